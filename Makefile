@@ -1,0 +1,60 @@
+# Targets that people and CI both use. With ROS 2 Jazzy from apt sourced, it is used in place of
+# the wheels: the environment then sees the system's packages.
+SHELL := /bin/bash
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+PACKAGES := auv_dynamics auv_gvc_controller auv_analysis
+SOURCES := $(foreach p,$(PACKAGES),src/$(p)/setup.py src/$(p)/setup.cfg src/$(p)/package.xml)
+
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+ifeq ($(ROS_DISTRO),jazzy)
+VENV_OPTIONS := --system-site-packages
+REQUIREMENTS := requirements.txt requirements-dev.txt
+else
+VENV_OPTIONS :=
+REQUIREMENTS := requirements.txt requirements-ros.txt requirements-dev.txt
+endif
+
+.PHONY: help setup case1 case2 test build lint format interop clean
+
+help:  ## this list
+	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/:/' | column -t -s:
+
+setup: $(READY)  ## the environment in .venv
+
+$(READY): Makefile $(REQUIREMENTS) $(SOURCES)
+	@$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "Python 3.11 or newer is needed, found " + sys.version.split()[0]'
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV_OPTIONS) $(VENV)
+	$(BIN)/python -m pip install --quiet $(foreach r,$(REQUIREMENTS),-r $(r))
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --use-pep517 $(foreach p,$(PACKAGES),-e src/$(p))
+	@touch $@
+
+case1 case2: setup  ## the paper's experiment: GVC against CL on real nodes, with a report
+	$(BIN)/auv run $@ --overwrite
+	@echo "open runs/$@/report.html"
+
+test: setup  ## the tests
+	$(BIN)/python -m pytest
+
+build: setup  ## colcon build of the workspace
+	AMENT_PREFIX_PATH="$(abspath $(VENV))$${AMENT_PREFIX_PATH:+:$$AMENT_PREFIX_PATH}" \
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m colcon build --symlink-install
+
+lint: setup  ## formatting, style, types
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+format: setup  ## apply the formatting
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+interop: setup  ## read a bag with npm's @mcap/core as well
+	$(BIN)/python -m pytest tests/system/test_interop.py
+
+clean:  ## remove what is made here
+	rm -rf $(VENV) build install log runs

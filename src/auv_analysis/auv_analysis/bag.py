@@ -1,0 +1,289 @@
+"""Reading a recorded run: every MCAP bag of the graph, finished or not, becomes a `Run`."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from mcap.exceptions import EndOfFile, McapError
+from mcap.records import Attachment, Channel, Footer, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
+from mcap_ros2.decoder import DecoderFactory
+
+from auv_analysis.run import Run
+from auv_analysis.simulate import unwrapped_eta
+from auv_dynamics import interface
+from auv_dynamics.files import InputError
+from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.vehicle_file import load_vehicle, vehicle_from_dict
+
+READERS = {
+    interface.ODOM: interface.read_odometry,
+    interface.CMD_VEL: lambda m, frames: interface.read_twist(m, frames, interface.CMD_VEL),
+    interface.CMD_ACCEL: lambda m, frames: interface.read_accel(m, frames, interface.CMD_ACCEL),
+    interface.WRENCH: lambda m, frames: interface.read_wrench(m, frames, interface.WRENCH),
+    interface.DISTURBANCE: lambda m, frames: interface.read_wrench(
+        m, frames, interface.DISTURBANCE
+    ),
+    interface.DISTURBANCE_ESTIMATE: lambda m, frames: interface.read_wrench(
+        m, frames, interface.DISTURBANCE_ESTIMATE
+    ),
+}
+REQUIRED = (interface.ODOM, interface.WRENCH)
+
+
+@dataclass
+class Contents:
+    """What lies in a bag, before anything is made of it.
+
+    Attributes
+    ----------
+    attachments : name -> text
+    metadata : name -> mapping
+    types : topic -> message type
+    counts : topic -> number of messages
+    first, last : ns, None when the bag is empty
+    messages : topic -> stamps in ns and values, of the topics that were asked for
+    notes : what is odd, one line each
+
+    """
+
+    attachments: dict[str, str] = field(default_factory=dict)
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    types: dict[str, str] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+    first: int | None = None
+    last: int | None = None
+    messages: dict[str, tuple[list[int], list[tuple]]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def bag_files(bag: str | Path) -> list[Path]:
+    """MCAP files of a bag, in order; InputError when there are none."""
+    path = Path(bag)
+    files = sorted(path.glob('*.mcap'), key=_split_order) if path.is_dir() else [path]
+    if not files or not files[0].is_file():
+        found = 'a folder without .mcap files' if path.is_dir() else 'no such file or folder'
+        raise InputError(path, '', 'a bag folder or an .mcap file', found)
+    return files
+
+
+def _split_order(path: Path) -> tuple[int, str]:
+    number = path.stem.rpartition('_')[2]
+    return (int(number) if number.isdigit() else 0, path.name)
+
+
+def _records(path: Path, notes: list[str]) -> Iterator[Any]:
+    finished = False
+    with path.open('rb') as stream:
+        try:
+            for record in StreamReader(stream).records:
+                finished = finished or isinstance(record, Footer)
+                yield record
+        except EndOfFile:
+            pass
+        except (McapError, ValueError, KeyError, OverflowError, RuntimeError) as error:
+            if stream.tell() <= 64:
+                found = str(error).splitlines()[0]
+                raise InputError(path, '', 'an MCAP file', found) from None
+            notes.append(f'{path.name}: damaged from byte {stream.tell()}, read up to there')
+            finished = True
+    if not finished:
+        notes.append(f'{path.name}: was not finished, its writer was killed; read to the end')
+
+
+def read_bag(bag: str | Path, *, decode: bool = True) -> Contents:
+    """Read a bag.
+
+    Parameters
+    ----------
+    bag : folder or .mcap file
+    decode : decode the step topics; else only count
+
+    Raises
+    ------
+    InputError : not a bag, or a message that must not be used
+
+    """
+    contents = Contents()
+    frames: dict[str, interface.Frames] = {}
+    for path in bag_files(bag):
+        schemas: dict[int, Schema] = {}
+        channels: dict[int, Channel] = {}
+        decoders: dict[int, Any] = {}
+        for record in _records(path, contents.notes):
+            if isinstance(record, Message):
+                topic = channels[record.channel_id].topic
+                contents.counts[topic] = contents.counts.get(topic, 0) + 1
+                first, last = contents.first, contents.last
+                contents.first = record.log_time if first is None else min(first, record.log_time)
+                contents.last = record.log_time if last is None else max(last, record.log_time)
+                if decode and record.channel_id in decoders:
+                    message = decoders[record.channel_id](record.data)
+                    _keep(contents, path, topic, message, frames)
+            elif isinstance(record, Schema):
+                schemas[record.id] = record
+            elif isinstance(record, Channel):
+                if record.id in channels:
+                    continue
+                channels[record.id] = record
+                schema = schemas.get(record.schema_id)
+                contents.types[record.topic] = schema.name if schema else ''
+                if decode and _role(record.topic) in READERS:
+                    # a factory of its own per file: schema ids are only unique within one
+                    decoder = DecoderFactory().decoder_for(record.message_encoding, schema)
+                    if decoder is not None:
+                        decoders[record.id] = decoder
+            elif isinstance(record, Attachment):
+                contents.attachments[record.name] = record.data.decode('utf-8', 'replace')
+            elif isinstance(record, Metadata):
+                contents.metadata[record.name] = dict(record.metadata)
+    return contents
+
+
+def _role(topic: str) -> str:
+    """Our name of a topic, whatever its namespace."""
+    return '' if topic.endswith('/ground_truth/odom') else topic.rpartition('/')[2]
+
+
+def _keep(contents: Contents, path: Path, topic: str, message: Any, frames: dict) -> None:
+    role = _role(topic)
+    namespace = topic.removesuffix(role)
+    if role == interface.ODOM:
+        frames.setdefault(
+            namespace, interface.Frames(message.header.frame_id, message.child_frame_id)
+        )
+    known = frames.get(namespace) or interface.Frames(base=message.header.frame_id)
+    try:
+        ns, values = READERS[role](message, known)
+    except interface.BadMessageError as error:
+        raise InputError(path, topic, 'usable messages', str(error)) from None
+    stamps, rows = contents.messages.setdefault(topic, ([], []))
+    stamps.append(ns)
+    rows.append(values)
+
+
+def load_run(bag: str | Path, vehicle: str | Path | None = None) -> Run:
+    """Run of a recorded bag.
+
+    Parameters
+    ----------
+    bag : folder or .mcap file
+    vehicle : vehicle file for a bag that does not carry its own
+
+    Returns
+    -------
+    run : Run that ends at the last step complete on all step topics; `run.notes` says what was
+        dropped and whether the recording was finished
+
+    Raises
+    ------
+    InputError : no bag, no vehicle, or topics missing
+
+    """
+    contents = read_bag(bag)
+    by_role = _one_graph(contents, Path(bag))
+    ns, series, dropped = _complete(by_role, Path(bag))
+    notes = [*contents.notes, *dropped]
+    parameters = _parameters(contents)
+    controller, step = parameters.get('controller_node', {}), _step(parameters, ns)
+    x = series[interface.ODOM]
+    nu_d = series.get(interface.CMD_VEL, np.zeros((len(ns), 6)))
+    return Run(
+        t=(ns - ns[0]) / interface.NANOSECONDS,
+        eta=unwrapped_eta(x),
+        nu=x[:, 7:],
+        nu_d=nu_d,
+        nu_d_dot=series.get(interface.CMD_ACCEL, np.gradient(nu_d, step, axis=0)),
+        tau=series[interface.WRENCH],
+        disturbance=series.get(interface.DISTURBANCE),
+        disturbance_estimate=series.get(interface.DISTURBANCE_ESTIMATE, np.zeros((len(ns), 6))),
+        vehicle=_vehicle(contents, Path(bag), vehicle),
+        scenario=_scenario_name(contents, Path(bag)),
+        controller=Path(parameters.get('recorder_node', {}).get('bag') or bag).name,
+        law=controller.get('law', 'unknown'),
+        gains=_gains(controller),
+        step=step,
+        source='bag',
+        notes=tuple(notes),
+    )
+
+
+def _one_graph(contents: Contents, bag: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Stamps and values by role, of the first namespace that has an odometry."""
+    spaces = sorted({t.removesuffix(_role(t)) for t in contents.messages if _role(t) == 'odom'})
+    found = ', '.join(sorted(contents.types)) or 'no topics'
+    if not spaces:
+        raise InputError(bag, interface.ODOM, 'messages', found)
+    if len(spaces) > 1:
+        contents.notes.append(f'several vehicles in the bag: read {spaces[0]}, left {spaces[1:]}')
+    by_role = {}
+    for role in READERS:
+        stamps, rows = contents.messages.get(f'{spaces[0]}{role}', ([], []))
+        if stamps:
+            by_role[role] = (np.array(stamps, np.int64), np.array(rows, float))
+        elif role in REQUIRED:
+            raise InputError(bag, role, 'messages', found)
+    return by_role
+
+
+def _complete(
+    by_role: dict[str, tuple[np.ndarray, np.ndarray]], bag: Path
+) -> tuple[np.ndarray, dict[str, np.ndarray], list[str]]:
+    """Stamps that are on every step topic, the values there, and what was dropped."""
+    stamps = None
+    for ns, _ in by_role.values():
+        stamps = ns if stamps is None else np.intersect1d(stamps, ns)
+    if stamps is None or len(stamps) < 2:
+        raise InputError(bag, '', 'at least two steps that are complete on all step topics', '0')
+    stamps = np.unique(stamps)
+    series, notes = {}, []
+    for role, (ns, rows) in by_role.items():
+        order = np.argsort(ns, kind='stable')
+        index = order[np.searchsorted(ns[order], stamps)]
+        series[role] = rows[index]
+        extra = len(ns) - len(stamps)
+        if extra:
+            notes.append(f'{role}: {extra} of {len(ns)} messages are not complete on all topics')
+    return stamps, series, notes
+
+
+def _parameters(contents: Contents) -> dict[str, dict[str, Any]]:
+    """Node name -> its parameters, from the attached parameter file."""
+    try:
+        data = yaml.safe_load(contents.attachments.get('params.yaml', '')) or {}
+        return {name.rpartition('/')[2]: entry['ros__parameters'] for name, entry in data.items()}
+    except (yaml.YAMLError, AttributeError, KeyError, TypeError):
+        contents.notes.append('params.yaml: attached, but it cannot be read')
+        return {}
+
+
+def _step(parameters: dict[str, dict[str, Any]], ns: np.ndarray) -> float:
+    step = parameters.get('plant_node', {}).get('step')
+    return float(step) if step else float(np.median(np.diff(ns))) / interface.NANOSECONDS
+
+
+def _gains(controller: dict[str, Any]) -> dict[str, Any]:
+    gains = {}
+    for key, value in controller.items():
+        if key.startswith('gains.'):
+            gains[key.removeprefix('gains.')] = value[0] if len(value) == 1 else list(value)
+    return gains
+
+
+def _vehicle(contents: Contents, bag: Path, vehicle: str | Path | None) -> Vehicle:
+    if vehicle is not None:
+        return load_vehicle(vehicle)
+    text = contents.attachments.get('vehicle.yaml')
+    if text is None:
+        raise InputError(bag, 'vehicle.yaml', 'an attachment, or --vehicle FILE', None)
+    return vehicle_from_dict(yaml.safe_load(text), f'{bag}: vehicle.yaml')
+
+
+def _scenario_name(contents: Contents, bag: Path) -> str:
+    try:
+        return yaml.safe_load(contents.attachments['scenario.yaml'])['name']
+    except (KeyError, TypeError, yaml.YAMLError):
+        return bag.resolve().parent.name

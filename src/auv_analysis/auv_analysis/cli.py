@@ -1,0 +1,74 @@
+"""The `auv` command: one function per subcommand, imports only when they are needed."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from auv_dynamics.files import InputError
+
+SCENARIO = 'a scenario file, or the bare name of a shipped one'
+
+
+def parser() -> argparse.ArgumentParser:
+    """Command line of `auv`."""
+    main = argparse.ArgumentParser(prog='auv', description=__doc__.split(':')[0])
+    commands = main.add_subparsers(dest='command', required=True, metavar='COMMAND')
+
+    def command(name: str, text: str, *, writes: bool = True) -> argparse.ArgumentParser:
+        sub = commands.add_parser(name, help=text, description=text)
+        if writes:
+            sub.add_argument('--out', type=Path, help='folder of the results')
+            sub.add_argument('--overwrite', action='store_true', help='replace earlier results')
+        sub.add_argument('--json', action='store_true', help='one JSON document on stdout')
+        return sub
+
+    run = command('run', 'run a scenario on real nodes, record, analyse and report')
+    run.add_argument('scenario', help=SCENARIO)
+    run.add_argument('--controller', action='append', help='only this one; may be repeated')
+    run.add_argument('--domain-id', type=int, help='ROS domain, default: a free one')
+    simulate = command('simulate', 'simulate a scenario in this process, analyse and report')
+    simulate.add_argument('scenario', help=SCENARIO)
+    simulate.add_argument('--controller', action='append', help='only this one; may be repeated')
+    simulate.add_argument('--hold', choices=('continuous', 'zoh'), default='continuous')
+    analyze = command('analyze', 'summary and report from recorded bags')
+    analyze.add_argument('bags', nargs='+', metavar='BAG', type=Path)
+    analyze.add_argument('--vehicle', help='for bags that do not carry their own')
+    info = command('info', 'what lies in a bag', writes=False)
+    info.add_argument('bag', type=Path, metavar='BAG')
+    params = command('params', 'the ROS parameter file of a scenario', writes=True)
+    params.add_argument('scenario', help=SCENARIO)
+    params.add_argument('--controller', required=True)
+    params.add_argument('--real-time', action='store_true', help='paced by the clock')
+    return main
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command; exit code 0 fine, 1 the work failed, 2 wrong input."""
+    options = parser().parse_args(arguments)
+    from auv_analysis import commands
+
+    try:
+        result = getattr(commands, options.command)(options)
+    except InputError as error:
+        _say(str(error))
+        sys.exit(2)
+    except (commands.FailedError, ArithmeticError) as error:
+        _say(str(error))
+        sys.exit(1)
+    except BrokenPipeError:
+        sys.exit(1)
+    except KeyboardInterrupt:
+        _say('interrupted')
+        sys.exit(1)
+    if options.json:
+        print(json.dumps(result, allow_nan=False))
+
+
+def _say(text: Any) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+if __name__ == '__main__':
+    main()

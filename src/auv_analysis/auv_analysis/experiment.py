@@ -1,0 +1,158 @@
+"""`auv run`: a scenario on real nodes, in lock-step, recorded; one run per controller."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+import yaml
+
+from auv_analysis.node_parameters import (
+    ANALYSIS,
+    CONTROLLER,
+    PLANT,
+    RECORDER,
+    SETPOINT,
+    node_parameters,
+    parameter_file,
+)
+from auv_analysis.scenario import Scenario
+from auv_analysis.supervisor import NodeDiedError, Supervisor, executable
+
+PACKAGES = {
+    RECORDER: 'auv_analysis',
+    PLANT: 'auv_dynamics',
+    SETPOINT: 'auv_gvc_controller',
+    CONTROLLER: 'auv_gvc_controller',
+    ANALYSIS: 'auv_analysis',
+}
+START_TIMEOUT = 60.0  # s until the start barrier must be down
+END_TIMEOUT = 30.0  # s for the recorder to close after the last step
+
+
+class Graph(Protocol):
+    """What an experiment sees of the node graph."""
+
+    complete_ns: int
+    waits_for: str
+
+    def spin(self, seconds: float) -> None:
+        """Handle what comes in for so long."""
+
+    def ask_to_run(self) -> bool:
+        """Whether the plant has agreed to run."""
+
+
+def environment(domain: int) -> dict[str, str]:
+    """Environment of the nodes: loopback only, quick discovery, the domain."""
+    from auv_dynamics import ros
+
+    profile = Path(ros.__file__).with_name('fastdds.xml')
+    return {
+        **os.environ,
+        'ROS_DOMAIN_ID': str(domain),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile),
+        'RCUTILS_COLORIZED_OUTPUT': '0',
+        'PYTHONUNBUFFERED': '1',
+    }
+
+
+def write_inputs(scenario: Scenario, out: Path) -> dict[str, Path]:
+    """Write the resolved scenario and its files into the results' folder: name -> path."""
+    files = dict(scenario.attachments)
+    resolved = {**scenario.data, 'vehicle': 'vehicle.yaml'}
+    if 'setpoint.csv' in files:
+        resolved['setpoint'] = {'file': 'setpoint.csv'}
+    header = f'# {scenario.path.name} with every default filled in\n'
+    files['scenario.yaml'] = header + yaml.safe_dump(
+        resolved, sort_keys=False, default_flow_style=None, width=100
+    )
+    paths = {}
+    for name, text in files.items():
+        paths[name] = out / name
+        paths[name].write_text(text, encoding='utf-8')
+    return paths
+
+
+def run_controller(
+    scenario: Scenario,
+    controller: str,
+    out: Path,
+    domain: int,
+    graph: Graph,
+    progress: Callable[[int], None],
+) -> Path:
+    """Run one controller on the node graph and wait for its bag.
+
+    Parameters
+    ----------
+    scenario : resolved scenario
+    controller : name of one of its controllers
+    out : folder of the results; the bag goes to out/<controller>
+    domain : ROS domain id
+    graph : the graph as seen from here, a `Watcher` of the same domain
+    progress : told the last complete step whenever it changes
+
+    Returns
+    -------
+    bag : folder of the closed bag
+
+    Raises
+    ------
+    NodeDiedError : a node ended, did not start or fell silent; nothing is left running
+
+    """
+    bag = out / controller
+    bag.mkdir(parents=True)
+    path = bag / 'params.yaml'
+    inputs = {**write_inputs(scenario, out), 'params.yaml': path}
+    parameters = node_parameters(
+        scenario, controller, bag=bag, vehicle=str(inputs['vehicle.yaml'].resolve()),
+        attachments={name: file.resolve() for name, file in inputs.items()},
+    )  # fmt: skip
+    parameters[PLANT]['start_paused'] = True
+    text = parameter_file(parameters, f'{scenario.name}, controller {controller}: auv run')
+    path.write_text(text, encoding='utf-8')
+    graph.complete_ns = -1
+    supervisor = Supervisor(out / 'logs' / controller, environment(domain))
+    try:
+        for node, package in PACKAGES.items():
+            command = [str(executable(package, node)), '--ros-args', '--params-file', str(path)]
+            supervisor.start(node, command)
+        _start(supervisor, graph)
+        _follow(supervisor, graph, scenario, progress)
+    finally:
+        supervisor.stop()
+    return bag
+
+
+def _start(supervisor: Supervisor, graph: Graph) -> None:
+    until = time.monotonic() + START_TIMEOUT
+    while not graph.ask_to_run():
+        graph.spin(0.05)
+        supervisor.check(may_end='')
+        if time.monotonic() > until:
+            raise NodeDiedError(
+                f'no start within {START_TIMEOUT:g} s: waiting for {graph.waits_for}'
+            )
+
+
+def _follow(
+    supervisor: Supervisor, graph: Graph, scenario: Scenario, progress: Callable[[int], None]
+) -> None:
+    step, done_since = -1, None
+    while not supervisor.check(may_end=RECORDER):
+        graph.spin(0.1)
+        complete = graph.complete_ns // scenario.step_ns
+        if complete > step:
+            step = complete
+            progress(step)
+        if step >= scenario.steps:
+            done_since = done_since or time.monotonic()
+            if time.monotonic() - done_since > END_TIMEOUT:
+                raise NodeDiedError(
+                    f'{RECORDER} does not close its bag{supervisor.last_lines(RECORDER)}'
+                )
+    progress(scenario.steps)

@@ -1,0 +1,174 @@
+"""A scenario as ROS parameters: one file per controller, for `auv run`, launch and `ros2 run`."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from auv_analysis.scenario import Scenario
+from auv_dynamics.files import matrix6
+from auv_dynamics.interface import STEP_TOPICS
+from auv_dynamics.signals import harmonic_columns
+
+PLANT, SETPOINT, CONTROLLER = 'plant_node', 'setpoint_node', 'controller_node'
+ANALYSIS, RECORDER = 'analysis_node', 'recorder_node'
+EVERY = 10  # steps between live analysis samples
+WINDOW = 2000  # steps that the plant may be ahead of the recorder
+HORIZON = 200  # steps that set-points are published ahead
+WRENCH_TIMEOUT = 30.0  # s of silence that end a lock-step run
+TIMEOUT = 0.5  # s, the real-time watchdogs
+SUBSCRIBERS = {  # topic -> who subscribes, by publisher
+    PLANT: {
+        'odom': (CONTROLLER, SETPOINT, ANALYSIS, RECORDER),
+        'twist': (RECORDER,),
+        'disturbance': (ANALYSIS, RECORDER),
+    },
+    SETPOINT: {'cmd_vel': (CONTROLLER, ANALYSIS, RECORDER), 'cmd_accel': (CONTROLLER, RECORDER)},
+    CONTROLLER: {
+        'wrench': (PLANT, ANALYSIS, RECORDER),
+        'disturbance_estimate': (ANALYSIS, RECORDER),
+    },
+    ANALYSIS: {},
+}
+
+
+def node_parameters(
+    scenario: Scenario,
+    controller: str,
+    *,
+    bag: Path | None,
+    analysis: bool = True,
+    lockstep: bool = True,
+    use_sim_time: bool = True,
+    vehicle: str | None = None,
+    attachments: Mapping[str, Path] | None = None,
+) -> dict[str, dict[str, Any]]:
+    """Parameters of every node, all written out.
+
+    Parameters
+    ----------
+    scenario : resolved scenario
+    controller : name of one of its controllers
+    bag : folder that the recorder writes to; None: no recorder
+    analysis : whether the analysis node runs
+    lockstep : deterministic and as fast as the machine allows, else in real time
+    use_sim_time : of all nodes but the plant
+    vehicle : how the files name the vehicle, by default its full path
+    attachments : name -> path of files that travel in the bag
+
+    Returns
+    -------
+    parameters : node name -> parameter name -> value
+
+    """
+    nodes = [PLANT, SETPOINT, CONTROLLER]
+    nodes += [ANALYSIS] * analysis + [RECORDER] * (bag is not None)
+    vehicle = vehicle or str(scenario.vehicle_path.resolve())
+    clock = {'use_sim_time': use_sim_time}
+    grid = {'step': scenario.step, 'duration': scenario.duration}
+    parameters = {
+        PLANT: {'use_sim_time': False, **_plant(scenario, vehicle, nodes, lockstep)},
+        SETPOINT: {**clock, **grid, 'horizon': HORIZON, **_setpoint(scenario)},
+        CONTROLLER: {**clock, **_controller(scenario, controller, vehicle, lockstep)},
+    }
+    for publisher in (PLANT, SETPOINT, CONTROLLER):
+        counts = {t: sum(n in nodes for n in who) for t, who in SUBSCRIBERS[publisher].items()}
+        listed = [f'{topic}={count}' for topic, count in counts.items() if count]
+        parameters[publisher].update(_frames(), expected_subscribers=listed)
+    if analysis:
+        parameters[ANALYSIS] = {**clock, **_frames(), 'vehicle': vehicle, 'every': EVERY}
+    if bag is not None:
+        parameters[RECORDER] = {
+            **clock,
+            **grid,
+            'bag': str(bag.resolve()),
+            'topics': list(STEP_TOPICS),
+            'strict': lockstep,
+            'analysis_every': EVERY if analysis else 0,
+            'storage.compression': 'zstd',
+            'storage.chunk_size': 1 << 20,
+            'attachments': [f'{name}={path}' for name, path in (attachments or {}).items()],
+        }
+    return {node: _without_empty_lists(values) for node, values in parameters.items()}
+
+
+def _frames() -> dict[str, str]:
+    return {'odom_frame': 'odom_ned', 'base_frame': 'base_link_fsd'}
+
+
+def _plant(scenario: Scenario, vehicle: str, nodes: list[str], lockstep: bool) -> dict[str, Any]:
+    others = [node for node in nodes if node != PLANT]
+    parameters: dict[str, Any] = {
+        'vehicle': vehicle,
+        'step': scenario.step,
+        'duration': scenario.duration,
+        'lockstep': lockstep,
+        'start_paused': False,
+        'recorder_window': WINDOW if RECORDER in nodes and lockstep else 0,
+        'integrator': scenario.data['integrator'],
+        'seed': scenario.data['seed'],
+        'initial.eta': scenario.data['initial']['eta'],
+        'initial.nu': scenario.data['initial']['nu'],
+        'start_after': others,
+        'wrench_timeout': WRENCH_TIMEOUT if lockstep else TIMEOUT,
+    }
+    names = []
+    for i, spec in enumerate(scenario.data['disturbance'], start=1):
+        name = f'd{i}_{spec["kind"]}'
+        names.append(name)
+        prefix = f'disturbance.{name}'
+        parameters[f'{prefix}.kind'] = spec['kind']
+        if spec['kind'] == 'herman2018':
+            parameters[f'{prefix}.exponent_sign'] = float(spec.get('exponent_sign', -1))
+        else:
+            columns = harmonic_columns(spec)
+            parameters.update({f'{prefix}.{key}': value for key, value in columns.items()})
+    return {**parameters, 'disturbance.names': names}
+
+
+def _setpoint(scenario: Scenario) -> dict[str, Any]:
+    spec = scenario.data['setpoint']
+    if 'file' in spec:
+        return {'setpoint.file': spec['file']}
+    return {f'setpoint.{key}': value for key, value in harmonic_columns(spec).items()}
+
+
+def _controller(
+    scenario: Scenario, controller: str, vehicle: str, lockstep: bool
+) -> dict[str, Any]:
+    spec = dict(scenario.controller(controller))
+    parameters = {
+        'law': spec.pop('law'),
+        'vehicle': vehicle,
+        'lockstep': lockstep,
+        'setpoint_pairing': 'exact' if lockstep else 'latest',
+        'setpoint_acceleration': 'topic',
+        'setpoint_timeout': TIMEOUT,
+        'odometry_timeout': TIMEOUT,
+        'limits.gap': max(1.0, 10 * scenario.step),
+        'limits.speed': 50.0,
+        'limits.rate': 50.0,
+        'autostart': True,
+    }
+    return {**parameters, **{f'gains.{name}': _flat(value) for name, value in spec.items()}}
+
+
+def _flat(value: Any) -> list[float]:
+    """Shortest list that a gain parameter takes: 1, 6 or 36 numbers."""
+    if np.ndim(value) < 2:
+        return [float(number) for number in np.atleast_1d(value)]
+    return matrix6(value).ravel().tolist()
+
+
+def _without_empty_lists(parameters: dict[str, Any]) -> dict[str, Any]:
+    # an empty list has no type in a ROS parameter file
+    return {name: value for name, value in parameters.items() if value != []}
+
+
+def parameter_file(parameters: Mapping[str, Mapping[str, Any]], comment: str) -> str:
+    """Text of a ROS parameter file; the nodes are found in any namespace."""
+    data = {f'/**/{node}': {'ros__parameters': dict(v)} for node, v in parameters.items()}
+    body = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
+    return f'# {comment}\n{body}'

@@ -1,0 +1,176 @@
+"""The recorder as a node: every topic of the graph into an MCAP bag, every step checked."""
+
+import importlib
+from typing import Any
+
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Header
+
+from auv_analysis.ledger import LostStepError, StepLedger
+from auv_analysis.recorder_parameters import recorder_parameters
+from auv_analysis.schemas import schema_text
+from auv_dynamics import interface
+from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.bulk import BulkNode, first_stamp
+from auv_dynamics.ros.graph import Graph, steady_timer
+from auv_dynamics.ros.life import main_of
+
+UNRECORDED = ('/rosout', '/parameter_events')
+STAMPED_TYPES = ('std_msgs/msg/Header', 'rosgraph_msgs/msg/Clock')
+
+
+class RecorderNode(BulkNode):
+    """Records raw messages; log time is the header stamp, so a bag is in simulated time."""
+
+    def __init__(self) -> None:
+        super().__init__('recorder_node')
+        self._settings = p = recorder_parameters(self)
+        self._writer = p.writer
+        self._ledger = StepLedger(p.topics, p.step_ns, p.strict)
+        self._latest = 0  # stamp of the newest step message, for messages without one
+        self._analysed = -1
+        self._reported = -1
+        self._known: set[str] = set()
+        self.graph = Graph(self, barrier=False)
+        self._progress = self.graph.publisher(topics.PROGRESS, topics.one_at_a_time())
+        for topic in topics.TOPICS:
+            self._record(topic.name, topic.type, topic)
+        steady_timer(self, 0.02, self._report)
+        steady_timer(self, 0.2, self._keep)
+        steady_timer(self, 0.5, self._discover)
+
+    def _record(self, name: str, kind: type, topic: topics.Topic | None = None) -> None:
+        resolved = self.resolve_topic_name(name)
+        step_topic = topic.name if topic and topic.name in self._settings.topics else ''
+        due = topic == topics.LUMPED_ERROR
+        stamped = _begins_with_stamp(kind)
+
+        def callback(message: bytes) -> None:
+            ns = first_stamp(message) if stamped else self._latest
+            self._take(resolved, kind, message, ns)
+            if step_topic:
+                self._count(step_topic, ns)
+            elif due:
+                self._analysed = max(self._analysed, ns)
+
+        self._known.add(resolved)
+        self.graph.subscribe(
+            topic or topics.Topic(resolved, kind), callback, topics.every_step(), raw=True
+        )
+
+    def _take(self, topic: str, kind: type, message: bytes, ns: int) -> None:
+        if self.exit_code is not None:
+            return
+        if not self._writer.has_channel(topic):
+            self._add_channel(topic, _type_name(kind))
+        try:
+            self._writer.write(topic, ns, message)
+        except OSError as error:
+            self._end(1, f'{self._writer.path}: {(error.strerror or str(error)).lower()}')
+
+    def _add_channel(self, topic: str, kind: str) -> None:
+        endpoints = self.get_publishers_info_by_topic(topic)
+        qos = [_qos_entry(endpoint.qos_profile) for endpoint in endpoints]
+        endpoints = endpoints or self.get_subscriptions_info_by_topic(topic)
+        digest = str(endpoints[0].topic_type_hash) if endpoints else ''
+        self._writer.add_channel(topic, kind, schema_text(kind), qos, digest)
+
+    def _count(self, topic: str, ns: int) -> None:
+        self._latest = max(self._latest, ns)
+        try:
+            self._ledger.add(topic, ns)
+        except LostStepError as error:
+            self._end(1, str(error))
+
+    def _report(self) -> None:
+        """Publish the last complete step when it is new, and end when it is the last one."""
+        complete = self._ledger.complete
+        if complete > self._reported:
+            self._reported = complete
+            self._say_progress()
+        p = self._settings
+        analysed = p.last_due is None or self._analysed >= p.last_due
+        if p.last is not None and complete >= p.last and analysed:
+            self._end(0)
+
+    def _say_progress(self) -> None:
+        if self._reported >= 0:
+            message = Header(stamp=convert.stamp(self._ledger.complete_ns))
+            message.frame_id = 'base_link_fsd'
+            self._progress.publish(message)
+
+    def _keep(self) -> None:
+        """Close chunks in time; repeat the progress for whoever has joined since."""
+        self._writer.flush_due()
+        self._say_progress()
+        self.graph.latest_ns = self._latest
+        self.graph.facts.update(complete=self._ledger.complete, behind=self._ledger.behind())
+
+    def _discover(self) -> None:
+        """Record topics that are not ours as well."""
+        for topic, kinds in self.get_topic_names_and_types():
+            if topic in self._known or topic in UNRECORDED:
+                continue
+            try:
+                kind = _message_class(kinds[0])
+                schema_text(kinds[0])
+            except (ImportError, AttributeError, FileNotFoundError):
+                self.get_logger().warning(f'{topic}: not recorded, no definition of {kinds[0]}')
+                self._known.add(topic)
+                continue
+            self._record(topic, kind)
+
+    def _end(self, code: int, text: str = '') -> None:
+        if self.exit_code is not None:
+            return
+        if text:
+            self.get_logger().error(text)
+        self._progress.wait_for_all_acked()
+        self.exit_code = code
+
+    def close(self) -> None:
+        """Finish the bag."""
+        self._writer.close()
+        lost = {topic: gaps for topic, gaps in self._ledger.gaps.items() if gaps}
+        if lost:
+            self.get_logger().warning(f'steps that did not arrive: {lost}')
+
+
+def _begins_with_stamp(kind: Any) -> bool:
+    if _type_name(kind) in STAMPED_TYPES:
+        return True
+    fields = kind.get_fields_and_field_types()
+    return bool(fields) and next(iter(fields.values())) == 'std_msgs/Header'
+
+
+def _type_name(kind: type) -> str:
+    package, folder, *_ = kind.__module__.split('.')
+    return f'{package}/{folder}/{kind.__name__}'
+
+
+def _message_class(name: str) -> type:
+    package, folder, message = name.split('/')
+    return getattr(importlib.import_module(f'{package}.{folder}'), message)
+
+
+def _qos_entry(qos: QoSProfile) -> dict[str, Any]:
+    def duration(value: Any) -> dict[str, int]:
+        sec, nsec = divmod(value.nanoseconds, interface.NANOSECONDS)
+        return {'sec': sec, 'nsec': nsec}
+
+    return {
+        'history': qos.history.name.lower(),
+        'depth': qos.depth,
+        'reliability': qos.reliability.name.lower(),
+        'durability': qos.durability.name.lower(),
+        'deadline': duration(qos.deadline),
+        'lifespan': duration(qos.lifespan),
+        'liveliness': qos.liveliness.name.lower(),
+        'liveliness_lease_duration': duration(qos.liveliness_lease_duration),
+        'avoid_ros_namespace_conventions': qos.avoid_ros_namespace_conventions,
+    }
+
+
+def main() -> None:
+    """Run the node."""
+    main_of(RecorderNode)

@@ -1,0 +1,64 @@
+"""A run: what was simulated or recorded, as arrays."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from auv_dynamics.vehicle import Vehicle
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One closed loop from start to end, n + 1 samples.
+
+    Attributes
+    ----------
+    t : (n + 1,) s
+    eta : (n + 1, 6) position in m (NED), ZYX Euler angles in rad, psi unwrapped
+    nu : (n + 1, 6) body velocity, m/s and rad/s
+    nu_d, nu_d_dot : (n + 1, 6) set-point and its derivative
+    tau : (n + 1, 6) commanded wrench, N and N m, body frame
+    disturbance : (n + 1, 6) lumped uncertainty F of (1), or None where it is not known
+    disturbance_estimate : (n + 1, 6) f of the law
+    vehicle : what the controller knows
+    scenario : name of the scenario
+    controller, law : name of the controller and of its law
+    gains : the law's gains as the scenario gives them
+    step : control period, s
+    source : 'simulate' or 'bag'
+    notes : what is worth saying about the run, one line each
+
+    """
+
+    t: np.ndarray
+    eta: np.ndarray
+    nu: np.ndarray
+    nu_d: np.ndarray
+    nu_d_dot: np.ndarray
+    tau: np.ndarray
+    disturbance: np.ndarray | None
+    disturbance_estimate: np.ndarray
+    vehicle: Vehicle
+    scenario: str
+    controller: str
+    law: str
+    gains: dict[str, Any]
+    step: float
+    source: str
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def nu_measured(self) -> np.ndarray:
+        """(n + 1, 6) what the controller saw: the true velocity, no sensors being simulated."""
+        return self.nu
+
+    @property
+    def tau_applied(self) -> np.ndarray:
+        """(n + 1, 6) what the actuators delivered: the command, no actuators being simulated."""
+        return self.tau
+
+    @property
+    def duration(self) -> float:
+        """Length of the run, s."""
+        return float(self.t[-1] - self.t[0])

@@ -1,0 +1,181 @@
+"""Scenario file, format 1: one experiment, resolved so that nothing is left to look up."""
+
+import copy
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from auv_dynamics.config import shipped
+from auv_dynamics.disturbance import Disturbance, make_disturbance
+from auv_dynamics.files import InputError, check, read_text, read_yaml
+from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.vehicle_file import vehicle_from_dict
+from auv_gvc_controller.laws import make_gains
+from auv_gvc_controller.setpoint import Setpoint, make_setpoint
+
+SCHEMA = Path(__file__).with_name('scenario.schema.json')
+NANOSECONDS = 10**9
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A checked scenario.
+
+    Attributes
+    ----------
+    path : of the scenario file
+    vehicle_path : of its vehicle file
+    vehicle : what the controller knows, and the plant
+    data : the file's contents with every default filled in
+    attachments : name -> text of each file that the scenario consists of
+
+    """
+
+    path: Path
+    vehicle_path: Path
+    vehicle: Vehicle
+    data: dict[str, Any]
+    attachments: dict[str, str]
+
+    @property
+    def name(self) -> str:
+        """Name, which is also that of the results' folder."""
+        return self.data['name']
+
+    @property
+    def step(self) -> float:
+        """Integration step and control period, s."""
+        return self.data['step']
+
+    @property
+    def step_ns(self) -> int:
+        """The same in whole nanoseconds."""
+        return round(self.step * NANOSECONDS)
+
+    @property
+    def steps(self) -> int:
+        """Index n of the last sample; a run has n + 1 of them."""
+        return round(self.data['duration'] / self.step)
+
+    @property
+    def duration(self) -> float:
+        """Length of the run, s."""
+        return self.data['duration']
+
+    @property
+    def controllers(self) -> dict[str, dict[str, Any]]:
+        """Name -> law and gains, in the file's order."""
+        return self.data['controllers']
+
+    def controller(self, name: str) -> dict[str, Any]:
+        """Law and gains of one controller; InputError when there is none of that name."""
+        if name not in self.controllers:
+            expected = f'one of {", ".join(self.controllers)}'
+            raise InputError(self.path, 'controllers', expected, name)
+        return self.controllers[name]
+
+    def gains(self, name: str) -> Any:
+        """Gains of one controller as the kernel takes them."""
+        values = dict(self.controller(name))
+        return make_gains(values.pop('law'), values)
+
+    @cached_property
+    def setpoint(self) -> Setpoint:
+        """nu_d(t) and its derivative."""
+        return make_setpoint(self.data['setpoint'], self.duration)
+
+    @cached_property
+    def disturbance(self) -> Disturbance:
+        """F(t)."""
+        return make_disturbance(self.data['disturbance'])
+
+    @property
+    def initial(self) -> tuple[np.ndarray, np.ndarray]:
+        """Eta (6,) and nu (6,) at the start."""
+        return np.array(self.data['initial']['eta']), np.array(self.data['initial']['nu'])
+
+
+def load_scenario(scenario: str | Path) -> Scenario:
+    """Scenario of a file or of a shipped bare name.
+
+    Parameters
+    ----------
+    scenario : path of a scenario file, or a bare name such as 'case1'
+
+    Returns
+    -------
+    scenario : Scenario, checked with its vehicle, gains and set-point file
+
+    Raises
+    ------
+    InputError : naming file, key, expected and found
+
+    """
+    path = shipped('scenarios', scenario)
+    data = read_yaml(path, 'scenario')
+    check(data, SCHEMA, path)
+    data = _resolved(data)
+    _check_time(data, path)
+    vehicle_path = _vehicle_path(data['vehicle'], path)
+    vehicle_data = read_yaml(vehicle_path, 'vehicle')
+    vehicle = vehicle_from_dict(vehicle_data, vehicle_path)
+    attachments = {
+        'scenario.yaml': read_text(path, 'scenario'),
+        'vehicle.yaml': read_text(vehicle_path, 'vehicle'),
+    }
+    if 'file' in data['setpoint']:
+        csv = path.parent / data['setpoint']['file']
+        attachments['setpoint.csv'] = read_text(csv, 'CSV set-point')
+        data['setpoint']['file'] = str(csv.resolve())
+    result = Scenario(path, vehicle_path, vehicle, data, attachments)
+    result.setpoint  # noqa: B018  a set-point file is read now, so that its errors come first
+    for name in result.controllers:
+        _check_gains(result, name)
+    return result
+
+
+def _resolved(data: dict[str, Any]) -> dict[str, Any]:
+    data = copy.deepcopy(data)
+    for key, value in (('format', 1), ('integrator', 'ode5'), ('seed', 0), ('initial', {})):
+        data.setdefault(key, value)
+    data['duration'], data['step'] = float(data['duration']), float(data['step'])
+    for key in ('eta', 'nu'):
+        data['initial'][key] = [float(x) for x in data['initial'].get(key, [0.0] * 6)]
+    disturbance = data.get('disturbance', [])
+    data['disturbance'] = disturbance if isinstance(disturbance, list) else [disturbance]
+    return data
+
+
+def _check_time(data: dict[str, Any], path: Path) -> None:
+    step_ns = data['step'] * NANOSECONDS
+    if round(step_ns) < 1 or abs(step_ns - round(step_ns)) > 1e-6 * max(1.0, step_ns * 1e-9):
+        raise InputError(path, 'step', 'a whole number of nanoseconds', f'{data["step"]!r} s')
+    steps = data['duration'] / data['step']
+    if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
+        expected = f'a multiple of step ({data["step"]:g} s)'
+        raise InputError(path, 'duration', expected, f'{data["duration"]!r} s')
+
+
+def _vehicle_path(vehicle: str, scenario: Path) -> Path:
+    relative = scenario.parent / vehicle
+    if relative.is_file() or Path(vehicle).is_absolute() or len(Path(vehicle).parts) > 1:
+        return relative
+    try:
+        return shipped('vehicles', vehicle)
+    except InputError as error:
+        raise InputError(scenario, 'vehicle', error.expected, vehicle) from None
+
+
+def _check_gains(scenario: Scenario, name: str) -> None:
+    try:
+        scenario.gains(name)
+    except ValueError as error:
+        text = str(error)
+        key, separator, rest = text.partition(': expected ')
+        if not separator:
+            key, rest = 'law', text.removeprefix('expected ')
+        expected, _, found = rest.partition(', found ')
+        raise InputError(scenario.path, f'controllers.{name}.{key}', expected, found) from None

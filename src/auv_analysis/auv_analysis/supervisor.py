@@ -1,0 +1,98 @@
+"""Processes of a run: started together, watched, ended together. psutil does the waiting."""
+
+import os
+import shutil
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import psutil
+
+GRACE = 5.0  # s between SIGTERM and SIGKILL
+PARENT = 'AUV_GVC_PARENT'
+
+
+class NodeDiedError(RuntimeError):
+    """A node ended before its time; the text names it and shows its last lines."""
+
+
+def executable(package: str, name: str) -> Path:
+    """Executable of a node: of the colcon install tree or of the environment.
+
+    Raises
+    ------
+    NodeDiedError : it is not installed
+
+    """
+    for root in Path(__file__).resolve().parents:
+        for candidate in (root / 'lib' / package / name, root / package / 'lib' / package / name):
+            if candidate.is_file():
+                return candidate
+    beside = Path(sys.executable).with_name(name)
+    found = str(beside) if beside.is_file() else shutil.which(name)
+    if found is None:
+        raise NodeDiedError(f'{name}: not installed beside {sys.executable}; run make setup')
+    return Path(found)
+
+
+class Supervisor:
+    """A group of processes that lives and dies together.
+
+    Parameters
+    ----------
+    logs : folder of the nodes' output, one file each
+    environment : of all of them
+
+    """
+
+    def __init__(self, logs: Path, environment: Mapping[str, str]):
+        self._logs = logs
+        self._environment = {**environment, PARENT: str(os.getpid())}
+        self._processes: dict[str, psutil.Popen] = {}
+
+    def start(self, name: str, command: list[str]) -> None:
+        """Start one process; its output goes to <logs>/<name>.log."""
+        self._logs.mkdir(parents=True, exist_ok=True)
+        with (self._logs / f'{name}.log').open('wb') as log:
+            # a session of its own: Ctrl-C reaches `auv`, which ends the nodes in order
+            self._processes[name] = psutil.Popen(
+                command,
+                env=self._environment,
+                stdin=-3,  # subprocess.DEVNULL
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+
+    def ended(self) -> dict[str, int]:
+        """Name -> exit code of the processes that have ended."""
+        return {
+            name: process.returncode
+            for name, process in self._processes.items()
+            if process.poll() is not None
+        }
+
+    def check(self, may_end: str) -> bool:
+        """Whether the process `may_end` has ended well; NodeDiedError when another has ended."""
+        ended = self.ended()
+        for name, code in ended.items():
+            if name != may_end or code != 0:
+                raise NodeDiedError(f'{name} ended with exit code {code}{self.last_lines(name)}')
+        return may_end in ended
+
+    def last_lines(self, name: str, count: int = 8) -> str:
+        """End of a process' output, indented, for a message."""
+        path = self._logs / f'{name}.log'
+        lines = path.read_text(errors='replace').splitlines() if path.is_file() else []
+        return ''.join(f'\n    {line}' for line in lines[-count:])
+
+    def stop(self) -> dict[str, int]:
+        """End all that still run: SIGTERM, then SIGKILL; exit codes of all."""
+        running = [p for p in self._processes.values() if p.poll() is None]
+        for process in running:
+            process.terminate()
+        _, alive = psutil.wait_procs(running, timeout=GRACE)
+        for process in alive:
+            process.kill()
+        psutil.wait_procs(alive, timeout=GRACE)
+        return self.ended()

@@ -1,0 +1,38 @@
+"""Compile what the nodes will call, once and before they start, with a word about it."""
+
+import sys
+import time
+
+import numpy as np
+
+from auv_analysis.scenario import Scenario
+from auv_dynamics.jit import JITTED, cache_folder
+from auv_dynamics.plant import Plant, initial_state
+from auv_gvc_controller.model import control_model
+from auv_gvc_controller.sampled import SampledLaw, is_compiled
+
+NOTICE_AFTER = 1.0  # s: a cached kernel is loaded faster than that
+
+
+def warm_up(scenario: Scenario, controllers: list[str]) -> None:
+    """Load or compile the kernel for one step of each law; say so when it takes time."""
+    if not JITTED:
+        print('numba is not installed: the kernel runs as plain Python, slower', file=sys.stderr)
+        return
+    if not any(cache_folder().glob('**/*.nbi')):
+        print('compiling the kernel for this machine, once ...', file=sys.stderr, flush=True)
+    begin = time.monotonic()
+    zero, upright = (0.0,) * 6, (1.0, 0.0, 0.0, 0.0)
+    model = control_model(scenario.vehicle)
+    for name in controllers:
+        gains = scenario.gains(name)
+        if is_compiled(gains):
+            SampledLaw(gains, model).sample(0.0, 0.0, zero, upright, zero, zero)
+        else:
+            law = type(gains).__name__
+            print(f'{name}: the law {law} runs as plain Python', file=sys.stderr)
+    x = initial_state(np.zeros(6), np.zeros(6))
+    integrator = scenario.data['integrator']
+    Plant(scenario.vehicle.model, scenario.disturbance, scenario.step, integrator, x).advance(zero)
+    if time.monotonic() - begin > NOTICE_AFTER:
+        print(f'kernel ready after {time.monotonic() - begin:.1f} s', file=sys.stderr)

@@ -1,0 +1,49 @@
+"""Build auv_analysis, for colcon and for pip."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = 'auv_analysis'
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    description='Experiments, recording, energy and coupling analysis, reports, the auv command',
+    license='Apache-2.0',
+    maintainer='auv_gvc developers',
+    maintainer_email='auv-gvc@users.noreply.github.com',
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={NAME: ['*.json', '*.j2']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        (f'share/{NAME}/launch', glob('launch/*.launch.py')),
+        (f'share/{NAME}/config/scenarios', glob('config/scenarios/*.yaml')),
+        (f'share/{NAME}/config/params', glob('config/params/*.yaml')),
+    ],
+    python_requires='>=3.11',
+    install_requires=[
+        'setuptools',
+        'auv_dynamics',
+        'auv_gvc_controller',
+        'numpy>=1.26',
+        'PyYAML>=6',
+        'jsonschema>=4.10',
+        'mcap>=1.2',
+        'mcap-ros2-support>=0.5',
+        'matplotlib>=3.6',
+        'Jinja2>=3.0',
+        'psutil>=5.9',
+        'rich>=13',
+    ],
+    extras_require={'test': ['pytest']},
+    zip_safe=False,
+    entry_points={
+        'console_scripts': [
+            'auv = auv_analysis.cli:main',
+            'recorder_node = auv_analysis.recorder_node:main',
+            'analysis_node = auv_analysis.analysis_node:main',
+        ]
+    },
+)

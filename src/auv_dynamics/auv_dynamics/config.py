@@ -1,0 +1,48 @@
+"""Where the shipped vehicles and scenarios are: checkout, colcon install tree or wheel."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from auv_dynamics.files import InputError
+
+OWNER = {'vehicles': 'auv_dynamics', 'scenarios': 'auv_analysis', 'params': 'auv_analysis'}
+
+
+def _folders(kind: str) -> Iterator[Path]:
+    package = OWNER[kind]
+    here = Path(__file__).resolve()
+    yield here.parents[2] / package / 'config' / kind  # src/<package>/config of a checkout
+    for root in (*here.parents, Path(sys.prefix)):
+        yield root / 'share' / package / 'config' / kind  # a prefix with everything below it
+        yield root / package / 'share' / package / 'config' / kind  # colcon: one prefix each
+
+
+def shipped(kind: str, name: str | Path) -> Path:
+    """Path of a file given by path or by the bare name of a shipped one.
+
+    Parameters
+    ----------
+    kind : 'vehicles', 'scenarios' or 'params'
+    name : a path, or a bare name without folder and ending
+
+    Returns
+    -------
+    path : of a file; a path that was given is returned as it is, existing or not
+
+    Raises
+    ------
+    InputError : a bare name that is no file and not shipped
+
+    """
+    path = Path(name)
+    if path.suffix in ('.yaml', '.yml') or len(path.parts) != 1 or path.is_file():
+        return path
+    found: set[str] = set()
+    for folder in _folders(kind):
+        candidate = folder / f'{name}.yaml'
+        if candidate.is_file():
+            return candidate
+        found.update(entry.stem for entry in folder.glob('*.yaml'))
+    expected = f'a file, or one of the shipped {kind}: {", ".join(sorted(found)) or "none"}'
+    raise InputError(name, '', expected, 'no such file or name')

@@ -1,0 +1,207 @@
+"""YAML files checked against a JSON schema: one line names file, key, expected and found."""
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import yaml
+
+
+class InputError(ValueError):
+    """Wrong input from the user; its text is one line fit for a terminal."""
+
+    def __init__(self, file: object, key: str, expected: str, found: object):
+        self.file, self.key, self.expected = str(file), key, expected
+        self.found = found if isinstance(found, str) else shorten(found)
+        place = f'{self.file}: {key}' if key else self.file
+        line = f'{place}: expected {expected}, found {self.found}'
+        super().__init__(' '.join(line.split()))
+
+
+def shorten(value: object) -> str:
+    """One short line that shows a value."""
+    text = 'nothing' if value is None else repr(value)
+    text = ' '.join(text.split())
+    return text if len(text) <= 60 else text[:57] + '...'
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML 1.1 as PyYAML reads it, but `1e-3` is a number and a doubled key is an error."""
+
+
+_Loader.add_implicit_resolver(
+    'tag:yaml.org,2002:float',
+    re.compile(r'^[-+]?(?:\d[\d_]*\.?\d*|\.\d+)[eE][-+]?\d+$'),
+    list('-+.0123456789'),
+)
+
+
+def _unique_mapping(loader: _Loader, node: yaml.MappingNode) -> dict:
+    seen: dict = {}
+    for key_node, value_node in node.value:
+        key = loader.construct_object(key_node, deep=True)
+        if not isinstance(key, str):
+            mark = key_node.start_mark
+            raise InputError(mark.name, f'line {mark.line + 1}', 'a word as key', key)
+        if key in seen:
+            mark = key_node.start_mark
+            raise InputError(mark.name, key, 'each key once', f'again in line {mark.line + 1}')
+        seen[key] = loader.construct_object(value_node, deep=True)
+    return seen
+
+
+_Loader.add_constructor('tag:yaml.org,2002:map', _unique_mapping)
+
+
+def read_text(path: Path, kind: str) -> str:
+    """Text of a file; InputError when it is missing, a folder, unreadable or not UTF-8."""
+    try:
+        return path.read_text(encoding='utf-8')
+    except FileNotFoundError:
+        found = 'no such file'
+    except UnicodeDecodeError as error:
+        found = f'bytes that are not UTF-8 (offset {error.start})'
+    except OSError as error:
+        found = (error.strerror or str(error)).lower()
+    raise InputError(path, '', f'a {kind} file', found)
+
+
+def read_yaml(path: Path, kind: str) -> dict[str, Any]:
+    """Mapping in a YAML file; InputError when it cannot be read or is no mapping."""
+    text = read_text(path, kind)
+    loader = _Loader(text)
+    loader.name = str(path)
+    try:
+        data = loader.get_single_data()
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f'line {mark.line + 1}, column {mark.column + 1}' if mark else ''
+        raise InputError(path, where, 'valid YAML', error.problem or 'an error') from None
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(path, '', 'valid YAML', str(error).splitlines()[0]) from None
+    finally:
+        loader.dispose()
+    if not isinstance(data, dict):
+        raise InputError(path, '', f'a mapping with the keys of a {kind} file', data)
+    return data
+
+
+@lru_cache
+def schema(path: Path) -> dict[str, Any]:
+    """Parse a JSON schema file."""
+    return json.loads(path.read_text(encoding='utf-8'))
+
+
+def check(data: dict[str, Any], schema_path: Path, file: object) -> None:
+    """Raise InputError for the first entry of `data` that breaks the schema or is not finite.
+
+    Every node of our schemas has a `title` that says in words what is expected there.
+    """
+    _check_finite(data, file)
+    root = schema(schema_path)
+    validator = jsonschema.Draft202012Validator(root)
+    errors = sorted(validator.iter_errors(data), key=_rank)
+    if errors:
+        raise _as_input_error(errors[0], root, file)
+
+
+def _rank(error: jsonschema.ValidationError) -> tuple:
+    # unknown keys first (a misspelt key also leaves a missing one), then in file order
+    order = {'additionalProperties': 0, 'unevaluatedProperties': 0, 'required': 2}
+    return order.get(error.validator, 1), [str(part) for part in error.absolute_path]
+
+
+def dotted(path: Any) -> str:
+    """Key path as a reader writes it: rigid_body.inertia[0][2]."""
+    text = ''
+    for part in path:
+        text += f'[{part}]' if isinstance(part, int) else f'.{part}' if text else str(part)
+    return text
+
+
+def _as_input_error(
+    error: jsonschema.ValidationError, root: dict[str, Any], file: object
+) -> InputError:
+    # of an alternative (6 numbers or 6x6) only an entry that is no number at all is named itself
+    for inner in sorted(error.context or [], key=lambda e: -len(e.absolute_path)):
+        if inner.validator == 'type' and not isinstance(inner.instance, list | int | float):
+            error = inner
+            break
+    path = list(error.absolute_path)
+    if error.validator == 'additionalProperties':
+        known = list(error.schema.get('properties', {}))
+        unknown = next(key for key in error.instance if key not in known)
+        return InputError(
+            file, dotted([*path, unknown]), f'one of {", ".join(known)}', 'an unknown key'
+        )
+    if error.validator == 'required':
+        missing = next(key for key in error.validator_value if key not in error.instance)
+        title = error.schema.get('properties', {}).get(missing, {}).get('title', 'a value')
+        return InputError(file, dotted([*path, missing]), title, 'nothing')
+    found = error.instance if not isinstance(error.instance, list) else _shape(error.instance)
+    return InputError(file, dotted(path), _title(error, root), found)
+
+
+def _title(error: jsonschema.ValidationError, root: dict[str, Any]) -> str:
+    """Title of the innermost schema node on the way to the error that has one."""
+    node: Any = root
+    title = ''
+    for part in error.absolute_schema_path:
+        while isinstance(node, dict) and part not in node and '$ref' in node:
+            node = root['$defs'][node['$ref'].rsplit('/', 1)[-1]]
+        if part == '$ref':
+            continue
+        node = node[part]
+        if isinstance(node, dict) and isinstance(node.get('title'), str):
+            title = node['title']
+    return title or error.message
+
+
+def _shape(value: list) -> str:
+    numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
+    if numbers:
+        return f'{len(value)} numbers {shorten(value)}'
+    if all(isinstance(v, list) for v in value):
+        lengths = sorted({len(v) for v in value})
+        if len(lengths) == 1:
+            return f'{len(value)}x{lengths[0]} {shorten(value)}'
+        return f'{len(value)} rows of {lengths[0]} to {lengths[-1]} entries'
+    return shorten(value)
+
+
+def _leaves(value: Any, path: tuple = ()) -> Iterator[tuple[tuple, Any]]:
+    if isinstance(value, dict):
+        for key, entry in value.items():
+            yield from _leaves(entry, (*path, key))
+    elif isinstance(value, list):
+        for i, entry in enumerate(value):
+            yield from _leaves(entry, (*path, i))
+    else:
+        yield path, value
+
+
+def _check_finite(data: dict[str, Any], file: object) -> None:
+    for path, value in _leaves(data):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if number and (abs(value) > 1e300 or not math.isfinite(value)):
+            raise InputError(file, dotted(path), 'a finite number', value)
+
+
+def matrix6(value: Any) -> np.ndarray:
+    """(6, 6) matrix of a scalar (times identity), six numbers (diagonal), 36 or 6x6."""
+    array = np.asarray(value, float)
+    if array.ndim == 0 or array.shape == (1,):
+        return float(array.reshape(())) * np.eye(6)
+    if array.shape == (6,):
+        return np.diag(array)
+    if array.shape in ((36,), (6, 6)):
+        return array.reshape(6, 6).copy()
+    raise ValueError(f'expected 1, 6 or 36 numbers, found shape {array.shape}')

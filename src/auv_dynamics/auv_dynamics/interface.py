@@ -1,0 +1,97 @@
+"""The topics by name and the numbers in their messages, without ROS.
+
+Nodes and bag readers share it: the readers take any object with the fields of the message, be it
+from rclpy or from a bag.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+NANOSECONDS = 10**9
+
+ODOM = 'odom'
+TWIST = 'twist'
+CMD_VEL = 'cmd_vel'
+CMD_ACCEL = 'cmd_accel'
+WRENCH = 'wrench'
+DISTURBANCE = 'disturbance'
+DISTURBANCE_ESTIMATE = 'disturbance_estimate'
+KINETIC_ENERGY = 'analysis/kinetic_energy'
+KINETIC_ENERGY_SHARES = 'analysis/kinetic_energy_shares'
+DELTA_XI = 'analysis/delta_xi'
+DELTA_PI = 'analysis/delta_pi'
+LUMPED_ERROR = 'analysis/lumped_error'
+PROGRESS = 'recorder/progress'
+DIAGNOSTICS = '/diagnostics'
+CLOCK = '/clock'
+
+STEP_TOPICS = (ODOM, TWIST, CMD_VEL, CMD_ACCEL, WRENCH, DISTURBANCE, DISTURBANCE_ESTIMATE)
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Frame ids: `odom` is NED, `base` forward-starboard-down."""
+
+    odom: str = 'odom_ned'
+    base: str = 'base_link_fsd'
+
+
+class BadMessageError(ValueError):
+    """A message that must not be used; its text names topic, expected and found."""
+
+
+def nanoseconds(time: Any) -> int:
+    """Nanoseconds of a Time message."""
+    return time.sec * NANOSECONDS + time.nanosec
+
+
+def _six(linear: Any, angular: Any) -> tuple:
+    return (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+
+
+def _finite(topic: str, values: tuple) -> tuple:
+    if not all(map(math.isfinite, values)):
+        raise BadMessageError(f'{topic}: expected finite numbers, found {values}')
+    return values
+
+
+def _frame(topic: str, key: str, expected: str, found: str) -> None:
+    if found != expected:
+        raise BadMessageError(f'{topic}: {key}: expected {expected!r}, found {found!r}')
+
+
+def read_odometry(message: Any, frames: Frames, topic: str = ODOM) -> tuple[int, tuple]:
+    """Stamp in ns and state (13 floats); BadMessageError when it must not be used."""
+    _frame(topic, 'header.frame_id', frames.odom, message.header.frame_id)
+    _frame(topic, 'child_frame_id', frames.base, message.child_frame_id)
+    p, q = message.pose.pose.position, message.pose.pose.orientation
+    nu = _six(message.twist.twist.linear, message.twist.twist.angular)
+    attitude = (q.w, q.x, q.y, q.z)
+    norm = math.hypot(*attitude)
+    x = _finite(topic, (p.x, p.y, p.z, *attitude, *nu))
+    if abs(norm - 1.0) > 1e-3:
+        raise BadMessageError(
+            f'{topic}: orientation: expected a unit quaternion, found norm {norm:g}'
+        )
+    return nanoseconds(message.header.stamp), x
+
+
+def _stamped(topic: str, message: Any, values: tuple, frames: Frames) -> tuple[int, tuple]:
+    _frame(topic, 'header.frame_id', frames.base, message.header.frame_id)
+    return nanoseconds(message.header.stamp), _finite(topic, values)
+
+
+def read_twist(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
+    """Stamp in ns and six floats of a TwistStamped; BadMessageError when it must not be used."""
+    return _stamped(topic, message, _six(message.twist.linear, message.twist.angular), frames)
+
+
+def read_accel(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
+    """Stamp in ns and six floats of an AccelStamped; BadMessageError when it must not be used."""
+    return _stamped(topic, message, _six(message.accel.linear, message.accel.angular), frames)
+
+
+def read_wrench(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
+    """Stamp in ns and six floats of a WrenchStamped; BadMessageError when it must not be used."""
+    return _stamped(topic, message, _six(message.wrench.force, message.wrench.torque), frames)

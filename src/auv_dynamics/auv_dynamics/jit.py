@@ -1,0 +1,90 @@
+"""Compile the kernel with numba where it is installed; the same source runs without it.
+
+Two decorators are all that the mathematics knows of numba: `helper` for small functions that are
+always inlined and `compiled` for the ones that are called from Python. Compiled code is kept in
+one explicit folder whose name changes with every source file of the workspace, so that a stale
+binary cannot be loaded: numba itself only looks at the file of the outermost function.
+"""
+
+import hashlib
+import importlib.util
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
+
+
+def sources_digest() -> str:
+    """Digest of every Python source of the workspace's packages."""
+    digest = hashlib.sha256()
+    for package in PACKAGES:
+        spec = importlib.util.find_spec(package)
+        for folder in (spec.submodule_search_locations or []) if spec else []:
+            for path in sorted(Path(folder).rglob('*.py')):
+                digest.update(path.name.encode() + b'\0' + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled code: `$AUV_GVC_CACHE_DIR`, else below `$XDG_CACHE_HOME`."""
+    root = os.environ.get('AUV_GVC_CACHE_DIR')
+    if root:
+        return Path(root)
+    cache = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
+    return Path(cache) / 'auv_gvc' / sources_digest()
+
+
+try:
+    import numba
+    from numba.extending import overload
+except ImportError:
+    numba = None  # type: ignore[assignment]  # the module or its absence
+
+config: Any = numba and numba.config
+JITTED = numba is not None and not config.DISABLE_JIT
+
+if JITTED:
+    config.CACHE_DIR = str(cache_folder())
+    OPTIONS: Any = {'fastmath': {'contract'}, 'error_model': 'numpy'}
+    helper = numba.njit(forceinline=True, **OPTIONS)
+    compiled = numba.njit(cache=True, nogil=True, **OPTIONS)
+else:
+
+    def helper(function: Callable) -> Callable:
+        """Return the function as it is: numba is absent or switched off."""
+        return function
+
+    compiled = helper
+
+
+def plain(function: Callable) -> Callable:
+    """Return the un-jitted form of a function."""
+    return getattr(function, 'py_func', function)
+
+
+def specialised(argument: str) -> Callable[[Callable], Callable]:
+    """Let a generic function be compiled for the class of one of its arguments.
+
+    The decorated function says in Python what it does: call the static method of its own name of
+    the class of `argument`, a named tuple. Under numba, the method itself is compiled.
+    """
+
+    def decorate(generic: Callable) -> Callable:
+        if not JITTED:
+            return generic
+        names = generic.__code__.co_varnames[: generic.__code__.co_argcount]
+        position = names.index(argument)
+
+        def choose(*types: Any) -> Callable:
+            return getattr(types[position].instance_class, generic.__name__)
+
+        # numba asks for an implementation through a function with the same argument names
+        scope: dict[str, Any] = {'choose': choose}
+        listed = ', '.join(names)
+        exec(f'def overloading({listed}): return choose({listed})', scope)
+        overload(generic, jit_options=OPTIONS, strict=True)(scope['overloading'])
+        return generic
+
+    return decorate

@@ -1,0 +1,175 @@
+"""How the plant's time passes: with the wrenches (lock-step) or with the steady clock."""
+
+import time
+from typing import Any
+
+from std_msgs.msg import Header
+
+from auv_dynamics import interface
+from auv_dynamics.ros import topics
+from auv_dynamics.ros.graph import steady_timer
+
+WATCH = 0.2  # s between two looks at the silence
+
+
+class LockStep:
+    """Step k is published, and only the wrench that carries its stamp leads to step k + 1.
+
+    Parameters
+    ----------
+    node : the plant node
+
+    """
+
+    def __init__(self, node: Any):
+        self._node = node
+        self._started = self._published = False
+        self._ack = -1
+        self._since: float | None = None  # when the present wait began; None: nothing is awaited
+        if node.window:
+            qos = topics.one_at_a_time()
+            node.graph.subscribe(topics.PROGRESS, self._on_progress, qos)
+        steady_timer(node, WATCH, self._watch)
+
+    @property
+    def _waits_for_credit(self) -> bool:
+        node = self._node
+        return bool(node.window) and node.plant.k - self._ack > node.window
+
+    def start(self) -> None:
+        """Publish step 0; later calls do nothing."""
+        if not self._started:
+            self._started = self._published = True
+            self._since = time.monotonic()
+            self._node.publish_state()
+
+    def resume(self) -> None:
+        """Go on after a pause."""
+        if self._since is not None:
+            self._since = time.monotonic()
+        self._go_on()
+
+    def pause(self) -> None:
+        """Hold the next step."""
+
+    def wrench(self, ns: int, tau: tuple) -> None:
+        """Take the answer to the step that was published last."""
+        node, plant = self._node, self._node.plant
+        expected = plant.k * node.step_ns
+        if not (self._started and self._published and ns == expected):
+            raise interface.BadMessageError(f'wrench: stamp: expected {expected} ns, found {ns} ns')
+        F = plant.F()[0].copy()
+        k = plant.k
+        if k == node.last:
+            node.publish_disturbance(k, F)
+            self._published = False
+            self._since = None
+            if not node.window:
+                node.end(0)
+            return
+        plant.advance(tau)
+        self._published = False
+        self._go_on()
+        node.publish_disturbance(k, F)
+
+    def _go_on(self) -> None:
+        done = self._since is None or not self._started
+        if done or self._published or self._node.paused or self._waits_for_credit:
+            return
+        self._published = True
+        self._since = time.monotonic()
+        self._node.publish_state()
+
+    def _on_progress(self, message: Header) -> None:
+        self._ack = max(self._ack, interface.nanoseconds(message.stamp) // self._node.step_ns)
+        self._go_on()
+
+    def _watch(self) -> None:
+        node = self._node
+        if not self._started or self._since is None or node.paused:
+            return
+        if self._published:
+            silent, topic = 'controller', topics.WRENCH.name
+        else:
+            silent, topic = 'recorder', topics.PROGRESS.name
+        if time.monotonic() - self._since > node.wrench_timeout:
+            names = [info.node_name for info in node.get_publishers_info_by_topic(topic)]
+            who = ', '.join(sorted(set(names))) or f'no {silent}'
+            text = f'no answer on {topic} to step {node.plant.k} for {node.wrench_timeout:g} s'
+            node.end(1, f'{text}; its publisher: {who}')
+
+
+class RealTime:
+    """Step k is published at k * step after the start; the last wrench is held, then zero.
+
+    Parameters
+    ----------
+    node : the plant node
+
+    """
+
+    ZERO = (0.0,) * 6
+
+    def __init__(self, node: Any):
+        self._node = node
+        self._began: float | None = None
+        self._first = 0  # step published at `_began`
+        self._tau, self._heard = self.ZERO, -float('inf')
+        self._answered = -1
+        self._ended: float | None = None
+
+    def start(self) -> None:
+        """Start the clock; later calls do nothing."""
+        if self._began is None and self._ended is None:
+            self._began = time.monotonic()
+            if not hasattr(self, '_timer'):
+                self._timer = steady_timer(self._node, self._node.step_ns / 1e9, self._tick)
+
+    def resume(self) -> None:
+        """Go on after a pause, from the step that was held."""
+        self.start()
+
+    def pause(self) -> None:
+        """Hold the clock."""
+        self._began, self._first = None, self._node.plant.k
+
+    def wrench(self, ns: int, tau: tuple) -> None:
+        """Hold this wrench from now on."""
+        if ns // self._node.step_ns < self._answered:
+            raise interface.BadMessageError(
+                f'wrench: stamp: expected newer than the last, found {ns} ns'
+            )
+        self._answered = ns // self._node.step_ns
+        self._tau, self._heard = tau, time.monotonic()
+
+    def _held(self) -> tuple:
+        node = self._node
+        if time.monotonic() - self._heard <= node.wrench_timeout:
+            return self._tau
+        if self._tau != self.ZERO:
+            node.graph.complain(f'no wrench for {node.wrench_timeout:g} s: zero wrench')
+            self._tau = self.ZERO
+        return self.ZERO
+
+    def _tick(self) -> None:
+        node, plant = self._node, self._node.plant
+        self._end()
+        if self._began is None:
+            return
+        due = self._first + int((time.monotonic() - self._began) * 1e9) // node.step_ns
+        while plant.k <= due and self._ended is None:
+            node.publish_state()
+            node.publish_disturbance(plant.k, plant.F()[0])
+            if plant.k == node.last:
+                self._ended = time.monotonic()
+            else:
+                plant.advance(self._held())
+
+    def _end(self) -> None:
+        """With no recorder to wait for, exit once the last wrench is here or overdue."""
+        node = self._node
+        if self._ended is None or node.window:
+            return
+        overdue = time.monotonic() - self._ended > node.wrench_timeout
+        if self._answered >= node.last or overdue:
+            node.end(0)

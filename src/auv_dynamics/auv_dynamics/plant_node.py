@@ -1,0 +1,145 @@
+"""The plant as a node: odometry out, wrench in, in lock-step or in real time."""
+
+import numpy as np
+from geometry_msgs.msg import WrenchStamped
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import SetBool, Trigger
+
+from auv_dynamics import interface, load_vehicle
+from auv_dynamics.disturbance import make_disturbance
+from auv_dynamics.files import InputError
+from auv_dynamics.integrator import TABLEAUS
+from auv_dynamics.plant import Plant, initial_state
+from auv_dynamics.plant_clock import LockStep, RealTime
+from auv_dynamics.plant_parameters import disturbance_specs
+from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.graph import Graph, steady_timer
+from auv_dynamics.ros.life import main_of
+from auv_dynamics.ros.parameters import declare, refuse_unknown
+from auv_dynamics.ros.peers import Peers
+
+NANOSECONDS = interface.NANOSECONDS
+
+
+class PlantNode(BulkNode):
+    """A 6-DOF vehicle: integrates equations (1) and (2) between two wrenches."""
+
+    prompt = True
+
+    def __init__(self) -> None:
+        super().__init__('plant_node')
+        self.graph = Graph(self)
+        self._declare()
+        refuse_unknown(self)
+        self._odom = self.graph.publisher(topics.ODOM)
+        self._clock_output = self.graph.publisher(topics.CLOCK)
+        self._twist = self.graph.publisher(topics.TWIST)
+        self._disturbance = self.graph.publisher(topics.DISTURBANCE)
+        self.peers = Peers(self, self._start_after)
+        self.graph.also_ready_when(self.peers.not_ready)
+        self.pace = LockStep(self) if self.lockstep else RealTime(self)
+        qos = topics.one_at_a_time() if self.lockstep else topics.newest_command()
+        self.graph.subscribe(topics.WRENCH, self._on_wrench, qos)
+        self.create_service(SetBool, '~/run', self._on_run)
+        self.create_service(Trigger, '~/reset', self._on_reset)
+        self.paused = self._start_paused
+        steady_timer(self, 0.05, self._start)
+
+    def _declare(self) -> None:
+        path = declare(self, 'vehicle', str, '', 'vehicle file, or bare name of a shipped one')
+        if not path:
+            raise InputError(self.get_name(), 'vehicle', 'a vehicle file', None)
+        step = declare(self, 'step', float, 0.01, 'integration step, s', at_least=1e-9)
+        duration = declare(self, 'duration', float, 0.0, 's, 0: no end', at_least=0.0)
+        self.step_ns = round(step * NANOSECONDS)
+        if abs(self.step_ns - step * NANOSECONDS) > 1e-6 * max(1.0, step):
+            raise InputError(self.get_name(), 'step', 'a whole number of nanoseconds', step)
+        self.last = round(duration / step) if duration else None
+        if self.last is not None and abs(duration / step - self.last) > 1e-9 * self.last:
+            raise InputError(
+                self.get_name(), 'duration', f'a multiple of step ({step} s)', duration
+            )
+        self.lockstep = declare(self, 'lockstep', bool, False, 'advance on the wrench, not on time')
+        self._start_paused = declare(self, 'start_paused', bool, False, 'wait for ~/run')
+        self.window = declare(
+            self, 'recorder_window', int, 0, 'steps ahead of recorder/progress, 0: off',
+            at_least=0, at_most=topics.DEPTH - 1,
+        )  # fmt: skip
+        integrator = declare(
+            self, 'integrator', str, 'ode5', 'fixed-step method', one_of=list(TABLEAUS)
+        )
+        declare(self, 'seed', int, 0, 'of everything random', at_least=0)
+        eta, nu = (self._six(f'initial.{name}') for name in ('eta', 'nu'))
+        self._start_after = (
+            declare(self, 'start_after', list[str], None, 'nodes whose ~/ready is waited for') or []
+        )
+        default = 30.0 if self.lockstep else 0.5
+        self.wrench_timeout = declare(
+            self, 'wrench_timeout', float, default,
+            's: real time: then zero wrench; lock-step: then the run ends', at_least=0.0,
+        )  # fmt: skip
+        self._initial = initial_state(eta, nu)
+        disturbance = make_disturbance(disturbance_specs(self))
+        model = load_vehicle(path).model
+        self.plant = Plant(model, disturbance, step, integrator, self._initial)
+
+    def _six(self, name: str) -> np.ndarray:
+        values = declare(self, name, list[float], [0.0] * 6, '6 numbers, SI, NED and body frame')
+        if len(values) != 6 or not np.all(np.isfinite(values)):
+            raise InputError(self.get_name(), name, '6 finite numbers', values)
+        return np.array(values)
+
+    def _start(self) -> None:
+        if self.graph.ready() and not self.peers.not_ready() and not self.paused:
+            self.pace.start()
+
+    def publish_state(self) -> None:
+        """Publish step k; odometry first, since the controller waits for it."""
+        ns, x = self.plant.k * self.step_ns, self.plant.x
+        self._odom.publish(convert.odometry(ns, x, self.graph.frames))
+        self._clock_output.publish(Clock(clock=convert.stamp(ns)))
+        self._twist.publish(convert.twist(ns, x[7:], self.graph.frames))
+        self.graph.latest_ns = ns
+        self.graph.facts['step'] = self.plant.k
+
+    def publish_disturbance(self, k: int, F: np.ndarray) -> None:
+        """Publish F of step k: what opposed the wrench in (1)."""
+        self._disturbance.publish(convert.wrench(k * self.step_ns, F, self.graph.frames))
+
+    def end(self, code: int, text: str = '') -> None:
+        """End the node: 1 with the reason when the run failed."""
+        if text:
+            self.get_logger().error(text)
+        if code == 0:
+            for publisher in self.graph.publishers.values():
+                publisher.wait_for_all_acked()
+        self.exit_code = code
+
+    def _on_wrench(self, message: WrenchStamped) -> None:
+        try:
+            ns, tau = interface.read_wrench(message, self.graph.frames, topics.WRENCH.name)
+            self.pace.wrench(ns, tau)
+        except interface.BadMessageError as error:
+            self.graph.refuse(str(error))
+
+    def _on_run(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        reason = ''
+        if request.data:
+            reason = self.peers.not_ready() or ('' if self.graph.ready() else 'plant_node')
+        if not reason:
+            self.paused = not request.data
+            self.pace.resume() if request.data else self.pace.pause()
+        word = 'running' if request.data else 'paused'
+        response.success, response.message = not reason, reason or word
+        return response
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self.plant.x[:] = self._initial
+        response.success, response.message = True, f'state of the start from step {self.plant.k}'
+        return response
+
+
+def main() -> None:
+    """Run the node."""
+    main_of(PlantNode)

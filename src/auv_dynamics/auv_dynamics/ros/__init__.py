@@ -1,0 +1,1 @@
+"""The one place for topic names, QoS, frames, message <-> array, parameters and a node's life."""

@@ -1,0 +1,166 @@
+"""A node's part of the graph: publishers, subscriptions, the start barrier, diagnostics."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSPolicyKind, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
+from std_srvs.srv import Trigger
+
+from auv_dynamics.files import InputError
+from auv_dynamics.interface import Frames
+from auv_dynamics.ros.convert import stamp
+from auv_dynamics.ros.parameters import declare
+from auv_dynamics.ros.topics import DIAGNOSTICS, STEP_TOPICS, Topic, every_step, one_at_a_time
+
+LOUD = 1.0  # s between two reports of the same kind
+
+
+def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Timer:
+    """Timer on the steady clock, whatever `use_sim_time` says."""
+    return node.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+
+class Graph:
+    """What every node of the graph has in common.
+
+    Declares `odom_frame`, `base_frame` and `expected_subscribers`, offers `~/ready`, publishes
+    `/diagnostics` and reports what is refused.
+    """
+
+    def __init__(self, node: Any, *, barrier: bool = True):
+        self.node = node
+        self.publishers: dict[str, Publisher] = {}
+        self.trouble = ''
+        self.refused = 0
+        self.latest_ns = 0
+        self.facts: dict[str, Any] = {}
+        self._said: dict[str, float] = {}
+        self._ready = False
+        self._not_ready: Callable[[], str] = str
+        self._expected: dict[str, int] = {}
+        if barrier:
+            self.frames = Frames(
+                declare(node, 'odom_frame', str, 'odom_ned', 'frame of poses, NED'),
+                declare(node, 'base_frame', str, 'base_link_fsd', 'body frame, FSD'),
+            )
+            listed = declare(
+                node, 'expected_subscribers', list[str], None,
+                'topic=count: nothing is published on step topics until so many have matched',
+            )  # fmt: skip
+            self._expected = self._counts(listed or [])
+        self._diagnostics = node.create_publisher(
+            DIAGNOSTICS.type, DIAGNOSTICS.name, one_at_a_time()
+        )
+        node.create_service(Trigger, '~/ready', self._answer_ready)
+        steady_timer(node, 1.0, self.publish_diagnostics)
+
+    def publisher(self, topic: Topic, qos: QoSProfile | None = None) -> Publisher:
+        """Publisher of a topic, by default one that loses nothing."""
+        events = PublisherEventCallbacks(
+            incompatible_qos=lambda event: self._incompatible(topic, event),
+            use_default_callbacks=False,
+        )
+        publisher = self.node.create_publisher(
+            topic.type,
+            topic.name,
+            qos or every_step(),
+            event_callbacks=events,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self.publishers[topic.name] = publisher
+        return publisher
+
+    def subscribe(
+        self, topic: Topic, callback: Callable, qos: QoSProfile, *, raw: bool = False
+    ) -> Subscription:
+        """Subscription to a topic; an incompatible publisher is an error that is heard.
+
+        It belongs to the node's data path; with `raw` the callback gets serialized messages.
+        """
+        events = SubscriptionEventCallbacks(
+            incompatible_qos=lambda event: self._incompatible(topic, event),
+            use_default_callbacks=False,
+        )
+        subscription = self.node.create_subscription(
+            topic.type,
+            topic.name,
+            callback,
+            qos,
+            event_callbacks=events,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            raw=raw,
+        )
+        self.node.add_bulk(subscription)
+        return subscription
+
+    def ready(self) -> bool:
+        """Whether every expected subscriber has matched; once true it stays true."""
+        self._ready = self._ready or not self._missing()
+        return self._ready
+
+    def also_ready_when(self, reason: Callable[[], str]) -> None:
+        """Add a condition to `~/ready`: `reason` says why not, or gives an empty text."""
+        self._not_ready = reason
+
+    def refuse(self, text: str) -> None:
+        """Say loudly that a message was refused."""
+        self.refused += 1
+        self.complain(f'refused: {text}')
+
+    def complain(self, text: str) -> None:
+        """Log an error and keep it for the diagnostics; the same one at most once a second."""
+        # rclpy's own throttling looks at the simulated clock, which may stand still
+        now = time.monotonic()
+        if now - self._said.get(text, -LOUD) >= LOUD:
+            self._said = {text: now}
+            self.node.get_logger().error(text)
+        self.trouble = text
+
+    def publish_diagnostics(self) -> None:
+        """Publish this node's health, stamped with the latest step."""
+        status = DiagnosticStatus(name=self.node.get_fully_qualified_name())
+        status.level = DiagnosticStatus.ERROR if self.trouble else DiagnosticStatus.OK
+        status.message = self.trouble or 'ok'
+        facts = {'ready': self._ready, 'refused': self.refused, **self.facts}
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in facts.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = stamp(self.latest_ns)
+        self._diagnostics.publish(message)
+        self.trouble = ''
+
+    def _counts(self, listed: list[str]) -> dict[str, int]:
+        known = [topic.name for topic in STEP_TOPICS]
+        counts = {}
+        for entry in listed:
+            topic, _, count = entry.partition('=')
+            if topic not in known or not count.isdigit():
+                expected = f'topic=count with a topic of {", ".join(known)}'
+                raise InputError(self.node.get_name(), 'expected_subscribers', expected, entry)
+            counts[topic] = int(count)
+        return counts
+
+    def _missing(self) -> str:
+        for topic, count in self._expected.items():
+            publisher = self.publishers.get(topic)
+            found = publisher.get_subscription_count() if publisher else 0
+            if found < count:
+                return f'{topic}: expected {count} subscribers, found {found}'
+        return ''
+
+    def _answer_ready(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        reason = self._not_ready() or ('' if self.ready() else self._missing())
+        response.success, response.message = not reason, reason or 'ready'
+        return response
+
+    def _incompatible(self, topic: Topic, event: Any) -> None:
+        policy = QoSPolicyKind(event.last_policy_kind).name.lower()
+        self.complain(f'{topic.name}: incompatible QoS with another endpoint: {policy}')

@@ -1,0 +1,132 @@
+"""ROS parameters: declared with description and range, read-only unless said, unknown refused."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from auv_dynamics.files import InputError
+
+KNOWN_TO_ALL = ('use_sim_time', 'start_type_description_service')
+TYPE_WORDS = {
+    Parameter.Type.BOOL: 'true or false',
+    Parameter.Type.INTEGER: 'a whole number',
+    Parameter.Type.DOUBLE: 'a number',
+    Parameter.Type.STRING: 'a word',
+    Parameter.Type.DOUBLE_ARRAY: 'a list of numbers',
+    Parameter.Type.STRING_ARRAY: 'a list of words',
+}
+TYPES = {
+    bool: Parameter.Type.BOOL,
+    int: Parameter.Type.INTEGER,
+    float: Parameter.Type.DOUBLE,
+    str: Parameter.Type.STRING,
+    list[float]: Parameter.Type.DOUBLE_ARRAY,
+    list[str]: Parameter.Type.STRING_ARRAY,
+}
+
+
+def given(node: Node, prefix: str = '') -> list[str]:
+    """Names of the parameters that the user gave and that begin with `prefix`."""
+    # rclpy offers no public way to see overrides that are not declared yet
+    return sorted(name for name in node._parameter_overrides if name.startswith(prefix))  # noqa: SLF001
+
+
+def declare(
+    node: Node,
+    name: str,
+    kind: Any,
+    default: Any,
+    description: str,
+    *,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    one_of: Sequence[str] = (),
+    writable: bool = False,
+) -> Any:
+    """Declare a parameter and return its value.
+
+    Parameters
+    ----------
+    node : that declares it
+    name : of the parameter
+    kind : bool, int, float, str, list[float] or list[str]
+    default : value when none is given; None leaves it unset and returns None
+    description : one line, with the unit
+    at_least, at_most : range of numbers
+    one_of : the words that are accepted
+    writable : taken at run time, else read-only
+
+    Raises
+    ------
+    InputError : wrong type or out of range
+
+    """
+    _coerce(node, name, kind)
+    descriptor = ParameterDescriptor(description=description, read_only=not writable)
+    if one_of:
+        descriptor.additional_constraints = f'one of {", ".join(one_of)}'
+    if at_least is not None or at_most is not None:
+        _set_range(descriptor, kind, at_least, at_most)
+    try:
+        if default is None:
+            node.declare_parameter(name, TYPES[kind], descriptor)
+            value = node.get_parameter_or(name, Parameter(name)).value
+        else:
+            value = node.declare_parameter(name, default, descriptor).value
+    except InvalidParameterTypeException:
+        found = node._parameter_overrides[name].value  # noqa: SLF001
+        raise InputError(node.get_name(), name, TYPE_WORDS[TYPES[kind]], found) from None
+    except InvalidParameterValueException:
+        found = node._parameter_overrides[name].value  # noqa: SLF001
+        expected = f'{at_least if at_least is not None else "-inf"} to {at_most or "inf"}'
+        raise InputError(node.get_name(), name, f'a number from {expected}', found) from None
+    if one_of and value not in one_of:
+        raise InputError(node.get_name(), name, f'one of {", ".join(one_of)}', value)
+    if hasattr(value, 'tolist'):
+        value = value.tolist()
+    return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
+
+
+def _coerce(node: Node, name: str, kind: Any) -> None:
+    """Take whole numbers where numbers are expected: `-p duration:=30` is not an error."""
+    override = node._parameter_overrides.get(name)  # noqa: SLF001
+    if override is None:
+        return
+    if kind is float and override.type_ == Parameter.Type.INTEGER:
+        value: Any = float(override.value)
+    elif kind == list[float] and override.type_ == Parameter.Type.INTEGER_ARRAY:
+        value = [float(number) for number in override.value]
+    elif kind == list[float] and override.type_ in (Parameter.Type.INTEGER, Parameter.Type.DOUBLE):
+        value = [float(override.value)]
+    elif kind == list[float] and override.type_ == Parameter.Type.DOUBLE_ARRAY:
+        value = [float(number) for number in override.value]
+    else:
+        return
+    node._parameter_overrides[name] = Parameter(name, value=value)  # noqa: SLF001
+
+
+def _set_range(
+    descriptor: ParameterDescriptor, kind: Any, at_least: float | None, at_most: float | None
+) -> None:
+    low = at_least if at_least is not None else -1e308
+    high = at_most if at_most is not None else 1e308
+    if kind is int:
+        limit = 2**62
+        entry = IntegerRange(from_value=int(max(low, -limit)), to_value=int(min(high, limit)))
+        descriptor.integer_range = [entry]
+    else:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
+
+
+def refuse_unknown(node: Node) -> None:
+    """Raise InputError for a parameter that was given but that the node does not declare."""
+    for name in given(node):
+        if name in KNOWN_TO_ALL or name.startswith('qos_overrides.') or node.has_parameter(name):
+            continue
+        known = sorted(node._parameters)  # noqa: SLF001
+        own = [k for k in known if k not in KNOWN_TO_ALL and not k.startswith('qos_overrides.')]
+        raise InputError(node.get_name(), name, f'one of {", ".join(own)}', 'an unknown parameter')

@@ -1,0 +1,69 @@
+"""Types and quality of service of the topics; names are relative so that a namespace works."""
+
+from dataclasses import dataclass
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from auv_dynamics import interface
+
+DEPTH = 3000  # of step topics: above every recorder_window and horizon that is accepted
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of the graph: `step` ones carry one message per step."""
+
+    name: str
+    type: type
+    step: bool = False
+
+
+ODOM = Topic(interface.ODOM, Odometry, step=True)
+TWIST = Topic(interface.TWIST, TwistStamped, step=True)
+CMD_VEL = Topic(interface.CMD_VEL, TwistStamped, step=True)
+CMD_ACCEL = Topic(interface.CMD_ACCEL, AccelStamped, step=True)
+WRENCH = Topic(interface.WRENCH, WrenchStamped, step=True)
+DISTURBANCE = Topic(interface.DISTURBANCE, WrenchStamped, step=True)
+DISTURBANCE_ESTIMATE = Topic(interface.DISTURBANCE_ESTIMATE, WrenchStamped, step=True)
+KINETIC_ENERGY = Topic(interface.KINETIC_ENERGY, JointState)
+KINETIC_ENERGY_SHARES = Topic(interface.KINETIC_ENERGY_SHARES, JointState)
+DELTA_XI = Topic(interface.DELTA_XI, TwistStamped)
+DELTA_PI = Topic(interface.DELTA_PI, WrenchStamped)
+LUMPED_ERROR = Topic(interface.LUMPED_ERROR, WrenchStamped)
+PROGRESS = Topic(interface.PROGRESS, Header)
+DIAGNOSTICS = Topic(interface.DIAGNOSTICS, DiagnosticArray)
+CLOCK = Topic(interface.CLOCK, Clock)
+
+STEP_TOPICS = (ODOM, TWIST, CMD_VEL, CMD_ACCEL, WRENCH, DISTURBANCE, DISTURBANCE_ESTIMATE)
+ANALYSIS_TOPICS = (KINETIC_ENERGY, KINETIC_ENERGY_SHARES, DELTA_XI, DELTA_PI, LUMPED_ERROR)
+TOPICS = (*STEP_TOPICS, *ANALYSIS_TOPICS, PROGRESS, DIAGNOSTICS, CLOCK)
+
+
+def _qos(reliability: ReliabilityPolicy, depth: int) -> QoSProfile:
+    return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=reliability)
+
+
+def every_step() -> QoSProfile:
+    """Nothing may be lost: publishers of step topics, the recorder, analysis, exact pairing."""
+    return _qos(ReliabilityPolicy.RELIABLE, DEPTH)
+
+
+def one_at_a_time() -> QoSProfile:
+    """Lock-step subscriptions: at most a few messages are ever under way."""
+    return _qos(ReliabilityPolicy.RELIABLE, 10)
+
+
+def newest_measurement() -> QoSProfile:
+    """Real time: the controller's odometry."""
+    return _qos(ReliabilityPolicy.BEST_EFFORT, 10)
+
+
+def newest_command() -> QoSProfile:
+    """Real time: the plant's wrench."""
+    return _qos(ReliabilityPolicy.RELIABLE, 1)

@@ -1,0 +1,100 @@
+"""Algebra of 6-vectors as tuples, in the order surge, sway, heave, roll, pitch, yaw.
+
+Tuples keep the kernel in registers when it is compiled and readable when it is not. A 6x6 matrix
+is a flat row-major array (36,); a triangular one is stored in full and used by its own functions.
+"""
+
+from auv_dynamics.jit import helper
+
+
+@helper
+def vector(array, start):
+    """Six numbers of a 1-D array from index `start`."""
+    return (
+        array[start],
+        array[start + 1],
+        array[start + 2],
+        array[start + 3],
+        array[start + 4],
+        array[start + 5],
+    )
+
+
+@helper
+def fill_vector(array, start, a):
+    """Write a 6-vector into a 1-D array from index `start`."""
+    array[start] = a[0]
+    array[start + 1] = a[1]
+    array[start + 2] = a[2]
+    array[start + 3] = a[3]
+    array[start + 4] = a[4]
+    array[start + 5] = a[5]
+
+
+@helper
+def add(a, b):
+    """A + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
+
+
+@helper
+def sub(a, b):
+    """A - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3], a[4] - b[4], a[5] - b[5])
+
+
+@helper
+def diag(N, a):
+    """N a with the diagonal N (6,)."""
+    return (N[0] * a[0], N[1] * a[1], N[2] * a[2], N[3] * a[3], N[4] * a[4], N[5] * a[5])
+
+
+@helper
+def _row(A, i, a):
+    return (
+        A[i] * a[0]
+        + A[i + 1] * a[1]
+        + A[i + 2] * a[2]
+        + A[i + 3] * a[3]
+        + A[i + 4] * a[4]
+        + A[i + 5] * a[5]
+    )
+
+
+@helper
+def mul(A, a):
+    """A a with the full matrix A (36,)."""
+    return (
+        _row(A, 0, a),
+        _row(A, 6, a),
+        _row(A, 12, a),
+        _row(A, 18, a),
+        _row(A, 24, a),
+        _row(A, 30, a),
+    )
+
+
+@helper
+def upper(U, a):
+    """U a with U (36,) upper triangular of unit diagonal."""
+    return (
+        a[0] + U[1] * a[1] + U[2] * a[2] + U[3] * a[3] + U[4] * a[4] + U[5] * a[5],
+        a[1] + U[8] * a[2] + U[9] * a[3] + U[10] * a[4] + U[11] * a[5],
+        a[2] + U[15] * a[3] + U[16] * a[4] + U[17] * a[5],
+        a[3] + U[22] * a[4] + U[23] * a[5],
+        a[4] + U[29] * a[5],
+        a[5],
+    )
+
+
+@helper
+def upper_T(U, a):
+    """U^T a with U (36,) upper triangular of unit diagonal."""
+    return (
+        a[0],
+        U[1] * a[0] + a[1],
+        U[2] * a[0] + U[8] * a[1] + a[2],
+        U[3] * a[0] + U[9] * a[1] + U[15] * a[2] + a[3],
+        U[4] * a[0] + U[10] * a[1] + U[16] * a[2] + U[22] * a[3] + a[4],
+        U[5] * a[0] + U[11] * a[1] + U[17] * a[2] + U[23] * a[3] + U[29] * a[4] + a[5],
+    )

@@ -1,0 +1,138 @@
+"""A vehicle's coefficients and the dynamics (1) as matrices, for people and for the kernel."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from auv_dynamics.jit import plain
+from auv_dynamics.kinematics import quaternion
+from auv_dynamics.model import Model, acceleration, coriolis, damping, restoring
+
+
+def skew(a: np.ndarray) -> np.ndarray:
+    """S(a) with S(a) b = a x b: (3,) to (3, 3)."""
+    x, y, z = a
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def rigid_body_matrix(
+    mass: float, r_G: np.ndarray, inertia: np.ndarray, reference: str
+) -> np.ndarray:
+    """M_RB about the body origin, Fossen 1994.
+
+    Parameters
+    ----------
+    mass : kg
+    r_G : (3,) centre of gravity from the body origin, m
+    inertia : (3, 3) tensor, kg m2
+    reference : 'cg' or 'co', the point about which the tensor is given
+
+    Returns
+    -------
+    M_RB : (6, 6) symmetric
+
+    """
+    S = skew(r_G)
+    about_origin = inertia - mass * S @ S if reference == 'cg' else inertia
+    return np.block([[mass * np.eye(3), -mass * S], [mass * S, about_origin]])
+
+
+@dataclass(frozen=True, eq=False)
+class Vehicle:
+    """What is known of a vehicle, body frame forward-starboard-down, SI units.
+
+    Attributes
+    ----------
+    name, source : from the file
+    M : (6, 6) inertia with added mass, symmetric positive definite
+    D_linear, D_quadratic : (6, 6) positive damping; column j of D_quadratic multiplies abs(nu_j)
+    weight, buoyancy : N
+    r_G, r_B : (3,) centres of gravity and buoyancy, m
+    M_RB, M_A : (6, 6) rigid-body and added part of M, None where a file gives M itself
+    warnings : what the loader found odd, one line each
+
+    """
+
+    name: str
+    source: str
+    M: np.ndarray
+    D_linear: np.ndarray
+    D_quadratic: np.ndarray
+    weight: float
+    buoyancy: float
+    r_G: np.ndarray
+    r_B: np.ndarray
+    M_RB: np.ndarray | None = None
+    M_A: np.ndarray | None = None
+    warnings: tuple[str, ...] = field(default=())
+
+    @cached_property
+    def model(self) -> Model:
+        """The coefficients as the kernel takes them."""
+        couple = self.weight * self.r_G - self.buoyancy * self.r_B
+        return Model(
+            M=np.ascontiguousarray(self.M).ravel().copy(),
+            M_inv=np.linalg.inv(self.M).ravel(),
+            D_linear=np.ascontiguousarray(self.D_linear).ravel().copy(),
+            D_quadratic=np.ascontiguousarray(self.D_quadratic).ravel().copy(),
+            hydrostatics=np.array([self.weight - self.buoyancy, *couple]),
+        )
+
+    def C(self, nu: np.ndarray) -> np.ndarray:
+        """C(nu) of (1), skew-symmetric: (6,) in m/s, rad/s to (6, 6)."""
+        return _columns(lambda x: plain(coriolis)(self.model.M, tuple(nu), x))
+
+    def D(self, nu: np.ndarray) -> np.ndarray:
+        """D(nu) of (1), positive: (6,) in m/s, rad/s to (6, 6)."""
+        return _columns(lambda x: plain(damping)(self.model, tuple(nu), x))
+
+    def g(self, eta: np.ndarray) -> np.ndarray:
+        """g(eta) of (1): (6,) in m (NED) and rad to (6,) in N, N m, body frame."""
+        return np.array(plain(restoring)(self.model, tuple(quaternion(np.asarray(eta)[3:]))))
+
+    def forward_dynamics(
+        self, eta: np.ndarray, nu: np.ndarray, tau: np.ndarray, F: np.ndarray | None = None
+    ) -> np.ndarray:
+        """nu_dot of equation (1).
+
+        Parameters
+        ----------
+        eta : (6,) position in m (NED) and Euler angles in rad
+        nu : (6,) body velocity, m/s and rad/s
+        tau : (6,) wrench, N and N m, body frame
+        F : (6,) lumped uncertainty, N and N m; it opposes tau; none: zero
+
+        Returns
+        -------
+        nu_dot : (6,) m/s2 and rad/s2, body frame
+
+        """
+        attitude = tuple(quaternion(np.asarray(eta)[3:]))
+        F = np.zeros(6) if F is None else F
+        return np.array(plain(acceleration)(self.model, attitude, tuple(nu), tuple(tau), tuple(F)))
+
+    def inverse_dynamics(
+        self, eta: np.ndarray, nu: np.ndarray, nu_dot: np.ndarray, F: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Tau = M nu_dot + C(nu) nu + D(nu) nu + g(eta) + F, equation (1).
+
+        Parameters
+        ----------
+        eta : (6,) position in m (NED) and Euler angles in rad
+        nu : (6,) body velocity, m/s and rad/s
+        nu_dot : (6,) body acceleration, m/s2 and rad/s2
+        F : (6,) lumped uncertainty, N and N m; none: zero
+
+        Returns
+        -------
+        tau : (6,) N and N m, body frame
+
+        """
+        nu = np.asarray(nu, float)
+        tau = self.M @ nu_dot + self.C(nu) @ nu + self.D(nu) @ nu + self.g(eta)
+        return tau if F is None else tau + F
+
+
+def _columns(product) -> np.ndarray:
+    return np.array([product(tuple(unit)) for unit in np.eye(6)]).T

@@ -1,0 +1,131 @@
+"""The controller's ROS parameters, and the controller that they describe."""
+
+import math
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from auv_dynamics import load_vehicle
+from auv_dynamics.files import InputError
+from auv_dynamics.ros.parameters import declare, given
+from auv_gvc_controller.controller import VelocityController
+from auv_gvc_controller.laws import law_class, make_gains
+from auv_gvc_controller.model import control_model
+from auv_gvc_controller.odometry_guard import OdometryGuard
+from auv_gvc_controller.pairing import DIFFERENCE, SAME, Pairing
+
+GAINS = ('k_D', 'k_I', 'Lambda', 'Gamma')
+WRITABLE = 'gains.'
+
+
+class ControllerParameters:
+    """Declares the parameters at construction, builds a controller from them on demand."""
+
+    def __init__(self, node: Node):
+        self._node = node
+        declare(node, 'law', str, '', 'gvc, cl or module:Class of your own', writable=True)
+        names = {*(f'{WRITABLE}{gain}' for gain in GAINS), *given(node, WRITABLE)}
+        for name in sorted(names):
+            text = '1 number (times identity), 6 (diagonal) or 36 (row-major)'
+            declare(node, name, list[float], None, text, writable=True)
+        self._vehicle = declare(node, 'vehicle', str, '', 'vehicle file, or shipped bare name')
+        self.lockstep = declare(node, 'lockstep', bool, False, 'answer every odometry, in its time')
+        self.exact = (
+            declare(
+                node,
+                'setpoint_pairing',
+                str,
+                'latest',
+                'which set-point',
+                one_of=('exact', 'latest'),
+            )
+            == 'exact'
+        )
+        self.acceleration = declare(
+            node, 'setpoint_acceleration', str, DIFFERENCE, 'where nu_d_dot comes from',
+            one_of=(SAME, DIFFERENCE),
+        )  # fmt: skip
+        self.odometry_timeout = self._time('odometry_timeout', 0.5, 'silence: zero wrench')
+        self._setpoint_timeout = self._time('setpoint_timeout', 0.5, 'older: zero wrench')
+        self._gap = self._time('limits.gap', 1.0, 'longest step of time that is integrated')
+        self._speed = declare(node, 'limits.speed', float, 50.0, 'm/s that is believed', at_least=0)
+        self._rate = declare(node, 'limits.rate', float, 50.0, 'rad/s that is believed', at_least=0)
+        limit = declare(
+            node, 'limits.wrench', list[float], None, '1 or 6 numbers, N, N m; none: off'
+        )
+        self._wrench_limit = self._limit(limit or [])
+        self.pairing = Pairing(self.exact, self.acceleration)
+        self.autostart = declare(node, 'autostart', bool, True, 'configure and activate at once')
+
+    def _time(self, name: str, default: float, text: str) -> float:
+        return declare(self._node, name, float, default, f's, {text}', at_least=0.0)
+
+    def _limit(self, values: list[float]) -> tuple:
+        values = values * 6 if len(values) == 1 else values
+        if len(values) not in (0, 6) or not all(v > 0 and math.isfinite(v) for v in values):
+            name = self._node.get_name()
+            raise InputError(name, 'limits.wrench', '1 or 6 positive numbers', values)
+        return tuple(values)
+
+    def build(self) -> VelocityController:
+        """Controller of the present values; InputError when law, vehicle or a gain is missing."""
+        node = self._node
+        name = node.get_name()
+        law = node.get_parameter('law').value
+        if not law:
+            raise InputError(name, 'law', 'gvc, cl or module:Class', None)
+        if not self._vehicle:
+            raise InputError(name, 'vehicle', 'a vehicle file', None)
+        try:
+            gains = make_gains(law, self._gains(law))
+        except ValueError as error:
+            key, separator, rest = str(error).partition(': expected ')
+            if not separator:
+                key, rest = 'law', str(error).removeprefix('expected ')
+            else:
+                key = f'{WRITABLE}{key}'
+            expected, _, found = rest.partition(', found ')
+            raise InputError(name, key, expected, found) from None
+        self.pairing.reset()
+        return VelocityController(
+            gains,
+            control_model(load_vehicle(self._vehicle)),
+            self.pairing,
+            OdometryGuard(round(self._gap * 1e9), self._speed, self._rate, self.lockstep),
+            lockstep=self.lockstep,
+            exact=self.exact,
+            setpoint_timeout_ns=round(self._setpoint_timeout * 1e9),
+            wrench_limit=self._wrench_limit,
+        )
+
+    def _gains(self, law: str) -> dict[str, Any]:
+        values = {}
+        given_here = (name.removeprefix(WRITABLE) for name in given(self._node, WRITABLE))
+        for gain in {*law_class(law)._fields, *given_here}:
+            parameter = self._node.get_parameter_or(f'{WRITABLE}{gain}', None)
+            if parameter is not None and parameter.type_ != Parameter.Type.NOT_SET:
+                values[gain] = list(parameter.value)
+        return values
+
+    def refuse_while(self, active: bool, parameters: list[Parameter]) -> SetParametersResult:
+        """Answer a change of parameters: laws and gains are taken while inactive only."""
+        for parameter in parameters:
+            if parameter.name != 'law' and not parameter.name.startswith(WRITABLE):
+                continue
+            if active:
+                reason = f'{parameter.name}: expected an inactive controller, found an active one'
+                return SetParametersResult(successful=False, reason=reason)
+            try:
+                if parameter.name == 'law':
+                    law_class(parameter.value)
+                elif len(parameter.value) not in (1, 6, 36) or not all(
+                    map(math.isfinite, parameter.value)
+                ):
+                    found = f'{len(parameter.value)} numbers'
+                    raise ValueError(f'expected 1, 6 or 36 finite numbers, found {found}')
+            except (ValueError, TypeError) as error:
+                reason = f'{parameter.name}: {error}'
+                return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)

@@ -1,0 +1,47 @@
+"""The decomposition of the inertia matrix into generalised velocity components, (4) and (9)."""
+
+import numpy as np
+
+
+def decompose(M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Upsilon and N of M = Upsilon^-T N Upsilon^-1, with nu = Upsilon xi.
+
+    M = L N L^T with L unit lower triangular, and Upsilon = L^-T: the direction is from xi to nu.
+
+    Parameters
+    ----------
+    M : (6, 6) inertia with added mass, symmetric positive definite
+
+    Returns
+    -------
+    Upsilon : (6, 6) upper triangular, unit diagonal
+    N : (6,) diagonal of N, positive; kg and kg m2
+
+    Raises
+    ------
+    ValueError : M is not a symmetric positive definite (6, 6) matrix
+
+    Equations (4), (9); the scaling by a unit diagonal is the one that gives (38).
+
+    """
+    M = np.asarray(M, float)
+    if M.shape != (6, 6) or not np.all(np.isfinite(M)):
+        raise ValueError(f'expected a finite (6, 6) matrix M, found shape {M.shape}')
+    if np.abs(M - M.T).max() > 1e-9 * np.abs(M).max():
+        raise ValueError('expected a symmetric M, found M[i][j] != M[j][i]')
+    try:
+        lower = np.linalg.cholesky(M)
+    except np.linalg.LinAlgError:
+        smallest = np.linalg.eigvalsh(M)[0]
+        text = f'expected a positive definite M, found smallest eigenvalue {smallest:.4g}'
+        raise ValueError(text) from None
+    scale = np.diagonal(lower)
+    return inverse_upper((lower / scale).T), scale**2
+
+
+def inverse_upper(U: np.ndarray) -> np.ndarray:
+    """Inverse of an upper triangular (6, 6) matrix of unit diagonal, exactly of that form."""
+    inverse = np.eye(len(U))
+    for i in reversed(range(len(U) - 1)):
+        inverse[i, i + 1 :] = -U[i, i + 1 :] @ inverse[i + 1 :, i + 1 :]
+    return inverse

@@ -1,0 +1,88 @@
+"""The control laws by name. A law is a named tuple of gains with two pure static functions."""
+
+import importlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from auv_dynamics.files import matrix6
+from auv_gvc_controller.laws.cl import CL
+from auv_gvc_controller.laws.gvc import GVC
+
+SHIPPED: dict[str, Any] = {'gvc': GVC, 'cl': CL}
+
+
+def law_class(name: str) -> Any:
+    """Class of a law.
+
+    Parameters
+    ----------
+    name : 'gvc', 'cl' or 'module:Class' of a user's own law
+
+    Returns
+    -------
+    law : named tuple with `wrench`, `state_rate` and `STATES`
+
+    Raises
+    ------
+    ValueError : no such law; the text says what was expected and found
+
+    """
+    if name in SHIPPED:
+        return SHIPPED[name]
+    expected = f'{", ".join(SHIPPED)} or module:Class'
+    module, colon, attribute = name.partition(':')
+    if not (colon and module and attribute):
+        raise ValueError(f'expected {expected}, found {name!r}')
+    try:
+        law = getattr(importlib.import_module(module), attribute)
+    except ImportError as error:
+        raise ValueError(f'expected {expected}, found {name!r} ({error})') from None
+    except AttributeError:
+        raise ValueError(f'expected {expected}, found no {attribute} in {module}') from None
+    missing = [
+        part for part in ('wrench', 'state_rate', 'STATES', '_fields') if not hasattr(law, part)
+    ]
+    if missing:
+        text = 'a named tuple of gains with wrench, state_rate and STATES'
+        raise ValueError(f'expected {text}, found {name!r} without {", ".join(missing)}')
+    return law
+
+
+def make_gains(name: str, values: Mapping[str, Any]) -> Any:
+    """Gains of a law as the kernel takes them.
+
+    Parameters
+    ----------
+    name : of the law
+    values : for each gain 1 number (times identity), 6 (diagonal), 36 or 6x6
+
+    Returns
+    -------
+    gains : the law's named tuple of (36,) arrays
+
+    Raises
+    ------
+    ValueError : unknown law, missing or unknown gain, wrong shape, not finite
+
+    """
+    law = law_class(name)
+    for key in law._fields:
+        if key not in values:
+            raise ValueError(f'{key}: expected a number, 6 numbers or a 6x6 matrix, found nothing')
+    unknown = [key for key in values if key not in law._fields]
+    if unknown:
+        raise ValueError(
+            f'{unknown[0]}: expected one of {", ".join(law._fields)}, found an unknown gain'
+        )
+    flat = {}
+    for key in law._fields:
+        try:
+            matrix = matrix6(values[key])
+        except (ValueError, TypeError) as error:
+            raise ValueError(f'{key}: {error}') from None
+        if not np.all(np.isfinite(matrix)):
+            raise ValueError(f'{key}: expected finite numbers, found {values[key]}')
+        flat[key] = matrix.ravel()
+    return law(**flat)

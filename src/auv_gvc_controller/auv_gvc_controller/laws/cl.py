@@ -1,0 +1,45 @@
+"""The classical law CL, equation (29): the same law without N and Upsilon in the gains."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from auv_dynamics.model import coriolis, damping, restoring
+from auv_dynamics.six import add, mul, sub, vector
+
+
+class CL(NamedTuple):
+    """Gains, each (36,) row-major: k_D in N s/m, k_I in N/m, Lambda in 1/s, Gamma in N/m."""
+
+    k_D: np.ndarray
+    k_I: np.ndarray
+    Lambda: np.ndarray
+    Gamma: np.ndarray
+
+    STATES = 12  # type: ignore[misc]  # no gain, but a constant of the law: z, then the integral of s
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        """(tau, f): the wrench and its adaptive part, N and N m, body frame."""
+        M = model.dynamics.M
+        z, S = vector(state, 0), vector(state, 6)
+        nu_err = sub(nu_d, nu)
+        nu_r = add(nu_d, mul(gains.Lambda, z))
+        nu_r_dot = add(nu_d_dot, mul(gains.Lambda, nu_err))
+        s = sub(nu_r, nu)
+        f = mul(gains.Gamma, S)
+
+        tau = add(  # (29)
+            add(
+                add(mul(M, nu_r_dot), coriolis(M, nu, nu_r)),
+                add(damping(model.dynamics, nu, nu_r), restoring(model.dynamics, attitude)),
+            ),
+            add(add(mul(gains.k_D, s), mul(gains.k_I, z)), f),
+        )
+        return tau, f
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        """Twelve rates: z_dot = nu_err, then s = nu_err + Lambda z, which f integrates."""
+        nu_err = sub(nu_d, nu)
+        return nu_err + add(nu_err, mul(gains.Lambda, vector(state, 0)))

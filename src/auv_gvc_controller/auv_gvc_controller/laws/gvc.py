@@ -1,0 +1,68 @@
+"""The GVC law, equations (16) to (21): velocity tracking in generalised velocity components."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from auv_dynamics.model import coriolis, damping, restoring
+from auv_dynamics.six import add, diag, mul, sub, upper, upper_T, vector
+
+
+class GVC(NamedTuple):
+    """Gains, each (36,) row-major: k_D in 1/s, k_I in N/m, Lambda in 1/s, Gamma in 1/s2."""
+
+    k_D: np.ndarray
+    k_I: np.ndarray
+    Lambda: np.ndarray
+    Gamma: np.ndarray
+
+    STATES = 12  # type: ignore[misc]  # no gain, but a constant of the law: z, then the integral of s_xi
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        """(tau, f): the wrench and its adaptive part, N and N m, body frame.
+
+        nu = Upsilon xi; U is Upsilon. The terms of (16) stand in its order, those that share a
+        factor U^T added before it is applied.
+        """
+        M, U, U_inv, N = model.dynamics.M, model.Upsilon, model.Upsilon_inv, model.N
+        z, S = vector(state, 0), vector(state, 6)
+        nu_err = sub(nu_d, nu)  # (17)
+
+        nu_r = add(nu_d, mul(gains.Lambda, z))
+        xi_r = upper(U_inv, nu_r)  # (18)
+        s_xi = sub(xi_r, upper(U_inv, nu))  # (19)
+        xi_r_dot = upper(U_inv, add(nu_d_dot, mul(gains.Lambda, nu_err)))  # (20)
+        f_xi = diag(N, mul(gains.Gamma, S))  # (21), integrated
+
+        pi = add(  # (16)
+            add(
+                diag(N, xi_r_dot),  # N xi_r_dot
+                upper_T(
+                    U,
+                    add(
+                        add(
+                            coriolis(M, nu, nu_r),  # C_xi xi_r = U^T C(nu) nu_r, (10)
+                            damping(model.dynamics, nu, nu_r),  # D_xi xi_r = U^T D(nu) nu_r, (11)
+                        ),
+                        add(
+                            restoring(model.dynamics, attitude),  # g_xi = U^T g, (12)
+                            mul(gains.k_I, z),  # U^T k_I z
+                        ),
+                    ),
+                ),
+            ),
+            add(
+                diag(N, mul(gains.k_D, s_xi)),  # N k_D s_xi
+                f_xi,
+            ),
+        )
+        return upper_T(U_inv, pi), upper_T(U_inv, f_xi)  # (14)
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        """Twelve rates: z_dot = nu_err (17), then s_xi (19), which (21) integrates."""
+        nu_err = sub(nu_d, nu)
+        z = vector(state, 0)
+        s_xi = upper(model.Upsilon_inv, add(nu_err, mul(gains.Lambda, z)))
+        return nu_err + s_xi

@@ -1,0 +1,90 @@
+"""Which set-point belongs to an odometry: the very same stamp, or the newest one before it."""
+
+from collections import OrderedDict
+from typing import NamedTuple
+
+SAME = 'topic'
+DIFFERENCE = 'difference'
+CAPACITY = 4096  # set-points kept; more than any horizon that is accepted
+
+
+class Reference(NamedTuple):
+    """A set-point: stamp in ns, nu_d and nu_d_dot as six floats each."""
+
+    ns: int
+    nu_d: tuple
+    nu_d_dot: tuple
+
+
+class Pairing:
+    """Buffers set-points and their derivatives by stamp.
+
+    Parameters
+    ----------
+    exact : take the set-point of the odometry's own stamp; else the newest at or before it
+    acceleration : 'topic' waits for the derivative of the same stamp, 'difference' takes the
+        backward difference of the set-points, zero at the first
+
+    """
+
+    def __init__(self, exact: bool, acceleration: str):
+        self._exact, self._acceleration = exact, acceleration
+        self._nu_d: OrderedDict[int, tuple] = OrderedDict()
+        self._nu_d_dot: OrderedDict[int, tuple] = OrderedDict()
+        self._used: Reference | None = None
+
+    def reset(self) -> None:
+        """Forget which set-point was used last, as at activation; the buffers stay."""
+        self._used = None
+
+    def setpoint(self, ns: int, nu_d: tuple) -> None:
+        """Keep a set-point; ValueError when its stamp is not newer than the one in use."""
+        self._keep(self._nu_d, ns, nu_d)
+
+    def derivative(self, ns: int, nu_d_dot: tuple) -> None:
+        """Keep a derivative; ValueError when its stamp is not newer than the one in use."""
+        self._keep(self._nu_d_dot, ns, nu_d_dot)
+
+    def _keep(self, buffer: OrderedDict[int, tuple], ns: int, values: tuple) -> None:
+        if self._used is not None and ns <= self._used.ns:
+            raise ValueError(f'stamp: expected later than {self._used.ns} ns, found {ns} ns')
+        buffer[ns] = values
+        if len(buffer) > CAPACITY:
+            buffer.popitem(last=False)
+
+    def find(self, ns: int) -> Reference | None:
+        """Set-point for an odometry stamped `ns`, or None while there is none."""
+        chosen = self._choose(ns)
+        if chosen is None:
+            return None
+        if self._used is not None and chosen == self._used.ns:
+            return self._used
+        if self._acceleration == SAME:
+            nu_d_dot = self._nu_d_dot[chosen]
+        else:
+            nu_d_dot = self._difference(chosen)
+        self._used = Reference(chosen, self._nu_d[chosen], nu_d_dot)
+        for buffer in (self._nu_d, self._nu_d_dot):
+            while buffer and next(iter(buffer)) <= chosen:
+                buffer.popitem(last=False)
+        return self._used
+
+    def _complete(self, ns: int) -> bool:
+        return ns in self._nu_d and (self._acceleration != SAME or ns in self._nu_d_dot)
+
+    def _choose(self, ns: int) -> int | None:
+        if self._exact:
+            used = self._used is not None and self._used.ns == ns
+            return ns if used or self._complete(ns) else None
+        earlier = [stamp for stamp in self._nu_d if stamp <= ns and self._complete(stamp)]
+        return max(earlier, default=self._used.ns if self._used else None)
+
+    def _difference(self, chosen: int) -> tuple:
+        before = [(stamp, self._nu_d[stamp]) for stamp in self._nu_d if stamp < chosen]
+        if self._used is not None:
+            before.append((self._used.ns, self._used.nu_d))
+        if not before:
+            return (0.0,) * 6
+        ns, last = max(before)
+        dt = (chosen - ns) / 1e9
+        return tuple((new - old) / dt for new, old in zip(self._nu_d[chosen], last, strict=True))

@@ -1,0 +1,95 @@
+"""A law between samples: zero-order hold, as the nodes and `simulate(hold='zoh')` run it."""
+
+from typing import Any
+
+import numpy as np
+
+from auv_dynamics.jit import JITTED, compiled, plain, specialised
+from auv_gvc_controller.laws import SHIPPED
+from auv_gvc_controller.model import ControlModel
+
+
+@specialised('gains')
+def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    """(tau, f) of the law to which `gains` belongs."""
+    return type(gains).wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+
+
+@specialised('gains')
+def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    """Rate of the state of the law to which `gains` belongs."""
+    return type(gains).state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+
+
+@compiled
+def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model):
+    """Take one sample: state += dt * rate of the last sample, in place, then (tau, f).
+
+    `rate` receives the rate at this sample; dt = 0 at the first one.
+    """
+    for i in range(state.shape[0]):
+        state[i] += dt * rate[i]
+    tau, f = wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+    change = state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+    for i in range(state.shape[0]):
+        rate[i] = change[i]
+    return tau, f
+
+
+def is_compiled(gains: Any) -> bool:
+    """Whether the kernel runs compiled for this law: a user's own law runs as plain Python."""
+    return JITTED and type(gains) in SHIPPED.values()
+
+
+class SampledLaw:
+    """A law with its state, one sample at a time.
+
+    Parameters
+    ----------
+    gains : named tuple of the law's gains, which also names the law
+    model : what the law knows of the vehicle
+
+    """
+
+    def __init__(self, gains: Any, model: ControlModel):
+        self._gains, self._model = gains, model
+        self._sample = fill_sample if is_compiled(gains) else plain(fill_sample)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the integrals."""
+        self._state = np.zeros(type(self._gains).STATES)
+        self._rate = np.zeros_like(self._state)
+
+    def forget_rate(self) -> None:
+        """Integrate nothing over the time since the last sample: the law was not in charge."""
+        self._rate[:] = 0.0
+
+    def sample(
+        self, t: float, dt: float, nu: tuple, attitude: tuple, nu_d: tuple, nu_d_dot: tuple
+    ) -> tuple[tuple, tuple]:
+        """One sample.
+
+        Parameters
+        ----------
+        t : s since the first odometry after activation
+        dt : s since the last sample, 0 at the first
+        nu, nu_d, nu_d_dot : six floats, m/s and rad/s (m/s2 and rad/s2), body frame
+        attitude : unit quaternion w, x, y, z, body to NED
+
+        Returns
+        -------
+        tau, f : six floats each, N and N m, body frame
+
+        A sample that is not finite leaves the state as it was and raises ArithmeticError.
+
+        """
+        state, rate = self._state.copy(), self._rate.copy()
+        tau, f = self._sample(
+            t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, self._gains, self._model
+        )
+        tau, f = tuple(map(float, tau)), tuple(map(float, f))
+        if not np.all(np.isfinite([*tau, *f, *state, *rate])):
+            raise ArithmeticError(f'the law gave a wrench that is not finite: {tau}')
+        self._state, self._rate = state, rate
+        return tau, f

@@ -1,0 +1,117 @@
+"""Velocity set-points nu_d and their derivative: offset plus sinusoids, or a CSV file."""
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from auv_dynamics.files import InputError, read_text
+from auv_dynamics.signals import DOFS, Harmonics
+
+COLUMNS = ('t', *DOFS)
+ROUNDING = 1e-10  # s
+
+
+class Setpoint(Protocol):
+    """A set-point as a function of time."""
+
+    def value(self, t: np.ndarray | float) -> np.ndarray:
+        """nu_d at t (...,) s: (..., 6) in m/s and rad/s, body frame."""
+
+    def derivative(self, t: np.ndarray | float) -> np.ndarray:
+        """nu_d_dot at t (...,) s: (..., 6) in m/s2 and rad/s2."""
+
+
+class Table:
+    """Set-points of a CSV file, linear between rows.
+
+    Parameters
+    ----------
+    t : (m,) s, increasing
+    nu_d : (m, 6) m/s and rad/s
+
+    """
+
+    def __init__(self, t: np.ndarray, nu_d: np.ndarray):
+        self._t, self._nu_d = t, nu_d
+        self._slope = np.diff(nu_d, axis=0) / np.diff(t)[:, None]
+
+    def _segment(self, t: np.ndarray | float) -> np.ndarray:
+        # the segment that begins at or before t; a hair of rounding does not choose another one
+        k = np.searchsorted(self._t, np.asarray(t, float) + ROUNDING, side='right') - 1
+        return np.clip(k, 0, len(self._slope) - 1)
+
+    def value(self, t: np.ndarray | float) -> np.ndarray:
+        """nu_d at t."""
+        t = np.minimum(t, self._t[-1])  # past the end the last value is held
+        k = self._segment(t)
+        return self._nu_d[k] + self._slope[k] * (t - self._t[k])[..., None]
+
+    def derivative(self, t: np.ndarray | float) -> np.ndarray:
+        """Slope of the segment that begins at t."""
+        held = np.asarray(t, float) > self._t[-1] + ROUNDING
+        return np.where(held[..., None], 0.0, self._slope[self._segment(t)])
+
+
+def load_table(path: Path, duration: float) -> Table:
+    """Set-points of a CSV file with the columns t, surge, sway, heave, roll, pitch, yaw.
+
+    Parameters
+    ----------
+    path : CSV file, first line the column names
+    duration : s that the file must cover from 0
+
+    Returns
+    -------
+    table : linear between rows, its derivative the slope of the segment that begins at t
+
+    Raises
+    ------
+    InputError : naming file, line, expected and found
+
+    """
+    rows = [row for row in csv.reader(read_text(path, 'CSV set-point').splitlines()) if row]
+    header = tuple(name.strip() for name in rows[0]) if rows else ()
+    if header != COLUMNS:
+        raise InputError(
+            path, 'line 1', f'the columns {",".join(COLUMNS)}', ','.join(header) or None
+        )
+    values = np.array([_numbers(path, i, row) for i, row in enumerate(rows[1:], start=2)])
+    if len(values) < 2:
+        raise InputError(path, 't', 'at least two rows', f'{len(values)}')
+    t = values[:, 0]
+    backward = np.flatnonzero(np.diff(t) <= 0)
+    if len(backward):
+        line = int(backward[0]) + 3
+        raise InputError(
+            path, f'line {line}', 'a time later than the line before', f'{t[line - 2]:g}'
+        )
+    if t[0] > 0 or t[-1] < duration - 1e-9:
+        raise InputError(path, 't', f'0 to {duration:g} s covered', f'{t[0]:g} to {t[-1]:g} s')
+    return Table(t, values[:, 1:])
+
+
+def _numbers(path: Path, line: int, row: list[str]) -> list[float]:
+    try:
+        numbers = [float(cell) for cell in row]
+    except ValueError:
+        numbers = [np.nan]
+    if len(numbers) != len(COLUMNS) or not np.all(np.isfinite(numbers)):
+        raise InputError(path, f'line {line}', f'{len(COLUMNS)} finite numbers', ','.join(row))
+    return numbers
+
+
+def make_setpoint(spec: Mapping[str, Any], duration: float) -> Setpoint:
+    """Set-point of a checked scenario entry: `file`, or a mapping of degrees of freedom.
+
+    Parameters
+    ----------
+    spec : {file: path} or {surge: {offset, terms}, ...}
+    duration : s that a file must cover
+
+    """
+    if 'file' in spec:
+        return load_table(Path(spec['file']), duration)
+    return Harmonics.from_spec(spec)

@@ -1,0 +1,97 @@
+"""Set-points as a node: `cmd_vel` and `cmd_accel`, published ahead of the odometry."""
+
+from pathlib import Path
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+
+from auv_dynamics import interface
+from auv_dynamics.files import InputError
+from auv_dynamics.plant_parameters import harmonic_parameters
+from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.graph import Graph, steady_timer
+from auv_dynamics.ros.life import main_of
+from auv_dynamics.ros.parameters import declare, given, refuse_unknown
+from auv_dynamics.signals import DOFS
+from auv_gvc_controller.setpoint import Setpoint, make_setpoint
+
+BLOCK = 256  # set-points that are evaluated at once
+
+
+class SetpointNode(BulkNode):
+    """Publishes nu_d and nu_d_dot for every step up to `horizon` steps ahead."""
+
+    def __init__(self) -> None:
+        super().__init__('setpoint_node')
+        self.graph = Graph(self)
+        step = declare(self, 'step', float, 0.01, 'time between set-points, s', at_least=1e-9)
+        duration = declare(self, 'duration', float, 0.0, 's, 0: no end', at_least=0.0)
+        self._horizon = declare(
+            self, 'horizon', int, 200, 'steps ahead of odom', at_least=0, at_most=topics.DEPTH - 1
+        )
+        self._step_ns = round(step * interface.NANOSECONDS)
+        self._last = round(duration / step) if duration else None
+        self._setpoint = self._declare_setpoint(duration)
+        refuse_unknown(self)
+        self._velocity = self.graph.publisher(topics.CMD_VEL)
+        self._acceleration = self.graph.publisher(topics.CMD_ACCEL)
+        self.graph.subscribe(topics.ODOM, self._on_odometry, topics.one_at_a_time(), raw=True)
+        self._origin: int | None = None
+        self._newest = -1
+        self._next = 0
+        self._first, self._rows = 0, np.zeros((0, 12))
+        steady_timer(self, 0.02, self._publish)
+
+    def _declare_setpoint(self, duration: float) -> Setpoint:
+        file = declare(self, 'setpoint.file', str, '', 'CSV file with t, surge, ..., yaw')
+        spec = harmonic_parameters(self, 'setpoint.', 'm/s, rad/s')
+        if file:
+            both = [dof for dof in DOFS if given(self, f'setpoint.{dof}.')]
+            if both:
+                raise InputError(
+                    self.get_name(), f'setpoint.{both[0]}', 'setpoint.file alone', 'both'
+                )
+            return make_setpoint({'file': Path(file)}, duration)
+        return make_setpoint(spec, duration)
+
+    def _on_odometry(self, data: bytes) -> None:
+        message = deserialize_message(data, topics.ODOM.type)
+        try:
+            ns, _ = interface.read_odometry(message, self.graph.frames)
+        except interface.BadMessageError as error:
+            self.graph.refuse(str(error))
+            return
+        if self._origin is None:
+            self._origin = ns
+        self._newest = max(self._newest, (ns - self._origin) // self._step_ns)
+        self._publish()
+
+    def _publish(self) -> None:
+        if self._origin is None or not self.graph.ready():
+            return
+        until = self._newest + self._horizon
+        until = until if self._last is None else min(until, self._last)
+        # after a jump of the odometry's clock what lies behind it is of no use to anybody
+        if self._last is None:
+            self._next = max(self._next, self._newest - self._horizon)
+        while self._next <= until:
+            row = self._row(self._next)
+            ns = self._origin + self._next * self._step_ns
+            self._velocity.publish(convert.twist(ns, row[:6], self.graph.frames))
+            self._acceleration.publish(convert.accel(ns, row[6:], self.graph.frames))
+            self.graph.latest_ns = ns
+            self._next += 1
+
+    def _row(self, k: int) -> np.ndarray:
+        if not self._first <= k < self._first + len(self._rows):
+            self._first = k
+            t = np.arange(k, k + BLOCK) * (self._step_ns / interface.NANOSECONDS)
+            values, slopes = self._setpoint.value(t), self._setpoint.derivative(t)
+            self._rows = np.concatenate([values, slopes], axis=1)
+        return self._rows[k - self._first]
+
+
+def main() -> None:
+    """Run the node."""
+    main_of(SetpointNode)

@@ -14,7 +14,7 @@ setup(
     maintainer='auv_gvc developers',
     maintainer_email='auv-gvc@users.noreply.github.com',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['*.json', '*.j2']},
+    package_data={NAME: ['*.json', 'report/*.j2']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -37,7 +37,7 @@ setup(
         'psutil>=5.9',
         'rich>=13',
     ],
-    extras_require={'test': ['pytest']},
+    extras_require={'test': ['pytest', 'pillow']},
     zip_safe=False,
     entry_points={
         'console_scripts': [

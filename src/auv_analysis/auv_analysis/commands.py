@@ -27,7 +27,6 @@ from auv_analysis.domain import VARIABLE, chosen_domain
 from auv_analysis.experiment import environment, run_controller, write_inputs
 from auv_analysis.folder import prepare
 from auv_analysis.node_parameters import node_parameters, parameter_file
-from auv_analysis.report import write_report
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario, load_scenario
 from auv_analysis.simulate import simulate as simulate_run
@@ -142,6 +141,8 @@ def _conclude(
     summaries = {name: summarize(run) for name, run in runs.items()}
     text = json.dumps(summaries, indent=2, allow_nan=False)
     (out / 'summary.json').write_text(text + '\n', encoding='utf-8')
+    from auv_analysis.report.page import write_report  # with matplotlib, which loads slowly
+
     with console.status('drawing figures, writing the report'):
         report = write_report(out, runs, summaries, scenario_text, vehicle_text)
     for name, run in runs.items():

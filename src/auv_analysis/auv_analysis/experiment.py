@@ -44,16 +44,23 @@ class Graph(Protocol):
         """Whether the plant has agreed to run."""
 
 
-def environment(domain: int) -> dict[str, str]:
-    """Environment of the nodes: loopback only, quick discovery, the domain."""
+def loopback() -> dict[str, str]:
+    """Environment variables that keep a graph on this machine, with quick discovery."""
     from auv_dynamics import ros
 
     profile = Path(ros.__file__).with_name('fastdds.xml')
     return {
-        **os.environ,
-        'ROS_DOMAIN_ID': str(domain),
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
         'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile),
+    }
+
+
+def environment(domain: int) -> dict[str, str]:
+    """Environment of the nodes: loopback only, the domain."""
+    return {
+        **os.environ,
+        **loopback(),
+        'ROS_DOMAIN_ID': str(domain),
         'RCUTILS_COLORIZED_OUTPUT': '0',
         'PYTHONUNBUFFERED': '1',
     }

@@ -19,6 +19,7 @@ WINDOW = 2000  # steps that the plant may be ahead of the recorder
 HORIZON = 200  # steps that set-points are published ahead
 WRENCH_TIMEOUT = 30.0  # s of silence that end a lock-step run
 TIMEOUT = 0.5  # s, the real-time watchdogs
+OF_PLANT_ALONE = ('twist', 'disturbance')  # no driver has to offer them
 SUBSCRIBERS = {  # topic -> who subscribes, by publisher
     PLANT: {
         'odom': (CONTROLLER, SETPOINT, ANALYSIS, RECORDER),
@@ -39,6 +40,7 @@ def node_parameters(
     controller: str,
     *,
     bag: Path | None,
+    plant: bool = True,
     analysis: bool = True,
     lockstep: bool = True,
     use_sim_time: bool = True,
@@ -52,6 +54,7 @@ def node_parameters(
     scenario : resolved scenario
     controller : name of one of its controllers
     bag : folder that the recorder writes to; None: no recorder
+    plant : whether the plant node runs; else a vehicle driver takes its place
     analysis : whether the analysis node runs
     lockstep : deterministic and as fast as the machine allows, else in real time
     use_sim_time : of all nodes but the plant
@@ -63,7 +66,7 @@ def node_parameters(
     parameters : node name -> parameter name -> value
 
     """
-    nodes = [PLANT, SETPOINT, CONTROLLER]
+    nodes = [PLANT] * plant + [SETPOINT, CONTROLLER]
     nodes += [ANALYSIS] * analysis + [RECORDER] * (bag is not None)
     vehicle = vehicle or str(scenario.vehicle_path.resolve())
     clock = {'use_sim_time': use_sim_time}
@@ -73,10 +76,12 @@ def node_parameters(
         SETPOINT: {**clock, **grid, 'horizon': HORIZON, **_setpoint(scenario)},
         CONTROLLER: {**clock, **_controller(scenario, controller, vehicle, lockstep)},
     }
-    for publisher in (PLANT, SETPOINT, CONTROLLER):
+    if not plant:
+        del parameters[PLANT]
+    for publisher, values in parameters.items():
         counts = {t: sum(n in nodes for n in who) for t, who in SUBSCRIBERS[publisher].items()}
         listed = [f'{topic}={count}' for topic, count in counts.items() if count]
-        parameters[publisher].update(_frames(), expected_subscribers=listed)
+        values.update(_frames(), expected_subscribers=listed)
     if analysis:
         parameters[ANALYSIS] = {**clock, **_frames(), 'vehicle': vehicle, 'every': EVERY}
     if bag is not None:
@@ -84,9 +89,9 @@ def node_parameters(
             **clock,
             **grid,
             'bag': str(bag.resolve()),
-            'topics': list(STEP_TOPICS),
+            'topics': [t for t in STEP_TOPICS if plant or t not in OF_PLANT_ALONE],
             'strict': lockstep,
-            'analysis_every': EVERY if analysis else 0,
+            'analysis_every': EVERY if analysis and plant else 0,
             'storage.compression': 'zstd',
             'storage.chunk_size': 1 << 20,
             'attachments': [f'{name}={path}' for name, path in (attachments or {}).items()],

@@ -22,17 +22,16 @@ def warm_up(scenario: Scenario, controllers: list[str]) -> None:
     if not any(cache_folder().glob('**/*.nbi')):
         print('compiling the kernel for this machine, once ...', file=sys.stderr, flush=True)
     begin = time.monotonic()
-    zero, upright = (0.0,) * 6, (1.0, 0.0, 0.0, 0.0)
     model = control_model(scenario.vehicle)
     for name in controllers:
         gains = scenario.gains(name)
         if is_compiled(gains):
-            SampledLaw(gains, model).sample(0.0, 0.0, zero, upright, zero, zero)
+            SampledLaw(gains, model)
         else:
             law = type(gains).__name__
             print(f'{name}: the law {law} runs as plain Python', file=sys.stderr)
     x = initial_state(np.zeros(6), np.zeros(6))
     integrator = scenario.data['integrator']
-    Plant(scenario.vehicle.model, scenario.disturbance, scenario.step, integrator, x).advance(zero)
+    Plant(scenario.vehicle.model, scenario.disturbance, scenario.step, integrator, x)
     if time.monotonic() - begin > NOTICE_AFTER:
         print(f'kernel ready after {time.monotonic() - begin:.1f} s', file=sys.stderr)

@@ -93,6 +93,9 @@ class Plant:
         self._first, self._F = 0, np.zeros((0, len(self._tableau.b), 6))
         self.k = 0
         self.x = np.array(x, float)
+        self.advance((0.0,) * 6)  # compiles or loads the kernel: not at the first step
+        self.k = 0
+        self.x = np.array(x, float)
 
     def F(self) -> np.ndarray:
         """Lumped uncertainty at the stages of the present step: (s, 6), stage 0 being t_k."""

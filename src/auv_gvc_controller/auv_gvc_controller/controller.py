@@ -110,14 +110,14 @@ class VelocityController:
         """Stamp of the odometry that still waits for its answer."""
         return self._waiting[0] if self._waiting else None
 
-    def silence(self, why: str) -> Answer:
+    def silence(self, why: str = '') -> Answer:
         """Zero wrench because the law lets go, stamped with the last odometry."""
         return self._zero(self._guard.last or 0, why)
 
     def _zero(self, ns: int, trouble: str) -> Answer:
         self._waiting = None
         self._bridge = True
-        return Answer(ns, ZERO, ZERO, f'{trouble}: zero wrench')
+        return Answer(ns, ZERO, ZERO, f'{trouble}: zero wrench' if trouble else '')
 
     def _limited(self, tau: tuple) -> tuple:
         if not self._limit:

@@ -52,11 +52,10 @@ class ControllerNode(BulkMixin, LifecycleNode):
     def _subscribe(self) -> None:
         p = self._settings
         odometry = topics.one_at_a_time() if p.lockstep else topics.newest_measurement()
-        setpoint = topics.every_step() if p.exact else topics.one_at_a_time()
         self.graph.subscribe(topics.ODOM, self._on_odometry, odometry)
-        self.graph.subscribe(topics.CMD_VEL, self._on_setpoint, setpoint)
+        self.graph.subscribe(topics.CMD_VEL, self._on_setpoint, topics.every_step())
         if p.acceleration == SAME:
-            self.graph.subscribe(topics.CMD_ACCEL, self._on_acceleration, setpoint)
+            self.graph.subscribe(topics.CMD_ACCEL, self._on_acceleration, topics.every_step())
 
     def _autostart(self) -> None:
         if self.trigger_configure() == SUCCESS and self.trigger_activate() == SUCCESS:
@@ -149,7 +148,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
             return
         lockstep = self._settings.lockstep
         if not lockstep or self._controller.unanswered is not None:
-            self._say(self._controller.silence('inactive'))
+            self._say(self._controller.silence())
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._active:

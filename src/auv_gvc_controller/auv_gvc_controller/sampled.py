@@ -41,6 +41,10 @@ def is_compiled(gains: Any) -> bool:
     return JITTED and type(gains) in SHIPPED.values()
 
 
+ZERO = (0.0,) * 6
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
 class SampledLaw:
     """A law with its state, one sample at a time.
 
@@ -54,6 +58,8 @@ class SampledLaw:
     def __init__(self, gains: Any, model: ControlModel):
         self._gains, self._model = gains, model
         self._sample = fill_sample if is_compiled(gains) else plain(fill_sample)
+        self.reset()
+        self.sample(0.0, 0.0, ZERO, UPRIGHT, ZERO, ZERO)  # compiles or loads the kernel: not later
         self.reset()
 
     def reset(self) -> None:

@@ -19,6 +19,7 @@ from auv_dynamics.ros.bulk import PLAIN
 
 RCLError = rclpy_implementation.RCLError
 POLL = 0.1  # s, longest wait before a signal is noticed
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SERVE = 0.02  # s of data between two looks at parameters, services and timers
 CALLBACKS = 3  # that are served at each look
 PARENT = 'AUV_GVC_PARENT'  # process id of `auv run`: its nodes do not outlive it
@@ -39,7 +40,7 @@ def live(make: Callable[[], Any], args: list[str] | None = None) -> int:
 
     """
     stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in SIGNALS:
         signal.signal(number, lambda *_: stop.set())
     node = None
     code = 0
@@ -67,6 +68,8 @@ def live(make: Callable[[], Any], args: list[str] | None = None) -> int:
             with contextlib.suppress(Exception):
                 node.destroy_node()
         rclpy.try_shutdown()
+        for number in SIGNALS:  # one that comes while Python tears down does not change the code
+            signal.signal(number, signal.SIG_IGN)
     return code
 
 

@@ -1,0 +1,117 @@
+"""What a study found, in sentences computed from its runs."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.report import paper
+from auv_analysis.report.claims import Claim
+from auv_analysis.report.figures import reference
+from auv_analysis.report.tables import energy_rows
+from auv_analysis.report.text import fixed, join, number
+from auv_analysis.run import Run
+from auv_dynamics.signals import DOFS
+
+Summaries = Mapping[str, Mapping[str, Any]]
+DECIDED = ('reproduced', 'partly', 'not reproduced')
+
+
+def findings(runs: Mapping[str, Run], summaries: Summaries, claims: Sequence[Claim]) -> list[str]:
+    """Sentences of the summary.
+
+    Parameters
+    ----------
+    runs, summaries : by name
+    claims : of `claims_table`
+
+    Returns
+    -------
+    sentences : settling, errors, inputs, energy, couplings, claims; what is not known is left out
+
+    """
+    leading = reference(runs)
+    sentences = [_settling(name, run, summaries[name]) for name, run in runs.items()]
+    sentences += [_late_errors(summaries), _inputs(summaries), _energy(runs, leading)]
+    sentences += [_couplings(summaries[leading.controller], leading), _claims(claims)]
+    return [sentence for sentence in sentences if sentence]
+
+
+def _settling(name: str, run: Run, summary: Mapping[str, Any]) -> str:
+    times = summary['velocity_error']['settling_time']
+    missing = [dof for dof, time in zip(DOFS, times, strict=True) if time is None]
+    if not missing:
+        return f'Under {name} every velocity error has settled (table 2) after {max(times):.2f} s.'
+    verb = 'does' if len(missing) == 1 else 'do'
+    return f'Under {name}, {join(missing)} {verb} not settle within {run.duration:g} s.'
+
+
+def _late_errors(summaries: Summaries) -> str:
+    parts = []
+    for name, summary in summaries.items():
+        late = summary['velocity_error']['max_after_2s']
+        if late is not None:
+            linear, angular = int(np.argmax(late[:3])), 3 + int(np.argmax(late[3:]))
+            parts.append(
+                f'{number(late[linear], 2)} m/s ({DOFS[linear]}) and '
+                f'{number(late[angular], 2)} rad/s ({DOFS[angular]}) under {name}'
+            )
+    return f'After 2 s the errors reach at most {"; ".join(parts)}.' if parts else ''
+
+
+def _inputs(summaries: Summaries) -> str:
+    parts = []
+    for name, summary in summaries.items():
+        largest = summary['effort']['max']
+        force, moment = int(np.argmax(largest[:3])), 3 + int(np.argmax(largest[3:]))
+        parts.append(
+            f'{number(largest[force])} N ({DOFS[force]}) and '
+            f'{number(largest[moment])} N m ({DOFS[moment]}) under {name}'
+        )
+    return f'The largest commands are {"; ".join(parts)}.'
+
+
+def _energy(runs: Mapping[str, Run], leading: Run) -> str:
+    name = leading.controller
+    means = [
+        f'{fixed(row["mean"], 2)} J over {row["window"]}'
+        for row in energy_rows({name: leading}, None)
+    ]
+    text = f'The mean kinetic energy of {name} is {join(means)}'
+    if paper.paper_run(runs, 'gvc') is leading:
+        printed = fixed(paper.KINETIC_ENERGY, 2)
+        text += f'; the paper prints {printed} J and no window'
+    return f'{text}.'
+
+
+def _couplings(summary: Mapping[str, Any], leading: Run) -> str:
+    coupling = summary['coupling']
+    if all(len(zeros) == 6 for zeros in coupling['structural_zeros'].values()):
+        return 'M is diagonal: no degree of freedom is coupled to another by inertia.'
+    xi, pi = coupling['delta_xi_max'], coupling['delta_pi_max']
+    parts = [
+        f'{symbol} of {DOFS[i]} by up to {number(values[i], 2)} {unit}'
+        for symbol, values, unit, members in (
+            ('the velocity component', xi, 'm/s', range(3)),
+            ('that', xi, 'rad/s', range(3, 6)),
+            ('the input', pi, 'N', range(3)),
+            ('the input', pi, 'N m', range(3, 6)),
+        )
+        for i in [max(members, key=values.__getitem__)]
+        if values[i] > 0
+    ]
+    return f'Inertial coupling deforms, under {leading.controller}, {join(parts)}.'
+
+
+def _claims(claims: Sequence[Claim]) -> str:
+    if not claims:
+        return ''
+    counts = {verdict: [c for c in claims if c.verdict == verdict] for verdict in DECIDED}
+    counts = {verdict: rows for verdict, rows in counts.items() if rows}
+    decided = sum(len(rows) for rows in counts.values())
+    parts = []
+    for verdict, rows in counts.items():
+        numbers = f' (no. {join([str(row.number) for row in rows])})'
+        parts.append(f'{len(rows)} {verdict}{"" if verdict == "reproduced" else numbers}')
+    outcome = f': {join(parts)}' if parts else ''
+    return f'Of the paper’s {len(claims)} claims these runs decide {decided}{outcome}.'

@@ -1,0 +1,218 @@
+"""Figures that put the controllers of a scenario side by side: errors, inputs, energy."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from auv_analysis.energy import kinetic_energy, shares
+from auv_analysis.report import paper, plotting
+from auv_analysis.report.plotting import COLOURS, DASHES, GREY
+from auv_analysis.report.text import join
+from auv_analysis.run import Run
+from auv_analysis.summary import BAND, SMALLEST_BAND
+from auv_dynamics.signals import DOFS
+from auv_gvc_controller.model import control_model
+
+MARKERS = 'os^vPX'
+SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
+SHARE_COLUMNS = 600  # of the stacked shares, each the mean of its samples
+XI = tuple(rf'$\xi_{i}$' for i in range(1, 7))
+
+
+def settling(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
+    """The largest error still to come, per degree of freedom and controller.
+
+    The envelope max of abs(nu_err) over [t, end] falls monotonically: where it crosses the band
+    the error has settled. Returns figure, title and caption.
+
+    """
+    figure, panels = _six_panels(runs)
+    for i, axes in enumerate(panels):
+        band = 0.0
+        for dashes, run in zip(_dashes(runs), runs.values(), strict=True):
+            error = np.abs(run.nu_d[:, i] - run.nu[:, i])
+            rest = np.maximum.accumulate(error[::-1])[::-1]
+            seen = (rest > 0) & (run.t > run.t[0])
+            line = plotting.decimate(run.t[seen] - run.t[0], rest[seen], logarithmic=True)
+            axes.plot(*line, color=COLOURS[i], linestyle=dashes)
+            band = max(SMALLEST_BAND, BAND * np.abs(run.nu_d[:, i]).max())
+        axes.axhline(band, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
+        plotting.logarithmic(axes, 'x', 'y')
+    for row, unit in zip((0, 3), plotting.VELOCITY, strict=True):
+        panels[row].set_ylabel(rf'$\max_{{s\,\geq\,t}}|\Delta\nu(s)|$ ({unit})')
+    title = 'Error still to come'
+    caption = (
+        f'{title}: the largest velocity error between t and the end of the run, '
+        f'{_named_dashes(runs)}. An error has settled where its line falls below the dotted band '
+        f'({100 * BAND:g} % of the peak of the set-point, at least {SMALLEST_BAND:g}). '
+        'Both axes are logarithmic; at the end of the run little is to come and every line drops.'
+    )
+    return figure, title, caption
+
+
+def inputs(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
+    """Inputs of all controllers over logarithmic time. Returns figure, title and caption."""
+    figure, panels = _six_panels(runs)
+    for i, axes in enumerate(panels):
+        for dashes, run in zip(_dashes(runs), runs.values(), strict=True):
+            first = run.t[0] + run.step  # the sample at t = 0 stands at the left edge
+            t = np.maximum(run.t, first) - run.t[0]
+            line = plotting.decimate(t, run.tau[:, i], logarithmic=True)
+            axes.plot(*line, color=COLOURS[i], linestyle=dashes)
+        plotting.logarithmic(axes, 'x')
+    for i, unit in enumerate(3 * plotting.WRENCH[:1] + 3 * plotting.WRENCH[1:]):
+        panels[i].set_ylabel(f'{plotting.INPUT.symbols[i]} ({unit})')
+    title = 'Inputs compared'
+    caption = (
+        f'{title}: {_named_dashes(runs)}. Time is logarithmic, so that the first instants, '
+        'where the laws differ most, and the steady part both show; '
+        'the sample at t = 0 stands at the left edge.'
+    )
+    return figure, title, caption
+
+
+def energy(runs: Mapping[str, Run], leading: Run) -> tuple[Figure, str, str]:
+    """Kinetic energy over time and its shares. Returns figure, title and caption."""
+    figure = plotting.new_figure(2.7)
+    left, right = figure.subplots(1, 2)
+    wanted = 0.5 * np.sum(leading.nu_d @ leading.vehicle.M * leading.nu_d, axis=1)
+    left.plot(*plotting.decimate(leading.t, wanted), color='#b5b5b5', linewidth=3.2)
+    handles = [Line2D([], [], color='#b5b5b5', linewidth=3.2)]
+    for dashes, run in zip(_dashes(runs), runs.values(), strict=True):
+        total = _components(run).sum(axis=1)
+        handles += left.plot(*plotting.decimate(run.t, total), color='black', linestyle=dashes)
+    left.legend(
+        handles,
+        ['set-point', *runs],
+        loc='lower right',
+        bbox_to_anchor=(1.0, 1.02),
+        ncols=min(len(handles), 4),
+    )
+    left.set_ylim(bottom=0.0)
+    left.set_ylabel('kinetic energy (J)')
+    _stack(right, leading)
+    for index, axes in enumerate((left, right)):
+        axes.set_xlim(leading.t[0], leading.t[-1])
+        axes.set_xlabel('$t$ (s)')
+        plotting.letter(axes, index)
+    title = 'Kinetic energy'
+    caption = (
+        f'{title}: (a) of each controller, and in grey that of a vehicle that moves exactly as '
+        f'the set-point asks; (b) shares of the components of {leading.controller}, equation (30).'
+    )
+    return figure, title, caption
+
+
+def energy_shares(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
+    """Shares of the mean kinetic energy on a logarithmic axis, the paper's beside case1's."""
+    figure = plotting.new_figure(2.9)
+    axes = figure.subplots()
+    end = min(paper.ENERGY_WINDOW, *(run.duration for run in runs.values()))
+    printed = paper.SHARES if _is_case1(runs) else None
+    rows = len(runs) + (printed is not None)
+    offsets = (np.arange(rows) - (rows - 1) / 2) * 0.62 / max(rows, 2)
+    handles, smallest = [], 1.0
+    for offset, marker, run in zip(offsets, MARKERS * rows, runs.values(), strict=False):
+        components = _components(run)
+        inside = run.t <= run.t[0] + end + run.step / 2
+        early, whole = (shares(c.mean(axis=0)) for c in (components[inside], components))
+        for i in range(6):
+            place = {'y': i + offset, 'marker': marker, 'edgecolors': COLOURS[i], 's': 30}
+            axes.scatter(whole[i], facecolors='white', linewidths=1.0, zorder=3, **place)
+            axes.scatter(early[i], facecolors=COLOURS[i], linewidths=1.0, zorder=4, **place)
+        smallest = min([smallest, *early[early > 0], *whole[whole > 0]])
+        handles.append(_mark(marker, run.controller))
+    left = max(10.0 ** np.floor(np.log10(smallest) - 0.3), SMALLEST_SHARE)
+    if printed:
+        _printed_shares(axes, printed, offsets[-1], left)
+        handles.append(_mark('D', 'paper', GREY))
+    plotting.logarithmic(axes, 'x')
+    axes.set(xlim=(left, 160.0), ylim=(5.5, -0.5), yticks=range(6))
+    axes.set_yticklabels([f'{XI[i]} {DOFS[i]}' for i in range(6)])
+    axes.tick_params(axis='y', length=0)
+    axes.set_xlabel('share of the mean kinetic energy (%)')
+    axes.legend(handles=handles, loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=rows)
+    title = 'Shares of kinetic energy'
+    caption = (
+        f'{title}: mean of the samples of 0 to {end:g} s (filled) and of the whole run '
+        '(open), logarithmic axis.'
+    )
+    if printed:
+        caption += (
+            ' The paper prints two decimals and no window; a grey bar stands for its 0.00 %, '
+            'anything below 0.005 %.'
+        )
+    return figure, title, caption
+
+
+def _printed_shares(axes: Axes, printed: tuple[float, ...], offset: float, left: float) -> None:
+    for i, share in enumerate(printed):
+        if share > 0:
+            axes.scatter(share, i + offset, marker='D', color=GREY, s=24, zorder=3)
+        else:
+            bounds = [left, paper.SHARES_DIGIT]
+            axes.plot(bounds, 2 * [i + offset], color=GREY, linewidth=2.5, solid_capstyle='butt')
+
+
+def _is_case1(runs: Mapping[str, Run]) -> bool:
+    run = paper.paper_run(runs, 'gvc')
+    return run is not None and run.scenario == 'case1'
+
+
+def _mark(marker: str, label: str, colour: str = 'black') -> Line2D:
+    return Line2D([], [], linestyle='', marker=marker, color=colour, markersize=5, label=label)
+
+
+def _stack(axes: Axes, run: Run) -> None:
+    """Shares (30) over time, stacked; long runs as means over columns of samples."""
+    components = _components(run)
+    edges = np.unique(np.linspace(0, len(run.t), SHARE_COLUMNS + 1).astype(int))[:-1]
+    counts = np.diff(np.append(edges, len(run.t)))[:, None]
+    part = shares(np.add.reduceat(components, edges, axis=0) / counts)
+    t = np.add.reduceat(run.t, edges) / counts[:, 0]
+    moving = part.sum(axis=1) > 0
+    axes.stackplot(t[moving], part[moving].T, colors=COLOURS, linewidth=0)
+    shown = [i for i in range(6) if part[:, i].max() > 1.0]
+    patches = [Line2D([], [], color=COLOURS[i], linewidth=6) for i in shown]
+    axes.legend(
+        patches, [XI[i] for i in shown], loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=6
+    )
+    axes.set_ylim(0.0, 100.0)
+    axes.set_ylabel('share (%)')
+    axes.grid(False)
+
+
+def _components(run: Run) -> np.ndarray:
+    model = control_model(run.vehicle)
+    return kinetic_energy(model.Upsilon_inv.reshape(6, 6), model.N, run.nu)
+
+
+def _dashes(runs: Mapping[str, Run]) -> list:
+    return [DASHES[i % len(DASHES)] for i in range(len(runs))]
+
+
+def _named_dashes(runs: Mapping[str, Run]) -> str:
+    words = ('solid', 'dashed', 'dotted', 'dash-dotted', 'long-dashed', 'dash-dot-dotted')
+    return join([f'{name} {words[i % len(words)]}' for i, name in enumerate(runs)])
+
+
+def _six_panels(runs: Mapping[str, Run]) -> tuple[Figure, list[Axes]]:
+    figure = plotting.new_figure(4.1)
+    panels = list(figure.subplots(2, 3, sharex=True).ravel())
+    for i, axes in enumerate(panels):
+        plotting.letter(axes, i, DOFS[i])
+    handles = [Line2D([], [], color='black', linestyle=dashes) for dashes in _dashes(runs)]
+    panels[2].legend(
+        handles,
+        list(runs),
+        loc='lower right',
+        bbox_to_anchor=(1.0, 1.16),
+        ncols=len(runs),
+        handlelength=2.6,
+    )
+    for axes in panels[3:]:
+        axes.set_xlabel('$t$ (s)')
+    return figure, panels

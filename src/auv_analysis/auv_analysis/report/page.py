@@ -1,0 +1,143 @@
+"""The report of a study: one HTML file that needs nothing but itself."""
+
+import base64
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import markupsafe
+import numpy as np
+
+from auv_analysis.report import paper, tables
+from auv_analysis.report.claims import claims_table
+from auv_analysis.report.figures import FigureRecord, draw_figures, reference
+from auv_analysis.report.findings import findings
+from auv_analysis.report.text import fixed, join, number, plain, tied
+from auv_analysis.run import Run
+from auv_analysis.summary import BAND, SMALLEST_BAND
+from auv_dynamics.signals import DOFS
+
+HERE = Path(__file__).parent
+SECTIONS = {  # section of the report -> beginnings of the names of its figures
+    'errors': ('errors_', 'settling'),
+    'estimates': ('lumped_error_', 'uncertainty_'),
+    'inputs': ('inputs_',),
+    'energy': ('kinetic_energy', 'energy_shares'),
+    'couplings': ('delta_',),
+}
+
+
+def write_report(
+    out: Path,
+    runs: dict[str, Run],
+    summaries: dict[str, dict[str, Any]],
+    scenario_text: str,
+    vehicle_text: str,
+) -> Path:
+    """Write the report and its figures.
+
+    Parameters
+    ----------
+    out : folder; gets `report.html` and `figures/`
+    runs : name -> run, one at least
+    summaries : name -> `summarize(run)`
+    scenario_text, vehicle_text : the files as they were read, shown as listings; may be empty
+
+    Returns
+    -------
+    path : of report.html
+
+    """
+    if not runs:
+        raise ValueError('runs: expected at least one run, found none')
+    runs = {name: replace(run, controller=name) for name, run in runs.items()}
+    figures = draw_figures(runs, out / 'figures')
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(HERE),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {
+        'num': number, 'plain': plain, 'fixed': fixed, 'tied': tied, 'join_words': join,
+        'maths': maths,
+    }  # fmt: skip
+    template = environment.get_template('report.html.j2')
+    context = _context(runs, summaries)
+    text = template.render(
+        **context,
+        figures=_sections(figures),
+        scenario_text=scenario_text,
+        vehicle_text=vehicle_text,
+    )
+    path = out / 'report.html'
+    path.write_text(text + '\n', encoding='utf-8')
+    return path
+
+
+def maths(text: str) -> markupsafe.Markup:
+    """Text with its indices lowered: w_X, K_D, ξ3; Lambda and Gamma become letters."""
+    safe = str(markupsafe.escape(tied(text))).replace('Lambda', 'Λ').replace('Gamma', 'Γ')
+    safe = re.sub(r'(?<=[A-Za-zτξπΓΛ])_([A-Za-z0-9])\b', r'<sub>\1</sub>', safe)
+    return markupsafe.Markup(re.sub(r'(?<=[ξπ])([1-6])\b', r'<sub>\1</sub>', safe))
+
+
+def _context(runs: Mapping[str, Run], summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """What the template prints, computed."""
+    leading = reference(runs)
+    claims = claims_table(runs, summaries)
+    vehicles = list(dict.fromkeys(run.vehicle.name for run in runs.values()))
+    original = paper.paper_run(runs, 'gvc')
+    return {
+        'dofs': DOFS,
+        'runs': runs,
+        'summaries': summaries,
+        'scenarios': list(dict.fromkeys(run.scenario for run in runs.values())),
+        'vehicles': vehicles,
+        'is_herman': any(name.startswith('herman2018') for name in vehicles),
+        'leading': leading,
+        'findings': findings(runs, summaries, claims),
+        'controllers': [tables.controller_row(run) for run in runs.values()],
+        'decompositions': tables.decompositions(runs, summaries),
+        'body_gains': tables.body_gains(summaries),
+        'energy': tables.energy_rows(runs, original),
+        'has_original': original is not None,
+        'certificates': tables.certificates(summaries),
+        'couplings': tables.couplings(runs, summaries),
+        'claims': claims,
+        'ends': {name: run.eta[-1, :3] for name, run in runs.items()},
+        'ends_apart': _ends_apart(runs),
+        'notes': tables.notes(runs),
+        'band': f'{100 * BAND:g} % of the peak of the set-point, at least {SMALLEST_BAND:g}',
+        'paper': paper,
+    }
+
+
+def _ends_apart(runs: Mapping[str, Run]) -> float | None:
+    """Largest distance of the final positions of runs of equal length, m; None for one run."""
+    ends = [run.eta[-1, :3] for run in runs.values()]
+    if len(ends) < 2 or len({len(run.t) for run in runs.values()}) > 1:
+        return None
+    return max(float(np.linalg.norm(a - b)) for a in ends for b in ends)
+
+
+def _sections(figures: list[FigureRecord]) -> dict[str, list[dict[str, Any]]]:
+    """Figures by section, numbered in the order in which the report shows them."""
+    sections: dict[str, list[dict[str, Any]]] = {}
+    shown = 0
+    for section, beginnings in SECTIONS.items():
+        sections[section] = []
+        for figure in figures:
+            if not figure.name.startswith(beginnings):
+                continue
+            entry: dict[str, Any] = {'figure': figure, 'number': None, 'data': None}
+            if figure.png is not None:
+                shown += 1
+                data = base64.b64encode(figure.png.read_bytes()).decode('ascii')
+                entry |= {'number': shown, 'data': data}
+            sections[section].append(entry)
+    return sections

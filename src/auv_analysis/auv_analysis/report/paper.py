@@ -1,0 +1,65 @@
+"""What Herman 2018 prints, as data: gains, numbers and which figure shows what."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.run import Run
+from auv_dynamics.files import matrix6
+
+CITATION = (
+    'P. Herman, Velocity tracking controller for simulation analysis of underwater vehicle '
+    'model, Journal of Marine Engineering & Technology, 2018'
+)
+CASES = ('case1', 'case2')
+
+GVC_GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}  # (36), (37)
+CL_GAINS = {'case1': GVC_GAINS, 'case2': {**GVC_GAINS, 'k_D': 1000.0, 'Gamma': 6000.0}}  # (40)
+
+N = (300.0, 500.0, 500.0, 40.0, 175.5, 141.1)  # kg, kg m2; (38)
+KINETIC_ENERGY = 519.47  # J; section 5, step 4
+SHARES = (23.34, 0.00, 76.57, 0.01, 0.00, 0.08)  # %; section 5, step 4
+SHARES_DIGIT = 0.005  # %, half of the last digit that is printed
+ENERGY_WINDOW = 10.0  # s; ours: the paper prints no window
+
+_BOTH = {
+    ('errors', 'gvc'): '1',
+    ('lumped_error', 'gvc'): '3',
+    ('delta_xi', 'gvc'): '4',
+    ('delta_pi', 'gvc'): '5',
+}
+FIGURES: dict[str, dict[tuple[str, str], str]] = {
+    'case1': _BOTH | {('errors', 'cl'): '2'},
+    'case2': _BOTH
+    | {
+        ('errors', 'cl'): '6(a,b)',
+        ('lumped_error', 'cl'): '6(c,d)',
+        ('inputs', 'cl'): '6(e,f)',
+        ('inputs', 'gvc'): '7',
+    },
+}
+
+
+def has_gains(run: Run, gains: Mapping[str, float]) -> bool:
+    """Whether a run's gains are these multiples of the identity."""
+
+    def equal(value: Any, expected: float) -> bool:
+        return bool(np.allclose(matrix6(value), expected * np.eye(6), rtol=1e-12, atol=0.0))
+
+    return set(run.gains) == set(gains) and all(equal(run.gains[k], gains[k]) for k in gains)
+
+
+def paper_run(runs: Mapping[str, Run], law: str) -> Run | None:
+    """The run of `case1` or `case2` that has the paper's gains for 'gvc' or 'cl'; None without."""
+    for run in runs.values():
+        gains = GVC_GAINS if law == 'gvc' else CL_GAINS.get(run.scenario)
+        if run.scenario in CASES and run.law == law and gains and has_gains(run, gains):
+            return run
+    return None
+
+
+def paper_figure(run: Run, kind: str) -> str | None:
+    """Number of the paper's figure that a run's figure of this kind reproduces, or None."""
+    number = FIGURES.get(run.scenario, {}).get((kind, run.law))
+    return number if number and paper_run({run.controller: run}, run.law) else None

@@ -1,0 +1,182 @@
+"""How the figures look: symbols, colours, panels, honest decimation and saving."""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.style
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import NullLocator
+
+from auv_dynamics.signals import DOFS
+
+COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#D55E00', '#56B4E9')  # Okabe and Ito
+DASHES = ('-', (0, (4, 1.6)), (0, (1, 1.3)), (0, (6, 1.4, 1, 1.4)), (0, (9, 2)), (0, (3, 1, 1, 1)))
+GREY = '#6b6b6b'
+WIDTH = 7.2  # in, two columns of a journal
+DPI = 160
+COLUMNS = 2000  # finer than the pixels of a panel; a line has at most two points in each
+GROUPS = (range(3), range(3, 6))  # linear, angular
+STYLE = {
+    'font.family': 'STIXGeneral',
+    'mathtext.fontset': 'stix',
+    'font.size': 9.5,
+    'axes.labelsize': 9.5,
+    'axes.titlesize': 9.5,
+    'axes.titlepad': 5.0,
+    'axes.linewidth': 0.6,
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.grid': True,
+    'axes.axisbelow': True,
+    'axes.xmargin': 0.0,
+    'axes.formatter.limits': (-5, 6),
+    'grid.color': '#e6e6e6',
+    'grid.linewidth': 0.5,
+    'lines.linewidth': 1.1,
+    'lines.solid_joinstyle': 'round',
+    'xtick.major.width': 0.6,
+    'ytick.major.width': 0.6,
+    'xtick.labelsize': 8.5,
+    'ytick.labelsize': 8.5,
+    'legend.frameon': False,
+    'legend.fontsize': 9.0,
+    'legend.handlelength': 1.6,
+    'legend.columnspacing': 1.2,
+    'legend.borderaxespad': 0.0,
+    'pdf.fonttype': 42,
+    'figure.dpi': DPI,
+    'savefig.dpi': DPI,
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a panel shows: a name, six symbols and the units of the two groups."""
+
+    name: str
+    symbols: tuple[str, ...]
+    units: tuple[str, str]
+
+    def unit(self, column: int) -> str:
+        """Unit of a column."""
+        return self.units[column // 3]
+
+    def label(self, columns: Sequence[int]) -> str:
+        """Axis label of columns of one group, with their unit."""
+        return f'{", ".join(self.symbols[i] for i in columns)} ({self.unit(columns[0])})'
+
+
+def _six(template: str, letters: str) -> tuple[str, ...]:
+    return tuple(f'${template.format(letter)}$' for letter in letters)
+
+
+VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
+ERROR = Quantity('velocity error', _six(r'\Delta {}', 'uvwpqr'), VELOCITY)
+LUMPED = Quantity('lumped estimation error', _six('w_{}', 'XYZKMN'), WRENCH)
+DELTA_XI = Quantity('velocity deformation', _six(r'\Delta\xi_{}', '123456'), VELOCITY)
+DELTA_PI = Quantity('input deformation', _six(r'\Delta\pi_{}', '123456'), WRENCH)
+INPUT = Quantity('input', _six(r'\tau_{}', 'XYZKMN'), WRENCH)
+UNCERTAINTY = Quantity('lumped uncertainty', _six('F_{}', 'XYZKMN'), WRENCH)
+
+
+def style() -> AbstractContextManager:
+    """Context in which figures are drawn and saved; the caller's settings come back after it."""
+    return matplotlib.style.context(['default', STYLE])
+
+
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """Empty figure of a size in inches, without pyplot."""
+    layout = ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.04, wspace=0.03, hspace=0.03)
+    figure = Figure(figsize=(width, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
+    """Write <name>.png and <name>.pdf, the same bytes every time; return both paths."""
+    png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
+    figure.savefig(png, metadata={'Software': None})
+    figure.set_layout_engine('none')  # laid out once is enough
+    figure.savefig(pdf, metadata={'CreationDate': None, 'Creator': None, 'Producer': None})
+    return png, pdf
+
+
+def decimate(
+    t: np.ndarray, y: np.ndarray, *, logarithmic: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lines of at most 2 * COLUMNS points that look the same: minimum and maximum per column.
+
+    Parameters
+    ----------
+    t, y : (n,) samples
+    logarithmic : columns of equal width on a logarithmic time axis; t > 0 then
+
+    Returns
+    -------
+    t, y : (m,) some of the samples in their order, first, last and every column's extremes
+
+    """
+    n, columns = len(t), COLUMNS - 1
+    if n <= 2 * columns:
+        return t, y
+    place = np.log(t) if logarithmic else t
+    column = np.floor((place - place[0]) / (place[-1] - place[0]) * columns).clip(max=columns - 1)
+    order = np.lexsort((y, column))
+    first = np.flatnonzero(np.diff(column[order], prepend=-1.0))
+    last = np.append(first[1:], n) - 1
+    keep = np.unique(np.concatenate([order[first], order[last], [0, n - 1]]))
+    return t[keep], y[keep]
+
+
+def moving(values: np.ndarray, skip: Sequence[str] = ()) -> list[int]:
+    """Indices of the columns (n, 6) that are drawn: not in `skip` and not zero throughout."""
+    return [i for i in range(6) if DOFS[i] not in skip and np.any(values[:, i] != 0.0)]
+
+
+def groups(columns: Sequence[int]) -> list[list[int]]:
+    """Those columns that are linear, then those that are angular; no group is empty."""
+    split = ([i for i in columns if i in members] for members in GROUPS)
+    return [members for members in split if members]
+
+
+def draw_lines(axes: Axes, t: np.ndarray, values: np.ndarray, columns: Sequence[int]) -> None:
+    """Lines of some columns of values (n, 6) over t (n,) in s, in their colours."""
+    for i in columns:
+        axes.plot(*decimate(t, values[:, i]), color=COLOURS[i])
+    axes.set_xlim(t[0], t[-1])
+
+
+def key(axes: Axes, quantity: Quantity, columns: Sequence[int]) -> None:
+    """Name the lines above the panel, at its right."""
+    handles = [axes.plot([], [], color=COLOURS[i])[0] for i in columns]
+    place: dict[str, Any] = {
+        'loc': 'lower right',
+        'bbox_to_anchor': (1.0, 1.02),
+        'ncols': len(columns),
+    }
+    axes.legend(handles, [f'{quantity.symbols[i]} {DOFS[i]}' for i in columns], **place)
+
+
+def logarithmic(axes: Axes, *directions: str) -> None:
+    """Logarithmic 'x' or 'y'; plain text, where it is short, is laid out far faster than powers."""
+
+    def decade(x: float, _: int) -> str:
+        return f'{x:g}' if 1e-4 <= x <= 1e5 else f'$10^{{{np.log10(x):.0f}}}$'
+
+    for direction in directions:
+        axes.set(**{f'{direction}scale': 'log'})
+        axis = getattr(axes, f'{direction}axis')
+        axis.set_major_formatter(decade)
+        axis.set_minor_locator(NullLocator())
+
+
+def letter(axes: Axes, index: int, text: str = '') -> None:
+    """Title (a), (b), ... at the panel's left."""
+    axes.set_title(f'({"abcdefghijkl"[index]}) {text}'.rstrip(), loc='left')

@@ -1,0 +1,147 @@
+"""The report's tables as plain values: what is printed, not how."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.energy import kinetic_energy, shares
+from auv_analysis.report import paper
+from auv_analysis.report.text import number, plain
+from auv_analysis.run import Run
+from auv_dynamics.files import matrix6
+from auv_dynamics.signals import DOFS
+from auv_gvc_controller.decomposition import inverse_upper
+from auv_gvc_controller.model import control_model
+
+Summaries = Mapping[str, Mapping[str, Any]]
+VELOCITIES, WRENCHES = 'uvwpqr', 'XYZKMN'
+
+
+def controller_row(run: Run) -> dict[str, Any]:
+    """Name, law, gains in words and origin of a run."""
+    return {
+        'name': run.controller,
+        'law': run.law,
+        'gains': {name: gain_text(value) for name, value in run.gains.items()},
+        'source': {'bag': 'recorded on the node graph', 'simulate': 'simulated in process'}.get(
+            run.source, run.source
+        ),
+        'duration': run.duration,
+        'step': run.step,
+        'samples': len(run.t),
+    }
+
+
+def gain_text(value: Any) -> str:
+    """A gain as '12 I', 'diag(...)' or 'full matrix'."""
+    matrix = np.asarray(matrix6(value))
+    diagonal = np.diagonal(matrix)
+    if np.any(matrix != np.diag(diagonal)):
+        return 'full matrix, in the listing'
+    if np.all(diagonal == diagonal[0]):
+        return f'{plain(diagonal[0], 6)} I'
+    return f'diag({", ".join(plain(x, 6) for x in diagonal)})'
+
+
+def decompositions(runs: Mapping[str, Run], summaries: Summaries) -> list[dict[str, Any]]:
+    """Upsilon and N, once for each vehicle that differs."""
+    found: list[dict[str, Any]] = []
+    for name, run in runs.items():
+        parts = summaries[name]['decomposition']
+        same = [entry for entry in found if entry['parts'] == parts]
+        if same:
+            same[0]['controllers'].append(name)
+        else:
+            entry = {'parts': parts, 'vehicle': run.vehicle.name, 'controllers': [name]}
+            found.append(entry)
+    return found
+
+
+def body_gains(summaries: Summaries) -> list[dict[str, Any]]:
+    """K_D and K_f of each controller: the matrix, or text where it is a multiple of I."""
+    rows = []
+    for name, summary in summaries.items():
+        for symbol, key in (('K_D', 'K_D'), ('K_f', 'K_f')):
+            matrix = np.array(summary['gains'][key])
+            scalar = np.array_equal(matrix, matrix[0, 0] * np.eye(6))
+            text = f'{plain(matrix[0, 0], 6)} I' if scalar else None
+            rows.append({'controller': name, 'symbol': symbol, 'text': text, 'matrix': matrix})
+    return rows
+
+
+def energy_rows(runs: Mapping[str, Run], original: Run | None) -> list[dict[str, Any]]:
+    """Mean kinetic energy and shares per run and window; the paper's first, where it applies."""
+    rows = []
+    if original is not None:
+        rows.append({
+            'name': 'paper', 'window': 'not printed', 'mean': paper.KINETIC_ENERGY,
+            'shares': [f'{x:.2f}' for x in paper.SHARES],
+        })  # fmt: skip
+    for name, run in runs.items():
+        model = control_model(run.vehicle)
+        parts = kinetic_energy(model.Upsilon_inv.reshape(6, 6), model.N, run.nu)
+        for end in dict.fromkeys([min(paper.ENERGY_WINDOW, run.duration), run.duration]):
+            mean = parts[run.t <= run.t[0] + end + run.step / 2].mean(axis=0)
+            rows.append({
+                'name': name, 'window': f'0–{end:g} s', 'mean': float(mean.sum()),
+                'shares': [_share(x) for x in shares(mean)],
+            })  # fmt: skip
+    return rows
+
+
+def certificates(summaries: Summaries) -> list[dict[str, Any]]:
+    """The certificate of each run; runs that lack it for the same reason in one row."""
+    rows: list[dict[str, Any]] = []
+    for name, summary in summaries.items():
+        lyapunov = summary['lyapunov']
+        same = [row for row in rows if row['lyapunov'] == lyapunov and not lyapunov['applicable']]
+        if same:
+            same[0]['names'].append(name)
+        else:
+            rows.append({'names': [name], 'lyapunov': lyapunov})
+    return rows
+
+
+def couplings(runs: Mapping[str, Run], summaries: Summaries) -> list[dict[str, Any]]:
+    """Rows of delta_xi and delta_pi: the equation and each run's largest magnitude."""
+    first = next(iter(runs))
+    Upsilon = np.array(summaries[first]['decomposition']['Upsilon'])
+    zeros = summaries[first]['coupling']['structural_zeros']
+    rules = {'delta_xi': inverse_upper(Upsilon) - np.eye(6), 'delta_pi': (Upsilon - np.eye(6)).T}
+    signals = {'delta_xi': list(VELOCITIES), 'delta_pi': [f'τ_{x}' for x in WRENCHES]}
+    symbols = {'delta_xi': 'Δξ', 'delta_pi': 'Δπ'}
+    units = {'delta_xi': ('m/s', 'rad/s'), 'delta_pi': ('N', 'N m')}
+    return [
+        {
+            'symbol': f'{symbols[kind]}_{i + 1}',
+            'dof': dof,
+            'unit': units[kind][i // 3],
+            'structural': dof in zeros[kind],
+            'rule': _linear(rules[kind][i], signals[kind]),
+            'values': [summary['coupling'][f'{kind}_max'][i] for summary in summaries.values()],
+        }
+        for kind in ('delta_xi', 'delta_pi')
+        for i, dof in enumerate(DOFS)
+    ]
+
+
+def notes(runs: Mapping[str, Run]) -> list[str]:
+    """Notes of the runs and warnings of their vehicles, each once."""
+    found = [f'{name}: {note}' for name, run in runs.items() for note in run.notes]
+    found += [warning for run in runs.values() for warning in run.vehicle.warnings]
+    return list(dict.fromkeys(found))
+
+
+def _share(value: float) -> str:
+    return (
+        f'{value:.2f}' if value >= 0.095 else f'{value:.3f}' if value >= 5e-4 else number(value, 1)
+    )
+
+
+def _linear(row: np.ndarray, signals: list[str]) -> str:
+    """A linear form such as '−0.015 p + 0.075 r'; entries that are rounding are left out."""
+    scale = 1e-12 * max(1.0, np.abs(row).max())
+    terms = [(value, name) for value, name in zip(row, signals, strict=True) if abs(value) > scale]
+    text = ' '.join(f'{"+" if v > 0 else "−"} {plain(abs(v), 3)} {name}' for v, name in terms)
+    return (text.removeprefix('+ ') if text[:1] == '+' else text.replace('− ', '−', 1)) or '0'

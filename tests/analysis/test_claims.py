@@ -1,0 +1,173 @@
+"""The claims table on the paper's own cases, and that its verdicts follow the numbers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.report.claims import claims_table
+from auv_analysis.report.evidence import grade
+from auv_analysis.report.text import MISSING
+from auv_analysis.run import Run
+
+CASE2_ONLY = {17, 18, 19, 20}
+
+
+@pytest.fixture(scope='module')
+def case1() -> dict[str, Run]:
+    return _runs('case1')
+
+
+@pytest.fixture(scope='module')
+def case2() -> dict[str, Run]:
+    return _runs('case2')
+
+
+def _runs(name: str) -> dict[str, Run]:
+    scenario = load_scenario(name)
+    return {controller: simulate(scenario, controller) for controller in scenario.controllers}
+
+
+def _table(runs: dict[str, Run]) -> dict:
+    claims = claims_table(runs, {name: summarize(run) for name, run in runs.items()})
+    return {claim.number: claim for claim in claims}
+
+
+def _shortened(run: Run, seconds: float) -> Run:
+    keep = run.t <= seconds + run.step / 2
+    series = ('t', 'eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate')
+    return replace(run, **{key: getattr(run, key)[keep] for key in series})
+
+
+def test_verdicts_of_case_1(case1):
+    table = _table(case1)
+    assert list(table) == list(range(1, 22))
+    verdicts = {number: claim.verdict for number, claim in table.items()}
+    expected = dict.fromkeys(range(1, 22), 'reproduced')
+    expected |= {8: 'partly', 9: 'partly', 14: 'not reproduced', 15: 'not evaluated'}
+    expected |= dict.fromkeys(CASE2_ONLY, 'other case')
+    assert verdicts == expected
+    assert all(claim.criterion for claim in table.values())
+
+
+def test_verdicts_of_case_2(case2):
+    table = _table(case2)
+    decided = CASE2_ONLY | {21}
+    assert {number for number, claim in table.items() if claim.verdict == 'reproduced'} == decided
+    others = [claim for number, claim in table.items() if number not in decided]
+    assert {claim.verdict for claim in others} == {'other case'}
+    assert {claim.ours for claim in others} == {MISSING}
+
+
+@pytest.mark.parametrize(
+    ('number', 'parts'),
+    [
+        (1, ['1.68 s', '0.0039']),
+        (2, ['0.0704', '0.369']),
+        (3, ['0.029', '0.081']),
+        (5, ['−0.52', '−0.55']),
+        (6, ['35.8', '113', '39.3']),
+        (8, ['28.9', '18.9', '22.0', '7.3']),
+        (9, ['528.18 J (0–10 s)', '402.45 J (0–30 s)']),
+        (10, ['22.57', '77.34', '(0–10 s)', '(0–30 s)']),
+        (11, ['0.0075 m/s']),
+        (12, ['0.0514 rad/s']),
+        (13, ['840 N m', '125 after 2 s']),
+        (14, ['829', '373', '11\u202f479', '2\u202f115']),
+        (21, ['39.98', '175.5', '141.114']),
+    ],
+)
+def test_values_of_case_1(case1, number, parts):
+    ours = _table(case1)[number].ours
+    assert [part for part in parts if part not in ours] == []
+
+
+@pytest.mark.parametrize(
+    ('number', 'parts'),
+    [(17, ['1.68 s against 4.28 s']), (19, ['−2.1']), (20, ['829', '326', '3\u202f986'])],
+)
+def test_values_of_case_2(case2, number, parts):
+    ours = _table(case2)[number].ours
+    assert [part for part in parts if part not in ours] == []
+
+
+def test_a_slow_controller_does_not_reproduce_claim_1(case1):
+    gvc = case1['gvc']
+    table = _table(case1 | {'gvc': replace(gvc, nu=gvc.nu_d + 0.01)})
+    assert table[1].verdict == 'not reproduced'
+    assert 'not in 30 s' in table[1].ours
+    assert table[9].ours != _table(case1)[9].ours
+
+
+def test_equal_inputs_reproduce_claim_14(case1):
+    cl = replace(case1['cl'], tau=case1['gvc'].tau)
+    assert _table(case1 | {'cl': cl})[14].verdict == 'reproduced'
+    peak = case1['gvc'].tau.copy()
+    peak[0, 2] *= 2.0
+    assert _table(case1 | {'cl': replace(cl, tau=peak)})[14].verdict == 'partly'
+
+
+def test_kinetic_energy_far_from_the_paper_is_not_reproduced(case1):
+    gvc = replace(case1['gvc'], nu=1.2 * case1['gvc'].nu)
+    assert _table(case1 | {'gvc': gvc})[9].verdict == 'not reproduced'
+
+
+def test_exchanged_laws_turn_case_2_around(case2):
+    gvc, cl = case2['gvc'], case2['cl']
+    exchanged = {
+        'gvc': replace(gvc, nu=cl.nu, tau=cl.tau),
+        'cl': replace(cl, nu=gvc.nu, tau=gvc.tau),
+    }
+    table = _table(exchanged)
+    assert [table[number].verdict for number in (17, 18, 20)] == ['not reproduced'] * 3
+    assert table[19].verdict == 'reproduced'
+
+
+def test_runs_are_known_by_law_and_gains_not_by_name(case1):
+    renamed = {'fast': case1['gvc'], 'slow': case1['cl']}
+    same = [(claim.ours, claim.verdict) for claim in _table(case1).values()]
+    assert [(claim.ours, claim.verdict) for claim in _table(renamed).values()] == same
+    other_gains = replace(case1['cl'], gains=case1['cl'].gains | {'k_D': 13.0})
+    row = _table(case1 | {'cl': other_gains})[2]
+    assert (row.verdict, row.ours) == ('not evaluated', MISSING)
+    assert 'law cl' in row.remark
+    assert '(36), (37)' in row.remark
+
+
+def test_one_run_leaves_the_comparisons_open(case1):
+    table = _table({'gvc': case1['gvc']})
+    assert {n for n, c in table.items() if c.verdict == 'not evaluated'} == {2, 3, 6, 14, 15}
+    assert table[1].verdict == 'reproduced'
+
+
+def test_unknown_disturbance_leaves_the_claims_on_it_open(case1):
+    blind = {name: replace(run, disturbance=None) for name, run in case1.items()}
+    table = _table(blind)
+    assert {table[number].verdict for number in (5, 6, 7, 8)} == {'not evaluated'}
+    assert 'F is not known' in table[5].remark
+
+
+def test_a_short_run_decides_only_what_it_can(case1):
+    table = _table({name: _shortened(run, 1.0) for name, run in case1.items()})
+    open_rows = {n for n, claim in table.items() if claim.verdict == 'not evaluated'}
+    assert open_rows == {1, 2, 3, 5, 6, 7, 9, 10, 14, 15}
+    assert 'at least 2.5 s' in table[1].remark
+    assert '(0–1 s)' in table[9].ours
+
+
+def test_every_duration_gives_a_table(case1):
+    for seconds in (0.05, 2.0, 2.5, 5.0, 10.0):
+        assert len(_table({name: _shortened(run, seconds) for name, run in case1.items()})) == 21
+
+
+def test_other_scenarios_have_no_claims(case1, case2):
+    other = {name: replace(run, scenario='other') for name, run in case1.items()}
+    assert _table(other) == {}
+    assert _table({'gvc': case1['gvc'], 'cl': case2['cl']}) == {}
+
+
+def test_grade_counts_the_parts():
+    assert grade([True, True]) == 'reproduced'
+    assert grade(np.array([True, False])) == 'partly'
+    assert grade([False]) == 'not reproduced'

@@ -1,0 +1,318 @@
+"""Figures and report: complete, readable, honest about zeros, and free of outside resources."""
+
+import re
+from dataclasses import replace
+from html import unescape
+from html.parser import HTMLParser
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from PIL import Image
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.report import plotting
+from auv_analysis.report.figures import FigureRecord, draw_figures
+from auv_analysis.report.page import maths, write_report
+from auv_analysis.report.text import fixed, join, number, plain, tied
+from auv_analysis.run import Run
+
+EMPTY_TAGS = {'meta', 'img', 'br'}
+
+
+def _runs(name: str) -> dict[str, Run]:
+    scenario = load_scenario(name)
+    return {controller: simulate(scenario, controller) for controller in scenario.controllers}
+
+
+@pytest.fixture(scope='module')
+def case1() -> dict[str, Run]:
+    return _runs('case1')
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp('case1')
+
+
+@pytest.fixture(scope='module')
+def figures(case1, folder) -> dict[str, FigureRecord]:
+    return {figure.name: figure for figure in draw_figures(case1, folder / 'figures')}
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Figures are composed but not rendered, for tests of what is drawn and said, not how."""
+
+    def save(figure, folder, name):
+        paths = folder / f'{name}.png', folder / f'{name}.pdf'
+        for path in paths:
+            path.write_bytes(b'not rendered')
+        return paths
+
+    monkeypatch.setattr(plotting, 'save', save)
+
+
+def _summaries(runs: dict[str, Run]) -> dict:
+    return {name: summarize(run) for name, run in runs.items()}
+
+
+def _write(out: Path, runs: dict[str, Run], scenario='a: 1', vehicle='b: 2  # <GIVEN>') -> str:
+    path = write_report(out, runs, _summaries(runs), scenario, vehicle)
+    assert path == out / 'report.html'
+    return path.read_text(encoding='utf-8')
+
+
+@pytest.fixture(scope='module')
+def report(case1, tmp_path_factory) -> str:
+    texts = load_scenario('case1').attachments
+    out = tmp_path_factory.mktemp('report')
+    return _write(out, case1, texts['scenario.yaml'], texts['vehicle.yaml'])
+
+
+def _short(run: Run, seconds: float) -> Run:
+    keep = run.t <= seconds + run.step / 2
+    series = ('t', 'eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate')
+    return replace(run, **{key: getattr(run, key)[keep] for key in series})
+
+
+def _uncoupled(run: Run) -> Run:
+    vehicle = replace(run.vehicle, M=np.diag(np.diagonal(run.vehicle.M)), name='uncoupled')
+    return replace(run, vehicle=vehicle)
+
+
+def _text(report: str) -> str:
+    body = report[report.index('<body>') :]
+    return unescape(re.sub(r'\s+', ' ', re.sub(r'<[^>]+>', '', body))).replace('\u00a0', ' ')
+
+
+def test_every_figure_is_a_png_and_a_pdf_with_something_on_it(figures):
+    assert len(figures) >= 7
+    for figure in figures.values():
+        assert figure.pdf.read_bytes().startswith(b'%PDF')
+        pixels = np.asarray(Image.open(figure.png).convert('L'), float)
+        assert pixels.std() > 5.0, figure.name
+        assert (pixels < 200).mean() > 0.003, figure.name
+
+
+def test_the_paper_figures_are_all_there(figures, tmp_path, quick):
+    captions = ' '.join(figure.caption for figure in figures.values())
+    assert all(f'the paper’s figure {number}.' in captions for number in '12345')
+    case2 = draw_figures({n: _short(r, 3.0) for n, r in _runs('case2').items()}, tmp_path)
+    captions = ' '.join(figure.caption for figure in case2)
+    assert all(f'figure {number}.' in captions for number in ('6(a,b)', '6(c,d)', '6(e,f)', '7'))
+    assert len(case2) >= 7
+
+
+def test_a_figure_is_not_called_the_papers_when_the_gains_are_others(case1, tmp_path, quick):
+    gvc = replace(case1['gvc'], gains=case1['gvc'].gains | {'Gamma': 61.0})
+    figures = draw_figures({'gvc': _short(gvc, 1.0)}, tmp_path)
+    assert 'the paper’s' not in ' '.join(figure.caption for figure in figures)
+
+
+def test_structural_zeros_are_named_and_not_drawn(figures, monkeypatch, case1, tmp_path, quick):
+    assert 'not drawn: pitch and yaw.' in figures['delta_xi'].caption
+    assert 'not drawn: surge, sway and heave.' in figures['delta_pi'].caption
+    drawn = []
+    original = plotting.draw_lines
+
+    def spy(axes, t, values, columns):
+        drawn.append(tuple(columns))
+        original(axes, t, values, columns)
+
+    monkeypatch.setattr(plotting, 'draw_lines', spy)
+    draw_figures({'gvc': _short(case1['gvc'], 5.0)}, tmp_path)
+    assert drawn[-4:] == [(0, 1, 2), (3,), (3, 4, 5), (3, 4, 5)]
+
+
+def test_signals_that_stay_zero_are_named_and_not_drawn(case1, tmp_path, quick):
+    still = case1['gvc'].nu_d.copy()
+    still[:, 2] = case1['gvc'].nu[:, 2]
+    figures = draw_figures({'gvc': replace(case1['gvc'], nu=still)}, tmp_path)
+    errors = next(figure for figure in figures if figure.name == 'errors_gvc')
+    assert 'not drawn: surge, sway, roll, pitch and yaw.' in errors.caption
+
+
+def test_diagonal_inertia_has_sentences_in_place_of_coupling_figures(case1, tmp_path, quick):
+    runs = {'gvc': _uncoupled(case1['gvc'])}
+    figures = {figure.name: figure for figure in draw_figures(runs, tmp_path / 'figures')}
+    for name, symbol in (('delta_xi', 'Δξ'), ('delta_pi', 'Δπ')):
+        assert figures[name].png is None
+        assert figures[name].pdf is None
+        assert f'{symbol} vanishes in all six degrees of freedom' in figures[name].caption
+    text = _text(_write(tmp_path, runs))
+    assert 'no degree of freedom is coupled to another by inertia' in text
+    assert 'Δξ vanishes in all six' in text
+
+
+def test_unknown_disturbance_leaves_out_what_needs_it(case1, tmp_path, quick):
+    runs = {name: replace(run, disturbance=None) for name, run in case1.items()}
+    names = [figure.name for figure in draw_figures(runs, tmp_path / 'figures')]
+    assert not [name for name in names if name.startswith(('lumped', 'uncertainty'))]
+    assert 'is neither drawn nor tabulated' in _text(_write(tmp_path, runs))
+
+
+def test_one_uncertainty_figure_when_all_runs_have_the_same(figures, case1, tmp_path, quick):
+    assert [name for name in figures if name.startswith('uncertainty')] == ['uncertainty_gvc']
+    cl = replace(case1['cl'], disturbance=2.0 * case1['cl'].disturbance)
+    names = [f.name for f in draw_figures({'gvc': case1['gvc'], 'cl': cl}, tmp_path)]
+    assert {'uncertainty_gvc', 'uncertainty_cl'} <= set(names)
+
+
+def test_figures_are_the_same_bytes_every_time_and_leave_matplotlib_alone(case1, tmp_path):
+    runs = {'gvc': _short(case1['gvc'], 1.0)}
+    settings = dict(matplotlib.rcParams)
+    first, second = (draw_figures(runs, tmp_path / name) for name in ('a', 'b'))
+    assert dict(matplotlib.rcParams) == settings
+    for one, other in zip(first, second, strict=True):
+        assert one.png.read_bytes() == other.png.read_bytes(), one.name
+        assert one.pdf.read_bytes() == other.pdf.read_bytes(), one.name
+
+
+@pytest.mark.parametrize('logarithmic', [False, True])
+@pytest.mark.parametrize('n', [10, 4000, 4001, 123_457])
+def test_decimation_keeps_every_extreme_and_few_points(n, logarithmic):
+    rng = np.random.default_rng(n)
+    t, y = np.arange(1.0, n + 1), rng.normal(size=n)
+    y[n // 3], y[-1] = 50.0, -60.0
+    few_t, few_y = plotting.decimate(t, y, logarithmic=logarithmic)
+    assert len(few_t) <= 4000
+    assert few_y.max() == 50.0
+    assert few_y.min() == -60.0
+    assert np.all(np.diff(few_t) > 0)
+    assert np.array_equal(y[few_t.astype(int) - 1], few_y)
+    if logarithmic:  # the first decades keep all of their samples
+        assert np.array_equal(few_t[: min(n, 100)], t[:100])
+
+
+class _Resources(HTMLParser):
+    """Collects what a browser would load, and checks that tags are closed in order."""
+
+    def __init__(self):
+        super().__init__()
+        self.loaded: list[str] = []
+        self.open: list[str] = []
+        self.images: list[dict] = []
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        self.loaded += [values[key] for key in ('src', 'srcset', 'data', 'poster') if key in values]
+        if tag in ('link', 'script', 'iframe', 'object', 'embed'):
+            self.loaded.append(f'<{tag}>')
+        if tag == 'a':
+            self.loaded += [] if values['href'].startswith('#') else [values['href']]
+        if tag == 'img':
+            self.images.append(values)
+        if tag not in EMPTY_TAGS:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag, f'</{tag}> closes something else'
+
+
+def test_report_needs_nothing_but_itself(report):
+    page = _Resources()
+    page.feed(report)
+    assert page.open == []
+    inline = 'data:image/png;base64,'
+    assert [item[:40] for item in page.loaded if not item.startswith(inline)] == []
+    assert not re.search(r'@import|url\(|https?://', report)
+    assert len(report) < 6_000_000
+    assert len(page.images) >= 7
+    assert all(len(image['alt']) > 30 for image in page.images)
+
+
+def test_headers_of_tables_have_a_scope(report):
+    headers = re.findall(r'<th\b[^>]*>', report)
+    assert headers
+    assert [header for header in headers if 'scope=' not in header] == []
+
+
+def test_report_shows_every_claim_with_its_verdict(report):
+    rows = re.findall(r'<tr id="claim-(\d+)".*?</tr>', report, re.DOTALL)
+    assert [int(row) for row in rows] == list(range(1, 22))
+    badges = re.findall(r'<tr id="claim-\d+".*?<span class="badge ([a-z-]+)">', report, re.DOTALL)
+    assert badges[13] == 'not-reproduced'
+    assert badges[16] == 'other-case'
+    assert badges.count('reproduced') == 13
+
+
+def test_report_says_what_it_must(report):
+    text = _text(report)
+    for sentence in (
+        'The velocity is tracked, not the position: nothing bounds η',
+        '528.18 J over 0–10 s and 402.45 J over 0–30 s',
+        'the paper prints 519.47 J and no window',
+        'an en dash (–) stands for what is missing',
+        'What is given and what is reconstructed',
+        'Readings of the paper',
+        'RECONSTRUCTED from N = diag(300, 500, 500, 40, 175.5, 141.1)',
+        'kind: herman2018, exponent_sign: -1',
+        'structural zero',
+        'not reproduced (no. 14)',
+    ):
+        assert sentence in text, sentence
+    assert [int(n) for n in re.findall(r'<b>Figure (\d+)\.', report)] == list(range(1, 14))
+    assert 'nan' not in text.lower().split()
+    assert 'None' not in text
+
+
+def test_report_of_one_run_and_of_three(case1, tmp_path, quick):
+    one = _text(_write(tmp_path / 'one', {'gvc': _short(case1['gvc'], 5.0)}))
+    assert 'Inputs compared' not in one
+    assert 'Under cl' not in one
+    third = replace(case1['cl'], law='mine:Law')
+    runs = {'gvc': case1['gvc'], 'cl': case1['cl'], 'cl_2': third}
+    with pytest.raises(ValueError, match='mine'):
+        summarize(third)
+    summaries = _summaries({'gvc': case1['gvc'], 'cl': case1['cl']})
+    summaries['cl_2'] = summaries['cl'] | {'law': 'mine:Law'}
+    path = write_report(tmp_path / 'three', runs, summaries, '', '')
+    three = path.read_text(encoding='utf-8')
+    assert {path.stem for path in (path.parent / 'figures').glob('errors_*.png')} == {
+        'errors_gvc', 'errors_cl', 'errors_cl_2',
+    }  # fmt: skip
+    assert '<details>' not in three
+    assert 'mine:Law' in three
+
+
+def test_report_of_another_vehicle_and_scenario(tmp_path, quick):
+    run = simulate(load_scenario('case1'), 'gvc')
+    vehicle = replace(run.vehicle, name='other', warnings=('file: key: <odd>',))
+    run = replace(run, scenario='mine', vehicle=vehicle, notes=('3 samples dropped',))
+    html = _write(tmp_path, {'gvc': _short(run, 1.0)})
+    text = _text(html)
+    assert 'reconstructed' not in text
+    assert 'claim-1"' not in html
+    assert '519.47' not in text
+    assert 'gvc: 3 samples dropped' in text
+    assert 'file: key: <odd>' in text
+    assert 'file: key: &lt;odd&gt;' in html
+    assert 'b: 2 # <GIVEN>' in text
+
+
+@pytest.mark.parametrize('seconds', [0.01, 2.0, 4.01])
+def test_report_of_short_runs(case1, tmp_path, seconds):
+    runs = {'cl': _short(case1['cl'], seconds)}
+    assert 'What was found' in _text(_write(tmp_path, runs))
+
+
+def test_no_run_is_refused(tmp_path):
+    with pytest.raises(ValueError, match='at least one run'):
+        write_report(tmp_path, {}, {}, '', '')
+
+
+def test_numbers_as_text():
+    assert [number(x) for x in (0.0, 11479.1, -0.51912, 528.184, None, 3.921e-5)] == [
+        '0', '11\u202f479', '−0.519', '528', '–', '3.92·10⁻⁵',
+    ]  # fmt: skip
+    assert [plain(x) for x in (12.0, 0.8, -0.025, 30000.0, 0)] == [
+        '12', '0.8', '−0.025', '30\u202f000', '0',
+    ]  # fmt: skip
+    assert [fixed(x, 2) for x in (-4.016, None)] == ['−4.02', '–']
+    assert [join(words) for words in ([], ['a'], ['a', 'b'], ['a', 'b', 'c'])] == [
+        '', 'a', 'a and b', 'a, b and c',
+    ]  # fmt: skip
+    assert tied('840 N m in 2 s') == '840\u00a0N\u00a0m in 2\u00a0s'
+    assert str(maths('w_X < ξ3, Lambda')) == 'w<sub>X</sub> &lt; ξ<sub>3</sub>, Λ'

@@ -1,0 +1,176 @@
+"""Real nodes as processes, and a rclpy participant that talks to them."""
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from auv_analysis.experiment import loopback
+from auv_analysis.supervisor import executable
+from auv_dynamics.ros import topics
+
+PACKAGES = {
+    'plant_node': 'auv_dynamics',
+    'setpoint_node': 'auv_gvc_controller',
+    'controller_node': 'auv_gvc_controller',
+    'recorder_node': 'auv_analysis',
+    'analysis_node': 'auv_analysis',
+}
+PATIENCE = 30.0  # s, after which a test that waits has failed
+_domains = itertools.count()
+
+
+def fresh_domain() -> int:
+    """Domain id of its own for each test, apart from those of parallel workers."""
+    worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])
+    return 1 + (os.getpid() + 25 * worker + next(_domains)) % 100
+
+
+def environment(domain: int) -> dict[str, str]:
+    """Environment of a process on the loopback in a domain."""
+    return {**os.environ, **loopback(), 'ROS_DOMAIN_ID': str(domain), 'PYTHONUNBUFFERED': '1'}
+
+
+def start_node(name: str, domain: int, *arguments: str) -> subprocess.Popen:
+    """Start one of our nodes; its output is captured."""
+    command = [str(executable(PACKAGES[name], name))]
+    if arguments:
+        command += ['--ros-args', *arguments]
+    return subprocess.Popen(
+        command,
+        env=environment(domain),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess:
+    """Run a node that is expected to end by itself."""
+    process = start_node(name, fresh_domain(), *arguments)
+    output, _ = process.communicate(timeout=PATIENCE)
+    return subprocess.CompletedProcess(process.args, process.returncode, output, '')
+
+
+def stop(process: subprocess.Popen, how: int = signal.SIGTERM) -> tuple[int, str]:
+    """End a process; its exit code and output."""
+    if process.poll() is None:
+        process.send_signal(how)
+    output, _ = process.communicate(timeout=PATIENCE)
+    return process.returncode, output
+
+
+def parameters(**values: Any) -> list[str]:
+    """Command-line parameters; `__` stands for a dot."""
+    listed = []
+    for name, value in values.items():
+        text = str(value).lower() if isinstance(value, bool) else str(value)
+        listed += ['-p', f'{name.replace("__", ".")}:={text}']
+    return listed
+
+
+GAINS = parameters(
+    gains__k_D='[12.0]', gains__k_I='[1.0]', gains__Lambda='[0.8]', gains__Gamma='[60.0]'
+)
+CONTROLLER = [*parameters(law='gvc', vehicle='herman2018'), *GAINS]
+
+
+class Peer:
+    """A participant of the test's own: publishes, listens, calls services."""
+
+    def __init__(self, domain: int):
+        os.environ.update(loopback())
+        self.context = Context()
+        rclpy.init(
+            context=self.context,
+            domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        self.node = rclpy.create_node('test_peer', context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.heard: dict[str, list[Any]] = {}
+        self._outputs: dict[str, Any] = {}
+
+    def listen(self, *heard: topics.Topic) -> None:
+        """Keep what is published on topics."""
+        for topic in heard:
+            self.heard[topic.name] = []
+            self.node.create_subscription(
+                topic.type, topic.name, self.heard[topic.name].append, topics.every_step()
+            )
+
+    def publish(self, topic: topics.Topic, message: Any, *, subscribers: int = 1) -> None:
+        """Publish once a subscriber has matched."""
+        if topic.name not in self._outputs:
+            self._outputs[topic.name] = self.node.create_publisher(
+                topic.type, topic.name, topics.every_step()
+            )
+        output = self._outputs[topic.name]
+        self.until(lambda: output.get_subscription_count() >= subscribers, f'match {topic.name}')
+        output.publish(message)
+
+    def until(self, done: Callable[[], Any], what: str = 'condition') -> Any:
+        """Spin until something is true; fail when it takes too long."""
+        limit = time.monotonic() + PATIENCE
+        while not (result := done()):
+            assert time.monotonic() < limit, f'{what} within {PATIENCE:g} s'
+            self.executor.spin_once(timeout_sec=0.05)
+        return result
+
+    def spin(self, seconds: float) -> None:
+        """Listen for a while, to see that something does not come."""
+        limit = time.monotonic() + seconds
+        while (left := limit - time.monotonic()) > 0:
+            self.executor.spin_once(timeout_sec=left)
+
+    def call(self, kind: type, name: str, request: Any = None) -> Any:
+        """Call a service."""
+        client = self.node.create_client(kind, name)
+        self.until(client.service_is_ready, f'service {name}')
+        future = client.call_async(request or kind.Request())
+        self.until(future.done, f'answer of {name}')
+        return future.result()
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self.node.destroy_node()
+        self.executor.shutdown()
+        rclpy.try_shutdown(context=self.context)
+
+
+@contextmanager
+def graph(*nodes: tuple[str, list[str]]) -> Iterator[tuple[Peer, dict[str, subprocess.Popen]]]:
+    """Nodes in a fresh domain with a peer beside them; all are ended afterwards."""
+    domain = fresh_domain()
+    peer = Peer(domain)
+    processes = {name: start_node(name, domain, *arguments) for name, arguments in nodes}
+    try:
+        yield peer, processes
+    finally:
+        peer.close()
+        for process in processes.values():
+            if process.poll() is None:
+                process.kill()
+            process.communicate(timeout=PATIENCE)
+
+
+def auv(*arguments: str, cwd: Path | None = None, **extra: str) -> subprocess.CompletedProcess:
+    """Run the installed `auv` command."""
+    command = [str(Path(sys.executable).with_name('auv')), *arguments]
+    environ = {k: v for k, v in os.environ.items() if k != 'ROS_DOMAIN_ID'}
+    return subprocess.run(
+        command, cwd=cwd, env={**environ, **extra}, capture_output=True, text=True, timeout=600,
+        check=False,
+    )  # fmt: skip

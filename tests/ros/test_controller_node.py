@@ -1,0 +1,232 @@
+"""The controller node: what it answers, what it refuses, how it lets go."""
+
+import itertools
+import math
+import signal
+
+import numpy as np
+import pytest
+from harness import CONTROLLER, GAINS, graph, parameters, run_node, stop
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from std_srvs.srv import Trigger
+
+from auv_dynamics import interface
+from auv_dynamics.interface import Frames
+from auv_dynamics.ros import convert, topics
+
+FRAMES = Frames()
+STEP = 10_000_000
+X = np.array([0, 0, 0, 1, 0, 0, 0, 0.1, 0, 0, 0, 0, 0], float)
+LOCKSTEP = [*CONTROLLER, *parameters(lockstep=True, setpoint_pairing='exact')]
+
+
+def odometry(k: int, x: np.ndarray = X):
+    return convert.odometry(k * STEP, x, FRAMES)
+
+
+def setpoint(k: int, surge: float = 0.2):
+    return convert.twist(k * STEP, (surge, 0, 0, 0, 0, 0), FRAMES)
+
+
+def stamps(messages: list) -> list[int]:
+    return [interface.nanoseconds(m.header.stamp) // STEP for m in messages]
+
+
+def offer(peer, k: int, count: int) -> list:
+    """Best effort may lose the first message: repeat it until it is answered."""
+
+    def done() -> bool:
+        peer.publish(topics.ODOM, odometry(k))
+        peer.spin(0.1)
+        return len(peer.heard['wrench']) >= count
+
+    peer.until(done, f'an answer to odometry {k}')
+    return peer.heard['wrench']
+
+
+@pytest.fixture
+def lockstep():
+    with graph(('controller_node', LOCKSTEP)) as (peer, processes):
+        peer.listen(topics.WRENCH, topics.DISTURBANCE_ESTIMATE)
+        peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
+        yield peer, processes['controller_node']
+
+
+def answered(peer, count: int) -> list:
+    peer.until(lambda: len(peer.heard['wrench']) >= count, f'{count} wrenches')
+    return peer.heard['wrench']
+
+
+def test_answers_the_odometry_whose_setpoint_has_come(lockstep) -> None:
+    peer, _ = lockstep
+    peer.publish(topics.ODOM, odometry(0))
+    peer.spin(0.3)
+    assert not peer.heard['wrench'], 'exact pairing answers nothing before the set-point'
+    peer.publish(topics.CMD_VEL, setpoint(0))
+    wrench = answered(peer, 1)[0]
+    assert stamps([wrench]) == [0]
+    assert wrench.header.frame_id == 'base_link_fsd'
+    assert wrench.wrench.force.x > 0
+    peer.until(lambda: peer.heard['disturbance_estimate'], 'an estimate')
+
+
+BAD = {
+    'nan': lambda: odometry(1, np.where(np.arange(13) == 7, np.nan, X)),
+    'inf': lambda: odometry(1, np.where(np.arange(13) == 12, np.inf, X)),
+    'pose frame': lambda: convert.odometry(STEP, X, Frames(odom='map')),
+    'child frame': lambda: convert.odometry(STEP, X, Frames(base='base_link')),
+    'old stamp': lambda: odometry(0),
+    'far stamp': lambda: odometry(10**9),
+    'no quaternion': lambda: odometry(1, np.where((np.arange(13) > 2) & (np.arange(13) < 7), 0, X)),
+    'impossible speed': lambda: odometry(1, np.where(np.arange(13) == 7, 1e9, X)),
+}
+
+
+@pytest.mark.parametrize('kind', BAD)
+def test_refuses_broken_odometry_and_goes_on(lockstep, kind: str) -> None:
+    peer, process = lockstep
+    for k in range(3):
+        peer.publish(topics.CMD_VEL, setpoint(k))
+    peer.publish(topics.ODOM, odometry(0))
+    answered(peer, 1)
+    peer.publish(topics.ODOM, BAD[kind]())
+    peer.publish(topics.ODOM, odometry(1))
+    wrenches = answered(peer, 2)
+    assert stamps(wrenches) == [0, 1]
+    forces = [m.wrench.force.x for m in wrenches]
+    assert all(map(math.isfinite, forces))
+    assert abs(forces[1] - forces[0]) < 100, 'the refused one left no trace'
+    code, output = stop(process)
+    assert code == 0
+    assert 'refused: odom' in output
+    assert 'expected' in output
+
+
+@pytest.mark.parametrize('how', [signal.SIGTERM, signal.SIGINT])
+def test_ends_on_a_signal(lockstep, how: int) -> None:
+    peer, process = lockstep
+    peer.publish(topics.ODOM, odometry(0))
+    peer.spin(0.2)
+    code, _ = stop(process, how)
+    assert code == 0
+    peer.until(lambda: peer.heard['wrench'], 'the zero wrench for the unanswered odometry')
+    assert peer.heard['wrench'][0].wrench.force.x == 0
+
+
+def change(peer, transition: int) -> bool:
+    request = ChangeState.Request(transition=Transition(id=transition))
+    return peer.call(ChangeState, 'controller_node/change_state', request).success
+
+
+def state(peer) -> str:
+    return peer.call(GetState, 'controller_node/get_state').current_state.label
+
+
+def set_parameter(peer, name: str, value: ParameterValue):
+    request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
+    return peer.call(SetParameters, 'controller_node/set_parameters', request).results[0]
+
+
+def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
+    with graph(('controller_node', [*CONTROLLER, *parameters(autostart=False)])) as (peer, _):
+        assert state(peer) == 'unconfigured'
+        assert change(peer, Transition.TRANSITION_CONFIGURE)
+        doubles = ParameterValue(type=8, double_array_value=[20.0])
+        assert set_parameter(peer, 'gains.k_D', doubles).successful
+        wrong = ParameterValue(type=8, double_array_value=[20.0, 1.0])
+        assert not set_parameter(peer, 'gains.k_D', wrong).successful
+        assert set_parameter(peer, 'law', ParameterValue(type=4, string_value='cl')).successful
+        assert change(peer, Transition.TRANSITION_ACTIVATE)
+        refused = set_parameter(peer, 'gains.k_D', doubles)
+        assert not refused.successful
+        assert 'inactive' in refused.reason
+        assert change(peer, Transition.TRANSITION_DEACTIVATE)
+        assert set_parameter(peer, 'gains.k_D', doubles).successful
+
+
+def test_reactivation_starts_from_zero_integrals() -> None:
+    """Rival controllers keep their integral over a deactivation (ros2_controllers#1840)."""
+    arguments = [*CONTROLLER, *parameters(lockstep=True, setpoint_pairing='exact')]
+    with graph(('controller_node', arguments)) as (peer, _):
+        peer.listen(topics.WRENCH)
+        for k in range(60):
+            peer.publish(topics.CMD_VEL, setpoint(k))
+        for k in range(50):
+            peer.publish(topics.ODOM, odometry(k))
+            answered(peer, k + 1)
+        first, last = peer.heard['wrench'][0], peer.heard['wrench'][-1]
+        assert last.wrench.force.x != first.wrench.force.x
+        assert change(peer, Transition.TRANSITION_DEACTIVATE)
+        assert change(peer, Transition.TRANSITION_ACTIVATE)
+        peer.publish(topics.ODOM, odometry(55))
+        again = answered(peer, 51)[-1]
+        assert again.wrench == first.wrench
+
+
+def test_reset_empties_the_integrals(lockstep) -> None:
+    peer, _ = lockstep
+    for k in range(50):
+        peer.publish(topics.CMD_VEL, setpoint(k))
+        peer.publish(topics.ODOM, odometry(k))
+        answered(peer, k + 1)
+    assert peer.call(Trigger, 'controller_node/reset').success
+    peer.publish(topics.CMD_VEL, setpoint(50))
+    peer.publish(topics.ODOM, odometry(50))
+    first, last = answered(peer, 51)[0], answered(peer, 51)[-1]
+    # what is left is the one step since the reset
+    assert abs(last.wrench.force.x - first.wrench.force.x) < 0.5
+
+
+def test_real_time_lets_go_without_setpoint_and_recovers() -> None:
+    arguments = [*CONTROLLER, *parameters(setpoint_timeout=0.1, odometry_timeout=100.0)]
+    with graph(('controller_node', arguments)) as (peer, _):
+        peer.listen(topics.WRENCH)
+        peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
+        assert offer(peer, 0, 1)[0].wrench.force.x == 0, 'no set-point yet'
+        peer.publish(topics.CMD_VEL, setpoint(1))
+        peer.spin(0.5)
+        assert offer(peer, 1, 2)[1].wrench.force.x > 0
+        assert offer(peer, 30, 3)[2].wrench.force.x == 0, 'the set-point is too old'
+        peer.publish(topics.CMD_VEL, setpoint(31))
+        peer.spin(0.5)
+        assert offer(peer, 31, 4)[3].wrench.force.x > 0
+
+
+def test_real_time_lets_go_when_odometry_falls_silent() -> None:
+    arguments = [*CONTROLLER, *parameters(odometry_timeout=0.5, setpoint_timeout=10.0)]
+    with graph(('controller_node', arguments)) as (peer, _):
+        peer.listen(topics.WRENCH)
+        peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
+        peer.publish(topics.CMD_VEL, setpoint(0))
+        peer.spin(0.1)
+        numbers = itertools.count(1)
+        peer.until(lambda: offer(peer, next(numbers), 1)[-1].wrench.force.x > 0, 'a wrench')
+        peer.until(lambda: peer.heard['wrench'][-1].wrench.force.x == 0, 'a zero wrench')
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'key', 'expected'),
+    [
+        ([*parameters(vehicle='herman2018'), *GAINS], 'law', 'gvc, cl or module:Class'),
+        ([*parameters(law='gvc'), *GAINS], 'vehicle', 'a vehicle file'),
+        (parameters(law='gvc', vehicle='herman2018'), 'gains.k_D', 'a number'),
+        ([*CONTROLLER, *parameters(gains__k_D='[1.0, 2.0]')], 'gains.k_D', '1, 6 or 36'),
+        ([*CONTROLLER, *parameters(gains__k_P='[1.0]')], 'gains.k_P', 'k_D, k_I, Lambda, Gamma'),
+        ([*CONTROLLER, *parameters(lockstop=True)], 'lockstop', 'one of'),
+        ([*CONTROLLER, *parameters(lockstep='maybe')], 'lockstep', 'true or false'),
+        ([*CONTROLLER, *parameters(setpoint_pairing='some')], 'setpoint_pairing', 'exact, latest'),
+        ([*CONTROLLER, *parameters(law='nonsense')], 'law', 'gvc, cl or module:Class'),
+        ([*CONTROLLER, *parameters(vehicle='nothing')], 'nothing', 'herman2018'),
+    ],
+)
+def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
+    ended = run_node('controller_node', *arguments)
+    assert ended.returncode == 2, ended.stdout
+    lines = ended.stdout.strip().splitlines()
+    assert len(lines) == 1, ended.stdout
+    assert key in lines[0]
+    assert expected in lines[0]
+    assert 'found' in lines[0]

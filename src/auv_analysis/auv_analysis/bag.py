@@ -1,12 +1,14 @@
 """Reading a recorded run: every MCAP bag of the graph, finished or not, becomes a `Run`."""
 
+import os
+import re
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Attachment, Channel, Footer, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
@@ -15,10 +17,13 @@ from mcap_ros2.decoder import DecoderFactory
 from auv_analysis.run import Run
 from auv_analysis.simulate import unwrapped_eta
 from auv_dynamics import interface
-from auv_dynamics.files import InputError
+from auv_dynamics.files import InputError, parse_yaml
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import load_vehicle, vehicle_from_dict
+from auv_gvc_controller.laws import make_gains
 
+NAME = re.compile('[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}')
+MAGIC = b'\x89MCAP0\r\n'
 READERS = {
     interface.ODOM: interface.read_odometry,
     interface.CMD_VEL: lambda m, frames: interface.read_twist(m, frames, interface.CMD_VEL),
@@ -31,6 +36,15 @@ READERS = {
         m, frames, interface.DISTURBANCE_ESTIMATE
     ),
 }
+KINDS = {
+    interface.ODOM: 'nav_msgs/msg/Odometry',
+    interface.CMD_VEL: 'geometry_msgs/msg/TwistStamped',
+    interface.CMD_ACCEL: 'geometry_msgs/msg/AccelStamped',
+    interface.WRENCH: 'geometry_msgs/msg/WrenchStamped',
+    interface.DISTURBANCE: 'geometry_msgs/msg/WrenchStamped',
+    interface.DISTURBANCE_ESTIMATE: 'geometry_msgs/msg/WrenchStamped',
+}
+UNKNOWN = 'unknown'  # law of a bag without params.yaml
 REQUIRED = (interface.ODOM, interface.WRENCH)
 
 
@@ -63,11 +77,17 @@ class Contents:
 def bag_files(bag: str | Path) -> list[Path]:
     """MCAP files of a bag, in order; InputError when there are none."""
     path = Path(bag)
-    files = sorted(path.glob('*.mcap'), key=_split_order) if path.is_dir() else [path]
-    if not files or not files[0].is_file():
-        found = 'a folder without .mcap files' if path.is_dir() else 'no such file or folder'
+    is_folder = os.path.isdir(path)  # Path.is_dir raises for a name that is too long
+    files = sorted(path.glob('*.mcap'), key=_split_order) if is_folder else [path]
+    if not files or not os.path.isfile(files[0]):
+        found = 'a folder without .mcap files' if is_folder else 'no such file or folder'
         raise InputError(path, '', 'a bag folder or an .mcap file', found)
     return files
+
+
+def _head(path: Path) -> bytes:
+    with path.open('rb') as stream:
+        return stream.read(len(MAGIC))
 
 
 def _split_order(path: Path) -> tuple[int, str]:
@@ -79,11 +99,12 @@ def _records(path: Path, notes: list[str]) -> Iterator[Any]:
     finished = False
     with path.open('rb') as stream:
         try:
-            for record in StreamReader(stream).records:
+            for record in StreamReader(stream, validate_crcs=True).records:
                 finished = finished or isinstance(record, Footer)
                 yield record
-        except EndOfFile:
-            pass
+        except (EndOfFile, struct.error):  # the reader unpacks a record that is cut without asking
+            if 0 < stream.tell() < len(MAGIC) or not MAGIC.startswith(_head(path)):
+                raise InputError(path, '', 'an MCAP file', 'another beginning') from None
         except (McapError, ValueError, KeyError, OverflowError, RuntimeError) as error:
             if stream.tell() <= 64:
                 found = str(error).splitlines()[0]
@@ -121,7 +142,8 @@ def read_bag(bag: str | Path, *, decode: bool = True) -> Contents:
                 contents.first = record.log_time if first is None else min(first, record.log_time)
                 contents.last = record.log_time if last is None else max(last, record.log_time)
                 if decode and record.channel_id in decoders:
-                    message = decoders[record.channel_id](record.data)
+                    decoder = decoders[record.channel_id]
+                    message = _decoded(decoder, record.data, path, topic)
                     _keep(contents, path, topic, message, frames)
             elif isinstance(record, Schema):
                 schemas[record.id] = record
@@ -132,6 +154,7 @@ def read_bag(bag: str | Path, *, decode: bool = True) -> Contents:
                 schema = schemas.get(record.schema_id)
                 contents.types[record.topic] = schema.name if schema else ''
                 if decode and _role(record.topic) in READERS:
+                    _check_type(path, record.topic, contents.types[record.topic])
                     # a factory of its own per file: schema ids are only unique within one
                     decoder = DecoderFactory().decoder_for(record.message_encoding, schema)
                     if decoder is not None:
@@ -141,6 +164,19 @@ def read_bag(bag: str | Path, *, decode: bool = True) -> Contents:
             elif isinstance(record, Metadata):
                 contents.metadata[record.name] = dict(record.metadata)
     return contents
+
+
+def _decoded(decoder: Any, data: bytes, path: Path, topic: str) -> Any:
+    try:
+        return decoder(data)
+    except (struct.error, ValueError, EOFError) as error:
+        raise InputError(path, topic, 'messages of its type', str(error)) from None
+
+
+def _check_type(path: Path, topic: str, found: str) -> None:
+    expected = KINDS[_role(topic)]
+    if found != expected:
+        raise InputError(path, topic, expected, found)
 
 
 def _role(topic: str) -> str:
@@ -187,8 +223,9 @@ def load_run(bag: str | Path, vehicle: str | Path | None = None) -> Run:
     by_role = _one_graph(contents, Path(bag))
     ns, series, dropped = _complete(by_role, Path(bag))
     notes = [*contents.notes, *dropped]
-    parameters = _parameters(contents)
-    controller, step = parameters.get('controller_node', {}), _step(parameters, ns)
+    parameters = _parameters(contents, Path(bag))
+    controller, step = parameters.get('controller_node', {}), _step(parameters, ns, Path(bag))
+    law, gains = _law_and_gains(controller, Path(bag))
     x = series[interface.ODOM]
     nu_d = series.get(interface.CMD_VEL, np.zeros((len(ns), 6)))
     return Run(
@@ -202,9 +239,9 @@ def load_run(bag: str | Path, vehicle: str | Path | None = None) -> Run:
         disturbance_estimate=series.get(interface.DISTURBANCE_ESTIMATE, np.zeros((len(ns), 6))),
         vehicle=_vehicle(contents, Path(bag), vehicle),
         scenario=_scenario_name(contents, Path(bag)),
-        controller=Path(parameters.get('recorder_node', {}).get('bag') or bag).name,
-        law=controller.get('law', 'unknown'),
-        gains=_gains(controller),
+        controller=_controller_name(parameters, Path(bag)),
+        law=law,
+        gains=gains,
         step=step,
         source='bag',
         notes=tuple(notes),
@@ -250,27 +287,52 @@ def _complete(
     return stamps, series, notes
 
 
-def _parameters(contents: Contents) -> dict[str, dict[str, Any]]:
+def _parameters(contents: Contents, bag: Path) -> dict[str, dict[str, Any]]:
     """Node name -> its parameters, from the attached parameter file."""
-    try:
-        data = yaml.safe_load(contents.attachments.get('params.yaml', '')) or {}
-        return {name.rpartition('/')[2]: entry['ros__parameters'] for name, entry in data.items()}
-    except (yaml.YAMLError, AttributeError, KeyError, TypeError):
-        contents.notes.append('params.yaml: attached, but it cannot be read')
+    text = contents.attachments.get('params.yaml')
+    if text is None:
         return {}
+    file = f'{bag}: params.yaml'
+    found: dict[str, dict[str, Any]] = {}
+    for name, entry in parse_yaml(text, file, 'parameter').items():
+        values = entry.get('ros__parameters') if isinstance(entry, dict) else None
+        if not isinstance(values, dict):
+            raise InputError(file, name, 'a mapping with ros__parameters', entry)
+        found[name.rpartition('/')[2]] = values
+    return found
 
 
-def _step(parameters: dict[str, dict[str, Any]], ns: np.ndarray) -> float:
+def _step(parameters: dict[str, dict[str, Any]], ns: np.ndarray, bag: Path) -> float:
     step = parameters.get('plant_node', {}).get('step')
-    return float(step) if step else float(np.median(np.diff(ns))) / interface.NANOSECONDS
+    if step is None:
+        return float(np.median(np.diff(ns))) / interface.NANOSECONDS
+    if not (isinstance(step, int | float) and 0 < step < np.inf):
+        raise InputError(f'{bag}: params.yaml', 'plant_node: step', 'a positive number (s)', step)
+    return float(step)
 
 
-def _gains(controller: dict[str, Any]) -> dict[str, Any]:
+def _controller_name(parameters: dict[str, dict[str, Any]], bag: Path) -> str:
+    recorded = parameters.get('recorder_node', {}).get('bag', str(bag))
+    if not isinstance(recorded, str):
+        raise InputError(f'{bag}: params.yaml', 'recorder_node: bag', 'a folder', recorded)
+    return Path(recorded).name
+
+
+def _law_and_gains(controller: dict[str, Any], bag: Path) -> tuple[str, dict[str, Any]]:
     gains = {}
     for key, value in controller.items():
         if key.startswith('gains.'):
-            gains[key.removeprefix('gains.')] = value[0] if len(value) == 1 else list(value)
-    return gains
+            one = isinstance(value, list) and len(value) == 1
+            gains[key.removeprefix('gains.')] = value[0] if one else value
+    law = controller.get('law')
+    file = f'{bag}: params.yaml'
+    if law is None:
+        return UNKNOWN, {}  # a bag that somebody else recorded says nothing of it
+    try:
+        make_gains(law, gains)
+    except ValueError as error:
+        raise InputError(file, 'controller_node', str(error), 'another law or gain') from None
+    return law, gains
 
 
 def _vehicle(contents: Contents, bag: Path, vehicle: str | Path | None) -> Vehicle:
@@ -279,11 +341,15 @@ def _vehicle(contents: Contents, bag: Path, vehicle: str | Path | None) -> Vehic
     text = contents.attachments.get('vehicle.yaml')
     if text is None:
         raise InputError(bag, 'vehicle.yaml', 'an attachment, or --vehicle FILE', None)
-    return vehicle_from_dict(yaml.safe_load(text), f'{bag}: vehicle.yaml')
+    file = f'{bag}: vehicle.yaml'
+    return vehicle_from_dict(parse_yaml(text, file, 'vehicle'), file)
 
 
 def _scenario_name(contents: Contents, bag: Path) -> str:
-    try:
-        return yaml.safe_load(contents.attachments['scenario.yaml'])['name']
-    except (KeyError, TypeError, yaml.YAMLError):
+    text, file = contents.attachments.get('scenario.yaml'), f'{bag}: scenario.yaml'
+    if text is None:
         return bag.resolve().parent.name
+    name = parse_yaml(text, file, 'scenario').get('name')
+    if not (isinstance(name, str) and NAME.fullmatch(name)):
+        raise InputError(file, 'name', 'a word without blanks or slashes', name)
+    return name

@@ -11,9 +11,19 @@ from auv_dynamics.files import InputError
 SCENARIO = 'a scenario file, or the bare name of a shipped one'
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> Any:
+        """Exit 2 with one line instead of usage and a line."""
+        text = message.replace(' (choose from ', '; expected one of (')
+        expected = text if 'expected' in text else f'expected a valid command line, found: {text}'
+        found = '' if 'found' in expected else f', found none; see {self.prog} --help'
+        _say(f'{self.prog}: {expected}{found}')
+        sys.exit(2)
+
+
 def parser() -> argparse.ArgumentParser:
     """Command line of `auv`."""
-    main = argparse.ArgumentParser(prog='auv', description=__doc__.split(':')[0])
+    main = _Parser(prog='auv', description=__doc__.split(':')[0])
     commands = main.add_subparsers(dest='command', required=True, metavar='COMMAND')
 
     def command(name: str, text: str, *, writes: bool = True) -> argparse.ArgumentParser:
@@ -27,7 +37,7 @@ def parser() -> argparse.ArgumentParser:
     run = command('run', 'run a scenario on real nodes, record, analyse and report')
     run.add_argument('scenario', help=SCENARIO)
     run.add_argument('--controller', action='append', help='only this one; may be repeated')
-    run.add_argument('--domain-id', type=int, help='ROS domain, default: a free one')
+    run.add_argument('--domain-id', help='ROS domain, default: a free one')
     simulate = command('simulate', 'simulate a scenario in this process, analyse and report')
     simulate.add_argument('scenario', help=SCENARIO)
     simulate.add_argument('--controller', action='append', help='only this one; may be repeated')

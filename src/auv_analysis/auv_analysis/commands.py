@@ -46,19 +46,30 @@ def _say(text: str) -> None:
 
 def _open(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
     scenario = load_scenario(options.scenario)
-    for warning in scenario.vehicle.warnings:
-        _say(f'warning: {warning}')
     names = list(dict.fromkeys(options.controller or scenario.controllers))
     for name in names:
         scenario.controller(name)
     return scenario, names
 
 
+def _prepare(options: argparse.Namespace, scenario: Scenario, names: list[str]) -> Path:
+    """Folder of the results; warnings only now, so that a refusal is one line."""
+    out = prepare(
+        options.out or Path('runs') / scenario.name,
+        overwrite=options.overwrite,
+        inputs=scenario.inputs,
+        new=names,
+    )
+    for warning in scenario.vehicle.warnings:
+        _say(f'warning: {warning}')
+    return out
+
+
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Real nodes, in lock-step, recorded."""
     scenario, names = _open(options)
     domain, picked = chosen_domain(options.domain_id)
-    out = prepare(options.out or Path('runs') / scenario.name, overwrite=options.overwrite)
+    out = _prepare(options, scenario, names)
     warm_up(scenario, names)
     os.environ.update(environment(domain))
     # the middleware reads its environment when it is loaded
@@ -115,7 +126,7 @@ def _progress() -> Progress:
 def simulate(options: argparse.Namespace) -> dict[str, Any]:
     """In this process, by the same kernel."""
     scenario, names = _open(options)
-    out = prepare(options.out or Path('runs') / scenario.name, overwrite=options.overwrite)
+    out = _prepare(options, scenario, names)
     write_inputs(scenario, out)
     runs = {}
     for name in names:
@@ -186,7 +197,8 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
         runs[_free_name(run.controller, runs)] = run
     name = '_'.join(dict.fromkeys(run.scenario for run in runs.values()))
     out = options.out or Path('runs') / f'analyze_{name}'
-    return _conclude(prepare(out, overwrite=options.overwrite), runs, *texts)
+    files = [file for bag in options.bags for file in bag_files(bag)]
+    return _conclude(prepare(out, overwrite=options.overwrite, inputs=files), runs, *texts)
 
 
 def _free_name(name: str, taken: Iterable[str]) -> str:

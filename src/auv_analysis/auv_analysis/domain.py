@@ -4,13 +4,13 @@ import os
 import random
 import socket
 
-from auv_dynamics.files import InputError
+from auv_dynamics.files import InputError, shorten
 
 LARGEST = 101  # above it, DDS ports fall into the range that the system hands out
 VARIABLE = 'ROS_DOMAIN_ID'
 
 
-def chosen_domain(option: int | None) -> tuple[int, bool]:
+def chosen_domain(option: int | str | None) -> tuple[int, bool]:
     """Domain id, and whether it was picked here because nobody asked for one.
 
     Parameters
@@ -37,7 +37,7 @@ def _checked(value: object, name: str) -> int:
     except ValueError:
         domain = -1
     if not 0 <= domain <= LARGEST:
-        raise InputError(name, '', f'a whole number from 0 to {LARGEST}', value)
+        raise InputError(name, '', f'a whole number from 0 to {LARGEST}', shorten(value))
     return domain
 
 

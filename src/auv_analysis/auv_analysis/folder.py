@@ -2,7 +2,11 @@
 
 import os
 import shutil
+import tempfile
+from collections.abc import Iterable
 from pathlib import Path
+
+import yaml
 
 from auv_dynamics.files import InputError
 
@@ -11,51 +15,74 @@ OURS = (
     'setpoint.csv',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
-OURS_ENDINGS = ('.mcap', '.npz')
 
 
-def prepare(out: Path, *, overwrite: bool) -> Path:
+def prepare(
+    out: Path, *, overwrite: bool, inputs: Iterable[Path] = (), new: Iterable[str] = ()
+) -> Path:
     """Make an empty folder for results.
 
     Parameters
     ----------
     out : the folder
     overwrite : clear it of earlier results; anything else in it stays where it is
+    inputs : files that the command reads, which must not be cleared away
+    new : names in the folder that must be free afterwards
 
     Raises
     ------
-    InputError : it exists, is no folder, or cannot be written
+    InputError : it exists, is no folder, cannot be written or holds an input
 
     """
     try:
         if out.is_dir() and any(out.iterdir()):
             if not overwrite:
                 raise InputError(out, '--out', 'a new folder, or --overwrite', 'an existing folder')
-            _clear(out)
+            _clear(out, [path.resolve() for path in inputs], new)
         out.mkdir(parents=True, exist_ok=True)
-        probe = out / '.writable'
-        probe.touch()
-        probe.unlink()
+        tempfile.TemporaryFile(dir=out).close()
     except OSError as error:
         found = (error.strerror or str(error)).lower()
         raise InputError(out, '--out', 'a folder that can be written', found) from None
     return out
 
 
-def _clear(out: Path) -> None:
-    for entry in list(out.iterdir()):
-        if (
-            entry.name in OURS
-            or entry.suffix in OURS_ENDINGS
-            or (entry.is_dir() and _is_run(entry))
-        ):
-            _remove(entry)
+def _clear(out: Path, inputs: list[Path], new: Iterable[str]) -> None:
+    samples = _samples(out)
+    ours = [
+        entry
+        for entry in out.iterdir()
+        if entry.name in OURS or entry.name in samples or (entry.is_dir() and _is_run(entry))
+    ]
+    for entry in ours:
+        for path in inputs:
+            if path.is_relative_to(entry.resolve()):
+                expected = 'a folder that does not hold what is read'
+                raise InputError(out, '--out', expected, str(path))
+    left = {entry.name for entry in out.iterdir()} - {entry.name for entry in ours}
+    for name in new:
+        if name in left:
+            raise InputError(out / name, '--out', 'no such file or folder', 'what is not ours')
+    for entry in ours:
+        _remove(entry)
+
+
+def _samples(out: Path) -> set[str]:
+    """Names of the sample files of `auv simulate`: its summary and scenario list the runs."""
+    names: set[str] = set()
+    for file, key in (('summary.json', None), ('scenario.yaml', 'controllers')):
+        try:
+            data = yaml.safe_load((out / file).read_text(encoding='utf-8'))
+            names.update(data[key] if key else data)
+        except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
+            continue
+    return {f'{name}{ending}' for name in names for ending in ('.npz', '.parquet')}
 
 
 def _is_run(folder: Path) -> bool:
     names = [entry.name for entry in folder.iterdir()]
-    ours = all(n in OURS_IN_RUN or n.endswith(OURS_ENDINGS) for n in names)
-    return ours and bool(names)
+    # params.yaml is written before anything else: without it the bag is somebody else's
+    return 'params.yaml' in names and all(n in OURS_IN_RUN or n.endswith('.mcap') for n in names)
 
 
 def _remove(entry: Path) -> None:

@@ -29,6 +29,7 @@ class RecorderNode(BulkNode):
         self._ledger = StepLedger(p.topics, p.step_ns, p.strict)
         self._latest = 0  # stamp of the newest step message, for messages without one
         self._analysed = -1
+        self._broken = False  # the disk takes no more
         self._reported = -1
         self._known: set[str] = set()
         self.graph = Graph(self, barrier=False)
@@ -59,13 +60,14 @@ class RecorderNode(BulkNode):
         )
 
     def _take(self, topic: str, kind: type, message: bytes, ns: int) -> None:
-        if self.exit_code is not None:
+        if self._broken:
             return
         if not self._writer.has_channel(topic):
             self._add_channel(topic, _type_name(kind))
         try:
             self._writer.write(topic, ns, message)
         except OSError as error:
+            self._broken = True
             self._end(1, f'{self._writer.path}: {(error.strerror or str(error)).lower()}')
 
     def _add_channel(self, topic: str, kind: str) -> None:
@@ -129,8 +131,14 @@ class RecorderNode(BulkNode):
         self.exit_code = code
 
     def close(self) -> None:
-        """Finish the bag."""
-        self._writer.close()
+        """Finish the bag with everything that has arrived."""
+        self.empty_bulk()
+        try:
+            self._writer.close()
+        except OSError as error:
+            text = (error.strerror or str(error)).lower()
+            self.get_logger().error(f'{self._writer.path}: not finished: {text}')
+            self.exit_code = 1
         lost = {topic: gaps for topic, gaps in self._ledger.gaps.items() if gaps}
         if lost:
             self.get_logger().warning(f'steps that did not arrive: {lost}')

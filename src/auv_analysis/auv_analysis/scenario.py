@@ -1,6 +1,7 @@
 """Scenario file, format 1: one experiment, resolved so that nothing is left to look up."""
 
 import copy
+import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_dynamics.config import shipped
+from auv_dynamics.config import shipped, shipped_by_name
 from auv_dynamics.disturbance import Disturbance, make_disturbance
 from auv_dynamics.files import InputError, check, read_text, read_yaml
 from auv_dynamics.vehicle import Vehicle
@@ -18,6 +19,9 @@ from auv_gvc_controller.setpoint import Setpoint, make_setpoint
 
 SCHEMA = Path(__file__).with_name('scenario.schema.json')
 NANOSECONDS = 10**9
+MOST_STEPS = 10_000_000  # some 10 GB of arrays
+RESERVED = ('figures', 'logs', 'summary.json', 'report.html', 'scenario.yaml', 'vehicle.yaml',
+            'setpoint.csv')  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +97,12 @@ class Scenario:
         return make_disturbance(self.data['disturbance'])
 
     @property
+    def inputs(self) -> list[Path]:
+        """Files that the scenario was read from."""
+        file = self.data['setpoint'].get('file')
+        return [self.path, self.vehicle_path, *([Path(file)] if file else [])]
+
+    @property
     def initial(self) -> tuple[np.ndarray, np.ndarray]:
         """Eta (6,) and nu (6,) at the start."""
         return np.array(self.data['initial']['eta']), np.array(self.data['initial']['nu'])
@@ -118,6 +128,10 @@ def load_scenario(scenario: str | Path) -> Scenario:
     data = read_yaml(path, 'scenario')
     check(data, SCHEMA, path)
     data = _resolved(data)
+    for name in data['controllers']:
+        if name in RESERVED:
+            expected = 'names that are not those of our own files'
+            raise InputError(path, 'controllers', expected, name)
     _check_time(data, path)
     vehicle_path = _vehicle_path(data['vehicle'], path)
     vehicle_data = read_yaml(vehicle_path, 'vehicle')
@@ -141,6 +155,7 @@ def _resolved(data: dict[str, Any]) -> dict[str, Any]:
     data = copy.deepcopy(data)
     for key, value in (('format', 1), ('integrator', 'ode5'), ('seed', 0), ('initial', {})):
         data.setdefault(key, value)
+    data['seed'] = int(data['seed'])
     data['duration'], data['step'] = float(data['duration']), float(data['step'])
     for key in ('eta', 'nu'):
         data['initial'][key] = [float(x) for x in data['initial'].get(key, [0.0] * 6)]
@@ -157,14 +172,17 @@ def _check_time(data: dict[str, Any], path: Path) -> None:
     if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
         expected = f'a multiple of step ({data["step"]:g} s)'
         raise InputError(path, 'duration', expected, f'{data["duration"]!r} s')
+    if steps > MOST_STEPS:
+        raise InputError(path, 'duration', f'at most {MOST_STEPS} steps', f'{steps:.0f}')
 
 
 def _vehicle_path(vehicle: str, scenario: Path) -> Path:
     relative = scenario.parent / vehicle
-    if relative.is_file() or Path(vehicle).is_absolute() or len(Path(vehicle).parts) > 1:
+    is_path = Path(vehicle).suffix in ('.yaml', '.yml') or len(Path(vehicle).parts) != 1
+    if os.path.isfile(relative) or is_path:
         return relative
     try:
-        return shipped('vehicles', vehicle)
+        return shipped_by_name('vehicles', vehicle)
     except InputError as error:
         raise InputError(scenario, 'vehicle', error.expected, vehicle) from None
 

@@ -31,7 +31,9 @@ def summarize(run: Run, window: tuple[float, float] | None = None) -> dict[str, 
     """
     model = control_model(run.vehicle)
     Upsilon, Upsilon_inv = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
-    K_D, K_f = body_gains(make_gains(run.law, run.gains), model)
+    gains = [None, None]
+    if run.gains:
+        gains = [K.tolist() for K in body_gains(make_gains(run.law, run.gains), model)]
     error = run.nu_d - run.nu
     return {
         'scenario': run.scenario,
@@ -53,7 +55,7 @@ def summarize(run: Run, window: tuple[float, float] | None = None) -> dict[str, 
             'structural_zeros': structural_zeros(Upsilon, Upsilon_inv),
         },
         'effort': {'rms': _rms(run.tau), 'max': _max(run.tau)},
-        'gains': {'K_D': K_D.tolist(), 'K_f': K_f.tolist()},
+        'gains': {'K_D': gains[0], 'K_f': gains[1]},
         'decomposition': {'Upsilon': Upsilon.tolist(), 'N': model.N.tolist()},
         'lyapunov': {
             'applicable': False,

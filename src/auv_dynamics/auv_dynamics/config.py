@@ -1,5 +1,6 @@
 """Where the shipped vehicles and scenarios are: checkout, colcon install tree or wheel."""
 
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,12 +37,17 @@ def shipped(kind: str, name: str | Path) -> Path:
 
     """
     path = Path(name)
-    if path.suffix in ('.yaml', '.yml') or len(path.parts) != 1 or path.is_file():
+    if path.suffix in ('.yaml', '.yml') or len(path.parts) != 1 or os.path.isfile(path):
         return path
+    return shipped_by_name(kind, str(name))
+
+
+def shipped_by_name(kind: str, name: str) -> Path:
+    """Path of a shipped file by its bare name; InputError when there is none."""
     found: set[str] = set()
     for folder in _folders(kind):
         candidate = folder / f'{name}.yaml'
-        if candidate.is_file():
+        if os.path.isfile(candidate):  # Path.is_file raises for a name that is too long
             return candidate
         found.update(entry.stem for entry in folder.glob('*.yaml'))
     expected = f'a file, or one of the shipped {kind}: {", ".join(sorted(found)) or "none"}'

@@ -1,8 +1,9 @@
 """YAML files checked against a JSON schema: one line names file, key, expected and found."""
 
+import itertools
 import json
-import math
 import re
+import reprlib
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -12,6 +13,13 @@ import jsonschema
 import numpy as np
 import yaml
 
+PLAIN = re.compile(r'[^\W\d](?:[\w ./:-]{0,55}\w)?')  # a word or two
+LONGEST = 200  # characters of what was found
+MOST_ENTRIES = 100_000  # of a file, with its aliases written out
+LARGEST = 1e100  # products of a few such numbers are still finite
+_repr = reprlib.Repr()
+_repr.maxlevel, _repr.maxlist, _repr.maxdict, _repr.maxstring = 3, 10, 5, 57
+
 
 class InputError(ValueError):
     """Wrong input from the user; its text is one line fit for a terminal."""
@@ -19,6 +27,8 @@ class InputError(ValueError):
     def __init__(self, file: object, key: str, expected: str, found: object):
         self.file, self.key, self.expected = str(file), key, expected
         self.found = found if isinstance(found, str) else shorten(found)
+        if len(self.found) > LONGEST:
+            self.found = f'{self.found[: LONGEST - 3]}...'
         place = f'{self.file}: {key}' if key else self.file
         line = f'{place}: expected {expected}, found {self.found}'
         super().__init__(' '.join(line.split()))
@@ -26,7 +36,9 @@ class InputError(ValueError):
 
 def shorten(value: object) -> str:
     """One short line that shows a value."""
-    text = 'nothing' if value is None else repr(value)
+    if isinstance(value, str) and PLAIN.fullmatch(value):
+        return value  # only what looks like no word is quoted: '', '1', control characters
+    text = 'nothing' if value is None else _repr.repr(value)
     text = ' '.join(text.split())
     return text if len(text) <= 60 else text[:57] + '...'
 
@@ -43,8 +55,13 @@ _Loader.add_implicit_resolver(
 
 
 def _unique_mapping(loader: _Loader, node: yaml.MappingNode) -> dict:
+    if not isinstance(node, yaml.MappingNode):
+        raise yaml.constructor.ConstructorError(problem='no mapping', problem_mark=node.start_mark)
     seen: dict = {}
     for key_node, value_node in node.value:
+        if key_node.tag == 'tag:yaml.org,2002:merge':
+            mark = key_node.start_mark
+            raise InputError(mark.name, f'line {mark.line + 1}', 'keys written out', 'merge key <<')
         key = loader.construct_object(key_node, deep=True)
         if not isinstance(key, str):
             mark = key_node.start_mark
@@ -62,33 +79,45 @@ _Loader.add_constructor('tag:yaml.org,2002:map', _unique_mapping)
 def read_text(path: Path, kind: str) -> str:
     """Text of a file; InputError when it is missing, a folder, unreadable or not UTF-8."""
     try:
-        return path.read_text(encoding='utf-8')
+        return path.read_text(encoding='utf-8-sig')
     except FileNotFoundError:
         found = 'no such file'
     except UnicodeDecodeError as error:
         found = f'bytes that are not UTF-8 (offset {error.start})'
     except OSError as error:
         found = (error.strerror or str(error)).lower()
+    except ValueError as error:  # NUL in the name
+        found = str(error)
     raise InputError(path, '', f'a {kind} file', found)
 
 
 def read_yaml(path: Path, kind: str) -> dict[str, Any]:
     """Mapping in a YAML file; InputError when it cannot be read or is no mapping."""
-    text = read_text(path, kind)
-    loader = _Loader(text)
-    loader.name = str(path)
+    return parse_yaml(read_text(path, kind), path, kind)
+
+
+def parse_yaml(text: str, path: object, kind: str) -> dict[str, Any]:
+    """Mapping in a YAML text; InputError, which names `path`, when there is none."""
     try:
+        loader = _Loader(text)
+        loader.name = str(path)
         data = loader.get_single_data()
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f'line {mark.line + 1}, column {mark.column + 1}' if mark else ''
-        raise InputError(path, where, 'valid YAML', error.problem or 'an error') from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(path, '', 'valid YAML', str(error).splitlines()[0]) from None
-    finally:
-        loader.dispose()
+        problem = re.sub('^(but )?found ', '', error.problem or 'an error')
+        raise InputError(path, where, 'valid YAML', problem) from None
+    except InputError:
+        raise
+    except RecursionError:
+        raise InputError(path, '', 'valid YAML', 'too many levels') from None
+    except (yaml.YAMLError, ValueError, TypeError, LookupError) as error:
+        # PyYAML's constructors of tagged scalars raise what their conversions raise
+        found = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(path, '', 'valid YAML', found) from None
+    if sum(1 for _ in itertools.islice(_leaves(data), MOST_ENTRIES + 1)) > MOST_ENTRIES:
+        expected = f'at most {MOST_ENTRIES} entries with all aliases written out'
+        raise InputError(path, '', expected, 'more')
     if not isinstance(data, dict):
         raise InputError(path, '', f'a mapping with the keys of a {kind} file', data)
     return data
@@ -132,13 +161,21 @@ def _as_input_error(
 ) -> InputError:
     # of an alternative (6 numbers or 6x6) only an entry that is no number at all is named itself
     for inner in sorted(error.context or [], key=lambda e: -len(e.absolute_path)):
-        if inner.validator == 'type' and not isinstance(inner.instance, list | int | float):
+        deeper = len(inner.absolute_path) > len(error.absolute_path)
+        number = isinstance(inner.instance, int | float) and not isinstance(inner.instance, bool)
+        if (
+            deeper
+            and inner.validator == 'type'
+            and not (number or isinstance(inner.instance, list))
+        ):
             error = inner
             break
     path = list(error.absolute_path)
     if error.validator == 'additionalProperties':
         known = list(error.schema.get('properties', {}))
         unknown = next(key for key in error.instance if key not in known)
+        if len(known) == 1:
+            return InputError(file, dotted(path), f'{known[0]} alone', f'{unknown} beside it')
         return InputError(
             file, dotted([*path, unknown]), f'one of {", ".join(known)}', 'an unknown key'
         )
@@ -146,17 +183,20 @@ def _as_input_error(
         missing = next(key for key in error.validator_value if key not in error.instance)
         title = error.schema.get('properties', {}).get(missing, {}).get('title', 'a value')
         return InputError(file, dotted([*path, missing]), title, 'nothing')
-    found = error.instance if not isinstance(error.instance, list) else _shape(error.instance)
+    value = error.instance
+    found = _shape(value) if isinstance(value, list) else shorten(value)
     return InputError(file, dotted(path), _title(error, root), found)
 
 
 def _title(error: jsonschema.ValidationError, root: dict[str, Any]) -> str:
     """Title of the innermost schema node on the way to the error that has one."""
     node: Any = root
-    title = ''
+    title = root.get('title', '')
     for part in error.absolute_schema_path:
         while isinstance(node, dict) and part not in node and '$ref' in node:
+            own = node.get('title')
             node = root['$defs'][node['$ref'].rsplit('/', 1)[-1]]
+            title = own or node.get('title') or title
         if part == '$ref':
             continue
         node = node[part]
@@ -191,8 +231,10 @@ def _leaves(value: Any, path: tuple = ()) -> Iterator[tuple[tuple, Any]]:
 def _check_finite(data: dict[str, Any], file: object) -> None:
     for path, value in _leaves(data):
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if number and (abs(value) > 1e300 or not math.isfinite(value)):
-            raise InputError(file, dotted(path), 'a finite number', value)
+        if number and not abs(value) <= LARGEST:
+            huge = f', at most {LARGEST:g}' if abs(value) < float('inf') else ''
+            expected = f'a finite number{huge}'
+            raise InputError(file, dotted(path), expected, value)
 
 
 def matrix6(value: Any) -> np.ndarray:

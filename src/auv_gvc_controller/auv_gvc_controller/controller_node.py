@@ -7,6 +7,7 @@ from typing import Any
 
 from geometry_msgs.msg import AccelStamped, TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 
@@ -157,8 +158,9 @@ class ControllerNode(BulkMixin, LifecycleNode):
         return response
 
     def close(self) -> None:
-        """Leave the vehicle without a wrench."""
+        """Leave the vehicle without a wrench, and see that it hears of it."""
         self._let_go()
+        self._wrench.wait_for_all_acked(Duration(seconds=0.5))
 
 
 def main() -> None:

@@ -72,25 +72,40 @@ def load_table(path: Path, duration: float) -> Table:
     InputError : naming file, line, expected and found
 
     """
-    rows = [row for row in csv.reader(read_text(path, 'CSV set-point').splitlines()) if row]
+    lines, rows = _rows(path)
     header = tuple(name.strip() for name in rows[0]) if rows else ()
     if header != COLUMNS:
         raise InputError(
             path, 'line 1', f'the columns {",".join(COLUMNS)}', ','.join(header) or None
         )
-    values = np.array([_numbers(path, i, row) for i, row in enumerate(rows[1:], start=2)])
+    values = np.array([_numbers(path, i, row) for i, row in zip(lines[1:], rows[1:], strict=True)])
     if len(values) < 2:
         raise InputError(path, 't', 'at least two rows', f'{len(values)}')
     t = values[:, 0]
     backward = np.flatnonzero(np.diff(t) <= 0)
     if len(backward):
-        line = int(backward[0]) + 3
-        raise InputError(
-            path, f'line {line}', 'a time later than the line before', f'{t[line - 2]:g}'
-        )
+        k = int(backward[0]) + 1
+        expected = 'a time later than the line before'
+        raise InputError(path, f'line {lines[k + 1]}', expected, f'{t[k]:g}')
     if t[0] > 0 or t[-1] < duration - 1e-9:
         raise InputError(path, 't', f'0 to {duration:g} s covered', f'{t[0]:g} to {t[-1]:g} s')
     return Table(t, values[:, 1:])
+
+
+def _rows(path: Path) -> tuple[list[int], list[list[str]]]:
+    """Line numbers and cells of the lines that are not blank."""
+    reader = csv.reader(read_text(path, 'CSV set-point').splitlines())
+    lines, rows = [], []
+    try:
+        for row in reader:
+            if row:
+                lines.append(reader.line_num)
+                rows.append(row)
+    except csv.Error:
+        expected = f'{len(COLUMNS)} finite numbers'
+        found = 'a cell of more than 131072 characters'
+        raise InputError(path, f'line {reader.line_num}', expected, found) from None
+    return lines, rows
 
 
 def _numbers(path: Path, line: int, row: list[str]) -> list[float]:

@@ -170,6 +170,9 @@ def logarithmic(axes: Axes, *directions: str) -> None:
     def decade(x: float, _: int) -> str:
         return f'{x:g}' if 1e-4 <= x <= 1e5 else f'$10^{{{np.log10(x):.0f}}}$'
 
+    shown = [np.asarray(line.get_xydata(), float) for line in axes.lines]
+    if not any(len(points) > 2 and np.all(points > 0) for points in shown):
+        return  # nothing positive to show: a logarithmic axis has no place for it
     for direction in directions:
         axes.set(**{f'{direction}scale': 'log'})
         axis = getattr(axes, f'{direction}axis')

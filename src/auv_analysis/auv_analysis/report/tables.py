@@ -63,6 +63,8 @@ def body_gains(summaries: Summaries) -> list[dict[str, Any]]:
     rows = []
     for name, summary in summaries.items():
         for symbol, key in (('K_D', 'K_D'), ('K_f', 'K_f')):
+            if summary['gains'][key] is None:
+                continue
             matrix = np.array(summary['gains'][key])
             scalar = np.array_equal(matrix, matrix[0, 0] * np.eye(6))
             text = f'{plain(matrix[0, 0], 6)} I' if scalar else None

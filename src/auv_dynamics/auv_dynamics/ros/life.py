@@ -51,7 +51,6 @@ def live(make: Callable[[], Any], args: list[str] | None = None) -> int:
         executor.add_node(node)
         while not stop.is_set() and node.exit_code is None and not _orphaned():
             _turn(node, executor)
-        code = node.exit_code or 0
     except InputError as error:
         print(error, file=sys.stderr, flush=True)
         code = 2
@@ -65,6 +64,7 @@ def live(make: Callable[[], Any], args: list[str] | None = None) -> int:
     finally:
         if node is not None:
             node.close()
+            code = node.exit_code or 0
             with contextlib.suppress(Exception):
                 node.destroy_node()
         rclpy.try_shutdown()

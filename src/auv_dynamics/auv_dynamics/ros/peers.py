@@ -1,10 +1,14 @@
 """The other nodes that a node waits for before it starts."""
 
+import time
+
 from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from auv_dynamics.ros.graph import steady_timer
+
+ASK_AGAIN = 1.0  # s: an answer is lost when it comes before both ends have matched
 
 
 class Peers:
@@ -19,7 +23,7 @@ class Peers:
 
     def __init__(self, node: Node, names: list[str]):
         self._clients = {name: node.create_client(Trigger, f'{name}/ready') for name in names}
-        self._pending: dict[str, Future] = {}
+        self._pending: dict[str, tuple[float, Future]] = {}
         self._ready: set[str] = set()
         if names:
             self._timer = steady_timer(node, 0.05, self._ask)
@@ -32,9 +36,9 @@ class Peers:
         for name, client in self._clients.items():
             if name in self._ready or not client.service_is_ready():
                 continue
-            future = self._pending.get(name)
-            if future is None:
-                self._pending[name] = client.call_async(Trigger.Request())
+            asked, future = self._pending.get(name, (0.0, None))
+            if future is None or time.monotonic() - asked > ASK_AGAIN:
+                self._pending[name] = (time.monotonic(), client.call_async(Trigger.Request()))
             elif future.done():
                 if future.result() is not None and future.result().success:
                     self._ready.add(name)

@@ -12,6 +12,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from auv_dynamics import interface
+from auv_dynamics.ros.peers import ASK_AGAIN
 from auv_dynamics.ros.topics import PROGRESS, one_at_a_time
 
 
@@ -43,6 +44,7 @@ class Watcher:
         )
         self._run = self._node.create_client(SetBool, f'{plant}/run')
         self._asked: Future | None = None
+        self._asked_at = 0.0
         self.complete_ns = -1
         self.running = False
         self.waits_for = f'{plant} to appear'
@@ -60,8 +62,10 @@ class Watcher:
             self.running = answer.success
             self.waits_for = f'{answer.message} to be ready'
             self._asked = None
-        if not self.running and self._asked is None and self._run.service_is_ready():
+        late = time.monotonic() - self._asked_at > ASK_AGAIN
+        if not self.running and (self._asked is None or late) and self._run.service_is_ready():
             self._asked = self._run.call_async(SetBool.Request(data=True))
+            self._asked_at = time.monotonic()
         return self.running
 
     def endpoints(self, names: Iterable[str] = (interface.WRENCH, interface.ODOM)) -> list[str]:

@@ -29,6 +29,8 @@ def law_class(name: str) -> Any:
     ValueError : no such law; the text says what was expected and found
 
     """
+    if not isinstance(name, str):
+        raise ValueError(f'expected {", ".join(SHIPPED)} or module:Class, found {name!r}')
     if name in SHIPPED:
         return SHIPPED[name]
     expected = f'{", ".join(SHIPPED)} or module:Class'
@@ -37,17 +39,23 @@ def law_class(name: str) -> Any:
         raise ValueError(f'expected {expected}, found {name!r}')
     try:
         law = getattr(importlib.import_module(module), attribute)
-    except ImportError as error:
-        raise ValueError(f'expected {expected}, found {name!r} ({error})') from None
     except AttributeError:
         raise ValueError(f'expected {expected}, found no {attribute} in {module}') from None
+    except (Exception, SystemExit) as error:  # whatever a user's module does when it is imported
+        raise ValueError(f'expected {expected}, found {name!r} ({_short(error)})') from None
     missing = [
         part for part in ('wrench', 'state_rate', 'STATES', '_fields') if not hasattr(law, part)
     ]
+    if not missing and not isinstance(law._fields, tuple):
+        missing = ['a tuple of _fields']
     if missing:
         text = 'a named tuple of gains with wrench, state_rate and STATES'
         raise ValueError(f'expected {text}, found {name!r} without {", ".join(missing)}')
     return law
+
+
+def _short(error: BaseException) -> str:
+    return f'{type(error).__name__}: {error}'.splitlines()[0]
 
 
 def make_gains(name: str, values: Mapping[str, Any]) -> Any:
@@ -68,21 +76,27 @@ def make_gains(name: str, values: Mapping[str, Any]) -> Any:
 
     """
     law = law_class(name)
-    for key in law._fields:
-        if key not in values:
-            raise ValueError(f'{key}: expected a number, 6 numbers or a 6x6 matrix, found nothing')
+    # unknown first: a misspelt gain also leaves a missing one
     unknown = [key for key in values if key not in law._fields]
     if unknown:
         raise ValueError(
             f'{unknown[0]}: expected one of {", ".join(law._fields)}, found an unknown gain'
         )
-    flat = {}
+    for key in law._fields:
+        if key not in values:
+            raise ValueError(f'{key}: expected a number, 6 numbers or a 6x6 matrix, found nothing')
+    flat: dict[str, Any] = {}
     for key in law._fields:
         try:
             matrix = matrix6(values[key])
         except (ValueError, TypeError) as error:
-            raise ValueError(f'{key}: {error}') from None
+            text = str(error) if 'expected ' in str(error) else f'expected numbers, found {error}'
+            raise ValueError(f'{key}: {text}') from None
         if not np.all(np.isfinite(matrix)):
             raise ValueError(f'{key}: expected finite numbers, found {values[key]}')
         flat[key] = matrix.ravel()
-    return law(**flat)
+    try:
+        return law(**flat)
+    except TypeError as error:
+        text = 'a named tuple of gains'
+        raise ValueError(f'expected {text}, found {name!r} ({_short(error)})') from None

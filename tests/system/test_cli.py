@@ -1,0 +1,344 @@
+"""The installed `auv`: help, refusals in one line, and exactly one JSON document."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+import yaml
+from geometry_msgs.msg import WrenchStamped
+from nav_msgs.msg import Odometry
+from rclpy.serialization import serialize_message
+
+from auv_analysis import cli, load_scenario
+from auv_analysis.bag_writer import BagWriter
+from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis.schemas import schema_text
+from auv_dynamics.config import shipped
+
+AUV = Path(sys.executable).with_name('auv')
+REXROV = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
+COMMANDS = ['run', 'simulate', 'analyze', 'info', 'params']
+WRONG_LINES = {  # what is typed -> what the one line names
+    '': 'COMMAND',
+    'fly': 'fly',
+    'simulate': 'scenario',
+    'simulate case1 case2': 'case2',
+    'simulate case1 --colour red': '--colour',
+    'simulate case1 --hold foh': '--hold',
+    'simulate case1 --out': '--out',
+    'simulate case9': 'case9',
+    'simulate gone/case.yaml': 'gone/case.yaml',
+    'simulate .': '.',
+    'simulate case1 --controller pid': 'controllers',
+    'simulate case1 --out taken': 'taken: --out',
+    'simulate case1 --out taken/notes.md': 'taken/notes.md: --out',
+    'simulate case1 --out taken/notes.md/x': 'taken/notes.md/x: --out',
+    'run case1 --controller gvc --controller pid': 'controllers',
+    'run case1 --domain-id text': '--domain-id',
+    'run case1 --domain-id 102': '--domain-id',
+    'run case1 --out taken': 'taken: --out',
+    'params case1': '--controller',
+    'params case1 --controller pid': 'controllers',
+    'params case1 --controller gvc --out taken/notes.md': 'taken/notes.md: --out',
+    'params case1 --controller gvc --out taken/notes.md/x': 'taken/notes.md/x: --out',
+    'params case1 --controller gvc --out taken --overwrite': 'taken: --out',
+    'analyze': 'BAG',
+    'analyze gone': 'gone',
+    'info gone.mcap': 'gone.mcap',
+    'info taken': 'taken',
+    'info taken/notes.md': 'taken/notes.md',
+    'analyze taken/notes.md': 'taken/notes.md',
+}
+INSTALLED = [  # of these, the ones that are also tried as the user runs them
+    'fly', 'simulate case1 --hold foh', 'simulate case9', 'simulate case1 --out taken',
+    'run case1 --controller gvc --controller pid', 'run case1 --domain-id 102',
+    'run case1 --out taken', 'info taken/notes.md',
+]  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Working directory with one folder that is in use."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
+    (tmp_path / 'taken').mkdir()
+    (tmp_path / 'taken' / 'notes.md').write_text('mine\n')
+    return tmp_path
+
+
+def _exit_code(*arguments: str) -> Any:
+    try:
+        cli.main(list(arguments))
+    except SystemExit as end:
+        return end.code
+    return 0
+
+
+def _is_refusal(code: Any, out: str, err: str, name: str, folder: Path) -> None:
+    lines = err.splitlines()
+    assert (code, len(lines), out) == (2, 1, ''), err
+    for word in ('expected', 'found', name):
+        assert word in lines[0]
+    assert [path.name for path in folder.iterdir()] == ['taken']
+    assert (folder / 'taken' / 'notes.md').read_text() == 'mine\n'
+
+
+@pytest.mark.parametrize('line', WRONG_LINES)
+def test_wrong_command_line_is_refused_in_one_line(line, folder, capsys) -> None:
+    code = _exit_code(*line.split())
+    captured = capsys.readouterr()
+    _is_refusal(code, captured.out, captured.err, WRONG_LINES[line], folder)
+
+
+@pytest.mark.parametrize('line', INSTALLED)
+def test_installed_command_refuses_and_leaves_no_process(line: str, folder: Path) -> None:
+    mark = uuid.uuid4().hex  # inherited by whatever the command starts
+    done = subprocess.run(
+        [AUV, *line.split()], cwd=folder, capture_output=True, text=True, check=False,
+        env={**os.environ, 'AUV_TEST_MARK': mark},
+    )  # fmt: skip
+    _is_refusal(done.returncode, done.stdout, done.stderr, WRONG_LINES[line], folder)
+    assert not [process for process in psutil.process_iter() if _has(process, mark)]
+
+
+def _has(process: psutil.Process, mark: str) -> bool:
+    try:
+        return process.environ().get('AUV_TEST_MARK') == mark
+    except psutil.Error:
+        return False
+
+
+@pytest.mark.parametrize('arguments', [[], *([command] for command in COMMANDS)], ids=' '.join)
+def test_help(arguments: list[str], capsys: pytest.CaptureFixture) -> None:
+    assert _exit_code(*arguments, '--help') == 0
+    text = capsys.readouterr().out
+    assert text.startswith(' '.join(['usage: auv', *arguments]))
+    words = COMMANDS if not arguments else ['--json']
+    words = words if arguments in ([], ['info']) else [*words, '--out', '--overwrite']
+    assert all(word in text for word in words)
+
+
+@pytest.mark.parametrize('options', [[], ['--real-time']])
+def test_params_prints_the_parameter_file(options, folder, capsys) -> None:
+    cli.main(['params', 'case1', '--controller', 'gvc', *options])
+    data = yaml.safe_load(capsys.readouterr().out)
+    assert all(set(entry) == {'ros__parameters'} for entry in data.values())
+    assert data['/**/controller_node']['ros__parameters']['law'] == 'gvc'
+    for node in ('plant_node', 'controller_node'):
+        assert data[f'/**/{node}']['ros__parameters']['lockstep'] is not bool(options)
+    cli.main(['params', 'case1', '--controller', 'gvc', *options, '--out', 'new/gvc.yaml'])
+    assert yaml.safe_load((folder / 'new' / 'gvc.yaml').read_text()) == data
+    cli.main(['params', 'case1', '--controller', 'gvc', *options, '--json'])
+    nodes = {name.rpartition('/')[2]: entry['ros__parameters'] for name, entry in data.items()}
+    assert json.loads(capsys.readouterr().out) == nodes
+
+
+SHORT = """
+name: short
+vehicle: herman2018_neutral
+duration: 0.05
+step: 0.01
+controllers: {gvc: {law: gvc, k_D: GAIN, k_I: 1, Lambda: 0.8, Gamma: 60}}
+setpoint: {surge: {offset: OFFSET}}
+"""
+
+
+@pytest.mark.parametrize('offset', ['0.5', '0'], ids=['moving', 'at rest'])
+def test_simulate_prints_one_document_and_leaves_its_files(offset, folder, capsys) -> None:
+    Path('short.yaml').write_text(SHORT.replace('OFFSET', offset).replace('GAIN', '12'))
+    assert _exit_code('simulate', 'short.yaml', '--json') == 0
+    summaries = json.loads(capsys.readouterr().out)
+    assert list(summaries) == ['gvc']
+    assert summaries['gvc']['samples'] == 6
+    results = folder / 'runs' / 'short'
+    assert json.loads((results / 'summary.json').read_text()) == summaries
+    left = {'report.html', 'figures', 'scenario.yaml', 'vehicle.yaml', 'gvc.npz'}
+    assert left <= {path.name for path in results.iterdir()}
+
+
+def test_work_that_fails_ends_in_one_line_with_code_1(folder, capsys) -> None:
+    Path('wild.yaml').write_text(SHORT.replace('OFFSET', '0.5').replace('GAIN', '-1.0e+5'))
+    assert _exit_code('simulate', 'wild.yaml', '--json') == 1
+    captured = capsys.readouterr()
+    assert captured.out == ''
+    assert len(captured.err.splitlines()) == 1
+    assert 'short, gvc: the closed loop diverges' in captured.err
+
+
+@pytest.fixture(scope='module')
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Write a bag of five steps at rest, with these attachments instead of the usual ones."""
+    scenario = load_scenario('case1')
+    parameters = node_parameters(scenario, 'gvc', bag=Path('gvc'))
+    usual = {
+        **scenario.attachments,
+        'params.yaml': parameter_file(parameters, 'case1'),
+    }
+
+    def write(**attachments: str | None) -> Path:
+        named = {name.replace('_', '.'): text for name, text in attachments.items()}
+        kept = {k: text for k, text in {**usual, **named}.items() if text is not None}
+        writer = BagWriter(tmp_path_factory.mktemp('bag') / 'gvc', kept, compression='none')
+        odom, wrench = Odometry(child_frame_id='base_link_fsd'), WrenchStamped()
+        odom.header.frame_id, wrench.header.frame_id = 'odom_ned', 'base_link_fsd'
+        for topic, kind in (('/odom', 'nav_msgs/msg/Odometry'),
+                            ('/wrench', 'geometry_msgs/msg/WrenchStamped')):  # fmt: skip
+            writer.add_channel(topic, kind, schema_text(kind), [], '')
+        for k in range(5):
+            odom.header.stamp.nanosec = k * 10**7
+            wrench.header.stamp = odom.header.stamp
+            writer.write('/odom', k * 10**7, serialize_message(odom))
+            writer.write('/wrench', k * 10**7, serialize_message(wrench))
+        writer.close()
+        return writer.path.parent
+
+    return write
+
+
+def test_info(recording, capsys) -> None:
+    bag = recording()
+    cli.main(['info', str(bag)])
+    text = capsys.readouterr().out
+    for word in ('10 messages', '0.04 s', '/odom', 'nav_msgs/msg/Odometry', 'params.yaml'):
+        assert word in text
+    cli.main(['info', str(bag), '--json'])
+    document = json.loads(capsys.readouterr().out)
+    assert document['topics']['/wrench'] == {
+        'type': 'geometry_msgs/msg/WrenchStamped',
+        'messages': 5,
+    }
+    assert document['files'] == ['gvc_0.mcap']
+    assert document['attachments'] == ['params.yaml', 'scenario.yaml', 'vehicle.yaml']
+    assert document['notes'] == []
+
+
+def test_info_of_every_beginning_of_a_bag_says_that_it_is_one(recording, capsys, tmp_path) -> None:
+    whole = next(recording().glob('*.mcap')).read_bytes()
+    path = tmp_path / 'cut.mcap'
+    end = len(whole) - 37  # where the footer begins, the last record
+    for length in [*range(40), *range(40, end, 101), end]:
+        path.write_bytes(whole[:length])
+        code = _exit_code('info', str(path), '--json')
+        captured = capsys.readouterr()
+        if code == 0:
+            assert 'cut.mcap: ' in json.loads(captured.out)['notes'][0], length
+        else:
+            lines = captured.err.splitlines()
+            assert (code, len(lines), captured.out) == (2, 1, ''), length
+            assert str(path) in lines[0]
+
+
+def test_info_of_a_damaged_bag_says_so(recording, capsys, tmp_path) -> None:
+    data = bytearray(next(recording().glob('*.mcap')).read_bytes())
+    data[data.rindex(b'odom_ned') + 200] ^= 1  # in a covariance: only the chunk's CRC can tell
+    path = tmp_path / 'bent.mcap'
+    path.write_bytes(data)
+    cli.main(['info', str(path), '--json'])
+    assert 'damaged' in ' '.join(json.loads(capsys.readouterr().out)['notes'])
+
+
+def _parameters(**changes: Any) -> str:
+    parameters = node_parameters(load_scenario('case1'), 'gvc', bag=Path('gvc'))
+    for place, value in changes.items():
+        node, key = place.split('__')
+        parameters[f'{node}_node'][key.replace('gains_', 'gains.')] = value
+    return parameter_file(parameters, 'changed')
+
+
+ATTACHED = {  # what is wrong -> attachment, its text
+    'vehicle: no YAML': ('vehicle_yaml', '}{'),
+    'vehicle: tab': ('vehicle_yaml', 'name: x\n\tmass: 1\n'),
+    'vehicle: scalar': ('vehicle_yaml', '5'),
+    'vehicle: empty': ('vehicle_yaml', ''),
+    'vehicle: none': ('vehicle_yaml', None),
+    'vehicle: number as key': ('vehicle_yaml', '1: 2\n'),
+    'vehicle: python tag': ('vehicle_yaml', 'name: !!python/object/apply:os.getcwd []\n'),
+    'vehicle: doubled key': ('vehicle_yaml', f'{REXROV}name: x\n'),
+    'law unknown': ('params_yaml', _parameters(controller__law='pid')),
+    'law a number': ('params_yaml', _parameters(controller__law=5)),
+    'law a list': ('params_yaml', _parameters(controller__law=['gvc'])),
+    'gain of 5': ('params_yaml', _parameters(controller__gains_k_D=[1.0] * 5)),
+    'gain a word': ('params_yaml', _parameters(controller__gains_k_D='x')),
+    'gain NaN': ('params_yaml', _parameters(controller__gains_k_D=[float('nan')])),
+    'gain unknown': ('params_yaml', _parameters(controller__gains_k_P=[1.0])),
+    'step a word': ('params_yaml', _parameters(plant__step='x')),
+    'step negative': ('params_yaml', _parameters(plant__step=-1.0)),
+    'step NaN': ('params_yaml', _parameters(plant__step=float('nan'))),
+    'bag a number': ('params_yaml', _parameters(recorder__bag=5)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('what', ATTACHED)
+def test_analyze_refuses_a_bag_with_a_bad_attachment(what, recording, folder, capsys) -> None:
+    name, text = ATTACHED[what]
+    bag = recording(**{name: text})
+    code = _exit_code('analyze', str(bag), '--out', str(folder / 'out'))
+    captured = capsys.readouterr()
+    _is_refusal(code, captured.out, captured.err, name.replace('_', '.'), folder)
+    assert str(bag) in captured.err
+    assert 'is not of type' not in captured.err  # jsonschema's words, not ours
+
+
+@pytest.fixture
+def stopped(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Folders that a command asked for; it ends, all well, where the summaries would begin."""
+    from auv_analysis import commands
+
+    asked: list[Path] = []
+    prepare = commands.prepare
+    monkeypatch.setattr(
+        commands, 'prepare', lambda out, **options: asked.append(out) or prepare(out, **options)
+    )
+    monkeypatch.setattr(commands, 'summarize', lambda *_: sys.exit(0))
+    return asked
+
+
+@pytest.mark.parametrize(
+    'text', ['name: ../../evil', 'name: /evil', 'name: a/b', 'name: 5', 'name: [a]', 'name:', '}{']
+)
+def test_analyze_writes_below_runs_whatever_a_bag_says(text, recording, folder, stopped) -> None:
+    assert _exit_code('analyze', str(recording(scenario_yaml=text))) in (0, 2)
+    assert all(out.parent == Path('runs') for out in stopped)
+    assert {path.name for path in folder.iterdir()} <= {'taken', 'runs'}
+
+
+@pytest.mark.parametrize('out', ['result', 'result/gvc', 'result/gvc/..'])
+@pytest.mark.parametrize('given', ['result/gvc', 'result/gvc/gvc_0.mcap'])
+@pytest.mark.usefixtures('stopped')
+def test_analyze_keeps_the_bags_that_it_reads(given, out, recording, folder) -> None:
+    bag = shutil.copytree(recording(), folder / 'result' / 'gvc')
+    (bag / 'params.yaml').write_text(_parameters())
+    before = {path.name: path.read_bytes() for path in bag.iterdir()}
+    assert _exit_code('analyze', given, '--out', out, '--overwrite') in (0, 2)
+    assert {path.name: path.read_bytes() for path in bag.iterdir()} == before
+
+
+@pytest.mark.parametrize('cut', [3, 20, 100])
+def test_analyze_refuses_messages_that_cannot_be_decoded(cut, folder, capsys) -> None:
+    writer = BagWriter(folder / 'taken' / 'gvc', {}, compression='none')
+    kind = 'nav_msgs/msg/Odometry'
+    writer.add_channel('/odom', kind, schema_text(kind), [], '')
+    writer.write('/odom', 0, serialize_message(Odometry())[:cut])
+    writer.close()
+    code = _exit_code('analyze', 'taken/gvc')
+    captured = capsys.readouterr()
+    _is_refusal(code, captured.out, captured.err, '/odom', folder)
+
+
+def test_analyze_refuses_a_topic_of_another_type(folder, capsys) -> None:
+    writer = BagWriter(folder / 'taken' / 'gvc', {}, compression='none')
+    kind = 'geometry_msgs/msg/WrenchStamped'
+    writer.add_channel('/odom', kind, schema_text(kind), [], '')
+    writer.write('/odom', 0, serialize_message(WrenchStamped()))
+    writer.close()
+    code = _exit_code('analyze', 'taken/gvc')
+    captured = capsys.readouterr()
+    _is_refusal(code, captured.out, captured.err, kind, folder)

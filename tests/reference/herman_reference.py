@@ -15,17 +15,17 @@ from typing import Any
 import numpy as np
 
 Array = np.ndarray
-DOFS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+DOFS = ('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw')
 
 # Butcher tableaux (c, A, b); ode5 is the fifth-order Dormand-Prince solution, six stages.
 TABLEAUX: dict[str, tuple[list[float], list[list[float]], list[float]]] = {
-    "euler": ([0.0], [[]], [1.0]),
-    "rk4": (
+    'euler': ([0.0], [[]], [1.0]),
+    'rk4': (
         [0.0, 1 / 2, 1 / 2, 1.0],
         [[], [1 / 2], [0.0, 1 / 2], [0.0, 0.0, 1.0]],
         [1 / 6, 1 / 3, 1 / 3, 1 / 6],
     ),
-    "ode5": (
+    'ode5': (
         [0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0],
         [
             [],
@@ -47,7 +47,7 @@ def square(value: Any) -> Array:
         return array.copy()
     if array.shape in ((), (6,)):
         return np.diag(np.broadcast_to(array, 6))
-    raise ValueError(f"expected a scalar, [6] or 6x6, found shape {array.shape}")
+    raise ValueError(f'expected a scalar, [6] or 6x6, found shape {array.shape}')
 
 
 def skew(v: Array) -> Array:
@@ -58,47 +58,47 @@ def skew(v: Array) -> Array:
 
 def vehicle_matrices(spec: dict[str, Any]) -> dict[str, Any]:
     """Constant matrices of a vehicle file (v1); M_RB and M_A are None with inertia_matrix."""
-    body, hydro = spec["rigid_body"], spec["hydrostatics"]
-    environment = spec.get("environment", {})
-    sign = {"positive": 1.0, "sname": -1.0}[spec.get("sign", "positive")]
-    mass = float(body["mass"])
-    r_g = np.array(body["center_of_gravity"], dtype=float)
-    gravity = float(environment.get("gravity", 9.81))
-    density = float(environment.get("water_density", 1000.0))
+    body, hydro = spec['rigid_body'], spec['hydrostatics']
+    environment = spec.get('environment', {})
+    sign = {'positive': 1.0, 'sname': -1.0}[spec.get('sign', 'positive')]
+    mass = float(body['mass'])
+    r_g = np.array(body['center_of_gravity'], dtype=float)
+    gravity = float(environment.get('gravity', 9.81))
+    density = float(environment.get('water_density', 1000.0))
 
     m_rb = m_a = None
-    if "inertia_matrix" in spec:
-        if "added_mass" in spec or "inertia" in body:
-            raise ValueError("inertia_matrix excludes rigid_body.inertia and added_mass")
-        m = np.array(spec["inertia_matrix"], dtype=float)
+    if 'inertia_matrix' in spec:
+        if 'added_mass' in spec or 'inertia' in body:
+            raise ValueError('inertia_matrix excludes rigid_body.inertia and added_mass')
+        m = np.array(spec['inertia_matrix'], dtype=float)
         m = (m + m.T) / 2
     else:
-        inertia = np.array(body["inertia"], dtype=float)
+        inertia = np.array(body['inertia'], dtype=float)
         inertia = (inertia + inertia.T) / 2
-        if body["inertia_reference"] == "cg":  # parallel axes, to the body origin
+        if body['inertia_reference'] == 'cg':  # parallel axes, to the body origin
             inertia = inertia + mass * (r_g @ r_g * np.eye(3) - np.outer(r_g, r_g))
-        elif body["inertia_reference"] != "co":
-            raise ValueError("inertia_reference must be cg or co")
+        elif body['inertia_reference'] != 'co':
+            raise ValueError('inertia_reference must be cg or co')
         m_rb = np.zeros((6, 6))
         m_rb[:3, :3] = mass * np.eye(3)
         m_rb[:3, 3:] = -mass * skew(r_g)
         m_rb[3:, :3] = mass * skew(r_g)
         m_rb[3:, 3:] = inertia
-        m_a = sign * square(spec["added_mass"])
+        m_a = sign * square(spec['added_mass'])
         m_a = (m_a + m_a.T) / 2
         m = m_rb + m_a
 
-    drag = spec.get("damping", {})
+    drag = spec.get('damping', {})
     return {
-        "M": m,
-        "M_RB": m_rb,
-        "M_A": m_a,
-        "D_linear": sign * square(drag.get("linear", 0.0)),
-        "D_quadratic": sign * square(drag.get("quadratic", 0.0)),
-        "W": mass * gravity,
-        "B": density * gravity * float(hydro["volume"]),
-        "r_G": r_g,
-        "r_B": np.array(hydro["center_of_buoyancy"], dtype=float),
+        'M': m,
+        'M_RB': m_rb,
+        'M_A': m_a,
+        'D_linear': sign * square(drag.get('linear', 0.0)),
+        'D_quadratic': sign * square(drag.get('quadratic', 0.0)),
+        'W': mass * gravity,
+        'B': density * gravity * float(hydro['volume']),
+        'r_G': r_g,
+        'r_B': np.array(hydro['center_of_buoyancy'], dtype=float),
     }
 
 
@@ -115,13 +115,13 @@ def coriolis(M: Array, nu: Array) -> Array:
 
 def damping(spec_matrices: dict[str, Any], nu: Array) -> Array:
     """D(nu) = D_linear + D_quadratic diag(|nu|): column j is multiplied by |nu_j|."""
-    return spec_matrices["D_linear"] + spec_matrices["D_quadratic"] * np.abs(nu)[np.newaxis, :]
+    return spec_matrices['D_linear'] + spec_matrices['D_quadratic'] * np.abs(nu)[np.newaxis, :]
 
 
 def restoring(mats: dict[str, Any], eta: Array) -> Array:
     """g(eta) on the left-hand side of (1), Fossen 1994, NED."""
-    w, b = mats["W"], mats["B"]
-    mx, my, mz = (w * mats["r_G"] - b * mats["r_B"]).tolist()
+    w, b = mats['W'], mats['B']
+    mx, my, mz = (w * mats['r_G'] - b * mats['r_B']).tolist()
     sp, cp, st, ct = sin(eta[3]), cos(eta[3]), sin(eta[4]), cos(eta[4])
     return np.array(
         [
@@ -156,7 +156,7 @@ def decompose(M: Array) -> tuple[Array, Array]:
     e = np.eye(len(a))
     for i in range(len(a)):
         if a[i, i] <= 0.0:
-            raise ValueError("M is not positive definite")
+            raise ValueError('M is not positive definite')
         for j in range(i + 1, len(a)):
             factor = a[j, i] / a[i, i]
             a[j] -= factor * a[i]
@@ -177,10 +177,10 @@ def setpoint(spec: dict[str, Any], t: float) -> tuple[Array, Array]:
     value, rate = np.zeros(6), np.zeros(6)
     for dof, entry in spec.items():
         i = DOFS.index(dof)
-        value[i] = entry.get("offset", 0.0)
-        for term in entry.get("terms", []):
-            amplitude, omega = float(term["amplitude"]), float(term["omega"])
-            angle = omega * t + float(term.get("phase", 0.0))
+        value[i] = entry.get('offset', 0.0)
+        for term in entry.get('terms', []):
+            amplitude, omega = float(term['amplitude']), float(term['omega'])
+            angle = omega * t + float(term.get('phase', 0.0))
             value[i] += amplitude * sin(angle)
             rate[i] += amplitude * omega * cos(angle)
     return value, rate
@@ -193,10 +193,10 @@ def disturbance(spec: list[dict[str, Any]] | dict[str, Any] | None, t: float) ->
     """
     total = np.zeros(6)
     for item in [] if spec is None else [spec] if isinstance(spec, dict) else spec:
-        if item["kind"] == "harmonic":
-            total += setpoint({k: v for k, v in item.items() if k != "kind"}, t)[0]
-        elif item["kind"] == "herman2018":
-            g = float(item.get("exponent_sign", -1))
+        if item['kind'] == 'harmonic':
+            total += setpoint({k: v for k, v in item.items() if k != 'kind'}, t)[0]
+        elif item['kind'] == 'herman2018':
+            g = float(item.get('exponent_sign', -1))
             f1 = pi / 4 * cos(pi * t / 5) + pi / 10 * sin(pi * t / 3)
             f2 = 0.2 * sin(t) * exp(g) + 0.1 * exp(cos(t - 0.7))
             f3 = pi / 5 * sin(pi * t / 15) + pi / 4 * cos(pi * t / 5)
@@ -209,7 +209,7 @@ def disturbance(spec: list[dict[str, Any]] | dict[str, Any] | None, t: float) ->
                 50 * f3 * exp(3 * g) + 4,
             ]
         else:
-            raise ValueError(f"disturbance kind {item['kind']!r} is not covered")
+            raise ValueError(f'disturbance kind {item["kind"]!r} is not covered')
     return total
 
 
@@ -220,7 +220,7 @@ Law = Callable[..., tuple[Array, Array, Array]]
 
 def make_law(M: Array, gains: dict[str, Any]) -> Law:
     """GVC (16)-(21) in the xi frame, or CL (29), with constant matrices built once."""
-    k_d, k_i, lam, gam = (square(gains[key]) for key in ("k_D", "k_I", "Lambda", "Gamma"))
+    k_d, k_i, lam, gam = (square(gains[key]) for key in ('k_D', 'k_I', 'Lambda', 'Gamma'))
     u, n = decompose(M)
     ut, u_inv = u.T, np.linalg.inv(u)
     ut_inv = u_inv.T
@@ -246,7 +246,7 @@ def make_law(M: Array, gains: dict[str, Any]) -> Law:
         tau = M @ nu_r_dot + c @ nu_r + d @ nu_r + g + k_d @ s + k_i @ z + f  # (29)
         return tau, s, f
 
-    return {"gvc": gvc, "cl": cl}[gains["law"]]
+    return {'gvc': gvc, 'cl': cl}[gains['law']]
 
 
 def simulate(
@@ -257,22 +257,22 @@ def simulate(
     duration: float | None = None,
 ) -> dict[str, Array]:
     """Run one entry of scenario['controllers']; state eta, nu and, if continuous, z, sigma."""
-    if hold not in ("continuous", "zoh"):
-        raise ValueError("hold must be continuous or zoh")
-    if scenario.get("actuators") or scenario.get("sensors"):
-        raise ValueError("actuators and sensors are not covered")
+    if hold not in ('continuous', 'zoh'):
+        raise ValueError('hold must be continuous or zoh')
+    if scenario.get('actuators') or scenario.get('sensors'):
+        raise ValueError('actuators and sensors are not covered')
     mats = vehicle_matrices(vehicle)
-    m, m_inv = mats["M"], np.linalg.inv(mats["M"])
-    law = make_law(m, scenario["controllers"][controller])
-    c_nodes, a_rows, b_weights = TABLEAUX[scenario.get("integrator", "ode5")]
+    m, m_inv = mats['M'], np.linalg.inv(mats['M'])
+    law = make_law(m, scenario['controllers'][controller])
+    c_nodes, a_rows, b_weights = TABLEAUX[scenario.get('integrator', 'ode5')]
     stage_rows, weights = [np.array(row) for row in a_rows], np.array(b_weights)
-    target, upset = scenario["setpoint"], scenario.get("disturbance")
+    target, upset = scenario['setpoint'], scenario.get('disturbance')
 
-    h = float(scenario["step"])
-    steps = round((float(scenario["duration"]) if duration is None else duration) / h)
+    h = float(scenario['step'])
+    steps = round((float(scenario['duration']) if duration is None else duration) / h)
     t = np.arange(steps + 1) * h
-    names = ("eta", "nu", "nu_d", "tau", "disturbance", "disturbance_estimate")
-    out: dict[str, Array] = {"t": t, **{name: np.zeros((steps + 1, 6)) for name in names}}
+    names = ('eta', 'nu', 'nu_d', 'tau', 'disturbance', 'disturbance_estimate')
+    out: dict[str, Array] = {'t': t, **{name: np.zeros((steps + 1, 6)) for name in names}}
 
     def model(x: Array) -> tuple[Array, Array, Array]:
         """C(nu), D(nu), g(eta): the same for plant and controller."""
@@ -297,12 +297,12 @@ def simulate(
             k[i] = derivative(time + node * h, x + h * (row @ k[:i]), *args)
         return x + h * (weights @ k)
 
-    initial = scenario.get("initial", {})
-    start = [np.array(initial.get(key, [0.0] * 6), dtype=float) for key in ("eta", "nu")]
+    initial = scenario.get('initial', {})
+    start = [np.array(initial.get(key, [0.0] * 6), dtype=float) for key in ('eta', 'nu')]
     x = np.concatenate((*start, np.zeros(12)))
     previous = None  # zoh: (e, s) of the sample before
     for k in range(steps + 1):
-        if hold == "zoh" and previous is not None:
+        if hold == 'zoh' and previous is not None:
             x[12:18] += (t[k] - t[k - 1]) * previous[0]
             x[18:24] += (t[k] - t[k - 1]) * previous[1]
         nu_d, nu_d_dot = setpoint(target, t[k])
@@ -312,7 +312,7 @@ def simulate(
             out[name][k] = disturbance(upset, t[k]) if row is None else row
         if k == steps:
             break
-        if hold == "continuous":
+        if hold == 'continuous':
             x = advance(closed_loop, t[k], x)
         else:
             x[:12] = advance(plant, t[k], x[:12], tau)

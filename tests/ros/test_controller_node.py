@@ -109,7 +109,7 @@ def test_refuses_broken_odometry_and_goes_on(lockstep, kind: str) -> None:
 def test_ends_on_a_signal(lockstep, how: int) -> None:
     peer, process = lockstep
     peer.publish(topics.ODOM, odometry(0))
-    peer.spin(0.2)
+    peer.spin(1.0)
     code, _ = stop(process, how)
     assert code == 0
     peer.until(lambda: peer.heard['wrench'], 'the zero wrench for the unanswered odometry')

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_dynamics.integrator import fill_step
-from auv_dynamics.jit import compiled
+from auv_dynamics.jit import compiled, jitable
 from auv_dynamics.model import Model
 from auv_dynamics.plant import (
     SIZE,
@@ -48,7 +48,7 @@ class ClosedLoop(NamedTuple):
             rate[SIZE + i] = change[i]
 
 
-@compiled
+@jitable
 def answer(system, stage, x):
     """(tau, f, state rate) of the law at a stage of the step."""
     t, nu, attitude, state = system.t[stage], vector(x, 7), attitude_of(x), x[SIZE:]

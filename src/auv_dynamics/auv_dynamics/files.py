@@ -44,14 +44,22 @@ def shorten(value: object) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML 1.1 as PyYAML reads it, but `1e-3` is a number and a doubled key is an error."""
+    """Scalars of YAML 1.2's core schema: `1e-3` is a number, `on` a word; a key stands once."""
+
+    yaml_implicit_resolvers = {}  # noqa: RUF012  not PyYAML's: 1:30 is not 90, 010 not 8
 
 
-_Loader.add_implicit_resolver(
-    'tag:yaml.org,2002:float',
-    re.compile(r'^[-+]?(?:\d[\d_]*\.?\d*|\.\d+)[eE][-+]?\d+$'),
-    list('-+.0123456789'),
-)
+for _tag, _pattern, _first in (
+    ('bool', r'true|True|TRUE|false|False|FALSE', 'tTfF'),
+    ('null', r'~|null|Null|NULL|', ['~', 'n', 'N', '']),
+    ('int', r'[-+]?(?:0|[1-9]\d*)', '-+0123456789'),
+    ('float', r'[-+]?(?:\.\d+|(?:0|[1-9]\d*)(?:\.\d*)?)(?:[eE][-+]?\d+)?', '-+.0123456789'),
+    ('float', r'[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)', '-+.'),
+    ('merge', r'<<', '<'),
+):
+    _Loader.add_implicit_resolver(
+        f'tag:yaml.org,2002:{_tag}', re.compile(f'^(?:{_pattern})$'), list(_first)
+    )
 
 
 def _unique_mapping(loader: _Loader, node: yaml.MappingNode) -> dict:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_dynamics.jit import compiled, specialised
+from auv_dynamics.jit import jitable, specialised
 
 
 class Tableau(NamedTuple):
@@ -45,7 +45,7 @@ def fill_rate(system, stage, x, rate):
     type(system).fill_rate(system, stage, x, rate)
 
 
-@compiled
+@jitable
 def fill_step(system, x, step, tableau, stages, trial):
     """Advance x (n,) in place by one step of `step` s.
 

@@ -1,9 +1,13 @@
 """Compile the kernel with numba where it is installed; the same source runs without it.
 
-Two decorators are all that the mathematics knows of numba: `helper` for small functions that are
-always inlined and `compiled` for the ones that are called from Python. Compiled code is kept in
-one explicit folder whose name changes with every source file of the workspace, so that a stale
-binary cannot be loaded: numba itself only looks at the file of the outermost function.
+Three decorators are all that the mathematics knows of numba: `helper` for small functions that
+are always inlined, `compiled` for those that are called from Python, and `jitable` for those that
+are compiled as part of another one but stay plain Python by themselves: they may meet a user's own
+law, which need not be compilable and must not enter the cache that other processes load.
+
+Compiled code is kept in one explicit folder whose name changes with every source file of the
+workspace, so that a stale binary cannot be loaded: numba itself only looks at the file of the
+outermost function.
 """
 
 import hashlib
@@ -38,7 +42,7 @@ def cache_folder() -> Path:
 
 try:
     import numba
-    from numba.extending import overload
+    from numba.extending import overload, register_jitable
 except ImportError:
     numba = None  # type: ignore[assignment]  # the module or its absence
 
@@ -50,13 +54,14 @@ if JITTED:
     OPTIONS: Any = {'fastmath': {'contract'}, 'error_model': 'numpy'}
     helper = numba.njit(forceinline=True, **OPTIONS)
     compiled = numba.njit(cache=True, nogil=True, **OPTIONS)
+    jitable: Any = register_jitable(**OPTIONS)
 else:
 
     def helper(function: Callable) -> Callable:
         """Return the function as it is: numba is absent or switched off."""
         return function
 
-    compiled = helper
+    compiled = jitable = helper
 
 
 def plain(function: Callable) -> Callable:

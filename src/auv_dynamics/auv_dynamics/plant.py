@@ -105,6 +105,11 @@ class Plant:
             self._F = self._disturbance(times.ravel()).reshape(*times.shape, 6)
         return self._F[self.k - self._first]
 
+    @property
+    def diverged(self) -> bool:
+        """Whether the state has left the finite numbers."""
+        return not np.isfinite(self.x).all()
+
     def advance(self, tau: tuple) -> None:
         """Hold the wrench tau, six floats in N and N m, over one step."""
         fill_plant_step(

@@ -75,6 +75,8 @@ class VelocityController:
         dt = self._guard.elapsed(ns, x[7:])
         if self._origin is None:
             self._origin = ns
+        if self._waiting is not None:
+            dt += self._waiting[2]  # the one before was never answered: its time counts as well
         self._waiting = (ns, x, dt)
         return self.answer()
 

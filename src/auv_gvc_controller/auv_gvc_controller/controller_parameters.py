@@ -12,6 +12,7 @@ from auv_dynamics.files import InputError
 from auv_dynamics.ros.parameters import declare, given
 from auv_gvc_controller.controller import VelocityController
 from auv_gvc_controller.laws import law_class, make_gains
+from auv_gvc_controller.limits import Limits
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.odometry_guard import OdometryGuard
 from auv_gvc_controller.pairing import DIFFERENCE, SAME, Pairing
@@ -50,14 +51,20 @@ class ControllerParameters:
         self.odometry_timeout = self._time('odometry_timeout', 0.5, 'silence: zero wrench')
         self._setpoint_timeout = self._time('setpoint_timeout', 0.5, 'older: zero wrench')
         self._gap = self._time('limits.gap', 1.0, 'longest step of time that is integrated')
-        self._speed = declare(node, 'limits.speed', float, 50.0, 'm/s that is believed', at_least=0)
-        self._rate = declare(node, 'limits.rate', float, 50.0, 'rad/s that is believed', at_least=0)
+        self._limits = Limits(
+            self._size('limits.speed', 20.0, 'm/s'),
+            self._size('limits.rate', 20.0, 'rad/s'),
+            self._size('limits.acceleration', 100.0, 'm/s2, rad/s2'),
+        )
         limit = declare(
             node, 'limits.wrench', list[float], None, '1 or 6 numbers, N, N m; none: off'
         )
         self._wrench_limit = self._limit(limit or [])
-        self.pairing = Pairing(self.exact, self.acceleration)
+        self.pairing = Pairing(self.exact, self.acceleration, self._limits)
         self.autostart = declare(node, 'autostart', bool, True, 'configure and activate at once')
+
+    def _size(self, name: str, default: float, unit: str) -> float:
+        return declare(self._node, name, float, default, f'{unit}; more is refused', at_least=0.0)
 
     def _time(self, name: str, default: float, text: str) -> float:
         return declare(self._node, name, float, default, f's, {text}', at_least=0.0)
@@ -93,7 +100,7 @@ class ControllerParameters:
             gains,
             control_model(load_vehicle(self._vehicle)),
             self.pairing,
-            OdometryGuard(round(self._gap * 1e9), self._speed, self._rate, self.lockstep),
+            OdometryGuard(round(self._gap * 1e9), self._limits, self.lockstep),
             lockstep=self.lockstep,
             exact=self.exact,
             setpoint_timeout_ns=round(self._setpoint_timeout * 1e9),

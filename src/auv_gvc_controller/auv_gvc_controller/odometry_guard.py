@@ -1,6 +1,6 @@
 """Which odometry may be used: stamps that go forward, without jumps, at speeds that exist."""
 
-import math
+from auv_gvc_controller.limits import Limits
 
 
 class OdometryGuard:
@@ -9,14 +9,13 @@ class OdometryGuard:
     Parameters
     ----------
     gap_ns : longest time between two stamps that a law may integrate over
-    speed, rate : largest speed in m/s and turn rate in rad/s that is believed
+    limits : speeds that are believed
     lockstep : a jump is then always an error; in real time the data stream may resume after it
 
     """
 
-    def __init__(self, gap_ns: int, speed: float, rate: float, lockstep: bool):
-        self._gap, self._speed, self._rate = gap_ns, speed, rate
-        self._lockstep = lockstep
+    def __init__(self, gap_ns: int, limits: Limits, lockstep: bool):
+        self._gap, self._limits, self._lockstep = gap_ns, limits, lockstep
         self.reset()
 
     def reset(self) -> None:
@@ -32,13 +31,7 @@ class OdometryGuard:
         ValueError : this odometry must not be used; the text says what was expected and found
 
         """
-        for name, values, most, unit in (
-            ('linear', nu[:3], self._speed, 'm/s'),
-            ('angular', nu[3:], self._rate, 'rad/s'),
-        ):
-            size = math.hypot(*values)
-            if size > most:
-                raise ValueError(f'twist.{name}: expected at most {most:g} {unit}, found {size:g}')
+        self._limits.check_velocity(nu)
         if self.last is None:
             self.last = ns
             return 0.0

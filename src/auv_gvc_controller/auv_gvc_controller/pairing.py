@@ -3,6 +3,9 @@
 from collections import OrderedDict
 from typing import NamedTuple
 
+from auv_gvc_controller.limits import Limits
+
+UNLIMITED = Limits()
 SAME = 'topic'
 DIFFERENCE = 'difference'
 CAPACITY = 4096  # set-points kept; more than any horizon that is accepted
@@ -23,12 +26,13 @@ class Pairing:
     ----------
     exact : take the set-point of the odometry's own stamp; else the newest at or before it
     acceleration : 'topic' waits for the derivative of the same stamp, 'difference' takes the
-        backward difference of the set-points, zero at the first
+        backward difference of the set-points, zero at the first and over a jump
+    limits : velocities and accelerations that are believed
 
     """
 
-    def __init__(self, exact: bool, acceleration: str):
-        self._exact, self._acceleration = exact, acceleration
+    def __init__(self, exact: bool, acceleration: str, limits: Limits = UNLIMITED):
+        self._exact, self._acceleration, self._limits = exact, acceleration, limits
         self._nu_d: OrderedDict[int, tuple] = OrderedDict()
         self._nu_d_dot: OrderedDict[int, tuple] = OrderedDict()
         self._used: Reference | None = None
@@ -38,11 +42,13 @@ class Pairing:
         self._used = None
 
     def setpoint(self, ns: int, nu_d: tuple) -> None:
-        """Keep a set-point; ValueError when its stamp is not newer than the one in use."""
+        """Keep a set-point; ValueError when it is not believed or not newer than the one in use."""
+        self._limits.check_velocity(nu_d)
         self._keep(self._nu_d, ns, nu_d)
 
     def derivative(self, ns: int, nu_d_dot: tuple) -> None:
-        """Keep a derivative; ValueError when its stamp is not newer than the one in use."""
+        """Keep a derivative; ValueError when it is not believed or not newer than that in use."""
+        self._limits.check_acceleration(nu_d_dot)
         self._keep(self._nu_d_dot, ns, nu_d_dot)
 
     def _keep(self, buffer: OrderedDict[int, tuple], ns: int, values: tuple) -> None:
@@ -87,4 +93,9 @@ class Pairing:
             return (0.0,) * 6
         ns, last = max(before)
         dt = (chosen - ns) / 1e9
-        return tuple((new - old) / dt for new, old in zip(self._nu_d[chosen], last, strict=True))
+        slope = tuple((new - old) / dt for new, old in zip(self._nu_d[chosen], last, strict=True))
+        try:
+            self._limits.check_acceleration(slope)
+        except ValueError:
+            return (0.0,) * 6  # a jump has no derivative
+        return slope

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_dynamics.jit import JITTED, compiled, plain, specialised
+from auv_dynamics.jit import JITTED, compiled, jitable, specialised
 from auv_gvc_controller.laws import SHIPPED
 from auv_gvc_controller.model import ControlModel
 
@@ -12,7 +12,8 @@ from auv_gvc_controller.model import ControlModel
 @specialised('gains')
 def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
     """(tau, f) of the law to which `gains` belongs."""
-    return type(gains).wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+    tau, f = type(gains).wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+    return tuple(map(float, tau)), tuple(map(float, f))
 
 
 @specialised('gains')
@@ -21,7 +22,7 @@ def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
     return type(gains).state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
 
 
-@compiled
+@jitable
 def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model):
     """Take one sample: state += dt * rate of the last sample, in place, then (tau, f).
 
@@ -34,6 +35,9 @@ def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model):
     for i in range(state.shape[0]):
         rate[i] = change[i]
     return tau, f
+
+
+compiled_sample = compiled(fill_sample)
 
 
 def is_compiled(gains: Any) -> bool:
@@ -57,10 +61,12 @@ class SampledLaw:
 
     def __init__(self, gains: Any, model: ControlModel):
         self._gains, self._model = gains, model
-        self._sample = fill_sample if is_compiled(gains) else plain(fill_sample)
+        self._sample = compiled_sample if is_compiled(gains) else fill_sample
         self.reset()
-        self.sample(0.0, 0.0, ZERO, UPRIGHT, ZERO, ZERO)  # compiles or loads the kernel: not later
-        self.reset()
+        if is_compiled(gains):
+            # compile or load the kernel now: the first sample must not wait for it
+            self.sample(0.0, 0.0, ZERO, UPRIGHT, ZERO, ZERO)
+            self.reset()
 
     def reset(self) -> None:
         """Forget the integrals."""
@@ -91,10 +97,10 @@ class SampledLaw:
 
         """
         state, rate = self._state.copy(), self._rate.copy()
-        tau, f = self._sample(
-            t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, self._gains, self._model
-        )
-        tau, f = tuple(map(float, tau)), tuple(map(float, f))
+        with np.errstate(all='ignore'):
+            tau, f = self._sample(
+                t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, self._gains, self._model
+            )
         if not np.all(np.isfinite([*tau, *f, *state, *rate])):
             raise ArithmeticError(f'the law gave a wrench that is not finite: {tau}')
         self._state, self._rate = state, rate

@@ -1,0 +1,268 @@
+"""The velocity controller between its guards: pairing, silence, gaps, limits, recovery."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from auv_dynamics import load_vehicle
+from auv_gvc_controller.controller import ZERO, VelocityController
+from auv_gvc_controller.laws import make_gains
+from auv_gvc_controller.laws.gvc import GVC
+from auv_gvc_controller.limits import Limits
+from auv_gvc_controller.model import control_model
+from auv_gvc_controller.odometry_guard import OdometryGuard
+from auv_gvc_controller.pairing import DIFFERENCE, SAME, Pairing
+from auv_gvc_controller.sampled import SampledLaw
+
+MS = 1_000_000
+PAPER = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
+MODEL = control_model(load_vehicle('rexrov'))
+GAINS = make_gains('gvc', PAPER)
+NU_D = (0.5, 0.0, -0.2, 0.0, 0.0, 0.1)
+NU_D_DOT = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def odometry(u: float = 0.1) -> tuple:
+    return (0.0, 0.0, 3.0, 1.0, 0.0, 0.0, 0.0, u, 0.0, 0.05, 0.0, 0.0, 0.02)
+
+
+class Bench:
+    """A controller with its pairing, and the law alone for comparison."""
+
+    def __init__(self, lockstep=False, exact=False, acceleration=DIFFERENCE, limit=(), gains=GAINS):
+        self.pairing = Pairing(exact, acceleration)
+        self.controller = VelocityController(
+            gains,
+            MODEL,
+            self.pairing,
+            OdometryGuard(100 * MS, Limits(50.0, 50.0), lockstep),
+            lockstep=lockstep,
+            exact=exact,
+            setpoint_timeout_ns=50 * MS,
+            wrench_limit=limit,
+        )
+        self.law = SampledLaw(gains, MODEL)
+
+    def setpoint(self, ms: float, nu_d: tuple = NU_D) -> None:
+        self.pairing.setpoint(round(ms * MS), nu_d)
+        self.pairing.derivative(round(ms * MS), NU_D_DOT)
+
+    def odometry(self, ms: float, u: float = 0.1):
+        return self.controller.odometry(round(ms * MS), odometry(u))
+
+    def alone(self, t: float, dt: float, u: float = 0.1, nu_d=NU_D, nu_d_dot=ZERO):
+        x = odometry(u)
+        return self.law.sample(t, dt, x[7:], x[3:7], nu_d, nu_d_dot)[0]
+
+
+def lockstep_bench(**options) -> Bench:
+    return Bench(lockstep=True, exact=True, acceleration=SAME, **options)
+
+
+def test_lockstep_answers_what_the_law_says():
+    bench = lockstep_bench()
+    for k in range(5):
+        bench.setpoint(700 + 10 * k)
+        answer = bench.odometry(700 + 10 * k, 0.1 * k)
+        tau = bench.alone(0.01 * k, 0.01 if k else 0.0, 0.1 * k, nu_d_dot=NU_D_DOT)
+        assert answer.ns == (700 + 10 * k) * MS
+        assert answer.tau == tau
+        assert answer.trouble == ''
+        assert len(answer.f) == 6
+    assert any(answer.f)
+
+
+def test_exact_waits_for_the_set_point():
+    bench = lockstep_bench()
+    assert bench.controller.answer() is None
+    assert bench.odometry(10) is None
+    assert bench.controller.unanswered == 10 * MS
+    bench.pairing.setpoint(10 * MS, NU_D)
+    assert bench.controller.answer() is None  # nor without its derivative
+    bench.pairing.derivative(10 * MS, NU_D_DOT)
+    answer = bench.controller.answer()
+    assert answer.ns == 10 * MS
+    assert answer.tau == bench.alone(0.0, 0.0, nu_d_dot=NU_D_DOT)
+    assert bench.controller.unanswered is None
+    assert bench.controller.answer() is None  # once
+
+
+def test_latest_without_a_set_point_is_a_zero_wrench_that_says_so():
+    bench = Bench()
+    answer = bench.odometry(10)
+    assert (answer.ns, answer.tau, answer.f) == (10 * MS, ZERO, ZERO)
+    assert answer.trouble == 'no set-point yet: zero wrench'
+    assert bench.controller.unanswered is None
+
+
+def test_the_law_starts_fresh_when_the_set_point_comes():
+    bench = Bench()
+    bench.odometry(0)
+    bench.odometry(10)
+    bench.setpoint(12)
+    answer = bench.odometry(20)
+    assert answer.trouble == ''
+    assert answer.tau == bench.alone(0.02, 0.01)
+
+
+def test_a_stale_set_point_is_a_zero_wrench_until_the_next():
+    bench = Bench()
+    bench.setpoint(0)
+    bench.odometry(0)
+    bench.alone(0.0, 0.0)
+    assert bench.odometry(50).tau == bench.alone(0.05, 0.05)  # just not stale
+    stale = bench.odometry(60, 0.4)
+    assert stale.tau == stale.f == ZERO
+    assert stale.trouble == 'no set-point for 0.06 s: zero wrench'
+    bench.setpoint(65)
+    bench.law.forget_rate()  # the time without the law is not integrated
+    recovered = bench.odometry(70)
+    assert recovered.trouble == ''
+    assert recovered.tau == bench.alone(0.07, 0.01)
+    bench.setpoint(75)
+    assert bench.odometry(80).tau == bench.alone(0.08, 0.01)  # and then it integrates again
+
+
+def test_lockstep_does_not_judge_the_age_of_a_set_point():
+    bench = Bench(lockstep=True, exact=False)
+    bench.setpoint(0)
+    for ms in (0, 90, 180):
+        assert bench.odometry(ms).trouble == ''
+
+
+def test_a_gap_is_refused_then_believed_and_not_integrated():
+    bench = Bench()
+    bench.setpoint(0)
+    bench.odometry(0)
+    bench.alone(0.0, 0.0)
+    with pytest.raises(ValueError, match='stamp: expected at most'):
+        bench.odometry(2000)
+    bench.setpoint(2005)
+    answer = bench.odometry(2010)
+    assert answer.trouble == ''
+    assert answer.tau == bench.alone(2.01, 0.0)
+    assert bench.odometry(2020).tau == bench.alone(2.02, 0.01)
+
+
+def test_refused_odometry_changes_nothing():
+    bench, other = lockstep_bench(), lockstep_bench()
+    for one in (bench, other):
+        for ms in (0, 10):
+            one.setpoint(ms)
+        one.odometry(0)
+    for ms in (0, -10, 5000):
+        with pytest.raises(ValueError, match='stamp: expected'):
+            bench.odometry(ms)
+    with pytest.raises(ValueError, match=r'twist\.linear: expected at most 50 m/s'):
+        bench.odometry(10, 60.0)
+    assert bench.odometry(10) == other.odometry(10)
+
+
+@pytest.mark.parametrize('bad', [1e308, math.inf, -math.inf])
+def test_no_wrench_is_ever_not_finite(bad):
+    bench = Bench()
+    bench.setpoint(0)
+    bench.odometry(0)
+    bench.alone(0.0, 0.0)
+    bench.setpoint(10, (bad, 0.0, 0.0, 0.0, 0.0, 0.0))
+    answer = bench.odometry(10)
+    assert answer.tau == answer.f == ZERO
+    assert 'not finite' in answer.trouble
+    bench.controller.reset()
+    bench.pairing.reset()
+    bench.law.reset()
+    bench.setpoint(20)
+    again = bench.odometry(20)
+    assert again.trouble == ''
+    assert again.tau == bench.alone(0.02, 0.0)
+
+
+def test_a_measurement_that_is_not_a_number_does_not_spoil_the_integrals():
+    bench = Bench()
+    for ms in (0, 10, 20, 30):
+        bench.setpoint(ms, NU_D)
+    bench.odometry(0)
+    bench.alone(0.0, 0.0)
+    with pytest.raises(ValueError, match=r'twist\.linear: expected at most 50 m/s, found nan'):
+        bench.odometry(10, math.nan)
+    assert bench.odometry(20).tau == bench.alone(0.02, 0.02)
+    assert bench.odometry(30).tau == bench.alone(0.03, 0.01)
+
+
+def test_a_law_that_is_not_finite_gives_no_wrench_and_keeps_its_integrals():
+    bench = Bench()
+    for ms, nu_d in ((0, NU_D), (10, (1e308,) * 6), (20, NU_D), (30, NU_D)):
+        bench.setpoint(ms, nu_d)
+    bench.odometry(0)
+    bench.alone(0.0, 0.0)
+    answer = bench.odometry(10)
+    assert answer.tau == ZERO
+    assert 'not finite' in answer.trouble
+    assert np.isfinite(bench.odometry(30).tau).all()
+
+
+def test_the_wrench_is_limited_per_axis():
+    free, limit = lockstep_bench(), (50.0, 1e9, 30.0, 1e9, 1e9, 1e-3)
+    held = lockstep_bench(limit=limit)
+    for bench in (free, held):
+        bench.setpoint(0)
+    wanted, found = free.odometry(0).tau, held.odometry(0).tau
+    assert_allclose(found, np.clip(wanted, -np.array(limit), limit))
+    assert found[0] == 50.0
+    assert found[2] == -30.0
+    assert found != wanted
+
+
+def test_reset_forgets_the_integrals():
+    bench = lockstep_bench()
+    for ms in (0, 10, 20):
+        bench.setpoint(ms)
+        bench.odometry(ms)
+    bench.controller.reset()
+    bench.setpoint(30)
+    answer = bench.odometry(30)
+    assert answer.tau == bench.alone(0.0, 0.0, nu_d_dot=NU_D_DOT)
+    assert not any(answer.f)
+
+
+def test_silence_answers_the_last_odometry_with_zero():
+    bench = lockstep_bench()
+    bench.setpoint(0)
+    bench.odometry(0)
+    bench.odometry(10)
+    answer = bench.controller.silence('inactive')
+    assert (answer.ns, answer.tau, answer.f) == (10 * MS, ZERO, ZERO)
+    assert answer.trouble == 'inactive: zero wrench'
+    assert bench.controller.unanswered is None
+    bench.setpoint(10)
+    assert bench.controller.answer() is None
+
+
+def test_time_is_counted_from_the_first_odometry():
+    seen = []
+
+    class Clock(GVC):
+        @staticmethod
+        def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+            seen.append(t)
+            return ZERO, ZERO
+
+    bench = Bench(gains=Clock(*make_gains('gvc', PAPER)))
+    bench.setpoint(5000)
+    seen.clear()
+    for ms in (5000, 5010, 5050):
+        bench.odometry(ms)
+    assert seen == [0.0, 0.01, 0.05]
+
+
+def test_time_between_answers_is_integrated_when_an_odometry_goes_unanswered():
+    bench = Bench(exact=True, acceleration=SAME)
+    bench.setpoint(0)
+    bench.odometry(0)
+    bench.alone(0.0, 0.0, nu_d_dot=NU_D_DOT)
+    assert bench.odometry(10) is None  # its set-point comes too late
+    bench.setpoint(20)
+    tau = bench.odometry(20).tau
+    assert tau == bench.alone(0.02, 0.02, nu_d_dot=NU_D_DOT)

@@ -1,0 +1,114 @@
+"""The kernel gives the same numbers compiled, with numba switched off, and without numba."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from auv_analysis import load_scenario, simulate
+from auv_dynamics import jit
+
+SERIES = ('t', 'eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate')
+CASES = [(law, hold) for law in ('gvc', 'cl') for hold in ('continuous', 'zoh')]
+SCRIPT = """
+import sys
+import numpy as np
+from dataclasses import replace
+from auv_dynamics import jit
+from auv_analysis import load_scenario, simulate
+assert not jit.JITTED
+scenario = load_scenario('case1')
+scenario = replace(scenario, data=scenario.data | {'duration': 0.4})
+arrays = {}
+for law in ('gvc', 'cl'):
+    for hold in ('continuous', 'zoh'):
+        run = simulate(scenario, law, hold)
+        for key in sys.argv[2:]:
+            arrays[f'{law} {hold} {key}'] = getattr(run, key)
+assert not hasattr(sys.modules.get('numba'), 'njit') or jit.config.DISABLE_JIT
+np.savez(sys.argv[1], **arrays)
+"""
+# found before every other sitecustomize: numba then looks as if it were not installed
+STUB = """
+import sys
+
+
+class Blocked:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition('.')[0] in ('numba', 'llvmlite'):
+            raise ModuleNotFoundError(f'No module named {name!r}', name=name)
+
+
+sys.meta_path.insert(0, Blocked())
+"""
+
+
+def run_script(tmp_path, **environment):
+    out = tmp_path / 'run.npz'
+    script = tmp_path / 'script.py'
+    script.write_text(SCRIPT, encoding='utf-8')
+    done = subprocess.run(
+        [sys.executable, str(script), str(out), *SERIES],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    return dict(np.load(out))
+
+
+def check_same(arrays):
+    scenario = load_scenario('case1')
+    scenario = replace(scenario, data=scenario.data | {'duration': 0.4})
+    for law, hold in CASES:
+        run = simulate(scenario, law, hold)
+        for key in SERIES:
+            ours, other = getattr(run, key), arrays[f'{law} {hold} {key}']
+            assert ours.shape == other.shape
+            scale = np.abs(ours).max()
+            assert scale > 0
+            assert_allclose(other, ours, rtol=0, atol=1e-12 * scale, err_msg=f'{law} {hold} {key}')
+
+
+@pytest.mark.skipif(not jit.JITTED, reason='numba is absent or switched off here')
+def test_the_compiled_kernel_agrees_with_the_source(tmp_path):
+    check_same(run_script(tmp_path, NUMBA_DISABLE_JIT='1'))
+
+
+def test_everything_runs_without_numba(tmp_path):
+    (tmp_path / 'sitecustomize.py').write_text(STUB, encoding='utf-8')
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get('PYTHONPATH')])])
+    check_same(run_script(tmp_path, PYTHONPATH=path))
+
+
+def test_compiled_code_is_kept_in_a_folder_of_these_sources(tmp_path, monkeypatch):
+    package = tmp_path / 'auv_made_up'
+    package.mkdir()
+    (package / '__init__.py').write_text('A = 1\n', encoding='utf-8')
+    (package / 'inner.py').write_text('B = 1\n', encoding='utf-8')
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(jit, 'PACKAGES', ('auv_made_up',))
+    monkeypatch.delenv('AUV_GVC_CACHE_DIR', raising=False)
+    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
+    before = jit.cache_folder()
+    assert before == jit.cache_folder()
+    assert before.parent == tmp_path / 'cache' / 'auv_gvc'
+    (package / 'inner.py').write_text('B = 2\n', encoding='utf-8')
+    assert jit.cache_folder() != before
+    monkeypatch.setenv('AUV_GVC_CACHE_DIR', str(tmp_path / 'mine'))
+    assert jit.cache_folder() == tmp_path / 'mine'
+
+
+def test_plain_gives_the_python_function():
+    def function():
+        return 1
+
+    assert jit.plain(function) is function
+    assert jit.plain(jit.compiled(function)) is function
+    assert jit.plain(jit.helper(function)) is function

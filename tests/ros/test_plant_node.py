@@ -1,0 +1,234 @@
+"""The plant node: lock-step on the wrench's stamp, start barrier, watchdog, reset, real time."""
+
+import itertools
+
+import numpy as np
+import pytest
+from harness import graph, parameters, run_node, stop
+from std_srvs.srv import SetBool, Trigger
+
+from auv_dynamics import interface
+from auv_dynamics.interface import Frames
+from auv_dynamics.kinematics import rotation
+from auv_dynamics.ros import convert, topics
+
+FRAMES = Frames()
+STEP = 10_000_000
+LOCKSTEP = parameters(vehicle='herman2018', lockstep=True, duration=1.0)
+
+
+def wrench(k: int, tau=(10.0, 0, 0, 0, 0, 0), frames: Frames = FRAMES):
+    return convert.wrench(k * STEP, tau, frames)
+
+
+def step_of(message) -> int:
+    return interface.nanoseconds(message.header.stamp) // STEP
+
+
+def odometry(peer, count: int) -> list:
+    peer.until(lambda: len(peer.heard['odom']) >= count, f'{count} odometry messages')
+    return peer.heard['odom']
+
+
+def barrier(*extra: str) -> list[str]:
+    return [*LOCKSTEP, '-p', 'expected_subscribers:=["odom=1", "disturbance=1"]', *extra]
+
+
+def listening(peer) -> None:
+    peer.listen(topics.ODOM, topics.TWIST, topics.DISTURBANCE, topics.CLOCK)
+
+
+def test_advances_only_on_the_wrench_of_its_own_stamp() -> None:
+    with graph(('plant_node', barrier())) as (peer, processes):
+        listening(peer)
+        assert [step_of(m) for m in odometry(peer, 1)] == [0]
+        for wrong in (
+            wrench(1),
+            wrench(5),
+            wrench(0, (np.nan,) * 6),
+            wrench(0, frames=Frames(base='x')),
+        ):
+            peer.publish(topics.WRENCH, wrong)
+        peer.spin(0.3)
+        assert len(peer.heard['odom']) == 1, 'no step without its wrench'
+        for k in range(3):
+            peer.publish(topics.WRENCH, wrench(k))
+            assert [step_of(m) for m in odometry(peer, k + 2)][-1] == k + 1
+        peer.until(lambda: len(peer.heard['disturbance']) == 3, 'a disturbance per wrench')
+        assert [step_of(m) for m in peer.heard['disturbance']] == [0, 1, 2]
+        code, output = stop(processes['plant_node'])
+    assert code == 0
+    for word in ('frame_id', 'finite', 'stamp'):
+        assert word in output, output
+
+
+def test_publishes_nothing_before_its_subscribers_have_matched() -> None:
+    """Rival recordings lose the first messages (rosbag2#1430)."""
+    with graph(('plant_node', barrier())) as (peer, _):
+        answer = peer.call(Trigger, 'plant_node/ready')
+        assert not answer.success
+        assert 'odom' in answer.message
+        peer.spin(0.3)
+        listening(peer)
+        assert step_of(odometry(peer, 1)[0]) == 0, 'the very first step is heard'
+        assert peer.call(Trigger, 'plant_node/ready').success
+
+
+def test_run_names_the_first_node_that_is_not_ready() -> None:
+    extra = ['-p', 'start_after:=["first", "second"]', *parameters(start_paused=True)]
+    with graph(('plant_node', barrier(*extra))) as (peer, _):
+        listening(peer)
+
+        def ready(_, response):
+            response.success = True
+            return response
+
+        def ask():
+            return peer.call(SetBool, 'plant_node/run', SetBool.Request(data=True))
+
+        assert ask().message == 'first'
+        peer.node.create_service(Trigger, 'first/ready', ready)
+        peer.until(lambda: ask().message == 'second', 'the second to be named')
+        assert not peer.heard['odom']
+        peer.node.create_service(Trigger, 'second/ready', ready)
+        peer.until(lambda: ask().success, 'consent')
+        assert step_of(odometry(peer, 1)[0]) == 0
+
+
+def test_a_pause_holds_the_next_step() -> None:
+    with graph(('plant_node', barrier())) as (peer, _):
+        listening(peer)
+        odometry(peer, 1)
+        assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=False)).success
+        peer.publish(topics.WRENCH, wrench(0))
+        peer.spin(0.3)
+        assert len(peer.heard['odom']) == 1
+        assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=True)).success
+        assert step_of(odometry(peer, 2)[1]) == 1
+
+
+def test_silence_ends_the_run_and_is_named() -> None:
+    with graph(('plant_node', barrier(*parameters(wrench_timeout=0.5)))) as (peer, processes):
+        listening(peer)
+        odometry(peer, 1)
+        process = processes['plant_node']
+        peer.until(lambda: process.poll() is not None, 'the end')
+        code, output = stop(process)
+    assert code == 1
+    assert 'no answer on wrench to step 0' in output
+    assert 'no controller' in output
+
+
+def test_without_recorder_it_ends_with_the_last_wrench() -> None:
+    with graph(('plant_node', barrier(*parameters(duration=0.03)))) as (peer, processes):
+        listening(peer)
+        for k in range(4):
+            odometry(peer, k + 1)
+            peer.publish(topics.WRENCH, wrench(k))
+        process = processes['plant_node']
+        peer.until(lambda: process.poll() is not None, 'the end')
+        assert process.returncode == 0
+        peer.until(lambda: len(peer.heard['disturbance']) == 4, 'the last disturbance')
+
+
+def test_credit_holds_the_plant_while_the_recorder_is_behind() -> None:
+    with graph(('plant_node', barrier(*parameters(recorder_window=2)))) as (peer, _):
+        listening(peer)
+        peer.until(lambda: peer.node.count_subscribers('recorder/progress'), 'a listener')
+        for k in range(2):  # ack is -1: steps 0 and 1 are free
+            odometry(peer, k + 1)
+            peer.publish(topics.WRENCH, wrench(k))
+        peer.spin(0.3)
+        assert len(peer.heard['odom']) == 2
+        progress = topics.PROGRESS.type(stamp=convert.stamp(0))
+        peer.publish(topics.PROGRESS, progress)
+        assert step_of(odometry(peer, 3)[2]) == 2
+
+
+def test_reset_restores_the_state_and_not_the_time() -> None:
+    extra = ['-p', 'initial.eta:=[1.0, 2.0, 3.0, 0.0, 0.0, 0.5]']
+    with graph(('plant_node', barrier(*extra))) as (peer, _):
+        listening(peer)
+        for k in range(20):
+            odometry(peer, k + 1)
+            peer.publish(topics.WRENCH, wrench(k, (500.0, 0, 0, 0, 0, 0)))
+        moved = odometry(peer, 21)[-1].twist.twist.linear.x
+        assert peer.call(Trigger, 'plant_node/reset').success
+        peer.publish(topics.WRENCH, wrench(20, (0.0,) * 6))
+        message = odometry(peer, 22)[-1]
+        assert step_of(message) == 21
+        assert moved > 0.1
+        assert abs(message.twist.twist.linear.x) < 0.01
+        assert message.pose.pose.position.x == pytest.approx(1.0, abs=1e-3)
+
+
+def test_twist_is_in_the_child_frame() -> None:
+    """Rivals publish it in the odom frame (Plankton#52, uuv_simulator#165)."""
+    extra = [
+        '-p',
+        'initial.eta:=[0.0, 0.0, 0.0, 0.0, 0.0, 1.2]',
+        '-p',
+        'initial.nu:=[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]',
+    ]
+    with graph(('plant_node', barrier(*extra))) as (peer, _):
+        listening(peer)
+        for k in range(2):
+            odometry(peer, k + 1)
+            peer.publish(topics.WRENCH, wrench(k))
+        first, second = odometry(peer, 2)[:2]
+    assert first.child_frame_id == 'base_link_fsd'
+    assert first.header.frame_id == 'odom_ned'
+    assert first.twist.twist.linear.x == 1.0
+    a, b = first.pose.pose.position, second.pose.pose.position
+    q = first.pose.pose.orientation
+    moved = np.array([b.x - a.x, b.y - a.y, b.z - a.z]) / 0.01
+    assert np.allclose(moved, rotation([q.w, q.x, q.y, q.z]) @ [1, 0, 0], atol=0.02)
+    assert np.allclose(moved, [np.cos(1.2), np.sin(1.2), 0], atol=0.02)
+
+
+def test_real_time_holds_the_last_wrench_then_lets_go() -> None:
+    arguments = parameters(vehicle='herman2018_neutral', wrench_timeout=0.3)
+    arguments += ['-p', 'expected_subscribers:=["odom=1"]']
+    with graph(('plant_node', arguments)) as (peer, _):
+        listening(peer)
+        odometry(peer, 3)
+        for _ in itertools.repeat(None, 10):
+            peer.publish(topics.WRENCH, wrench(len(peer.heard['odom']), (300.0, 0, 0, 0, 0, 0)))
+            peer.spin(0.02)
+        peer.until(lambda: peer.heard['odom'][-1].twist.twist.linear.x > 0.05, 'motion')
+
+        def slowing() -> bool:
+            surge = [m.twist.twist.linear.x for m in peer.heard['odom'][-2:]]
+            return surge[1] < surge[0]
+
+        peer.until(slowing, 'the wrench to end')
+        stamps = [step_of(m) for m in peer.heard['odom']]
+        assert stamps == list(range(len(stamps)))
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'key', 'expected'),
+    [
+        ([], 'vehicle', 'a vehicle file'),
+        (parameters(vehicle='herman2018', step=-1.0), 'step', 'a number from'),
+        (parameters(vehicle='herman2018', step=1e-10), 'step', 'a number from'),
+        (parameters(vehicle='herman2018', duration=1.005), 'duration', 'a multiple of step'),
+        (parameters(vehicle='herman2018', integrator='ode45'), 'integrator', 'ode5, rk4, euler'),
+        (parameters(vehicle='herman2018', recorder_window=3000), 'recorder_window', '2999'),
+        (parameters(vehicle='herman2018', colour='red'), 'colour', 'one of'),
+        (parameters(vehicle='herman2018', initial__eta='[1.0]'), 'initial.eta', '6 finite'),
+        (
+            [*parameters(vehicle='herman2018'), '-p', 'disturbance.names:=["a"]'],
+            'disturbance.a.kind',
+            'herman2018, harmonic',
+        ),
+    ],
+)
+def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
+    ended = run_node('plant_node', *arguments)
+    assert ended.returncode == 2, ended.stdout
+    lines = ended.stdout.strip().splitlines()
+    assert len(lines) == 1, ended.stdout
+    assert key in lines[0]
+    assert expected in lines[0]
+    assert 'found' in lines[0]

@@ -1,0 +1,86 @@
+"""The set-point node: silent before the first odometry, ahead of it, and at an end."""
+
+import numpy as np
+import pytest
+from harness import graph, parameters, run_node
+
+from auv_dynamics import interface
+from auv_dynamics.interface import Frames
+from auv_dynamics.ros import convert, topics
+
+STEP = 10_000_000
+UPRIGHT = np.array([0, 0, 0, 1, *[0] * 9], float)
+SURGE = [
+    *parameters(setpoint__surge__offset=0.2, horizon=5),
+    *['-p', 'setpoint.surge.amplitude:=[1.0]', '-p', 'setpoint.surge.omega:=[2.0]'],
+]
+
+
+def odometry(ns: int):
+    return convert.odometry(ns, UPRIGHT, Frames())
+
+
+def stamps(peer, topic: str) -> list[int]:
+    return [interface.nanoseconds(m.header.stamp) for m in peer.heard[topic]]
+
+
+def test_runs_ahead_of_the_odometry_on_its_grid() -> None:
+    start = 7 * 10**9 + 123
+    with graph(('setpoint_node', SURGE)) as (peer, _):
+        peer.listen(topics.CMD_VEL, topics.CMD_ACCEL)
+        peer.until(lambda: peer.node.count_publishers('cmd_vel'), 'a publisher')
+        peer.spin(0.3)
+        assert not peer.heard['cmd_vel'], 'nothing before the first odometry'
+        peer.publish(topics.ODOM, odometry(start))
+        peer.until(lambda: len(peer.heard['cmd_vel']) >= 6, 'five steps ahead')
+        peer.spin(0.2)
+        assert stamps(peer, 'cmd_vel') == [start + k * STEP for k in range(6)]
+        peer.publish(topics.ODOM, odometry(start + 2 * STEP))
+        peer.until(lambda: len(peer.heard['cmd_accel']) >= 8, 'two more')
+        assert stamps(peer, 'cmd_vel') == stamps(peer, 'cmd_accel')
+    t = np.arange(8) * 0.01
+    surge = [m.twist.linear.x for m in peer.heard['cmd_vel']]
+    slope = [m.accel.linear.x for m in peer.heard['cmd_accel']]
+    assert np.allclose(surge, 0.2 + np.sin(2 * t), atol=1e-15)
+    assert np.allclose(slope, 2 * np.cos(2 * t), atol=1e-15)
+    assert peer.heard['cmd_vel'][0].header.frame_id == 'base_link_fsd'
+
+
+def test_ends_with_its_duration() -> None:
+    with graph(('setpoint_node', [*SURGE, *parameters(duration=0.03)])) as (peer, _):
+        peer.listen(topics.CMD_VEL)
+        peer.publish(topics.ODOM, odometry(0))
+        peer.until(lambda: len(peer.heard['cmd_vel']) >= 4, 'four set-points')
+        peer.publish(topics.ODOM, odometry(3 * STEP))
+        peer.spin(0.3)
+        assert stamps(peer, 'cmd_vel') == [k * STEP for k in range(4)]
+
+
+def test_refuses_odometry_in_another_frame() -> None:
+    with graph(('setpoint_node', SURGE)) as (peer, _):
+        peer.listen(topics.CMD_VEL)
+        peer.publish(
+            topics.ODOM, convert.odometry(0, UPRIGHT, Frames(odom='odom', base='base_link'))
+        )
+        peer.spin(0.3)
+        assert not peer.heard['cmd_vel']
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'key', 'expected'),
+    [
+        (parameters(horizon=3000), 'horizon', '2999'),
+        (parameters(setpoint__warp__offset=1.0), 'setpoint.warp.offset', 'one of'),
+        (['-p', 'setpoint.surge.amplitude:=[1.0]'], 'setpoint', 'of equal length'),
+        (parameters(setpoint__file='none.csv'), 'none.csv', 'a CSV set-point file'),
+        (parameters(setpoint__file='none.csv', setpoint__yaw__offset=1.0), 'setpoint.yaw', 'alone'),
+    ],
+)
+def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
+    ended = run_node('setpoint_node', *arguments)
+    assert ended.returncode == 2, ended.stdout
+    lines = ended.stdout.strip().splitlines()
+    assert len(lines) == 1, ended.stdout
+    assert key in lines[0]
+    assert expected in lines[0]
+    assert 'found' in lines[0]

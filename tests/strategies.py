@@ -1,0 +1,114 @@
+"""Hypothesis strategies of physical vehicles, states and gains, as the files give them."""
+
+from typing import Any
+
+import numpy as np
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from auv_dynamics.files import matrix6
+
+# few examples, the same in every run, and no verdict on how long one takes
+QUICK = settings(derandomize=True, max_examples=25, deadline=None, database=None)
+
+
+def vectors(n: int = 6, largest: float = 3.0) -> st.SearchStrategy[np.ndarray]:
+    """(n,) finite numbers within +-largest."""
+    return _dense(n, largest)
+
+
+def _dense(shape: Any, largest: float) -> st.SearchStrategy[np.ndarray]:
+    elements = st.floats(-largest, largest, allow_subnormal=False)
+    return arrays(float, shape, elements=elements, fill=st.nothing())  # each entry its own
+
+
+def attitudes(pitch: float = 1.3) -> st.SearchStrategy[np.ndarray]:
+    """(6,) eta with theta within +-pitch."""
+    parts = (st.floats(-50, 50), st.floats(-50, 50), st.floats(-50, 50))
+    angles = (st.floats(-3.1, 3.1), st.floats(-pitch, pitch), st.floats(-3.1, 3.1))
+    return st.tuples(*parts, *angles).map(np.array)
+
+
+def _signed(smallest: float, largest: float) -> st.SearchStrategy[float]:
+    return st.builds(
+        lambda size, sign: size * sign, st.floats(smallest, largest), st.sampled_from((-1.0, 1.0))
+    )
+
+
+@st.composite
+def positive_definite(draw: st.DrawFn, n: int = 6) -> np.ndarray:
+    """(n, n) dense, symmetric, eigenvalues from 0.1 to a few."""
+    A = draw(_dense((n, n), 1.0))
+    P = 0.1 * np.eye(n) + A @ A.T / n
+    return (P + P.T) / 2
+
+
+@st.composite
+def inertias(draw: st.DrawFn, mass: float) -> np.ndarray:
+    """(3, 3) tensor about the centre of gravity: that of some distribution of mass."""
+    second_moments = mass * 0.1 * draw(positive_definite(3))
+    return np.trace(second_moments) * np.eye(3) - second_moments
+
+
+@st.composite
+def vehicles(draw: st.DrawFn, heavy_water: bool | None = None) -> dict[str, Any]:
+    """Contents of a vehicle file: dense M_A, often far above M_RB, and CG off in all axes.
+
+    Parameters
+    ----------
+    draw : given by Hypothesis
+    heavy_water : M_A twenty times the size of M_RB; None: drawn
+
+    """
+    mass = draw(st.floats(5.0, 3000.0))
+    heavy = draw(st.booleans()) if heavy_water is None else heavy_water
+    length = np.array([1.0, 1.0, 1.0, 0.4, 0.4, 0.4])
+    added = mass * (20.0 if heavy else 0.5) * np.outer(length, length) * draw(positive_definite())
+    linear = mass * draw(positive_definite())
+    twist = draw(_dense((6, 6), 0.1))
+    linear = linear + mass * (twist - twist.T)  # damping may be asymmetric
+    quadratic = mass * np.diag(np.abs(draw(vectors())))
+    sign = draw(st.sampled_from(('positive', 'sname')))
+    factor = {'positive': 1.0, 'sname': -1.0}[sign]
+    return {
+        'format': 1,
+        'name': 'random',
+        'source': 'drawn by Hypothesis',
+        'rigid_body': {
+            'mass': mass,
+            'center_of_gravity': [draw(_signed(0.01, 0.3)) for _ in range(3)],
+            'inertia': draw(inertias(mass)).tolist(),
+            'inertia_reference': 'cg',
+        },
+        'hydrostatics': {
+            'volume': mass * draw(st.floats(0.9, 1.1)) / 1025.0,
+            'center_of_buoyancy': draw(vectors(3, 0.2)).tolist(),
+        },
+        'added_mass': (factor * added).tolist(),
+        'damping': {
+            'linear': (factor * linear).tolist(),
+            'quadratic': (factor * quadratic).tolist(),
+        },
+        'environment': {'water_density': 1025.0, 'gravity': 9.81},
+        'sign': sign,
+    }
+
+
+@st.composite
+def gains(draw: st.DrawFn) -> dict[str, Any]:
+    """k_D, k_I, Lambda, Gamma: each a number, six numbers or a symmetric 6x6 matrix."""
+    sizes = {'k_D': 10.0, 'k_I': 1.0, 'Lambda': 1.0, 'Gamma': 50.0}
+    one = {}
+    for name, size in sizes.items():
+        scalar = st.floats(0.1, 2.0)
+        form = draw(
+            st.one_of(scalar, st.lists(scalar, min_size=6, max_size=6), positive_definite())
+        )
+        one[name] = (size * np.asarray(form)).tolist()
+    return one
+
+
+def full(value: Any) -> np.ndarray:
+    """(6, 6) of a gain or coefficient as a file gives it."""
+    return matrix6(value)

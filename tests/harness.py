@@ -27,7 +27,7 @@ PACKAGES = {
     'recorder_node': 'auv_analysis',
     'analysis_node': 'auv_analysis',
 }
-PATIENCE = 8.0  # s, after which a test that waits has failed
+PATIENCE = 30.0  # s, after which a test that waits has failed
 _domains = itertools.count()
 
 

@@ -153,13 +153,17 @@ def _controller(
         'setpoint_timeout': TIMEOUT,
         'odometry_timeout': TIMEOUT,
         'limits.gap': max(1.0, 10 * scenario.step),
-        # a simulation may go where no vehicle goes: only what has diverged is refused
-        'limits.speed': 1e3,
-        'limits.rate': 1e3,
-        'limits.acceleration': 1e6,
+        **{f'limits.{name}': value for name, value in _limits(lockstep).items()},
         'autostart': True,
     }
     return {**parameters, **{f'gains.{name}': _flat(value) for name, value in spec.items()}}
+
+
+def _limits(lockstep: bool) -> dict[str, float]:
+    """What the controller believes: in lock-step anything, the plant itself notices divergence."""
+    if lockstep:
+        return {'speed': 1e7, 'rate': 1e7, 'acceleration': 1e10}
+    return {'speed': 20.0, 'rate': 20.0, 'acceleration': 100.0}
 
 
 def _flat(value: Any) -> list[float]:

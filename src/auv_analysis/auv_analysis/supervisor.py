@@ -77,7 +77,8 @@ class Supervisor:
         ended = self.ended()
         for name, code in ended.items():
             if name != may_end or code != 0:
-                raise NodeDiedError(f'{name} ended with exit code {code}{self.last_lines(name)}')
+                text = f'{name} ended with exit code {code}{self.last_lines(name)}'
+                raise NodeDiedError(text + self._complaints(besides=name))
         return may_end in ended
 
     def last_lines(self, name: str, count: int = 8) -> str:
@@ -85,6 +86,15 @@ class Supervisor:
         path = self._logs / f'{name}.log'
         lines = path.read_text(errors='replace').splitlines() if path.is_file() else []
         return ''.join(f'\n    {line}' for line in lines[-count:])
+
+    def _complaints(self, besides: str) -> str:
+        """Last error of each other process: often the cause."""
+        text = ''
+        for path in sorted(self._logs.glob('*.log')):
+            errors = [x for x in path.read_text(errors='replace').splitlines() if '[ERROR]' in x]
+            if errors and path.stem != besides:
+                text += f'\n    {path.stem}: {errors[-1]}'
+        return text
 
     def stop(self) -> dict[str, int]:
         """End all that still run: SIGTERM, then SIGKILL; exit codes of all."""

@@ -71,7 +71,7 @@ class LockStep:
         self._published = False
         if plant.diverged:
             node.publish_disturbance(k, F)
-            node.end(1, f'the state is not finite after step {k}: the closed loop diverges')
+            node.end(1, f'beyond every speed after step {k}: the closed loop diverges')
             return
         self._go_on()
         node.publish_disturbance(k, F)

@@ -1,0 +1,243 @@
+"""`auv run` as a user starts it: the graph equals the simulation, nothing is lost, nobody stays."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+import yaml
+from harness import PACKAGES, auv, fresh_domain
+
+from auv_analysis import load_scenario, simulate
+from auv_analysis.bag import load_run, read_bag
+from auv_dynamics import interface
+from auv_dynamics.kinematics import quaternion
+
+GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
+SCENARIO = {
+    'name': 'six_dofs',
+    'vehicle': 'rexrov',
+    'duration': 3.0,
+    'step': 0.01,
+    'initial': {'eta': [1.0, 2.0, 3.0, 0.2, -0.3, 1.2], 'nu': [0.3, -0.1, 0.2, 0.05, 0.02, -0.1]},
+    'controllers': {
+        'gvc': {'law': 'gvc', **GAINS},
+        'cl': {'law': 'cl', **GAINS, 'k_D': [900.0, 800.0, 700.0, 600.0, 500.0, 400.0]},
+    },
+    'setpoint': {
+        dof: {'offset': 0.05 * i, 'terms': [{'amplitude': 0.1, 'omega': 0.5 + 0.1 * i}]}
+        for i, dof in enumerate(('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw'))
+    },
+    'disturbance': [
+        {'kind': 'herman2018'},
+        {
+            'kind': 'harmonic',
+            'heave': {'offset': -30.0, 'terms': [{'amplitude': 10, 'omega': 0.3}]},
+        },
+    ],
+}
+SIGNALS = ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate')
+
+
+def write(path: Path, **changes) -> Path:
+    path.write_text(yaml.safe_dump({**SCENARIO, **changes}, sort_keys=False))
+    return path
+
+
+def no_node_is_left(folder: Path) -> bool:
+    """Whether no node of a run in this folder is alive; its parameter file is in its command."""
+    commands = [' '.join(p.info['cmdline'] or []) for p in psutil.process_iter(['cmdline'])]
+    return not any(str(folder) in c and any(n in c for n in PACKAGES) for c in commands)
+
+
+@pytest.fixture(scope='module')
+def done(tmp_path_factory) -> Path:
+    """Two recorded runs of the same scenario: folders one and two."""
+    root = tmp_path_factory.mktemp('run')
+    scenario = write(root / 'six_dofs.yaml')
+    for name in ('one', 'two'):
+        ended = auv('run', str(scenario), '--out', str(root / name), '--json')
+        assert ended.returncode == 0, ended.stderr
+        assert json.loads(ended.stdout).keys() == {'gvc', 'cl'}
+        assert 'export ROS_DOMAIN_ID=' in ended.stderr
+    assert no_node_is_left(root)
+    return root
+
+
+@pytest.mark.parametrize('controller', ['gvc', 'cl'])
+def test_the_graph_equals_the_simulation(done: Path, controller: str) -> None:
+    recorded = load_run(done / 'one' / controller)
+    simulated = simulate(load_scenario(done / 'six_dofs.yaml'), controller, 'zoh')
+    assert recorded.notes == ()
+    assert len(recorded.t) == 301
+    for name in SIGNALS:
+        a, b = getattr(recorded, name), getattr(simulated, name)
+        assert np.all(np.abs(a - b) <= 1e-9 * np.maximum(1, np.abs(b))), name
+    assert recorded.law == controller
+    assert recorded.controller == controller
+    assert recorded.scenario == 'six_dofs'
+    assert recorded.gains == simulated.gains
+
+
+@pytest.mark.parametrize('controller', ['gvc', 'cl'])
+def test_two_runs_are_equal(done: Path, controller: str) -> None:
+    one, two = (read_bag(done / name / controller).messages for name in ('one', 'two'))
+    assert one.keys() == two.keys()
+    assert {topic.strip('/') for topic in one} == set(interface.STEP_TOPICS) - {'twist'}
+    for topic, (stamps, values) in one.items():
+        assert stamps == two[topic][0]
+        assert values == two[topic][1]
+
+
+def test_the_bag_alone_closes_the_equation_of_motion(done: Path) -> None:
+    """Signs and frames: M dnu/dt = tau - C nu - D nu - g - F, F from the topic `disturbance`."""
+    run = load_run(done / 'one' / 'gvc')
+    vehicle, h = run.vehicle, run.step
+    residual, scale = [], []
+    for k in range(50, len(run.t) - 1):
+        middle_nu = (run.nu[k] + run.nu[k + 1]) / 2
+        middle_eta = (run.eta[k] + run.eta[k + 1]) / 2
+        F = (run.disturbance[k] + run.disturbance[k + 1]) / 2
+        rate = (run.nu[k + 1] - run.nu[k]) / h
+        needed = vehicle.inverse_dynamics(middle_eta, middle_nu, rate, F)
+        residual.append(needed - run.tau[k])
+        scale.append(np.abs(run.tau[k]))
+    assert np.abs(residual).max() < 1e-4 * np.max(scale)
+    assert np.abs(run.disturbance).max() > 20, 'a disturbance without effect would be noticed'
+
+
+def test_twist_is_in_the_child_frame(done: Path) -> None:
+    run = load_run(done / 'one' / 'gvc')
+    assert np.abs(run.eta[:, 5]).min() > 0.5, 'yaw is not zero'
+    from auv_dynamics.kinematics import rotation
+
+    for k in range(0, 300, 20):
+        moved = (run.eta[k + 1, :3] - run.eta[k, :3]) / run.step
+        nu, euler = (run.nu[k] + run.nu[k + 1]) / 2, (run.eta[k] + run.eta[k + 1])[3:] / 2
+        assert np.allclose(moved, rotation(quaternion(euler)) @ nu[:3], atol=1e-4)
+
+
+def test_what_a_run_leaves(done: Path) -> None:
+    out = done / 'one'
+    assert {'summary.json', 'report.html', 'figures', 'gvc', 'cl'} <= {
+        p.name for p in out.iterdir()
+    }
+    assert len(list((out / 'figures').glob('*.png'))) >= 7
+    summary = json.loads((out / 'summary.json').read_text())
+    assert summary['gvc']['source'] == 'bag'
+    assert summary['gvc']['samples'] == 301
+    parameters = yaml.safe_load((out / 'gvc' / 'params.yaml').read_text())
+    assert parameters['/**/plant_node']['ros__parameters']['lockstep'] is True
+
+
+def test_analyze_and_info_read_what_run_recorded(done: Path, tmp_path: Path) -> None:
+    bags = [str(done / name / 'gvc') for name in ('one', 'two')]
+    ended = auv('analyze', *bags, '--out', str(tmp_path / 'both'), '--json')
+    assert ended.returncode == 0, ended.stderr
+    summaries = json.loads(ended.stdout)
+    original = json.loads((done / 'one' / 'summary.json').read_text())['gvc']
+    assert list(summaries.values()) == [original, original]
+    ended = auv('info', bags[0])
+    assert ended.returncode == 0
+    assert '/odom' in ended.stdout
+    assert 'scenario.yaml' in ended.stdout
+
+
+def test_a_run_can_be_repeated_from_what_it_left(done: Path, tmp_path: Path) -> None:
+    left = done / 'one' / 'scenario.yaml'
+    again = simulate(load_scenario(left), 'gvc', 'zoh')
+    first = simulate(load_scenario(done / 'six_dofs.yaml'), 'gvc', 'zoh')
+    assert np.array_equal(again.nu, first.nu)
+
+
+def start(scenario: Path, out: Path) -> subprocess.Popen:
+    command = [str(Path(sys.executable).with_name('auv')), 'run', str(scenario), '--out', str(out)]
+    environ = {**os.environ, 'ROS_DOMAIN_ID': str(fresh_domain())}
+    return subprocess.Popen(command, env=environ, stderr=subprocess.PIPE, text=True)
+
+
+def node_of(out: Path, name: str) -> psutil.Process:
+    """A node of this run, once steps are being recorded."""
+    limit = time.monotonic() + 60
+    while time.monotonic() < limit:
+        bags = list(out.glob('*/*.mcap'))
+        if bags and bags[0].stat().st_size > 50_000:
+            for process in psutil.process_iter(['cmdline']):
+                command = process.info['cmdline'] or []
+                if any(str(out) in c for c in command) and any(c.endswith(name) for c in command):
+                    return process
+        time.sleep(0.05)
+    raise AssertionError(f'{name} does not run')
+
+
+@pytest.mark.parametrize('name', sorted(PACKAGES))
+def test_a_node_that_dies_ends_the_run_and_loses_nothing(tmp_path: Path, name: str) -> None:
+    out = tmp_path / 'out'
+    process = start(write(tmp_path / 's.yaml', duration=600.0), out)
+    node_of(out, name).kill()
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert f'{name} ended with exit code -9' in errors
+    assert no_node_is_left(out)
+    run = load_run(out / 'gvc')
+    assert len(run.t) > 10
+    assert np.isfinite(run.nu).all()
+
+
+@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGKILL])
+def test_ending_auv_ends_its_nodes(tmp_path: Path, how: int) -> None:
+    out = tmp_path / 'out'
+    process = start(write(tmp_path / 's.yaml', duration=600.0), out)
+    node_of(out, 'plant_node')
+    process.send_signal(how)
+    process.communicate(timeout=60)
+    limit = time.monotonic() + 10
+    while not no_node_is_left(out):
+        assert time.monotonic() < limit, 'its nodes outlive auv'
+        time.sleep(0.05)
+    notes = ' '.join(load_run(out / 'gvc').notes)
+    assert 'not finished' not in notes, 'the recorder has closed its bag'
+
+
+def test_a_diverging_loop_says_so(tmp_path: Path) -> None:
+    unstable = {'bad': {'law': 'cl', **GAINS, 'k_D': -1e6}}
+    scenario = write(tmp_path / 's.yaml', controllers=unstable)
+    ended = auv('run', str(scenario), '--out', str(tmp_path / 'out'))
+    assert ended.returncode == 1
+    assert 'plant_node ended with exit code 1' in ended.stderr
+    assert 'diverges' in ended.stderr
+    assert no_node_is_left(tmp_path)
+
+
+def test_a_domain_with_another_vehicle_is_refused(tmp_path: Path) -> None:
+    from harness import Peer
+
+    from auv_dynamics.ros import topics
+
+    domain = fresh_domain()
+    peer = Peer(domain)
+    peer.node.create_publisher(topics.WRENCH.type, '/other/wrench', 10)
+    scenario = write(tmp_path / 's.yaml')
+    ended = auv('run', str(scenario), '--out', str(tmp_path / 'out'), '--domain-id', str(domain))
+    peer.close()
+    assert ended.returncode == 2
+    assert 'test_peer on /other/wrench' in ended.stderr
+
+
+def test_ten_runs_in_a_row_lose_and_double_nothing(tmp_path: Path) -> None:
+    controllers = {f'gvc{i}': {'law': 'gvc', **GAINS} for i in range(10)}
+    scenario = write(tmp_path / 's.yaml', duration=30.0, controllers=controllers)
+    ended = auv('run', str(scenario), '--out', str(tmp_path / 'out'))
+    assert ended.returncode == 0, ended.stderr
+    for name in controllers:
+        contents = read_bag(tmp_path / 'out' / name, decode=False)
+        for topic in interface.STEP_TOPICS:
+            assert contents.counts[f'/{topic}'] == 3001, (name, topic)
+        assert contents.counts['/clock'] == 3001
+        assert contents.counts['/analysis/lumped_error'] == 301

@@ -181,7 +181,7 @@ def _check_type(path: Path, topic: str, found: str) -> None:
 
 def _role(topic: str) -> str:
     """Our name of a topic, whatever its namespace."""
-    return '' if topic.endswith('/ground_truth/odom') else topic.rpartition('/')[2]
+    return '' if topic.endswith(f'/{interface.GROUND_TRUTH}') else topic.rpartition('/')[2]
 
 
 def _keep(contents: Contents, path: Path, topic: str, message: Any, frames: dict) -> None:
@@ -250,7 +250,9 @@ def load_run(bag: str | Path, vehicle: str | Path | None = None) -> Run:
 
 def _one_graph(contents: Contents, bag: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Stamps and values by role, of the first namespace that has an odometry."""
-    spaces = sorted({t.removesuffix(_role(t)) for t in contents.messages if _role(t) == 'odom'})
+    spaces = sorted(
+        {t.removesuffix(_role(t)) for t in contents.messages if _role(t) == interface.ODOM}
+    )
     found = ', '.join(sorted(contents.types)) or 'no topics'
     if not spaces:
         raise InputError(bag, interface.ODOM, 'messages', found)

@@ -108,6 +108,7 @@ class _Speed(ProgressColumn):
     """Steps per second, of a run that has begun."""
 
     def render(self, task: Task) -> str:
+        """Text of the column."""
         speed = task.finished_speed or task.speed
         return f'{speed:>6.0f} steps/s' if speed else ''
 
@@ -250,10 +251,17 @@ def params(options: argparse.Namespace) -> dict[str, Any]:
     """The parameter file that `auv run` would write, for plain `ros2 run`."""
     scenario = load_scenario(options.scenario)
     lockstep = not options.real_time
+    bag = Path('runs') / scenario.name / options.controller
     parameters = node_parameters(
-        scenario, options.controller, bag=Path('bag'), analysis=True, lockstep=lockstep
+        scenario,
+        options.controller,
+        bag=bag,
+        lockstep=lockstep,
+        vehicle=scenario.shipped_vehicle,
     )
-    text = parameter_file(parameters, f'{scenario.name}, controller {options.controller}')
+    text = parameter_file(
+        parameters, f'auv params {scenario.name} --controller {options.controller}'
+    )
     if options.out is not None:
         if options.out.exists() and not options.overwrite:
             raise InputError(options.out, '--out', 'a new file, or --overwrite', 'an existing file')

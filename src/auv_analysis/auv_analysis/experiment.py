@@ -116,7 +116,7 @@ def run_controller(
     path = bag / 'params.yaml'
     inputs = {**write_inputs(scenario, out), 'params.yaml': path}
     parameters = node_parameters(
-        scenario, controller, bag=bag, vehicle=str(inputs['vehicle.yaml'].resolve()),
+        scenario, controller, bag=bag.resolve(), vehicle=str(inputs['vehicle.yaml'].resolve()),
         attachments={name: file.resolve() for name, file in inputs.items()},
     )  # fmt: skip
     parameters[PLANT]['start_paused'] = True

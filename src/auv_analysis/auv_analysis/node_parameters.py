@@ -8,8 +8,8 @@ import numpy as np
 import yaml
 
 from auv_analysis.scenario import Scenario
+from auv_dynamics import interface
 from auv_dynamics.files import matrix6
-from auv_dynamics.interface import STEP_TOPICS
 from auv_dynamics.signals import harmonic_columns
 
 PLANT, SETPOINT, CONTROLLER = 'plant_node', 'setpoint_node', 'controller_node'
@@ -19,17 +19,20 @@ WINDOW = 2000  # steps that the plant may be ahead of the recorder
 HORIZON = 200  # steps that set-points are published ahead
 WRENCH_TIMEOUT = 30.0  # s of silence that end a lock-step run
 TIMEOUT = 0.5  # s, the real-time watchdogs
-OF_PLANT_ALONE = ('twist', 'disturbance')  # no driver has to offer them
+OF_PLANT_ALONE = (interface.TWIST, interface.DISTURBANCE)  # no driver has to offer them
 SUBSCRIBERS = {  # topic -> who subscribes, by publisher
     PLANT: {
-        'odom': (CONTROLLER, SETPOINT, ANALYSIS, RECORDER),
-        'twist': (RECORDER,),
-        'disturbance': (ANALYSIS, RECORDER),
+        interface.ODOM: (CONTROLLER, SETPOINT, ANALYSIS, RECORDER),
+        interface.TWIST: (RECORDER,),
+        interface.DISTURBANCE: (ANALYSIS, RECORDER),
     },
-    SETPOINT: {'cmd_vel': (CONTROLLER, ANALYSIS, RECORDER), 'cmd_accel': (CONTROLLER, RECORDER)},
+    SETPOINT: {
+        interface.CMD_VEL: (CONTROLLER, ANALYSIS, RECORDER),
+        interface.CMD_ACCEL: (CONTROLLER, RECORDER),
+    },
     CONTROLLER: {
-        'wrench': (PLANT, ANALYSIS, RECORDER),
-        'disturbance_estimate': (ANALYSIS, RECORDER),
+        interface.WRENCH: (PLANT, ANALYSIS, RECORDER),
+        interface.DISTURBANCE_ESTIMATE: (ANALYSIS, RECORDER),
     },
     ANALYSIS: {},
 }
@@ -88,8 +91,8 @@ def node_parameters(
         parameters[RECORDER] = {
             **clock,
             **grid,
-            'bag': str(bag.resolve()),
-            'topics': [t for t in STEP_TOPICS if plant or t not in OF_PLANT_ALONE],
+            'bag': str(bag),
+            'topics': [t for t in interface.STEP_TOPICS if plant or t not in OF_PLANT_ALONE],
             'strict': lockstep,
             'analysis_every': EVERY if analysis and plant else 0,
             'storage.compression': 'zstd',
@@ -160,9 +163,9 @@ def _controller(
 
 
 def _limits(lockstep: bool) -> dict[str, float]:
-    """What the controller believes: in lock-step anything, the plant itself notices divergence."""
+    """What the controller believes; in lock-step more than the plant, which ends at 100 m/s."""
     if lockstep:
-        return {'speed': 1e7, 'rate': 1e7, 'acceleration': 1e10}
+        return {'speed': 120.0, 'rate': 120.0, 'acceleration': 1e5}
     return {'speed': 20.0, 'rate': 20.0, 'acceleration': 100.0}
 
 

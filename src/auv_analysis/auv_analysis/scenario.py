@@ -74,6 +74,12 @@ class Scenario:
         """Name -> law and gains, in the file's order."""
         return self.data['controllers']
 
+    @property
+    def shipped_vehicle(self) -> str | None:
+        """Bare name of the vehicle where it is a shipped one."""
+        named = self.vehicle_path.with_suffix('').name
+        return named if named == self.data['vehicle'] else None
+
     def controller(self, name: str) -> dict[str, Any]:
         """Law and gains of one controller; InputError when there is none of that name."""
         if name not in self.controllers:

@@ -54,7 +54,7 @@ def _nodes(context: LaunchContext) -> list:
     parameters = node_parameters(
         scenario,
         controller,
-        bag=bag,
+        bag=bag and bag.resolve(),
         plant=plant,
         analysis=on('analysis'),
         lockstep=on('lockstep', plant),

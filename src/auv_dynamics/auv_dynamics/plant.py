@@ -12,7 +12,7 @@ from auv_dynamics.model import Model, acceleration
 from auv_dynamics.six import fill_vector, vector
 
 SIZE = 13
-DIVERGED = 1e6  # m/s, rad/s
+DIVERGED = 100.0  # m/s, rad/s: no underwater vehicle is as fast
 BLOCK = 256  # steps whose disturbance is tabulated at once
 
 

@@ -1,0 +1,54 @@
+"""The examples run as a user would run them."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from harness import fresh_domain
+
+from auv_analysis.bag import load_run
+
+EXAMPLES = Path(__file__).resolve().parents[2] / 'examples'
+GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
+
+
+def run(name: str, *arguments: str, cwd: Path) -> str:
+    ended = subprocess.run(
+        [sys.executable, str(EXAMPLES / name), *arguments, '--domain-id', str(fresh_domain())],
+        cwd=cwd, capture_output=True, text=True, timeout=180, check=False,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    return ended.stdout
+
+
+def test_change_the_law(tmp_path: Path) -> None:
+    scenario = {
+        'name': 'short', 'vehicle': 'herman2018', 'duration': 3.0, 'step': 0.01,
+        'controllers': {'gvc': {'law': 'gvc', **GAINS}}, 'setpoint': {'heave': {'offset': 0.5}},
+    }  # fmt: skip
+    path = tmp_path / 'short.yaml'
+    path.write_text(yaml.safe_dump(scenario))
+    output = run('change_the_law.py', '--scenario', str(path), '--out', 'out', cwd=tmp_path)
+    assert 'gvc: 301 steps recorded, law gvc' in output
+    assert 'cl: 301 steps recorded, law cl' in output
+    heave = next(line.split() for line in output.splitlines() if 'heave' in line)
+    assert float(heave[2]) > float(heave[1]), 'the same gains are weaker without the inertia'
+    assert load_run(tmp_path / 'out' / 'cl').law == 'cl'
+
+
+def test_stub_driver_is_controlled(tmp_path: Path) -> None:
+    output = run('stub_driver.py', '--seconds', '6', cwd=tmp_path)
+    reached = float(re.search(r'surge ([\d.]+)', output)[1])
+    assert reached == pytest.approx(0.4, abs=0.05)
+
+
+@pytest.mark.skipif(shutil.which('ros2') is None, reason='no ros2 command: it has no wheel')
+def test_ros2_run_finds_the_nodes() -> None:
+    ended = subprocess.run(
+        ['ros2', 'pkg', 'executables', 'auv_dynamics'], capture_output=True, text=True, check=True
+    )
+    assert 'plant_node' in ended.stdout

@@ -1,5 +1,6 @@
 """The examples run as a user would run them."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -8,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from harness import fresh_domain
+from harness import auv, fresh_domain
 
 from auv_analysis.bag import load_run
 
@@ -44,6 +45,25 @@ def test_stub_driver_is_controlled(tmp_path: Path) -> None:
     output = run('stub_driver.py', '--seconds', '6', cwd=tmp_path)
     reached = float(re.search(r'surge ([\d.]+)', output)[1])
     assert reached == pytest.approx(0.4, abs=0.05)
+
+
+def test_the_law_of_the_readme_runs_in_process_and_on_the_nodes(tmp_path: Path) -> None:
+    text = (EXAMPLES.parent / 'README.md').read_text()
+    (tmp_path / 'my_module.py').write_text(re.search(r'```python\n(.*?)```', text, re.DOTALL)[1])
+    scenario = {
+        'name': 'mine', 'vehicle': 'herman2018_neutral', 'duration': 2.0, 'step': 0.01,
+        'controllers': {'mine': {'law': 'my_module:MyLaw', 'k_P': 900.0}},
+        'setpoint': {'surge': {'offset': 0.5}},
+    }  # fmt: skip
+    (tmp_path / 'mine.yaml').write_text(yaml.safe_dump(scenario))
+    reached = {}
+    for how in (['simulate', '--hold', 'zoh'], ['run']):
+        ended = auv(how[0], 'mine.yaml', *how[1:], '--json', '--out', how[0], cwd=tmp_path)
+        assert ended.returncode == 0, ended.stderr
+        reached[how[0]] = json.loads(ended.stdout)['mine']['velocity_error']['rms'][0]
+    assert 'MyLaw runs as plain Python' in ended.stderr
+    assert 0 < reached['run'] < 0.3
+    assert reached['run'] == pytest.approx(reached['simulate'], rel=1e-9)
 
 
 @pytest.mark.skipif(shutil.which('ros2') is None, reason='no ros2 command: it has no wheel')

@@ -1,6 +1,8 @@
 """The control laws by name. A law is a named tuple of gains with two pure static functions."""
 
 import importlib
+import os
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,7 +20,8 @@ def law_class(name: str) -> Any:
 
     Parameters
     ----------
-    name : 'gvc', 'cl' or 'module:Class' of a user's own law
+    name : 'gvc', 'cl' or 'module:Class' of a user's own law, found on Python's path or in the
+        working directory
 
     Returns
     -------
@@ -37,6 +40,8 @@ def law_class(name: str) -> Any:
     module, colon, attribute = name.partition(':')
     if not (colon and module and attribute):
         raise ValueError(f'expected {expected}, found {name!r}')
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())  # a user's module may lie where `auv` was started
     try:
         law = getattr(importlib.import_module(module), attribute)
     except AttributeError:

@@ -63,6 +63,15 @@ def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess:
     return subprocess.CompletedProcess(process.args, process.returncode, output, '')
 
 
+def assert_one_line(ended: subprocess.CompletedProcess, *words: str) -> None:
+    """Wrong input: exit code 2 and one line with the words in it, `expected` and `found`."""
+    assert ended.returncode == 2, ended.stdout
+    lines = ended.stdout.strip().splitlines()
+    assert len(lines) == 1, ended.stdout
+    for word in (*words, 'expected', 'found'):
+        assert word in lines[0]
+
+
 def stop(process: subprocess.Popen, how: int = signal.SIGTERM) -> tuple[int, str]:
     """End a process; its exit code and output."""
     if process.poll() is None:

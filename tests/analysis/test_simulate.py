@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.simulate import DivergedError
+from auv_analysis.simulation import DivergedError
 from auv_dynamics import InputError
 from auv_dynamics.disturbance import herman2018
 

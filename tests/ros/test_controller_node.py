@@ -6,11 +6,12 @@ import signal
 
 import numpy as np
 import pytest
-from harness import CONTROLLER, GAINS, graph, parameters, run_node, stop
+from harness import CONTROLLER, GAINS, assert_one_line, graph, parameters, run_node, stop
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 from auv_dynamics import interface
@@ -114,6 +115,16 @@ def test_ends_on_a_signal(lockstep, how: int) -> None:
     assert code == 0
     peer.until(lambda: peer.heard['wrench'], 'the zero wrench for the unanswered odometry')
     assert peer.heard['wrench'][0].wrench.force.x == 0
+
+
+def test_an_incompatible_publisher_is_heard(lockstep) -> None:
+    peer, process = lockstep
+    weak = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    peer.node.create_publisher(topics.ODOM.type, 'odom', weak)
+    peer.spin(2.0)
+    _, output = stop(process)
+    assert 'odom: incompatible QoS' in output
+    assert 'reliability' in output
 
 
 def change(peer, transition: int) -> bool:
@@ -223,10 +234,4 @@ def test_real_time_lets_go_when_odometry_falls_silent() -> None:
     ],
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
-    ended = run_node('controller_node', *arguments)
-    assert ended.returncode == 2, ended.stdout
-    lines = ended.stdout.strip().splitlines()
-    assert len(lines) == 1, ended.stdout
-    assert key in lines[0]
-    assert expected in lines[0]
-    assert 'found' in lines[0]
+    assert_one_line(run_node('controller_node', *arguments), key, expected)

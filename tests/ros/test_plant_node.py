@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from harness import graph, parameters, run_node, stop
+from harness import assert_one_line, graph, parameters, run_node, stop
 from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics import interface
@@ -218,6 +218,15 @@ def test_real_time_holds_the_last_wrench_then_lets_go() -> None:
         (parameters(vehicle='herman2018', colour='red'), 'colour', 'one of'),
         (parameters(vehicle='herman2018', initial__eta='[1.0]'), 'initial.eta', '6 finite'),
         (
+            [
+                *parameters(vehicle='herman2018', recorder_window=50),
+                '-p',
+                'qos_overrides./odom.publisher.depth:=50',
+            ],
+            'qos_overrides./odom.publisher.depth',
+            'more than 50',
+        ),
+        (
             [*parameters(vehicle='herman2018'), '-p', 'disturbance.names:=["a"]'],
             'disturbance.a.kind',
             'herman2018, harmonic',
@@ -225,10 +234,4 @@ def test_real_time_holds_the_last_wrench_then_lets_go() -> None:
     ],
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
-    ended = run_node('plant_node', *arguments)
-    assert ended.returncode == 2, ended.stdout
-    lines = ended.stdout.strip().splitlines()
-    assert len(lines) == 1, ended.stdout
-    assert key in lines[0]
-    assert expected in lines[0]
-    assert 'found' in lines[0]
+    assert_one_line(run_node('plant_node', *arguments), key, expected)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness import PATIENCE, graph, parameters, run_node, stop
+from harness import PATIENCE, assert_one_line, graph, parameters, run_node, stop
 from std_msgs.msg import String
 
 from auv_analysis.bag import read_bag
@@ -146,10 +146,5 @@ def test_refuses_a_folder_that_holds_a_bag(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str) -> None:
-    ended = run_node('recorder_node', *arguments)
-    assert ended.returncode == 2, ended.stdout
-    lines = ended.stdout.strip().splitlines()
-    assert len(lines) == 1, ended.stdout
-    assert key in lines[0]
-    assert 'expected' in lines[0]
+    assert_one_line(run_node('recorder_node', *arguments), key)
     assert not Path('x').exists()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from harness import graph, parameters, run_node
+from harness import assert_one_line, graph, parameters, run_node
 
 from auv_dynamics import interface
 from auv_dynamics.interface import Frames
@@ -77,10 +77,4 @@ def test_refuses_odometry_in_another_frame() -> None:
     ],
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
-    ended = run_node('setpoint_node', *arguments)
-    assert ended.returncode == 2, ended.stdout
-    lines = ended.stdout.strip().splitlines()
-    assert len(lines) == 1, ended.stdout
-    assert key in lines[0]
-    assert expected in lines[0]
-    assert 'found' in lines[0]
+    assert_one_line(run_node('setpoint_node', *arguments), key, expected)

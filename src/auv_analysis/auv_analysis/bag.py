@@ -15,7 +15,7 @@ from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 
 from auv_analysis.run import Run
-from auv_analysis.simulate import unwrapped_eta
+from auv_analysis.simulation import unwrapped_eta
 from auv_dynamics import interface
 from auv_dynamics.files import InputError, parse_yaml
 from auv_dynamics.vehicle import Vehicle

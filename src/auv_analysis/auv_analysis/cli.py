@@ -6,8 +6,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from auv_dynamics.files import InputError
-
 SCENARIO = 'a scenario file, or the bare name of a shipped one'
 
 
@@ -58,6 +56,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command; exit code 0 fine, 1 the work failed, 2 wrong input."""
     options = parser().parse_args(arguments)
     from auv_analysis import commands
+    from auv_dynamics.files import InputError
 
     try:
         result = getattr(commands, options.command)(options)

@@ -29,7 +29,7 @@ from auv_analysis.folder import prepare
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario, load_scenario
-from auv_analysis.simulate import simulate as simulate_run
+from auv_analysis.simulation import simulate as simulate_run
 from auv_analysis.summary import summarize
 from auv_analysis.supervisor import NodeDiedError
 from auv_analysis.warm_up import warm_up

@@ -98,7 +98,7 @@ class RecorderNode(BulkNode):
     def _say_progress(self) -> None:
         if self._reported >= 0:
             message = Header(stamp=convert.stamp(self._ledger.complete_ns))
-            message.frame_id = 'base_link_fsd'
+            message.frame_id = self.graph.frames.base
             self._progress.publish(message)
 
     def _keep(self) -> None:

@@ -1,7 +1,23 @@
 """Vehicle model, kinematics, integrator, disturbances and the plant."""
 
-from auv_dynamics.files import InputError
-from auv_dynamics.vehicle import Vehicle
-from auv_dynamics.vehicle_file import load_vehicle
+import importlib
+from typing import TYPE_CHECKING, Any
 
+if TYPE_CHECKING:
+    from auv_dynamics.files import InputError
+    from auv_dynamics.vehicle import Vehicle
+    from auv_dynamics.vehicle_file import load_vehicle
+
+_HOME = {
+    'InputError': 'auv_dynamics.files',
+    'Vehicle': 'auv_dynamics.vehicle',
+    'load_vehicle': 'auv_dynamics.vehicle_file',
+}
 __all__ = ['InputError', 'Vehicle', 'load_vehicle']
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for: `auv --help` must not load numba."""
+    if name in _HOME:
+        return getattr(importlib.import_module(_HOME[name]), name)
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

@@ -32,6 +32,7 @@ class PlantNode(BulkNode):
         self.graph = Graph(self)
         self._declare()
         refuse_unknown(self)
+        self.graph.must_hold = self.window
         self._odom = self.graph.publisher(topics.ODOM)
         self._clock_output = self.graph.publisher(topics.CLOCK)
         self._twist = self.graph.publisher(topics.TWIST)

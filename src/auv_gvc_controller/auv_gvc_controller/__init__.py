@@ -1,5 +1,19 @@
 """Decomposition into generalised velocity components, control laws and set-points."""
 
-from auv_gvc_controller.decomposition import decompose
+import importlib
+from typing import TYPE_CHECKING, Any
 
+if TYPE_CHECKING:
+    from auv_gvc_controller.decomposition import decompose
+
+_HOME = {
+    'decompose': 'auv_gvc_controller.decomposition',
+}
 __all__ = ['decompose']
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for: `auv --help` must not load numba."""
+    if name in _HOME:
+        return getattr(importlib.import_module(_HOME[name]), name)
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

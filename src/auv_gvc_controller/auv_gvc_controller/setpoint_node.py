@@ -34,6 +34,7 @@ class SetpointNode(BulkNode):
         self._last = round(duration / step) if duration else None
         self._setpoint = self._declare_setpoint(duration)
         refuse_unknown(self)
+        self.graph.must_hold = self._horizon
         self._velocity = self.graph.publisher(topics.CMD_VEL)
         self._acceleration = self.graph.publisher(topics.CMD_ACCEL)
         self.graph.subscribe(topics.ODOM, self._on_odometry, topics.one_at_a_time(), raw=True)

@@ -36,10 +36,14 @@ def odometry(ns: int, x: Any, frames: Frames) -> Odometry:
     return message
 
 
+def _stamped(message: Any, ns: int, frames: Frames) -> Any:
+    message.header.stamp, message.header.frame_id = stamp(ns), frames.base
+    return message
+
+
 def twist(ns: int, nu: Any, frames: Frames) -> TwistStamped:
     """TwistStamped of (6,) m/s, rad/s in the body frame."""
-    message = TwistStamped()
-    message.header.stamp, message.header.frame_id = stamp(ns), frames.base
+    message = _stamped(TwistStamped(), ns, frames)
     _fill3(message.twist.linear, *nu[:3])
     _fill3(message.twist.angular, *nu[3:])
     return message
@@ -47,8 +51,7 @@ def twist(ns: int, nu: Any, frames: Frames) -> TwistStamped:
 
 def accel(ns: int, nu_dot: Any, frames: Frames) -> AccelStamped:
     """AccelStamped of (6,) m/s2, rad/s2 in the body frame."""
-    message = AccelStamped()
-    message.header.stamp, message.header.frame_id = stamp(ns), frames.base
+    message = _stamped(AccelStamped(), ns, frames)
     _fill3(message.accel.linear, *nu_dot[:3])
     _fill3(message.accel.angular, *nu_dot[3:])
     return message
@@ -56,8 +59,7 @@ def accel(ns: int, nu_dot: Any, frames: Frames) -> AccelStamped:
 
 def wrench(ns: int, tau: Any, frames: Frames) -> WrenchStamped:
     """WrenchStamped of (6,) N, N m in the body frame."""
-    message = WrenchStamped()
-    message.header.stamp, message.header.frame_id = stamp(ns), frames.base
+    message = _stamped(WrenchStamped(), ns, frames)
     _fill3(message.wrench.force, *tau[:3])
     _fill3(message.wrench.torque, *tau[3:])
     return message
@@ -65,7 +67,6 @@ def wrench(ns: int, tau: Any, frames: Frames) -> WrenchStamped:
 
 def joint_state(ns: int, effort: Any, frames: Frames) -> JointState:
     """JointState whose names are the DOF words and whose `effort` holds (6,) numbers."""
-    message = JointState()
-    message.header.stamp, message.header.frame_id = stamp(ns), frames.base
+    message = _stamped(JointState(), ns, frames)
     message.name, message.effort = list(DOFS), [float(value) for value in effort]
     return message

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -21,6 +22,7 @@ from auv_dynamics.ros.convert import stamp
 from auv_dynamics.ros.parameters import declare
 from auv_dynamics.ros.topics import DIAGNOSTICS, STEP_TOPICS, Topic, every_step, one_at_a_time
 
+STEP_TOPICS_BY_NAME = [topic.name for topic in STEP_TOPICS]
 LOUD = 1.0  # s between two reports of the same kind
 
 
@@ -47,6 +49,8 @@ class Graph:
         self._ready = False
         self._not_ready: Callable[[], str] = str
         self._expected: dict[str, int] = {}
+        self.frames = Frames()
+        self.must_hold = 0  # messages: a publisher of step topics needs a greater depth
         if barrier:
             self.frames = Frames(
                 declare(node, 'odom_frame', str, 'odom_ned', 'frame of poses, NED'),
@@ -74,7 +78,9 @@ class Graph:
             topic.name,
             qos or every_step(),
             event_callbacks=events,
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(
+                callback=lambda used: self._deep_enough(topic, used)
+            ),
         )
         self.publishers[topic.name] = publisher
         return publisher
@@ -133,12 +139,19 @@ class Graph:
         facts = {'ready': self._ready, 'refused': self.refused, **self.facts}
         status.values = [KeyValue(key=key, value=str(value)) for key, value in facts.items()]
         message = DiagnosticArray(status=[status])
-        message.header.stamp = stamp(self.latest_ns)
+        message.header.stamp, message.header.frame_id = stamp(self.latest_ns), self.frames.base
         self._diagnostics.publish(message)
         self.trouble = ''
 
+    def _deep_enough(self, topic: Topic, qos: QoSProfile) -> SetParametersResult:
+        name = f'qos_overrides.{self.node.resolve_topic_name(topic.name)}.publisher.depth'
+        if topic.name in STEP_TOPICS_BY_NAME and qos.depth <= self.must_hold:
+            expected = f'more than {self.must_hold}, the steps that may be under way'
+            raise InputError(self.node.get_name(), name, expected, qos.depth)
+        return SetParametersResult(successful=True)
+
     def _counts(self, listed: list[str]) -> dict[str, int]:
-        known = [topic.name for topic in STEP_TOPICS]
+        known = STEP_TOPICS_BY_NAME
         counts = {}
         for entry in listed:
             topic, _, count = entry.partition('=')

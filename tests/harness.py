@@ -177,10 +177,13 @@ def graph(*nodes: tuple[str, list[str]]) -> Iterator[tuple[Peer, dict[str, subpr
         yield peer, processes
     finally:
         peer.close()
-        for process in processes.values():
-            if process.poll() is None:
+        for name, process in processes.items():
+            died = process.poll()
+            if died is None:
                 process.kill()
-            process.communicate(timeout=PATIENCE)
+            if not process.stdout.closed:
+                output, _ = process.communicate(timeout=PATIENCE)
+                print(f'--- {name}, exit code {died}\n{output}')  # shown when the test fails
 
 
 def auv(*arguments: str, cwd: Path | None = None, **extra: str) -> subprocess.CompletedProcess:

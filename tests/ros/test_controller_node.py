@@ -158,6 +158,19 @@ def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
         assert set_parameter(peer, 'gains.k_D', doubles).successful
 
 
+def test_a_transition_that_does_not_exist_is_survived() -> None:
+    with graph(('controller_node', CONTROLLER)) as (peer, processes):
+        peer.until(lambda: state(peer) == 'active', 'activation')
+        client = peer.node.create_client(ChangeState, 'controller_node/change_state')
+        peer.until(client.service_is_ready)
+        wrong = Transition(id=Transition.TRANSITION_ACTIVATE)
+        client.call_async(ChangeState.Request(transition=wrong))
+        peer.spin(0.5)
+        assert state(peer) == 'active'
+        _, output = stop(processes['controller_node'])
+    assert 'No transition' in output
+
+
 def test_reactivation_starts_from_zero_integrals() -> None:
     """Rival controllers keep their integral over a deactivation (ros2_controllers#1840)."""
     arguments = [*CONTROLLER, *parameters(lockstep=True, setpoint_pairing='exact')]

@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 import sys
+import time
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
@@ -37,6 +38,7 @@ from auv_dynamics.files import InputError
 from auv_dynamics.signals import DOFS
 
 FailedError = NodeDiedError
+DISCOVERY = 3.0  # s: discovery may take so long
 console = Console(stderr=True)
 
 
@@ -69,8 +71,6 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     """Real nodes, in lock-step, recorded."""
     scenario, names = _open(options)
     domain, picked = chosen_domain(options.domain_id)
-    out = _prepare(options, scenario, names)
-    warm_up(scenario, names)
     os.environ.update(environment(domain))
     # the middleware reads its environment when it is loaded
     from auv_dynamics.ros.watcher import Watcher
@@ -79,6 +79,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     try:
         if not picked:
             _refuse_strangers(graph, domain)
+        out = _prepare(options, scenario, names)
+        warm_up(scenario, names)
         _say(f'export {VARIABLE}={domain}')
         for name in names:
             graph.running = False
@@ -93,9 +95,14 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _refuse_strangers(graph: Any, domain: int) -> None:
-    graph.spin(1.0)
-    strangers = graph.endpoints()
+    until = time.monotonic() + DISCOVERY
+    strangers: list[str] = []
+    while not strangers and time.monotonic() < until:
+        graph.spin(0.1)
+        strangers = graph.endpoints()
     if strangers:
+        graph.spin(0.5)  # the names of nodes arrive behind their endpoints
+        strangers = graph.endpoints() or strangers
         expected = 'a domain without endpoints on wrench or odom'
         raise InputError(f'{VARIABLE}={domain}', '', expected, ', '.join(strangers))
 

@@ -64,7 +64,7 @@ def live(make: Callable[[], Any], args: list[str] | None = None) -> int:
     finally:
         if node is not None:
             node.close()
-            code = node.exit_code or 0
+            code = code or node.exit_code or 0
             with contextlib.suppress(Exception):
                 node.destroy_node()
         rclpy.try_shutdown()
@@ -76,7 +76,7 @@ def live(make: Callable[[], Any], args: list[str] | None = None) -> int:
 def _turn(node: Any, executor: SingleThreadedExecutor) -> None:
     """Data as it comes, for a while; then whatever the executor has to serve."""
     if PLAIN:
-        executor.spin_once(timeout_sec=POLL)
+        _serve(node, executor, POLL)
         return
     until = time.monotonic() + SERVE
     while (left := until - time.monotonic()) > 0 and node.exit_code is None:
@@ -84,7 +84,14 @@ def _turn(node: Any, executor: SingleThreadedExecutor) -> None:
         node.empty_bulk()
     node.follow_clock()
     for _ in range(CALLBACKS):
-        executor.spin_once(timeout_sec=0)
+        _serve(node, executor, 0.0)
+
+
+def _serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> None:
+    try:
+        executor.spin_once(timeout_sec=timeout)
+    except RCLError as error:  # e.g. a lifecycle transition that does not exist from here
+        node.get_logger().error(f'refused: {str(error).splitlines()[0]}')
 
 
 def _orphaned() -> bool:

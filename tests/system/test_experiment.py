@@ -95,6 +95,15 @@ def test_two_runs_are_equal(done: Path, controller: str) -> None:
         assert values == two[topic][1]
 
 
+def test_the_plain_executor_gives_the_same_run(done: Path, tmp_path: Path) -> None:
+    out = tmp_path / 'plain'
+    arguments = ('run', str(done / 'six_dofs.yaml'), '--controller', 'gvc', '--out', str(out))
+    ended = auv(*arguments, AUV_GVC_EXECUTOR='plain')
+    assert ended.returncode == 0, ended.stderr
+    ours, plain = (read_bag(folder / 'gvc').messages for folder in (done / 'one', out))
+    assert ours == plain
+
+
 def test_the_bag_alone_closes_the_equation_of_motion(done: Path) -> None:
     """Signs and frames: M dnu/dt = tau - C nu - D nu - g - F, F from the topic `disturbance`."""
     run = load_run(done / 'one' / 'gvc')

@@ -3,6 +3,7 @@
 import importlib
 from typing import Any
 
+from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 
@@ -127,7 +128,7 @@ class RecorderNode(BulkNode):
             return
         if text:
             self.get_logger().error(text)
-        self._progress.wait_for_all_acked()
+        self._progress.wait_for_all_acked(Duration(seconds=1.0))
         self.exit_code = code
 
     def close(self) -> None:

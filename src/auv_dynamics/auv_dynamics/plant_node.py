@@ -2,6 +2,7 @@
 
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
+from rclpy.duration import Duration
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
@@ -114,7 +115,7 @@ class PlantNode(BulkNode):
             self.get_logger().error(text)
         if code == 0:
             for publisher in self.graph.publishers.values():
-                publisher.wait_for_all_acked()
+                publisher.wait_for_all_acked(Duration(seconds=5.0))
         self.exit_code = code
 
     def _on_wrench(self, message: WrenchStamped) -> None:

@@ -12,7 +12,6 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from std_srvs.srv import Trigger
 
 from auv_dynamics import interface
-from auv_dynamics.files import InputError
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.bulk import BulkMixin
 from auv_dynamics.ros.graph import Graph, steady_timer
@@ -41,6 +40,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self._controller: VelocityController  # exists once configured
         self._active = False
         self._heard: float | None = None
+        self._held: Answer | None = None
         self._wrench = self.graph.publisher(topics.WRENCH)
         self._estimate = self.graph.publisher(topics.DISTURBANCE_ESTIMATE)
         self.graph.also_ready_when(lambda: '' if self._active else 'inactive')
@@ -89,7 +89,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
     def _build(self) -> bool:
         try:
             self._controller = self._settings.build()
-        except InputError as error:
+        except (ValueError, ArithmeticError) as error:  # InputError among them
             print(error, file=sys.stderr, flush=True)
             self.graph.trouble = str(error)
             return False
@@ -128,8 +128,11 @@ class ControllerNode(BulkMixin, LifecycleNode):
             self._say(self._controller.answer())
 
     def _say(self, answer: Answer | None) -> None:
-        if answer is None or not self.graph.ready():
+        if answer is None:
             return
+        self._held = None if self.graph.ready() else answer
+        if self._held is not None:
+            return  # until the expected subscribers have matched; see _watch
         if answer.trouble:
             self.graph.complain(answer.trouble)
         self._wrench.publish(convert.wrench(answer.ns, answer.tau, self.graph.frames))
@@ -137,7 +140,9 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self.graph.latest_ns = answer.ns
 
     def _watch(self) -> None:
-        """In real time, zero wrench when odometry falls silent; it recovers with the next."""
+        """Say what is held back; in real time, let go when odometry falls silent."""
+        if self._held is not None:
+            self._say(self._held)
         if self._settings.lockstep or not self._active or self._heard is None:
             return
         if time.monotonic() - self._heard > self._settings.odometry_timeout:

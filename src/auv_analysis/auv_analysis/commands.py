@@ -33,7 +33,7 @@ from auv_analysis.scenario import Scenario, load_scenario
 from auv_analysis.simulation import simulate as simulate_run
 from auv_analysis.summary import summarize
 from auv_analysis.supervisor import NodeDiedError
-from auv_analysis.warm_up import warm_up
+from auv_analysis.warm_up import announce, warm_up
 from auv_dynamics.files import InputError
 from auv_dynamics.signals import DOFS
 
@@ -136,6 +136,7 @@ def simulate(options: argparse.Namespace) -> dict[str, Any]:
     scenario, names = _open(options)
     out = _prepare(options, scenario, names)
     write_inputs(scenario, out)
+    announce()
     runs = {}
     for name in names:
         with console.status(f'{scenario.name} {name}: simulating'):

@@ -14,13 +14,19 @@ from auv_gvc_controller.sampled import SampledLaw, is_compiled
 NOTICE_AFTER = 1.0  # s: a cached kernel is loaded faster than that
 
 
-def warm_up(scenario: Scenario, controllers: list[str]) -> None:
-    """Load or compile the kernel for one step of each law; say so when it takes time."""
+def announce() -> None:
+    """Say how the kernel runs where that costs time: not compiled, or to be compiled first."""
     if not JITTED:
         print('numba is not installed: the kernel runs as plain Python, slower', file=sys.stderr)
-        return
-    if not any(cache_folder().glob('**/*.nbi')):
+    elif not any(cache_folder().glob('**/*.nbi')):
         print('compiling the kernel for this machine, once ...', file=sys.stderr, flush=True)
+
+
+def warm_up(scenario: Scenario, controllers: list[str]) -> None:
+    """Load or compile the kernel for one step of each law; say so when it takes time."""
+    announce()
+    if not JITTED:
+        return
     begin = time.monotonic()
     model = control_model(scenario.vehicle)
     for name in controllers:

@@ -10,7 +10,7 @@ import yaml
 from auv_analysis import load_scenario
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.scenario import Scenario
-from auv_dynamics.interface import STEP_TOPICS
+from auv_dynamics.interface import ANALYSIS_TOPICS, STEP_TOPICS
 
 FRAMES = {'odom_frame', 'base_frame', 'expected_subscribers'}
 CONTRACT = {  # every name of the contract's table that is not optional
@@ -129,7 +129,7 @@ def test_every_subscriber_that_is_waited_for_runs(whole: Scenario) -> None:
         for node, values in parameters.items():
             for entry in values.get('expected_subscribers', []):
                 topic, _, count = entry.partition('=')
-                assert topic in STEP_TOPICS
+                assert topic in (*STEP_TOPICS, *ANALYSIS_TOPICS)
                 assert 0 < int(count) < len(parameters), (node, entry)
 
 

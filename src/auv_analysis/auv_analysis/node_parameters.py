@@ -20,7 +20,7 @@ HORIZON = 200  # steps that set-points are published ahead
 WRENCH_TIMEOUT = 30.0  # s of silence that end a lock-step run
 TIMEOUT = 0.5  # s, the real-time watchdogs
 OF_PLANT_ALONE = (interface.TWIST, interface.DISTURBANCE)  # no driver has to offer them
-SUBSCRIBERS = {  # topic -> who subscribes, by publisher
+SUBSCRIBERS: dict[str, dict[str, tuple[str, ...]]] = {  # topic -> who subscribes, by publisher
     PLANT: {
         interface.ODOM: (CONTROLLER, SETPOINT, ANALYSIS, RECORDER),
         interface.TWIST: (RECORDER,),
@@ -34,7 +34,7 @@ SUBSCRIBERS = {  # topic -> who subscribes, by publisher
         interface.WRENCH: (PLANT, ANALYSIS, RECORDER),
         interface.DISTURBANCE_ESTIMATE: (ANALYSIS, RECORDER),
     },
-    ANALYSIS: {},
+    ANALYSIS: dict.fromkeys(interface.ANALYSIS_TOPICS, (RECORDER,)),
 }
 
 
@@ -74,19 +74,19 @@ def node_parameters(
     vehicle = vehicle or str(scenario.vehicle_path.resolve())
     clock = {'use_sim_time': use_sim_time}
     grid = {'step': scenario.step, 'duration': scenario.duration}
-    parameters = {
+    parameters: dict[str, dict[str, Any]] = {
         PLANT: {'use_sim_time': False, **_plant(scenario, vehicle, nodes, lockstep)},
         SETPOINT: {**clock, **grid, 'horizon': HORIZON, **_setpoint(scenario)},
         CONTROLLER: {**clock, **_controller(scenario, controller, vehicle, lockstep)},
     }
+    if analysis:
+        parameters[ANALYSIS] = {**clock, 'vehicle': vehicle, 'every': EVERY}
     if not plant:
         del parameters[PLANT]
     for publisher, values in parameters.items():
         counts = {t: sum(n in nodes for n in who) for t, who in SUBSCRIBERS[publisher].items()}
         listed = [f'{topic}={count}' for topic, count in counts.items() if count]
         values.update(_frames(), expected_subscribers=listed)
-    if analysis:
-        parameters[ANALYSIS] = {**clock, **_frames(), 'vehicle': vehicle, 'every': EVERY}
     if bag is not None:
         parameters[RECORDER] = {
             **clock,

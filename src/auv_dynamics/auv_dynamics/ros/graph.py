@@ -20,7 +20,14 @@ from auv_dynamics.files import InputError
 from auv_dynamics.interface import Frames
 from auv_dynamics.ros.convert import stamp
 from auv_dynamics.ros.parameters import declare
-from auv_dynamics.ros.topics import DIAGNOSTICS, STEP_TOPICS, Topic, every_step, one_at_a_time
+from auv_dynamics.ros.topics import (
+    ANALYSIS_TOPICS,
+    DIAGNOSTICS,
+    STEP_TOPICS,
+    Topic,
+    every_step,
+    one_at_a_time,
+)
 
 STEP_TOPICS_BY_NAME = [topic.name for topic in STEP_TOPICS]
 LOUD = 1.0  # s between two reports of the same kind
@@ -151,7 +158,7 @@ class Graph:
         return SetParametersResult(successful=True)
 
     def _counts(self, listed: list[str]) -> dict[str, int]:
-        known = STEP_TOPICS_BY_NAME
+        known = [topic.name for topic in (*STEP_TOPICS, *ANALYSIS_TOPICS)]
         counts = {}
         for entry in listed:
             topic, _, count = entry.partition('=')

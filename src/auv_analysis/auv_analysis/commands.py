@@ -34,7 +34,7 @@ from auv_analysis.simulation import simulate as simulate_run
 from auv_analysis.summary import summarize
 from auv_analysis.supervisor import NodeDiedError
 from auv_analysis.warm_up import announce, warm_up
-from auv_dynamics.files import InputError
+from auv_dynamics.files import InputError, reason
 from auv_dynamics.signals import DOFS
 
 FailedError = NodeDiedError
@@ -277,7 +277,7 @@ def params(options: argparse.Namespace) -> dict[str, Any]:
             options.out.parent.mkdir(parents=True, exist_ok=True)
             options.out.write_text(text, encoding='utf-8')
         except OSError as error:
-            found = (error.strerror or str(error)).lower()
+            found = reason(error)
             raise InputError(options.out, '--out', 'a file that can be written', found) from None
     elif not options.json:
         print(text, end='')

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import yaml
 
-from auv_dynamics.files import InputError
+from auv_dynamics.files import InputError, reason
 
 OURS = (
     'summary.json', 'report.html', 'figures', 'logs', 'scenario.yaml', 'vehicle.yaml',
@@ -42,7 +42,7 @@ def prepare(
         out.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=out).close()
     except OSError as error:
-        found = (error.strerror or str(error)).lower()
+        found = reason(error)
         raise InputError(out, '--out', 'a folder that can be written', found) from None
     return out
 

@@ -11,6 +11,7 @@ from auv_analysis.ledger import LostStepError, StepLedger
 from auv_analysis.recorder_parameters import recorder_parameters
 from auv_analysis.schemas import schema_text
 from auv_dynamics import interface
+from auv_dynamics.files import reason
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.bulk import BulkNode, first_stamp
 from auv_dynamics.ros.graph import Graph, steady_timer
@@ -69,7 +70,7 @@ class RecorderNode(BulkNode):
             self._writer.write(topic, ns, message)
         except OSError as error:
             self._broken = True
-            self._end(1, f'{self._writer.path}: {(error.strerror or str(error)).lower()}')
+            self._end(1, f'{self._writer.path}: {reason(error)}')
 
     def _add_channel(self, topic: str, kind: str) -> None:
         endpoints = self.get_publishers_info_by_topic(topic)
@@ -137,7 +138,7 @@ class RecorderNode(BulkNode):
         try:
             self._writer.close()
         except OSError as error:
-            text = (error.strerror or str(error)).lower()
+            text = reason(error)
             self.get_logger().error(f'{self._writer.path}: not finished: {text}')
             self.exit_code = 1
         lost = {topic: gaps for topic, gaps in self._ledger.gaps.items() if gaps}

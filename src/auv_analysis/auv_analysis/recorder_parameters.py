@@ -7,7 +7,7 @@ from rclpy.node import Node
 
 from auv_analysis.bag_writer import COMPRESSIONS, BagWriter
 from auv_dynamics import interface
-from auv_dynamics.files import InputError, read_text
+from auv_dynamics.files import InputError, read_text, reason
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.parameters import declare, refuse_unknown
 
@@ -67,7 +67,7 @@ def recorder_parameters(node: Node) -> RecorderParameters:
     try:
         writer = BagWriter(Path(bag), attachments, compression, size)
     except OSError as error:
-        found = (error.strerror or str(error)).lower()
+        found = reason(error)
         raise InputError(bag, '', 'a folder without a bag that can be written', found) from None
     last = round(duration / step) if duration else None
     step_ns = round(step * interface.NANOSECONDS)

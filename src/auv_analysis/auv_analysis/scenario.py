@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.folder import OURS
 from auv_dynamics.config import shipped, shipped_by_name
 from auv_dynamics.disturbance import Disturbance, make_disturbance
 from auv_dynamics.files import InputError, check, read_text, read_yaml
@@ -20,8 +21,6 @@ from auv_gvc_controller.setpoint import Setpoint, make_setpoint
 SCHEMA = Path(__file__).with_name('scenario.schema.json')
 NANOSECONDS = 10**9
 MOST_STEPS = 10_000_000  # some 10 GB of arrays
-RESERVED = ('figures', 'logs', 'summary.json', 'report.html', 'scenario.yaml', 'vehicle.yaml',
-            'setpoint.csv')  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +134,7 @@ def load_scenario(scenario: str | Path) -> Scenario:
     check(data, SCHEMA, path)
     data = _resolved(data)
     for name in data['controllers']:
-        if name in RESERVED:
+        if name in OURS:
             expected = 'names that are not those of our own files'
             raise InputError(path, 'controllers', expected, name)
     _check_time(data, path)

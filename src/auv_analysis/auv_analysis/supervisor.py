@@ -8,8 +8,9 @@ from pathlib import Path
 
 import psutil
 
+from auv_dynamics.interface import PARENT
+
 GRACE = 5.0  # s between SIGTERM and SIGKILL
-PARENT = 'AUV_GVC_PARENT'
 
 
 class NodeDiedError(RuntimeError):

@@ -34,6 +34,11 @@ class InputError(ValueError):
         super().__init__(' '.join(line.split()))
 
 
+def reason(error: OSError) -> str:
+    """What the system said, as a few words for a message."""
+    return (error.strerror or str(error)).lower()
+
+
 def shorten(value: object) -> str:
     """One short line that shows a value."""
     if isinstance(value, str) and PLAIN.fullmatch(value):
@@ -93,7 +98,7 @@ def read_text(path: Path, kind: str) -> str:
     except UnicodeDecodeError as error:
         found = f'bytes that are not UTF-8 (offset {error.start})'
     except OSError as error:
-        found = (error.strerror or str(error)).lower()
+        found = reason(error)
     except ValueError as error:  # NUL in the name
         found = str(error)
     raise InputError(path, '', f'a {kind} file', found)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 NANOSECONDS = 10**9
+PARENT = 'AUV_GVC_PARENT'  # variable with the process id of `auv run`: nodes do not outlive it
 
 ODOM = 'odom'
 TWIST = 'twist'

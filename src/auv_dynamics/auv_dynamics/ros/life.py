@@ -15,6 +15,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 
 from auv_dynamics.files import InputError
+from auv_dynamics.interface import PARENT
 from auv_dynamics.ros.bulk import PLAIN
 
 RCLError = rclpy_implementation.RCLError
@@ -22,7 +23,6 @@ POLL = 0.1  # s, longest wait before a signal is noticed
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SERVE = 0.02  # s of data between two looks at parameters, services and timers
 CALLBACKS = 3  # that are served at each look
-PARENT = 'AUV_GVC_PARENT'  # process id of `auv run`: its nodes do not outlive it
 
 
 def live(make: Callable[[], Any], args: list[str] | None = None) -> int:

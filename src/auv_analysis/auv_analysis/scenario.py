@@ -15,7 +15,7 @@ from auv_dynamics.disturbance import Disturbance, make_disturbance
 from auv_dynamics.files import InputError, check, read_text, read_yaml
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import vehicle_from_dict
-from auv_gvc_controller.laws import make_gains
+from auv_gvc_controller.laws import make_gains, refusal
 from auv_gvc_controller.setpoint import Setpoint, make_setpoint
 
 SCHEMA = Path(__file__).with_name('scenario.schema.json')
@@ -196,9 +196,6 @@ def _check_gains(scenario: Scenario, name: str) -> None:
     try:
         scenario.gains(name)
     except ValueError as error:
-        text = str(error)
-        key, separator, rest = text.partition(': expected ')
-        if not separator:
-            key, rest = 'law', text.removeprefix('expected ')
-        expected, _, found = rest.partition(', found ')
-        raise InputError(scenario.path, f'controllers.{name}.{key}', expected, found) from None
+        key, expected, found = refusal(error)
+        place = f'controllers.{name}.{key or "law"}'
+        raise InputError(scenario.path, place, expected, found) from None

@@ -11,7 +11,7 @@ from auv_dynamics import load_vehicle
 from auv_dynamics.files import InputError
 from auv_dynamics.ros.parameters import declare, given
 from auv_gvc_controller.controller import VelocityController
-from auv_gvc_controller.laws import law_class, make_gains
+from auv_gvc_controller.laws import law_class, make_gains, refusal
 from auv_gvc_controller.limits import Limits
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.odometry_guard import OdometryGuard
@@ -88,12 +88,8 @@ class ControllerParameters:
         try:
             gains = make_gains(law, self._gains(law))
         except ValueError as error:
-            key, separator, rest = str(error).partition(': expected ')
-            if not separator:
-                key, rest = 'law', str(error).removeprefix('expected ')
-            else:
-                key = f'{WRITABLE}{key}'
-            expected, _, found = rest.partition(', found ')
+            gain, expected, found = refusal(error)
+            key = f'{WRITABLE}{gain}' if gain else 'law'
             raise InputError(name, key, expected, found) from None
         self.pairing.reset()
         return VelocityController(

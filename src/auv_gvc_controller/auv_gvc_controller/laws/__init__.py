@@ -59,6 +59,18 @@ def law_class(name: str) -> Any:
     return law
 
 
+def refusal(error: ValueError) -> tuple[str, str, str]:
+    """Key, expected and found of an error of `law_class` or `make_gains`.
+
+    The key is the name of a gain, or empty where the law itself is refused.
+    """
+    key, separator, rest = str(error).partition(': expected ')
+    if not separator:
+        key, rest = '', str(error).removeprefix('expected ')
+    expected, _, found = rest.partition(', found ')
+    return key, expected, found
+
+
 def _short(error: BaseException) -> str:
     return f'{type(error).__name__}: {error}'.splitlines()[0]
 

@@ -10,7 +10,7 @@ import yaml
 from auv_analysis import load_scenario
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.scenario import Scenario
-from auv_dynamics.interface import ANALYSIS_TOPICS, STEP_TOPICS
+from auv_dynamics.interface import ANALYSIS_TOPICS, OPTIONAL_STEP_TOPICS, STEP_TOPICS
 
 FRAMES = {'odom_frame', 'base_frame', 'expected_subscribers'}
 CONTRACT = {  # every name of the contract's table that is not optional
@@ -36,11 +36,17 @@ WORDS = {
     'odom_frame', 'base_frame', 'storage.compression', 'kind',
 }  # fmt: skip
 WHOLE = {'seed', 'recorder_window', 'horizon', 'every', 'analysis_every', 'storage.chunk_size'}
-SWITCHES = {'lockstep', 'start_paused', 'autostart', 'use_sim_time', 'strict'}
+SWITCHES = {
+    'lockstep', 'start_paused', 'autostart', 'use_sim_time', 'strict', 'ground_truth', 'thrusters',
+    'anti_windup',
+}  # fmt: skip
 LISTS_OF_WORDS = {
     'expected_subscribers', 'start_after', 'disturbance.names', 'topics', 'attachments',
 }  # fmt: skip
-LISTS = {'initial.eta', 'initial.nu', 'amplitude', 'omega', 'phase'}
+LISTS = {
+    'initial.eta', 'initial.nu', 'amplitude', 'omega', 'phase', 'scale', 'dM', 'dD', 'velocity',
+    'actuators.limit', 'actuators.rate', 'sensors.velocity_noise', 'sensors.attitude_noise',
+}  # fmt: skip
 WHOLE_NUMBERS = """
 name: whole
 vehicle: rexrov
@@ -51,7 +57,14 @@ initial: {eta: [1, 0, 0, 0, 0, 0]}
 controllers:
   mine: {law: cl, k_D: 12, k_I: [1, 2, 3, 4, 5, 6], Lambda: 1, Gamma: 60}
 setpoint: {surge: {offset: 1, terms: [{amplitude: 1, omega: 2}, {amplitude: 3, omega: 4}]}}
-disturbance: [{kind: herman2018, exponent_sign: 1}, {kind: harmonic, yaw: {offset: -5}}]
+disturbance:
+- {kind: herman2018, exponent_sign: 1, scale: 2}
+- {kind: harmonic, yaw: {offset: -5}}
+- {kind: model_error, mass: 1, added_mass: 0, damping: 2, buoyancy: 1, dM: 5}
+- {kind: model_error, dD: [1, 2, 3, 4, 5, 6]}
+- {kind: current, velocity: [1, 0, 0]}
+actuators: {limit: 100, rate: [1, 2, 3, 4, 5, 6], lag: 1, delay: 2}
+sensors: {velocity_noise: 1, attitude_noise: [1, 2, 3], drop_out: 1}
 """
 
 
@@ -129,7 +142,7 @@ def test_every_subscriber_that_is_waited_for_runs(whole: Scenario) -> None:
         for node, values in parameters.items():
             for entry in values.get('expected_subscribers', []):
                 topic, _, count = entry.partition('=')
-                assert topic in (*STEP_TOPICS, *ANALYSIS_TOPICS)
+                assert topic in (*STEP_TOPICS, *OPTIONAL_STEP_TOPICS, *ANALYSIS_TOPICS)
                 assert 0 < int(count) < len(parameters), (node, entry)
 
 

@@ -61,7 +61,7 @@ def test_defaults_are_filled_in(tmp_path: Path) -> None:
         np.testing.assert_array_equal(vector, np.zeros(6))
     t = np.linspace(0, 4, 9)
     np.testing.assert_array_equal(scenario.setpoint.value(t), np.zeros((9, 6)))
-    np.testing.assert_array_equal(scenario.disturbance(t), np.zeros((9, 6)))
+    np.testing.assert_array_equal(scenario.uncertainty.F(t), np.zeros((9, 6)))
 
 
 def test_half_an_initial_state_is_filled_up(tmp_path: Path) -> None:
@@ -127,13 +127,13 @@ def test_bare_name_is_not_hidden_by_a_file_that_happens_to_be_here(tmp_path, mon
 def test_disturbance_is_one_or_a_list(several: bool, tmp_path: Path) -> None:
     scenario = loaded(tmp_path, disturbance=[HARMONIC] if several else HARMONIC)
     assert scenario.data['disturbance'] == [HARMONIC]
-    np.testing.assert_array_equal(scenario.disturbance(np.zeros(1)), [[0, 0, 5, 0, 0, 0]])
+    np.testing.assert_array_equal(scenario.uncertainty.F(np.zeros(1)), [[0, 0, 5, 0, 0, 0]])
 
 
 def test_disturbances_add_up(tmp_path: Path) -> None:
     t = np.linspace(0, 4, 9)
-    paper = loaded(tmp_path, disturbance={'kind': 'herman2018'}).disturbance(t)
-    both = loaded(tmp_path, disturbance=[{'kind': 'herman2018'}, HARMONIC]).disturbance(t)
+    paper = loaded(tmp_path, disturbance={'kind': 'herman2018'}).uncertainty.F(t)
+    both = loaded(tmp_path, disturbance=[{'kind': 'herman2018'}, HARMONIC]).uncertainty.F(t)
     np.testing.assert_allclose(both - paper, np.tile([0, 0, 5.0, 0, 0, 0], (9, 1)), atol=1e-12)
 
 

@@ -34,8 +34,7 @@ class Bench:
     def __init__(self, lockstep=False, exact=False, acceleration=DIFFERENCE, limit=(), gains=GAINS):
         self.pairing = Pairing(exact, acceleration)
         self.controller = VelocityController(
-            gains,
-            MODEL,
+            SampledLaw(gains, MODEL),
             self.pairing,
             OdometryGuard(100 * MS, Limits(50.0, 50.0), lockstep),
             lockstep=lockstep,

@@ -4,11 +4,11 @@ import herman_reference as reference
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from plants import plant_of, push
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.disturbance import KINDS, herman2018, make_disturbance
-from auv_dynamics.integrator import TABLEAUS, stage_times
-from auv_dynamics.plant import BLOCK, Plant, initial_state
+from auv_dynamics.plant import BLOCK, initial_state
 
 T = np.linspace(0.0, 30.0, 601)
 HARMONIC = {
@@ -60,23 +60,21 @@ def test_none_is_zero_and_every_kind_has_the_shape():
         assert make_disturbance([{'kind': kind}])(T).shape == (len(T), 6)
 
 
-def still(specs, steps_before=0):
+def still(specs):
     vehicle = load_vehicle('herman2018_neutral')
     x = initial_state(np.zeros(6), np.zeros(6))
-    plant = Plant(vehicle.model, make_disturbance(specs), 0.01, 'ode5', x)
-    plant.k = steps_before
-    return vehicle, plant
+    return vehicle, plant_of(vehicle, specs, 0.01, 'ode5', x)
 
 
 def test_a_positive_disturbance_opposes_the_wrench():
     _, plant = still([{'kind': 'harmonic', 'surge': {'offset': 50.0}}])
-    plant.advance((0.0,) * 6)
+    push(plant, (0.0,) * 6)
     assert plant.x[7] < -1e-3
     _, balanced = still([{'kind': 'harmonic', 'surge': {'offset': 50.0}}])
     vehicle, free = still([])
     restoring, surge = vehicle.g(np.zeros(6)), 50.0 * np.eye(6)[0]
-    balanced.advance(tuple(restoring + surge))
-    free.advance(tuple(restoring))
+    push(balanced, restoring + surge)
+    push(free, restoring)
     assert_array_equal(balanced.x[7:], np.zeros(6))
     assert_array_equal(free.x[7:], np.zeros(6))
 
@@ -87,16 +85,14 @@ def test_no_component_is_without_effect(dof):
     vehicle, plant = still([{'kind': 'harmonic', name: {'offset': 30.0}}])
     _, free = still([])
     for one in (plant, free):
-        one.advance((0.0,) * 6)
+        push(one, (0.0,) * 6)
     expected = -0.01 * np.linalg.inv(vehicle.M)[:, dof] * 30.0
     assert_allclose((plant.x - free.x)[7:], expected, atol=0.05 * np.abs(expected).max())
 
 
 def test_the_plant_looks_up_the_very_same_disturbance_in_every_block():
     specs = [HARMONIC, {'kind': 'herman2018'}]
-    whole = make_disturbance(specs)(stage_times(TABLEAUS['ode5'], 0.01, 0, 600).ravel())
-    whole = whole.reshape(600, 6, 6)
+    whole = make_disturbance(specs)(0.01 * np.arange(2 * BLOCK + 8))
     _, plant = still(specs)
-    for k in (0, 1, BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK + 7, 3):
-        plant.k = k
-        assert_array_equal(plant.F(), whole[k])
+    for F in whole:
+        assert_array_equal(push(plant, (0.0,) * 6)[1], F)

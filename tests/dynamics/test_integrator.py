@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from plants import plant_of, push
 
-from auv_dynamics.disturbance import make_disturbance
 from auv_dynamics.integrator import TABLEAUS, fill_step, stage_times
 from auv_dynamics.jit import plain
-from auv_dynamics.plant import Plant, initial_state
+from auv_dynamics.plant import initial_state
 from auv_dynamics.vehicle_file import vehicle_from_dict
 
 ORDERS = {'euler': 1, 'rk4': 4, 'ode5': 5}
@@ -60,10 +60,10 @@ def sinking(name: str, steps: int) -> float:
         },
         'sinking.yaml',
     )
-    F = make_disturbance([{'kind': 'harmonic', 'surge': {'offset': 2.0}}])
-    plant = Plant(vehicle.model, F, 1.0 / steps, name, initial_state(np.zeros(6), np.zeros(6)))
+    F = [{'kind': 'harmonic', 'surge': {'offset': 2.0}}]
+    plant = plant_of(vehicle, F, 1.0 / steps, name, initial_state(np.zeros(6), np.zeros(6)))
     for _ in range(steps):
-        plant.advance((14.0, 0, 0, 0, 0, 0))  # 14 - 2 N against 3 u^2: u = 2 tanh(3 t)
+        push(plant, (14.0, 0, 0, 0, 0, 0))  # 14 - 2 N against 3 u^2: u = 2 tanh(3 t)
     assert plant.k == steps
     return abs(plant.x[7] - 2.0 * np.tanh(3.0)) + abs(plant.x[0] - 2.0 / 3.0 * np.log(np.cosh(3)))
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from plants import plant_of, push
 from strategies import QUICK, attitudes, vectors
 
-from auv_dynamics.disturbance import make_disturbance
 from auv_dynamics.jit import plain
 from auv_dynamics.kinematics import (
     attitude_rate,
@@ -19,7 +19,7 @@ from auv_dynamics.kinematics import (
     rotation,
     unwrapped,
 )
-from auv_dynamics.plant import Plant, eta_of, initial_state
+from auv_dynamics.plant import eta_of, initial_state
 from auv_dynamics.vehicle_file import vehicle_from_dict
 
 ANGLES = st.floats(-3.1, 3.1)
@@ -143,11 +143,11 @@ def tumbling():
 
 
 def turn(eta: np.ndarray, nu: np.ndarray, steps: int) -> np.ndarray:
-    plant = Plant(tumbling().model, make_disturbance([]), 0.01, 'ode5', initial_state(eta, nu))
+    plant = plant_of(tumbling(), [], 0.01, 'ode5', initial_state(eta, nu))
     rows = []
     for _ in range(steps + 1):
         rows.append(plant.x.copy())
-        plant.advance((0.0,) * 6)
+        push(plant, (0.0,) * 6)
     return np.array(rows)
 
 
@@ -182,6 +182,6 @@ def test_the_caller_keeps_its_arrays():
     eta, nu = np.arange(6.0), np.ones(6)
     x = initial_state(eta, nu)
     before = x.copy()
-    Plant(tumbling().model, make_disturbance([]), 0.1, 'rk4', x).advance((1.0,) * 6)
+    push(plant_of(tumbling(), [], 0.1, 'rk4', x), (1.0,) * 6)
     assert_allclose(x, before)
     assert_allclose(eta, np.arange(6.0))

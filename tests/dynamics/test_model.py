@@ -6,12 +6,13 @@ import pytest
 import yaml
 from hypothesis import given
 from numpy.testing import assert_allclose, assert_array_equal
+from plants import plant_of, push
 from strategies import QUICK, attitudes, vectors, vehicles
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.config import shipped
 from auv_dynamics.disturbance import make_disturbance
-from auv_dynamics.plant import Plant, initial_state
+from auv_dynamics.plant import initial_state
 from auv_dynamics.vehicle_file import vehicle_from_dict
 
 DENSE_M_A = [
@@ -183,10 +184,10 @@ def energy(data: dict, x: np.ndarray) -> float:
 def test_without_damping_energy_is_kept(data, nu, eta):
     data['damping'] = {'linear': [0.0] * 6, 'quadratic': [0.0] * 6}
     x = initial_state(eta, nu)
-    plant = Plant(vehicle_of(data).model, make_disturbance([]), 0.005, 'ode5', x)
+    plant = plant_of(vehicle_of(data), [], 0.005, 'ode5', x)
     start = energy(data, plant.x)
     for _ in range(200):
-        plant.advance((0.0,) * 6)
+        push(plant, (0.0,) * 6)
     turned = np.abs(plant.x - x).max()
     assert turned > 0.0
     assert energy(data, plant.x) == pytest.approx(
@@ -201,15 +202,13 @@ def test_power_balance_along_a_run():
     specs = [{'kind': 'harmonic', 'sway': {'offset': 150.0, 'terms': []}, 'yaw': {'offset': 60.0}}]
     F = make_disturbance(specs)(np.zeros(1))[0]
     nu = np.array([0.5, -0.4, 0.3, 0.1, -0.2, 0.3])
-    plant = Plant(
-        vehicle.model, make_disturbance(specs), step, 'ode5', initial_state(np.zeros(6), nu)
-    )
+    plant = plant_of(vehicle, specs, step, 'ode5', initial_state(np.zeros(6), nu))
     start, power = energy(data, plant.x), []
     for _ in range(401):
         nu = plant.x[7:]
         power.append(nu @ (tau - vehicle.D(nu) @ nu - F))
         end = energy(data, plant.x)
-        plant.advance(tuple(tau))
+        push(plant, tau)
     simpson = step / 3 * (power[0] + power[-1] + 4 * sum(power[1:-1:2]) + 2 * sum(power[2:-1:2]))
     assert abs(simpson) > 100.0
     assert end - start == pytest.approx(simpson, rel=1e-6)

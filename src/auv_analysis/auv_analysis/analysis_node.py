@@ -17,7 +17,7 @@ from auv_dynamics.ros.parameters import declare, refuse_unknown
 
 CAPACITY = 2 * topics.DEPTH  # messages per topic that wait for their odometry
 READERS: dict[topics.Topic, Callable] = {
-    topics.ODOM: lambda message, frames, _: interface.read_odometry(message, frames),
+    topics.ODOM: interface.read_odometry,
     topics.CMD_VEL: interface.read_twist,
     topics.WRENCH: interface.read_wrench,
     topics.DISTURBANCE: interface.read_wrench,
@@ -33,7 +33,11 @@ class AnalysisNode(BulkNode):
         self.graph = Graph(self)
         vehicle = declare(self, 'vehicle', str, '', 'vehicle file, or shipped bare name')
         self._every = declare(self, 'every', int, 10, 'steps between samples', at_least=1)
+        truth = declare(
+            self, 'ground_truth', bool, False, 'look at ground_truth/odom in place of odom'
+        )
         refuse_unknown(self)
+        self._odometry = topics.GROUND_TRUTH if truth else topics.ODOM
         if not vehicle:
             raise InputError(self.get_name(), 'vehicle', 'a vehicle file', None)
         self._live = LiveAnalysis(load_vehicle(vehicle))
@@ -52,7 +56,8 @@ class AnalysisNode(BulkNode):
         def callback(message: bytes) -> None:
             self._take(topic, first_stamp(message), message)
 
-        self.graph.subscribe(topic, callback, topics.every_step(), raw=True)
+        source = self._odometry if topic is topics.ODOM else topic
+        self.graph.subscribe(source, callback, topics.every_step(), raw=True)
 
     def _take(self, topic: topics.Topic, ns: int, message: bytes) -> None:
         waiting = self._waiting[topic]

@@ -29,6 +29,12 @@ READERS = {
     interface.CMD_VEL: lambda m, frames: interface.read_twist(m, frames, interface.CMD_VEL),
     interface.CMD_ACCEL: lambda m, frames: interface.read_accel(m, frames, interface.CMD_ACCEL),
     interface.WRENCH: lambda m, frames: interface.read_wrench(m, frames, interface.WRENCH),
+    interface.WRENCH_APPLIED: lambda m, frames: interface.read_wrench(
+        m, frames, interface.WRENCH_APPLIED
+    ),
+    interface.GROUND_TRUTH: lambda m, frames: interface.read_odometry(
+        m, frames, interface.GROUND_TRUTH
+    ),
     interface.DISTURBANCE: lambda m, frames: interface.read_wrench(
         m, frames, interface.DISTURBANCE
     ),
@@ -41,6 +47,8 @@ KINDS = {
     interface.CMD_VEL: 'geometry_msgs/msg/TwistStamped',
     interface.CMD_ACCEL: 'geometry_msgs/msg/AccelStamped',
     interface.WRENCH: 'geometry_msgs/msg/WrenchStamped',
+    interface.WRENCH_APPLIED: 'geometry_msgs/msg/WrenchStamped',
+    interface.GROUND_TRUTH: 'nav_msgs/msg/Odometry',
     interface.DISTURBANCE: 'geometry_msgs/msg/WrenchStamped',
     interface.DISTURBANCE_ESTIMATE: 'geometry_msgs/msg/WrenchStamped',
 }
@@ -181,13 +189,15 @@ def _check_type(path: Path, topic: str, found: str) -> None:
 
 def _role(topic: str) -> str:
     """Our name of a topic, whatever its namespace."""
-    return '' if topic.endswith(f'/{interface.GROUND_TRUTH}') else topic.rpartition('/')[2]
+    if topic.endswith(f'/{interface.GROUND_TRUTH}'):
+        return interface.GROUND_TRUTH
+    return topic.rpartition('/')[2]
 
 
 def _keep(contents: Contents, path: Path, topic: str, message: Any, frames: dict) -> None:
     role = _role(topic)
     namespace = topic.removesuffix(role)
-    if role == interface.ODOM:
+    if role in (interface.ODOM, interface.GROUND_TRUTH):
         frames.setdefault(
             namespace, interface.Frames(message.header.frame_id, message.child_frame_id)
         )
@@ -226,7 +236,8 @@ def load_run(bag: str | Path, vehicle: str | Path | None = None) -> Run:
     parameters = _parameters(contents, Path(bag))
     controller, step = parameters.get('controller_node', {}), _step(parameters, ns, Path(bag))
     law, gains = _law_and_gains(controller, Path(bag))
-    x = series[interface.ODOM]
+    x = series.get(interface.GROUND_TRUTH, series[interface.ODOM])
+    sensing = interface.GROUND_TRUTH in series
     nu_d = series.get(interface.CMD_VEL, np.zeros((len(ns), 6)))
     return Run(
         t=(ns - ns[0]) / interface.NANOSECONDS,
@@ -244,6 +255,9 @@ def load_run(bag: str | Path, vehicle: str | Path | None = None) -> Run:
         gains=gains,
         step=step,
         source='bag',
+        measured=series[interface.ODOM][:, 7:] if sensing else None,
+        applied=series.get(interface.WRENCH_APPLIED),
+        kinds=_kinds(contents, Path(bag)),
         notes=tuple(notes),
     )
 
@@ -345,6 +359,18 @@ def _vehicle(contents: Contents, bag: Path, vehicle: str | Path | None) -> Vehic
         raise InputError(bag, 'vehicle.yaml', 'an attachment, or --vehicle FILE', None)
     file = f'{bag}: vehicle.yaml'
     return vehicle_from_dict(parse_yaml(text, file, 'vehicle'), file)
+
+
+def _kinds(contents: Contents, bag: Path) -> frozenset[str] | None:
+    """Kinds of the disturbances, None where the bag does not say."""
+    text, file = contents.attachments.get('scenario.yaml'), f'{bag}: scenario.yaml'
+    if text is None:
+        return None
+    listed = parse_yaml(text, file, 'scenario').get('disturbance', [])
+    specs = listed if isinstance(listed, list) else [listed]
+    return frozenset(
+        str(spec['kind']) for spec in specs if isinstance(spec, dict) and 'kind' in spec
+    )
 
 
 def _scenario_name(contents: Contents, bag: Path) -> str:

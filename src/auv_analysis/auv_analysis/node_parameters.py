@@ -9,6 +9,7 @@ import yaml
 
 from auv_analysis.scenario import Scenario
 from auv_dynamics import interface
+from auv_dynamics.current import AXES
 from auv_dynamics.files import matrix6
 from auv_dynamics.signals import harmonic_columns
 
@@ -19,12 +20,17 @@ WINDOW = 2000  # steps that the plant may be ahead of the recorder
 HORIZON = 200  # steps that set-points are published ahead
 WRENCH_TIMEOUT = 30.0  # s of silence that end a lock-step run
 TIMEOUT = 0.5  # s, the real-time watchdogs
-OF_PLANT_ALONE = (interface.TWIST, interface.DISTURBANCE)  # no driver has to offer them
+OF_PLANT_ALONE = (  # no driver has to offer them
+    *(interface.TWIST, interface.DISTURBANCE),
+    *(interface.WRENCH_APPLIED, interface.GROUND_TRUTH),
+)
 SUBSCRIBERS: dict[str, dict[str, tuple[str, ...]]] = {  # topic -> who subscribes, by publisher
     PLANT: {
         interface.ODOM: (CONTROLLER, SETPOINT, ANALYSIS, RECORDER),
         interface.TWIST: (RECORDER,),
         interface.DISTURBANCE: (ANALYSIS, RECORDER),
+        interface.WRENCH_APPLIED: (RECORDER,),
+        interface.GROUND_TRUTH: (ANALYSIS, RECORDER),
     },
     SETPOINT: {
         interface.CMD_VEL: (CONTROLLER, ANALYSIS, RECORDER),
@@ -79,12 +85,20 @@ def node_parameters(
         SETPOINT: {**clock, **grid, 'horizon': HORIZON, **_setpoint(scenario)},
         CONTROLLER: {**clock, **_controller(scenario, controller, vehicle, lockstep)},
     }
+    sensing = plant and 'sensors' in scenario.data
     if analysis:
-        parameters[ANALYSIS] = {**clock, 'vehicle': vehicle, 'every': EVERY}
+        parameters[ANALYSIS] = {
+            **clock, 'vehicle': vehicle, 'every': EVERY, 'ground_truth': sensing
+        }  # fmt: skip
     if not plant:
         del parameters[PLANT]
+    published = _published(scenario)
     for publisher, values in parameters.items():
-        counts = {t: sum(n in nodes for n in who) for t, who in SUBSCRIBERS[publisher].items()}
+        counts = {
+            topic: sum(_listens(node, topic, sensing) for node in who if node in nodes)
+            for topic, who in SUBSCRIBERS[publisher].items()
+            if topic in published
+        }
         listed = [f'{topic}={count}' for topic, count in counts.items() if count]
         values.update(_frames(), expected_subscribers=listed)
     if bag is not None:
@@ -92,7 +106,11 @@ def node_parameters(
             **clock,
             **grid,
             'bag': str(bag),
-            'topics': [t for t in interface.STEP_TOPICS if plant or t not in OF_PLANT_ALONE],
+            'topics': [
+                topic
+                for topic in (*interface.STEP_TOPICS, *interface.OPTIONAL_STEP_TOPICS)
+                if topic in published and (plant or topic not in OF_PLANT_ALONE)
+            ],
             'strict': lockstep,
             'analysis_every': EVERY if analysis and plant else 0,
             'storage.compression': 'zstd',
@@ -100,6 +118,19 @@ def node_parameters(
             'attachments': [f'{name}={path}' for name, path in (attachments or {}).items()],
         }
     return {node: _without_empty_lists(values) for node, values in parameters.items()}
+
+
+def _published(scenario: Scenario) -> list[str]:
+    """Topics of which something is published in this scenario."""
+    absent = {interface.WRENCH_APPLIED: 'actuators', interface.GROUND_TRUTH: 'sensors'}
+    listed = (*interface.STEP_TOPICS, *interface.OPTIONAL_STEP_TOPICS, *interface.ANALYSIS_TOPICS)
+    return [topic for topic in listed if absent.get(topic, 'name') in scenario.data]
+
+
+def _listens(node: str, topic: str, sensing: bool) -> bool:
+    """Whether a node subscribes: analysis looks at the truth where there are sensors."""
+    unused = interface.ODOM if sensing else interface.GROUND_TRUTH
+    return node != ANALYSIS or topic != unused
 
 
 def _frames() -> dict[str, str]:
@@ -124,16 +155,31 @@ def _plant(scenario: Scenario, vehicle: str, nodes: list[str], lockstep: bool) -
     }
     names = []
     for i, spec in enumerate(scenario.data['disturbance'], start=1):
-        name = f'd{i}_{spec["kind"]}'
-        names.append(name)
-        prefix = f'disturbance.{name}'
-        parameters[f'{prefix}.kind'] = spec['kind']
-        if spec['kind'] == 'herman2018':
-            parameters[f'{prefix}.exponent_sign'] = float(spec.get('exponent_sign', -1))
-        else:
-            columns = harmonic_columns(spec)
-            parameters.update({f'{prefix}.{key}': value for key, value in columns.items()})
+        names.append(f'd{i}_{spec["kind"]}')
+        values = _disturbance(spec)
+        parameters.update({f'disturbance.{names[-1]}.{key}': v for key, v in values.items()})
+    for group in ('actuators', 'sensors'):
+        for key, value in scenario.data.get(group, {}).items():
+            listed = key in ('limit', 'rate', 'velocity_noise', 'attitude_noise')
+            kind = _flat if listed else bool if key == 'thrusters' else float
+            parameters[f'{group}.{key}'] = kind(value)
     return {**parameters, 'disturbance.names': names}
+
+
+def _disturbance(spec: Mapping[str, Any]) -> dict[str, Any]:
+    values = {
+        'herman2018': {'exponent_sign': float(spec.get('exponent_sign', -1))},
+        'harmonic': harmonic_columns(spec),
+        'current': harmonic_columns(spec, tuple(AXES)),
+        'model_error': {},
+    }[spec['kind']]
+    for key in ('mass', 'added_mass', 'damping', 'buoyancy'):
+        if key in spec:
+            values[key] = float(spec[key])
+    for key in ('scale', 'dM', 'dD', 'velocity'):
+        if key in spec:
+            values[key] = _flat(spec[key])
+    return {'kind': spec['kind'], **values}
 
 
 def _setpoint(scenario: Scenario) -> dict[str, Any]:
@@ -146,9 +192,11 @@ def _setpoint(scenario: Scenario) -> dict[str, Any]:
 def _controller(
     scenario: Scenario, controller: str, vehicle: str, lockstep: bool
 ) -> dict[str, Any]:
-    spec = dict(scenario.controller(controller))
+    known = {'law': scenario.controller(controller)['law']}
+    if 'actuators' in scenario.data:
+        known.update(_anti_windup(scenario, controller))
     parameters = {
-        'law': spec.pop('law'),
+        **known,
         'vehicle': vehicle,
         'lockstep': lockstep,
         'setpoint_pairing': 'exact' if lockstep else 'latest',
@@ -159,7 +207,19 @@ def _controller(
         **{f'limits.{name}': value for name, value in _limits(lockstep).items()},
         'autostart': True,
     }
-    return {**parameters, **{f'gains.{name}': _flat(value) for name, value in spec.items()}}
+    gains = scenario.gain_values(controller)
+    return {**parameters, **{f'gains.{name}': _flat(value) for name, value in gains.items()}}
+
+
+def _anti_windup(scenario: Scenario, controller: str) -> dict[str, Any]:
+    """What the controller is told of the actuators."""
+    spec = scenario.data['actuators']
+    told: dict[str, Any] = {'anti_windup': scenario.controller(controller).get('anti_windup', True)}
+    if 'limit' in spec:
+        told['actuators.limit'] = _flat(spec['limit'])
+    if spec.get('thrusters'):
+        told['actuators.thrusters'] = True
+    return told
 
 
 def _limits(lockstep: bool) -> dict[str, float]:
@@ -170,7 +230,7 @@ def _limits(lockstep: bool) -> dict[str, float]:
 
 
 def _flat(value: Any) -> list[float]:
-    """Shortest list that a gain parameter takes: 1, 6 or 36 numbers."""
+    """Shortest list of numbers that a parameter takes: as it is, 36 for a matrix."""
     if np.ndim(value) < 2:
         return [float(number) for number in np.atleast_1d(value)]
     return matrix6(value).ravel().tolist()

@@ -40,7 +40,8 @@ def recorder_parameters(node: Node) -> RecorderParameters:
     name = node.get_name()
     known = [topic.name for topic in topics.STEP_TOPICS]
     bag = declare(node, 'bag', str, '', 'folder of the bag')
-    expected = declare(node, 'topics', list[str], known, 'step topics that are expected')
+    usual = list(interface.STEP_TOPICS)
+    expected = declare(node, 'topics', list[str], usual, 'step topics that are expected')
     duration = declare(node, 'duration', float, 0.0, 's, 0: until SIGTERM', at_least=0.0)
     step = declare(node, 'step', float, 0.01, 's between steps', at_least=1e-9)
     every = declare(

@@ -27,6 +27,11 @@ class Run:
     gains : the law's gains as the scenario gives them
     step : control period, s
     source : 'simulate' or 'bag'
+    hold : 'continuous' or 'zoh': whether the wrench was held between the samples
+    measured : (n + 1, 6) velocity that the law saw; None: the true one
+    applied : (n + 1, 6) wrench that the actuators delivered; None: the command
+    law_state : (n + 1, m) the law's integrals, None where they are not known
+    kinds : kinds of the disturbances, None where they are not known
     notes : what is worth saying about the run, one line each
 
     """
@@ -46,17 +51,22 @@ class Run:
     gains: dict[str, Any]
     step: float
     source: str
+    hold: str = 'zoh'
+    measured: np.ndarray | None = None
+    applied: np.ndarray | None = None
+    law_state: np.ndarray | None = None
+    kinds: frozenset[str] | None = None
     notes: tuple[str, ...] = field(default=())
 
     @property
     def nu_measured(self) -> np.ndarray:
-        """(n + 1, 6) what the controller saw: the true velocity, no sensors being simulated."""
-        return self.nu
+        """(n + 1, 6) velocity that the law saw, m/s and rad/s."""
+        return self.nu if self.measured is None else self.measured
 
     @property
     def tau_applied(self) -> np.ndarray:
-        """(n + 1, 6) what the actuators delivered: the command, no actuators being simulated."""
-        return self.tau
+        """(n + 1, 6) wrench that the actuators delivered, N and N m."""
+        return self.tau if self.applied is None else self.applied
 
     @property
     def duration(self) -> float:

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.folder import OURS
+from auv_dynamics.actuators import Actuators, Reach, make_actuators, make_reach
 from auv_dynamics.config import shipped, shipped_by_name
-from auv_dynamics.disturbance import Disturbance, make_disturbance
 from auv_dynamics.files import InputError, check, read_text, read_yaml
+from auv_dynamics.sensors import SensorNoise
+from auv_dynamics.uncertainty import Uncertainty, make_uncertainty
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.laws import make_gains, refusal
@@ -31,7 +33,7 @@ class Scenario:
     ----------
     path : of the scenario file
     vehicle_path : of its vehicle file
-    vehicle : what the controller knows, and the plant
+    vehicle : what the controller knows; the plant is that plus `uncertainty`
     data : the file's contents with every default filled in
     attachments : name -> text of each file that the scenario consists of
 
@@ -86,10 +88,20 @@ class Scenario:
             raise InputError(self.path, 'controllers', expected, name)
         return self.controllers[name]
 
+    def gain_values(self, name: str) -> dict[str, Any]:
+        """Gains of one controller as the file gives them."""
+        settings = ('law', 'anti_windup')
+        return {k: v for k, v in self.controller(name).items() if k not in settings}
+
     def gains(self, name: str) -> Any:
         """Gains of one controller as the kernel takes them."""
-        values = dict(self.controller(name))
-        return make_gains(values.pop('law'), values)
+        return make_gains(self.controller(name)['law'], self.gain_values(name))
+
+    def reach(self, name: str) -> Reach:
+        """What one controller knows of the actuators, for its anti-windup."""
+        if self.controller(name).get('anti_windup', True):
+            return self.actuators.reach
+        return make_reach(None, None)
 
     @cached_property
     def setpoint(self) -> Setpoint:
@@ -97,9 +109,26 @@ class Scenario:
         return make_setpoint(self.data['setpoint'], self.duration)
 
     @cached_property
-    def disturbance(self) -> Disturbance:
-        """F(t)."""
-        return make_disturbance(self.data['disturbance'])
+    def uncertainty(self) -> Uncertainty:
+        """What acts on the plant besides the wrench."""
+        specs = self.data['disturbance']
+        places = [f'disturbance[{i}]' for i in range(len(specs))]
+        return make_uncertainty(self.vehicle, specs, self.path, places)
+
+    @cached_property
+    def actuators(self) -> Actuators:
+        """Between the command and the applied wrench."""
+        return make_actuators(self.data.get('actuators'), self.vehicle, self.step, self.path)
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Kinds of its disturbances."""
+        return frozenset(spec['kind'] for spec in self.data['disturbance'])
+
+    def noise(self) -> SensorNoise | None:
+        """Random numbers of the sensors from the first sample on; None: they are perfect."""
+        spec = self.data.get('sensors')
+        return None if spec is None else SensorNoise(spec, self.data['seed'])
 
     @property
     def inputs(self) -> list[Path]:
@@ -150,7 +179,8 @@ def load_scenario(scenario: str | Path) -> Scenario:
         attachments['setpoint.csv'] = read_text(csv, 'CSV set-point')
         data['setpoint']['file'] = str(csv.resolve())
     result = Scenario(path, vehicle_path, vehicle, data, attachments)
-    result.setpoint  # noqa: B018  a set-point file is read now, so that its errors come first
+    # read and checked now, so that errors come first
+    _ = (result.setpoint, result.uncertainty, result.actuators)
     for name in result.controllers:
         _check_gains(result, name)
     return result

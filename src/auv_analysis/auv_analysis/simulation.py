@@ -1,21 +1,24 @@
 """In-process simulation of a scenario by the one kernel."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from auv_analysis.closed_loop import Grid, Log, fill_continuous, fill_held
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario
+from auv_dynamics.actuators import memory
+from auv_dynamics.files import InputError
 from auv_dynamics.integrator import TABLEAUS, stage_times
 from auv_dynamics.jit import plain
 from auv_dynamics.kinematics import unwrapped
 from auv_dynamics.plant import SIZE, eta_of, initial_state
+from auv_dynamics.sensors import WIDTH
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.sampled import is_compiled
 
 Hold = Literal['continuous', 'zoh']
-KERNELS = {'continuous': fill_continuous, 'zoh': fill_held}
+HOLDS = ('continuous', 'zoh')
 
 
 class DivergedError(ArithmeticError):
@@ -38,54 +41,77 @@ def simulate(scenario: Scenario, controller: str, hold: Hold = 'continuous') -> 
 
     Raises
     ------
-    InputError : no controller of that name
+    InputError : no controller of that name; actuators or sensors with hold 'continuous'
     ValueError : no such hold
     DivergedError : a value stopped being finite; the text says when
 
     """
-    if hold not in KERNELS:
-        raise ValueError(f'hold: expected {" or ".join(KERNELS)}, found {hold!r}')
+    if hold not in HOLDS:
+        raise ValueError(f'hold: expected {" or ".join(HOLDS)}, found {hold!r}')
     gains = scenario.gains(controller)
-    kernel = KERNELS[hold] if is_compiled(gains) else plain(KERNELS[hold])
-    tableau = TABLEAUS[scenario.data['integrator']]
-    n, states = scenario.steps, type(gains).STATES
-    t = stage_times(tableau, scenario.step, 0, n + 1)
-    reference = np.concatenate(
-        [scenario.setpoint.value(t), scenario.setpoint.derivative(t)], axis=-1
-    )
-    F = scenario.disturbance(t.ravel()).reshape(*t.shape, 6)
-    log = Log(*(np.full((n + 1, width), np.nan) for width in (SIZE, states, 6, 6)))
-    x = np.concatenate([initial_state(*scenario.initial), np.zeros(states)])
-    model = control_model(scenario.vehicle)
-    with np.errstate(all='ignore'):
-        kernel(
-            scenario.vehicle.model,
-            gains,
-            model,
-            Grid(t, reference, F, scenario.step),
-            tableau,
-            x,
-            log,
-        )
-    _check_finite(log, t[:, 0], scenario, controller)
-    spec = dict(scenario.controller(controller))
+    for key in ('actuators', 'sensors'):
+        if hold == 'continuous' and key in scenario.data:
+            expected = "hold 'zoh': they act on samples"
+            raise InputError(scenario.path, key, expected, "hold 'continuous'")
+    grid, log = _grid(scenario), _log(scenario.steps, type(gains).STATES)
+    _run_kernel(scenario, controller, hold, gains, grid, log)
+    t = grid.t[:, 0].copy()
+    _check_finite(log, t, scenario, controller)
+    sensing, acting = 'sensors' in scenario.data, 'actuators' in scenario.data
     return Run(
-        t=t[:, 0],
+        t=t,
         eta=unwrapped_eta(log.x),
         nu=log.x[:, 7:],
-        nu_d=reference[:, 0, :6],
-        nu_d_dot=reference[:, 0, 6:],
+        nu_d=grid.reference[:, 0, :6],
+        nu_d_dot=grid.reference[:, 0, 6:],
         tau=log.tau,
-        disturbance=F[:, 0],
+        disturbance=log.F,
         disturbance_estimate=log.f,
         vehicle=scenario.vehicle,
         scenario=scenario.name,
         controller=controller,
-        law=spec.pop('law'),
-        gains=spec,
+        law=scenario.controller(controller)['law'],
+        gains=scenario.gain_values(controller),
         step=scenario.step,
         source='simulate',
+        hold=hold,
+        measured=log.measured[:, 7:] if sensing else None,
+        applied=log.applied if acting else None,
+        law_state=log.state,
+        kinds=scenario.kinds,
     )
+
+
+def _grid(scenario: Scenario) -> Grid:
+    t = stage_times(TABLEAUS[scenario.data['integrator']], scenario.step, 0, scenario.steps + 1)
+    setpoint, noise = scenario.setpoint, scenario.noise()
+    reference = np.concatenate([setpoint.value(t), setpoint.derivative(t)], axis=-1)
+    rows = np.zeros((0, WIDTH)) if noise is None else noise.rows(len(t))
+    return Grid(t, reference, *scenario.uncertainty.tables(t), rows, scenario.step)
+
+
+def _log(n: int, states: int) -> Log:
+    widths = (SIZE, SIZE, states, 6, 6, 6, 6)
+    return Log(*(np.full((n + 1, width), np.nan) for width in widths))
+
+
+def _run_kernel(
+    scenario: Scenario, controller: str, hold: Hold, gains: Any, grid: Grid, log: Log
+) -> None:
+    def kernel(function: Any) -> Any:
+        return function if is_compiled(gains) else plain(function)
+
+    tableau, model = TABLEAUS[scenario.data['integrator']], control_model(scenario.vehicle)
+    x = np.concatenate([initial_state(*scenario.initial), np.zeros(log.state.shape[1])])
+    truth, actuators = scenario.uncertainty.truth, scenario.actuators
+    with np.errstate(all='ignore'):
+        if hold == 'continuous':
+            kernel(fill_continuous)(truth, gains, model, grid, tableau, x, log)
+        else:
+            reach = scenario.reach(controller)
+            kernel(fill_held)(
+                truth, actuators, memory(actuators), gains, model, reach, grid, tableau, x, log
+            )
 
 
 def unwrapped_eta(x: np.ndarray) -> np.ndarray:

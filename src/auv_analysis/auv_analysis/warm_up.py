@@ -32,12 +32,13 @@ def warm_up(scenario: Scenario, controllers: list[str]) -> None:
     for name in controllers:
         gains = scenario.gains(name)
         if is_compiled(gains):
-            SampledLaw(gains, model)
+            SampledLaw(gains, model, scenario.reach(name))
         else:
             law = type(gains).__name__
             print(f'{name}: the law {law} runs as plain Python', file=sys.stderr)
     x = initial_state(np.zeros(6), np.zeros(6))
     integrator = scenario.data['integrator']
-    Plant(scenario.vehicle.model, scenario.disturbance, scenario.step, integrator, x)
+    noise = scenario.noise()
+    Plant(scenario.uncertainty, scenario.step, integrator, x, scenario.actuators, noise)
     if time.monotonic() - begin > NOTICE_AFTER:
         print(f'kernel ready after {time.monotonic() - begin:.1f} s', file=sys.stderr)

@@ -1,10 +1,11 @@
-"""Lumped uncertainty F(t) of equation (1): positive F opposes tau."""
+"""External part d(t) of the lumped uncertainty (3): positive F opposes tau."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from auv_dynamics.files import matrix6
 from auv_dynamics.signals import Harmonics
 
 Disturbance = Callable[[np.ndarray], np.ndarray]  # t (n,) in s -> F (n, 6) in N, N m, body frame
@@ -49,7 +50,10 @@ def herman2018(t: np.ndarray, exponent_sign: float = -1.0) -> np.ndarray:
 
 def _herman2018(spec: Mapping[str, Any]) -> Disturbance:
     sign = float(spec.get('exponent_sign', -1))
-    return lambda t: herman2018(t, sign)
+    if 'scale' not in spec:
+        return lambda t: herman2018(t, sign)
+    scale = matrix6(spec['scale'])
+    return lambda t: herman2018(t, sign) @ scale.T
 
 
 KINDS: dict[str, Callable[[Mapping[str, Any]], Disturbance]] = {
@@ -59,18 +63,19 @@ KINDS: dict[str, Callable[[Mapping[str, Any]], Disturbance]] = {
 
 
 def make_disturbance(specs: Sequence[Mapping[str, Any]]) -> Disturbance:
-    """Sum of the disturbances of a checked scenario; zero where there is none.
+    """Sum of the external disturbances of a checked scenario; zero where there is none.
 
     Parameters
     ----------
-    specs : mappings with `kind` and what that kind takes
+    specs : mappings with `kind` and what that kind takes; kinds that are no function of time
+        alone (`model_error`, `current`) are left out, see `uncertainty`
 
     Returns
     -------
     F : function of t (n,) in s, gives (n, 6) in N, N m
 
     """
-    parts = [KINDS[spec['kind']](spec) for spec in specs]
+    parts = [KINDS[spec['kind']](spec) for spec in specs if spec['kind'] in KINDS]
 
     def total(t: np.ndarray) -> np.ndarray:
         t = np.asarray(t, float)

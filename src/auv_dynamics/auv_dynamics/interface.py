@@ -16,6 +16,7 @@ TWIST = 'twist'
 CMD_VEL = 'cmd_vel'
 CMD_ACCEL = 'cmd_accel'
 WRENCH = 'wrench'
+WRENCH_APPLIED = 'wrench_applied'
 DISTURBANCE = 'disturbance'
 DISTURBANCE_ESTIMATE = 'disturbance_estimate'
 GROUND_TRUTH = 'ground_truth/odom'
@@ -30,6 +31,7 @@ CLOCK = '/clock'
 
 ANALYSIS_TOPICS = (KINETIC_ENERGY, KINETIC_ENERGY_SHARES, DELTA_XI, DELTA_PI, LUMPED_ERROR)
 STEP_TOPICS = (ODOM, TWIST, CMD_VEL, CMD_ACCEL, WRENCH, DISTURBANCE, DISTURBANCE_ESTIMATE)
+OPTIONAL_STEP_TOPICS = (WRENCH_APPLIED, GROUND_TRUTH)  # with actuators, with sensors
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_dynamics.disturbance import Disturbance
+from auv_dynamics.actuators import IDEAL, Actuators, applied_wrench, memory
 from auv_dynamics.integrator import TABLEAUS, fill_step, stage_times
 from auv_dynamics.jit import compiled, helper
 from auv_dynamics.kinematics import attitude_rate, euler, position_rate, quaternion
-from auv_dynamics.model import Model, acceleration
+from auv_dynamics.sensors import SensorNoise, fill_measurement
 from auv_dynamics.six import fill_vector, vector
+from auv_dynamics.uncertainty import Truth, Uncertainty, lumped, true_acceleration
 
 SIZE = 13
 DIVERGED = 100.0  # m/s, rad/s: no underwater vehicle is as fast
@@ -23,12 +24,12 @@ def attitude_of(x):
 
 
 @helper
-def fill_plant_rate(model, x, tau, F, rate):
-    """Write (2) and (1) at state x under wrench tau and lumped uncertainty F into `rate`."""
+def fill_plant_rate(truth, x, tau, F, current, stage, rate):
+    """Write (2) and (1) at state x, under wrench tau and external disturbance F, into `rate`."""
     attitude, nu = attitude_of(x), vector(x, 7)
     rate[0], rate[1], rate[2] = position_rate(attitude, nu)
     rate[3], rate[4], rate[5], rate[6] = attitude_rate(attitude, nu)
-    fill_vector(rate, 7, acceleration(model, attitude, nu, tau, F))
+    fill_vector(rate, 7, true_acceleration(truth, attitude, nu, tau, F, current, stage))
 
 
 @helper
@@ -42,23 +43,31 @@ def fill_unit_attitude(x):
 
 
 class HeldWrench(NamedTuple):
-    """The plant over one step with tau held: `F` (s, 6) at the stages of this step."""
+    """The plant over one step with tau held: `F`, `current` (s, 6) at the stages of this step."""
 
-    model: Model
+    truth: Truth
     tau: tuple
     F: np.ndarray
+    current: np.ndarray
 
     @staticmethod
     def fill_rate(system, stage, x, rate):
         """x_dot at one stage."""
-        fill_plant_rate(system.model, x, system.tau, vector(system.F[stage], 0), rate)
+        F = vector(system.F[stage], 0)
+        fill_plant_rate(system.truth, x, system.tau, F, system.current, stage, rate)
 
 
 @compiled
-def fill_plant_step(model, x, tau, F, step, tableau, stages, trial):
+def fill_plant_step(truth, x, tau, F, current, step, tableau, stages, trial):
     """Advance the plant's state x (13,) in place by one step under a held wrench."""
-    fill_step(HeldWrench(model, tau, F), x, step, tableau, stages, trial)
+    fill_step(HeldWrench(truth, tau, F, current), x, step, tableau, stages, trial)
     fill_unit_attitude(x)
+
+
+@compiled
+def lumped_uncertainty(truth, x, tau, F, current):
+    """F of (1) and (3) at the state x under the applied wrench tau, see `lumped`."""
+    return lumped(truth, attitude_of(x), vector(x, 7), tau, vector(F[0], 0), current)
 
 
 def initial_state(eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
@@ -72,55 +81,115 @@ def eta_of(x: np.ndarray) -> np.ndarray:
 
 
 class Plant:
-    """A vehicle under a held wrench and a disturbance of time, one step at a time.
+    """A vehicle with its actuators and sensors, one step at a time: `answer`, then `advance`.
 
     Parameters
     ----------
-    model : coefficients of (1)
-    disturbance : F(t), N and N m
+    uncertainty : coefficients of (1), disturbance and current
     step : integration step, s
     integrator : 'ode5', 'rk4' or 'euler'
     x : (13,) initial state, copied
+    actuators : between the command and the applied wrench; default: the command is applied
+    noise : of the sensors; None: they are perfect
 
     """
 
     def __init__(
-        self, model: Model, disturbance: Disturbance, step: float, integrator: str, x: np.ndarray
+        self,
+        uncertainty: Uncertainty,
+        step: float,
+        integrator: str,
+        x: np.ndarray,
+        actuators: Actuators = IDEAL,
+        noise: SensorNoise | None = None,
     ):
-        self._model, self._disturbance, self._step = model, disturbance, step
+        self._uncertainty, self._step = uncertainty, step
         self._tableau = TABLEAUS[integrator]
         self._stages = np.zeros((len(self._tableau.b), SIZE))
         self._trial = np.zeros(SIZE)
-        self._first, self._F = 0, np.zeros((0, len(self._tableau.b), 6))
+        self._actuators, self._noise = actuators, noise
+        self._first = 0
+        self._F, self._current = (np.zeros((0, 0, 6)) for _ in range(2))
+        self._rows = np.zeros((0, 0))
+        self._start = np.array(x, float)
         self.k = 0
-        self.x = np.array(x, float)
-        self.advance((0.0,) * 6)  # compiles or loads the kernel: not at the first step
-        self.k = 0
-        self.x = np.array(x, float)
+        self.reset()
+        self._tabulate()
+        self.answer((0.0,) * 6)  # compiles or loads the kernel: not at the first step
+        self._integrate()
+        self.reset()
+        self._measure()
 
-    def F(self) -> np.ndarray:
-        """Lumped uncertainty at the stages of the present step: (s, 6), stage 0 being t_k."""
-        if not self._first <= self.k < self._first + len(self._F):
-            self._first = self.k
-            times = stage_times(self._tableau, self._step, self.k, BLOCK)
-            self._F = self._disturbance(times.ravel()).reshape(*times.shape, 6)
-        return self._F[self.k - self._first]
+    def reset(self) -> None:
+        """Put the vehicle and its actuators back to where they started; time goes on."""
+        self.x = self._start.copy()
+        self.measured = self.x.copy()
+        self._memory = memory(self._actuators)
+        self._applied: tuple = (0.0,) * 6
+
+    @property
+    def lost(self) -> bool:
+        """Whether the sample of this step is lost: `measured` is an older one."""
+        return self._noise is not None and self.k > 0 and bool(self._rows[self._row, 9])
 
     @property
     def diverged(self) -> bool:
         """Whether a velocity has left what any vehicle could have, or the finite numbers."""
         return not (np.abs(self.x[7:]) < DIVERGED).all()
 
-    def advance(self, tau: tuple) -> None:
-        """Hold the wrench tau, six floats in N and N m, over one step."""
+    def answer(self, tau: tuple) -> tuple[tuple, tuple]:
+        """Take the command of this step: six floats, N and N m.
+
+        Returns
+        -------
+        applied, F : the wrench applied over the step, and the lumped uncertainty (3) at its start
+
+        """
+        truth, row = self._uncertainty.truth, self._row
+        self._applied = tau
+        if not self._actuators.ideal:
+            self._applied = applied_wrench(self._actuators, self.k, tau, self._memory)
+        if truth.exact:
+            return self._applied, tuple(self._F[row, 0])
+        F, current = self._F[row], self._current[row]
+        return self._applied, lumped_uncertainty(truth, self.x, self._applied, F, current)
+
+    def advance(self) -> None:
+        """Hold the applied wrench over one step, then measure."""
+        self._integrate()
+        self.k += 1
+        if self.k - self._first >= len(self._F):
+            self._tabulate()
+        self._measure()
+
+    @property
+    def _row(self) -> int:
+        return self.k - self._first
+
+    def _tabulate(self) -> None:
+        """What is known of the next block of steps."""
+        self._first = self.k
+        times = stage_times(self._tableau, self._step, self.k, BLOCK)
+        self._F, self._current = self._uncertainty.tables(times)
+        if self._noise is not None:
+            self._rows = self._noise.rows(BLOCK)
+
+    def _measure(self) -> None:
+        if self._noise is None:
+            self.measured = self.x
+        else:
+            fill_measurement(self._rows[self._row], self.k, self.x, self.measured)
+
+    def _integrate(self) -> None:
+        row = self._row
         fill_plant_step(
-            self._model,
+            self._uncertainty.truth,
             self.x,
-            tau,
-            self.F(),
+            self._applied,
+            self._F[row],
+            self._current[row],
             self._step,
             self._tableau,
             self._stages,
             self._trial,
         )
-        self.k += 1

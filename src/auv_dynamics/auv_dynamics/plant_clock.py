@@ -58,23 +58,23 @@ class LockStep:
         expected = plant.k * node.step_ns
         if not (self._started and self._published and ns == expected):
             raise interface.BadMessageError(f'wrench: stamp: expected {expected} ns, found {ns} ns')
-        F = plant.F()[0].copy()
         k = plant.k
+        applied, F = plant.answer(tau)
         if k == node.last:
-            node.publish_disturbance(k, F)
+            node.publish_forces(k, applied, F)
             self._published = False
             self._since = None
             if not node.window:
                 node.end(0)
             return
-        plant.advance(tau)
+        plant.advance()
         self._published = False
         if plant.diverged:
-            node.publish_disturbance(k, F)
+            node.publish_forces(k, applied, F)
             node.end(1, f'beyond every speed after step {k}: the closed loop diverges')
             return
         self._go_on()
-        node.publish_disturbance(k, F)
+        node.publish_forces(k, applied, F)
 
     def _go_on(self) -> None:
         done = self._since is None or not self._started
@@ -162,12 +162,12 @@ class RealTime:
             return
         due = self._first + int((time.monotonic() - self._began) * 1e9) // node.step_ns
         while plant.k <= due and self._ended is None:
-            node.publish_state()
-            node.publish_disturbance(plant.k, plant.F()[0])
+            node.publish_state(measured=not plant.lost)
+            node.publish_forces(plant.k, *plant.answer(self._held()))
             if plant.k == node.last:
                 self._ended = time.monotonic()
             else:
-                plant.advance(self._held())
+                plant.advance()
 
     def _end(self) -> None:
         """With no recorder to wait for, exit once the last wrench is here or overdue."""

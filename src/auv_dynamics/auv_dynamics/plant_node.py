@@ -7,18 +7,25 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics import interface, load_vehicle
-from auv_dynamics.disturbance import make_disturbance
+from auv_dynamics.actuators import make_actuators
 from auv_dynamics.files import InputError
 from auv_dynamics.integrator import TABLEAUS
 from auv_dynamics.plant import Plant, initial_state
 from auv_dynamics.plant_clock import LockStep, RealTime
-from auv_dynamics.plant_parameters import disturbance_specs
+from auv_dynamics.plant_parameters import (
+    actuator_spec,
+    disturbance_prefixes,
+    disturbance_specs,
+    sensor_spec,
+)
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import declare, refuse_unknown
 from auv_dynamics.ros.peers import Peers
+from auv_dynamics.sensors import SensorNoise
+from auv_dynamics.uncertainty import make_uncertainty
 
 NANOSECONDS = interface.NANOSECONDS
 
@@ -38,6 +45,8 @@ class PlantNode(BulkNode):
         self._clock_output = self.graph.publisher(topics.CLOCK)
         self._twist = self.graph.publisher(topics.TWIST)
         self._disturbance = self.graph.publisher(topics.DISTURBANCE)
+        self._applied = self.graph.publisher(topics.WRENCH_APPLIED) if self._acts else None
+        self._truth = self.graph.publisher(topics.GROUND_TRUTH) if self._senses else None
         self.peers = Peers(self, self._start_after)
         self.graph.also_ready_when(self.peers.not_ready)
         self.pace = LockStep(self) if self.lockstep else RealTime(self)
@@ -71,7 +80,7 @@ class PlantNode(BulkNode):
         integrator = declare(
             self, 'integrator', str, 'ode5', 'fixed-step method', one_of=list(TABLEAUS)
         )
-        declare(self, 'seed', int, 0, 'of everything random', at_least=0)
+        seed = declare(self, 'seed', int, 0, 'of everything random', at_least=0)
         eta, nu = (self._six(f'initial.{name}') for name in ('eta', 'nu'))
         self._start_after = (
             declare(self, 'start_after', list[str], None, 'nodes whose ~/ready is waited for') or []
@@ -81,10 +90,17 @@ class PlantNode(BulkNode):
             self, 'wrench_timeout', float, default,
             's: real time: then zero wrench; lock-step: then the run ends', at_least=0.0,
         )  # fmt: skip
-        self._initial = initial_state(eta, nu)
-        disturbance = make_disturbance(disturbance_specs(self))
-        model = load_vehicle(path).model
-        self.plant = Plant(model, disturbance, step, integrator, self._initial)
+        specs, actuators, sensors = disturbance_specs(self), actuator_spec(self), sensor_spec(self)
+        self._acts, self._senses = actuators is not None, sensors is not None
+        name, vehicle = self.get_name(), load_vehicle(path)
+        self.plant = Plant(
+            make_uncertainty(vehicle, specs, name, disturbance_prefixes(self)),
+            step,
+            integrator,
+            initial_state(eta, nu),
+            make_actuators(actuators, vehicle, step, name),
+            SensorNoise(sensors, seed) if sensors is not None else None,
+        )
 
     def _six(self, name: str) -> np.ndarray:
         values = declare(self, name, list[float], [0.0] * 6, '6 numbers, SI, NED and body frame')
@@ -96,18 +112,26 @@ class PlantNode(BulkNode):
         if self.graph.ready() and not self.peers.not_ready() and not self.paused:
             self.pace.start()
 
-    def publish_state(self) -> None:
+    def publish_state(self, *, measured: bool = True) -> None:
         """Publish step k; odometry first, since the controller waits for it."""
-        ns, x = self.plant.k * self.step_ns, self.plant.x
-        self._odom.publish(convert.odometry(ns, x, self.graph.frames))
+        plant, frames = self.plant, self.graph.frames
+        ns = plant.k * self.step_ns
+        if measured:
+            self._odom.publish(convert.odometry(ns, plant.measured, frames))
         self._clock_output.publish(Clock(clock=convert.stamp(ns)))
-        self._twist.publish(convert.twist(ns, x[7:], self.graph.frames))
+        if measured:
+            self._twist.publish(convert.twist(ns, plant.measured[7:], frames))
+        if self._truth is not None:
+            self._truth.publish(convert.odometry(ns, plant.x, frames))
         self.graph.latest_ns = ns
-        self.graph.facts['step'] = self.plant.k
+        self.graph.facts['step'] = plant.k
 
-    def publish_disturbance(self, k: int, F: np.ndarray) -> None:
-        """Publish F of step k: what opposed the wrench in (1)."""
-        self._disturbance.publish(convert.wrench(k * self.step_ns, F, self.graph.frames))
+    def publish_forces(self, k: int, applied: tuple, F: tuple) -> None:
+        """Publish what was applied at step k and F, what opposed it in (1)."""
+        ns, frames = k * self.step_ns, self.graph.frames
+        self._disturbance.publish(convert.wrench(ns, F, frames))
+        if self._applied is not None:
+            self._applied.publish(convert.wrench(ns, applied, frames))
 
     def end(self, code: int, text: str = '') -> None:
         """End the node: 1 with the reason when the run failed."""
@@ -137,7 +161,7 @@ class PlantNode(BulkNode):
         return response
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self.plant.x[:] = self._initial
+        self.plant.reset()
         response.success, response.message = True, f'state of the start from step {self.plant.k}'
         return response
 

@@ -1,45 +1,118 @@
-"""The plant's disturbances as ROS parameters: `disturbance.names` and per name its values."""
+"""The plant's disturbances, actuators and sensors as ROS parameters, as a scenario writes them."""
 
 from typing import Any
 
 from rclpy.node import Node
 
+from auv_dynamics.current import AXES
 from auv_dynamics.disturbance import KINDS
 from auv_dynamics.files import InputError
 from auv_dynamics.ros.parameters import declare, given
 from auv_dynamics.signals import DOFS, harmonic_spec
 
+NAMES = 'disturbance.names'
+ALL_KINDS = (*KINDS, 'model_error', 'current')
+RELATIVE = ('mass', 'added_mass', 'damping', 'buoyancy')
+
 
 def disturbance_specs(node: Node) -> list[dict[str, Any]]:
     """Declare the disturbances of a node and return them as a scenario writes them."""
-    names = declare(node, 'disturbance.names', list[str], None, 'disturbances, added up') or []
-    return [_spec(node, name) for name in names]
+    declare(node, NAMES, list[str], None, 'disturbances, added up')
+    return [_spec(node, f'{prefix}.') for prefix in disturbance_prefixes(node)]
 
 
-def _spec(node: Node, name: str) -> dict[str, Any]:
-    prefix = f'disturbance.{name}.'
-    kind = declare(node, f'{prefix}kind', str, '', 'kind of disturbance', one_of=list(KINDS))
+def disturbance_prefixes(node: Node) -> list[str]:
+    """How the parameters of each disturbance begin, in their order; after `disturbance_specs`."""
+    names = node.get_parameter_or(NAMES, None)
+    return [f'disturbance.{name}' for name in (names.value if names is not None else None) or []]
+
+
+def _spec(node: Node, prefix: str) -> dict[str, Any]:
+    kind = declare(node, f'{prefix}kind', str, '', 'kind of disturbance', one_of=ALL_KINDS)
     if kind == 'herman2018':
         sign = declare(node, f'{prefix}exponent_sign', float, -1.0, 'sign of the exponents of (39)')
         if sign not in (-1.0, 1.0):
             raise InputError(node.get_name(), f'{prefix}exponent_sign', '-1 or 1', sign)
-        return {'kind': kind, 'exponent_sign': sign}
+        return {'kind': kind, 'exponent_sign': sign, **_matrices(node, prefix, ('scale',))}
+    if kind == 'model_error':
+        spec: dict[str, Any] = {'kind': kind, **_matrices(node, prefix, ('dM', 'dD'))}
+        for key in RELATIVE:
+            at_least = -1.0 if key in ('damping', 'buoyancy', 'added_mass') else -0.999
+            value = declare(
+                node, f'{prefix}{key}', float, None, 'relative error', at_least=at_least
+            )
+            if value is not None:
+                spec[key] = value
+        return spec
+    if kind == 'current':
+        velocity = _numbers(node, f'{prefix}velocity', 'm/s, NED', (3,))
+        waves = harmonic_parameters(node, prefix, 'm/s', tuple(AXES))
+        return {'kind': kind, **({'velocity': velocity} if velocity else {}), **waves}
     return {'kind': kind, **harmonic_parameters(node, prefix, 'N, N m')}
 
 
-def harmonic_parameters(node: Node, prefix: str, unit: str) -> dict[str, Any]:
-    """Declare `<prefix><dof>.{offset, amplitude, omega, phase}` and return them as a mapping."""
+def actuator_spec(node: Node) -> dict[str, Any] | None:
+    """Declare `actuators.*` and return them as a scenario writes them; None when there are none."""
+    spec: dict[str, Any] = {}
+    for key, unit in (('limit', 'N, N m'), ('rate', 'N/s, N m/s')):
+        values = _numbers(node, f'actuators.{key}', unit, (1, 6))
+        if values and min(values) <= 0:
+            raise InputError(node.get_name(), f'actuators.{key}', 'positive numbers', values)
+        spec[key] = (values[0] if len(values) == 1 else values) if values else None
+    for key in ('lag', 'delay'):
+        spec[key] = declare(node, f'actuators.{key}', float, None, 's', at_least=0.0)
+    text = 'allocate to the thrusters of the vehicle file'
+    spec['thrusters'] = declare(node, 'actuators.thrusters', bool, None, text)
+    return _what_is_given(spec)
+
+
+def sensor_spec(node: Node) -> dict[str, Any] | None:
+    """Declare `sensors.*` and return them as a scenario writes them; None when there are none."""
+    spec: dict[str, Any] = {}
+    for key, unit, count in (('velocity_noise', 'm/s, rad/s', 6), ('attitude_noise', 'rad', 3)):
+        values = _numbers(node, f'sensors.{key}', f'standard deviation, {unit}', (1, count))
+        if values and min(values) < 0:
+            raise InputError(node.get_name(), f'sensors.{key}', 'numbers from 0 up', values)
+        spec[key] = (values[0] if len(values) == 1 else values) if values else None
+    text = 'probability that a sample is lost'
+    spec['drop_out'] = declare(
+        node, 'sensors.drop_out', float, None, text, at_least=0.0, at_most=1.0
+    )
+    return _what_is_given(spec)
+
+
+def _what_is_given(spec: dict[str, Any]) -> dict[str, Any] | None:
+    return {key: value for key, value in spec.items() if value is not None} or None
+
+
+def _numbers(node: Node, name: str, text: str, lengths: tuple[int, ...]) -> list[float]:
+    values = declare(node, name, list[float], None, text) or []
+    if values and len(values) not in lengths:
+        expected = f'{" or ".join(map(str, lengths))} numbers'
+        raise InputError(node.get_name(), name, expected, f'{len(values)} numbers')
+    return values
+
+
+def _matrices(node: Node, prefix: str, keys: tuple[str, ...]) -> dict[str, list[float]]:
+    found = {key: _numbers(node, f'{prefix}{key}', '6x6', (1, 6, 36)) for key in keys}
+    return {key: value for key, value in found.items() if value}
+
+
+def harmonic_parameters(
+    node: Node, prefix: str, unit: str, axes: tuple[str, ...] = DOFS
+) -> dict[str, Any]:
+    """Declare `<prefix><axis>.{offset, amplitude, omega, phase}` and return them as a mapping."""
     columns: dict[str, Any] = {}
-    for dof in DOFS:
-        columns[f'{dof}.offset'] = declare(
-            node, f'{prefix}{dof}.offset', float, 0.0, f'constant part, {unit}'
+    for axis in axes:
+        columns[f'{axis}.offset'] = declare(
+            node, f'{prefix}{axis}.offset', float, 0.0, f'constant part, {unit}'
         )
         for key, what in (('amplitude', unit), ('omega', 'rad/s'), ('phase', 'rad')):
-            values = declare(node, f'{prefix}{dof}.{key}', list[float], None, f'{what}, per term')
-            columns[f'{dof}.{key}'] = values or []
+            values = declare(node, f'{prefix}{axis}.{key}', list[float], None, f'{what}, per term')
+            columns[f'{axis}.{key}'] = values or []
     try:
-        spec = harmonic_spec(columns)
+        spec = harmonic_spec(columns, axes)
     except ValueError as error:
         raise InputError(node.get_name(), prefix.rstrip('.'), str(error), 'other lengths') from None
-    used = {dof for dof in DOFS if given(node, f'{prefix}{dof}.')}
-    return {dof: entry for dof, entry in spec.items() if dof in used}
+    used = {axis for axis in axes if given(node, f'{prefix}{axis}.')}
+    return {axis: entry for axis, entry in spec.items() if axis in used}

@@ -1,6 +1,6 @@
 """Offsets plus sinusoids per degree of freedom: set-points and harmonic disturbances."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,10 +55,10 @@ class Harmonics:
         return out
 
 
-def harmonic_columns(spec: Mapping[str, Any]) -> dict[str, Any]:
+def harmonic_columns(spec: Mapping[str, Any], axes: Sequence[str] = DOFS) -> dict[str, Any]:
     """Flatten a harmonic mapping to ROS parameters: `surge.offset`, `surge.amplitude`, ..."""
     flat: dict[str, Any] = {}
-    for dof in DOFS:
+    for dof in axes:
         if dof not in spec:
             continue
         flat[f'{dof}.offset'] = float(spec[dof].get('offset', 0.0))
@@ -70,10 +70,10 @@ def harmonic_columns(spec: Mapping[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def harmonic_spec(columns: Mapping[str, Any]) -> dict[str, Any]:
-    """Invert `harmonic_columns`; ValueError when the lists of a DOF differ in length."""
+def harmonic_spec(columns: Mapping[str, Any], axes: Sequence[str] = DOFS) -> dict[str, Any]:
+    """Invert `harmonic_columns`; ValueError when the lists of an axis differ in length."""
     spec: dict[str, Any] = {}
-    for dof in DOFS:
+    for dof in axes:
         lists = {
             key: list(columns.get(f'{dof}.{key}', [])) for key in ('amplitude', 'omega', 'phase')
         }

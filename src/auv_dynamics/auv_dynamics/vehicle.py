@@ -1,7 +1,8 @@
 """A vehicle's coefficients and the dynamics (1) as matrices, for people and for the kernel."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -65,6 +66,7 @@ class Vehicle:
     r_B: np.ndarray
     M_RB: np.ndarray | None = None
     M_A: np.ndarray | None = None
+    thrusters: Any = None
     warnings: tuple[str, ...] = field(default=())
 
     @cached_property
@@ -78,6 +80,10 @@ class Vehicle:
             D_quadratic=np.ascontiguousarray(self.D_quadratic).ravel().copy(),
             hydrostatics=np.array([self.weight - self.buoyancy, *couple]),
         )
+
+    def changed(self, **values: Any) -> 'Vehicle':
+        """Vehicle with some attributes replaced; M_RB and M_A are dropped unless given."""
+        return replace(self, **{'M_RB': None, 'M_A': None, **values})
 
     def C(self, nu: np.ndarray) -> np.ndarray:
         """C(nu) of (1), skew-symmetric: (6,) in m/s, rad/s to (6, 6)."""

@@ -1,9 +1,7 @@
 """The velocity controller without ROS: odometry and set-points in, wrench out."""
 
 from dataclasses import dataclass
-from typing import Any
 
-from auv_gvc_controller.model import ControlModel
 from auv_gvc_controller.odometry_guard import OdometryGuard
 from auv_gvc_controller.pairing import Pairing
 from auv_gvc_controller.sampled import SampledLaw
@@ -26,8 +24,7 @@ class VelocityController:
 
     Parameters
     ----------
-    gains : named tuple of the law's gains, which names the law
-    model : what the law knows of the vehicle
+    law : with its gains, its model and its state
     pairing : which set-point belongs to an odometry
     guard : which odometry may be used
     lockstep : wait for the set-point; else answer every odometry, with zero if need be
@@ -38,8 +35,7 @@ class VelocityController:
 
     def __init__(
         self,
-        gains: Any,
-        model: ControlModel,
+        law: SampledLaw,
         pairing: Pairing,
         guard: OdometryGuard,
         *,
@@ -48,8 +44,7 @@ class VelocityController:
         setpoint_timeout_ns: int,
         wrench_limit: tuple,
     ):
-        self._law = SampledLaw(gains, model)
-        self._pairing, self._guard = pairing, guard
+        self._law, self._pairing, self._guard = law, pairing, guard
         self._lockstep, self._exact = lockstep, exact
         self._timeout, self._limit = setpoint_timeout_ns, wrench_limit
         self._waiting: tuple[int, tuple, float] | None = None

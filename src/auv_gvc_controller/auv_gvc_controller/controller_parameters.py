@@ -8,17 +8,21 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from auv_dynamics import load_vehicle
+from auv_dynamics.actuators import Reach, make_reach
 from auv_dynamics.files import InputError
 from auv_dynamics.ros.parameters import declare, given
+from auv_dynamics.vehicle import Vehicle
 from auv_gvc_controller.controller import VelocityController
-from auv_gvc_controller.laws import law_class, make_gains, refusal
+from auv_gvc_controller.laws import SHIPPED, law_class, make_gains, refusal
 from auv_gvc_controller.limits import Limits
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.odometry_guard import OdometryGuard
 from auv_gvc_controller.pairing import DIFFERENCE, SAME, Pairing
+from auv_gvc_controller.sampled import SampledLaw
 
-GAINS = ('k_D', 'k_I', 'Lambda', 'Gamma')
+GAINS = {gain for law in SHIPPED.values() for gain in law._fields}
 WRITABLE = 'gains.'
+LAWS = f'{", ".join(SHIPPED)} or module:Class of your own'
 
 
 class ControllerParameters:
@@ -26,7 +30,7 @@ class ControllerParameters:
 
     def __init__(self, node: Node):
         self._node = node
-        declare(node, 'law', str, '', 'gvc, cl or module:Class of your own', writable=True)
+        declare(node, 'law', str, '', LAWS, writable=True)
         names = {*(f'{WRITABLE}{gain}' for gain in GAINS), *given(node, WRITABLE)}
         for name in sorted(names):
             text = '1 number (times identity), 6 (diagonal) or 36 (row-major)'
@@ -56,10 +60,14 @@ class ControllerParameters:
             self._size('limits.rate', 20.0, 'rad/s'),
             self._size('limits.acceleration', 100.0, 'm/s2, rad/s2'),
         )
-        limit = declare(
-            node, 'limits.wrench', list[float], None, '1 or 6 numbers, N, N m; none: off'
+        self._wrench_limit = self._six('limits.wrench', 'clips the wrench')
+        self._known_limit = self._six('actuators.limit', 'of the actuators, for anti-windup')
+        self._thrusters = declare(
+            node, 'actuators.thrusters', bool, False, "anti-windup knows the vehicle's thrusters"
         )
-        self._wrench_limit = self._limit(limit or [])
+        self._anti_windup = declare(
+            node, 'anti_windup', bool, True, 'stop integrating what pushes beyond these limits'
+        )
         self.pairing = Pairing(self.exact, self.acceleration, self._limits)
         self.autostart = declare(node, 'autostart', bool, True, 'configure and activate at once')
 
@@ -69,12 +77,25 @@ class ControllerParameters:
     def _time(self, name: str, default: float, text: str) -> float:
         return declare(self._node, name, float, default, f's, {text}', at_least=0.0)
 
-    def _limit(self, values: list[float]) -> tuple:
+    def _six(self, name: str, text: str) -> tuple:
+        node = self._node
+        text = f'1 or 6 numbers, N, N m, {text}; none: off'
+        values = declare(node, name, list[float], None, text) or []
         values = values * 6 if len(values) == 1 else values
         if len(values) not in (0, 6) or not all(v > 0 and math.isfinite(v) for v in values):
-            name = self._node.get_name()
-            raise InputError(name, 'limits.wrench', '1 or 6 positive numbers', values)
+            raise InputError(node.get_name(), name, '1 or 6 positive numbers', values)
         return tuple(values)
+
+    def _reach(self, vehicle: Vehicle) -> Reach:
+        """What anti-windup knows of the wrenches that can be had."""
+        if self._thrusters and vehicle.thrusters is None:
+            name, expected = self._node.get_name(), f'a vehicle with thrusters, not {vehicle.name}'
+            raise InputError(name, 'actuators.thrusters', expected, 'true')
+        if not self._anti_windup:
+            return make_reach(None, None)
+        limits = [limit for limit in (self._wrench_limit, self._known_limit) if limit]
+        smallest = [min(axis) for axis in zip(*limits, strict=True)]
+        return make_reach(smallest or None, vehicle if self._thrusters else None)
 
     def build(self) -> VelocityController:
         """Controller of the present values; InputError when law, vehicle or a gain is missing."""
@@ -82,7 +103,7 @@ class ControllerParameters:
         name = node.get_name()
         law = node.get_parameter('law').value
         if not law:
-            raise InputError(name, 'law', 'gvc, cl or module:Class', None)
+            raise InputError(name, 'law', LAWS, None)
         if not self._vehicle:
             raise InputError(name, 'vehicle', 'a vehicle file', None)
         try:
@@ -91,10 +112,10 @@ class ControllerParameters:
             gain, expected, found = refusal(error)
             key = f'{WRITABLE}{gain}' if gain else 'law'
             raise InputError(name, key, expected, found) from None
+        vehicle = load_vehicle(self._vehicle)
         self.pairing.reset()
         return VelocityController(
-            gains,
-            control_model(load_vehicle(self._vehicle)),
+            SampledLaw(gains, control_model(vehicle), self._reach(vehicle)),
             self.pairing,
             OdometryGuard(round(self._gap * 1e9), self._limits, self.lockstep),
             lockstep=self.lockstep,

@@ -4,15 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from auv_gvc_controller.laws.gvc import GVC
 from auv_gvc_controller.model import ControlModel
 
 
 def body_gains(gains: Any, model: ControlModel) -> tuple[np.ndarray, np.ndarray]:
     """K_D and K_f of tau = ... + K_D s + K_f integral(s).
 
-    GVC: K_D = U^-T N k_D U^-1 and K_f = U^-T N Gamma U^-1; for scalar gains k M and Gamma M
-    exactly. Any other law: its own k_D and Gamma, zero where it has none.
+    A law says it in a static method `body_gains(gains, model)`; one without it is taken by its own
+    k_D and Gamma, zero where it has none.
 
     Parameters
     ----------
@@ -21,13 +20,12 @@ def body_gains(gains: Any, model: ControlModel) -> tuple[np.ndarray, np.ndarray]
 
     Returns
     -------
-    K_D, K_f : (6, 6) body frame
+    K_D, K_f : (6, 6) body frame; of GVC k M and Gamma M exactly where the gains are scalar
 
     """
-    k_D, Gamma = (
-        np.reshape(getattr(gains, name, np.zeros(36)), (6, 6)) for name in ('k_D', 'Gamma')
-    )
-    if not isinstance(gains, GVC):
-        return k_D, Gamma
-    U_inv, N = model.Upsilon_inv.reshape(6, 6), np.diag(model.N)
-    return U_inv.T @ N @ k_D @ U_inv, U_inv.T @ N @ Gamma @ U_inv
+    law = type(gains)
+    if hasattr(law, 'body_gains'):
+        K_D, K_f = law.body_gains(gains, model)
+    else:
+        K_D, K_f = (getattr(gains, name, np.zeros(36)) for name in ('k_D', 'Gamma'))
+    return np.reshape(K_D, (6, 6)), np.reshape(K_f, (6, 6))

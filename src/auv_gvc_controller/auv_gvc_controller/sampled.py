@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_dynamics.actuators import Reach, make_reach, reachable
 from auv_dynamics.jit import JITTED, compiled, jitable, specialised
 from auv_gvc_controller.laws import SHIPPED
 from auv_gvc_controller.model import ControlModel
@@ -23,7 +24,7 @@ def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
 
 
 @jitable
-def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model):
+def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model, reach):
     """Take one sample: state += dt * rate of the last sample, in place, then (tau, f).
 
     `rate` receives the rate at this sample; dt = 0 at the first one.
@@ -34,7 +35,33 @@ def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model):
     change = state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
     for i in range(state.shape[0]):
         rate[i] = change[i]
+    if reach.bounded:
+        had = reachable(reach, tau)
+        if had != tau:
+            for i in range(state.shape[0]):
+                kept = state[i]
+                state[i] = kept + rate[i]
+                ahead, _ = wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+                state[i] = kept
+                if pushes_out(tau, had, ahead):
+                    rate[i] = 0.0
     return tau, f
+
+
+@jitable
+def pushes_out(tau, had, ahead):
+    """Whether the wrench `ahead` lies further beyond what can be had than tau does.
+
+    Conditional integration (Astrom & Hagglund 2006, section 3.5; Visioli 2006, chapter 3), asked
+    of one state of the law: over the axes that are cut, (tau - had)/tau^2 * (ahead - tau) > 0.
+    """
+    rounding, push = 0.0, 0.0
+    for i in range(6):
+        rounding += 1e-9 * abs(tau[i])
+    for i in range(6):
+        if abs(tau[i] - had[i]) > rounding:
+            push += (tau[i] - had[i]) / (tau[i] * tau[i]) * (ahead[i] - tau[i])
+    return push > 0.0
 
 
 compiled_sample = compiled(fill_sample)
@@ -56,11 +83,13 @@ class SampledLaw:
     ----------
     gains : named tuple of the law's gains, which also names the law
     model : what the law knows of the vehicle
+    reach : what is known of the actuators, for anti-windup; None: no bounds
 
     """
 
-    def __init__(self, gains: Any, model: ControlModel):
+    def __init__(self, gains: Any, model: ControlModel, reach: Reach | None = None):
         self._gains, self._model = gains, model
+        self._reach = reach or make_reach(None, None)
         self._sample = compiled_sample if is_compiled(gains) else fill_sample
         self.reset()
         if is_compiled(gains):
@@ -99,8 +128,9 @@ class SampledLaw:
         state, rate = self._state.copy(), self._rate.copy()
         with np.errstate(all='ignore'):
             tau, f = self._sample(
-                t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, self._gains, self._model
-            )
+                t, dt, nu, attitude, nu_d, nu_d_dot, state, rate,
+                self._gains, self._model, self._reach,
+            )  # fmt: skip
         if not np.all(np.isfinite([*tau, *f, *state, *rate])):
             raise ArithmeticError(f'the law gave a wrench that is not finite: {tau}')
         self._state, self._rate = state, rate

@@ -29,6 +29,8 @@ TWIST = Topic(interface.TWIST, TwistStamped, step=True)
 CMD_VEL = Topic(interface.CMD_VEL, TwistStamped, step=True)
 CMD_ACCEL = Topic(interface.CMD_ACCEL, AccelStamped, step=True)
 WRENCH = Topic(interface.WRENCH, WrenchStamped, step=True)
+WRENCH_APPLIED = Topic(interface.WRENCH_APPLIED, WrenchStamped, step=True)
+GROUND_TRUTH = Topic(interface.GROUND_TRUTH, Odometry, step=True)
 DISTURBANCE = Topic(interface.DISTURBANCE, WrenchStamped, step=True)
 DISTURBANCE_ESTIMATE = Topic(interface.DISTURBANCE_ESTIMATE, WrenchStamped, step=True)
 KINETIC_ENERGY = Topic(interface.KINETIC_ENERGY, JointState)
@@ -40,7 +42,10 @@ PROGRESS = Topic(interface.PROGRESS, Header)
 DIAGNOSTICS = Topic(interface.DIAGNOSTICS, DiagnosticArray)
 CLOCK = Topic(interface.CLOCK, Clock)
 
-STEP_TOPICS = (ODOM, TWIST, CMD_VEL, CMD_ACCEL, WRENCH, DISTURBANCE, DISTURBANCE_ESTIMATE)
+STEP_TOPICS = (
+    *(ODOM, TWIST, CMD_VEL, CMD_ACCEL, WRENCH, DISTURBANCE, DISTURBANCE_ESTIMATE),
+    *(WRENCH_APPLIED, GROUND_TRUTH),
+)
 ANALYSIS_TOPICS = (KINETIC_ENERGY, KINETIC_ENERGY_SHARES, DELTA_XI, DELTA_PI, LUMPED_ERROR)
 TOPICS = (*STEP_TOPICS, *ANALYSIS_TOPICS, PROGRESS, DIAGNOSTICS, CLOCK)
 

@@ -11,8 +11,10 @@ import numpy as np
 from auv_dynamics.files import matrix6
 from auv_gvc_controller.laws.cl import CL
 from auv_gvc_controller.laws.gvc import GVC
+from auv_gvc_controller.laws.pid import PID
+from auv_gvc_controller.laws.smc import SMC
 
-SHIPPED: dict[str, Any] = {'gvc': GVC, 'cl': CL}
+SHIPPED: dict[str, Any] = {'gvc': GVC, 'cl': CL, 'pid': PID, 'smc': SMC}
 
 
 def law_class(name: str) -> Any:
@@ -20,8 +22,8 @@ def law_class(name: str) -> Any:
 
     Parameters
     ----------
-    name : 'gvc', 'cl' or 'module:Class' of a user's own law, found on Python's path or in the
-        working directory
+    name : 'gvc', 'cl', 'pid', 'smc' or 'module:Class' of a user's own law, found on Python's path
+        or in the working directory
 
     Returns
     -------
@@ -81,7 +83,8 @@ def make_gains(name: str, values: Mapping[str, Any]) -> Any:
     Parameters
     ----------
     name : of the law
-    values : for each gain 1 number (times identity), 6 (diagonal), 36 or 6x6
+    values : for each gain 1 number (times identity), 6 (diagonal), 36 or 6x6; a gain for which the
+        law's named tuple has a default may be absent
 
     Returns
     -------
@@ -99,6 +102,7 @@ def make_gains(name: str, values: Mapping[str, Any]) -> Any:
         raise ValueError(
             f'{unknown[0]}: expected one of {", ".join(law._fields)}, found an unknown gain'
         )
+    values = {**getattr(law, '_field_defaults', {}), **values}
     for key in law._fields:
         if key not in values:
             raise ValueError(f'{key}: expected a number, 6 numbers or a 6x6 matrix, found nothing')
@@ -113,7 +117,10 @@ def make_gains(name: str, values: Mapping[str, Any]) -> Any:
             raise ValueError(f'{key}: expected finite numbers, found {values[key]}')
         flat[key] = matrix.ravel()
     try:
-        return law(**flat)
+        gains = law(**flat)
     except TypeError as error:
         text = 'a named tuple of gains'
         raise ValueError(f'expected {text}, found {name!r} ({_short(error)})') from None
+    if hasattr(law, 'check'):
+        law.check(gains)
+    return gains

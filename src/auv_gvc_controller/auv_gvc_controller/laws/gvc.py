@@ -66,3 +66,10 @@ class GVC(NamedTuple):
         z = vector(state, 0)
         s_xi = upper(model.Upsilon_inv, add(nu_err, mul(gains.Lambda, z)))
         return nu_err + s_xi
+
+    @staticmethod
+    def body_gains(gains, model):
+        """(K_D, K_f) = (U^-T N k_D U^-1, U^-T N Gamma U^-1), (6, 6): step 1 of section 4.2."""
+        U_inv, N = model.Upsilon_inv.reshape(6, 6), np.diag(model.N)
+        k_D, Gamma = gains.k_D.reshape(6, 6), gains.Gamma.reshape(6, 6)
+        return U_inv.T @ N @ k_D @ U_inv, U_inv.T @ N @ Gamma @ U_inv

@@ -1,0 +1,61 @@
+"""PID on the velocity error with feed-forward of the model: the baseline to compare with."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from auv_dynamics.model import coriolis, damping, restoring
+from auv_dynamics.six import add, mul, sub, vector
+
+
+class PID(NamedTuple):
+    """Gains, each (36,) row-major: k_P in N s/m, k_I in N/m, k_D in kg; two more have defaults.
+
+    omega_f in rad/s is the cut-off of the derivative's first-order filter (Astrom & Hagglund 2006,
+    section 3.3); k_FF scales the feed-forward of the model at the set-point, 0: off.
+    """
+
+    k_P: np.ndarray
+    k_I: np.ndarray
+    k_D: np.ndarray
+    omega_f: Any = 20.0
+    k_FF: Any = 1.0
+
+    STATES = 12  # type: ignore[misc]  # no gain, but a constant of the law: z, then the filter's x
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        """(tau, 0): the wrench in N and N m, body frame; there is no adaptive part."""
+        M = model.dynamics.M
+        z, x = vector(state, 0), vector(state, 6)
+        nu_err = sub(nu_d, nu)
+        d = mul(gains.omega_f, sub(nu_err, x))  # nu_err_dot behind the filter
+        feed_forward = add(
+            mul(M, nu_d_dot),
+            add(coriolis(M, nu_d, nu_d), damping(model.dynamics, nu_d, nu_d)),
+        )
+        tau = add(
+            add(restoring(model.dynamics, attitude), mul(gains.k_FF, feed_forward)),
+            add(mul(gains.k_P, nu_err), add(mul(gains.k_I, z), mul(gains.k_D, d))),
+        )
+        return tau, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        """Twelve rates: z_dot = nu_err, then x_dot = omega_f (nu_err - x)."""
+        nu_err = sub(nu_d, nu)
+        return nu_err + mul(gains.omega_f, sub(nu_err, vector(state, 6)))
+
+    @staticmethod
+    def body_gains(gains, model):
+        """(K_D, K_f) (6, 6): what multiplies a fast velocity error, and no adaptation."""
+        k_P, k_D, omega_f = (np.reshape(K, (6, 6)) for K in (gains.k_P, gains.k_D, gains.omega_f))
+        return k_P + k_D @ omega_f, np.zeros((6, 6))
+
+    @staticmethod
+    def check(gains):
+        """Raise ValueError for a filter that is not stable."""
+        smallest = np.linalg.eigvals(np.reshape(gains.omega_f, (6, 6))).real.min()
+        if not smallest > 0:
+            text = f'smallest real part of its eigenvalues {smallest:g}'
+            raise ValueError(f'omega_f: expected a positive cut-off (rad/s), found {text}')

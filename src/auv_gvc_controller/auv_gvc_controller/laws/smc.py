@@ -1,0 +1,84 @@
+"""Adaptive sliding mode without chattering, after Soylu, Buckham & Podhorodeski 2008."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from auv_dynamics.jit import helper
+from auv_dynamics.model import coriolis, damping, restoring
+from auv_dynamics.six import add, mul, sub, vector
+
+
+class SMC(NamedTuple):
+    """Gains, each (36,) row-major: k_D in N s/m, Lambda in 1/s, Gamma in N/m; two have defaults.
+
+    k_S in N and N m switches inside the boundary layer phi (diagonal, m/s and rad/s; Slotine & Li
+    1991, section 7.2); 0 leaves the adaptive term of Soylu et al. alone.
+    """
+
+    k_D: np.ndarray
+    Lambda: np.ndarray
+    Gamma: np.ndarray
+    k_S: Any = 0.0
+    phi: Any = 0.1
+
+    STATES = 18  # type: ignore[misc]  # no gain, but a constant of the law: z, its integral, that of s
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        """(tau, f): the wrench and its adaptive part, N and N m, body frame."""
+        M = model.dynamics.M
+        z = vector(state, 0)
+        nu_err = sub(nu_d, nu)
+        s = manifold(nu_err, state, gains)
+        nu_r = add(nu, s)
+        twice = mul(gains.Lambda, add(nu_err, nu_err))
+        nu_r_dot = add(nu_d_dot, add(twice, mul(gains.Lambda, mul(gains.Lambda, z))))
+        f = mul(gains.Gamma, vector(state, 12))
+        equivalent = add(
+            add(mul(M, nu_r_dot), coriolis(M, nu, nu_r)),
+            add(damping(model.dynamics, nu, nu_r), restoring(model.dynamics, attitude)),
+        )
+        switched = mul(gains.k_S, saturated(s, gains.phi))
+        return add(add(equivalent, mul(gains.k_D, s)), add(switched, f)), f
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        """Eighteen rates: z_dot = nu_err, z, and s, which f integrates."""
+        nu_err = sub(nu_d, nu)
+        return nu_err + vector(state, 0) + manifold(nu_err, state, gains)
+
+    @staticmethod
+    def body_gains(gains, model):
+        """(K_D, K_f) (6, 6): what multiplies s, steepest inside the layer, and its integral."""
+        k_D, k_S, phi, Gamma = (
+            np.reshape(K, (6, 6)) for K in (gains.k_D, gains.k_S, gains.phi, gains.Gamma)
+        )
+        return k_D + k_S / np.diagonal(phi), Gamma
+
+    @staticmethod
+    def check(gains):
+        """Raise ValueError for a boundary layer that is no positive diagonal."""
+        phi = np.reshape(gains.phi, (6, 6))
+        if np.any(phi != np.diag(np.diagonal(phi))) or not np.all(np.diagonal(phi) > 0):
+            raise ValueError('phi: expected a positive number or 6 of them, found other numbers')
+
+
+@helper
+def manifold(nu_err, state, gains):
+    """S = (d/dt + Lambda)^2 of the integral of z: nu_err + 2 Lambda z + Lambda^2 integral(z)."""
+    z, Z = vector(state, 0), vector(state, 6)
+    return add(nu_err, mul(gains.Lambda, add(add(z, z), mul(gains.Lambda, Z))))
+
+
+@helper
+def saturated(s, phi):
+    """sat(s / phi) by component, phi (36,) a diagonal."""
+    return (
+        min(max(s[0] / phi[0], -1.0), 1.0),
+        min(max(s[1] / phi[7], -1.0), 1.0),
+        min(max(s[2] / phi[14], -1.0), 1.0),
+        min(max(s[3] / phi[21], -1.0), 1.0),
+        min(max(s[4] / phi[28], -1.0), 1.0),
+        min(max(s[5] / phi[35], -1.0), 1.0),
+    )

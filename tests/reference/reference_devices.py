@@ -1,0 +1,113 @@
+"""Actuators, anti-windup and sensors at the samples of a zero-order hold (docs/model.md)."""
+
+from __future__ import annotations
+
+from math import exp
+from typing import Any
+
+import numpy as np
+from reference_vehicle import Array, rodrigues
+
+NOISE_OF_ROUNDING = 1e-12  # of the largest element of tau: what lies below decides nothing
+
+
+def thruster_matrix(thrusters: list[dict[str, Any]]) -> tuple[Array, Array, Array]:
+    """T (6, n) and the lowest and highest thrusts (n,), N."""
+    columns, lowest, highest = [], [], []
+    for one in thrusters:
+        direction = np.asarray(one['direction'], dtype=float)
+        direction = direction / np.linalg.norm(direction)
+        lever = np.cross(np.asarray(one['position'], dtype=float), direction)
+        columns.append(np.concatenate((direction, lever)))
+        reverse, forward = np.broadcast_to(np.abs(np.asarray(one['limit'], dtype=float)), 2)
+        lowest.append(-reverse)
+        highest.append(forward)
+    return np.array(columns).T, np.array(lowest), np.array(highest)
+
+
+class Actuators:
+    """Delay, thrusters, limit, lag and rate, in this order; call once per sample."""
+
+    def __init__(self, spec: dict[str, Any], vehicle: dict[str, Any], h: float):
+        unknown = set(spec) - {'limit', 'rate', 'lag', 'delay', 'thrusters'}
+        if unknown:
+            raise ValueError(f'actuators do not know {sorted(unknown)}')
+        self.limit = np.broadcast_to(np.asarray(spec.get('limit', np.inf), dtype=float), 6)
+        self.rate = h * np.broadcast_to(np.asarray(spec.get('rate', np.inf), dtype=float), 6)
+        lag, delay = float(spec.get('lag', 0.0)), float(spec.get('delay', 0.0))
+        self.factor = 1.0 - exp(-h / lag) if lag > 0.0 else 1.0
+        steps = round(delay / h)
+        if abs(steps * h - delay) > 1e-9:
+            raise ValueError('the delay must be a whole number of steps')
+        self.under_way = [np.zeros(6)] * steps
+        self.applied = np.zeros(6)
+        self.T: Array | None = None
+        if spec.get('thrusters', False):
+            if 'thrusters' not in vehicle:
+                raise ValueError('thrusters: true needs a vehicle file with thrusters')
+            self.T, self.lowest, self.highest = thruster_matrix(vehicle['thrusters'])
+            self.T_plus = np.linalg.pinv(self.T)
+        self.cuts = self.T is not None or bool(np.isfinite(self.limit).any())
+
+    def saturate(self, tau: Array) -> Array:
+        """What thrusters and limits let through of tau, at once."""
+        if self.T is not None:
+            u = self.T_plus @ tau
+            share = 1.0
+            for thrust, low, high in zip(u, self.lowest, self.highest, strict=True):
+                if thrust > high:
+                    share = min(share, high / thrust)
+                elif thrust < low:
+                    share = min(share, low / thrust)
+            tau = self.T @ (share * u)
+        return np.clip(tau, -self.limit, self.limit)
+
+    def __call__(self, tau: Array) -> Array:
+        """a_k of tau_k, N and N m."""
+        self.under_way.append(tau)
+        step = self.factor * (self.saturate(self.under_way.pop(0)) - self.applied)
+        self.applied = self.applied + np.clip(step, -self.rate, self.rate)
+        return self.applied
+
+
+def not_wound_up(answer, x: Array, tau: Array, x_dot: Array, cut: Array, h: float) -> Array:
+    """x_dot without the states that would push tau further beyond cut, the saturated tau.
+
+    Readings: an axis is cut, and a change counts, if larger than rounding; an axis where tau is
+    zero to rounding cannot be weighted by 1 / tau^2 and is left out.
+    """
+    small = NOISE_OF_ROUNDING * np.abs(tau).max()
+    axes = [i for i in range(6) if abs(tau[i] - cut[i]) > small and abs(tau[i]) > small]
+    kept = x_dot.copy()
+    for j in range(len(x) if axes else 0):
+        ahead = x.copy()
+        ahead[j] += h * x_dot[j]
+        change = answer(ahead)[0] - tau
+        change[np.abs(change) <= small] = 0.0
+        if sum((tau[i] - cut[i]) / tau[i] ** 2 * change[i] for i in axes) > 0.0:
+            kept[j] = 0.0
+    return kept
+
+
+class Sensors:
+    """Noise on velocity and attitude, and lost samples; call once per sample."""
+
+    def __init__(self, spec: dict[str, Any], seed: int):
+        unknown = set(spec) - {'velocity_noise', 'attitude_noise', 'drop_out'}
+        if unknown:
+            raise ValueError(f'sensors do not know {sorted(unknown)}')
+        noise, loss = np.random.SeedSequence(seed).spawn(2)
+        self.noise = np.random.Generator(np.random.PCG64(noise))
+        self.loss = np.random.Generator(np.random.PCG64(loss))
+        self.velocity = np.broadcast_to(np.asarray(spec.get('velocity_noise', 0.0), float), 6)
+        self.attitude = np.broadcast_to(np.asarray(spec.get('attitude_noise', 0.0), float), 3)
+        self.drop_out = float(spec.get('drop_out', 0.0))
+        self.last: tuple[Array, Array, Array] | None = None
+
+    def __call__(self, position: Array, R: Array, nu: Array) -> tuple[Array, Array, Array]:
+        """Measured position, rotation body to NED, and velocity; both generators always turn."""
+        normal, uniform = self.noise.standard_normal(9), self.loss.random()
+        if self.last is None or uniform >= self.drop_out:
+            turned = R @ rodrigues(self.attitude * normal[6:])  # q exp(noise / 2), as matrices
+            self.last = position.copy(), turned, nu + self.velocity * normal[:6]
+        return self.last

@@ -1,38 +1,13 @@
 """Closed loops against the independent implementation, for many kinds of scenario."""
 
-from dataclasses import replace
-
-import herman_reference as reference
 import numpy as np
 import pytest
-import yaml
+from closed_loops import FULL, HARMONIC, PER_AXIS, SIX, TURNED, file_of, pair, wave
 from hypothesis import given, settings
 from numpy.testing import assert_allclose
 from strategies import QUICK, gains, vehicles
 
-from auv_analysis import load_scenario, simulate
-from auv_dynamics.config import shipped
-from auv_dynamics.vehicle_file import vehicle_from_dict
-
-PAPER = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 SERIES = ('t', 'nu', 'nu_d', 'tau', 'disturbance', 'disturbance_estimate', 'eta')
-
-
-def wave(offset: float, amplitude: float, omega: float, phase: float = 0.0) -> dict:
-    return {'offset': offset, 'terms': [{'amplitude': amplitude, 'omega': omega, 'phase': phase}]}
-
-
-SIX = {
-    'surge': wave(0.3, 0.4, 0.5), 'sway': wave(-0.1, 0.2, 0.7, 1.0), 'heave': wave(0.1, 0.3, 0.4),
-    'roll': wave(0.0, 0.2, 0.9), 'pitch': wave(0.02, 0.15, 0.8, 2.0), 'yaw': wave(0.1, 0.2, 0.6),
-}  # fmt: skip
-HARMONIC = {'kind': 'harmonic', 'sway': wave(25.0, 40.0, 0.8), 'pitch': wave(-8.0, 5.0, 1.5, 0.4)}
-DENSE = 0.1 * np.ones((6, 6)) + np.diag([1.0, 1.1, 0.9, 1.2, 0.8, 1.0])
-PER_AXIS = {'k_D': [8, 10, 12, 6, 9, 11], 'k_I': [1, 2, 3, 4, 5, 6],
-            'Lambda': [0.5, 0.6, 0.7, 0.8, 0.9, 1], 'Gamma': [30, 40, 50, 60, 70, 80]}  # fmt: skip
-FULL = {'k_D': (9.0 * DENSE).tolist(), 'k_I': (2.0 * DENSE).tolist(),
-        'Lambda': (0.7 * DENSE).tolist(), 'Gamma': (40.0 * DENSE).tolist()}  # fmt: skip
-TURNED = {'eta': [1.0, -2.0, 3.0, 0.4, -0.5, 2.5], 'nu': [0.4, -0.3, 0.2, 0.1, -0.2, 0.3]}
 
 VARIANTS = {
     'initial attitude and velocity': {'initial': TURNED},
@@ -46,21 +21,6 @@ VARIANTS = {
     'other disturbances': {'disturbance': [HARMONIC, {'kind': 'herman2018', 'exponent_sign': 1}]},
     'no disturbance': {'disturbance': []},
 }
-
-
-def file_of(vehicle: str) -> dict:
-    return yaml.safe_load(shipped('vehicles', vehicle).read_text(encoding='utf-8'))
-
-
-def pair(law, hold, vehicle, **changes):
-    """(ours, theirs) of one controller of case1 with some of its entries replaced."""
-    base = load_scenario(changes.pop('base', 'case1'))
-    values = changes.pop('gains', None)
-    data = base.data | {'duration': 3.0} | changes
-    if values is not None:
-        data['controllers'] = {law: values | {'law': law}}
-    scenario = replace(base, vehicle=vehicle_from_dict(vehicle, 'vehicle.yaml'), data=data)
-    return simulate(scenario, law, hold), reference.simulate(vehicle, data, law, hold)
 
 
 def check(ours, theirs, tolerance=1e-8, series=SERIES) -> None:

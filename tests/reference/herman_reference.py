@@ -226,7 +226,7 @@ def simulate(
         tau, rate, f = answer(x[n + 6 :])
         applied = actuators(tau)
         if actuators.cuts and entry.get('anti_windup', True):
-            rate = not_wound_up(answer, x[n + 6 :], tau, rate, actuators.saturate(tau), h)
+            rate = not_wound_up(answer, x[n + 6 :], tau, rate, actuators, entry['law'])
         nu_dot = plant.acceleration(t[k], R, nu, applied)
         model = known['M'] @ nu_dot + (coriolis(known['M'], nu) + damping(known, nu)) @ nu
         for name, row in {

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from reference_vehicle import Array, rodrigues
 
-NOISE_OF_ROUNDING = 1e-12  # of the largest element of tau: what lies below decides nothing
+NOISE_OF_ROUNDING = 1e-9  # of the sum of all |d|: what lies below is not cut
+INTEGRALS = {'pid': 6}  # of the law's states; of the other laws all
 
 
 def thruster_matrix(thrusters: list[dict[str, Any]]) -> tuple[Array, Array, Array]:
@@ -52,7 +53,7 @@ class Actuators:
     def saturate(self, tau: Array) -> Array:
         """What thrusters and limits let through of tau, at once."""
         if self.T is not None:
-            u = self.T_plus @ tau
+            u = self.T_plus @ tau  # thrusts
             share = 1.0
             for thrust, low, high in zip(u, self.lowest, self.highest, strict=True):
                 if thrust > high:
@@ -62,6 +63,10 @@ class Actuators:
             tau = self.T @ (share * u)
         return np.clip(tau, -self.limit, self.limit)
 
+    def demand(self, tau: Array) -> Array:
+        """What tau asks of the actuators: the part that the thrusters span."""
+        return tau if self.T is None else self.T @ (self.T_plus @ tau)
+
     def __call__(self, tau: Array) -> Array:
         """a_k of tau_k, N and N m."""
         self.under_way.append(tau)
@@ -70,21 +75,21 @@ class Actuators:
         return self.applied
 
 
-def not_wound_up(answer, x: Array, tau: Array, x_dot: Array, cut: Array, h: float) -> Array:
-    """x_dot without the states that would push tau further beyond cut, the saturated tau.
-
-    Readings: an axis is cut, and a change counts, if larger than rounding; an axis where tau is
-    zero to rounding cannot be weighted by 1 / tau^2 and is left out.
-    """
-    small = NOISE_OF_ROUNDING * np.abs(tau).max()
-    axes = [i for i in range(6) if abs(tau[i] - cut[i]) > small and abs(tau[i]) > small]
+def not_wound_up(
+    answer, x: Array, tau: Array, x_dot: Array, actuators: Actuators, law: str
+) -> Array:
+    """x_dot without the integrals of cut axes that would push them further out."""
+    wanted, had = actuators.demand(tau), actuators.saturate(tau)
+    excess = wanted - had
     kept = x_dot.copy()
-    for j in range(len(x) if axes else 0):
+    for j in range(INTEGRALS.get(law, len(x))):
+        axis = j % 6
+        if abs(excess[axis]) <= NOISE_OF_ROUNDING * np.abs(wanted).sum():
+            continue
         ahead = x.copy()
-        ahead[j] += h * x_dot[j]
-        change = answer(ahead)[0] - tau
-        change[np.abs(change) <= small] = 0.0
-        if sum((tau[i] - cut[i]) / tau[i] ** 2 * change[i] for i in axes) > 0.0:
+        ahead[j] += x_dot[j]
+        change = actuators.demand(answer(ahead)[0])[axis] - wanted[axis]
+        if excess[axis] * change > 0.0:
             kept[j] = 0.0
     return kept
 

@@ -123,16 +123,29 @@ def test_anti_windup_keeps_the_integrals_of_a_cut_axis(entry, surge):
     assert left[1] > 0.5
 
 
-def test_a_state_that_pulls_back_goes_on():
-    """Cut at +1 in surge: of two states only the one that adds to tau stops; no cut, none stops."""
-    tau, rate = np.array([2.0, 0, 0, 0, 0, 0]), np.array([1.0, -1.0, 3.0])
+def test_only_an_integral_of_the_cut_axis_that_adds_to_it_stops():
+    """Cut at +1 in surge: z_surge adds and stops, S_surge pulls back, z_sway is of another axis."""
+    tau, rate = np.array([2.0, 0.5, 0, 0, 0, 0]), np.zeros(12)
+    rate[[0, 6, 1]] = 1.0, -1.0, 3.0
 
     def answer(x):
-        return tau + np.array([x[0] + x[1], 0, 0, x[2], 0, 0]), rate, None
+        return tau + np.array([x[0] + x[6] + x[1], x[1], 0, 0, 0, 0]), rate, None
 
-    kept = reference.not_wound_up(answer, np.zeros(3), tau, rate, np.clip(tau, -1, 1), H)
-    assert_array_equal(kept, [0.0, -1.0, 3.0])
-    assert_array_equal(reference.not_wound_up(answer, np.zeros(3), tau, rate, tau, H), rate)
+    one, wide = (reference.Actuators({'limit': limit}, {}, H) for limit in (1.0, 5.0))
+    kept = reference.not_wound_up(answer, np.zeros(12), tau, rate, one, 'cl')
+    assert_array_equal(kept, [0.0, 3.0, 0, 0, 0, 0, -1.0, 0, 0, 0, 0, 0])
+    assert_array_equal(reference.not_wound_up(answer, np.zeros(12), tau, rate, wide, 'cl'), rate)
+
+
+def test_the_filter_of_pid_is_no_integral():
+    tau, rate = np.full(6, 2.0), np.ones(12)
+
+    def answer(x):
+        return tau + x[:6] + x[6:], rate, None
+
+    one = reference.Actuators({'limit': 1.0}, {}, H)
+    kept = reference.not_wound_up(answer, np.zeros(12), tau, rate, one, 'pid')
+    assert_array_equal(kept, [0.0] * 6 + [1.0] * 6)
 
 
 def test_rounding_of_the_allocation_stops_nothing():
@@ -155,19 +168,6 @@ def test_anti_windup_does_not_know_lag_rate_and_delay():
     z = 0.01 * np.cumsum(one['nu_d'] - one['nu'], axis=0)[:-1]
     assert np.abs(one['tau'] - one['tau_applied']).max() > 100.0
     assert_allclose(one['law_state'][1:, :6], z, atol=1e-13)
-
-
-def test_axes_are_weighted_by_how_far_they_are_cut():
-    """(2 - 1) / 2^2 * 1 against (10 - 9) / 10^2 * -20: 0.25 - 0.2 > 0 stops, -30 does not."""
-    tau = np.array([2.0, 10.0, 0, 0, 0, 0])
-    cut = np.array([1.0, 9.0, 0, 0, 0, 0])
-    for pull, kept in ((-20.0, 0.0), (-30.0, 1.0)):
-
-        def answer(x, pull=pull):
-            return tau + np.array([x[0], pull * x[0], 0, 0, 0, 0]), np.ones(1), None
-
-        found = reference.not_wound_up(answer, np.zeros(1), tau, np.ones(1), cut, H)
-        assert found[0] == kept
 
 
 def product(p, q):

@@ -134,7 +134,7 @@ def fill_continuous(truth, gains, model, grid, tableau, x, log):
 
 
 @compiled
-def fill_held(truth, actuators, memory, gains, model, reach, grid, tableau, x, log):
+def fill_held(truth, actuators, memory, gains, model, guard, grid, tableau, x, log):
     """Run the loop with the law at the samples, the wrench held between; x (13 + m,) in place."""
     stages, trial = np.zeros((tableau.b.shape[0], SIZE)), np.zeros(SIZE)
     last = grid.t.shape[0] - 1
@@ -151,7 +151,7 @@ def fill_held(truth, actuators, memory, gains, model, reach, grid, tableau, x, l
         dt = grid.step if k > 0 else 0.0
         tau, f = fill_sample(
             grid.t[k, 0], dt, vector(measured, 7), attitude_of(measured), nu_d, nu_d_dot,
-            state, rate, gains, model, reach,
+            state, rate, gains, model, guard,
         )  # fmt: skip
         applied = fill_applied(actuators, k, tau, memory)
         fill_log(log, k, truth, body, measured, state, tau, applied, f, F, current)

@@ -15,7 +15,7 @@ from auv_dynamics.kinematics import unwrapped
 from auv_dynamics.plant import SIZE, eta_of, initial_state
 from auv_dynamics.sensors import WIDTH
 from auv_gvc_controller.model import control_model
-from auv_gvc_controller.sampled import is_compiled
+from auv_gvc_controller.sampled import anti_windup, is_compiled
 
 Hold = Literal['continuous', 'zoh']
 HOLDS = ('continuous', 'zoh')
@@ -108,9 +108,9 @@ def _run_kernel(
         if hold == 'continuous':
             kernel(fill_continuous)(truth, gains, model, grid, tableau, x, log)
         else:
-            reach = scenario.reach(controller)
+            guard = anti_windup(gains, scenario.reach(controller))
             kernel(fill_held)(
-                truth, actuators, memory(actuators), gains, model, reach, grid, tableau, x, log
+                truth, actuators, memory(actuators), gains, model, guard, grid, tableau, x, log
             )
 
 

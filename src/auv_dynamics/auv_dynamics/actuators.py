@@ -126,24 +126,52 @@ def _clipped(a, most):
 
 
 @helper
-def allocated(reach, tau):
-    """T u with u = T^+ tau, scaled down together until every thrust is within its limits."""
+def thrusts(reach, tau):
+    """U = T^+ tau (n,) in N, without limits."""
     count = reach.T.shape[1]
-    if count == 0:
-        return tau
     u = np.zeros(count)
-    share = 1.0
     for i in range(count):
         for j in range(6):
             u[i] += reach.T_inv[i, j] * tau[j]
+    return u
+
+
+@helper
+def share_within(reach, u):
+    """Largest share of the thrusts u, at most 1, that is within every thruster's limits."""
+    share = 1.0
+    for i in range(u.shape[0]):
         most = reach.forward[i] if u[i] > 0 else reach.reverse[i]
         if abs(u[i]) * share > most:
             share = most / abs(u[i])
-    delivered = np.zeros(6)
+    return share
+
+
+@helper
+def delivered(reach, u, share):
+    """T u, scaled: six floats, N and N m."""
+    total = np.zeros(6)
     for j in range(6):
-        for i in range(count):
-            delivered[j] += reach.T[j, i] * u[i] * share
-    return vector(delivered, 0)
+        for i in range(u.shape[0]):
+            total[j] += reach.T[j, i] * u[i] * share
+    return vector(total, 0)
+
+
+@helper
+def demanded(reach, tau):
+    """T T^+ tau: the part of the command that the thrusters could deliver, had they no limits."""
+    if reach.T.shape[1] == 0:
+        return tau
+    return delivered(reach, thrusts(reach, tau), 1.0)
+
+
+@helper
+def allocated(reach, tau):
+    """T u with u = T^+ tau, scaled down together until every thrust is within its limits."""
+    if reach.T.shape[1] == 0:
+        return tau
+    u = thrusts(reach, tau)
+    return delivered(reach, u, share_within(reach, u))
 
 
 @helper

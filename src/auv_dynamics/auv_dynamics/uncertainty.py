@@ -13,6 +13,7 @@ from auv_dynamics.jit import helper
 from auv_dynamics.model import Model, acceleration, coriolis, damping, restoring
 from auv_dynamics.six import add, mul, sub, vector
 from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.vehicle_file import ASYMMETRY
 
 APART = ('mass', 'added_mass', 'damping')  # relative errors, for M_RB and M_A given apart
 
@@ -104,7 +105,7 @@ def _check(
                 expected = 'dM and dD for a vehicle given by inertia_matrix'
                 raise InputError(file, f'{place}.{key}', expected, 'a relative error')
         dM = matrix6(spec.get('dM', 0.0))
-        if np.abs(dM - dM.T).max() > 1e-9 * np.abs(dM).max():
+        if np.abs(dM - dM.T).max() > ASYMMETRY * np.abs(dM).max():
             raise InputError(file, f'{place}.dM', 'a symmetric matrix', 'an asymmetric one')
     if spec['kind'] == 'current' and varies(spec):
         key = next(axis for axis in ('north', 'east', 'down') if axis in spec)
@@ -125,11 +126,12 @@ def _with_errors(vehicle: Vehicle, errors: Sequence[Mapping[str, Any]]) -> tuple
         M = M_RB + vehicle.M_A * (1 + _sum(errors, 'added_mass'))
     if not errors:
         return vehicle.model, M_RB
+    dM = np.sum([matrix6(error.get('dM', 0.0)) for error in errors], axis=0)
     drag = 1 + _sum(errors, 'damping')
     weight = vehicle.weight * (1 + _sum(errors, 'mass'))
     buoyancy = vehicle.buoyancy * (1 + _sum(errors, 'buoyancy'))
     plant = vehicle.changed(
-        M=M + sum(matrix6(error.get('dM', 0.0)) for error in errors),
+        M=M + (dM + dM.T) / 2,
         D_linear=vehicle.D_linear * drag + sum(matrix6(error.get('dD', 0.0)) for error in errors),
         D_quadratic=vehicle.D_quadratic * drag,
         weight=weight,

@@ -1,13 +1,15 @@
 """A law between samples: zero-order hold, as the nodes and `simulate(hold='zoh')` run it."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.actuators import Reach, make_reach, reachable
+from auv_dynamics.actuators import Reach, demanded, make_reach, reachable
 from auv_dynamics.jit import JITTED, compiled, jitable, specialised
 from auv_gvc_controller.laws import SHIPPED
 from auv_gvc_controller.model import ControlModel
+
+ROUNDING = 1e-9
 
 
 @specialised('gains')
@@ -23,11 +25,39 @@ def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
     return type(gains).state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
 
 
+class AntiWindup(NamedTuple):
+    """What stops a law's integrals.
+
+    Attributes
+    ----------
+    integrals : how many of the law's states, the first ones, are integrals: blocks of six, one
+        per axis; 0: nothing is stopped
+    reach : which wrenches can be had
+
+    """
+
+    integrals: int
+    reach: Reach
+
+
+def anti_windup(gains: Any, reach: Reach | None) -> AntiWindup:
+    """Anti-windup of a law whose actuators are known; None: off.
+
+    A law says how many of its states are integrals in `INTEGRALS`; without it all are, where
+    their number is a multiple of six.
+    """
+    if reach is None or not reach.bounded:
+        return AntiWindup(0, make_reach(None, None))
+    law = type(gains)
+    integrals = getattr(law, 'INTEGRALS', law.STATES - law.STATES % 6)
+    return AntiWindup(integrals, reach)
+
+
 @jitable
-def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model, reach):
+def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model, guard):
     """Take one sample: state += dt * rate of the last sample, in place, then (tau, f).
 
-    `rate` receives the rate at this sample; dt = 0 at the first one.
+    `rate` receives the rate at this sample, as anti-windup lets it; dt = 0 at the first one.
     """
     for i in range(state.shape[0]):
         state[i] += dt * rate[i]
@@ -35,33 +65,32 @@ def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model, 
     change = state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
     for i in range(state.shape[0]):
         rate[i] = change[i]
-    if reach.bounded:
-        had = reachable(reach, tau)
-        if had != tau:
-            for i in range(state.shape[0]):
-                kept = state[i]
-                state[i] = kept + rate[i]
+    if guard.integrals > 0:
+        reach = guard.reach
+        wanted, had = demanded(reach, tau), reachable(reach, tau)
+        for j in range(guard.integrals):
+            if cut(wanted, had, j % 6):
+                kept = state[j]
+                state[j] = kept + rate[j]
                 ahead, _ = wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
-                state[i] = kept
-                if pushes_out(tau, had, ahead):
-                    rate[i] = 0.0
+                state[j] = kept
+                pushed = demanded(reach, ahead)[j % 6] - wanted[j % 6]
+                if pushed * (wanted[j % 6] - had[j % 6]) > 0.0:
+                    rate[j] = 0.0
     return tau, f
 
 
 @jitable
-def pushes_out(tau, had, ahead):
-    """Whether the wrench `ahead` lies further beyond what can be had than tau does.
+def cut(wanted, had, i):
+    """Whether the actuators keep axis i from what is wanted, by more than rounding.
 
-    Conditional integration (Astrom & Hagglund 2006, section 3.5; Visioli 2006, chapter 3), asked
-    of one state of the law: over the axes that are cut, (tau - had)/tau^2 * (ahead - tau) > 0.
+    Conditional integration (Astrom & Hagglund 2006, section 3.5; Visioli 2006, chapter 3): an
+    integral of such an axis stops while it would push the wrench further out.
     """
-    rounding, push = 0.0, 0.0
-    for i in range(6):
-        rounding += 1e-9 * abs(tau[i])
-    for i in range(6):
-        if abs(tau[i] - had[i]) > rounding:
-            push += (tau[i] - had[i]) / (tau[i] * tau[i]) * (ahead[i] - tau[i])
-    return push > 0.0
+    total = 0.0
+    for j in range(6):
+        total += abs(wanted[j])
+    return abs(wanted[i] - had[i]) > ROUNDING * total
 
 
 compiled_sample = compiled(fill_sample)
@@ -89,7 +118,7 @@ class SampledLaw:
 
     def __init__(self, gains: Any, model: ControlModel, reach: Reach | None = None):
         self._gains, self._model = gains, model
-        self._reach = reach or make_reach(None, None)
+        self._guard = anti_windup(gains, reach)
         self._sample = compiled_sample if is_compiled(gains) else fill_sample
         self.reset()
         if is_compiled(gains):
@@ -129,7 +158,7 @@ class SampledLaw:
         with np.errstate(all='ignore'):
             tau, f = self._sample(
                 t, dt, nu, attitude, nu_d, nu_d_dot, state, rate,
-                self._gains, self._model, self._reach,
+                self._gains, self._model, self._guard,
             )  # fmt: skip
         if not np.all(np.isfinite([*tau, *f, *state, *rate])):
             raise ArithmeticError(f'the law gave a wrench that is not finite: {tau}')

@@ -22,6 +22,7 @@ class PID(NamedTuple):
     k_FF: Any = 1.0
 
     STATES = 12  # type: ignore[misc]  # no gain, but a constant of the law: z, then the filter's x
+    INTEGRALS = 6  # type: ignore[misc]  # only z: the filter is no integral
 
     @staticmethod
     def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):

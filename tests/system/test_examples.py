@@ -47,23 +47,25 @@ def test_stub_driver_is_controlled(tmp_path: Path) -> None:
     assert reached == pytest.approx(0.4, abs=0.05)
 
 
-def test_the_law_of_the_readme_runs_in_process_and_on_the_nodes(tmp_path: Path) -> None:
+def test_the_law_of_the_readme_is_the_example_and_short() -> None:
     text = (EXAMPLES.parent / 'README.md').read_text()
-    (tmp_path / 'my_module.py').write_text(re.search(r'```python\n(.*?)```', text, re.DOTALL)[1])
-    scenario = {
-        'name': 'mine', 'vehicle': 'herman2018_neutral', 'duration': 2.0, 'step': 0.01,
-        'controllers': {'mine': {'law': 'my_module:MyLaw', 'k_P': 900.0}},
-        'setpoint': {'surge': {'offset': 0.5}},
-    }  # fmt: skip
-    (tmp_path / 'mine.yaml').write_text(yaml.safe_dump(scenario))
+    law = (EXAMPLES / 'own_law.py').read_text()
+    assert re.search(r'```python\n(.*?)```', text, re.DOTALL)[1] == law
+    assert len(law.splitlines()) < 40
+
+
+def test_own_law_runs_in_process_and_on_the_nodes(tmp_path: Path) -> None:
+    for name in ('own_law.py', 'own_law.yaml'):
+        shutil.copy(EXAMPLES / name, tmp_path)
     reached = {}
     for how in (['simulate', '--hold', 'zoh'], ['run']):
-        ended = auv(how[0], 'mine.yaml', *how[1:], '--json', '--out', how[0], cwd=tmp_path)
+        ended = auv(how[0], 'own_law.yaml', *how[1:], '--json', '--out', how[0], cwd=tmp_path)
         assert ended.returncode == 0, ended.stderr
-        reached[how[0]] = json.loads(ended.stdout)['mine']['velocity_error']['rms'][0]
-    assert 'MyLaw runs as plain Python' in ended.stderr
-    assert 0 < reached['run'] < 0.3
-    assert reached['run'] == pytest.approx(reached['simulate'], rel=1e-9)
+        assert 'ComputedTorque runs as plain Python' in ended.stderr
+        reached[how[0]] = json.loads(ended.stdout)['mine']['velocity_error']
+    assert reached['run']['rms'] == pytest.approx(reached['simulate']['rms'], rel=1e-9, abs=1e-12)
+    assert 0 < reached['run']['rms'][0] < 0.2
+    assert max(reached['run']['max_after_2s']) < 0.2
 
 
 @pytest.mark.skipif(shutil.which('ros2') is None, reason='no ros2 command: it has no wheel')

@@ -136,7 +136,7 @@ def simulate(options: argparse.Namespace) -> dict[str, Any]:
     scenario, names = _open(options)
     out = _prepare(options, scenario, names)
     write_inputs(scenario, out)
-    announce()
+    announce(scenario, names)
     runs = {}
     for name in names:
         with console.status(f'{scenario.name} {name}: simulating'):

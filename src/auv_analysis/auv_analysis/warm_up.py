@@ -14,8 +14,13 @@ from auv_gvc_controller.sampled import SampledLaw, is_compiled
 NOTICE_AFTER = 1.0  # s: a cached kernel is loaded faster than that
 
 
-def announce() -> None:
+def announce(scenario: Scenario, controllers: list[str]) -> None:
     """Say how the kernel runs where that costs time: not compiled, or to be compiled first."""
+    for name in controllers:
+        gains = scenario.gains(name)
+        if JITTED and not is_compiled(gains):
+            law = type(gains).__name__
+            print(f'{name}: the law {law} runs as plain Python', file=sys.stderr)
     if not JITTED:
         print('numba is not installed: the kernel runs as plain Python, slower', file=sys.stderr)
     elif not any(cache_folder().glob('**/*.nbi')):
@@ -24,7 +29,7 @@ def announce() -> None:
 
 def warm_up(scenario: Scenario, controllers: list[str]) -> None:
     """Load or compile the kernel for one step of each law; say so when it takes time."""
-    announce()
+    announce(scenario, controllers)
     if not JITTED:
         return
     begin = time.monotonic()
@@ -33,9 +38,6 @@ def warm_up(scenario: Scenario, controllers: list[str]) -> None:
         gains = scenario.gains(name)
         if is_compiled(gains):
             SampledLaw(gains, model, scenario.reach(name))
-        else:
-            law = type(gains).__name__
-            print(f'{name}: the law {law} runs as plain Python', file=sys.stderr)
     x = initial_state(np.zeros(6), np.zeros(6))
     integrator = scenario.data['integrator']
     noise = scenario.noise()

@@ -9,6 +9,7 @@ import numpy as np
 from auv_dynamics.jit import plain
 from auv_dynamics.kinematics import quaternion
 from auv_dynamics.model import Model, acceleration, coriolis, damping, restoring
+from auv_dynamics.thrusters import Thrusters
 
 
 def skew(a: np.ndarray) -> np.ndarray:
@@ -52,6 +53,7 @@ class Vehicle:
     r_G, r_B : (3,) centres of gravity and buoyancy, m
     M_RB, M_A : (6, 6) rigid-body and added part of M, None where a file gives M itself
     warnings : what the loader found odd, one line each
+    thrusters : the file's, None where it gives none
 
     """
 
@@ -68,6 +70,7 @@ class Vehicle:
     M_A: np.ndarray | None = None
     thrusters: Any = None
     warnings: tuple[str, ...] = field(default=())
+    thrusters: Thrusters | None = None
 
     @cached_property
     def model(self) -> Model:

@@ -7,6 +7,7 @@ import numpy as np
 
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError, check, matrix6, read_yaml
+from auv_dynamics.thrusters import Thrusters, thrusters_of
 from auv_dynamics.vehicle import Vehicle, rigid_body_matrix, skew
 
 SCHEMA = Path(__file__).with_name('vehicle.schema.json')
@@ -52,6 +53,7 @@ def vehicle_from_dict(data: dict[str, Any], file: object) -> Vehicle:
     buoyancy = environment['water_density'] * environment['gravity'] * water['volume']
     D_linear, D_quadratic = source.damping()
     source.warn_buoyancy(weight, buoyancy)
+    thrusters = source.thrusters()
     return Vehicle(
         name=data['name'],
         source=data.get('source', ''),
@@ -65,6 +67,7 @@ def vehicle_from_dict(data: dict[str, Any], file: object) -> Vehicle:
         M_RB=M_RB,
         M_A=M_A,
         warnings=tuple(source.warnings),
+        thrusters=thrusters,
     )
 
 
@@ -140,6 +143,14 @@ class _Source:
         self._check_semidefinite('damping.linear', (linear + linear.T) / 2)
         self._warn_quadratic(quadratic)
         return linear, quadratic
+
+    def thrusters(self) -> Thrusters | None:
+        if 'thrusters' not in self._data:
+            return None
+        thrusters, warnings = thrusters_of(self._data['thrusters'], self._file)
+        for key, text in warnings:
+            self._warn(key, text)
+        return thrusters
 
     def _check_semidefinite(self, key: str, A: np.ndarray) -> None:
         smallest = np.linalg.eigvalsh(A)[0]

@@ -49,6 +49,8 @@ def parser() -> argparse.ArgumentParser:
     params.add_argument('scenario', help=SCENARIO)
     params.add_argument('--controller', required=True)
     params.add_argument('--real-time', action='store_true', help='paced by the clock')
+    check = command('check-vehicle', 'inertia, couplings and limits of a vehicle', writes=False)
+    check.add_argument('vehicle', metavar='FILE', help='a vehicle file, or a shipped bare name')
     return main
 
 
@@ -59,7 +61,7 @@ def main(arguments: list[str] | None = None) -> None:
     from auv_dynamics.files import InputError
 
     try:
-        result = getattr(commands, options.command)(options)
+        result = getattr(commands, options.command.replace('-', '_'))(options)
     except InputError as error:
         _say(str(error))
         sys.exit(2)

@@ -23,6 +23,7 @@ from rich.progress import (
 )
 from rich.table import Table
 
+from auv_analysis import vehicle_check
 from auv_analysis.bag import bag_files, load_run, read_bag
 from auv_analysis.domain import VARIABLE, chosen_domain
 from auv_analysis.experiment import environment, run_controller, write_inputs
@@ -33,6 +34,7 @@ from auv_analysis.scenario import Scenario, load_scenario
 from auv_analysis.simulation import simulate as simulate_run
 from auv_analysis.summary import summarize
 from auv_analysis.supervisor import NodeDiedError
+from auv_analysis.vehicle_table import print_check
 from auv_analysis.warm_up import announce, warm_up
 from auv_dynamics.files import InputError, reason
 from auv_dynamics.signals import DOFS
@@ -282,3 +284,11 @@ def params(options: argparse.Namespace) -> dict[str, Any]:
     elif not options.json:
         print(text, end='')
     return parameters
+
+
+def check_vehicle(options: argparse.Namespace) -> dict[str, Any]:
+    """What a vehicle file says about how it can be controlled."""
+    document = vehicle_check.check_vehicle(options.vehicle)
+    if not options.json:
+        print_check(document)
+    return document

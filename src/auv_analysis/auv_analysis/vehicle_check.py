@@ -1,0 +1,199 @@
+"""What a vehicle file says: inertia, couplings, hydrostatics, damping, thrusters, largest step."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.coupling import NEGLIGIBLE, structural_zeros
+from auv_analysis.scaling import RINGS, UNSTABLE, sampled_rate
+from auv_dynamics.signals import DOFS
+from auv_dynamics.thrusters import Thrusters
+from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.vehicle_file import load_vehicle
+from auv_gvc_controller.decomposition import decompose, inverse_upper
+
+K_D = 12.0  # k_D of the paper, (36)
+VELOCITY = ('m/s',) * 3 + ('rad/s',) * 3
+WRENCH = ('N',) * 3 + ('N m',) * 3
+
+
+def check_vehicle(name_or_path: str | Path) -> dict[str, Any]:
+    """Properties of a vehicle file that decide how it can be controlled, ready for JSON.
+
+    Parameters
+    ----------
+    name_or_path : a vehicle file, or the bare name of a shipped one
+
+    Returns
+    -------
+    document : name, source, M, N, Upsilon, inertia, couplings, structural_zeros, statement,
+        hydrostatics, damping, thrusters (None without), sampling, warnings; SI units, None for
+        what does not exist (a time constant without damping, a frequency without restoring)
+
+    Raises
+    ------
+    InputError : naming file, key, expected and found
+
+    """
+    vehicle = load_vehicle(name_or_path)
+    Upsilon, N = decompose(vehicle.M)
+    inverse = inverse_upper(Upsilon)
+    couplings = _couplings(Upsilon, inverse)
+    moments = np.linalg.eigvalsh(vehicle.M)
+    return {
+        'name': vehicle.name,
+        'source': vehicle.source,
+        'M': vehicle.M.tolist(),
+        'N': N.tolist(),
+        'Upsilon': Upsilon.tolist(),
+        'inertia': {
+            'eigenvalues': moments.tolist(),
+            'condition_number': float(moments[-1] / moments[0]),
+        },
+        'couplings': couplings,
+        'structural_zeros': structural_zeros(Upsilon, inverse),
+        'statement': _statement(couplings),
+        'hydrostatics': _hydrostatics(vehicle),
+        'damping': _damping(vehicle),
+        'thrusters': None if vehicle.thrusters is None else _thrusters(vehicle.thrusters),
+        'sampling': _sampling(vehicle.M),
+        'warnings': list(vehicle.warnings),
+    }
+
+
+def _couplings(Upsilon: np.ndarray, inverse: np.ndarray) -> list[dict[str, Any]]:
+    """Entries of (33) and (34): delta_xi_i by nu_j, j > i, and delta_pi_i by tau_j, j < i."""
+    found: list[dict[str, Any]] = []
+    for key, weights, units in (
+        ('delta_xi', inverse, VELOCITY),
+        ('delta_pi', Upsilon.T, WRENCH),
+    ):
+        for i, j in zip(*np.nonzero(np.abs(weights - np.eye(6)) > NEGLIGIBLE), strict=True):
+            found.append(
+                {
+                    'from': DOFS[j],
+                    'to': DOFS[i],
+                    key: float(weights[i, j]),
+                    'unit': f'{units[i]} per {units[j]}',
+                }
+            )
+    return found
+
+
+def _statement(couplings: list[dict[str, Any]]) -> str:
+    if not couplings:
+        return (
+            'M is diagonal: Upsilon is the identity and there is no inertial coupling; '
+            'delta_xi and delta_pi are zero in every motion'
+        )
+    number = sum('delta_xi' in entry for entry in couplings)
+    word = 'coupling' if number == 1 else 'couplings'
+    return f'M is not diagonal: {number} {word} of velocities by its inertia'
+
+
+def _hydrostatics(vehicle: Vehicle) -> dict[str, Any]:
+    """N, m, N m: metacentric height is z_G - z_B, positive with the weight below the buoyancy.
+
+    `moment_when_level` acts in roll and pitch at phi = theta = 0; not zero: the vehicle does
+    not float level.
+    """
+    difference = vehicle.buoyancy - vehicle.weight
+    couple = vehicle.weight * vehicle.r_G - vehicle.buoyancy * vehicle.r_B
+    return {
+        'weight': vehicle.weight,
+        'buoyancy': vehicle.buoyancy,
+        'difference': difference,
+        'difference_percent': 100 * difference / vehicle.weight,
+        'r_G': vehicle.r_G.tolist(),
+        'r_B': vehicle.r_B.tolist(),
+        'metacentric_height': float(vehicle.r_G[2] - vehicle.r_B[2]),
+        'moment_when_level': [float(couple[1]), float(0.0 - couple[0])],
+        'modes': _pendulum(vehicle),
+    }
+
+
+def _pendulum(vehicle: Vehicle) -> dict[str, dict[str, float | None]]:
+    """Undamped motion in phi and theta about level: its stiffness M^-1 dg/d(phi, theta), 1/s2.
+
+    The eigenvalue is the square of the natural frequency; negative: the vehicle turns over.
+    """
+    small = 1e-6
+
+    def g(phi: float, theta: float) -> np.ndarray:
+        return vehicle.g(np.array([0.0, 0.0, 0.0, phi, theta, 0.0]))
+
+    slope = np.stack([g(small, 0.0) - g(-small, 0.0), g(0.0, small) - g(0.0, -small)], axis=1) / (
+        2 * small
+    )
+    values, modes = np.linalg.eig(np.linalg.solve(vehicle.M, slope)[3:5])
+    roll = int(np.argmax(np.abs(modes[0])))
+    named = {}
+    for dof, i in (('roll', roll), ('pitch', 1 - roll)):
+        value = float(values[i].real)
+        stable = value > NEGLIGIBLE
+        omega = float(np.sqrt(value)) if stable else None
+        named[dof] = {
+            'eigenvalue': value,
+            'natural_frequency': omega,
+            'period': None if omega is None else 2 * np.pi / omega,
+        }
+    return named
+
+
+def _damping(vehicle: Vehicle) -> dict[str, Any]:
+    """Linear damping: eigenvalues of its symmetric part, time constants of M nu_dot = -D nu."""
+    rates, modes = np.linalg.eig(np.linalg.solve(vehicle.M, vehicle.D_linear))
+    constants = []
+    for i in np.argsort(rates.real):
+        energy = np.abs(np.conj(modes[:, i]) * (vehicle.M @ modes[:, i]))
+        rate = float(rates[i].real)
+        constants.append(
+            {
+                'mostly': DOFS[int(np.argmax(energy))],
+                'rate': rate,
+                'time_constant': 1 / rate if rate > NEGLIGIBLE else None,
+            }
+        )
+    symmetric = (vehicle.D_linear + vehicle.D_linear.T) / 2
+    return {
+        'linear_symmetric_eigenvalues': np.linalg.eigvalsh(symmetric).tolist(),
+        'time_constants': constants,
+    }
+
+
+def _thrusters(thrusters: Thrusters) -> dict[str, Any]:
+    """What is there, and how much of each degree of freedom it gives; None where it gives none."""
+    lost = thrusters.unactuated()
+    much = 1e6 * (thrusters.forward.sum() + thrusters.reverse.sum())  # beyond any limit
+
+    def largest(axis: np.ndarray) -> list[float]:
+        return [float(abs(axis @ thrusters.allocate(way * much * axis)[1])) for way in (-1, 1)]
+
+    axes = zip(DOFS, np.eye(6), strict=True)
+    return {
+        'names': list(thrusters.names),
+        'matrix': thrusters.matrix.tolist(),
+        'reverse': thrusters.reverse.tolist(),
+        'forward': thrusters.forward.tolist(),
+        'rank': thrusters.rank,
+        'unactuated': {dof: list(others) for dof, others in lost.items()},
+        'largest': {dof: None if dof in lost else largest(axis) for dof, axis in axes},
+    }
+
+
+def _sampling(M: np.ndarray) -> dict[str, dict[str, Any]]:
+    """Rate of the sampled velocity loop with k_D = 12, and the steps where it rings and grows.
+
+    GVC with a scalar k_D has K_D = k_D M: the rate is k_D in every degree of freedom.
+    """
+    found = {}
+    for law, (rate, dof) in (('cl', sampled_rate(K_D * np.eye(6), M)), ('gvc', (K_D, 'all'))):
+        found[law] = {
+            'k_D': K_D,
+            'rate': rate,
+            'mostly': dof,
+            'rings_above': RINGS / rate,
+            'unstable_above': UNSTABLE / rate,
+        }
+    return found

@@ -12,8 +12,6 @@ from strategies import QUICK, positive_definite
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.scaling import (
-    sampled_rate,
-    sampling_warning,
     scaled_case1,
     scaled_scenarios,
     scenario_text,
@@ -23,6 +21,7 @@ from auv_analysis.simulation import DivergedError
 from auv_dynamics import InputError, load_vehicle
 from auv_dynamics.config import shipped
 from auv_dynamics.disturbance import herman2018
+from auv_gvc_controller.gains import sampled_rate, sampling_warning
 
 FOLDER = shipped('scenarios', 'case1').parent
 NAMES = sorted(path.stem for path in shipped('vehicles', 'herman2018').parent.glob('*.yaml'))

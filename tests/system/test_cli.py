@@ -25,7 +25,7 @@ from auv_dynamics.config import shipped
 
 AUV = Path(sys.executable).with_name('auv')
 REXROV = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
-COMMANDS = ['run', 'simulate', 'analyze', 'info', 'params']
+COMMANDS = ['run', 'simulate', 'analyze', 'info', 'params', 'check-vehicle']
 WRONG_LINES = {  # what is typed -> what the one line names
     '': 'COMMAND',
     'fly': 'fly',
@@ -122,7 +122,7 @@ def test_help(arguments: list[str], capsys: pytest.CaptureFixture) -> None:
     text = capsys.readouterr().out
     assert text.startswith(' '.join(['usage: auv', *arguments]))
     words = COMMANDS if not arguments else ['--json']
-    words = words if arguments in ([], ['info']) else [*words, '--out', '--overwrite']
+    words = words if arguments in ([], ['info'], ['check-vehicle']) else [*words, '--out', '--overwrite']
     assert all(word in text for word in words)
 
 

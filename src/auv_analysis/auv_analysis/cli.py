@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,8 @@ def main(arguments: list[str] | None = None) -> None:
 
     try:
         result = getattr(commands, options.command.replace('-', '_'))(options)
+        if options.json:
+            print(json.dumps(result, allow_nan=False), flush=True)
     except InputError as error:
         _say(str(error))
         sys.exit(2)
@@ -69,12 +72,11 @@ def main(arguments: list[str] | None = None) -> None:
         _say(str(error))
         sys.exit(1)
     except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing left to flush
         sys.exit(1)
     except KeyboardInterrupt:
         _say('interrupted')
         sys.exit(1)
-    if options.json:
-        print(json.dumps(result, allow_nan=False))
 
 
 def _say(text: Any) -> None:

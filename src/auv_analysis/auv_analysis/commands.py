@@ -64,7 +64,7 @@ def _prepare(options: argparse.Namespace, scenario: Scenario, names: list[str]) 
         inputs=scenario.inputs,
         new=names,
     )
-    for warning in scenario.vehicle.warnings:
+    for warning in scenario.warnings:
         _say(f'warning: {warning}')
     return out
 

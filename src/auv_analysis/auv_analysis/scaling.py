@@ -1,4 +1,4 @@
-"""Case 1 of the paper on another vehicle: the scenario, and whether its gains fit the step."""
+"""Case 1 of the paper on another vehicle, as a scenario."""
 
 import copy
 import re
@@ -11,7 +11,6 @@ import yaml
 
 from auv_dynamics.config import shipped
 from auv_dynamics.files import read_yaml
-from auv_dynamics.signals import DOFS
 from auv_dynamics.vehicle_file import load_vehicle
 
 REFERENCE = 'herman2018'  # the vehicle that case1 was made for
@@ -20,7 +19,6 @@ DIGITS = 10  # of a written scale: the last ones differ between BLAS libraries
 ROUNDING = 1e-12  # relative to the largest entry, below which an entry of the scale is zero
 UNFIT = re.compile('[^A-Za-z0-9_.+-]+')  # in the name of a scenario, which names a folder
 LONGEST = 90
-RINGS, UNSTABLE = 1.0, 2.0  # of lambda step, for a velocity loop that is sampled and held
 
 TOP_SPEED = {
     'bluerov2': '1.5 m/s (Blue Robotics)',
@@ -140,47 +138,3 @@ def write_scaled_scenarios(folder: Path) -> list[Path]:
         paths.append(folder / name)
         paths[-1].write_text(text, encoding='utf-8')
     return paths
-
-
-def sampled_rate(K_D: np.ndarray, M: np.ndarray) -> tuple[float, str]:
-    """Fastest rate of the velocity loop M nu_dot + K_D nu = 0, and the DOF that has most of it.
-
-    Parameters
-    ----------
-    K_D : (6, 6) velocity gain in the body frame, N s/m ... N m s/rad; need not be symmetric
-    M : (6, 6) inertia with added mass, kg ... kg m2
-
-    Returns
-    -------
-    rate : spectral radius of M^-1 K_D, 1/s
-    dof : the degree of freedom with the largest part of the energy of that mode
-
-    """
-    eigenvalues, modes = np.linalg.eig(np.linalg.solve(M, K_D))
-    fastest = int(np.argmax(np.abs(eigenvalues)))
-    energy = np.abs(np.conj(modes[:, fastest]) * (M @ modes[:, fastest]))
-    return float(np.abs(eigenvalues[fastest])), DOFS[int(np.argmax(energy))]
-
-
-def sampling_warning(K_D: np.ndarray, M: np.ndarray, step: float) -> str | None:
-    """What happens to a velocity gain that is sampled and held for too long; None: nothing.
-
-    An axis m nu_dot = -k nu, held for h, follows nu_{k+1} = (1 - h k / m) nu_k: it overshoots
-    at every sample above h k / m = 1 and grows above 2. Here k / m is the spectral radius of
-    M^-1 K_D. An adaptive gain gamma raises the second bound to 2 + h^2 gamma / (2 m).
-
-    Parameters
-    ----------
-    K_D : (6, 6) velocity gain in the body frame; need not be symmetric
-    M : (6, 6) inertia with added mass
-    step : s
-
-    """
-    rate, dof = sampled_rate(K_D, M)
-    if rate * step <= RINGS:
-        return None
-    limit, what = (UNSTABLE, 'is unstable') if rate * step > UNSTABLE else (RINGS, 'rings')
-    return (
-        f'lambda_max(M^-1 K_D) * step = {rate * step:.3g}, mostly in {dof}: above {limit:g} the '
-        f'sampled loop {what}; a step of at most {RINGS / rate:.2g} s or a smaller gain avoids it'
-    )

@@ -17,7 +17,9 @@ from auv_dynamics.sensors import SensorNoise
 from auv_dynamics.uncertainty import Uncertainty, make_uncertainty
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import vehicle_from_dict
+from auv_gvc_controller.gains import body_gains, sampling_warning
 from auv_gvc_controller.laws import make_gains, refusal
+from auv_gvc_controller.model import control_model
 from auv_gvc_controller.setpoint import Setpoint, make_setpoint
 
 SCHEMA = Path(__file__).with_name('scenario.schema.json')
@@ -124,6 +126,17 @@ class Scenario:
     def kinds(self) -> frozenset[str]:
         """Kinds of its disturbances."""
         return frozenset(spec['kind'] for spec in self.data['disturbance'])
+
+    @cached_property
+    def warnings(self) -> list[str]:
+        """What is odd but usable, of the vehicle and of gains for this step, one line each."""
+        found = list(self.vehicle.warnings)
+        for name in self.controllers:
+            K_D, _ = body_gains(self.gains(name), control_model(self.vehicle))
+            warning = sampling_warning(K_D, self.vehicle.M, self.step)
+            if warning:
+                found.append(f'{self.path}: controllers.{name}: {warning}')
+        return found
 
     def noise(self) -> SensorNoise | None:
         """Random numbers of the sensors from the first sample on; None: they are perfect."""

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.coupling import NEGLIGIBLE, structural_zeros
-from auv_analysis.scaling import RINGS, UNSTABLE, sampled_rate
 from auv_dynamics.signals import DOFS
 from auv_dynamics.thrusters import Thrusters
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import load_vehicle
 from auv_gvc_controller.decomposition import decompose, inverse_upper
+from auv_gvc_controller.gains import RINGS, UNSTABLE, sampled_rate
 
 K_D = 12.0  # k_D of the paper, (36)
 VELOCITY = ('m/s',) * 3 + ('rad/s',) * 3

@@ -68,7 +68,6 @@ class Vehicle:
     r_B: np.ndarray
     M_RB: np.ndarray | None = None
     M_A: np.ndarray | None = None
-    thrusters: Any = None
     warnings: tuple[str, ...] = field(default=())
     thrusters: Thrusters | None = None
 

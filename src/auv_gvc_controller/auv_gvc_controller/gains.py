@@ -1,14 +1,17 @@
-"""The body-frame gains that a law's gains amount to: step 1 of the paper's procedure."""
+"""The body-frame gains that a law's gains amount to, and whether they fit the control period."""
 
 from typing import Any
 
 import numpy as np
 
+from auv_dynamics.signals import DOFS
 from auv_gvc_controller.model import ControlModel
+
+RINGS, UNSTABLE = 1.0, 2.0  # of lambda step, for a velocity loop that is sampled and held
 
 
 def body_gains(gains: Any, model: ControlModel) -> tuple[np.ndarray, np.ndarray]:
-    """K_D and K_f of tau = ... + K_D s + K_f integral(s).
+    """K_D and K_f of tau = ... + K_D s + K_f integral(s), step 1 of section 4.2.
 
     A law says it in a static method `body_gains(gains, model)`; one without it is taken by its own
     k_D and Gamma, zero where it has none.
@@ -29,3 +32,47 @@ def body_gains(gains: Any, model: ControlModel) -> tuple[np.ndarray, np.ndarray]
     else:
         K_D, K_f = (getattr(gains, name, np.zeros(36)) for name in ('k_D', 'Gamma'))
     return np.reshape(K_D, (6, 6)), np.reshape(K_f, (6, 6))
+
+
+def sampled_rate(K_D: np.ndarray, M: np.ndarray) -> tuple[float, str]:
+    """Fastest rate of the velocity loop M nu_dot + K_D nu = 0, and the DOF that has most of it.
+
+    Parameters
+    ----------
+    K_D : (6, 6) velocity gain in the body frame, N s/m ... N m s/rad; need not be symmetric
+    M : (6, 6) inertia with added mass, kg ... kg m2
+
+    Returns
+    -------
+    rate : spectral radius of M^-1 K_D, 1/s
+    dof : the degree of freedom with the largest part of the energy of that mode
+
+    """
+    eigenvalues, modes = np.linalg.eig(np.linalg.solve(M, K_D))
+    fastest = int(np.argmax(np.abs(eigenvalues)))
+    energy = np.abs(np.conj(modes[:, fastest]) * (M @ modes[:, fastest]))
+    return float(np.abs(eigenvalues[fastest])), DOFS[int(np.argmax(energy))]
+
+
+def sampling_warning(K_D: np.ndarray, M: np.ndarray, step: float) -> str | None:
+    """What happens to a velocity gain that is sampled and held for too long; None: nothing.
+
+    An axis m nu_dot = -k nu, held for h, follows nu_{k+1} = (1 - h k / m) nu_k: it overshoots
+    at every sample above h k / m = 1 and grows above 2. Here k / m is the spectral radius of
+    M^-1 K_D. An adaptive gain gamma raises the second bound to 2 + h^2 gamma / (2 m).
+
+    Parameters
+    ----------
+    K_D : (6, 6) velocity gain in the body frame; need not be symmetric
+    M : (6, 6) inertia with added mass
+    step : s
+
+    """
+    rate, dof = sampled_rate(K_D, M)
+    if rate * step <= RINGS:
+        return None
+    limit, what = (UNSTABLE, 'is unstable') if rate * step > UNSTABLE else (RINGS, 'rings')
+    return (
+        f'lambda_max(M^-1 K_D) * step = {rate * step:.3g}, mostly in {dof}: above {limit:g} the '
+        f'sampled loop {what}; a step of at most {RINGS / rate:.2g} s or a smaller gain avoids it'
+    )

@@ -1,0 +1,341 @@
+"""The Lyapunov certificate (23) to (28), evaluated on a run.
+
+Both laws have one form, with s = U^-1 (nu_err + Lambda z) and w = U^T (f - F):
+
+    law   U        A   B      G        H
+    gvc   Upsilon  N   N k_D  Gamma N  N Gamma
+    cl    I        M   k_D    Gamma    Gamma
+
+    A s_dot + [U^T (C + D) U + B] s + U^T k_I z + w = 0,  w_dot = H s - U^T F_dot          (22)
+    L = 1/2 s^T A s + 1/2 z^T k_I z + 1/2 w^T G^-1 w                                       (23)
+    L_dot = -(U s)^T D (U s) - s^T B s - z^T Lambda k_I z - (U^T F_dot)^T G^-1 w           (26)
+    L_dot <= the same with +rho for its last term, rho = |G^-1| |U^T F_dot| |w|            (28)
+
+Why (26) holds: s^T U^T C U s = 0 because C is skew. U s = nu_err + Lambda z gives
+-s^T U^T k_I z = -nu_err^T k_I z - z^T Lambda^T k_I z, whose first part cancels the derivative of
+1/2 z^T k_I z when k_I is symmetric, and whose second is that of (26) when Lambda is symmetric
+(Lambda k_I need not be). -s^T w cancels w^T G^-1 H s for every s and w exactly when the symmetric
+part of G^-1 is H^-1. For CL that is a symmetric Gamma. For GVC it is N Gamma = Gamma N and Gamma
+symmetric: Gamma is diagonal, or couples nothing but axes of equal N, although the theorem admits
+every positive definite Gamma. k_D and D may be asymmetric, only their quadratic forms occur.
+
+(26) is an identity along solutions, not a decrease: F_dot may raise L.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from auv_analysis.differences import derivative
+from auv_gvc_controller.model import ControlModel
+
+LAWS = ('gvc', 'cl')
+ROUNDING = 1e-9  # relative to the largest: an entry or eigenvalue that is zero
+BOUND_TOLERANCE = 1e-6  # of max abs((26)): allows for truncation in the measured L_dot
+OF_THE_MOTION = ('model_error', 'current')  # kinds of disturbance whose F depends on the motion
+SHARES = ('share_of_time_increasing', 'share_condition_27', 'share_bound_28')
+FIGURES = (
+    'identity_residual', 'identity_residual_rms', *SHARES,
+    'sup_s', 'sup_z', 'sup_w', 'L_first', 'L_last', 'rho_max',
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """The certificate at each of n samples; s and w of GVC are s_xi and w_xi.
+
+    Attributes
+    ----------
+    t : (n,) s
+    s : (n, 6) of (19), m/s and rad/s
+    z : (n, 6) of (17), m and rad
+    w : (n, 6) of (22), N and N m
+    L : (n,) of (23), J
+    L_dot : (n,) measured, `derivative` of L, W
+    dissipation : (n,) left side of (27), W
+    drift : (n,) F_xi_dot^T (Gamma N)^-1 w of (26), what a changing F takes from L, W
+    rho : (n,) of (28), W
+
+    """
+
+    t: np.ndarray
+    s: np.ndarray
+    z: np.ndarray
+    w: np.ndarray
+    L: np.ndarray
+    L_dot: np.ndarray
+    dissipation: np.ndarray
+    drift: np.ndarray
+    rho: np.ndarray
+
+    @property
+    def identity(self) -> np.ndarray:
+        """(n,) right side of (26), W."""
+        return -self.dissipation - self.drift
+
+    @property
+    def bound(self) -> np.ndarray:
+        """(n,) right side of (28), W."""
+        return -self.dissipation + self.rho
+
+
+class _Form(NamedTuple):
+    """U, A, B, G of a law as above, and its gains: (6, 6) each."""
+
+    U: np.ndarray
+    A: np.ndarray
+    B: np.ndarray
+    G: np.ndarray
+    k_I: np.ndarray
+    Lambda: np.ndarray
+    Gamma: np.ndarray
+
+
+def _form(law: str, gains: Any, model: ControlModel) -> _Form:
+    if law not in LAWS:
+        raise ValueError(f'law: expected {" or ".join(LAWS)}, found {law!r}')
+    k_D, k_I, Lambda, Gamma = (
+        np.reshape(getattr(gains, name), (6, 6)) for name in ('k_D', 'k_I', 'Lambda', 'Gamma')
+    )
+    if law == 'cl':
+        M = model.dynamics.M.reshape(6, 6)
+        return _Form(np.eye(6), M, k_D, Gamma, k_I, Lambda, Gamma)
+    U, N = model.Upsilon.reshape(6, 6), np.diag(model.N)
+    return _Form(U, N, N @ k_D, Gamma @ N, k_I, Lambda, Gamma)
+
+
+def certificate(
+    t: np.ndarray,
+    nu: np.ndarray,
+    nu_d: np.ndarray,
+    z: np.ndarray,
+    disturbance: np.ndarray,
+    disturbance_estimate: np.ndarray,
+    law: str,
+    gains: Any,
+    model: ControlModel,
+) -> Certificate:
+    """Evaluate (23), (26) and (28) at every sample of a run.
+
+    Parameters
+    ----------
+    t : (n,) s, increasing; steps may differ
+    nu, nu_d : (n, 6) true velocity and set-point, m/s and rad/s, body frame
+    z : (n, 6) integral of nu_d - nu as the law has it, m and rad
+    disturbance, disturbance_estimate : (n, 6) F and f, N and N m, body frame
+    law : 'gvc' or 'cl'
+    gains : the law's named tuple
+    model : what the law knows of the vehicle
+
+    Returns
+    -------
+    certificate : NaN what does not exist: rates of a single sample, all that takes the inverse of
+        a singular Gamma
+
+    Raises
+    ------
+    ValueError : a law without certificate
+
+    """
+    form, dynamics = _form(law, gains, model), model.dynamics
+    x = nu_d - nu + z @ form.Lambda.T  # U s, a row per sample
+    s = np.linalg.solve(form.U, x.T).T
+    w = (disturbance_estimate - disturbance) @ form.U  # U^T (f - F)
+    F_dot = derivative(t, disturbance) @ form.U  # U^T F_dot
+    G_inv, norm = _inverse(form.G)
+    drag = x @ dynamics.D_linear.reshape(6, 6).T
+    drag += (np.abs(nu) * x) @ dynamics.D_quadratic.reshape(6, 6).T  # D(nu) x
+    L = 0.5 * (_quadratic(s, form.A, s) + _quadratic(z, form.k_I, z) + _quadratic(w, G_inv, w))
+    return Certificate(
+        t=t,
+        s=s,
+        z=z,
+        w=w,
+        L=L,
+        L_dot=derivative(t, L),
+        dissipation=(x * drag).sum(axis=1)
+        + _quadratic(s, form.B, s)
+        + _quadratic(z, form.Lambda @ form.k_I, z),
+        drift=_quadratic(F_dot, G_inv, w),
+        rho=norm * _size(F_dot) * _size(w),
+    )
+
+
+def sampled_integral(t: np.ndarray, nu_err: np.ndarray) -> np.ndarray:
+    """Z of a law under zero-order hold: z_0 = 0, z_k = z_{k-1} + (t_k - t_{k-1}) nu_err_{k-1}.
+
+    Parameters
+    ----------
+    t : (n,) s
+    nu_err : (n, 6) nu_d - nu as the law saw it, m/s and rad/s
+
+    Returns
+    -------
+    z : (n, 6) m and rad; equation (17)
+
+    """
+    z = np.zeros(np.shape(nu_err))
+    np.cumsum(np.diff(t)[:, None] * nu_err[:-1], axis=0, out=z[1:])
+    return z
+
+
+def applicability(law: str, gains: Any, model: ControlModel) -> str:
+    """Why a law with its gains has no certificate, in plain words; '' when it has one.
+
+    Parameters
+    ----------
+    law : its name
+    gains : its named tuple, None where not known
+    model : what the law knows of the vehicle
+
+    """
+    if law not in LAWS:
+        return f'no certificate of the law {law} is known: (23) to (28) are those of gvc and cl'
+    if gains is None:
+        return 'the gains are not known'
+    form = _form(law, gains, model)
+    return _no_identity(form) or _no_decrease(law, form)
+
+
+def _no_identity(form: _Form) -> str:
+    """Why L is not positive definite, or (26) not its derivative."""
+    for name in ('k_I', 'Lambda', 'Gamma'):
+        matrix = getattr(form, name)
+        if not _symmetric(matrix):
+            return f'{name} is not symmetric: (26) is not L_dot'
+        if name != 'Lambda' and not _positive(matrix):
+            return f'{name} is not positive definite, nor is L of (23)'
+    if not _symmetric(form.G):
+        return 'Gamma is not diagonal and couples axes of different N: (26) is not L_dot'
+    return ''
+
+
+def _no_decrease(law: str, form: _Form) -> str:
+    """Why (26) may be positive even where F is constant."""
+    k_D = 'k_D' if law == 'cl' else 'N k_D'
+    for name, matrix in ((k_D, form.B), ('Lambda k_I', form.Lambda @ form.k_I)):
+        if not _positive(matrix):
+            return f'the symmetric part of {name} is not positive definite: (27) may fail for any F'
+    return ''
+
+
+def lyapunov_summary(
+    t: np.ndarray,
+    nu: np.ndarray,
+    nu_d: np.ndarray,
+    z: np.ndarray | None,
+    disturbance: np.ndarray | None,
+    disturbance_estimate: np.ndarray,
+    law: str,
+    gains: Any,
+    model: ControlModel,
+    *,
+    kinds: Collection[str] | None,
+    sensors: bool = False,
+    actuators: bool = False,
+    sampled: bool = False,
+) -> dict[str, Any]:
+    """Figures of the certificate of a run, ready for JSON.
+
+    Parameters
+    ----------
+    t, nu, nu_d, disturbance_estimate, law, model : as `certificate` takes them
+    z, disturbance, gains : the same, or None where not known
+    kinds : kinds of disturbance of the run, None where not known
+    sensors, actuators : the law does not see the true velocity; its wrench is not the one applied
+    sampled : zero-order hold; the residual then also has what sampling does, of the first order
+        in the step
+
+    Returns
+    -------
+    summary : None is what is not known
+        applicable, reason : whether the certificate holds of this run, and if not, why
+        identity_residual : max abs(L_dot - (26)) / max abs((26)), L_dot being the measured one
+        identity_residual_rms : the same of root mean squares
+        share_of_time_increasing : share of samples with (26) > 0; this and the next two are None
+            where (26) is not the derivative of L
+        share_condition_27 : share of samples where (27) holds
+        share_bound_28 : share of samples with L_dot <= (28) + 1e-6 max abs((26))
+        sup_s, sup_z, sup_w : largest Euclidean norms
+        L_first, L_last : J
+        rho_max : W
+        sampled : as given
+
+    """
+    reasons = [
+        applicability(law, gains, model),
+        _against_15(disturbance is not None, kinds),
+        'the law does not see the true velocity, so that (26) is not L_dot' if sensors else '',
+        'the wrench applied is not that of the law, so that (26) is not L_dot' if actuators else '',
+    ]
+    reason = '; '.join(filter(None, reasons))
+    summary = {'applicable': not reason, 'reason': reason, **dict.fromkeys(FIGURES)}
+    if law in LAWS and gains is not None:
+        unknown = np.full(np.shape(nu), np.nan)
+        z = unknown if z is None else z
+        F = unknown if disturbance is None else disturbance
+        summary |= _figures(certificate(t, nu, nu_d, z, F, disturbance_estimate, law, gains, model))
+        if sensors or actuators or _no_identity(_form(law, gains, model)):
+            summary |= dict.fromkeys(SHARES)
+    return summary | {'sampled': sampled}
+
+
+def _against_15(known: bool, kinds: Collection[str] | None) -> str:
+    """Why F may not be the bounded function of time that (15) takes it for."""
+    if not known:
+        return 'F is not known'
+    if kinds is None:
+        return 'what F consists of is not known: (15) cannot be assumed'
+    errors = ' and '.join(kind for kind in OF_THE_MOTION if kind in kinds)
+    if not errors:
+        return ''
+    return (
+        f'F contains {errors} and so depends on the motion, nu_dot included: (15) cannot be '
+        'assumed and no bound follows a priori, though (26) holds along solutions with that F'
+    )
+
+
+def _figures(found: Certificate) -> dict[str, float | None]:
+    """Figures of a certificate; None for those that are not finite."""
+    identity, residual = found.identity, found.L_dot - found.identity
+    largest = np.abs(identity).max()
+    figures = {f'sup_{name}': _size(getattr(found, name)).max() for name in ('s', 'z', 'w')}
+    figures |= {'L_first': found.L[0], 'L_last': found.L[-1], 'rho_max': found.rho.max()}
+    if np.isfinite(largest):
+        below = found.bound + BOUND_TOLERANCE * largest
+        at_samples = identity > 0, found.dissipation >= np.abs(found.drift), found.L_dot <= below
+        figures |= zip(SHARES, map(np.mean, at_samples), strict=True)
+    if largest > 0:
+        figures['identity_residual'] = np.abs(residual).max() / largest
+        figures['identity_residual_rms'] = np.sqrt(np.mean(residual**2) / np.mean(identity**2))
+    return {name: float(x) if np.isfinite(x) else None for name, x in figures.items()}
+
+
+def _inverse(G: np.ndarray) -> tuple[np.ndarray, float]:
+    """G^-1 and its spectral norm: lambda_max(G^-1) where G is symmetric positive definite."""
+    sizes = np.linalg.svd(G, compute_uv=False)
+    if sizes[-1] <= ROUNDING * sizes[0]:
+        return np.full(G.shape, np.nan), np.nan
+    return np.linalg.inv(G), 1.0 / sizes[-1]
+
+
+def _symmetric(matrix: np.ndarray) -> bool:
+    return bool(np.abs(matrix - matrix.T).max() <= ROUNDING * np.abs(matrix).max())
+
+
+def _positive(matrix: np.ndarray) -> bool:
+    """Whether the symmetric part is positive definite."""
+    values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
+    return bool(values[0] > ROUNDING * np.abs(values).max())
+
+
+def _quadratic(a: np.ndarray, matrix: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a^T matrix b of each row."""
+    return ((a @ matrix) * b).sum(axis=1)
+
+
+def _size(a: np.ndarray) -> np.ndarray:
+    """Euclidean norm of each row."""
+    return np.linalg.norm(a, axis=1)

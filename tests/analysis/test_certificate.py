@@ -14,7 +14,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from strategies import QUICK, attitudes, full, gains, vectors, vehicles
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.certificate import applicability, certificate, lyapunov_summary, sampled_integral
+from auv_analysis.certificate import certificate, sampled_integral
+from auv_analysis.lyapunov import applicability, lyapunov_summary
 from auv_dynamics import load_vehicle
 from auv_dynamics.config import shipped
 from auv_dynamics.vehicle_file import vehicle_from_dict

@@ -36,8 +36,7 @@ def _table(runs: dict[str, Run]) -> dict:
 
 def _shortened(run: Run, seconds: float) -> Run:
     keep = run.t <= seconds + run.step / 2
-    series = ('t', 'eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate')
-    return replace(run, **{key: getattr(run, key)[keep] for key in series})
+    return run.part(keep)
 
 
 def test_verdicts_of_case_1(case1):

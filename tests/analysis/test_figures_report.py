@@ -73,8 +73,7 @@ def report(case1, tmp_path_factory) -> str:
 
 def _short(run: Run, seconds: float) -> Run:
     keep = run.t <= seconds + run.step / 2
-    series = ('t', 'eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate')
-    return replace(run, **{key: getattr(run, key)[keep] for key in series})
+    return run.part(keep)
 
 
 def _uncoupled(run: Run) -> Run:

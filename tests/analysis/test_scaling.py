@@ -82,7 +82,7 @@ def test_what_is_kept_and_what_is_changed(name):
 def test_every_vehicle_meets_the_same_acceleration(name, scaled):
     scenario = scaled(name)
     a = np.linalg.solve(load_vehicle('herman2018').M, herman2018(T).T).T
-    F = scenario.disturbance(T)
+    F = scenario.uncertainty.F(T)
     assert_allclose(F, a @ scenario.vehicle.M.T, rtol=0, atol=1e-8 * np.abs(F).max())
 
 

@@ -122,7 +122,8 @@ def test_help(arguments: list[str], capsys: pytest.CaptureFixture) -> None:
     text = capsys.readouterr().out
     assert text.startswith(' '.join(['usage: auv', *arguments]))
     words = COMMANDS if not arguments else ['--json']
-    words = words if arguments in ([], ['info'], ['check-vehicle']) else [*words, '--out', '--overwrite']
+    writes = arguments not in ([], ['info'], ['check-vehicle'])
+    words = [*words, '--out', '--overwrite'] if writes else words
     assert all(word in text for word in words)
 
 

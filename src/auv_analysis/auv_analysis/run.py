@@ -1,6 +1,6 @@
 """A run: what was simulated or recorded, as arrays."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,11 @@ class Run:
     law_state: np.ndarray | None = None
     kinds: frozenset[str] | None = None
     notes: tuple[str, ...] = field(default=())
+
+    def part(self, keep: Any) -> 'Run':
+        """Run of the samples that an index, slice or mask of samples keeps."""
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return replace(self, **{k: v[keep] for k, v in values.items() if isinstance(v, np.ndarray)})
 
     @property
     def nu_measured(self) -> np.ndarray:

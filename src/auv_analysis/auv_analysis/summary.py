@@ -6,6 +6,7 @@ import numpy as np
 
 from auv_analysis.coupling import delta_pi, delta_xi, structural_zeros
 from auv_analysis.energy import kinetic_energy, shares
+from auv_analysis.lyapunov import lyapunov
 from auv_analysis.run import Run
 from auv_gvc_controller.gains import body_gains
 from auv_gvc_controller.laws import make_gains
@@ -57,15 +58,7 @@ def summarize(run: Run, window: tuple[float, float] | None = None) -> dict[str, 
         'effort': {'rms': _rms(run.tau), 'max': _max(run.tau)},
         'gains': {'K_D': gains[0], 'K_f': gains[1]},
         'decomposition': {'Upsilon': Upsilon.tolist(), 'N': model.N.tolist()},
-        'lyapunov': {
-            'applicable': False,
-            'reason': 'the certificate (23) to (28) is not evaluated by this version',
-            'identity_residual': None,
-            'share_of_time_increasing': None,
-            'sup_s': None,
-            'sup_z': None,
-            'sup_w': None,
-        },
+        'lyapunov': lyapunov(run, model),
         'notes': list(run.notes),
     }
 

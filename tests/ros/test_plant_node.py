@@ -235,3 +235,64 @@ def test_real_time_holds_the_last_wrench_then_lets_go() -> None:
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
     assert_one_line(run_node('plant_node', *arguments), key, expected)
+
+
+def test_actuators_and_sensors_have_topics_of_their_own() -> None:
+    extra = parameters(actuators__limit='[5.0]', sensors__velocity_noise='[0.1]', seed=3)
+    with graph(('plant_node', barrier(*extra))) as (peer, _):
+        listening(peer)
+        peer.listen(topics.WRENCH_APPLIED, topics.GROUND_TRUTH)
+        odometry(peer, 1)
+        for k in range(3):
+            peer.publish(topics.WRENCH, wrench(k))
+            odometry(peer, k + 2)
+        peer.until(lambda: len(peer.heard['wrench_applied']) == 3, 'applied wrenches')
+        applied, truth = peer.heard['wrench_applied'], peer.heard['ground_truth/odom']
+        peer.until(lambda: len(truth) == 4, 'true states')
+        assert [step_of(m) for m in applied] == [0, 1, 2]
+        assert [m.wrench.force.x for m in applied] == [5.0] * 3
+        assert [step_of(m) for m in truth] == [0, 1, 2, 3]
+        assert truth[0].header.frame_id == 'odom_ned'
+        assert truth[0].twist.twist.linear.x == 0.0
+        assert peer.heard['odom'][0].twist.twist.linear.x != 0.0
+        for odom, twist in zip(peer.heard['odom'], peer.heard['twist'], strict=True):
+            assert odom.twist.twist == twist.twist
+
+
+def test_real_time_withholds_a_lost_sample() -> None:
+    extra = parameters(vehicle='herman2018', duration=2.0, sensors__drop_out=0.5, seed=1)
+    with graph(('plant_node', extra)) as (peer, _):
+        listening(peer)
+        peer.listen(topics.GROUND_TRUTH)
+        truth = peer.heard['ground_truth/odom']
+        peer.until(lambda: truth and step_of(truth[-1]) == 200, 'the end')
+        peer.spin(0.2)
+        seen = {step_of(m) for m in truth}
+        measured = {step_of(m) for m in peer.heard['odom']}
+        assert measured < seen
+        assert 0.3 < len(measured) / len(seen) < 0.7
+
+
+@pytest.mark.parametrize(
+    ('extra', 'words'),
+    [
+        ({'actuators__limit': '[1.0, 2.0]'}, ('actuators.limit', '1 or 6')),
+        ({'actuators__rate': '[-1.0]'}, ('actuators.rate', 'positive')),
+        ({'actuators__delay': 0.0123}, ('actuators.delay', 'multiple of step')),
+        ({'actuators__thrusters': True}, ('actuators.thrusters', 'thrusters')),
+        ({'sensors__drop_out': 2.0}, ('sensors.drop_out', '2.0')),
+        ({'sensors__velocity_noise': '[-0.1]'}, ('sensors.velocity_noise', 'from 0')),
+        (
+            {'disturbance__names': '["a"]', 'disturbance__a__kind': 'model_error',
+             'disturbance__a__mass': 0.1},
+            ('disturbance.a.mass', 'dM and dD'),
+        ),
+        (
+            {'disturbance__names': '["a"]', 'disturbance__a__kind': 'current',
+             'disturbance__a__velocity': '[1.0, 2.0]'},
+            ('disturbance.a.velocity', '3 numbers'),
+        ),
+    ],
+)  # fmt: skip
+def test_wrong_uncertainty_ends_with_one_line(extra, words) -> None:
+    assert_one_line(run_node('plant_node', *LOCKSTEP, *parameters(**extra)), *words)

@@ -1,88 +1,63 @@
-"""Fixed-step integrators: order of convergence, tableau conditions, times on the grid."""
-
-from typing import NamedTuple
+"""Fixed-step integrators: what makes a tableau one of its order, and times on the grid."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from plants import plant_of, push
 
-from auv_dynamics.integrator import TABLEAUS, fill_step, stage_times
-from auv_dynamics.jit import plain
-from auv_dynamics.plant import initial_state
-from auv_dynamics.vehicle_file import vehicle_from_dict
+from auv_dynamics.integrator import TABLEAUS, stage_times
 
 ORDERS = {'euler': 1, 'rk4': 4, 'ode5': 5}
 
 
-class Growth(NamedTuple):
-    """x_dot = x cos t, so that x = e^(sin t): the rate depends on the time of each stage."""
-
-    t: np.ndarray
-
-    @staticmethod
-    def fill_rate(system, stage, x, rate):
-        rate[0] = x[0] * np.cos(system.t[stage])
-
-
-def growth_error(name: str, steps: int) -> float:
-    tableau, step = TABLEAUS[name], 2.0 / steps
-    times = stage_times(tableau, step, 0, steps)
-    x, trial = np.ones(1), np.zeros(1)
-    stages = np.zeros((len(tableau.b), 1))
-    for k in range(steps):
-        plain(fill_step)(Growth(times[k]), x, step, tableau, stages, trial)
-    return abs(x[0] - np.exp(np.sin(2.0)))
+# a rooted tree is the tuple of its subtrees; all of them by their number of nodes
+TREES: dict[int, list[tuple]] = {
+    1: [()],
+    2: [((),)],
+    3: [((), ()), (((),),)],
+    4: [((), (), ()), ((), ((),)), (((), ()),), ((((),),),)],
+    5: [
+        ((), (), (), ()), ((), (), ((),)), (((),), ((),)), ((), ((), ())), (((), (), ()),),
+        ((), (((),),)), (((), ((),)),), ((((), ()),),), (((((),),),),),
+    ],
+}  # fmt: skip
 
 
-def fitted_order(counts, errors) -> float:
-    return -np.polyfit(np.log(counts), np.log(errors), 1)[0]
+def nodes(tree: tuple) -> int:
+    return 1 + sum(map(nodes, tree))
 
 
-@pytest.mark.parametrize('name', ORDERS)
-def test_order_on_an_analytic_solution(name):
-    counts = [200, 400, 800, 1600] if name == 'euler' else [20, 40, 80, 160]
-    errors = [growth_error(name, steps) for steps in counts]
-    assert fitted_order(counts, errors) == pytest.approx(ORDERS[name], abs=0.2)
+def density(tree: tuple) -> int:
+    return nodes(tree) * int(np.prod([density(branch) for branch in tree]))
 
 
-def sinking(name: str, steps: int) -> float:
-    """Error of the compiled plant: m u_dot = X - 3 u|u| - F from rest."""
-    vehicle = vehicle_from_dict(
-        {
-            'name': 'sinking',
-            'source': 'none needed',
-            'rigid_body': {'mass': 2.0, 'center_of_gravity': [0.0, 0.0, 0.0]},
-            'inertia_matrix': (2.0 * np.eye(6)).tolist(),
-            'hydrostatics': {'volume': 0.002, 'center_of_buoyancy': [0.0, 0.0, 0.0]},
-            'damping': {'linear': [0.0] * 6, 'quadratic': [3.0] + [0.0] * 5},
-            'environment': {'water_density': 1000.0, 'gravity': 9.81},
-        },
-        'sinking.yaml',
-    )
-    F = [{'kind': 'harmonic', 'surge': {'offset': 2.0}}]
-    plant = plant_of(vehicle, F, 1.0 / steps, name, initial_state(np.zeros(6), np.zeros(6)))
-    for _ in range(steps):
-        push(plant, (14.0, 0, 0, 0, 0, 0))  # 14 - 2 N against 3 u^2: u = 2 tanh(3 t)
-    assert plant.k == steps
-    return abs(plant.x[7] - 2.0 * np.tanh(3.0)) + abs(plant.x[0] - 2.0 / 3.0 * np.log(np.cosh(3)))
+def weights(A: np.ndarray, tree: tuple) -> np.ndarray:
+    """Elementary weights of the stages (s,): b times them is 1 / density for the order to hold."""
+    product = np.ones(len(A))
+    for branch in tree:
+        product = product * (A @ weights(A, branch))
+    return product
 
 
-@pytest.mark.parametrize('name', ORDERS)
-def test_order_of_the_compiled_plant(name):
-    counts = [200, 400, 800, 1600] if name == 'euler' else [20, 40, 80, 160]
-    counts = [60, 120, 240] if name == 'ode5' else counts  # fifth order shows late here
-    errors = [sinking(name, steps) for steps in counts]
-    assert fitted_order(counts, errors) == pytest.approx(ORDERS[name], abs=0.3)
+def holds(name: str, order: int) -> list[bool]:
+    A, b, _ = TABLEAUS[name]
+    return [abs(b @ weights(A, tree) * density(tree) - 1.0) < 1e-13 for tree in TREES[order]]
+
+
+def test_the_trees_are_all_there_are():
+    for order, trees in TREES.items():
+        assert {nodes(tree) for tree in trees} == {order}
+        assert len(set(trees)) == {1: 1, 2: 1, 3: 2, 4: 4, 5: 9}[order]
 
 
 @pytest.mark.parametrize('name', ORDERS)
 def test_tableau_conditions(name):
-    A, b, c = TABLEAUS[name]
+    A, _, c = TABLEAUS[name]
     assert_array_equal(A, np.tril(A, -1))  # explicit
-    for power in range(ORDERS[name]):
-        assert b @ c**power == pytest.approx(1.0 / (power + 1), rel=1e-14)
     assert_allclose(A.sum(axis=1), c)
+    for order in range(1, ORDERS[name] + 1):  # Butcher's condition of every tree
+        assert all(holds(name, order)), order
+    if ORDERS[name] < 5:
+        assert not all(holds(name, ORDERS[name] + 1))
 
 
 def test_ode5_is_dormand_and_prince_without_the_last_stage():

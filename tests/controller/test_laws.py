@@ -104,14 +104,23 @@ def test_closed_loop_identity(law, data, values, F, eta, nu, nu_d, nu_d_dot, sta
     assert_allclose(sum(parts), np.zeros(6), atol=1e-9 * scale)
 
 
+def check_multiples(M: np.ndarray, model) -> None:
+    for K, k in zip(body_gains(make_gains('gvc', PAPER), model), (12.0, 60.0), strict=True):
+        assert np.linalg.norm(K - k * M, 2) <= 1e-12 * k * np.linalg.norm(M, 2)
+
+
 @QUICK
 @given(vehicles())
 def test_scalar_gains_are_multiples_of_M_in_the_body_frame(data):
+    # K_D = 12 M and K_f = 60 M, whatever M is: U^-T N k U^-1 with one number k
     vehicle = vehicle_from_dict(data, 'f')
-    K_D, K_f = body_gains(make_gains('gvc', PAPER), control_model(vehicle))
-    scale = 1e-11 * np.abs(vehicle.M).max()
-    assert_allclose(K_D, 12.0 * vehicle.M, rtol=0, atol=12 * scale)
-    assert_allclose(K_f, 60.0 * vehicle.M, rtol=0, atol=60 * scale)
+    check_multiples(vehicle.M, control_model(vehicle))
+
+
+@pytest.mark.parametrize('name', ['herman2018', 'herman2018_neutral', 'rexrov'])
+def test_scalar_gains_of_shipped_vehicles_are_multiples_of_M(name):
+    vehicle = load_vehicle(name)
+    check_multiples(vehicle.M, control_model(vehicle))
 
 
 @QUICK

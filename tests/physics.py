@@ -106,6 +106,29 @@ def down(q: np.ndarray) -> np.ndarray:
     return np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z], -1)
 
 
+def hamilton(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Product of two quaternions w, x, y, z."""
+    scalar = a[0] * b[0] - a[1:] @ b[1:]
+    return np.array([scalar, *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
+
+
+def attitude_of(angles: np.ndarray) -> np.ndarray:
+    """Quaternion of phi, theta, psi: about z, then y, then x, by half angles."""
+    product = np.array([1.0, 0.0, 0.0, 0.0])
+    for axis in (2, 1, 0):
+        half = np.zeros(4)
+        half[0], half[1 + axis] = np.cos(angles[axis] / 2), np.sin(angles[axis] / 2)
+        product = hamilton(product, half)
+    return product
+
+
+def turned(q: np.ndarray) -> np.ndarray:
+    """R(q) from its action on the axes, q e q*; takes complex q."""
+    star = q * [1, -1, -1, -1]
+    axes = (np.array([0, *axis]) for axis in np.eye(3))
+    return np.stack([hamilton(hamilton(q, axis), star)[1:] for axis in axes], axis=1)
+
+
 def potential(data: dict[str, Any], eta: np.ndarray) -> complex:
     """Potential energy, J: weight times height of r_G minus buoyancy times height of r_B.
 

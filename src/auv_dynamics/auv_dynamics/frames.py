@@ -14,11 +14,8 @@ REP-103 (Standard Units of Measure and Coordinate Conventions), NED and FSD thos
 
 import numpy as np
 
-EARTH = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-BODY = np.diag([1.0, -1.0, -1.0])
-_S = np.diagonal(BODY)
+_S = np.array([1.0, -1.0, -1.0])  # diagonal of S
 _S6 = np.concatenate([_S, _S])
-_S6.flags.writeable = EARTH.flags.writeable = BODY.flags.writeable = False
 
 
 def _checked(values: np.ndarray, *shape: int) -> np.ndarray:

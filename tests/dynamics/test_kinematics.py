@@ -160,6 +160,14 @@ def test_psi_of_a_turning_run_has_no_jump():
     assert_allclose(psi, 2.0 * 0.01 * np.arange(701), atol=1e-8)
 
 
+@QUICK
+@given(attitudes(1.5), vectors())
+def test_the_attitude_stays_a_rotation(eta, nu):
+    # each step of Euler's method alone would lengthen the quaternion by some (omega h)^2 / 8
+    x = drive(vehicle_of(body()), initial_state(eta, nu), integrator='euler', step=0.05, steps=40)
+    assert_allclose(np.linalg.norm(x[:, 3:7], axis=1), 1.0, rtol=1e-15)
+
+
 def test_velocity_is_in_the_body_frame_with_yaw():
     x = turn(np.array([0, 0, 0, 0, 0, np.pi / 2]), np.array([1.0, 0.5, 0, 0, 0, 0]), 100)
     assert_allclose(x[-1, :3], [-0.5, 1.0, 0.0], atol=1e-12)

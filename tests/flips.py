@@ -10,6 +10,8 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
+from auv_dynamics import six
+
 JIT = ('helper', 'compiled', 'jitable', 'specialised')
 OPPOSITE = {ast.Add: ast.Sub, ast.Sub: ast.Add}
 SWAPPED = {'add': 'sub', 'sub': 'add'}
@@ -73,7 +75,7 @@ def run(tree: ast.Module, module: str) -> SimpleNamespace:
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             node.decorator_list = [d for d in node.decorator_list if name_of(d) not in JIT]
-    scope = {'__name__': module}
+    scope = {'__name__': module, 'add': six.add, 'sub': six.sub}  # one may not be imported there
     exec(compile(ast.fix_missing_locations(tree), str(source_of(module)), 'exec'), scope)
     return SimpleNamespace(**scope)
 

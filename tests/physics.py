@@ -153,12 +153,6 @@ def energy(data: dict[str, Any], x: np.ndarray) -> np.ndarray:
     return kinetic - m['W'] * depth_G + m['B'] * depth_B
 
 
-def kirchhoff(M: np.ndarray, nu: np.ndarray) -> np.ndarray:
-    """C(nu) nu (6,) from momentum (p, h) = M nu: omega x p, and omega x h + v x p."""
-    (p, h), (v, omega) = (M @ nu).reshape(2, 3), nu.reshape(2, 3)
-    return np.concatenate([np.cross(omega, p), np.cross(omega, h) + np.cross(v, p)])
-
-
 def particles(mass: float, r_G: np.ndarray, inertia: np.ndarray) -> tuple[float, np.ndarray]:
     """Six equal particles with the mass, centre and inertia (about it) of a rigid body.
 

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import herman_reference as reference
 import numpy as np
 import pytest
-import yaml
 from numpy.testing import assert_allclose, assert_array_equal
 from physics import (
     DENSE_C_NU,
@@ -24,7 +23,6 @@ from physics import (
     T,
     attitude_of,
     diagonal_C,
-    kirchhoff,
     particle_wrench,
     particles,
     potential_gradient,
@@ -33,11 +31,8 @@ from physics import (
 )
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.config import shipped
 from auv_dynamics.jit import plain
 from auv_dynamics.model import Model
-from auv_gvc_controller.laws import make_gains
-from auv_gvc_controller.model import control_model
 
 DRAWN = np.random.default_rng(6)
 
@@ -54,15 +49,8 @@ def symmetric(size: float) -> np.ndarray:
 
 
 DENSE = symmetric(50.0)  # every entry couples
-X, NU, NU_DOT, TAU, F, NU_D, NU_D_DOT = (drawn(6) for _ in range(7))
+X, NU, NU_DOT, TAU, F = (drawn(6) for _ in range(5))
 D_LINEAR, D_QUADRATIC, FULL = drawn(6, 6), drawn(6, 6), drawn(6, 6)
-GAINS = {
-    'k_D': symmetric(3.0),
-    'k_I': symmetric(2.0),
-    'Lambda': symmetric(0.5),
-    'Gamma': symmetric(7.0),
-}
-STATE = drawn(12)
 ATTITUDES = [G_ETA, np.array([0, 0, 0, 0.7, 0.4, -2.0]), np.array([0, 0, 0, -2.5, -1.1, 0.9])]
 
 
@@ -77,7 +65,7 @@ def model_of(M: np.ndarray, data: dict | None = None) -> Model:
 def right_side(M: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """C nu + D nu + g (6,) with the coefficients of `model_of`."""
     drag = (D_LINEAR + D_QUADRATIC * np.abs(nu)) @ nu
-    return kirchhoff(M, nu) + drag + gradient(with_inertia(M), eta)
+    return reference.kirchhoff(M, nu) + drag + gradient(with_inertia(M), eta)
 
 
 def gradient(data: dict, eta: np.ndarray) -> np.ndarray:
@@ -92,7 +80,7 @@ def check_C(coriolis: Callable) -> None:
     found = coriolis(DENSE_M_A.ravel(), tuple(DENSE_NU), tuple(DENSE_NU))
     assert_allclose(found, DENSE_C_NU, atol=1e-12)
     found = coriolis(DENSE.ravel(), tuple(NU), tuple(NU))
-    assert_allclose(found, kirchhoff(DENSE, NU), rtol=1e-12)
+    assert_allclose(found, reference.kirchhoff(DENSE, NU), rtol=1e-12)
     assert abs(X @ coriolis(DENSE.ravel(), tuple(NU), tuple(X))) < 1e-12
 
 
@@ -129,7 +117,7 @@ def published_vehicle(vehicle_class: Any) -> Any:
 
 def check_M(module: Any) -> None:
     """Newton for particles, whichever the point about which the inertia is given."""
-    second, r_G, mass = GAINS['k_D'][:3, :3], np.array([0.3, -0.2, 0.1]), 7.0
+    second, r_G, mass = DENSE[:3, :3], np.array([0.3, -0.2, 0.1]), 7.0
     inertia = np.trace(second) * np.eye(3) - second
     size, places = particles(mass, r_G, inertia)
     newton = [particle_wrench(size, places, np.zeros(6), unit) for unit in np.eye(6)]
@@ -210,43 +198,12 @@ def check_inverse(vehicle: Any) -> None:
     for eta in ATTITUDES:
         tau = vehicle.inverse_dynamics(eta, NU, NU_DOT, F)
         g = gradient(with_inertia(DENSE), eta)
-        assert_allclose(tau, DENSE @ NU_DOT + kirchhoff(DENSE, NU) + g + F, rtol=1e-10)
+        assert_allclose(tau, DENSE @ NU_DOT + reference.kirchhoff(DENSE, NU) + g + F, rtol=1e-10)
         damped = type(vehicle)(
             'v', '', DENSE, D_LINEAR, D_QUADRATIC, 300.0, 310.0, vehicle.r_G, vehicle.r_B
         )
         drag = damped.inverse_dynamics(eta, NU, NU_DOT, F) - tau
         assert_allclose(drag, (D_LINEAR + D_QUADRATIC * np.abs(NU)) @ NU, rtol=1e-9)
-
-
-def check_law(name: str, law: Any) -> None:
-    """f by (21), the rates that are integrated, and the closed loop (22) with any F.
-
-    (22) for GVC; for CL the same with M for N, 1 for Upsilon, and gains that carry no N.
-    """
-    data = yaml.safe_load(shipped('vehicles', 'rexrov').read_text(encoding='utf-8'))
-    m, vehicle = reference.vehicle_matrices(data), load_vehicle('rexrov')
-    k_D, k_I, Lambda, Gamma = GAINS.values()
-    z, S, nu_err, eta = STATE[:6], STATE[6:], NU_D - NU, ATTITUDES[1]
-    arguments = (0.0, tuple(NU), tuple(attitude_of(eta[3:])), tuple(NU_D), tuple(NU_D_DOT),
-                 STATE, make_gains(name, GAINS), control_model(vehicle))  # fmt: skip
-    tau, f = (np.array(part) for part in law.wrench(*arguments))
-    rate = np.array(law.state_rate(*arguments))
-
-    U, N = reference.decompose(m['M'])
-    if name == 'cl':
-        U, N = np.eye(6), m['M']
-    scaled = {'gvc': N, 'cl': np.eye(6)}[name]
-    s = np.linalg.solve(U, nu_err + Lambda @ z)
-    assert_allclose(U.T @ f, scaled @ Gamma @ S, rtol=1e-9)
-    assert_allclose(rate, [*nu_err, *s], rtol=1e-10)
-
-    C, D = reference.coriolis(m['M'], NU), reference.damping(m, NU)
-    disturbed = 100.0 * F
-    nu_dot = np.linalg.solve(m['M'], tau - C @ NU - D @ NU - gradient(data, eta) - disturbed)
-    s_dot = np.linalg.solve(U, NU_D_DOT - nu_dot + Lambda @ nu_err)  # (20)
-    damped = U.T @ (C + D) @ U + scaled @ k_D
-    loop = N @ s_dot + damped @ s + U.T @ (k_I @ z + f - disturbed)
-    assert_allclose(loop, np.zeros(6), atol=1e-9 * np.abs(tau).max())
 
 
 class Growth(NamedTuple):

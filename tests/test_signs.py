@@ -19,14 +19,15 @@ from sign_checks import (
     check_g,
     check_inverse,
     check_J,
-    check_law,
     check_M,
     check_step,
     check_U,
     published_vehicle,
 )
+from sign_checks_loop import check_current, check_law, check_other_law, check_uncertainty
 
 from auv_dynamics.jit import plain
+from auv_gvc_controller.laws import SHIPPED
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,22 @@ FORMULAS = [
         lambda m: check_law('cl', m.CL), 13,
     ),
     Formula(
+        'f pid', 'auv_gvc_controller.laws.pid', ['PID.wrench', 'PID.state_rate'],
+        lambda m: check_other_law('pid', m.PID), 11,
+    ),
+    Formula(
+        'f smc', 'auv_gvc_controller.laws.smc',
+        ['SMC.wrench', 'SMC.state_rate', 'manifold', 'saturated'],
+        lambda m: check_other_law('smc', m.SMC), 23,
+    ),
+    Formula(
+        'F current', 'auv_dynamics.current',
+        ['make_current', 'to_body', 'acceleration_in_current'], check_current, 33,
+    ),
+    Formula(
+        'F lumped', 'auv_dynamics.uncertainty', ['_with_errors', 'lumped'], check_uncertainty, 13
+    ),
+    Formula(
         'step', 'auv_dynamics.integrator', ['TABLEAUS', 'fill_step', 'stage_times'], check_step, 10
     ),
     Formula(
@@ -116,6 +133,10 @@ def survivors(formula: Formula, check: Callable[[Any], None]) -> list[str]:
 def test_every_flipped_sign_is_noticed(formula: Formula) -> None:
     unnoticed = '\n'.join(survivors(formula, formula.check))
     assert not unnoticed, f'signs that may be turned without notice:\n{unnoticed}'
+
+
+def test_no_shipped_law_is_left_out() -> None:
+    assert {f'f {law}' for law in SHIPPED} <= {formula.symbol for formula in FORMULAS}
 
 
 def test_a_check_that_looks_at_less_lets_signs_through() -> None:

@@ -21,7 +21,8 @@ from auv_analysis.simulation import DivergedError
 from auv_dynamics import InputError, load_vehicle
 from auv_dynamics.config import shipped
 from auv_dynamics.disturbance import herman2018
-from auv_gvc_controller.gains import sampled_rate, sampling_warning
+from auv_gvc_controller.gains import sampled_rate, sampling_warning, state_warning
+from auv_gvc_controller.laws import make_gains
 
 FOLDER = shipped('scenarios', 'case1').parent
 NAMES = sorted(path.stem for path in shipped('vehicles', 'herman2018').parent.glob('*.yaml'))
@@ -225,3 +226,21 @@ def test_the_degree_of_freedom_is_that_of_the_energy():
     K_D = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 50.0])
     assert sampled_rate(K_D, np.eye(6)) == (pytest.approx(50.0), 'yaw')
     assert_array_equal(M, np.diag([1.0, 1.0, 1.0, 1e-3, 1.0, 1.0]))
+
+
+def test_a_gain_that_pushes_is_no_matter_of_sampling():
+    assert sampling_warning(-1e5 * np.eye(6), np.eye(6), 0.01) is None
+
+
+@pytest.mark.parametrize(('step', 'words'), [(0.04, ''), (0.06, 'rings'), (0.11, 'unstable')])
+def test_the_filter_of_pid_is_sampled_too(step, words):
+    gains = make_gains('pid', {'k_P': 1.0, 'k_I': 0.0, 'k_D': 0.0})
+    text = state_warning(gains, step)
+    assert words in text if words else text is None
+    assert state_warning(make_gains('smc', {'k_D': 1, 'Lambda': 1, 'Gamma': 1}), 10.0) is None
+
+
+def test_a_scenario_warns_of_its_gains(tmp_path):
+    scenario = load_scenario('case1_lauv')
+    assert any('controllers.cl' in line and 'unstable' in line for line in scenario.warnings)
+    assert not any('controllers.gvc' in line for line in scenario.warnings)

@@ -17,7 +17,7 @@ from auv_dynamics.sensors import SensorNoise
 from auv_dynamics.uncertainty import Uncertainty, make_uncertainty
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import vehicle_from_dict
-from auv_gvc_controller.gains import body_gains, sampling_warning
+from auv_gvc_controller.gains import body_gains, sampling_warning, state_warning
 from auv_gvc_controller.laws import make_gains, refusal
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.setpoint import Setpoint, make_setpoint
@@ -132,9 +132,10 @@ class Scenario:
         """What is odd but usable, of the vehicle and of gains for this step, one line each."""
         found = list(self.vehicle.warnings)
         for name in self.controllers:
-            K_D, _ = body_gains(self.gains(name), control_model(self.vehicle))
-            warning = sampling_warning(K_D, self.vehicle.M, self.step)
-            if warning:
+            gains = self.gains(name)
+            K_D, _ = body_gains(gains, control_model(self.vehicle))
+            loop = sampling_warning(K_D, self.vehicle.M, self.step)
+            for warning in filter(None, (loop, state_warning(gains, self.step))):
                 found.append(f'{self.path}: controllers.{name}: {warning}')
         return found
 

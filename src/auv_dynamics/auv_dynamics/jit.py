@@ -32,12 +32,13 @@ def sources_digest() -> str:
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled code: `$AUV_GVC_CACHE_DIR`, else below `$XDG_CACHE_HOME`."""
+    """Folder of the compiled code of these sources.
+
+    Below `$AUV_GVC_CACHE_DIR`, else `$XDG_CACHE_HOME/auv_gvc`.
+    """
     root = os.environ.get('AUV_GVC_CACHE_DIR')
-    if root:
-        return Path(root)
     cache = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
-    return Path(cache) / 'auv_gvc' / sources_digest()
+    return Path(root or Path(cache) / 'auv_gvc') / sources_digest()
 
 
 try:

@@ -68,11 +68,29 @@ def sampling_warning(K_D: np.ndarray, M: np.ndarray, step: float) -> str | None:
     step : s
 
     """
+    eigenvalues = np.linalg.eigvals(np.linalg.solve(M, K_D))
+    if eigenvalues[np.argmax(np.abs(eigenvalues))].real < 0:
+        return None  # it grows at every step, however short
     rate, dof = sampled_rate(K_D, M)
+    return _ringing(f'lambda_max(M^-1 K_D) * step = {rate * step:.3g}, mostly in {dof}', rate, step)
+
+
+def state_warning(gains: Any, step: float) -> str | None:
+    """The same for a law's own states, which are integrated by Euler's rule between samples.
+
+    A law says how fast they are in a static method `own_rate(gains)`, 1/s.
+    """
+    if not hasattr(type(gains), 'own_rate'):
+        return None
+    rate = float(type(gains).own_rate(gains))
+    return _ringing(f"the law's own states: rate * step = {rate * step:.3g}", rate, step)
+
+
+def _ringing(text: str, rate: float, step: float) -> str | None:
     if rate * step <= RINGS:
         return None
     limit, what = (UNSTABLE, 'is unstable') if rate * step > UNSTABLE else (RINGS, 'rings')
     return (
-        f'lambda_max(M^-1 K_D) * step = {rate * step:.3g}, mostly in {dof}: above {limit:g} the '
-        f'sampled loop {what}; a step of at most {RINGS / rate:.2g} s or a smaller gain avoids it'
+        f'{text}: above {limit:g} the sampled loop {what}; '
+        f'a step of at most {RINGS / rate:.2g} s or a smaller gain avoids it'
     )

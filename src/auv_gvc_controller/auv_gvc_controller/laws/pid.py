@@ -54,6 +54,11 @@ class PID(NamedTuple):
         return k_P + k_D @ omega_f, np.zeros((6, 6))
 
     @staticmethod
+    def own_rate(gains):
+        """Cut-off of the fastest filter, 1/s."""
+        return np.abs(np.linalg.eigvals(np.reshape(gains.omega_f, (6, 6)))).max()
+
+    @staticmethod
     def check(gains):
         """Raise ValueError for a filter that is not stable."""
         smallest = np.linalg.eigvals(np.reshape(gains.omega_f, (6, 6))).real.min()

@@ -19,7 +19,11 @@ VENV_OPTIONS :=
 REQUIREMENTS := requirements.txt requirements-ros.txt requirements-dev.txt
 endif
 
-.PHONY: help setup case1 case2 test build lint format interop clean
+COUNT ?= 10
+SEED ?= 0
+EXAMPLES ?= 500
+
+.PHONY: help setup case1 case2 test soak properties build lint format interop clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/:/' | column -t -s:
@@ -38,7 +42,14 @@ case1 case2: setup  ## the paper's experiment: GVC against CL on real nodes, wit
 	@echo "open runs/$@/report.html"
 
 test: setup  ## the tests
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+
+soak: setup  ## COUNT random runs on the node graph by SEED, and what else takes long
+	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) $(BIN)/python -m pytest -m long tests/system
+
+properties: setup  ## the property tests with EXAMPLES examples each, drawn by SEED
+	AUV_GVC_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n 2 --hypothesis-seed=$(SEED) \
+	  tests/dynamics tests/controller tests/analysis tests/reference
 
 build: setup  ## colcon build of the workspace
 	AMENT_PREFIX_PATH="$(abspath $(VENV))$${AMENT_PREFIX_PATH:+:$$AMENT_PREFIX_PATH}" \

@@ -16,6 +16,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from auv_analysis.domain import is_free
 from auv_analysis.experiment import loopback
 from auv_analysis.supervisor import executable
 from auv_dynamics.ros import topics
@@ -34,7 +35,11 @@ _domains = itertools.count()
 def fresh_domain() -> int:
     """Domain id of its own for each test, apart from those of parallel workers."""
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])
-    return 1 + (os.getpid() + 25 * worker + next(_domains)) % 100
+    share = 100 // int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
+    while True:
+        domain = 1 + worker * share + (os.getpid() + next(_domains)) % share
+        if is_free(domain):  # `auv` picks its own from all of them
+            return domain
 
 
 def environment(domain: int) -> dict[str, str]:

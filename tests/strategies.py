@@ -1,5 +1,6 @@
 """Hypothesis strategies of physical vehicles, states and gains, as the files give them."""
 
+import os
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,12 @@ from hypothesis.extra.numpy import arrays
 
 from auv_dynamics.files import matrix6
 
-# few examples, the same in every run, and no verdict on how long one takes
-QUICK = settings(derandomize=True, max_examples=25, deadline=None, database=None)
+# few examples, the same in every run, and no verdict on how long one takes; `make properties`
+# asks for more, drawn by the seed of --hypothesis-seed
+EXAMPLES = os.environ.get('AUV_GVC_EXAMPLES')
+QUICK = settings(
+    derandomize=EXAMPLES is None, max_examples=int(EXAMPLES or 25), deadline=None, database=None
+)
 
 
 def vectors(n: int = 6, largest: float = 3.0) -> st.SearchStrategy[np.ndarray]:

@@ -157,7 +157,6 @@ def test_parameter_file_round_trips(controller: str) -> None:
     }
 
 
-@pytest.mark.ros
 @pytest.mark.parametrize('namespace', ['', 'auv1'])
 def test_ros_itself_reads_the_file(whole, namespace, tmp_path, monkeypatch) -> None:
     import rclpy

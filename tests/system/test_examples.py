@@ -59,7 +59,8 @@ def test_own_law_runs_in_process_and_on_the_nodes(tmp_path: Path) -> None:
         shutil.copy(EXAMPLES / name, tmp_path)
     reached = {}
     for how in (['simulate', '--hold', 'zoh'], ['run']):
-        ended = auv(how[0], 'own_law.yaml', *how[1:], '--json', '--out', how[0], cwd=tmp_path)
+        options = (*how[1:], '--controller', 'mine', '--json', '--out', how[0])
+        ended = auv(how[0], 'own_law.yaml', *options, cwd=tmp_path)
         assert ended.returncode == 0, ended.stderr
         assert 'ComputedTorque runs as plain Python' in ended.stderr
         reached[how[0]] = json.loads(ended.stdout)['mine']['velocity_error']

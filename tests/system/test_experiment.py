@@ -185,7 +185,14 @@ def node_of(out: Path, name: str) -> psutil.Process:
     raise AssertionError(f'{name} does not run')
 
 
-@pytest.mark.parametrize('name', sorted(PACKAGES))
+QUICKLY = ('controller_node', 'recorder_node')  # the others take as long and need `make soak`
+NODES = [
+    name if name in QUICKLY else pytest.param(name, marks=pytest.mark.long)
+    for name in sorted(PACKAGES)
+]
+
+
+@pytest.mark.parametrize('name', NODES)
 def test_a_node_that_dies_ends_the_run_and_loses_nothing(tmp_path: Path, name: str) -> None:
     out = tmp_path / 'out'
     process = start(write(tmp_path / 's.yaml', duration=600.0), out)
@@ -239,6 +246,7 @@ def test_a_domain_with_another_vehicle_is_refused(tmp_path: Path) -> None:
     assert 'test_peer on /other/wrench' in ended.stderr
 
 
+@pytest.mark.long
 def test_ten_runs_in_a_row_lose_and_double_nothing(tmp_path: Path) -> None:
     controllers = {f'gvc{i}': {'law': 'gvc', **GAINS} for i in range(10)}
     scenario = write(tmp_path / 's.yaml', duration=30.0, controllers=controllers)

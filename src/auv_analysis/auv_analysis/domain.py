@@ -28,7 +28,7 @@ def chosen_domain(option: int | str | None) -> tuple[int, bool]:
         return _checked(os.environ[VARIABLE], VARIABLE), False
     candidates = list(range(1, LARGEST + 1))
     random.shuffle(candidates)
-    return next((domain for domain in candidates if _is_free(domain)), 1), True
+    return next((domain for domain in candidates if is_free(domain)), 1), True
 
 
 def _checked(value: object, name: str) -> int:
@@ -41,7 +41,7 @@ def _checked(value: object, name: str) -> int:
     return domain
 
 
-def _is_free(domain: int) -> bool:
+def is_free(domain: int) -> bool:
     """Whether the first participant's port of a domain is unused (DDSI-RTPS 9.6.1.1)."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:

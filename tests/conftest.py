@@ -1,0 +1,17 @@
+"""The order of the tests: what waits for nodes first, so that parallel workers end together."""
+
+from pathlib import Path
+
+import pytest
+
+FIRST = ('system', 'ros')
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    folders = [*FIRST, '']
+
+    def place(item: pytest.Item) -> int:
+        folder = Path(item.path).parent.name
+        return folders.index(folder if folder in FIRST else '')
+
+    items.sort(key=place)

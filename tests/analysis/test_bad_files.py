@@ -74,6 +74,7 @@ actuators = {lag: -1} | actuators.lag | from 0 up | -1
 actuators = {thrusters: true} | actuators.thrusters | a vehicle with thrusters | true
 actuators = {} | actuators | a mapping with limit | {}
 sensors = {drop_out: 1.1} | sensors.drop_out | from 0 to 1 | 1.1
+sensors = {velocity_noise: 101} | sensors.velocity_noise | from 0 to 100 | 101
 sensors = {velocity_noise: [1, 2]} | sensors.velocity_noise | 6 numbers | 2 numbers
 sensors = {noise: 1} | sensors.noise | velocity_noise | unknown key
 name = a/b | name | without blanks or slashes | a/b

@@ -189,3 +189,41 @@ def test_the_attitude_stays_a_rotation(hold):
     run = simulate(scenario, 'gvc', hold)
     way = np.linalg.norm(np.diff(run.eta[:, :3], axis=0), axis=1)
     assert_allclose(way, 0.01 * np.linalg.norm(run.nu[:-1, :3], axis=1), rtol=1e-9)
+
+
+def test_numbers_that_no_summary_can_hold_end_the_run(tmp_path):
+    """A wrench of 1e110 N behind a limiter moves nothing, but it is no result either."""
+    path = tmp_path / 'huge.yaml'
+    path.write_text(
+        'name: huge\nvehicle: rexrov\nduration: 0.1\nstep: 0.01\nsetpoint: {surge: {offset: 1}}\n'
+        'actuators: {limit: 10}\n'
+        'controllers: {a: {law: cl, k_D: 9.0e+99, k_I: 9.0e+99, Lambda: 9.0e+99, Gamma: 1}}\n'
+    )
+    with pytest.raises(DivergedError, match='diverges'):
+        simulate(load_scenario(path), 'a', 'zoh')
+
+
+@pytest.mark.parametrize('key', ['actuators', 'sensors'])
+def test_devices_of_samples_need_the_hold(key, tmp_path):
+    entry = {'actuators': '{limit: 10}', 'sensors': '{drop_out: 0.1}'}[key]
+    path = tmp_path / 'case.yaml'
+    path.write_text(
+        'name: case\nvehicle: rexrov\nduration: 0.1\nstep: 0.01\nsetpoint: {surge: {offset: 1}}\n'
+        'controllers: {a: {law: cl, k_D: 9, k_I: 9, Lambda: 9, Gamma: 1}}\n'
+        f'{key}: {entry}\n'
+    )
+    with pytest.raises(InputError, match=f'{key}: expected hold .zoh.'):
+        simulate(load_scenario(path), 'a')
+    assert simulate(load_scenario(path), 'a', 'zoh').hold == 'zoh'
+
+
+def test_the_seed_decides_the_noise():
+    base = load_scenario('case1')
+    sensors = {'velocity_noise': 0.01, 'drop_out': 0.1}
+    runs = [
+        simulate(replace(base, data=base.data | {'duration': 1.0, 'sensors': sensors, 'seed': s}),
+                 'gvc', 'zoh')
+        for s in (1, 1, 2)
+    ]  # fmt: skip
+    np.testing.assert_array_equal(runs[0].nu, runs[1].nu)
+    assert np.abs(runs[0].nu_measured - runs[2].nu_measured).max() > 0.005

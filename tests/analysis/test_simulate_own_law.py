@@ -62,7 +62,7 @@ np.savez(sys.argv[2], nu=run.nu, tau=run.tau, f=run.disturbance_estimate)
 """
 
 
-@pytest.mark.parametrize('hold', ['continuous', 'zoh'])
+@pytest.mark.parametrize('hold', ['zoh', pytest.param('continuous', marks=pytest.mark.long)])
 def test_a_law_of_ones_own_is_plain_python(tmp_path, hold):
     (tmp_path / 'own_law_of_mine.py').write_text(OWN, encoding='utf-8')
     (tmp_path / 'script.py').write_text(SCRIPT, encoding='utf-8')

@@ -37,10 +37,6 @@ def test_the_papers_cases(case, law, hold):
     check(*pair(law, hold, file_of('herman2018'), base=case, duration=5.0))
 
 
-def test_case_1_over_its_whole_duration():
-    check(*pair('gvc', 'continuous', file_of('herman2018'), duration=30.0))
-
-
 @pytest.mark.parametrize('hold', ['continuous', 'zoh'])
 @pytest.mark.parametrize('law', ['gvc', 'cl'])
 @pytest.mark.parametrize('name', VARIANTS)

@@ -8,7 +8,7 @@ from auv_analysis.closed_loop import Grid, Log, fill_continuous, fill_held
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario
 from auv_dynamics.actuators import memory
-from auv_dynamics.files import InputError
+from auv_dynamics.files import LARGEST, InputError
 from auv_dynamics.integrator import TABLEAUS, stage_times
 from auv_dynamics.jit import plain
 from auv_dynamics.kinematics import unwrapped
@@ -122,7 +122,7 @@ def unwrapped_eta(x: np.ndarray) -> np.ndarray:
 
 
 def _check_finite(log: Log, t: np.ndarray, scenario: Scenario, controller: str) -> None:
-    finite = np.isfinite(log.x).all(axis=1) & np.isfinite(log.tau).all(axis=1)
+    finite = np.all([(np.abs(part) < LARGEST).all(axis=1) for part in log], axis=0)
     if not finite.all():
         first = t[np.argmin(finite)]
         where = f'{scenario.name}, {controller}'

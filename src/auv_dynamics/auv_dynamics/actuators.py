@@ -10,6 +10,7 @@ from auv_dynamics.jit import compiled, helper
 from auv_dynamics.six import fill_vector, vector
 from auv_dynamics.vehicle import Vehicle
 
+MOST_STEPS = 1_000_000  # of a delay
 WHOLE = 1e-6  # of a step: how far a delay may be from a whole number of steps
 
 
@@ -92,6 +93,9 @@ def make_actuators(
     delay = float(spec.get('delay', 0.0)) / step
     if abs(delay - round(delay)) > WHOLE:
         expected = f'a multiple of step ({step:g} s)'
+        raise InputError(file, 'actuators.delay', expected, f'{spec["delay"]} s')
+    if delay > MOST_STEPS:
+        expected = f'at most {MOST_STEPS} steps of {step:g} s'
         raise InputError(file, 'actuators.delay', expected, f'{spec["delay"]} s')
     use_thrusters = bool(spec.get('thrusters', False))
     if use_thrusters and vehicle.thrusters is None:

@@ -69,10 +69,13 @@ def actuator_spec(node: Node) -> dict[str, Any] | None:
 def sensor_spec(node: Node) -> dict[str, Any] | None:
     """Declare `sensors.*` and return them as a scenario writes them; None when there are none."""
     spec: dict[str, Any] = {}
-    for key, unit, count in (('velocity_noise', 'm/s, rad/s', 6), ('attitude_noise', 'rad', 3)):
+    for key, unit, count, most in (
+        ('velocity_noise', 'm/s, rad/s', 6, 100),
+        ('attitude_noise', 'rad', 3, 10),
+    ):
         values = _numbers(node, f'sensors.{key}', f'standard deviation, {unit}', (1, count))
-        if values and min(values) < 0:
-            raise InputError(node.get_name(), f'sensors.{key}', 'numbers from 0 up', values)
+        if values and not all(0 <= value <= most for value in values):
+            raise InputError(node.get_name(), f'sensors.{key}', f'numbers from 0 to {most}', values)
         spec[key] = (values[0] if len(values) == 1 else values) if values else None
     text = 'probability that a sample is lost'
     spec['drop_out'] = declare(

@@ -252,7 +252,7 @@ def test_report_says_what_it_must(report):
         'not reproduced (no. 14)',
     ):
         assert sentence in text, sentence
-    assert [int(n) for n in re.findall(r'<b>Figure (\d+)\.', report)] == list(range(1, 14))
+    assert [int(n) for n in re.findall(r'<b>Figure (\d+)\.', report)] == list(range(1, 16))
     assert 'nan' not in text.lower().split()
     assert 'None' not in text
 

@@ -78,9 +78,7 @@ def lyapunov(run: Run, model: ControlModel) -> dict[str, Any]:
 
     """
     sampled = run.hold == 'zoh'
-    z = sampled_integral(run.t, run.nu_d - run.nu_measured) if sampled else None
-    if run.law in LAWS and run.law_state is not None:
-        z = run.law_state[:, :6]
+    z = integral_of(run)
     return lyapunov_summary(
         run.t,
         run.nu,
@@ -96,6 +94,22 @@ def lyapunov(run: Run, model: ControlModel) -> dict[str, Any]:
         actuators=run.applied is not None,
         sampled=sampled,
     )
+
+
+def integral_of(run: Run) -> np.ndarray | None:
+    """Z of (17) as the law has it, (n, 6) in m and rad; None where it is not known."""
+    if run.law in LAWS and run.law_state is not None:
+        return run.law_state[:, :6]
+    return sampled_integral(run.t, run.nu_d - run.nu_measured) if run.hold == 'zoh' else None
+
+
+def certificate_of(run: Run, model: ControlModel) -> Certificate | None:
+    """The certificate at every sample; None without law, gains, z or F that it could be of."""
+    z = integral_of(run)
+    if run.law not in LAWS or not run.gains or z is None or run.disturbance is None:
+        return None
+    F, f, gains = run.disturbance, run.disturbance_estimate, make_gains(run.law, run.gains)
+    return certificate(run.t, run.nu, run.nu_d, z, F, f, run.law, gains, model)
 
 
 def lyapunov_summary(

@@ -6,7 +6,7 @@ from typing import Any
 
 from auv_analysis.report.claims_rows import BOTH, ROWS, Row
 from auv_analysis.report.evidence import Evidence, Signals, Verdict
-from auv_analysis.report.paper import CASES, paper_run
+from auv_analysis.report.paper import CASES, is_plain, paper_run
 from auv_analysis.report.text import MISSING
 from auv_analysis.run import Run
 
@@ -54,11 +54,13 @@ def claims_table(
 
     Returns
     -------
-    claims : 21 rows where all runs are of case1 or all of case2, else none
+    claims : 21 rows where all runs are of case1 or all of case2, else none; none either where
+        all of them have what the paper's have not, such as limits of actuators
 
     """
     scenarios = {run.scenario for run in runs.values()}
-    if len(scenarios) != 1 or not scenarios <= set(CASES):
+    ours = len(scenarios) == 1 and scenarios <= set(CASES)
+    if not ours or not any(is_plain(run) for run in runs.values()):
         return []
     (scenario,) = scenarios
     found = {law: paper_run(runs, law) for law in BOTH}

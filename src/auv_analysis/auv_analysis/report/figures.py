@@ -3,12 +3,16 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from auv_analysis.coupling import delta_pi, delta_xi, structural_zeros
+from auv_analysis.lyapunov import OF_THE_MOTION
 from auv_analysis.report import overview, plotting
+from auv_analysis.report.applied import applied_figure
+from auv_analysis.report.certificates import certificate_figure, is_drawn
 from auv_analysis.report.paper import paper_figure
 from auv_analysis.report.plotting import Quantity
 from auv_analysis.report.text import join, number
@@ -18,6 +22,7 @@ from auv_dynamics.signals import DOFS
 from auv_gvc_controller.model import control_model
 
 SPLIT = ('errors', 'lumped_error', 'inputs', 'delta_pi')  # begin with a peak that dwarfs the rest
+Drawn = tuple[Figure | None, str, str]  # with title and caption
 SYMBOLS = {'delta_xi': 'Δξ', 'delta_pi': 'Δπ'}
 
 
@@ -40,17 +45,24 @@ class FigureRecord:
     pdf: Path | None
 
 
-def draw_figures(runs: Mapping[str, Run], folder: Path) -> list[FigureRecord]:
+def draw_figures(
+    runs: Mapping[str, Run],
+    folder: Path,
+    summaries: Mapping[str, Mapping[str, Any]] | None = None,
+    limit: np.ndarray | None = None,
+) -> list[FigureRecord]:
     """Draw every figure that these runs allow, as PNG and PDF.
 
     Parameters
     ----------
     runs : name -> run, any number of any laws; the name goes into titles and file names
     folder : where the files go; made when it is not there
+    summaries : name -> `summarize(run)`, for the certificate; none: it is not drawn
+    limit : (6,) axis limits of the actuators, N and N m; none: there are none
 
     Returns
     -------
-    figures : in the order of the report; lumped errors only where F is known
+    figures : in the order of the report; lumped errors only where F is known and estimated
 
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -66,18 +78,18 @@ def draw_figures(runs: Mapping[str, Run], folder: Path) -> list[FigureRecord]:
             add(f'errors_{run.controller}', *_errors(run))
         add('settling', *overview.settling(runs))
         for run in runs.values():
-            w = lumped_error(run)
-            if w is not None:
-                name = f'lumped_error_{run.controller}'
-                add(name, *six_signals('lumped_error', run, plotting.LUMPED, w))
+            if run.disturbance is not None:
+                add(f'lumped_error_{run.controller}', *_lumped(run))
         for run, F in _different_disturbances(runs):
             name = f'uncertainty_{run.controller}'
-            add(name, *six_signals('uncertainty', run, plotting.UNCERTAINTY, F))
+            add(name, *_uncertainty(run, F))
         for run in runs.values():
-            name = f'inputs_{run.controller}'
-            add(name, *six_signals('inputs', run, plotting.INPUT, run.tau))
+            add(f'inputs_{run.controller}', *_inputs(run, limit))
         if len(runs) > 1:
             add('inputs_compared', *overview.inputs(runs))
+        for name, run in runs.items():
+            if summaries is not None and is_drawn(summaries[name]):
+                add(f'certificate_{name}', *certificate_figure(run, summaries[name]))
         leading = reference(runs)
         add('kinetic_energy', *overview.energy(runs, leading))
         add('energy_shares', *overview.energy_shares(runs))
@@ -93,7 +105,7 @@ def reference(runs: Mapping[str, Run]) -> Run:
 
 def six_signals(
     kind: str, run: Run, quantity: Quantity, values: np.ndarray, zeros: Sequence[str] = ()
-) -> tuple[Figure | None, str, str]:
+) -> Drawn:
     """Linear and angular signals of a run, the first phase apart where it dwarfs the rest.
 
     Parameters
@@ -136,18 +148,51 @@ def structure_sentence(kind: str, zeros: Sequence[str]) -> str:
     return f'Zero for every motion by the structure of M and not drawn: {join(zeros)}.'
 
 
-def _errors(run: Run) -> tuple[Figure | None, str, str]:
-    return six_signals('errors', run, plotting.ERROR, run.nu_d - run.nu)
+def estimates(run: Run) -> bool:
+    """Whether the law of a run has an adaptive term, or at least one that is not zero."""
+    return bool(np.any(run.disturbance_estimate != 0.0))
 
 
-def _deformation(kind: str, run: Run) -> tuple[Figure | None, str, str]:
+def _errors(run: Run) -> Drawn:
+    figure, title, caption = six_signals('errors', run, plotting.ERROR, run.nu_d - run.nu)
+    if run.measured is not None:
+        caption += ' The law saw measured velocities; these errors are those of the true ones.'
+    return figure, title, caption
+
+
+def _lumped(run: Run) -> Drawn:
+    w = lumped_error(run)
+    if w is None or not estimates(run):
+        title = f'Lumped estimation error, {run.controller}'
+        text = 'the law estimates nothing, f = 0 and w = −F, which is no error of an estimate.'
+        return None, title, f'{title}: {text}'
+    return six_signals('lumped_error', run, plotting.LUMPED, w)
+
+
+def _uncertainty(run: Run, F: np.ndarray) -> Drawn:
+    figure, title, caption = six_signals('uncertainty', run, plotting.UNCERTAINTY, F)
+    kinds = [kind.replace('_', ' ') for kind in OF_THE_MOTION if kind in (run.kinds or ())]
+    if kinds:
+        caption += f' F contains {join(kinds)} and so depends on the motion of this very run.'
+    return figure, title, caption
+
+
+def _inputs(run: Run, limit: np.ndarray | None) -> Drawn:
+    if run.applied is not None and np.any(run.tau):
+        return applied_figure(run, limit)
+    return six_signals('inputs', run, plotting.INPUT, run.tau)
+
+
+def _deformation(kind: str, run: Run) -> Drawn:
     model = control_model(run.vehicle)
     Upsilon, Upsilon_inv = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
     zeros = structural_zeros(Upsilon, Upsilon_inv)[kind]
     if kind == 'delta_xi':
         values = delta_xi(Upsilon_inv, run.nu)
         return six_signals(kind, run, plotting.DELTA_XI, values, zeros)
-    return six_signals(kind, run, plotting.DELTA_PI, delta_pi(Upsilon, run.tau), zeros)
+    drawn = six_signals(kind, run, plotting.DELTA_PI, delta_pi(Upsilon, run.tau), zeros)
+    note = ' Of the commanded wrench.' if run.applied is not None and drawn[0] is not None else ''
+    return drawn[0], drawn[1], drawn[2] + note
 
 
 def _different_disturbances(runs: Mapping[str, Run]) -> list[tuple[Run, np.ndarray]]:

@@ -32,7 +32,8 @@ def findings(runs: Mapping[str, Run], summaries: Summaries, claims: Sequence[Cla
     """
     leading = reference(runs)
     sentences = [_settling(name, run, summaries[name]) for name, run in runs.items()]
-    sentences += [_late_errors(summaries), _inputs(summaries), _energy(runs, leading)]
+    sentences += [_late_errors(summaries), _inputs(summaries), _applied(runs)]
+    sentences += [_energy(runs, leading)]
     sentences += [_couplings(summaries[leading.controller], leading), _claims(claims)]
     return [sentence for sentence in sentences if sentence]
 
@@ -69,6 +70,16 @@ def _inputs(summaries: Summaries) -> str:
             f'{number(largest[moment])} N m ({DOFS[moment]}) under {name}'
         )
     return f'The largest commands are {"; ".join(parts)}.'
+
+
+def _applied(runs: Mapping[str, Run]) -> str:
+    """What the actuators left of the commands, of the runs that have any."""
+    parts = []
+    for name, run in runs.items():
+        if run.applied is not None:
+            force, moment = (np.abs(run.applied[:, m]).max() for m in (slice(3), slice(3, 6)))
+            parts.append(f'{number(force)} N and {number(moment)} N m under {name}')
+    return f'The actuators deliver at most {"; ".join(parts)}.' if parts else ''
 
 
 def _energy(runs: Mapping[str, Run], leading: Run) -> str:

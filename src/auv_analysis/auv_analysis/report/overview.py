@@ -1,6 +1,7 @@
 """Figures that put the controllers of a scenario side by side: errors, inputs, energy."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +19,8 @@ from auv_gvc_controller.model import control_model
 
 MARKERS = 'os^vPX'
 SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
+RUNS = ('#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00')  # three runs and more
+APART = 20.0  # ratio of peaks from which runs share no linear scale
 SHARE_COLUMNS = 600  # of the stacked shares, each the mean of its samples
 XI = tuple(rf'$\xi_{i}$' for i in range(1, 7))
 
@@ -32,12 +35,12 @@ def settling(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
     figure, panels = _six_panels(runs)
     for i, axes in enumerate(panels):
         band = 0.0
-        for dashes, run in zip(_dashes(runs), runs.values(), strict=True):
+        for look, run in zip(_looks(runs, COLOURS[i]), runs.values(), strict=True):
             error = np.abs(run.nu_d[:, i] - run.nu[:, i])
             rest = np.maximum.accumulate(error[::-1])[::-1]
             seen = (rest > 0) & (run.t > run.t[0])
             line = plotting.decimate(run.t[seen] - run.t[0], rest[seen], logarithmic=True)
-            axes.plot(*line, color=COLOURS[i], linestyle=dashes)
+            axes.plot(*line, **look)
             band = max(SMALLEST_BAND, BAND * np.abs(run.nu_d[:, i]).max())
         axes.axhline(band, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
         plotting.logarithmic(axes, 'x', 'y')
@@ -56,21 +59,30 @@ def settling(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
 def inputs(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
     """Inputs of all controllers over logarithmic time. Returns figure, title and caption."""
     figure, panels = _six_panels(runs)
+    apart = False
     for i, axes in enumerate(panels):
-        for dashes, run in zip(_dashes(runs), runs.values(), strict=True):
+        for look, run in zip(_looks(runs, COLOURS[i]), runs.values(), strict=True):
             first = run.t[0] + run.step  # the sample at t = 0 stands at the left edge
             t = np.maximum(run.t, first) - run.t[0]
             line = plotting.decimate(t, run.tau[:, i], logarithmic=True)
-            axes.plot(*line, color=COLOURS[i], linestyle=dashes)
+            axes.plot(*line, **look)
         plotting.logarithmic(axes, 'x')
+        apart = _symmetric(axes, [np.abs(run.tau[:, i]).max() for run in runs.values()]) or apart
     for i, unit in enumerate(3 * plotting.WRENCH[:1] + 3 * plotting.WRENCH[1:]):
         panels[i].set_ylabel(f'{plotting.INPUT.symbols[i]} ({unit})')
     title = 'Inputs compared'
+    if any(run.applied is not None for run in runs.values()):
+        title += ', as commanded'
     caption = (
         f'{title}: {_named_dashes(runs)}. Time is logarithmic, so that the first instants, '
         'where the laws differ most, and the steady part both show; '
         'the sample at t = 0 stands at the left edge.'
     )
+    if apart:
+        caption += (
+            f' Where one run’s peak is more than {APART:g} times another’s, the scale is linear '
+            'between the two dotted lines and logarithmic beyond.'
+        )
     return figure, title, caption
 
 
@@ -81,15 +93,15 @@ def energy(runs: Mapping[str, Run], leading: Run) -> tuple[Figure, str, str]:
     wanted = 0.5 * np.sum(leading.nu_d @ leading.vehicle.M * leading.nu_d, axis=1)
     left.plot(*plotting.decimate(leading.t, wanted), color='#b5b5b5', linewidth=3.2)
     handles = [Line2D([], [], color='#b5b5b5', linewidth=3.2)]
-    for dashes, run in zip(_dashes(runs), runs.values(), strict=True):
+    for look, run in zip(_looks(runs), runs.values(), strict=True):
         total = _components(run).sum(axis=1)
-        handles += left.plot(*plotting.decimate(run.t, total), color='black', linestyle=dashes)
+        handles += left.plot(*plotting.decimate(run.t, total), **look)
     left.legend(
         handles,
         ['set-point', *runs],
         loc='lower right',
         bbox_to_anchor=(1.0, 1.02),
-        ncols=min(len(handles), 4),
+        ncols=3,
     )
     left.set_ylim(bottom=0.0)
     left.set_ylabel('kinetic energy (J)')
@@ -190,8 +202,22 @@ def _components(run: Run) -> np.ndarray:
     return kinetic_energy(model.Upsilon_inv.reshape(6, 6), model.N, run.nu)
 
 
-def _dashes(runs: Mapping[str, Run]) -> list:
-    return [DASHES[i % len(DASHES)] for i in range(len(runs))]
+def _looks(runs: Mapping[str, Run], colour: str = 'black') -> list[dict[str, Any]]:
+    """Dashes per run; for three runs and more a colour per run in place of the given one."""
+    many = len(runs) > 2
+    return [
+        {'linestyle': DASHES[i % len(DASHES)], 'color': RUNS[i % len(RUNS)] if many else colour}
+        for i in range(len(runs))
+    ]
+
+
+def _symmetric(axes: Axes, peaks: list[float]) -> bool:
+    """Symmetric logarithmic axis where the peaks of the runs are far apart; whether it is one."""
+    peaks = [peak for peak in peaks if peak > 0]
+    if not peaks or max(peaks) < APART * min(peaks):
+        return False
+    plotting.symmetric(axes, min(peaks))
+    return True
 
 
 def _named_dashes(runs: Mapping[str, Run]) -> str:
@@ -204,14 +230,9 @@ def _six_panels(runs: Mapping[str, Run]) -> tuple[Figure, list[Axes]]:
     panels = list(figure.subplots(2, 3, sharex=True).ravel())
     for i, axes in enumerate(panels):
         plotting.letter(axes, i, DOFS[i])
-    handles = [Line2D([], [], color='black', linestyle=dashes) for dashes in _dashes(runs)]
-    panels[2].legend(
-        handles,
-        list(runs),
-        loc='lower right',
-        bbox_to_anchor=(1.0, 1.16),
-        ncols=len(runs),
-        handlelength=2.6,
+    handles = [Line2D([], [], **look) for look in _looks(runs)]
+    figure.legend(
+        handles, list(runs), loc='outside upper right', ncols=min(len(runs), 4), handlelength=2.6
     )
     for axes in panels[3:]:
         axes.set_xlabel('$t$ (s)')

@@ -12,9 +12,11 @@ import markupsafe
 import numpy as np
 
 from auv_analysis.report import paper, tables
+from auv_analysis.report.certificates import certificate_table
 from auv_analysis.report.claims import claims_table
-from auv_analysis.report.figures import FigureRecord, draw_figures, reference
+from auv_analysis.report.figures import FigureRecord, draw_figures, estimates, reference
 from auv_analysis.report.findings import findings
+from auv_analysis.report.set_up import SetUp, set_up
 from auv_analysis.report.text import fixed, join, number, plain, tied
 from auv_analysis.run import Run
 from auv_analysis.summary import BAND, SMALLEST_BAND
@@ -25,6 +27,7 @@ SECTIONS = {  # section of the report -> beginnings of the names of its figures
     'errors': ('errors_', 'settling'),
     'estimates': ('lumped_error_', 'uncertainty_'),
     'inputs': ('inputs_',),
+    'certificates': ('certificate_',),
     'energy': ('kinetic_energy', 'energy_shares'),
     'couplings': ('delta_',),
 }
@@ -54,7 +57,8 @@ def write_report(
     if not runs:
         raise ValueError('runs: expected at least one run, found none')
     runs = {name: replace(run, controller=name) for name, run in runs.items()}
-    figures = draw_figures(runs, out / 'figures')
+    scene = set_up(runs, summaries, scenario_text)
+    figures = draw_figures(runs, out / 'figures', summaries, scene.limit)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE),
         autoescape=True,
@@ -67,7 +71,7 @@ def write_report(
         'maths': maths,
     }  # fmt: skip
     template = environment.get_template('report.html.j2')
-    context = _context(runs, summaries)
+    context = _context(runs, summaries, scene)
     text = template.render(
         **context,
         figures=_sections(figures),
@@ -82,11 +86,14 @@ def write_report(
 def maths(text: str) -> markupsafe.Markup:
     """Text with its indices lowered: w_X, K_D, ξ3; Lambda and Gamma become letters."""
     safe = str(markupsafe.escape(tied(text))).replace('Lambda', 'Λ').replace('Gamma', 'Γ')
-    safe = re.sub(r'(?<=[A-Za-zτξπΓΛ])_([A-Za-z0-9])\b', r'<sub>\1</sub>', safe)
+    safe = safe.replace('omega', 'ω').replace('phi', 'φ')
+    safe = re.sub(r'(?<=[A-Za-zτξπωΓΛ])_([A-Za-z0-9]|FF)\b', r'<sub>\1</sub>', safe)
     return markupsafe.Markup(re.sub(r'(?<=[ξπ])([1-6])\b', r'<sub>\1</sub>', safe))
 
 
-def _context(runs: Mapping[str, Run], summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def _context(
+    runs: Mapping[str, Run], summaries: Mapping[str, Mapping[str, Any]], scene: SetUp
+) -> dict[str, Any]:
     """What the template prints, computed."""
     leading = reference(runs)
     claims = claims_table(runs, summaries)
@@ -106,7 +113,11 @@ def _context(runs: Mapping[str, Run], summaries: Mapping[str, Mapping[str, Any]]
         'body_gains': tables.body_gains(summaries),
         'energy': tables.energy_rows(runs, original),
         'has_original': original is not None,
-        'certificates': tables.certificates(summaries),
+        'certificates': certificate_table(summaries),
+        'scene': scene,
+        'laws': {run.law for run in runs.values()},
+        'without_estimate': [n for n, run in runs.items() if not estimates(run)],
+        'commanded': any(run.applied is not None for run in runs.values()),
         'couplings': tables.couplings(runs, summaries),
         'claims': claims,
         'ends': {name: run.eta[-1, :3] for name, run in runs.items()},

@@ -50,11 +50,18 @@ def has_gains(run: Run, gains: Mapping[str, float]) -> bool:
     return set(run.gains) == set(gains) and all(equal(run.gains[k], gains[k]) for k in gains)
 
 
+def is_plain(run: Run) -> bool:
+    """Whether a run has nothing that the paper's have not: devices, model error or current."""
+    plain = run.applied is None and run.measured is None
+    return plain and run.kinds in (None, frozenset({'herman2018'}))
+
+
 def paper_run(runs: Mapping[str, Run], law: str) -> Run | None:
     """The run of `case1` or `case2` that has the paper's gains for 'gvc' or 'cl'; None without."""
     for run in runs.values():
         gains = GVC_GAINS if law == 'gvc' else CL_GAINS.get(run.scenario)
-        if run.scenario in CASES and run.law == law and gains and has_gains(run, gains):
+        known = run.scenario in CASES and run.law == law and is_plain(run)
+        if known and gains and has_gains(run, gains):
             return run
     return None
 

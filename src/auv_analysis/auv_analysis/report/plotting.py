@@ -171,13 +171,37 @@ def logarithmic(axes: Axes, *directions: str) -> None:
         return f'{x:g}' if 1e-4 <= x <= 1e5 else f'$10^{{{np.log10(x):.0f}}}$'
 
     shown = [np.asarray(line.get_xydata(), float) for line in axes.lines]
-    if not any(len(points) > 2 and np.all(points > 0) for points in shown):
-        return  # nothing positive to show: a logarithmic axis has no place for it
     for direction in directions:
+        values = [points[:, 'xy'.index(direction)] for points in shown]
+        if not any(len(v) > 2 and np.all(v > 0) for v in values):
+            continue  # nothing positive to show: a logarithmic axis has no place for it
         axes.set(**{f'{direction}scale': 'log'})
         axis = getattr(axes, f'{direction}axis')
         axis.set_major_formatter(decade)
         axis.set_minor_locator(NullLocator())
+
+
+def symmetric(axes: Axes, linear: float) -> float:
+    """Axis that is linear around zero and logarithmic beyond a power of ten next to `linear`.
+
+    Dotted lines mark where the one ends and the other begins; returns that power of ten.
+
+    """
+    first = round(np.log10(linear))
+    low, high = axes.dataLim.intervaly
+    axes.set_yscale('symlog', linthresh=10.0**first, linscale=0.8)
+    for level in (-(10.0**first), 10.0**first):
+        axes.axhline(level, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)))
+    last = int(np.ceil(np.log10(max(abs(low), abs(high), 10.0 ** (first + 1)))))
+    powers = range(first, last + 1, 1 + (last - first) // 4)
+    ticks = [0.0, *(10.0**k for k in powers if 10.0**k <= high)]
+    ticks += [-(10.0**k) for k in powers if -(10.0**k) >= low]
+    names = [
+        '0' if x == 0 else f'${"-" if x < 0 else ""}10^{{{np.log10(abs(x)):.0f}}}$' for x in ticks
+    ]
+    axes.set_yticks(ticks, names)
+    axes.yaxis.set_minor_locator(NullLocator())
+    return 10.0**first
 
 
 def letter(axes: Axes, index: int, text: str = '') -> None:

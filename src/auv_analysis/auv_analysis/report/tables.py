@@ -8,22 +8,27 @@ import numpy as np
 from auv_analysis.energy import kinetic_energy, shares
 from auv_analysis.report import paper
 from auv_analysis.report.text import number, plain
+from auv_analysis.report.words import gain_text
 from auv_analysis.run import Run
-from auv_dynamics.files import matrix6
 from auv_dynamics.signals import DOFS
 from auv_gvc_controller.decomposition import inverse_upper
+from auv_gvc_controller.laws import SHIPPED
 from auv_gvc_controller.model import control_model
 
 Summaries = Mapping[str, Mapping[str, Any]]
 VELOCITIES, WRENCHES = 'uvwpqr', 'XYZKMN'
+ZERO = 'zero (no adaptive term)'
 
 
 def controller_row(run: Run) -> dict[str, Any]:
-    """Name, law, gains in words and origin of a run."""
+    """Name, law, gains in words and origin of a run; a gain left to its default says so."""
+    defaults = getattr(SHIPPED.get(run.law), '_field_defaults', {}) if run.gains else {}
+    left = {name: value for name, value in defaults.items() if name not in run.gains}
     return {
         'name': run.controller,
         'law': run.law,
-        'gains': {name: gain_text(value) for name, value in run.gains.items()},
+        'gains': {name: gain_text(value) for name, value in run.gains.items()}
+        | {name: f'{gain_text(value)} (default)' for name, value in left.items()},
         'source': {'bag': 'recorded on the node graph', 'simulate': 'simulated in process'}.get(
             run.source, run.source
         ),
@@ -31,17 +36,6 @@ def controller_row(run: Run) -> dict[str, Any]:
         'step': run.step,
         'samples': len(run.t),
     }
-
-
-def gain_text(value: Any) -> str:
-    """A gain as '12 I', 'diag(...)' or 'full matrix'."""
-    matrix = np.asarray(matrix6(value))
-    diagonal = np.diagonal(matrix)
-    if np.any(matrix != np.diag(diagonal)):
-        return 'full matrix, in the listing'
-    if np.all(diagonal == diagonal[0]):
-        return f'{plain(diagonal[0], 6)} I'
-    return f'diag({", ".join(plain(x, 6) for x in diagonal)})'
 
 
 def decompositions(runs: Mapping[str, Run], summaries: Summaries) -> list[dict[str, Any]]:
@@ -60,12 +54,15 @@ def decompositions(runs: Mapping[str, Run], summaries: Summaries) -> list[dict[s
 
 def body_gains(summaries: Summaries) -> list[dict[str, Any]]:
     """K_D and K_f of each controller: the matrix, or text where it is a multiple of I."""
-    rows = []
+    rows: list[dict[str, Any]] = []
     for name, summary in summaries.items():
         for symbol, key in (('K_D', 'K_D'), ('K_f', 'K_f')):
             if summary['gains'][key] is None:
                 continue
             matrix = np.array(summary['gains'][key])
+            if not matrix.any():
+                rows.append({'controller': name, 'symbol': symbol, 'text': ZERO, 'matrix': matrix})
+                continue
             scalar = np.array_equal(matrix, matrix[0, 0] * np.eye(6))
             text = f'{plain(matrix[0, 0], 6)} I' if scalar else None
             rows.append({'controller': name, 'symbol': symbol, 'text': text, 'matrix': matrix})
@@ -89,19 +86,6 @@ def energy_rows(runs: Mapping[str, Run], original: Run | None) -> list[dict[str,
                 'name': name, 'window': f'0–{end:g} s', 'mean': float(mean.sum()),
                 'shares': [_share(x) for x in shares(mean)],
             })  # fmt: skip
-    return rows
-
-
-def certificates(summaries: Summaries) -> list[dict[str, Any]]:
-    """The certificate of each run; runs that lack it for the same reason in one row."""
-    rows: list[dict[str, Any]] = []
-    for name, summary in summaries.items():
-        lyapunov = summary['lyapunov']
-        same = [row for row in rows if row['lyapunov'] == lyapunov and not lyapunov['applicable']]
-        if same:
-            same[0]['names'].append(name)
-        else:
-            rows.append({'names': [name], 'lyapunov': lyapunov})
     return rows
 
 
@@ -129,9 +113,8 @@ def couplings(runs: Mapping[str, Run], summaries: Summaries) -> list[dict[str, A
 
 
 def notes(runs: Mapping[str, Run]) -> list[str]:
-    """Notes of the runs and warnings of their vehicles, each once."""
+    """Notes of the runs, each once."""
     found = [f'{name}: {note}' for name, run in runs.items() for note in run.notes]
-    found += [warning for run in runs.values() for warning in run.vehicle.warnings]
     return list(dict.fromkeys(found))
 
 

@@ -1,0 +1,99 @@
+"""The commanded wrench beside what the actuators delivered."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from auv_analysis.report import plotting
+from auv_analysis.report.plotting import COLOURS
+from auv_analysis.report.text import join, number
+from auv_analysis.run import Run
+from auv_dynamics.signals import DOFS
+
+BEYOND = 3.0  # times what else is to be seen: a command that is cut off and told in the panel
+ROOM = 1.25  # of the axis above what it shows
+COMMAND: dict[str, Any] = {'color': '#8a8a8a', 'linewidth': 0.8, 'linestyle': '-'}
+LIMIT: dict[str, Any] = {'color': 'black', 'linewidth': 0.9, 'linestyle': (0, (1, 1.6))}
+
+
+def applied_figure(run: Run, limit: np.ndarray | None) -> tuple[Figure, str, str]:
+    """Commanded and applied wrench, a panel per degree of freedom.
+
+    Parameters
+    ----------
+    run : with a wrench that was applied
+    limit : (6,) axis limits, N and N m, drawn where they are in the panel; None: there are none
+
+    Returns
+    -------
+    figure, title, caption
+
+    """
+    title = f'Input, {run.controller}'
+    figure = plotting.new_figure(5.6)
+    panels = figure.subplots(3, 2, sharex=True)
+    cut, missed = [], []
+    for i, dof in enumerate(DOFS):
+        axes = panels[i % 3, i // 3]
+        bound = None if limit is None else float(limit[i])
+        if _panel(axes, run, i, bound):
+            cut.append(dof)
+        if not np.array_equal(run.tau[:, i], run.tau_applied[:, i]):
+            missed.append(dof)
+        axes.set_ylabel(f'{plotting.INPUT.symbols[i]} ({plotting.INPUT.unit(i)})')
+        plotting.letter(axes, i, dof)
+    for axes in panels[-1]:
+        axes.set_xlabel('$t$ (s)')
+    figure.legend(*_key(limit), loc='outside upper right', ncols=3, handlelength=2.4)
+    return figure, title, _caption(title, run, limit, cut, missed)
+
+
+def _panel(axes: Axes, run: Run, i: int, bound: float | None) -> bool:
+    """Draw one degree of freedom; whether its command was cut off by the axis."""
+    command, applied = run.tau[:, i], run.tau_applied[:, i]
+    axes.plot(*plotting.decimate(run.t, command), **COMMAND)
+    axes.plot(*plotting.decimate(run.t, applied), color=COLOURS[i], linewidth=1.4)
+    axes.set_xlim(run.t[0], run.t[-1])
+    seen = np.abs(applied).max()
+    if bound is not None and bound <= BEYOND * max(seen, np.abs(command).max()):
+        seen = max(seen, bound)
+        for level in (-bound, bound):
+            axes.axhline(level, **LIMIT)
+    peak = int(np.argmax(np.abs(command)))
+    if not seen or abs(command[peak]) <= BEYOND * seen:
+        return False
+    axes.set_ylim(-ROOM * seen, ROOM * seen)
+    reached = f'{number(command[peak])} {plotting.INPUT.unit(i)} at {run.t[peak]:.2f} s'
+    axes.set_title(f'command to {reached}', loc='right', fontsize=8.5)
+    return True
+
+
+def _key(limit: np.ndarray | None) -> tuple[list[Line2D], list[str]]:
+    looks: dict[str, dict[str, Any]] = {
+        'commanded': COMMAND,
+        'applied': {'color': 'black', 'lw': 1.4},
+    }
+    if limit is not None:
+        looks['axis limit'] = LIMIT
+    return [Line2D([], [], **look) for look in looks.values()], list(looks)
+
+
+def _caption(
+    title: str, run: Run, limit: np.ndarray | None, cut: list[str], missed: list[str]
+) -> str:
+    parts = [
+        f'{title}: commanded τ (thin, grey) and the wrench that the actuators applied (thick, in '
+        'colour).'
+    ]
+    if limit is not None:
+        parts.append('Dotted: axis limits, left out where everything stays far below them.')
+    if cut:
+        parts.append(f'The commands in {join(cut)} leave the panel: their peak is written above.')
+    force, moment = (np.abs(run.tau_applied[:, m]).max() for m in (slice(3), slice(3, 6)))
+    parts.append(f'Largest applied: {number(force)} N and {number(moment)} N m.')
+    if not missed:
+        parts.append('The two never differ in this run.')
+    return ' '.join(parts)

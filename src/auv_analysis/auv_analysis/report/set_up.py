@@ -1,0 +1,205 @@
+"""The set-up of a study in words: what acts on the plant, and what lies between it and the law."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.report.text import join, number, plain
+from auv_analysis.report.words import (
+    current,
+    harmonics,
+    herman2018,
+    model_error,
+    per_axis,
+    rotations,
+)
+from auv_analysis.run import Run
+from auv_analysis.scenario import SCHEMA
+from auv_dynamics.files import InputError, check, parse_yaml
+from auv_dynamics.signals import DOFS
+from auv_gvc_controller.gains import sampling_warning
+
+VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
+KINDS = {
+    'herman2018': herman2018,
+    'harmonic': lambda spec: f'harmonic, opposing τ: {harmonics(spec, DOFS, WRENCH)}',
+    'model_error': model_error,
+    'current': current,
+}
+
+
+@dataclass(frozen=True)
+class SetUp:
+    """What the report says of the scenario beside its controllers.
+
+    Attributes
+    ----------
+    name : of the scenario that the words are about, '' where its file is not at hand
+    rows : what, and lines about it
+    limit : (6,) axis limits of the actuators, N and N m; None where there are none
+
+    """
+
+    name: str
+    rows: list[tuple[str, list[str]]]
+    limit: np.ndarray | None
+
+
+def set_up(runs: Mapping[str, Run], summaries: Mapping[str, Any], scenario_text: str) -> SetUp:
+    """Words about the scenario of some runs.
+
+    Parameters
+    ----------
+    runs, summaries : by name
+    scenario_text : the scenario's file; a text that is none, or that of other runs, says nothing
+
+    """
+    data = scenario_data(scenario_text)
+    if data is None or data['name'] not in {run.scenario for run in runs.values()}:
+        return SetUp('', [*_of_the_runs(runs), *_shared(runs, summaries)], None)
+    mine = {name: run for name, run in runs.items() if run.scenario == data['name']}
+    actuators, sensors = data.get('actuators'), data.get('sensors')
+    rows = [('set-point', [_setpoint(data['setpoint'])])]
+    start = _start(data.get('initial', {}))
+    rows += [('start', [start])] if start else []
+    rows += [('disturbances', _disturbances(data.get('disturbance', [])))]
+    rows += [('actuators', _actuators(actuators, mine))]
+    if actuators and ('limit' in actuators or actuators.get('thrusters')):
+        rows += [('anti-windup', [_anti_windup(data['controllers'], mine)])]
+    rows += [('sensors', [_sensors(sensors)])]
+    seed = f'{data.get("seed", 0)}'
+    rows += [('seed', [seed if sensors else f'{seed}; nothing in this scenario is random'])]
+    rows += _shared(runs, summaries, str(data.get('integrator', 'ode5')))
+    limit = (actuators or {}).get('limit')
+    bounds = None if limit is None else np.broadcast_to(np.asarray(limit, float), 6)
+    return SetUp(data['name'], rows, bounds)
+
+
+def scenario_data(text: str) -> dict[str, Any] | None:
+    """Contents of a scenario's text; None where it is not one."""
+    try:
+        data = parse_yaml(text, 'scenario', 'scenario')
+        check(data, SCHEMA, 'scenario')
+    except InputError:
+        return None
+    return data
+
+
+def sampling_warnings(runs: Mapping[str, Run], summaries: Mapping[str, Any]) -> list[str]:
+    """Runs whose velocity gain is too fast for their control period, in words."""
+    found = []
+    for name, run in runs.items():
+        K_D = summaries[name]['gains']['K_D']
+        if run.hold == 'zoh' and K_D is not None:
+            text = sampling_warning(np.array(K_D), run.vehicle.M, run.step)
+            found += [f'{name}: {text}'] if text else []
+    return found
+
+
+def _of_the_runs(runs: Mapping[str, Run]) -> list[tuple[str, list[str]]]:
+    """What the runs themselves say where their scenario is not at hand."""
+    rows = []
+    for name, run in runs.items():
+        words = 'not known' if run.kinds is None else join(sorted(run.kinds)) or 'none'
+        line = f'disturbances {words}'
+        line += '; the actuators are not ideal' if run.applied is not None else ''
+        line += '; the law sees measurements' if run.measured is not None else ''
+        rows.append((name, [line]))
+    return rows
+
+
+def _shared(
+    runs: Mapping[str, Run], summaries: Mapping[str, Any], integrator: str = ''
+) -> list[tuple[str, list[str]]]:
+    """How the law is run, and what is odd about it."""
+    words = {
+        'zoh': 'the law is sampled once per step and its wrench held, as on a computer',
+        'continuous': 'the law is evaluated in every stage of the integrator, as in the paper',
+    }
+    holds: dict[str, list[str]] = {}
+    for name, run in runs.items():
+        holds.setdefault(words.get(run.hold, run.hold), []).append(name)
+    lines = [
+        text + (f' ({join(names)})' if len(holds) > 1 else '') for text, names in holds.items()
+    ]
+    if integrator:
+        lines[0] = f'{integrator}; {lines[0]}'
+    odd = sampling_warnings(runs, summaries)
+    odd += dict.fromkeys(warning for run in runs.values() for warning in run.vehicle.warnings)
+    return [('integration', lines), *([('warnings', odd)] if odd else [])]
+
+
+def _setpoint(spec: Mapping[str, Any]) -> str:
+    if 'file' in spec:
+        return 'read from a CSV file'
+    return harmonics(spec, DOFS, VELOCITY) or 'zero'
+
+
+def _start(initial: Mapping[str, Any]) -> str:
+    eta, nu = initial.get('eta', [0.0] * 6), initial.get('nu', [0.0] * 6)
+    parts = []
+    if any(eta):
+        parts.append(f'η = ({", ".join(plain(x) for x in eta)}) m, rad')
+    if any(nu):
+        parts.append(f'ν = ({", ".join(plain(x) for x in nu)}) m/s, rad/s')
+    return '; '.join(parts)
+
+
+def _disturbances(specs: Any) -> list[str]:
+    specs = specs if isinstance(specs, list) else [specs]
+    return [KINDS[spec['kind']](spec) for spec in specs] or ['none: F is zero']
+
+
+def _actuators(spec: Mapping[str, Any] | None, runs: Mapping[str, Run]) -> list[str]:
+    if spec is None:
+        return ['ideal: the commanded wrench is the applied one']
+    parts = []
+    if spec.get('thrusters'):
+        parts.append(_thrusters(next(iter(runs.values()))))
+    if 'limit' in spec:
+        parts.append(f'axis limits ± {per_axis(spec["limit"], WRENCH)}')
+    if 'rate' in spec:
+        parts.append(f'slew rate at most {per_axis(spec["rate"], ("N/s", "N m/s"))}')
+    parts += [f'{key} {plain(spec[key])} s' for key in ('lag', 'delay') if spec.get(key)]
+    return parts or ['ideal: the commanded wrench is the applied one']
+
+
+def _thrusters(run: Run) -> str:
+    thrusters = run.vehicle.thrusters
+    if thrusters is None:
+        return 'thrusters of the vehicle file'
+    n = len(thrusters.names)
+    reverse, forward = thrusters.reverse, thrusters.forward
+    most = f'{_span(-reverse)} to {_span(forward)} N'
+    return (
+        f'{n} thrusters of {run.vehicle.name} (T of rank {thrusters.rank} of 6) with thrusts from '
+        f'{most}, allocated by the pseudo-inverse and scaled down together'
+    )
+
+
+def _span(values: np.ndarray) -> str:
+    texts = dict.fromkeys(number(x) for x in (values.min(), values.max()))
+    return '…'.join(texts)
+
+
+def _anti_windup(controllers: Mapping[str, Any], runs: Mapping[str, Run]) -> str:
+    off = [name for name in runs if not controllers.get(name, {}).get('anti_windup', True)]
+    on = [name for name in runs if name not in off]
+    parts = [f'on for {join(on)}'] if on else []
+    return '; '.join(parts + ([f'off for {join(off)}'] if off else []))
+
+
+def _sensors(spec: Mapping[str, Any] | None) -> str:
+    if spec is None:
+        return 'perfect: the law sees the true state'
+    parts = []
+    if np.any(spec.get('velocity_noise', 0.0)):
+        parts.append(f'velocity noise {per_axis(spec["velocity_noise"], VELOCITY)}')
+    if np.any(spec.get('attitude_noise', 0.0)):
+        parts.append(f'attitude noise {rotations(spec["attitude_noise"])} rad')
+    text = f'{join(parts)} (standard deviations)' if parts else ''
+    lost = spec.get('drop_out', 0.0)
+    lost_text = f'a sample is lost with probability {plain(lost)}' if lost else ''
+    return '; '.join(filter(None, [text, lost_text])) or 'perfect: the law sees the true state'

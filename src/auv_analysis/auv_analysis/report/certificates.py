@@ -24,10 +24,10 @@ ROWS = (  # symbol or words, unit or '', key of summary.json, factor
     ('L increases by (26)', '% of the samples', 'share_of_time_increasing', 100.0),
     ('condition (27) holds', '% of the samples', 'share_condition_27', 100.0),
     ('bound (28) holds', '% of the samples', 'share_bound_28', 100.0),
-    ('largest rho of (28)', 'W', 'rho_max', 1.0),
-    ('sup |s|', 'm/s, rad/s', 'sup_s', 1.0),
-    ('sup |z|', 'm, rad', 'sup_z', 1.0),
-    ('sup |w|', 'N, N m', 'sup_w', 1.0),
+    ('largest ρ of (28)', 'W', 'rho_max', 1.0),
+    ('sup ‖s‖', 'm/s, rad/s', 'sup_s', 1.0),
+    ('sup ‖z‖', 'm, rad', 'sup_z', 1.0),
+    ('sup ‖w‖', 'N, N m', 'sup_w', 1.0),
     ('L at the start', 'J', 'L_first', 1.0),
     ('L at the end', 'J', 'L_last', 1.0),
 )
@@ -50,8 +50,8 @@ def certificate_table(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, A
     entries = {name: summary['lyapunov'] for name, summary in summaries.items()}
     reasons: dict[str, list[str]] = {}
     for name, entry in entries.items():
-        if not entry['applicable']:
-            reasons.setdefault(entry['reason'] or 'not applicable', []).append(name)
+        for reason in _parts(entry):
+            reasons.setdefault(reason, []).append(name)
     marks = {reason: chr(ord('a') + i) for i, reason in enumerate(reasons)}
     rows = []
     for label, unit, key, factor in ROWS:
@@ -59,7 +59,10 @@ def certificate_table(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, A
         rows.append({'label': label, 'unit': unit, 'cells': cells})
     return {
         'applies': [
-            {'yes': entry['applicable'], 'mark': marks.get(entry['reason'] or 'not applicable', '')}
+            {
+                'yes': entry['applicable'],
+                'mark': ', '.join(sorted(marks[part] for part in _parts(entry))),
+            }
             for entry in entries.values()
         ],
         'rows': rows,
@@ -67,10 +70,18 @@ def certificate_table(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, A
             {'mark': marks[reason], 'names': names, 'text': reason}
             for reason, names in reasons.items()
         ],
-        'sampled': [name for name, entry in entries.items() if entry.get('sampled')],
-        'any': any(is_drawn(summary) for summary in summaries.values()),
+        'sampled': [
+            name
+            for name, entry in entries.items()
+            if entry.get('sampled') and entry.get('identity_residual') is not None
+        ],
         'soft': any(soft for row in rows for _, soft in row['cells']),
     }
+
+
+def _parts(entry: Mapping[str, Any]) -> list[str]:
+    """Why a certificate does not apply, reason by reason."""
+    return [] if entry['applicable'] else (entry['reason'] or 'not applicable').split('; ')
 
 
 def is_drawn(summary: Mapping[str, Any]) -> bool:

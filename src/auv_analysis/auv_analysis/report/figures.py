@@ -164,7 +164,7 @@ def _lumped(run: Run) -> Drawn:
     w = lumped_error(run)
     if w is None or not estimates(run):
         title = f'Lumped estimation error, {run.controller}'
-        text = 'the law estimates nothing, f = 0 and w = −F, which is no error of an estimate.'
+        text = 'the law estimates nothing; w is −F, no error of an estimate, and not drawn.'
         return None, title, f'{title}: {text}'
     return six_signals('lumped_error', run, plotting.LUMPED, w)
 

@@ -171,9 +171,11 @@ def logarithmic(axes: Axes, *directions: str) -> None:
         return f'{x:g}' if 1e-4 <= x <= 1e5 else f'$10^{{{np.log10(x):.0f}}}$'
 
     shown = [np.asarray(line.get_xydata(), float) for line in axes.lines]
+    marks = [np.asarray(marks.get_offsets(), float) for marks in axes.collections]
+    shown += [np.concatenate(marks)] if marks else []
     for direction in directions:
         values = [points[:, 'xy'.index(direction)] for points in shown]
-        if not any(len(v) > 2 and np.all(v > 0) for v in values):
+        if not any(len(v) > 2 and np.any(v > 0) and np.all(v >= 0) for v in values):
             continue  # nothing positive to show: a logarithmic axis has no place for it
         axes.set(**{f'{direction}scale': 'log'})
         axis = getattr(axes, f'{direction}axis')

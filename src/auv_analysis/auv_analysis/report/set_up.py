@@ -162,7 +162,8 @@ def _actuators(spec: Mapping[str, Any] | None, runs: Mapping[str, Run]) -> list[
         parts.append(f'axis limits ± {per_axis(spec["limit"], WRENCH)}')
     if 'rate' in spec:
         parts.append(f'slew rate at most {per_axis(spec["rate"], ("N/s", "N m/s"))}')
-    parts += [f'{key} {plain(spec[key])} s' for key in ('lag', 'delay') if spec.get(key)]
+    slow = [f'{key} {plain(spec[key])} s' for key in ('lag', 'delay') if spec.get(key)]
+    parts += [', '.join(slow)] if slow else []
     return parts or ['ideal: the commanded wrench is the applied one']
 
 

@@ -53,20 +53,26 @@ def decompositions(runs: Mapping[str, Run], summaries: Summaries) -> list[dict[s
 
 
 def body_gains(summaries: Summaries) -> list[dict[str, Any]]:
-    """K_D and K_f of each controller: the matrix, or text where it is a multiple of I."""
+    """K_D and K_f, once for those that share them: the matrix, or text for a multiple of I."""
     rows: list[dict[str, Any]] = []
     for name, summary in summaries.items():
-        for symbol, key in (('K_D', 'K_D'), ('K_f', 'K_f')):
-            if summary['gains'][key] is None:
-                continue
-            matrix = np.array(summary['gains'][key])
-            if not matrix.any():
-                rows.append({'controller': name, 'symbol': symbol, 'text': ZERO, 'matrix': matrix})
-                continue
-            scalar = np.array_equal(matrix, matrix[0, 0] * np.eye(6))
-            text = f'{plain(matrix[0, 0], 6)} I' if scalar else None
-            rows.append({'controller': name, 'symbol': symbol, 'text': text, 'matrix': matrix})
+        for symbol in ('K_D', 'K_f'):
+            gain = summary['gains'][symbol]
+            same = [row for row in rows if (row['symbol'], row['gain']) == (symbol, gain)]
+            if same:
+                same[0]['controllers'].append(name)
+            elif gain is not None:
+                row = {'controllers': [name], 'symbol': symbol, 'gain': gain}
+                rows.append(row | {'text': _multiple(np.array(gain))})
     return rows
+
+
+def _multiple(matrix: np.ndarray) -> str | None:
+    """A matrix as a multiple of I in words; None where it is none."""
+    if not matrix.any():
+        return ZERO
+    scalar = np.array_equal(matrix, matrix[0, 0] * np.eye(6))
+    return f'{plain(matrix[0, 0], 6)} I' if scalar else None
 
 
 def energy_rows(runs: Mapping[str, Run], original: Run | None) -> list[dict[str, Any]]:

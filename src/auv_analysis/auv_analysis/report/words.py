@@ -74,6 +74,8 @@ def current(spec: Mapping[str, Any]) -> str:
 def per_axis(value: Any, units: Sequence[str]) -> str:
     """One number or six with their units: '3000, 3000, 4000 N and 800, 800, 500 N m'."""
     six = np.broadcast_to(np.asarray(value, float), 6)
+    if np.all(six == six[0]):
+        return f'{plain(six[0], 6)} {units[0]} and {units[1]}'
     halves = zip((six[:3], six[3:]), units, strict=True)
     return join([f'{_three(half)} {unit}' for half, unit in halves])
 

@@ -249,3 +249,42 @@ def test_real_time_lets_go_when_odometry_falls_silent() -> None:
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
     assert_one_line(run_node('controller_node', *arguments), key, expected)
+
+
+@pytest.mark.parametrize(
+    'told', [{'limits__wrench': '[5.0]'}, {'actuators__limit': '[5.0]'}], ids=['clips', 'knows']
+)
+def test_integrals_stop_at_the_limits_that_are_known(told) -> None:
+    """The adaptive term of surge stays zero while its wrench is cut, that of an idle axis too."""
+    arguments = [*LOCKSTEP, *parameters(**told)]
+    with graph(('controller_node', arguments)) as (peer, _):
+        peer.listen(topics.WRENCH, topics.DISTURBANCE_ESTIMATE)
+        peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
+        for k in range(5):
+            peer.publish(topics.CMD_VEL, setpoint(k))
+            peer.publish(topics.ODOM, odometry(k))
+            answered(peer, k + 1)
+        estimates = peer.heard['disturbance_estimate']
+        peer.until(lambda: len(estimates) == 5, 'estimates')
+        assert [m.wrench.force.x for m in estimates] == [0.0] * 5
+        clipped = 'limits__wrench' in told
+        assert all((m.wrench.force.x == 5.0) == clipped for m in peer.heard['wrench'])
+
+
+def test_without_anti_windup_they_do_not_stop() -> None:
+    arguments = [*LOCKSTEP, *parameters(limits__wrench='[5.0]', anti_windup=False)]
+    with graph(('controller_node', arguments)) as (peer, _):
+        peer.listen(topics.WRENCH, topics.DISTURBANCE_ESTIMATE)
+        peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
+        for k in range(3):
+            peer.publish(topics.CMD_VEL, setpoint(k))
+            peer.publish(topics.ODOM, odometry(k))
+            answered(peer, k + 1)
+        estimates = peer.heard['disturbance_estimate']
+        peer.until(lambda: len(estimates) == 3, 'estimates')
+        assert estimates[-1].wrench.force.x > 0.0
+
+
+def test_thrusters_that_the_vehicle_has_not_are_refused() -> None:
+    extra = parameters(actuators__thrusters=True)
+    assert_one_line(run_node('controller_node', *CONTROLLER, *extra), 'actuators.thrusters')

@@ -148,7 +148,8 @@ def simulate(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _write_samples(run: Run, path: Path) -> None:
-    names = ('t', 'eta', 'nu', 'nu_d', 'tau', 'disturbance', 'disturbance_estimate')
+    names = ('t', 'eta', 'nu', 'nu_measured', 'nu_d', 'nu_d_dot', 'tau', 'tau_applied')
+    names += ('disturbance', 'disturbance_estimate')
     np.savez_compressed(path, **{name: getattr(run, name) for name in names})
 
 

@@ -299,7 +299,8 @@ def test_certificate_figure_holds_the_measured_derivative_against_26_and_28(case
     energy, early, late = figure.axes
     assert energy.get_yscale() == 'log'
     assert early.get_yscale() == 'symlog'
-    assert late.get_yscale() == 'linear'
+    assert late.get_yscale() == 'symlog'
+    assert 'linear between them and logarithmic beyond' in caption
     rest = found.t > found.t[0] + 2.0
     curves = [np.asarray(line.get_ydata(), float) for line in late.lines]
     for values in (found.bound, found.identity, found.L_dot):
@@ -358,3 +359,26 @@ def test_report_follows_the_readers_colour_scheme(rough, tmp_path, quick):
     style = re.search(r'<style>(.*?)</style>', _report(tmp_path, *rough), re.DOTALL)[1]
     assert style.count('prefers-color-scheme: dark') == 2
     assert 'background: var(--paper)' in style
+
+
+def test_report_of_laws_without_a_certificate_has_reasons_and_no_empty_table(
+    rough, tmp_path, quick
+):
+    runs, summaries, text = rough
+    only = {'pid': runs['pid']}
+    html = _report(tmp_path, only, {'pid': summaries['pid']}, text)
+    assert 'aria-label="Certificate"' not in html
+    assert 'no certificate of the law pid is known' in _text(html)
+    assert 'aria-label="Certificate"' in _report(tmp_path / 'all', *rough)
+
+
+def test_restless_lines_lie_below_smooth_ones(case1):
+    run = case1[0]['gvc']
+    noise = np.random.default_rng(1).normal(size=run.tau.shape) * 100.0
+    runs = {'smooth': run, 'noisy': replace(run, tau=run.tau + noise, measured=run.nu)}
+    with plotting.style():
+        figure, _, _ = overview.inputs(runs)
+    for axes in figure.axes:
+        smooth, noisy = axes.lines[:2]
+        assert smooth.get_zorder() > noisy.get_zorder()
+        assert smooth.get_color() != noisy.get_color()

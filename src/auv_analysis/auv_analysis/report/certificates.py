@@ -11,12 +11,13 @@ from matplotlib.lines import Line2D
 from auv_analysis.certificate import Certificate
 from auv_analysis.lyapunov import certificate_of
 from auv_analysis.report import plotting
-from auv_analysis.report.text import number
+from auv_analysis.report.text import MISSING, number
 from auv_analysis.run import Run
 from auv_analysis.summary import TRANSIENT
 from auv_gvc_controller.model import control_model
 
 IDENTITY, BOUND, MEASURED = '#56B4E9', '#D55E00', '#1a1a1a'
+APART = 10.0  # ratio of a largest value to what else is to be seen, from which it is logarithmic
 DECADES = 5  # of a symmetric logarithmic axis, from its linear part to its end
 ROWS = (  # symbol or words, unit or '', key of summary.json, factor
     ('identity (26): largest residual', '% of max |(26)|', 'identity_residual', 100.0),
@@ -43,8 +44,9 @@ def certificate_table(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, A
 
     Returns
     -------
-    table : `applies` words per run; `rows` of name, unit, cells (text, whether it is no residual
-        of an identity); `reasons` as mark, names, text; `sampled` names of zero-order hold
+    table : `applies` per run; `rows` of label, unit, cells (text, whether it is the residual of
+        what is no identity there); `reasons` as mark, names, text; `sampled` names of runs under
+        zero-order hold; `known` and `soft`: whether any cell is a number, and such a residual
 
     """
     entries = {name: summary['lyapunov'] for name, summary in summaries.items()}
@@ -75,6 +77,7 @@ def certificate_table(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, A
             for name, entry in entries.items()
             if entry.get('sampled') and entry.get('identity_residual') is not None
         ],
+        'known': any(text != MISSING for row in rows for text, _ in row['cells']),
         'soft': any(soft for row in rows for _, soft in row['cells']),
     }
 
@@ -127,9 +130,9 @@ def _caption(
     parts = [f'{title}: (a) L of (23) on a logarithmic axis; (b) its derivative, measured from L']
     parts[0] += ', against the identity (26) and the bound (28)'
     parts[0] += f', the first {TRANSIENT:g} s' if split else ''
+    parts[0] += '; (c) the rest on a scale of its own.' if split else '.'
     if partly:
-        parts[0] += ', on an axis that is linear around zero, logarithmic beyond the dotted lines'
-    parts[0] += '; (c) the rest on a linear scale of its own.' if split else '.'
+        parts += ['An axis with two dotted lines is linear between them and logarithmic beyond.']
     parts += ['Grey: where (26) is positive, so that L increases.']
     if run.hold == 'zoh':
         parts += ['The wrench is held between samples; (26) is that of the continuous law.']
@@ -158,12 +161,15 @@ def _rates(axes: Axes, found: Certificate, inside: np.ndarray, *, symmetric: boo
     _increasing(axes, found, inside)
     axes.set_xlim(t[0], t[-1])
     largest = np.abs(found.identity[inside]).max()
-    if symmetric and largest > 0:
-        ends = np.abs(found.identity[inside][-max(len(t) // 4, 1) :])
-        linear = max(ends.max(), largest * 10.0**-DECADES)
-        if 10.0 * linear < largest:
-            plotting.symmetric(axes, linear)
-            return True
+    beyond = max(largest, np.abs(found.bound[inside]).max())
+    if symmetric:  # to its last quarter, where it has died away
+        last = np.abs(found.identity[inside][-max(len(t) // 4, 1) :]).max()
+        linear = max(last, beyond * 10.0**-DECADES)
+    else:  # the bound alone is large: what it bounds keeps the linear part
+        linear = max(largest, beyond * 10.0**-DECADES)
+    if beyond > 0 and beyond > APART * linear:
+        plotting.symmetric(axes, linear)
+        return True
     return False
 
 

@@ -19,7 +19,7 @@ from auv_gvc_controller.model import control_model
 
 MARKERS = 'os^vPX'
 SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
-RUNS = ('#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00')  # three runs and more
+RUNS = ('#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00')  # of three runs and more
 APART = 20.0  # ratio of peaks from which runs share no linear scale
 SHARE_COLUMNS = 600  # of the stacked shares, each the mean of its samples
 XI = tuple(rf'$\xi_{i}$' for i in range(1, 7))
@@ -61,11 +61,13 @@ def inputs(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
     figure, panels = _six_panels(runs)
     apart = False
     for i, axes in enumerate(panels):
-        for look, run in zip(_looks(runs, COLOURS[i]), runs.values(), strict=True):
+        path = [np.abs(np.diff(run.tau[:, i])).sum() for run in runs.values()]
+        above = 3.0 - np.argsort(np.argsort(path)) / len(runs)  # smooth lines over restless ones
+        for look, run, order in zip(_looks(runs, COLOURS[i]), runs.values(), above, strict=True):
             first = run.t[0] + run.step  # the sample at t = 0 stands at the left edge
             t = np.maximum(run.t, first) - run.t[0]
             line = plotting.decimate(t, run.tau[:, i], logarithmic=True)
-            axes.plot(*line, **look)
+            axes.plot(*line, zorder=order, **look)
         plotting.logarithmic(axes, 'x')
         apart = _symmetric(axes, [np.abs(run.tau[:, i]).max() for run in runs.values()]) or apart
     for i, unit in enumerate(3 * plotting.WRENCH[:1] + 3 * plotting.WRENCH[1:]):
@@ -203,8 +205,8 @@ def _components(run: Run) -> np.ndarray:
 
 
 def _looks(runs: Mapping[str, Run], colour: str = 'black') -> list[dict[str, Any]]:
-    """Dashes per run; for three runs and more a colour per run in place of the given one."""
-    many = len(runs) > 2
+    """Dashes per run; of three runs and more, or noisy ones, a colour per run for the given one."""
+    many = len(runs) > 2 or any(run.measured is not None for run in runs.values())
     return [
         {'linestyle': DASHES[i % len(DASHES)], 'color': RUNS[i % len(RUNS)] if many else colour}
         for i in range(len(runs))

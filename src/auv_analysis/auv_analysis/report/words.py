@@ -52,7 +52,8 @@ def herman2018(spec: Mapping[str, Any]) -> str:
     text = f'equation (39), exponents read with {sign}'
     if isinstance(scale, int | float):
         return text if scale == 1 else f'{text}, times {plain(scale)}'
-    return f'{text}, times {gain_text(scale)}'
+    words = gain_text(scale)
+    return f'{text}, times {"a " if words.startswith("full") else ""}{words}'
 
 
 def model_error(spec: Mapping[str, Any]) -> str:

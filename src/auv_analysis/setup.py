@@ -33,6 +33,7 @@ setup(
         'mcap>=1.5',
         'mcap-ros2-support>=0.5.5',
         'matplotlib>=3.6',
+        'Pillow>=9',
         'Jinja2>=3.0',
         'psutil>=5.9.4',
         'rich>=13',

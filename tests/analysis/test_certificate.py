@@ -29,6 +29,7 @@ TWIST = np.triu(np.ones((6, 6)), 1) - np.tril(np.ones((6, 6)), -1)
 HERMAN = yaml.safe_load(shipped('vehicles', 'herman2018').read_text(encoding='utf-8'))
 KEYS = {
     'applicable', 'reason', 'identity_residual', 'identity_residual_rms',
+    'identity_residual_after_2s',
     'share_of_time_increasing', 'share_condition_27', 'share_bound_28',
     'sup_s', 'sup_z', 'sup_w', 'L_first', 'L_last', 'rho_max', 'sampled',
 }  # fmt: skip
@@ -276,6 +277,16 @@ def test_the_papers_cases(case, law, largest):
     assert summary['identity_residual'] == residual(found)
     assert summary['identity_residual_rms'] < largest
     assert summary['share_bound_28'] == 1.0
+
+
+def test_the_residual_after_the_transient_is_relative_to_what_is_left():
+    samples, arguments = of_the_paper('case1', 'gvc')
+    whole = certificate(*samples, *arguments)
+    summary = lyapunov_summary(*samples, *arguments, kinds={'herman2018'})
+    late = whole.t >= 2.0
+    residual = np.abs(whole.L_dot - whole.identity)[late].max()
+    expected = residual / np.abs(whole.identity[late]).max()
+    assert summary['identity_residual_after_2s'] == pytest.approx(expected, rel=1e-12)
 
 
 def test_in_case_1_the_lyapunov_function_rises_at_43_percent_of_the_samples():

@@ -23,7 +23,8 @@ KEYS = {
     'decomposition': {'Upsilon', 'N'},
     'lyapunov': {'applicable', 'reason', 'identity_residual', 'share_of_time_increasing',
                  'sup_s', 'sup_z', 'sup_w',
-                 'identity_residual_rms', 'share_condition_27', 'share_bound_28', 'L_first',
+                 'identity_residual_rms', 'identity_residual_after_2s', 'share_condition_27',
+                 'share_bound_28', 'L_first',
                  'L_last', 'rho_max', 'sampled'},
 }  # fmt: skip
 

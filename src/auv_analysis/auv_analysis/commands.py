@@ -31,6 +31,7 @@ from auv_analysis.folder import prepare
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario, load_scenario
+from auv_analysis.simulation import DivergedError
 from auv_analysis.simulation import simulate as simulate_run
 from auv_analysis.summary import summarize
 from auv_analysis.supervisor import NodeDiedError
@@ -84,16 +85,21 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         out = _prepare(options, scenario, names)
         warm_up(scenario, names)
         _say(f'export {VARIABLE}={domain}')
+        failure, done = None, []
         for name in names:
             graph.running = False
             with _progress() as bar:
                 task = bar.add_task(f'{scenario.name} {name}', total=scenario.steps)
                 show = partial(_show_step, bar, task)
-                run_controller(scenario, name, out, domain, graph, show)
+                try:
+                    run_controller(scenario, name, out, domain, graph, show)
+                except NodeDiedError as error:
+                    failure = error
+                    break  # the graph is broken; what was recorded is still worth a report
+            done.append(name)
     finally:
         graph.close()
-    runs = {name: load_run(out / name) for name in names}
-    return _finish(out, runs, scenario)
+    return _finish(out, {name: load_run(out / name) for name in done}, scenario, failure)
 
 
 def _refuse_strangers(graph: Any, domain: int) -> None:
@@ -139,23 +145,34 @@ def simulate(options: argparse.Namespace) -> dict[str, Any]:
     out = _prepare(options, scenario, names)
     write_inputs(scenario, out)
     announce(scenario, names)
-    runs = {}
+    runs, failure = {}, None
     for name in names:
-        with console.status(f'{scenario.name} {name}: simulating'):
-            runs[name] = simulate_run(scenario, name, options.hold)
+        try:
+            with console.status(f'{scenario.name} {name}: simulating'):
+                runs[name] = simulate_run(scenario, name, options.hold)
+        except DivergedError as error:
+            failure = failure or error
+            continue
         _write_samples(runs[name], out / f'{name}.npz')
-    return _finish(out, runs, scenario)
+    return _finish(out, runs, scenario, failure)
 
 
 def _write_samples(run: Run, path: Path) -> None:
-    names = ('t', 'eta', 'nu', 'nu_measured', 'nu_d', 'nu_d_dot', 'tau', 'tau_applied')
-    names += ('disturbance', 'disturbance_estimate')
+    motion, forces = ('t', 'eta', 'nu', 'nu_measured', 'nu_d', 'nu_d_dot'), ('tau', 'tau_applied')
+    names = (*motion, *forces, 'disturbance', 'disturbance_estimate')
     np.savez_compressed(path, **{name: getattr(run, name) for name in names})
 
 
-def _finish(out: Path, runs: dict[str, Run], scenario: Scenario) -> dict[str, Any]:
-    texts = scenario.attachments
-    return _conclude(out, runs, texts['scenario.yaml'], texts['vehicle.yaml'])
+def _finish(
+    out: Path, runs: dict[str, Run], scenario: Scenario, failure: Exception | None
+) -> dict[str, Any]:
+    """Summary and report of the runs that came to their end; then the failure of another one."""
+    texts, document = scenario.attachments, {}
+    if runs:
+        document = _conclude(out, runs, texts['scenario.yaml'], texts['vehicle.yaml'])
+    if failure is not None:
+        raise failure
+    return document
 
 
 def _conclude(

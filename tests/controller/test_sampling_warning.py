@@ -1,0 +1,67 @@
+"""When a velocity gain is too fast for the control period, against one axis worked out by hand."""
+
+import numpy as np
+import pytest
+
+from auv_gvc_controller.gains import body_gains, sampled_rate, sampling_warning
+from auv_gvc_controller.laws.cl import CL
+
+M = np.diag([2.0, 4.0, 5.0, 1.0, 10.0, 8.0])
+
+
+@pytest.mark.parametrize('axis', range(6))
+def test_rate_of_the_fastest_axis(axis):
+    dof = ('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw')[axis]
+    K_D = M + 2.0 * M[axis, axis] * np.diag(np.eye(6)[axis])  # 1/s on all but one, 3/s there
+    assert sampled_rate(K_D, M) == (pytest.approx(3.0), dof)
+    assert sampled_rate(-K_D, M) == (pytest.approx(3.0), dof)
+
+
+def test_the_axis_is_that_of_the_energy_and_not_of_the_velocity():
+    inertia = np.diag([1.0, 100.0, 1.0, 1.0, 1.0, 1.0])
+    mode = np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])  # fastest, and faster in surge
+    K_D = inertia @ (0.1 * np.eye(6) + 5.0 * np.outer(mode, mode) / (mode @ mode))
+    rate, dof = sampled_rate(K_D, inertia)
+    assert rate == pytest.approx(5.1)
+    assert dof == 'sway'
+
+
+def test_a_rotating_mode_has_the_rate_of_its_modulus():
+    K_D = np.diag([0.0, 0, 0, 1, 10, 8])
+    K_D[:2, :2] = [[0.0, 8.0], [-16.0, 0.0]]
+    rate, _ = sampled_rate(K_D, np.diag([2.0, 4, 5, 1, 10, 8]))
+    assert rate == pytest.approx(4.0)  # eigenvalues +-4i
+
+
+@pytest.mark.parametrize(
+    ('step', 'words'),
+    [
+        (0.25, None),  # exactly 1
+        (0.2500001, 'above 1 the sampled loop rings'),
+        (0.5, 'above 1 the sampled loop rings'),  # exactly 2
+        (0.5000001, 'above 2 the sampled loop is unstable'),
+    ],
+)
+def test_bounds_of_the_warning(step, words):
+    text = sampling_warning(4.0 * np.eye(6), np.eye(6), step)
+    assert text is None if words is None else words in text
+
+
+def test_what_the_warning_says():
+    text = sampling_warning(4.0 * M, M, 0.75)
+    assert text.startswith('lambda_max(M^-1 K_D) * step = 3, mostly in ')
+    assert 'a step of at most 0.25 s' in text
+
+
+def test_a_law_without_gains_of_these_names_has_none():
+    class Own(tuple):
+        pass
+
+    K_D, K_f = body_gains(Own(), None)
+    assert K_D.shape == K_f.shape == (6, 6)
+    assert not K_D.any()
+    assert not K_f.any()
+    full = np.arange(36.0)
+    K_D, K_f = body_gains(CL(full, full, full, 2 * full), None)
+    assert np.array_equal(K_D.ravel(), full)
+    assert np.array_equal(K_f.ravel(), 2 * full)

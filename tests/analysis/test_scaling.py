@@ -244,3 +244,15 @@ def test_a_scenario_warns_of_its_gains(tmp_path):
     scenario = load_scenario('case1_lauv')
     assert any('controllers.cl' in line and 'unstable' in line for line in scenario.warnings)
     assert not any('controllers.gvc' in line for line in scenario.warnings)
+
+
+def test_gains_that_turn_ring_before_they_are_large():
+    skew = np.zeros((6, 6))
+    skew[0, 1], skew[1, 0] = 10.0, -10.0
+    text = sampling_warning(np.eye(6) + skew, np.eye(6), 0.05)
+    assert 'complex pair grows by 1.07' in text
+
+
+def test_one_gain_that_pushes_does_not_hide_another_that_rings():
+    K_D = np.diag([-400.0, 300.0, 1, 1, 1, 1])
+    assert 'unstable' in sampling_warning(K_D, np.eye(6), 0.01)

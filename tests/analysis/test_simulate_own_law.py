@@ -13,6 +13,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
+from auv_dynamics import InputError
 
 # CL by NumPy and a dictionary: what people write, and what numba does not compile
 OWN = """
@@ -51,6 +52,7 @@ import numpy as np
 
 import own_law_of_mine
 from auv_analysis import load_scenario, simulate
+from auv_dynamics import InputError
 
 scenario = load_scenario('case1')
 mine = scenario.data['controllers']['cl'] | {'law': 'own_law_of_mine:Mine'}
@@ -85,3 +87,54 @@ def test_a_law_of_ones_own_is_plain_python(tmp_path, hold):
     assert_allclose(own['nu'], shipped.nu, rtol=0, atol=1e-12)
     for key, series in (('tau', shipped.tau), ('f', shipped.disturbance_estimate)):
         assert_allclose(own[key], series, rtol=0, atol=1e-11 * np.abs(series).max())
+
+
+WRONG = {  # what a user's law has wrong -> what the one line says
+    'STATES = 6.0': 'STATES a whole number',
+    'STATES = -1': 'STATES a whole number',
+    'INTEGRALS = 30': 'INTEGRALS a multiple of 6',
+    'body_gains = staticmethod(lambda gains, model: (np.eye(3), np.eye(3)))': 'two finite 6x6',
+    'own_rate = staticmethod(lambda gains: "fast")': 'own_rate',
+    'check = staticmethod(lambda gains: {}["k"])': 'KeyError',
+    'wrench = staticmethod(lambda *a: (np.zeros(5), np.zeros(6)))': '6 numbers each',
+    'wrench = staticmethod(lambda *a: 1 / 0)': 'ZeroDivisionError',
+    'state_rate = staticmethod(lambda *a: np.zeros(3))': '6 numbers',
+}
+
+
+@pytest.mark.parametrize('line', WRONG)
+def test_a_wrong_law_is_refused_in_one_line_before_it_runs(line, tmp_path, monkeypatch):
+    module = f'wrong_law_{list(WRONG).index(line)}'
+    (tmp_path / f'{module}.py').write_text(
+        'from typing import NamedTuple\nimport numpy as np\n\n\n'
+        'class Mine(NamedTuple):\n    k_P: np.ndarray\n    STATES = 6\n'
+        '    wrench = staticmethod(lambda *a: (np.zeros(6), np.zeros(6)))\n'
+        f'    state_rate = staticmethod(lambda *a: np.zeros(6))\n    {line}\n'
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    path = tmp_path / 'case.yaml'
+    path.write_text(
+        'name: case\nvehicle: rexrov\nduration: 0.1\nstep: 0.01\nsetpoint: {}\n'
+        f'controllers: {{mine: {{law: "{module}:Mine", k_P: 1}}}}\n'
+    )
+    with pytest.raises(InputError, match=r'controllers\.mine\.law: expected ') as caught:
+        load_scenario(path)
+    assert WRONG[line] in str(caught.value)
+    assert '\n' not in str(caught.value)
+
+
+def test_a_law_that_fails_under_way_is_named(tmp_path, monkeypatch):
+    (tmp_path / 'late_law.py').write_text(
+        'from typing import NamedTuple\nimport numpy as np\n\n\n'
+        'class Late(NamedTuple):\n    k_P: np.ndarray\n    STATES = 6\n'
+        '    wrench = staticmethod(lambda t, *a: ({}[t] if t > 0.05 else [0.0] * 6, [0.0] * 6))\n'
+        '    state_rate = staticmethod(lambda *a: np.zeros(6))\n'
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    path = tmp_path / 'case.yaml'
+    path.write_text(
+        'name: case\nvehicle: rexrov\nduration: 0.1\nstep: 0.01\nsetpoint: {}\n'
+        'controllers: {mine: {law: "late_law:Late", k_P: 1}}\n'
+    )
+    with pytest.raises(ArithmeticError, match='the law Late failed: KeyError'):
+        simulate(load_scenario(path), 'mine', 'zoh')

@@ -110,3 +110,23 @@ def test_how_many_states_are_integrals():
     counts = {law: anti_windup(make_gains(law, GAINS[law]), reach).integrals for law in GAINS}
     assert counts == {'gvc': 12, 'cl': 12, 'pid': 6, 'smc': 18}
     assert anti_windup(make_gains('cl', GAINS['cl']), None).integrals == 0
+
+
+@pytest.mark.parametrize('law', ['gvc', 'cl'])
+def test_an_axis_that_the_thrusters_cannot_drive_does_not_wind_up(law):
+    """The BlueROV2's six thrusters give no pitch of its own: nothing answers, nothing may grow."""
+    base = load_scenario('case1_bluerov2')
+    entry = {'law': law, 'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
+    data = base.data | {
+        'controllers': {'with': entry, 'without': entry | {'anti_windup': False}},
+        'setpoint': {'surge': {'offset': 0.3}},
+        'disturbance': [{'kind': 'harmonic', 'pitch': {'offset': 1.0}}],
+        'actuators': {'thrusters': True},
+        'duration': 20.0,
+    }
+    scenario = replace(base, data=data)
+    guarded, wound = (simulate(scenario, name, 'zoh') for name in ('with', 'without'))
+    pitch = [np.abs(run.tau[:, 4]) for run in (guarded, wound)]
+    late = guarded.t > 10.0
+    assert pitch[0][late].max() < 0.5 * pitch[1][late].max()
+    assert np.abs((guarded.nu_d - guarded.nu)[late, 0]).mean() < 0.02, 'surge still settles'

@@ -20,6 +20,7 @@ from auv_dynamics.actuators import (
 )
 from auv_dynamics.files import InputError
 from auv_dynamics.jit import plain
+from auv_dynamics.thrusters import Thrusters
 
 STEP = 0.01
 VEHICLE = load_vehicle('rexrov')
@@ -104,9 +105,8 @@ def eight_thrusters():
     e /= np.linalg.norm(e, axis=1)[:, None]
     r = generator.normal(size=(8, 3))
     T = np.vstack([e.T, np.cross(r, e).T])
-    thrusters = SimpleNamespace(
-        matrix=T, inverse=np.linalg.pinv(T), reverse=np.full(8, 40.0), forward=np.full(8, 50.0)
-    )
+    names = tuple('abcdefgh')
+    thrusters = Thrusters(names, T, np.full(8, 40.0), np.full(8, 50.0))
     return SimpleNamespace(thrusters=thrusters), T
 
 

@@ -195,6 +195,8 @@ VARYING = {'kind': 'current', 'north': {'terms': [{'amplitude': 0.1, 'omega': 1.
         ('herman2018', [VARYING], 'd0.north', 'constant current'),
         ('rexrov', [VARYING, {'kind': 'model_error', 'dM': 1.0}], 'd0.north', 'beside dM'),
         ('herman2018', [ERRORS], 'd0.mass', 'dM and dD'),
+        ('rexrov', [{'kind': 'model_error', 'mass': -0.6}] * 2, 'd0.mass', 'sum of all entries'),
+        ('rexrov', [{'kind': 'model_error', 'damping': -0.6}] * 2, 'd0.damping', 'sum of all'),
         ('herman2018', [{'kind': 'model_error', 'damping': 0.1}], 'd0.damping', 'dM and dD'),
         ('rexrov', [{'kind': 'model_error', 'dM': -1e5}], 'd0', 'positive definite'),
         ('rexrov', [{'kind': 'model_error', 'dM': ASKEW}], 'd0.dM', 'symmetric'),

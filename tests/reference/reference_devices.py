@@ -65,7 +65,15 @@ class Actuators:
 
     def demand(self, tau: Array) -> Array:
         """What tau asks of the actuators: the part that the thrusters span."""
-        return tau if self.T is None else self.T @ (self.T_plus @ tau)
+        if self.T is None:
+            return tau
+        asked = self.T @ (self.T_plus @ tau)
+        for i in range(6):  # a row that the rows before it span has no wrench of its own
+            if np.linalg.matrix_rank(self.T[: i + 1], tol=1e-9) == np.linalg.matrix_rank(
+                self.T[:i], tol=1e-9
+            ):
+                asked[i] = tau[i]
+        return asked
 
     def __call__(self, tau: Array) -> Array:
         """a_k of tau_k, N and N m."""

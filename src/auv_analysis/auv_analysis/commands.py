@@ -6,6 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ from auv_analysis.folder import prepare
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario, load_scenario
-from auv_analysis.simulation import DivergedError
+from auv_analysis.simulation import check_hold
 from auv_analysis.simulation import simulate as simulate_run
 from auv_analysis.summary import summarize
 from auv_analysis.supervisor import NodeDiedError
@@ -142,6 +143,7 @@ def _progress() -> Progress:
 def simulate(options: argparse.Namespace) -> dict[str, Any]:
     """In this process, by the same kernel."""
     scenario, names = _open(options)
+    check_hold(scenario, options.hold)
     out = _prepare(options, scenario, names)
     write_inputs(scenario, out)
     announce(scenario, names)
@@ -150,7 +152,7 @@ def simulate(options: argparse.Namespace) -> dict[str, Any]:
         try:
             with console.status(f'{scenario.name} {name}: simulating'):
                 runs[name] = simulate_run(scenario, name, options.hold)
-        except DivergedError as error:
+        except ArithmeticError as error:  # it diverges, or a user's own law fails
             failure = failure or error
             continue
         _write_samples(runs[name], out / f'{name}.npz')
@@ -168,6 +170,9 @@ def _finish(
 ) -> dict[str, Any]:
     """Summary and report of the runs that came to their end; then the failure of another one."""
     texts, document = scenario.attachments, {}
+    if failure is not None:
+        note = f'another controller did not come to its end: {str(failure).splitlines()[0]}'
+        runs = {name: replace(run, notes=(*run.notes, note)) for name, run in runs.items()}
     if runs:
         document = _conclude(out, runs, texts['scenario.yaml'], texts['vehicle.yaml'])
     if failure is not None:

@@ -98,9 +98,15 @@ def lyapunov(run: Run, model: ControlModel) -> dict[str, Any]:
 
 
 def integral_of(run: Run) -> np.ndarray | None:
-    """Z of (17) as the law has it, (n, 6) in m and rad; None where it is not known."""
+    """Z of (17) as the law has it, (n, 6) in m and rad; None where it is not known.
+
+    A bag does not hold it: there it follows from what the law saw, unless anti-windup may have
+    stopped it at the limits of actuators.
+    """
     if run.law in LAWS and run.law_state is not None:
         return run.law_state[:, :6]
+    if run.applied is not None:
+        return None
     return sampled_integral(run.t, run.nu_d - run.nu_measured) if run.hold == 'zoh' else None
 
 

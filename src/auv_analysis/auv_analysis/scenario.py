@@ -18,7 +18,7 @@ from auv_dynamics.uncertainty import Uncertainty, make_uncertainty
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.gains import body_gains, sampling_warning, state_warning
-from auv_gvc_controller.laws import make_gains, refusal
+from auv_gvc_controller.laws import make_gains, refusal, try_law
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.setpoint import Setpoint, make_setpoint
 
@@ -238,7 +238,7 @@ def _vehicle_path(vehicle: str, scenario: Path) -> Path:
 
 def _check_gains(scenario: Scenario, name: str) -> None:
     try:
-        scenario.gains(name)
+        try_law(scenario.gains(name), control_model(scenario.vehicle))
     except ValueError as error:
         key, expected, found = refusal(error)
         place = f'controllers.{name}.{key or "law"}'

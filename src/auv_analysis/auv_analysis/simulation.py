@@ -15,7 +15,7 @@ from auv_dynamics.kinematics import unwrapped
 from auv_dynamics.plant import SIZE, eta_of, initial_state
 from auv_dynamics.sensors import WIDTH
 from auv_gvc_controller.model import control_model
-from auv_gvc_controller.sampled import anti_windup, is_compiled
+from auv_gvc_controller.sampled import anti_windup, is_compiled, user_law
 
 Hold = Literal['continuous', 'zoh']
 HOLDS = ('continuous', 'zoh')
@@ -49,10 +49,7 @@ def simulate(scenario: Scenario, controller: str, hold: Hold = 'continuous') -> 
     if hold not in HOLDS:
         raise ValueError(f'hold: expected {" or ".join(HOLDS)}, found {hold!r}')
     gains = scenario.gains(controller)
-    for key in ('actuators', 'sensors'):
-        if hold == 'continuous' and key in scenario.data:
-            expected = "hold 'zoh': they act on samples"
-            raise InputError(scenario.path, key, expected, "hold 'continuous'")
+    check_hold(scenario, hold)
     grid, log = _grid(scenario), _log(scenario.steps, type(gains).STATES)
     _run_kernel(scenario, controller, hold, gains, grid, log)
     t = grid.t[:, 0].copy()
@@ -82,6 +79,14 @@ def simulate(scenario: Scenario, controller: str, hold: Hold = 'continuous') -> 
     )
 
 
+def check_hold(scenario: Scenario, hold: Hold) -> None:
+    """Raise InputError where the scenario has something that acts on samples only."""
+    for key in ('actuators', 'sensors'):
+        if hold == 'continuous' and key in scenario.data:
+            expected = "hold 'zoh' (--hold zoh): they act on samples"
+            raise InputError(scenario.path, key, expected, "hold 'continuous'")
+
+
 def _grid(scenario: Scenario) -> Grid:
     t = stage_times(TABLEAUS[scenario.data['integrator']], scenario.step, 0, scenario.steps + 1)
     setpoint, noise = scenario.setpoint, scenario.noise()
@@ -104,7 +109,7 @@ def _run_kernel(
     tableau, model = TABLEAUS[scenario.data['integrator']], control_model(scenario.vehicle)
     x = np.concatenate([initial_state(*scenario.initial), np.zeros(log.state.shape[1])])
     truth, actuators = scenario.uncertainty.truth, scenario.actuators
-    with np.errstate(all='ignore'):
+    with np.errstate(all='ignore'), user_law(gains):
         if hold == 'continuous':
             kernel(fill_continuous)(truth, gains, model, grid, tableau, x, log)
         else:

@@ -7,6 +7,7 @@ import numpy as np
 
 from auv_dynamics.files import InputError
 from auv_dynamics.jit import compiled, helper
+from auv_dynamics.signals import DOFS
 from auv_dynamics.six import fill_vector, vector
 from auv_dynamics.vehicle import Vehicle
 
@@ -23,6 +24,7 @@ class Reach(NamedTuple):
     limit : (6,) largest absolute wrench per axis, N and N m; inf where there is none
     T_inv, T : (n, 6) pseudo-inverse and (6, n) configuration of the thrusters, n = 0 for none
     reverse, forward : (n,) largest thrust each way, N
+    own : (6,) 1 for a degree of freedom that the thrusters give a wrench of its own, else 0
 
     """
 
@@ -32,6 +34,7 @@ class Reach(NamedTuple):
     T: np.ndarray
     reverse: np.ndarray
     forward: np.ndarray
+    own: np.ndarray
 
 
 class Actuators(NamedTuple):
@@ -59,8 +62,8 @@ def make_reach(limit: Any, vehicle: Vehicle | None) -> Reach:
     bounds = np.full(6, np.inf) if limit is None else _six(limit)
     thrusters = vehicle.thrusters if vehicle is not None else None
     if thrusters is None:
-        none = np.zeros(0)
-        return Reach(limit is not None, bounds, np.zeros((0, 6)), np.zeros((6, 0)), none, none)
+        no, every = np.zeros(0), np.ones(6)
+        return Reach(limit is not None, bounds, np.zeros((0, 6)), np.zeros((6, 0)), no, no, every)
     return Reach(
         True,
         bounds,
@@ -68,6 +71,7 @@ def make_reach(limit: Any, vehicle: Vehicle | None) -> Reach:
         np.ascontiguousarray(thrusters.matrix),
         thrusters.reverse.astype(float),
         thrusters.forward.astype(float),
+        np.array([float(dof not in thrusters.unactuated()) for dof in DOFS]),
     )
 
 
@@ -163,10 +167,21 @@ def delivered(reach, u, share):
 
 @helper
 def demanded(reach, tau):
-    """T T^+ tau: the part of the command that the thrusters could deliver, had they no limits."""
+    """What the command asks of the actuators: T T^+ tau, had the thrusters no limits.
+
+    A degree of freedom without a wrench of its own keeps its command: it is never delivered.
+    """
     if reach.T.shape[1] == 0:
         return tau
-    return delivered(reach, thrusts(reach, tau), 1.0)
+    spanned, own = delivered(reach, thrusts(reach, tau), 1.0), reach.own
+    return (
+        spanned[0] if own[0] > 0 else tau[0],
+        spanned[1] if own[1] > 0 else tau[1],
+        spanned[2] if own[2] > 0 else tau[2],
+        spanned[3] if own[3] > 0 else tau[3],
+        spanned[4] if own[4] > 0 else tau[4],
+        spanned[5] if own[5] > 0 else tau[5],
+    )
 
 
 @helper

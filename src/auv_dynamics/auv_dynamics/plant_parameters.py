@@ -1,5 +1,6 @@
 """The plant's disturbances, actuators and sensors as ROS parameters, as a scenario writes them."""
 
+import math
 from typing import Any
 
 from rclpy.node import Node
@@ -37,10 +38,7 @@ def _spec(node: Node, prefix: str) -> dict[str, Any]:
     if kind == 'model_error':
         spec: dict[str, Any] = {'kind': kind, **_matrices(node, prefix, ('dM', 'dD'))}
         for key in RELATIVE:
-            at_least = -1.0 if key in ('damping', 'buoyancy', 'added_mass') else -0.999
-            value = declare(
-                node, f'{prefix}{key}', float, None, 'relative error', at_least=at_least
-            )
+            value = declare(node, f'{prefix}{key}', float, None, 'relative error', at_least=-1.0)
             if value is not None:
                 spec[key] = value
         return spec
@@ -70,7 +68,7 @@ def sensor_spec(node: Node) -> dict[str, Any] | None:
     """Declare `sensors.*` and return them as a scenario writes them; None when there are none."""
     spec: dict[str, Any] = {}
     for key, unit, count, most in (
-        ('velocity_noise', 'm/s, rad/s', 6, 100),
+        ('velocity_noise', 'm/s, rad/s', 6, 10),
         ('attitude_noise', 'rad', 3, 10),
     ):
         values = _numbers(node, f'sensors.{key}', f'standard deviation, {unit}', (1, count))
@@ -93,6 +91,8 @@ def _numbers(node: Node, name: str, text: str, lengths: tuple[int, ...]) -> list
     if values and len(values) not in lengths:
         expected = f'{" or ".join(map(str, lengths))} numbers'
         raise InputError(node.get_name(), name, expected, f'{len(values)} numbers')
+    if not all(map(math.isfinite, values)):
+        raise InputError(node.get_name(), name, 'finite numbers', values)
     return values
 
 

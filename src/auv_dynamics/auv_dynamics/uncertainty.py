@@ -76,6 +76,7 @@ def make_uncertainty(
     InputError : an error that this vehicle's file cannot take, or that leaves M indefinite
 
     """
+    _check_sums(specs, file, places)
     of_kind = {kind: [s for s in specs if s['kind'] == kind] for kind in ('model_error', 'current')}
     for spec, place in zip(specs, places, strict=True):
         _check(vehicle, spec, file, place, of_kind['model_error'])
@@ -89,6 +90,17 @@ def make_uncertainty(
     exact = current is None and not of_kind['model_error']
     truth = Truth(model, M_RB.ravel().copy(), vehicle.model, exact)
     return Uncertainty(truth, make_disturbance(specs), current)
+
+
+def _check_sums(specs: Sequence[Mapping[str, Any]], file: object, places: Sequence[str]) -> None:
+    """Relative errors of several entries add up: what is left must not be negative."""
+    errors = [spec for spec in specs if spec['kind'] == 'model_error']
+    for key in (*APART, 'buoyancy'):
+        left = 1 + _sum(errors, key)
+        if left < 0 or (left == 0 and key == 'mass'):
+            place = next(p for s, p in zip(specs, places, strict=True) if key in s)
+            bound = 'above -1' if key == 'mass' else 'of at least -1'
+            raise InputError(file, f'{place}.{key}', f'a sum of all entries {bound}', left - 1)
 
 
 def _check(

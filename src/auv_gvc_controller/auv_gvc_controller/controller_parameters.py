@@ -13,7 +13,7 @@ from auv_dynamics.files import InputError
 from auv_dynamics.ros.parameters import declare, given
 from auv_dynamics.vehicle import Vehicle
 from auv_gvc_controller.controller import VelocityController
-from auv_gvc_controller.laws import SHIPPED, law_class, make_gains, refusal
+from auv_gvc_controller.laws import SHIPPED, law_class, make_gains, refusal, try_law
 from auv_gvc_controller.limits import Limits
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.odometry_guard import OdometryGuard
@@ -106,13 +106,14 @@ class ControllerParameters:
             raise InputError(name, 'law', LAWS, None)
         if not self._vehicle:
             raise InputError(name, 'vehicle', 'a vehicle file', None)
+        vehicle = load_vehicle(self._vehicle)
         try:
             gains = make_gains(law, self._gains(law))
+            try_law(gains, control_model(vehicle))
         except ValueError as error:
             gain, expected, found = refusal(error)
             key = f'{WRITABLE}{gain}' if gain else 'law'
             raise InputError(name, key, expected, found) from None
-        vehicle = load_vehicle(self._vehicle)
         self.pairing.reset()
         return VelocityController(
             SampledLaw(gains, control_model(vehicle), self._reach(vehicle)),

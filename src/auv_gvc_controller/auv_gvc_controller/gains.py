@@ -7,6 +7,7 @@ import numpy as np
 from auv_dynamics.signals import DOFS
 from auv_gvc_controller.model import ControlModel
 
+ROUNDING = 1e-9
 RINGS, UNSTABLE = 1.0, 2.0  # of lambda step, for a velocity loop that is sampled and held
 
 
@@ -69,10 +70,19 @@ def sampling_warning(K_D: np.ndarray, M: np.ndarray, step: float) -> str | None:
 
     """
     eigenvalues = np.linalg.eigvals(np.linalg.solve(M, K_D))
-    if eigenvalues[np.argmax(np.abs(eigenvalues))].real < 0:
-        return None  # it grows at every step, however short
-    rate, dof = sampled_rate(K_D, M)
-    return _ringing(f'lambda_max(M^-1 K_D) * step = {rate * step:.3g}, mostly in {dof}', rate, step)
+    damped = eigenvalues[eigenvalues.real >= 0]  # the others grow at every step, however short
+    if len(damped) == 0:
+        return None
+    rate = float(np.abs(damped).max())
+    turning = damped[(damped.imag != 0) & (damped.real > ROUNDING * np.abs(damped))]
+    growth = float(np.abs(1 - step * turning).max(initial=0.0))
+    _, dof = sampled_rate(K_D, M)
+    text = f'lambda_max(M^-1 K_D) * step = {rate * step:.3g}, mostly in {dof}'
+    if growth > 1 + ROUNDING and rate * step <= UNSTABLE:
+        return (
+            f'{text}: its complex pair grows by {growth:.3g} a sample, the sampled loop is unstable'
+        )
+    return _ringing(text, rate, step)
 
 
 def state_warning(gains: Any, step: float) -> str | None:

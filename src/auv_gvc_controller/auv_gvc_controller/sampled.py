@@ -1,5 +1,7 @@
 """A law between samples: zero-order hold, as the nodes and `simulate(hold='zoh')` run it."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,7 +51,7 @@ def anti_windup(gains: Any, reach: Reach | None) -> AntiWindup:
     if reach is None or not reach.bounded:
         return AntiWindup(0, make_reach(None, None))
     law = type(gains)
-    integrals = getattr(law, 'INTEGRALS', law.STATES - law.STATES % 6)
+    integrals = getattr(law, 'INTEGRALS', 0 if law.STATES % 6 else law.STATES)
     return AntiWindup(integrals, reach)
 
 
@@ -99,6 +101,20 @@ compiled_sample = compiled(fill_sample)
 def is_compiled(gains: Any) -> bool:
     """Whether the kernel runs compiled for this law: a user's own law runs as plain Python."""
     return JITTED and type(gains) in SHIPPED.values()
+
+
+@contextmanager
+def user_law(gains: Any) -> Iterator[None]:
+    """Turn what a user's law raises while it runs into an ArithmeticError that names it."""
+    try:
+        yield
+    except ArithmeticError:
+        raise
+    except Exception as error:
+        if type(gains) in SHIPPED.values():
+            raise
+        text = f'{type(error).__name__}: {error}'.splitlines()[0]
+        raise ArithmeticError(f'the law {type(gains).__name__} failed: {text}') from error
 
 
 ZERO = (0.0,) * 6
@@ -155,7 +171,7 @@ class SampledLaw:
 
         """
         state, rate = self._state.copy(), self._rate.copy()
-        with np.errstate(all='ignore'):
+        with np.errstate(all='ignore'), user_law(self._gains):
             tau, f = self._sample(
                 t, dt, nu, attitude, nu_d, nu_d_dot, state, rate,
                 self._gains, self._model, self._guard,

@@ -58,7 +58,68 @@ def law_class(name: str) -> Any:
     if missing:
         text = 'a named tuple of gains with wrench, state_rate and STATES'
         raise ValueError(f'expected {text}, found {name!r} without {", ".join(missing)}')
+    _check_counts(law, name)
     return law
+
+
+def _check_counts(law: Any, name: str) -> None:
+    states = law.STATES
+    if not _whole(states) or states < 0:
+        raise ValueError(f'expected {name} with STATES a whole number, found {states!r}')
+    integrals = getattr(law, 'INTEGRALS', 0)
+    if not _whole(integrals) or not 0 <= integrals <= states or integrals % 6:
+        text = f'INTEGRALS a multiple of 6 up to STATES = {states}'
+        raise ValueError(f'expected {name} with {text}, found {integrals!r}')
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def try_law(gains: Any, model: Any) -> None:
+    """Call the functions of a user's law once, at rest, and look at what they give.
+
+    Parameters
+    ----------
+    gains : of `make_gains`
+    model : ControlModel of the vehicle
+
+    Raises
+    ------
+    ValueError : a function that fails or gives another number of values
+
+    """
+    law = type(gains)
+    if law in SHIPPED.values():
+        return
+    zero, upright = (0.0,) * 6, (1.0, 0.0, 0.0, 0.0)
+    arguments = (0.0, zero, upright, zero, zero, np.zeros(law.STATES), gains, model)
+
+    def call(part: str, function: Any) -> Any:
+        try:
+            with np.errstate(all='ignore'):
+                return function()
+        except Exception as error:  # whatever a user's law does
+            text = f'expected {part} of {law.__name__} to answer at rest, found {_short(error)}'
+            raise ValueError(text) from None
+
+    answer = call('wrench', lambda: [np.asarray(a, float).size for a in law.wrench(*arguments)])
+    _expect(law, 'wrench', 'tau and f, 6 numbers each', answer, [6, 6])
+    rates = call('state_rate', lambda: np.asarray(law.state_rate(*arguments), float).size)
+    _expect(law, 'state_rate', f'{law.STATES} numbers', rates, law.STATES)
+    if hasattr(law, 'body_gains'):
+        gained = call('body_gains', lambda: np.asarray(law.body_gains(gains, model), float))
+        good = gained.size == 72 and bool(np.isfinite(gained).all())
+        _expect(law, 'body_gains', 'two finite 6x6 matrices', good, True)
+    if hasattr(law, 'own_rate'):
+        rate = call('own_rate', lambda: float(law.own_rate(gains)))
+        _expect(law, 'own_rate', 'a finite rate', bool(np.isfinite(rate)), True)
+
+
+def _expect(law: Any, part: str, expected: str, found: Any, wanted: Any) -> None:
+    if found != wanted:
+        other = 'something else' if isinstance(found, bool) else found
+        raise ValueError(f'expected {part} of {law.__name__} to give {expected}, found {other}')
 
 
 def refusal(error: ValueError) -> tuple[str, str, str]:
@@ -122,5 +183,13 @@ def make_gains(name: str, values: Mapping[str, Any]) -> Any:
         text = 'a named tuple of gains'
         raise ValueError(f'expected {text}, found {name!r} ({_short(error)})') from None
     if hasattr(law, 'check'):
-        law.check(gains)
+        try:
+            law.check(gains)
+        except ValueError as error:
+            if ': expected ' in str(error) and ', found ' in str(error):
+                raise
+            raise ValueError(f'expected gains that {name} accepts, found {error}') from None
+        except Exception as error:  # whatever a user's law does
+            text = f'expected check of {name} to judge the gains'
+            raise ValueError(f'{text}, found {_short(error)}') from None
     return gains

@@ -61,7 +61,12 @@ class SMC(NamedTuple):
         """Raise ValueError for a boundary layer that is no positive diagonal."""
         phi = np.reshape(gains.phi, (6, 6))
         if np.any(phi != np.diag(np.diagonal(phi))) or not np.all(np.diagonal(phi) > 0):
-            raise ValueError('phi: expected a positive number or 6 of them, found other numbers')
+            found = (
+                f'smallest {np.diagonal(phi).min():g}'
+                if np.all(phi == phi * np.eye(6))
+                else 'a full matrix'
+            )
+            raise ValueError(f'phi: expected a positive number or 6 of them, found {found}')
 
 
 @helper

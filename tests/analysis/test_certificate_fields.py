@@ -58,6 +58,10 @@ def test_a_singular_gamma_leaves_what_does_not_need_its_inverse(law, smallest):
         assert np.isfinite(getattr(c, name)).all(), name
 
 
+def test_singular_is_relative_to_the_largest():
+    assert np.isnan(found('cl', Gamma=[1.0, 2.0, 1e6, 1e-4, 3.0, 1.0]).rho).all()
+
+
 def test_a_small_gamma_is_not_a_singular_one():
     c = found('cl', Gamma=1e-12)
     assert np.isfinite(c.rho).all()

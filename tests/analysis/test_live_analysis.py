@@ -23,3 +23,11 @@ def test_samples_of_the_papers_vehicle():
     assert_allclose(energy.sum(), 0.5 * np.array(NU) @ vehicle.M @ NU, rtol=1e-12)
     assert_allclose(energy[0], 0.5 * 300.0 * (NU[0] + 0.025 * q) ** 2, rtol=1e-9)
     assert_allclose(shares, 100.0 * energy / energy.sum(), rtol=1e-12)
+
+
+def test_shares_of_little_energy():
+    live = LiveAnalysis(load_vehicle('herman2018'))
+    components, shares = live.energy((1e-3, 0, 0, 0, 0, 0))
+    assert components.sum() < 1e-3
+    assert_allclose(shares, [100.0, 0, 0, 0, 0, 0])
+    assert_allclose(live.energy((0.0,) * 6)[1], np.zeros(6))

@@ -112,3 +112,21 @@ def test_share_of_the_thrusts_that_is_within_limits():
         assert share(reach, astern) == 0.125
     assert share(reach, np.array([20.0, -24.0, 31.0])) == 0.25  # the smallest
     assert share(reach, np.array([80.0, -24.0, 31.0])) == 0.125  # wherever it stands
+
+
+def test_share_of_thrusts_below_a_newton():
+    reach = make_reach(1.0, None)._replace(forward=np.array([0.4]), reverse=np.array([0.1]))
+    assert plain(share_within)(reach, np.array([0.8])) == 0.5
+    assert plain(share_within)(reach, np.array([-0.2])) == 0.5
+
+
+@pytest.mark.parametrize('name', ['bluerov2', 'bluerov2_heavy'])
+def test_what_is_demanded_knows_no_limits(name):
+    vehicle = load_vehicle(name)
+    tau = np.array([900.0, -800.0, 700.0, 60.0, -50.0, 40.0])
+    T = vehicle.thrusters.matrix
+    expected = T @ np.linalg.pinv(T) @ tau
+    reach = make_reach(None, vehicle)
+    assert_allclose(plain(demanded)(reach, tuple(tau)), expected, atol=1e-9)
+    most = np.abs(plain(reachable)(reach, tuple(tau))).max()
+    assert most < 0.5 * np.abs(expected).max()

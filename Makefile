@@ -22,8 +22,9 @@ endif
 COUNT ?= 10
 SEED ?= 0
 EXAMPLES ?= 500
+MUTANTS ?= 250
 
-.PHONY: help setup case1 case2 test soak properties build lint format interop clean
+.PHONY: help setup case1 case2 test soak properties mutation build lint format interop clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/:/' | column -t -s:
@@ -50,6 +51,13 @@ soak: setup  ## COUNT random runs on the node graph by SEED, and what else takes
 properties: setup  ## the property tests with EXAMPLES examples each, drawn by SEED
 	AUV_GVC_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n 2 --hypothesis-seed=$(SEED) \
 	  tests/dynamics tests/controller tests/analysis tests/reference
+
+# in an environment of its own, so that .venv stays what people use
+mutation: setup  ## mutants of the mathematics: MUTANTS=count or all, SEED=number
+	test -x $(VENV)/mutation/bin/python || $(PYTHON) -m venv $(VENV)/mutation
+	$(VENV)/mutation/bin/python -m pip install --quiet -r requirements-mutation.txt
+	$(VENV)/mutation/bin/python tests/mutation/run.py --python $(abspath $(BIN))/python \
+	    --mutants $(MUTANTS) --seed $(SEED)
 
 build: setup  ## colcon build of the workspace
 	AMENT_PREFIX_PATH="$(abspath $(VENV))$${AMENT_PREFIX_PATH:+:$$AMENT_PREFIX_PATH}" \

@@ -46,7 +46,15 @@ def test_body_gains_are_those_inside_the_layer():
 
 
 @pytest.mark.parametrize(
-    'phi', [0.0, [1, 1, 1, 1, 1, 0], [0, 1, 1, 1, 1, 1], [1, 1, -1, 1, 1, 1], np.eye(6) + 0.1]
+    'phi',
+    [
+        0.0,
+        [1, 1, 1, 1, 1, 0],
+        [0, 1, 1, 1, 1, 1],
+        [1, 1, -1, 1, 1, 1],
+        np.eye(6) + 0.1,
+        1.1 * np.eye(6) - 0.1,
+    ],
 )
 def test_a_layer_that_is_no_positive_diagonal_is_refused(phi):
     with pytest.raises(ValueError, match='phi: expected a positive number'):

@@ -1,0 +1,137 @@
+"""Mutation testing of the mathematics: `make mutation MUTANTS=<count or all> SEED=<seed>`.
+
+Cosmic-ray changes one operator, comparison or number of a formula at a time; a test that
+`mutation.toml` names for the file has to fail then, in plain Python. What survives stands in
+`equivalent.toml` with the reason why no test can tell, and is subtracted; README.md says more.
+"""
+
+import argparse
+import random
+import sys
+import tomllib
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from queue import SimpleQueue
+
+from copies import Copy, Verdict, copies
+from cosmic_ray.work_item import MutationSpec
+from mutants import mutants
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+WANTED = 0.95  # share of killed mutants, without the equivalent ones
+Stages = dict[Path, list[list[str]]]
+
+
+def arguments() -> argparse.Namespace:
+    """What was asked for."""
+    parser = argparse.ArgumentParser(description='Mutation testing of the mathematics.')
+    parser.add_argument('--mutants', default='250', help='how many, drawn at random, or all')
+    parser.add_argument('--seed', type=int, default=0, help='of the draw')
+    parser.add_argument(
+        '--only', nargs='*', default=[''], help='files with one of these in their path'
+    )
+    parser.add_argument('--workers', type=int, default=2)
+    parser.add_argument(
+        '--python', type=Path, default=ROOT / '.venv/bin/python', help='of the tests'
+    )
+    given = parser.parse_args()
+    if given.mutants != 'all' and not given.mutants.isdecimal():
+        parser.error(f'MUTANTS: expected a count or all, found {given.mutants}')
+    return given
+
+
+def verdicts(
+    chosen: list[MutationSpec], stages: Stages, python: Path, workers: int
+) -> Iterator[Verdict]:
+    """Verdicts in the order of the mutants, as they come."""
+    with copies(ROOT, workers, python) as made, ThreadPoolExecutor(workers) as pool:
+        used = [stages[mutant.module_path] for mutant in chosen]
+        tests = sorted({test for lists in used for one in lists for test in one})
+        complaints = list(
+            pool.map(Copy.complaint, made, (tests[i::workers] for i in range(workers)))
+        )
+        if any(complaints):
+            sys.exit('without any mutant the tests fail\n' + ''.join(complaints))
+        free: SimpleQueue[Copy] = SimpleQueue()
+        for one in made:
+            free.put(one)
+
+        def judge(mutant: MutationSpec) -> Verdict:
+            copy = free.get()
+            try:
+                return copy.verdict(mutant, stages[mutant.module_path])
+            finally:
+                free.put(copy)
+
+        try:
+            yield from pool.map(judge, chosen)
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def squeezed(line: str) -> str:
+    """A line without blanks: cosmic-ray leaves some before a number."""
+    return ''.join(line.split())
+
+
+def equivalents() -> set[tuple[str, str, str]]:
+    """File, line before and line after of the mutants that are known to be equivalent."""
+    groups = tomllib.loads((HERE / 'equivalent.toml').read_text(encoding='utf-8'))['equivalent']
+    return {
+        (group['file'], squeezed(before), squeezed(after))
+        for group in groups
+        for before, after in group['mutants']
+    }
+
+
+def main() -> int:
+    """Draw mutants, try them, print what survived and the ratio; 1 below 95 %."""
+    given = arguments()
+    plan = tomllib.loads((HERE / 'mutation.toml').read_text(encoding='utf-8'))
+    equivalent = equivalents()
+    own = {
+        file: [plan['quick'][kind], tests]
+        for kind in plan['quick']
+        for file, tests in plan[kind].items()
+    }
+    stages = {
+        ROOT / 'src' / file: own[file]
+        for file in sorted(own)
+        if any(part in file for part in given.only)
+    }
+    every = mutants(list(stages))
+    count = len(every) if given.mutants == 'all' else min(int(given.mutants), len(every))
+    chosen = sorted(random.Random(given.seed).sample(range(len(every)), count))
+    print(f'{count} of {len(every)} mutants of {len(stages)} files, seed {given.seed}', flush=True)
+
+    tally: Counter[str] = Counter()
+    for i, one in enumerate(
+        verdicts([every[k] for k in chosen], stages, given.python, given.workers), start=1
+    ):
+        listed = (one.file, squeezed(one.before), squeezed(one.after)) in equivalent
+        outcome = 'equivalent' if listed and one.outcome == 'survived' else one.outcome
+        tally[outcome] += 1
+        where = f'{one.file}:{one.line}: {one.operator}\n    - {one.before}\n    + {one.after}'
+        if outcome == 'survived':
+            print(f'{i}/{count} survived: {where}', flush=True)
+        elif listed and outcome != 'equivalent':
+            print(f'{i}/{count} listed as equivalent, but {outcome}: {where}', flush=True)
+        elif i % 25 == 0:
+            print(f'{i}/{count}', flush=True)
+    dead, tried = tally['killed'] + tally['timeout'], count - tally['equivalent']
+    ratio = dead / tried if tried else 1.0
+    print(
+        f'{count} mutants, {tally["equivalent"]} equivalent: of the other {tried}, {dead} killed '
+        f'({tally["timeout"]} by the clock), {tally["survived"]} survived: {100 * ratio:.1f} %'
+    )
+    return 0 if ratio >= WANTED else 1
+
+
+if __name__ == '__main__':
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit('interrupted: the copies are removed, the checkout was not touched')

@@ -22,7 +22,7 @@ endif
 COUNT ?= 10
 SEED ?= 0
 EXAMPLES ?= 500
-MUTANTS ?= 250
+MUTANTS ?= 500
 
 .PHONY: help setup case1 case2 test soak properties mutation build lint format interop clean
 
@@ -42,8 +42,9 @@ case1 case2: setup  ## the paper's experiment: GVC against CL on real nodes, wit
 	$(BIN)/auv run $@ --overwrite
 	@echo "open runs/$@/report.html"
 
+# four workers on two cores: the tests of the nodes mostly wait
 test: setup  ## the tests
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
 soak: setup  ## COUNT random runs on the node graph by SEED, and what else takes long
 	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) $(BIN)/python -m pytest -m long tests/system

@@ -47,6 +47,12 @@ def test_bounds_of_the_warning(step, words):
     assert text is None if words is None else words in text
 
 
+def test_the_bound_is_that_of_the_product():
+    assert 'is unstable' in sampling_warning(1.5 * np.eye(6), np.eye(6), 1.5)
+    assert 'rings' in sampling_warning(1.3 * np.eye(6), np.eye(6), 1.5)
+    assert sampling_warning(9.0 * np.eye(6), np.eye(6), 0.1) is None
+
+
 def test_what_the_warning_says():
     text = sampling_warning(4.0 * M, M, 0.75)
     assert text.startswith('lambda_max(M^-1 K_D) * step = 3, mostly in ')

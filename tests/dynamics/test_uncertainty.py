@@ -228,3 +228,10 @@ def test_without_errors_F_is_the_disturbance_to_the_last_bit():
     assert uncertainty.truth.exact
     plant = plant_of(vehicle, specs, 0.01, 'ode5', initial_state(np.zeros(6), np.zeros(6)))
     assert push(plant, TAU)[1] == tuple(uncertainty.F(np.zeros(1))[0])
+
+
+def test_an_exactly_singular_M_is_refused_in_one_line():
+    vehicle = load_vehicle('herman2018')
+    specs = [{'kind': 'model_error', 'dM': (-vehicle.M).tolist()}]
+    with pytest.raises(InputError, match='positive definite'):
+        make_uncertainty(vehicle, specs, 'case.yaml', ['d0'])

@@ -28,7 +28,7 @@ Stages = dict[Path, list[list[str]]]
 def arguments() -> argparse.Namespace:
     """What was asked for."""
     parser = argparse.ArgumentParser(description='Mutation testing of the mathematics.')
-    parser.add_argument('--mutants', default='250', help='how many, drawn at random, or all')
+    parser.add_argument('--mutants', default='500', help='how many, drawn at random, or all')
     parser.add_argument('--seed', type=int, default=0, help='of the draw')
     parser.add_argument(
         '--only', nargs='*', default=[''], help='files with one of these in their path'

@@ -80,15 +80,15 @@ def make_uncertainty(
     of_kind = {kind: [s for s in specs if s['kind'] == kind] for kind in ('model_error', 'current')}
     for spec, place in zip(specs, places, strict=True):
         _check(vehicle, spec, file, place, of_kind['model_error'])
-    model, M_RB = _with_errors(vehicle, of_kind['model_error'])
-    smallest = np.linalg.eigvalsh(model.M.reshape(6, 6))[0]
-    if not smallest > 0:
+    plant, M_RB = _with_errors(vehicle, of_kind['model_error'])
+    eigenvalues = np.linalg.eigvalsh(plant.M)
+    if eigenvalues[0] <= np.finfo(float).eps * eigenvalues[-1]:
         place = next(p for s, p in zip(specs, places, strict=True) if s['kind'] == 'model_error')
-        found = f'smallest eigenvalue {smallest:.4g}'
+        found = f'smallest eigenvalue {eigenvalues[0]:.4g}'
         raise InputError(file, place, 'a positive definite M + dM', found)
     current = make_current(of_kind['current'])
     exact = current is None and not of_kind['model_error']
-    truth = Truth(model, M_RB.ravel().copy(), vehicle.model, exact)
+    truth = Truth(plant.model, M_RB.ravel().copy(), vehicle.model, exact)
     return Uncertainty(truth, make_disturbance(specs), current)
 
 
@@ -129,15 +129,17 @@ def _check(
             raise InputError(file, f'{place}.{key}', expected, 'one that varies in time')
 
 
-def _with_errors(vehicle: Vehicle, errors: Sequence[Mapping[str, Any]]) -> tuple[Model, np.ndarray]:
-    """Model of the plant and its M_RB (6, 6), zero where it is not known."""
+def _with_errors(
+    vehicle: Vehicle, errors: Sequence[Mapping[str, Any]]
+) -> tuple[Vehicle, np.ndarray]:
+    """The plant with its errors and its M_RB (6, 6), zero where it is not known."""
     if vehicle.M_RB is None or vehicle.M_A is None:
         M_RB, M = np.zeros((6, 6)), vehicle.M
     else:
         M_RB = vehicle.M_RB * (1 + _sum(errors, 'mass'))
         M = M_RB + vehicle.M_A * (1 + _sum(errors, 'added_mass'))
     if not errors:
-        return vehicle.model, M_RB
+        return vehicle, M_RB
     dM = np.sum([matrix6(error.get('dM', 0.0)) for error in errors], axis=0)
     drag = 1 + _sum(errors, 'damping')
     weight = vehicle.weight * (1 + _sum(errors, 'mass'))
@@ -149,7 +151,7 @@ def _with_errors(vehicle: Vehicle, errors: Sequence[Mapping[str, Any]]) -> tuple
         weight=weight,
         buoyancy=buoyancy,
     )
-    return plant.model, M_RB
+    return plant, M_RB
 
 
 def _sum(errors: Sequence[Mapping[str, Any]], key: str) -> float:

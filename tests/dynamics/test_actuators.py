@@ -128,3 +128,13 @@ def test_axis_limits_come_after_the_allocation():
     reach = make_reach([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], vehicle)
     expected = np.clip(tau, -np.arange(1.0, 7.0), np.arange(1.0, 7.0))
     assert_allclose(plain(reachable)(reach, tau), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize('name', ['bluerov2', 'bluerov2_heavy'])
+@pytest.mark.parametrize('size', [1.0, 30.0, 900.0])
+def test_the_kernel_allocates_as_the_vehicle_says(name, size):
+    vehicle = load_vehicle(name)
+    tau = size * np.array([1.0, -0.8, 0.7, 0.1, -0.05, 0.2])
+    _, delivered = vehicle.thrusters.allocate(tau)
+    found = plain(reachable)(make_reach(None, vehicle), tuple(tau))
+    assert_allclose(found, delivered, rtol=0, atol=1e-9 * size)

@@ -168,7 +168,10 @@ def test_a_run_can_be_repeated_from_what_it_left(done: Path, tmp_path: Path) -> 
 def start(scenario: Path, out: Path) -> subprocess.Popen:
     command = [str(Path(sys.executable).with_name('auv')), 'run', str(scenario), '--out', str(out)]
     environ = {**os.environ, 'ROS_DOMAIN_ID': str(fresh_domain())}
-    return subprocess.Popen(command, env=environ, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        command, env=environ, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509  ignored in background
+    )  # fmt: skip
 
 
 def node_of(out: Path, name: str) -> psutil.Process:

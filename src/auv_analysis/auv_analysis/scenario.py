@@ -1,6 +1,5 @@
 """Scenario file, format 1: one experiment, resolved so that nothing is left to look up."""
 
-import copy
 import os
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.folder import OURS
+from auv_analysis.scenario_values import NANOSECONDS, check_names, check_time, resolved
 from auv_dynamics.actuators import Actuators, Reach, make_actuators, make_reach
 from auv_dynamics.config import shipped, shipped_by_name
 from auv_dynamics.files import InputError, check, read_text, read_yaml
@@ -23,8 +22,6 @@ from auv_gvc_controller.model import control_model
 from auv_gvc_controller.setpoint import Setpoint, make_setpoint
 
 SCHEMA = Path(__file__).with_name('scenario.schema.json')
-NANOSECONDS = 10**9
-MOST_STEPS = 10_000_000  # some 10 GB of arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +33,8 @@ class Scenario:
     path : of the scenario file
     vehicle_path : of its vehicle file
     vehicle : what the controller knows; the plant is that plus `uncertainty`
-    data : the file's contents with every default filled in
+    vehicle_data : the vehicle file's contents
+    data : the scenario file's contents with every default filled in
     attachments : name -> text of each file that the scenario consists of
 
     """
@@ -44,6 +42,7 @@ class Scenario:
     path: Path
     vehicle_path: Path
     vehicle: Vehicle
+    vehicle_data: dict[str, Any]
     data: dict[str, Any]
     attachments: dict[str, str]
 
@@ -108,7 +107,8 @@ class Scenario:
     @cached_property
     def setpoint(self) -> Setpoint:
         """nu_d(t) and its derivative."""
-        return make_setpoint(self.data['setpoint'], self.duration)
+        text = self.attachments.get('setpoint.csv')
+        return make_setpoint(self.data['setpoint'], self.duration, text)
 
     @cached_property
     def uncertainty(self) -> Uncertainty:
@@ -175,57 +175,59 @@ def load_scenario(scenario: str | Path) -> Scenario:
     path = shipped('scenarios', scenario)
     data = read_yaml(path, 'scenario')
     check(data, SCHEMA, path)
-    data = _resolved(data)
-    for name in data['controllers']:
-        if name in OURS:
-            expected = 'names that are not those of our own files'
-            raise InputError(path, 'controllers', expected, name)
-    _check_time(data, path)
-    vehicle_path = _vehicle_path(data['vehicle'], path)
+    vehicle_path = vehicle_path_of(data['vehicle'], path)
     vehicle_data = read_yaml(vehicle_path, 'vehicle')
-    vehicle = vehicle_from_dict(vehicle_data, vehicle_path)
-    attachments = {
+    texts = {
         'scenario.yaml': read_text(path, 'scenario'),
         'vehicle.yaml': read_text(vehicle_path, 'vehicle'),
     }
     if 'file' in data['setpoint']:
         csv = path.parent / data['setpoint']['file']
-        attachments['setpoint.csv'] = read_text(csv, 'CSV set-point')
+        texts['setpoint.csv'] = read_text(csv, 'CSV set-point')
         data['setpoint']['file'] = str(csv.resolve())
-    result = Scenario(path, vehicle_path, vehicle, data, attachments)
-    # read and checked now, so that errors come first
+    return scenario_from(data, vehicle_data, path, vehicle_path, texts)
+
+
+def scenario_from(
+    data: dict[str, Any],
+    vehicle_data: dict[str, Any],
+    path: Path,
+    vehicle_path: Path,
+    attachments: dict[str, str],
+) -> Scenario:
+    """Scenario of the contents of its files; nothing is read.
+
+    Parameters
+    ----------
+    data, vehicle_data : contents of a scenario file and of its vehicle file
+    path, vehicle_path : of these files, for their names and for errors
+    attachments : name -> text of each file; `setpoint.csv` must be there where the set-point is
+        a file
+
+    Returns
+    -------
+    scenario : Scenario, checked
+
+    Raises
+    ------
+    InputError : naming file, key, expected and found
+
+    """
+    check(data, SCHEMA, path)
+    data = resolved(data)
+    check_names(data, path)
+    check_time(data, path)
+    vehicle = vehicle_from_dict(vehicle_data, vehicle_path)
+    result = Scenario(path, vehicle_path, vehicle, vehicle_data, data, attachments)
+    # made and checked now, so that errors come first
     _ = (result.setpoint, result.uncertainty, result.actuators)
     for name in result.controllers:
         _check_gains(result, name)
     return result
 
 
-def _resolved(data: dict[str, Any]) -> dict[str, Any]:
-    data = copy.deepcopy(data)
-    for key, value in (('format', 1), ('integrator', 'ode5'), ('seed', 0), ('initial', {})):
-        data.setdefault(key, value)
-    data['seed'] = int(data['seed'])
-    data['duration'], data['step'] = float(data['duration']), float(data['step'])
-    for key in ('eta', 'nu'):
-        data['initial'][key] = [float(x) for x in data['initial'].get(key, [0.0] * 6)]
-    disturbance = data.get('disturbance', [])
-    data['disturbance'] = disturbance if isinstance(disturbance, list) else [disturbance]
-    return data
-
-
-def _check_time(data: dict[str, Any], path: Path) -> None:
-    step_ns = data['step'] * NANOSECONDS
-    if round(step_ns) < 1 or abs(step_ns - round(step_ns)) > 1e-6 * max(1.0, step_ns * 1e-9):
-        raise InputError(path, 'step', 'a whole number of nanoseconds', f'{data["step"]!r} s')
-    steps = data['duration'] / data['step']
-    if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
-        expected = f'a multiple of step ({data["step"]:g} s)'
-        raise InputError(path, 'duration', expected, f'{data["duration"]!r} s')
-    if steps > MOST_STEPS:
-        raise InputError(path, 'duration', f'at most {MOST_STEPS} steps', f'{steps:.0f}')
-
-
-def _vehicle_path(vehicle: str, scenario: Path) -> Path:
+def vehicle_path_of(vehicle: str, scenario: Path) -> Path:
+    """Path of a vehicle as a scenario file names it: relative to it, absolute or a bare name."""
     relative = scenario.parent / vehicle
     is_path = Path(vehicle).suffix in ('.yaml', '.yml') or len(Path(vehicle).parts) != 1
     if os.path.isfile(relative) or is_path:

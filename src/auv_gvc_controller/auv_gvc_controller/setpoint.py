@@ -55,13 +55,14 @@ class Table:
         return np.where(held[..., None], 0.0, self._slope[self._segment(t)])
 
 
-def load_table(path: Path, duration: float) -> Table:
+def load_table(path: Path, duration: float, text: str | None = None) -> Table:
     """Set-points of a CSV file with the columns t, surge, sway, heave, roll, pitch, yaw.
 
     Parameters
     ----------
     path : CSV file, first line the column names
     duration : s that the file must cover from 0
+    text : its contents where they have been read already; `path` is then only named in errors
 
     Returns
     -------
@@ -72,7 +73,7 @@ def load_table(path: Path, duration: float) -> Table:
     InputError : naming file, line, expected and found
 
     """
-    lines, rows = _rows(path)
+    lines, rows = _rows(path, text)
     header = tuple(name.strip() for name in rows[0]) if rows else ()
     if header != COLUMNS:
         raise InputError(
@@ -92,9 +93,10 @@ def load_table(path: Path, duration: float) -> Table:
     return Table(t, values[:, 1:])
 
 
-def _rows(path: Path) -> tuple[list[int], list[list[str]]]:
+def _rows(path: Path, text: str | None) -> tuple[list[int], list[list[str]]]:
     """Line numbers and cells of the lines that are not blank."""
-    reader = csv.reader(read_text(path, 'CSV set-point').splitlines())
+    text = read_text(path, 'CSV set-point') if text is None else text
+    reader = csv.reader(text.splitlines())
     lines, rows = [], []
     try:
         for row in reader:
@@ -118,15 +120,16 @@ def _numbers(path: Path, line: int, row: list[str]) -> list[float]:
     return numbers
 
 
-def make_setpoint(spec: Mapping[str, Any], duration: float) -> Setpoint:
+def make_setpoint(spec: Mapping[str, Any], duration: float, text: str | None = None) -> Setpoint:
     """Set-point of a checked scenario entry: `file`, or a mapping of degrees of freedom.
 
     Parameters
     ----------
     spec : {file: path} or {surge: {offset, terms}, ...}
     duration : s that a file must cover
+    text : the file's contents where they have been read already
 
     """
     if 'file' in spec:
-        return load_table(Path(spec['file']), duration)
+        return load_table(Path(spec['file']), duration, text)
     return Harmonics.from_spec(spec)

@@ -8,7 +8,7 @@ from auv_dynamics import load_vehicle
 from auv_dynamics.actuators import applied_wrench, make_actuators, memory
 from auv_dynamics.integrator import TABLEAUS, stage_times
 from auv_dynamics.plant import BLOCK, SIZE, fill_plant_step, initial_state, lumped_uncertainty
-from auv_dynamics.sensors import SensorNoise, fill_measurement
+from auv_dynamics.sensors import LOST, SensorNoise, fill_measurement
 from auv_dynamics.uncertainty import make_uncertainty
 
 VEHICLE = load_vehicle('rexrov')
@@ -39,9 +39,9 @@ def test_a_plant_goes_through_its_blocks_as_through_one_table():
     stages, trial = np.zeros((4, SIZE)), np.zeros(SIZE)
     truth = uncertainty.truth
     for k in range(STEPS + 1):
-        fill_measurement(rows[k], k, x, measured)
+        fill_measurement(rows[k], x, measured)
         assert plant.k == k
-        assert plant.lost == (k > 0 and rows[k, 9] == 1.0)
+        assert plant.lost == (rows[k, LOST] == 1.0)
         assert_array_equal(plant.x, x)
         assert_array_equal(plant.measured, measured)
         applied = applied_wrench(chain, k, command(k), state)

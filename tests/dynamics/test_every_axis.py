@@ -102,22 +102,31 @@ def test_one_limit_holds_for_all_axes():
 
 def test_share_of_the_thrusts_that_is_within_limits():
     forward, reverse = np.array([10.0, 20.0, 30.0]), np.array([5.0, 6.0, 7.0])
-    reach = make_reach(1.0, None)._replace(forward=forward, reverse=reverse)
-    share = plain(share_within)
-    assert share(reach, np.zeros(3)) == 1.0
-    assert share(reach, np.array([10.0, -6.0, 30.0])) == 1.0  # each at its limit
+    reach = one_thruster_per_axis(forward, reverse)
+    assert share_of(reach, [0.0, 0.0, 0.0]) == 1.0
+    assert share_of(reach, [10.0, -6.0, 30.0]) == 1.0  # each at its limit
     for i in range(3):
         ahead, astern = 4.0 * forward[i] * np.eye(3)[i], -8.0 * reverse[i] * np.eye(3)[i]
-        assert share(reach, ahead) == 0.25
-        assert share(reach, astern) == 0.125
-    assert share(reach, np.array([20.0, -24.0, 31.0])) == 0.25  # the smallest
-    assert share(reach, np.array([80.0, -24.0, 31.0])) == 0.125  # wherever it stands
+        assert share_of(reach, ahead) == 0.25
+        assert share_of(reach, astern) == 0.125
+    assert share_of(reach, [20.0, -24.0, 31.0]) == 0.25  # the smallest
+    assert share_of(reach, [80.0, -24.0, 31.0]) == 0.125  # wherever it stands
+
+
+def one_thruster_per_axis(forward, reverse):
+    T = np.eye(6, len(forward))
+    return make_reach(1.0, None)._replace(forward=forward, reverse=reverse, T=T, T_inv=T.T)
+
+
+def share_of(reach, thrusts):
+    """Share of thrusts that are the first entries of the wrench."""
+    return plain(share_within)(reach, (*thrusts, *[0.0] * (6 - len(thrusts))))
 
 
 def test_share_of_thrusts_below_a_newton():
-    reach = make_reach(1.0, None)._replace(forward=np.array([0.4]), reverse=np.array([0.1]))
-    assert plain(share_within)(reach, np.array([0.8])) == 0.5
-    assert plain(share_within)(reach, np.array([-0.2])) == 0.5
+    reach = one_thruster_per_axis(np.array([0.4]), np.array([0.1]))
+    assert share_of(reach, [0.8]) == 0.5
+    assert share_of(reach, [-0.2]) == 0.5
 
 
 @pytest.mark.parametrize('name', ['bluerov2', 'bluerov2_heavy'])

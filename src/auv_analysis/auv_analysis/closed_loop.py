@@ -1,33 +1,56 @@
-"""The one kernel: plant, law and integrator composed into a closed loop over a whole run."""
+"""The one kernel: plant, law and integrator composed into a closed loop, for one or many vehicles.
+
+What stands here is written for one vehicle; with `lanes` it takes several of them at a time.
+"""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.actuators import fill_applied
+from auv_analysis.records import Sample, fill_record
+from auv_dynamics.actuators import Actuators, fill_applied
 from auv_dynamics.integrator import fill_step
 from auv_dynamics.jit import compiled, jitable
+from auv_dynamics.lanes import uncounted
 from auv_dynamics.plant import (
     SIZE,
+    HeldWrench,
     attitude_of,
     fill_plant_rate,
-    fill_plant_step,
     fill_unit_attitude,
 )
 from auv_dynamics.sensors import fill_measured
-from auv_dynamics.six import fill_vector, vector
+from auv_dynamics.six import vector
 from auv_dynamics.uncertainty import Truth, lumped
 from auv_gvc_controller.model import ControlModel
-from auv_gvc_controller.sampled import fill_sample, state_rate, wrench
+from auv_gvc_controller.sampled import AntiWindup, fill_sample, state_rate, wrench
 
 
-class ClosedLoop(NamedTuple):
-    """The law inside every stage, as the paper simulates it: x = plant (13), law's state.
+class Loop(NamedTuple):
+    """One vehicle and its controller.
 
     Attributes
     ----------
     truth : coefficients of the plant
-    gains, model : the law's gains and what it knows
+    actuators : between the command and the applied wrench
+    gains, model : the law's gains and what it knows of the vehicle
+    guard : what stops its integrals
+
+    """
+
+    truth: Truth
+    actuators: Actuators
+    gains: Any
+    model: ControlModel
+    guard: AntiWindup
+
+
+class LawInside(NamedTuple):
+    """A step with the law inside every stage, as the paper has it: x = plant (13), law's state.
+
+    Attributes
+    ----------
+    loop : the vehicle and its controller
     t : (s,) times of the stages of this step, s
     reference : (s, 12) nu_d, nu_d_dot at the stages
     F : (s, 6) external disturbance at the stages
@@ -35,9 +58,7 @@ class ClosedLoop(NamedTuple):
 
     """
 
-    truth: Truth
-    gains: Any
-    model: ControlModel
+    loop: Loop
     t: np.ndarray
     reference: np.ndarray
     F: np.ndarray
@@ -48,7 +69,7 @@ class ClosedLoop(NamedTuple):
         """x_dot at one stage."""
         tau, _, change = answer(system, stage, x)
         F = vector(system.F[stage], 0)
-        fill_plant_rate(system.truth, x, tau, F, system.current, stage, rate)
+        fill_plant_rate(system.loop.truth, x, tau, F, system.current, stage, rate)
         for i in range(x.shape[0] - SIZE):
             rate[SIZE + i] = change[i]
 
@@ -58,102 +79,137 @@ def answer(system, stage, x):
     """(tau, f, state rate) of the law at a stage of the step."""
     t, nu, attitude, state = system.t[stage], vector(x, 7), attitude_of(x), x[SIZE:]
     nu_d, nu_d_dot = vector(system.reference[stage], 0), vector(system.reference[stage], 6)
-    gains, model = system.gains, system.model
+    gains, model = system.loop.gains, system.loop.model
     tau, f = wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
     change = state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
     return tau, f, change
 
 
 class Grid(NamedTuple):
-    """What is known of a run before it starts, on the grid of steps and stages.
+    """A block of consecutive steps: T samples, the first of which is sample `first` of the run.
 
     Attributes
     ----------
-    t : (n + 1, s) s
-    reference : (n + 1, s, 12) nu_d, nu_d_dot
-    F : (n + 1, s, 6) external disturbance, N, N m
-    current : (n + 1, s, 6) v_c, v_c_dot in NED; (n + 1, 0, 6) in still water
-    noise : (n + 1, 10) of the sensors; (0, 10): they are perfect
+    t : (T, s) times of the stages, s
     step : s
+    first, last : index of the block's first sample, and of the last one of the run
 
     """
 
     t: np.ndarray
+    step: float
+    first: int
+    last: int
+
+
+class Tables(NamedTuple):
+    """What is known of these steps before they are taken, on the grid of steps and stages.
+
+    Attributes
+    ----------
+    reference : (T, s, 12) nu_d, nu_d_dot
+    F : (T, s, 6) external disturbance, N, N m
+    current : (T, s, 6) v_c, v_c_dot in NED; (T, 0, 6) in still water
+    noise : (T, 11) of the sensors; (0, 11): they are perfect
+
+    """
+
     reference: np.ndarray
     F: np.ndarray
     current: np.ndarray
     noise: np.ndarray
-    step: float
 
 
-class Log(NamedTuple):
-    """What a run leaves, a row per sample.
+class SharedTables(Tables):
+    """Tables of a batch that are the same for all its vehicles."""
+
+    SHARED = True
+
+
+class Motion(NamedTuple):
+    """What goes on from one block of steps to the next.
 
     Attributes
     ----------
-    x, measured : (n + 1, 13) true state and what the law saw of it
-    state : (n + 1, m) of the law
-    tau, applied, f, F : (n + 1, 6) command, applied wrench, adaptive term, lumped uncertainty
+    x : (13 + m,) state of the plant, then of the law
+    measured : (13,) what the law last saw of the plant
+    rate : (m,) of the law's state, held between samples
+    memory : (1 + delay, 6) of the actuators
 
     """
 
     x: np.ndarray
     measured: np.ndarray
-    state: np.ndarray
-    tau: np.ndarray
-    applied: np.ndarray
-    f: np.ndarray
-    F: np.ndarray
+    rate: np.ndarray
+    memory: np.ndarray
+
+
+class Workspace(NamedTuple):
+    """Stages (s, n) and trial state (n,) of the integrator, n = 13 + m."""
+
+    stages: np.ndarray
+    trial: np.ndarray
 
 
 @jitable
-def fill_log(log, k, truth, x, measured, state, tau, applied, f, F, current):
-    """Write sample k; F (s, 6) and `current` at the stages of the step that begins there."""
-    log.x[k], log.measured[k], log.state[k] = x, measured, state
-    fill_vector(log.tau[k], 0, tau)
-    fill_vector(log.applied[k], 0, applied)
-    fill_vector(log.f[k], 0, f)
-    total = lumped(truth, attitude_of(x), vector(x, 7), applied, vector(F[0], 0), current)
-    fill_vector(log.F[k], 0, total)
-
-
-@compiled
-def fill_continuous(truth, gains, model, grid, tableau, x, log):
-    """Run the loop with the law inside every stage; x (13 + m,) is advanced in place."""
-    stages, trial = np.zeros((tableau.b.shape[0], x.shape[0])), np.zeros(x.shape[0])
-    last = grid.t.shape[0] - 1
+def fill_continuous(loop, tables, grid, tableau, motion, work, record):
+    """Take a block of steps with the law inside every stage."""
+    x = motion.x
     body, state = x[:SIZE], x[SIZE:]
-    for k in range(last + 1):
-        F, current = grid.F[k], grid.current[k]
-        system = ClosedLoop(truth, gains, model, grid.t[k], grid.reference[k], F, current)
+    for row in range(grid.t.shape[0]):
+        k = grid.first + row
+        reference, F, current = tables.reference[row], tables.F[row], tables.current[row]
+        system = LawInside(loop, grid.t[row], reference, F, current)
         tau, f, _ = answer(system, 0, x)
-        fill_log(log, k, truth, body, body, state, tau, tau, f, F, current)
-        if k < last:
-            fill_step(system, x, grid.step, tableau, stages, trial)
+        total = lumped(loop.truth, attitude_of(x), vector(x, 7), tau, vector(F[0], 0), current)
+        nu_d = vector(reference[0], 0)
+        fill_record(record, k, Sample(body, body, state, nu_d, tau, tau, f, total))
+        if k < grid.last:
+            fill_step(system, x, grid.step, tableau, work.stages, work.trial)
             fill_unit_attitude(x)
 
 
-@compiled
-def fill_held(truth, actuators, memory, gains, model, guard, grid, tableau, x, log):
-    """Run the loop with the law at the samples, the wrench held between; x (13 + m,) in place."""
-    stages, trial = np.zeros((tableau.b.shape[0], SIZE)), np.zeros(SIZE)
-    last = grid.t.shape[0] - 1
+@jitable
+def fill_held(loop, tables, grid, tableau, motion, work, record):
+    """Take a block of steps with the law at the samples, the wrench held between."""
+    truth, x, measured = loop.truth, motion.x, motion.measured
     body, state = x[:SIZE], x[SIZE:]
-    measured = body.copy()
-    rate = np.zeros(state.shape[0])
-    for k in range(last + 1):
-        F, current = grid.F[k], grid.current[k]
-        if grid.noise.shape[0] > 0:
-            fill_measured(grid.noise[k], k, body, measured)
+    for row in range(grid.t.shape[0]):
+        k = grid.first + row
+        reference, F, current = tables.reference[row], tables.F[row], tables.current[row]
+        if tables.noise.shape[0] > 0:
+            fill_measured(tables.noise[row], body, measured)
         else:
-            measured[:] = body
-        nu_d, nu_d_dot = vector(grid.reference[k, 0], 0), vector(grid.reference[k, 0], 6)
+            for i in range(SIZE):
+                measured[i] = body[i]
+        nu_d, nu_d_dot = vector(reference[0], 0), vector(reference[0], 6)
         dt = grid.step if k > 0 else 0.0
         tau, f = fill_sample(
-            grid.t[k, 0], dt, vector(measured, 7), attitude_of(measured), nu_d, nu_d_dot,
-            state, rate, gains, model, guard,
+            grid.t[row, 0], dt, vector(measured, 7), attitude_of(measured), nu_d, nu_d_dot,
+            state, motion.rate, loop.gains, loop.model, loop.guard,
         )  # fmt: skip
-        applied = fill_applied(actuators, k, tau, memory)
-        fill_log(log, k, truth, body, measured, state, tau, applied, f, F, current)
-        if k < last:
-            fill_plant_step(truth, body, applied, F, current, grid.step, tableau, stages, trial)
+        applied = fill_applied(loop.actuators, k, tau, motion.memory)
+        total = lumped(truth, attitude_of(x), vector(x, 7), applied, vector(F[0], 0), current)
+        fill_record(record, k, Sample(body, measured, state, nu_d, tau, applied, f, total))
+        if k < grid.last:
+            held = HeldWrench(truth, applied, F, current)
+            fill_step(held, body, grid.step, tableau, work.stages, work.trial)
+            fill_unit_attitude(body)
+
+
+@compiled
+def run_continuous(loop, tables, grid, tableau, motion, work, record):
+    """`fill_continuous` for one vehicle, to be called from Python."""
+    fill_continuous(
+        uncounted(loop), uncounted(tables), uncounted(grid), uncounted(tableau),
+        uncounted(motion), uncounted(work), uncounted(record),
+    )  # fmt: skip
+
+
+@compiled
+def run_held(loop, tables, grid, tableau, motion, work, record):
+    """`fill_held` for one vehicle, to be called from Python."""
+    fill_held(
+        uncounted(loop), uncounted(tables), uncounted(grid), uncounted(tableau),
+        uncounted(motion), uncounted(work), uncounted(record),
+    )  # fmt: skip

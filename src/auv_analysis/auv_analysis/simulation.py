@@ -1,10 +1,20 @@
 """In-process simulation of a scenario by the one kernel."""
 
+from collections.abc import Iterator
 from typing import Any, Literal
 
 import numpy as np
 
-from auv_analysis.closed_loop import Grid, Log, fill_continuous, fill_held
+from auv_analysis.closed_loop import (
+    Grid,
+    Loop,
+    Motion,
+    Tables,
+    Workspace,
+    run_continuous,
+    run_held,
+)
+from auv_analysis.records import Log
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario
 from auv_dynamics.actuators import memory
@@ -13,12 +23,13 @@ from auv_dynamics.integrator import TABLEAUS, stage_times
 from auv_dynamics.jit import plain
 from auv_dynamics.kinematics import unwrapped
 from auv_dynamics.plant import SIZE, eta_of, initial_state
-from auv_dynamics.sensors import WIDTH
+from auv_dynamics.sensors import WIDTH, SensorNoise
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.sampled import anti_windup, is_compiled, user_law
 
 Hold = Literal['continuous', 'zoh']
 HOLDS = ('continuous', 'zoh')
+BLOCK = 1024  # steps that are tabulated at once
 
 
 class DivergedError(ArithmeticError):
@@ -50,17 +61,17 @@ def simulate(scenario: Scenario, controller: str, hold: Hold = 'continuous') -> 
         raise ValueError(f'hold: expected {" or ".join(HOLDS)}, found {hold!r}')
     gains = scenario.gains(controller)
     check_hold(scenario, hold)
-    grid, log = _grid(scenario), _log(scenario.steps, type(gains).STATES)
-    _run_kernel(scenario, controller, hold, gains, grid, log)
-    t = grid.t[:, 0].copy()
+    log = Log.empty(scenario.steps, type(gains).STATES)
+    nu_d_dot = _run_kernel(scenario, controller, hold, gains, log)
+    t = np.arange(scenario.steps + 1) * scenario.step
     _check_finite(log, t, scenario, controller)
     sensing, acting = 'sensors' in scenario.data, 'actuators' in scenario.data
     return Run(
         t=t,
         eta=unwrapped_eta(log.x),
         nu=log.x[:, 7:],
-        nu_d=grid.reference[:, 0, :6],
-        nu_d_dot=grid.reference[:, 0, 6:],
+        nu_d=log.nu_d,
+        nu_d_dot=nu_d_dot,
         tau=log.tau,
         disturbance=log.F,
         disturbance_estimate=log.f,
@@ -87,36 +98,45 @@ def check_hold(scenario: Scenario, hold: Hold) -> None:
             raise InputError(scenario.path, key, expected, "hold 'continuous'")
 
 
-def _grid(scenario: Scenario) -> Grid:
-    t = stage_times(TABLEAUS[scenario.data['integrator']], scenario.step, 0, scenario.steps + 1)
-    setpoint, noise = scenario.setpoint, scenario.noise()
+def blocks(scenario: Scenario) -> Iterator[tuple[Grid, Tables]]:
+    """What is known of a run before it starts, a block of steps at a time."""
+    tableau, count = TABLEAUS[scenario.data['integrator']], scenario.steps + 1
+    noise = scenario.noise()
+    for first in range(0, count, BLOCK):
+        t = stage_times(tableau, scenario.step, first, min(BLOCK, count - first))
+        yield Grid(t, scenario.step, first, count - 1), tables(scenario, t, noise)
+
+
+def tables(scenario: Scenario, t: np.ndarray, noise: SensorNoise | None) -> Tables:
+    """Set-points, disturbance, current and the next rows of noise at the stage times t (T, s)."""
+    setpoint = scenario.setpoint
     reference = np.concatenate([setpoint.value(t), setpoint.derivative(t)], axis=-1)
     rows = np.zeros((0, WIDTH)) if noise is None else noise.rows(len(t))
-    return Grid(t, reference, *scenario.uncertainty.tables(t), rows, scenario.step)
-
-
-def _log(n: int, states: int) -> Log:
-    widths = (SIZE, SIZE, states, 6, 6, 6, 6)
-    return Log(*(np.full((n + 1, width), np.nan) for width in widths))
+    return Tables(reference, *scenario.uncertainty.tables(t), rows)
 
 
 def _run_kernel(
-    scenario: Scenario, controller: str, hold: Hold, gains: Any, grid: Grid, log: Log
-) -> None:
+    scenario: Scenario, controller: str, hold: Hold, gains: Any, log: Log
+) -> np.ndarray:
+    """Fill the log; nu_d_dot (n + 1, 6) at the samples."""
+
     def kernel(function: Any) -> Any:
         return function if is_compiled(gains) else plain(function)
 
     tableau, model = TABLEAUS[scenario.data['integrator']], control_model(scenario.vehicle)
-    x = np.concatenate([initial_state(*scenario.initial), np.zeros(log.state.shape[1])])
     truth, actuators = scenario.uncertainty.truth, scenario.actuators
-    with np.errstate(all='ignore'), user_law(gains):
-        if hold == 'continuous':
-            kernel(fill_continuous)(truth, gains, model, grid, tableau, x, log)
-        else:
-            guard = anti_windup(gains, scenario.reach(controller))
-            kernel(fill_held)(
-                truth, actuators, memory(actuators), gains, model, guard, grid, tableau, x, log
-            )
+    guard = anti_windup(gains, scenario.reach(controller))
+    loop = Loop(truth, actuators, gains, model, guard)
+    function = kernel(run_continuous if hold == 'continuous' else run_held)
+    x = np.concatenate([initial_state(*scenario.initial), np.zeros(type(gains).STATES)])
+    motion = Motion(x, x[:SIZE].copy(), np.zeros(type(gains).STATES), memory(actuators))
+    work = Workspace(np.zeros((len(tableau.b), len(x))), np.zeros(len(x)))
+    nu_d_dot = np.empty((scenario.steps + 1, 6))
+    for grid, known in blocks(scenario):
+        nu_d_dot[grid.first : grid.first + len(grid.t)] = known.reference[:, 0, 6:]
+        with np.errstate(all='ignore'), user_law(gains):
+            function(loop, known, grid, tableau, motion, work, log)
+    return nu_d_dot
 
 
 def unwrapped_eta(x: np.ndarray) -> np.ndarray:

@@ -68,6 +68,11 @@ def lumped_error(run: Run) -> np.ndarray | None:
     return None if run.disturbance is None else run.disturbance_estimate - run.disturbance
 
 
+def band_of(peak: np.ndarray) -> np.ndarray:
+    """Band of a settled error for the peak (6,) of abs(nu_d), m/s and rad/s."""
+    return np.maximum(BAND * peak, SMALLEST_BAND)
+
+
 def settling_time(t: np.ndarray, error: np.ndarray, nu_d: np.ndarray) -> list[float | None]:
     """Time from which each error stays within its band; None when it ends outside.
 
@@ -79,7 +84,7 @@ def settling_time(t: np.ndarray, error: np.ndarray, nu_d: np.ndarray) -> list[fl
     error, nu_d : (n, 6) m/s, rad/s
 
     """
-    band = np.maximum(BAND * np.abs(nu_d).max(axis=0), SMALLEST_BAND)
+    band = band_of(np.abs(nu_d).max(axis=0))
     times: list[float | None] = []
     for i in range(6):
         outside = np.flatnonzero(np.abs(error[:, i]) > band[i])

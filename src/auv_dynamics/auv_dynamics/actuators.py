@@ -7,6 +7,7 @@ import numpy as np
 
 from auv_dynamics.files import InputError
 from auv_dynamics.jit import compiled, helper
+from auv_dynamics.lanes import clip, select
 from auv_dynamics.signals import DOFS
 from auv_dynamics.six import fill_vector, vector
 from auv_dynamics.vehicle import Vehicle
@@ -45,7 +46,7 @@ class Actuators(NamedTuple):
     ideal : the command is applied as it is
     reach : which wrenches can be had
     slew : (6,) largest change per step, N and N m
-    follow : share of the remaining way that the first-order lag covers in a step
+    follow : (6,) share of the remaining way that the first-order lag covers in a step
     delay : steps
 
     """
@@ -53,7 +54,7 @@ class Actuators(NamedTuple):
     ideal: bool
     reach: Reach
     slew: np.ndarray
-    follow: float
+    follow: np.ndarray
     delay: int
 
 
@@ -110,7 +111,7 @@ def make_actuators(
         False,
         make_reach(spec.get('limit'), vehicle if use_thrusters else None),
         np.full(6, np.inf) if spec.get('rate') is None else _six(spec['rate']) * step,
-        1.0 if lag == 0 else float(-np.expm1(-step / lag)),
+        np.full(6, 1.0 if lag == 0 else -np.expm1(-step / lag)),
         round(delay),
     )
 
@@ -120,7 +121,7 @@ def _six(value: Any) -> np.ndarray:
     return np.broadcast_to(np.asarray(value, float), 6).copy()
 
 
-IDEAL = Actuators(True, make_reach(None, None), np.full(6, np.inf), 1.0, 0)
+IDEAL = Actuators(True, make_reach(None, None), np.full(6, np.inf), np.ones(6), 0)
 
 
 def memory(actuators: Actuators) -> np.ndarray:
@@ -129,40 +130,50 @@ def memory(actuators: Actuators) -> np.ndarray:
 
 
 @helper
-def _clipped(a, most):
-    return min(max(a, -most), most)
+def thrust(reach, i, tau):
+    """u_i of u = T^+ tau in N, without limits."""
+    T_inv = reach.T_inv
+    return (
+        T_inv[i, 0] * tau[0]
+        + T_inv[i, 1] * tau[1]
+        + T_inv[i, 2] * tau[2]
+        + T_inv[i, 3] * tau[3]
+        + T_inv[i, 4] * tau[4]
+        + T_inv[i, 5] * tau[5]
+    )
 
 
 @helper
-def thrusts(reach, tau):
-    """U = T^+ tau (n,) in N, without limits."""
-    count = reach.T.shape[1]
-    u = np.zeros(count)
-    for i in range(count):
-        for j in range(6):
-            u[i] += reach.T_inv[i, j] * tau[j]
-    return u
-
-
-@helper
-def share_within(reach, u):
-    """Largest share of the thrusts u, at most 1, that is within every thruster's limits."""
+def share_within(reach, tau):
+    """Largest share of the thrusts T^+ tau, at most 1, that is within every thruster's limits."""
     share = 1.0
-    for i in range(u.shape[0]):
-        most = reach.forward[i] if u[i] > 0 else reach.reverse[i]
-        if abs(u[i]) * share > most:
-            share = most / abs(u[i])
+    for i in range(reach.T.shape[1]):
+        u = thrust(reach, i, tau)
+        most = select(u > 0.0, reach.forward[i], reach.reverse[i])
+        over = abs(u) * share > most
+        share = select(over, most / select(over, abs(u), 1.0), share)
     return share
 
 
 @helper
-def delivered(reach, u, share):
-    """T u, scaled: six floats, N and N m."""
-    total = np.zeros(6)
-    for j in range(6):
-        for i in range(u.shape[0]):
-            total[j] += reach.T[j, i] * u[i] * share
-    return vector(total, 0)
+def _delivered_in(reach, j, tau, share):
+    total = 0.0 * tau[j]
+    for i in range(reach.T.shape[1]):
+        total = total + reach.T[j, i] * thrust(reach, i, tau) * share
+    return total
+
+
+@helper
+def delivered(reach, tau, share):
+    """T u with u a share of T^+ tau: six floats, N and N m."""
+    return (
+        _delivered_in(reach, 0, tau, share),
+        _delivered_in(reach, 1, tau, share),
+        _delivered_in(reach, 2, tau, share),
+        _delivered_in(reach, 3, tau, share),
+        _delivered_in(reach, 4, tau, share),
+        _delivered_in(reach, 5, tau, share),
+    )
 
 
 @helper
@@ -173,14 +184,14 @@ def demanded(reach, tau):
     """
     if reach.T.shape[1] == 0:
         return tau
-    spanned, own = delivered(reach, thrusts(reach, tau), 1.0), reach.own
+    spanned, own = delivered(reach, tau, 1.0), reach.own
     return (
-        spanned[0] if own[0] > 0 else tau[0],
-        spanned[1] if own[1] > 0 else tau[1],
-        spanned[2] if own[2] > 0 else tau[2],
-        spanned[3] if own[3] > 0 else tau[3],
-        spanned[4] if own[4] > 0 else tau[4],
-        spanned[5] if own[5] > 0 else tau[5],
+        select(own[0] > 0.0, spanned[0], tau[0]),
+        select(own[1] > 0.0, spanned[1], tau[1]),
+        select(own[2] > 0.0, spanned[2], tau[2]),
+        select(own[3] > 0.0, spanned[3], tau[3]),
+        select(own[4] > 0.0, spanned[4], tau[4]),
+        select(own[5] > 0.0, spanned[5], tau[5]),
     )
 
 
@@ -189,8 +200,7 @@ def allocated(reach, tau):
     """T u with u = T^+ tau, scaled down together until every thrust is within its limits."""
     if reach.T.shape[1] == 0:
         return tau
-    u = thrusts(reach, tau)
-    return delivered(reach, u, share_within(reach, u))
+    return delivered(reach, tau, share_within(reach, tau))
 
 
 @helper
@@ -199,12 +209,12 @@ def reachable(reach, tau):
     c = allocated(reach, tau)
     limit = reach.limit
     return (
-        _clipped(c[0], limit[0]),
-        _clipped(c[1], limit[1]),
-        _clipped(c[2], limit[2]),
-        _clipped(c[3], limit[3]),
-        _clipped(c[4], limit[4]),
-        _clipped(c[5], limit[5]),
+        clip(c[0], -limit[0], limit[0]),
+        clip(c[1], -limit[1], limit[1]),
+        clip(c[2], -limit[2], limit[2]),
+        clip(c[3], -limit[3], limit[3]),
+        clip(c[4], -limit[4], limit[4]),
+        clip(c[5], -limit[5], limit[5]),
     )
 
 
@@ -212,11 +222,8 @@ def reachable(reach, tau):
 def _servo(applied, command, follow, slew):
     """First-order servo with a slew limit, Fossen 2021, section 9.5, over one step."""
     move = follow * (command - applied)
-    if abs(move) > slew:
-        return applied + _clipped(move, slew)
-    if follow == 1.0:
-        return command
-    return applied + move
+    near = select(follow == 1.0, command, applied + move)
+    return select(abs(move) > slew, applied + clip(move, -slew, slew), near)
 
 
 @helper
@@ -233,12 +240,12 @@ def fill_applied(actuators, k, tau, state):
     a = state[0]
     follow, slew = actuators.follow, actuators.slew
     applied = (
-        _servo(a[0], c[0], follow, slew[0]),
-        _servo(a[1], c[1], follow, slew[1]),
-        _servo(a[2], c[2], follow, slew[2]),
-        _servo(a[3], c[3], follow, slew[3]),
-        _servo(a[4], c[4], follow, slew[4]),
-        _servo(a[5], c[5], follow, slew[5]),
+        _servo(a[0], c[0], follow[0], slew[0]),
+        _servo(a[1], c[1], follow[1], slew[1]),
+        _servo(a[2], c[2], follow[2], slew[2]),
+        _servo(a[3], c[3], follow[3], slew[3]),
+        _servo(a[4], c[4], follow[4], slew[4]),
+        _servo(a[5], c[5], follow[5], slew[5]),
     )
     fill_vector(a, 0, applied)
     return applied

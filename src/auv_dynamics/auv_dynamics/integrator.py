@@ -52,18 +52,19 @@ def fill_step(system, x, step, tableau, stages, trial):
     `stages` (s, n) and `trial` (n,) are workspace; the time of a stage is the system's business,
     which knows its inputs on the grid (k + c) * step, so that no time is ever accumulated.
     """
-    for s in range(tableau.b.shape[0]):
-        for i in range(x.shape[0]):
-            total = x[i]
-            for j in range(s):
-                total += step * tableau.A[s, j] * stages[j, i]
-            trial[i] = total
+    count, size = tableau.b.shape[0], x.shape[0]
+    for s in range(count):
+        for i in range(size):
+            trial[i] = x[i]
+        for j in range(s):
+            share = step * tableau.A[s, j]
+            for i in range(size):
+                trial[i] = trial[i] + share * stages[j, i]
         fill_rate(system, s, trial, stages[s])
-    for i in range(x.shape[0]):
-        total = x[i]
-        for s in range(tableau.b.shape[0]):
-            total += step * tableau.b[s] * stages[s, i]
-        x[i] = total
+    for s in range(count):
+        share = step * tableau.b[s]
+        for i in range(size):
+            x[i] = x[i] + share * stages[s, i]
 
 
 def stage_times(tableau: Tableau, step: float, first: int, count: int) -> np.ndarray:

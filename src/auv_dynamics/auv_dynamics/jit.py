@@ -55,7 +55,7 @@ if JITTED:
     OPTIONS: Any = {'fastmath': {'contract'}, 'error_model': 'numpy'}
     helper = numba.njit(forceinline=True, **OPTIONS)
     compiled = numba.njit(cache=True, nogil=True, **OPTIONS)
-    jitable: Any = register_jitable(**OPTIONS)
+    jitable: Any = register_jitable(forceinline=True, **OPTIONS)
 else:
 
     def helper(function: Callable) -> Callable:
@@ -90,7 +90,9 @@ def specialised(argument: str) -> Callable[[Callable], Callable]:
         scope: dict[str, Any] = {'choose': choose}
         listed = ', '.join(names)
         exec(f'def overloading({listed}): return choose({listed})', scope)
-        overload(generic, jit_options=OPTIONS, strict=True)(scope['overloading'])
+        overload(generic, jit_options={'forceinline': True, **OPTIONS}, strict=True)(
+            scope['overloading']
+        )
         return generic
 
     return decorate

@@ -8,7 +8,8 @@ from auv_dynamics.actuators import IDEAL, Actuators, applied_wrench, memory
 from auv_dynamics.integrator import TABLEAUS, fill_step, stage_times
 from auv_dynamics.jit import compiled, helper
 from auv_dynamics.kinematics import attitude_rate, euler, position_rate, quaternion
-from auv_dynamics.sensors import SensorNoise, fill_measurement
+from auv_dynamics.lanes import sqrt
+from auv_dynamics.sensors import LOST, SensorNoise, fill_measurement
 from auv_dynamics.six import fill_vector, vector
 from auv_dynamics.uncertainty import Truth, Uncertainty, lumped, true_acceleration
 
@@ -35,7 +36,7 @@ def fill_plant_rate(truth, x, tau, F, current, stage, rate):
 @helper
 def fill_unit_attitude(x):
     """Renormalise the quaternion of a state in place."""
-    norm = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6])
+    norm = sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6])
     x[3] /= norm
     x[4] /= norm
     x[5] /= norm
@@ -130,7 +131,7 @@ class Plant:
     @property
     def lost(self) -> bool:
         """Whether the sample of this step is lost: `measured` is an older one."""
-        return self._noise is not None and self.k > 0 and bool(self._rows[self._row, 9])
+        return self._noise is not None and bool(self._rows[self._row, LOST])
 
     @property
     def diverged(self) -> bool:
@@ -178,7 +179,7 @@ class Plant:
         if self._noise is None:
             self.measured = self.x
         else:
-            fill_measurement(self._rows[self._row], self.k, self.x, self.measured)
+            fill_measurement(self._rows[self._row], self.x, self.measured)
 
     def _integrate(self) -> None:
         row = self._row

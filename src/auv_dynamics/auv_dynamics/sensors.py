@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 
 from auv_dynamics.jit import compiled, helper
+from auv_dynamics.lanes import select
 
-WIDTH = 10  # columns of a row: noise of velocity (6), of attitude (3), whether the sample is lost
+WIDTH = 11  # columns of a row: velocity noise (6), rotation quaternion (4), whether it is lost
+LOST = WIDTH - 1
 
 
 class SensorNoise:
@@ -30,37 +32,44 @@ class SensorNoise:
         attitude = np.broadcast_to(np.asarray(spec.get('attitude_noise', 0.0), float), 3)
         self._deviation = np.concatenate([velocity, attitude])
         self._drop_out = float(spec.get('drop_out', 0.0))
+        self._begun = False
 
     def rows(self, count: int) -> np.ndarray:
-        """The next `count` rows (count, 10): noise in m/s, rad/s and rad, then 1 where lost."""
+        """The next `count` rows (count, 11).
+
+        Noise of nu in m/s and rad/s; exp(noise / 2) of the attitude as a quaternion w, x, y, z; 1
+        where the sample is lost, which the first of a run never is.
+        """
         noise = self._noise.standard_normal((count, 9)) * self._deviation
+        half = 0.5 * noise[:, 6:]
+        angle = np.sqrt((half**2).sum(axis=1))
+        scale = np.divide(np.sin(angle), angle, out=np.ones(count), where=angle > 0)
         lost = self._loss.random(count) < self._drop_out
-        return np.column_stack([noise, lost])
+        if not self._begun:
+            lost[:1], self._begun = False, True
+        return np.column_stack([noise[:, :6], np.cos(angle), half * scale[:, None], lost])
 
 
 @helper
-def fill_measured(noise, k, x, measured):
-    """Write what is measured of the state x (13,) at sample k; a lost sample changes nothing.
+def fill_measured(noise, x, measured):
+    """Write what is measured of the state x (13,); a lost sample changes nothing.
 
     nu + noise; q * exp(noise / 2), a small rotation about the body axes; the position is true.
     """
-    if noise[9] != 0.0 and k > 0:
-        return
-    a, b, c = 0.5 * noise[6], 0.5 * noise[7], 0.5 * noise[8]
-    angle = np.sqrt(a * a + b * b + c * c)
-    scale = np.sin(angle) / angle if angle > 0.0 else 1.0
-    e0, e1, e2, e3 = np.cos(angle), a * scale, b * scale, c * scale
+    lost = noise[10] != 0.0
+    e0, e1, e2, e3 = noise[6], noise[7], noise[8], noise[9]
     w, i, j, l = x[3], x[4], x[5], x[6]
-    measured[0], measured[1], measured[2] = x[0], x[1], x[2]
-    measured[3] = w * e0 - i * e1 - j * e2 - l * e3
-    measured[4] = w * e1 + i * e0 + j * e3 - l * e2
-    measured[5] = w * e2 - i * e3 + j * e0 + l * e1
-    measured[6] = w * e3 + i * e2 - j * e1 + l * e0
+    for n in range(3):
+        measured[n] = select(lost, measured[n], x[n])
+    measured[3] = select(lost, measured[3], w * e0 - i * e1 - j * e2 - l * e3)
+    measured[4] = select(lost, measured[4], w * e1 + i * e0 + j * e3 - l * e2)
+    measured[5] = select(lost, measured[5], w * e2 - i * e3 + j * e0 + l * e1)
+    measured[6] = select(lost, measured[6], w * e3 + i * e2 - j * e1 + l * e0)
     for n in range(6):
-        measured[7 + n] = x[7 + n] + noise[n]
+        measured[7 + n] = select(lost, measured[7 + n], x[7 + n] + noise[n])
 
 
 @compiled
-def fill_measurement(noise, k, x, measured):
+def fill_measurement(noise, x, measured):
     """`fill_measured` to be called from Python."""
-    fill_measured(noise, k, x, measured)
+    fill_measured(noise, x, measured)

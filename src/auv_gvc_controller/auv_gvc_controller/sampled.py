@@ -8,6 +8,7 @@ import numpy as np
 
 from auv_dynamics.actuators import Reach, demanded, make_reach, reachable
 from auv_dynamics.jit import JITTED, compiled, jitable, specialised
+from auv_dynamics.lanes import anywhere, select
 from auv_gvc_controller.laws import SHIPPED
 from auv_gvc_controller.model import ControlModel
 
@@ -18,7 +19,12 @@ ROUNDING = 1e-9
 def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
     """(tau, f) of the law to which `gains` belongs."""
     tau, f = type(gains).wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
-    return tuple(map(float, tau)), tuple(map(float, f))
+    return tuple(map(number, tau)), tuple(map(number, f))
+
+
+def number(value: Any) -> Any:
+    """A float of whatever a user's law returns, or lanes as they are."""
+    return value if isinstance(value, np.ndarray) and value.ndim == 1 else float(value)
 
 
 @specialised('gains')
@@ -71,14 +77,15 @@ def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model, 
         reach = guard.reach
         wanted, had = demanded(reach, tau), reachable(reach, tau)
         for j in range(guard.integrals):
-            if cut(wanted, had, j % 6):
-                kept = state[j]
+            stopped = cut(wanted, had, j % 6)
+            if anywhere(stopped):
+                kept = 1.0 * state[j]  # a number of its own, also where state[j] is a view
                 state[j] = kept + rate[j]
                 ahead, _ = wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
                 state[j] = kept
                 pushed = demanded(reach, ahead)[j % 6] - wanted[j % 6]
-                if pushed * (wanted[j % 6] - had[j % 6]) > 0.0:
-                    rate[j] = 0.0
+                outward = pushed * (wanted[j % 6] - had[j % 6]) > 0.0
+                rate[j] = select(stopped, select(outward, 0.0, rate[j]), rate[j])
     return tau, f
 
 
@@ -89,9 +96,14 @@ def cut(wanted, had, i):
     Conditional integration (Astrom & Hagglund 2006, section 3.5; Visioli 2006, chapter 3): an
     integral of such an axis stops while it would push the wrench further out.
     """
-    total = 0.0
-    for j in range(6):
-        total += abs(wanted[j])
+    total = (
+        abs(wanted[0])
+        + abs(wanted[1])
+        + abs(wanted[2])
+        + abs(wanted[3])
+        + abs(wanted[4])
+        + abs(wanted[5])
+    )
     return abs(wanted[i] - had[i]) > ROUNDING * total
 
 

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_dynamics.jit import helper
+from auv_dynamics.lanes import clip
 from auv_dynamics.model import coriolis, damping, restoring
 from auv_dynamics.six import add, mul, sub, vector
 
@@ -80,10 +81,10 @@ def manifold(nu_err, state, gains):
 def saturated(s, phi):
     """sat(s / phi) by component, phi (36,) a diagonal."""
     return (
-        min(max(s[0] / phi[0], -1.0), 1.0),
-        min(max(s[1] / phi[7], -1.0), 1.0),
-        min(max(s[2] / phi[14], -1.0), 1.0),
-        min(max(s[3] / phi[21], -1.0), 1.0),
-        min(max(s[4] / phi[28], -1.0), 1.0),
-        min(max(s[5] / phi[35], -1.0), 1.0),
+        clip(s[0] / phi[0], -1.0, 1.0),
+        clip(s[1] / phi[7], -1.0, 1.0),
+        clip(s[2] / phi[14], -1.0, 1.0),
+        clip(s[3] / phi[21], -1.0, 1.0),
+        clip(s[4] / phi[28], -1.0, 1.0),
+        clip(s[5] / phi[35], -1.0, 1.0),
     )

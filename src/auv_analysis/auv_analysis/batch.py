@@ -1,0 +1,215 @@
+"""Many closed loops at once: vehicles in lanes, blocks of lanes over threads, figures reduced."""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.closed_loop import (
+    Grid,
+    Loop,
+    Motion,
+    SharedTables,
+    Tables,
+    Workspace,
+    fill_continuous,
+    fill_held,
+)
+from auv_analysis.reduction import Figures
+from auv_dynamics.integrator import TABLEAUS, stage_times
+from auv_dynamics.jit import JITTED, compiled, plain
+from auv_dynamics.lanes import empty, of_block, packed, uncounted, unpacked, width
+from auv_dynamics.plant import SIZE
+
+Known = Callable[[np.ndarray], Tables]  # stage times t (T, s) of the next block -> its tables
+SHARED_STEPS = 1024  # steps that are tabulated at once where all vehicles share the tables
+OWN_STEPS = 64  # the same where each has its own
+PARTS = 4  # of a batch per thread, so that a slow one is made up for
+OWN_VEHICLES = 64  # of a part where each has its own tables
+
+
+@compiled
+def run_continuous_batch(loop, tables, grid, tableau, motion, work, record, first, last):
+    """`fill_continuous` for the blocks of lanes from `first` to before `last`."""
+    for b in range(first, last):
+        fill_continuous(
+            of_block(loop, b), of_block(tables, b), uncounted(grid), uncounted(tableau),
+            of_block(motion, b), of_block(work, 0), of_block(record, b),
+        )  # fmt: skip
+
+
+@compiled
+def run_held_batch(loop, tables, grid, tableau, motion, work, record, first, last):
+    """`fill_held` for the blocks of lanes from `first` to before `last`."""
+    for b in range(first, last):
+        fill_held(
+            of_block(loop, b), of_block(tables, b), uncounted(grid), uncounted(tableau),
+            of_block(motion, b), of_block(work, 0), of_block(record, b),
+        )  # fmt: skip
+
+
+KERNELS = {'continuous': run_continuous_batch, 'zoh': run_held_batch}
+
+
+@dataclass(frozen=True)
+class Batch:
+    """B closed loops of one law over one grid of steps.
+
+    Attributes
+    ----------
+    loop : every array with a leading axis of B, or of 1 where all vehicles have the same
+    x : (B, 13 + m) at the start
+    band : (B, 6) or (1, 6) of a settled error, m/s and rad/s
+    step : s
+    steps : n, index of the last sample
+    integrator : 'ode5', 'rk4' or 'euler'
+    hold : 'continuous' or 'zoh'
+    shared : gives the tables of all vehicles; None: `own` gives those of each
+    own : for the indices of some vehicles, a function of the same kind with tables (count, T, ...)
+
+    """
+
+    loop: Loop
+    x: np.ndarray
+    band: np.ndarray
+    step: float
+    steps: int
+    integrator: str
+    hold: str
+    shared: Known | None
+    own: Callable[[range], Known] | None = None
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+
+def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) -> Figures:
+    """Run all loops of a batch.
+
+    Parameters
+    ----------
+    batch : Batch; the figures of a vehicle do not depend, bit for bit, on the others in it
+    threads : how many to use
+    executor : of threads, to be used in place of own ones
+
+    Returns
+    -------
+    figures : Figures with arrays (B, n)
+
+    """
+    lanes = width(len(batch))
+    loop, band = pack(batch.loop, lanes), packed(batch.band, lanes)
+    count = -(-len(batch) // lanes)
+    record = Figures.start(
+        loop.model, band, batch.step, lambda n, value: _full(count, n, lanes, value)
+    )
+    tables = _listed(batch) if batch.shared else None
+
+    def run(blocks: range) -> None:
+        _run_part(batch, loop, record, lanes, blocks, tables)
+
+    parts = _parts(count, lanes, threads, own=batch.shared is None)
+    if executor is None and (threads == 1 or len(parts) == 1):
+        for part in parts:
+            run(part)
+    elif executor is not None:
+        list(executor.map(run, parts))
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(run, parts))
+    return Figures(*(_per_vehicle(value, len(batch)) for value in record))
+
+
+def pack(value: Any, lanes: int, done: dict[int, Any] | None = None) -> Any:
+    """Lanes of everything in a named tuple of arrays (B, ...) or (1, ...), each array once."""
+    done = {} if done is None else done
+    if isinstance(value, np.ndarray):
+        if id(value) not in done:
+            done[id(value)] = packed(value, lanes)
+        return done[id(value)]
+    if isinstance(value, tuple):
+        return type(value)(*(pack(part, lanes, done) for part in value))
+    return value
+
+
+def _full(count: int, n: int, lanes: int, value: float) -> np.ndarray:
+    array = empty((count, n, lanes))
+    array[...] = value
+    return array
+
+
+def _per_vehicle(value: Any, count: int) -> Any:
+    return unpacked(value, count) if isinstance(value, np.ndarray) else value
+
+
+def _parts(count: int, lanes: int, threads: int, *, own: bool) -> list[range]:
+    """Blocks 0 ... count in pieces that threads work on."""
+    size = -(-count // (PARTS * threads)) if threads > 1 else count
+    if own:
+        size = min(size, max(1, OWN_VEHICLES // lanes))
+    return [range(first, min(first + size, count)) for first in range(0, count, size)]
+
+
+def _grids(batch: Batch, size: int) -> Iterator[Grid]:
+    tableau, count = TABLEAUS[batch.integrator], batch.steps + 1
+    for first in range(0, count, size):
+        t = stage_times(tableau, batch.step, first, min(size, count - first))
+        yield Grid(t, batch.step, first, batch.steps)
+
+
+def _listed(batch: Batch) -> Sequence[tuple[Grid, Tables]] | None:
+    """Shared tables of the whole run where they are few; else each part makes them anew."""
+    if batch.shared is None or batch.steps > 64 * SHARED_STEPS:
+        return None
+    return list(_shared(batch))
+
+
+def _shared(batch: Batch) -> Iterator[tuple[Grid, Tables]]:
+    assert batch.shared is not None
+    for grid in _grids(batch, SHARED_STEPS):
+        yield grid, SharedTables(*batch.shared(grid.t))
+
+
+def _own(batch: Batch, lanes: int, blocks: range) -> Iterator[tuple[Grid, Tables]]:
+    assert batch.own is not None
+    known = batch.own(range(blocks.start * lanes, min(blocks.stop * lanes, len(batch))))
+    for grid in _grids(batch, OWN_STEPS):
+        yield grid, Tables(*(packed(table, lanes) for table in known(grid.t)))
+
+
+def _run_part(
+    batch: Batch,
+    loop: Loop,
+    record: Figures,
+    lanes: int,
+    blocks: range,
+    tables: Sequence[tuple[Grid, Tables]] | None,
+) -> None:
+    """Run some blocks of lanes from the first step to the last."""
+    tableau, size = TABLEAUS[batch.integrator], batch.x.shape[1]
+    x = packed(batch.x[blocks.start * lanes : blocks.stop * lanes], lanes)
+    count, delay = len(x), loop.actuators.delay
+    motion = Motion(
+        x,
+        x[:, :SIZE].copy(),
+        _full(count, size - SIZE, lanes, 0.0),
+        _full(count, (1 + delay) * 6, lanes, 0.0).reshape(count, 1 + delay, 6, lanes),
+    )
+    work = Workspace(empty((1, len(tableau.b), size, lanes)), empty((1, size, lanes)))
+    here = _slice(loop, blocks), _slice(record, blocks)
+    kernel = KERNELS[batch.hold] if JITTED else plain(KERNELS[batch.hold])
+    known = tables or (_shared(batch) if batch.shared else _own(batch, lanes, blocks))
+    with np.errstate(all='ignore'):
+        for grid, block in known:
+            kernel(here[0], block, grid, tableau, motion, work, here[1], 0, count)
+
+
+def _slice(value: Any, blocks: range) -> Any:
+    """The blocks' part of lanes; what all vehicles share stays."""
+    if isinstance(value, np.ndarray):
+        return value if len(value) == 1 else value[blocks.start : blocks.stop]
+    if isinstance(value, tuple):
+        return type(value)(*(_slice(part, blocks) for part in value))
+    return value

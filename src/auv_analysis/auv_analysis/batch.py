@@ -18,6 +18,7 @@ from auv_analysis.closed_loop import (
     fill_held,
 )
 from auv_analysis.reduction import Figures
+from auv_analysis.trees import kept, mapped
 from auv_dynamics.integrator import TABLEAUS, stage_times
 from auv_dynamics.jit import JITTED, compiled, plain
 from auv_dynamics.lanes import empty, of_block, packed, uncounted, unpacked, width
@@ -100,7 +101,8 @@ def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) 
 
     """
     lanes = width(len(batch))
-    loop, band = pack(batch.loop, lanes), packed(batch.band, lanes)
+    loop = pack(batch.loop, lanes)
+    band = packed(batch.band, lanes)
     count = -(-len(batch) // lanes)
     record = Figures.start(
         loop.model, band, batch.step, lambda n, value: _full(count, n, lanes, value)
@@ -119,29 +121,26 @@ def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) 
     else:
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(run, parts))
-    return Figures(*(_per_vehicle(value, len(batch)) for value in record))
+    return mapped(lambda blocks: unpacked(blocks, len(batch)), record)
 
 
-def pack(value: Any, lanes: int, done: dict[int, Any] | None = None) -> Any:
-    """Lanes of everything in a named tuple of arrays (B, ...) or (1, ...), each array once."""
-    done = {} if done is None else done
-    if isinstance(value, np.ndarray):
-        if id(value) not in done:
-            done[id(value)] = packed(value, lanes)
-        return done[id(value)]
-    if isinstance(value, tuple):
-        return type(value)(*(pack(part, lanes, done) for part in value))
-    return value
+def pack(value: Any, lanes: int) -> Any:
+    """Lanes of every array (B, ...) or (1, ...); one that stands in several places only once."""
+    done: dict[tuple, np.ndarray] = {}
+
+    def once(array: np.ndarray) -> np.ndarray:
+        place = array.ctypes.data, array.shape, array.strides
+        if place not in done:
+            done[place] = packed(array, lanes)
+        return done[place]
+
+    return mapped(once, value)
 
 
 def _full(count: int, n: int, lanes: int, value: float) -> np.ndarray:
     array = empty((count, n, lanes))
     array[...] = value
     return array
-
-
-def _per_vehicle(value: Any, count: int) -> Any:
-    return unpacked(value, count) if isinstance(value, np.ndarray) else value
 
 
 def _parts(count: int, lanes: int, threads: int, *, own: bool) -> list[range]:
@@ -189,6 +188,7 @@ def _run_part(
 ) -> None:
     """Run some blocks of lanes from the first step to the last."""
     tableau, size = TABLEAUS[batch.integrator], batch.x.shape[1]
+    blocks_of = slice(blocks.start, blocks.stop)
     x = packed(batch.x[blocks.start * lanes : blocks.stop * lanes], lanes)
     count, delay = len(x), loop.actuators.delay
     motion = Motion(
@@ -198,18 +198,9 @@ def _run_part(
         _full(count, (1 + delay) * 6, lanes, 0.0).reshape(count, 1 + delay, 6, lanes),
     )
     work = Workspace(empty((1, len(tableau.b), size, lanes)), empty((1, size, lanes)))
-    here = _slice(loop, blocks), _slice(record, blocks)
+    here = kept(loop, blocks_of), kept(record, blocks_of)
     kernel = KERNELS[batch.hold] if JITTED else plain(KERNELS[batch.hold])
     known = tables or (_shared(batch) if batch.shared else _own(batch, lanes, blocks))
     with np.errstate(all='ignore'):
         for grid, block in known:
             kernel(here[0], block, grid, tableau, motion, work, here[1], 0, count)
-
-
-def _slice(value: Any, blocks: range) -> Any:
-    """The blocks' part of lanes; what all vehicles share stays."""
-    if isinstance(value, np.ndarray):
-        return value if len(value) == 1 else value[blocks.start : blocks.stop]
-    if isinstance(value, tuple):
-        return type(value)(*(_slice(part, blocks) for part in value))
-    return value

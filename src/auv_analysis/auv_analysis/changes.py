@@ -170,14 +170,45 @@ def check_paths(scenario: Scenario, paths: Iterable[str]) -> None:
 
     """
     for path in paths:
-        if of_vehicle(path):
-            root, data, file = schema(VEHICLE_SCHEMA), scenario.vehicle_data, scenario.vehicle_path
-            _check_path(root, data, split(_below_vehicle(path)), file)
-        elif path != VEHICLE:
-            _check_path(schema(SCHEMA), scenario.data, split(path), scenario.path)
+        if path != VEHICLE:
+            _nodes_of(scenario, path)
 
 
-def _check_path(root: dict[str, Any], data: Any, parts: Parts, file: object) -> None:
+def bounds(scenario: Scenario, path: str) -> tuple[float, float] | None:
+    """Open interval of the finite numbers that the schema lets stand at a path.
+
+    Parameters
+    ----------
+    scenario : of `load_scenario`
+    path : see `changed_scenario`
+
+    Returns
+    -------
+    bounds : below and above every such number; None where the schema asks for more than bounds
+
+    """
+    low, high = -np.inf, np.inf
+    for node in _nodes_of(scenario, path):
+        kind = node.get('type')
+        if 'enum' in node or 'const' in node or 'multipleOf' in node or kind == 'integer':
+            return None
+        if kind == 'number':
+            low = max(low, node.get('exclusiveMinimum', -np.inf))
+            low = max(low, np.nextafter(node.get('minimum', -np.inf), -np.inf))
+            high = min(high, node.get('exclusiveMaximum', np.inf))
+            high = min(high, np.nextafter(node.get('maximum', np.inf), np.inf))
+    return float(low), float(high)
+
+
+def _nodes_of(scenario: Scenario, path: str) -> list[dict[str, Any]]:
+    """What the schemas say of the entry at a path; InputError where nothing can stand there."""
+    if of_vehicle(path):
+        root, data, file = schema(VEHICLE_SCHEMA), scenario.vehicle_data, scenario.vehicle_path
+        return _nodes_at(root, data, split(_below_vehicle(path)), file)
+    return _nodes_at(schema(SCHEMA), scenario.data, split(path), scenario.path)
+
+
+def _nodes_at(root: dict[str, Any], data: Any, parts: Parts, file: object) -> list[dict[str, Any]]:
     nodes = list(_applicable(root, root, data))
     for depth, part in enumerate(parts):
         if isinstance(part, int):
@@ -194,6 +225,7 @@ def _check_path(root: dict[str, Any], data: Any, parts: Parts, file: object) -> 
             below = [_property(node, part) for node in nodes]
             data = data.get(part)
         nodes = [node for inner in below for node in _applicable(inner, root, data)]
+    return nodes
 
 
 def _among(part: str, known: Iterable[str]) -> str:

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_analysis.summary import TRANSIENT, band_of
+from auv_analysis.summary import TRANSIENT
 from auv_dynamics.files import LARGEST
 from auv_dynamics.jit import helper, jitable
 from auv_dynamics.lanes import select
@@ -142,6 +142,15 @@ def size_of(sample):
     return total
 
 
+SIX = (
+    'kinetic_energy.mean_by_component', 'kinetic_energy.shares_percent', 'velocity_error.rms',
+    'velocity_error.max_after_2s', 'velocity_error.settling_time', 'lumped_error.rms',
+    'lumped_error.max_after_2s', 'coupling.delta_xi_max', 'coupling.delta_pi_max', 'effort.rms',
+    'effort.max',
+)  # fmt: skip
+COLUMNS = ('diverged_at', 'kinetic_energy.mean', *(f'{name}.{dof}' for name in SIX for dof in DOFS))
+
+
 def columns(found: Figures, samples: int, step: float) -> dict[str, np.ndarray]:
     """Figures as columns, named like the keys of `summary.json`.
 
@@ -161,28 +170,23 @@ def columns(found: Figures, samples: int, step: float) -> dict[str, np.ndarray]:
     shares = 100.0 * np.divide(energy, total, out=np.zeros_like(energy), where=total > 0)
     late = samples > found.late
     settled = np.where(found.outside == samples - 1, np.nan, (found.outside + 1) * step)
-    six = {
-        'kinetic_energy.mean_by_component': energy,
-        'kinetic_energy.shares_percent': shares,
-        'velocity_error.rms': np.sqrt(found.error_squares / samples),
-        'velocity_error.max_after_2s': found.error_late if late else np.nan * found.error_late,
-        'velocity_error.settling_time': settled,
-        'lumped_error.rms': np.sqrt(found.w_squares / samples),
-        'lumped_error.max_after_2s': found.w_late if late else np.nan * found.w_late,
-        'coupling.delta_xi_max': found.delta_xi,
-        'coupling.delta_pi_max': found.delta_pi,
-        'effort.rms': np.sqrt(found.tau_squares / samples),
-        'effort.max': found.tau,
-    }
+    six = (
+        energy,
+        shares,
+        np.sqrt(found.error_squares / samples),
+        found.error_late if late else np.nan * found.error_late,
+        settled,
+        np.sqrt(found.w_squares / samples),
+        found.w_late if late else np.nan * found.w_late,
+        found.delta_xi,
+        found.delta_pi,
+        np.sqrt(found.tau_squares / samples),
+        found.tau,
+    )
     diverged = np.isfinite(found.diverged[:, 0])
     result = {'diverged_at': np.where(diverged, found.diverged[:, 0] * step, np.nan)}
     result['kinetic_energy.mean'] = np.where(diverged, np.nan, total[:, 0])
-    for name, values in six.items():
+    for name, values in zip(SIX, six, strict=True):
         for i, dof in enumerate(DOFS):
             result[f'{name}.{dof}'] = np.where(diverged, np.nan, values[:, i])
     return result
-
-
-def bands(reference: np.ndarray) -> np.ndarray:
-    """Band (..., 6) of a settled error for set-points (..., T, 6) of whole runs."""
-    return band_of(np.abs(reference).max(axis=-2))

@@ -1,5 +1,6 @@
 """Scenario file, format 1: one experiment, resolved so that nothing is left to look up."""
 
+import json
 import os
 from dataclasses import dataclass
 from functools import cached_property
@@ -122,6 +123,12 @@ class Scenario:
         """Between the command and the applied wrench."""
         return make_actuators(self.data.get('actuators'), self.vehicle, self.step, self.path)
 
+    @cached_property
+    def known(self) -> str:
+        """Text that is the same for scenarios whose set-point, disturbance and current are."""
+        said = self.data['setpoint'], self.data['disturbance'], self.attachments.get('setpoint.csv')
+        return json.dumps(said, sort_keys=True)
+
     @property
     def kinds(self) -> frozenset[str]:
         """Kinds of its disturbances."""
@@ -139,10 +146,12 @@ class Scenario:
                 found.append(f'{self.path}: controllers.{name}: {warning}')
         return found
 
-    def noise(self) -> SensorNoise | None:
+    def noise(self, seed: int | None = None) -> SensorNoise | None:
         """Random numbers of the sensors from the first sample on; None: they are perfect."""
         spec = self.data.get('sensors')
-        return None if spec is None else SensorNoise(spec, self.data['seed'])
+        return (
+            None if spec is None else SensorNoise(spec, self.data['seed'] if seed is None else seed)
+        )
 
     @property
     def inputs(self) -> list[Path]:

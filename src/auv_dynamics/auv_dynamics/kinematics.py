@@ -15,21 +15,23 @@ def quaternion(euler: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    euler : (3,) phi, theta, psi in rad
+    euler : (..., 3) phi, theta, psi in rad
 
     Returns
     -------
-    q : (4,) w, x, y, z, body to NED
+    q : (..., 4) w, x, y, z, body to NED
 
     """
-    (cr, cp, cy), (sr, sp, sy) = np.cos(np.asarray(euler) / 2), np.sin(np.asarray(euler) / 2)
-    return np.array(
+    half = np.moveaxis(np.asarray(euler, float) / 2, -1, 0)
+    (cr, cp, cy), (sr, sp, sy) = np.cos(half), np.sin(half)
+    return np.stack(
         [
             cr * cp * cy + sr * sp * sy,
             sr * cp * cy - cr * sp * sy,
             cr * sp * cy + sr * cp * sy,
             cr * cp * sy - sr * sp * cy,
-        ]
+        ],
+        axis=-1,
     )
 
 

@@ -72,8 +72,9 @@ def lumped_uncertainty(truth, x, tau, F, current):
 
 
 def initial_state(eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
-    """State (13,) from eta (6,) in m (NED) and rad, and nu (6,) in m/s, rad/s."""
-    return np.concatenate([eta[:3], quaternion(np.asarray(eta)[3:]), nu]).astype(float)
+    """State (..., 13) from eta (..., 6) in m (NED) and rad, and nu (..., 6) in m/s, rad/s."""
+    eta = np.asarray(eta, float)
+    return np.concatenate([eta[..., :3], quaternion(eta[..., 3:]), np.asarray(nu, float)], axis=-1)
 
 
 def eta_of(x: np.ndarray) -> np.ndarray:

@@ -12,8 +12,8 @@ from auv_dynamics.files import InputError, matrix6
 from auv_dynamics.jit import helper
 from auv_dynamics.model import Model, acceleration, coriolis, damping, restoring
 from auv_dynamics.six import add, mul, sub, vector
-from auv_dynamics.vehicle import Vehicle
-from auv_dynamics.vehicle_file import ASYMMETRY
+from auv_dynamics.vehicle import Vehicle, row_major
+from auv_dynamics.vehicle_file import ASYMMETRY, is_definite
 
 APART = ('mass', 'added_mass', 'damping')  # relative errors, for M_RB and M_A given apart
 
@@ -80,15 +80,14 @@ def make_uncertainty(
     of_kind = {kind: [s for s in specs if s['kind'] == kind] for kind in ('model_error', 'current')}
     for spec, place in zip(specs, places, strict=True):
         _check(vehicle, spec, file, place, of_kind['model_error'])
-    plant, M_RB = _with_errors(vehicle, of_kind['model_error'])
-    eigenvalues = np.linalg.eigvalsh(plant.M)
-    if eigenvalues[0] <= np.finfo(float).eps * eigenvalues[-1]:
+    plant, M_RB = with_errors(vehicle, of_kind['model_error'])
+    if not is_definite(plant.M):
         place = next(p for s, p in zip(specs, places, strict=True) if s['kind'] == 'model_error')
-        found = f'smallest eigenvalue {eigenvalues[0]:.4g}'
+        found = f'smallest eigenvalue {np.linalg.eigvalsh(plant.M)[0]:.4g}'
         raise InputError(file, place, 'a positive definite M + dM', found)
     current = make_current(of_kind['current'])
     exact = current is None and not of_kind['model_error']
-    truth = Truth(plant.model, M_RB.ravel().copy(), vehicle.model, exact)
+    truth = Truth(plant.model, row_major(M_RB), vehicle.model, exact)
     return Uncertainty(truth, make_disturbance(specs), current)
 
 
@@ -129,19 +128,26 @@ def _check(
             raise InputError(file, f'{place}.{key}', expected, 'one that varies in time')
 
 
-def _with_errors(
+def with_errors(
     vehicle: Vehicle, errors: Sequence[Mapping[str, Any]]
 ) -> tuple[Vehicle, np.ndarray]:
-    """The plant with its errors and its M_RB (6, 6), zero where it is not known."""
+    """The plant with its errors and its M_RB (..., 6, 6), zero where it is not known.
+
+    Each relative error is a number, or (B,) of them for as many plants.
+    """
+
+    def factor(key: str) -> Any:
+        return np.asarray(1 + _sum(errors, key))[..., None, None]
+
     if vehicle.M_RB is None or vehicle.M_A is None:
         M_RB, M = np.zeros((6, 6)), vehicle.M
     else:
-        M_RB = vehicle.M_RB * (1 + _sum(errors, 'mass'))
-        M = M_RB + vehicle.M_A * (1 + _sum(errors, 'added_mass'))
+        M_RB = vehicle.M_RB * factor('mass')
+        M = M_RB + vehicle.M_A * factor('added_mass')
     if not errors:
         return vehicle, M_RB
     dM = np.sum([matrix6(error.get('dM', 0.0)) for error in errors], axis=0)
-    drag = 1 + _sum(errors, 'damping')
+    drag = factor('damping')
     weight = vehicle.weight * (1 + _sum(errors, 'mass'))
     buoyancy = vehicle.buoyancy * (1 + _sum(errors, 'buoyancy'))
     plant = vehicle.changed(
@@ -154,8 +160,8 @@ def _with_errors(
     return plant, M_RB
 
 
-def _sum(errors: Sequence[Mapping[str, Any]], key: str) -> float:
-    return float(sum(error.get(key, 0.0) for error in errors))
+def _sum(errors: Sequence[Mapping[str, Any]], key: str) -> Any:
+    return sum(error.get(key, 0.0) for error in errors)
 
 
 @helper

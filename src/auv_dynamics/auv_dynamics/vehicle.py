@@ -13,36 +13,45 @@ from auv_dynamics.thrusters import Thrusters
 
 
 def skew(a: np.ndarray) -> np.ndarray:
-    """S(a) with S(a) b = a x b: (3,) to (3, 3)."""
-    x, y, z = a
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    """S(a) with S(a) b = a x b: (..., 3) to (..., 3, 3)."""
+    x, y, z = np.moveaxis(np.asarray(a, float), -1, 0)
+    o = np.zeros_like(x)
+    rows = [[o, -z, y], [z, o, -x], [-y, x, o]]
+    return np.stack([np.stack(row, -1) for row in rows], -2)
 
 
 def rigid_body_matrix(
-    mass: float, r_G: np.ndarray, inertia: np.ndarray, reference: str
+    mass: float | np.ndarray, r_G: np.ndarray, inertia: np.ndarray, reference: str
 ) -> np.ndarray:
-    """M_RB about the body origin, Fossen 1994.
+    """M_RB about the body origin, Fossen 1994; any number of leading axes.
 
     Parameters
     ----------
-    mass : kg
-    r_G : (3,) centre of gravity from the body origin, m
-    inertia : (3, 3) tensor, kg m2
+    mass : (...,) kg
+    r_G : (..., 3) centre of gravity from the body origin, m
+    inertia : (..., 3, 3) tensor, kg m2
     reference : 'cg' or 'co', the point about which the tensor is given
 
     Returns
     -------
-    M_RB : (6, 6) symmetric
+    M_RB : (..., 6, 6) symmetric
 
     """
-    S = skew(r_G)
-    about_origin = inertia - mass * S @ S if reference == 'cg' else inertia
-    return np.block([[mass * np.eye(3), -mass * S], [mass * S, about_origin]])
+    S, m = skew(r_G), np.asarray(mass, float)[..., None, None]
+    about_origin = inertia - m * S @ S if reference == 'cg' else inertia
+    return np.block([[m * np.eye(3), -m * S], [m * S, about_origin]])
+
+
+def row_major(A: np.ndarray) -> np.ndarray:
+    """Matrices (..., 6, 6) as the kernel takes them: (..., 36), copied."""
+    return np.array(A, float).reshape(*np.shape(A)[:-2], 36)
 
 
 @dataclass(frozen=True, eq=False)
 class Vehicle:
     """What is known of a vehicle, body frame forward-starboard-down, SI units.
+
+    Of many vehicles, see `fleet`, every number has a leading axis.
 
     Attributes
     ----------
@@ -62,8 +71,8 @@ class Vehicle:
     M: np.ndarray
     D_linear: np.ndarray
     D_quadratic: np.ndarray
-    weight: float
-    buoyancy: float
+    weight: Any
+    buoyancy: Any
     r_G: np.ndarray
     r_B: np.ndarray
     M_RB: np.ndarray | None = None
@@ -74,13 +83,15 @@ class Vehicle:
     @cached_property
     def model(self) -> Model:
         """The coefficients as the kernel takes them."""
-        couple = self.weight * self.r_G - self.buoyancy * self.r_B
+        weight, buoyancy = (np.asarray(force)[..., None] for force in (self.weight, self.buoyancy))
+        couple = weight * self.r_G - buoyancy * self.r_B
+        heavy = np.broadcast_to(weight - buoyancy, (*couple.shape[:-1], 1))
         return Model(
-            M=np.ascontiguousarray(self.M).ravel().copy(),
-            M_inv=np.linalg.inv(self.M).ravel(),
-            D_linear=np.ascontiguousarray(self.D_linear).ravel().copy(),
-            D_quadratic=np.ascontiguousarray(self.D_quadratic).ravel().copy(),
-            hydrostatics=np.array([self.weight - self.buoyancy, *couple]),
+            M=row_major(self.M),
+            M_inv=row_major(np.linalg.inv(self.M)),
+            D_linear=row_major(self.D_linear),
+            D_quadratic=row_major(self.D_quadratic),
+            hydrostatics=np.concatenate([heavy, couple], axis=-1),
         )
 
     def changed(self, **values: Any) -> 'Vehicle':

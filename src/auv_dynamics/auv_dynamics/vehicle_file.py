@@ -71,6 +71,37 @@ def vehicle_from_dict(data: dict[str, Any], file: object) -> Vehicle:
     )
 
 
+def is_symmetric(A: np.ndarray) -> Any:
+    """Whether matrices (..., n, n) are symmetric but for a tolerated share."""
+    difference = np.abs(A - np.swapaxes(A, -2, -1)).max(axis=(-2, -1))
+    return difference <= ASYMMETRY * np.abs(A).max(axis=(-2, -1))
+
+
+def is_definite(M: np.ndarray) -> Any:
+    """Whether symmetric matrices (..., n, n) are positive definite, and can be inverted."""
+    eigenvalues = np.linalg.eigvalsh(M)
+    return eigenvalues[..., 0] > np.finfo(float).eps * eigenvalues[..., -1]
+
+
+def is_semidefinite(A: np.ndarray) -> Any:
+    """Whether symmetric matrices (..., n, n) are positive semidefinite but for rounding."""
+    size = np.maximum(np.abs(A).max(axis=(-2, -1)), np.finfo(float).tiny)
+    return np.linalg.eigvalsh(A)[..., 0] >= -ROUNDING * size
+
+
+def principal_moments(
+    mass: Any, r_G: np.ndarray, inertia: np.ndarray, reference: str
+) -> np.ndarray:
+    """Moments (..., 3) about the centre of gravity, ascending, kg m2."""
+    S, m = skew(r_G), np.asarray(mass, float)[..., None, None]
+    return np.linalg.eigvalsh(inertia + m * S @ S if reference == 'co' else inertia)
+
+
+def satisfies_triangle(moments: np.ndarray) -> Any:
+    """Whether no principal moment (..., 3) exceeds the sum of the others."""
+    return moments[..., 0] + moments[..., 1] >= moments[..., 2] * (1 - ROUNDING)
+
+
 class _Source:
     """The file's matrices, each checked for what physics asks of it."""
 
@@ -87,8 +118,7 @@ class _Source:
     def _symmetric(self, key: str, A: np.ndarray) -> np.ndarray:
         difference = np.abs(A - A.T)
         i, j = np.unravel_index(np.argmax(difference), A.shape)
-        largest = np.abs(A).max()
-        if difference[i, j] > ASYMMETRY * largest:
+        if not is_symmetric(A):
             found = f'[{i}][{j}] = {A[i, j]:g} against [{j}][{i}] = {A[j, i]:g}'
             raise InputError(self._file, key, 'a symmetric matrix', found)
         if difference[i, j] > 0:
@@ -116,13 +146,11 @@ class _Source:
                 raise InputError(self._file, f'rigid_body.{key}', expected, None)
         key = 'rigid_body.inertia'
         inertia = self._symmetric(key, np.array(body['inertia'], float))
-        S = skew(r_G)
-        about_cg = inertia + mass * S @ S if body['inertia_reference'] == 'co' else inertia
-        moments = np.linalg.eigvalsh(about_cg)
+        moments = principal_moments(mass, r_G, inertia, body['inertia_reference'])
         if moments[0] <= 0:
             found = f'principal moments {_numbers(moments)} about the centre of gravity'
             raise InputError(self._file, key, 'a positive definite tensor', found)
-        if moments[0] + moments[1] < moments[2] * (1 - ROUNDING):
+        if not satisfies_triangle(moments):
             found = f'principal moments {_numbers(moments)}'
             expected = 'principal moments that satisfy the triangle inequality'
             raise InputError(self._file, key, expected, found)
@@ -153,17 +181,15 @@ class _Source:
         return thrusters
 
     def _check_semidefinite(self, key: str, A: np.ndarray) -> None:
-        smallest = np.linalg.eigvalsh(A)[0]
-        if smallest < -ROUNDING * max(np.abs(A).max(), np.finfo(float).tiny):
+        if not is_semidefinite(A):
             sign = '' if self._sign > 0 else ' after sign: sname'
-            found = f'smallest eigenvalue {smallest:.4g}{sign}'
+            found = f'smallest eigenvalue {np.linalg.eigvalsh(A)[0]:.4g}{sign}'
             raise InputError(self._file, key, 'a positive semidefinite matrix', found)
 
     def check_positive_definite(self, M: np.ndarray) -> None:
-        eigenvalues = np.linalg.eigvalsh(M)
-        if eigenvalues[0] <= np.finfo(float).eps * eigenvalues[-1]:
+        if not is_definite(M):
             key = 'inertia_matrix' if 'inertia_matrix' in self._data else 'M'
-            found = f'smallest eigenvalue {eigenvalues[0]:.4g}'
+            found = f'smallest eigenvalue {np.linalg.eigvalsh(M)[0]:.4g}'
             raise InputError(self._file, key, 'a positive definite inertia M', found)
 
     def _warn_quadratic(self, quadratic: np.ndarray) -> None:

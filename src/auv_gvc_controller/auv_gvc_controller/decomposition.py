@@ -10,12 +10,12 @@ def decompose(M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Parameters
     ----------
-    M : (6, 6) inertia with added mass, symmetric positive definite
+    M : (..., 6, 6) inertia with added mass, symmetric positive definite
 
     Returns
     -------
-    Upsilon : (6, 6) upper triangular, unit diagonal
-    N : (6,) diagonal of N, positive; kg and kg m2
+    Upsilon : (..., 6, 6) upper triangular, unit diagonal
+    N : (..., 6) diagonal of N, positive; kg and kg m2
 
     Raises
     ------
@@ -25,23 +25,25 @@ def decompose(M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     """
     M = np.asarray(M, float)
-    if M.shape != (6, 6) or not np.all(np.isfinite(M)):
+    if M.shape[-2:] != (6, 6) or not np.all(np.isfinite(M)):
         raise ValueError(f'expected a finite (6, 6) matrix M, found shape {M.shape}')
-    if np.abs(M - M.T).max() > 1e-9 * np.abs(M).max():
+    size = np.abs(M).max(axis=(-2, -1))
+    if np.any(np.abs(M - np.swapaxes(M, -2, -1)).max(axis=(-2, -1)) > 1e-9 * size):
         raise ValueError('expected a symmetric M, found M[i][j] != M[j][i]')
     try:
         lower = np.linalg.cholesky(M)
     except np.linalg.LinAlgError:
-        smallest = np.linalg.eigvalsh(M)[0]
+        smallest = np.linalg.eigvalsh(M)[..., 0].min()
         text = f'expected a positive definite M, found smallest eigenvalue {smallest:.4g}'
         raise ValueError(text) from None
-    scale = np.diagonal(lower)
-    return inverse_upper((lower / scale).T), scale**2
+    scale = np.diagonal(lower, axis1=-2, axis2=-1)
+    return inverse_upper(np.swapaxes(lower / scale[..., None, :], -2, -1)), scale**2
 
 
 def inverse_upper(U: np.ndarray) -> np.ndarray:
-    """Inverse of an upper triangular (6, 6) matrix of unit diagonal, exactly of that form."""
-    inverse = np.eye(len(U))
-    for i in reversed(range(len(U) - 1)):
-        inverse[i, i + 1 :] = -U[i, i + 1 :] @ inverse[i + 1 :, i + 1 :]
+    """Inverse of upper triangular (..., 6, 6) matrices of unit diagonal, exactly of that form."""
+    inverse = np.broadcast_to(np.eye(6), U.shape).copy()
+    for i in reversed(range(5)):
+        row = U[..., i : i + 1, i + 1 :]
+        inverse[..., i, i + 1 :] = -(row @ inverse[..., i + 1 :, i + 1 :])[..., 0, :]
     return inverse

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from auv_dynamics.model import Model
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.vehicle import Vehicle, row_major
 from auv_gvc_controller.decomposition import decompose, inverse_upper
 
 
@@ -27,6 +27,6 @@ class ControlModel(NamedTuple):
 
 
 def control_model(vehicle: Vehicle) -> ControlModel:
-    """Model of a vehicle as a law takes it."""
+    """Model of a vehicle, or of a fleet of them, as a law takes it."""
     Upsilon, N = decompose(vehicle.M)
-    return ControlModel(vehicle.model, Upsilon.ravel(), inverse_upper(Upsilon).ravel(), N)
+    return ControlModel(vehicle.model, row_major(Upsilon), row_major(inverse_upper(Upsilon)), N)

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,14 +15,13 @@ from auv_analysis.closed_loop import (
     SharedTables,
     Tables,
     Workspace,
-    fill_continuous,
-    fill_held,
 )
+from auv_analysis.kernels import Kernel, kernels
 from auv_analysis.reduction import Figures
 from auv_analysis.trees import kept, mapped
 from auv_dynamics.integrator import TABLEAUS, stage_times
-from auv_dynamics.jit import JITTED, compiled, plain
-from auv_dynamics.lanes import empty, of_block, packed, uncounted, unpacked, width
+from auv_dynamics.jit import numba
+from auv_dynamics.lanes import empty, packed, unpacked, width
 from auv_dynamics.plant import SIZE
 
 Known = Callable[[np.ndarray], Tables]  # stage times t (T, s) of the next block -> its tables
@@ -29,29 +29,6 @@ SHARED_STEPS = 1024  # steps that are tabulated at once where all vehicles share
 OWN_STEPS = 64  # the same where each has its own
 PARTS = 4  # of a batch per thread, so that a slow one is made up for
 OWN_VEHICLES = 64  # of a part where each has its own tables
-
-
-@compiled
-def run_continuous_batch(loop, tables, grid, tableau, motion, work, record, first, last):
-    """`fill_continuous` for the blocks of lanes from `first` to before `last`."""
-    for b in range(first, last):
-        fill_continuous(
-            of_block(loop, b), of_block(tables, b), uncounted(grid), uncounted(tableau),
-            of_block(motion, b), of_block(work, 0), of_block(record, b),
-        )  # fmt: skip
-
-
-@compiled
-def run_held_batch(loop, tables, grid, tableau, motion, work, record, first, last):
-    """`fill_held` for the blocks of lanes from `first` to before `last`."""
-    for b in range(first, last):
-        fill_held(
-            of_block(loop, b), of_block(tables, b), uncounted(grid), uncounted(tableau),
-            of_block(motion, b), of_block(work, 0), of_block(record, b),
-        )  # fmt: skip
-
-
-KERNELS = {'continuous': run_continuous_batch, 'zoh': run_held_batch}
 
 
 @dataclass(frozen=True)
@@ -100,28 +77,57 @@ def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) 
     figures : Figures with arrays (B, n)
 
     """
-    lanes = width(len(batch))
-    loop = pack(batch.loop, lanes)
-    band = packed(batch.band, lanes)
-    count = -(-len(batch) // lanes)
-    record = Figures.start(
-        loop.model, band, batch.step, lambda n, value: _full(count, n, lanes, value)
-    )
-    tables = _listed(batch) if batch.shared else None
-
-    def run(blocks: range) -> None:
-        _run_part(batch, loop, record, lanes, blocks, tables)
-
-    parts = _parts(count, lanes, threads, own=batch.shared is None)
+    job = _job(batch, kernel_of(batch))
+    parts = _parts(len(job.record.outside), job.lanes, threads, own=batch.shared is None)
     if executor is None and (threads == 1 or len(parts) == 1):
         for part in parts:
-            run(part)
+            _run_part(job, part)
     elif executor is not None:
-        list(executor.map(run, parts))
+        list(executor.map(partial(_run_part, job), parts))
     else:
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(run, parts))
-    return mapped(lambda blocks: unpacked(blocks, len(batch)), record)
+            list(pool.map(partial(_run_part, job), parts))
+    return mapped(lambda blocks: unpacked(blocks, len(batch)), job.record)
+
+
+class _Job(NamedTuple):
+    batch: Batch
+    kernel: Kernel
+    lanes: int
+    loop: Loop
+    record: Figures
+    tables: Sequence[tuple[Grid, Tables]] | None
+
+
+def kernel_of(batch: Batch) -> Kernel:
+    """Fastest kernel that takes the batch's law; compiles a user's law to find out, once."""
+    law = type(batch.loop.gains)
+    candidates = kernels(law, batch.hold)
+    if (law, batch.hold) not in _CHOSEN:
+        _CHOSEN[law, batch.hold] = next(k for k in candidates if _works(batch, k, candidates[-1]))
+    return _CHOSEN[law, batch.hold]
+
+
+_CHOSEN: dict[tuple[Any, str], Kernel] = {}
+
+
+def _works(batch: Batch, kernel: Kernel, last: Kernel) -> bool:
+    """Whether numba compiles a kernel, tried on no steps; the last one needs no trial."""
+    if kernel is last:
+        return True
+    try:
+        _run_part(_job(batch, kernel), range(1), trial=True)
+    except numba.core.errors.NumbaError:
+        return False
+    return True
+
+
+def _job(batch: Batch, kernel: Kernel) -> _Job:
+    lanes = 1 if kernel.alone else width(len(batch))
+    loop, band = pack(batch.loop, lanes), packed(batch.band, lanes)
+    count = -(-len(batch) // lanes)
+    record = Figures.start(loop.model, band, batch.step, partial(_full, count, lanes))
+    return _Job(batch, kernel, lanes, loop, record, _listed(batch))
 
 
 def pack(value: Any, lanes: int) -> Any:
@@ -137,7 +143,7 @@ def pack(value: Any, lanes: int) -> Any:
     return mapped(once, value)
 
 
-def _full(count: int, n: int, lanes: int, value: float) -> np.ndarray:
+def _full(count: int, lanes: int, n: int, value: float) -> np.ndarray:
     array = empty((count, n, lanes))
     array[...] = value
     return array
@@ -178,29 +184,25 @@ def _own(batch: Batch, lanes: int, blocks: range) -> Iterator[tuple[Grid, Tables
         yield grid, Tables(*(packed(table, lanes) for table in known(grid.t)))
 
 
-def _run_part(
-    batch: Batch,
-    loop: Loop,
-    record: Figures,
-    lanes: int,
-    blocks: range,
-    tables: Sequence[tuple[Grid, Tables]] | None,
-) -> None:
-    """Run some blocks of lanes from the first step to the last."""
+def _run_part(job: _Job, blocks: range, *, trial: bool = False) -> None:
+    """Run some blocks of lanes from the first step to the last; a trial takes no step."""
+    batch, lanes = job.batch, job.lanes
     tableau, size = TABLEAUS[batch.integrator], batch.x.shape[1]
-    blocks_of = slice(blocks.start, blocks.stop)
     x = packed(batch.x[blocks.start * lanes : blocks.stop * lanes], lanes)
-    count, delay = len(x), loop.actuators.delay
+    count, delay = len(x), job.loop.actuators.delay
     motion = Motion(
         x,
         x[:, :SIZE].copy(),
-        _full(count, size - SIZE, lanes, 0.0),
-        _full(count, (1 + delay) * 6, lanes, 0.0).reshape(count, 1 + delay, 6, lanes),
+        _full(count, lanes, size - SIZE, 0.0),
+        _full(count, lanes, (1 + delay) * 6, 0.0).reshape(count, 1 + delay, 6, lanes),
     )
     work = Workspace(empty((1, len(tableau.b), size, lanes)), empty((1, size, lanes)))
-    here = kept(loop, blocks_of), kept(record, blocks_of)
-    kernel = KERNELS[batch.hold] if JITTED else plain(KERNELS[batch.hold])
-    known = tables or (_shared(batch) if batch.shared else _own(batch, lanes, blocks))
-    with np.errstate(all='ignore'):
-        for grid, block in known:
-            kernel(here[0], block, grid, tableau, motion, work, here[1], 0, count)
+    here = slice(blocks.start, blocks.stop)
+    loop, record = kept(job.loop, here), kept(job.record, here)
+    known = job.tables or (_shared(batch) if batch.shared else _own(batch, lanes, blocks))
+    for grid, tables in known:
+        steps = grid._replace(t=grid.t[:0]) if trial else grid
+        with np.errstate(all='ignore'):
+            job.kernel.run(loop, tables, steps, tableau, motion, work, record, 0, count)
+        if trial:
+            return

@@ -1,0 +1,108 @@
+"""The kernel over blocks of lanes, and how far it is compiled for a user's own law.
+
+The shipped laws run in vector registers. A user's law does too where numba can compile it so: plain
+arithmetic on six-tuples, without branches. Else it is compiled for one vehicle at a time, and where
+that fails as well it runs as plain Python. Code compiled for it is not kept in the shared folder.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+from auv_analysis.closed_loop import fill_continuous, fill_held, run_continuous, run_held
+from auv_analysis.trees import mapped
+from auv_dynamics.jit import JITTED, OPTIONS, compiled, numba, plain
+from auv_dynamics.lanes import of_block, uncounted
+from auv_gvc_controller.laws import SHIPPED
+from auv_gvc_controller.sampled import user_law
+
+
+@compiled
+def run_continuous_batch(loop, tables, grid, tableau, motion, work, record, first, last):
+    """`fill_continuous` for the blocks of lanes from `first` to before `last`."""
+    for b in range(first, last):
+        fill_continuous(
+            of_block(loop, b), of_block(tables, b), uncounted(grid), uncounted(tableau),
+            of_block(motion, b), of_block(work, 0), of_block(record, b),
+        )  # fmt: skip
+
+
+@compiled
+def run_held_batch(loop, tables, grid, tableau, motion, work, record, first, last):
+    """`fill_held` for the blocks of lanes from `first` to before `last`."""
+    for b in range(first, last):
+        fill_held(
+            of_block(loop, b), of_block(tables, b), uncounted(grid), uncounted(tableau),
+            of_block(motion, b), of_block(work, 0), of_block(record, b),
+        )  # fmt: skip
+
+
+IN_LANES = {'continuous': run_continuous_batch, 'zoh': run_held_batch}
+ALONE = {'continuous': run_continuous, 'zoh': run_held}
+
+
+class Kernel(NamedTuple):
+    """A function of (loop, tables, grid, tableau, motion, work, record, first, last).
+
+    Attributes
+    ----------
+    run : takes the blocks from `first` to before `last`
+    alone : a block is one vehicle: lanes of width 1
+    how : in words, for people
+
+    """
+
+    run: Callable[..., None]
+    alone: bool
+    how: str
+
+
+def kernels(law: Any, hold: str) -> Sequence[Kernel]:
+    """Kernels for a law, the fastest first; the last one always works.
+
+    Parameters
+    ----------
+    law : its class
+    hold : 'continuous' or 'zoh'
+
+    """
+    if law in SHIPPED.values():
+        run = IN_LANES[hold] if JITTED else plain(IN_LANES[hold])
+        return [Kernel(run, False, 'in vector registers' if JITTED else 'as NumPy arrays')]
+    return _of_users(hold)
+
+
+@cache
+def _of_users(hold: str) -> Sequence[Kernel]:
+    def in_words(*arguments: Any) -> None:
+        with user_law(arguments[0].gains):
+            plain(ALONE[hold])(*arguments)
+
+    in_python = Kernel(_one_by_one(in_words), True, 'as plain Python')
+    if not JITTED:
+        return [in_python]
+    options = {'nogil': True, **OPTIONS}
+    in_lanes = numba.njit(**options)(plain(IN_LANES[hold]))
+    alone = numba.njit(**options)(plain(ALONE[hold]))
+    return [
+        Kernel(in_lanes, False, 'in vector registers'),
+        Kernel(_one_by_one(alone), True, 'compiled'),
+        in_python,
+    ]
+
+
+def _one_by_one(function: Callable[..., None]) -> Callable[..., None]:
+    """A kernel of one vehicle as one of blocks, each of one vehicle."""
+
+    def run(loop, tables, grid, tableau, motion, work, record, first, last):
+        def only(value: Any, b: int) -> Any:
+            return mapped(lambda lanes: lanes[..., 0], of_block(value, b))
+
+        for b in range(first, last):
+            known = tables if getattr(tables, 'SHARED', False) else only(tables, b)
+            function(
+                only(loop, b), known, grid, tableau, only(motion, b), only(work, 0),
+                only(record, b),
+            )  # fmt: skip
+
+    return run

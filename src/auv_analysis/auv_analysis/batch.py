@@ -1,7 +1,9 @@
 """Many closed loops at once: vehicles in lanes, blocks of lanes over threads, figures reduced."""
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -23,6 +25,7 @@ from auv_dynamics.integrator import TABLEAUS, stage_times
 from auv_dynamics.jit import numba
 from auv_dynamics.lanes import empty, packed, unpacked, width
 from auv_dynamics.plant import SIZE
+from auv_gvc_controller.sampled import user_law
 
 Known = Callable[[np.ndarray], Tables]  # stage times t (T, s) of the next block -> its tables
 SHARED_STEPS = 1024  # steps that are tabulated at once where all vehicles share the tables
@@ -116,7 +119,9 @@ def _works(batch: Batch, kernel: Kernel, last: Kernel) -> bool:
     if kernel is last:
         return True
     try:
-        _run_part(_job(batch, kernel), range(1), trial=True)
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore')  # what numba thinks of a user's code
+            _run_part(_job(batch, kernel), range(1), trial=True)
     except numba.core.errors.NumbaError:
         return False
     return True
@@ -202,7 +207,7 @@ def _run_part(job: _Job, blocks: range, *, trial: bool = False) -> None:
     known = job.tables or (_shared(batch) if batch.shared else _own(batch, lanes, blocks))
     for grid, tables in known:
         steps = grid._replace(t=grid.t[:0]) if trial else grid
-        with np.errstate(all='ignore'):
+        with np.errstate(all='ignore'), nullcontext() if trial else user_law(loop.gains):
             job.kernel.run(loop, tables, steps, tableau, motion, work, record, 0, count)
         if trial:
             return

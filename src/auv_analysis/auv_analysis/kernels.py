@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 
 from auv_analysis.closed_loop import fill_continuous, fill_held, run_continuous, run_held
 from auv_analysis.trees import mapped
-from auv_dynamics.jit import JITTED, OPTIONS, compiled, numba, plain
+from auv_dynamics.jit import JITTED, compiled, plain, uncached
 from auv_dynamics.lanes import of_block, uncounted
 from auv_gvc_controller.laws import SHIPPED
-from auv_gvc_controller.sampled import user_law
 
 
 @compiled
@@ -69,24 +68,19 @@ def kernels(law: Any, hold: str) -> Sequence[Kernel]:
     if law in SHIPPED.values():
         run = IN_LANES[hold] if JITTED else plain(IN_LANES[hold])
         return [Kernel(run, False, 'in vector registers' if JITTED else 'as NumPy arrays')]
-    return _of_users(hold)
+    return _of_user(law, hold)
 
 
 @cache
-def _of_users(hold: str) -> Sequence[Kernel]:
-    def in_words(*arguments: Any) -> None:
-        with user_law(arguments[0].gains):
-            plain(ALONE[hold])(*arguments)
+def _of_user(law: Any, hold: str) -> Sequence[Kernel]:
+    """Kernels of their own for each law: numba takes two classes of one name for the same."""
 
-    in_python = Kernel(_one_by_one(in_words), True, 'as plain Python')
+    in_python = Kernel(_one_by_one(plain(ALONE[hold])), True, 'as plain Python')
     if not JITTED:
         return [in_python]
-    options = {'nogil': True, **OPTIONS}
-    in_lanes = numba.njit(**options)(plain(IN_LANES[hold]))
-    alone = numba.njit(**options)(plain(ALONE[hold]))
     return [
-        Kernel(in_lanes, False, 'in vector registers'),
-        Kernel(_one_by_one(alone), True, 'compiled'),
+        Kernel(uncached(plain(IN_LANES[hold])), False, 'in vector registers'),
+        Kernel(_one_by_one(uncached(plain(ALONE[hold]))), True, 'compiled'),
         in_python,
     ]
 

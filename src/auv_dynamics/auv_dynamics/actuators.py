@@ -9,7 +9,7 @@ from auv_dynamics.files import InputError
 from auv_dynamics.jit import compiled, helper
 from auv_dynamics.lanes import clip, select
 from auv_dynamics.signals import DOFS
-from auv_dynamics.six import fill_vector, vector
+from auv_dynamics.six import copied, fill_vector, vector
 from auv_dynamics.vehicle import Vehicle
 
 MOST_STEPS = 1_000_000  # of a delay
@@ -234,7 +234,7 @@ def fill_applied(actuators, k, tau, state):
     command = tau
     if actuators.delay > 0:
         slot = 1 + k % actuators.delay
-        command = vector(state[slot], 0)
+        command = copied(vector(state[slot], 0))
         fill_vector(state[slot], 0, tau)
     c = reachable(actuators.reach, command)
     a = state[0]

@@ -1,9 +1,10 @@
 """Compile the kernel with numba where it is installed; the same source runs without it.
 
-Three decorators are all that the mathematics knows of numba: `helper` for small functions that
+Four decorators are all that the mathematics knows of numba: `helper` for small functions that
 are always inlined, `compiled` for those that are called from Python, and `jitable` for those that
 are compiled as part of another one but stay plain Python by themselves: they may meet a user's own
-law, which need not be compilable and must not enter the cache that other processes load.
+law, which need not be compilable and must not enter the cache that other processes load: `uncached`
+is for that.
 
 Compiled code is kept in one explicit folder whose name changes with every source file of the
 workspace, so that a stale binary cannot be loaded: numba itself only looks at the file of the
@@ -55,6 +56,7 @@ if JITTED:
     OPTIONS: Any = {'fastmath': {'contract'}, 'error_model': 'numpy'}
     helper = numba.njit(forceinline=True, **OPTIONS)
     compiled = numba.njit(cache=True, nogil=True, **OPTIONS)
+    uncached = numba.njit(nogil=True, **OPTIONS)
     jitable: Any = register_jitable(forceinline=True, **OPTIONS)
 else:
 
@@ -62,7 +64,7 @@ else:
         """Return the function as it is: numba is absent or switched off."""
         return function
 
-    compiled = jitable = helper
+    compiled = uncached = jitable = helper
 
 
 def plain(function: Callable) -> Callable:

@@ -110,7 +110,7 @@ def packed(values: np.ndarray, lanes: int) -> np.ndarray:
 def unpacked(blocks: np.ndarray, count: int) -> np.ndarray:
     """Values (B, ...) of the first `count` vehicles of blocks (blocks, ..., W)."""
     rows = np.moveaxis(blocks, -1, 1)
-    return rows.reshape(-1, *rows.shape[2:])[:count].copy()
+    return rows.reshape(rows.shape[0] * rows.shape[1], *rows.shape[2:])[:count].copy()
 
 
 def empty(shape: tuple[int, ...]) -> np.ndarray:

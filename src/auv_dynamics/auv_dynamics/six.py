@@ -32,6 +32,12 @@ def fill_vector(array, start, a):
 
 
 @helper
+def copied(a):
+    """The same numbers, also where those of `a` are views of lanes that will be overwritten."""
+    return (1.0 * a[0], 1.0 * a[1], 1.0 * a[2], 1.0 * a[3], 1.0 * a[4], 1.0 * a[5])
+
+
+@helper
 def add(a, b):
     """A + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])

@@ -1,0 +1,84 @@
+"""A user's own law in rollouts: compiled as far as numba takes it, with the same figures."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from auv_analysis import batch, load_scenario, simulate, summarize
+from auv_analysis.changes import changed_scenario
+from auv_analysis.rollouts import rollouts
+from auv_dynamics.jit import JITTED
+
+# all have the same name, which numba alone would not tell apart
+LAW = """
+from typing import NamedTuple
+import numpy as np
+from auv_dynamics.six import add, mul, sub, vector
+
+class PI(NamedTuple):
+    k_P: np.ndarray
+    k_I: np.ndarray
+    STATES = 6
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        {before}
+        error = sub(nu_d, nu)
+        return add(mul(gains.k_P, error), mul(gains.k_I, vector(state, 0))), (0.0,) * 6
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return sub(nu_d, nu)
+"""
+BRANCHES = """if nu[0] > 0.05:
+            nu_d = nu"""
+NOT_FOR_NUMBA = "assert isinstance({'a': 1, 2: 'b'}, dict)"
+FAILS = """if t > 0.1:
+            raise KeyError('lost')"""
+GAINS = np.geomspace(50.0, 400.0, 9)
+
+
+@pytest.fixture
+def scenario(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def with_law(name, before):
+        (tmp_path / f'{name}.py').write_text(LAW.format(before=before or 'pass'))
+        values = {
+            'duration': 0.3,
+            'controllers': {'own': {'law': f'{name}:PI', 'k_P': 300.0, 'k_I': 20.0}},
+        }
+        return changed_scenario(load_scenario('case1'), values)
+
+    return with_law
+
+
+@pytest.mark.parametrize(
+    ('name', 'before', 'how'),
+    [
+        ('own_plain_arithmetic', '', 'in vector registers'),
+        ('own_branch', BRANCHES, 'compiled'),
+        ('own_python', NOT_FOR_NUMBA, 'as plain Python'),
+    ],
+)
+def test_a_law_runs_as_compiled_as_can_be(scenario, name, before, how):
+    base = scenario(name, before)
+    changes = {'controllers.own.k_P': GAINS}
+    columns = rollouts(base, 'own', changes, threads=2)
+    chosen = {law.__module__: k.how for (law, _), k in batch._CHOSEN.items()}
+    assert chosen[name] == (how if JITTED else 'as plain Python')
+    assert set(columns['status']) == {'ok'}
+    for i in (0, 8):
+        single = changed_scenario(base, {'controllers.own.k_P': float(GAINS[i])})
+        expected = summarize(simulate(single, 'own'))
+        for j, dof in enumerate(('surge', 'sway')):
+            rms = expected['velocity_error']['rms'][j]
+            assert columns[f'velocity_error.rms.{dof}'][i] == pytest.approx(rms, rel=1e-10)
+    alone = rollouts(base, 'own', {'controllers.own.k_P': GAINS[3:4]})
+    assert_array_equal(alone['effort.rms.yaw'], columns['effort.rms.yaw'][3:4])
+
+
+def test_a_law_that_fails_is_named(scenario):
+    with pytest.raises(ArithmeticError, match="the law PI failed: KeyError: 'lost'"):
+        rollouts(scenario('own_failing', FAILS), 'own', {})

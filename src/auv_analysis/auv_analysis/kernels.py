@@ -74,7 +74,6 @@ def kernels(law: Any, hold: str) -> Sequence[Kernel]:
 @cache
 def _of_user(law: Any, hold: str) -> Sequence[Kernel]:
     """Kernels of their own for each law: numba takes two classes of one name for the same."""
-
     in_python = Kernel(_one_by_one(plain(ALONE[hold])), True, 'as plain Python')
     if not JITTED:
         return [in_python]

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from auv_analysis import cli, commands
+from auv_analysis import cli
+from auv_analysis.commands import scenarios
 from auv_dynamics.config import shipped
 
 HEADER = 't,surge,sway,heave,roll,pitch,yaw'
@@ -187,7 +188,7 @@ TABLES = {  # what is wrong with the CSV file -> text, key, expected, found
 @pytest.fixture(autouse=True)
 def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fail where the results' folder would be made, which comes before all work."""
-    monkeypatch.setattr(commands, 'prepare', lambda *_, **__: pytest.fail('work has begun'))
+    monkeypatch.setattr(scenarios, 'prepare', lambda *_, **__: pytest.fail('work has begun'))
 
 
 def _cases(table: str) -> list[tuple[str, str, str, str, str]]:

@@ -5,7 +5,8 @@ from contextlib import suppress
 
 import pytest
 
-from auv_analysis import cli, commands
+from auv_analysis import cli
+from auv_analysis.commands import scenarios
 from auv_analysis.domain import LARGEST, VARIABLE, chosen_domain
 from auv_dynamics.files import InputError
 
@@ -63,7 +64,7 @@ def test_wrong_environment_is_refused(value: str, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize('where', ['--domain-id', VARIABLE])
 @pytest.mark.parametrize('value', WRONG)
 def test_run_refuses_a_wrong_domain_in_one_line(where, value, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(commands, 'prepare', lambda *_, **__: pytest.fail('work has begun'))
+    monkeypatch.setattr(scenarios, 'prepare', lambda *_, **__: pytest.fail('work has begun'))
     arguments = ['run', 'case1']
     if where == VARIABLE:
         monkeypatch.setenv(VARIABLE, value)

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from auv_analysis import cli, commands
+from auv_analysis import cli
+from auv_analysis.commands import run, simulate
 from auv_analysis.folder import prepare
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError
@@ -114,8 +115,8 @@ def test_folder_that_cannot_be_written_is_refused() -> None:
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder in which a user keeps scenario and vehicle under the names that we use as well."""
-    for command in ('warm_up', 'write_inputs'):
-        monkeypatch.setattr(commands, command, lambda *_: pytest.fail('work has begun'))
+    for module, work in ((run, 'warm_up'), (simulate, 'write_inputs')):
+        monkeypatch.setattr(module, work, lambda *_: pytest.fail('work has begun'))
     shutil.copy(shipped('scenarios', 'case1'), tmp_path / 'scenario.yaml')
     shutil.copy(shipped('vehicles', 'herman2018'), tmp_path / 'vehicle.yaml')
     text = (tmp_path / 'scenario.yaml').read_text()

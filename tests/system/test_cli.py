@@ -291,14 +291,14 @@ def test_analyze_refuses_a_bag_with_a_bad_attachment(what, recording, folder, ca
 @pytest.fixture
 def stopped(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """Folders that a command asked for; it ends, all well, where the summaries would begin."""
-    from auv_analysis import commands
+    from auv_analysis.commands import analyze, conclude
 
     asked: list[Path] = []
-    prepare = commands.prepare
+    prepare = analyze.prepare
     monkeypatch.setattr(
-        commands, 'prepare', lambda out, **options: asked.append(out) or prepare(out, **options)
+        analyze, 'prepare', lambda out, **options: asked.append(out) or prepare(out, **options)
     )
-    monkeypatch.setattr(commands, 'summarize', lambda *_: sys.exit(0))
+    monkeypatch.setattr(conclude, 'summarize', lambda *_: sys.exit(0))
     return asked
 
 

@@ -58,17 +58,18 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command; exit code 0 fine, 1 the work failed, 2 wrong input."""
     options = parser().parse_args(arguments)
-    from auv_analysis import commands
+    from auv_analysis.commands import function
+    from auv_analysis.supervisor import NodeDiedError
     from auv_dynamics.files import InputError
 
     try:
-        result = getattr(commands, options.command.replace('-', '_'))(options)
+        result = function(options.command)(options)
         if options.json:
             print(json.dumps(result, allow_nan=False), flush=True)
     except InputError as error:
         _say(str(error))
         sys.exit(2)
-    except (commands.FailedError, ArithmeticError) as error:
+    except (NodeDiedError, ArithmeticError) as error:
         _say(str(error))
         sys.exit(1)
     except BrokenPipeError:

@@ -1,0 +1,46 @@
+"""`auv info`: what lies in a bag."""
+
+import argparse
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from auv_analysis.bag import bag_files, read_bag
+
+
+def info(options: argparse.Namespace) -> dict[str, Any]:
+    """What lies in a bag."""
+    contents = read_bag(options.bag, decode=False)
+    first, last = contents.first, contents.last
+    span = None if first is None or last is None else (last - first) / 1e9
+    document = {
+        'bag': str(options.bag),
+        'files': [path.name for path in bag_files(options.bag)],
+        'duration': span,
+        'messages': sum(contents.counts.values()),
+        'topics': {
+            topic: {'type': kind, 'messages': contents.counts.get(topic, 0)}
+            for topic, kind in sorted(contents.types.items())
+        },
+        'attachments': sorted(contents.attachments),
+        'notes': contents.notes,
+    }
+    if not options.json:
+        _print_info(document)
+    return document
+
+
+def _print_info(document: dict[str, Any]) -> None:
+    out = Console()
+    span = 'no messages' if document['duration'] is None else f'{document["duration"]:g} s'
+    out.print(f'{document["bag"]}: {document["messages"]} messages, {span}')
+    table = Table(box=None, header_style='bold')
+    for column in ('topic', 'type', 'messages'):
+        table.add_column(column)
+    for topic, entry in document['topics'].items():
+        table.add_row(topic, entry['type'], str(entry['messages']))
+    out.print(table)
+    out.print(f'attachments: {", ".join(document["attachments"]) or "none"}')
+    for note in document['notes']:
+        out.print(f'note: {note}')

@@ -1,0 +1,97 @@
+"""`auv run`: real nodes, in lock-step, recorded."""
+
+import argparse
+import os
+import time
+from functools import partial
+from typing import Any
+
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
+
+from auv_analysis.bag import load_run
+from auv_analysis.commands.conclude import console, finish, say
+from auv_analysis.commands.scenarios import open_scenario, prepare_out
+from auv_analysis.domain import VARIABLE, chosen_domain
+from auv_analysis.experiment import environment, run_controller
+from auv_analysis.supervisor import NodeDiedError
+from auv_analysis.warm_up import warm_up
+from auv_dynamics.files import InputError
+
+DISCOVERY = 3.0  # s: discovery may take so long
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
+    """Real nodes, in lock-step, recorded."""
+    scenario, names = open_scenario(options)
+    domain, picked = chosen_domain(options.domain_id)
+    os.environ.update(environment(domain))
+    # the middleware reads its environment when it is loaded
+    from auv_dynamics.ros.watcher import Watcher
+
+    graph = Watcher(domain)
+    try:
+        if not picked:
+            _refuse_strangers(graph, domain)
+        out = prepare_out(options, scenario, names)
+        warm_up(scenario, names)
+        say(f'export {VARIABLE}={domain}')
+        failure, done = None, []
+        for name in names:
+            graph.running = False
+            with _progress() as bar:
+                task = bar.add_task(f'{scenario.name} {name}', total=scenario.steps)
+                show = partial(_show_step, bar, task)
+                try:
+                    run_controller(scenario, name, out, domain, graph, show)
+                except NodeDiedError as error:
+                    failure = error
+                    break  # the graph is broken; what was recorded is still worth a report
+            done.append(name)
+    finally:
+        graph.close()
+    return finish(out, {name: load_run(out / name) for name in done}, scenario, failure)
+
+
+def _refuse_strangers(graph: Any, domain: int) -> None:
+    until = time.monotonic() + DISCOVERY
+    strangers: list[str] = []
+    while not strangers and time.monotonic() < until:
+        graph.spin(0.1)
+        strangers = graph.endpoints()
+    if strangers:
+        graph.spin(0.5)  # the names of nodes arrive behind their endpoints
+        strangers = graph.endpoints() or strangers
+        expected = 'a domain without endpoints on wrench or odom'
+        raise InputError(f'{VARIABLE}={domain}', '', expected, ', '.join(strangers))
+
+
+def _show_step(bar: Progress, task: TaskID, step: int) -> None:
+    bar.update(task, completed=step)
+
+
+class _Speed(ProgressColumn):
+    """Steps per second, of a run that has begun."""
+
+    def render(self, task: Task) -> str:
+        """Text of the column."""
+        speed = task.finished_speed or task.speed
+        return f'{speed:>6.0f} steps/s' if speed else ''
+
+
+def _progress() -> Progress:
+    return Progress(
+        TextColumn('{task.description:<16}'),
+        BarColumn(bar_width=40),
+        TextColumn('{task.completed:>6}/{task.total} steps'),
+        _Speed(),
+        TimeRemainingColumn(),
+        console=console,
+    )

@@ -1,15 +1,99 @@
-"""A run: what was simulated or recorded, as arrays."""
+"""A run: what was simulated or recorded, as arrays or, where it is long, in blocks of samples."""
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from auv_dynamics.vehicle import Vehicle
 
+BLOCK = 8192  # samples that are worked on together: their arrays fit into a processor's cache
 
-@dataclass(frozen=True, eq=False)
-class Run:
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Facts(ABC):
+    """What is known of a run beside its samples.
+
+    Attributes
+    ----------
+    vehicle : what the controller knows
+    scenario : name of the scenario
+    controller, law : name of the controller and of its law
+    gains : the law's gains as the scenario gives them
+    step : control period, s
+    source : 'simulate' or 'bag'
+    hold : 'continuous' or 'zoh': whether the wrench was held between the samples
+    kinds : kinds of the disturbances, None where they are not known
+    notes : what is worth saying about the run, one line each
+
+    """
+
+    vehicle: Vehicle
+    scenario: str
+    controller: str
+    law: str
+    gains: dict[str, Any]
+    step: float
+    source: str
+    hold: str = 'zoh'
+    kinds: frozenset[str] | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    @abstractmethod
+    def extent(self) -> 'Extent':
+        """How long the run is, and which of the signals are there that not every run has."""
+
+    @property
+    def samples(self) -> int:
+        """Number of samples, n + 1."""
+        return self.extent.samples
+
+    @property
+    def start(self) -> float:
+        """Time of the first sample, s."""
+        return self.extent.start
+
+    @property
+    def duration(self) -> float:
+        """Length of the run, s."""
+        return self.extent.end - self.extent.start
+
+    @property
+    def sensing(self) -> bool:
+        """Whether the law saw measurements in place of the true velocity."""
+        return self.extent.sensing
+
+    @property
+    def acting(self) -> bool:
+        """Whether actuators stand between the command and the wrench applied."""
+        return self.extent.acting
+
+    @property
+    def knows_disturbance(self) -> bool:
+        """Whether the lumped uncertainty F is known."""
+        return self.extent.knows_disturbance
+
+    def facts(self) -> dict[str, Any]:
+        """Name -> value of what every kind of run has, for building another one."""
+        return {entry.name: getattr(self, entry.name) for entry in fields(Facts)}
+
+
+class Extent(NamedTuple):
+    """Length of a run and its optional signals: times in s."""
+
+    samples: int
+    start: float
+    end: float
+    sensing: bool
+    acting: bool
+    knows_disturbance: bool
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Run(Facts):
     """One closed loop from start to end, n + 1 samples.
 
     Attributes
@@ -21,18 +105,11 @@ class Run:
     tau : (n + 1, 6) commanded wrench, N and N m, body frame
     disturbance : (n + 1, 6) lumped uncertainty F of (1), or None where it is not known
     disturbance_estimate : (n + 1, 6) f of the law
-    vehicle : what the controller knows
-    scenario : name of the scenario
-    controller, law : name of the controller and of its law
-    gains : the law's gains as the scenario gives them
-    step : control period, s
-    source : 'simulate' or 'bag'
-    hold : 'continuous' or 'zoh': whether the wrench was held between the samples
     measured : (n + 1, 6) velocity that the law saw; None: the true one
     applied : (n + 1, 6) wrench that the actuators delivered; None: the command
     law_state : (n + 1, m) the law's integrals, None where they are not known
-    kinds : kinds of the disturbances, None where they are not known
-    notes : what is worth saying about the run, one line each
+
+    The other attributes are those of `Facts`.
 
     """
 
@@ -44,24 +121,36 @@ class Run:
     tau: np.ndarray
     disturbance: np.ndarray | None
     disturbance_estimate: np.ndarray
-    vehicle: Vehicle
-    scenario: str
-    controller: str
-    law: str
-    gains: dict[str, Any]
-    step: float
-    source: str
-    hold: str = 'zoh'
     measured: np.ndarray | None = None
     applied: np.ndarray | None = None
     law_state: np.ndarray | None = None
-    kinds: frozenset[str] | None = None
-    notes: tuple[str, ...] = field(default=())
 
     def part(self, keep: Any) -> 'Run':
         """Run of the samples that an index, slice or mask of samples keeps."""
+        return replace(self, **{name: values[keep] for name, values in self.arrays().items()})
+
+    def blocks(self, rows: int = BLOCK) -> Iterator['Run']:
+        """The run in parts of so many samples."""
+        return (self.part(slice(i, i + rows)) for i in range(0, len(self.t), rows))
+
+    def wide_blocks(self, margin: int, rows: int = BLOCK) -> Iterator[tuple['Run', slice]]:
+        """The same parts with up to `margin` samples at either side, and where the part is."""
+        for i in range(0, len(self.t), rows):
+            first = max(i - margin, 0)
+            wide = self.part(slice(first, i + rows + margin))
+            yield wide, slice(i - first, min(i + rows, len(self.t)) - first)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Name -> values of the signals that are there, t included."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        return replace(self, **{k: v[keep] for k, v in values.items() if isinstance(v, np.ndarray)})
+        return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+
+    @property
+    def extent(self) -> Extent:
+        """Length and optional signals, from the arrays."""
+        signals = self.measured, self.applied, self.disturbance
+        known = (signal is not None for signal in signals)
+        return Extent(len(self.t), float(self.t[0]), float(self.t[-1]), *known)
 
     @property
     def nu_measured(self) -> np.ndarray:
@@ -73,7 +162,64 @@ class Run:
         """(n + 1, 6) wrench that the actuators delivered, N and N m."""
         return self.tau if self.applied is None else self.applied
 
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LongRun(Facts):
+    """A run whose samples are read in blocks, whenever they are asked for.
+
+    Attributes
+    ----------
+    known_extent : length and optional signals
+    source_of_blocks : reads the run from its beginning, in blocks of so many samples
+
+    The other attributes are those of `Facts`.
+
+    """
+
+    known_extent: Extent
+    source_of_blocks: Callable[[int], Iterator[Run]]
+
     @property
-    def duration(self) -> float:
-        """Length of the run, s."""
-        return float(self.t[-1] - self.t[0])
+    def extent(self) -> Extent:
+        """Length and optional signals, as they were found when the run was opened."""
+        return self.known_extent
+
+    def blocks(self, rows: int = BLOCK) -> Iterator[Run]:
+        """The run in parts of so many samples."""
+        return self.source_of_blocks(rows)
+
+    def wide_blocks(self, margin: int, rows: int = BLOCK) -> Iterator[tuple[Run, slice]]:
+        """The same parts with up to `margin` samples at either side, and where the part is."""
+        return widened(self.blocks(rows), margin)
+
+
+AnyRun = Run | LongRun
+
+
+def joined(parts: Sequence[Run]) -> Run:
+    """One run of consecutive parts."""
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    arrays = [part.arrays() for part in parts]
+    whole: dict[str, Any] = {n: np.concatenate([a[n] for a in arrays]) for n in arrays[0]}
+    return replace(first, **whole)
+
+
+def widened(blocks: Iterable[Run], margin: int) -> Iterator[tuple[Run, slice]]:
+    """Each block with up to `margin` samples of its neighbours, and where it lies in that."""
+    before: list[Run] = []
+    queue: list[Run] = []
+
+    def first_of_queue() -> tuple[Run, slice]:
+        wide, start = joined([*before, *queue]), sum(len(part.t) for part in before)
+        inside = slice(start, start + len(queue.pop(0).t))
+        before[:] = [wide.part(slice(max(inside.stop - margin, 0), inside.stop))]
+        return wide.part(slice(0, inside.stop + margin)), inside
+
+    for block in blocks:
+        queue.append(block)
+        while sum(len(part.t) for part in queue[1:]) >= max(margin, 1):
+            yield first_of_queue()
+    while queue:
+        yield first_of_queue()

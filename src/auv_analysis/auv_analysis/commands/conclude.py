@@ -39,7 +39,10 @@ def finish(
 
 
 def conclude(
-    out: Path, runs: dict[str, Run], scenario_text: str, vehicle_text: str
+    out: Path,
+    runs: dict[str, Run],
+    scenario_text: str | dict[str, str],
+    vehicle_text: str | dict[str, str],
 ) -> dict[str, Any]:
     """Write summary and report, show the table; returns the summaries."""
     summaries = {name: summarize(run) for name, run in runs.items()}

@@ -49,7 +49,7 @@ def draw_figures(
     runs: Mapping[str, Run],
     folder: Path,
     summaries: Mapping[str, Mapping[str, Any]] | None = None,
-    limit: np.ndarray | None = None,
+    limits: Mapping[str, np.ndarray | None] | None = None,
 ) -> list[FigureRecord]:
     """Draw every figure that these runs allow, as PNG and PDF.
 
@@ -58,7 +58,7 @@ def draw_figures(
     runs : name -> run, any number of any laws; the name goes into titles and file names
     folder : where the files go; made when it is not there
     summaries : name -> `summarize(run)`, for the certificate; none: it is not drawn
-    limit : (6,) axis limits of the actuators, N and N m; none: there are none
+    limits : name -> (6,) axis limits of the actuators, N and N m; none: there are none
 
     Returns
     -------
@@ -83,8 +83,8 @@ def draw_figures(
         for run, F in _different_disturbances(runs):
             name = f'uncertainty_{run.controller}'
             add(name, *_uncertainty(run, F))
-        for run in runs.values():
-            add(f'inputs_{run.controller}', *_inputs(run, limit))
+        for name, run in runs.items():
+            add(f'inputs_{name}', *_inputs(run, (limits or {}).get(name)))
         if len(runs) > 1:
             add('inputs_compared', *overview.inputs(runs))
         for name, run in runs.items():

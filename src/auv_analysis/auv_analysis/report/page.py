@@ -16,12 +16,13 @@ from auv_analysis.report.certificates import certificate_table
 from auv_analysis.report.claims import claims_table
 from auv_analysis.report.figures import FigureRecord, draw_figures, estimates, reference
 from auv_analysis.report.findings import findings
-from auv_analysis.report.set_up import SetUp, set_up
+from auv_analysis.report.set_up import set_up
 from auv_analysis.report.text import fixed, join, number, plain, tied
 from auv_analysis.run import Run
 from auv_analysis.summary import BAND, SMALLEST_BAND
 from auv_dynamics.signals import DOFS
 
+Texts = str | Mapping[str, str]
 HERE = Path(__file__).parent
 SECTIONS = {  # section of the report -> beginnings of the names of its figures
     'errors': ('errors_', 'settling'),
@@ -37,8 +38,8 @@ def write_report(
     out: Path,
     runs: dict[str, Run],
     summaries: dict[str, dict[str, Any]],
-    scenario_text: str,
-    vehicle_text: str,
+    scenario_text: Texts,
+    vehicle_text: Texts,
 ) -> Path:
     """Write the report and its figures.
 
@@ -47,7 +48,8 @@ def write_report(
     out : folder; gets `report.html` and `figures/`
     runs : name -> run, one at least
     summaries : name -> `summarize(run)`
-    scenario_text, vehicle_text : the files as they were read, shown as listings; may be empty
+    scenario_text, vehicle_text : the files as they were read, shown as listings: one of all runs,
+        or name -> that of a run; may be empty
 
     Returns
     -------
@@ -57,8 +59,12 @@ def write_report(
     if not runs:
         raise ValueError('runs: expected at least one run, found none')
     runs = {name: replace(run, controller=name) for name, run in runs.items()}
-    scene = set_up(runs, summaries, scenario_text)
-    figures = draw_figures(runs, out / 'figures', summaries, scene.limit)
+    scenes = {
+        names: set_up({name: runs[name] for name in names}, summaries, text)
+        for names, text in _shared_by(runs, scenario_text)
+    }
+    limits = {name: scene.limit for names, scene in scenes.items() for name in names}
+    figures = draw_figures(runs, out / 'figures', summaries, limits)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE),
         autoescape=True,
@@ -71,16 +77,35 @@ def write_report(
         'maths': maths,
     }  # fmt: skip
     template = environment.get_template('report.html.j2')
-    context = _context(runs, summaries, scene)
+    context = _context(runs, summaries)
     text = template.render(
         **context,
         figures=_sections(figures),
-        scenario_text=scenario_text,
-        vehicle_text=vehicle_text,
+        scenes=scenes,
+        scenario_texts=_listings(runs, scenario_text),
+        vehicle_texts=_listings(runs, vehicle_text),
     )
     path = out / 'report.html'
     path.write_text(text + '\n', encoding='utf-8')
     return path
+
+
+def _shared_by(runs: Mapping[str, Run], texts: Texts) -> list[tuple[tuple[str, ...], str]]:
+    """Names of the runs that share a text, and that text."""
+    if isinstance(texts, str):
+        return [(tuple(runs), texts)]
+    names: dict[str, list[str]] = {}
+    for name in runs:
+        names.setdefault(texts.get(name, ''), []).append(name)
+    return [(tuple(members), text) for text, members in names.items()]
+
+
+def _listings(runs: Mapping[str, Run], texts: Texts) -> list[tuple[str, str]]:
+    """Texts that are not empty, each with the runs that it is of where there are several."""
+    shared = _shared_by(runs, texts)
+    return [
+        (f' of {join(names)}' if len(shared) > 1 else '', text) for names, text in shared if text
+    ]
 
 
 def maths(text: str) -> markupsafe.Markup:
@@ -91,9 +116,7 @@ def maths(text: str) -> markupsafe.Markup:
     return markupsafe.Markup(re.sub(r'(?<=[ξπ])([1-6])\b', r'<sub>\1</sub>', safe))
 
 
-def _context(
-    runs: Mapping[str, Run], summaries: Mapping[str, Mapping[str, Any]], scene: SetUp
-) -> dict[str, Any]:
+def _context(runs: Mapping[str, Run], summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """What the template prints, computed."""
     leading = reference(runs)
     claims = claims_table(runs, summaries)
@@ -114,7 +137,6 @@ def _context(
         'energy': tables.energy_rows(runs, original),
         'has_original': original is not None,
         'certificates': certificate_table(summaries),
-        'scene': scene,
         'laws': {run.law for run in runs.values()},
         'without_estimate': [n for n, run in runs.items() if not estimates(run)],
         'commanded': any(run.applied is not None for run in runs.values()),

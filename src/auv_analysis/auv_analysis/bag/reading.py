@@ -1,0 +1,53 @@
+"""A bag from its first file to its last: batch by batch, or all of it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from auv_analysis.bag.contents import Contents, Series
+from auv_analysis.bag.files import bag_files
+from auv_analysis.bag.messages import Batch, FileReader
+from auv_analysis.bag.records import records
+from auv_analysis.bag.steps import joined_series
+from auv_dynamics import interface
+
+
+def batches(bag: str | Path, contents: Contents, *, decode: bool = True) -> Iterator[Batch]:
+    """Messages of our topics in the order of the bag, a chunk at a time.
+
+    Parameters
+    ----------
+    bag : folder or .mcap file
+    contents : filled on the way, but for its messages
+    decode : whether our topics are read; else nothing comes, but everything is counted
+
+    Raises
+    ------
+    InputError : not a bag, or a message that must not be used
+
+    """
+    frames: dict[str, interface.Frames] = {}
+    for path in bag_files(bag):
+        reader = FileReader(path, contents, frames, decode)
+        for item in records(path, contents.notes):
+            yield from reader.take(item)
+
+
+def read_bag(bag: str | Path, *, decode: bool = True) -> Contents:
+    """Read a bag.
+
+    Parameters
+    ----------
+    bag : folder or .mcap file
+    decode : read the messages of our topics; else only count
+
+    Raises
+    ------
+    InputError : not a bag, or a message that must not be used
+
+    """
+    contents = Contents()
+    found: dict[str, list[Series]] = {}
+    for topic, stamps, rows in batches(bag, contents, decode=decode):
+        found.setdefault(topic, []).append((stamps, rows))
+    contents.messages = {topic: joined_series(parts) for topic, parts in found.items()}
+    return contents

@@ -1,0 +1,141 @@
+"""The steps of a bag that are complete on all step topics."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from auv_analysis.bag.contents import Contents, Series
+from auv_analysis.bag.roles import READERS, namespace_of, role_of
+from auv_dynamics import interface
+from auv_dynamics.files import InputError
+
+REQUIRED = (interface.ODOM, interface.WRENCH)
+Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> values
+
+
+def topics_of_one_graph(topics: Iterable[str], contents: Contents, bag: Path) -> dict[str, str]:
+    """Role -> topic, of the first namespace that has an odometry.
+
+    Parameters
+    ----------
+    topics : those of ours that have messages
+    contents : of the bag; gets a note when there are several vehicles
+    bag : for the refusal
+
+    Raises
+    ------
+    InputError : a topic without which there is no run has no messages
+
+    """
+    topics = set(topics)
+    spaces = sorted(namespace_of(t) for t in topics if role_of(t) == interface.ODOM)
+    found = ', '.join(sorted(contents.types)) or 'no topics'
+    if not spaces:
+        raise InputError(bag, interface.ODOM, 'messages', found)
+    if len(spaces) > 1:
+        contents.notes.append(f'several vehicles in the bag: read {spaces[0]}, left {spaces[1:]}')
+    ours = {role: f'{spaces[0]}{role}' for role in READERS if f'{spaces[0]}{role}' in topics}
+    for role in REQUIRED:
+        if role not in ours:
+            raise InputError(bag, role, 'messages', found)
+    return ours
+
+
+def complete(series: Mapping[str, Series]) -> Steps:
+    """Stamps that are on every topic, rising, and the values there; of a doubled one the first."""
+    stamps, *others = (ns for ns, _ in series.values())
+    if np.all(np.diff(stamps) > 0) and all(np.array_equal(stamps, ns) for ns in others):
+        return stamps, {role: rows for role, (_, rows) in series.items()}
+    for ns in others:
+        stamps = np.intersect1d(stamps, ns)
+    stamps = np.unique(stamps)
+    values = {}
+    for role, (ns, rows) in series.items():
+        order = np.argsort(ns, kind='stable')
+        values[role] = rows[order[np.searchsorted(ns, stamps, sorter=order)]]
+    return stamps, values
+
+
+def complete_blocks(
+    parts: Iterable[tuple[str, Series]], last: Mapping[str, int], size: int
+) -> Iterator[Steps]:
+    """The same of topics whose stamps rise, in blocks of `size` steps; the last may be shorter.
+
+    Parameters
+    ----------
+    parts : roles and what comes next of them, in any interleaving
+    last : role -> its last stamp: what comes behind the earliest of them is not complete
+    size : steps of a block
+
+    """
+    end = min(last.values())
+    waiting: dict[str, list[Series]] = {role: [] for role in last}
+    counts = dict.fromkeys(last, 0)
+    ready: list[Steps] = []
+    for role, (stamps, rows) in parts:
+        if role not in last:
+            continue
+        inside = slice(0, int(np.searchsorted(stamps, end, 'right')))
+        waiting[role].append((stamps[inside], rows[inside]))
+        counts[role] += len(stamps[inside])
+        if min(counts.values()) >= size:
+            ready.append(_settled(waiting, counts, finished=False))
+            yield from _cut(ready, size)
+    ready.append(_settled(waiting, counts, finished=True))
+    yield from _cut(ready, size)
+    if len(ready[0][0]):
+        yield ready[0]
+
+
+def _settled(waiting: dict[str, list[Series]], counts: dict[str, int], *, finished: bool) -> Steps:
+    """Take the steps that no topic can add to any more from what waits."""
+    series = {role: joined_series(parts) for role, parts in waiting.items()}
+    sure = None if finished else min(int(ns[-1]) for ns, _ in series.values())
+    early = {}
+    for role, (ns, rows) in series.items():
+        n = len(ns) if sure is None else int(np.searchsorted(ns, sure))  # it may come once more
+        early[role] = ns[:n], rows[:n]
+        waiting[role], counts[role] = [(ns[n:], rows[n:])], len(ns) - n
+    return complete(early)
+
+
+def _cut(ready: list[Steps], size: int) -> Iterator[Steps]:
+    """Blocks of exactly `size` steps; one shorter one is left in `ready`."""
+    roles = ready[0][1].keys()
+    ns = np.concatenate([stamps for stamps, _ in ready])
+    values = {role: np.concatenate([rows[role] for _, rows in ready]) for role in roles}
+    full = len(ns) // size * size
+    for i in range(0, full, size):
+        here = slice(i, i + size)
+        yield ns[here], {role: rows[here] for role, rows in values.items()}
+    ready[:] = [(ns[full:], {role: rows[full:] for role, rows in values.items()})]
+
+
+def joined_series(parts: Iterable[Series]) -> Series:
+    """One series of consecutive ones."""
+    stamps, rows = zip(*parts, strict=True)
+    return np.concatenate(stamps), np.concatenate(rows)
+
+
+def dropped(counts: dict[str, int], steps: int, bag: Path) -> list[str]:
+    """Notes on messages that are not complete on all topics.
+
+    Parameters
+    ----------
+    counts : role -> number of messages
+    steps : that are complete
+    bag : for the refusal
+
+    Raises
+    ------
+    InputError : there is no run in fewer than two steps
+
+    """
+    if steps < 2:
+        raise InputError(bag, '', 'at least two steps that are complete on all step topics', '0')
+    return [
+        f'{role}: {count - steps} of {count} messages are not complete on all topics'
+        for role, count in counts.items()
+        if count > steps
+    ]

@@ -14,13 +14,14 @@ setup(
     maintainer='auv_gvc developers',
     maintainer_email='auv-gvc@users.noreply.github.com',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['*.json', 'report/*.j2']},
+    package_data={NAME: ['*.json', 'report/*.j2', 'sweep/*.json']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
         (f'share/{NAME}/launch', glob('launch/*.launch.py')),
         (f'share/{NAME}/config/scenarios', glob('config/scenarios/*.yaml')),
         (f'share/{NAME}/config/params', glob('config/params/*.yaml')),
+        (f'share/{NAME}/config/campaigns', glob('config/campaigns/*.yaml')),
     ],
     python_requires='>=3.11',
     install_requires=[
@@ -37,8 +38,14 @@ setup(
         'Jinja2>=3.0',
         'psutil>=5.9.4',
         'rich>=13',
+        'pyarrow>=17',
+        'scipy>=1.15',
     ],
-    extras_require={'test': ['pytest', 'pillow']},
+    extras_require={
+        'test': ['pytest', 'pillow'],
+        'dask': ['distributed>=2024.8'],
+        'salib': ['SALib>=1.5'],
+    },
     zip_safe=False,
     entry_points={
         'console_scripts': [

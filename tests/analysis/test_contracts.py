@@ -9,6 +9,7 @@ import yaml
 
 from auv_analysis import load_scenario
 from auv_analysis.cli import main
+from auv_analysis.sweep.campaign import load_campaign
 from auv_dynamics import interface, load_vehicle
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -75,6 +76,9 @@ def test_every_shipped_file_loads(path: Path) -> None:
     elif path.parent.name == 'scenarios':
         assert load_scenario(path).name == path.stem
         assert load_scenario(path.stem).name == path.stem
+    elif path.parent.name == 'campaigns':
+        assert load_campaign(path).name == path.stem
+        assert load_campaign(path.stem).name == path.stem
     else:
         assert yaml.safe_load(path.read_text())
 

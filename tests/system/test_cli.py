@@ -25,7 +25,7 @@ from auv_dynamics.config import shipped
 
 AUV = Path(sys.executable).with_name('auv')
 REXROV = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
-COMMANDS = ['run', 'simulate', 'analyze', 'info', 'params', 'check-vehicle']
+COMMANDS = ['run', 'simulate', 'sweep', 'analyze', 'info', 'params', 'check-vehicle']
 WRONG_LINES = {  # what is typed -> what the one line names
     '': 'COMMAND',
     'fly': 'fly',
@@ -45,6 +45,15 @@ WRONG_LINES = {  # what is typed -> what the one line names
     'run case1 --domain-id text': '--domain-id',
     'run case1 --domain-id 102': '--domain-id',
     'run case1 --out taken': 'taken: --out',
+    'sweep': 'campaign',
+    'sweep case9': 'case9',
+    'sweep case1_gains --out taken': 'taken: --out',
+    'sweep case1_gains --workers 0': '--workers',
+    'sweep case1_gains --workers two': '--workers',
+    'sweep case1_gains --executor ray': '--executor',
+    'sweep case1_gains --executor threads --scheduler tcp://localhost:1': '--scheduler',
+    'sweep case1_gains --scheduler tcp://localhost:1 --workers 2': '--workers',
+    'sweep case1_gains --scheduler nowhere': '--scheduler',
     'params case1': '--controller',
     'params case1 --controller pid': 'controllers',
     'params case1 --controller gvc --out taken/notes.md': 'taken/notes.md: --out',
@@ -60,7 +69,7 @@ WRONG_LINES = {  # what is typed -> what the one line names
 INSTALLED = [  # of these, the ones that are also tried as the user runs them
     'fly', 'simulate case1 --hold foh', 'simulate case9', 'simulate case1 --out taken',
     'run case1 --controller gvc --controller pid', 'run case1 --domain-id 102',
-    'run case1 --out taken', 'info taken/notes.md',
+    'run case1 --out taken', 'sweep case1_gains --out taken', 'info taken/notes.md',
 ]  # fmt: skip
 
 

@@ -44,6 +44,11 @@ def parser() -> argparse.ArgumentParser:
     analyze = command('analyze', 'summary and report from recorded bags')
     analyze.add_argument('bags', nargs='+', metavar='BAG', type=Path)
     analyze.add_argument('--vehicle', help='for bags that do not carry their own')
+    sweep = command('sweep', 'many rollouts of a scenario, with values that vary, to Parquet')
+    sweep.add_argument('campaign', help='a campaign file, or the bare name of a shipped one')
+    sweep.add_argument('--executor', choices=('threads', 'dask'), help='default: threads')
+    sweep.add_argument('--scheduler', metavar='ADDRESS', help='of dask, such as tcp://host:8786')
+    sweep.add_argument('--workers', metavar='N', help='threads or processes; default: the cores')
     info = command('info', 'what lies in a bag', writes=False)
     info.add_argument('bag', type=Path, metavar='BAG')
     params = command('params', 'the ROS parameter file of a scenario', writes=True)
@@ -59,7 +64,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command; exit code 0 fine, 1 the work failed, 2 wrong input."""
     options = parser().parse_args(arguments)
     from auv_analysis.commands import function
-    from auv_analysis.supervisor import NodeDiedError
+    from auv_analysis.failure import FailedError
     from auv_dynamics.files import InputError
 
     try:
@@ -69,7 +74,7 @@ def main(arguments: list[str] | None = None) -> None:
     except InputError as error:
         _say(str(error))
         sys.exit(2)
-    except (NodeDiedError, ArithmeticError) as error:
+    except (FailedError, ArithmeticError) as error:
         _say(str(error))
         sys.exit(1)
     except BrokenPipeError:

@@ -1,6 +1,7 @@
 """The folder of a run's results: made, checked and, when asked, cleared of what we left there."""
 
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterable
@@ -15,6 +16,9 @@ OURS = (
     'setpoint.csv',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
+MANIFEST, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep
+PART = re.compile(r'part-(\d{8})\.parquet')
+UNFINISHED = '.unfinished'  # ends the name of a file that is being written
 
 
 def prepare(
@@ -52,7 +56,10 @@ def _clear(out: Path, inputs: list[Path], new: Iterable[str]) -> None:
     ours = [
         entry
         for entry in out.iterdir()
-        if entry.name in OURS or entry.name in samples or (entry.is_dir() and _is_run(entry))
+        if entry.name in OURS
+        or entry.name in samples
+        or (entry.is_dir() and _is_run(entry))
+        or _is_of_sweep(entry)
     ]
     for entry in ours:
         for path in inputs:
@@ -63,7 +70,8 @@ def _clear(out: Path, inputs: list[Path], new: Iterable[str]) -> None:
     for name in new:
         if name in left:
             raise InputError(out / name, '--out', 'no such file or folder', 'what is not ours')
-    for entry in ours:
+    # a sweep's manifest goes last: without it, its parts would be taken for somebody else's
+    for entry in sorted(ours, key=lambda entry: entry.name == MANIFEST):
         _remove(entry)
 
 
@@ -83,6 +91,15 @@ def _is_run(folder: Path) -> bool:
     names = [entry.name for entry in folder.iterdir()]
     # params.yaml is written before anything else: without it the bag is somebody else's
     return 'params.yaml' in names and all(n in OURS_IN_RUN or n.endswith('.mcap') for n in names)
+
+
+def _is_of_sweep(entry: Path) -> bool:
+    if not (entry.parent / MANIFEST).is_file():
+        return False
+    if entry.name == ROLLOUTS and entry.is_dir():
+        names = [part.name for part in entry.iterdir()]
+        return all(PART.fullmatch(name) or name.endswith(UNFINISHED) for name in names)
+    return entry.name in (MANIFEST, CAMPAIGN)
 
 
 def _remove(entry: Path) -> None:

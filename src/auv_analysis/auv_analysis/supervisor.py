@@ -8,12 +8,13 @@ from pathlib import Path
 
 import psutil
 
+from auv_analysis.failure import FailedError
 from auv_dynamics.interface import PARENT
 
 GRACE = 5.0  # s between SIGTERM and SIGKILL
 
 
-class NodeDiedError(RuntimeError):
+class NodeDiedError(FailedError):
     """A node ended before its time; the text names it and shows its last lines."""
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from auv_dynamics.files import InputError
 
-OWNER = {'vehicles': 'auv_dynamics', 'scenarios': 'auv_analysis', 'params': 'auv_analysis'}
+OWNER = {'vehicles': 'auv_dynamics', 'scenarios': 'auv_analysis', 'params': 'auv_analysis',
+         'campaigns': 'auv_analysis'}  # fmt: skip
 
 
 def _folders(kind: str) -> Iterator[Path]:

@@ -11,10 +11,12 @@ _HOME = {
     'info': 'inspect_bag',
     'params': 'params',
     'check-vehicle': 'check_vehicle',
+    'sweep': 'auv_analysis.sweep.command',
 }
 
 
 def function(command: str) -> Callable[..., dict[str, Any]]:
     """Function of a subcommand; only its own module is imported."""
-    module = importlib.import_module(f'{__name__}.{_HOME[command]}')
+    home = _HOME[command]
+    module = importlib.import_module(home if '.' in home else f'{__name__}.{home}')
     return getattr(module, command.replace('-', '_'))

@@ -1,0 +1,1 @@
+"""Sweeps: campaign -> values of each rollout -> blocks on an executor -> Parquet."""

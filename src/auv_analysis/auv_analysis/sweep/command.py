@@ -1,0 +1,128 @@
+"""`auv sweep`: a campaign's rollouts into a folder; the same command goes on after a stop."""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from auv_analysis.failure import FailedError
+from auv_analysis.sweep.campaign import Campaign, load_campaign
+from auv_analysis.sweep.engine import REFUSED, Outcome, SweepStoppedError
+from auv_analysis.sweep.engine import sweep as run_sweep
+from auv_analysis.sweep.executors import opened
+from auv_analysis.sweep.folder import SweepFolder
+from auv_analysis.warm_up import announce
+from auv_dynamics.files import InputError
+
+STATUSES = ('ok', 'diverged', REFUSED)
+console = Console(stderr=True)
+
+
+def sweep(options: argparse.Namespace) -> dict[str, Any]:
+    """Run a campaign, or what is left of it."""
+    campaign = load_campaign(options.campaign)
+    out = options.out or Path('runs') / campaign.name
+    with opened(options.executor, options.scheduler, _workers(options.workers)) as executor:
+        folder = SweepFolder(out, campaign, overwrite=options.overwrite)
+        try:
+            for warning in campaign.scenario.warnings:
+                _say(f'warning: {warning}')
+            if folder.new:
+                announce(campaign.scenario, campaign.controllers)
+            outcome = _run(campaign, folder, *executor, overwrite=options.overwrite)
+        finally:
+            folder.close()
+    return _conclude(campaign, folder, outcome)
+
+
+def _workers(text: str | None) -> int | None:
+    if text is None:
+        return None
+    if not text.isdecimal() or not 1 <= int(text) <= 1024:
+        raise InputError('--workers', '', 'a whole number from 1 to 1024', text)
+    return int(text)
+
+
+def _run(
+    campaign: Campaign,
+    folder: SweepFolder,
+    executor: Executor,
+    in_flight: Callable[[], int],
+    *,
+    overwrite: bool,
+) -> Outcome:
+    try:
+        with _progress() as bar:
+            task = bar.add_task(campaign.name, total=campaign.rollouts)
+            return run_sweep(
+                campaign, folder, executor, in_flight, lambda done: bar.update(task, completed=done)
+            )
+    except SweepStoppedError as stopped:
+        done = f'{stopped.outcome.rollouts} of {campaign.rollouts} rollouts'
+        how = 'the same command without --overwrite' if overwrite else 'the same command'
+        line = f'{folder.out}: {stopped}; {done} are finished, {how} goes on from there'
+        raise FailedError(line) from None
+    except KeyboardInterrupt:  # the second one: running blocks are not waited for
+        _say(f'{folder.out}: interrupted; the same command goes on from there')
+        os._exit(1)
+
+
+class _Speed(ProgressColumn):
+    """Rollouts per second."""
+
+    def render(self, task: Task) -> str:
+        """Text of the column."""
+        speed = task.finished_speed or task.speed
+        return f'{speed:>6.0f} rollouts/s' if speed else ''
+
+
+def _progress() -> Progress:
+    return Progress(
+        TextColumn('{task.description}'),
+        BarColumn(bar_width=40),
+        TextColumn('{task.completed}/{task.total} rollouts'),
+        _Speed(),
+        TimeRemainingColumn(),
+        console=console,
+    )
+
+
+def _conclude(campaign: Campaign, folder: SweepFolder, outcome: Outcome) -> dict[str, Any]:
+    counts = {
+        name: {status: outcome.counts[name, status] for status in STATUSES}
+        for name in campaign.controllers
+    }
+    table = Table(box=None, header_style='bold')
+    for column in ('controller', *STATUSES):
+        table.add_column(column)
+    for name, row in counts.items():
+        table.add_row(name, *(str(row[status]) for status in STATUSES))
+    console.print(table)
+    refused = sum(row[REFUSED] for row in counts.values())
+    rows = sum(outcome.counts.values())
+    if refused:
+        _say(f'warning: {refused} of {rows} rows refused, the first: {outcome.reason}')
+    _say(f"rollouts: {rows} rows, pandas.read_parquet('{folder.data}')")
+    if refused == rows:
+        raise FailedError('every rollout was refused: its values make no scenario')
+    return {
+        'campaign': campaign.name,
+        'folder': str(folder.out),
+        'dataset': str(folder.data),
+        'rollouts': outcome.rollouts,
+        'rollouts_before': outcome.before,
+        'rows': rows,
+        'controllers': counts,
+        'paths': list(campaign.values(0, 1)),
+    }
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,183 @@
+"""Campaign files: what is taken, how rollouts are numbered and seeded, what is refused."""
+
+import itertools
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from auv_analysis.sweep.campaign import Campaign, load_campaign
+from auv_dynamics.files import InputError
+
+SOURCE = """
+name: mixed
+scenario: case1
+seed: 5
+vary:
+  - grid:
+      controllers.*.k_D: [6, 12.0]
+      vehicle: [herman2018, rexrov]
+  - zip:
+      setpoint.surge.offset: [0.1, 0.2, 0.3]
+      controllers.gvc.k_I: {from: 1, to: 100, count: 3, spacing: log}
+  - random:
+      vehicle.rigid_body.mass: {normal: {mean: 250, std: 2}}
+    count: 4
+  - sobol:
+      vehicle.damping.linear[0]: {uniform: {from: 50, to: 90}}
+      initial.nu[2]: {uniform: {from: -1, to: 1}}
+    count: 8
+"""
+
+
+def written(folder: Path, text: str = SOURCE) -> Path:
+    path = folder / 'campaign.yaml'
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture(scope='module')
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    return load_campaign(written(tmp_path_factory.mktemp('campaign')))
+
+
+def same(a: dict, b: dict) -> bool:
+    return list(a) == list(b) and all(list(a[path]) == list(b[path]) for path in a)
+
+
+def test_every_combination_of_the_groups_is_a_rollout(mixed: Campaign) -> None:
+    assert mixed.rollouts == 4 * 3 * 4 * 8
+    values = mixed.values(0, mixed.rollouts)
+    listed = list(zip(values['controllers.*.k_D'], values['vehicle'],
+                      values['setpoint.surge.offset'], strict=True))  # fmt: skip
+    grid = itertools.product([6, 12.0], ['herman2018', 'rexrov'], [0.1, 0.2, 0.3])
+    assert listed[:: 4 * 8] == list(grid)
+    np.testing.assert_allclose(values['controllers.gvc.k_I'][:96:32], [1, 10, 100])
+    drawn = values['vehicle.rigid_body.mass'].reshape(12, 4, 8)
+    assert (drawn == drawn[:1, :, :1]).all()  # all combinations of the others see the same draws
+    assert len(np.unique(drawn)) == 4
+    swept = values['vehicle.damping.linear[0]'].reshape(48, 8)
+    assert (swept == swept[0]).all()
+    assert len(np.unique(swept)) == 8
+
+
+@given(st.lists(st.integers(0, 384), min_size=1, max_size=6))
+def test_values_and_seeds_do_not_depend_on_the_blocks(mixed: Campaign, cuts: list[int]) -> None:
+    values, seeds = mixed.values(0, 384), mixed.seeds(0, 384)
+    for first, last in itertools.pairwise(sorted({0, *cuts, 384})):
+        part = mixed.values(first, last)
+        assert same(part, {path: column[first:last] for path, column in values.items()})
+        assert (mixed.seeds(first, last) == seeds[first:last]).all()
+
+
+def test_seed_is_that_of_root_and_index(mixed: Campaign) -> None:
+    for i in (0, 3, 10**9):
+        words = np.random.SeedSequence(5, spawn_key=(i,)).generate_state(1, np.uint64)
+        assert mixed.seeds(i, i + 1)[0] == int(words[0]) // 2
+    seeds = mixed.seeds(0, 384)
+    assert seeds.dtype == np.int64
+    assert (seeds >= 0).all()
+    assert len(np.unique(seeds)) == 384
+
+
+def test_defaults_are_filled_in(tmp_path: Path) -> None:
+    text = 'name: x\nscenario: case1\nvary: [{grid: {duration: [1.0]}}]'
+    campaign = load_campaign(written(tmp_path, text))
+    data = {'format': 1, 'controllers': ['gvc', 'cl'], 'hold': 'continuous', 'seed': 0}
+    assert campaign.data == {**data, **yaml.safe_load(text)}
+
+
+def test_scenario_is_named_relative_to_the_campaign(tmp_path: Path, monkeypatch) -> None:
+    text = (Path(__file__).parents[2] / 'config/scenarios/case2.yaml').read_text()
+    (tmp_path / 'mine.yaml').write_text(text)
+    path = written(tmp_path, 'name: x\nscenario: mine.yaml\nvary: [{grid: {duration: [1.0]}}]')
+    monkeypatch.chdir('/')
+    assert load_campaign(path).scenario.name == 'case2'
+
+
+def test_blocks_are_shorter_where_rollouts_are_longer(tmp_path: Path) -> None:
+    def block(duration: float, count: int) -> int:
+        scenario = (Path(__file__).parents[2] / 'config/scenarios/case1.yaml').read_text()
+        text = scenario.replace('duration: 30.0', f'duration: {duration}')
+        (tmp_path / 'scenario.yaml').write_text(text)
+        text = ('name: x\nscenario: scenario.yaml\nvary: [{random: {duration: {uniform: '
+                f'{{from: 1, to: 2}}}}}}, count: {count}}}]')  # fmt: skip
+        return load_campaign(written(tmp_path, text)).block
+
+    assert block(10.0, 10_000) > block(100.0, 10_000) >= block(10_000.0, 10_000) > 1
+    assert block(10.0, 20) <= 20
+    assert 10**7 / block(10.0, 10**7) <= 10**4  # files
+
+
+def test_ten_million_rollouts_take_no_memory_of_their_number(tmp_path: Path) -> None:
+    text = SOURCE.replace('count: 8', 'count: 1048576').replace('case1\n', 'case1\nblock: 512\n')
+    path = written(tmp_path, text)
+    load_campaign(path).values(0, 512)  # what is imported then is not counted
+    tracemalloc.start()
+    campaign = load_campaign(path)
+    assert campaign.rollouts > 5e7
+    for first in range(0, campaign.rollouts, 10**7):
+        assert len(campaign.values(first, first + 512)['initial.nu[2]']) == 512
+        campaign.seeds(first, first + 512)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8e6
+
+
+REPLACED = {  # old text, new text -> what the one line says
+    ('name: mixed', 'name: a b'): 'campaign.yaml: name: expected a word without blanks',
+    ('scenario: case1', 'scenario: case9'): 'campaign.yaml: scenario: .*case1, .*found case9',
+    ('scenario: case1', 'scenario: gone/x.yaml'): 'gone/x.yaml: expected a scenario file',
+    ('scenario: case1', 'scenarios: case1'): 'scenarios: expected one of .*unknown key',
+    ('seed: 5', 'seed: -1'): 'seed: expected a whole number from 0 to 2.63 - 1, found -1',
+    ('seed: 5', 'controllers: [pid]'): 'controllers.0.: expected one of gvc, cl, found pid',
+    ('seed: 5', 'controllers: []'): 'controllers: expected a list of at least one',
+    ('seed: 5', 'hold: foh'): 'hold: expected continuous or zoh, found foh',
+    ('seed: 5', 'controllers: [cl]'): 'expected a controller that is swept: cl, found gvc',
+    ('controllers.*.k_D', 'controllers.*.kD'): 'grid.controllers...kD: .*nearest: k_D',
+    ('controllers.*.k_D', 'controllers.pid.k_D'): 'expected one of gvc, cl',
+    ('controllers.*.k_D', 'controllers.*'): 'grid.controllers..: expected',
+    ('controllers.*.k_D', 'seed'): "grid.seed: expected nothing: a rollout's seed",
+    ('controllers.*.k_D', 'name'): 'grid.name: expected nothing',
+    ('controllers.*.k_D', 'a..b'): 'grid.a..b: expected keys and .indices',
+    ('controllers.*.k_D', 'actuators.lag'): 'grid.actuators.lag: expected hold: zoh',
+    ('initial.nu[2]', 'controllers.*.k_D'): 'each path once, found again in vary.0.',
+    ('initial.nu[2]', 'initial.nu[6]'): 'sobol.initial.nu.6.: expected an index below 6',
+    ('[herman2018, rexrov]', '[herman2018, nautilus]'): 'vehicle: expected .*, found nautilus',
+    ('[herman2018, rexrov]', '[1, 2]'): 'grid.vehicle: expected a list of names or paths',
+    ('vehicle.rigid_body.mass', 'vehicle.inertia_matrix[0][0]'): 'a list that has .0., found noth',
+    ('[6, 12.0]', '[]'): 'k_D: expected a list of at least one value',
+    ('[6, 12.0]', '[null]'): 'k_D.0.: expected a number, a word',
+    ('[6, 12.0]', '{from: 1, to: 2}'): 'k_D.count: expected a whole number from 1 to',
+    ('[6, 12.0]', '5'): 'k_D: expected a list of values, or a mapping with from',
+    ('  - zip:', '  - zipped:'): 'vary.1..zipped: expected one of grid, zip, random',
+    ('    count: 4', ''): 'vary.2..count: expected a whole number',
+    ('    count: 4', '    count: 0'): 'vary.2..count: expected a whole number',
+    ('    count: 4', '    count: 4\n    grid: {duration: [1]}'): 'vary.2..* expected grid alone',
+    ('{normal: {mean: 250, std: 2}}', '{normal: {mean: 250}}'): 'std: expected a positive',
+    ('{normal: {mean: 250, std: 2}}', '{gauss: {mean: 250}}'): 'mass.gauss: expected one of',
+    ('{normal: {mean: 250, std: 2}}', '[250]'): 'mass: expected one of uniform',
+    ('{from: 1, to: 100, count: 3, spacing: log}', '[1, 2]'): 'as many values of each path',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(('old', 'new'), REPLACED)
+def test_wrong_campaign_is_refused_in_one_line(old: str, new: str, tmp_path: Path) -> None:
+    assert old in SOURCE
+    with pytest.raises(InputError, match=REPLACED[old, new]) as caught:
+        load_campaign(written(tmp_path, SOURCE.replace(old, new)))
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_samples_of_a_scenario_with_actuators_need_zero_order_hold(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / 'config/scenarios/case1.yaml').read_text()
+    (tmp_path / 'scenario.yaml').write_text(text + 'actuators: {lag: 0.1}\n')
+    text = 'name: x\nscenario: scenario.yaml\nvary: [{grid: {actuators.lag: [0.1, 0.2]}}]\n'
+    with pytest.raises(InputError, match='actuators: expected hold'):
+        load_campaign(written(tmp_path, text))
+    campaign = load_campaign(written(tmp_path, text + 'hold: zoh\n'))
+    assert (campaign.hold, campaign.rollouts) == ('zoh', 2)

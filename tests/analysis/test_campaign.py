@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import QUICK
 
 from auv_analysis.sweep.campaign import Campaign, load_campaign
 from auv_dynamics.files import InputError
@@ -65,6 +66,7 @@ def test_every_combination_of_the_groups_is_a_rollout(mixed: Campaign) -> None:
     assert len(np.unique(swept)) == 8
 
 
+@settings(QUICK)
 @given(st.lists(st.integers(0, 384), min_size=1, max_size=6))
 def test_values_and_seeds_do_not_depend_on_the_blocks(mixed: Campaign, cuts: list[int]) -> None:
     values, seeds = mixed.values(0, 384), mixed.seeds(0, 384)

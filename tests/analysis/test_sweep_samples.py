@@ -5,10 +5,11 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 from scipy.stats import qmc
+from strategies import QUICK
 
 from auv_analysis.sweep.designs import MOST_AT_ONCE, make_design
 from auv_analysis.sweep.distributions import make_distribution
@@ -83,6 +84,7 @@ def test_integers_and_choices_are_equally_likely() -> None:
 
 
 @pytest.mark.parametrize('kind', ['random', 'sobol', 'latin_hypercube', 'saltelli', 'morris'])
+@settings(QUICK)
 @given(data=st.data())
 def test_point_depends_on_its_position_alone(kind: str, data: st.DataObject) -> None:
     every = whole(kind)

@@ -40,6 +40,7 @@ class Campaign:
     ----------
     path : of the campaign file
     data : its contents with every default filled in
+    scenario : as it is in its file
     scenarios : name of a vehicle -> the scenario with it; '' -> the scenario as it is, where the
         vehicle does not vary
     groups : what varies together, the last one fastest
@@ -48,6 +49,7 @@ class Campaign:
 
     path: Path
     data: dict[str, Any]
+    scenario: Scenario
     scenarios: dict[str, Scenario]
     groups: list[Group]
 
@@ -55,11 +57,6 @@ class Campaign:
     def name(self) -> str:
         """Name, which is also that of the results' folder."""
         return self.data['name']
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario, with the first of its vehicles."""
-        return next(iter(self.scenarios.values()))
 
     @property
     def controllers(self) -> list[str]:
@@ -74,7 +71,8 @@ class Campaign:
     @property
     def inputs(self) -> list[Path]:
         """Files that the campaign was read from."""
-        files = [file for scenario in self.scenarios.values() for file in scenario.inputs]
+        scenarios = (self.scenario, *self.scenarios.values())
+        files = [file for scenario in scenarios for file in scenario.inputs]
         return list(dict.fromkeys([self.path, *files]))
 
     @cached_property
@@ -146,7 +144,7 @@ def load_campaign(campaign: str | Path) -> Campaign:
             raise InputError(path, f'controllers[{i}]', expected, name)
     check_hold(scenario, data['hold'])
     groups = [make_group(spec, data['seed'], i, path) for i, spec in enumerate(data['vary'])]
-    result = Campaign(path, data, _scenarios(scenario, data, path), groups)
+    result = Campaign(path, data, scenario, _scenarios(scenario, data, path), groups)
     if result.rollouts > MOST_ROLLOUTS:
         raise InputError(path, 'vary', f'at most {MOST_ROLLOUTS} rollouts', f'{result.rollouts}')
     _check_varied(result)

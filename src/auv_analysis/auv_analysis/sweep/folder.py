@@ -42,7 +42,14 @@ class SweepFolder:
     def __init__(self, out: Path, campaign: Campaign, *, overwrite: bool):
         self.out, self.data = out, out / ROLLOUTS
         self._lock = _lock(out) if out.is_dir() else None
-        manifest = _manifest(campaign)
+        try:
+            self._open(campaign, overwrite=overwrite)
+        except BaseException:
+            self.close()
+            raise
+
+    def _open(self, campaign: Campaign, *, overwrite: bool) -> None:
+        out, manifest = self.out, _manifest(campaign)
         stored = None if overwrite else _stored(out)
         self.new = stored is None
         if stored is None:
@@ -133,8 +140,8 @@ def _manifest(campaign: Campaign) -> dict[str, Any]:
         'format': 1,
         'campaign': campaign.data,
         'scenario': data,
-        'vehicles': {k or entry.data['vehicle']: entry.vehicle_data
-                     for k, entry in campaign.scenarios.items()},
+        'vehicles': {entry.data['vehicle']: entry.vehicle_data
+                     for entry in campaign.scenarios.values()},
         'setpoint.csv': table,
         'laws': laws_of(campaign),
         'versions': {**versions(), **_sampling_versions(campaign), 'machine': platform.machine()},

@@ -1,0 +1,90 @@
+"""A sweep: the figures of its simulations, the same rows whatever runs it, bounded work ahead."""
+
+import math
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import pytest
+from sweeps import CAMPAIGN, ROLLOUTS, Counting, parts, rows, run, write_files
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.changes import changed_scenario
+from auv_analysis.sweep import block as sweep_block
+from auv_analysis.sweep.campaign import load_campaign
+from auv_analysis.sweep.table import column
+from auv_dynamics.signals import DOFS
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    return write_files(tmp_path)
+
+
+def test_rows_are_the_figures_of_their_simulations(files: Path) -> None:
+    outcome = run(files)
+    assert (outcome.rollouts, outcome.before) == (ROLLOUTS, 0)
+    assert outcome.counts == {('gvc', 'ok'): ROLLOUTS, ('cl', 'ok'): ROLLOUTS}
+    table = rows(files / 'out').to_pylist()
+    assert [(r['controller'], r['index']) for r in table] == [
+        (name, i) for name in ('cl', 'gvc') for i in range(ROLLOUTS)
+    ]
+    scenario = load_scenario(files / 'scenario.yaml')
+    for row in table[::5]:
+        name = row['controller']
+        values = {'vehicle': row['vehicle'], f'controllers.{name}.k_D': row['controllers.*.k_D']}
+        for path in ('vehicle.damping.linear[0]', 'setpoint.surge.offset'):
+            values[path] = row[path]
+        summary = summarize(simulate(changed_scenario(scenario, values), name))
+        assert row['kinetic_energy.mean'] == pytest.approx(summary['kinetic_energy']['mean'])
+        for i, dof in enumerate(DOFS):
+            for group, key in (('velocity_error', 'rms'), ('effort', 'max'),
+                               ('velocity_error', 'settling_time')):  # fmt: skip
+                known = summary[group][key][i]
+                assert row[f'{group}.{key}.{dof}'] == (
+                    None if known is None else pytest.approx(known, rel=1e-9, abs=1e-12)
+                )
+
+
+def test_rows_do_not_depend_on_blocks_workers_or_processes(files: Path) -> None:
+    run(files)
+    reference = rows(files / 'out')
+    text = (files / 'campaign.yaml').read_text()
+    for out, block, executor, ahead in (
+        ('single', 1, ThreadPoolExecutor(3), 7),
+        ('whole', 16, ThreadPoolExecutor(1), 1),
+        ('processes', 3, ProcessPoolExecutor(2, get_context('spawn')), 4),
+    ):
+        (files / 'campaign.yaml').write_text(text.replace('block: 5', f'block: {block}'))
+        with executor:
+            run(files, executor, out, ahead)
+        assert rows(files / out).equals(reference)
+        assert len(parts(files / out)) == math.ceil(ROLLOUTS / block)
+
+
+@pytest.mark.parametrize('ahead', [1, 3])
+def test_no_more_blocks_are_under_way_than_allowed(ahead: int, files: Path) -> None:
+    text = CAMPAIGN.replace('block: 5', 'block: 1')
+    (files / 'campaign.yaml').write_text(text)
+    executor = Counting()
+    run(files, executor, ahead=ahead)
+    assert (executor.submitted, executor.most <= ahead) == (ROLLOUTS, True)
+
+
+def test_worker_with_other_versions_is_refused(files: Path, monkeypatch) -> None:
+    campaign = load_campaign(files / 'campaign.yaml')
+    contents = sweep_block.contents_of(campaign)
+    there = {**sweep_block.versions(), 'numba': 'another', 'sources': 'x'}
+    monkeypatch.setattr(sweep_block, 'versions', lambda: there)
+    with pytest.raises(sweep_block.BlockError, match='found another sources, numba'):
+        sweep_block.block_figures(contents, ['gvc'], 'continuous', {}, campaign.seeds(0, 1))
+
+
+@pytest.mark.parametrize(
+    'values',
+    [['a', '', 'grün'], [[1.0, 2.0], [3.0]], [[[1.0], [2.0]], [[3.0], [4.0]]], [[1, 2]]],
+)
+def test_columns_of_words_and_lists(values: list) -> None:
+    made = column(values)
+    made.validate(full=True)
+    assert made.to_pylist() == values

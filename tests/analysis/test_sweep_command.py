@@ -1,0 +1,131 @@
+"""`auv sweep`: one document, one line that says where, refused and diverged rollouts, own laws."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pyarrow.parquet
+import pytest
+from sweeps import CAMPAIGN, ROLLOUTS, SCENARIO, parts, rows, write_files
+
+from auv_analysis.cli import main
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    return write_files(tmp_path)
+
+
+@pytest.fixture
+def command(files: Path, monkeypatch, capsys) -> Callable:
+    """`auv sweep` in this process: exit code, stdout, lines of stderr."""
+    monkeypatch.chdir(files)
+
+    def call(*arguments: str) -> tuple[object, str, list[str]]:
+        code: object = 0
+        try:
+            main(['sweep', 'campaign.yaml', *arguments])
+        except SystemExit as end:
+            code = end.code
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err.splitlines()
+
+    return call
+
+
+def test_command_prints_one_document_and_says_where(command: Callable, files: Path) -> None:
+    code, out, lines = command('--json', '--workers', '2')
+    document = json.loads(out)
+    assert (code, document['rows'], document['dataset']) == (0, 32, 'runs/small/rollouts')
+    assert document['controllers']['cl'] == {'ok': ROLLOUTS, 'diverged': 0, 'refused': 0}
+    assert lines[-1] == "rollouts: 32 rows, pandas.read_parquet('runs/small/rollouts')"
+    assert len(pyarrow.parquet.read_table(files / document['dataset'])) == 32
+    assert json.loads(command('--json')[1])['rollouts_before'] == ROLLOUTS
+
+
+def test_overwrite_replaces_a_sweep_and_leaves_the_rest(command: Callable, files: Path) -> None:
+    command()
+    first = parts(files / 'runs/small')
+    (files / 'runs/small/notes.md').write_text('mine')
+    text = CAMPAIGN.replace('count: 4', 'count: 1').replace('seed: 11', 'seed: 12')
+    (files / 'campaign.yaml').write_text(text)
+    assert command()[0] == 2
+    assert parts(files / 'runs/small') == first
+    assert command('--overwrite')[0] == 0
+    assert len(parts(files / 'runs/small')) == 1
+    assert rows(files / 'runs/small')['index'].to_pylist() == [*range(4)] * 2
+    assert (files / 'runs/small/notes.md').read_text() == 'mine'
+
+
+def test_campaign_of_the_folder_makes_the_same_rows(command: Callable, files: Path) -> None:
+    command()
+    main(['sweep', 'runs/small/campaign.yaml', '--out', 'again'])
+    assert rows(files / 'again').equals(rows(files / 'runs/small'))
+
+
+@pytest.mark.parametrize('all_of_them', [False, True])
+def test_values_that_make_no_scenario_are_counted(command, all_of_them: bool, files: Path) -> None:
+    masses = '[-1.0, 0.0]' if all_of_them else '[250.0, -1.0]'
+    varied = f"[{{grid: {{'vehicle.rigid_body.mass': {masses}}}}}]"
+    text = f'name: small\nscenario: scenario.yaml\nvary: {varied}'
+    (files / 'campaign.yaml').write_text(text)
+    code, _, lines = command()
+    table = rows(files / 'runs/small')
+    refused = [i for i, status in enumerate(table['status'].to_pylist()) if status == 'refused']
+    assert len(refused) == (4 if all_of_them else 2)
+    assert all('rigid_body.mass' in table['reason'][i].as_py() for i in refused)
+    assert all(table['kinetic_energy.mean'][i].as_py() is None for i in refused)
+    assert any(line.startswith(f'warning: {len(refused)} of 4 rows refused') for line in lines)
+    assert code == (1 if all_of_them else 0)
+    assert ('every rollout was refused' in lines[-1]) is all_of_them
+
+
+def test_diverging_rollout_is_a_result(command: Callable, files: Path) -> None:
+    text = "name: small\nscenario: scenario.yaml\nvary: [{grid: {'controllers.*.k_D': [12, 1e9]}}]"
+    (files / 'campaign.yaml').write_text(text)
+    code, out, _ = command('--json')
+    assert (code, json.loads(out)['controllers']['gvc']) == (
+        0,
+        {'ok': 1, 'diverged': 1, 'refused': 0},
+    )
+    table = rows(files / 'runs/small')
+    assert [t is None for t in table['diverged_at'].to_pylist()] == [True, False] * 2
+
+
+OWN_LAW = """
+from typing import NamedTuple
+import numpy as np
+
+class Proportional(NamedTuple):
+    k_P: np.ndarray
+    STATES = 6
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        tau = gains.k_P.reshape(6, 6) @ np.subtract(nu_d, nu)
+        return tau, np.zeros(6)
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return np.zeros(6)
+"""
+
+
+def test_own_law_runs_as_plain_python_and_says_so(command, files: Path, monkeypatch) -> None:
+    (files / 'my_sweep_law.py').write_text(OWN_LAW)
+    monkeypatch.syspath_prepend(str(files))
+    text = SCENARIO.replace('0.3', '0.02')
+    mine = "  mine: {law: 'my_sweep_law:Proportional', k_P: 100.0}\n"
+    (files / 'scenario.yaml').write_text(text.replace('  gvc:', f'{mine}  gvc:'))
+    text = ('name: small\nscenario: scenario.yaml\ncontrollers: [mine]\n'
+            "vary: [{grid: {'controllers.mine.k_P': [50, 100.0]}}]")  # fmt: skip
+    (files / 'campaign.yaml').write_text(text)
+    code, out, lines = command('--json')
+    assert (code, json.loads(out)['controllers']['mine']['ok']) == (0, 2)
+    assert any('the law Proportional runs as plain Python' in line for line in lines)
+    errors = rows(files / 'runs/small')['velocity_error.rms.surge'].to_pylist()
+    assert errors[0] > errors[1]
+    (files / 'my_sweep_law.py').write_text(OWN_LAW + '# changed\n')
+    code, _, lines = command()
+    assert (code, len(lines)) == (2, 1)
+    assert 'laws.mine: expected' in lines[0]

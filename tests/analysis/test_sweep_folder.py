@@ -1,0 +1,120 @@
+"""The folder of a sweep: gone on with after a stop, refused where something has changed."""
+
+import json
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from sweeps import CAMPAIGN, ROLLOUTS, ROOT, Counting, Interrupted, parts, run, write_files
+
+from auv_analysis.sweep.campaign import load_campaign
+from auv_analysis.sweep.engine import SweepStoppedError
+from auv_analysis.sweep.folder import SweepFolder
+from auv_dynamics.files import InputError
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    return write_files(tmp_path)
+
+
+def test_interrupted_sweep_keeps_what_is_finished_and_goes_on(files: Path) -> None:
+    run(files, out='reference')
+    with pytest.raises(SweepStoppedError, match='interrupted') as stopped:
+        run(files, Interrupted(after=2), ahead=1)
+    kept = parts(files / 'out')
+    assert 1 <= len(kept) <= 2
+    assert stopped.value.outcome.rollouts == 5 * len(kept)
+    stamps = {path: path.stat().st_mtime_ns for path in (files / 'out/rollouts').iterdir()}
+    executor = Counting()
+    outcome = run(files, executor)
+    assert (outcome.before, outcome.rollouts) == (5 * len(kept), ROLLOUTS)
+    assert executor.submitted == 4 - len(kept)
+    assert all(path.stat().st_mtime_ns == stamp for path, stamp in stamps.items())
+    assert parts(files / 'out') == parts(files / 'reference')
+    assert run(files, executor).counts == outcome.counts
+    assert executor.submitted == 4 - len(kept)
+
+
+def test_part_that_is_missing_or_broken_is_made_again(files: Path) -> None:
+    run(files)
+    before = parts(files / 'out')
+    data = files / 'out/rollouts'
+    (data / 'part-00000001.parquet').unlink()
+    (data / 'part-00000002.parquet').write_bytes(before['part-00000002.parquet'][:-9])
+    (data / '.part-00000003.parquet.unfinished').write_bytes(b'half')
+    assert run(files).before == ROLLOUTS - 10
+    assert parts(files / 'out') == before
+
+
+CHANGED = {  # file, old, new -> key that the line names
+    ('campaign.yaml', 'seed: 11', 'seed: 12'): 'campaign.seed: expected 11 as when it was begun',
+    ('campaign.yaml', 'to: 90', 'to: 91'): r'uniform.to: expected 90 .*',
+    ('campaign.yaml', 'count: 4', 'count: 5'): r'vary\[1\].count: expected 4',
+    ('campaign.yaml', 'block: 5', 'block: 6'): 'campaign.block: expected 5',
+    ('campaign.yaml', 'seed: 11', 'seed: 11\ncontrollers: [gvc]'): 'campaign.controllers: expected',
+    ('scenario.yaml', 'k_I: 1.0', 'k_I: 2.0'): 'scenario.controllers.gvc.k_I: expected 1.0 as',
+    ('scenario.yaml', 'duration: 0.3', 'duration: 0.4'): 'scenario.duration: expected 0.3',
+}
+
+
+@pytest.mark.parametrize(('file', 'old', 'new'), CHANGED)
+def test_folder_of_another_campaign_is_refused(file: str, old: str, new: str, files: Path) -> None:
+    with pytest.raises(SweepStoppedError):
+        run(files, Interrupted(after=1))
+    before = parts(files / 'out')
+    text = (files / file).read_text()
+    assert old in text
+    (files / file).write_text(text.replace(old, new, 1))
+    line = f'{CHANGED[file, old, new]}.*or --overwrite, found'
+    with pytest.raises(InputError, match=line) as refused:
+        run(files)
+    assert len(str(refused.value).splitlines()) == 1
+    assert parts(files / 'out') == before
+    (files / file).write_text(text + '# a comment changes nothing\n')
+    assert run(files).rollouts == ROLLOUTS
+
+
+def test_folder_is_refused_when_the_vehicle_has_changed(files: Path) -> None:
+    vehicle = (ROOT / 'config/vehicles/herman2018.yaml').read_text()
+    (files / 'mine.yaml').write_text(vehicle)
+    (files / 'campaign.yaml').write_text(CAMPAIGN.replace('[herman2018,', '[mine.yaml,'))
+    run(files)
+    (files / 'mine.yaml').write_text(vehicle.replace('mass: 250.0', 'mass: 251.0'))
+    with pytest.raises(InputError, match=r'vehicles.mine.yaml.rigid_body.mass: expected 250.0'):
+        run(files)
+
+
+def test_folder_is_refused_when_the_versions_differ(files: Path) -> None:
+    run(files)
+    path = files / 'out/sweep.json'
+    manifest = json.loads(path.read_text())
+    manifest['versions']['numpy'] = '1.0'
+    path.write_text(json.dumps(manifest))
+    with pytest.raises(InputError, match=r'versions.numpy: expected "1.0" as when it was begun'):
+        run(files)
+
+
+def test_folder_that_another_process_sweeps_into_is_refused(files: Path) -> None:
+    campaign = load_campaign(files / 'campaign.yaml')
+    with closing(SweepFolder(files / 'out', campaign, overwrite=False)):
+        for overwrite in (False, True):
+            with pytest.raises(InputError, match='no other process is sweeping into'):
+                SweepFolder(files / 'out', campaign, overwrite=overwrite)
+    SweepFolder(files / 'out', campaign, overwrite=False).close()
+
+
+@pytest.mark.parametrize('name', ['notes.md', 'rollouts/part-00000000.parquet', 'rollouts/x'])
+def test_folder_that_is_no_sweep_is_left_alone(name: str, files: Path) -> None:
+    theirs = files / 'out' / name
+    theirs.parent.mkdir(parents=True)
+    theirs.write_text('mine')
+    with pytest.raises(InputError, match='a new folder, or --overwrite'):
+        run(files)
+    campaign = load_campaign(files / 'campaign.yaml')
+    if name.startswith('rollouts'):  # a part without its manifest is not known to be ours
+        with pytest.raises(InputError, match='expected no such file or folder'):
+            SweepFolder(files / 'out', campaign, overwrite=True)
+    else:
+        SweepFolder(files / 'out', campaign, overwrite=True).close()
+    assert theirs.read_text() == 'mine'

@@ -20,11 +20,10 @@ def files(tmp_path: Path) -> Path:
 
 def test_interrupted_sweep_keeps_what_is_finished_and_goes_on(files: Path) -> None:
     run(files, out='reference')
-    with pytest.raises(SweepStoppedError, match='interrupted') as stopped:
+    with pytest.raises(SweepStoppedError, match='interrupted'):
         run(files, Interrupted(after=2), ahead=1)
     kept = parts(files / 'out')
     assert 1 <= len(kept) <= 2
-    assert stopped.value.outcome.rollouts == 5 * len(kept)
     stamps = {path: path.stat().st_mtime_ns for path in (files / 'out/rollouts').iterdir()}
     executor = Counting()
     outcome = run(files, executor)

@@ -65,7 +65,8 @@ def _run(
                 campaign, folder, executor, in_flight, lambda done: bar.update(task, completed=done)
             )
     except SweepStoppedError as stopped:
-        done = f'{stopped.outcome.rollouts} of {campaign.rollouts} rollouts'
+        stored = folder.stored(campaign.rollouts)  # the interrupt may come when one is just stored
+        done = f'{stored} of {campaign.rollouts} rollouts'
         how = 'the same command without --overwrite' if overwrite else 'the same command'
         line = f'{folder.out}: {stopped}; {done} are finished, {how} goes on from there'
         raise FailedError(line) from None

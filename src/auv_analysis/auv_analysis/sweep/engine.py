@@ -60,10 +60,6 @@ class Outcome:
 class SweepStoppedError(FailedError):
     """The sweep ended before its last block; what is finished is kept."""
 
-    def __init__(self, reason: str, outcome: Outcome):
-        super().__init__(reason)
-        self.outcome = outcome
-
 
 @dataclass(frozen=True)
 class _Task:
@@ -104,12 +100,12 @@ def sweep(
         run.all()
     except KeyboardInterrupt:
         run.finish_running()
-        raise SweepStoppedError('interrupted', run.outcome) from None
+        raise SweepStoppedError('interrupted') from None
     except Exception as error:
         run.cancel()
         if (why := _why(error)) is None:
             raise
-        raise SweepStoppedError(why, run.outcome) from error
+        raise SweepStoppedError(why) from error
     return run.outcome
 
 

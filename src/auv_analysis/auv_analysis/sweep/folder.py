@@ -72,13 +72,22 @@ class SweepFolder:
 
     def finished(self, columns: list[str]) -> Iterator[tuple[int, 'pa.Table']]:
         """Number and some columns of each finished block; what cannot be read is not finished."""
-        parts = [(PART.fullmatch(entry.name), entry) for entry in self.data.iterdir()]
-        for number, path in sorted((int(match[1]), path) for match, path in parts if match):
+        for number, path in sorted(self._parts()):
             import pyarrow as pa
             import pyarrow.parquet as pq
 
             with suppress(pa.ArrowInvalid):
                 yield number, pq.ParquetFile(path).read(columns)
+
+    def stored(self, rollouts: int) -> int:
+        """How many of so many rollouts lie in the folder."""
+        blocks = (block for block, _ in self._parts())
+        return sum(min(self.block, rollouts - block * self.block) for block in blocks)
+
+    def _parts(self) -> Iterator[tuple[int, Path]]:
+        for entry in self.data.iterdir():
+            if match := PART.fullmatch(entry.name):
+                yield int(match[1]), entry
 
     def store(self, block: int, table: 'pa.Table') -> None:
         """Write a finished block."""

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from strategies import QUICK
 
 from auv_analysis.sweep.campaign import Campaign, load_campaign
+from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError
 
 SOURCE = """
@@ -99,6 +100,14 @@ def test_scenario_is_named_relative_to_the_campaign(tmp_path: Path, monkeypatch)
     path = written(tmp_path, 'name: x\nscenario: mine.yaml\nvary: [{grid: {duration: [1.0]}}]')
     monkeypatch.chdir('/')
     assert load_campaign(path).scenario.name == 'case2'
+
+
+def test_readme_shows_the_shipped_campaign() -> None:
+    readme = (Path(__file__).parents[2] / 'README.md').read_text()
+    shown = readme[readme.index('```yaml\nvary:') + 8 :].split('```')[0]
+    assert shown in shipped('campaigns', 'case1_gains').read_text()
+    campaign = load_campaign('case1_gains')
+    assert f'{campaign.rollouts} rollouts of each controller' in readme
 
 
 def test_blocks_are_shorter_where_rollouts_are_longer(tmp_path: Path) -> None:

@@ -29,9 +29,9 @@ from auv_gvc_controller.sampled import user_law
 
 Known = Callable[[np.ndarray], Tables]  # stage times t (T, s) of the next block -> its tables
 SHARED_STEPS = 1024  # steps that are tabulated at once where all vehicles share the tables
-OWN_STEPS = 64  # the same where each has its own
+OWN_STEPS = 256  # the same where each has its own
 PARTS = 4  # of a batch per thread, so that a slow one is made up for
-OWN_VEHICLES = 64  # of a part where each has its own tables
+OWN_VEHICLES = 16  # of a part where each has its own tables
 
 
 @dataclass(frozen=True)

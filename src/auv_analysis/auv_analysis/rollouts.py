@@ -12,7 +12,7 @@ from auv_analysis.closed_loop import Tables
 from auv_analysis.columns import in_columns
 from auv_analysis.reduction import COLUMNS, columns
 from auv_analysis.scenario import Scenario
-from auv_analysis.simulation import Hold, check_hold, tables
+from auv_analysis.simulation import Hold, check_hold, reference, tables
 from auv_analysis.summary import band_of
 from auv_analysis.variants import Variants, merged, packed_variants
 from auv_dynamics.files import InputError
@@ -173,8 +173,8 @@ def _reason(error: InputError) -> str:
 
 def _figures(variants: Variants, hold: Hold, threads: int) -> dict[str, np.ndarray]:
     first = variants.scenarios[0]
-    peaks = {s.known: _peak(s) for s in {s.known: s for s in variants.scenarios}.values()}
-    peak = np.array([peaks[scenario.known] for scenario in variants.scenarios])
+    peaks = _once(variants.scenarios, 0, _peak)
+    peak = np.array([peaks[scenario.texts[0]] for scenario in variants.scenarios])
     batch = Batch(
         loop=variants.loop,
         x=variants.x,
@@ -202,7 +202,7 @@ def _peak(scenario: Scenario) -> np.ndarray:
 def _shared(variants: Variants) -> Known | None:
     """Tables of all vehicles where they are the same."""
     first, *others = variants.scenarios
-    if 'sensors' in first.data or any(s.known != first.known for s in others):
+    if 'sensors' in first.data or any(s.texts != first.texts for s in others):
         return None
     return lambda t: tables(first, t, None)
 
@@ -213,10 +213,18 @@ def _own(variants: Variants, vehicles: range) -> Known:
     noises = [s.noise(int(variants.seeds[i])) for s, i in zip(used, vehicles, strict=True)]
 
     def known(t: np.ndarray) -> Tables:
-        distinct = {s.known: tables(s, t, None) for s in {s.known: s for s in used}.values()}
-        found = [distinct[s.known] for s in used]
-        rows = [np.zeros((0, 0)) if n is None else n.rows(len(t)) for n in noises]
-        reference, F, current, _ = (np.stack(part) for part in zip(*found, strict=True))
-        return Tables(reference, F, current, np.stack(rows))
+        references = _once(used, 0, lambda s: reference(s, t))
+        acting = _once(used, 1, lambda s: s.uncertainty.tables(t))
+        return Tables(
+            np.stack([references[s.texts[0]] for s in used]),
+            np.stack([acting[s.texts[1]][0] for s in used]),
+            np.stack([acting[s.texts[1]][1] for s in used]),
+            np.stack([np.zeros((0, 0)) if n is None else n.rows(len(t)) for n in noises]),
+        )
 
     return known
+
+
+def _once(scenarios: Sequence[Scenario], which: int, function: Any) -> dict[str, Any]:
+    """What a function makes of each of several scenarios, once for those of the same text."""
+    return {text: function(s) for text, s in {s.texts[which]: s for s in scenarios}.items()}

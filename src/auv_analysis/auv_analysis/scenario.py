@@ -124,10 +124,10 @@ class Scenario:
         return make_actuators(self.data.get('actuators'), self.vehicle, self.step, self.path)
 
     @cached_property
-    def known(self) -> str:
-        """Text that is the same for scenarios whose set-point, disturbance and current are."""
-        said = self.data['setpoint'], self.data['disturbance'], self.attachments.get('setpoint.csv')
-        return json.dumps(said, sort_keys=True)
+    def texts(self) -> tuple[str, str]:
+        """Texts that are the same for scenarios whose set-point, or disturbance, is."""
+        setpoint = self.data['setpoint'], self.attachments.get('setpoint.csv')
+        return json.dumps(setpoint), json.dumps(self.data['disturbance'])
 
     @property
     def kinds(self) -> frozenset[str]:

@@ -109,10 +109,14 @@ def blocks(scenario: Scenario) -> Iterator[tuple[Grid, Tables]]:
 
 def tables(scenario: Scenario, t: np.ndarray, noise: SensorNoise | None) -> Tables:
     """Set-points, disturbance, current and the next rows of noise at the stage times t (T, s)."""
-    setpoint = scenario.setpoint
-    reference = np.concatenate([setpoint.value(t), setpoint.derivative(t)], axis=-1)
     rows = np.zeros((0, WIDTH)) if noise is None else noise.rows(len(t))
-    return Tables(reference, *scenario.uncertainty.tables(t), rows)
+    return Tables(reference(scenario, t), *scenario.uncertainty.tables(t), rows)
+
+
+def reference(scenario: Scenario, t: np.ndarray) -> np.ndarray:
+    """nu_d and nu_d_dot (T, s, 12) at the stage times t (T, s)."""
+    setpoint = scenario.setpoint
+    return np.concatenate([setpoint.value(t), setpoint.derivative(t)], axis=-1)
 
 
 def _run_kernel(

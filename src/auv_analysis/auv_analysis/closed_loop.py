@@ -68,10 +68,7 @@ class LawInside(NamedTuple):
     def fill_rate(system, stage, x, rate):
         """x_dot at one stage."""
         tau, _, change = answer(system, stage, x)
-        F = vector(system.F[stage], 0)
-        fill_plant_rate(system.loop.truth, x, tau, F, system.current, stage, rate)
-        for i in range(x.shape[0] - SIZE):
-            rate[SIZE + i] = change[i]
+        fill_answered(system, stage, x, tau, change, rate)
 
 
 @jitable
@@ -83,6 +80,15 @@ def answer(system, stage, x):
     tau, f = wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
     change = state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
     return tau, f, change
+
+
+@jitable
+def fill_answered(system, stage, x, tau, change, rate):
+    """Write x_dot at a stage of the step at which the law has answered into `rate`."""
+    F = vector(system.F[stage], 0)
+    fill_plant_rate(system.loop.truth, x, tau, F, system.current, stage, rate)
+    for i in range(x.shape[0] - SIZE):
+        rate[SIZE + i] = change[i]
 
 
 class Grid(NamedTuple):
@@ -160,12 +166,13 @@ def fill_continuous(loop, tables, grid, tableau, motion, work, record):
         k = grid.first + row
         reference, F, current = tables.reference[row], tables.F[row], tables.current[row]
         system = LawInside(loop, grid.t[row], reference, F, current)
-        tau, f, _ = answer(system, 0, x)
+        tau, f, change = answer(system, 0, x)
         total = lumped(loop.truth, attitude_of(x), vector(x, 7), tau, vector(F[0], 0), current)
         nu_d = vector(reference[0], 0)
         fill_record(record, k, Sample(body, body, state, nu_d, tau, tau, f, total))
         if k < grid.last:
-            fill_step(system, x, grid.step, tableau, work.stages, work.trial)
+            fill_answered(system, 0, x, tau, change, work.stages[0])
+            fill_step(system, x, grid.step, tableau, work.stages, work.trial, 1)
             fill_unit_attitude(x)
 
 

@@ -9,7 +9,7 @@ from auv_dynamics.files import LARGEST
 from auv_dynamics.jit import helper, jitable
 from auv_dynamics.lanes import select
 from auv_dynamics.signals import DOFS
-from auv_dynamics.six import diag, sub, upper, upper_T, vector
+from auv_dynamics.six import add, diag, sub, upper, upper_T, vector
 from auv_gvc_controller.model import ControlModel
 
 
@@ -127,19 +127,28 @@ def keep_last(last, a, band, k):
 
 
 @helper
-def _sum(a):
-    return abs(a[0]) + abs(a[1]) + abs(a[2]) + abs(a[3]) + abs(a[4]) + abs(a[5])
+def sizes(a):
+    """Absolute values, by component."""
+    return (abs(a[0]), abs(a[1]), abs(a[2]), abs(a[3]), abs(a[4]), abs(a[5]))
 
 
 @jitable
 def size_of(sample):
     """Sum of the absolute values of a sample; NaN or inf where one is not finite."""
-    total = _sum(sample.tau) + _sum(sample.applied) + _sum(sample.f) + _sum(sample.F)
-    for i in range(sample.x.shape[0]):
-        total = total + abs(sample.x[i])
-    for i in range(sample.state.shape[0]):
-        total = total + abs(sample.state[i])
-    return total
+    x, state = sample.x, sample.state
+    total = sizes(sample.tau)  # six sums that do not wait for each other
+    total = add(total, sizes(sample.applied))
+    total = add(total, sizes(sample.f))
+    total = add(total, sizes(sample.F))
+    total = add(total, sizes(vector(x, 0)))
+    total = add(total, sizes(vector(x, 7)))
+    whole = state.shape[0] // 6 * 6
+    for i in range(0, whole, 6):
+        total = add(total, sizes(vector(state, i)))
+    rest = abs(x[6])
+    for i in range(whole, state.shape[0]):
+        rest = rest + abs(state[i])
+    return total[0] + total[1] + total[2] + total[3] + total[4] + total[5] + rest
 
 
 SIX = (

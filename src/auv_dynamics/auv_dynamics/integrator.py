@@ -46,25 +46,36 @@ def fill_rate(system, stage, x, rate):
 
 
 @jitable
-def fill_step(system, x, step, tableau, stages, trial):
+def fill_step(system, x, step, tableau, stages, trial, known=0):
     """Advance x (n,) in place by one step of `step` s.
 
-    `stages` (s, n) and `trial` (n,) are workspace; the time of a stage is the system's business,
-    which knows its inputs on the grid (k + c) * step, so that no time is ever accumulated.
+    `stages` (s, n) and `trial` (n,) are workspace, of which the first `known` stages are there
+    already; the time of a stage is the system's business, which knows its inputs on the grid
+    (k + c) * step, so that no time is ever accumulated.
     """
-    count, size = tableau.b.shape[0], x.shape[0]
-    for s in range(count):
-        for i in range(size):
-            trial[i] = x[i]
-        for j in range(s):
-            share = step * tableau.A[s, j]
-            for i in range(size):
-                trial[i] = trial[i] + share * stages[j, i]
+    count = tableau.b.shape[0]
+    for s in range(known, count):
+        fill_sum(trial, x, step, tableau.A[s], stages, s)
         fill_rate(system, s, trial, stages[s])
-    for s in range(count):
-        share = step * tableau.b[s]
+    fill_sum(x, x, step, tableau.b, stages, count)
+
+
+@jitable
+def fill_sum(total, x, step, weights, stages, count):
+    """Write x + step * sum of weights[j] stages[j], j below `count`, into `total`."""
+    size, odd = x.shape[0], count % 2
+    if odd:
+        share, rate = step * weights[0], stages[0]
         for i in range(size):
-            x[i] = x[i] + share * stages[s, i]
+            total[i] = x[i] + share * rate[i]
+    else:
+        for i in range(size):
+            total[i] = x[i]
+    for j in range(odd, count, 2):  # two at a time: half as often through memory
+        share, rate = step * weights[j], stages[j]
+        other_share, other_rate = step * weights[j + 1], stages[j + 1]
+        for i in range(size):
+            total[i] = total[i] + share * rate[i] + other_share * other_rate[i]
 
 
 def stage_times(tableau: Tableau, step: float, first: int, count: int) -> np.ndarray:

@@ -65,7 +65,8 @@ def rollouts(
     result: dict[str, np.ndarray] = {name: np.full(count, np.nan) for name in COLUMNS}
     result |= {'status': np.full(count, 'refused', object), 'reason': np.full(count, '', object)}
     for variants in _batches(scenario, controller, given, count, result['reason']):
-        found = _figures(variants, hold, threads)
+        batch = batch_of(variants, hold)
+        found = columns(run_batch(batch, threads), batch.steps + 1, batch.step)
         for name, values in found.items():
             result[name][variants.rows] = values
         diverged = np.isfinite(found['diverged_at'])
@@ -171,11 +172,12 @@ def _reason(error: InputError) -> str:
     return f'{error.key}: expected {error.expected}, found {error.found}'
 
 
-def _figures(variants: Variants, hold: Hold, threads: int) -> dict[str, np.ndarray]:
+def batch_of(variants: Variants, hold: Hold) -> Batch:
+    """Closed loops of one structure, ready to run."""
     first = variants.scenarios[0]
     peaks = _once(variants.scenarios, 0, _peak)
     peak = np.array([peaks[scenario.texts[0]] for scenario in variants.scenarios])
-    batch = Batch(
+    return Batch(
         loop=variants.loop,
         x=variants.x,
         band=band_of(peak[:1] if len(peaks) == 1 else peak[variants.of]),
@@ -186,8 +188,6 @@ def _figures(variants: Variants, hold: Hold, threads: int) -> dict[str, np.ndarr
         shared=_shared(variants),
         own=lambda vehicles: _own(variants, vehicles),
     )
-    found = run_batch(batch, threads)
-    return columns(found, first.steps + 1, first.step)
 
 
 def _peak(scenario: Scenario) -> np.ndarray:

@@ -127,20 +127,32 @@ def _run_kernel(
     def kernel(function: Any) -> Any:
         return function if is_compiled(gains) else plain(function)
 
-    tableau, model = TABLEAUS[scenario.data['integrator']], control_model(scenario.vehicle)
-    truth, actuators = scenario.uncertainty.truth, scenario.actuators
-    guard = anti_windup(gains, scenario.reach(controller))
-    loop = Loop(truth, actuators, gains, model, guard)
+    tableau, loop = TABLEAUS[scenario.data['integrator']], one_loop(scenario, controller)
     function = kernel(run_continuous if hold == 'continuous' else run_held)
-    x = np.concatenate([initial_state(*scenario.initial), np.zeros(type(gains).STATES)])
-    motion = Motion(x, x[:SIZE].copy(), np.zeros(type(gains).STATES), memory(actuators))
-    work = Workspace(np.zeros((len(tableau.b), len(x))), np.zeros(len(x)))
+    motion, work = at_start(scenario, loop)
     nu_d_dot = np.empty((scenario.steps + 1, 6))
     for grid, known in blocks(scenario):
         nu_d_dot[grid.first : grid.first + len(grid.t)] = known.reference[:, 0, 6:]
         with np.errstate(all='ignore'), user_law(gains):
             function(loop, known, grid, tableau, motion, work, log)
     return nu_d_dot
+
+
+def one_loop(scenario: Scenario, controller: str) -> Loop:
+    """The vehicle of a scenario with one of its controllers."""
+    gains = scenario.gains(controller)
+    guard = anti_windup(gains, scenario.reach(controller))
+    model, actuators = control_model(scenario.vehicle), scenario.actuators
+    return Loop(scenario.uncertainty.truth, actuators, gains, model, guard)
+
+
+def at_start(scenario: Scenario, loop: Loop) -> tuple[Motion, Workspace]:
+    """Where a run begins, and room for its stages."""
+    states = type(loop.gains).STATES
+    x = np.concatenate([initial_state(*scenario.initial), np.zeros(states)])
+    stages = len(TABLEAUS[scenario.data['integrator']].b)
+    motion = Motion(x, x[:SIZE].copy(), np.zeros(states), memory(loop.actuators))
+    return motion, Workspace(np.zeros((stages, len(x))), np.zeros(len(x)))
 
 
 def unwrapped_eta(x: np.ndarray) -> np.ndarray:

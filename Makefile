@@ -24,7 +24,7 @@ SEED ?= 0
 EXAMPLES ?= 500
 MUTANTS ?= 500
 
-.PHONY: help setup case1 case2 test soak properties mutation build lint format interop clean
+.PHONY: help setup case1 case2 test soak properties mutation bench bench-growth build lint format interop clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/:/' | column -t -s:
@@ -59,6 +59,14 @@ mutation: setup  ## mutants of the mathematics: MUTANTS=count or all, SEED=numbe
 	$(VENV)/mutation/bin/python -m pip install --quiet -r requirements-mutation.txt
 	$(VENV)/mutation/bin/python tests/mutation/run.py --python $(abspath $(BIN))/python \
 	    --mutants $(MUTANTS) --seed $(SEED)
+
+# without the peers of the registry, what is measured against them is reported as not measured
+bench: setup  ## speed against scalar C, ping-pong, readers and peers: benchmarks/README.md
+	$(BIN)/python -m pip install --quiet -r requirements-bench.txt || true
+	$(BIN)/python benchmarks/run.py
+
+bench-growth: setup  ## how cost grows with batch, horizon, threads, topics and bag length
+	$(BIN)/python benchmarks/growth.py
 
 build: setup  ## colcon build of the workspace
 	AMENT_PREFIX_PATH="$(abspath $(VENV))$${AMENT_PREFIX_PATH:+:$$AMENT_PREFIX_PATH}" \

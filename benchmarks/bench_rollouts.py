@@ -1,0 +1,119 @@
+"""Rollouts of Case 1: against scalar C, on two threads, growing, and against other simulators."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import c_reference
+import numpy as np
+import peers
+from loops import CONTROLLER, case1, in_c, prepared, single, varied
+from measure import Measured, cost, interleaved, seconds, speed
+
+from auv_analysis import simulate
+from auv_analysis.batch import run_batch
+from auv_analysis.rollouts import rollouts
+from auv_analysis.scenario import Scenario
+from auv_dynamics.signals import DOFS
+
+DURATION = 10.0  # s
+BATCH = 96
+SINGLES = 20  # rollouts of one vehicle that are timed together
+THREADS_BATCH = 2048
+MANY, FEW = 10_000, 100
+SAME = 1e-9  # relative, of figures computed by different programs
+AGREE = 1e-6  # m/s, rad/s: of a peer's final velocity
+
+
+@cache
+def fastest_c() -> Any:
+    """The C reference with the flags that are faster here."""
+    loops = in_c(case1(DURATION), varied(SINGLES))
+
+    def took(library: Any) -> float:
+        return min(seconds(lambda: c_reference.rollouts(library, loops)) for _ in range(5))
+
+    return min(map(c_reference.library, (c_reference.PLAIN, c_reference.NATIVE)), key=took)
+
+
+def against_c() -> dict[str, Measured]:
+    """A batch, and one rollout after the other, per rollout: prepared inputs to figures."""
+    scenario, changes = case1(DURATION), varied(BATCH)
+    batch, loops, library = (
+        prepared(scenario, changes),
+        in_c(scenario, changes),
+        fastest_c(),
+    )
+    check_figures(rollouts(scenario, CONTROLLER, changes), c_reference.rollouts(library, loops)[0])
+
+    one = single(scenario)
+
+    def singles() -> None:
+        for _ in range(SINGLES):
+            one()
+
+    subjects = {
+        'rollout_vs_c': cost(lambda: run_batch(batch), BATCH),
+        'single_vs_c': cost(singles, SINGLES),
+    }
+    return interleaved(subjects, cost(lambda: c_reference.rollouts(library, loops), BATCH), 's')
+
+
+def check_figures(ours: dict[str, np.ndarray], theirs: np.ndarray) -> None:
+    """Raise ArithmeticError where a figure differs from C's (B, 10, 6)."""
+    for i, name in enumerate(c_reference.FIGURES):
+        for j, dof in enumerate(DOFS):
+            if not np.allclose(
+                ours[f'{name}.{dof}'], theirs[:, i, j], rtol=SAME, atol=0, equal_nan=True
+            ):
+                raise ArithmeticError(f'{name}.{dof}: expected the same as in C, found another')
+
+
+def threads() -> dict[str, Measured]:
+    """Two threads against one: rollouts per second of a large batch."""
+    batch = prepared(case1(DURATION), varied(THREADS_BATCH))
+    return interleaved(
+        {'threads_2_vs_1': speed(lambda: run_batch(batch, threads=2), THREADS_BATCH)},
+        speed(lambda: run_batch(batch), THREADS_BATCH),
+        'rollouts/s',
+    )
+
+
+def growth() -> dict[str, Measured]:
+    """Cost of a rollout in a large batch, and of a long horizon; parameters are made as well."""
+    many, few, short, long = varied(MANY), varied(FEW), case1(DURATION), case1(10 * DURATION)
+    again = MANY // FEW // 10  # so that both last long enough to be timed
+
+    def little() -> None:
+        for _ in range(again):
+            rollouts(short, CONTROLLER, few)
+
+    def over(scenario: Scenario) -> Callable[[], float]:
+        return cost(lambda: rollouts(scenario, CONTROLLER, few))
+
+    large = cost(lambda: rollouts(short, CONTROLLER, many), MANY)
+    return {
+        **interleaved({'growth_batch': large}, cost(little, FEW * again), 's'),
+        **interleaved({'growth_horizon': over(long)}, over(short), 's'),
+    }
+
+
+def against_scipy() -> dict[str, Measured]:
+    """Rollouts per second of a batch against those of `solve_ivp`."""
+    return _against('rollout_vs_solve_ivp', peers.solve_ivp)
+
+
+def against_python_control() -> dict[str, Measured]:
+    """Rollouts per second of a batch against those of `input_output_response`."""
+    return _against('rollout_vs_python_control', peers.python_control)
+
+
+def _against(key: str, peer: Callable[..., np.ndarray]) -> dict[str, Measured]:
+    scenario = case1(DURATION)
+    rate, x = peers.closed_loop(scenario, CONTROLLER)
+    difference = np.abs(peer(rate, x, DURATION)[7:13] - simulate(scenario, CONTROLLER).nu[-1]).max()
+    if not difference < AGREE:
+        raise ArithmeticError(f'{key}: expected the same velocity at the end, found {difference:g}')
+    batch = prepared(scenario, varied(BATCH))
+    ours = speed(lambda: run_batch(batch), BATCH)
+    return interleaved({key: ours}, speed(lambda: peer(rate, x, DURATION)), 'rollouts/s')

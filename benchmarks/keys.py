@@ -1,0 +1,117 @@
+"""What `make bench` measures: every key with what it must reach and what it aims at."""
+
+from dataclasses import dataclass
+
+from measure import Measured
+
+NOISE = 0.02  # an aim that is missed by less is not told from one that is reached
+
+
+@dataclass(frozen=True)
+class Key:
+    """A row of the table.
+
+    Attributes
+    ----------
+    what, reference : subject and what it is measured against
+    kind : 'cost' is a time over the reference's, 'gain' a speed over the reference's,
+        'value' the value itself
+    must, aim : bounds of that number, from above for a cost or a value, from below for a gain
+    why : why the aim is missed, where it is
+
+    """
+
+    name: str
+    what: str
+    reference: str
+    kind: str
+    must: float
+    aim: float
+    why: str = ''
+
+    def number(self, measured: Measured) -> float:
+        """What is compared with `must` and `aim`."""
+        if self.kind == 'value' or measured.ratio is None:
+            return measured.value
+        return measured.ratio
+
+    def verdict(self, measured: Measured) -> str:
+        """'aim reached', 'met' or 'MISSED'."""
+        number = self.number(measured)
+        if not self._within(number, self.must, 0.0):
+            return 'MISSED'
+        return 'aim reached' if self._within(number, self.aim, NOISE) else 'met'
+
+    def bound(self, value: float) -> str:
+        """A bound as the table shows it."""
+        return f'{"≥" if self.kind == "gain" else "≤"} {value:g}'
+
+    def _within(self, number: float, bound: float, noise: float) -> bool:
+        if self.kind == 'gain':
+            return number >= bound * (1 - noise)
+        return number <= bound * (1 + noise)
+
+
+CASE1 = 'Case 1, 10 s'
+KEYS = (
+    Key(
+        'rollout_vs_c', f'{CASE1}: one of a batch of 96 with figures, one thread',
+        'scalar C', 'cost', 0.6, 0.25,
+    ),
+    Key('single_vs_c', f'{CASE1}: one rollout with figures', 'scalar C', 'cost', 1.2, 0.85),
+    Key('threads_2_vs_1', 'a batch of 2 048 on two threads', 'one thread', 'gain', 1.6, 1.95),
+    Key(
+        'growth_batch', 'one of a batch of 10 000, parameters included',
+        'one of a batch of 100', 'cost', 1.2, 1.0,
+    ),
+    Key('growth_horizon', 'a batch over 100 s', 'over 10 s', 'cost', 11.0, 10.0),
+    Key(
+        'rollout_vs_solve_ivp', f'{CASE1}: rollouts of a batch, one thread',
+        'scipy `solve_ivp`', 'gain', 100.0, 300.0,
+    ),
+    Key(
+        'rollout_vs_python_control', f'{CASE1}: rollouts of a batch, one thread',
+        'python-control', 'gain', 20.0, 100.0,
+    ),
+    Key(
+        'sweep_10k_vs_c', '`auv sweep`: 10 000 rollouts of Case 1 over 10 s, to Parquet',
+        '10 000 of scalar C on two cores', 'cost', 1.2, 0.4,
+    ),
+    Key(
+        'graph_vs_pingpong', 'five processes, every topic recorded: steps',
+        'round trips of bare rclpy', 'gain', 0.45, 0.9,
+    ),
+    Key(
+        'composed_vs_pingpong', 'all nodes in one process, every topic recorded: steps',
+        'round trips of bare rclpy', 'gain', 0.5, 1.7,
+    ),
+    Key(
+        'bag_read_vs_raw_reader', 'messages of a bag to arrays',
+        '`mcap` raw reader', 'gain', 15.0, 30.0,
+    ),
+    Key(
+        'analysis_vs_numpy', 'figures of 1e6 samples',
+        'the same in NumPy, whole arrays', 'gain', 8.0, 30.0,
+    ),
+    Key(
+        'analysis_one_hour_rss_mb', 'memory to analyse a bag of one hour',
+        '', 'value', 400.0, 400.0,
+    ),
+    Key('help_vs_python', '`auv --help`', '`python -c pass`', 'cost', 4.0, 2.0),
+)  # fmt: skip
+BY_NAME = {key.name: key for key in KEYS}
+
+# measured together: module:function, which gives a Measured by key
+GROUPS = {
+    'bench_rollouts:against_c': ('rollout_vs_c', 'single_vs_c'),
+    'bench_rollouts:threads': ('threads_2_vs_1',),
+    'bench_rollouts:growth': ('growth_batch', 'growth_horizon'),
+    'bench_rollouts:against_scipy': ('rollout_vs_solve_ivp',),
+    'bench_rollouts:against_python_control': ('rollout_vs_python_control',),
+    'bench_commands:sweep': ('sweep_10k_vs_c',),
+    'bench_nodes:against_pingpong': ('graph_vs_pingpong', 'composed_vs_pingpong'),
+    'bench_bags:against_readers': ('bag_read_vs_raw_reader',),
+    'bench_analysis:against_numpy': ('analysis_vs_numpy',),
+    'bench_analysis:one_hour': ('analysis_one_hour_rss_mb',),
+    'bench_commands:command_line': ('help_vs_python',),
+}

@@ -1,0 +1,96 @@
+"""Closed loops that are measured: Case 1 of any length, and batches in which no two are alike."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from c_reference import Loops, loops
+
+from auv_analysis import load_scenario
+from auv_analysis.batch import Batch
+from auv_analysis.changes import changed_scenario, split
+from auv_analysis.closed_loop import run_continuous
+from auv_analysis.reduction import Figures
+from auv_analysis.rollouts import batch_of
+from auv_analysis.scenario import Scenario
+from auv_analysis.simulation import at_start, blocks, one_loop, tables
+from auv_analysis.summary import band_of
+from auv_analysis.variants import packed_variants
+from auv_dynamics.integrator import TABLEAUS
+
+CONTROLLER = 'gvc'
+VARIED = (
+    'controllers.gvc.k_D', 'controllers.gvc.k_I', 'controllers.gvc.Lambda', 'controllers.gvc.Gamma',
+    'vehicle.inertia_matrix[0][0]', 'vehicle.inertia_matrix[5][5]',
+    'vehicle.damping.linear[0]', 'vehicle.damping.quadratic[2]', 'vehicle.hydrostatics.volume',
+)  # fmt: skip
+SPREAD = 0.05  # relative, to either side
+SEED = 0
+
+
+def case1(duration: float) -> Scenario:
+    """Case 1 of another duration, s."""
+    scenario = load_scenario('case1')
+    return replace(scenario, data={**scenario.data, 'duration': duration})
+
+
+def varied(count: int) -> dict[str, np.ndarray]:
+    """Gains and coefficients of so many vehicles around those of Case 1: path -> (count,)."""
+    scenario, generator = load_scenario('case1'), np.random.default_rng(SEED)
+    factors = generator.uniform(1 - SPREAD, 1 + SPREAD, (len(VARIED), count))
+    return {
+        path: _value(scenario, path) * factor for path, factor in zip(VARIED, factors, strict=True)
+    }
+
+
+def _value(scenario: Scenario, path: str) -> Any:
+    first, *rest = split(path)
+    value = scenario.vehicle_data if first == 'vehicle' else scenario.data[str(first)]
+    for part in rest:
+        value = value[part]  # type: ignore[index]  # keys of mappings, indices of lists
+    return value
+
+
+def prepared(scenario: Scenario, changes: dict[str, np.ndarray]) -> Batch:
+    """The same closed loops with everything done that comes before the first step."""
+    count = len(next(iter(changes.values())))
+    seeds = np.zeros(count, int)
+    variants, good = packed_variants(scenario, CONTROLLER, changes, np.arange(count), seeds)
+    assert good.all(), 'values that no scenario may have'
+    known: dict[float, Any] = {}
+
+    def tabulated(t: np.ndarray) -> Any:
+        first = float(t[0, 0])
+        if first not in known:
+            known[first] = tables(scenario, t, None)
+        return known[first]
+
+    return replace(batch_of(variants, 'continuous'), shared=tabulated)
+
+
+def single(scenario: Scenario) -> Callable[[], Figures]:
+    """One closed loop, prepared in the same way: a function that runs it and gives its figures."""
+    loop, known = one_loop(scenario, CONTROLLER), list(blocks(scenario))
+    motion, work = at_start(scenario, loop)
+    start, tableau = motion.x.copy(), TABLEAUS[scenario.data['integrator']]
+    t = np.arange(scenario.steps + 1) * scenario.step
+    band = band_of(np.abs(scenario.setpoint.value(t)).max(axis=0))
+
+    def run() -> Figures:
+        motion.x[:] = start
+        figures = Figures.start(loop.model, band, scenario.step, np.full)
+        for grid, table in known:
+            run_continuous(loop, table, grid, tableau, motion, work, figures)
+        return figures
+
+    return run
+
+
+def in_c(scenario: Scenario, changes: dict[str, np.ndarray]) -> Loops:
+    """The same closed loops for the C reference."""
+    rows = zip(*changes.values(), strict=True)
+    return loops(
+        [changed_scenario(scenario, dict(zip(changes, row, strict=True))) for row in rows],
+        CONTROLLER,
+    )

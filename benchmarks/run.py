@@ -1,0 +1,84 @@
+"""Measure every key of the table: `make bench`.
+
+    python benchmarks/run.py [--only KEY...]
+
+Writes benchmarks/results.json and the table in benchmarks/README.md. Exit code 1 when a key that
+must be met is missed or could not be measured. With --only nothing is written: the numbers of a
+table are of one run.
+"""
+
+import argparse
+import importlib
+import json
+import sys
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from keys import BY_NAME, GROUPS, KEYS
+from machine import machine, versions
+from measure import Measured
+from table import table, write_table
+
+RESULTS = Path(__file__).with_name('results.json')
+
+
+def measure(names: set[str]) -> tuple[dict[str, Measured], dict[str, str]]:
+    """Results by key, and why a key that was asked for has none."""
+    found: dict[str, Measured] = {}
+    missing: dict[str, str] = {}
+    for place, keys in GROUPS.items():
+        if not names.intersection(keys):
+            continue
+        _say(f'{", ".join(keys)} ...')
+        start = time.monotonic()
+        module, _, function = place.partition(':')
+        try:
+            found |= getattr(importlib.import_module(module), function)()
+        except Exception as error:  # one benchmark that fails must not cost the others
+            missing |= dict.fromkeys(keys, f'{type(error).__name__}: {error}'.splitlines()[0])
+        for key in keys:
+            _say(f'  {_line(key, found, missing)}')
+        _say(f'  {time.monotonic() - start:.0f} s')
+    return found, missing
+
+
+def _line(name: str, found: dict[str, Measured], missing: dict[str, str]) -> str:
+    if name in missing:
+        return f'{name}: not measured: {missing[name]}'
+    key, result = BY_NAME[name], found[name]
+    bounds = f'must {key.bound(key.must)}, aim {key.bound(key.aim)}'
+    return f'{name} = {key.number(result):.3g} ({bounds}): {key.verdict(result)}'
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Measure, write, and judge."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        '--only', nargs='+', metavar='KEY', choices=list(BY_NAME), help='these; nothing is written'
+    )
+    options = parser.parse_args(arguments)
+    conditions: dict[str, Any] = {'machine': machine(), 'versions': versions()}
+    found, missing = measure(set(options.only or BY_NAME))
+    results = {name: asdict(result) for name, result in found.items()} | conditions
+    if options.only:
+        print(json.dumps(results, indent=2))
+    else:
+        RESULTS.write_text(json.dumps(results, indent=2) + '\n', encoding='utf-8')
+        write_table(results)
+        print(table(results))
+    missed = [
+        key.name for key in KEYS if key.name in found and key.verdict(found[key.name]) == 'MISSED'
+    ]
+    for name in (*missed, *missing):
+        _say(f'missed: {_line(name, found, missing)}')
+    sys.exit(1 if missed or missing else 0)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,125 @@
+"""How `make bench` measures in turns, judges and writes its table; no test looks at a clock."""
+
+import json
+from dataclasses import asdict
+
+import keys
+import pytest
+import run
+import table
+from measure import Measured, interleaved
+
+MACHINE = {'cpu': 'a processor', 'cores': 2, 'memory_gb': 8.0, 'kernel': 'Linux 6'}
+CONDITIONS = {'machine': MACHINE, 'versions': {'python': '3.11.7'}}
+
+
+def measured(ratio, value=1.0):
+    return Measured(value, 's', ratio, 2.0, 7, (ratio, ratio))
+
+
+def test_every_round_calls_each_once_and_every_second_goes_backwards():
+    calls = []
+
+    def part(name, values):
+        numbers = iter(values)
+
+        def measure():
+            calls.append(name)
+            return next(numbers)
+
+        return measure
+
+    a = part('a', [99, 2, 4, 9])  # the first call of each is not counted
+    b = part('b', [99, 10, 10, 10])
+    c = part('c', [99, 1, 2, 3])
+    found = interleaved({'a': a, 'b': b}, c, 'ms', runs=3)
+    assert ''.join(calls) == 'abc' + 'abc' + 'cba' + 'abc'
+    assert found['a'] == Measured(4, 'ms', 2.0, 2, 3, (2.0, 3.0))
+    assert found['b'] == Measured(10, 'ms', 5.0, 2, 3, (10 / 3, 10.0))
+
+
+def test_the_ratio_is_the_median_of_pairs_not_of_columns():
+    subject, reference = iter([0, 1, 4, 9]), iter([1, 1, 2, 9])
+    found = interleaved({'a': lambda: next(subject)}, lambda: next(reference), 's', runs=3)['a']
+    assert (found.ratio, found.value / found.reference) == (1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ('name', 'ratio', 'verdict'),
+    [
+        ('rollout_vs_c', 0.61, 'MISSED'), ('rollout_vs_c', 0.6, 'met'),
+        ('rollout_vs_c', 0.25, 'aim reached'), ('rollout_vs_c', 0.26, 'met'),
+        ('threads_2_vs_1', 1.59, 'MISSED'), ('threads_2_vs_1', 1.6, 'met'),
+        ('threads_2_vs_1', 1.95, 'aim reached'), ('threads_2_vs_1', 1.9, 'met'),
+        ('growth_horizon', 10.1, 'aim reached'), ('growth_horizon', 11.1, 'MISSED'),
+    ],
+)  # fmt: skip
+def test_verdict(name, ratio, verdict):
+    assert keys.BY_NAME[name].verdict(measured(ratio)) == verdict
+
+
+def test_a_value_is_judged_by_itself():
+    key = keys.BY_NAME['analysis_one_hour_rss_mb']
+    assert key.verdict(Measured(399.0, 'MB', 1.0, 399.0, 7)) == 'aim reached'
+    assert key.verdict(Measured(401.0, 'MB', None, None, 7)) == 'MISSED'
+
+
+def test_every_key_is_measured_by_one_group():
+    listed = [name for names in keys.GROUPS.values() for name in names]
+    assert sorted(listed) == sorted(keys.BY_NAME)
+
+
+@pytest.mark.parametrize(
+    ('value', 'unit', 'text'),
+    [
+        (0.000233, 's', '233 µs'), (0.0514, 's', '51.4 ms'), (2.5, 's', '2.5 s'),
+        (31234.0, 'rollouts/s', '31 234 rollouts/s'), (2330.4, 'steps/s', '2 330 steps/s'),
+        (381.0, 'MB', '381 MB'),
+    ],
+)  # fmt: skip
+def test_quantity(value, unit, text):
+    assert table.quantity(value, unit) == text
+
+
+def test_the_table_names_what_was_missed_and_why_and_what_was_not_measured():
+    results = {'rollout_vs_c': asdict(measured(0.7)), **CONDITIONS}
+    text = table.table(results)
+    row = next(line for line in text.splitlines() if '`rollout_vs_c`' in line)
+    assert '| **0.7** (0.7–0.7) | ≤ 0.6 | ≤ 0.25 | MISSED |' in row
+    assert '* `rollout_vs_c`: ' in text
+    assert text.count('| not measured |') == len(keys.KEYS) - 1
+
+
+def test_results_survive_json():
+    results = json.loads(json.dumps({'help_vs_python': asdict(measured(1.5)), **CONDITIONS}))
+    assert '**1.5** (1.5–1.5)' in table.table(results)
+
+
+@pytest.mark.parametrize(('ratio', 'code'), [(1.5, 0), (4.5, 1)])
+def test_only_judges_and_writes_nothing(ratio, code, monkeypatch, capsys):
+    before = run.RESULTS.stat() if run.RESULTS.exists() else None
+    monkeypatch.setattr(run, 'measure', lambda names: ({n: measured(ratio) for n in names}, {}))
+    with pytest.raises(SystemExit) as end:
+        run.main(['--only', 'help_vs_python'])
+    assert end.value.code == code
+    assert json.loads(capsys.readouterr().out)['help_vs_python']['ratio'] == ratio
+    assert (run.RESULTS.stat() if run.RESULTS.exists() else None) == before
+
+
+def test_a_benchmark_that_fails_is_named_and_does_not_cost_the_others(monkeypatch, capsys):
+    def fails():
+        raise ValueError('no\nreason')
+
+    monkeypatch.setattr('bench_commands.command_line', lambda: {'help_vs_python': measured(1.5)})
+    monkeypatch.setattr('bench_commands.sweep', fails, raising=False)
+    found, missing = run.measure({'help_vs_python', 'sweep_10k_vs_c'})
+    assert found == {'help_vs_python': measured(1.5)}
+    assert missing == {'sweep_10k_vs_c': 'ValueError: no'}
+    assert 'sweep_10k_vs_c: not measured: ValueError: no\n' in capsys.readouterr().err
+
+
+def test_an_unknown_key_ends_with_two(capsys):
+    with pytest.raises(SystemExit) as end:
+        run.main(['--only', 'rollout_vs_d'])
+    assert end.value.code == 2
+    assert 'rollout_vs_c' in capsys.readouterr().err

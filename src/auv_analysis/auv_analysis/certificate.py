@@ -22,7 +22,7 @@ every positive definite Gamma. k_D and D may be asymmetric, only their quadratic
 (26) is an identity along solutions, not a decrease: F_dot may raise L.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,6 +61,10 @@ class Certificate:
     dissipation: np.ndarray
     drift: np.ndarray
     rho: np.ndarray
+
+    def part(self, keep: Any) -> 'Certificate':
+        """Certificate of the samples that an index, slice or mask of samples keeps."""
+        return Certificate(*(getattr(self, entry.name)[keep] for entry in fields(self)))
 
     @property
     def identity(self) -> np.ndarray:
@@ -136,18 +140,19 @@ def certificate(
     x = nu_d - nu + z @ form.Lambda.T  # U s, a row per sample
     s = np.linalg.solve(form.U, x.T).T
     w = (disturbance_estimate - disturbance) @ form.U  # U^T (f - F)
-    F_dot = derivative(t, disturbance) @ form.U  # U^T F_dot
     G_inv, norm = _inverse(form.G)
     drag = x @ dynamics.D_linear.reshape(6, 6).T
     drag += (np.abs(nu) * x) @ dynamics.D_quadratic.reshape(6, 6).T  # D(nu) x
     L = 0.5 * (_quadratic(s, form.A, s) + _quadratic(z, form.k_I, z) + _quadratic(w, G_inv, w))
+    rates = derivative(t, np.column_stack([disturbance, L]))
+    F_dot = rates[:, :6] @ form.U  # U^T F_dot
     return Certificate(
         t=t,
         s=s,
         z=z,
         w=w,
         L=L,
-        L_dot=derivative(t, L),
+        L_dot=rates[:, 6],
         dissipation=(x * drag).sum(axis=1)
         + _quadratic(s, form.B, s)
         + _quadratic(z, form.Lambda @ form.k_I, z),
@@ -156,22 +161,27 @@ def certificate(
     )
 
 
-def sampled_integral(t: np.ndarray, nu_err: np.ndarray) -> np.ndarray:
+def sampled_integral(
+    t: np.ndarray, nu_err: np.ndarray, start: np.ndarray | None = None
+) -> np.ndarray:
     """Z of a law under zero-order hold: z_0 = 0, z_k = z_{k-1} + (t_k - t_{k-1}) nu_err_{k-1}.
 
     Parameters
     ----------
     t : (n,) s
     nu_err : (n, 6) nu_d - nu as the law saw it, m/s and rad/s
+    start : (6,) z at the first sample, of a part that is not the beginning; None: zero
 
     Returns
     -------
     z : (n, 6) m and rad; equation (17)
 
     """
-    z = np.zeros(np.shape(nu_err))
-    np.cumsum(np.diff(t)[:, None] * nu_err[:-1], axis=0, out=z[1:])
-    return z
+    steps = np.zeros(np.shape(nu_err))
+    np.multiply(np.diff(t)[:, None], nu_err[:-1], out=steps[1:])
+    if start is not None:
+        steps[0] = start
+    return np.cumsum(steps, axis=0)
 
 
 def _inverse(G: np.ndarray) -> tuple[np.ndarray, float]:

@@ -2,6 +2,14 @@
 
 import numpy as np
 
+from auv_dynamics.jit import jitable
+
+
+@jitable
+def component(N, xi):
+    """1/2 N_i xi_i^2 of one number or of arrays: kg, kg m2 and m/s, rad/s to J; equation (30)."""
+    return 0.5 * N * xi * xi
+
 
 def generalised_velocity(Upsilon_inv: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """Xi = Upsilon^-1 nu, (4) and (31): nu (..., 6) in m/s, rad/s to xi (..., 6)."""
@@ -22,7 +30,7 @@ def kinetic_energy(Upsilon_inv: np.ndarray, N: np.ndarray, nu: np.ndarray) -> np
     components : (..., 6) J; equation (30)
 
     """
-    return 0.5 * N * generalised_velocity(Upsilon_inv, nu) ** 2
+    return component(N, generalised_velocity(Upsilon_inv, nu))
 
 
 def shares(components: np.ndarray) -> np.ndarray:

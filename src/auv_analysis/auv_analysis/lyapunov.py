@@ -1,32 +1,23 @@
 """The Lyapunov certificate as figures of a run: whether it applies, and what it says."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Any
 
 import numpy as np
 
-from auv_analysis.certificate import (
-    LAWS,
-    ROUNDING,
-    Certificate,
-    Form,
-    certificate,
-    form_of,
-    sampled_integral,
-    size,
+from auv_analysis.certificate import LAWS, ROUNDING, Certificate, Form, certificate, form_of
+from auv_analysis.certificate_figures import (
+    FIGURES,
+    SHARES,
+    as_figures,
+    certificate_blocks,
+    integral_of,
 )
-from auv_analysis.run import Run
+from auv_analysis.run import AnyRun, Run
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.model import ControlModel
 
-BOUND_TOLERANCE = 1e-6  # of max abs((26)): allows for truncation in the measured L_dot
-TRANSIENT = 2.0 - 1e-9  # s, which the paper leaves out of its errors
 OF_THE_MOTION = ('model_error', 'current')  # kinds of disturbance whose F depends on the motion
-SHARES = ('share_of_time_increasing', 'share_condition_27', 'share_bound_28')
-FIGURES = (
-    'identity_residual', 'identity_residual_rms', 'identity_residual_after_2s', *SHARES,
-    'sup_s', 'sup_z', 'sup_w', 'L_first', 'L_last', 'rho_max',
-)  # fmt: skip
 
 
 def applicability(law: str, gains: Any, model: ControlModel) -> str:
@@ -69,45 +60,29 @@ def _no_decrease(law: str, form: Form) -> str:
     return ''
 
 
-def lyapunov(run: Run, model: ControlModel) -> dict[str, Any]:
+def lyapunov(run: AnyRun, model: ControlModel) -> dict[str, Any]:
     """Figures of the certificate of a run, see `lyapunov_summary`.
 
     Parameters
     ----------
-    run : of `simulate` or `load_run`
+    run : of `simulate`, `load_run` or `open_bag`
     model : what the law knows of the vehicle
 
     """
-    sampled = run.hold == 'zoh'
-    z = integral_of(run)
-    return lyapunov_summary(
-        run.t,
-        run.nu,
-        run.nu_d,
-        z,
-        run.disturbance,
-        run.disturbance_estimate,
+    gains = make_gains(run.law, run.gains) if run.gains else None
+    known = run.law in LAWS and gains is not None
+    return _summary(
+        certificate_blocks(run, model) if known else iter(()),
+        run.start,
         run.law,
-        make_gains(run.law, run.gains) if run.gains else None,
+        gains,
         model,
+        knows_F=run.knows_disturbance,
         kinds=run.kinds,
-        sensors=run.measured is not None,
-        actuators=run.applied is not None,
-        sampled=sampled,
+        sensors=run.sensing,
+        actuators=run.acting,
+        sampled=run.hold == 'zoh',
     )
-
-
-def integral_of(run: Run) -> np.ndarray | None:
-    """Z of (17) as the law has it, (n, 6) in m and rad; None where it is not known.
-
-    A bag does not hold it: there it follows from what the law saw, unless anti-windup may have
-    stopped it at the limits of actuators.
-    """
-    if run.law in LAWS and run.law_state is not None:
-        return run.law_state[:, :6]
-    if run.applied is not None:
-        return None
-    return sampled_integral(run.t, run.nu_d - run.nu_measured) if run.hold == 'zoh' else None
 
 
 def certificate_of(run: Run, model: ControlModel) -> Certificate | None:
@@ -163,19 +138,50 @@ def lyapunov_summary(
         sampled : as given
 
     """
+    found: Iterator[Certificate] = iter(())
+    if law in LAWS and gains is not None:
+        unknown = np.full(np.shape(nu), np.nan)
+        z = unknown if z is None else z
+        F = unknown if disturbance is None else disturbance
+        found = iter([certificate(t, nu, nu_d, z, F, disturbance_estimate, law, gains, model)])
+    return _summary(
+        found,
+        float(t[0]),
+        law,
+        gains,
+        model,
+        knows_F=disturbance is not None,
+        kinds=kinds,
+        sensors=sensors,
+        actuators=actuators,
+        sampled=sampled,
+    )
+
+
+def _summary(
+    found: Iterator[Certificate],
+    start: float,
+    law: str,
+    gains: Any,
+    model: ControlModel,
+    *,
+    knows_F: bool,
+    kinds: Collection[str] | None,
+    sensors: bool,
+    actuators: bool,
+    sampled: bool,
+) -> dict[str, Any]:
+    """The summary from the certificates of consecutive blocks, none where there is none."""
     reasons = [
         applicability(law, gains, model),
-        _against_15(disturbance is not None, kinds),
+        _against_15(knows_F, kinds),
         'the law does not see the true velocity, so that (26) is not L_dot' if sensors else '',
         'the wrench applied is not that of the law, so that (26) is not L_dot' if actuators else '',
     ]
     reason = '; '.join(filter(None, reasons))
     summary = {'applicable': not reason, 'reason': reason, **dict.fromkeys(FIGURES)}
     if law in LAWS and gains is not None:
-        unknown = np.full(np.shape(nu), np.nan)
-        z = unknown if z is None else z
-        F = unknown if disturbance is None else disturbance
-        summary |= _figures(certificate(t, nu, nu_d, z, F, disturbance_estimate, law, gains, model))
+        summary |= as_figures(found, start)
         if sensors or actuators or _no_identity(form_of(law, gains, model)):
             summary |= dict.fromkeys(SHARES)
     return summary | {'sampled': sampled}
@@ -194,26 +200,6 @@ def _against_15(known: bool, kinds: Collection[str] | None) -> str:
         f'F contains {errors} and so depends on the motion, nu_dot included: (15) cannot be '
         'assumed and no bound follows a priori, though (26) holds along solutions with that F'
     )
-
-
-def _figures(found: Certificate) -> dict[str, float | None]:
-    """Figures of a certificate; None for those that are not finite."""
-    identity, residual = found.identity, found.L_dot - found.identity
-    largest = np.abs(identity).max()
-    figures = {f'sup_{name}': size(getattr(found, name)).max() for name in ('s', 'z', 'w')}
-    figures |= {'L_first': found.L[0], 'L_last': found.L[-1], 'rho_max': found.rho.max()}
-    if np.isfinite(largest):
-        below = found.bound + BOUND_TOLERANCE * largest
-        at_samples = identity > 0, found.dissipation >= np.abs(found.drift), found.L_dot <= below
-        figures |= zip(SHARES, map(np.mean, at_samples), strict=True)
-    if largest > 0:
-        figures['identity_residual'] = np.abs(residual).max() / largest
-        figures['identity_residual_rms'] = np.sqrt(np.mean(residual**2) / np.mean(identity**2))
-    late = found.t >= found.t[0] + TRANSIENT
-    if late.any() and np.abs(identity[late]).max() > 0:
-        late_largest = np.abs(identity[late]).max()
-        figures['identity_residual_after_2s'] = np.abs(residual[late]).max() / late_largest
-    return {name: float(x) if np.isfinite(x) else None for name, x in figures.items()}
 
 
 def _symmetric(matrix: np.ndarray) -> bool:

@@ -1,13 +1,16 @@
 """The figures of a run, as written to summary.json."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from auv_analysis.coupling import delta_pi, delta_xi, structural_zeros
-from auv_analysis.energy import kinetic_energy, shares
+from auv_analysis import moments
+from auv_analysis.coupling import structural_zeros
+from auv_analysis.energy import shares
 from auv_analysis.lyapunov import lyapunov
-from auv_analysis.run import Run
+from auv_analysis.moments import Moments, Tally, maps_of
+from auv_analysis.run import AnyRun, Run
 from auv_gvc_controller.gains import body_gains
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.model import control_model
@@ -17,12 +20,12 @@ BAND = 0.02  # of the peak of nu_d: settled
 SMALLEST_BAND = 0.005  # m/s, rad/s
 
 
-def summarize(run: Run, window: tuple[float, float] | None = None) -> dict[str, Any]:
+def summarize(run: AnyRun, window: tuple[float, float] | None = None) -> dict[str, Any]:
     """Figures of a run as a plain dict, ready for JSON.
 
     Parameters
     ----------
-    run : of `simulate` or `load_run`
+    run : of `simulate`, `load_run` or `open_bag`; it is gone through in blocks
     window : (from, to) in s over whose samples energy is averaged; none: the whole run
 
     Returns
@@ -35,27 +38,39 @@ def summarize(run: Run, window: tuple[float, float] | None = None) -> dict[str, 
     gains = [None, None]
     if run.gains:
         gains = [K.tolist() for K in body_gains(make_gains(run.law, run.gains), model)]
-    error = run.nu_d - run.nu
+    first, last = window or (run.start, run.start + run.duration)
+    late = run.start + TRANSIENT - 1e-9
+    begin, end = first - run.step / 2, np.nextafter(last + run.step / 2, np.inf)
+    tally = Tally(maps_of(model), (late,))
+    energies = Tally(maps_of(model), (begin, end)) if window else tally
+    for block in run.blocks():
+        for one in {tally, energies}:
+            one.add(block)
+    whole, after = tally.between(), tally.between(late)
+    inside = energies.between(begin, end) if window else whole
     return {
         'scenario': run.scenario,
         'law': run.law,
         'source': run.source,
         'duration': run.duration,
         'step': run.step,
-        'samples': len(run.t),
-        'kinetic_energy': _energy(run, Upsilon_inv, model.N, window),
+        'samples': run.samples,
+        'kinetic_energy': _energy(inside, (first, last)),
         'velocity_error': {
-            'rms': _rms(error),
-            'max_after_2s': _max_after_transient(run.t, error),
-            'settling_time': settling_time(run.t, error, run.nu_d),
+            'rms': whole.rms(moments.ERROR),
+            'max_after_2s': _peak(after, moments.ERROR),
+            'settling_time': _settling(run, whole.peaks[moments.SETPOINT]),
         },
-        'lumped_error': _lumped_error(run),
+        'lumped_error': {
+            'rms': whole.rms(moments.LUMPED) if run.knows_disturbance else None,
+            'max_after_2s': _peak(after, moments.LUMPED) if run.knows_disturbance else None,
+        },
         'coupling': {
-            'delta_xi_max': _max(delta_xi(Upsilon_inv, run.nu)),
-            'delta_pi_max': _max(delta_pi(Upsilon, run.tau)),
+            'delta_xi_max': whole.peak(moments.DELTA_XI),
+            'delta_pi_max': whole.peak(moments.DELTA_PI),
             'structural_zeros': structural_zeros(Upsilon, Upsilon_inv),
         },
-        'effort': {'rms': _rms(run.tau), 'max': _max(run.tau)},
+        'effort': {'rms': whole.rms(moments.TAU), 'max': whole.peak(moments.TAU)},
         'gains': {'K_D': gains[0], 'K_f': gains[1]},
         'decomposition': {'Upsilon': Upsilon.tolist(), 'N': model.N.tolist()},
         'lyapunov': lyapunov(run, model),
@@ -84,55 +99,47 @@ def settling_time(t: np.ndarray, error: np.ndarray, nu_d: np.ndarray) -> list[fl
     error, nu_d : (n, 6) m/s, rad/s
 
     """
-    band = band_of(np.abs(nu_d).max(axis=0))
-    times: list[float | None] = []
-    for i in range(6):
-        outside = np.flatnonzero(np.abs(error[:, i]) > band[i])
-        if len(outside) == 0:
-            times.append(float(t[0]))
-        elif outside[-1] == len(t) - 1:
-            times.append(None)
-        else:
-            times.append(float(t[outside[-1] + 1]))
+    return _last_entry([(t, error)], np.abs(nu_d).max(axis=0))
+
+
+def _settling(run: AnyRun, peaks: np.ndarray) -> list[float | None]:
+    return _last_entry(((block.t, block.nu_d - block.nu) for block in run.blocks()), peaks)
+
+
+def _last_entry(
+    blocks: Iterable[tuple[np.ndarray, np.ndarray]], peaks: np.ndarray
+) -> list[float | None]:
+    """Settling times from consecutive blocks of times and errors."""
+    band = band_of(peaks)
+    times: list[float | None] = [None] * 6  # None: outside at the last sample so far
+    for t, error in blocks:
+        outside = np.abs(error) > band
+        for i in range(6):
+            where = np.flatnonzero(outside[:, i])
+            inside_from = where[-1] + 1 if len(where) else 0
+            if inside_from == len(t):
+                times[i] = None
+            elif len(where) or times[i] is None:
+                times[i] = float(t[inside_from])
     return times
 
 
-def _energy(
-    run: Run, Upsilon_inv: np.ndarray, N: np.ndarray, window: tuple[float, float] | None
-) -> dict[str, Any]:
-    first, last = window or (float(run.t[0]), float(run.t[-1]))
-    inside = (run.t >= first - run.step / 2) & (run.t <= last + run.step / 2)
-    if inside.sum() < 2:
+def _energy(inside: Moments, window: tuple[float, float]) -> dict[str, Any]:
+    if inside.count < 2:
         return {
             'mean': None,
             'mean_by_component': None,
             'shares_percent': None,
-            'window': [first, last],
+            'window': list(window),
         }
-    components = kinetic_energy(Upsilon_inv, N, run.nu[inside]).mean(axis=0)
+    components = inside.mean(moments.ENERGY)
     return {
         'mean': float(components.sum()),
         'mean_by_component': components.tolist(),
         'shares_percent': shares(components).tolist(),
-        'window': [float(run.t[inside][0]), float(run.t[inside][-1])],
+        'window': [float(inside.first), float(inside.last)],
     }
 
 
-def _lumped_error(run: Run) -> dict[str, Any]:
-    w = lumped_error(run)
-    if w is None:
-        return {'rms': None, 'max_after_2s': None}
-    return {'rms': _rms(w), 'max_after_2s': _max_after_transient(run.t, w)}
-
-
-def _rms(values: np.ndarray) -> list[float]:
-    return np.sqrt(np.mean(values**2, axis=0)).tolist()
-
-
-def _max(values: np.ndarray) -> list[float]:
-    return np.abs(values).max(axis=0).tolist()
-
-
-def _max_after_transient(t: np.ndarray, values: np.ndarray) -> list[float] | None:
-    after = t >= t[0] + TRANSIENT - 1e-9
-    return _max(values[after]) if after.any() else None
+def _peak(part: Moments, signal: int) -> list[float] | None:
+    return part.peak(signal) if part.count else None

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.coupling import input_deformation, velocity_deformation
 from auv_analysis.energy import kinetic_energy, shares
 from auv_analysis.report import paper
 from auv_analysis.report.text import number, plain
@@ -100,7 +101,10 @@ def couplings(runs: Mapping[str, Run], summaries: Summaries) -> list[dict[str, A
     first = next(iter(runs))
     Upsilon = np.array(summaries[first]['decomposition']['Upsilon'])
     zeros = summaries[first]['coupling']['structural_zeros']
-    rules = {'delta_xi': inverse_upper(Upsilon) - np.eye(6), 'delta_pi': (Upsilon - np.eye(6)).T}
+    rules = {
+        'delta_xi': velocity_deformation(inverse_upper(Upsilon)),
+        'delta_pi': input_deformation(Upsilon),
+    }
     signals = {'delta_xi': list(VELOCITIES), 'delta_pi': [f'τ_{x}' for x in WRENCHES]}
     symbols = {'delta_xi': 'Δξ', 'delta_pi': 'Δπ'}
     units = {'delta_xi': ('m/s', 'rad/s'), 'delta_pi': ('N', 'N m')}

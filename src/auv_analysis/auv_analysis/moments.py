@@ -1,0 +1,183 @@
+"""Sums and largest magnitudes of a run's signals, in one go over its samples.
+
+A signal is formed from the sample at hand and only its sums are kept. What a signal is stands once,
+in `signals`: it takes the numbers of one sample where it is compiled, and whole columns of a block
+where it is not.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import reduce
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from auv_analysis.coupling import input_deformation, velocity_deformation
+from auv_analysis.energy import component
+from auv_analysis.run import Run
+from auv_dynamics.jit import JITTED, compiled, jitable
+from auv_dynamics.six import mul, sub, upper, vector
+from auv_gvc_controller.model import ControlModel
+
+NAMES = ('error', 'lumped_error', 'tau', 'delta_xi', 'delta_pi', 'energy', 'nu_d')
+ERROR, LUMPED, TAU, DELTA_XI, DELTA_PI, ENERGY, SETPOINT = range(len(NAMES))
+
+
+class Maps(NamedTuple):
+    """What leads from nu and tau to the signals: flat, row-major."""
+
+    Upsilon_inv: np.ndarray
+    N: np.ndarray
+    to_delta_xi: np.ndarray
+    to_delta_pi: np.ndarray
+
+
+def maps_of(model: ControlModel) -> Maps:
+    """Maps of a vehicle."""
+    Upsilon, Upsilon_inv = (m.reshape(6, 6) for m in (model.Upsilon, model.Upsilon_inv))
+    deformations = velocity_deformation(Upsilon_inv), input_deformation(Upsilon)
+    return Maps(model.Upsilon_inv, model.N, *(np.ravel(matrix) for matrix in deformations))
+
+
+@jitable
+def signals(nu, nu_d, tau, f, F, maps):
+    """The signals of `NAMES`, six numbers each: m/s, rad/s; N, N m; J."""
+    xi, N = upper(maps.Upsilon_inv, nu), maps.N
+    energy = (
+        component(N[0], xi[0]),
+        component(N[1], xi[1]),
+        component(N[2], xi[2]),
+        component(N[3], xi[3]),
+        component(N[4], xi[4]),
+        component(N[5], xi[5]),
+    )
+    return (
+        sub(nu_d, nu),
+        sub(f, F),
+        tau,
+        mul(maps.to_delta_xi, nu),
+        mul(maps.to_delta_pi, tau),
+        energy,
+        nu_d,
+    )
+
+
+@compiled
+def add_samples(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
+    """Add samples, flat arrays (6 n,), to what (7, 6) is known of those before them.
+
+    Only the sum of the energy, the squares of errors and input, and no peak of the energy are
+    ever asked for.
+    """
+    for k in range(0, nu.shape[0], 6):
+        error, lumped, command, xi, pi, energy, setpoint = signals(
+            vector(nu, k), vector(nu_d, k), vector(tau, k), vector(f, k), vector(F, k), maps
+        )
+        for i in range(6):
+            sums[ENERGY, i] += energy[i]
+            squares[ERROR, i] += error[i] * error[i]
+            squares[LUMPED, i] += lumped[i] * lumped[i]
+            squares[TAU, i] += command[i] * command[i]
+            peaks[ERROR, i] = max(peaks[ERROR, i], abs(error[i]))
+            peaks[LUMPED, i] = max(peaks[LUMPED, i], abs(lumped[i]))
+            peaks[TAU, i] = max(peaks[TAU, i], abs(command[i]))
+            peaks[DELTA_XI, i] = max(peaks[DELTA_XI, i], abs(xi[i]))
+            peaks[DELTA_PI, i] = max(peaks[DELTA_PI, i], abs(pi[i]))
+            peaks[SETPOINT, i] = max(peaks[SETPOINT, i], abs(setpoint[i]))
+
+
+def add_columns(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
+    """The same without a compiler: the samples as columns."""
+    columns = (np.ascontiguousarray(flat.reshape(-1, 6).T) for flat in (nu, nu_d, tau, f, F))
+    for s, signal in enumerate(signals(*columns, maps)):
+        for i, values in enumerate(signal):
+            sums[s, i] += values.sum()
+            squares[s, i] += values @ values
+            peaks[s, i] = max(peaks[s, i], np.abs(values).max(initial=0.0))
+
+
+def _zeros() -> np.ndarray:
+    return np.zeros((len(NAMES), 6))
+
+
+@dataclass
+class Moments:
+    """What is kept of some samples; the rows are those of `NAMES`.
+
+    Attributes
+    ----------
+    count : number of samples
+    first, last : their times, s
+    sums, squares, peaks : (7, 6) sums, sums of squares and largest magnitudes
+
+    """
+
+    count: int = 0
+    first: float = np.inf
+    last: float = -np.inf
+    sums: np.ndarray = field(default_factory=_zeros)
+    squares: np.ndarray = field(default_factory=_zeros)
+    peaks: np.ndarray = field(default_factory=_zeros)
+
+    def add(self, run: Run, maps: Maps) -> None:
+        """Add the samples of a block, (n, 6) each."""
+        known = run.disturbance_estimate if run.disturbance is None else run.disturbance
+        values = run.nu, run.nu_d, run.tau, run.disturbance_estimate, known
+        nu, nu_d, tau, f, F = (np.ascontiguousarray(value, float).ravel() for value in values)
+        self.count += len(run.t)
+        self.first, self.last = min(self.first, run.t[0]), max(self.last, run.t[-1])
+        add = add_samples if JITTED else add_columns
+        add(nu, nu_d, tau, f, F, maps, self.sums, self.squares, self.peaks)
+
+    def joined(self, other: 'Moments') -> 'Moments':
+        """What is known of these samples and those of the other."""
+        return Moments(
+            self.count + other.count,
+            min(self.first, other.first),
+            max(self.last, other.last),
+            self.sums + other.sums,
+            self.squares + other.squares,
+            np.maximum(self.peaks, other.peaks),
+        )
+
+    def mean(self, signal: int) -> np.ndarray:
+        """Mean (6,) of a signal."""
+        return self.sums[signal] / self.count
+
+    def rms(self, signal: int) -> list[float]:
+        """Root mean squares of a signal."""
+        return np.sqrt(self.squares[signal] / self.count).tolist()
+
+    def peak(self, signal: int) -> list[float]:
+        """Largest magnitudes of a signal."""
+        return self.peaks[signal].tolist()
+
+
+class Tally:
+    """Moments of the parts of a run between some times.
+
+    Parameters
+    ----------
+    maps : of its vehicle
+    times : s; a sample at one of them belongs to the part behind it
+
+    """
+
+    def __init__(self, maps: Maps, times: Iterable[float]):
+        self._maps = maps
+        self._times = sorted(set(times))
+        self._parts = [Moments() for _ in range(len(self._times) + 1)]
+
+    def add(self, block: Run) -> None:
+        """Add the next samples."""
+        edges = [0, *np.searchsorted(block.t, self._times).tolist(), len(block.t)]
+        for part, (first, last) in zip(self._parts, pairwise(edges), strict=True):
+            if last > first:
+                part.add(block.part(slice(first, last)), self._maps)
+
+    def between(self, first: float | None = None, last: float | None = None) -> Moments:
+        """Moments of the samples from one of the times up to another; None: of the run's end."""
+        begin = 0 if first is None else self._times.index(first) + 1
+        end = None if last is None else self._times.index(last) + 1
+        return reduce(Moments.joined, self._parts[begin:end], Moments())

@@ -1,0 +1,144 @@
+"""A run in blocks gives the figures of the whole run, wherever its borders fall."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis import moments as of
+from auv_analysis.certificate_figures import certificate_blocks
+from auv_analysis.lyapunov import certificate_of
+from auv_analysis.run import LongRun, Run, joined, widened
+from auv_dynamics.jit import plain
+from auv_gvc_controller.model import control_model
+
+quick = settings(max_examples=20, deadline=None)
+ROWS = st.integers(1, 40) | st.integers(100, 450)
+
+
+@pytest.fixture(scope='module')
+def run() -> Run:
+    scenario = load_scenario('case1')
+    return simulate(replace(scenario, data=scenario.data | {'duration': 4.0}), 'gvc', 'zoh')
+
+
+def in_blocks(run: Run, rows: int) -> LongRun:
+    """The same run, whose blocks have another length than is asked for."""
+    return LongRun(
+        **run.facts(), known_extent=run.extent, source_of_blocks=lambda _: run.blocks(rows)
+    )
+
+
+def assert_same_figures(found: Any, expected: Any) -> None:
+    if isinstance(expected, dict):
+        assert found.keys() == expected.keys()
+        for key, value in expected.items():
+            assert_same_figures(found[key], value)
+    elif isinstance(expected, list) and expected and isinstance(expected[0], float):
+        assert_allclose(found, expected, rtol=1e-12)
+    elif isinstance(expected, float):
+        assert found == pytest.approx(expected, rel=1e-12)
+    else:
+        assert found == expected
+
+
+@given(rows=ROWS, margin=st.integers(0, 20), wide=st.booleans())
+@quick
+def test_blocks_are_the_run(run, rows, margin, wide) -> None:
+    if not wide:
+        whole = joined([*run.blocks(rows)])
+    else:
+        parts = [*widened(run.blocks(rows), margin)]
+        whole = joined([block.part(inside) for block, inside in parts])
+        for (a, i), (b, j) in zip(parts, run.wide_blocks(margin, rows), strict=True):
+            assert i == j
+            assert_array_equal(a.t, b.t)
+    assert whole.arrays().keys() == run.arrays().keys()
+    for name, values in run.arrays().items():
+        assert_array_equal(whole.arrays()[name], values)
+
+
+@given(rows=st.integers(1, 130), blocks=st.floats(0.1, 8))
+@quick
+def test_summary(run, rows, blocks) -> None:
+    part = run.part(slice(0, max(int(blocks * rows), 1)))
+    assert_same_figures(summarize(in_blocks(part, rows)), summarize(part))
+
+
+@given(rows=st.integers(50, 450), first=st.floats(-1, 5), last=st.floats(-1, 5))
+@quick
+def test_window_of_the_energy(run, rows, first, last) -> None:
+    window = first, last
+    assert_same_figures(summarize(in_blocks(run, rows), window), summarize(run, window))
+
+
+@given(rows=st.integers(1, 60), n=st.integers(1, 60), known=st.booleans(), seed=st.integers(0, 99))
+@quick
+def test_certificate_at_the_borders(run, rows, n, known, seed) -> None:
+    """Bit for bit: derivative over nine samples, and z that is summed up from the start."""
+    steps = np.random.default_rng(seed).uniform(0.005, 0.02, n)
+    part = replace(run.part(slice(0, n)), t=np.cumsum(steps))
+    part = part if known else replace(part, law_state=None)
+    model = control_model(part.vehicle)
+    whole = certificate_of(part, model)
+    blocks = [*certificate_blocks(in_blocks(part, rows), model, rows)]
+    for name in ('t', 's', 'z', 'w', 'L', 'L_dot', 'dissipation', 'drift', 'rho'):
+        found = np.concatenate([getattr(block, name) for block in blocks])
+        # products of matrices with other numbers of rows may round in another way
+        assert_allclose(found, getattr(whole, name), rtol=1e-9, atol=1e-9 * abs(whole.L).max())
+
+
+def test_a_late_error_and_a_late_set_point_are_seen_over_borders(run) -> None:
+    for k in (0, 99, 100, 199, 399, 400):
+        nu_d = run.nu_d.copy()
+        nu_d[k, 3] += 2.0
+        bent = replace(run, nu_d=nu_d)
+        found = summarize(in_blocks(bent, 100))['velocity_error']['settling_time']
+        assert found == summarize(bent)['velocity_error']['settling_time']
+        assert found[3] == (None if k == 400 else pytest.approx((k + 1) / 100))
+
+
+def numbers(seed: int, n: int) -> list[np.ndarray]:
+    return [*np.random.default_rng(seed).normal(size=(5, n, 6))]
+
+
+@given(seed=st.integers(0, 99), n=st.integers(1, 40), compiled=st.booleans())
+@quick
+def test_moments_by_their_definition(run, seed, n, compiled) -> None:
+    nu, nu_d, tau, f, F = numbers(seed, n)
+    model = control_model(run.vehicle)
+    Upsilon, inverse = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
+    xi, pi = np.linalg.solve(Upsilon, nu.T).T, tau @ Upsilon
+    expected = nu_d - nu, f - F, tau, xi - nu, pi - tau, 0.5 * model.N * xi**2, nu_d
+    found = of.Moments()
+    add = plain(of.add_samples) if not compiled else of.add_samples
+    flat = (values.ravel() for values in (nu, nu_d, tau, f, F))
+    add(*flat, of.maps_of(model), found.sums, found.squares, found.peaks)
+    assert_allclose(found.sums[of.ENERGY], expected[of.ENERGY].sum(axis=0), rtol=1e-11)
+    for signal in (of.ERROR, of.LUMPED, of.TAU):
+        assert_allclose(found.squares[signal], (expected[signal] ** 2).sum(axis=0), rtol=1e-11)
+    for signal in (of.ERROR, of.LUMPED, of.TAU, of.DELTA_XI, of.DELTA_PI, of.SETPOINT):
+        assert_allclose(found.peaks[signal], abs(expected[signal]).max(axis=0), atol=1e-12)
+    assert np.allclose(inverse @ Upsilon, np.eye(6))
+
+
+@given(seed=st.integers(0, 99), n=st.integers(1, 40))
+@quick
+def test_columns_give_what_samples_give(run, seed, n) -> None:
+    flat = [values.ravel() for values in numbers(seed, n)]
+    maps = of.maps_of(control_model(run.vehicle))
+    found, expected = of.Moments(), of.Moments()
+    of.add_columns(*flat, maps, found.sums, found.squares, found.peaks)
+    of.add_samples(*flat, maps, expected.sums, expected.squares, expected.peaks)
+    for kind, signals in (
+        ('sums', [of.ENERGY]),
+        ('squares', [of.ERROR, of.LUMPED, of.TAU]),
+        ('peaks', [of.ERROR, of.LUMPED, of.TAU, of.DELTA_XI, of.DELTA_PI, of.SETPOINT]),
+    ):
+        one, other = getattr(found, kind), getattr(expected, kind)
+        assert_allclose(one[signals], other[signals], rtol=1e-12, atol=1e-12)

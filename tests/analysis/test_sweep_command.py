@@ -122,7 +122,7 @@ def test_own_law_runs_as_plain_python_and_says_so(command, files: Path, monkeypa
     (files / 'campaign.yaml').write_text(text)
     code, out, lines = command('--json')
     assert (code, json.loads(out)['controllers']['mine']['ok']) == (0, 2)
-    assert any('the law Proportional runs as plain Python' in line for line in lines)
+    assert any('the law Proportional runs as plain Python, slower' in line for line in lines)
     errors = rows(files / 'runs/small')['velocity_error.rms.surge'].to_pylist()
     assert errors[0] > errors[1]
     (files / 'my_sweep_law.py').write_text(OWN_LAW + '# changed\n')

@@ -19,7 +19,6 @@ from auv_analysis.sweep.campaign import Campaign, of_controller
 from auv_analysis.sweep.values import Values, take
 from auv_dynamics.files import InputError
 from auv_dynamics.jit import JITTED, sources_digest
-from auv_gvc_controller.laws import SHIPPED
 
 Figures = dict[str, np.ndarray]  # column -> (n,)
 
@@ -135,9 +134,7 @@ def laws_of(campaign: Campaign) -> dict[str, str]:
     import inspect
 
     found = {}
-    for name in campaign.controllers:
-        law = type(campaign.scenario.gains(name))
-        file = inspect.getsourcefile(law) if law not in SHIPPED.values() else None
-        if file:
+    for name, law in campaign.own_laws.items():
+        if file := inspect.getsourcefile(law):
             found[name] = hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16]
     return found

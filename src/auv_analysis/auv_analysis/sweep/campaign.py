@@ -14,7 +14,7 @@ from auv_analysis.sweep.groups import Group, kind_of, make_group
 from auv_analysis.sweep.values import Values
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError, check, read_yaml
-from auv_gvc_controller.sampled import is_compiled
+from auv_gvc_controller.laws import SHIPPED
 
 SCHEMA = Path(__file__).with_name('campaign.schema.json')
 EVERY = 'controllers.*.'  # begins a path into each controller of the sweep
@@ -26,7 +26,7 @@ NOT_VARIED = {
 }
 MOST_ROLLOUTS = 2**53
 STEPS_AT_ONCE = 500_000  # of a block, about: a fraction of a second, compiled
-PLAIN_BLOCK = 8  # rollouts, where the law runs as plain Python: a second or more each
+PLAIN_BLOCK = 8  # rollouts of a user's own law: as plain Python a second or more each
 SMALLEST_BLOCK, LARGEST_BLOCK = 16, 1024
 BLOCKS_AT_LEAST = 8  # so that every core has something to do
 MOST_PARTS = 10_000  # files of a result, about
@@ -69,6 +69,12 @@ class Campaign:
         return self.data['hold']
 
     @property
+    def own_laws(self) -> dict[str, type]:
+        """Controller -> its law, where that is a user's own."""
+        laws = {name: type(self.scenario.gains(name)) for name in self.controllers}
+        return {name: law for name, law in laws.items() if law not in SHIPPED.values()}
+
+    @property
     def inputs(self) -> list[Path]:
         """Files that the campaign was read from."""
         scenarios = (self.scenario, *self.scenarios.values())
@@ -85,10 +91,11 @@ class Campaign:
         """Rollouts that are simulated and stored at once."""
         if 'block' in self.data:
             return self.data['block']
-        plain = not all(is_compiled(self.scenario.gains(name)) for name in self.controllers)
-        by_length = PLAIN_BLOCK if plain else STEPS_AT_ONCE // self.scenario.steps
+        by_length = STEPS_AT_ONCE // self.scenario.steps
         shared = min(by_length, -(-self.rollouts // BLOCKS_AT_LEAST))
-        size = min(max(shared, PLAIN_BLOCK if plain else SMALLEST_BLOCK), LARGEST_BLOCK)
+        size = min(max(shared, SMALLEST_BLOCK), LARGEST_BLOCK)
+        if self.own_laws:
+            size = min(size, PLAIN_BLOCK)
         return max(size, -(-self.rollouts // MOST_PARTS))
 
     def values(self, first: int, last: int) -> dict[str, Values]:

@@ -35,11 +35,19 @@ def sweep(options: argparse.Namespace) -> dict[str, Any]:
             for warning in campaign.scenario.warnings:
                 _say(f'warning: {warning}')
             if folder.new:
-                announce(campaign.scenario, campaign.controllers)
+                _announce(campaign)
             outcome = _run(campaign, folder, *executor, overwrite=options.overwrite)
         finally:
             folder.close()
     return _conclude(campaign, folder, outcome)
+
+
+def _announce(campaign: Campaign) -> None:
+    own = campaign.own_laws
+    announce(campaign.scenario, [name for name in campaign.controllers if name not in own])
+    for name, law in own.items():
+        how = 'as plain Python, slower, where numba cannot compile it'
+        _say(f'{name}: the law {law.__name__} runs {how}')
 
 
 def _workers(text: str | None) -> int | None:

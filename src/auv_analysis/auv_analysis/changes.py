@@ -8,7 +8,8 @@ from typing import Any
 import jsonschema
 import numpy as np
 
-from auv_analysis.scenario import SCHEMA, Scenario, scenario_from, vehicle_path_of
+from auv_analysis.scenario import SCHEMA, Scenario, scenario_from
+from auv_analysis.scenario_values import vehicle_path_of
 from auv_dynamics.files import InputError, dotted, read_text, read_yaml, schema
 from auv_dynamics.vehicle_file import SCHEMA as VEHICLE_SCHEMA
 
@@ -189,14 +190,12 @@ def bounds(scenario: Scenario, path: str) -> tuple[float, float] | None:
     """
     low, high = -np.inf, np.inf
     for node in _nodes_of(scenario, path):
-        kind = node.get('type')
-        if 'enum' in node or 'const' in node or 'multipleOf' in node or kind == 'integer':
+        if node.keys() & {'enum', 'const', 'multipleOf'} or node.get('type') == 'integer':
             return None
-        if kind == 'number':
-            low = max(low, node.get('exclusiveMinimum', -np.inf))
-            low = max(low, np.nextafter(node.get('minimum', -np.inf), -np.inf))
-            high = min(high, node.get('exclusiveMaximum', np.inf))
-            high = min(high, np.nextafter(node.get('maximum', np.inf), np.inf))
+        if node.get('type') == 'number':
+            least, most = node.get('minimum', -np.inf), node.get('maximum', np.inf)
+            low = max(low, node.get('exclusiveMinimum', -np.inf), np.nextafter(least, -np.inf))
+            high = min(high, node.get('exclusiveMaximum', np.inf), np.nextafter(most, np.inf))
     return float(low), float(high)
 
 

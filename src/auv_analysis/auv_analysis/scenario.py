@@ -1,7 +1,6 @@
 """Scenario file, format 1: one experiment, resolved so that nothing is left to look up."""
 
 import json
-import os
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,9 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.scenario_values import NANOSECONDS, check_names, check_time, resolved
+from auv_analysis.scenario_values import (
+    NANOSECONDS,
+    check_names,
+    check_time,
+    resolved,
+    vehicle_path_of,
+)
 from auv_dynamics.actuators import Actuators, Reach, make_actuators, make_reach
-from auv_dynamics.config import shipped, shipped_by_name
+from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError, check, read_text, read_yaml
 from auv_dynamics.sensors import SensorNoise
 from auv_dynamics.uncertainty import Uncertainty, make_uncertainty
@@ -233,18 +238,6 @@ def scenario_from(
     for name in result.controllers:
         _check_gains(result, name)
     return result
-
-
-def vehicle_path_of(vehicle: str, scenario: Path) -> Path:
-    """Path of a vehicle as a scenario file names it: relative to it, absolute or a bare name."""
-    relative = scenario.parent / vehicle
-    is_path = Path(vehicle).suffix in ('.yaml', '.yml') or len(Path(vehicle).parts) != 1
-    if os.path.isfile(relative) or is_path:
-        return relative
-    try:
-        return shipped_by_name('vehicles', vehicle)
-    except InputError as error:
-        raise InputError(scenario, 'vehicle', error.expected, vehicle) from None
 
 
 def _check_gains(scenario: Scenario, name: str) -> None:

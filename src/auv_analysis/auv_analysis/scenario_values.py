@@ -1,10 +1,12 @@
-"""A scenario's values: defaults filled in, times that fit together."""
+"""A scenario's values: defaults filled in, times that fit together, the vehicle's file."""
 
 import copy
+import os
 from pathlib import Path
 from typing import Any
 
 from auv_analysis.folder import OURS
+from auv_dynamics.config import shipped_by_name
 from auv_dynamics.files import InputError
 
 NANOSECONDS = 10**9
@@ -44,3 +46,15 @@ def check_time(data: dict[str, Any], path: Path) -> None:
         raise InputError(path, 'duration', expected, f'{data["duration"]!r} s')
     if steps > MOST_STEPS:
         raise InputError(path, 'duration', f'at most {MOST_STEPS} steps', f'{steps:.0f}')
+
+
+def vehicle_path_of(vehicle: str, scenario: Path) -> Path:
+    """Path of a vehicle as a scenario file names it: relative to it, absolute or a bare name."""
+    relative = scenario.parent / vehicle
+    is_path = Path(vehicle).suffix in ('.yaml', '.yml') or len(Path(vehicle).parts) != 1
+    if os.path.isfile(relative) or is_path:
+        return relative
+    try:
+        return shipped_by_name('vehicles', vehicle)
+    except InputError as error:
+        raise InputError(scenario, 'vehicle', error.expected, vehicle) from None

@@ -9,7 +9,7 @@ from auv_dynamics.files import InputError
 from auv_dynamics.jit import compiled, helper
 from auv_dynamics.lanes import clip, select
 from auv_dynamics.signals import DOFS
-from auv_dynamics.six import copied, fill_vector, vector
+from auv_dynamics.six import clipped, copied, fill_vector, vector
 from auv_dynamics.vehicle import Vehicle
 
 MOST_STEPS = 1_000_000  # of a delay
@@ -206,16 +206,7 @@ def allocated(reach, tau):
 @helper
 def reachable(reach, tau):
     """The wrench that is had for the command tau: thruster allocation, then the axis limits."""
-    c = allocated(reach, tau)
-    limit = reach.limit
-    return (
-        clip(c[0], -limit[0], limit[0]),
-        clip(c[1], -limit[1], limit[1]),
-        clip(c[2], -limit[2], limit[2]),
-        clip(c[3], -limit[3], limit[3]),
-        clip(c[4], -limit[4], limit[4]),
-        clip(c[5], -limit[5], limit[5]),
-    )
+    return clipped(allocated(reach, tau), reach.limit)
 
 
 @helper

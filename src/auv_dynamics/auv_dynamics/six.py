@@ -5,6 +5,7 @@ is a flat row-major array (36,); a triangular one is stored in full and used by 
 """
 
 from auv_dynamics.jit import helper
+from auv_dynamics.lanes import clip
 
 
 @helper
@@ -47,6 +48,19 @@ def add(a, b):
 def sub(a, b):
     """A - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3], a[4] - b[4], a[5] - b[5])
+
+
+@helper
+def clipped(a, limit):
+    """A within -limit ... limit, by component."""
+    return (
+        clip(a[0], -limit[0], limit[0]),
+        clip(a[1], -limit[1], limit[1]),
+        clip(a[2], -limit[2], limit[2]),
+        clip(a[3], -limit[3], limit[3]),
+        clip(a[4], -limit[4], limit[4]),
+        clip(a[5], -limit[5], limit[5]),
+    )
 
 
 @helper

@@ -16,6 +16,7 @@ from auv_analysis.report import plotting
 from auv_analysis.report.figures import FigureRecord, draw_figures
 from auv_analysis.report.page import maths, write_report
 from auv_analysis.report.text import fixed, join, number, plain, tied
+from auv_analysis.report.traces import decimate
 from auv_analysis.run import Run
 
 EMPTY_TAGS = {'meta', 'img', 'br'}
@@ -116,9 +117,9 @@ def test_structural_zeros_are_named_and_not_drawn(figures, monkeypatch, case1, t
     drawn = []
     original = plotting.draw_lines
 
-    def spy(axes, t, values, columns):
+    def spy(axes, run, signal, part, columns):
         drawn.append(tuple(columns))
-        original(axes, t, values, columns)
+        original(axes, run, signal, part, columns)
 
     monkeypatch.setattr(plotting, 'draw_lines', spy)
     draw_figures({'gvc': _short(case1['gvc'], 5.0)}, tmp_path)
@@ -175,7 +176,7 @@ def test_decimation_keeps_every_extreme_and_few_points(n, logarithmic):
     rng = np.random.default_rng(n)
     t, y = np.arange(1.0, n + 1), rng.normal(size=n)
     y[n // 3], y[-1] = 50.0, -60.0
-    few_t, few_y = plotting.decimate(t, y, logarithmic=logarithmic)
+    few_t, few_y = decimate(t, y, logarithmic=logarithmic)
     assert len(few_t) <= 4000
     assert few_y.max() == 50.0
     assert few_y.min() == -60.0

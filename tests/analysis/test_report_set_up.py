@@ -19,6 +19,7 @@ from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.page import write_report
 from auv_analysis.report.paper import paper_figure
 from auv_analysis.report.set_up import set_up
+from auv_analysis.report.sketching import sketch, sketches
 from auv_analysis.run import Run
 from auv_gvc_controller.model import control_model
 
@@ -224,7 +225,7 @@ def test_a_law_that_estimates_nothing_has_no_estimation_error(rough, tmp_path, q
 def test_applied_and_commanded_wrench_are_both_drawn_with_their_limits(rough):
     run, limit = rough[0]['wound'], np.array(DATA['actuators']['limit'], float)
     with plotting.style():
-        figure, _, caption = applied_figure(run, limit)
+        figure, _, caption = applied_figure(sketch(run), limit)
     surge = figure.axes[0]
     lines = [np.asarray(line.get_ydata(), float) for line in surge.lines]
     drawn = [line for line in lines if len(line) == len(run.t)]
@@ -295,7 +296,7 @@ def test_certificate_figure_holds_the_measured_derivative_against_26_and_28(case
     run, summary = case1[0]['gvc'], case1[1]['gvc']
     found = certificate_of(run, control_model(run.vehicle))
     with plotting.style():
-        figure, _, caption = certificate_figure(run, summary)
+        figure, _, caption = certificate_figure(sketch(run), summary)
     energy, early, late = figure.axes
     assert energy.get_yscale() == 'log'
     assert early.get_yscale() == 'symlog'
@@ -310,7 +311,7 @@ def test_certificate_figure_holds_the_measured_derivative_against_26_and_28(case
     assert 'The certificate does not apply' not in caption
     with plotting.style():
         sampled = replace(run, hold='zoh')
-        assert 'held between samples' in certificate_figure(sampled, summary)[2]
+        assert 'held between samples' in certificate_figure(sketch(sampled), summary)[2]
 
 
 def test_certificate_is_drawn_where_26_holds_along_solutions_and_says_so(tmp_path, quick):
@@ -331,24 +332,26 @@ def test_certificate_is_drawn_where_26_holds_along_solutions_and_says_so(tmp_pat
 def test_certificate_figure_of_next_to_nothing(case1):
     run, summary = case1[0]['gvc'], case1[1]['gvc']
     two = run.part(run.t <= 0.015)
-    assert certificates.certificate_figure(two, summary)[0] is None
+    assert certificates.certificate_figure(sketch(two), summary)[0] is None
 
 
 def test_axes_that_are_called_logarithmic_are(case1):
     runs = case1[0]
     with plotting.style():
-        shares, _, caption = overview.energy_shares(runs)
+        shares, _, caption = overview.energy_shares(sketches(runs))
         assert 'logarithmic axis' in caption
         assert shares.axes[0].get_xscale() == 'log'
-        inputs, _, _ = overview.inputs({'gvc': replace(runs['gvc'], tau=-np.abs(runs['gvc'].tau))})
+        pushed = replace(runs['gvc'], tau=-np.abs(runs['gvc'].tau))
+        inputs, _, _ = overview.inputs(sketches({'gvc': pushed}))
         assert {axes.get_xscale() for axes in inputs.axes} == {'log'}
 
 
 def test_runs_that_are_far_apart_share_a_scale_on_which_both_show(case1):
     gvc, cl = case1[0]['gvc'], case1[0]['cl']
     with plotting.style():
-        near, _, told = overview.inputs({'gvc': gvc, 'cl': gvc})
-        far, _, told_far = overview.inputs({'gvc': gvc, 'cl': replace(cl, tau=1000.0 * cl.tau)})
+        near, _, told = overview.inputs(sketches({'gvc': gvc, 'cl': gvc}))
+        apart = sketches({'gvc': gvc, 'cl': replace(cl, tau=1000.0 * cl.tau)})
+        far, _, told_far = overview.inputs(apart)
     assert {axes.get_yscale() for axes in near.axes} == {'linear'}
     assert far.axes[2].get_yscale() == 'symlog'
     assert 'dotted lines' not in told
@@ -377,7 +380,7 @@ def test_restless_lines_lie_below_smooth_ones(case1):
     noise = np.random.default_rng(1).normal(size=run.tau.shape) * 100.0
     runs = {'smooth': run, 'noisy': replace(run, tau=run.tau + noise, measured=run.nu)}
     with plotting.style():
-        figure, _, _ = overview.inputs(runs)
+        figure, _, _ = overview.inputs(sketches(runs))
     for axes in figure.axes:
         smooth, noisy = axes.lines[:2]
         assert smooth.get_zorder() > noisy.get_zorder()

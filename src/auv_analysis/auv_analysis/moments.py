@@ -8,7 +8,6 @@ where it is not.
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import reduce
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from auv_analysis.coupling import input_deformation, velocity_deformation
 from auv_analysis.energy import component
 from auv_analysis.run import Run
+from auv_analysis.windows import Windows
 from auv_dynamics.jit import JITTED, compiled, jitable
 from auv_dynamics.six import mul, sub, upper, vector
 from auv_gvc_controller.model import ControlModel
@@ -165,19 +165,15 @@ class Tally:
     """
 
     def __init__(self, maps: Maps, times: Iterable[float]):
-        self._maps = maps
-        self._times = sorted(set(times))
-        self._parts = [Moments() for _ in range(len(self._times) + 1)]
+        self._maps, self._windows = maps, Windows(times)
+        self._parts = [Moments() for _ in range(self._windows.parts)]
 
     def add(self, block: Run) -> None:
         """Add the next samples."""
-        edges = [0, *np.searchsorted(block.t, self._times).tolist(), len(block.t)]
-        for part, (first, last) in zip(self._parts, pairwise(edges), strict=True):
-            if last > first:
-                part.add(block.part(slice(first, last)), self._maps)
+        for i, inside in self._windows.split(block.t):
+            self._parts[i].add(block.part(inside), self._maps)
 
     def between(self, first: float | None = None, last: float | None = None) -> Moments:
         """Moments of the samples from one of the times up to another; None: of the run's end."""
-        begin = 0 if first is None else self._times.index(first) + 1
-        end = None if last is None else self._times.index(last) + 1
-        return reduce(Moments.joined, self._parts[begin:end], Moments())
+        parts = (self._parts[i] for i in self._windows.between(first, last))
+        return reduce(Moments.joined, parts, Moments())

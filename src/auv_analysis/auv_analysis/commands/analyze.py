@@ -1,7 +1,6 @@
 """`auv analyze`: summary and report of bags that are there already."""
 
 import argparse
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -9,17 +8,17 @@ from typing import Any
 from auv_analysis.bag import bag_files, open_bag
 from auv_analysis.commands.conclude import conclude
 from auv_analysis.folder import prepare
-from auv_analysis.run import Run, joined
+from auv_analysis.run import AnyRun
 
 
 def analyze(options: argparse.Namespace) -> dict[str, Any]:
     """Summary and report of bags that are there already."""
-    runs: dict[str, Run] = {}
+    runs: dict[str, AnyRun] = {}
     texts: dict[str, dict[str, str]] = {'scenario.yaml': {}, 'vehicle.yaml': {}}
     for bag in options.bags:
-        run, attachments = open_bag(bag, options.vehicle, whole=sys.maxsize)
+        run, attachments = open_bag(bag, options.vehicle)
         name = _free_name(run.controller, runs)
-        runs[name] = joined([*run.blocks()])
+        runs[name] = run
         for file, by_name in texts.items():
             by_name[name] = attachments.get(file, '')
     name = '_'.join(dict.fromkeys(run.scenario for run in runs.values()))

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from auv_analysis.run import Run
+from auv_analysis.run import AnyRun, Run
 from auv_analysis.scenario import Scenario
 from auv_analysis.summary import summarize
 from auv_dynamics.signals import DOFS
@@ -40,7 +41,7 @@ def finish(
 
 def conclude(
     out: Path,
-    runs: dict[str, Run],
+    runs: Mapping[str, AnyRun],
     scenario_text: str | dict[str, str],
     vehicle_text: str | dict[str, str],
 ) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from matplotlib.lines import Line2D
 
 from auv_analysis.report import plotting
 from auv_analysis.report.plotting import COLOURS
+from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.text import join, number
-from auv_analysis.run import Run
 from auv_dynamics.signals import DOFS
 
 BEYOND = 3.0  # times what else is to be seen: a command that is cut off and told in the panel
@@ -19,7 +19,7 @@ COMMAND: dict[str, Any] = {'color': '#8a8a8a', 'linewidth': 0.8, 'linestyle': '-
 LIMIT: dict[str, Any] = {'color': 'black', 'linewidth': 0.9, 'linestyle': (0, (1, 1.6))}
 
 
-def applied_figure(run: Run, limit: np.ndarray | None) -> tuple[Figure, str, str]:
+def applied_figure(run: Sketch, limit: np.ndarray | None) -> tuple[Figure, str, str]:
     """Commanded and applied wrench, a panel per degree of freedom.
 
     Parameters
@@ -41,7 +41,7 @@ def applied_figure(run: Run, limit: np.ndarray | None) -> tuple[Figure, str, str
         bound = None if limit is None else float(limit[i])
         if _panel(axes, run, i, bound):
             cut.append(dof)
-        if not np.array_equal(run.tau[:, i], run.tau_applied[:, i]):
+        if run.missed[i]:
             missed.append(dof)
         axes.set_ylabel(f'{plotting.INPUT.symbols[i]} ({plotting.INPUT.unit(i)})')
         plotting.letter(axes, i, dof)
@@ -51,22 +51,22 @@ def applied_figure(run: Run, limit: np.ndarray | None) -> tuple[Figure, str, str
     return figure, title, _caption(title, run, limit, cut, missed)
 
 
-def _panel(axes: Axes, run: Run, i: int, bound: float | None) -> bool:
+def _panel(axes: Axes, run: Sketch, i: int, bound: float | None) -> bool:
     """Draw one degree of freedom; whether its command was cut off by the axis."""
-    command, applied = run.tau[:, i], run.tau_applied[:, i]
-    axes.plot(*plotting.decimate(run.t, command), **COMMAND)
-    axes.plot(*plotting.decimate(run.t, applied), color=COLOURS[i], linewidth=1.4)
-    axes.set_xlim(run.t[0], run.t[-1])
-    seen = np.abs(applied).max()
-    if bound is not None and bound <= BEYOND * max(seen, np.abs(command).max()):
+    command = run.part('tau')
+    axes.plot(*run.line('tau', i), **COMMAND)
+    axes.plot(*run.line('applied', i), color=COLOURS[i], linewidth=1.4)
+    axes.set_xlim(run.start, run.start + run.duration)
+    seen = run.part('applied').peak[i]
+    if bound is not None and bound <= BEYOND * max(seen, command.peak[i]):
         seen = max(seen, bound)
         for level in (-bound, bound):
             axes.axhline(level, **LIMIT)
-    peak = int(np.argmax(np.abs(command)))
-    if not seen or abs(command[peak]) <= BEYOND * seen:
+    if not seen or command.peak[i] <= BEYOND * seen:
         return False
     axes.set_ylim(-ROOM * seen, ROOM * seen)
-    reached = f'{number(command[peak])} {plotting.INPUT.unit(i)} at {run.t[peak]:.2f} s'
+    peak = command.low[i] if command.low[i] == -command.peak[i] else command.high[i]
+    reached = f'{number(peak)} {plotting.INPUT.unit(i)} at {command.at[i]:.2f} s'
     axes.set_title(f'command to {reached}', loc='right', fontsize=8.5)
     return True
 
@@ -82,7 +82,7 @@ def _key(limit: np.ndarray | None) -> tuple[list[Line2D], list[str]]:
 
 
 def _caption(
-    title: str, run: Run, limit: np.ndarray | None, cut: list[str], missed: list[str]
+    title: str, run: Sketch, limit: np.ndarray | None, cut: list[str], missed: list[str]
 ) -> str:
     parts = [
         f'{title}: commanded τ (thin, grey) and the wrench that the actuators applied (thick, in '
@@ -92,7 +92,8 @@ def _caption(
         parts.append('Dotted: axis limits, left out where everything stays far below them.')
     if cut:
         parts.append(f'The commands in {join(cut)} leave the panel: their peak is written above.')
-    force, moment = (np.abs(run.tau_applied[:, m]).max() for m in (slice(3), slice(3, 6)))
+    peak = run.part('applied').peak
+    force, moment = peak[:3].max(), peak[3:].max()
     parts.append(f'Largest applied: {number(force)} N and {number(moment)} N m.')
     if not missed:
         parts.append('The two never differ in this run.')

@@ -1,6 +1,6 @@
 """The Lyapunov certificate in the report: a table of all runs, a figure of each that has one."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -8,13 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from auv_analysis.certificate import Certificate
-from auv_analysis.lyapunov import certificate_of
 from auv_analysis.report import plotting
+from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.text import MISSING, number
-from auv_analysis.run import Run
 from auv_analysis.summary import TRANSIENT
-from auv_gvc_controller.model import control_model
 
 IDENTITY, BOUND, MEASURED = '#56B4E9', '#D55E00', '#1a1a1a'
 APART = 10.0  # ratio of a largest value to what else is to be seen, from which it is logarithmic
@@ -105,33 +102,30 @@ def _cell(entry: Mapping[str, Any], key: str, factor: float) -> tuple[str, bool]
     return text, soft and value is not None
 
 
-def certificate_figure(run: Run, summary: Mapping[str, Any]) -> tuple[Figure | None, str, str]:
+def certificate_figure(run: Sketch, summary: Mapping[str, Any]) -> tuple[Figure | None, str, str]:
     """L, and its measured derivative against (26) and (28). Returns figure, title and caption."""
     title = f'Certificate, {run.controller}'
-    found = certificate_of(run, control_model(run.vehicle))
-    if found is None or len(found.t) < 3 or not np.any(found.L > 0):
+    if run.samples < 3 or ('L', 'whole') not in run.traces or not len(run.line('L')[0]):
         return None, title, f'{title}: too little to draw.'
-    split = run.duration > 2.0 * TRANSIENT
+    split = ('identity', 'early') in run.traces
     figure = plotting.new_figure(4.6)
-    mosaic: list[list[Any]] = [['L', 'L'], ['early', 'late']] if split else [['L'], ['early']]
+    mosaic: list[list[Any]] = [['L', 'L'], ['early', 'late']] if split else [['L'], ['whole']]
     ratios = (1, 1.9) if split else (1,)
     panels = figure.subplot_mosaic(mosaic, height_ratios=(1, 1.25), width_ratios=ratios)
-    _energy(panels['L'], found)
+    _energy(panels.pop('L'), run, panels)
     partly = False
-    early = found.t <= found.t[0] + TRANSIENT if split else np.ones(len(found.t), bool)
-    plotting.letter(panels['L'], 0)
-    for index, (name, inside) in enumerate((('early', early), ('late', ~early)), start=1):
-        if name in panels:
-            partly |= _rates(panels[name], found, inside, symmetric=name == 'early')
-            plotting.letter(panels[name], index)
-            panels[name].set_xlabel('$t$ (s)')
-    panels['early'].set_ylabel(r'$\dot{L}$ (W)')
-    _key(panels['late' if split else 'early'])
+    for index, (part, axes) in enumerate(panels.items(), start=1):
+        partly |= _rates(axes, run, part)
+        plotting.letter(axes, index)
+        axes.set_xlabel('$t$ (s)')
+    rates = list(panels.values())
+    rates[0].set_ylabel(r'$\dot{L}$ (W)')
+    _key(rates[-1])
     return figure, title, _caption(run, summary['lyapunov'], title, split=split, partly=partly)
 
 
 def _caption(
-    run: Run, lyapunov: Mapping[str, Any], title: str, *, split: bool, partly: bool
+    run: Sketch, lyapunov: Mapping[str, Any], title: str, *, split: bool, partly: bool
 ) -> str:
     parts = [f'{title}: (a) L of (23) on a logarithmic axis; (b) its derivative, measured from L']
     parts[0] += ', against the identity (26) and the bound (28)'
@@ -147,29 +141,31 @@ def _caption(
     return ' '.join(parts)
 
 
-def _energy(axes: Axes, found: Certificate) -> None:
-    seen = found.L > 0
-    axes.plot(*plotting.decimate(found.t[seen], found.L[seen]), color=MEASURED)
-    _increasing(axes, found, np.ones(len(found.t), bool))
+def _energy(axes: Axes, run: Sketch, parts: Iterable[str]) -> None:
+    t, L = run.line('L')
+    axes.plot(t, L, color=MEASURED)
+    for part in parts:
+        _increasing(axes, run, part)
     plotting.logarithmic(axes, 'y')
-    ends = np.log10([found.L[seen].min(), found.L[seen].max()])
+    ends = np.log10([L.min(), L.max()])
     axes.set_ylim(10.0 ** np.floor(ends[0]), 10.0 ** np.ceil(ends[1]))
-    axes.set_xlim(found.t[0], found.t[-1])
+    axes.set_xlim(run.start, run.start + run.duration)
     axes.set_ylabel('$L$ (J)')
+    plotting.letter(axes, 0)
 
 
-def _rates(axes: Axes, found: Certificate, inside: np.ndarray, *, symmetric: bool) -> bool:
+def _rates(axes: Axes, run: Sketch, part: str) -> bool:
     """Lines of (28), (26), the measured derivative; whether the axis is partly logarithmic."""
-    t = found.t[inside]
     axes.axhline(0.0, color=plotting.GREY, linewidth=0.6)
-    for values, look in zip((found.bound, found.identity, found.L_dot), _looks(), strict=True):
-        axes.plot(*plotting.decimate(t, values[inside]), **look)
-    _increasing(axes, found, inside)
+    for name, look in zip(('bound', 'identity', 'L_dot'), _looks(), strict=True):
+        axes.plot(*run.line(name, 0, part), **look)
+    _increasing(axes, run, part)
+    (t, identity), (_, bound) = (run.line(name, 0, part) for name in ('identity', 'bound'))
     axes.set_xlim(t[0], t[-1])
-    largest = np.abs(found.identity[inside]).max()
-    beyond = max(largest, np.abs(found.bound[inside]).max())
-    if symmetric:  # to its last quarter, where it has died away
-        last = np.abs(found.identity[inside][-max(len(t) // 4, 1) :]).max()
+    largest = np.abs(identity).max()
+    beyond = max(largest, np.abs(bound).max())
+    if part != 'late':  # to its last quarter, where it has died away
+        last = np.abs(identity[t >= t[-1] - 0.25 * (t[-1] - t[0])]).max()
         linear = max(last, beyond * 10.0**-DECADES)
     else:  # the bound alone is large: what it bounds keeps the linear part
         linear = max(largest, beyond * 10.0**-DECADES)
@@ -179,10 +175,11 @@ def _rates(axes: Axes, found: Certificate, inside: np.ndarray, *, symmetric: boo
     return False
 
 
-def _increasing(axes: Axes, found: Certificate, inside: np.ndarray) -> None:
-    """Grey bands where (26) is positive."""
+def _increasing(axes: Axes, run: Sketch, part: str) -> None:
+    """Grey bands where (26) is positive, each sample as wide as it is from its neighbours."""
+    t, increasing = run.line('increasing', 0, part)
     axes.fill_between(
-        found.t[inside], 0.0, 1.0, where=found.identity[inside] > 0,
+        t, 0.0, increasing, step='mid',
         transform=axes.get_xaxis_transform(), color='#ececec', linewidth=0, zorder=0.2,
     )  # fmt: skip
 

@@ -7,8 +7,10 @@ from typing import Any
 from auv_analysis.report.claims_rows import BOTH, ROWS, Row
 from auv_analysis.report.evidence import Evidence, Signals, Verdict
 from auv_analysis.report.paper import CASES, is_plain, paper_run
+from auv_analysis.report.sketch import Sketch
+from auv_analysis.report.sketching import sketches
 from auv_analysis.report.text import MISSING
-from auv_analysis.run import Run
+from auv_analysis.run import AnyRun
 
 GAINS = {
     ('case1', 'gvc'): '(36), (37)',
@@ -43,7 +45,7 @@ class Claim:
 
 
 def claims_table(
-    runs: Mapping[str, Run], summaries: Mapping[str, Mapping[str, Any]]
+    runs: Mapping[str, AnyRun | Sketch], summaries: Mapping[str, Mapping[str, Any]]
 ) -> list[Claim]:
     """The paper's claims, each with what these runs say of it.
 
@@ -64,7 +66,8 @@ def claims_table(
         return []
     (scenario,) = scenarios
     found = {law: paper_run(runs, law) for law in BOTH}
-    signals = {law: Signals(run) for law, run in found.items() if run is not None}
+    known = sketches({law: run for law, run in found.items() if run is not None})
+    signals = {law: Signals(run) for law, run in known.items()}
     N = next(iter(summaries.values()))['decomposition']['N']
     evidence = Evidence(signals, tuple(N))
     return [_claim(i, row, scenario, evidence) for i, row in enumerate(ROWS, start=1)]
@@ -88,6 +91,6 @@ def _obstacle(row: Row, scenario: str, evidence: Evidence) -> tuple[Verdict | No
             return 'not evaluated', f'No run of law {law} with gains {GAINS[scenario, law]}.'
         if signals.run.duration < row.seconds:
             return 'not evaluated', f'Needs a run of at least {row.seconds:g} s.'
-        if row.knows_F and signals.run.disturbance is None:
+        if row.knows_F and not signals.run.knows_disturbance:
             return 'not evaluated', 'F is not known for this run.'
     return None, ''

@@ -3,7 +3,8 @@
 import numpy as np
 
 from auv_analysis.report.claims_motion import U, W
-from auv_analysis.report.evidence import NEAR_ZERO, Evidence, Finding, grade, listed, seconds
+from auv_analysis.report.evidence import Evidence, Finding, grade, listed, seconds
+from auv_analysis.report.sketching import NEAR_ZERO
 from auv_analysis.report.text import number
 from auv_analysis.summary import TRANSIENT
 
@@ -14,7 +15,7 @@ ERRORS = ('Δu', 'Δv', 'Δw', 'Δp', 'Δq', 'Δr')
 
 def inputs_similar(of: Evidence) -> Finding:
     """Row 14: inputs of both laws with the same gains."""
-    gvc, cl = (run.peak(run.run.tau) for run in of.both)
+    gvc, cl = (run.peak('tau') for run in of.both)
     change = _rms_change(of)
     text = (
         f'peak τ_X {number(gvc[U])} against {number(cl[U])} N, '
@@ -29,15 +30,15 @@ def inputs_similar(of: Evidence) -> Finding:
 
 def earlier(of: Evidence) -> Finding:
     """Row 17: time to the final errors."""
-    times = [run.settled() for run in of.both]
+    times = [run.run.settled for run in of.both]
     text = ' against '.join(seconds(time, of.gvc.run.duration) for time in times)
     return Finding(f'{text} to {NEAR_ZERO:g}', grade([times[0] < times[1]]))
 
 
 def oscillates(of: Evidence) -> Finding:
     """Row 18: total variation of the errors."""
-    gvc, cl = (np.abs(np.diff(run.error, axis=0)).sum(axis=0) for run in of.both)
-    seen = np.maximum(*(run.peak(run.error) for run in of.both)) > NEAR_ZERO
+    gvc, cl = (run.part('error').path for run in of.both)
+    seen = np.maximum(*(run.peak('error') for run in of.both)) > NEAR_ZERO
     text = '; '.join(
         f'{ERRORS[i]} {number(cl[i], 2)} against {number(gvc[i], 2)}' for i in np.flatnonzero(seen)
     )
@@ -48,7 +49,7 @@ def efforts_comparable(of: Evidence) -> Finding:
     """Row 19: RMS of the inputs after 2 s, per axis."""
     change = _rms_change(of)
     near = np.abs(change) <= COMPARABLE
-    gvc, cl = (run.late_rms(run.run.tau) for run in of.both)
+    gvc, cl = (run.late_rms('tau') for run in of.both)
     text = (
         f'RMS after 2 s, CL relative to GVC: {_percent(change)} % (surge to yaw); '
         f'GVC {listed(gvc)}, CL {listed(cl)} N, N m'
@@ -60,7 +61,7 @@ def efforts_comparable(of: Evidence) -> Finding:
 
 def larger_start(of: Evidence) -> Finding:
     """Row 20: inputs of the first instants."""
-    gvc, cl = (run.peak(run.run.tau, 0.0, TRANSIENT)[[U, W]] for run in of.both)
+    gvc, cl = (run.peak('tau', 0.0, TRANSIENT)[[U, W]] for run in of.both)
     text = (
         f'τ_X {number(gvc[0])} against {number(cl[0])} N, '
         f'τ_Z {number(gvc[1])} against {number(cl[1])} N'
@@ -70,7 +71,7 @@ def larger_start(of: Evidence) -> Finding:
 
 def _rms_change(of: Evidence) -> np.ndarray:
     """Relative change (6,) of the RMS input after 2 s from GVC to CL."""
-    return _change(*(run.late_rms(run.run.tau) for run in of.both))
+    return _change(*(run.late_rms('tau') for run in of.both))
 
 
 def _change(gvc: np.ndarray, cl: np.ndarray) -> np.ndarray:

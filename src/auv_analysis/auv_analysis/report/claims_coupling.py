@@ -37,7 +37,7 @@ def kinetic_energy_shares(of: Evidence) -> Finding:
 
 def energy_in_two(of: Evidence) -> Finding:
     """Row 16: energy mainly in xi_3 and xi_1."""
-    part = shares(of.gvc.energy.mean(axis=0))
+    part = shares(of.gvc.part('energy').mean)
     order = np.argsort(part)[::-1]
     text = f'ξ{order[0] + 1} and ξ{order[1] + 1}, together {part[order[:2]].sum():.2f} %'
     return Finding(text, grade([tuple(order[:2]) == (2, 0), part[[0, 2]].sum() > 99.0]))
@@ -45,14 +45,14 @@ def energy_in_two(of: Evidence) -> Finding:
 
 def sway_deformed(of: Evidence) -> Finding:
     """Row 11: delta_xi of sway."""
-    peak = of.gvc.peak(of.gvc.delta_xi)
+    peak = of.gvc.peak('delta_xi')
     text = f'{number(peak[V], 2)} m/s'
     return Finding(text, grade([peak[V] == max(peak[:3]) and round(peak[V], 2) == 0.01]))
 
 
 def roll_deformed(of: Evidence) -> Finding:
     """Row 12: delta_xi of roll."""
-    peak, rate = of.gvc.peak(of.gvc.delta_xi), of.gvc.peak(of.gvc.run.nu)[P]
+    peak, rate = of.gvc.peak('delta_xi'), of.gvc.peak('nu')[P]
     text = f'{number(peak[P])} rad/s, where p itself reaches {number(rate, 2)} rad/s'
     return Finding(text, grade([peak[P] == max(peak[3:]) and peak[P] > rate]))
 
@@ -60,11 +60,11 @@ def roll_deformed(of: Evidence) -> Finding:
 def pitch_input(of: Evidence) -> Finding:
     """Row 13: delta_pi of pitch."""
     gvc = of.gvc
-    peak = gvc.peak(gvc.delta_pi)
+    peak = gvc.peak('delta_pi')
     others = np.delete(peak, Q)
     text = f'pitch {number(peak[Q])} N m'
     if gvc.run.duration > TRANSIENT:
-        text += f', {number(gvc.late_peak(gvc.delta_pi)[Q])} after 2 s'
+        text += f', {number(gvc.late_peak("delta_pi")[Q])} after 2 s'
     text += f'; roll {number(peak[3], 2)}, yaw {number(peak[5], 2)} N m; '
     text += f'forces at most {number(peak[:3].max(), 2)} N'
     return Finding(text, grade([peak[Q] > FAR * others.max()]))
@@ -72,7 +72,7 @@ def pitch_input(of: Evidence) -> Finding:
 
 def pitch_sensitive(of: Evidence) -> Finding:
     """Row 15: no verdict; what the change of gains from GVC to CL does to the errors."""
-    gvc, cl = (np.sqrt(np.mean(run.error**2, axis=0)) for run in of.both)
+    gvc, cl = (run.part('error').rms for run in of.both)
     ratio = np.divide(cl, gvc, out=np.full(6, np.inf), where=gvc > 0)
     text = f'RMS error of CL over that of GVC, surge to yaw: {listed(ratio, 2)}'
     return Finding(text, 'not evaluated')
@@ -87,4 +87,4 @@ def decomposition(of: Evidence) -> Finding:
 def _windows(gvc: Signals) -> dict[str, np.ndarray]:
     """Mean energy by component (6,) over 0-10 s and over the whole run, by window."""
     ends = dict.fromkeys([min(paper.ENERGY_WINDOW, gvc.run.duration), gvc.run.duration])
-    return {f'0–{end:g} s': gvc.part(gvc.energy, 0.0, end).mean(axis=0) for end in ends}
+    return {f'0–{end:g} s': gvc.part('energy', 0.0, end).mean for end in ends}

@@ -2,21 +2,16 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from auv_analysis.coupling import delta_pi, delta_xi
-from auv_analysis.energy import kinetic_energy
+from auv_analysis.report.sketch import FOREVER, Sketch, last_third
+from auv_analysis.report.statistics import Part
 from auv_analysis.report.text import number
-from auv_analysis.run import Run
 from auv_analysis.summary import TRANSIENT
-from auv_gvc_controller.model import ControlModel, control_model
 
 Verdict = Literal['reproduced', 'partly', 'not reproduced', 'other case', 'not evaluated']
-NEAR_ZERO = 0.005  # m/s, rad/s: what counts as a settled error
-FOREVER = float('inf')
 
 
 class Finding(NamedTuple):
@@ -28,75 +23,29 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """The paper's signals of a run, (n + 1, 6) each, and its N (6,)."""
+    """A run and what the judges ask of its signals, which are named as in `Sketch`."""
 
-    run: Run
+    run: Sketch
 
-    @cached_property
-    def error(self) -> np.ndarray:
-        """nu_d - nu in m/s, rad/s."""
-        return self.run.nu_d - self.run.nu
+    def part(self, name: str, first: float = 0.0, last: float = FOREVER) -> Part:
+        """Statistics of a signal in [first, last], s from the start."""
+        return self.run.part(name, first, last)
 
-    @cached_property
-    def w(self) -> np.ndarray:
-        """Estimate minus F in N, N m; only asked for where F is known."""
-        return self.run.disturbance_estimate - self.F
+    def peak(self, name: str, first: float = 0.0, last: float = FOREVER) -> np.ndarray:
+        """Largest magnitudes (6,) of a signal in [first, last]."""
+        return self.part(name, first, last).peak
 
-    @cached_property
-    def F(self) -> np.ndarray:
-        """Lumped uncertainty in N, N m; only asked for where it is known."""
-        if self.run.disturbance is None:
-            raise ValueError('the lumped uncertainty of this run is not known')
-        return self.run.disturbance
-
-    @cached_property
-    def delta_xi(self) -> np.ndarray:
-        """Xi - nu in m/s, rad/s; (33)."""
-        return delta_xi(self._model.Upsilon_inv.reshape(6, 6), self.run.nu)
-
-    @cached_property
-    def delta_pi(self) -> np.ndarray:
-        """Pi - tau in N, N m; (34)."""
-        return delta_pi(self._model.Upsilon.reshape(6, 6), self.run.tau)
-
-    @cached_property
-    def energy(self) -> np.ndarray:
-        """Kinetic energy by component, J; (30)."""
-        model = self._model
-        return kinetic_energy(model.Upsilon_inv.reshape(6, 6), model.N, self.run.nu)
-
-    @cached_property
-    def _model(self) -> ControlModel:
-        return control_model(self.run.vehicle)
-
-    def part(self, values: np.ndarray, first: float, last: float = FOREVER) -> np.ndarray:
-        """Samples of [first, last], in s from the start."""
-        t, half = self.run.t - self.run.t[0], 0.5 * self.run.step
-        return values[(t >= first - half) & (t <= last + half)]
-
-    def peak(self, values: np.ndarray, first: float = 0.0, last: float = FOREVER) -> np.ndarray:
-        """Largest magnitudes (6,) of [first, last]."""
-        return np.abs(self.part(values, first, last)).max(axis=0)
-
-    def late_peak(self, values: np.ndarray) -> np.ndarray:
+    def late_peak(self, name: str) -> np.ndarray:
         """Largest magnitudes (6,) after the transient."""
-        return self.peak(values, TRANSIENT)
+        return self.peak(name, TRANSIENT)
 
-    def late_rms(self, values: np.ndarray) -> np.ndarray:
+    def late_rms(self, name: str) -> np.ndarray:
         """Root mean squares (6,) after the transient."""
-        return np.sqrt(np.mean(self.part(values, TRANSIENT) ** 2, axis=0))
+        return self.part(name, TRANSIENT).rms
 
-    def last_third(self, values: np.ndarray) -> np.ndarray:
-        """Samples of the last third of the run."""
-        return self.part(values, 2.0 / 3.0 * self.run.duration)
-
-    def settled(self) -> float:
-        """Time, s from the start, of the last sample with an error above 0.005; inf: the end."""
-        outside = np.flatnonzero(np.abs(self.error).max(axis=1) > NEAR_ZERO)
-        if len(outside) == 0:
-            return 0.0
-        end = outside[-1] == len(self.run.t) - 1
-        return FOREVER if end else float(self.run.t[outside[-1]] - self.run.t[0])
+    def last_third(self, name: str) -> Part:
+        """Statistics of a signal in the last third of the run."""
+        return self.part(name, last_third(self.run))
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,18 @@ import numpy as np
 from auv_analysis.report import paper
 from auv_analysis.report.claims import Claim
 from auv_analysis.report.figures import reference
+from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.tables import energy_rows
 from auv_analysis.report.text import fixed, join, number
-from auv_analysis.run import Run
 from auv_dynamics.signals import DOFS
 
 Summaries = Mapping[str, Mapping[str, Any]]
 DECIDED = ('reproduced', 'partly', 'not reproduced')
 
 
-def findings(runs: Mapping[str, Run], summaries: Summaries, claims: Sequence[Claim]) -> list[str]:
+def findings(
+    runs: Mapping[str, Sketch], summaries: Summaries, claims: Sequence[Claim]
+) -> list[str]:
     """Sentences of the summary.
 
     Parameters
@@ -38,7 +40,7 @@ def findings(runs: Mapping[str, Run], summaries: Summaries, claims: Sequence[Cla
     return [sentence for sentence in sentences if sentence]
 
 
-def _settling(name: str, run: Run, summary: Mapping[str, Any]) -> str:
+def _settling(name: str, run: Sketch, summary: Mapping[str, Any]) -> str:
     times = summary['velocity_error']['settling_time']
     missing = [dof for dof, time in zip(DOFS, times, strict=True) if time is None]
     if not missing:
@@ -72,17 +74,18 @@ def _inputs(summaries: Summaries) -> str:
     return f'The largest commands are {"; ".join(parts)}.'
 
 
-def _applied(runs: Mapping[str, Run]) -> str:
+def _applied(runs: Mapping[str, Sketch]) -> str:
     """What the actuators left of the commands, of the runs that have any."""
     parts = []
     for name, run in runs.items():
-        if run.applied is not None:
-            force, moment = (np.abs(run.applied[:, m]).max() for m in (slice(3), slice(3, 6)))
+        if run.acting:
+            peak = run.part('applied').peak
+            force, moment = peak[:3].max(), peak[3:].max()
             parts.append(f'{number(force)} N and {number(moment)} N m under {name}')
     return f'The actuators deliver at most {"; ".join(parts)}.' if parts else ''
 
 
-def _energy(runs: Mapping[str, Run], leading: Run) -> str:
+def _energy(runs: Mapping[str, Sketch], leading: Sketch) -> str:
     name = leading.controller
     means = [
         f'{fixed(row["mean"], 2)} J over {row["window"]}'
@@ -95,7 +98,7 @@ def _energy(runs: Mapping[str, Run], leading: Run) -> str:
     return f'{text}.'
 
 
-def _couplings(summary: Mapping[str, Any], leading: Run) -> str:
+def _couplings(summary: Mapping[str, Any], leading: Sketch) -> str:
     coupling = summary['coupling']
     if all(len(zeros) == 6 for zeros in coupling['structural_zeros'].values()):
         return 'M is diagonal: no degree of freedom is coupled to another by inertia.'

@@ -8,24 +8,23 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from auv_analysis.energy import kinetic_energy, shares
+from auv_analysis.energy import shares
 from auv_analysis.report import paper, plotting
 from auv_analysis.report.plotting import COLOURS, DASHES, GREY
+from auv_analysis.report.sketch import FOREVER, Sketch
+from auv_analysis.report.sketching import common_window
 from auv_analysis.report.text import join
-from auv_analysis.run import Run
 from auv_analysis.summary import BAND, SMALLEST_BAND
 from auv_dynamics.signals import DOFS
-from auv_gvc_controller.model import control_model
 
 MARKERS = 'os^vPX'
 SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
 RUNS = ('#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00')  # of three runs and more
 APART = 20.0  # ratio of peaks from which runs share no linear scale
-SHARE_COLUMNS = 600  # of the stacked shares, each the mean of its samples
 XI = tuple(rf'$\xi_{i}$' for i in range(1, 7))
 
 
-def settling(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
+def settling(runs: Mapping[str, Sketch]) -> tuple[Figure, str, str]:
     """The largest error still to come, per degree of freedom and controller.
 
     The envelope max of abs(nu_err) over [t, end] falls monotonically: where it crosses the band
@@ -36,12 +35,10 @@ def settling(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
     for i, axes in enumerate(panels):
         band = 0.0
         for look, run in zip(_looks(runs, COLOURS[i]), runs.values(), strict=True):
-            error = np.abs(run.nu_d[:, i] - run.nu[:, i])
+            t, error = run.line('error', i, 'log')
             rest = np.maximum.accumulate(error[::-1])[::-1]
-            seen = (rest > 0) & (run.t > run.t[0])
-            line = plotting.decimate(run.t[seen] - run.t[0], rest[seen], logarithmic=True)
-            axes.plot(*line, **look)
-            band = max(SMALLEST_BAND, BAND * np.abs(run.nu_d[:, i]).max())
+            axes.plot(t[rest > 0], rest[rest > 0], **look)
+            band = max(SMALLEST_BAND, BAND * run.part('nu_d').peak[i])
         axes.axhline(band, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
         plotting.logarithmic(axes, 'x', 'y')
     for row, unit in zip((0, 3), plotting.VELOCITY, strict=True):
@@ -56,24 +53,21 @@ def settling(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
     return figure, title, caption
 
 
-def inputs(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
+def inputs(runs: Mapping[str, Sketch]) -> tuple[Figure, str, str]:
     """Inputs of all controllers over logarithmic time. Returns figure, title and caption."""
     figure, panels = _six_panels(runs)
     apart = False
     for i, axes in enumerate(panels):
-        path = [np.abs(np.diff(run.tau[:, i])).sum() for run in runs.values()]
+        path = [run.part('tau').path[i] for run in runs.values()]
         above = 3.0 - np.argsort(np.argsort(path)) / len(runs)  # smooth lines over restless ones
         for look, run, order in zip(_looks(runs, COLOURS[i]), runs.values(), above, strict=True):
-            first = run.t[0] + run.step  # the sample at t = 0 stands at the left edge
-            t = np.maximum(run.t, first) - run.t[0]
-            line = plotting.decimate(t, run.tau[:, i], logarithmic=True)
-            axes.plot(*line, zorder=order, **look)
+            axes.plot(*run.line('tau', i, 'log'), zorder=order, **look)
         plotting.logarithmic(axes, 'x')
-        apart = _symmetric(axes, [np.abs(run.tau[:, i]).max() for run in runs.values()]) or apart
+        apart = _symmetric(axes, [run.part('tau').peak[i] for run in runs.values()]) or apart
     for i, unit in enumerate(3 * plotting.WRENCH[:1] + 3 * plotting.WRENCH[1:]):
         panels[i].set_ylabel(f'{plotting.INPUT.symbols[i]} ({unit})')
     title = 'Inputs compared'
-    if any(run.applied is not None for run in runs.values()):
+    if any(run.acting for run in runs.values()):
         title += ', as commanded'
     caption = (
         f'{title}: {_named_dashes(runs)}. Time is logarithmic, so that the first instants, '
@@ -88,16 +82,14 @@ def inputs(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
     return figure, title, caption
 
 
-def energy(runs: Mapping[str, Run], leading: Run) -> tuple[Figure, str, str]:
+def energy(runs: Mapping[str, Sketch], leading: Sketch) -> tuple[Figure, str, str]:
     """Kinetic energy over time and its shares. Returns figure, title and caption."""
     figure = plotting.new_figure(2.7)
     left, right = figure.subplots(1, 2)
-    wanted = 0.5 * np.sum(leading.nu_d @ leading.vehicle.M * leading.nu_d, axis=1)
-    left.plot(*plotting.decimate(leading.t, wanted), color='#b5b5b5', linewidth=3.2)
+    left.plot(*leading.line('wanted'), color='#b5b5b5', linewidth=3.2)
     handles = [Line2D([], [], color='#b5b5b5', linewidth=3.2)]
     for look, run in zip(_looks(runs), runs.values(), strict=True):
-        total = _components(run).sum(axis=1)
-        handles += left.plot(*plotting.decimate(run.t, total), **look)
+        handles += left.plot(*run.line('kinetic'), **look)
     left.legend(
         handles,
         ['set-point', *runs],
@@ -109,7 +101,7 @@ def energy(runs: Mapping[str, Run], leading: Run) -> tuple[Figure, str, str]:
     left.set_ylabel('kinetic energy (J)')
     _stack(right, leading)
     for index, axes in enumerate((left, right)):
-        axes.set_xlim(leading.t[0], leading.t[-1])
+        axes.set_xlim(leading.start, leading.start + leading.duration)
         axes.set_xlabel('$t$ (s)')
         plotting.letter(axes, index)
     title = 'Kinetic energy'
@@ -120,19 +112,17 @@ def energy(runs: Mapping[str, Run], leading: Run) -> tuple[Figure, str, str]:
     return figure, title, caption
 
 
-def energy_shares(runs: Mapping[str, Run]) -> tuple[Figure, str, str]:
+def energy_shares(runs: Mapping[str, Sketch]) -> tuple[Figure, str, str]:
     """Shares of the mean kinetic energy on a logarithmic axis, the paper's beside case1's."""
     figure = plotting.new_figure(2.9)
     axes = figure.subplots()
-    end = min(paper.ENERGY_WINDOW, *(run.duration for run in runs.values()))
+    end = common_window(runs)
     printed = paper.SHARES if _is_case1(runs) else None
     rows = len(runs) + (printed is not None)
     offsets = (np.arange(rows) - (rows - 1) / 2) * 0.62 / max(rows, 2)
     handles, smallest = [], 1.0
     for offset, marker, run in zip(offsets, MARKERS * rows, runs.values(), strict=False):
-        components = _components(run)
-        inside = run.t <= run.t[0] + end + run.step / 2
-        early, whole = (shares(c.mean(axis=0)) for c in (components[inside], components))
+        early, whole = (shares(run.part('energy', 0.0, last).mean) for last in (end, FOREVER))
         for i in range(6):
             place = {'y': i + offset, 'marker': marker, 'edgecolors': COLOURS[i], 's': 30}
             axes.scatter(whole[i], facecolors='white', linewidths=1.0, zorder=3, **place)
@@ -171,7 +161,7 @@ def _printed_shares(axes: Axes, printed: tuple[float, ...], offset: float, left:
             axes.plot(bounds, 2 * [i + offset], color=GREY, linewidth=2.5, solid_capstyle='butt')
 
 
-def _is_case1(runs: Mapping[str, Run]) -> bool:
+def _is_case1(runs: Mapping[str, Sketch]) -> bool:
     run = paper.paper_run(runs, 'gvc')
     return run is not None and run.scenario == 'case1'
 
@@ -180,16 +170,11 @@ def _mark(marker: str, label: str, colour: str = 'black') -> Line2D:
     return Line2D([], [], linestyle='', marker=marker, color=colour, markersize=5, label=label)
 
 
-def _stack(axes: Axes, run: Run) -> None:
+def _stack(axes: Axes, run: Sketch) -> None:
     """Shares (30) over time, stacked; long runs as means over columns of samples."""
-    components = _components(run)
-    edges = np.unique(np.linspace(0, len(run.t), SHARE_COLUMNS + 1).astype(int))[:-1]
-    counts = np.diff(np.append(edges, len(run.t)))[:, None]
-    part = shares(np.add.reduceat(components, edges, axis=0) / counts)
-    t = np.add.reduceat(run.t, edges) / counts[:, 0]
-    moving = part.sum(axis=1) > 0
-    axes.stackplot(t[moving], part[moving].T, colors=COLOURS, linewidth=0)
-    shown = [i for i in range(6) if part[:, i].max() > 1.0]
+    t, part = run.stack
+    axes.stackplot(t, part.T, colors=COLOURS, linewidth=0)
+    shown = [i for i in range(6) if part[:, i].max(initial=0.0) > 1.0]
     patches = [Line2D([], [], color=COLOURS[i], linewidth=6) for i in shown]
     axes.legend(
         patches, [XI[i] for i in shown], loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=6
@@ -199,14 +184,9 @@ def _stack(axes: Axes, run: Run) -> None:
     axes.grid(False)
 
 
-def _components(run: Run) -> np.ndarray:
-    model = control_model(run.vehicle)
-    return kinetic_energy(model.Upsilon_inv.reshape(6, 6), model.N, run.nu)
-
-
-def _looks(runs: Mapping[str, Run], colour: str = 'black') -> list[dict[str, Any]]:
+def _looks(runs: Mapping[str, Sketch], colour: str = 'black') -> list[dict[str, Any]]:
     """Dashes per run; of three runs and more, or noisy ones, a colour per run for the given one."""
-    many = len(runs) > 2 or any(run.measured is not None for run in runs.values())
+    many = len(runs) > 2 or any(run.sensing for run in runs.values())
     return [
         {'linestyle': DASHES[i % len(DASHES)], 'color': RUNS[i % len(RUNS)] if many else colour}
         for i in range(len(runs))
@@ -222,12 +202,12 @@ def _symmetric(axes: Axes, peaks: list[float]) -> bool:
     return True
 
 
-def _named_dashes(runs: Mapping[str, Run]) -> str:
+def _named_dashes(runs: Mapping[str, Sketch]) -> str:
     words = ('solid', 'dashed', 'dotted', 'dash-dotted', 'long-dashed', 'dash-dot-dotted')
     return join([f'{name} {words[i % len(words)]}' for i, name in enumerate(runs)])
 
 
-def _six_panels(runs: Mapping[str, Run]) -> tuple[Figure, list[Axes]]:
+def _six_panels(runs: Mapping[str, Sketch]) -> tuple[Figure, list[Axes]]:
     figure = plotting.new_figure(4.1)
     panels = list(figure.subplots(2, 3, sharex=True).ravel())
     for i, axes in enumerate(panels):

@@ -14,11 +14,13 @@ import numpy as np
 from auv_analysis.report import paper, tables
 from auv_analysis.report.certificates import certificate_table
 from auv_analysis.report.claims import claims_table
-from auv_analysis.report.figures import FigureRecord, draw_figures, estimates, reference
+from auv_analysis.report.figures import FigureRecord, draw_figures, reference
 from auv_analysis.report.findings import findings
 from auv_analysis.report.set_up import set_up
+from auv_analysis.report.sketch import Sketch
+from auv_analysis.report.sketching import sketches
 from auv_analysis.report.text import fixed, join, number, plain, tied
-from auv_analysis.run import Run
+from auv_analysis.run import AnyRun
 from auv_analysis.summary import BAND, SMALLEST_BAND
 from auv_dynamics.signals import DOFS
 
@@ -36,7 +38,7 @@ SECTIONS = {  # section of the report -> beginnings of the names of its figures
 
 def write_report(
     out: Path,
-    runs: dict[str, Run],
+    runs: Mapping[str, AnyRun | Sketch],
     summaries: dict[str, dict[str, Any]],
     scenario_text: Texts,
     vehicle_text: Texts,
@@ -58,13 +60,13 @@ def write_report(
     """
     if not runs:
         raise ValueError('runs: expected at least one run, found none')
-    runs = {name: replace(run, controller=name) for name, run in runs.items()}
+    shown = {name: replace(run, controller=name) for name, run in sketches(runs).items()}
     scenes = {
-        names: set_up({name: runs[name] for name in names}, summaries, text)
-        for names, text in _shared_by(runs, scenario_text)
+        names: set_up({name: shown[name] for name in names}, summaries, text)
+        for names, text in _shared_by(shown, scenario_text)
     }
     limits = {name: scene.limit for names, scene in scenes.items() for name in names}
-    figures = draw_figures(runs, out / 'figures', summaries, limits)
+    figures = draw_figures(shown, out / 'figures', summaries, limits)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE),
         autoescape=True,
@@ -77,20 +79,20 @@ def write_report(
         'maths': maths,
     }  # fmt: skip
     template = environment.get_template('report.html.j2')
-    context = _context(runs, summaries)
+    context = _context(shown, summaries)
     text = template.render(
         **context,
         figures=_sections(figures),
         scenes=scenes,
-        scenario_texts=_listings(runs, scenario_text),
-        vehicle_texts=_listings(runs, vehicle_text),
+        scenario_texts=_listings(shown, scenario_text),
+        vehicle_texts=_listings(shown, vehicle_text),
     )
     path = out / 'report.html'
     path.write_text(text + '\n', encoding='utf-8')
     return path
 
 
-def _shared_by(runs: Mapping[str, Run], texts: Texts) -> list[tuple[tuple[str, ...], str]]:
+def _shared_by(runs: Mapping[str, Sketch], texts: Texts) -> list[tuple[tuple[str, ...], str]]:
     """Names of the runs that share a text, and that text."""
     if isinstance(texts, str):
         return [(tuple(runs), texts)]
@@ -100,7 +102,7 @@ def _shared_by(runs: Mapping[str, Run], texts: Texts) -> list[tuple[tuple[str, .
     return [(tuple(members), text) for text, members in names.items()]
 
 
-def _listings(runs: Mapping[str, Run], texts: Texts) -> list[tuple[str, str]]:
+def _listings(runs: Mapping[str, Sketch], texts: Texts) -> list[tuple[str, str]]:
     """Texts that are not empty, each with the runs that it is of where there are several."""
     shared = _shared_by(runs, texts)
     return [
@@ -116,7 +118,9 @@ def maths(text: str) -> markupsafe.Markup:
     return markupsafe.Markup(re.sub(r'(?<=[ξπ])([1-6])\b', r'<sub>\1</sub>', safe))
 
 
-def _context(runs: Mapping[str, Run], summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def _context(
+    runs: Mapping[str, Sketch], summaries: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
     """What the template prints, computed."""
     leading = reference(runs)
     claims = claims_table(runs, summaries)
@@ -138,11 +142,11 @@ def _context(runs: Mapping[str, Run], summaries: Mapping[str, Mapping[str, Any]]
         'has_original': original is not None,
         'certificates': certificate_table(summaries),
         'laws': {run.law for run in runs.values()},
-        'without_estimate': [n for n, run in runs.items() if not estimates(run)],
-        'commanded': any(run.applied is not None for run in runs.values()),
+        'without_estimate': [n for n, run in runs.items() if not run.estimates],
+        'commanded': any(run.acting for run in runs.values()),
         'couplings': tables.couplings(runs, summaries),
         'claims': claims,
-        'ends': {name: run.eta[-1, :3] for name, run in runs.items()},
+        'ends': {name: run.end[:3] for name, run in runs.items()},
         'ends_apart': _ends_apart(runs),
         'notes': tables.notes(runs),
         'band': f'{100 * BAND:g} % of the peak of the set-point, at least {SMALLEST_BAND:g}',
@@ -150,10 +154,10 @@ def _context(runs: Mapping[str, Run], summaries: Mapping[str, Mapping[str, Any]]
     }
 
 
-def _ends_apart(runs: Mapping[str, Run]) -> float | None:
+def _ends_apart(runs: Mapping[str, Sketch]) -> float | None:
     """Largest distance of the final positions of runs of equal length, m; None for one run."""
-    ends = [run.eta[-1, :3] for run in runs.values()]
-    if len(ends) < 2 or len({len(run.t) for run in runs.values()}) > 1:
+    ends = [run.end[:3] for run in runs.values()]
+    if len(ends) < 2 or len({run.samples for run in runs.values()}) > 1:
         return None
     return max(float(np.linalg.norm(a - b)) for a in ends for b in ends)
 

@@ -1,13 +1,14 @@
 """What Herman 2018 prints, as data: gains, numbers and which figure shows what."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from auv_analysis.run import Run
+from auv_analysis.run import Facts
 from auv_dynamics.files import matrix6
 
+AnyFacts = TypeVar('AnyFacts', bound=Facts)
 CITATION = (
     'P. Herman, Velocity tracking controller for simulation analysis of underwater vehicle '
     'model, Journal of Marine Engineering & Technology, 2018'
@@ -41,7 +42,7 @@ FIGURES: dict[str, dict[tuple[str, str], str]] = {
 }
 
 
-def has_gains(run: Run, gains: Mapping[str, float]) -> bool:
+def has_gains(run: Facts, gains: Mapping[str, float]) -> bool:
     """Whether a run's gains are these multiples of the identity."""
 
     def equal(value: Any, expected: float) -> bool:
@@ -50,13 +51,13 @@ def has_gains(run: Run, gains: Mapping[str, float]) -> bool:
     return set(run.gains) == set(gains) and all(equal(run.gains[k], gains[k]) for k in gains)
 
 
-def is_plain(run: Run) -> bool:
+def is_plain(run: Facts) -> bool:
     """Whether a run has nothing that the paper's have not: devices, model error or current."""
-    plain = run.applied is None and run.measured is None
+    plain = not (run.acting or run.sensing)
     return plain and run.kinds in (None, frozenset({'herman2018'}))
 
 
-def paper_run(runs: Mapping[str, Run], law: str) -> Run | None:
+def paper_run(runs: Mapping[str, AnyFacts], law: str) -> AnyFacts | None:
     """The run of `case1` or `case2` that has the paper's gains for 'gvc' or 'cl'; None without."""
     for run in runs.values():
         gains = GVC_GAINS if law == 'gvc' else CL_GAINS.get(run.scenario)
@@ -66,7 +67,7 @@ def paper_run(runs: Mapping[str, Run], law: str) -> Run | None:
     return None
 
 
-def paper_figure(run: Run, kind: str) -> str | None:
+def paper_figure(run: Facts, kind: str) -> str | None:
     """Number of the paper's figure that a run's figure of this kind reproduces, or None."""
     number = FIGURES.get(run.scenario, {}).get((kind, run.law))
     return number if number and paper_run({run.controller: run}, run.law) else None

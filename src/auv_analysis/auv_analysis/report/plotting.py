@@ -16,6 +16,8 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import NullLocator
 from PIL import Image
 
+from auv_analysis.report.sketch import Sketch
+from auv_analysis.report.statistics import Part
 from auv_dynamics.signals import DOFS
 
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#D55E00', '#56B4E9')  # Okabe and Ito
@@ -24,7 +26,6 @@ GREY = '#6b6b6b'
 PALETTE = 255  # colours of a PNG
 WIDTH = 7.2  # in, two columns of a journal
 DPI = 160
-COLUMNS = 2000  # finer than the pixels of a panel; a line has at most two points in each
 GROUPS = (range(3), range(3, 6))  # linear, angular
 STYLE = {
     'font.family': 'STIXGeneral',
@@ -117,36 +118,9 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     return png, pdf
 
 
-def decimate(
-    t: np.ndarray, y: np.ndarray, *, logarithmic: bool = False
-) -> tuple[np.ndarray, np.ndarray]:
-    """Lines of at most 2 * COLUMNS points that look the same: minimum and maximum per column.
-
-    Parameters
-    ----------
-    t, y : (n,) samples
-    logarithmic : columns of equal width on a logarithmic time axis; t > 0 then
-
-    Returns
-    -------
-    t, y : (m,) some of the samples in their order, first, last and every column's extremes
-
-    """
-    n, columns = len(t), COLUMNS - 1
-    if n <= 2 * columns:
-        return t, y
-    place = np.log(t) if logarithmic else t
-    column = np.floor((place - place[0]) / (place[-1] - place[0]) * columns).clip(max=columns - 1)
-    order = np.lexsort((y, column))
-    first = np.flatnonzero(np.diff(column[order], prepend=-1.0))
-    last = np.append(first[1:], n) - 1
-    keep = np.unique(np.concatenate([order[first], order[last], [0, n - 1]]))
-    return t[keep], y[keep]
-
-
-def moving(values: np.ndarray, skip: Sequence[str] = ()) -> list[int]:
-    """Indices of the columns (n, 6) that are drawn: not in `skip` and not zero throughout."""
-    return [i for i in range(6) if DOFS[i] not in skip and np.any(values[:, i] != 0.0)]
+def moving(part: Part, skip: Sequence[str] = ()) -> list[int]:
+    """Indices of the columns that are drawn: not in `skip` and not zero throughout."""
+    return [i for i in range(6) if DOFS[i] not in skip and part.peak[i] != 0.0]
 
 
 def groups(columns: Sequence[int]) -> list[list[int]]:
@@ -155,11 +129,14 @@ def groups(columns: Sequence[int]) -> list[list[int]]:
     return [members for members in split if members]
 
 
-def draw_lines(axes: Axes, t: np.ndarray, values: np.ndarray, columns: Sequence[int]) -> None:
-    """Lines of some columns of values (n, 6) over t (n,) in s, in their colours."""
+def draw_lines(axes: Axes, run: Sketch, signal: str, part: str, columns: Sequence[int]) -> None:
+    """Lines of some columns of a signal over a part of the time, in their colours."""
+    ends = []
     for i in columns:
-        axes.plot(*decimate(t, values[:, i]), color=COLOURS[i])
-    axes.set_xlim(t[0], t[-1])
+        t, y = run.line(signal, i, part)
+        axes.plot(t, y, color=COLOURS[i])
+        ends = [t[0], t[-1]]
+    axes.set_xlim(*ends)
 
 
 def key(axes: Axes, quantity: Quantity, columns: Sequence[int]) -> None:

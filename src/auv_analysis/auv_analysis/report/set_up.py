@@ -15,7 +15,7 @@ from auv_analysis.report.words import (
     per_axis,
     rotations,
 )
-from auv_analysis.run import Run
+from auv_analysis.run import Facts
 from auv_analysis.scenario import SCHEMA
 from auv_dynamics.files import InputError, check, parse_yaml
 from auv_dynamics.signals import DOFS
@@ -47,7 +47,7 @@ class SetUp:
     limit: np.ndarray | None
 
 
-def set_up(runs: Mapping[str, Run], summaries: Mapping[str, Any], scenario_text: str) -> SetUp:
+def set_up(runs: Mapping[str, Facts], summaries: Mapping[str, Any], scenario_text: str) -> SetUp:
     """Words about the scenario of some runs.
 
     Parameters
@@ -87,7 +87,7 @@ def scenario_data(text: str) -> dict[str, Any] | None:
     return data
 
 
-def sampling_warnings(runs: Mapping[str, Run], summaries: Mapping[str, Any]) -> list[str]:
+def sampling_warnings(runs: Mapping[str, Facts], summaries: Mapping[str, Any]) -> list[str]:
     """Runs whose velocity gain is too fast for their control period, in words."""
     found = []
     for name, run in runs.items():
@@ -98,20 +98,20 @@ def sampling_warnings(runs: Mapping[str, Run], summaries: Mapping[str, Any]) -> 
     return found
 
 
-def _of_the_runs(runs: Mapping[str, Run]) -> list[tuple[str, list[str]]]:
+def _of_the_runs(runs: Mapping[str, Facts]) -> list[tuple[str, list[str]]]:
     """What the runs themselves say where their scenario is not at hand."""
     rows = []
     for name, run in runs.items():
         words = 'not known' if run.kinds is None else join(sorted(run.kinds)) or 'none'
         line = f'disturbances {words}'
-        line += '; the actuators are not ideal' if run.applied is not None else ''
-        line += '; the law sees measurements' if run.measured is not None else ''
+        line += '; the actuators are not ideal' if run.acting else ''
+        line += '; the law sees measurements' if run.sensing else ''
         rows.append((name, [line]))
     return rows
 
 
 def _shared(
-    runs: Mapping[str, Run], summaries: Mapping[str, Any], integrator: str = ''
+    runs: Mapping[str, Facts], summaries: Mapping[str, Any], integrator: str = ''
 ) -> list[tuple[str, list[str]]]:
     """How the law is run, and what is odd about it."""
     words = {
@@ -152,7 +152,7 @@ def _disturbances(specs: Any) -> list[str]:
     return [KINDS[spec['kind']](spec) for spec in specs] or ['none: F is zero']
 
 
-def _actuators(spec: Mapping[str, Any] | None, runs: Mapping[str, Run]) -> list[str]:
+def _actuators(spec: Mapping[str, Any] | None, runs: Mapping[str, Facts]) -> list[str]:
     if spec is None:
         return ['ideal: the commanded wrench is the applied one']
     parts = []
@@ -167,7 +167,7 @@ def _actuators(spec: Mapping[str, Any] | None, runs: Mapping[str, Run]) -> list[
     return parts or ['ideal: the commanded wrench is the applied one']
 
 
-def _thrusters(run: Run) -> str:
+def _thrusters(run: Facts) -> str:
     thrusters = run.vehicle.thrusters
     if thrusters is None:
         return 'thrusters of the vehicle file'
@@ -185,7 +185,7 @@ def _span(values: np.ndarray) -> str:
     return '…'.join(texts)
 
 
-def _anti_windup(controllers: Mapping[str, Any], runs: Mapping[str, Run]) -> str:
+def _anti_windup(controllers: Mapping[str, Any], runs: Mapping[str, Facts]) -> str:
     off = [name for name in runs if not controllers.get(name, {}).get('anti_windup', True)]
     on = [name for name in runs if name not in off]
     parts = [f'on for {join(on)}'] if on else []

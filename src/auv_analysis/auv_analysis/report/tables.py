@@ -6,22 +6,22 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.coupling import input_deformation, velocity_deformation
-from auv_analysis.energy import kinetic_energy, shares
+from auv_analysis.energy import shares
 from auv_analysis.report import paper
+from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.text import number, plain
 from auv_analysis.report.words import gain_text
-from auv_analysis.run import Run
+from auv_analysis.run import Facts
 from auv_dynamics.signals import DOFS
 from auv_gvc_controller.decomposition import inverse_upper
 from auv_gvc_controller.laws import SHIPPED
-from auv_gvc_controller.model import control_model
 
 Summaries = Mapping[str, Mapping[str, Any]]
 VELOCITIES, WRENCHES = 'uvwpqr', 'XYZKMN'
 ZERO = 'zero (no adaptive term)'
 
 
-def controller_row(run: Run) -> dict[str, Any]:
+def controller_row(run: Facts) -> dict[str, Any]:
     """Name, law, gains in words and origin of a run; a gain left to its default says so."""
     defaults = getattr(SHIPPED.get(run.law), '_field_defaults', {}) if run.gains else {}
     left = {name: value for name, value in defaults.items() if name not in run.gains}
@@ -35,11 +35,11 @@ def controller_row(run: Run) -> dict[str, Any]:
         ),
         'duration': run.duration,
         'step': run.step,
-        'samples': len(run.t),
+        'samples': run.samples,
     }
 
 
-def decompositions(runs: Mapping[str, Run], summaries: Summaries) -> list[dict[str, Any]]:
+def decompositions(runs: Mapping[str, Facts], summaries: Summaries) -> list[dict[str, Any]]:
     """Upsilon and N, once for each vehicle that differs."""
     found: list[dict[str, Any]] = []
     for name, run in runs.items():
@@ -76,7 +76,7 @@ def _multiple(matrix: np.ndarray) -> str | None:
     return f'{plain(matrix[0, 0], 6)} I' if scalar else None
 
 
-def energy_rows(runs: Mapping[str, Run], original: Run | None) -> list[dict[str, Any]]:
+def energy_rows(runs: Mapping[str, Sketch], original: Sketch | None) -> list[dict[str, Any]]:
     """Mean kinetic energy and shares per run and window; the paper's first, where it applies."""
     rows = []
     if original is not None:
@@ -85,10 +85,8 @@ def energy_rows(runs: Mapping[str, Run], original: Run | None) -> list[dict[str,
             'shares': [f'{x:.2f}' for x in paper.SHARES],
         })  # fmt: skip
     for name, run in runs.items():
-        model = control_model(run.vehicle)
-        parts = kinetic_energy(model.Upsilon_inv.reshape(6, 6), model.N, run.nu)
         for end in dict.fromkeys([min(paper.ENERGY_WINDOW, run.duration), run.duration]):
-            mean = parts[run.t <= run.t[0] + end + run.step / 2].mean(axis=0)
+            mean = run.part('energy', 0.0, end).mean
             rows.append({
                 'name': name, 'window': f'0–{end:g} s', 'mean': float(mean.sum()),
                 'shares': [_share(x) for x in shares(mean)],
@@ -96,7 +94,7 @@ def energy_rows(runs: Mapping[str, Run], original: Run | None) -> list[dict[str,
     return rows
 
 
-def couplings(runs: Mapping[str, Run], summaries: Summaries) -> list[dict[str, Any]]:
+def couplings(runs: Mapping[str, Facts], summaries: Summaries) -> list[dict[str, Any]]:
     """Rows of delta_xi and delta_pi: the equation and each run's largest magnitude."""
     first = next(iter(runs))
     Upsilon = np.array(summaries[first]['decomposition']['Upsilon'])
@@ -122,7 +120,7 @@ def couplings(runs: Mapping[str, Run], summaries: Summaries) -> list[dict[str, A
     ]
 
 
-def notes(runs: Mapping[str, Run]) -> list[str]:
+def notes(runs: Mapping[str, Facts]) -> list[str]:
     """Notes of the runs, each once."""
     found = [f'{name}: {note}' for name, run in runs.items() for note in run.notes]
     return list(dict.fromkeys(found))

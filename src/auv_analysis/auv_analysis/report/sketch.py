@@ -1,0 +1,82 @@
+"""What the report needs of a run, taken in one pass over its blocks: lines, extremes, sums."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from auv_analysis.report.statistics import Part, Statistics
+from auv_analysis.report.traces import Line, Trace
+from auv_analysis.run import Extent, Facts
+
+FOREVER = float('inf')
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sketch(Facts):
+    """A run as the report sees it: never more than some thousand points of each signal.
+
+    Signals of six columns: `error`, `nu`, `nu_d`, `tau`, `delta_xi`, `delta_pi`, `energy`, and
+    where they are there `F`, `lumped_error` and `applied`. Of one column: `kinetic` and `wanted`,
+    the energies of the run and of its set-point, and of a certificate `L`, `L_dot`, `identity`,
+    `bound` and `increasing`, which is 1 where the identity is positive, else 0.
+
+    Attributes
+    ----------
+    known_extent : length and optional signals
+    columns : name -> its columns in the statistics
+    statistics : of all signals
+    traces : name, part -> lines of the columns; parts are 'whole', 'early', 'late' (of the
+        transient) and 'log' (over the time since the start)
+    stack : times (c,) and shares (c, 6) in %, means over columns of samples
+    settled : time, s from the start, of the last sample with an error above 0.005; 0: of none,
+        inf: of the very last
+    end : (6,) eta at the last sample
+    estimates : whether the adaptive term is ever other than zero
+    missed : (6,) whether the applied wrench ever differs from the command
+    F_digest : tells disturbances of different runs apart
+
+    """
+
+    known_extent: Extent
+    columns: dict[str, slice]
+    statistics: Statistics
+    traces: dict[tuple[str, str], list[Trace]]
+    stack: Line
+    settled: float
+    end: np.ndarray
+    estimates: bool
+    missed: np.ndarray
+    F_digest: bytes
+
+    @property
+    def extent(self) -> Extent:
+        """Length and optional signals."""
+        return self.known_extent
+
+    def line(self, name: str, column: int = 0, part: str = 'whole') -> Line:
+        """Line of a column of a signal."""
+        return self.traces[name, part][column].line()
+
+    def part(self, name: str, first: float = 0.0, last: float = FOREVER) -> Part:
+        """Statistics of a signal in [first, last], s from the start, one of `questions`."""
+        begin = None if first <= 0.0 else cut_before(self, first)
+        end = None if last >= self.duration else cut_behind(self, last)
+        found = self.statistics.between(begin, end)
+        if found is None:
+            raise ValueError(f'expected samples in {first:g} to {last:g} s, found none')
+        return found.of(self.columns[name])
+
+
+def cut_before(run: Facts, time: float) -> float:
+    """Cut before the sample nearest to a time, s from the start."""
+    return run.start + time - 0.5 * run.step
+
+
+def cut_behind(run: Facts, time: float) -> float:
+    """Cut behind the sample nearest to a time, s from the start."""
+    return float(np.nextafter(run.start + time + 0.5 * run.step, np.inf))
+
+
+def last_third(run: Facts) -> float:
+    """Time from which the last third of a run counts, s from the start."""
+    return 2.0 / 3.0 * run.duration

@@ -1,0 +1,74 @@
+"""Lines with few points that look the same: the extremes of every column of pixels."""
+
+import numpy as np
+
+COLUMNS = 2000  # finer than the pixels of a panel; a line has at most two points in each
+FEW = 2 * (COLUMNS - 1)  # samples that are all drawn
+Line = tuple[np.ndarray, np.ndarray]  # t and y, (m,) each
+
+
+class Trace:
+    """A line that is thinned while its samples come in, see `thinned`.
+
+    Parameters
+    ----------
+    first, last : times between which the columns lie, s
+    logarithmic : columns of equal width on a logarithmic time axis; first > 0 then
+
+    """
+
+    def __init__(self, first: float, last: float, *, logarithmic: bool = False):
+        self._ends, self._logarithmic = (first, last), logarithmic
+        self._parts: list[Line] = []
+        self._seen = self._held = 0
+
+    def add(self, t: np.ndarray, y: np.ndarray) -> None:
+        """Add the next samples, (n,) each, n may be 0."""
+        self._parts.append((np.array(t), np.array(y)))  # not views: those would keep the block
+        self._seen += len(t)
+        self._held += len(t)
+        if self._held > 2 * FEW:
+            self._parts = [self.line()]
+            self._held = len(self._parts[0][0])
+
+    def line(self) -> Line:
+        """Times and values to be drawn."""
+        t, y = (np.concatenate(values) for values in zip(*self._parts, strict=True))
+        if self._seen <= FEW:
+            return t, y
+        return thinned(t, y, *self._ends, logarithmic=self._logarithmic)
+
+
+def thinned(
+    t: np.ndarray, y: np.ndarray, begin: float, end: float, *, logarithmic: bool = False
+) -> Line:
+    """The first and the last sample, and every column's smallest and largest.
+
+    Parameters
+    ----------
+    t, y : (n,) samples, t rising
+    begin, end : times between which the columns lie
+    logarithmic : columns of equal width on a logarithmic time axis; t > 0 then
+
+    Returns
+    -------
+    t, y : (m,) some of the samples in their order; thinning them again changes nothing
+
+    """
+    place, (left, right) = (np.log(t), np.log([begin, end])) if logarithmic else (t, (begin, end))
+    column = np.floor((place - left) / (right - left) * (COLUMNS - 1)).clip(0, COLUMNS - 2)
+    starts = np.flatnonzero(np.diff(column, prepend=-1.0))
+    owner = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(t)))
+    low = np.flatnonzero(y == np.minimum.reduceat(y, starts)[owner])
+    high = np.flatnonzero(y == np.maximum.reduceat(y, starts)[owner])
+    low = low[np.diff(owner[low], prepend=-1) > 0]  # where several are smallest, the first
+    high = high[np.diff(owner[high], append=len(starts)) > 0]  # and the last that is largest
+    keep = np.unique(np.concatenate([low, high, [0, len(t) - 1]]))
+    return t[keep], y[keep]
+
+
+def decimate(t: np.ndarray, y: np.ndarray, *, logarithmic: bool = False) -> Line:
+    """Line of all samples (n,) of a signal, thinned where they are many."""
+    if len(t) <= FEW:
+        return t, y
+    return thinned(t, y, t[0], t[-1], logarithmic=logarithmic)

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.changes import VEHICLE, changed_scenario, check_paths, split
+from auv_analysis.changes import VEHICLE, Parts, changed_scenario, check_paths, split
 from auv_analysis.scenario import Scenario, load_scenario
 from auv_analysis.simulation import Hold, check_hold
 from auv_analysis.sweep.groups import Group, kind_of, make_group
 from auv_analysis.sweep.values import Values
 from auv_dynamics.config import shipped
-from auv_dynamics.files import InputError, check, read_yaml
+from auv_dynamics.files import InputError, check, dotted, read_yaml
 from auv_gvc_controller.laws import SHIPPED
 
 SCHEMA = Path(__file__).with_name('campaign.schema.json')
@@ -185,17 +185,19 @@ def _scenarios(scenario: Scenario, data: dict[str, Any], path: Path) -> dict[str
 
 def _check_varied(campaign: Campaign) -> None:
     """Refuse paths that lead nowhere, that must not vary or that stand twice."""
-    seen: dict[str, str] = {}
+    seen: dict[Parts, str] = {}
     for number, spec in enumerate(campaign.data['vary']):
         for path in spec[kind_of(spec)]:
             place = f'vary[{number}].{kind_of(spec)}.{path}'
-            if path in seen:
-                raise InputError(campaign.path, place, 'each path once', f'again in {seen[path]}')
-            seen[path] = f'vary[{number}]'
             try:
                 _check_path(campaign, path)
             except InputError as error:
                 raise InputError(campaign.path, place, error.expected, error.found) from None
+            for parts in {split(of_controller(path, name)) for name in campaign.controllers}:
+                if parts in seen:
+                    found = f'{dotted(parts)} in {seen[parts]} as well'
+                    raise InputError(campaign.path, place, 'each value varied once', found)
+                seen[parts] = f'vary[{number}]'
 
 
 def _check_path(campaign: Campaign, path: str) -> None:

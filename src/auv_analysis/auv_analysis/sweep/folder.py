@@ -76,7 +76,7 @@ class SweepFolder:
             import pyarrow as pa
             import pyarrow.parquet as pq
 
-            with suppress(pa.ArrowInvalid):
+            with suppress(pa.ArrowInvalid, OSError):
                 yield number, pq.ParquetFile(path).read(columns)
 
     def stored(self, rollouts: int) -> int:

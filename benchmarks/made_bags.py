@@ -29,11 +29,11 @@ TWIST, ACCEL = 'geometry_msgs/msg/TwistStamped', 'geometry_msgs/msg/AccelStamped
 
 def _state(run: Run) -> np.ndarray:
     """Numbers of an odometry (n, 13): position, quaternion x y z w, velocity."""
-    w, x, y, z = quaternion(run.eta[:, 3:].T)
+    w, x, y, z = quaternion(run.eta[:, 3:]).T
     return np.column_stack([run.eta[:, :3], x, y, z, w, run.nu])
 
 
-COLUMNS: dict[str, tuple[str, Callable[[Run], np.ndarray]]] = {  # topic -> type, its numbers
+COLUMNS: dict[str, tuple[str, Callable[[Run], Any]]] = {  # topic -> type, its numbers
     'odom': (ODOMETRY, _state),
     'twist': (TWIST, lambda run: run.nu),
     'cmd_vel': (TWIST, lambda run: run.nu_d),

@@ -1,13 +1,64 @@
 """The node graph against a bare rclpy ping-pong."""
 
-from graph import graph_rate, pingpong
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 from measure import Measured, interleaved
+
+from auv_analysis.domain import VARIABLE, chosen_domain
+from auv_analysis.experiment import environment
+from auv_dynamics.ros.topics import TOPICS
+
+ECHO = Path(__file__).with_name('echo.py')
+OWN = len(TOPICS)
+STEPS = 10_000  # of a run that is made once for each number of topics
 
 
 def against_pingpong() -> dict[str, Measured]:
     """Steps per second of five processes and of one process, every topic recorded."""
+    from graph import graph_rate, pingpong
+
     subjects = {
         'graph_vs_pingpong': graph_rate,
         'composed_vs_pingpong': lambda: graph_rate(composed=True),
     }
     return interleaved(subjects, pingpong, 'steps/s')
+
+
+@contextmanager
+def recorded_topics() -> Iterator[Callable[[float], float]]:
+    """Time in s of a step with so many topics recorded: the graph's own and others beside them."""
+    from graph import graph_rate
+
+    def cost(count: float) -> float:
+        with _echoing(round(count) - OWN):
+            return 1.0 / graph_rate(steps=STEPS)
+
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = str(chosen_domain(None)[0])  # the same for the graph and for the echo
+    try:
+        yield cost
+    finally:
+        del os.environ[VARIABLE]
+        if before is not None:
+            os.environ[VARIABLE] = before
+
+
+@contextmanager
+def _echoing(count: int) -> Iterator[None]:
+    if not count:
+        yield
+        return
+    command = [sys.executable, str(ECHO), str(count)]
+    environ = environment(int(os.environ[VARIABLE]))
+    with subprocess.Popen(command, env=environ, stdout=subprocess.PIPE) as echo:
+        try:
+            assert echo.stdout is not None
+            echo.stdout.readline()  # it is there
+            yield
+        finally:
+            echo.terminate()

@@ -55,8 +55,13 @@ def against_c() -> dict[str, Measured]:
     subjects = {
         'rollout_vs_c': cost(lambda: run_batch(batch), BATCH),
         'single_vs_c': cost(singles, SINGLES),
+        'scalar_c_o3_vs_c': _c(c_reference.library(c_reference.PLAIN), loops),
     }
-    return interleaved(subjects, cost(lambda: c_reference.rollouts(library, loops), BATCH), 's')
+    return interleaved(subjects, _c(library, loops), 's')
+
+
+def _c(library: Any, loops: c_reference.Loops) -> Callable[[], float]:
+    return cost(lambda: c_reference.rollouts(library, loops), len(loops.parameters))
 
 
 def check_figures(ours: dict[str, np.ndarray], theirs: np.ndarray) -> None:

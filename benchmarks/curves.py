@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench_nodes import OWN, recorded_topics
 from loops import case1, varied
 from made_bags import make_bag
 from measure import seconds
@@ -106,6 +107,11 @@ CURVES = (
         'threads', '4 096 rollouts of Case 1 over 10 s',
         'threads', 'threads', tuple(range(1, CORES + 1)),
         'times threads', lambda size: 1 / size, '-1 is in inverse proportion', _threads,
+    ),
+    Curve(
+        'topics', 'A step of the node graph; each topic beside its own has a message per step',
+        'recorded topics', 'topics', tuple(OWN + more for more in (0, 4, 16, 32)),
+        'per topic', lambda size: size, '1 is in proportion', recorded_topics,
     ),
     Curve(
         'bag', 'A bag of Case 1 at 100 Hz to arrays, eight topics',

@@ -23,6 +23,7 @@ def main() -> None:
             output.publish(message)
 
     node.create_subscription(Odometry, interface.ODOM, again, every_step(), raw=True)
+    print('ready', flush=True)
     try:
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):

@@ -40,11 +40,12 @@ def varied(count: int) -> dict[str, np.ndarray]:
     scenario, generator = load_scenario('case1'), np.random.default_rng(SEED)
     factors = generator.uniform(1 - SPREAD, 1 + SPREAD, (len(VARIED), count))
     return {
-        path: _value(scenario, path) * factor for path, factor in zip(VARIED, factors, strict=True)
+        path: nominal(scenario, path) * factor for path, factor in zip(VARIED, factors, strict=True)
     }
 
 
-def _value(scenario: Scenario, path: str) -> Any:
+def nominal(scenario: Scenario, path: str) -> Any:
+    """What stands at a path of a scenario or its vehicle."""
     first, *rest = split(path)
     value = scenario.vehicle_data if first == 'vehicle' else scenario.data[str(first)]
     for part in rest:

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from curves import CURVES
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullLocator
 
 from auv_analysis.report.plotting import COLOURS, DPI, GREY, letter, new_figure, style
 
 COLUMNS = 3
+MANY_DECADES = 2.5  # beyond which only powers of ten are named
 PANEL = 2.3  # in, height of a row
 
 
@@ -38,5 +40,17 @@ def _draw(axes: Axes, found: Mapping[str, Any]) -> None:
     axes.plot(size, line, color=GREY, linestyle=(0, (4, 2)), label=f'slope {found["slope"]:.2f}')
     axes.plot(size, cost, 'o-', color=COLOURS[0], markersize=3.5)
     axes.set(xscale='log', yscale='log')
-    axes.margins(0.06)
-    axes.legend(loc='upper left')
+    axes.margins(0.08, 0.15)
+    axes.set_xticks(size, [short(value) for value in size])
+    decades = np.log10(cost.max() / cost.min())
+    subs = (1.0, 2.0, 5.0) if decades < MANY_DECADES else (1.0,)
+    axes.yaxis.set_major_locator(LogLocator(subs=subs))
+    axes.yaxis.set_major_formatter(lambda value, _: f'{value:g}')
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_minor_locator(NullLocator())
+    axes.legend(loc='best')
+
+
+def short(size: float) -> str:
+    """A size as a tick's label: thousands as k."""
+    return f'{size / 1000:g}k' if size >= 1000 else f'{size:g}'

@@ -48,6 +48,8 @@ def _line(name: str, found: dict[str, Measured], missing: dict[str, str]) -> str
     if name in missing:
         return f'{name}: not measured: {missing[name]}'
     key, result = BY_NAME[name], found[name]
+    if key.must is None:
+        return f'{name} = {key.number(result):.3g}'
     bounds = f'must {key.bound(key.must)}, aim {key.bound(key.aim)}'
     return f'{name} = {key.number(result):.3g} ({bounds}): {key.verdict(result)}'
 

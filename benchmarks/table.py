@@ -31,7 +31,7 @@ def table(results: Mapping[str, Any]) -> str:
             continue
         measured = Measured(**results[key.name])
         lines.append(_row(key, measured))
-        if key.verdict(measured) != 'aim reached':
+        if key.verdict(measured) in ('met', 'MISSED'):
             reasons.append(f'* `{key.name}`: {key.why or "no reason is known."}')
     if reasons:
         lines += ['', 'Where an aim is missed:', '', *reasons]

@@ -58,10 +58,20 @@ def test_verdict(name, ratio, verdict):
     assert keys.BY_NAME[name].verdict(measured(ratio)) == verdict
 
 
-def test_a_value_is_judged_by_itself():
+@pytest.mark.parametrize(
+    ('value', 'ratio', 'verdict'),
+    [(399.0, 1.05, 'aim reached'), (399.0, 2.0, 'met'), (401.0, 1.0, 'MISSED')],
+)
+def test_memory_is_judged_by_its_size_and_its_aim_by_its_growth(value, ratio, verdict):
     key = keys.BY_NAME['analysis_one_hour_rss_mb']
-    assert key.verdict(Measured(399.0, 'MB', 1.0, 399.0, 7)) == 'aim reached'
-    assert key.verdict(Measured(401.0, 'MB', None, None, 7)) == 'MISSED'
+    result = Measured(value, 'MB', ratio, value / ratio, 7)
+    assert (key.number(result), key.verdict(result)) == (value, verdict)
+    assert (key.bound(key.must), key.bound(key.aim)) == ('≤ 400', 'flat')
+
+
+def test_what_is_there_for_information_is_not_judged():
+    key = keys.BY_NAME['bag_read_vs_rosbags']
+    assert (key.verdict(measured(0.1)), key.bound(key.must)) == ('', '')
 
 
 def test_every_key_is_measured_by_one_group():

@@ -1,0 +1,105 @@
+"""Figures of long runs: against NumPy over whole arrays, and how much memory an hour takes."""
+
+import os
+import statistics
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bench_commands import AUV
+from loops import CONTROLLER, case1
+from made_bags import make_bag
+from measure import RUNS, Measured, interleaved, speed
+
+from auv_analysis import simulate
+from auv_analysis.coupling import delta_pi, delta_xi
+from auv_analysis.energy import kinetic_energy
+from auv_analysis.moments import DELTA_PI, DELTA_XI, ENERGY, ERROR, LUMPED, TAU, Tally, maps_of
+from auv_analysis.run import Run
+from auv_analysis.summary import TRANSIENT
+from auv_gvc_controller.model import ControlModel, control_model
+
+SAMPLES = 1_000_000
+SIGNALS = ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate')
+SAME = 1e-9  # relative, of sums that are taken in another order
+BRIEF, HOUR = 36_000, 360_000  # steps at 100 Hz
+MB = 1e6
+
+
+def against_numpy() -> dict[str, Measured]:
+    """Samples per second of the figures that are sums and peaks: no settling, no certificate."""
+    run = _long_run()
+    model = control_model(run.vehicle)
+    for ours, theirs in zip(reduced(run, model), whole(run, model), strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=SAME)
+    return interleaved(
+        {'analysis_vs_numpy': speed(lambda: reduced(run, model), SAMPLES)},
+        speed(lambda: whole(run, model), SAMPLES),
+        'samples/s',
+    )
+
+
+def _long_run() -> Run:
+    """A run of random samples: their values do not matter, their number does."""
+    run, generator = simulate(case1(1.0), CONTROLLER), np.random.default_rng(0)
+    values: dict[str, Any] = {name: generator.normal(size=(SAMPLES, 6)) for name in SIGNALS}
+    return replace(run, t=np.arange(SAMPLES) * run.step, law_state=None, **values)
+
+
+def reduced(run: Run, model: ControlModel) -> list[np.ndarray]:
+    """Figures in one go over the samples."""
+    late = run.start + TRANSIENT - 1e-9
+    tally = Tally(maps_of(model), (late,))
+    for block in run.blocks():
+        tally.add(block)
+    everything, after = tally.between(), tally.between(late)
+    figures = [everything.mean(ENERGY)]
+    figures += [np.array(everything.rms(signal)) for signal in (ERROR, LUMPED, TAU)]
+    figures += [np.array(after.peak(signal)) for signal in (ERROR, LUMPED)]
+    return figures + [np.array(everything.peak(s)) for s in (DELTA_XI, DELTA_PI, TAU)]
+
+
+def whole(run: Run, model: ControlModel) -> list[np.ndarray]:
+    """The same figures as one writes them down: an array for each signal."""
+    assert run.disturbance is not None
+    Upsilon, Upsilon_inv = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
+    error, lumped = run.nu_d - run.nu, run.disturbance_estimate - run.disturbance
+    late = run.t >= run.t[0] + TRANSIENT - 1e-9
+    figures = [kinetic_energy(Upsilon_inv, model.N, run.nu).mean(axis=0)]
+    figures += [np.sqrt(np.mean(values**2, axis=0)) for values in (error, lumped, run.tau)]
+    figures += [np.abs(values[late]).max(axis=0) for values in (error, lumped)]
+    signals = (delta_xi(Upsilon_inv, run.nu), delta_pi(Upsilon, run.tau), run.tau)
+    return figures + [np.abs(values).max(axis=0) for values in signals]
+
+
+def one_hour() -> dict[str, Measured]:
+    """Peak memory of `auv analyze` on a bag of an hour, beside one of six minutes."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        bags = [make_bag(folder / str(steps), steps) for steps in (HOUR, BRIEF)]
+        out = ['--out', str(folder / 'out'), '--overwrite', '--json']
+        pairs = [
+            [peak_memory([AUV, 'analyze', str(b), *out]) / MB for b in bags] for _ in range(RUNS)
+        ]
+    ratios = [hour / brief for hour, brief in pairs]
+    value, reference = (statistics.median(column) for column in zip(*pairs, strict=True))
+    spread = min(ratios), max(ratios)
+    measured = Measured(value, 'MB', statistics.median(ratios), reference, RUNS, spread)
+    return {'analysis_one_hour_rss_mb': measured}
+
+
+def peak_memory(command: Sequence[str]) -> int:
+    """Largest resident memory in bytes of a command that must succeed."""
+    with tempfile.TemporaryFile() as said:
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode:
+            said.seek(0)
+            last = (said.read().decode().splitlines() or ['no message'])[-1]
+            raise RuntimeError(f'{" ".join(command)}: exit code {process.returncode}: {last}')
+    return used.ru_maxrss * 1024

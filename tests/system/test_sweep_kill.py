@@ -13,7 +13,7 @@ from sweeps import CAMPAIGN, parts, write_files
 
 AUV = [sys.executable, '-m', 'auv_analysis.cli', 'sweep', 'campaign.yaml', '--workers', '2']
 BLOCKS = 48
-PATIENCE = 120.0  # s, after which a test that waits has failed
+PATIENCE = 600.0  # s, after which a test that waits has failed: the first process compiles
 
 
 @pytest.fixture

@@ -160,6 +160,10 @@ def test_columns_and_scenarios_of_their_own_give_the_same_bits(monkeypatch):
         'disturbance[1].added_mass': generator.uniform(-0.3, 0.3, count),
         'disturbance[1].mass': generator.uniform(-0.3, 0.3, count),
         'initial.eta[4]': generator.uniform(-1.5, 1.5, count),
+        'setpoint.surge.offset': generator.uniform(-0.5, 0.5, count),
+        'setpoint.yaw.terms[0].omega': generator.uniform(0.1, 3.0, count),
+        'setpoint.sway.terms[0].amplitude': generator.uniform(-0.5, 0.5, count),
+        'setpoint.heave.terms[0].phase': generator.uniform(-3.0, 3.0, count),
     }
     in_columns = rollouts(scenario, 'gvc', changes)
     monkeypatch.setattr(module, 'in_columns', lambda *_: False)

@@ -1,11 +1,11 @@
 """Which values of a sweep are packed as columns of numbers, without a scenario for each.
 
-Gains, the vehicle's numbers, relative model errors and initial states are; any other value makes a
-scenario of its own, checked like a file. Both ways give the same numbers, and what a column cannot
-vouch for goes the long way.
+Gains, the vehicle's numbers, relative model errors, set-points and initial states are; any other
+value makes a scenario of its own, checked like a file. Both ways give the same numbers, and what a
+column cannot vouch for goes the long way.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ RELATIVE = ('mass', 'added_mass', 'damping', 'buoyancy')  # errors of a plant
 NUMERIC = (
     'rigid_body', 'inertia_matrix', 'hydrostatics', 'added_mass', 'damping', 'environment',
 )  # fmt: skip
+TERM = ('amplitude', 'omega', 'phase')
 SHAPES = ((6,), (6, 6))  # of what stands for a matrix, beside a number where that may stand
 
 
@@ -44,7 +45,22 @@ def in_columns(scenario: Scenario, controller: str, path: str, values: np.ndarra
     if head == 'disturbance':
         apart = scenario.vehicle.M_RB is not None
         return apart and len(rest) == 2 and rest[1] in RELATIVE and values.ndim == 1
+    if head == 'setpoint':
+        return values.ndim == 1 and _setpoint_fits(scenario.data['setpoint'], rest)
     return head == 'seed' or (head == 'initial' and _fits(scenario.data, keys, values, ()))
+
+
+def _setpoint_fits(spec: Mapping[str, Any], keys: Keys) -> bool:
+    """A number of a degree of freedom that has a set-point, of a term that there is."""
+    entry = spec.get(str(keys[0]))
+    if 'file' in spec or entry is None:
+        return False
+    match keys[1:]:
+        case ('offset',):
+            return True
+        case ('terms', int(j), name):
+            return j < len(entry.get('terms', [])) and name in TERM
+    return False
 
 
 def _gain_fits(scenario: Scenario, controller: str, keys: Keys, values: np.ndarray) -> bool:

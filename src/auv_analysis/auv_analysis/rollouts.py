@@ -16,8 +16,9 @@ from auv_analysis.simulation import Hold, check_hold, reference, tables
 from auv_analysis.summary import band_of
 from auv_analysis.variants import Variants, merged, packed_variants
 from auv_dynamics.files import InputError
+from auv_gvc_controller.setpoint import Setpoint
 
-BLOCK = 4096  # steps whose set-points are looked at together for their peak
+BLOCK = 256  # steps whose set-points are looked at together for their peak
 
 
 def rollouts(
@@ -175,12 +176,16 @@ def _reason(error: InputError) -> str:
 def batch_of(variants: Variants, hold: Hold) -> Batch:
     """Closed loops of one structure, ready to run."""
     first = variants.scenarios[0]
-    peaks = _once(variants.scenarios, 0, _peak)
-    peak = np.array([peaks[scenario.texts[0]] for scenario in variants.scenarios])
+    if variants.setpoint is not None:
+        peak = _peak(variants.setpoint, first)
+    else:
+        peaks = _once(variants.scenarios, 0, lambda s: _peak(s.setpoint, s))
+        of_each = np.array([peaks[s.texts[0]] for s in variants.scenarios])
+        peak = of_each[:1] if len(peaks) == 1 else of_each[variants.of]
     return Batch(
         loop=variants.loop,
         x=variants.x,
-        band=band_of(peak[:1] if len(peaks) == 1 else peak[variants.of]),
+        band=band_of(peak),
         step=first.step,
         steps=first.steps,
         integrator=first.data['integrator'],
@@ -190,19 +195,19 @@ def batch_of(variants: Variants, hold: Hold) -> Batch:
     )
 
 
-def _peak(scenario: Scenario) -> np.ndarray:
-    """Largest abs(nu_d) (6,) at the samples of a whole run."""
+def _peak(setpoint: Setpoint, scenario: Scenario) -> np.ndarray:
+    """Largest abs(nu_d) (..., 6) at the samples of a whole run."""
     largest = np.zeros(6)
     for start in range(0, scenario.steps + 1, BLOCK):
         t = np.arange(start, min(start + BLOCK, scenario.steps + 1)) * scenario.step
-        largest = np.maximum(largest, np.abs(scenario.setpoint.value(t)).max(axis=0))
+        largest = np.maximum(largest, np.abs(setpoint.value(t)).max(axis=-2))
     return largest
 
 
 def _shared(variants: Variants) -> Known | None:
     """Tables of all vehicles where they are the same."""
     first, *others = variants.scenarios
-    if 'sensors' in first.data or any(s.texts != first.texts for s in others):
+    if variants.setpoint or 'sensors' in first.data or any(s.texts != first.texts for s in others):
         return None
     return lambda t: tables(first, t, None)
 
@@ -212,11 +217,18 @@ def _own(variants: Variants, vehicles: range) -> Known:
     used = [variants.scenarios[variants.of[i]] for i in vehicles]
     noises = [s.noise(int(variants.seeds[i])) for s, i in zip(used, vehicles, strict=True)]
 
+    varying = variants.setpoint and variants.setpoint.part(slice(vehicles.start, vehicles.stop))
+
+    def references(t: np.ndarray) -> np.ndarray:
+        if varying is not None:
+            return reference(varying, t)
+        of_each = _once(used, 0, lambda s: reference(s.setpoint, t))
+        return np.stack([of_each[s.texts[0]] for s in used])
+
     def known(t: np.ndarray) -> Tables:
-        references = _once(used, 0, lambda s: reference(s, t))
         acting = _once(used, 1, lambda s: s.uncertainty.tables(t))
         return Tables(
-            np.stack([references[s.texts[0]] for s in used]),
+            references(t),
             np.stack([acting[s.texts[1]][0] for s in used]),
             np.stack([acting[s.texts[1]][1] for s in used]),
             np.stack([np.zeros((0, 0)) if n is None else n.rows(len(t)) for n in noises]),

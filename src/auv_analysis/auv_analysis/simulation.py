@@ -26,6 +26,7 @@ from auv_dynamics.plant import SIZE, eta_of, initial_state
 from auv_dynamics.sensors import WIDTH, SensorNoise
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.sampled import anti_windup, is_compiled, user_law
+from auv_gvc_controller.setpoint import Setpoint
 
 Hold = Literal['continuous', 'zoh']
 HOLDS = ('continuous', 'zoh')
@@ -110,12 +111,11 @@ def blocks(scenario: Scenario) -> Iterator[tuple[Grid, Tables]]:
 def tables(scenario: Scenario, t: np.ndarray, noise: SensorNoise | None) -> Tables:
     """Set-points, disturbance, current and the next rows of noise at the stage times t (T, s)."""
     rows = np.zeros((0, WIDTH)) if noise is None else noise.rows(len(t))
-    return Tables(reference(scenario, t), *scenario.uncertainty.tables(t), rows)
+    return Tables(reference(scenario.setpoint, t), *scenario.uncertainty.tables(t), rows)
 
 
-def reference(scenario: Scenario, t: np.ndarray) -> np.ndarray:
-    """nu_d and nu_d_dot (T, s, 12) at the stage times t (T, s)."""
-    setpoint = scenario.setpoint
+def reference(setpoint: Setpoint, t: np.ndarray) -> np.ndarray:
+    """nu_d and nu_d_dot (..., T, s, 12) at the stage times t (T, s)."""
     return np.concatenate([setpoint.value(t), setpoint.derivative(t)], axis=-1)
 
 

@@ -8,11 +8,12 @@ import numpy as np
 
 from auv_analysis.changes import split
 from auv_analysis.closed_loop import Loop
-from auv_analysis.columns import RELATIVE, within
+from auv_analysis.columns import RELATIVE, TERM, within
 from auv_analysis.scenario import Scenario
 from auv_analysis.trees import arrays, joined, kept, led
 from auv_dynamics.fleet import Keys, fleet, matrices, numbers
 from auv_dynamics.plant import initial_state
+from auv_dynamics.signals import DOFS, Harmonics
 from auv_dynamics.uncertainty import Truth, with_errors
 from auv_dynamics.vehicle import Vehicle, row_major
 from auv_dynamics.vehicle_file import is_definite
@@ -32,6 +33,7 @@ class Variants:
     loop : arrays with a leading axis of B or 1
     x : (B, 13 + m) initial states
     seeds : (B,) of the sensors' noise
+    setpoint : with a leading axis of B; None: that of the scenarios
 
     """
 
@@ -41,13 +43,15 @@ class Variants:
     loop: Loop
     x: np.ndarray
     seeds: np.ndarray
+    setpoint: Harmonics | None
 
     def part(self, keep: np.ndarray) -> 'Variants':
         """Those that a mask (B,) keeps."""
         if keep.all():
             return self
         arrays = {name: getattr(self, name)[keep] for name in ('rows', 'of', 'x', 'seeds')}
-        return replace(self, loop=kept(self.loop, keep), **arrays)
+        setpoint = self.setpoint and self.setpoint.part(keep)
+        return replace(self, loop=kept(self.loop, keep), setpoint=setpoint, **arrays)
 
     @property
     def structure(self) -> tuple:
@@ -58,7 +62,8 @@ class Variants:
         guard = loop.guard.integrals, loop.guard.reach.bounded, loop.actuators.reach.bounded
         time = scenario.step, scenario.steps, scenario.data['integrator']
         water = scenario.uncertainty.current is None, 'sensors' in scenario.data
-        return type(loop.gains), sizes, numbers_in_common, guard, time, water
+        waves = self.setpoint and tuple(terms.shape[1] for terms in self.setpoint.terms)
+        return type(loop.gains), sizes, numbers_in_common, guard, time, water, waves
 
 
 def merged(parts: Sequence[Variants]) -> Variants:
@@ -75,7 +80,15 @@ def merged(parts: Sequence[Variants]) -> Variants:
         joined([part.loop for part in parts], counts),
         np.concatenate([part.x for part in parts]),
         np.concatenate([part.seeds for part in parts]),
+        _joined_setpoints([part.setpoint for part in parts if part.setpoint is not None]),
     )
+
+
+def _joined_setpoints(parts: Sequence[Harmonics]) -> Harmonics | None:
+    if not parts:
+        return None
+    terms = (np.concatenate(of_axis) for of_axis in zip(*(p.terms for p in parts), strict=True))
+    return Harmonics(np.concatenate([part.offset for part in parts]), tuple(terms))
 
 
 def loop_of(scenario: Scenario, controller: str) -> Loop:
@@ -126,7 +139,26 @@ def packed_variants(
     if of_vehicle or any(keys[0] == 'disturbance' for keys in safe):
         loop = loop._replace(truth=_truth(scenario, vehicle, safe, good))
     x = _initial(scenario, safe, count, type(loop.gains).STATES)
-    return Variants(rows, (scenario,), np.zeros(count, int), loop, x, seeds), good
+    setpoint = _setpoint(scenario, safe, count)
+    return Variants(rows, (scenario,), np.zeros(count, int), loop, x, seeds, setpoint), good
+
+
+def _setpoint(
+    scenario: Scenario, columns: Mapping[Keys, np.ndarray], count: int
+) -> Harmonics | None:
+    """Set-points with a leading axis, None where none of their numbers vary."""
+    varying = _below(columns, 'setpoint')
+    if not varying:
+        return None
+    base = Harmonics.from_spec(scenario.data['setpoint'])
+    offset, *terms = (np.repeat(part[None], count, axis=0) for part in (base.offset, *base.terms))
+    for keys, values in varying.items():
+        i = DOFS.index(str(keys[0]))
+        if keys[1] == 'offset':
+            offset[:, i] = values
+        else:
+            terms[i][:, int(keys[2]), TERM.index(str(keys[3]))] = values
+    return Harmonics(offset, tuple(terms))
 
 
 def _harmless(scenario: Scenario, keys: Keys, values: np.ndarray, good: np.ndarray) -> np.ndarray:

@@ -15,8 +15,8 @@ class Harmonics:
 
     Attributes
     ----------
-    offset : (6,)
-    terms : for each degree of freedom (m, 3) amplitude, omega in rad/s, phase in rad
+    offset : (..., 6)
+    terms : for each degree of freedom (..., m, 3) amplitude, omega in rad/s, phase in rad
 
     """
 
@@ -38,21 +38,29 @@ class Harmonics:
         return cls(offset, tuple(terms))
 
     def value(self, t: np.ndarray | float) -> np.ndarray:
-        """Values at times t (...,) in s: (..., 6)."""
+        """Values at times t in s: the leading axes, those of t, then (6,)."""
         return self._sum(t, self.offset, lambda a, w, angle: a * np.sin(angle))
 
     def derivative(self, t: np.ndarray | float) -> np.ndarray:
-        """Time derivatives at times t (...,) in s: (..., 6)."""
-        return self._sum(t, np.zeros(6), lambda a, w, angle: a * w * np.cos(angle))
+        """Time derivatives at times t in s, of the same shape."""
+        return self._sum(t, np.zeros_like(self.offset), lambda a, w, angle: a * w * np.cos(angle))
 
     def _sum(self, t: np.ndarray | float, offset: np.ndarray, term: Any) -> np.ndarray:
         t = np.asarray(t, float)
-        out = np.empty((*t.shape, 6))
+        over_time = (..., *(None,) * t.ndim)
+        out = np.empty((*offset.shape[:-1], *t.shape, 6))
         for i in range(6):
-            out[..., i] = offset[i]
-            for amplitude, omega, phase in self.terms[i]:
+            out[..., i] = offset[..., i][over_time]
+            for j in range(self.terms[i].shape[-2]):
+                amplitude, omega, phase = np.moveaxis(
+                    self.terms[i][..., j, :][over_time], -1 - t.ndim, 0
+                )
                 out[..., i] += term(amplitude, omega, omega * t + phase)
         return out
+
+    def part(self, keep: Any) -> 'Harmonics':
+        """Those that an index of the first axis keeps."""
+        return Harmonics(self.offset[keep], tuple(terms[keep] for terms in self.terms))
 
 
 def harmonic_columns(spec: Mapping[str, Any], axes: Sequence[str] = DOFS) -> dict[str, Any]:

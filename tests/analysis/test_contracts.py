@@ -68,6 +68,11 @@ def test_topic_names_stand_in_one_module() -> None:
     assert found == {'interface.py'}
 
 
+def test_private_names_of_rclpy_stand_in_one_file() -> None:
+    pattern = re.compile(r'rclpy\.impl|_rclpy|noqa: SLF001')
+    assert {p.name for p in SOURCES if pattern.search(p.read_text())} == {'private.py'}
+
+
 @pytest.mark.parametrize('path', sorted((ROOT / 'config').glob('*/*.yaml')), ids=lambda p: p.stem)
 def test_every_shipped_file_loads(path: Path) -> None:
     if path.parent.name == 'vehicles':

@@ -119,6 +119,21 @@ def test_silence_ends_the_run_and_is_named() -> None:
     assert 'no controller' in output
 
 
+def test_silence_of_the_recorder_ends_the_run_and_is_named() -> None:
+    extra = parameters(recorder_window=2, wrench_timeout=1.0)
+    with graph(('plant_node', barrier(*extra))) as (peer, processes):
+        listening(peer)
+        peer.node.create_publisher(topics.PROGRESS.type, topics.PROGRESS.name, 1)
+        for k in range(2):
+            odometry(peer, k + 1)
+            peer.publish(topics.WRENCH, wrench(k))
+        process = processes['plant_node']
+        peer.until(lambda: process.poll() is not None, 'the end')
+        code, output = stop(process)
+    assert code == 1
+    assert 'no answer on recorder/progress to step 2 for 1 s; its publisher: test_peer' in output
+
+
 def test_without_recorder_it_ends_with_the_last_wrench() -> None:
     with graph(('plant_node', barrier(*parameters(duration=0.03)))) as (peer, processes):
         listening(peer)

@@ -105,6 +105,36 @@ def test_a_lost_or_doubled_step_is_an_error(tmp_path: Path, steps: tuple, word: 
     assert read_bag(tmp_path / 'bag').counts['/odom'] == 3, 'what came is kept'
 
 
+@pytest.mark.parametrize(('strict', 'code'), [(True, 1), (False, 0)])
+def test_a_gap_on_a_topic_without_steps_is_seen(tmp_path: Path, strict: bool, code: int) -> None:
+    """A publisher that keeps ten messages, a recorder that sleeps: the middleware drops some."""
+    arguments = [*TOPICS, *parameters(bag=tmp_path / 'bag', strict=strict)]
+    with graph(('recorder_node', arguments)) as (peer, processes):
+        process = processes['recorder_node']
+        peer.listen(topics.PROGRESS)
+        clock = peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 10)
+        peer.until(clock.get_subscription_count, 'the recorder')
+        publish_step(peer, 0)
+        clock.publish(topics.CLOCK.type(clock=convert.stamp(0)))
+        acknowledged(peer, 0)
+        process.send_signal(signal.SIGSTOP)
+        for k in range(1, 30_000):
+            clock.publish(topics.CLOCK.type(clock=convert.stamp(k)))
+        process.send_signal(signal.SIGCONT)
+        publish_step(peer, 1)
+        if not strict:
+            acknowledged(peer, 1)
+            peer.spin(1.0)
+            process.terminate()
+        peer.until(lambda: process.poll() is not None, 'the end')
+        ended, output = stop(process)
+    assert ended == code, output
+    assert ('/clock: expected publication' in output) == strict
+    assert strict == ('lost' in output)
+    assert strict or "messages that did not arrive: {'/clock'" in output
+    assert read_bag(tmp_path / 'bag').counts['/clock'] < 30_000
+
+
 def test_records_what_is_not_ours_as_well(tmp_path: Path) -> None:
     with graph(('recorder_node', [*TOPICS, *parameters(bag=tmp_path / 'bag')])) as (
         peer,

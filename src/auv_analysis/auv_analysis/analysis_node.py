@@ -1,28 +1,23 @@
 """Live analysis as a node: kinetic energy, couplings and lumped error of every tenth step."""
 
 from collections import OrderedDict
-from collections.abc import Callable
 
 import numpy as np
-from rclpy.serialization import deserialize_message
 
 from auv_analysis.live_analysis import LiveAnalysis
 from auv_dynamics import interface, load_vehicle
 from auv_dynamics.files import InputError
-from auv_dynamics.ros import convert, topics
-from auv_dynamics.ros.bulk import BulkNode, first_stamp
+from auv_dynamics.ros import topics
+from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.codec import Codec, first_stamp
 from auv_dynamics.ros.graph import Graph
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import declare, refuse_unknown
 
 CAPACITY = 2 * topics.DEPTH  # messages per topic that wait for their odometry
-READERS: dict[topics.Topic, Callable] = {
-    topics.ODOM: interface.read_odometry,
-    topics.CMD_VEL: interface.read_twist,
-    topics.WRENCH: interface.read_wrench,
-    topics.DISTURBANCE: interface.read_wrench,
-    topics.DISTURBANCE_ESTIMATE: interface.read_wrench,
-}
+HEARD = (
+    topics.ODOM, topics.CMD_VEL, topics.WRENCH, topics.DISTURBANCE, topics.DISTURBANCE_ESTIMATE
+)  # fmt: skip
 
 
 class AnalysisNode(BulkNode):
@@ -44,31 +39,33 @@ class AnalysisNode(BulkNode):
         self._k = 0  # odometry messages so far
         self._due: OrderedDict[int, set[topics.Topic]] = OrderedDict()
         self._waiting: dict[topics.Topic, OrderedDict[int, bytes]] = {
-            topic: OrderedDict() for topic in READERS
+            topic: OrderedDict() for topic in HEARD
         }
         self._values: dict[int, dict[topics.Topic, tuple]] = {}
-        for topic in topics.ANALYSIS_TOPICS:
-            self.graph.publisher(topic)
-        for topic in READERS:
+        self._outputs = {topic: self.graph.output(topic) for topic in topics.ANALYSIS_TOPICS}
+        self._codecs = {t: Codec(t.type, self.graph.frames, t.name) for t in HEARD}
+        for topic in HEARD:
             self._watch(topic)
 
     def _watch(self, topic: topics.Topic) -> None:
-        def callback(message: bytes) -> None:
+        def callback(message: bytes, _: dict) -> None:
             self._take(topic, first_stamp(message), message)
 
         source = self._odometry if topic is topics.ODOM else topic
-        self.graph.subscribe(source, callback, topics.every_step(), raw=True)
+        self.graph.subscribe(source, callback, topics.every_step())
 
     def _take(self, topic: topics.Topic, ns: int, message: bytes) -> None:
         waiting = self._waiting[topic]
         waiting[ns] = message
         if topic is topics.ODOM:
             if self._k % self._every == 0:
-                self._due[ns] = set(READERS)
+                self._due[ns] = set(HEARD)
                 self.graph.latest_ns = ns
+                if len(self._due) > CAPACITY // self._every:  # one that will not come any more
+                    self._values.pop(self._due.popitem(last=False)[0], None)
             self._k += 1
-        for due in list(self._due):
-            self._advance(due)
+        if ns in self._due:
+            self._advance(ns)
         while len(waiting) > CAPACITY:
             waiting.popitem(last=False)
 
@@ -79,41 +76,38 @@ class AnalysisNode(BulkNode):
         for topic in [t for t in missing if ns in self._waiting[t]]:
             missing.remove(topic)
             try:
-                message = deserialize_message(self._waiting[topic][ns], topic.type)
-                values[topic] = READERS[topic](message, self.graph.frames, topic.name)[1]
+                values[topic] = self._codecs[topic].decode(self._waiting[topic][ns])[1]
             except interface.BadMessageError as error:
                 self.graph.refuse(str(error))
                 continue
             self._publish(ns, topic, values)
-        late = len(self._due) > CAPACITY // self._every
-        if not missing or late:
+        if not missing:
             del self._due[ns], self._values[ns]
             for waiting in self._waiting.values():
                 while waiting and next(iter(waiting)) <= ns:
                     waiting.popitem(last=False)
 
     def _publish(self, ns: int, topic: topics.Topic, values: dict) -> None:
-        frames, publish = self.graph.frames, self._send
+        publish = self._send
         if topic is topics.ODOM:
             nu = values[topic][7:]
             energy, shares = self._live.energy(nu)
-            publish(topics.KINETIC_ENERGY, convert.joint_state(ns, energy, frames))
-            publish(topics.KINETIC_ENERGY_SHARES, convert.joint_state(ns, shares, frames))
-            publish(topics.DELTA_XI, convert.twist(ns, self._live.delta_xi(nu), frames))
+            publish(topics.KINETIC_ENERGY, ns, energy)
+            publish(topics.KINETIC_ENERGY_SHARES, ns, shares)
+            publish(topics.DELTA_XI, ns, self._live.delta_xi(nu))
         elif topic is topics.WRENCH:
-            pi = self._live.delta_pi(values[topic])
-            publish(topics.DELTA_PI, convert.wrench(ns, pi, frames))
+            publish(topics.DELTA_PI, ns, self._live.delta_pi(values[topic]))
         pair = (topics.DISTURBANCE, topics.DISTURBANCE_ESTIMATE)
         if topic in pair and all(t in values for t in pair):
             w = np.subtract(values[pair[1]], values[pair[0]])
-            publish(topics.LUMPED_ERROR, convert.wrench(ns, w, frames))
+            publish(topics.LUMPED_ERROR, ns, w)
         if {topics.ODOM, topics.CMD_VEL} <= values.keys():
             error = np.subtract(values[topics.CMD_VEL], values[topics.ODOM][7:])
             self.graph.facts['largest velocity error'] = float(np.abs(error).max())
 
-    def _send(self, topic: topics.Topic, message: object) -> None:
+    def _send(self, topic: topics.Topic, ns: int, values: np.ndarray) -> None:
         if self.graph.ready():
-            self.graph.publishers[topic.name].publish(message)
+            self._outputs[topic](ns, values)
 
 
 def main() -> None:

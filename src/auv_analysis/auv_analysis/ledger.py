@@ -1,4 +1,4 @@
-"""Which steps have arrived on which step topic: nothing lost, nothing doubled."""
+"""Which steps and publications have arrived: nothing lost, nothing doubled."""
 
 from collections.abc import Sequence
 
@@ -52,3 +52,33 @@ class StepLedger:
         furthest = max(self._newest.values())
         late = [f'{topic} at step {k}' for topic, k in self._newest.items() if k < furthest]
         return ', '.join(late) or 'none'
+
+
+class PublicationLedger:
+    """Follows the numbers that the middleware gives to a publisher's messages.
+
+    It sees what the steps do not show, a loss on a topic that has no message for every step. Each
+    topic is taken to have one publisher; the first number is any, for one may have joined late.
+
+    Parameters
+    ----------
+    strict : a gap is an error, else it is only counted
+
+    """
+
+    def __init__(self, strict: bool = True):
+        self._strict = strict
+        self._newest: dict[str, int] = {}
+        self.gaps: dict[str, int] = {}
+
+    def add(self, topic: str, number: int | None) -> None:
+        """Count a publication; LostStepError after a gap. None: the middleware does not number."""
+        if number is None:
+            return
+        last = self._newest.get(topic, number - 1)
+        self._newest[topic] = number
+        if number > last + 1:
+            self.gaps[topic] = self.gaps.get(topic, 0) + number - last - 1
+            if self._strict:
+                text = f'{topic}: expected publication {last + 1}, found {number}'
+                raise LostStepError(f'{text}: lost')

@@ -7,17 +7,19 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 
-from auv_analysis.ledger import LostStepError, StepLedger
+from auv_analysis.ledger import LostStepError, PublicationLedger, StepLedger
 from auv_analysis.recorder_parameters import recorder_parameters
 from auv_analysis.schemas import schema_text
 from auv_dynamics import interface
 from auv_dynamics.files import reason
 from auv_dynamics.ros import convert, topics
-from auv_dynamics.ros.bulk import BulkNode, first_stamp
+from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
 
 UNRECORDED = ('/rosout', '/parameter_events')
+NUMBERED = (*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK)  # with one publisher each
 STAMPED_TYPES = ('std_msgs/msg/Header', 'rosgraph_msgs/msg/Clock')
 
 
@@ -29,6 +31,7 @@ class RecorderNode(BulkNode):
         self._settings = p = recorder_parameters(self)
         self._writer = p.writer
         self._ledger = StepLedger(p.topics, p.step_ns, p.strict)
+        self._publications = PublicationLedger(p.strict)
         self._latest = 0  # stamp of the newest step message, for messages without one
         self._analysed = -1
         self._broken = False  # the disk takes no more
@@ -45,21 +48,19 @@ class RecorderNode(BulkNode):
     def _record(self, name: str, kind: type, topic: topics.Topic | None = None) -> None:
         resolved = self.resolve_topic_name(name)
         step_topic = topic.name if topic and topic.name in self._settings.topics else ''
-        due = topic == topics.LUMPED_ERROR
+        numbered, due = topic in NUMBERED, topic == topics.LUMPED_ERROR
         stamped = _begins_with_stamp(kind)
 
-        def callback(message: bytes) -> None:
+        def callback(message: bytes, info: dict[str, Any]) -> None:
             ns = first_stamp(message) if stamped else self._latest
             self._take(resolved, kind, message, ns)
-            if step_topic:
-                self._count(step_topic, ns)
-            elif due:
+            if numbered:
+                self._count(name, step_topic, ns, info.get('publication_sequence_number'))
+            if due:
                 self._analysed = max(self._analysed, ns)
 
         self._known.add(resolved)
-        self.graph.subscribe(
-            topic or topics.Topic(resolved, kind), callback, topics.every_step(), raw=True
-        )
+        self.graph.subscribe(topic or topics.Topic(resolved, kind), callback, topics.every_step())
 
     def _take(self, topic: str, kind: type, message: bytes, ns: int) -> None:
         if self._broken:
@@ -79,10 +80,12 @@ class RecorderNode(BulkNode):
         digest = str(endpoints[0].topic_type_hash) if endpoints else ''
         self._writer.add_channel(topic, kind, schema_text(kind), qos, digest)
 
-    def _count(self, topic: str, ns: int) -> None:
-        self._latest = max(self._latest, ns)
+    def _count(self, name: str, step_topic: str, ns: int, number: int | None) -> None:
         try:
-            self._ledger.add(topic, ns)
+            if step_topic:
+                self._latest = max(self._latest, ns)
+                self._ledger.add(step_topic, ns)
+            self._publications.add(name, number)
         except LostStepError as error:
             self._end(1, str(error))
 
@@ -134,7 +137,7 @@ class RecorderNode(BulkNode):
 
     def close(self) -> None:
         """Finish the bag with everything that has arrived."""
-        self.empty_bulk()
+        self.take_data()
         try:
             self._writer.close()
         except OSError as error:
@@ -142,8 +145,9 @@ class RecorderNode(BulkNode):
             self.get_logger().error(f'{self._writer.path}: not finished: {text}')
             self.exit_code = 1
         lost = {topic: gaps for topic, gaps in self._ledger.gaps.items() if gaps}
-        if lost:
-            self.get_logger().warning(f'steps that did not arrive: {lost}')
+        if lost or self._publications.gaps:
+            lost.update(self._publications.gaps)
+            self.get_logger().warning(f'steps or messages that did not arrive: {lost}')
 
 
 def _begins_with_stamp(kind: Any) -> bool:

@@ -55,10 +55,22 @@ def _six(linear: Any, angular: Any) -> tuple:
     return (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
 
 
-def _finite(topic: str, values: tuple) -> tuple:
+def check_finite(topic: str, values: tuple) -> tuple:
+    """Return the numbers of a message; BadMessageError when one is not finite."""
     if not all(map(math.isfinite, values)):
         raise BadMessageError(f'{topic}: expected finite numbers, found {values}')
     return values
+
+
+def check_state(topic: str, x: tuple) -> tuple:
+    """Return a state (13 floats); BadMessageError: not finite, or no unit quaternion."""
+    check_finite(topic, x)
+    norm = math.hypot(*x[3:7])
+    if abs(norm - 1.0) > 1e-3:
+        raise BadMessageError(
+            f'{topic}: orientation: expected a unit quaternion, found norm {norm:g}'
+        )
+    return x
 
 
 def _frame(topic: str, key: str, expected: str, found: str) -> None:
@@ -72,19 +84,13 @@ def read_odometry(message: Any, frames: Frames, topic: str = ODOM) -> tuple[int,
     _frame(topic, 'child_frame_id', frames.base, message.child_frame_id)
     p, q = message.pose.pose.position, message.pose.pose.orientation
     nu = _six(message.twist.twist.linear, message.twist.twist.angular)
-    attitude = (q.w, q.x, q.y, q.z)
-    norm = math.hypot(*attitude)
-    x = _finite(topic, (p.x, p.y, p.z, *attitude, *nu))
-    if abs(norm - 1.0) > 1e-3:
-        raise BadMessageError(
-            f'{topic}: orientation: expected a unit quaternion, found norm {norm:g}'
-        )
+    x = check_state(topic, (p.x, p.y, p.z, q.w, q.x, q.y, q.z, *nu))
     return nanoseconds(message.header.stamp), x
 
 
 def _stamped(topic: str, message: Any, values: tuple, frames: Frames) -> tuple[int, tuple]:
     _frame(topic, 'header.frame_id', frames.base, message.header.frame_id)
-    return nanoseconds(message.header.stamp), _finite(topic, values)
+    return nanoseconds(message.header.stamp), check_finite(topic, values)
 
 
 def read_twist(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:

@@ -3,12 +3,12 @@
 import time
 from typing import Any
 
-from std_msgs.msg import Header
-
 from auv_dynamics import interface
 from auv_dynamics.ros import topics
+from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.graph import steady_timer
 
+UNNAMED = '_NODE_NAME_UNKNOWN_'  # what the middleware calls an endpoint without a known node
 WATCH = 0.2  # s between two looks at the silence
 
 
@@ -26,6 +26,7 @@ class LockStep:
         self._started = self._published = False
         self._ack = -1
         self._since: float | None = None  # when the present wait began; None: nothing is awaited
+        self._publishers: dict[str, str] = {}  # topic -> nodes last seen to publish it
         if node.window:
             qos = topics.one_at_a_time()
             node.graph.subscribe(topics.PROGRESS, self._on_progress, qos)
@@ -84,22 +85,25 @@ class LockStep:
         self._since = time.monotonic()
         self._node.publish_state()
 
-    def _on_progress(self, message: Header) -> None:
-        self._ack = max(self._ack, interface.nanoseconds(message.stamp) // self._node.step_ns)
+    def _on_progress(self, message: bytes, _: dict) -> None:
+        self._ack = max(self._ack, first_stamp(message) // self._node.step_ns)
         self._go_on()
 
     def _watch(self) -> None:
         node = self._node
         if not self._started or self._since is None or node.paused:
             return
-        if self._published:
-            silent, topic = 'controller', topics.WRENCH.name
-        else:
-            silent, topic = 'recorder', topics.PROGRESS.name
+        for topic in (topics.WRENCH.name, topics.PROGRESS.name):
+            names = {info.node_name for info in node.get_publishers_info_by_topic(topic)}
+            # one that is stopped for long leaves the graph, or loses its name; it is named here
+            if names and UNNAMED not in names:
+                self._publishers[topic] = ', '.join(sorted(names))
         if time.monotonic() - self._since > node.wrench_timeout:
-            names = [info.node_name for info in node.get_publishers_info_by_topic(topic)]
-            who = ', '.join(sorted(set(names))) or f'no {silent}'
-            text = f'no answer on {topic} to step {node.plant.k} for {node.wrench_timeout:g} s'
+            silent = (topics.WRENCH.name, 'no controller')
+            if not self._published:
+                silent = (topics.PROGRESS.name, 'no recorder')
+            who = self._publishers.get(*silent)
+            text = f'no answer on {silent[0]} to step {node.plant.k} for {node.wrench_timeout:g} s'
             node.end(1, f'{text}; its publisher: {who}')
 
 

@@ -1,9 +1,7 @@
 """The plant as a node: odometry out, wrench in, in lock-step or in real time."""
 
 import numpy as np
-from geometry_msgs.msg import WrenchStamped
 from rclpy.duration import Duration
-from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics import interface, load_vehicle
@@ -18,7 +16,7 @@ from auv_dynamics.plant_parameters import (
     disturbance_specs,
     sensor_spec,
 )
-from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
@@ -41,17 +39,17 @@ class PlantNode(BulkNode):
         self._declare()
         refuse_unknown(self)
         self.graph.must_hold = self.window
-        self._odom = self.graph.publisher(topics.ODOM)
-        self._clock_output = self.graph.publisher(topics.CLOCK)
-        self._twist = self.graph.publisher(topics.TWIST)
-        self._disturbance = self.graph.publisher(topics.DISTURBANCE)
-        self._applied = self.graph.publisher(topics.WRENCH_APPLIED) if self._acts else None
-        self._truth = self.graph.publisher(topics.GROUND_TRUTH) if self._senses else None
+        self._say_odometry = self.graph.output(topics.ODOM)
+        self._say_clock = self.graph.output(topics.CLOCK)
+        self._say_twist = self.graph.output(topics.TWIST)
+        self._say_disturbance = self.graph.output(topics.DISTURBANCE)
+        self._say_applied = self.graph.output(topics.WRENCH_APPLIED) if self._acts else None
+        self._say_truth = self.graph.output(topics.GROUND_TRUTH) if self._senses else None
         self.peers = Peers(self, self._start_after)
         self.graph.also_ready_when(self.peers.not_ready)
         self.pace = LockStep(self) if self.lockstep else RealTime(self)
         qos = topics.one_at_a_time() if self.lockstep else topics.newest_command()
-        self.graph.subscribe(topics.WRENCH, self._on_wrench, qos)
+        self.graph.listen(topics.WRENCH, self.pace.wrench, qos)
         self.create_service(SetBool, '~/run', self._on_run)
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.paused = self._start_paused
@@ -114,24 +112,22 @@ class PlantNode(BulkNode):
 
     def publish_state(self, *, measured: bool = True) -> None:
         """Publish step k; odometry first, since the controller waits for it."""
-        plant, frames = self.plant, self.graph.frames
-        ns = plant.k * self.step_ns
+        plant, ns = self.plant, self.plant.k * self.step_ns
         if measured:
-            self._odom.publish(convert.odometry(ns, plant.measured, frames))
-        self._clock_output.publish(Clock(clock=convert.stamp(ns)))
+            self._say_odometry(ns, plant.measured)
+        self._say_clock(ns, ())
         if measured:
-            self._twist.publish(convert.twist(ns, plant.measured[7:], frames))
-        if self._truth is not None:
-            self._truth.publish(convert.odometry(ns, plant.x, frames))
+            self._say_twist(ns, plant.measured[7:])
+        if self._say_truth is not None:
+            self._say_truth(ns, plant.x)
         self.graph.latest_ns = ns
         self.graph.facts['step'] = plant.k
 
     def publish_forces(self, k: int, applied: tuple, F: tuple) -> None:
         """Publish what was applied at step k and F, what opposed it in (1)."""
-        ns, frames = k * self.step_ns, self.graph.frames
-        self._disturbance.publish(convert.wrench(ns, F, frames))
-        if self._applied is not None:
-            self._applied.publish(convert.wrench(ns, applied, frames))
+        self._say_disturbance(k * self.step_ns, F)
+        if self._say_applied is not None:
+            self._say_applied(k * self.step_ns, applied)
 
     def end(self, code: int, text: str = '') -> None:
         """End the node: 1 with the reason when the run failed."""
@@ -141,13 +137,6 @@ class PlantNode(BulkNode):
             for publisher in self.graph.publishers.values():
                 publisher.wait_for_all_acked(Duration(seconds=5.0))
         self.exit_code = code
-
-    def _on_wrench(self, message: WrenchStamped) -> None:
-        try:
-            ns, tau = interface.read_wrench(message, self.graph.frames, topics.WRENCH.name)
-            self.pace.wrench(ns, tau)
-        except interface.BadMessageError as error:
-            self.graph.refuse(str(error))
 
     def _on_run(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         reason = ''

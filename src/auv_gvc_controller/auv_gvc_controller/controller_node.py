@@ -3,16 +3,12 @@
 import sys
 import time
 from collections.abc import Callable
-from typing import Any
 
-from geometry_msgs.msg import AccelStamped, TwistStamped
-from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 
-from auv_dynamics import interface
-from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkMixin
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
@@ -41,8 +37,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self._active = False
         self._heard: float | None = None
         self._held: Answer | None = None
-        self._wrench = self.graph.publisher(topics.WRENCH)
-        self._estimate = self.graph.publisher(topics.DISTURBANCE_ESTIMATE)
+        self._say_wrench = self.graph.output(topics.WRENCH)
+        self._say_estimate = self.graph.output(topics.DISTURBANCE_ESTIMATE)
         self.graph.also_ready_when(lambda: '' if self._active else 'inactive')
         self._subscribe()
         self.create_service(Trigger, '~/reset', self._on_reset)
@@ -53,10 +49,10 @@ class ControllerNode(BulkMixin, LifecycleNode):
     def _subscribe(self) -> None:
         p = self._settings
         odometry = topics.one_at_a_time() if p.lockstep else topics.newest_measurement()
-        self.graph.subscribe(topics.ODOM, self._on_odometry, odometry)
-        self.graph.subscribe(topics.CMD_VEL, self._on_setpoint, topics.every_step())
+        self.graph.listen(topics.ODOM, self._on_odometry, odometry)
+        self._keep(topics.CMD_VEL, p.pairing.setpoint)
         if p.acceleration == SAME:
-            self.graph.subscribe(topics.CMD_ACCEL, self._on_acceleration, topics.every_step())
+            self._keep(topics.CMD_ACCEL, p.pairing.derivative)
 
     def _autostart(self) -> None:
         if self.trigger_configure() == SUCCESS and self.trigger_activate() == SUCCESS:
@@ -95,37 +91,28 @@ class ControllerNode(BulkMixin, LifecycleNode):
             return False
         return True
 
-    def _on_odometry(self, message: Odometry) -> None:
+    def _on_odometry(self, ns: int, x: tuple) -> None:
         if not self._active:
             return
         try:
-            ns, x = interface.read_odometry(message, self.graph.frames)
             self._say(self._controller.odometry(ns, x))
             self._heard = time.monotonic()
-        except interface.BadMessageError as error:
-            self.graph.refuse(str(error))
         except ValueError as error:
-            self.graph.refuse(f'odom: {error}')
+            self.graph.refuse(f'{topics.ODOM.name}: {error}')
 
-    def _on_setpoint(self, message: TwistStamped) -> None:
-        name, pairing = topics.CMD_VEL.name, self._settings.pairing
-        self._take(name, pairing.setpoint, interface.read_twist, message)
+    def _keep(self, topic: topics.Topic, keep: Callable[[int, tuple], None]) -> None:
+        """Subscribe to set-points; one may be what an odometry has been waiting for."""
 
-    def _on_acceleration(self, message: AccelStamped) -> None:
-        name, pairing = topics.CMD_ACCEL.name, self._settings.pairing
-        self._take(name, pairing.derivative, interface.read_accel, message)
+        def take(ns: int, values: tuple) -> None:
+            try:
+                keep(ns, values)
+            except ValueError as error:
+                self.graph.refuse(f'{topic.name}: {error}')
+                return
+            if self._active:
+                self._say(self._controller.answer())
 
-    def _take(self, topic: str, keep: Callable, read: Callable, message: Any) -> None:
-        try:
-            keep(*read(message, self.graph.frames, topic))
-        except interface.BadMessageError as error:
-            self.graph.refuse(str(error))
-            return
-        except ValueError as error:
-            self.graph.refuse(f'{topic}: {error}')
-            return
-        if self._active:
-            self._say(self._controller.answer())
+        self.graph.listen(topic, take, topics.every_step())
 
     def _say(self, answer: Answer | None) -> None:
         if answer is None:
@@ -135,8 +122,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
             return  # until the expected subscribers have matched; see _watch
         if answer.trouble:
             self.graph.complain(answer.trouble)
-        self._wrench.publish(convert.wrench(answer.ns, answer.tau, self.graph.frames))
-        self._estimate.publish(convert.wrench(answer.ns, answer.f, self.graph.frames))
+        self._say_wrench(answer.ns, answer.tau)
+        self._say_estimate(answer.ns, answer.f)
         self.graph.latest_ns = answer.ns
 
     def _watch(self) -> None:
@@ -165,7 +152,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
     def close(self) -> None:
         """Leave the vehicle without a wrench, and see that it hears of it."""
         self._let_go()
-        self._wrench.wait_for_all_acked(Duration(seconds=0.5))
+        self.graph.publishers[topics.WRENCH.name].wait_for_all_acked(Duration(seconds=0.5))
 
 
 def main() -> None:

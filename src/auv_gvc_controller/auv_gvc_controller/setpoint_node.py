@@ -3,12 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-from rclpy.serialization import deserialize_message
 
 from auv_dynamics import interface
 from auv_dynamics.files import InputError
 from auv_dynamics.plant_parameters import harmonic_parameters
-from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
@@ -35,9 +34,9 @@ class SetpointNode(BulkNode):
         self._setpoint = self._declare_setpoint(duration)
         refuse_unknown(self)
         self.graph.must_hold = self._horizon
-        self._velocity = self.graph.publisher(topics.CMD_VEL)
-        self._acceleration = self.graph.publisher(topics.CMD_ACCEL)
-        self.graph.subscribe(topics.ODOM, self._on_odometry, topics.one_at_a_time(), raw=True)
+        self._say_velocity = self.graph.output(topics.CMD_VEL)
+        self._say_acceleration = self.graph.output(topics.CMD_ACCEL)
+        self.graph.listen(topics.ODOM, self._on_odometry, topics.one_at_a_time())
         self._origin: int | None = None
         self._newest = -1
         self._next = 0
@@ -56,13 +55,7 @@ class SetpointNode(BulkNode):
             return make_setpoint({'file': Path(file)}, duration)
         return make_setpoint(spec, duration)
 
-    def _on_odometry(self, data: bytes) -> None:
-        message = deserialize_message(data, topics.ODOM.type)
-        try:
-            ns, _ = interface.read_odometry(message, self.graph.frames)
-        except interface.BadMessageError as error:
-            self.graph.refuse(str(error))
-            return
+    def _on_odometry(self, ns: int, _: tuple) -> None:
         if self._origin is None:
             self._origin = ns
         self._newest = max(self._newest, (ns - self._origin) // self._step_ns)
@@ -79,8 +72,8 @@ class SetpointNode(BulkNode):
         while self._next <= until:
             row = self._row(self._next)
             ns = self._origin + self._next * self._step_ns
-            self._velocity.publish(convert.twist(ns, row[:6], self.graph.frames))
-            self._acceleration.publish(convert.accel(ns, row[6:], self.graph.frames))
+            self._say_velocity(ns, row[:6])
+            self._say_acceleration(ns, row[6:])
             self.graph.latest_ns = ns
             self._next += 1
 

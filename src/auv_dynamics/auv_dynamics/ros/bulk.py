@@ -2,109 +2,111 @@
 
 An executor of rclpy rebuilds its whole wait set, services and timers included, for every message.
 Here the data subscriptions have a small wait set of their own, and all that has arrived is taken
-at once; the executor serves parameters, services and timers in between. This file is the only
-one that touches private names of rclpy. Where they are missing, or with AUV_GVC_EXECUTOR=plain,
+at once; the executor serves parameters, services and timers in between. With AUV_GVC_EXECUTOR=plain
 the same subscriptions are ordinary ones.
 """
 
-import os
-import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-from auv_dynamics.ros.topics import CLOCK
+from auv_dynamics.ros.private import PLAIN, DataWait, taken
+from auv_dynamics.ros.topics import CLOCK, DEPTH
 
-try:
-    from rclpy.impl.implementation_singleton import rclpy_implementation
-
-    WaitSet = rclpy_implementation.WaitSet
-except (ImportError, AttributeError):
-    WaitSet = None
-
-PLAIN = WaitSet is None or os.environ.get('AUV_GVC_EXECUTOR') == 'plain'
-NAP = 0.005  # s between two looks of an observer
-
-_STAMP = struct.Struct('<iI')
-_STAMP_BIG = struct.Struct('>iI')
-_OFFSET = 4  # of the first field, behind the CDR encapsulation header
-
-
-def first_stamp(data: bytes) -> int:
-    """Nanoseconds of a serialized message that begins with a Header or a Time."""
-    little = data[1] & 1
-    sec, nanosec = (_STAMP if little else _STAMP_BIG).unpack_from(data, _OFFSET)
-    return sec * 10**9 + nanosec
-
-
-def taken(subscription: Subscription) -> Iterator[Any]:
-    """Everything that has arrived on a subscription."""
-    handle = subscription.handle
-    with handle:
-        while (entry := handle.take_message(subscription.msg_type, subscription.raw)) is not None:
-            yield entry[0]
+NAP = 0.005  # s between two looks at an observer's data
 
 
 class BulkMixin:
     """Keeps data subscriptions out of the executor's sight; stands before `Node`.
 
-    A node that must answer at once is `prompt`: it waits for its data. Others look now and then.
+    A node that must answer at once is `prompt`: its data is waited for. At others one looks now and
+    then: the longer the naps, the more there is to be taken at once.
     """
 
-    context: Any
     prompt = False
     exit_code: int | None = None  # set when the node ends by itself
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
         """The subscriptions that an executor waits for."""
-        hidden = self._bulk()
+        hidden = self.data_subscriptions()
         mine = super().subscriptions  # type: ignore[misc]  # of the Node behind the mixin
         return (s for s in mine if PLAIN or not (s in hidden or _is_clock(s)))
 
     def close(self) -> None:
         """Last words while the context is still valid: zero wrench, closed bag."""
 
-    def _bulk(self) -> list[Subscription]:
-        return self.__dict__.setdefault('bulk_subscriptions', [])
+    def data_subscriptions(self) -> list[Subscription]:
+        """The subscriptions of the data path."""
+        return self.__dict__.setdefault('_data_subscriptions', [])
 
-    def add_bulk(self, subscription: Subscription) -> None:
-        """Take a subscription away from the executor."""
+    def add_data(self, subscription: Subscription) -> None:
+        """Take a subscription, with a callback (message, info), away from the executor."""
         if not PLAIN:
-            self._bulk().append(subscription)
+            self.data_subscriptions().append(subscription)
 
-    def wait_for_bulk(self, timeout: float) -> None:
-        """Wait until data has arrived, at most `timeout` s; an observer only naps."""
-        subscriptions = self._bulk()
-        if not self.prompt or not subscriptions:
-            time.sleep(min(NAP, timeout))
-            return
-        with self.context.handle:
-            waiting = WaitSet(len(subscriptions), 0, 0, 0, 0, 0, self.context.handle)
-            waiting.clear_entities()
-            for subscription in subscriptions:
-                waiting.add_subscription(subscription.handle)
-            waiting.wait(int(timeout * 1e9))
-
-    def empty_bulk(self) -> None:
-        """Hand everything that has arrived to its callbacks."""
-        for subscription in self._bulk():
-            for message in taken(subscription):
-                subscription.callback(message)
+    def take_data(self) -> int:
+        """Hand everything that has arrived to its callbacks; how many messages that were."""
+        count = 0
+        for subscription in self.data_subscriptions():
+            callback = subscription.callback
+            # not without end, should they come as fast as they are taken
+            for message, info in islice(taken(subscription), DEPTH):
+                callback(message, info)
+                count += 1
+        return count
 
     def follow_clock(self) -> None:
         """Tell rclpy's clock the newest simulated time."""
         mine = super().subscriptions  # type: ignore[misc]  # of the Node behind the mixin
         for subscription in [s for s in mine if not PLAIN and _is_clock(s)]:
-            for newest in list(taken(subscription))[-1:]:
+            for newest, _ in list(taken(subscription))[-1:]:
                 subscription.callback(newest)
 
 
 class BulkNode(BulkMixin, Node):
     """A node with a data path of its own: see `BulkMixin`."""
+
+
+class DataPath:
+    """Serves the data of the nodes of a process, in one thread.
+
+    Parameters
+    ----------
+    nodes : of one context
+
+    """
+
+    def __init__(self, nodes: Sequence[Any]):
+        self._prompt = [node for node in nodes if node.prompt]
+        self._observers = [node for node in nodes if not node.prompt]
+        self._wait = DataWait(nodes[0].context)
+        self._look_at = 0.0
+
+    def serve(self, until: float, ended: Callable[[], bool]) -> None:
+        """Take data as it comes until a time of the monotonic clock, or until a node has ended."""
+        while (now := time.monotonic()) < until and not ended():
+            if now >= self._look_at:
+                for node in self._observers:
+                    node.take_data()
+                self._look_at = time.monotonic() + NAP
+            rest = min(self._look_at, until) if self._observers else until
+            self._serve_prompt(rest, ended)
+
+    def _serve_prompt(self, until: float, ended: Callable[[], bool]) -> None:
+        prompt = self._prompt
+        if not prompt:
+            time.sleep(max(0.0, until - time.monotonic()))
+            return
+        while (left := until - time.monotonic()) > 0 and not ended():
+            # one node's answer may be the other's question: wait only when nothing came
+            if not sum(node.take_data() for node in prompt):
+                waited_for = [s for node in prompt for s in node.data_subscriptions()]
+                self._wait.wait(waited_for, left)
 
 
 def _is_clock(subscription: Subscription) -> bool:

@@ -12,12 +12,12 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSPolicyKind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from auv_dynamics.files import InputError
-from auv_dynamics.interface import Frames
+from auv_dynamics.interface import BadMessageError, Frames
+from auv_dynamics.ros.codec import Codec
 from auv_dynamics.ros.convert import stamp
 from auv_dynamics.ros.parameters import declare
 from auv_dynamics.ros.topics import (
@@ -92,12 +92,31 @@ class Graph:
         self.publishers[topic.name] = publisher
         return publisher
 
-    def subscribe(
-        self, topic: Topic, callback: Callable, qos: QoSProfile, *, raw: bool = False
-    ) -> Subscription:
-        """Subscription to a topic; an incompatible publisher is an error that is heard.
+    def output(self, topic: Topic) -> Callable[[int, Any], None]:
+        """Publisher of a topic as a function of a stamp in ns and the numbers."""
+        publish = self.publisher(topic).publish
+        encode = Codec(topic.type, self.frames, topic.name).encode
+        return lambda ns, values: publish(encode(ns, values))
 
-        It belongs to the node's data path; with `raw` the callback gets serialized messages.
+    def listen(self, topic: Topic, callback: Callable[[int, tuple], None], qos: QoSProfile) -> None:
+        """Subscription to the stamps in ns and the numbers of a topic; broken ones are refused."""
+        codec = Codec(topic.type, self.frames, topic.name)
+
+        def take(data: bytes, _: dict) -> None:
+            try:
+                callback(*codec.decode(data))
+            except BadMessageError as error:
+                self.refuse(str(error))
+
+        self.subscribe(topic, take, qos)
+
+    def subscribe(
+        self, topic: Topic, callback: Callable[[bytes, dict], None], qos: QoSProfile
+    ) -> None:
+        """Subscription to the serialized messages of a topic, in the node's data path.
+
+        The callback gets what rclpy knows of a message's way as well. An incompatible publisher is
+        an error that is heard.
         """
         events = SubscriptionEventCallbacks(
             incompatible_qos=lambda event: self._incompatible(topic, event),
@@ -110,10 +129,9 @@ class Graph:
             qos,
             event_callbacks=events,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
-            raw=raw,
+            raw=True,
         )
-        self.node.add_bulk(subscription)
-        return subscription
+        self.node.add_data(subscription)
 
     def ready(self) -> bool:
         """Whether every expected subscriber has matched; once true it stays true."""

@@ -6,32 +6,31 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.signals import SignalHandlerOptions
 
 from auv_dynamics.files import InputError
 from auv_dynamics.interface import PARENT
-from auv_dynamics.ros.bulk import PLAIN
+from auv_dynamics.ros.bulk import DataPath
+from auv_dynamics.ros.private import PLAIN, RCLError
 
-RCLError = rclpy_implementation.RCLError
 POLL = 0.1  # s, longest wait before a signal is noticed
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 SERVE = 0.02  # s of data between two looks at parameters, services and timers
-CALLBACKS = 3  # that are served at each look
+CALLBACKS = 50  # that are served at each look, at most
 
 
-def live(make: Callable[[], Any], args: list[str] | None = None) -> int:
-    """Run a node until a signal or its own end.
+def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> int:
+    """Run nodes in this process until a signal or until one of them ends.
 
     Parameters
     ----------
-    make : builds the node, which may set its `exit_code`; InputError gives one line on stderr
-        and exit code 2
+    makes : each builds a node, which may set its `exit_code`; InputError gives one line on stderr
+        and exit code 2. They are closed in reverse order: the first one hears the last words
     args : command line, default sys.argv
 
     Returns
@@ -42,56 +41,88 @@ def live(make: Callable[[], Any], args: list[str] | None = None) -> int:
     stop = threading.Event()
     for number in SIGNALS:
         signal.signal(number, lambda *_: stop.set())
-    node = None
+    nodes: list[Any] = []
     code = 0
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = make()
         executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        while not stop.is_set() and node.exit_code is None and not _orphaned():
-            _turn(node, executor)
+        for make in makes:
+            nodes.append(make())
+            executor.add_node(nodes[-1])
+        _spin(nodes, executor, stop)
     except InputError as error:
         print(error, file=sys.stderr, flush=True)
         code = 2
-    except rclpy.exceptions.ROSInterruptException:
-        code = 0
-    except ExternalShutdownException:
+    except (rclpy.exceptions.ROSInterruptException, ExternalShutdownException):
         code = 0
     except RCLError as error:  # e.g. a parameter file that is no YAML
         print(str(error).splitlines()[0], file=sys.stderr, flush=True)
         code = 2
     finally:
-        if node is not None:
-            node.close()
-            code = code or node.exit_code or 0
-            with contextlib.suppress(Exception):
-                node.destroy_node()
+        closed = _close(nodes)
+        code = code or closed
         rclpy.try_shutdown()
         for number in SIGNALS:  # one that comes while Python tears down does not change the code
             signal.signal(number, signal.SIG_IGN)
     return code
 
 
-def _turn(node: Any, executor: SingleThreadedExecutor) -> None:
-    """Data as it comes, for a while; then whatever the executor has to serve."""
-    if PLAIN:
-        _serve(node, executor, POLL)
-        return
-    until = time.monotonic() + SERVE
-    while (left := until - time.monotonic()) > 0 and node.exit_code is None:
-        node.wait_for_bulk(left)
-        node.empty_bulk()
-    node.follow_clock()
-    for _ in range(CALLBACKS):
-        _serve(node, executor, 0.0)
+def _spin(nodes: list[Any], executor: SingleThreadedExecutor, stop: threading.Event) -> None:
+    """Data as it comes, and in between whatever the executor has to serve."""
+    data = DataPath(nodes)
+
+    def ended() -> bool:
+        return any(node.exit_code is not None for node in nodes)
+
+    while not (stop.is_set() or ended() or _orphaned()):
+        if PLAIN:
+            _serve(nodes[0], executor, POLL)
+            continue
+        data.serve(_next_look(nodes), ended)
+        for node in nodes:
+            node.follow_clock()
+        for _ in range(CALLBACKS):
+            if not _serve(nodes[0], executor, 0.0):
+                break
 
 
-def _serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> None:
+def _next_look(nodes: list[Any]) -> float:
+    """When to serve the executor again: soon, and in time for timers that are even faster."""
+    fast = [timer for node in nodes for timer in node.timers if timer.timer_period_ns < SERVE * 1e9]
+    left = [timer.time_until_next_call() for timer in fast]
+    return time.monotonic() + min([SERVE, *(max(0, ns) / 1e9 for ns in left if ns is not None)])
+
+
+def _serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> bool:
+    """Run a callback that is ready, if there is one."""
     try:
-        executor.spin_once(timeout_sec=timeout)
+        callback, _, node = executor.wait_for_ready_callbacks(timeout_sec=timeout)
+        callback()
+        callback.result()
+    except TimeoutException:
+        return False
     except RCLError as error:  # e.g. a lifecycle transition that does not exist from here
         node.get_logger().error(f'refused: {str(error).splitlines()[0]}')
+    return True
+
+
+def _close(nodes: list[Any]) -> int:
+    """Close all nodes, the first one last; the exit code of one that has failed, else 0."""
+    failed = {node.get_name(): node.exit_code for node in nodes if node.exit_code}
+    with contextlib.ExitStack() as stack:
+        for node in nodes:
+            stack.callback(_close_node, node)
+    codes = [node.exit_code for node in nodes if node.exit_code]
+    if len(nodes) > 1:
+        for name, code in failed.items():
+            print(f'{name} ended with exit code {code}', file=sys.stderr, flush=True)
+    return codes[0] if codes else 0
+
+
+def _close_node(node: Any) -> None:
+    node.close()
+    with contextlib.suppress(Exception):
+        node.destroy_node()
 
 
 def _orphaned() -> bool:
@@ -99,6 +130,6 @@ def _orphaned() -> bool:
     return parent is not None and os.getppid() != int(parent)
 
 
-def main_of(make: Callable[[], Any]) -> None:
-    """Entry point of a node executable."""
-    sys.exit(live(make))
+def main_of(*makes: Callable[[], Any]) -> None:
+    """Entry point of an executable with one node, or several."""
+    sys.exit(live(makes))

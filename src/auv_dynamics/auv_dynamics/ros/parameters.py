@@ -9,6 +9,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from auv_dynamics.files import InputError
+from auv_dynamics.ros.private import declared, overrides
 
 KNOWN_TO_ALL = ('use_sim_time', 'start_type_description_service')
 TYPE_WORDS = {
@@ -31,8 +32,7 @@ TYPES = {
 
 def given(node: Node, prefix: str = '') -> list[str]:
     """Names of the parameters that the user gave and that begin with `prefix`."""
-    # rclpy offers no public way to see overrides that are not declared yet
-    return sorted(name for name in node._parameter_overrides if name.startswith(prefix))  # noqa: SLF001
+    return sorted(name for name in overrides(node) if name.startswith(prefix))
 
 
 def declare(
@@ -78,10 +78,10 @@ def declare(
         else:
             value = node.declare_parameter(name, default, descriptor).value
     except InvalidParameterTypeException:
-        found = node._parameter_overrides[name].value  # noqa: SLF001
+        found = overrides(node)[name].value
         raise InputError(node.get_name(), name, TYPE_WORDS[TYPES[kind]], found) from None
     except InvalidParameterValueException:
-        found = node._parameter_overrides[name].value  # noqa: SLF001
+        found = overrides(node)[name].value
         expected = f'{at_least if at_least is not None else "-inf"} to {at_most or "inf"}'
         raise InputError(node.get_name(), name, f'a number from {expected}', found) from None
     if one_of and value not in one_of:
@@ -93,7 +93,7 @@ def declare(
 
 def _coerce(node: Node, name: str, kind: Any) -> None:
     """Take whole numbers where numbers are expected: `-p duration:=30` is not an error."""
-    override = node._parameter_overrides.get(name)  # noqa: SLF001
+    override = overrides(node).get(name)
     if override is None:
         return
     if kind is float and override.type_ == Parameter.Type.INTEGER:
@@ -106,7 +106,7 @@ def _coerce(node: Node, name: str, kind: Any) -> None:
         value = [float(number) for number in override.value]
     else:
         return
-    node._parameter_overrides[name] = Parameter(name, value=value)  # noqa: SLF001
+    overrides(node)[name] = Parameter(name, value=value)
 
 
 def _set_range(
@@ -127,6 +127,9 @@ def refuse_unknown(node: Node) -> None:
     for name in given(node):
         if name in KNOWN_TO_ALL or name.startswith('qos_overrides.') or node.has_parameter(name):
             continue
-        known = sorted(node._parameters)  # noqa: SLF001
-        own = [k for k in known if k not in KNOWN_TO_ALL and not k.startswith('qos_overrides.')]
+        own = [
+            k
+            for k in declared(node)
+            if k not in KNOWN_TO_ALL and not k.startswith('qos_overrides.')
+        ]
         raise InputError(node.get_name(), name, f'one of {", ".join(own)}', 'an unknown parameter')

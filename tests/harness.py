@@ -28,6 +28,7 @@ PACKAGES = {
     'recorder_node': 'auv_analysis',
     'analysis_node': 'auv_analysis',
 }
+EXECUTABLES = {**PACKAGES, 'composed_graph': 'auv_analysis'}
 PATIENCE = 30.0  # s, after which a test that waits has failed
 _domains = itertools.count()
 
@@ -49,7 +50,7 @@ def environment(domain: int) -> dict[str, str]:
 
 def start_node(name: str, domain: int, *arguments: str) -> subprocess.Popen:
     """Start one of our nodes; its output is captured."""
-    command = [str(executable(PACKAGES[name], name))]
+    command = [str(executable(EXECUTABLES[name], name))]
     if arguments:
         command += ['--ros-args', *arguments]
     return subprocess.Popen(

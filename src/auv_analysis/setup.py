@@ -52,6 +52,7 @@ setup(
             'auv = auv_analysis.cli:main',
             'recorder_node = auv_analysis.recorder_node:main',
             'analysis_node = auv_analysis.analysis_node:main',
+            'composed_graph = auv_analysis.composed_graph:main',
         ]
     },
 )

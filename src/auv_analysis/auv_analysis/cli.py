@@ -37,6 +37,7 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument('scenario', help=SCENARIO)
     run.add_argument('--controller', action='append', help='only this one; may be repeated')
     run.add_argument('--domain-id', help='ROS domain, default: a free one')
+    run.add_argument('--composed', action='store_true', help='all nodes in one process: faster')
     simulate = command('simulate', 'simulate a scenario in this process, analyse and report')
     simulate.add_argument('scenario', help=SCENARIO)
     simulate.add_argument('--controller', action='append', help='only this one; may be repeated')

@@ -27,6 +27,7 @@ PACKAGES = {
     CONTROLLER: 'auv_gvc_controller',
     ANALYSIS: 'auv_analysis',
 }
+COMPOSED = 'composed_graph'  # the executable that holds them all
 START_TIMEOUT = 60.0  # s until the start barrier must be down
 END_TIMEOUT = 30.0  # s for the recorder to close after the last step
 
@@ -90,6 +91,8 @@ def run_controller(
     domain: int,
     graph: Graph,
     progress: Callable[[int], None],
+    *,
+    composed: bool = False,
 ) -> Path:
     """Run one controller on the node graph and wait for its bag.
 
@@ -101,6 +104,7 @@ def run_controller(
     domain : ROS domain id
     graph : the graph as seen from here, a `Watcher` of the same domain
     progress : told the last complete step whenever it changes
+    composed : all nodes in one process, else one each
 
     Returns
     -------
@@ -125,11 +129,11 @@ def run_controller(
     graph.complete_ns = -1
     supervisor = Supervisor(out / 'logs' / controller, environment(domain))
     try:
-        for node, package in PACKAGES.items():
-            command = [str(executable(package, node)), '--ros-args', '--params-file', str(path)]
-            supervisor.start(node, command)
+        for name, package in ({COMPOSED: PACKAGES[RECORDER]} if composed else PACKAGES).items():
+            command = [str(executable(package, name)), '--ros-args', '--params-file', str(path)]
+            supervisor.start(name, command)
         _start(supervisor, graph)
-        _follow(supervisor, graph, scenario, progress)
+        _follow(supervisor, COMPOSED if composed else RECORDER, graph, scenario, progress)
     finally:
         supervisor.stop()
     return bag
@@ -147,10 +151,15 @@ def _start(supervisor: Supervisor, graph: Graph) -> None:
 
 
 def _follow(
-    supervisor: Supervisor, graph: Graph, scenario: Scenario, progress: Callable[[int], None]
+    supervisor: Supervisor,
+    last: str,
+    graph: Graph,
+    scenario: Scenario,
+    progress: Callable[[int], None],
 ) -> None:
+    """Show the progress until the process that ends last has ended well."""
     step, done_since = -1, None
-    while not supervisor.check(may_end=RECORDER):
+    while not supervisor.check(may_end=last):
         graph.spin(0.1)
         complete = graph.complete_ns // scenario.step_ns
         if complete > step:
@@ -159,7 +168,5 @@ def _follow(
         if step >= scenario.steps:
             done_since = done_since or time.monotonic()
             if time.monotonic() - done_since > END_TIMEOUT:
-                raise NodeDiedError(
-                    f'{RECORDER} does not close its bag{supervisor.last_lines(RECORDER)}'
-                )
+                raise NodeDiedError(f'{last} does not close the bag{supervisor.last_lines(last)}')
     progress(scenario.steps)

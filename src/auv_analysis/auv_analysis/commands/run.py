@@ -50,7 +50,9 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
                 task = bar.add_task(f'{scenario.name} {name}', total=scenario.steps)
                 show = partial(_show_step, bar, task)
                 try:
-                    run_controller(scenario, name, out, domain, graph, show)
+                    run_controller(
+                        scenario, name, out, domain, graph, show, composed=options.composed
+                    )
                 except NodeDiedError as error:
                     failure = error
                     break  # the graph is broken; what was recorded is still worth a report

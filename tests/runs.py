@@ -1,0 +1,97 @@
+"""A run of `auv` from outside: its processes while it lasts, what its bag holds afterwards."""
+
+import os
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+from harness import EXECUTABLES, environment, fresh_domain
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+
+def start(scenario: Path, out: Path, *options: str) -> subprocess.Popen:
+    """Start `auv run`."""
+    command = [str(Path(sys.executable).with_name('auv')), 'run', str(scenario), '--out', str(out)]
+    environ = {**os.environ, 'ROS_DOMAIN_ID': str(fresh_domain())}
+    return subprocess.Popen([*command, *options], env=environ, stderr=subprocess.PIPE, text=True)
+
+
+def record(scenario: Path, out: Path) -> subprocess.Popen:
+    """Start the nodes of `auv run` and record, without the analysis and the report behind it."""
+    environ = environment(fresh_domain())
+    command = [sys.executable, __file__, str(scenario), str(out)]
+    return subprocess.Popen(command, env=environ, stderr=subprocess.PIPE, text=True)
+
+
+def nodes(folder: Path) -> dict[str, psutil.Process]:
+    """Processes of the nodes of a run in this folder; its parameter file is in their commands."""
+    found = {}
+    for process in psutil.process_iter(['cmdline']):
+        command = process.info['cmdline'] or []
+        if any(str(folder) in part for part in command):
+            names = [name for name in EXECUTABLES for part in command if part.endswith(name)]
+            found.update(dict.fromkeys(names, process))
+    return found
+
+
+def node_of(out: Path, name: str) -> psutil.Process:
+    """A node of this run, once steps are being recorded."""
+    limit = time.monotonic() + 60
+    while time.monotonic() < limit:
+        bags = list(out.glob('*/*.mcap'))
+        if bags and bags[0].stat().st_size > 50_000 and name in (running := nodes(out)):
+            return running[name]
+        time.sleep(0.05)
+    raise AssertionError(f'{name} does not run')
+
+
+def raw_messages(bag: Path) -> Iterator[tuple[str, int, bytes]]:
+    """Topic, log time and serialized message of everything in a bag, in the order of the file."""
+    with next(bag.glob('*.mcap')).open('rb') as file:
+        for _, channel, message in make_reader(file).iter_messages(log_time_order=False):
+            yield channel.topic, message.log_time, message.data
+
+
+def every_message(bag: Path, *besides: str) -> dict[str, list]:
+    """Everything in a bag but some topics: per topic log times and messages, as plain numbers."""
+    found: dict[str, list] = defaultdict(list)
+    with next(bag.glob('*.mcap')).open('rb') as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for _, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
+            if channel.topic not in besides:
+                found[channel.topic].append((message.log_time, plain(decoded)))
+    return found
+
+
+def plain(value: object) -> object:
+    """A decoded message as tuples, which can be compared."""
+    if hasattr(value, '__slots__'):
+        return tuple(plain(getattr(value, name)) for name in value.__slots__)
+    return tuple(map(plain, value)) if isinstance(value, list | tuple) else value
+
+
+def main(path: str, out: str) -> None:
+    """Record the first controller of a scenario."""
+    from auv_analysis.experiment import run_controller
+    from auv_analysis.scenario import load_scenario
+    from auv_analysis.warm_up import warm_up
+    from auv_dynamics.ros.watcher import Watcher
+
+    scenario, domain = load_scenario(path), int(os.environ['ROS_DOMAIN_ID'])
+    name = next(iter(scenario.controllers))
+    Path(out).mkdir()
+    warm_up(scenario, [name])
+    graph = Watcher(domain)
+    try:
+        run_controller(scenario, name, Path(out), domain, graph, lambda _: None)
+    finally:
+        graph.close()
+
+
+if __name__ == '__main__':
+    main(*sys.argv[1:])

@@ -21,6 +21,7 @@ endif
 
 COUNT ?= 10
 SEED ?= 0
+STEPS ?= 1000000
 EXAMPLES ?= 500
 MUTANTS ?= 500
 
@@ -46,8 +47,9 @@ case1 case2: setup  ## the paper's experiment: GVC against CL on real nodes, wit
 test: setup  ## the tests
 	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
-soak: setup  ## COUNT random runs on the node graph by SEED, and what else takes long
-	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) $(BIN)/python -m pytest -m long tests/system
+soak: setup  ## COUNT random runs on the node graph by SEED, one of STEPS, what else takes long
+	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) AUV_GVC_STEPS=$(STEPS) \
+	  $(BIN)/python -m pytest -m long tests/system
 
 properties: setup  ## the property tests with EXAMPLES examples each, drawn by SEED
 	AUV_GVC_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n 2 --hypothesis-seed=$(SEED) \

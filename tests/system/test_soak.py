@@ -1,23 +1,33 @@
-"""Random scenarios on the node graph, one after the other: each equals its simulation.
+"""Random scenarios on the node graph, and a recorder that is stopped and slowed at random.
 
-`make soak COUNT=10 SEED=0`; a scenario of run i is drawn by (SEED, i) and named after both.
+`make soak COUNT=10 SEED=0 STEPS=1000000`; a scenario of run i is drawn by (SEED, i) and named after
+both. Nothing may be lost or doubled, which is checked by reading the bag; the run that cannot keep
+this promise says so.
 """
 
 import os
+import re
+import subprocess
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 import yaml
 from harness import auv
+from runs import node_of, nodes, raw_messages, record, start
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
 from auv_dynamics import interface
+from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.signals import DOFS
 
 COUNT = int(os.environ.get('AUV_GVC_COUNT', '10'))
 SEED = int(os.environ.get('AUV_GVC_SEED', '0'))
+STEPS = int(os.environ.get('AUV_GVC_STEPS', '1000000'))
 VEHICLES = ('herman2018', 'herman2018_neutral', 'rexrov', 'bluerov2_heavy', 'girona500')
 PAPER = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 SIGNALS = ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate',
@@ -79,3 +89,118 @@ def test_a_random_run_loses_nothing_and_equals_its_simulation(i: int, tmp_path: 
     for name in SIGNALS:
         a, b = getattr(recorded, name), getattr(simulated, name)
         assert np.all(np.abs(a - b) <= 1e-9 * np.maximum(1, np.abs(b))), name
+
+
+def long_run(folder: Path, steps: int) -> Path:
+    """Case 1 of another length, GVC alone."""
+    case1 = load_scenario('case1')
+    controllers = {'gvc': case1.data['controllers']['gvc']}
+    data = {**case1.data, 'vehicle': 'herman2018', 'controllers': controllers}
+    path = folder / 'long.yaml'
+    path.write_text(yaml.safe_dump({**data, 'name': 'long', 'duration': steps * case1.step}))
+    return path
+
+
+def ended_within(process: subprocess.Popen, seconds: float) -> bool:
+    try:
+        process.wait(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        return False
+    return True
+
+
+def hold_up(recorder: psutil.Process, process: subprocess.Popen, sizes: list[dict]) -> Counter:
+    """Stop and slow the recorder at random until the run ends; how often each was done."""
+    g = np.random.default_rng([SEED, 1])
+    done: Counter = Counter()
+    running = nodes(Path(recorder.cmdline()[-1]).parent)
+    try:
+        while not ended_within(process, g.uniform(0.1, 1.5)):
+            sizes.append({name: node.memory_info().rss / 1e6 for name, node in running.items()})
+            kind = str(g.choice(['stop', 'slow']))
+            longest = 2.5 if g.random() < 0.9 else 10.0
+            pauses = [g.uniform(0.1, longest)] if kind == 'stop' else g.uniform(0.01, 0.06, 15)
+            for pause in pauses:
+                recorder.suspend()
+                try:
+                    ended_within(process, pause)
+                finally:
+                    recorder.resume()
+                if ended_within(process, 0.01):
+                    break
+            done[kind] += 1
+    except psutil.NoSuchProcess:
+        process.wait(timeout=60)
+    return done
+
+
+def assert_every_step_once(bag: Path, steps: int, step_ns: int) -> None:
+    """Each step topic carries the steps 0 ... n in order, analysis every tenth of them."""
+    topics = {f'/{topic}': 1 for topic in interface.STEP_TOPICS}
+    topics |= {f'/{topic}': 10 for topic in interface.ANALYSIS_TOPICS} | {interface.CLOCK: 1}
+    count: Counter = Counter()
+    for topic, log_time, data in raw_messages(bag):
+        if topic in topics:
+            expected = count[topic] * topics[topic] * step_ns
+            assert first_stamp(data) == log_time == expected, (topic, count[topic])
+            count[topic] += 1
+    assert count == {topic: steps // every + 1 for topic, every in topics.items()}
+
+
+def held_up_run(folder: Path, steps: int, begin: Callable = start) -> list[dict]:
+    """Run so many lock-steps with the recorder held up, check the bag; the nodes' sizes in MB."""
+    scenario, out = long_run(folder, steps), folder / 'out'
+    process = begin(scenario, out)
+    sizes: list[dict] = []
+    done = hold_up(node_of(out, 'recorder_node'), process, sizes)
+    assert process.returncode == 0, process.stderr.read()
+    assert done['stop'], done
+    assert done['slow'], done
+    assert_every_step_once(out / 'gvc', steps, load_scenario(scenario).step_ns)
+    return sizes
+
+
+def test_a_recorder_stopped_and_slowed_at_random_loses_and_doubles_nothing(tmp_path: Path) -> None:
+    held_up_run(tmp_path, 10_000)
+    recorded = load_run(tmp_path / 'out' / 'gvc')
+    simulated = simulate(load_scenario(tmp_path / 'long.yaml'), 'gvc', 'zoh')
+    for name in SIGNALS:
+        np.testing.assert_allclose(
+            getattr(recorded, name), getattr(simulated, name), rtol=1e-9, atol=1e-9, err_msg=name
+        )
+
+
+@pytest.mark.long
+def test_a_million_steps_lose_and_double_nothing_in_bounded_memory(tmp_path: Path) -> None:
+    sizes = held_up_run(tmp_path, STEPS, record)
+    first, last = sizes[: len(sizes) // 3], sizes[-len(sizes) // 3 :]
+    for node in sizes[0]:
+        before, after = (max(sample[node] for sample in part) for part in (first, last))
+        print(f'{node}: {before:.0f} MB in the first third, {after:.0f} MB in the last')
+        assert after < before + 20.0, node
+
+
+LOST = r'recorder_node ended with exit code 1\n.*expected (step|publication) .* lost'
+SILENT = (
+    r'plant_node ended with exit code 1\n.*'
+    r'no answer on recorder/progress to step \d+ for 30 s; its publisher: recorder_node'
+)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(('seconds', 'said'), [(27.0, f'{LOST}|{SILENT}'), (60.0, SILENT)])
+def test_a_recorder_held_up_for_too_long_fails_loudly(
+    tmp_path: Path, seconds: float, said: str
+) -> None:
+    """Longer than the middleware believes in it; longer than the plant waits."""
+    out = tmp_path / 'out'
+    process = start(long_run(tmp_path, 1_000_000), out)
+    recorder = node_of(out, 'recorder_node')
+    recorder.suspend()
+    ended_within(process, seconds)
+    if recorder.is_running() and process.poll() is None:
+        recorder.resume()
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 1
+    assert re.search(said, errors), errors
+    assert not nodes(out)

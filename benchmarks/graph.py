@@ -1,0 +1,199 @@
+"""Steps per second of the node graph beside a bare rclpy ping-pong, measured in turns.
+
+    python benchmarks/graph.py [--runs 3] [--steps 20000] [--seconds 4]
+
+The reference is what rclpy itself offers: two processes, Odometry one way, WrenchStamped the other,
+message objects, one callback each, SingleThreadedExecutor, reliable with depth 10. The graph is
+Case 1 as `auv run` starts it, every topic recorded. Only its steady part counts, from 10 % to 90 %
+of the steps as the recorder reports them complete: start-up, discovery and the closing of the bag
+are not in the number. Both run on the loopback with the same middleware profile.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import yaml
+
+from auv_analysis.domain import chosen_domain
+from auv_analysis.experiment import environment, loopback, run_controller
+from auv_analysis.scenario import load_scenario
+from auv_analysis.warm_up import warm_up
+
+SETTLE = 1.0  # s of ping-pong before it is counted
+PATIENCE = 30.0  # s for the other end to appear
+STEADY = (0.1, 0.9)  # part of a run that is counted
+
+
+def pingpong(seconds: float = 4.0) -> float:
+    """Round trips per second of a bare rclpy ping-pong between two processes."""
+    environ = environment(chosen_domain(None)[0])
+    command = [sys.executable, __file__, '--end', 'pong']
+    pong = subprocess.Popen(command, env=environ)
+    command[-1] = 'ping'
+    try:
+        ping = subprocess.run(
+            [*command, '--seconds', str(seconds)], env=environ, stdout=subprocess.PIPE, check=True
+        )
+    finally:
+        pong.terminate()
+        pong.wait()
+    return float(ping.stdout)
+
+
+def _ping(seconds: float) -> float:
+    """Count round trips with the other process."""
+    import rclpy
+    from geometry_msgs.msg import WrenchStamped
+    from nav_msgs.msg import Odometry
+
+    rclpy.init()
+    node = rclpy.create_node('ping')
+    executor = rclpy.executors.SingleThreadedExecutor()
+    executor.add_node(node)
+    output = node.create_publisher(Odometry, 'ping', 10)
+    trips = 0
+
+    def back(_: WrenchStamped) -> None:
+        nonlocal trips
+        trips += 1
+        output.publish(Odometry())
+
+    node.create_subscription(WrenchStamped, 'pong', back, 10)
+    until = time.monotonic() + PATIENCE
+    while not (output.get_subscription_count() and node.count_publishers('pong')):
+        executor.spin_once(timeout_sec=0.05)
+        assert time.monotonic() < until, 'no other end'
+    while not trips:  # the way back may match a little later
+        output.publish(Odometry())
+        executor.spin_once(timeout_sec=0.2)
+        assert time.monotonic() < until, 'no answer'
+    begin = time.monotonic()
+    while time.monotonic() - begin < SETTLE:
+        executor.spin_once(timeout_sec=1.0)
+    first, begin = trips, time.monotonic()
+    while time.monotonic() - begin < seconds:
+        executor.spin_once(timeout_sec=1.0)
+    rate = (trips - first) / (time.monotonic() - begin)
+    rclpy.try_shutdown()
+    return rate
+
+
+def _pong() -> None:
+    """Answer until SIGTERM."""
+    import rclpy
+    from geometry_msgs.msg import WrenchStamped
+    from nav_msgs.msg import Odometry
+
+    rclpy.init()
+    node = rclpy.create_node('pong')
+    output = node.create_publisher(WrenchStamped, 'pong', 10)
+    node.create_subscription(Odometry, 'ping', lambda _: output.publish(WrenchStamped()), 10)
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, rclpy.executors.ExternalShutdownException):
+        rclpy.try_shutdown()
+
+
+def graph_rate(composed: bool = False, steps: int = 20_000, controller: str = 'gvc') -> float:
+    """Lock-steps per second of Case 1 on the node graph, every topic recorded.
+
+    Parameters
+    ----------
+    composed : all nodes in one process, else one process each
+    steps : length of the run
+    controller : of case1
+
+    Returns
+    -------
+    rate : steps per second of the steady part, 10 % to 90 % of the run
+
+    """
+    domain = chosen_domain(None)[0]
+    os.environ.update(loopback())
+    # the middleware reads its environment when it is loaded
+    from auv_dynamics.ros.watcher import Watcher
+
+    progress: list[tuple[float, int]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        scenario = load_scenario(_case1(Path(folder), steps))
+        warm_up(scenario, [controller])
+        graph = Watcher(domain)
+        try:
+            run_controller(
+                scenario, controller, Path(folder) / 'out', domain, graph,
+                lambda step: progress.append((time.monotonic(), step)), composed=composed,
+            )  # fmt: skip
+        finally:
+            graph.close()
+    low, high = (part * steps for part in STEADY)
+    steady = [(at, step) for at, step in progress if low <= step <= high]
+    if len(steady) < 2:
+        raise ValueError(f'steps: expected a run of some seconds, found {steps} steps')
+    (begin, first), (end, last) = steady[0], steady[-1]
+    return (last - first) / (end - begin)
+
+
+def _case1(folder: Path, steps: int) -> Path:
+    """Case 1 of another length, in a folder."""
+    case1 = load_scenario('case1')
+    data = {**case1.data, 'vehicle': str(case1.vehicle_path), 'duration': steps * case1.step}
+    path = folder / 'case1_long.yaml'
+    path.write_text(yaml.safe_dump(data, sort_keys=False), encoding='utf-8')
+    (folder / 'out').mkdir()
+    return path
+
+
+def measure(runs: int, steps: int, seconds: float) -> dict[str, Any]:
+    """Rates of ping-pong, five processes and one process, taken in turns, and their ratios.
+
+    The ping-pong is measured before and after each graph run; a ratio is taken to their mean.
+    """
+    trips = [pingpong(seconds)]
+    rates: dict[str, list[float]] = {'five processes': [], 'composed': []}
+    ratios: dict[str, list[float]] = {name: [] for name in rates}
+    for _ in range(runs):
+        for name, values in rates.items():
+            values.append(graph_rate(name == 'composed', steps))
+            trips.append(pingpong(seconds))
+            ratios[name].append(2 * values[-1] / (trips[-2] + trips[-1]))
+            print(f'{name}: {values[-1]:.0f} steps/s, {ratios[name][-1]:.2f}', file=sys.stderr)
+    return {
+        'pingpong': {'value': median(trips), 'unit': 'round trips/s', 'runs': trips},
+        **{
+            name: {
+                'value': median(rates[name]),
+                'unit': 'steps/s',
+                'ratio': median(ratios[name]),
+                'runs': rates[name],
+            }
+            for name in rates
+        },
+    }
+
+
+def main() -> None:
+    """Measure and print one JSON document."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--runs', type=int, default=3)
+    parser.add_argument('--steps', type=int, default=20_000)
+    parser.add_argument('--seconds', type=float, default=4.0)
+    parser.add_argument('--end', choices=('ping', 'pong'), help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.end == 'pong':
+        _pong()
+    elif options.end == 'ping':
+        print(_ping(options.seconds))
+    else:
+        print(json.dumps(measure(options.runs, options.steps, options.seconds), indent=2))
+
+
+if __name__ == '__main__':
+    main()

@@ -1,5 +1,9 @@
 """A run in blocks gives the figures of the whole run, wherever its borders fall."""
 
+import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis import certificate_figures, load_scenario, simulate, summarize
 from auv_analysis import moments as of
 from auv_analysis.certificate_figures import certificate_blocks
 from auv_analysis.lyapunov import certificate_of
@@ -93,6 +97,19 @@ def test_certificate_at_the_borders(run, rows, n, known, seed) -> None:
         assert_allclose(found, getattr(whole, name), rtol=1e-9, atol=1e-9 * abs(whole.L).max())
 
 
+@pytest.mark.parametrize('kept', [0, 3, 1000])
+def test_a_bound_that_is_often_broken_is_counted_in_a_second_pass(run, kept, monkeypatch) -> None:
+    jumpy = run.disturbance_estimate + np.random.default_rng(5).normal(size=run.nu.shape)
+    bent = replace(run, disturbance_estimate=jumpy)
+    expected = summarize(bent)['lyapunov']
+    assert 0.0 < expected['share_bound_28'] < 0.9
+    found = certificate_of(bent, control_model(bent.vehicle))
+    allowed = 1e-6 * np.abs(found.identity).max()
+    assert expected['share_bound_28'] == np.mean(found.L_dot <= found.bound + allowed)
+    monkeypatch.setattr(certificate_figures, 'KEPT', kept)
+    assert_same_figures(summarize(in_blocks(bent, 50))['lyapunov'], expected)
+
+
 def test_a_late_error_and_a_late_set_point_are_seen_over_borders(run) -> None:
     for k in (0, 99, 100, 199, 399, 400):
         nu_d = run.nu_d.copy()
@@ -127,18 +144,43 @@ def test_moments_by_their_definition(run, seed, n, compiled) -> None:
     assert np.allclose(inverse @ Upsilon, np.eye(6))
 
 
-@given(seed=st.integers(0, 99), n=st.integers(1, 40))
-@quick
-def test_columns_give_what_samples_give(run, seed, n) -> None:
-    flat = [values.ravel() for values in numbers(seed, n)]
+SCRIPT = """
+import json, sys
+import numpy as np
+from auv_analysis import moments as of
+from auv_dynamics import load_vehicle
+from auv_dynamics.jit import JITTED
+from auv_gvc_controller.model import control_model
+
+maps = of.maps_of(control_model(load_vehicle('herman2018')))
+flat = [v.ravel() for v in np.random.default_rng(7).normal(size=(5, 40, 6))]
+found = {'JITTED': JITTED}
+for add in (of.add_samples, of.add_columns):
+    m = of.Moments()
+    add(*flat, maps, m.sums, m.squares, m.peaks)
+    found[add.__name__] = [m.sums.tolist(), m.squares.tolist(), m.peaks.tolist()]
+print(json.dumps(found))
+"""
+
+
+def test_without_a_compiler_columns_give_what_samples_give(run) -> None:
+    """The same source, plain, in a process without compiled code, against the compiled sums."""
+    environment = {**os.environ, 'NUMBA_DISABLE_JIT': '1'}
+    done = subprocess.run(
+        [sys.executable, '-c', SCRIPT], env=environment, capture_output=True, text=True, check=True
+    )
+    document = json.loads(done.stdout)
+    assert document['JITTED'] is False
+    compiled = of.Moments()
+    flat = [values.ravel() for values in numbers(7, 40)]
     maps = of.maps_of(control_model(run.vehicle))
-    found, expected = of.Moments(), of.Moments()
-    of.add_columns(*flat, maps, found.sums, found.squares, found.peaks)
-    of.add_samples(*flat, maps, expected.sums, expected.squares, expected.peaks)
-    for kind, signals in (
-        ('sums', [of.ENERGY]),
-        ('squares', [of.ERROR, of.LUMPED, of.TAU]),
-        ('peaks', [of.ERROR, of.LUMPED, of.TAU, of.DELTA_XI, of.DELTA_PI, of.SETPOINT]),
-    ):
-        one, other = getattr(found, kind), getattr(expected, kind)
-        assert_allclose(one[signals], other[signals], rtol=1e-12, atol=1e-12)
+    of.add_samples(*flat, maps, compiled.sums, compiled.squares, compiled.peaks)
+    kept = {
+        'sums': [of.ENERGY],
+        'squares': [of.ERROR, of.LUMPED, of.TAU],
+        'peaks': [of.ERROR, of.LUMPED, of.TAU, of.DELTA_XI, of.DELTA_PI, of.SETPOINT],
+    }
+    for name in ('add_samples', 'add_columns'):
+        for kind, values in zip(kept, document[name], strict=True):
+            expected = getattr(compiled, kind)[kept[kind]]
+            assert_allclose(np.array(values)[kept[kind]], expected, rtol=1e-12, atol=1e-12)

@@ -1,7 +1,6 @@
 """The certificate of a run in blocks, and the figures that are read off it."""
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from auv_gvc_controller.model import ControlModel
 BOUND_TOLERANCE = 1e-6  # of max abs((26)): allows for truncation in the measured L_dot
 TRANSIENT = 2.0 - 1e-9  # s, which the paper leaves out of its errors
 MARGIN = NODES - 1  # samples about a block with which its derivatives are those of the whole run
+KEPT = 1 << 16  # samples outside the bound, as far as one can say before the end
 SHARES = ('share_of_time_increasing', 'share_condition_27', 'share_bound_28')
 FIGURES = (
     'identity_residual', 'identity_residual_rms', 'identity_residual_after_2s', *SHARES,
@@ -75,15 +75,24 @@ class CertificateFigures:
     Parameters
     ----------
     start : time of the run's first sample, s
+    largest : max abs((26)) of the whole run, where it is known beforehand
+
+    Attributes
+    ----------
+    unsettled : whether `largest` must be known beforehand to count where the bound holds: before
+        the last block it is not, and samples about which nothing can be said yet are kept, but
+        not any number of them
 
     """
 
-    def __init__(self, start: float):
+    def __init__(self, start: float, largest: float | None = None):
         self._late = start + TRANSIENT
+        self._known, self.unsettled = largest, False
         self._count = self._increasing = self._condition = 0
         self._squares = np.zeros(2)  # of the residual and of (26)
         self._largest, self._late_largest = np.zeros(2), np.zeros(2)
         self._beyond = np.zeros((2, 0))  # L_dot and (28) where the bound may not hold
+        self._broken = 0  # samples where it does not
         self._figures: dict[str, float] = {}
 
     def add(self, found: Certificate) -> None:
@@ -96,9 +105,7 @@ class CertificateFigures:
         self._late_largest = np.maximum(self._late_largest, late)
         self._increasing += int(np.count_nonzero(found.identity > 0))
         self._condition += int(np.count_nonzero(found.dissipation >= np.abs(found.drift)))
-        self._beyond = self._out_of_bound(
-            np.concatenate([self._beyond, [found.L_dot, found.bound]], axis=1)
-        )
+        self._compare(np.array([found.L_dot, found.bound]))
         peaks = {f'sup_{name}': size(getattr(found, name)).max() for name in ('s', 'z', 'w')}
         peaks['rho_max'] = found.rho.max()
         for name, peak in peaks.items():
@@ -106,20 +113,27 @@ class CertificateFigures:
         self._figures.setdefault('L_first', found.L[0])
         self._figures['L_last'] = found.L[-1]
 
-    def _out_of_bound(self, rates: np.ndarray) -> np.ndarray:
-        """Those columns of L_dot and (28) whose bound does not hold, as far as one can say yet."""
-        allowed = BOUND_TOLERANCE * self._largest[1]
-        if not np.isfinite(allowed):
-            return rates[:, :0]  # nothing will be said of them
-        return rates[:, ~(rates[0] <= rates[1] + allowed)]
+    def _compare(self, rates: np.ndarray) -> None:
+        """Compare L_dot and (28), (2, n)."""
+        if self._known is not None:
+            self._broken += _outside(rates, self._known).shape[1]
+        elif not self.unsettled and np.isfinite(self.largest):
+            rates = np.concatenate([self._beyond, rates], axis=1)
+            self._beyond = _outside(rates, self.largest)
+            self.unsettled = self._beyond.shape[1] > KEPT
+            self._broken = self._beyond.shape[1]
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude of (26) so far, W."""
+        return float(self._largest[1])
 
     def result(self) -> dict[str, float | None]:
         """Figures by name; those that are not finite, or do not exist, are None or left out."""
         figures = dict(self._figures)
         residual, largest = self._largest
         if np.isfinite(largest):
-            below = self._count - self._beyond.shape[1]
-            counts = self._increasing, self._condition, below
+            counts = self._increasing, self._condition, self._count - self._broken
             figures |= {k: n / self._count for k, n in zip(SHARES, counts, strict=True)}
         if largest > 0:
             figures['identity_residual'] = residual / largest
@@ -130,9 +144,27 @@ class CertificateFigures:
         return {name: float(x) if np.isfinite(x) else None for name, x in figures.items()}
 
 
-def as_figures(certificates: Iterator[Certificate], start: float) -> dict[str, Any]:
-    """Figures of the certificates of consecutive blocks."""
+def as_figures(
+    certificates: Callable[[], Iterator[Certificate]], start: float
+) -> dict[str, float | None]:
+    """Figures of a run.
+
+    Parameters
+    ----------
+    certificates : goes through the certificates of its blocks, from the beginning
+    start : time of its first sample, s
+
+    """
     figures = CertificateFigures(start)
-    for found in certificates:
+    for found in certificates():
         figures.add(found)
+    if figures.unsettled:
+        figures = CertificateFigures(start, figures.largest)
+        for found in certificates():
+            figures.add(found)
     return figures.result()
+
+
+def _outside(rates: np.ndarray, largest: float) -> np.ndarray:
+    """Those columns of L_dot and (28) between which the bound does not hold."""
+    return rates[:, ~(rates[0] <= rates[1] + BOUND_TOLERANCE * largest)]

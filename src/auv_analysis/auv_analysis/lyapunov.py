@@ -1,6 +1,6 @@
 """The Lyapunov certificate as figures of a run: whether it applies, and what it says."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -70,9 +70,8 @@ def lyapunov(run: AnyRun, model: ControlModel) -> dict[str, Any]:
 
     """
     gains = make_gains(run.law, run.gains) if run.gains else None
-    known = run.law in LAWS and gains is not None
     return _summary(
-        certificate_blocks(run, model) if known else iter(()),
+        lambda: certificate_blocks(run, model),
         run.start,
         run.law,
         gains,
@@ -138,14 +137,14 @@ def lyapunov_summary(
         sampled : as given
 
     """
-    found: Iterator[Certificate] = iter(())
+    found: list[Certificate] = []
     if law in LAWS and gains is not None:
         unknown = np.full(np.shape(nu), np.nan)
         z = unknown if z is None else z
         F = unknown if disturbance is None else disturbance
-        found = iter([certificate(t, nu, nu_d, z, F, disturbance_estimate, law, gains, model)])
+        found = [certificate(t, nu, nu_d, z, F, disturbance_estimate, law, gains, model)]
     return _summary(
-        found,
+        lambda: iter(found),
         float(t[0]),
         law,
         gains,
@@ -159,7 +158,7 @@ def lyapunov_summary(
 
 
 def _summary(
-    found: Iterator[Certificate],
+    found: Callable[[], Iterator[Certificate]],
     start: float,
     law: str,
     gains: Any,

@@ -8,8 +8,7 @@ import numpy as np
 from auv_analysis.bag.contents import Series
 from auv_analysis.bag.messages import Batch
 from auv_analysis.bag.steps import complete_blocks
-
-ROWS = 1 << 16  # stamps that are merged together
+from auv_analysis.run import BLOCK
 
 
 class Survey:
@@ -61,7 +60,7 @@ class Survey:
         number, first, last = 0, 0, 0
         intervals: Counter[int] = Counter()
         ends = {topic: self.last[topic] for topic in topics.values()}
-        for ns, _ in complete_blocks(self._series(), ends, ROWS):
+        for ns, _ in complete_blocks(self._series(), ends, BLOCK):
             if number:
                 intervals[int(ns[0]) - last] += 1
             else:

@@ -11,13 +11,13 @@ import yaml
 from harness import auv, graph, parameters, stop
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from runs import every_message, node_of, nodes, start
 from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag import load_run, read_bag
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.scenario import load_scenario
 from auv_dynamics.ros import topics
+from runs import every_message, node_of, nodes, start
 
 SCENARIO = """
 name: composed

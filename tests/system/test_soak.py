@@ -17,13 +17,13 @@ import psutil
 import pytest
 import yaml
 from harness import auv
-from runs import node_of, nodes, raw_messages, record, start
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
 from auv_dynamics import interface
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.signals import DOFS
+from runs import node_of, nodes, raw_messages, record, start
 
 COUNT = int(os.environ.get('AUV_GVC_COUNT', '10'))
 SEED = int(os.environ.get('AUV_GVC_SEED', '0'))

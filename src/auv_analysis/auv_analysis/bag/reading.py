@@ -10,6 +10,8 @@ from auv_analysis.bag.records import records
 from auv_analysis.bag.steps import joined_series
 from auv_dynamics import interface
 
+TOGETHER = 64  # chunks whose small arrays are joined at once: thousands of them scatter the memory
+
 
 def batches(bag: str | Path, contents: Contents, *, decode: bool = True) -> Iterator[Batch]:
     """Messages of our topics in the order of the bag, a chunk at a time.
@@ -47,7 +49,13 @@ def read_bag(bag: str | Path, *, decode: bool = True) -> Contents:
     """
     contents = Contents()
     found: dict[str, list[Series]] = {}
+    small: dict[str, list[Series]] = {}
     for topic, stamps, rows in batches(bag, contents, decode=decode):
-        found.setdefault(topic, []).append((stamps, rows))
-    contents.messages = {topic: joined_series(parts) for topic, parts in found.items()}
+        parts = small.setdefault(topic, [])
+        parts.append((stamps, rows))
+        if len(parts) == TOGETHER:
+            found.setdefault(topic, []).append(joined_series(parts))
+            parts.clear()
+    for topic, parts in small.items():  # one topic after the other, so that little is held twice
+        contents.messages[topic] = joined_series([*found.pop(topic, []), *parts])
     return contents

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.bag import bag_files, open_bag
-from auv_analysis.commands.conclude import conclude
+from auv_analysis.commands.conclude import conclude, console
 from auv_analysis.folder import prepare
 from auv_analysis.run import AnyRun
 
@@ -16,7 +16,8 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
     runs: dict[str, AnyRun] = {}
     texts: dict[str, dict[str, str]] = {'scenario.yaml': {}, 'vehicle.yaml': {}}
     for bag in options.bags:
-        run, attachments = open_bag(bag, options.vehicle)
+        with console.status(f'reading {bag}'):
+            run, attachments = open_bag(bag, options.vehicle)
         name = _free_name(run.controller, runs)
         runs[name] = run
         for file, by_name in texts.items():

@@ -46,7 +46,8 @@ def conclude(
     vehicle_text: str | dict[str, str],
 ) -> dict[str, Any]:
     """Write summary and report, show the table; returns the summaries."""
-    summaries = {name: summarize(run) for name, run in runs.items()}
+    with console.status('computing the figures of summary.json'):
+        summaries = {name: summarize(run) for name, run in runs.items()}
     text = json.dumps(summaries, indent=2, allow_nan=False)
     (out / 'summary.json').write_text(text + '\n', encoding='utf-8')
     from auv_analysis.report.page import write_report  # with matplotlib, which loads slowly

@@ -94,7 +94,8 @@ def _records(path: Path, notes: list[str]) -> Iterator[Any]:
             McapError, ValueError, KeyError, OverflowError, RuntimeError, MemoryError, ZstdError,
         ) as error:  # fmt: skip
             if stream.tell() <= 64:
-                raise InputError(path, '', 'an MCAP file', str(error).splitlines()[0]) from None
+                found = (str(error) or repr(error)).splitlines()[0]
+                raise InputError(path, '', 'an MCAP file', found) from None
             notes.append(f'{path.name}: damaged from byte {stream.tell()}, read up to there')
             finished = True
     if not finished:

@@ -33,6 +33,7 @@ setup(
         'jsonschema>=4.10',
         'mcap>=1.5',
         'mcap-ros2-support>=0.5.5',
+        'zstandard>=0.19',
         'matplotlib>=3.6',
         'Pillow>=9',
         'Jinja2>=3.0',

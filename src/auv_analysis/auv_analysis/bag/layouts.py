@@ -56,9 +56,8 @@ class Layout:
         """Whether the frames in the strings are those."""
         if frames is None:
             return False
-        return self.frames.base == frames.base and self.frames.odom in (
-            (frames.odom,) if self.is_state else (frames.base,)
-        )
+        own = frames if self.is_state else interface.Frames(frames.base, frames.base)
+        return self.frames == own
 
     def read(
         self, data: bytes, starts: np.ndarray, sizes: np.ndarray

@@ -100,7 +100,7 @@ def _ended(path: Path, error: Exception, position: int, notes: list[str], finish
             raise InputError(path, '', 'an MCAP file', 'another beginning') from None
         return finished
     if position <= 64:
-        found = str(error).splitlines()[0]
+        found = (str(error) or repr(error)).splitlines()[0]
         raise InputError(path, '', 'an MCAP file', found) from None
     notes.append(f'{path.name}: damaged from byte {position}, read up to there')
     return True

@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from auv_analysis.run import AnyRun, Run
+from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
 from auv_analysis.summary import summarize
 from auv_dynamics.signals import DOFS
@@ -25,7 +25,7 @@ def say(text: str) -> None:
 
 
 def finish(
-    out: Path, runs: dict[str, Run], scenario: Scenario, failure: Exception | None
+    out: Path, runs: Mapping[str, AnyRun], scenario: Scenario, failure: Exception | None
 ) -> dict[str, Any]:
     """Summary and report of the runs that came to their end; then the failure of another one."""
     texts, document = scenario.attachments, {}

@@ -16,7 +16,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from auv_analysis.bag import load_run
+from auv_analysis.bag import open_bag
 from auv_analysis.commands.conclude import console, finish, say
 from auv_analysis.commands.scenarios import open_scenario, prepare_out
 from auv_analysis.domain import VARIABLE, chosen_domain
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             done.append(name)
     finally:
         graph.close()
-    return finish(out, {name: load_run(out / name) for name in done}, scenario, failure)
+    return finish(out, {name: open_bag(out / name).run for name in done}, scenario, failure)
 
 
 def _refuse_strangers(graph: Any, domain: int) -> None:

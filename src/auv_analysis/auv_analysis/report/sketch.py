@@ -58,7 +58,12 @@ class Sketch(Facts):
         return self.traces[name, part][column].line()
 
     def part(self, name: str, first: float = 0.0, last: float = FOREVER) -> Part:
-        """Statistics of a signal in [first, last], s from the start, one of `questions`."""
+        """Statistics of a signal in [first, last], s from the start.
+
+        First may be 0, 2 or `last_third`, last 2, 10, the common window or the end; another time
+        is a ValueError, as are times between which there is no sample.
+
+        """
         begin = None if first <= 0.0 else cut_before(self, first)
         end = None if last >= self.duration else cut_behind(self, last)
         found = self.statistics.between(begin, end)

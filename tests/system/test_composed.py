@@ -8,6 +8,7 @@ import numpy as np
 import psutil
 import pytest
 import yaml
+from graph_runs import every_message, node_of, nodes, start
 from harness import auv, graph, parameters, stop
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -17,7 +18,6 @@ from auv_analysis.bag import load_run, read_bag
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.scenario import load_scenario
 from auv_dynamics.ros import topics
-from runs import every_message, node_of, nodes, start
 
 SCENARIO = """
 name: composed

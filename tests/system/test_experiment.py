@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from graph_runs import every_message, node_of, nodes, start
 from harness import PACKAGES, auv, fresh_domain
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
 from auv_dynamics import interface
 from auv_dynamics.kinematics import quaternion
-from runs import every_message, node_of, nodes, start
 
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 SCENARIO = {

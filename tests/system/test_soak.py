@@ -16,6 +16,7 @@ import numpy as np
 import psutil
 import pytest
 import yaml
+from graph_runs import node_of, nodes, raw_messages, record, start
 from harness import auv
 
 from auv_analysis import load_scenario, simulate
@@ -23,7 +24,6 @@ from auv_analysis.bag import load_run, read_bag
 from auv_dynamics import interface
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.signals import DOFS
-from runs import node_of, nodes, raw_messages, record, start
 
 COUNT = int(os.environ.get('AUV_GVC_COUNT', '10'))
 SEED = int(os.environ.get('AUV_GVC_SEED', '0'))

@@ -49,7 +49,7 @@ test: setup  ## the tests
 
 soak: setup  ## COUNT random runs on the node graph by SEED, one of STEPS, what else takes long
 	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) AUV_GVC_STEPS=$(STEPS) \
-	  $(BIN)/python -m pytest -m long tests/system
+	  $(BIN)/python -m pytest -m long tests
 
 properties: setup  ## the property tests with EXAMPLES examples each, drawn by SEED
 	AUV_GVC_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n 2 --hypothesis-seed=$(SEED) \

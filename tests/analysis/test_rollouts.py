@@ -256,6 +256,7 @@ def test_no_changes_give_the_run_of_the_scenario():
     assert len(columns['status']) == 1
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not JITTED, reason='runs this file again without numba')
 def test_the_same_source_runs_without_numba_for_every_law():
     command = [sys.executable, '-m', 'pytest', '-q', '-x', '-p', 'no:cacheprovider', __file__]

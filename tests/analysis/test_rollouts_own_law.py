@@ -58,8 +58,8 @@ def scenario(tmp_path, monkeypatch):
     ('name', 'before', 'how'),
     [
         ('own_plain_arithmetic', '', 'in vector registers'),
-        ('own_branch', BRANCHES, 'compiled'),
-        ('own_python', NOT_FOR_NUMBA, 'as plain Python'),
+        pytest.param('own_branch', BRANCHES, 'compiled', marks=pytest.mark.long),
+        pytest.param('own_python', NOT_FOR_NUMBA, 'as plain Python', marks=pytest.mark.long),
     ],
 )
 def test_a_law_runs_as_compiled_as_can_be(scenario, name, before, how):

@@ -161,8 +161,12 @@ def check_U(module: Any) -> None:
     assert_allclose(found, [300.0, 500.0, 500.0, 40.0, 175.5, 141.1], atol=0.05)
     xi = np.linalg.solve(Upsilon, [0, 0, 0, 0, 1.0, 0])  # delta_xi: 0.025 q and -0.075 q
     assert_allclose(xi, [0.025, 0.0, -0.075, 0.0, 1.0, 0.0], atol=1e-12)
-    with pytest.raises(ValueError, match='expected a symmetric M'):
-        module.decompose(DENSE + np.triu(np.ones((6, 6)), 1))
+    fleet = np.array([DENSE, U_inv.T @ np.diag(N) @ U_inv, 2.0 * DENSE])
+    for one, M in zip(np.swapaxes(module.decompose(fleet)[0], 1, 2), fleet, strict=True):
+        assert_allclose(one @ M @ one.T, np.diag(module.decompose(M)[1]), atol=1e-9)
+    for skewed in (DENSE + np.triu(np.ones((6, 6)), 1), fleet + np.triu(np.ones((6, 6)), 1)):
+        with pytest.raises(ValueError, match='expected a symmetric M'):
+            module.decompose(skewed)
 
 
 def check_algebra(module: Any) -> None:

@@ -91,10 +91,11 @@ FORMULAS = [
         ['make_current', 'to_body', 'acceleration_in_current'], check_current, 33,
     ),
     Formula(
-        'F lumped', 'auv_dynamics.uncertainty', ['_with_errors', 'lumped'], check_uncertainty, 13
+        'F lumped', 'auv_dynamics.uncertainty', ['with_errors', 'lumped'], check_uncertainty, 11
     ),
     Formula(
-        'step', 'auv_dynamics.integrator', ['TABLEAUS', 'fill_step', 'stage_times'], check_step, 10
+        'step', 'auv_dynamics.integrator',
+        ['TABLEAUS', 'fill_step', 'fill_sum', 'stage_times'], check_step, 10,
     ),
     Formula(
         'frames', 'auv_dynamics.frames',

@@ -43,8 +43,9 @@ def assert_same_figures(found: Any, expected: Any) -> None:
         assert found.keys() == expected.keys()
         for key, value in expected.items():
             assert_same_figures(found[key], value)
-    elif isinstance(expected, list) and expected and isinstance(expected[0], float):
-        assert_allclose(found, expected, rtol=1e-12)
+    elif isinstance(expected, list):
+        for one, other in zip(found, expected, strict=True):
+            assert_same_figures(one, other)
     elif isinstance(expected, float):
         assert found == pytest.approx(expected, rel=1e-12)
     else:

@@ -1,8 +1,8 @@
 """Figures of long runs: against NumPy over whole arrays, and how much memory an hour takes."""
 
-import os
 import statistics
 import subprocess
+import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
@@ -92,14 +92,20 @@ def one_hour() -> dict[str, Measured]:
     return {'analysis_one_hour_rss_mb': measured}
 
 
+# a process takes the peak of the one that started it along: this small one stands between
+BETWEEN = """
+import resource, subprocess, sys
+code = subprocess.call(sys.argv[1:], stdout=subprocess.DEVNULL)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+sys.exit(code)
+"""
+
+
 def peak_memory(command: Sequence[str]) -> int:
     """Largest resident memory in bytes of a command that must succeed."""
-    with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
-        _, status, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            said.seek(0)
-            last = (said.read().decode().splitlines() or ['no message'])[-1]
-            raise RuntimeError(f'{" ".join(command)}: exit code {process.returncode}: {last}')
-    return used.ru_maxrss * 1024
+    between = [sys.executable, '-c', BETWEEN, *command]
+    done = subprocess.run(between, capture_output=True, text=True, check=False)
+    if done.returncode:
+        last = (done.stderr.splitlines() or ['no message'])[-1]
+        raise RuntimeError(f'{" ".join(command)}: exit code {done.returncode}: {last}')
+    return int(done.stdout) * 1024

@@ -1,10 +1,14 @@
 """The order of the tests: what waits for nodes first, so that parallel workers end together."""
 
+import signal
 from pathlib import Path
 
 import pytest
 
 FIRST = ('system', 'ros')
+
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # in the background of a shell
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # what tests interrupt inherits it
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

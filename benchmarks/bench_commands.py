@@ -8,7 +8,7 @@ from pathlib import Path
 
 import c_reference
 import yaml
-from bench_rollouts import BATCH, DURATION, fastest_c
+from bench_rollouts import BATCH, DURATION
 from loops import CONTROLLER, SPREAD, VARIED, case1, in_c, nominal, varied
 from measure import Measured, cost, interleaved, seconds
 
@@ -19,7 +19,7 @@ CORES = 2  # that C is granted
 
 def sweep() -> dict[str, Measured]:
     """`auv sweep` from its start to the last row, against C's time for as many on two cores."""
-    loops, library = in_c(case1(DURATION), varied(BATCH)), fastest_c()
+    loops, library = in_c(case1(DURATION), varied(BATCH)), c_reference.library()
     c = cost(lambda: c_reference.rollouts(library, loops), BATCH * CORES / SWEEP)
     with tempfile.TemporaryDirectory() as folder:
         campaign = _campaign(Path(folder))

@@ -1,14 +1,13 @@
 """Rollouts of Case 1: against scalar C, on two threads, growing, and against other simulators."""
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import c_reference
 import numpy as np
 import peers
 from loops import CONTROLLER, case1, in_c, prepared, single, varied
-from measure import Measured, cost, interleaved, seconds, speed
+from measure import Measured, cost, interleaved, speed
 
 from auv_analysis import simulate
 from auv_analysis.batch import run_batch
@@ -25,25 +24,11 @@ SAME = 1e-9  # relative, of figures computed by different programs
 AGREE = 1e-6  # m/s, rad/s: of a peer's final velocity
 
 
-@cache
-def fastest_c() -> Any:
-    """The C reference with the flags that are faster here."""
-    loops = in_c(case1(DURATION), varied(SINGLES))
-
-    def took(library: Any) -> float:
-        return min(seconds(lambda: c_reference.rollouts(library, loops)) for _ in range(5))
-
-    return min(map(c_reference.library, (c_reference.PLAIN, c_reference.NATIVE)), key=took)
-
-
 def against_c() -> dict[str, Measured]:
     """A batch, and one rollout after the other, per rollout: prepared inputs to figures."""
     scenario, changes = case1(DURATION), varied(BATCH)
-    batch, loops, library = (
-        prepared(scenario, changes),
-        in_c(scenario, changes),
-        fastest_c(),
-    )
+    batch, loops = prepared(scenario, changes), in_c(scenario, changes)
+    library, native = c_reference.library(), c_reference.library(c_reference.NATIVE)
     check_figures(rollouts(scenario, CONTROLLER, changes), c_reference.rollouts(library, loops)[0])
 
     one = single(scenario)
@@ -55,7 +40,7 @@ def against_c() -> dict[str, Measured]:
     subjects = {
         'rollout_vs_c': cost(lambda: run_batch(batch), BATCH),
         'single_vs_c': cost(singles, SINGLES),
-        'scalar_c_o3_vs_c': _c(c_reference.library(c_reference.PLAIN), loops),
+        'native_c_vs_c': _c(native, loops),
     }
     return interleaved(subjects, _c(library, loops), 's')
 

@@ -73,11 +73,14 @@ KEYS = (
     ),
     Key(
         'single_vs_c', f'{CASE1}: one rollout with figures', 'scalar C', 'cost', 1.2, 0.85,
-        'gcc puts neighbouring numbers of the one vehicle into vector registers. numba could too '
-        '(`NUMBA_SLP_VECTORIZE=1` takes about a fifth off), but then a single run would round '
-        'otherwise than the same vehicle in a batch, and they agree to the last bit.',
+        'a single vehicle leaves the vector registers empty. numba could put neighbouring numbers '
+        'into them (`NUMBA_SLP_VECTORIZE=1` takes a seventh off), but then a single run would '
+        'round otherwise than the same vehicle in a batch, and they agree to the last bit.',
     ),
-    Key('scalar_c_o3_vs_c', 'the C reference with `-O3` alone', 'scalar C', 'cost'),
+    Key(
+        'native_c_vs_c', 'the C reference built for this processor (`-march=native`)',
+        'scalar C', 'cost',
+    ),
     Key('threads_2_vs_1', 'a batch of 2 048 on two threads', 'one thread', 'gain', 1.6, 1.95),
     Key(
         'growth_batch', 'one of a batch of 10 000, parameters included',
@@ -95,24 +98,34 @@ KEYS = (
     Key(
         'sweep_10k_vs_c', '`auv sweep`: 10 000 rollouts of Case 1 over 10 s, to Parquet',
         '10 000 of scalar C on two cores', 'cost', 1.2, 0.4,
+        'half of the two seconds is the start of the command: importing numba and pyarrow, reading '
+        'the compiled kernel, checking the campaign. It does not grow with the rollouts.',
     ),
     Key(
         'graph_vs_pingpong', 'five processes, every topic recorded: steps',
         'round trips of bare rclpy', 'gain', 0.45, 0.9,
+        'five processes share two cores, which the two of the ping-pong have to themselves; the '
+        'cost is that of messages times their readers. `--composed` saves most of it.',
     ),
     Key(
         'composed_vs_pingpong', 'all nodes in one process, every topic recorded: steps',
         'round trips of bare rclpy', 'gain', 0.5, 1.7,
+        'one thread takes and publishes every message by itself, two thirds of the time within '
+        'rclpy and the recording; the ping-pong is spread over two cores.',
     ),
     Key(
         'bag_read_vs_raw_reader', 'messages of a bag to arrays',
         '`mcap` raw reader', 'gain', 15.0, 30.0,
+        'nearly half of the time is decompression and the checksum of each chunk, which the raw '
+        'reader does not verify. Doing it ahead in a thread was tried and gained nothing.',
     ),
     Key('bag_read_vs_rosbags', 'the same', 'rosbags, decoding', 'gain'),
     Key('bag_read_vs_mcap_ros2_support', 'the same', 'mcap-ros2-support, decoding', 'gain'),
     Key(
         'analysis_vs_numpy', 'figures of 1e6 samples',
         'the same in NumPy, whole arrays', 'gain', 8.0, 30.0,
+        'memory: to add up the same five arrays, and nothing else, takes NumPy three quarters of '
+        'this time.',
     ),
     Key(
         'analysis_one_hour_rss_mb', 'memory to analyse a bag of one hour',
@@ -124,7 +137,7 @@ BY_NAME = {key.name: key for key in KEYS}
 
 # measured together: module:function, which gives a Measured by key
 GROUPS = {
-    'bench_rollouts:against_c': ('rollout_vs_c', 'single_vs_c', 'scalar_c_o3_vs_c'),
+    'bench_rollouts:against_c': ('rollout_vs_c', 'single_vs_c', 'native_c_vs_c'),
     'bench_rollouts:threads': ('threads_2_vs_1',),
     'bench_rollouts:growth': ('growth_batch', 'growth_horizon'),
     'bench_rollouts:against_scipy': ('rollout_vs_solve_ivp',),

@@ -18,7 +18,6 @@ from auv_analysis import moments as of
 from auv_analysis.certificate_figures import certificate_blocks
 from auv_analysis.lyapunov import certificate_of
 from auv_analysis.run import LongRun, Run, joined, widened
-from auv_dynamics.jit import plain
 from auv_gvc_controller.model import control_model
 
 quick = settings(max_examples=20, deadline=None)
@@ -125,18 +124,17 @@ def numbers(seed: int, n: int) -> list[np.ndarray]:
     return [*np.random.default_rng(seed).normal(size=(5, n, 6))]
 
 
-@given(seed=st.integers(0, 99), n=st.integers(1, 40), compiled=st.booleans())
+@given(seed=st.integers(0, 99), n=st.integers(1, 40))
 @quick
-def test_moments_by_their_definition(run, seed, n, compiled) -> None:
+def test_moments_by_their_definition(run, seed, n) -> None:
     nu, nu_d, tau, f, F = numbers(seed, n)
     model = control_model(run.vehicle)
     Upsilon, inverse = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
     xi, pi = np.linalg.solve(Upsilon, nu.T).T, tau @ Upsilon
     expected = nu_d - nu, f - F, tau, xi - nu, pi - tau, 0.5 * model.N * xi**2, nu_d
     found = of.Moments()
-    add = plain(of.add_samples) if not compiled else of.add_samples
     flat = (values.ravel() for values in (nu, nu_d, tau, f, F))
-    add(*flat, of.maps_of(model), found.sums, found.squares, found.peaks)
+    of.add_compiled(*flat, of.maps_of(model), found.sums, found.squares, found.peaks)
     assert_allclose(found.sums[of.ENERGY], expected[of.ENERGY].sum(axis=0), rtol=1e-11)
     for signal in (of.ERROR, of.LUMPED, of.TAU):
         assert_allclose(found.squares[signal], (expected[signal] ** 2).sum(axis=0), rtol=1e-11)
@@ -154,9 +152,9 @@ from auv_dynamics.jit import JITTED
 from auv_gvc_controller.model import control_model
 
 maps = of.maps_of(control_model(load_vehicle('herman2018')))
-flat = [v.ravel() for v in np.random.default_rng(7).normal(size=(5, 40, 6))]
+flat = [v.ravel() for v in np.random.default_rng(7).normal(size=(5, 43, 6))]
 found = {'JITTED': JITTED}
-for add in (of.add_samples, of.add_columns):
+for add in (of.add_compiled, of.add_columns):
     m = of.Moments()
     add(*flat, maps, m.sums, m.squares, m.peaks)
     found[add.__name__] = [m.sums.tolist(), m.squares.tolist(), m.peaks.tolist()]
@@ -173,15 +171,15 @@ def test_without_a_compiler_columns_give_what_samples_give(run) -> None:
     document = json.loads(done.stdout)
     assert document['JITTED'] is False
     compiled = of.Moments()
-    flat = [values.ravel() for values in numbers(7, 40)]
+    flat = [values.ravel() for values in numbers(7, 43)]
     maps = of.maps_of(control_model(run.vehicle))
-    of.add_samples(*flat, maps, compiled.sums, compiled.squares, compiled.peaks)
+    of.add_compiled(*flat, maps, compiled.sums, compiled.squares, compiled.peaks)
     kept = {
         'sums': [of.ENERGY],
         'squares': [of.ERROR, of.LUMPED, of.TAU],
         'peaks': [of.ERROR, of.LUMPED, of.TAU, of.DELTA_XI, of.DELTA_PI, of.SETPOINT],
     }
-    for name in ('add_samples', 'add_columns'):
+    for name in ('add_compiled', 'add_columns'):
         for kind, values in zip(kept, document[name], strict=True):
             expected = getattr(compiled, kind)[kept[kind]]
             assert_allclose(np.array(values)[kept[kind]], expected, rtol=1e-12, atol=1e-12)

@@ -17,7 +17,17 @@ from auv_analysis.energy import component
 from auv_analysis.run import Run
 from auv_analysis.windows import Windows
 from auv_dynamics.jit import JITTED, compiled, jitable
-from auv_dynamics.six import mul, sub, upper, vector
+from auv_dynamics.lanes import LANES, of_block, uncounted
+from auv_dynamics.six import (
+    add,
+    add_products,
+    fill_vector,
+    keep_largest,
+    mul,
+    sub,
+    upper,
+    vector,
+)
 from auv_gvc_controller.model import ControlModel
 
 NAMES = ('error', 'lumped_error', 'tau', 'delta_xi', 'delta_pi', 'energy', 'nu_d')
@@ -63,28 +73,71 @@ def signals(nu, nu_d, tau, f, F, maps):
     )
 
 
-@compiled
-def add_samples(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
-    """Add samples, flat arrays (6 n,), to what (7, 6) is known of those before them.
+@jitable
+def add_sample(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
+    """Add one sample, or lanes of them, to what (7, 6) is known of those before it.
 
     Only the sum of the energy, the squares of errors and input, and no peak of the energy are
     ever asked for.
     """
-    for k in range(0, nu.shape[0], 6):
-        error, lumped, command, xi, pi, energy, setpoint = signals(
-            vector(nu, k), vector(nu_d, k), vector(tau, k), vector(f, k), vector(F, k), maps
-        )
-        for i in range(6):
-            sums[ENERGY, i] += energy[i]
-            squares[ERROR, i] += error[i] * error[i]
-            squares[LUMPED, i] += lumped[i] * lumped[i]
-            squares[TAU, i] += command[i] * command[i]
-            peaks[ERROR, i] = max(peaks[ERROR, i], abs(error[i]))
-            peaks[LUMPED, i] = max(peaks[LUMPED, i], abs(lumped[i]))
-            peaks[TAU, i] = max(peaks[TAU, i], abs(command[i]))
-            peaks[DELTA_XI, i] = max(peaks[DELTA_XI, i], abs(xi[i]))
-            peaks[DELTA_PI, i] = max(peaks[DELTA_PI, i], abs(pi[i]))
-            peaks[SETPOINT, i] = max(peaks[SETPOINT, i], abs(setpoint[i]))
+    error, lumped, command, xi, pi, energy, setpoint = signals(nu, nu_d, tau, f, F, maps)
+    fill_vector(sums[ENERGY], 0, add(vector(sums[ENERGY], 0), energy))
+    add_products(squares[ERROR], error, error)
+    add_products(squares[LUMPED], lumped, lumped)
+    add_products(squares[TAU], command, command)
+    keep_largest(peaks[ERROR], error)
+    keep_largest(peaks[LUMPED], lumped)
+    keep_largest(peaks[TAU], command)
+    keep_largest(peaks[DELTA_XI], xi)
+    keep_largest(peaks[DELTA_PI], pi)
+    keep_largest(peaks[SETPOINT], setpoint)
+
+
+@jitable
+def fill_beside(beside, first, flat, k, lanes):
+    """Put six numbers each of the samples from index `k` side by side, from row `first`."""
+    for i in range(6):
+        for w in range(lanes):
+            beside[0, first + i, w] = flat[k + 6 * w + i]
+
+
+@jitable
+def fill_signals(beside, nu, nu_d, tau, f, F, k, lanes):
+    """Put the numbers of `lanes` samples from index `k` side by side: (1, 30, LANES)."""
+    fill_beside(beside, 0, nu, k, lanes)
+    fill_beside(beside, 6, nu_d, k, lanes)
+    fill_beside(beside, 12, tau, k, lanes)
+    fill_beside(beside, 18, f, k, lanes)
+    fill_beside(beside, 24, F, k, lanes)
+
+
+@compiled
+def add_samples(nu, nu_d, tau, f, F, maps, beside, sums, squares, peaks):
+    """Add samples, flat arrays (6 n,), to lanes (1, 7, 6, LANES): as many at a time as fit.
+
+    `beside` (1, 30, LANES) is workspace. Zeros, which fill up the last register, add nothing.
+    """
+    known, block = uncounted(maps), of_block(beside, 0)
+    s, q, p = of_block(sums, 0), of_block(squares, 0), of_block(peaks, 0)
+    for k in range(0, nu.shape[0], 6 * LANES):
+        if k + 6 * LANES <= nu.shape[0]:
+            fill_signals(beside, nu, nu_d, tau, f, F, k, LANES)
+        else:
+            beside[:] = 0.0
+            fill_signals(beside, nu, nu_d, tau, f, F, k, (nu.shape[0] - k) // 6)
+        add_sample(
+            vector(block, 0), vector(block, 6), vector(block, 12), vector(block, 18),
+            vector(block, 24), known, s, q, p,
+        )  # fmt: skip
+
+
+def add_compiled(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
+    """Add samples, flat arrays (6 n,), to what (7, 6) is known of those before them."""
+    lanes = np.zeros((3, 1, *sums.shape, LANES))
+    add_samples(nu, nu_d, tau, f, F, maps, np.empty((1, 30, LANES)), *lanes)
+    sums += lanes[0, 0].sum(axis=-1)
+    squares += lanes[1, 0].sum(axis=-1)
+    np.maximum(peaks, lanes[2, 0].max(axis=-1), out=peaks)
 
 
 def add_columns(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
@@ -127,7 +180,7 @@ class Moments:
         nu, nu_d, tau, f, F = (np.ascontiguousarray(value, float).ravel() for value in values)
         self.count += len(run.t)
         self.first, self.last = min(self.first, run.t[0]), max(self.last, run.t[-1])
-        add = add_samples if JITTED else add_columns
+        add = add_compiled if JITTED else add_columns
         add(nu, nu_d, tau, f, F, maps, self.sums, self.squares, self.peaks)
 
     def joined(self, other: 'Moments') -> 'Moments':

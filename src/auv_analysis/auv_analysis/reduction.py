@@ -9,7 +9,7 @@ from auv_dynamics.files import LARGEST
 from auv_dynamics.jit import helper, jitable
 from auv_dynamics.lanes import select
 from auv_dynamics.signals import DOFS
-from auv_dynamics.six import add, diag, sub, upper, upper_T, vector
+from auv_dynamics.six import add, add_products, diag, keep_largest, sub, upper, upper_T, vector
 from auv_gvc_controller.model import ControlModel
 
 
@@ -91,28 +91,6 @@ class Figures(NamedTuple):
         good = size_of(sample) < LARGEST
         first = select(record.diverged[0] < k, record.diverged[0], float(k))
         record.diverged[0] = select(good, record.diverged[0], first)
-
-
-@helper
-def add_products(total, a, b):
-    """Total += a b, by component and in place."""
-    total[0] = total[0] + a[0] * b[0]
-    total[1] = total[1] + a[1] * b[1]
-    total[2] = total[2] + a[2] * b[2]
-    total[3] = total[3] + a[3] * b[3]
-    total[4] = total[4] + a[4] * b[4]
-    total[5] = total[5] + a[5] * b[5]
-
-
-@helper
-def keep_largest(largest, a):
-    """Largest absolute values so far, by component and in place."""
-    largest[0] = select(abs(a[0]) > largest[0], abs(a[0]), largest[0])
-    largest[1] = select(abs(a[1]) > largest[1], abs(a[1]), largest[1])
-    largest[2] = select(abs(a[2]) > largest[2], abs(a[2]), largest[2])
-    largest[3] = select(abs(a[3]) > largest[3], abs(a[3]), largest[3])
-    largest[4] = select(abs(a[4]) > largest[4], abs(a[4]), largest[4])
-    largest[5] = select(abs(a[5]) > largest[5], abs(a[5]), largest[5])
 
 
 @helper

@@ -5,7 +5,7 @@ is a flat row-major array (36,); a triangular one is stored in full and used by 
 """
 
 from auv_dynamics.jit import helper
-from auv_dynamics.lanes import clip
+from auv_dynamics.lanes import clip, select
 
 
 @helper
@@ -118,3 +118,25 @@ def upper_T(U, a):
         U[4] * a[0] + U[10] * a[1] + U[16] * a[2] + U[22] * a[3] + a[4],
         U[5] * a[0] + U[11] * a[1] + U[17] * a[2] + U[23] * a[3] + U[29] * a[4] + a[5],
     )
+
+
+@helper
+def add_products(total, a, b):
+    """Total += a b, by component and in place."""
+    total[0] = total[0] + a[0] * b[0]
+    total[1] = total[1] + a[1] * b[1]
+    total[2] = total[2] + a[2] * b[2]
+    total[3] = total[3] + a[3] * b[3]
+    total[4] = total[4] + a[4] * b[4]
+    total[5] = total[5] + a[5] * b[5]
+
+
+@helper
+def keep_largest(largest, a):
+    """Largest absolute values so far, by component and in place."""
+    largest[0] = select(abs(a[0]) > largest[0], abs(a[0]), largest[0])
+    largest[1] = select(abs(a[1]) > largest[1], abs(a[1]), largest[1])
+    largest[2] = select(abs(a[2]) > largest[2], abs(a[2]), largest[2])
+    largest[3] = select(abs(a[3]) > largest[3], abs(a[3]), largest[3])
+    largest[4] = select(abs(a[4]) > largest[4], abs(a[4]), largest[4])
+    largest[5] = select(abs(a[5]) > largest[5], abs(a[5]), largest[5])

@@ -12,13 +12,14 @@ from typing import Any, NamedTuple
 from auv_analysis.closed_loop import fill_continuous, fill_held, run_continuous, run_held
 from auv_analysis.trees import mapped
 from auv_dynamics.jit import JITTED, compiled, plain, uncached
-from auv_dynamics.lanes import of_block, uncounted
+from auv_dynamics.lanes import align_stack, of_block, uncounted
 from auv_gvc_controller.laws import SHIPPED
 
 
 @compiled
 def run_continuous_batch(loop, tables, grid, tableau, motion, work, record, first, last):
     """`fill_continuous` for the blocks of lanes from `first` to before `last`."""
+    align_stack()
     for b in range(first, last):
         fill_continuous(
             of_block(loop, b), of_block(tables, b), uncounted(grid), uncounted(tableau),
@@ -29,6 +30,7 @@ def run_continuous_batch(loop, tables, grid, tableau, motion, work, record, firs
 @compiled
 def run_held_batch(loop, tables, grid, tableau, motion, work, record, first, last):
     """`fill_held` for the blocks of lanes from `first` to before `last`."""
+    align_stack()
     for b in range(first, last):
         fill_held(
             of_block(loop, b), of_block(tables, b), uncounted(grid), uncounted(tableau),

@@ -3,7 +3,7 @@
 The mathematics is written for one vehicle, whose coefficients and state are arrays of floats. A
 batch runs the same source on *lanes*: arrays (n, W) of W vehicles, an element of which is W numbers
 that are added and multiplied together. Compiled, those are the numbers in one vector register, see
-`simd`; without numba they are NumPy arrays, and W is the size of the batch.
+`simd` and `simd_arrays`; without numba they are NumPy arrays, and W is the size of the batch.
 
 What the vehicles may decide differently cannot be an `if`: it is a `select`.
 """
@@ -56,6 +56,14 @@ def uncounted(value: Any) -> Any:
     Whoever calls the kernel holds the arrays for as long as it runs.
     """
     return value
+
+
+def align_stack() -> None:
+    """Let a kernel put the lanes that find no register at the borders of cache lines.
+
+    Else it depends on the caller's depth whether they straddle them, and on that a fifth of the
+    time.
+    """
 
 
 def of_block(value: Any, b: int) -> Any:
@@ -122,4 +130,6 @@ def empty(shape: tuple[int, ...]) -> np.ndarray:
 
 
 if JITTED:
-    import auv_dynamics.simd  # noqa: F401  gives the functions above their compiled form
+    # give the functions above their compiled form
+    import auv_dynamics.simd
+    import auv_dynamics.simd_arrays  # noqa: F401

@@ -1,12 +1,15 @@
 """Rollouts of Case 1: against scalar C, on two threads, growing, and against other simulators."""
 
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import c_reference
 import numpy as np
 import peers
-from loops import CONTROLLER, case1, in_c, prepared, single, varied
+from loops import CONTROLLER, case1, in_c, prepared, varied
 from measure import Measured, cost, interleaved, speed
 
 from auv_analysis import simulate
@@ -17,7 +20,7 @@ from auv_dynamics.signals import DOFS
 
 DURATION = 10.0  # s
 BATCH = 96
-SINGLES = 20  # rollouts of one vehicle that are timed together
+ALONE = Path(__file__).with_name('alone.py')
 THREADS_BATCH = 2048
 MANY, FEW = 10_000, 100
 SAME = 1e-9  # relative, of figures computed by different programs
@@ -31,18 +34,17 @@ def against_c() -> dict[str, Measured]:
     library, native = c_reference.library(), c_reference.library(c_reference.NATIVE)
     check_figures(rollouts(scenario, CONTROLLER, changes), c_reference.rollouts(library, loops)[0])
 
-    one = single(scenario)
-
-    def singles() -> None:
-        for _ in range(SINGLES):
-            one()
-
     subjects = {
         'rollout_vs_c': cost(lambda: run_batch(batch), BATCH),
-        'single_vs_c': cost(singles, SINGLES),
+        'single_vs_c': _alone,
         'native_c_vs_c': _c(native, loops),
     }
     return interleaved(subjects, _c(library, loops), 's')
+
+
+def _alone() -> float:
+    command = [sys.executable, str(ALONE)]
+    return float(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
 
 
 def _c(library: Any, loops: c_reference.Loops) -> Callable[[], float]:

@@ -75,7 +75,7 @@ KEYS = (
         'single_vs_c', f'{CASE1}: one rollout with figures', 'scalar C', 'cost', 1.2, 0.85,
         'a single vehicle leaves the vector registers empty. numba could put neighbouring numbers '
         'into them (`NUMBA_SLP_VECTORIZE=1` takes a seventh off), but then a single run would '
-        'round otherwise than the same vehicle in a batch, and they agree to the last bit.',
+        'round otherwise than the same vehicle in a batch; now they agree to the last bit here.',
     ),
     Key(
         'native_c_vs_c', 'the C reference built for this processor (`-march=native`)',

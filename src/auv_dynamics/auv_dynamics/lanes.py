@@ -3,7 +3,7 @@
 The mathematics is written for one vehicle, whose coefficients and state are arrays of floats. A
 batch runs the same source on *lanes*: arrays (n, W) of W vehicles, an element of which is W numbers
 that are added and multiplied together. Compiled, those are the numbers in one vector register, see
-`simd` and `simd_arrays`; without numba they are NumPy arrays, and W is the size of the batch.
+`simd`; without numba they are NumPy arrays, and W is the size of the batch.
 
 What the vehicles may decide differently cannot be an `if`: it is a `select`.
 """
@@ -130,6 +130,4 @@ def empty(shape: tuple[int, ...]) -> np.ndarray:
 
 
 if JITTED:
-    # give the functions above their compiled form
-    import auv_dynamics.simd
-    import auv_dynamics.simd_arrays  # noqa: F401
+    import auv_dynamics.simd  # noqa: F401  gives the functions above their compiled form

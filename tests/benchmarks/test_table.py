@@ -106,14 +106,16 @@ def test_results_survive_json():
 
 
 @pytest.mark.parametrize(('ratio', 'code'), [(1.5, 0), (4.5, 1)])
-def test_only_judges_and_writes_nothing(ratio, code, monkeypatch, capsys):
-    before = run.RESULTS.stat() if run.RESULTS.exists() else None
+def test_only_judges_and_writes_nothing(ratio, code, tmp_path, monkeypatch, capsys):
+    results, readme = tmp_path / 'results.json', tmp_path / 'README.md'
+    monkeypatch.setattr(run, 'RESULTS', results)
+    monkeypatch.setattr(table, 'README', readme)
     monkeypatch.setattr(run, 'measure', lambda names: ({n: measured(ratio) for n in names}, {}))
     with pytest.raises(SystemExit) as end:
         run.main(['--only', 'help_vs_python'])
     assert end.value.code == code
     assert json.loads(capsys.readouterr().out)['help_vs_python']['ratio'] == ratio
-    assert (run.RESULTS.stat() if run.RESULTS.exists() else None) == before
+    assert not [*tmp_path.iterdir()]
 
 
 def test_a_benchmark_that_fails_is_named_and_does_not_cost_the_others(monkeypatch, capsys):

@@ -1,26 +1,23 @@
 """The recorder as a node: every topic of the graph into an MCAP bag, every step checked."""
 
-import importlib
 from typing import Any
 
 from rclpy.duration import Duration
-from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 
 from auv_analysis.ledger import LostStepError, PublicationLedger, StepLedger
 from auv_analysis.recorder_parameters import recorder_parameters
 from auv_analysis.schemas import schema_text
-from auv_dynamics import interface
 from auv_dynamics.files import reason
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.graph import Graph, steady_timer
+from auv_dynamics.ros.kinds import begins_with_stamp, message_class, qos_entry, type_name
 from auv_dynamics.ros.life import main_of
 
 UNRECORDED = ('/rosout', '/parameter_events')
 NUMBERED = (*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK)  # with one publisher each
-STAMPED_TYPES = ('std_msgs/msg/Header', 'rosgraph_msgs/msg/Clock')
 
 
 class RecorderNode(BulkNode):
@@ -49,7 +46,7 @@ class RecorderNode(BulkNode):
         resolved = self.resolve_topic_name(name)
         step_topic = topic.name if topic and topic.name in self._settings.topics else ''
         numbered, due = topic in NUMBERED, topic == topics.LUMPED_ERROR
-        stamped = _begins_with_stamp(kind)
+        stamped = begins_with_stamp(kind)
 
         def callback(message: bytes, info: dict[str, Any]) -> None:
             ns = first_stamp(message) if stamped else self._latest
@@ -66,7 +63,7 @@ class RecorderNode(BulkNode):
         if self._broken:
             return
         if not self._writer.has_channel(topic):
-            self._add_channel(topic, _type_name(kind))
+            self._add_channel(topic, type_name(kind))
         try:
             self._writer.write(topic, ns, message)
         except OSError as error:
@@ -75,7 +72,7 @@ class RecorderNode(BulkNode):
 
     def _add_channel(self, topic: str, kind: str) -> None:
         endpoints = self.get_publishers_info_by_topic(topic)
-        qos = [_qos_entry(endpoint.qos_profile) for endpoint in endpoints]
+        qos = [qos_entry(endpoint.qos_profile) for endpoint in endpoints]
         endpoints = endpoints or self.get_subscriptions_info_by_topic(topic)
         digest = str(endpoints[0].topic_type_hash) if endpoints else ''
         self._writer.add_channel(topic, kind, schema_text(kind), qos, digest)
@@ -119,7 +116,7 @@ class RecorderNode(BulkNode):
             if topic in self._known or topic in UNRECORDED:
                 continue
             try:
-                kind = _message_class(kinds[0])
+                kind = message_class(kinds[0])
                 schema_text(kinds[0])
             except (ImportError, AttributeError, FileNotFoundError):
                 self.get_logger().warning(f'{topic}: not recorded, no definition of {kinds[0]}')
@@ -148,41 +145,6 @@ class RecorderNode(BulkNode):
         if lost or self._publications.gaps:
             lost.update(self._publications.gaps)
             self.get_logger().warning(f'steps or messages that did not arrive: {lost}')
-
-
-def _begins_with_stamp(kind: Any) -> bool:
-    if _type_name(kind) in STAMPED_TYPES:
-        return True
-    fields = kind.get_fields_and_field_types()
-    return bool(fields) and next(iter(fields.values())) == 'std_msgs/Header'
-
-
-def _type_name(kind: type) -> str:
-    package, folder, *_ = kind.__module__.split('.')
-    return f'{package}/{folder}/{kind.__name__}'
-
-
-def _message_class(name: str) -> type:
-    package, folder, message = name.split('/')
-    return getattr(importlib.import_module(f'{package}.{folder}'), message)
-
-
-def _qos_entry(qos: QoSProfile) -> dict[str, Any]:
-    def duration(value: Any) -> dict[str, int]:
-        sec, nsec = divmod(value.nanoseconds, interface.NANOSECONDS)
-        return {'sec': sec, 'nsec': nsec}
-
-    return {
-        'history': qos.history.name.lower(),
-        'depth': qos.depth,
-        'reliability': qos.reliability.name.lower(),
-        'durability': qos.durability.name.lower(),
-        'deadline': duration(qos.deadline),
-        'lifespan': duration(qos.lifespan),
-        'liveliness': qos.liveliness.name.lower(),
-        'liveliness_lease_duration': duration(qos.liveliness_lease_duration),
-        'avoid_ros_namespace_conventions': qos.avoid_ros_namespace_conventions,
-    }
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ POINTS = 1.0  # percentage points of a share
 def kinetic_energy_mean(of: Evidence) -> Finding:
     """Row 9: total kinetic energy, a mean over a window that the paper does not print."""
     windows = _windows(of.gvc)
-    text = '; '.join(f'{fixed(part.sum(), 2)} J ({name})' for name, part in windows.items())
+    text = '; '.join(f'{fixed(float(part.sum()), 2)} J ({name})' for name, part in windows.items())
     if of.gvc.run.duration < paper.ENERGY_WINDOW:
         return Finding(text, 'not evaluated')
     total = next(iter(windows.values())).sum()
@@ -40,7 +40,7 @@ def energy_in_two(of: Evidence) -> Finding:
     part = shares(of.gvc.part('energy').mean)
     order = np.argsort(part)[::-1]
     text = f'ξ{order[0] + 1} and ξ{order[1] + 1}, together {part[order[:2]].sum():.2f} %'
-    return Finding(text, grade([tuple(order[:2]) == (2, 0), part[[0, 2]].sum() > 99.0]))
+    return Finding(text, grade([tuple(order[:2]) == (2, 0), bool(part[[0, 2]].sum() > 99.0)]))
 
 
 def sway_deformed(of: Evidence) -> Finding:

@@ -58,7 +58,7 @@ def lumped_fast(of: Evidence) -> Finding:
         f'after 2 s at most {100 * ratio.max():.1f} % of the peak; at {gvc.run.duration:g} s '
         f'w_X {number(end[U], 2)}, w_Z {number(end[W], 2)} N'
     )
-    ends = (np.abs(end) > 0.01 * F)[[U, W]].any()
+    ends = bool((np.abs(end) > 0.01 * F)[[U, W]].any())
     return Finding(text, grade([ratio.max() < 1 / FAR, ends]))
 
 

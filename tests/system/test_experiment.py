@@ -1,6 +1,7 @@
 """`auv run` as a user starts it: the graph equals the simulation, nothing is lost, nobody stays."""
 
 import json
+import os
 import signal
 import time
 from pathlib import Path
@@ -192,6 +193,18 @@ def test_ending_auv_ends_its_nodes(tmp_path: Path, how: int) -> None:
         time.sleep(0.05)
     notes = ' '.join(load_run(out / 'gvc').notes)
     assert 'not finished' not in notes, 'the recorder has closed its bag'
+
+
+def test_observers_give_way_to_those_that_are_waited_for(tmp_path: Path) -> None:
+    out = tmp_path / 'out'
+    process = start(write(tmp_path / 's.yaml', duration=600.0), out)
+    node_of(out, 'plant_node')
+    policies = {name: os.sched_getscheduler(node.pid) for name, node in nodes(out).items()}
+    process.kill()
+    process.communicate(timeout=60)
+    prompt = {name for name, policy in policies.items() if policy != os.SCHED_BATCH}
+    assert len(policies) == 5
+    assert prompt == {'plant_node', 'controller_node'}
 
 
 def test_a_diverging_loop_says_so(tmp_path: Path) -> None:

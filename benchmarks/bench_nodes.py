@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from measure import Measured, interleaved
+from measure import RUNS, Measured, interleaved
 
 from auv_analysis.domain import VARIABLE, chosen_domain
 from auv_analysis.experiment import environment
@@ -18,15 +18,25 @@ OWN = len(TOPICS)
 STEPS = 10_000  # of a run that is made once for each number of topics
 
 
-def against_pingpong() -> dict[str, Measured]:
-    """Steps per second of five processes and of one process, every topic recorded."""
+def against_pingpong(
+    steps: int = 20_000, trips_for: float = 4.0, runs: int = RUNS
+) -> dict[str, Measured]:
+    """Steps per second of five processes and of one process, every topic recorded.
+
+    Parameters
+    ----------
+    steps : of a run
+    trips_for : s for which the ping-pong is counted
+    runs : rounds
+
+    """
     from graph import graph_rate, pingpong
 
     subjects = {
-        'graph_vs_pingpong': graph_rate,
-        'composed_vs_pingpong': lambda: graph_rate(composed=True),
+        'graph_vs_pingpong': lambda: graph_rate(steps),
+        'composed_vs_pingpong': lambda: graph_rate(steps, composed=True),
     }
-    return interleaved(subjects, pingpong, 'steps/s')
+    return interleaved(subjects, lambda: pingpong(trips_for), 'steps/s', runs)
 
 
 @contextmanager
@@ -36,7 +46,7 @@ def recorded_topics() -> Iterator[Callable[[float], float]]:
 
     def cost(count: float) -> float:
         with _echoing(round(count) - OWN):
-            return 1.0 / graph_rate(steps=STEPS)
+            return 1.0 / graph_rate(STEPS)
 
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = str(chosen_domain(None)[0])  # the same for the graph and for the echo

@@ -1,6 +1,4 @@
-"""Steps per second of the node graph beside a bare rclpy ping-pong, measured in turns.
-
-    python benchmarks/graph.py [--runs 3] [--steps 20000] [--seconds 4]
+"""Steps per second of the node graph, and round trips per second of a bare rclpy ping-pong.
 
 The reference is what rclpy itself offers: two processes, Odometry one way, WrenchStamped the other,
 message objects, one callback each, SingleThreadedExecutor, reliable with depth 10. The graph is
@@ -10,17 +8,15 @@ are not in the number. Both run on the loopback with the same middleware profile
 """
 
 import argparse
-import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
-from statistics import median
-from typing import Any
 
 import yaml
+from loops import CONTROLLER
 
 from auv_analysis.domain import chosen_domain
 from auv_analysis.experiment import environment, loopback, run_controller
@@ -32,10 +28,10 @@ PATIENCE = 30.0  # s for the other end to appear
 STEADY = (0.1, 0.9)  # part of a run that is counted
 
 
-def pingpong(seconds: float = 4.0) -> float:
+def pingpong(seconds: float) -> float:
     """Round trips per second of a bare rclpy ping-pong between two processes."""
     environ = environment(chosen_domain(None)[0])
-    command = [sys.executable, __file__, '--end', 'pong']
+    command = [sys.executable, __file__, 'pong']
     pong = subprocess.Popen(command, env=environ)
     command[-1] = 'ping'
     try:
@@ -102,14 +98,13 @@ def _pong() -> None:
         rclpy.try_shutdown()
 
 
-def graph_rate(composed: bool = False, steps: int = 20_000, controller: str = 'gvc') -> float:
+def graph_rate(steps: int, *, composed: bool = False) -> float:
     """Lock-steps per second of Case 1 on the node graph, every topic recorded.
 
     Parameters
     ----------
-    composed : all nodes in one process, else one process each
     steps : length of the run
-    controller : of case1
+    composed : all nodes in one process, else one process each
 
     Returns
     -------
@@ -124,11 +119,11 @@ def graph_rate(composed: bool = False, steps: int = 20_000, controller: str = 'g
     progress: list[tuple[float, int]] = []
     with tempfile.TemporaryDirectory() as folder:
         scenario = load_scenario(_case1(Path(folder), steps))
-        warm_up(scenario, [controller])
+        warm_up(scenario, [CONTROLLER])
         graph = Watcher(domain)
         try:
             run_controller(
-                scenario, controller, Path(folder) / 'out', domain, graph,
+                scenario, CONTROLLER, Path(folder) / 'out', domain, graph,
                 lambda step: progress.append((time.monotonic(), step)), composed=composed,
             )  # fmt: skip
         finally:
@@ -151,48 +146,16 @@ def _case1(folder: Path, steps: int) -> Path:
     return path
 
 
-def measure(runs: int, steps: int, seconds: float) -> dict[str, Any]:
-    """Rates of ping-pong, five processes and one process, taken in turns, and their ratios.
-
-    The ping-pong is measured before and after each graph run; a ratio is taken to their mean.
-    """
-    trips = [pingpong(seconds)]
-    rates: dict[str, list[float]] = {'five processes': [], 'composed': []}
-    ratios: dict[str, list[float]] = {name: [] for name in rates}
-    for _ in range(runs):
-        for name, values in rates.items():
-            values.append(graph_rate(name == 'composed', steps))
-            trips.append(pingpong(seconds))
-            ratios[name].append(2 * values[-1] / (trips[-2] + trips[-1]))
-            print(f'{name}: {values[-1]:.0f} steps/s, {ratios[name][-1]:.2f}', file=sys.stderr)
-    return {
-        'pingpong': {'value': median(trips), 'unit': 'round trips/s', 'runs': trips},
-        **{
-            name: {
-                'value': median(rates[name]),
-                'unit': 'steps/s',
-                'ratio': median(ratios[name]),
-                'runs': rates[name],
-            }
-            for name in rates
-        },
-    }
-
-
 def main() -> None:
-    """Measure and print one JSON document."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('--runs', type=int, default=3)
-    parser.add_argument('--steps', type=int, default=20_000)
-    parser.add_argument('--seconds', type=float, default=4.0)
-    parser.add_argument('--end', choices=('ping', 'pong'), help=argparse.SUPPRESS)
+    """One end of a ping-pong, as `pingpong` starts it."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument('end', choices=('ping', 'pong'))
+    parser.add_argument('--seconds', type=float)
     options = parser.parse_args()
     if options.end == 'pong':
         _pong()
-    elif options.end == 'ping':
-        print(_ping(options.seconds))
     else:
-        print(json.dumps(measure(options.runs, options.steps, options.seconds), indent=2))
+        print(_ping(options.seconds))
 
 
 if __name__ == '__main__':

@@ -1,17 +1,14 @@
 """Values of a scenario and its vehicle addressed by dotted paths, and scenarios changed by them."""
 
-import difflib
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-import jsonschema
 import numpy as np
 
-from auv_analysis.scenario import SCHEMA, Scenario, scenario_from
+from auv_analysis.scenario import Scenario, scenario_from
 from auv_analysis.scenario_values import vehicle_path_of
-from auv_dynamics.files import InputError, dotted, read_text, read_yaml, schema
-from auv_dynamics.vehicle_file import SCHEMA as VEHICLE_SCHEMA
+from auv_dynamics.files import InputError, dotted, read_text, read_yaml
 
 VEHICLE = 'vehicle'
 KEY = r"(?:^|(?<=.)\.)(?:([^.\[\]'\s]+)|'([^']+)')"
@@ -77,7 +74,7 @@ def _replaced(data: Any, parts: Parts, depth: int, value: Any, file: object) -> 
     if depth == len(parts):
         return value
     part = parts[depth]
-    _check_container(data, parts, depth, file)
+    check_container(data, parts, depth, file)
     if isinstance(part, int):
         copy = list(data)
         copy[part] = _replaced(data[part], parts, depth + 1, value, file)
@@ -86,7 +83,7 @@ def _replaced(data: Any, parts: Parts, depth: int, value: Any, file: object) -> 
     return {**data, part: _replaced(inner, parts, depth + 1, value, file)}
 
 
-def _check_container(data: Any, parts: Parts, depth: int, file: object) -> None:
+def check_container(data: Any, parts: Parts, depth: int, file: object) -> None:
     """Refuse the part at `depth` where what it is looked up in is not of its kind."""
     part = parts[depth]
     if isinstance(part, int):
@@ -129,7 +126,7 @@ def changed_scenario(scenario: Scenario, values: Mapping[str, Any]) -> Scenario:
             vehicle_path = vehicle_path_of(str(value), scenario.path)
             data, vehicle = {**data, VEHICLE: str(value)}, read_yaml(vehicle_path, 'vehicle')
         elif of_vehicle(path):
-            vehicle = changed(vehicle, _below_vehicle(path), value, vehicle_path)
+            vehicle = changed(vehicle, below_vehicle(path), value, vehicle_path)
         else:
             data = changed(data, path, value, scenario.path)
     texts = _from_file(data, scenario)
@@ -153,99 +150,6 @@ def of_vehicle(path: str) -> bool:
     return path.startswith(f'{VEHICLE}.')
 
 
-def _below_vehicle(path: str) -> str:
+def below_vehicle(path: str) -> str:
+    """Path within the vehicle file."""
     return path.removeprefix(f'{VEHICLE}.')
-
-
-def check_paths(scenario: Scenario, paths: Iterable[str]) -> None:
-    """Refuse paths at which nothing can stand, before any value is known.
-
-    Parameters
-    ----------
-    scenario : of `load_scenario`
-    paths : see `changed_scenario`
-
-    Raises
-    ------
-    InputError : naming the file, the path, and the known keys with the nearest one
-
-    """
-    for path in paths:
-        if path != VEHICLE:
-            _nodes_of(scenario, path)
-
-
-def bounds(scenario: Scenario, path: str) -> tuple[float, float] | None:
-    """Open interval of the finite numbers that the schema lets stand at a path.
-
-    Parameters
-    ----------
-    scenario : of `load_scenario`
-    path : see `changed_scenario`
-
-    Returns
-    -------
-    bounds : below and above every such number; None where the schema asks for more than bounds
-
-    """
-    low, high = -np.inf, np.inf
-    for node in _nodes_of(scenario, path):
-        if node.keys() & {'enum', 'const', 'multipleOf'} or node.get('type') == 'integer':
-            return None
-        if node.get('type') == 'number':
-            least, most = node.get('minimum', -np.inf), node.get('maximum', np.inf)
-            low = max(low, node.get('exclusiveMinimum', -np.inf), np.nextafter(least, -np.inf))
-            high = min(high, node.get('exclusiveMaximum', np.inf), np.nextafter(most, np.inf))
-    return float(low), float(high)
-
-
-def _nodes_of(scenario: Scenario, path: str) -> list[dict[str, Any]]:
-    """What the schemas say of the entry at a path; InputError where nothing can stand there."""
-    if of_vehicle(path):
-        root, data, file = schema(VEHICLE_SCHEMA), scenario.vehicle_data, scenario.vehicle_path
-        return _nodes_at(root, data, split(_below_vehicle(path)), file)
-    return _nodes_at(schema(SCHEMA), scenario.data, split(path), scenario.path)
-
-
-def _nodes_at(root: dict[str, Any], data: Any, parts: Parts, file: object) -> list[dict[str, Any]]:
-    nodes = list(_applicable(root, root, data))
-    for depth, part in enumerate(parts):
-        if isinstance(part, int):
-            _check_container(data, parts, depth, file)
-            below = [node['items'] for node in nodes if 'items' in node]
-            data = data[part]
-        else:
-            data = {} if data is None else data  # absent, and the schema knows it
-            _check_container(data, parts, depth, file)
-            known = dict.fromkeys(k for node in nodes for k in node.get('properties', ()))
-            known |= dict.fromkeys(data)
-            if part not in known:
-                raise InputError(file, dotted(parts[: depth + 1]), _among(part, known), part)
-            below = [_property(node, part) for node in nodes]
-            data = data.get(part)
-        nodes = [node for inner in below for node in _applicable(inner, root, data)]
-    return nodes
-
-
-def _among(part: str, known: Iterable[str]) -> str:
-    nearest = difflib.get_close_matches(part, known, n=1, cutoff=0.0)
-    meant = f' (nearest: {nearest[0]})' if nearest else ''
-    return f'one of {", ".join(known)}{meant}' if known else 'a single value'
-
-
-def _property(node: Mapping[str, Any], key: str) -> Any:
-    return node.get('properties', {}).get(key, node.get('additionalProperties'))
-
-
-def _applicable(node: Any, root: dict[str, Any], data: Any) -> Iterator[dict[str, Any]]:
-    """Nodes of a schema that say something about `data`, references and conditions followed."""
-    if not isinstance(node, dict):
-        return
-    yield node
-    if '$ref' in node:
-        yield from _applicable(root['$defs'][node['$ref'].rsplit('/', 1)[-1]], root, data)
-    for inner in (*node.get('allOf', ()), *node.get('anyOf', ())):
-        yield from _applicable(inner, root, data)
-    if 'if' in node:
-        holds = jsonschema.Draft202012Validator(node['if']).is_valid(data)
-        yield from _applicable(node.get('then' if holds else 'else'), root, data)

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.changes import VEHICLE, Parts, changed_scenario, check_paths, split
+from auv_analysis.changes import VEHICLE, Parts, changed_scenario, split
 from auv_analysis.scenario import Scenario, load_scenario
+from auv_analysis.schema_paths import check_paths
 from auv_analysis.simulation import Hold, check_hold
 from auv_analysis.sweep.groups import Group, kind_of, make_group
 from auv_analysis.sweep.values import Values

@@ -92,6 +92,9 @@ def test_compiled_code_is_kept_in_a_folder_of_these_sources(tmp_path, monkeypatc
     package.mkdir()
     (package / '__init__.py').write_text('A = 1\n', encoding='utf-8')
     (package / 'inner.py').write_text('B = 1\n', encoding='utf-8')
+    (package / 'other.py').write_text('C = 1\n', encoding='utf-8')
+    kernel = 'from auv_made_up import inner\n\n\n@compiled\ndef f():\n    return inner.B\n'
+    (package / 'kernel.py').write_text(kernel, encoding='utf-8')
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(jit, 'PACKAGES', ('auv_made_up',))
     monkeypatch.delenv('AUV_GVC_CACHE_DIR', raising=False)
@@ -99,6 +102,8 @@ def test_compiled_code_is_kept_in_a_folder_of_these_sources(tmp_path, monkeypatc
     before = jit.cache_folder()
     assert before == jit.cache_folder()
     assert before.parent == tmp_path / 'cache' / 'auv_gvc'
+    (package / 'other.py').write_text('C = 2\n', encoding='utf-8')
+    assert jit.cache_folder() == before, 'no kernel depends on it'
     (package / 'inner.py').write_text('B = 2\n', encoding='utf-8')
     assert jit.cache_folder() != before
     monkeypatch.setenv('AUV_GVC_CACHE_DIR', str(tmp_path / 'mine'))

@@ -6,40 +6,73 @@ are compiled as part of another one but stay plain Python by themselves: they ma
 law, which need not be compilable and must not enter the cache that other processes load: `uncached`
 is for that.
 
-Compiled code is kept in one explicit folder whose name changes with every source file of the
-workspace, so that a stale binary cannot be loaded: numba itself only looks at the file of the
-outermost function.
+Compiled code is kept in one explicit folder whose name changes with every source file that the
+kernels can depend on, so that a stale binary cannot be loaded: numba itself only looks at the file
+of the outermost function.
 """
 
 import hashlib
 import importlib.util
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
+COMPILES = re.compile(rb'^@(?:helper|compiled|uncached|jitable|specialised)\b', re.M)
+IMPORT = re.compile(rb'^\s*(?:from|import)\s+(auv_[\w.]+)(?:\s+import\s+(\([^)]*\)|.*))?', re.M)
 
 
-def sources_digest() -> str:
-    """Digest of every Python source of the workspace's packages."""
-    digest = hashlib.sha256()
+def _sources() -> dict[str, bytes]:
+    """Dotted name -> text of every Python source of the workspace's packages."""
+    found: dict[str, bytes] = {}
     for package in PACKAGES:
         spec = importlib.util.find_spec(package)
         for folder in (spec.submodule_search_locations or []) if spec else []:
             for path in sorted(Path(folder).rglob('*.py')):
-                digest.update(path.name.encode() + b'\0' + path.read_bytes())
+                parts = path.relative_to(folder).with_suffix('').parts
+                name = '.'.join((package, *parts)).removesuffix('.__init__')
+                found[name] = path.read_bytes()
+    return found
+
+
+def _digest(sources: Mapping[str, bytes]) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(sources):
+        digest.update(name.encode() + b'\0' + sources[name])
     return digest.hexdigest()[:16]
 
 
+def sources_digest() -> str:
+    """Digest of every Python source of the workspace's packages."""
+    return _digest(_sources())
+
+
+def kernels_digest() -> str:
+    """Digest of the sources that compile something, and of all that these import."""
+    sources = _sources()
+    kept: dict[str, bytes] = {}
+    waiting = [name for name, text in sources.items() if COMPILES.search(text)]
+    while waiting:
+        name = waiting.pop()
+        if name in sources and name not in kept:
+            kept[name] = sources[name]
+            for module, names in IMPORT.findall(sources[name]):
+                inner = [f'{module.decode()}.{word}' for word in re.findall(r'\w+', names.decode())]
+                modules = [entry for entry in inner if entry in sources]
+                waiting += modules if modules == inner and inner else [*modules, module.decode()]
+    return _digest(kept)
+
+
 def cache_folder() -> Path:
-    """Folder of the compiled code of these sources.
+    """Folder of the compiled code of these kernels.
 
     Below `$AUV_GVC_CACHE_DIR`, else `$XDG_CACHE_HOME/auv_gvc`.
     """
     root = os.environ.get('AUV_GVC_CACHE_DIR')
     cache = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
-    return Path(root or Path(cache) / 'auv_gvc') / sources_digest()
+    return Path(root or Path(cache) / 'auv_gvc') / kernels_digest()
 
 
 try:

@@ -14,7 +14,7 @@ setup(
     maintainer='auv_gvc developers',
     maintainer_email='auv-gvc@users.noreply.github.com',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['*.json', 'report/*.j2', 'sweep/*.json']},
+    package_data={NAME: ['*.json', 'report/*.j2', 'report/*.css', 'report/*.js', 'sweep/*.json']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

@@ -49,4 +49,4 @@ def test_equal_files_are_shown_once(tmp_path) -> None:
     cli.main(['analyze', str(bag), str(bag), '--out', str(tmp_path / 'out')])
     report = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
     assert report.count('<summary>Scenario file</summary>') == 1
-    assert report.count('<summary>Vehicle file, with its comments</summary>') == 1
+    assert report.count('<summary>Vehicle file</summary>') == 1

@@ -14,7 +14,8 @@ from PIL import Image
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.report import plotting
 from auv_analysis.report.figures import FigureRecord, draw_figures
-from auv_analysis.report.page import maths, write_report
+from auv_analysis.report.page import write_report
+from auv_analysis.report.rendering import maths
 from auv_analysis.report.text import fixed, join, number, plain, tied
 from auv_analysis.report.traces import decimate
 from auv_analysis.run import Run
@@ -83,7 +84,7 @@ def _uncoupled(run: Run) -> Run:
 
 
 def _text(report: str) -> str:
-    body = report[report.index('<body>') :]
+    body = report[report.index('<body>') : report.rindex('<script>')]
     return unescape(re.sub(r'\s+', ' ', re.sub(r'<[^>]+>', '', body))).replace('\u00a0', ' ')
 
 
@@ -198,7 +199,7 @@ class _Resources(HTMLParser):
     def handle_starttag(self, tag, attributes):
         values = dict(attributes)
         self.loaded += [values[key] for key in ('src', 'srcset', 'data', 'poster') if key in values]
-        if tag in ('link', 'script', 'iframe', 'object', 'embed'):
+        if tag in ('link', 'iframe', 'object', 'embed'):
             self.loaded.append(f'<{tag}>')
         if tag == 'a':
             self.loaded += [] if values['href'].startswith('#') else [values['href']]

@@ -13,13 +13,14 @@ from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.lyapunov import certificate_of
 from auv_analysis.report import certificates, overview, plotting
 from auv_analysis.report.applied import applied_figure
-from auv_analysis.report.certificates import certificate_figure, certificate_table
+from auv_analysis.report.certificates import certificate_figure
 from auv_analysis.report.claims import claims_table
 from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.page import write_report
 from auv_analysis.report.paper import paper_figure
 from auv_analysis.report.set_up import set_up
 from auv_analysis.report.sketching import sketch, sketches
+from auv_analysis.report.tables import certificate_table, reasons
 from auv_analysis.run import Run
 from auv_gvc_controller.model import control_model
 
@@ -94,7 +95,7 @@ def _report(out: Path, runs, summaries, text) -> str:
 
 
 def _text(report: str) -> str:
-    body = report[report.index('<body>') :]
+    body = report[report.index('<body>') : report.rindex('<script>')]
     plain = unescape(re.sub(r'\s+', ' ', re.sub(r'<[^>]+>', '', body)))
     return plain.replace('\u00a0', ' ').replace('\u202f', '')
 
@@ -259,26 +260,27 @@ def test_a_plant_with_devices_is_not_the_papers(case1):
 def test_certificate_table_prints_the_summary(case1):
     summaries = case1[1]
     table = certificate_table(summaries)
-    rows = {row['label']: [text for text, _ in row['cells']] for row in table['rows']}
-    assert table['applies'] == [{'yes': True, 'mark': ''}] * 2
-    assert table['reasons'] == []
-    assert table['sampled'] == []
+    rows = {row[0].text: row[1:-1] for row in table.rows}
+    assert [cell.text for cell in rows['applies']] == ['yes', 'yes']
+    assert reasons(summaries) == []
     share = summaries['gvc']['lyapunov']['share_of_time_increasing']
-    assert rows['L increases by (26)'][0] == f'{100 * share:.1f}'
-    assert rows['L at the start'][1] == f'{summaries["cl"]["lyapunov"]["L_first"]:.0f}'
-    assert not table['soft']
+    shown = rows['L increases by (26)'][0]
+    assert shown.text == f'{100 * share:.1f}'
+    assert shown.value == 100 * share
+    assert rows['L at the start'][1].text == f'{summaries["cl"]["lyapunov"]["L_first"]:.0f}'
+    assert not any(cell.kind for row in table.rows for cell in row)
 
 
 def test_certificate_table_gives_every_reason_once(rough):
     table = certificate_table(rough[1])
-    assert [entry['mark'] for entry in table['applies']] == ['a, b, c', 'a, b, c', 'a, b, c, d']
-    assert [reason['names'] for reason in table['reasons']] == [
+    applies = ['no (a, b, c)', 'no (a, b, c)', 'no (a, b, c, d)']
+    assert [cell.text for cell in table.rows[0][1:-1]] == applies
+    assert [names for _, names, _ in reasons(rough[1])] == [
         ['gvc', 'wound', 'pid'], ['gvc', 'wound', 'pid'], ['gvc', 'wound', 'pid'], ['pid'],
     ]  # fmt: skip
-    assert table['sampled'] == ['gvc', 'wound']
-    residual = table['rows'][0]['cells']
-    assert [soft for _, soft in residual] == [True, True, False]
-    assert residual[2][0] == '–'
+    residual = table.rows[1][1:-1]
+    assert [cell.kind for cell in residual] == ['zero', 'zero', '']
+    assert residual[2].text == '–'
 
 
 def test_certificate_arrays_are_those_of_the_summary(case1):
@@ -370,9 +372,9 @@ def test_report_of_laws_without_a_certificate_has_reasons_and_no_empty_table(
     runs, summaries, text = rough
     only = {'pid': runs['pid']}
     html = _report(tmp_path, only, {'pid': summaries['pid']}, text)
-    assert 'aria-label="Certificate"' not in html
+    assert 'id="table-certificate"' not in html
     assert 'no certificate of the law pid is known' in _text(html)
-    assert 'aria-label="Certificate"' in _report(tmp_path / 'all', *rough)
+    assert 'id="table-certificate"' in _report(tmp_path / 'all', *rough)
 
 
 def test_restless_lines_lie_below_smooth_ones(case1):

@@ -12,8 +12,8 @@ import yaml
 from auv_dynamics.files import InputError, reason
 
 OURS = (
-    'summary.json', 'report.html', 'figures', 'logs', 'scenario.yaml', 'vehicle.yaml',
-    'setpoint.csv',
+    'summary.json', 'report.html', 'numbers.parquet', 'figures', 'logs', 'scenario.yaml',
+    'vehicle.yaml', 'setpoint.csv',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
 MANIFEST, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep

@@ -1,4 +1,4 @@
-"""The Lyapunov certificate in the report: a table of all runs, a figure of each that has one."""
+"""The Lyapunov certificate in the report: a figure of each run that has one."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -10,96 +10,16 @@ from matplotlib.lines import Line2D
 
 from auv_analysis.report import plotting
 from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.text import MISSING, number
 from auv_analysis.summary import TRANSIENT
 
 IDENTITY, BOUND, MEASURED = '#56B4E9', '#D55E00', '#1a1a1a'
 APART = 10.0  # ratio of a largest value to what else is to be seen, from which it is logarithmic
 DECADES = 5  # of a symmetric logarithmic axis, from its linear part to its end
-ROWS = (  # symbol or words, unit or '', key of summary.json, factor
-    ('identity (26): largest residual', '% of max |(26)|', 'identity_residual', 100.0),
-    ('identity (26): RMS residual', '% of the RMS of (26)', 'identity_residual_rms', 100.0),
-    (
-        'identity (26): largest after 2 s',
-        '% of max |(26)| there',
-        'identity_residual_after_2s',
-        100.0,
-    ),
-    ('L increases by (26)', '% of the samples', 'share_of_time_increasing', 100.0),
-    ('condition (27) holds', '% of the samples', 'share_condition_27', 100.0),
-    ('bound (28) holds', '% of the samples', 'share_bound_28', 100.0),
-    ('largest ρ of (28)', 'W', 'rho_max', 1.0),
-    ('sup ‖s‖', 'm/s, rad/s', 'sup_s', 1.0),
-    ('sup ‖z‖', 'm, rad', 'sup_z', 1.0),
-    ('sup ‖w‖', 'N, N m', 'sup_w', 1.0),
-    ('L at the start', 'J', 'L_first', 1.0),
-    ('L at the end', 'J', 'L_last', 1.0),
-)
-OF_THE_IDENTITY = ('identity_residual', 'identity_residual_rms', 'identity_residual_after_2s')
-
-
-def certificate_table(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Rows of the certificate's table, a column per run, and why it does not apply to some.
-
-    Parameters
-    ----------
-    summaries : name -> `summarize(run)`
-
-    Returns
-    -------
-    table : `applies` per run; `rows` of label, unit, cells (text, whether it is the residual of
-        what is no identity there); `reasons` as mark, names, text; `sampled` names of runs under
-        zero-order hold; `known` and `soft`: whether any cell is a number, and such a residual
-
-    """
-    entries = {name: summary['lyapunov'] for name, summary in summaries.items()}
-    reasons: dict[str, list[str]] = {}
-    for name, entry in entries.items():
-        for reason in _parts(entry):
-            reasons.setdefault(reason, []).append(name)
-    marks = {reason: chr(ord('a') + i) for i, reason in enumerate(reasons)}
-    rows = []
-    for label, unit, key, factor in ROWS:
-        cells = [_cell(entry, key, factor) for entry in entries.values()]
-        rows.append({'label': label, 'unit': unit, 'cells': cells})
-    return {
-        'applies': [
-            {
-                'yes': entry['applicable'],
-                'mark': ', '.join(sorted(marks[part] for part in _parts(entry))),
-            }
-            for entry in entries.values()
-        ],
-        'rows': rows,
-        'reasons': [
-            {'mark': marks[reason], 'names': names, 'text': reason}
-            for reason, names in reasons.items()
-        ],
-        'sampled': [
-            name
-            for name, entry in entries.items()
-            if entry.get('sampled') and entry.get('identity_residual') is not None
-        ],
-        'known': any(text != MISSING for row in rows for text, _ in row['cells']),
-        'soft': any(soft for row in rows for _, soft in row['cells']),
-    }
-
-
-def _parts(entry: Mapping[str, Any]) -> list[str]:
-    """Why a certificate does not apply, reason by reason."""
-    return [] if entry['applicable'] else (entry['reason'] or 'not applicable').split('; ')
 
 
 def is_drawn(summary: Mapping[str, Any]) -> bool:
     """Whether (26) is the derivative of L in a run, so that the two can be held together."""
     return summary['lyapunov'].get('share_of_time_increasing') is not None
-
-
-def _cell(entry: Mapping[str, Any], key: str, factor: float) -> tuple[str, bool]:
-    value = entry.get(key)
-    soft = key in OF_THE_IDENTITY and entry.get('share_of_time_increasing') is None
-    text = number(None if value is None else factor * value)
-    return text, soft and value is not None
 
 
 def certificate_figure(run: Sketch, summary: Mapping[str, Any]) -> tuple[Figure | None, str, str]:

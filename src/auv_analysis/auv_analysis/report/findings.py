@@ -7,9 +7,9 @@ import numpy as np
 
 from auv_analysis.report import paper
 from auv_analysis.report.claims import Claim
+from auv_analysis.report.document import Sentence
 from auv_analysis.report.figures import reference
 from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.tables import energy_rows
 from auv_analysis.report.text import fixed, join, number
 from auv_dynamics.signals import DOFS
 
@@ -19,7 +19,7 @@ DECIDED = ('reproduced', 'partly', 'not reproduced')
 
 def findings(
     runs: Mapping[str, Sketch], summaries: Summaries, claims: Sequence[Claim]
-) -> list[str]:
+) -> list[Sentence]:
     """Sentences of the summary.
 
     Parameters
@@ -33,18 +33,22 @@ def findings(
 
     """
     leading = reference(runs)
-    sentences = [_settling(name, run, summaries[name]) for name, run in runs.items()]
-    sentences += [_late_errors(summaries), _inputs(summaries), _applied(runs)]
-    sentences += [_energy(runs, leading)]
-    sentences += [_couplings(summaries[leading.controller], leading), _claims(claims)]
-    return [sentence for sentence in sentences if sentence]
+    mine = summaries[leading.controller]
+    figures = 'table-key_figures'
+    found = [Sentence(_settling(n, run, summaries[n]), figures) for n, run in runs.items()]
+    found += [Sentence(_late_errors(summaries), figures), Sentence(_inputs(summaries), figures)]
+    found += [Sentence(_applied(runs), 'inputs_compared')]
+    found += [Sentence(_energy(runs, leading, mine), 'table-energy')]
+    found += [Sentence(_couplings(mine, leading), 'table-couplings')]
+    found += [Sentence(_claims(claims), 'table-claims')]
+    return [sentence for sentence in found if sentence.text]
 
 
 def _settling(name: str, run: Sketch, summary: Mapping[str, Any]) -> str:
     times = summary['velocity_error']['settling_time']
     missing = [dof for dof, time in zip(DOFS, times, strict=True) if time is None]
     if not missing:
-        return f'Under {name} every velocity error has settled (table 2) after {max(times):.2f} s.'
+        return f'Under {name} every velocity error has settled after {max(times):.2f} s.'
     verb = 'does' if len(missing) == 1 else 'do'
     return f'Under {name}, {join(missing)} {verb} not settle within {run.duration:g} s.'
 
@@ -85,13 +89,16 @@ def _applied(runs: Mapping[str, Sketch]) -> str:
     return f'The actuators deliver at most {"; ".join(parts)}.' if parts else ''
 
 
-def _energy(runs: Mapping[str, Sketch], leading: Sketch) -> str:
-    name = leading.controller
+def _energy(runs: Mapping[str, Sketch], leading: Sketch, summary: Mapping[str, Any]) -> str:
+    entries = summary['kinetic_energy_windows'][:2]
     means = [
-        f'{fixed(row["mean"], 2)} J over {row["window"]}'
-        for row in energy_rows({name: leading}, None)
+        f'{fixed(entry["mean"], 2)} J over {entry["window"][0]:g}–{entry["window"][1]:g} s'
+        for entry in entries
+        if entry['mean'] is not None and entry['window'][0] == entries[0]['window'][0]
     ]
-    text = f'The mean kinetic energy of {name} is {join(means)}'
+    if not means:
+        return ''
+    text = f'The mean kinetic energy of {leading.controller} is {join(means)}'
     if paper.paper_run(runs, 'gvc') is leading:
         printed = fixed(paper.KINETIC_ENERGY, 2)
         text += f'; the paper prints {printed} J and no window'

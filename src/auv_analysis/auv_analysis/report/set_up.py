@@ -1,13 +1,15 @@
 """The set-up of a study in words: what acts on the plant, and what lies between it and the law."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from auv_analysis.report.tables.sources import numbers_in
 from auv_analysis.report.text import join, number, plain
 from auv_analysis.report.words import (
+    RELATIVE,
     current,
     harmonics,
     herman2018,
@@ -22,6 +24,7 @@ from auv_dynamics.signals import DOFS
 from auv_gvc_controller.gains import sampling_warning
 
 VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
+KEYS = {'set-point': 'setpoint', 'start': 'initial', 'disturbances': 'disturbance'}
 KINDS = {
     'herman2018': herman2018,
     'harmonic': lambda spec: f'harmonic, opposing τ: {harmonics(spec, DOFS, WRENCH)}',
@@ -39,12 +42,22 @@ class SetUp:
     name : of the scenario that the words are about, '' where its file is not at hand
     rows : what, and lines about it
     limit : (6,) axis limits of the actuators, N and N m; None where there are none
+    data : contents of the scenario's file
 
     """
 
     name: str
     rows: list[tuple[str, list[str]]]
     limit: np.ndarray | None
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    def numbers(self, what: str) -> Iterator[tuple[str, float]]:
+        """Path in the scenario's file and value of each number that the lines of a row may say."""
+        key = KEYS.get(what, what)
+        for path, value in numbers_in(self.data.get(key), key):
+            yield path, value
+            if path.rpartition('/')[2] in RELATIVE:
+                yield f'{path} in %', 100.0 * value
 
 
 def set_up(runs: Mapping[str, Facts], summaries: Mapping[str, Any], scenario_text: str) -> SetUp:
@@ -74,7 +87,7 @@ def set_up(runs: Mapping[str, Facts], summaries: Mapping[str, Any], scenario_tex
     rows += _shared(runs, summaries, str(data.get('integrator', 'ode5')))
     limit = (actuators or {}).get('limit')
     bounds = None if limit is None else np.broadcast_to(np.asarray(limit, float), 6)
-    return SetUp(data['name'], rows, bounds)
+    return SetUp(data['name'], rows, bounds, data)
 
 
 def scenario_data(text: str) -> dict[str, Any] | None:

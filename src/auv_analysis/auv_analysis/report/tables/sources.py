@@ -1,0 +1,26 @@
+"""Where the numbers of tables are found, and the words that tables share."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+Summaries = Mapping[str, Mapping[str, Any]]
+VELOCITIES, WRENCHES = 'uvwpqr', 'XYZKMN'
+VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
+
+
+def summary_source(*keys: object) -> str:
+    """Where a number stands in summary.json, as a JSON pointer behind the file's name."""
+    parts = (str(key).replace('~', '~0').replace('/', '~1') for key in keys)
+    return f'summary.json:/{"/".join(parts)}'
+
+
+def numbers_in(data: Any, path: str = '') -> Iterator[tuple[str, float]]:
+    """Path and value of each number in nested mappings and lists, such as those of a scenario."""
+    if isinstance(data, Mapping):
+        for key, value in data.items():
+            yield from numbers_in(value, f'{path}/{key}')
+    elif isinstance(data, Sequence) and not isinstance(data, str):
+        for i, value in enumerate(data):
+            yield from numbers_in(value, f'{path}/{i}')
+    elif isinstance(data, int | float) and not isinstance(data, bool):
+        yield path, float(data)

@@ -7,7 +7,16 @@ from hypothesis import given
 from numpy.testing import assert_allclose, assert_array_equal
 from strategies import QUICK, vectors, vehicles
 
-from auv_analysis.coupling import delta_pi, delta_xi, structural_zeros
+from auv_analysis.coupling import (
+    Products,
+    coupling_terms,
+    delta_pi,
+    delta_xi,
+    input_deformation,
+    pieces,
+    structural_zeros,
+    velocity_deformation,
+)
 from auv_dynamics import load_vehicle
 from auv_dynamics.signals import DOFS
 from auv_dynamics.vehicle_file import vehicle_from_dict
@@ -106,3 +115,53 @@ def test_many_samples_at_once():
     for function, matrix in ((delta_xi, inverse), (delta_pi, Upsilon)):
         whole = function(matrix, many)
         assert_allclose(whole, [function(matrix, one) for one in many], atol=1e-14)
+
+
+@QUICK
+@given(vehicles(), vectors(), vectors(largest=500.0))
+def test_the_pieces_add_up_to_the_deformations(data, nu, tau):
+    Upsilon, inverse = factors(vehicle_from_dict(data, 'f'))
+    xi, pi = pieces(velocity_deformation(inverse), nu), pieces(input_deformation(Upsilon), tau)
+    for parts, whole in ((xi, delta_xi(inverse, nu)), (pi, delta_pi(Upsilon, tau))):
+        scale = np.abs(parts).sum()
+        assert_allclose(parts.sum(axis=-1), whole, rtol=0, atol=1e-14 * scale)
+    # (31): xi_i = nu_i + the pieces of j > i; (32): pi_i = tau_i + those of j < i
+    assert not np.tril(xi).any()
+    assert not np.triu(pi).any()
+    assert_allclose(nu + xi.sum(axis=-1), inverse @ nu, atol=1e-12 * (1 + np.abs(xi).sum()))
+    assert_allclose(tau + pi.sum(axis=-1), Upsilon.T @ tau, atol=1e-12 * (1 + np.abs(pi).sum()))
+
+
+@QUICK
+@given(vehicles())
+def test_terms_are_the_figures_of_the_pieces(data):
+    _, inverse = factors(vehicle_from_dict(data, 'f'))
+    weights = velocity_deformation(inverse)
+    nu = np.random.default_rng(4).normal(size=(50, 6))
+    products = Products()
+    for block in (nu[:17], nu[17:17], nu[17:]):
+        products.add(block)
+    terms = coupling_terms(weights, products)
+    parts, whole = pieces(weights, nu), delta_xi(inverse, nu)
+    for term in terms:
+        i, j = DOFS.index(term['to']), DOFS.index(term['from'])
+        assert term['coefficient'] == weights[i, j]
+        assert term['rms'] == pytest.approx(np.sqrt((parts[:, i, j] ** 2).mean()))
+        assert term['max'] == pytest.approx(np.abs(parts[:, i, j]).max())
+        share = 100.0 * (parts[:, i, j] * whole[:, i]).mean() / (whole[:, i] ** 2).mean()
+        scale = sum(abs(t['share_percent']) for t in terms if t['to'] == term['to'])
+        assert term['share_percent'] == pytest.approx(share, abs=1e-9 * scale)
+    for dof in {term['to'] for term in terms}:
+        shares = [term['share_percent'] for term in terms if term['to'] == dof]
+        assert sum(shares) == pytest.approx(100.0, abs=1e-9 * np.abs(shares).sum())
+
+
+def test_terms_of_a_vehicle_at_rest_have_no_shares():
+    _, inverse = factors(load_vehicle('rexrov'))
+    products = Products()
+    products.add(np.zeros((3, 6)))
+    terms = coupling_terms(velocity_deformation(inverse), products)
+    assert len(terms) == 15
+    assert {(term['rms'], term['max'], term['share_percent']) for term in terms} == {
+        (0.0, 0.0, None)
+    }

@@ -9,8 +9,11 @@ from strategies import QUICK, vectors, vehicles
 
 from auv_analysis.energy import generalised_velocity, kinetic_energy, shares
 from auv_dynamics import load_vehicle
+from auv_dynamics.config import shipped
 from auv_dynamics.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.model import control_model
+
+VEHICLES = sorted(shipped('vehicles', 'herman2018').parent.glob('*.yaml'))
 
 
 def model_of(vehicle):
@@ -60,3 +63,14 @@ def test_shares_add_up_to_a_hundred_and_rest_has_none():
     components = np.array([[1.0, 0, 2, 0, 0, 1], [0, 0, 0, 0, 0, 0]])
     found = shares(components)
     assert_array_equal(found, [[25, 0, 50, 0, 0, 25], [0, 0, 0, 0, 0, 0]])
+
+
+@pytest.mark.parametrize('name', [path.stem for path in VEHICLES])
+def test_energy_in_nu_is_energy_in_xi(name):
+    vehicle = load_vehicle(name)
+    Upsilon_inv, N = model_of(vehicle)
+    nu = np.random.default_rng(6).normal(size=(1000, 6))
+    of_nu = 0.5 * np.einsum('ki,ij,kj->k', nu, vehicle.M, nu)
+    components = kinetic_energy(Upsilon_inv, N, nu)
+    assert_allclose(components.sum(axis=1), of_nu, rtol=1e-12)
+    assert_allclose(shares(components).sum(axis=1), 100.0, rtol=1e-12)

@@ -42,6 +42,25 @@ def parser() -> argparse.ArgumentParser:
     simulate.add_argument('scenario', help=SCENARIO)
     simulate.add_argument('--controller', action='append', help='only this one; may be repeated')
     simulate.add_argument('--hold', choices=('continuous', 'zoh'), default='continuous')
+    study = command('study', 'the procedure of the paper, steps 1 to 6, as one report')
+    study.add_argument('scenario', help=SCENARIO)
+    study.add_argument('--controller', action='append', help='only this one; may be repeated')
+    study.add_argument('--hold', choices=('continuous', 'zoh'), default='continuous')
+    study.add_argument('--run', action='store_true', help='real nodes in place of this process')
+    study.add_argument('--domain-id', help='ROS domain with --run, default: a free one')
+    study.add_argument(
+        '--composed', action='store_true', help='with --run: all nodes in one process'
+    )
+    study.add_argument(
+        '--window', nargs=2, action='append', type=float, metavar=('FROM', 'TO'), default=[],
+        help='kinetic energy over this window as well, s; may be repeated',
+    )  # fmt: skip
+    study.add_argument('--sensitivity', choices=('sobol', 'morris', 'none'), default='sobol')
+    study.add_argument('--samples', type=int, metavar='N', help='base points or trajectories of it')
+    study.add_argument(
+        '--span', type=float, default=2.0, help='gains vary from 1/SPAN to SPAN times'
+    )
+    study.add_argument('--seed', type=int, default=0, help='of what is drawn')
     analyze = command('analyze', 'summary and report from recorded bags')
     analyze.add_argument('bags', nargs='+', metavar='BAG', type=Path)
     analyze.add_argument('--vehicle', help='for bags that do not carry their own')

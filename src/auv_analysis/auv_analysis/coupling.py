@@ -64,6 +64,11 @@ class Products:
         """Mean products (6, 6): the squares of the root mean squares on the diagonal."""
         return self.sums / max(self.count, 1)
 
+    @property
+    def rms(self) -> list[float]:
+        """Root mean squares of the six signals."""
+        return np.sqrt(np.diagonal(self.means)).tolist()
+
 
 def pieces(weights: np.ndarray, signals: np.ndarray) -> np.ndarray:
     """Pieces of (31) or (32) that add to a deformation.

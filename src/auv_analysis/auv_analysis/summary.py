@@ -79,6 +79,7 @@ def summarize(
         'samples': run.samples,
         'kinetic_energy': energies[chosen],
         'kinetic_energy_windows': [energies[entry] for entry in listed],
+        'velocity': {'rms': velocities.rms, 'max': velocities.peaks.tolist()},
         'velocity_error': {
             'rms': whole.rms(moments.ERROR),
             'max_after_2s': _peak(after, moments.ERROR),

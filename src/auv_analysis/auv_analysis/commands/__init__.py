@@ -7,6 +7,7 @@ from typing import Any
 _HOME = {
     'run': 'run',
     'simulate': 'simulate',
+    'study': 'study',
     'analyze': 'analyze',
     'info': 'inspect_bag',
     'params': 'params',

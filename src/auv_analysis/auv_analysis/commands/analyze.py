@@ -26,7 +26,7 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
     out = options.out or Path('runs') / f'analyze_{name}'
     files = [file for bag in options.bags for file in bag_files(bag)]
     out = prepare(out, overwrite=options.overwrite, inputs=files)
-    return conclude(out, runs, *texts.values())
+    return conclude(out, runs, texts['scenario.yaml'], texts['vehicle.yaml'])
 
 
 def _free_name(name: str, taken: Iterable[str]) -> str:

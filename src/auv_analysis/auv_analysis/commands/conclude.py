@@ -2,10 +2,10 @@
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from rich.console import Console
@@ -13,10 +13,23 @@ from rich.table import Table
 
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
-from auv_analysis.summary import summarize
+from auv_analysis.summary import Window, summarize
 from auv_dynamics.signals import DOFS
 
 console = Console(stderr=True)
+
+
+class Study(Protocol):
+    """What a command adds to the report of its runs."""
+
+    @property
+    def windows(self) -> Sequence[Window]:
+        """Windows of the kinetic energy beside the usual ones, s."""
+
+    def examine(
+        self, runs: Mapping[str, AnyRun], summaries: Mapping[str, Mapping[str, Any]]
+    ) -> dict[str, Any]:
+        """Further arguments of `write_report`."""
 
 
 def say(text: str) -> None:
@@ -24,8 +37,20 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
+class Outcome(NamedTuple):
+    """Runs that came to their end, the folder that they lie in, and the failure of another one."""
+
+    out: Path
+    runs: Mapping[str, AnyRun]
+    failure: Exception | None
+
+
 def finish(
-    out: Path, runs: Mapping[str, AnyRun], scenario: Scenario, failure: Exception | None
+    out: Path,
+    runs: Mapping[str, AnyRun],
+    failure: Exception | None,
+    scenario: Scenario,
+    study: Study | None = None,
 ) -> dict[str, Any]:
     """Summary and report of the runs that came to their end; then the failure of another one."""
     texts, document = scenario.attachments, {}
@@ -33,7 +58,7 @@ def finish(
         note = f'another controller did not come to its end: {str(failure).splitlines()[0]}'
         runs = {name: replace(run, notes=(*run.notes, note)) for name, run in runs.items()}
     if runs:
-        document = conclude(out, runs, texts['scenario.yaml'], texts['vehicle.yaml'])
+        document = conclude(out, runs, texts['scenario.yaml'], texts['vehicle.yaml'], study)
     if failure is not None:
         raise failure
     return document
@@ -44,16 +69,28 @@ def conclude(
     runs: Mapping[str, AnyRun],
     scenario_text: str | dict[str, str],
     vehicle_text: str | dict[str, str],
+    study: Study | None = None,
 ) -> dict[str, Any]:
-    """Write summary and report, show the table; returns the summaries."""
+    """Write summary and report, show the table; returns the summaries.
+
+    Parameters
+    ----------
+    out : folder of the results
+    runs : name -> run
+    scenario_text, vehicle_text : as for `write_report`
+    study : what the report has beside the runs, made from their summaries
+
+    """
+    windows = study.windows if study else ()
     with console.status('computing the figures of summary.json'):
-        summaries = {name: summarize(run) for name, run in runs.items()}
+        summaries = {name: summarize(run, windows=windows) for name, run in runs.items()}
     text = json.dumps(summaries, indent=2, allow_nan=False)
     (out / 'summary.json').write_text(text + '\n', encoding='utf-8')
     from auv_analysis.report.page import write_report  # with matplotlib, which loads slowly
 
+    more = study.examine(runs, summaries) if study else {}
     with console.status('drawing figures, writing the report'):
-        report = write_report(out, runs, summaries, scenario_text, vehicle_text)
+        report = write_report(out, runs, summaries, scenario_text, vehicle_text, **more)
     for name, run in runs.items():
         for note in run.notes:
             say(f'note: {name}: {note}')

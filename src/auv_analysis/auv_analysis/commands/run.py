@@ -17,10 +17,11 @@ from rich.progress import (
 )
 
 from auv_analysis.bag import open_bag
-from auv_analysis.commands.conclude import console, finish, say
+from auv_analysis.commands.conclude import Outcome, console, finish, say
 from auv_analysis.commands.scenarios import open_scenario, prepare_out
 from auv_analysis.domain import VARIABLE, chosen_domain
 from auv_analysis.experiment import environment, run_controller
+from auv_analysis.scenario import Scenario
 from auv_analysis.supervisor import NodeDiedError
 from auv_analysis.warm_up import warm_up
 from auv_dynamics.files import InputError
@@ -31,6 +32,11 @@ DISCOVERY = 3.0  # s: discovery may take so long
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Real nodes, in lock-step, recorded."""
     scenario, names = open_scenario(options)
+    return finish(*recorded(options, scenario, names), scenario)
+
+
+def recorded(options: argparse.Namespace, scenario: Scenario, names: list[str]) -> Outcome:
+    """Runs of the node graph: the folder, the runs from their bags, what went wrong."""
     domain, picked = chosen_domain(options.domain_id)
     os.environ.update(environment(domain))
     # the middleware reads its environment when it is loaded
@@ -59,7 +65,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             done.append(name)
     finally:
         graph.close()
-    return finish(out, {name: open_bag(out / name).run for name in done}, scenario, failure)
+    return Outcome(out, {name: open_bag(out / name).run for name in done}, failure)
 
 
 def _refuse_strangers(graph: Any, domain: int) -> None:

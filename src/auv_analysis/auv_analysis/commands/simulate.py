@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.commands.conclude import console, finish
+from auv_analysis.commands.conclude import Outcome, console, finish
 from auv_analysis.commands.scenarios import open_scenario, prepare_out
 from auv_analysis.experiment import write_inputs
-from auv_analysis.run import Run
+from auv_analysis.run import AnyRun, Run
+from auv_analysis.scenario import Scenario
 from auv_analysis.simulation import check_hold
 from auv_analysis.simulation import simulate as simulate_run
 from auv_analysis.warm_up import announce
@@ -18,20 +19,27 @@ from auv_analysis.warm_up import announce
 def simulate(options: argparse.Namespace) -> dict[str, Any]:
     """In this process, by the same kernel."""
     scenario, names = open_scenario(options)
+    return finish(*simulated(options, scenario, names), scenario)
+
+
+def simulated(options: argparse.Namespace, scenario: Scenario, names: list[str]) -> Outcome:
+    """Runs of this process: the folder, the runs, the first failure."""
     check_hold(scenario, options.hold)
     out = prepare_out(options, scenario, names)
     write_inputs(scenario, out)
     announce(scenario, names)
-    runs, failure = {}, None
+    runs: dict[str, AnyRun] = {}
+    failure = None
     for name in names:
         try:
             with console.status(f'{scenario.name} {name}: simulating'):
-                runs[name] = simulate_run(scenario, name, options.hold)
+                run = simulate_run(scenario, name, options.hold)
         except ArithmeticError as error:  # it diverges, or a user's own law fails
             failure = failure or error
             continue
-        _write_samples(runs[name], out / f'{name}.npz')
-    return finish(out, runs, scenario, failure)
+        runs[name] = run
+        _write_samples(run, out / f'{name}.npz')
+    return Outcome(out, runs, failure)
 
 
 def _write_samples(run: Run, path: Path) -> None:

@@ -35,8 +35,8 @@ def key_figures_table(summaries: Summaries, without_estimate: list[str]) -> Tabl
     """
     caption = (
         'Key figures: velocity error ν_d − ν, lumped estimation error w = f − F, '
-        'commanded input τ. Linear rows in m/s and N, angular rows in rad/s and N m; an en dash (–) stands for what '
-        'is missing: not known, or not settled within the run.'
+        'commanded input τ. Linear rows in m/s and N, angular rows in rad/s and N m; an en dash '
+        '(–) stands for what is missing: not known, or not settled within the run.'
     )
     if without_estimate:
         caption += f' Under {join(without_estimate)} nothing is estimated: there w is −F.'

@@ -1,0 +1,173 @@
+"""Reports as data: what the page shows is what lies beside it, and every source leads somewhere."""
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pyarrow.parquet as parquet
+import pytest
+import yaml
+
+from auv_analysis import cli
+from auv_analysis.report import document, rendering
+from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
+from auv_analysis.report.text import MISSING
+
+TOKEN = re.compile(r'−?\d(?:[\d\u202f]*)(?:\.\d+)?(?:·10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?')
+POWERS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
+
+
+class Page(HTMLParser):
+    """Tables of a page: name -> rows of (text, value) of the body's cells; ids; links."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.tables: dict[str, list[list[tuple[str, str | None]]]] = {}
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self._table: list | None = None
+        self._cell: list[str] | None = None
+        self._value: str | None = None
+        self._body = False
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        self.ids += [values['id']] if 'id' in values else []
+        self.links += [values['href'][1:]] if tag == 'a' else []
+        if tag == 'table':
+            self._table = self.tables.setdefault(values['data-name'], [])
+        elif tag == 'tbody':
+            self._body = True
+        elif tag == 'tr' and self._body:
+            self._table.append([])
+        elif tag in ('td', 'th') and self._body:
+            self._cell, self._value = [], values.get('data-value')
+
+    def handle_endtag(self, tag):
+        if tag == 'tbody':
+            self._body = False
+        elif tag in ('td', 'th') and self._body:
+            self._table[-1].append((''.join(self._cell), self._value))
+            self._cell = None
+
+    def handle_data(self, data):
+        if self._cell is not None:
+            self._cell.append(data)
+
+
+def tokens(text: str) -> list[tuple[float, float]]:
+    """Numbers in a text, each with half a unit of its last digit."""
+    found = []
+    for match in TOKEN.finditer(text):
+        mantissa, _, power = match[0].replace('\u202f', '').replace('−', '-').partition('·10')
+        scale = 10.0 ** int(power.translate(POWERS)) if power else 1.0
+        decimals = len(mantissa.partition('.')[2])
+        found.append((float(mantissa) * scale, 0.5000001 * 10.0**-decimals * scale))
+    return found
+
+
+def at(document, pointer: str):
+    for part in pointer.split('/')[1:]:
+        key = part.replace('~1', '/').replace('~0', '~')
+        document = document[int(key)] if isinstance(document, list) else document[key]
+    return document
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp('document') / 'out'
+    cli.main(['simulate', 'case1', '--out', str(out)])
+    return out
+
+
+def test_every_number_of_the_tables_lies_beside_the_page_with_its_source(folder):
+    page = Page((folder / 'report.html').read_text(encoding='utf-8'))
+    rows = parquet.read_table(folder / document.NUMBERS).to_pylist()
+    assert {row['table'] for row in rows} == set(page.tables)
+    shown = [
+        (float(value), text.replace('\u00a0', ' '))
+        for table in page.tables.values() for row in table for text, value in row if value
+    ]  # fmt: skip
+    kept = [(row['value'], row['text']) for row in rows if not row['name']]
+    assert sorted(value for value, _ in shown) == sorted(value for value, _ in kept)
+    summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
+    checked = 0
+    for row in rows:
+        if row['source'].startswith('summary.json:/') and not row['name']:
+            pointer, _, factor = row['source'].removeprefix('summary.json:').partition('*')
+            assert at(summary, pointer) * float(factor or 1.0) == row['value'], row
+            checked += 1
+        if not row['name']:
+            (found,) = tokens(row['text'])
+            assert abs(found[0] - row['value']) <= found[1] + 1e-12 * abs(found[0]), row
+    assert checked > 250
+
+
+def test_every_number_in_words_is_one_of_the_cells_figures(folder):
+    rows = parquet.read_table(folder / document.NUMBERS).to_pylist()
+    named = [row for row in rows if row['name'] and row['table'] in ('controllers', 'couplings')]
+    assert named
+    for text in {row['text'] for row in named}:
+        values = [abs(row['value']) for row in named if row['text'] == text]
+        for value, half in tokens(re.sub('[ξπτ]_?[1-6]|KB', '', text)):
+            assert any(abs(abs(value) - x) <= half for x in values), (text, value)
+
+
+def test_every_link_leads_to_an_anchor_that_there_is_once(folder):
+    page = Page((folder / 'report.html').read_text(encoding='utf-8'))
+    assert len(set(page.ids)) == len(page.ids)
+    assert set(page.links) <= set(page.ids)
+    assert {'experiment', 'table-key_figures', 'claim-14', 'quantities'} <= set(page.ids)
+
+
+def test_a_report_says_what_made_it(folder):
+    text = (folder / 'report.html').read_text(encoding='utf-8')
+    assert 'numpy' in text
+    assert re.search(r'<dt>written</dt><dd>\d{4}-\d\d-\d\d', text)
+
+
+def made(tmp_path: Path, **changes) -> str:
+    columns = Column('what', numeric=False), Column('x', 'm', 'how far <it> is', group='far')
+    rows = [[Cell('<a>'), cell(0.0)], [Cell('b'), cell(None)], [Cell('c'), cell(1234.5, 'here')]]
+    table = Table('t', 'A table of x_d.', columns, rows)
+    blocks = ['A paragraph.', Sentence('It is 1.', 'table-t'), table]
+    sections = [Section('s', 'First', blocks), Section('empty', 'Second', [])]
+    arguments = {'title': 'T', 'about': 'a', 'findings': [Sentence('Found.', 's')]} | changes
+    rendering.write_document(tmp_path, **arguments, sections=sections, listings=[('f', 'a: <1>')])
+    return (tmp_path / 'report.html').read_text(encoding='utf-8')
+
+
+def test_a_document_of_all_kinds_of_blocks(tmp_path):
+    text = made(tmp_path)
+    page = Page(text)
+    assert page.tables['t'] == [
+        [('<a>', None), ('0', '0.0')], [('b', None), (MISSING, None)],
+        [('c', None), ('1\u202f234', '1234.5')],
+    ]  # fmt: skip
+    assert '(table 1)</a>' in text
+    assert '(section 1)</a>' in text
+    assert 'x<sub>d</sub>' in text
+    assert 'how far &lt;it&gt; is' in text
+    assert 'Second' not in text
+    assert 'a: &lt;1&gt;' in text
+    (zero, far) = parquet.read_table(tmp_path / document.NUMBERS).to_pylist()
+    assert (zero['row'], zero['value']) == ('<a>', 0.0)
+    assert far == {
+        'table': 't', 'row': 'c', 'column': 'far x', 'name': '', 'text': '1\u202f234',
+        'value': 1234.5, 'unit': 'm', 'source': 'here',
+    }  # fmt: skip
+
+
+def test_rows_that_do_not_fit_their_columns_are_refused():
+    with pytest.raises(ValueError, match='t: expected 1 cells, found 2'):
+        Table('t', '', [Column('a')], [[Cell('1'), Cell('2')]])
+
+
+def test_set_up_numbers_are_those_of_the_scenario(folder):
+    scenario = yaml.safe_load((folder / 'scenario.yaml').read_text(encoding='utf-8'))
+    rows = parquet.read_table(folder / document.NUMBERS).to_pylist()
+    found = {row['name']: row['value'] for row in rows if row['table'] == 'set_up'}
+    assert found['setpoint/surge/offset'] == scenario['setpoint']['surge']['offset']
+    assert found['disturbance/exponent_sign'] == -1

@@ -1,0 +1,105 @@
+"""Step 6 in sentences: each follows from the numbers, and there is none that they do not carry."""
+
+import copy
+from functools import cache
+
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+from numpy.testing import assert_allclose
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.study.discussion import discussion
+from auv_analysis.study.samples import write_samples
+from auv_dynamics.signals import DOFS
+
+
+@cache
+def runs(name):
+    scenario = load_scenario(name)
+    return {law: simulate(scenario, law) for law in scenario.controllers}
+
+
+def summaries(name='case1'):
+    return copy.deepcopy({law: summarize(run) for law, run in runs(name).items()})
+
+
+def said(found) -> str:
+    return ' '.join(sentence.text for sentence in discussion(found, 'gvc'))
+
+
+def test_case1_as_the_paper_discusses_it():
+    text = said(summaries())
+    for part in (
+        'Under gvc, heave settles last, after 0.64 s.',
+        'Under cl, roll, pitch and yaw do not settle within 30 s',
+        'ξ3 (heave) has 76.61 % and ξ1 (surge) has 23.29 %',
+        'velocity component of roll is deformed by up to 0.0514 rad/s',
+        'the motion of yaw causes 100.0 % of it',
+        'input of pitch is deformed by up to 840 N m',
+        'Structurally zero, for every motion and input, are Δξ of pitch and yaw and Δπ of surge, '
+        'sway and heave.',
+    ):
+        assert part in text, part
+
+
+def test_every_sentence_names_a_table():
+    anchors = {'table-key_figures', 'table-energy', 'table-terms', 'table-couplings'}
+    for name in ('case1', 'case1_rexrov'):
+        assert {sentence.source for sentence in discussion(summaries(name), 'gvc')} == anchors
+
+
+def test_a_diagonal_vehicle_is_told_that_nothing_deforms():
+    text = said(summaries('case1_bluerov2_heavy'))
+    assert 'M is diagonal' in text
+    assert 'deformed' not in text
+    assert 'Structurally' not in text
+
+
+def test_sentences_follow_the_numbers():
+    found = summaries()
+    times = found['gvc']['velocity_error']['settling_time']
+    times[:] = [0.0] * 6
+    assert 'Under gvc no error ever leaves the band' in said(found)
+    times[:] = [None] * 6
+    assert 'Under gvc, surge, sway, heave, roll, pitch and yaw do not settle within 30 s.' in said(
+        found
+    )
+    times[:] = [1.0, None, 3.0, 0.0, 0.0, 0.0]
+    assert (
+        'Under gvc, sway does not settle within 30 s; of the others heave is last, after 3.00 s.'
+        in said(found)
+    )
+
+
+@pytest.mark.parametrize('factor', [1.9, 2.1])
+def test_errors_are_compared_only_where_they_differ_much(factor):
+    found = summaries()
+    mine = found['gvc']['velocity_error']['max_after_2s']
+    found['cl']['velocity_error']['max_after_2s'] = [factor * x for x in mine]
+    assert ('After 2 s the errors of cl exceed' in said(found)) == (factor > 2)
+    found['cl']['velocity_error']['max_after_2s'] = [x / factor for x in mine]
+    assert ('After 2 s the errors of gvc exceed' in said(found)) == (factor > 2)
+    found['cl']['velocity_error']['max_after_2s'] = None
+    assert 'After 2 s' not in said(found)
+
+
+def test_a_vehicle_at_rest_has_nothing_to_be_said_of_its_energy():
+    found = {'gvc': summaries()['gvc']}
+    found['gvc']['kinetic_energy']['shares_percent'] = [0.0] * 6
+    assert 'kinetic energy' not in said(found)
+
+
+def test_samples_carry_energy_over_time(tmp_path):
+    run = runs('case1')['gvc']
+    table = parquet.read_table(write_samples(run, tmp_path / 'gvc.parquet')).to_pydict()
+    energy = np.column_stack([table[f'kinetic_energy.{dof}'] for dof in DOFS])
+    total = 0.5 * np.einsum('ki,ij,kj->k', run.nu, run.vehicle.M, run.nu)
+    assert_allclose(energy.sum(axis=1), total, rtol=1e-12)
+    assert_allclose(energy.mean(axis=0), summaries()['gvc']['kinetic_energy']['mean_by_component'])
+    assert_allclose(table['t'], run.t)
+    for name, values in {'nu': run.nu, 'tau': run.tau, 'F': run.disturbance}.items():
+        assert_allclose(np.column_stack([table[f'{name}.{dof}'] for dof in DOFS]), values)
+    xi = np.column_stack([table[f'xi.{dof}'] for dof in DOFS])
+    delta = np.column_stack([table[f'delta_xi.{dof}'] for dof in DOFS])
+    assert_allclose(xi - delta, run.nu, atol=1e-12)

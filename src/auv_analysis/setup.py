@@ -41,11 +41,11 @@ setup(
         'rich>=13',
         'pyarrow>=17',
         'scipy>=1.15',
+        'SALib>=1.5',
     ],
     extras_require={
         'test': ['pytest', 'pillow'],
         'dask': ['distributed>=2024.8'],
-        'salib': ['SALib>=1.5'],
     },
     zip_safe=False,
     entry_points={

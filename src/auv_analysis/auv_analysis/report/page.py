@@ -15,6 +15,7 @@ from auv_analysis.report.rendering import write_document
 from auv_analysis.report.set_up import set_up
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
+from auv_analysis.report.tables.claims import write_claims
 from auv_analysis.report.text import join
 from auv_analysis.run import AnyRun
 
@@ -36,7 +37,8 @@ def write_report(
 
     Parameters
     ----------
-    out : folder; gets `report.html`, `numbers.parquet` and `figures/`
+    out : folder; gets `report.html`, `numbers.parquet`, `figures/` and, of the paper's cases,
+        `claims.parquet`
     runs : name -> run, one at least
     summaries : name -> `summarize(run)`
     scenario_text, vehicle_text : the files as they were read, shown as listings: one of all runs,
@@ -60,6 +62,8 @@ def write_report(
     limits = {name: scene.limit for names, scene in scenes.items() for name in names}
     figures = draw_figures(shown, out / 'figures', summaries, limits)
     judged = claims_table(shown, summaries) if claims is None else claims
+    if judged:
+        write_claims(out, judged)
     sections = Contents(shown, summaries, scenes, figures, judged).sections()
     scenarios = list(dict.fromkeys(run.scenario for run in shown.values()))
     vehicles = list(dict.fromkeys(run.vehicle.name for run in shown.values()))

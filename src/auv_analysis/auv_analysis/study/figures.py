@@ -41,7 +41,7 @@ class Figure:
     ----------
     name : key of `summary.json`, such as 'velocity_error.rms'
     dof : its degree of freedom; 'all' of the total energy
-    group : what it is ranked among
+    group : what kind of quantity it is
     words : what it is
     unit : m/s, rad/s, N, N m, s, J or %
 

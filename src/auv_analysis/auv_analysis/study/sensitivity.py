@@ -49,6 +49,11 @@ class Index:
         """What gains are ordered by: ST, or mu_star."""
         return float(self.mu_star if self.ST is None else self.ST)  # type: ignore[arg-type]
 
+    @property
+    def doubled(self) -> float:
+        """Change of the figure in % when the gain is doubled, by the elasticity."""
+        return 100.0 * (2.0**self.elasticity - 1.0)
+
 
 @dataclass(frozen=True)
 class Variable:
@@ -60,7 +65,8 @@ class Variable:
     value : with the scenario's own gains
     smallest, largest : over all rollouts
     spread : standard deviation of ln(figure), about its relative change; with a 95 % interval
-    rank : place in its group by spread, 1 the largest; with a 95 % interval
+    rank : place by spread among the degrees of freedom of this figure, 1 the largest; with a
+        95 % interval
     indices : one of each gain
 
     """
@@ -121,6 +127,12 @@ class Sensitivity:
     def of(self, name: str) -> dict[str, Variable]:
         """Degree of freedom -> variable of a figure such as 'velocity_error.rms'."""
         return {v.figure.dof: v for v in self.variables if v.figure.name == name}
+
+    @property
+    def alike(self) -> dict[str, int]:
+        """Figure -> number of its degrees of freedom that are ranked."""
+        names = [variable.figure.name for variable in self.variables]
+        return {name: names.count(name) for name in names}
 
     def six(self, name: str) -> np.ndarray:
         """Spreads (6,) of a figure; 0 where it has none."""
@@ -213,8 +225,8 @@ def _judged(
     values = {figure: np.asarray(found[figure.column], float) for figure in figures}
     variables = [
         variable
-        for group in dict.fromkeys(figure.group for figure in figures)
-        for variable in _group([f for f in figures if f.group == group], values, design, result)
+        for name in dict.fromkeys(figure.name for figure in figures)
+        for variable in _alike([f for f in figures if f.name == name], values, design, result)
     ]
     variables.sort(key=lambda variable: -variable.spread)
     return replace(
@@ -225,13 +237,13 @@ def _judged(
     )
 
 
-def _group(
+def _alike(
     figures: Sequence[Figure],
     values: Mapping[Figure, np.ndarray],
     design: Design,
     result: Sensitivity,
 ) -> list[Variable]:
-    """Variables of one group, in which they are ranked."""
+    """Variables of one kind, among which they are ranked."""
     answers = np.log(np.column_stack([values[figure][1:] for figure in figures]))
     found = spreads(design, answers)
     return [

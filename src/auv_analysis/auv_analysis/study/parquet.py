@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -9,10 +10,8 @@ import pyarrow.parquet as pq
 
 from auv_analysis.sweep.table import column
 
-Values = Sequence[str] | Sequence[float | None]
 
-
-def write_table(path: Path, columns: Mapping[str, Values]) -> Path:
+def write_table(path: Path, columns: Mapping[str, Sequence[Any]]) -> Path:
     """Write columns of words, whole numbers or numbers.
 
     Parameters
@@ -26,7 +25,7 @@ def write_table(path: Path, columns: Mapping[str, Values]) -> Path:
     return path
 
 
-def _array(values: Values) -> pa.Array:
+def _array(values: Sequence[Any]) -> pa.Array:
     if all(isinstance(value, str) for value in values):
         return column([str(value) for value in values]) if values else pa.array([], pa.string())
     if all(isinstance(value, int | np.integer) for value in values):

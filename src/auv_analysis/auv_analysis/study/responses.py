@@ -9,7 +9,7 @@ from auv_analysis.report.evidence import Response
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario
 from auv_analysis.simulation import DivergedError, Hold, simulate
-from auv_analysis.study.sensitivity import Sensitivity
+from auv_analysis.study.effects import Sensitivity
 from auv_dynamics.signals import DOFS
 
 STEP = 1.1  # factor by which a set-point is changed

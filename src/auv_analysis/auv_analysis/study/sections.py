@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from auv_analysis.report.document import Block, Section, Sentence
+from auv_analysis.study.effects import Sensitivity
 from auv_analysis.study.paper_claims import PaperClaims
 from auv_analysis.study.robustness import robustness
-from auv_analysis.study.sensitivity import Sensitivity
 from auv_analysis.study.sensitivity_figure import sensitivity_figure
 from auv_analysis.study.sensitivity_file import write_sensitivities
 from auv_analysis.study.sensitivity_report import (

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from auv_analysis.report import plotting
 from auv_analysis.report.figures import FigureRecord
 from auv_analysis.report.text import number
-from auv_analysis.study.sensitivity import Sensitivity, Variable
+from auv_analysis.study.effects import Sensitivity, Variable
 
 SHOWN = {  # what is drawn of step 3, with a short name
     'velocity_error.rms': 'RMS error',

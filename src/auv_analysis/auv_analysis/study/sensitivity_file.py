@@ -5,9 +5,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from auv_analysis.study.effects import Index, Sensitivity, Variable
 from auv_analysis.study.figures import Excluded
 from auv_analysis.study.parquet import write_table
-from auv_analysis.study.sensitivity import Index, Sensitivity, Variable
 
 FILE = 'sensitivity.parquet'
 OF_VARIABLE = (

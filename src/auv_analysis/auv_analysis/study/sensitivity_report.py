@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from auv_analysis.report.document import Cell, Column, Sentence, Table, cell
 from auv_analysis.report.text import fixed, join, number
-from auv_analysis.study.sensitivity import Sensitivity, Variable
+from auv_analysis.study.effects import Sensitivity, Variable
 from auv_analysis.study.sensitivity_file import FILE
 
 HEADLINES = ('velocity_error.rms', 'lumped_error.rms', 'effort.rms', 'effort.max')

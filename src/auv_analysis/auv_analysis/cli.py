@@ -55,7 +55,7 @@ def parser() -> argparse.ArgumentParser:
         '--window', nargs=2, action='append', type=float, metavar=('FROM', 'TO'), default=[],
         help='kinetic energy over this window as well, s; may be repeated',
     )  # fmt: skip
-    study.add_argument('--sensitivity', choices=('sobol', 'morris', 'none'), default='sobol')
+    study.add_argument('--sensitivity', choices=('sobol', 'morris', 'none'), help='default: sobol')
     study.add_argument('--samples', type=int, metavar='N', help='base points or trajectories of it')
     study.add_argument(
         '--span', type=float, default=2.0, help='gains vary from 1/SPAN to SPAN times'

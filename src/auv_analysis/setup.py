@@ -37,6 +37,7 @@ setup(
         'matplotlib>=3.6',
         'Pillow>=9',
         'Jinja2>=3.0',
+        'bokeh>=3.4,<4',
         'psutil>=5.9.4',
         'rich>=13',
         'pyarrow>=17',

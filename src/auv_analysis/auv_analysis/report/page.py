@@ -11,6 +11,7 @@ from auv_analysis.report.contents import Contents
 from auv_analysis.report.document import Section, Sentence
 from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.findings import findings
+from auv_analysis.report.interactive import interactive
 from auv_analysis.report.rendering import write_document
 from auv_analysis.report.set_up import set_up
 from auv_analysis.report.sketch import Sketch
@@ -64,7 +65,8 @@ def write_report(
     judged = claims_table(shown, summaries) if claims is None else claims
     if judged:
         write_claims(out, judged)
-    sections = Contents(shown, summaries, scenes, figures, judged).sections()
+    panels = interactive(shown)
+    sections = Contents(shown, summaries, scenes, figures, judged, panels.sets).sections()
     scenarios = list(dict.fromkeys(run.scenario for run in shown.values()))
     vehicles = list(dict.fromkeys(run.vehicle.name for run in shown.values()))
     return write_document(
@@ -77,6 +79,7 @@ def write_report(
             *_listings(shown, 'Vehicle file', vehicle_text),
             *_listings(shown, 'Scenario file', scenario_text),
         ],
+        panels,
     )
 
 

@@ -18,7 +18,7 @@ from auv_analysis.summary import TRANSIENT
 from auv_gvc_controller.model import ControlModel, control_model
 
 SPLIT = ('error', 'lumped_error', 'tau', 'delta_pi')  # begin with a peak that dwarfs the rest
-WHOLE = ('F', 'delta_xi', 'applied', 'kinetic', 'wanted')
+WHOLE = ('F', 'delta_xi', 'applied', 'kinetic', 'wanted', 'energy')
 NEAR_ZERO = 0.005  # m/s, rad/s: what counts as a settled error
 SHARE_COLUMNS = 600  # of the stacked shares
 

@@ -1,0 +1,121 @@
+"""The interactive part of a report's page: packed lines, models of the panels, scripts."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from auv_analysis.report.packing import Packer, packed
+from auv_analysis.report.panel_models import DASHES, item
+from auv_analysis.report.panels import Panel, PanelLine, PanelSet, panel_sets
+from auv_analysis.report.plotting import COLOURS
+from auv_analysis.report.sketch import Sketch
+from auv_analysis.report.traces import COLUMNS, Line, thinned
+from auv_analysis.summary import TRANSIENT
+from auv_dynamics.signals import DOFS
+
+POINTS = 400_000  # of all panels together, some 2 MB of the page
+FEWEST = 200  # columns of pixels that a line keeps however many lines there are
+HERE = Path(__file__).parent
+SCRIPTS = ('panel_data.js', 'panel_view.js', 'panels.js')
+
+
+@dataclass(frozen=True)
+class Interactive:
+    """Panels of a report, ready for its template.
+
+    Attributes
+    ----------
+    sets : section -> its panels
+    runs : names of the runs, each with the dashes of its lines, px
+    data : packed lines
+    index : packed JSON: models, axes, which line is where
+    library : source of BokehJS
+    scripts : ours
+    start, end : of the time axis, s
+    dofs : degree of freedom -> colour
+    transient : length of the first phase, s
+
+    """
+
+    sets: dict[str, PanelSet]
+    runs: dict[str, str]
+    data: str
+    index: str
+    library: str
+    scripts: str
+    start: float
+    end: float
+
+    dofs: ClassVar = dict(zip(DOFS, COLOURS, strict=True))
+    transient: ClassVar = TRANSIENT
+
+
+def interactive(runs: Mapping[str, Sketch]) -> Interactive:
+    """Panels of some runs with all that a page needs to show them.
+
+    Parameters
+    ----------
+    runs : name -> sketch; one at least
+
+    """
+    from bokeh.resources import Resources  # loads slowly
+
+    sets = panel_sets(runs)
+    panels = [panel for members in sets.values() for panel in members.panels]
+    names, packer = list(runs), Packer()
+    columns = _columns(panels)
+    start = min(run.start for run in runs.values())
+    end = max(run.start + run.duration for run in runs.values())
+    index = {
+        'panels': {panel.name: _entry(panel, names, packer, columns) for panel in panels},
+        'axes': packer.axes,
+        'runs': names,
+        'start': start,
+        'end': end,
+    }
+    return Interactive(
+        sets=sets,
+        runs={name: ' '.join(map(str, DASHES[i % len(DASHES)])) for i, name in enumerate(names)},
+        data=packer.packed(),
+        index=packed(json.dumps(index, allow_nan=False).encode()),
+        library='\n'.join(Resources(mode='inline', components=['bokeh']).js_raw),
+        scripts='\n'.join((HERE / name).read_text(encoding='utf-8') for name in SCRIPTS),
+        start=start,
+        end=end,
+    )
+
+
+def _columns(panels: list[Panel]) -> int:
+    """Columns of pixels in which lines are thinned, so that all of them stay within `POINTS`."""
+    points = sum(len(line.line[0]) for panel in panels for line in panel.lines)
+    return COLUMNS if points <= POINTS else max(FEWEST, COLUMNS * POINTS // points)
+
+
+def _entry(panel: Panel, runs: list[str], packer: Packer, columns: int) -> dict[str, Any]:
+    forms = {'both': (False, True), 'log': (True,)}.get(panel.kind, (False,))
+    return {
+        'unit': panel.unit,
+        'kind': panel.kind,
+        'keys': [{'label': key.label, 'colour': key.colour, 'dof': key.dof} for key in panel.keys],
+        'items': [item(panel, runs, logarithmic=logarithmic) for logarithmic in forms],
+        'lines': [_packed_line(line, packer, columns) for line in panel.lines],
+    }
+
+
+def _packed_line(line: PanelLine, packer: Packer, columns: int) -> dict[str, Any]:
+    t, y = _thinned(line.line, columns)
+    return {
+        'run': line.run,
+        'key': line.key,
+        'axis': packer.add_axis(t, line.step),
+        'at': packer.add_values(y),
+    }
+
+
+def _thinned(line: Line, columns: int) -> Line:
+    t, y = line
+    if columns == COLUMNS or len(t) <= 2 * columns:
+        return t, y
+    return thinned(t, y, t[0], t[-1], columns=columns)

@@ -1,0 +1,210 @@
+"""What the interactive panels of a report show: lines of the sketches, of all controllers."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from auv_analysis.report import plotting
+from auv_analysis.report.certificates import BOUND, IDENTITY
+from auv_analysis.report.plotting import COLOURS, GREY, Quantity
+from auv_analysis.report.sketch import Sketch
+from auv_analysis.report.text import join
+from auv_analysis.report.traces import Line
+from auv_dynamics.signals import DOFS
+
+INK = 'ink'  # the colour of the text, light or dark
+GROUPS = {'linear': range(3), 'angular': range(3, 6)}
+ENERGY = Quantity('energy of ξ', tuple(f'ξ{i}' for i in range(1, 7)), ('J', 'J'))
+SIX = {  # signal of `Sketch` -> what it is, whether its size also shows on a logarithmic axis
+    'error': (plotting.ERROR, True),
+    'lumped_error': (plotting.LUMPED, True),
+    'F': (plotting.UNCERTAINTY, False),
+    'tau': (plotting.INPUT, False),
+    'applied': (Quantity('applied wrench', (), plotting.WRENCH), False),
+    'energy': (ENERGY, False),
+    'delta_xi': (plotting.DELTA_XI, False),
+    'delta_pi': (plotting.DELTA_PI, False),
+}
+SECTIONS = {  # set of panels -> its signals, beginnings of the names of the figures it stands for
+    'errors': (('error',), ('errors_',)),
+    'estimates': (('lumped_error', 'F'), ('lumped_error_', 'uncertainty_')),
+    'inputs': (('tau', 'applied'), ('inputs_',)),
+    'certificates': ((), ('certificate_',)),
+    'energy': (('energy',), ('kinetic_energy',)),
+    'couplings': (('delta_xi', 'delta_pi'), ('delta_xi', 'delta_pi')),
+}
+STILL = ('inputs_compared',)  # of logarithmic time: shown beside the panels
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a colour stands for in a panel: a degree of freedom or something else."""
+
+    label: str
+    colour: str
+    dof: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class PanelLine:
+    """Line of a run in a panel: of its `keys[key]`, times and values (n,) each."""
+
+    run: str
+    key: int
+    line: Line
+    step: float
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One pair of axes over time.
+
+    Attributes
+    ----------
+    name : of the panel, unlike all others of the report
+    title : above it
+    label : of its vertical axis, with the unit
+    unit : of its values
+    keys : what its colours stand for
+    lines : of all runs
+    kind : 'line'; 'log': on a logarithmic axis; 'both': there as well, when asked for;
+        'stack': areas one above the other
+
+    """
+
+    name: str
+    title: str
+    label: str
+    unit: str
+    keys: tuple[Key, ...]
+    lines: tuple[PanelLine, ...]
+    kind: str = 'line'
+
+    @property
+    def rows(self) -> dict[str, list[int]]:
+        """Run -> numbers of its lines, in the order of the keys."""
+        rows: dict[str, list[int]] = {}
+        for number, line in enumerate(self.lines):
+            rows.setdefault(line.run, []).append(number)
+        return rows
+
+
+@dataclass(frozen=True, eq=False)
+class PanelSet:
+    """Panels that are shown together, in the place of some figures."""
+
+    name: str
+    panels: tuple[Panel, ...]
+    figures: tuple[str, ...]
+
+    def stands_for(self, figure: str) -> bool:
+        """Whether these panels show what the figure of that name shows."""
+        return figure.startswith(self.figures) and figure not in STILL
+
+
+def panel_sets(runs: Mapping[str, Sketch]) -> dict[str, PanelSet]:
+    """Panels of all runs by section of the report; no set is without panels."""
+    sets = {}
+    for name, (signals, figures) in SECTIONS.items():
+        panels = [panel for signal in signals for panel in _six_signals(signal, runs)]
+        if name == 'certificates':
+            panels = list(_certificates(runs))
+        elif name == 'energy':
+            panels = [_kinetic(runs), *_shares(runs), *panels]
+        if panels:
+            sets[name] = PanelSet(name, tuple(panels), figures)
+    return sets
+
+
+def different_disturbances(runs: Mapping[str, Sketch]) -> dict[str, Sketch]:
+    """Runs with a known F that no run before them has."""
+    kept: dict[bytes, str] = {}
+    for name, run in runs.items():
+        if run.knows_disturbance:
+            kept.setdefault(run.F_digest, name)
+    return {name: runs[name] for name in kept.values()}
+
+
+def _with(signal: str, runs: Mapping[str, Sketch]) -> Mapping[str, Sketch]:
+    """Runs that have a signal worth a line."""
+    if signal == 'F':
+        return different_disturbances(runs)
+    there = {name: run for name, run in runs.items() if signal in run.columns}
+    if signal == 'lumped_error':
+        return {name: run for name, run in there.items() if run.estimates}
+    return there
+
+
+def _six_signals(signal: str, runs: Mapping[str, Sketch]) -> Iterator[Panel]:
+    quantity, logarithmic = SIX[signal]
+    there = _with(signal, runs)
+    moving = {i for run in there.values() for i in plotting.moving(run.part(signal))}
+    for group, members in GROUPS.items():
+        columns = [i for i in members if i in moving]
+        if not columns:
+            continue
+        unit = quantity.unit(columns[0])
+        yield Panel(
+            f'{signal}-{group}',
+            f'{quantity.name.capitalize()}, {group}' if signal != 'energy' else _energies(columns),
+            f'{quantity.name} ({unit})',
+            unit,
+            tuple(Key(DOFS[i], COLOURS[i]) for i in columns),
+            tuple(_lines(there, [(signal, i) for i in columns])),
+            'both' if logarithmic else 'line',
+        )
+
+
+def _energies(columns: Sequence[int]) -> str:
+    return f'Kinetic energy of {join([ENERGY.symbols[i] for i in columns])}'
+
+
+def _certificates(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
+    there = {name: run for name, run in runs.items() if ('L', 'whole') in run.traces}
+    there = {name: run for name, run in there.items() if len(run.line('L')[0])}
+    if there:
+        keys = (Key('L', INK, dof=False),)
+        yield Panel('L', 'L of (23)', 'L (J)', 'J', keys, tuple(_lines(there, [('L', 0)])), 'log')
+        names = {'L_dot': ('measured', INK), 'identity': ('identity (26)', IDENTITY)}
+        names['bound'] = ('bound (28)', BOUND)
+        for name, run in there.items():
+            yield Panel(
+                f'rates-{name}',
+                f'Derivative of L, {name}',
+                'dL/dt (W)',
+                'W',
+                tuple(Key(*look, dof=False) for look in names.values()),
+                tuple(_lines({name: run}, [(signal, 0) for signal in names])),
+            )
+
+
+def _kinetic(runs: Mapping[str, Sketch]) -> Panel:
+    keys = Key('of the run', INK, dof=False), Key('of the set-point', GREY, dof=False)
+    lines = tuple(_lines(runs, [('kinetic', 0), ('wanted', 0)]))
+    return Panel('kinetic', 'Kinetic energy', 'kinetic energy (J)', 'J', keys, lines)
+
+
+def _shares(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
+    keys = tuple(Key(dof, colour) for dof, colour in zip(DOFS, COLOURS, strict=True))
+    for name, run in runs.items():
+        t, parts = run.stack
+        if len(t):
+            lines = tuple(PanelLine(name, i, (t, parts[:, i]), run.step) for i in range(6))
+            title = f'Shares of ξ1 to ξ6 in the kinetic energy, {name}'
+            yield Panel(f'shares-{name}', title, 'share (%)', '%', keys, lines, 'stack')
+
+
+def _lines(runs: Mapping[str, Sketch], signals: Sequence[tuple[str, int]]) -> Iterator[PanelLine]:
+    for name, run in runs.items():
+        for key, (signal, column) in enumerate(signals):
+            yield PanelLine(name, key, _whole(run, signal, column), run.step)
+
+
+def _whole(run: Sketch, signal: str, column: int) -> Line:
+    """Line over the whole run, of its phases where it is drawn in two."""
+    if (signal, 'whole') in run.traces:
+        return run.line(signal, column)
+    phases = [run.line(signal, column, part) for part in ('early', 'late')]
+    t, y = (np.concatenate(values) for values in zip(*phases, strict=True))
+    return t, y

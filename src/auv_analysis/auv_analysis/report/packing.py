@@ -13,7 +13,7 @@ class Packer:
     """Takes time axes and values; every array is a run of bytes in one block.
 
     A time axis is the number of ticks from each sample to the next, uint32. A value is a float32
-    without its last byte: 17 significant bits, so that five digits stay. The first bytes of all
+    without its last byte: 16 significant bits, so that four digits stay. The first bytes of all
     numbers of an array come first, then the second ones: so they compress well.
 
     """

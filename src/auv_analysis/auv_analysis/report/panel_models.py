@@ -52,17 +52,18 @@ def item(panel: Panel, runs: list[str], *, logarithmic: bool) -> dict[str, Any]:
         outline_line_color=None,
     )
     for k, line in enumerate(panel.lines):
-        colour = panel.keys[line.key].colour
+        key = panel.keys[line.key]
         look = {'source': ColumnDataSource({'t': [], 'y': [], 'base': []}), 'name': f'line {k}'}
         if panel.kind == 'stack':
-            plot.varea('t', 'base', 'y', fill_color=colour, **look)
+            plot.varea('t', 'base', 'y', fill_color=key.colour, **look)
             continue
         dash = DASHES[runs.index(line.run) % len(DASHES)]
-        shown = TEXT if colour == INK else colour
-        plot.line('t', 'y', line_color=shown, line_dash=dash, line_width=1.6, **look)
+        shown = TEXT if key.colour == INK else key.colour
+        plot.line('t', 'y', line_color=shown, line_dash=dash, line_width=key.width, **look)
     cursor = Span(dimension='height', name='cursor', line_dash=[3, 3], line_width=1, visible=False)
     plot.add_layout(cursor)
-    plot.yaxis.axis_label = panel.label
+    label = f'|{panel.label}|' if logarithmic and panel.kind == 'both' else panel.label
+    plot.yaxis.axis_label = f'{label} ({panel.unit})'
     plot.xaxis.axis_label = 't (s)'
     for axis in (plot.xaxis, plot.yaxis):
         axis.axis_label_text_font_style = 'normal'

@@ -1,12 +1,24 @@
 'use strict';
-// one panel: Bokeh's figure, and beside it a table that is its key and shows the values at a time
+// one panel: Bokeh's figure, and above it a table that is its key and shows the values at a time
 
+const SUPERSCRIPTS = { '-': '⁻', 0: '⁰', 1: '¹', 2: '²', 3: '³', 4: '⁴', 5: '⁵', 6: '⁶', 7: '⁷', 8: '⁸', 9: '⁹' };
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-const digits = (x) => (x === 0 ? '0' : Number(x.toPrecision(4)).toString().replace('-', '\u2212'));
+
+// four digits of a number, as the tables of the report write it
+function digits(x) {
+  if (x === 0) return '0';
+  const power = Number(x.toExponential(3).split('e')[1]);
+  const mantissa = x.toExponential(3).split('e')[0];
+  const raised = [...String(power)].map((letter) => SUPERSCRIPTS[letter]).join('');
+  const text = power < -3 || power > 6 ? `${mantissa}·10${raised}` : x.toFixed(Math.max(3 - power, 0));
+  return text.replace('-', '−');
+}
 
 class PanelView {
   constructor(host, content, state) {
     Object.assign(this, { host, content, state, hidden: new Set(), figure: null, form: -1 });
+    this.near = false;
+    this.work = Promise.resolve();
     this.cells = [...host.querySelectorAll('[data-line]')];
     for (const box of host.querySelectorAll('input[data-key]')) {
       box.addEventListener('change', () => {
@@ -16,42 +28,52 @@ class PanelView {
     }
   }
 
-  // Bokeh's models are built when the panel is first seen, and again for another vertical axis
-  async render() {
+  get logarithmic() {
+    return this.content.kind === 'log' || this.form === 1;
+  }
+
+  // what is out of sight is drawn when it comes into sight
+  refresh() {
+    if (!this.near) return this.work;
+    this.work = this.work.then(() => this.build()).then(() => this.update());
+    return this.work;
+  }
+
+  // Bokeh's models are made when the panel is first seen, and again for another vertical axis
+  async build() {
     const form = this.state.logarithmic && this.content.kind === 'both' ? 1 : 0;
     if (form === this.form) return;
-    this.form = form;
     const target = this.host.querySelector('.plot');
-    const old = this.figure;
+    const [old, shown] = [this.figure, [...target.children]];
     const views = await Bokeh.embed.embed_item(structuredClone(this.content.items[form]), target);
-    if (old) {
-      old.document.clear();
-      while (target.children.length > 1) target.firstElementChild.remove();
-    }
-    const root = views.roots[0];
-    this.figure = root.model;
-    const models = [...this.figure.references()];
-    this.named = (name) => models.find((model) => model.name === name);
-    this.models = models;
-    this.lines = this.content.lines.map((_, i) => this.named(`line ${i}`));
-    this.time = this.named('time');
-    this.wheel = models.find((model) => model.type === 'WheelZoomTool');
-    this.drags = { pan: models.find((model) => model.type === 'PanTool'), zoom: models.find((model) => model.type === 'BoxZoomTool') };
+    if (old) old.document.clear();
+    for (const element of shown) element.remove();
+    this.form = form;
+    this.figure = views.roots[0].model;
+    this.models = [...this.figure.references()];
+    const named = (name) => this.models.find((model) => model.name === name);
+    const typed = (type) => this.models.find((model) => model.type === type);
+    this.lines = this.content.lines.map((_, i) => named(`line ${i}`));
+    this.wheel = typed('WheelZoomTool');
+    this.drags = { pan: typed('PanTool'), zoom: typed('BoxZoomTool') };
+    this.cursor = named('cursor');
     this.fill();
-    const moved = () => this.state.moveTo(this.time.start, this.time.end);
-    this.time.on_change([this.time.properties.start, this.time.properties.end], moved);
-    this.figure.on_event('mousemove', ({ x }) => this.state.pointAt(x));
-    this.figure.on_event('tap', ({ x }) => this.state.pointAt(x));
-    this.figure.on_event('doubletap', () => this.state.moveTo(...this.state.whole));
-    this.update();
+    this.listen(this.figure.x_range);
+    this.paint();
   }
 
   fill() {
     this.content.lines.forEach((line, i) => {
-      const shown = this.form === 1 || this.content.kind === 'log';
-      const y = shown ? line.y.map((value) => Math.abs(value) || NaN) : line.y;
+      const y = this.logarithmic ? line.y.map((value) => Math.abs(value) || NaN) : line.y;
       this.lines[i].data_source.data = { t: line.t, y, base: new Float64Array(y.length) };
     });
+  }
+
+  listen(time) {
+    const { state, figure } = this;
+    time.on_change([time.properties.start, time.properties.end], () => state.moveTo(time.start, time.end));
+    for (const event of ['mousemove', 'tap']) figure.on_event(event, ({ x }) => state.pointAt(x));
+    figure.on_event('doubletap', () => state.moveTo(...state.whole));
   }
 
   shows({ run, key }) {
@@ -60,16 +82,16 @@ class PanelView {
   }
 
   update() {
-    if (!this.figure) return;
     const [start, end] = this.state.window;
+    const { figure } = this;
     this.content.lines.forEach((line, i) => { this.lines[i].visible = this.shows(line); });
-    if (this.time.start !== start || this.time.end !== end) this.time.setv({ start, end });
+    if (figure.x_range.start !== start || figure.x_range.end !== end) figure.x_range.setv({ start, end });
     if (this.content.kind === 'stack') this.stack();
-    this.named('values').setv(this.range(start, end));
+    figure.y_range.setv(this.fitted(start, end));
     this.wheel.active = this.host.contains(document.activeElement);
-    this.figure.toolbar.active_drag = this.drags[this.state.drag];
+    figure.toolbar.active_drag = this.drags[this.state.drag];
     this.read();
-    this.host.dataset.ready = '';
+    this.host.dataset.version = this.state.version;
   }
 
   // areas of what is shown, each on those before it
@@ -83,47 +105,44 @@ class PanelView {
     });
   }
 
-  // the vertical axis fits what is shown between these times
-  range(start, end) {
+  // ends of the vertical axis, about what is shown between two times
+  fitted(start, end) {
     if (this.content.kind === 'stack') return { start: 0, end: 100 };
-    const logarithmic = this.form === 1 || this.content.kind === 'log';
     let [low, high] = [Infinity, -Infinity];
-    this.content.lines.forEach((line, i) => {
-      if (!this.lines[i].visible) return;
-      const { t, y } = this.lines[i].data_source.data;
+    for (const { visible, data_source: { data: { t, y } } } of this.lines) {
+      if (!visible) continue;
       const stop = Math.min(first(t, end) + 1, t.length);
       for (let k = Math.max(first(t, start) - 1, 0); k < stop; k++) {
         if (y[k] < low) low = y[k];
         if (y[k] > high) high = y[k];
       }
-    });
-    if (low > high) return logarithmic ? { start: 0.1, end: 1 } : { start: -1, end: 1 };
-    if (logarithmic) return { start: low / 1.5, end: high * 1.5 };
+    }
+    if (low > high) return this.logarithmic ? { start: 0.1, end: 1 } : { start: -1, end: 1 };
+    if (this.logarithmic) return { start: low / 1.5, end: high * 1.5 };
     const margin = 0.05 * (high - low) || 0.05 * Math.abs(high) || 1;
     return { start: low - margin, end: high + margin };
   }
 
-  // values at the time pointed at, of the samples that are nearest to it
+  // values of the samples that are nearest to the time pointed at
   read() {
+    if (!this.near || !this.figure) return;
     const { pointed } = this.state;
-    const cursor = this.figure && this.named('cursor');
-    if (cursor) cursor.setv({ location: pointed, visible: pointed !== null });
+    this.cursor.setv({ location: pointed, visible: pointed !== null });
     for (const cell of this.cells) {
       const line = this.content.lines[cell.dataset.line];
-      const i = pointed === null ? -1 : nearest(line.t, pointed);
-      const shown = this.shows(line);
-      cell.textContent = i < 0 || !shown ? '' : digits(line.y[i]);
-      cell.classList.toggle('off', !shown);
+      const i = pointed === null || !this.shows(line) ? -1 : nearest(line.t, pointed);
+      cell.textContent = i < 0 ? '' : digits(line.y[i]);
     }
   }
 
+  // the colours of the page
   paint() {
     if (!this.figure) return;
     const [ink, soft, hair] = ['ink', 'soft', 'hair'].map(colour);
+    const axis = { axis_label_text_color: ink, major_label_text_color: soft, axis_line_color: soft, major_tick_line_color: soft };
     for (const model of this.models) {
-      if (model.type.endsWith('Axis')) {
-        model.setv({ axis_label_text_color: ink, major_label_text_color: soft, axis_line_color: soft, major_tick_line_color: soft });
-      } else if (model.type === 'Grid') model.grid_line_color = hair;
+      if (model.type.endsWith('Axis')) model.setv(axis);
+      else if (model.type === 'Grid') model.grid_line_color = hair;
       else if (model.type === 'Span') model.line_color = soft;
     }
     this.content.lines.forEach(({ key }, i) => {

@@ -2,7 +2,8 @@
 // what all panels share: the time axis, the time pointed at, what is shown, the theme
 
 class PanelState {
-  constructor(index) {
+  constructor(index, bar) {
+    this.bar = bar;
     this.whole = [index.start, index.end];
     this.window = this.whole;
     this.pointed = null;
@@ -12,14 +13,17 @@ class PanelState {
     this.dofs = new Set();
     this.views = [];
     this.asked = 0;
+    this.version = 0;
   }
 
   // everything that is asked for until the next frame is done at once
   refresh() {
+    this.version += 1;
+    this.bar.dataset.version = this.version;
     cancelAnimationFrame(this.asked);
     this.asked = requestAnimationFrame(() => {
-      for (const view of this.views) view.update();
-      document.dispatchEvent(new CustomEvent('panels', { detail: this }));
+      for (const view of this.views) view.refresh();
+      document.dispatchEvent(new CustomEvent('panels'));
     });
   }
 
@@ -48,7 +52,7 @@ class PanelState {
     const [start, end] = this.window;
     this.pointed = time === null ? null : Math.min(Math.max(time, start), end);
     for (const view of this.views) view.read();
-    document.dispatchEvent(new CustomEvent('panels', { detail: this }));
+    document.dispatchEvent(new CustomEvent('panels'));
   }
 
   step(share) {
@@ -107,9 +111,9 @@ function connectControls(bar, state) {
       });
     }
   }
-  bar.querySelector('[name=logarithmic]').addEventListener('change', async ({ target }) => {
+  bar.querySelector('[name=logarithmic]').addEventListener('change', ({ target }) => {
     state.logarithmic = target.checked;
-    await Promise.all(state.views.filter((view) => view.figure).map((view) => view.render().then(() => view.paint())));
+    state.refresh();
   });
   bar.querySelector('[name=drag]').addEventListener('change', ({ target }) => {
     state.drag = target.value;
@@ -118,7 +122,7 @@ function connectControls(bar, state) {
   const shown = bar.querySelector('output');
   document.addEventListener('panels', () => {
     [from.value, to.value] = state.window.map((time) => Number(time.toPrecision(6)));
-    shown.textContent = state.pointed === null ? '' : `t = ${digits(state.pointed)} s`;
+    shown.textContent = state.pointed === null ? 'point at a panel for values' : `t = ${digits(state.pointed)} s`;
   });
 }
 
@@ -127,28 +131,36 @@ async function startPanels() {
   if (!bar || typeof DecompressionStream === 'undefined') return;
   const index = await unpacked();
   Bokeh.set_log_level('error');
-  const state = new PanelState(index);
+  const state = new PanelState(index, bar);
   connectControls(bar, state);
   const seen = new IntersectionObserver((entries) => {
     for (const { isIntersecting, target } of entries) {
-      if (!isIntersecting) continue;
-      seen.unobserve(target);
       const view = state.views.find(({ host }) => host === target);
-      view.render().then(() => view.paint());
+      view.near = isIntersecting;
+      view.refresh();
     }
-  }, { rootMargin: '400px' });
+  }, { rootMargin: '300px' });
   for (const host of document.querySelectorAll('[data-panel]')) {
-    state.views.push(new PanelView(host, index.panels[host.dataset.panel], state));
-    for (const event of ['focusin', 'focusout']) host.addEventListener(event, () => state.refresh());
+    const view = new PanelView(host, index.panels[host.dataset.panel], state);
+    state.views.push(view);
+    for (const event of ['focusin', 'focusout']) host.addEventListener(event, () => view.refresh());
     host.addEventListener('keydown', (event) => onKey(event, state));
     seen.observe(host);
   }
   bar.addEventListener('keydown', (event) => onKey(event, state));
-  document.documentElement.classList.add('with-panels');
-  for (const details of document.querySelectorAll('details.stills')) {
-    details.open = !!(location.hash && details.querySelector(location.hash));
-  }
   document.addEventListener('theme', () => state.views.forEach((view) => view.paint()));
+  showPanels(bar);
   state.refresh();
+}
+
+// in the place of the still figures, which stay for paper
+function showPanels(bar) {
+  const stills = [...document.querySelectorAll('details.stills')];
+  const wanted = document.getElementById(location.hash.slice(1));
+  document.documentElement.classList.add('with-panels');
+  for (const details of stills) details.open = details.contains(wanted);
+  bar.open = !matchMedia('(max-width: 40rem)').matches;
+  wanted?.scrollIntoView();
+  window.addEventListener('beforeprint', () => stills.forEach((details) => { details.open = true; }));
 }
 startPanels();

@@ -13,6 +13,7 @@ from auv_analysis.report.text import join
 from auv_analysis.report.traces import Line
 from auv_dynamics.signals import DOFS
 
+WIDTH, THIN, THICK = 1.6, 1.0, 3.0  # of lines, px; the thick ones lie under others
 INK = 'ink'  # the colour of the text, light or dark
 GROUPS = {'linear': range(3), 'angular': range(3, 6)}
 ENERGY = Quantity('energy of ξ', tuple(f'ξ{i}' for i in range(1, 7)), ('J', 'J'))
@@ -39,11 +40,21 @@ STILL = ('inputs_compared',)  # of logarithmic time: shown beside the panels
 
 @dataclass(frozen=True)
 class Key:
-    """What a colour stands for in a panel: a degree of freedom or something else."""
+    """What a colour stands for in a panel: a degree of freedom or something else.
+
+    Attributes
+    ----------
+    label : short
+    colour : '#rrggbb' or `INK`
+    dof : whether it is a degree of freedom
+    width : of its lines, px
+
+    """
 
     label: str
     colour: str
     dof: bool = True
+    width: float = WIDTH
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +75,7 @@ class Panel:
     ----------
     name : of the panel, unlike all others of the report
     title : above it
-    label : of its vertical axis, with the unit
+    label : of its vertical axis, without the unit
     unit : of its values
     keys : what its colours stand for
     lines : of all runs
@@ -148,7 +159,7 @@ def _six_signals(signal: str, runs: Mapping[str, Sketch]) -> Iterator[Panel]:
         yield Panel(
             f'{signal}-{group}',
             f'{quantity.name.capitalize()}, {group}' if signal != 'energy' else _energies(columns),
-            f'{quantity.name} ({unit})',
+            quantity.name,
             unit,
             tuple(Key(DOFS[i], COLOURS[i]) for i in columns),
             tuple(_lines(there, [(signal, i) for i in columns])),
@@ -165,24 +176,28 @@ def _certificates(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
     there = {name: run for name, run in there.items() if len(run.line('L')[0])}
     if there:
         keys = (Key('L', INK, dof=False),)
-        yield Panel('L', 'L of (23)', 'L (J)', 'J', keys, tuple(_lines(there, [('L', 0)])), 'log')
-        names = {'L_dot': ('measured', INK), 'identity': ('identity (26)', IDENTITY)}
-        names['bound'] = ('bound (28)', BOUND)
+        yield Panel('L', 'L of (23)', 'L', 'J', keys, tuple(_lines(there, [('L', 0)])), 'log')
+        rates = {
+            'bound': Key('bound (28)', BOUND, dof=False),
+            'identity': Key('identity (26)', IDENTITY, dof=False, width=THICK),
+            'L_dot': Key('measured', INK, dof=False, width=THIN),
+        }
         for name, run in there.items():
             yield Panel(
                 f'rates-{name}',
                 f'Derivative of L, {name}',
-                'dL/dt (W)',
+                'dL/dt',
                 'W',
-                tuple(Key(*look, dof=False) for look in names.values()),
-                tuple(_lines({name: run}, [(signal, 0) for signal in names])),
+                tuple(rates.values()),
+                tuple(_lines({name: run}, [(signal, 0) for signal in rates])),
             )
 
 
 def _kinetic(runs: Mapping[str, Sketch]) -> Panel:
-    keys = Key('of the run', INK, dof=False), Key('of the set-point', GREY, dof=False)
-    lines = tuple(_lines(runs, [('kinetic', 0), ('wanted', 0)]))
-    return Panel('kinetic', 'Kinetic energy', 'kinetic energy (J)', 'J', keys, lines)
+    wanted = Key('of the set-point', GREY, dof=False, width=THICK)
+    keys = wanted, Key('of the run', INK, dof=False)
+    lines = tuple(_lines(runs, [('wanted', 0), ('kinetic', 0)]))
+    return Panel('kinetic', 'Kinetic energy', 'kinetic energy', 'J', keys, lines)
 
 
 def _shares(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
@@ -192,7 +207,7 @@ def _shares(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
         if len(t):
             lines = tuple(PanelLine(name, i, (t, parts[:, i]), run.step) for i in range(6))
             title = f'Shares of ξ1 to ξ6 in the kinetic energy, {name}'
-            yield Panel(f'shares-{name}', title, 'share (%)', '%', keys, lines, 'stack')
+            yield Panel(f'shares-{name}', title, 'share', '%', keys, lines, 'stack')
 
 
 def _lines(runs: Mapping[str, Sketch], signals: Sequence[tuple[str, int]]) -> Iterator[PanelLine]:

@@ -85,7 +85,7 @@ def _uncoupled(run: Run) -> Run:
 
 
 def _text(report: str) -> str:
-    body = report[report.index('<body>') : report.rindex('<script>')]
+    body = report[report.index('<body>') : report.index('<script>')]
     return unescape(re.sub(r'\s+', ' ', re.sub(r'<[^>]+>', '', body))).replace('\u00a0', ' ')
 
 

@@ -1,71 +1,14 @@
-"""The report in a browser: it needs nothing but itself, and every control does what it says."""
-
-from collections.abc import Iterator
-from itertools import count
-from pathlib import Path
+"""The panels of a report in a browser: every control does what it says."""
 
 import numpy as np
 import pytest
-from browser import Watched, chromium, coloured, pixels
-from PIL import Image
+from browser import coloured, pixels
 
-from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.report import plotting
-from auv_analysis.report.page import write_report
 from auv_analysis.report.plotting import COLOURS
-from auv_analysis.run import Run
 from auv_dynamics.signals import DOFS
 
 SUPERSCRIPTS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
 PANELS = ('error-linear', 'error-angular', 'tau-linear')
-
-
-@pytest.fixture(scope='module')
-def browser() -> Iterator:
-    with chromium() as found:
-        yield found
-
-
-@pytest.fixture(scope='module')
-def runs() -> dict[str, Run]:
-    scenario = load_scenario('case1')
-    found = {name: simulate(scenario, name) for name in scenario.controllers}
-    return {name: run.part(run.t <= 5.0) for name, run in found.items()}
-
-
-@pytest.fixture(scope='module')
-def path(browser, runs, tmp_path_factory) -> Path:
-    """Of a report whose still figures are composed but not rendered: that takes long."""
-
-    heights = count()  # the same image twice would be one in a PDF
-
-    def save(figure, folder, name):
-        png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
-        Image.new('RGB', (720, 300 + next(heights)), 'white').save(png)
-        return png, pdf
-
-    out = tmp_path_factory.mktemp('report')
-    summaries = {name: summarize(run) for name, run in runs.items()}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plotting, 'save', save)
-        return write_report(out, runs, summaries, 'a: 1', 'b: 2')
-
-
-@pytest.fixture
-def report(browser, path) -> Iterator[Watched]:
-    watched = Watched(browser, path)
-    watched.page.wait_for_selector('.with-panels')
-    yield watched
-    watched.close()
-
-
-def test_the_page_is_small_and_its_panels_replace_the_still_figures(report, path):
-    assert path.stat().st_size < 6_000_000
-    assert report.panel('error-linear').is_visible()
-    still = report.page.locator('#errors_gvc img')
-    assert not still.is_visible()
-    report.page.locator('details.stills summary').first.click()
-    assert still.is_visible()
 
 
 def test_a_panel_shows_the_colours_of_its_degrees_of_freedom_until_they_are_switched_off(report):
@@ -109,14 +52,14 @@ def test_panels_share_one_time_axis(report):
     report.page.locator('[name=to]').fill('3.5')
     report.page.locator('[name=to]').press('Enter')
     assert report.shown('tau-linear')['window'] == pytest.approx([start, 3.5], abs=1e-4)
-    report.page.get_by_role('button', name='after 2 s').click()
+    report.page.get_by_role('button', name='after 2 s', exact=True).click()
     assert report.shown('error-angular')['window'] == [2.0, 5.0]
 
 
-def test_the_vertical_axis_fits_what_is_shown(report, runs):
+def test_the_vertical_axis_fits_what_is_shown(report, short_runs):
     report.panel('error-linear')
-    report.page.get_by_role('button', name='after 2 s').click()
-    late = [run.part(run.t >= 2.0) for run in runs.values()]
+    report.page.get_by_role('button', name='after 2 s', exact=True).click()
+    late = [run.part(run.t >= 2.0) for run in short_runs.values()]
     errors = np.concatenate([(run.nu_d - run.nu)[:, :3] for run in late])
     low, high = report.shown('error-linear')['values']
     margin = 0.06 * (errors.max() - errors.min())
@@ -124,13 +67,13 @@ def test_the_vertical_axis_fits_what_is_shown(report, runs):
     assert errors.max() < high < errors.max() + margin
 
 
-def test_values_are_those_of_the_sample_pointed_at(report, runs):
+def test_values_are_those_of_the_sample_pointed_at(report, short_runs):
     report.panel('error-angular')
     panel = report.panel('error-linear')
     panel.locator('.plot').hover(position={'x': 420, 'y': 100})
     time = report.shown('error-linear')['cursor']
     assert report.shown('error-angular')['cursor'] == time
-    for row, run in zip(panel.locator('tbody tr').all(), runs.values(), strict=True):
+    for row, run in zip(panel.locator('tbody tr').all(), short_runs.values(), strict=True):
         sample = int(np.argmin(np.abs(run.t - time)))
         cells = [_number(cell) for cell in row.locator('td').all_inner_texts()]
         wanted = (run.nu_d - run.nu)[sample, :3]
@@ -188,45 +131,3 @@ def test_the_wheel_scrolls_the_page_unless_the_panel_has_the_focus(report):
     panel.locator('.plot').hover(position={'x': 420, 'y': 100})
     report.page.mouse.wheel(0, -40)
     report.page.wait_for_function('document.querySelector("[name=to]").valueAsNumber < 5')
-
-
-@pytest.mark.parametrize('how', ['button', 'system'])
-def test_dark_pages_have_light_axes(browser, path, how):
-    report = Watched(browser, path, color_scheme='dark' if how == 'system' else 'light')
-    report.panel('error-linear')
-    button = report.page.get_by_role('button', name='Theme')
-    if how == 'button':
-        assert report.shown('error-linear')['ink'] == '#1a1a1a'
-        button.click()
-        button.click()
-        assert button.inner_text() == 'Theme: dark'
-    assert report.shown('error-linear')['ink'] == '#e4e4e0'
-    image = pixels(report.panel('error-linear').locator('.plot'))
-    assert np.median(image) < 60
-    report.close()
-
-
-def test_paper_gets_the_still_figures(report):
-    report.panel('error-linear')
-    report.page.emulate_media(media='print')
-    assert not report.page.locator('.panels, .panel-controls').first.is_visible()
-    images = report.page.locator('figure img').all()
-    assert len(images) > 10
-    assert all(image.bounding_box()['height'] > 50 for image in images)
-    assert report.page.pdf().count(b'/Subtype /Image') >= len(images)
-
-
-def test_without_scripts_the_still_figures_are_there(browser, path):
-    report = Watched(browser, path, java_script_enabled=False)
-    assert report.page.locator('#errors_gvc img').is_visible()
-    assert not report.page.locator('.panel-controls').is_visible()
-    report.close()
-
-
-def test_a_link_opens_what_it_leads_to(browser, path):
-    report = Watched(browser, path, '#errors_cl')
-    report.page.wait_for_selector('.with-panels')
-    image = report.page.locator('#errors_cl img')
-    assert image.is_visible()
-    assert 0.0 < report.page.locator('#errors_cl').bounding_box()['y'] < 450.0
-    report.close()

@@ -2,12 +2,12 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 from auv_analysis.report.packing import Packer, packed
-from auv_analysis.report.panel_models import DASHES, item
+from auv_analysis.report.panel_models import DASHES, model
 from auv_analysis.report.panels import Panel, PanelLine, PanelSet, panel_sets
 from auv_analysis.report.plotting import COLOURS
 from auv_analysis.report.sketch import Sketch
@@ -18,6 +18,7 @@ from auv_dynamics.signals import DOFS
 POINTS = 400_000  # of all panels together, some 2 MB of the page
 FEWEST = 200  # columns of pixels that a line keeps however many lines there are
 HERE = Path(__file__).parent
+KINDS = {'line': ('line',), 'log': ('log',), 'both': ('line', 'log'), 'stack': ('stack',)}
 SCRIPTS = ('panel_data.js', 'panel_view.js', 'panels.js')
 
 
@@ -68,16 +69,17 @@ def interactive(runs: Mapping[str, Sketch]) -> Interactive:
     columns = _columns(panels)
     start = min(run.start for run in runs.values())
     end = max(run.start + run.duration for run in runs.values())
-    index = {
-        'panels': {panel.name: _entry(panel, names, packer, columns) for panel in panels},
+    index: dict[str, Any] = {
+        'panels': {panel.name: _entry(panel, packer, columns) for panel in panels},
+        'models': {name: model(*form) for name, form in _forms(panels).items()},
         'axes': packer.axes,
-        'runs': names,
+        'runs': {name: DASHES[i % len(DASHES)] for i, name in enumerate(names)},
         'start': start,
         'end': end,
     }
     return Interactive(
         sets=sets,
-        runs={name: ' '.join(map(str, DASHES[i % len(DASHES)])) for i, name in enumerate(names)},
+        runs={name: ' '.join(map(str, dash)) for name, dash in index['runs'].items()},
         data=packer.packed(),
         index=packed(json.dumps(index, allow_nan=False).encode()),
         library='\n'.join(Resources(mode='inline', components=['bokeh']).js_raw),
@@ -93,13 +95,18 @@ def _columns(panels: list[Panel]) -> int:
     return COLUMNS if points <= POINTS else max(FEWEST, COLUMNS * POINTS // points)
 
 
-def _entry(panel: Panel, runs: list[str], packer: Packer, columns: int) -> dict[str, Any]:
-    forms = {'both': (False, True), 'log': (True,)}.get(panel.kind, (False,))
+def _forms(panels: list[Panel]) -> dict[str, tuple[int, str]]:
+    """Name -> number of lines and kind, of the models that panels need."""
+    forms = {(len(panel.lines), kind) for panel in panels for kind in KINDS[panel.kind]}
+    return {f'{kind} {lines}': (lines, kind) for lines, kind in sorted(forms)}
+
+
+def _entry(panel: Panel, packer: Packer, columns: int) -> dict[str, Any]:
     return {
+        'label': panel.label,
         'unit': panel.unit,
-        'kind': panel.kind,
-        'keys': [{'label': key.label, 'colour': key.colour, 'dof': key.dof} for key in panel.keys],
-        'items': [item(panel, runs, logarithmic=logarithmic) for logarithmic in forms],
+        'kinds': KINDS[panel.kind],
+        'keys': [asdict(key) for key in panel.keys],
         'lines': [_packed_line(line, packer, columns) for line in panel.lines],
     }
 

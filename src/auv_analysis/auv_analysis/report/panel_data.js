@@ -30,12 +30,13 @@ function values(bytes, at, count) {
   return Float64Array.from(new Float32Array(words.buffer));
 }
 
-// all panels by name, each with its lines {run, key, t, y}
+// all panels by name, each with its models and its lines {run, key, t, y}
 async function unpacked() {
   const [bytes, text] = await Promise.all([inflated('panel-data'), inflated('panel-index')]);
   const index = JSON.parse(new TextDecoder().decode(text));
   const axes = index.axes.map((axis) => times(bytes, axis));
   for (const panel of Object.values(index.panels)) {
+    panel.models = panel.kinds.map((kind) => index.models[`${kind} ${panel.lines.length}`]);
     panel.lines = panel.lines.map(({ run, key, axis, at }) => ({
       run, key, t: axes[axis], y: values(bytes, at, axes[axis].length),
     }));

@@ -16,7 +16,7 @@ function digits(x) {
 
 class PanelView {
   constructor(host, content, state) {
-    Object.assign(this, { host, content, state, hidden: new Set(), figure: null, form: -1 });
+    Object.assign(this, { host, content, state, hidden: new Set(), figure: null, kind: '' });
     this.near = false;
     this.work = Promise.resolve();
     this.cells = [...host.querySelectorAll('[data-line]')];
@@ -29,7 +29,7 @@ class PanelView {
   }
 
   get logarithmic() {
-    return this.content.kind === 'log' || this.form === 1;
+    return this.kind === 'log';
   }
 
   // what is out of sight is drawn when it comes into sight
@@ -41,14 +41,15 @@ class PanelView {
 
   // Bokeh's models are made when the panel is first seen, and again for another vertical axis
   async build() {
-    const form = this.state.logarithmic && this.content.kind === 'both' ? 1 : 0;
-    if (form === this.form) return;
+    const form = this.content.kinds.length > 1 && this.state.logarithmic ? 1 : 0;
+    const kind = this.content.kinds[form];
+    if (kind === this.kind) return;
     const target = this.host.querySelector('.plot');
     const [old, shown] = [this.figure, [...target.children]];
-    const views = await Bokeh.embed.embed_item(structuredClone(this.content.items[form]), target);
+    const views = await Bokeh.embed.embed_item(structuredClone(this.content.models[form]), target);
     if (old) old.document.clear();
     for (const element of shown) element.remove();
-    this.form = form;
+    this.kind = kind;
     this.figure = views.roots[0].model;
     this.models = [...this.figure.references()];
     const named = (name) => this.models.find((model) => model.name === name);
@@ -57,15 +58,20 @@ class PanelView {
     this.wheel = typed('WheelZoomTool');
     this.drags = { pan: typed('PanTool'), zoom: typed('BoxZoomTool') };
     this.cursor = named('cursor');
-    this.fill();
+    this.dress();
     this.listen(this.figure.x_range);
     this.paint();
   }
 
-  fill() {
+  dress() {
+    const { keys, label, unit, kinds } = this.content;
+    this.figure.name = this.host.dataset.panel;
+    this.figure.left[0].axis_label = `${this.logarithmic && kinds.length > 1 ? `|${label}|` : label} (${unit})`;
     this.content.lines.forEach((line, i) => {
       const y = this.logarithmic ? line.y.map((value) => Math.abs(value) || NaN) : line.y;
-      this.lines[i].data_source.data = { t: line.t, y, base: new Float64Array(y.length) };
+      const { data_source: source, glyph } = this.lines[i];
+      source.data = { t: line.t, y, base: new Float64Array(y.length) };
+      if (this.kind !== 'stack') glyph.setv({ line_dash: this.state.dashes[line.run], line_width: keys[line.key].width });
     });
   }
 
@@ -86,7 +92,7 @@ class PanelView {
     const { figure } = this;
     this.content.lines.forEach((line, i) => { this.lines[i].visible = this.shows(line); });
     if (figure.x_range.start !== start || figure.x_range.end !== end) figure.x_range.setv({ start, end });
-    if (this.content.kind === 'stack') this.stack();
+    if (this.kind === 'stack') this.stack();
     figure.y_range.setv(this.fitted(start, end));
     this.wheel.active = this.host.contains(document.activeElement);
     figure.toolbar.active_drag = this.drags[this.state.drag];
@@ -107,7 +113,7 @@ class PanelView {
 
   // ends of the vertical axis, about what is shown between two times
   fitted(start, end) {
-    if (this.content.kind === 'stack') return { start: 0, end: 100 };
+    if (this.kind === 'stack') return { start: 0, end: 100 };
     let [low, high] = [Infinity, -Infinity];
     for (const { visible, data_source: { data: { t, y } } } of this.lines) {
       if (!visible) continue;
@@ -146,7 +152,8 @@ class PanelView {
       else if (model.type === 'Span') model.line_color = soft;
     }
     this.content.lines.forEach(({ key }, i) => {
-      if (this.content.keys[key].colour === 'ink') this.lines[i].glyph.line_color = ink;
+      const shade = this.content.keys[key].colour;
+      this.lines[i].glyph[this.kind === 'stack' ? 'fill_color' : 'line_color'] = shade === 'ink' ? ink : shade;
     });
   }
 }

@@ -9,7 +9,8 @@ class PanelState {
     this.pointed = null;
     this.logarithmic = false;
     this.drag = 'zoom';
-    this.runs = new Set(index.runs);
+    this.dashes = index.runs;
+    this.runs = new Set(Object.keys(index.runs));
     this.dofs = new Set();
     this.views = [];
     this.asked = 0;

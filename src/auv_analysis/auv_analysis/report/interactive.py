@@ -15,7 +15,7 @@ from auv_analysis.report.traces import COLUMNS, Line, thinned
 from auv_analysis.summary import TRANSIENT
 from auv_dynamics.signals import DOFS
 
-POINTS = 400_000  # of all panels together, some 2 MB of the page
+POINTS = 300_000  # of all panels together, at most 1.3 MB of the page
 FEWEST = 200  # columns of pixels that a line keeps however many lines there are
 HERE = Path(__file__).parent
 KINDS = {'line': ('line',), 'log': ('log',), 'both': ('line', 'log'), 'stack': ('stack',)}

@@ -23,7 +23,7 @@ from auv_dynamics.signals import DOFS
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#D55E00', '#56B4E9')  # Okabe and Ito
 DASHES = ('-', (0, (4, 1.6)), (0, (1, 1.3)), (0, (6, 1.4, 1, 1.4)), (0, (9, 2)), (0, (3, 1, 1, 1)))
 GREY = '#6b6b6b'
-PALETTE = 255  # colours of a PNG
+PALETTE = 64  # colours of a PNG
 WIDTH = 7.2  # in, two columns of a journal
 DPI = 160
 GROUPS = (range(3), range(3, 6))  # linear, angular
@@ -110,7 +110,7 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     figure.savefig(drawn)
     with Image.open(
         drawn
-    ) as image:  # few colours: a third of the bytes, so that a report stays small
+    ) as image:  # few colours: a fifth of the bytes, so that a report stays small
         few = image.convert('RGB').quantize(PALETTE, dither=Image.Dither.NONE)
     few.save(png, optimize=True, dpi=(DPI, DPI))
     figure.set_layout_engine('none')  # laid out once is enough

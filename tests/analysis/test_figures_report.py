@@ -98,6 +98,19 @@ def test_every_figure_is_a_png_and_a_pdf_with_something_on_it(figures):
         assert (pixels < 200).mean() > 0.003, figure.name
 
 
+def test_figures_are_what_the_journal_prints(figures):
+    """At the width of its text, of lines and embedded fonts, without images and transparency."""
+    for figure in figures.values():
+        pdf = figure.pdf.read_bytes()
+        left, _, right, _ = map(float, re.search(rb'/MediaBox \[([^]]*)\]', pdf)[1].split())
+        assert right - left == pytest.approx(72 * 6.27, abs=0.5), figure.name
+        assert set(re.findall(rb'/Subtype /(\w+)', pdf)) == {b'Type0', b'CIDFontType2'}
+        assert pdf.count(b'/FontFile2') == pdf.count(b'/Subtype /CIDFontType2') > 0
+        assert set(re.findall(rb'/(?:ca|CA) ([0-9.]+)', pdf)) <= {b'0', b'1'}
+        with Image.open(figure.png) as image:
+            assert image.size[0] == pytest.approx(184 * 6.27, abs=1.0)
+
+
 def test_the_paper_figures_are_all_there(figures, tmp_path, quick):
     captions = ' '.join(figure.caption for figure in figures.values())
     assert all(f'the paper’s figure {number}.' in captions for number in '12345')

@@ -160,7 +160,10 @@ function showPanels(bar) {
   const wanted = document.getElementById(location.hash.slice(1));
   document.documentElement.classList.add('with-panels');
   for (const details of stills) details.open = details.contains(wanted);
-  bar.open = !matchMedia('(max-width: 40rem)').matches;
+  const narrow = matchMedia('(max-width: 40rem)');
+  const fold = () => { bar.open = !narrow.matches; };
+  narrow.addEventListener('change', fold);
+  fold();
   wanted?.scrollIntoView();
   window.addEventListener('beforeprint', () => stills.forEach((details) => { details.open = true; }));
 }

@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 from browser import Watched, pixels
 
+from auv_analysis.report.packing import Packer
+
 CELLS = """(table) => [...table.tBodies[0].rows].map((row) => [...row.cells].map(
   (cell) => cell.dataset.value ?? cell.textContent.replace(/\\s+/g, ' ').trim()))"""
+READ = """async ([packed, axis, at]) => {
+  document.getElementById('panel-data').textContent = packed;
+  const bytes = await inflated('panel-data');
+  return [[...times(bytes, axis)], [...values(bytes, at, axis.count)]];
+}"""
 
 
 def test_the_page_is_small_and_its_panels_replace_the_still_figures(report, report_path):
@@ -93,3 +100,15 @@ def test_tables_download_what_they_show(report):
     shown = table.evaluate(CELLS)
     assert len(rows) == len(shown) + 1
     assert rows[1:] == shown
+
+
+def test_packed_lines_are_read_as_they_were_written(report):
+    t = 3.0 + 0.01 * np.array([0, 1, 5, 70_000, 90_000_000])
+    y = np.array([0.0, -1.25, 3.0e-7, 4.0e9, -(2.0**-100)])
+    packer = Packer()
+    packer.add_values(np.ones(3))
+    packer.add_axis(t, 0.01)
+    at = packer.add_values(y)
+    times, values = report.page.evaluate(READ, [packer.packed(), packer.axes[0], at])
+    assert times == pytest.approx(t.tolist(), abs=1e-9)
+    assert values == pytest.approx(y.tolist(), rel=2.0**-16)

@@ -76,7 +76,6 @@ def draw_figures(
     figures : in the order of the report; lumped errors only where F is known and estimated
 
     """
-    folder.mkdir(parents=True, exist_ok=True)
     drawn = {name: replace(run, controller=name) for name, run in sketches(runs).items()}
     figures: list[FigureRecord] = []
 

@@ -26,7 +26,6 @@ def sensitivity_figure(found: Sensitivity, folder: Path) -> FigureRecord:
     shown = [variable for kind in SHOWN for variable in found.of(kind).values()]
     if not shown:
         return FigureRecord(name, title, f'{title}: nothing to draw.', None, None)
-    folder.mkdir(parents=True, exist_ok=True)
     sobol = found.method == 'sobol'
     with plotting.style():
         figure = plotting.new_figure(ROW * len(shown) + 0.9)

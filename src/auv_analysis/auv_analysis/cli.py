@@ -69,6 +69,17 @@ def parser() -> argparse.ArgumentParser:
     sweep.add_argument('--executor', choices=('threads', 'dask'), help='default: threads')
     sweep.add_argument('--scheduler', metavar='ADDRESS', help='of dask, such as tcp://host:8786')
     sweep.add_argument('--workers', metavar='N', help='threads or processes; default: the cores')
+    watch = command('watch', 'live dashboard in the terminal', writes=False)
+    watch.add_argument('--domain-id', help='ROS domain, default: $ROS_DOMAIN_ID, else 0')
+    watch.add_argument('--namespace', default='/', help='of the graph, such as /auv1')
+    watch.add_argument('--vehicle', help='for energy and couplings where no analysis_node runs')
+    watch.add_argument('--rate', metavar='HZ', help='refreshes per second; default: 4, in a pipe 1')
+    watch.add_argument('--once', action='store_true', help='print a single snapshot')
+    watch.add_argument(
+        '--for', dest='limit', metavar='SECONDS', help='print the last snapshot after so long'
+    )
+    watch.add_argument('--odom-frame', default='odom_ned', help='frame of poses, NED')
+    watch.add_argument('--base-frame', default='base_link_fsd', help='body frame, FSD')
     info = command('info', 'what lies in a bag', writes=False)
     info.add_argument('bag', type=Path, metavar='BAG')
     params = command('params', 'the ROS parameter file of a scenario', writes=True)

@@ -41,7 +41,8 @@ def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> i
     stop = threading.Event()
     for number in SIGNALS:
         signal.signal(number, lambda *_: stop.set())
-    _give_way(makes)
+    if not any(getattr(make, 'prompt', False) for make in makes):
+        give_way()
     nodes: list[Any] = []
     code = 0
     try:
@@ -68,11 +69,10 @@ def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> i
     return code
 
 
-def _give_way(makes: Sequence[Any]) -> None:
+def give_way() -> None:
     """Let a process that only observes not interrupt those whose answers are waited for."""
-    if not any(getattr(make, 'prompt', False) for make in makes):
-        with contextlib.suppress(OSError, AttributeError):  # not every system has it
-            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    with contextlib.suppress(OSError, AttributeError):  # not every system has it
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def _spin(nodes: list[Any], executor: SingleThreadedExecutor, stop: threading.Event) -> None:

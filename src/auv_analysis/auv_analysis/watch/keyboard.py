@@ -1,0 +1,50 @@
+"""What ends a dashboard: the key q, Ctrl-C, or a signal."""
+
+import select
+import signal
+import sys
+import termios
+import time
+import tty
+from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Keyboard:
+    """Reads single keys while it is entered; terminal and signals are as before afterwards.
+
+    Attributes
+    ----------
+    ended : whether somebody wants an end
+
+    """
+
+    def __init__(self) -> None:
+        self.ended = False
+        has_keys = sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty()
+        self._file = sys.stdin.fileno() if has_keys else None
+
+    def __enter__(self) -> 'Keyboard':
+        self._signals = {number: signal.signal(number, self._end) for number in SIGNALS}
+        if self._file is not None:
+            self._terminal = termios.tcgetattr(self._file)
+            tty.setcbreak(self._file)
+        return self
+
+    def _end(self, number: int, frame: FrameType | None) -> None:
+        self.ended = True
+
+    def wait(self, seconds: float) -> None:
+        """Wait for a key, at most so many s."""
+        if self._file is None:
+            time.sleep(seconds)
+        elif select.select([self._file], [], [], seconds)[0]:
+            key = sys.stdin.read(1)
+            self.ended = self.ended or key in ('q', 'Q', '')
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            termios.tcsetattr(self._file, termios.TCSADRAIN, self._terminal)
+        for number, handler in self._signals.items():
+            signal.signal(number, handler)

@@ -78,8 +78,8 @@ def parser() -> argparse.ArgumentParser:
     watch.add_argument(
         '--for', dest='limit', metavar='SECONDS', help='print the last snapshot after so long'
     )
-    watch.add_argument('--odom-frame', default='odom_ned', help='frame of poses, NED')
-    watch.add_argument('--base-frame', default='base_link_fsd', help='body frame, FSD')
+    watch.add_argument('--odom-frame', help='frame of poses, default: odom_ned')
+    watch.add_argument('--base-frame', help='body frame, default: base_link_fsd')
     info = command('info', 'what lies in a bag', writes=False)
     info.add_argument('bag', type=Path, metavar='BAG')
     params = command('params', 'the ROS parameter file of a scenario', writes=True)

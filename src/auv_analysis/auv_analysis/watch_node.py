@@ -11,7 +11,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.exceptions import InvalidNamespaceException
 from rclpy.qos import HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
@@ -19,7 +18,6 @@ from rclpy.subscription import Subscription
 from auv_analysis.watch.gauge import HEARD, Gauge
 from auv_analysis.watch.snapshot import LEVELS, NodeState
 from auv_dynamics import interface
-from auv_dynamics.files import InputError
 from auv_dynamics.interface import BadMessageError, Frames
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
@@ -55,18 +53,14 @@ class WatchNode(BulkNode):
     """
 
     def __init__(self, context: Context, namespace: str, frames: Frames, gauge: Gauge):
-        try:
-            super().__init__(
-                interface.OBSERVER,
-                context=context,
-                namespace=namespace,
-                use_global_arguments=False,
-                start_parameter_services=False,
-                enable_rosout=False,
-            )
-        except InvalidNamespaceException as error:
-            found = str(error).splitlines()[0]
-            raise InputError('--namespace', '', 'a ROS namespace such as /auv1', found) from None
+        super().__init__(
+            interface.OBSERVER,
+            context=context,
+            namespace=namespace,
+            use_global_arguments=False,
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
         self._gauge = gauge
         self._frames = frames
         heard = [topic for topic in topics.TOPICS if topic.name in HEARD]
@@ -158,10 +152,6 @@ class Listener(Participant):
     namespace : of the graph
     frames : frame ids that are accepted
     gauge : is told of everything
-
-    Raises
-    ------
-    InputError : no namespace
 
     """
 

@@ -3,6 +3,7 @@
 import argparse
 import math
 import os
+import re
 import time
 from contextlib import ExitStack
 from dataclasses import replace
@@ -39,16 +40,18 @@ def watch(options: argparse.Namespace) -> dict[str, Any]:
     limit = _positive(options.limit, '--for', math.inf) or math.inf
     vehicle = None if options.vehicle is None else load_vehicle(options.vehicle)
     domain = joined_domain(options.domain_id)
-    namespace = '/' + options.namespace.strip('/')
-    _join(domain)
-    # the middleware reads its environment when it is loaded
-    from auv_analysis.watch_node import Listener
-    from auv_dynamics.ros.life import give_way
-
-    give_way()
-    gauge = Gauge(domain, namespace, vehicle, begin=time.monotonic())
+    namespace = _namespace(options.namespace)
     with ExitStack() as stack:
-        frames = Frames(options.odom_frame, options.base_frame)
+        keyboard = stack.enter_context(Keyboard())  # from here on Ctrl-C is an end like another
+        _join(domain)
+        # the middleware reads its environment when it is loaded
+        from auv_analysis.watch_node import Listener
+        from auv_dynamics.ros.life import give_way
+
+        give_way()
+        gauge = Gauge(domain, namespace, vehicle, begin=time.monotonic())
+        usual = Frames()
+        frames = Frames(options.odom_frame or usual.odom, options.base_frame or usual.base)
         listener = Listener(domain, namespace, frames, gauge)
         stack.callback(listener.close)
         say(f'listens on {_place(domain, namespace)}')
@@ -56,7 +59,6 @@ def watch(options: argparse.Namespace) -> dict[str, Any]:
         single = options.once or limit < math.inf
         live = console.is_terminal and not single
         display = Live(console) if live else Printed(console, every=not single)
-        keyboard = stack.enter_context(Keyboard())
         stack.enter_context(display)
         session = _Session(gauge, listener, display, rate or (ON_SCREEN if live else IN_PIPE))
         return session.run(keyboard, limit, once=options.once).document()
@@ -131,6 +133,13 @@ def _place(domain: int, namespace: str) -> str:
     reach = f'this machine only ({RANGE}={HERE})' if where == HERE else f'{RANGE}={where}'
     inside = '' if namespace == '/' else f', namespace {namespace}'
     return f'{VARIABLE}={domain}{inside}, {reach}'
+
+
+def _namespace(text: str) -> str:
+    namespace = '/' + text.strip('/')
+    if not re.fullmatch(r'/|(/[A-Za-z_][A-Za-z0-9_]*)+', namespace):
+        raise InputError('--namespace', '', 'a ROS namespace such as /auv1', text)
+    return namespace
 
 
 def _positive(text: str | None, name: str, most: float) -> float | None:

@@ -1,5 +1,6 @@
 """What ends a dashboard: the key q, Ctrl-C, or a signal."""
 
+import os
 import select
 import signal
 import sys
@@ -40,8 +41,8 @@ class Keyboard:
         if self._file is None:
             time.sleep(seconds)
         elif select.select([self._file], [], [], seconds)[0]:
-            key = sys.stdin.read(1)
-            self.ended = self.ended or key in ('q', 'Q', '')
+            keys = os.read(self._file, 64)
+            self.ended = self.ended or not keys or b'q' in keys.lower()
 
     def __exit__(self, *_: object) -> None:
         if self._file is not None:

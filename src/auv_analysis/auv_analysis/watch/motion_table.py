@@ -5,7 +5,6 @@ from collections.abc import Callable
 from rich.console import RenderableType
 from rich.progress_bar import ProgressBar
 from rich.table import Table
-from rich.text import Text
 
 from auv_analysis.watch.snapshot import Six, Snapshot
 from auv_analysis.watch.text import MISSING, fixed, short, spark
@@ -29,16 +28,22 @@ def motion_table(snapshot: Snapshot, width: int) -> Table:
     table.add_column('energy\n%', justify='right', no_wrap=True)
     table.add_column('', width=BAR, no_wrap=True)
     if wide:
-        table.add_column('error lately', width=HISTORY, no_wrap=True)
+        table.add_column('error, last 10 s', width=HISTORY, no_wrap=True)
     energy, history = snapshot.kinetic_energy, snapshot.velocity_error.history[-HISTORY:]
     for i, dof in enumerate(DOFS):
         share = energy.shares_percent[i] if energy else None
         row: list[RenderableType] = [dof, *(texts[i] for _, _, texts in columns)]
-        row += [fixed(share, 1), Text() if share is None else ProgressBar(100.0, share, BAR)]
+        row += [fixed(share, 1), _bar(share)]
         if wide:
             row.append(spark([largest[i] for largest in history]))
         table.add_row(*row)
     return table
+
+
+def _bar(share: float | None) -> RenderableType:
+    if share is None:
+        return ''
+    return ProgressBar(100.0, share, BAR, complete_style='cyan', finished_style='cyan')
 
 
 def _columns(snapshot: Snapshot, *, wide: bool) -> list[Column]:

@@ -1,6 +1,8 @@
 """Health of a snapshot: its topics, its nodes, and what is wrong."""
 
-from collections.abc import Iterable
+import posixpath
+from collections.abc import Sequence
+from textwrap import wrap
 
 from rich.table import Table
 from rich.text import Text
@@ -9,7 +11,7 @@ from auv_analysis.watch.snapshot import NodeState, Snapshot, TopicState, Trouble
 from auv_analysis.watch.text import count, fact, rate, seconds
 from auv_dynamics import interface
 
-ANALYSIS = 'analysis/*'
+ANALYSIS = f'{posixpath.commonpath(interface.ANALYSIS_TOPICS)}/*'
 BASIC = (interface.ODOM, interface.CMD_VEL, interface.WRENCH)  # shown though nobody publishes them
 STYLES = {'ok': 'green', 'warning': 'yellow', 'error': 'bold red', 'stale': 'yellow'}
 OWN = (interface.DIAGNOSTICS,)  # shown as nodes
@@ -73,45 +75,43 @@ def _folded(topics: list[TopicState]) -> list[TopicState]:
     return [*rest[:first], one, *rest[first:]]
 
 
-def nodes_table(snapshot: Snapshot, rows: int | None = None) -> Table:
-    """Table of what the nodes say of themselves; `rows` at most."""
+def nodes_table(snapshot: Snapshot, rows: int | None = None, *, facts: bool = True) -> Table:
+    """Table of what the nodes say of themselves; `rows` at most, with or without their facts."""
     table = _table()
     table.add_column('node', no_wrap=True, min_width=NAME)
     table.add_column('health', no_wrap=True, overflow='ellipsis')
     for node in snapshot.nodes[:rows]:
-        table.add_row(node.name.removeprefix('/'), _health(node))
+        table.add_row(node.name.removeprefix('/'), _health(node, facts=facts))
     if not snapshot.nodes:
         table.add_row(Text(f'none on {interface.DIAGNOSTICS}', 'dim'))
     return table
 
 
-def _health(node: NodeState) -> Text:
-    text = Text(node.level, STYLES[node.level])
+def _health(node: NodeState, *, facts: bool) -> Text:
+    text = Text().append(node.level, STYLES[node.level])
     if node.level == 'stale':
         text.append(f' for {seconds(node.age)}')
-    facts = {key: value for key, value in node.facts.items() if key not in ('ready', 'refused')}
     if node.facts.get('ready') == 'False':
         text.append(' not ready', 'yellow')
     if node.facts.get('refused', '0') != '0':
         text.append(f' refused {node.facts["refused"]}', 'red')
-    for key, value in list(facts.items())[:SHOWN_FACTS]:
+    others = {key: value for key, value in node.facts.items() if key not in ('ready', 'refused')}
+    for key, value in list(others.items())[: SHOWN_FACTS if facts else 0]:
         text.append(f' {key} {fact(value)}', 'dim')
     return text
 
 
-def troubles_lines(troubles: Iterable[Trouble], most: int | None = None) -> list[Text]:
-    """A line for each of what is wrong, `most` at most; the worst come first."""
-    troubles = list(troubles)
+def troubles_lines(troubles: Sequence[Trouble], width: int, most: int | None = None) -> list[Text]:
+    """What is wrong, the worst first, in lines of so many columns; `most` lines at most."""
     lines = []
-    for trouble in troubles[:most]:
-        again = f' ({trouble.count} times)' if trouble.count > 1 else ''
-        age = f' {seconds(trouble.age)} ago' if trouble.age >= 1.0 else ''
-        line = f'{trouble.level}: {trouble.text}{again}{age}'
-        lines.append(
-            Text(line, STYLES[trouble.level], no_wrap=most is not None, overflow='ellipsis')
-        )
-    if most is not None and len(troubles) > most:
-        lines[-1] = Text(f'and {len(troubles) - most + 1} more', STYLES[troubles[most - 1].level])
+    for trouble in troubles:
+        seen = [f'{trouble.count} times'] if trouble.count > 1 else []
+        seen += [f'{seconds(trouble.age)} ago'] if trouble.age >= 1.0 else []
+        line = f'{", ".join([trouble.level, *seen])}: {trouble.text}'
+        style = STYLES[trouble.level]
+        lines += [Text(part, style) for part in wrap(line, width, subsequent_indent='  ')]
+    if most is not None and len(lines) > most:
+        lines[most - 1 :] = [Text(f'and more: {len(troubles)} in all', lines[0].style)]
     return lines
 
 

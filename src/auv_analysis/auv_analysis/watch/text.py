@@ -1,7 +1,10 @@
 """Numbers as short texts for a terminal."""
 
+from datetime import UTC, datetime
+
 MISSING = '–'
 BLOCKS = ' ▁▂▃▄▅▆▇█'
+DATES = 1e9  # s: stamps from here on are of the wall clock
 
 
 def fixed(value: float | None, digits: int = 4) -> str:
@@ -37,6 +40,13 @@ def seconds(value: float | None) -> str:
     if value is None:
         return MISSING
     return f'{value:.1f} s' if value < 100 else f'{value:.0f} s'
+
+
+def stamp(value: float) -> str:
+    """Time of a message: s since the start of a simulation, else the time of day."""
+    if value < DATES:
+        return f'{value:.2f} s'
+    return datetime.fromtimestamp(value, UTC).strftime('%H:%M:%S.%f')[:-5] + ' UTC'
 
 
 def fact(value: str) -> str:

@@ -69,7 +69,19 @@ def parser() -> argparse.ArgumentParser:
     sweep.add_argument('--executor', choices=('threads', 'dask'), help='default: threads')
     sweep.add_argument('--scheduler', metavar='ADDRESS', help='of dask, such as tcp://host:8786')
     sweep.add_argument('--workers', metavar='N', help='threads or processes; default: the cores')
-    watch = command('watch', 'live dashboard in the terminal', writes=False)
+    _add_watch_options(command('watch', 'live dashboard in the terminal', writes=False))
+    info = command('info', 'what lies in a bag', writes=False)
+    info.add_argument('bag', type=Path, metavar='BAG')
+    params = command('params', 'the ROS parameter file of a scenario', writes=True)
+    params.add_argument('scenario', help=SCENARIO)
+    params.add_argument('--controller', required=True)
+    params.add_argument('--real-time', action='store_true', help='paced by the clock')
+    check = command('check-vehicle', 'inertia, couplings and limits of a vehicle', writes=False)
+    check.add_argument('vehicle', metavar='FILE', help='a vehicle file, or a shipped bare name')
+    return main
+
+
+def _add_watch_options(watch: argparse.ArgumentParser) -> None:
     watch.add_argument('--domain-id', help='ROS domain, default: $ROS_DOMAIN_ID, else 0')
     watch.add_argument('--namespace', default='/', help='of the graph, such as /auv1')
     watch.add_argument('--vehicle', help='for energy and couplings where no analysis_node runs')
@@ -80,15 +92,6 @@ def parser() -> argparse.ArgumentParser:
     )
     watch.add_argument('--odom-frame', help='frame of poses, default: odom_ned')
     watch.add_argument('--base-frame', help='body frame, default: base_link_fsd')
-    info = command('info', 'what lies in a bag', writes=False)
-    info.add_argument('bag', type=Path, metavar='BAG')
-    params = command('params', 'the ROS parameter file of a scenario', writes=True)
-    params.add_argument('scenario', help=SCENARIO)
-    params.add_argument('--controller', required=True)
-    params.add_argument('--real-time', action='store_true', help='paced by the clock')
-    check = command('check-vehicle', 'inertia, couplings and limits of a vehicle', writes=False)
-    check.add_argument('vehicle', metavar='FILE', help='a vehicle file, or a shipped bare name')
-    return main
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 from rich.console import RenderableType
-from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from auv_analysis.share_bar import share_bar
 from auv_analysis.watch.snapshot import Six, Snapshot
 from auv_analysis.watch.text import MISSING, fixed, short, spark
 from auv_dynamics.signals import DOFS
@@ -33,17 +33,11 @@ def motion_table(snapshot: Snapshot, width: int) -> Table:
     for i, dof in enumerate(DOFS):
         share = energy.shares_percent[i] if energy else None
         row: list[RenderableType] = [dof, *(texts[i] for _, _, texts in columns)]
-        row += [fixed(share, 1), _bar(share)]
+        row += [fixed(share, 1), '' if share is None else share_bar(share, BAR)]
         if wide:
             row.append(spark([largest[i] for largest in history]))
         table.add_row(*row)
     return table
-
-
-def _bar(share: float | None) -> RenderableType:
-    if share is None:
-        return ''
-    return ProgressBar(100.0, share, BAR, complete_style='cyan', finished_style='cyan')
 
 
 def _columns(snapshot: Snapshot, *, wide: bool) -> list[Column]:

@@ -63,9 +63,7 @@ class WatchNode(BulkNode):
         )
         self._gauge = gauge
         self._frames = frames
-        heard = [topic for topic in topics.TOPICS if topic.name in HEARD]
-        # set-points come first, so that those of an odometry are there before it
-        self._topics = sorted(heard, key=lambda topic: topic is not topics.CMD_VEL)
+        self._topics = [topic for topic in topics.TOPICS if topic.name in HEARD]
         self._subscribed: dict[topics.Topic, Subscription] = {}
         self._now = 0.0
 
@@ -98,6 +96,9 @@ class WatchNode(BulkNode):
             topic.type, topic.name, callback, _sight(), event_callbacks=events, raw=True
         )
         self.add_data(subscription)
+        # set-points come first, so that the one of an odometry is there before it
+        setpoints = self.resolve_topic_name(topics.CMD_VEL.name)
+        self.data_subscriptions().sort(key=lambda one: one.topic_name != setpoints)
         return subscription
 
     def _callback(self, topic: topics.Topic) -> Callable[[bytes, dict], None]:

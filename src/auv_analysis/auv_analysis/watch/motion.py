@@ -1,5 +1,6 @@
 """Errors, energy and couplings of what was heard last."""
 
+import math
 from bisect import bisect_right
 from collections import OrderedDict
 
@@ -45,7 +46,7 @@ class Motion:
         self.tau: Six | None = None
         self.lumped_error: Six | None = None
         self._trend = Trend()
-        self._paired = -FRESH  # when a velocity was last heard together with its set-point
+        self._paired = -math.inf  # when a velocity was last heard together with its set-point
         self._stamps: list[int] = []
         self._setpoints: list[Six] = []
         self._pending: dict[str, OrderedDict[int, Six]] = {
@@ -111,7 +112,7 @@ class Motion:
 
     def published(self, now: float, topic: str) -> Six | None:
         """Newest numbers of an analysis topic, while it is alive."""
-        at, values = self._published.get(topic, (-FRESH, None))
+        at, values = self._published.get(topic, (-math.inf, None))
         return values if now - at < FRESH else None
 
     def energy(self, now: float) -> Energy | None:

@@ -23,6 +23,7 @@ from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.codec import KINDS, Codec, first_stamp
 from auv_dynamics.ros.endpoints import Endpoints, endpoints
+from auv_dynamics.ros.life import serve
 from auv_dynamics.ros.participant import Participant
 from auv_dynamics.ros.private import PLAIN
 
@@ -169,12 +170,13 @@ class Listener(Participant):
             self._serve(SERVED)
         if self._looked is None or now - self._looked > LOOK or listening != self._listened:
             self._looked, self._listened = now, listening
-            self._serve(1)
+            self._serve(SERVED)
             self._node.look(listening=listening)
 
     def _serve(self, callbacks: int) -> None:
         for _ in range(callbacks):
-            self._executor.spin_once(timeout_sec=0.0)
+            if not serve(self._node, self._executor, 0.0):
+                break
 
     def elsewhere(self) -> list[str]:
         """Other namespaces in which odometry is published."""

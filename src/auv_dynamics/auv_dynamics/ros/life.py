@@ -84,13 +84,13 @@ def _spin(nodes: list[Any], executor: SingleThreadedExecutor, stop: threading.Ev
 
     while not (stop.is_set() or ended() or _orphaned()):
         if PLAIN:
-            _serve(nodes[0], executor, POLL)
+            serve(nodes[0], executor, POLL)
             continue
         data.serve(_next_look(nodes), ended)
         for node in nodes:
             node.follow_clock()
         for _ in range(CALLBACKS):
-            if not _serve(nodes[0], executor, 0.0):
+            if not serve(nodes[0], executor, 0.0):
                 break
 
 
@@ -101,8 +101,8 @@ def _next_look(nodes: list[Any]) -> float:
     return time.monotonic() + min([SERVE, *(max(0, ns) / 1e9 for ns in left if ns is not None)])
 
 
-def _serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> bool:
-    """Run a callback that is ready, if there is one."""
+def serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> bool:
+    """Run a callback that is ready within so many s; whether there was one."""
     try:
         callback, _, node = executor.wait_for_ready_callbacks(timeout_sec=timeout)
         callback()

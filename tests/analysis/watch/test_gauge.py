@@ -38,6 +38,18 @@ def test_nobody_there_is_no_trouble() -> None:
     assert snapshot.troubles == ()
 
 
+def test_diagnostics_are_of_all_namespaces_and_no_sign_of_this_graph() -> None:
+    gauge = Gauge(0)
+    gauge.see(0.0, {interface.DIAGNOSTICS: ends(), interface.ODOM: ends(0)})
+    gauge.hear(0.0, interface.DIAGNOSTICS, 0, 0, None)
+    assert not gauge.snapshot(0.0).heard
+    assert not gauge.snapshot(0.0).published
+    gauge.see(0.0, {interface.ODOM: ends()})
+    gauge.hear(0.0, interface.ODOM, 0, 0, STATE)
+    assert gauge.snapshot(0.0).heard
+    assert gauge.snapshot(0.0).published
+
+
 def test_a_snapshot_is_plain_json_without_and_with_everything() -> None:
     gauge = Gauge(0, vehicle=load_vehicle('herman2018'))
     json.dumps(gauge.snapshot(0.0).document(), allow_nan=False)

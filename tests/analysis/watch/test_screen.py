@@ -139,6 +139,13 @@ def test_topics_and_nodes_are_listed_with_their_health() -> None:
     assert row(lines(ended, 120), interface.ODOM)[1] == 'ended'
 
 
+def test_names_are_shown_as_they_are() -> None:
+    odd = NodeState('camera: [front]', 'ok', 'ok', 0.0, {'[red]': '[b]'})
+    text = ' '.join(lines(replace(FULL, nodes=(odd,)), 120))
+    assert 'camera: [front]' in text
+    assert '[red] [b]' in text
+
+
 def test_troubles_are_lines_of_their_own_and_end_where_the_terminal_does() -> None:
     found = lines(replace(FULL, troubles=WRONG), 80, 24)
     assert 'error, 1.0 s ago: trouble 1' in [line.strip() for line in found]

@@ -1,9 +1,11 @@
 """`auv watch`: a live dashboard of a node graph, which is not disturbed by it."""
 
 import argparse
+import io
 import math
 import os
 import re
+import sys
 import time
 from contextlib import ExitStack
 from dataclasses import replace
@@ -55,13 +57,20 @@ def watch(options: argparse.Namespace) -> dict[str, Any]:
         listener = Listener(domain, namespace, frames, gauge)
         stack.callback(listener.close)
         say(f'listens on {_place(domain, namespace)}')
-        console = Console(stderr=options.json, highlight=False)
+        console = _console(stderr=options.json)
         single = options.once or limit < math.inf
         live = console.is_terminal and not single
         display = Live(console) if live else Printed(console, every=not single)
         stack.enter_context(display)
         session = _Session(gauge, listener, display, rate or (ON_SCREEN if live else IN_PIPE))
         return session.run(keyboard, limit, once=options.once).document()
+
+
+def _console(*, stderr: bool) -> Console:
+    stream = sys.stderr if stderr else sys.stdout
+    if isinstance(stream, io.TextIOWrapper):
+        stream.reconfigure(errors='replace')  # bars and dashes, where the encoding has none
+    return Console(stderr=stderr, highlight=False)
 
 
 class _Session:
@@ -90,8 +99,9 @@ class _Session:
             if keyboard.ended or (once and now >= settled):
                 break
             if now - begin >= limit:
-                if not self._gauge.heard:
-                    raise FailedError(f'{self._waits_for()}: nothing came in {limit:g} s')
+                snapshot = self._snapshot(now)
+                if not snapshot.heard:
+                    raise FailedError(f'{self._waits_for(snapshot)}: gave up after {limit:g} s')
                 break
             keyboard.wait(LOOK)
         snapshot = self._snapshot(time.monotonic())
@@ -104,18 +114,19 @@ class _Session:
     def _show(self, now: float, *, waits: bool) -> None:
         snapshot = self._snapshot(now)
         if waits and not snapshot.heard:
-            text = f'{self._waits_for()}; waiting'
+            text = f'{self._waits_for(snapshot)}; waiting'
             snapshot = replace(snapshot, troubles=(Trouble('warning', text), *snapshot.troubles))
             if not (self._said or self._display.live):
                 say(text)
                 self._said = True
         self._display.show(snapshot)
 
-    def _waits_for(self) -> str:
+    def _waits_for(self, snapshot: Snapshot) -> str:
+        what = 'nothing comes of' if snapshot.published else 'nobody publishes'
         names = f'{", ".join(BASIC[:-1])} or {BASIC[-1]}'
-        text = f'nobody publishes {names} on {_place(self._gauge.domain, self._gauge.namespace)}'
+        text = f'{what} {names} on {_place(snapshot.domain, snapshot.namespace)}'
         elsewhere = ' or '.join(self._listener.elsewhere())
-        return f'{text}, but somebody in {elsewhere}, see --namespace' if elsewhere else text
+        return f'{text}, but odometry in {elsewhere}: see --namespace' if elsewhere else text
 
 
 def _join(domain: int) -> None:

@@ -68,11 +68,6 @@ class Gauge:
             self._streams[name].publishers = ends.publishers
 
     @property
-    def heard(self) -> bool:
-        """Whether any message has come."""
-        return any(stream.heard for stream in self._streams.values())
-
-    @property
     def moves(self) -> bool:
         """Whether any message has come that is published every step."""
         return any(self._streams[name].heard for name in STEP_TOPICS)

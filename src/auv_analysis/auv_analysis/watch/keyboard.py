@@ -23,8 +23,7 @@ class Keyboard:
 
     def __init__(self) -> None:
         self.ended = False
-        has_keys = sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty()
-        self._file = sys.stdin.fileno() if has_keys else None
+        self._file = sys.stdin.fileno() if _has_keys() else None
 
     def __enter__(self) -> 'Keyboard':
         self._signals = {number: signal.signal(number, self._end) for number in SIGNALS}
@@ -49,3 +48,13 @@ class Keyboard:
             termios.tcsetattr(self._file, termios.TCSADRAIN, self._terminal)
         for number, handler in self._signals.items():
             signal.signal(number, handler)
+
+
+def _has_keys() -> bool:
+    """Whether there is a terminal, and this process in front: one behind would be stopped."""
+    if sys.stdin is None or sys.stdin.closed or not sys.stdin.isatty():
+        return False
+    try:
+        return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except OSError:  # not the terminal of this session
+        return True

@@ -81,7 +81,7 @@ def nodes_table(snapshot: Snapshot, rows: int | None = None, *, facts: bool = Tr
     table.add_column('node', no_wrap=True, min_width=NAME)
     table.add_column('health', no_wrap=True, overflow='ellipsis')
     for node in snapshot.nodes[:rows]:
-        table.add_row(node.name.removeprefix('/'), _health(node, facts=facts))
+        table.add_row(Text(node.name.removeprefix('/')), _health(node, facts=facts))
     if not snapshot.nodes:
         table.add_row(Text(f'none on {interface.DIAGNOSTICS}', 'dim'))
     return table

@@ -126,13 +126,17 @@ class Snapshot:
 
     @property
     def heard(self) -> bool:
-        """Whether any message has come in on a topic of the graph, refused ones included."""
-        return any(topic.heard or topic.refused for topic in self.topics)
+        """Whether any message has come on a topic of this namespace, refused ones included."""
+        return any(topic.heard for topic in self._inside)
 
     @property
     def published(self) -> bool:
-        """Whether somebody publishes a topic of the graph."""
-        return any(topic.publishers for topic in self.topics)
+        """Whether somebody publishes a topic of this namespace."""
+        return any(topic.publishers for topic in self._inside)
+
+    @property
+    def _inside(self) -> list[TopicState]:
+        return [topic for topic in self.topics if not topic.name.startswith('/')]
 
     def document(self) -> dict[str, Any]:
         """The snapshot ready for JSON."""

@@ -10,7 +10,7 @@ from auv_analysis.report import paper, tables
 from auv_analysis.report.claims import Claim
 from auv_analysis.report.document import Block, Gallery, Section
 from auv_analysis.report.figures import FigureRecord, reference
-from auv_analysis.report.panels import PanelSet
+from auv_analysis.report.panel import PanelSet
 from auv_analysis.report.quantities import QUANTITIES
 from auv_analysis.report.rendering import prose
 from auv_analysis.report.set_up import SetUp

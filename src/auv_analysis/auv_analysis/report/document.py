@@ -13,7 +13,7 @@ from markupsafe import Markup
 from pyarrow import parquet
 
 from auv_analysis.report.figures import FigureRecord
-from auv_analysis.report.panels import PanelSet
+from auv_analysis.report.panel import PanelSet
 from auv_analysis.report.text import MISSING, number
 
 Kind = TypeVar('Kind')

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from auv_analysis.report.packing import Packer, packed
+from auv_analysis.report.panel import Panel, PanelLine, PanelSet
 from auv_analysis.report.panel_models import DASHES, model
-from auv_analysis.report.panels import Panel, PanelLine, PanelSet, panel_sets
+from auv_analysis.report.panels import panel_sets
 from auv_analysis.report.plotting import COLOURS
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.traces import COLUMNS, Line, thinned

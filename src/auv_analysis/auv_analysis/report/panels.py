@@ -1,19 +1,19 @@
 """What the interactive panels of a report show: lines of the sketches, of all controllers."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from auv_analysis.report import plotting
 from auv_analysis.report.certificates import BOUND, IDENTITY
+from auv_analysis.report.panel import Key, Panel, PanelLine, PanelSet
 from auv_analysis.report.plotting import COLOURS, GREY, Quantity
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.text import join
 from auv_analysis.report.traces import Line
 from auv_dynamics.signals import DOFS
 
-WIDTH, THIN, THICK = 1.6, 1.0, 3.0  # of lines, px; the thick ones lie under others
+THIN, THICK = 1.0, 3.0  # of lines, px; the thick ones lie under others
 INK = 'ink'  # the colour of the text, light or dark
 GROUPS = {'linear': range(3), 'angular': range(3, 6)}
 ENERGY = Quantity('energy of ξ', tuple(f'ξ{i}' for i in range(1, 7)), ('J', 'J'))
@@ -35,83 +35,6 @@ SECTIONS = {  # set of panels -> its signals, beginnings of the names of the fig
     'energy': (('energy',), ('kinetic_energy',)),
     'couplings': (('delta_xi', 'delta_pi'), ('delta_xi', 'delta_pi')),
 }
-STILL = ('inputs_compared',)  # of logarithmic time: shown beside the panels
-
-
-@dataclass(frozen=True)
-class Key:
-    """What a colour stands for in a panel: a degree of freedom or something else.
-
-    Attributes
-    ----------
-    label : short
-    colour : '#rrggbb' or `INK`
-    dof : whether it is a degree of freedom
-    width : of its lines, px
-
-    """
-
-    label: str
-    colour: str
-    dof: bool = True
-    width: float = WIDTH
-
-
-@dataclass(frozen=True, eq=False)
-class PanelLine:
-    """Line of a run in a panel: of its `keys[key]`, times and values (n,) each."""
-
-    run: str
-    key: int
-    line: Line
-    step: float
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """One pair of axes over time.
-
-    Attributes
-    ----------
-    name : of the panel, unlike all others of the report
-    title : above it
-    label : of its vertical axis, without the unit
-    unit : of its values
-    keys : what its colours stand for
-    lines : of all runs
-    kind : 'line'; 'log': on a logarithmic axis; 'both': there as well, when asked for;
-        'stack': areas one above the other
-
-    """
-
-    name: str
-    title: str
-    label: str
-    unit: str
-    keys: tuple[Key, ...]
-    lines: tuple[PanelLine, ...]
-    kind: str = 'line'
-
-    @property
-    def rows(self) -> dict[str, list[int]]:
-        """Run -> numbers of its lines, in the order of the keys."""
-        rows: dict[str, list[int]] = {}
-        for number, line in enumerate(self.lines):
-            rows.setdefault(line.run, []).append(number)
-        return rows
-
-
-@dataclass(frozen=True, eq=False)
-class PanelSet:
-    """Panels that are shown together, in the place of some figures."""
-
-    name: str
-    panels: tuple[Panel, ...]
-    figures: tuple[str, ...]
-
-    def stands_for(self, figure: str) -> bool:
-        """Whether these panels show what the figure of that name shows."""
-        return figure.startswith(self.figures) and figure not in STILL
 
 
 def panel_sets(runs: Mapping[str, Sketch]) -> dict[str, PanelSet]:

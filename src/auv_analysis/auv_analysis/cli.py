@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 SCENARIO = 'a scenario file, or the bare name of a shipped one'
+RESULT = 'a bag, a folder of results or of a sweep, or a scenario, which is simulated'
 
 
 class _Parser(argparse.ArgumentParser):
@@ -61,8 +62,8 @@ def parser() -> argparse.ArgumentParser:
         '--span', type=float, default=2.0, help='gains vary from 1/SPAN to SPAN times'
     )
     study.add_argument('--seed', type=int, default=0, help='of what is drawn')
-    analyze = command('analyze', 'summary and report from recorded bags')
-    analyze.add_argument('bags', nargs='+', metavar='BAG', type=Path)
+    analyze = command('analyze', 'summary and report of bags, folders of results, or a sweep')
+    analyze.add_argument('results', nargs='+', metavar='BAG', help=RESULT)
     analyze.add_argument('--vehicle', help='for bags that do not carry their own')
     sweep = command('sweep', 'many rollouts of a scenario, with values that vary, to Parquet')
     sweep.add_argument('campaign', help='a campaign file, or the bare name of a shipped one')

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 from rich.console import Console
 
-from auv_analysis.commands.terminal import summary_tables
+from auv_analysis.commands.terminal import comparison_table, summary_tables
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
 from auv_analysis.summary import Window, summarize
@@ -92,3 +92,8 @@ def conclude(
     console.print(summary_tables(summaries))
     say(f'report: {report}')
     return summaries
+
+
+def show(summaries: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print a row per run on stderr."""
+    console.print(comparison_table(summaries))

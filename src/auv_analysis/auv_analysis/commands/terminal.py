@@ -30,7 +30,7 @@ def summary_tables(summaries: Mapping[str, Mapping[str, Any]]) -> RenderableType
     parts: list[RenderableType] = []
     for name, summary in summaries.items():
         parts += [*_one(name, summary), Text()]
-    return Group(*parts, *([_comparison(summaries)] if len(summaries) > 1 else []))
+    return Group(*parts, *([comparison_table(summaries)] if len(summaries) > 1 else []))
 
 
 def _one(name: str, summary: Mapping[str, Any]) -> list[RenderableType]:
@@ -87,7 +87,7 @@ def _remarks(summary: Mapping[str, Any]) -> Iterable[str]:
         yield f'not settled at the end: {join(late)}'
 
 
-def _comparison(summaries: Mapping[str, Mapping[str, Any]]) -> Table:
+def comparison_table(summaries: Mapping[str, Mapping[str, Any]]) -> Table:
     """Each run in a line."""
     table = Table(box=None, header_style='bold', pad_edge=False)
     table.add_column('')

@@ -14,8 +14,8 @@ from auv_dynamics.files import InputError, reason
 OURS = (
     'summary.json', 'report.html', 'numbers.parquet', 'figures', 'logs', 'scenario.yaml',
     'vehicle.yaml', 'setpoint.csv', 'claims.parquet', 'sensitivity.parquet', 'unknowns.parquet',
-    'unknowns_claims.parquet', 'energy_window.parquet',
-    'comparison.parquet', 'comparison.csv',
+    'unknowns_claims.parquet', 'energy_window.parquet', 'comparison.parquet', 'comparison.csv',
+    'atlas.json', 'atlas.parquet',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
 MANIFEST, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep

@@ -13,6 +13,7 @@ _HOME = {
     'params': 'params',
     'check-vehicle': 'check_vehicle',
     'watch': 'watch',
+    'atlas': 'auv_analysis.atlas.command',
     'sweep': 'auv_analysis.sweep.command',
 }
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -138,7 +139,7 @@ def _ranking(ranking: Ranking) -> Drawn:
         labels,
         'log2 of value / median of the runs',
         'PuOr_r',
-        (-end, end),
+        Normalize(-end, end),
     )
     figure = grid_figure(ranking.runs, [grid])
     axes = figure.axes[0]

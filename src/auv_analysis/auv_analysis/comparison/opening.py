@@ -88,7 +88,7 @@ def named(runs: Sequence[tuple[Source, Named]], join: str = '/') -> list[str]:
             return names
     doubled = Counter(names)
     names = [c[2] if doubled[c[1]] > 1 else c[1] for c in candidates]
-    return _numbered(names)
+    return numbered(names)
 
 
 def _folder(source: Source) -> tuple[str, ...]:
@@ -99,7 +99,7 @@ def _folder(source: Source) -> tuple[str, ...]:
     return parts[-2:] if len(parts) > 2 else parts[-1:]
 
 
-def _numbered(names: Sequence[str]) -> list[str]:
+def numbered(names: Sequence[str]) -> list[str]:
     """The same names, with a number behind those that have been there."""
     found: list[str] = []
     for name in names:

@@ -34,7 +34,7 @@ class Grid:
     columns : names (c,)
     label : of the scale, with its unit
     colours : name of a colour map
-    limits : ends of the scale; None: from the values
+    scale : of the colours; None: from the values
     digits : significant ones of the numbers in the cells
     structural : (r, c) whether a zero follows from the structure of M; None: not known
 
@@ -44,15 +44,15 @@ class Grid:
     columns: Sequence[str]
     label: str
     colours: str = 'cividis_r'
-    limits: tuple[float, float] | None = None
+    scale: Normalize | None = None
     digits: int = 2
     structural: np.ndarray | None = None
 
     def norm(self) -> Normalize:
         """Scale of the colours: logarithmic where positive values are far apart."""
         known = self.values[np.isfinite(self.values)]
-        if self.limits is not None:
-            return Normalize(*self.limits)
+        if self.scale is not None:
+            return self.scale
         positive = known[known > 0]
         if len(positive) == 0 or known.min() < 0:
             return Normalize(*(known.min(), known.max()) if len(known) else (0.0, 1.0))

@@ -26,6 +26,7 @@ class Family:
     meaning: str
 
 
+MATRICES = ('gains.K_D', 'gains.K_f')
 FAMILIES = {
     'kinetic_energy.mean_by_component': Family(
         'energy', ('J', 'J'), 'mean kinetic energy of a component, 1/2 N_i xi_i^2'
@@ -179,12 +180,27 @@ def _columns(key: str, value: Any) -> dict[str, Any]:
     if isinstance(value, Mapping):
         parts = [_columns(f'{key}.{name}', entry) for name, entry in value.items()]
         return {name: entry for part in parts for name, entry in part.items()}
-    if value is None and key in FAMILIES:
-        value = [None] * 6
+    if value is None and (key in FAMILIES or key in MATRICES):
+        value = [None] * 6 if key in FAMILIES else []
     if not isinstance(value, list):
         return {key: value}
+    if value and isinstance(value[0], Mapping):
+        return _columns(key, {_item(entry): _figures(entry) for entry in value})
+    if key in MATRICES and not value:
+        return {}
     if not value or isinstance(value[0], str):
         return {key: '; '.join(value)}
     names = DOFS if len(value) == 6 else ('from', 'to')
     pairs = zip(names, value, strict=True)
     return {k: v for name, entry in pairs for k, v in _columns(f'{key}.{name}', entry).items()}
+
+
+def _item(entry: Mapping[str, Any]) -> str:
+    """Name of an entry of a list: what deforms what, or a window of time."""
+    if 'window' in entry:
+        return 'to'.join(f'{time:g}' for time in entry['window'])
+    return f'{entry["to"]}.{entry["from"]}'
+
+
+def _figures(entry: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in entry.items() if key not in ('to', 'from', 'window')}

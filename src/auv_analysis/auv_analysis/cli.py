@@ -64,6 +64,7 @@ def parser() -> argparse.ArgumentParser:
     study.add_argument('--seed', type=int, default=0, help='of what is drawn')
     analyze = command('analyze', 'summary and report of bags, folders of results, or a sweep')
     analyze.add_argument('results', nargs='+', metavar='BAG', help=RESULT)
+    analyze.add_argument('--by', metavar='MEASURE', help='of a sweep: what sorts the best rows')
     analyze.add_argument('--vehicle', help='for bags that do not carry their own')
     sweep = command('sweep', 'many rollouts of a scenario, with values that vary, to Parquet')
     sweep.add_argument('campaign', help='a campaign file, or the bare name of a shipped one')

@@ -15,7 +15,9 @@ OURS = (
     'summary.json', 'report.html', 'numbers.parquet', 'figures', 'logs', 'scenario.yaml',
     'vehicle.yaml', 'setpoint.csv', 'claims.parquet', 'sensitivity.parquet', 'unknowns.parquet',
     'unknowns_claims.parquet', 'energy_window.parquet', 'comparison.parquet', 'comparison.csv',
-    'atlas.json', 'atlas.parquet',
+    'atlas.json', 'atlas.parquet', 'analysis.json', 'quantiles.parquet', 'influence.parquet',
+    'dependence.parquet', 'together.parquet', 'failures.parquet', 'paired.parquet',
+    'indices.parquet', 'best.parquet',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
 MANIFEST, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep
@@ -53,7 +55,11 @@ def prepare(
 
 def check_free(out: Path, *, overwrite: bool) -> bool:
     """Whether a folder has something in it; InputError where that must not be overwritten."""
-    taken = out.is_dir() and any(out.iterdir())
+    try:
+        taken = out.is_dir() and any(out.iterdir())
+    except OSError as error:
+        found = reason(error)
+        raise InputError(out, '--out', 'a folder that can be written', found) from None
     if taken and not overwrite:
         raise InputError(out, '--out', 'a new folder, or --overwrite', 'an existing folder')
     return taken

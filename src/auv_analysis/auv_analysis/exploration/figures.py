@@ -152,6 +152,7 @@ def _influence(results: Results) -> Drawn:
                 f'{controller}: explained (%)',
                 'Blues',
                 Normalize(0.0, 100.0),
+                decimals=0,
             )
         )
     figure = grid_figure([m.label for m in results.measures], grids)
@@ -161,7 +162,8 @@ def _influence(results: Results) -> Drawn:
     caption = (
         f'{title}: share of the variance of the ranks of a figure that lies between the groups of '
         'a path (bins of a number, or its values), corrected for their number; the paths in the '
-        'order of their mean share. 0: no more than chance; crossed out: of another controller.'
+        'order of their mean share. A pale 0: no more than chance; crossed out: of another '
+        'controller.'
     )
     left = results.sweep.controllers[MOST_GRIDS:]
     if left:

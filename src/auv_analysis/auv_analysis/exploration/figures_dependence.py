@@ -8,11 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from auv_analysis.comparison.lines import look
-from auv_analysis.exploration.names import short_names, with_unit
+from auv_analysis.exploration.names import cut, short_names, with_unit
 from auv_analysis.exploration.results import SAMPLE, Results, Row
 from auv_analysis.exploration.varied import Varied
 from auv_analysis.measures import Measure
 from auv_analysis.report import plotting
+from auv_analysis.report.text import typeset
 
 MOST_PATHS = 6
 ACROSS = 3
@@ -103,7 +104,7 @@ def _finish(axes: Axes, varied: Varied, measure: Measure) -> None:
         if low > 0 and high > WIDE * low:
             axes.set_xscale('log')
     else:
-        labels = [label if len(label) <= 16 else f'{label[:14]}…' for label in varied.labels]
+        labels = [typeset(cut(label)) for label in varied.labels]
         axes.set_xticks(range(len(labels)), labels)
         axes.set_xlim(-0.6, len(labels) - 0.4)
         if sum(map(len, labels)) > 20:

@@ -7,12 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from auv_analysis.exploration.names import short_names
+from auv_analysis.exploration.names import cut, short_names
 from auv_analysis.exploration.results import Results, Row
 from auv_analysis.measures import Measure
 from auv_analysis.report import plotting
 from auv_analysis.report.grids import Grid, draw_grid
 from auv_analysis.report.plotting import COLOURS, GREY
+from auv_analysis.report.text import typeset
 
 MOST_GRIDS = 3  # controllers side by side
 Drawn = tuple[Figure, str, str]
@@ -48,8 +49,8 @@ def together(results: Results, measures: Sequence[Measure]) -> Drawn:
     title = 'The two paths that matter most'
     caption = (
         f'{title}, together: median of the rows of each combination of {first.path} and '
-        f'{second.path}, over whatever else varies; one scale for all controllers; crossed out: none, or more than half never '
-        'settle.'
+        f'{second.path}, over whatever else varies; one scale for all controllers; crossed out: '
+        'none, or more than half never settle.'
     )
     return figure, title, caption
 
@@ -59,8 +60,9 @@ def _one_pair(axes: Axes, cells: Sequence[Row], label: str, scale: Normalize) ->
     across = list(dict.fromkeys(cell['other_value'] for cell in cells))
     values = np.array([np.nan if c['median'] is None else c['median'] for c in cells])
     values = values.reshape(len(down), len(across))
-    draw_grid(axes, Grid(values, across, label, scale=scale), 6.0)
-    axes.set_yticks(range(len(down)), down)
+    heads = [typeset(cut(word)) for word in across]
+    draw_grid(axes, Grid(values, heads, label, scale=scale), 6.0)
+    axes.set_yticks(range(len(down)), [typeset(cut(word)) for word in down])
     axes.tick_params(labelsize=7)
     if len(across) > 4:
         axes.tick_params(axis='x', labelrotation=60)
@@ -86,7 +88,8 @@ def failures(results: Results) -> Drawn:
             ])  # fmt: skip
             axes.bar(range(len(labels)), share, bottom=bottom, color=colour, label=word)
             bottom += share
-        axes.set_xticks(range(len(labels)), labels, rotation=90, fontsize=7)
+        heads = [typeset(cut(label)) for label in labels]
+        axes.set_xticks(range(len(labels)), heads, rotation=90, fontsize=7)
         axes.set_title(names[path], loc='left', fontsize=8.5)
         axes.grid(axis='x', visible=False)
     for axes in panels[::across]:

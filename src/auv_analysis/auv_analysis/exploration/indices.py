@@ -31,7 +31,7 @@ class Designed(NamedTuple):
     step : rows of one base point or trajectory
     positions : (n,) place of each row of the sweep in the design
     others : (n,) which combination of the other groups it has
-    combinations : how many of these
+    cases : what each of these is, '' where it is the only one
     points : (size, k) of the unit cube; None of saltelli, which needs none
 
     """
@@ -42,7 +42,7 @@ class Designed(NamedTuple):
     step: int
     positions: np.ndarray
     others: np.ndarray
-    combinations: int
+    cases: list[str]
     points: np.ndarray | None
 
 
@@ -61,9 +61,9 @@ def designed(sweep: Sweep) -> tuple[list[Designed], list[str]]:
         if kind_of(spec) not in METHODS:
             continue
         entry = _designed(sweep, groups, i, spec)
-        if entry.combinations > MOST_OTHERS:
+        if len(entry.cases) > MOST_OTHERS:
             notes.append(
-                f'no indices of {", ".join(entry.paths)}: {entry.combinations} combinations of '
+                f'no indices of {", ".join(entry.paths)}: {len(entry.cases)} combinations of '
                 f'the other groups, of at most {MOST_OTHERS}'
             )
         elif not _is_the_same(sweep, groups[i], entry):
@@ -86,9 +86,22 @@ def _designed(sweep: Sweep, groups: list[Group], number: int, spec: dict[str, An
         design = make_design(kind, paths, options, sweep.campaign['seed'], number)
         points = design.at(np.arange(design.size))
     step = sizes[number] // int(spec['count'])
-    combinations = sweep.manifest['rollouts'] // sizes[number]
     others = outer * inner + sweep.index % inner
-    return Designed(kind, paths, spec, step, positions, others, combinations, points)
+    cases = _cases(sweep, others, paths, sweep.manifest['rollouts'] // sizes[number])
+    return Designed(kind, paths, spec, step, positions, others, cases, points)
+
+
+def _cases(sweep: Sweep, others: np.ndarray, paths: list[str], count: int) -> list[str]:
+    """What else varies, in each combination that has rows."""
+    beside = [path for path in sweep.paths if path not in paths]
+    if not beside or count > MOST_OTHERS:
+        return [''] * count
+    table, cases = sweep.table(beside), []
+    for case in range(count):
+        rows = np.flatnonzero(others == case)
+        values = table.slice(rows[0], 1).to_pylist()[0] if len(rows) else {}
+        cases.append(', '.join(f'{path} = {value}' for path, value in values.items()))
+    return cases
 
 
 def _is_the_same(sweep: Sweep, group: Group, entry: Designed) -> bool:
@@ -121,7 +134,7 @@ def indices(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure)
     analyze = _sobol if entry.kind == 'saltelli' else _morris
     size = int(entry.spec['count']) * entry.step
     for i, controller in enumerate(sweep.controllers):
-        for other in range(entry.combinations):
+        for other, case in enumerate(entry.cases):
             rows = (sweep.controller == i) & (sweep.status == 0) & (entry.others == other)
             Y = np.full(size, np.nan)
             Y[entry.positions[rows]] = values[rows]
@@ -132,7 +145,7 @@ def indices(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure)
                 continue
             names: Row = {'method': 'sobol' if entry.kind == 'saltelli' else 'morris'}
             names |= {'controller': controller, 'figure': measure.name, 'unit': measure.unit}
-            names |= {'others': other, 'points': len(used), 'of': int(entry.spec['count'])}
+            names |= {'case': case, 'points': len(used), 'of': int(entry.spec['count'])}
             yield from (names | row for row in _quiet(analyze, entry, used, whole))
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from auv_analysis.exploration.varied import Varied
 
 PREFIXES = ('controllers.*.', 'vehicle.', 'setpoint.', 'controllers.')
-LONGEST_UNIT = 14
+LONGEST_UNIT, LONGEST = 14, 18  # of an axis, of a value at it
 
 
 def short_names(varied: Sequence[Varied]) -> dict[str, str]:
@@ -25,3 +25,8 @@ def _short(path: str) -> str:
 def with_unit(name: str, varied: Varied) -> str:
     """Axis label: the name, and the unit where the schema says a short one."""
     return f'{name} ({varied.unit})' if 0 < len(varied.unit) <= LONGEST_UNIT else name
+
+
+def cut(label: str) -> str:
+    """A value that has room at an axis."""
+    return label if len(label) <= LONGEST else f'{label[: LONGEST - 2]}…'

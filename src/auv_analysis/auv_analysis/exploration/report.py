@@ -30,6 +30,7 @@ def write_report(out: Path, results: Results, figures: Mapping[str, FigureRecord
         return [figures[name] for name in names if name in figures]
 
     many = len(sweep.controllers) > 1 and results.tables['paired']
+    best: list[Block] = [tables_rows.best(results)] if results.tables['best'] else []
     indices: list[Block] = list(tables_rows.indices(results))
     sections = [
         Section('campaign', 'What was swept', [tables.paths(results), tables.counts(results),
@@ -43,7 +44,7 @@ def write_report(out: Path, results: Results, figures: Mapping[str, FigureRecord
                                    else []),
             *shown('total_indices', 'elementary_effects'), *indices]),
         Section('dependence', 'What it depends on', [*depends, *shown('together')]),
-        Section('best', 'Best rollouts', [tables_rows.best(results)] if results.tables['best'] else []),
+        Section('best', 'Best rollouts', best),
         Section('failures', 'Where it fails', _failures(results, shown('failures'))),
     ]  # fmt: skip
     about = (

@@ -9,6 +9,7 @@ from auv_analysis.measures import BY_NAME
 from auv_analysis.report.document import Cell, Column, Table, cell
 
 MOST_FAILURES = 20
+WORDS = ('measure', 'controller', 'path', 'with', 'case')  # of an index
 
 
 def indices(results: Results) -> Iterator[Table]:
@@ -44,18 +45,17 @@ def _indices(
     rows: Sequence[tuple[int, Row]],
     heads: Mapping[str, tuple[str, str]],
 ) -> Table:
-    columns = [Column(head, numeric=False) for head in ('measure', 'controller', 'path', 'with')]
-    columns += [Column('case', '', 'combination of the other groups of the campaign')]
+    columns = [Column(head, numeric=False) for head in WORDS]
     columns += [Column('points', '', 'base points or trajectories that came to their end')]
     columns += [Column(label, '', meaning) for label, meaning in heads.values()]
     names = short_names(results.varied)
     body = []
     for i, row in rows:
         words = BY_NAME[row['figure']].label, row['controller'], names[row['path']]
-        keys = ('others', 'points', *heads)
+        keys = ('points', *heads)
         numbers = (cell(row[key], f'indices.parquet:{key}[{i}]') for key in keys)
         other = names.get(row['with'] or '', '')
-        body.append([*map(Cell, words), Cell(other), *numbers])
+        body.append([*map(Cell, words), Cell(other), Cell(row['case']), *numbers])
     caption = {'sobol': 'Sensitivity indices of Sobol.', 'morris': 'Elementary effects of Morris.'}
     text = caption.get(name, 'Interactions of two paths, by Sobol’s indices.')
     return Table(name, text, columns, body, stub=3)

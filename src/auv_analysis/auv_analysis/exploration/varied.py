@@ -16,6 +16,7 @@ from auv_dynamics.files import shorten
 
 MOST_VALUES = 12  # different numbers up to which each is a group of its own
 BINS = 16
+LONGEST = 40  # of a word that is shown as it is
 ROWS_PER_BIN = 12  # at least
 
 
@@ -106,5 +107,5 @@ def _categories(column: pa.ChunkedArray) -> tuple[np.ndarray, list[str]]:
         column = pa.chunked_array([pa.array(words, pa.string())])
     known = pc.unique(column)
     codes = pc.index_in(column, value_set=known).to_numpy()
-    return codes, [value if isinstance(value, str) and len(value) < 40 else shorten(value)
+    return codes, [value if isinstance(value, str) and len(value) < LONGEST else shorten(value)
                    for value in known.to_pylist()]  # fmt: skip

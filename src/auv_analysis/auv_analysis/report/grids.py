@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 
 from auv_analysis.report import plotting
 from auv_analysis.report.plotting import GREY
-from auv_analysis.report.text import number
+from auv_analysis.report.text import fixed, number, typeset
 
 MOST_NAMED = 60  # rows whose names and numbers still have room
 TALLEST = 11.0  # in
@@ -21,7 +21,6 @@ DECADES = 4.0  # that a logarithmic scale spans at most
 APART = 20.0  # ratio of the extremes from which a scale is logarithmic
 BLANK = '#f2f2f2'
 ALWAYS = '≡ 0'  # zero for every motion
-LOWERED = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,7 @@ class Grid:
     label : of the scale, with its unit
     colours : name of a colour map
     scale : of the colours; None: from the values
-    digits : significant ones of the numbers in the cells
+    decimals : of the numbers in the cells; None: two significant digits
     structural : (r, c) whether a zero follows from the structure of M; None: not known
 
     """
@@ -45,7 +44,7 @@ class Grid:
     label: str
     colours: str = 'cividis_r'
     scale: Normalize | None = None
-    digits: int = 2
+    decimals: int | None = None
     structural: np.ndarray | None = None
 
     def norm(self) -> Normalize:
@@ -129,12 +128,11 @@ def draw_grid(axes: Axes, grid: Grid, size: float = 7.0) -> None:
 
 
 def _text(value: float, grid: Grid) -> str:
-    """Number in a cell; the font has no raised digits, so that powers are set as formulas."""
-    text = '0' if value == 0.0 else number(value, grid.digits)
-    if '·10' not in text:
-        return text
-    mantissa, _, power = text.partition('·10')
-    return rf'${mantissa.replace("−", "-")}\cdot10^{{{power.translate(LOWERED)}}}$'
+    if value == 0.0:
+        return '0'
+    if grid.decimals is not None:
+        return fixed(value, grid.decimals)
+    return typeset(number(value, 2))
 
 
 def _ink(colour: tuple[float, float, float, float]) -> str:

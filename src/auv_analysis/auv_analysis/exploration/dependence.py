@@ -26,20 +26,11 @@ def along(values: np.ndarray, rows: np.ndarray, varied: Varied, measure: Measure
 
     """
     groups = by_group(values[rows], varied.codes[rows], len(varied.labels))
-    middles = _middles(varied, rows)
     for i, (label, group) in enumerate(zip(varied.labels, groups, strict=True)):
         row: Row = {'path': varied.path, 'figure': measure.name, 'unit': measure.unit}
-        row |= {'group': i, 'value': label, 'middle': finite(middles[i])}
+        row |= {'group': i, 'value': label, 'middle': finite(varied.middles[i])}
         ends = (None, None) if varied.edges is None else map(float, varied.edges[i])
         yield row | dict(zip(('from', 'to'), ends, strict=True)) | spread(group, measure.unit)
-
-
-def _middles(varied: Varied, rows: np.ndarray) -> list[float]:
-    """Median number in each group, NaN of what is no number."""
-    if varied.numbers is None:
-        return [np.nan] * len(varied.labels)
-    groups = by_group(varied.numbers[rows], varied.codes[rows], len(varied.labels))
-    return [float(np.median(group)) if len(group) else np.nan for group in groups]
 
 
 def together(

@@ -4,8 +4,9 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -21,6 +22,15 @@ from auv_dynamics.files import InputError, reason
 STATUSES = ('ok', 'diverged', 'refused')
 OWN = ('index', 'controller', 'seed', 'status', 'reason')
 BROKEN = 'a finished part of a sweep'
+
+
+class Pair(NamedTuple):
+    """Two controllers by their places, and rows of the same rollouts (m,) of each."""
+
+    first: int
+    second: int
+    mine: np.ndarray
+    other: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +96,17 @@ class Sweep:
         if found.null_count:
             unknown = pc.unique(self.table([column])[column]).to_pylist()
             raise InputError(self.folder, column, f'one of {", ".join(words)}', f'{unknown}')
-        return found.to_numpy()
+        return found.to_numpy().astype(np.int16)
+
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """For each two controllers, the rows of the rollouts that both have."""
+        found = []
+        for a, b in combinations(range(len(self.controllers)), 2):
+            first, second = (np.flatnonzero(self.controller == i) for i in (a, b))
+            both = np.intersect1d(self.index[first], self.index[second], return_indices=True)
+            found.append(Pair(a, b, first[both[1]], second[both[2]]))
+        return found
 
     def numbers(self, column: str) -> np.ndarray:
         """Column of numbers (n,), NaN where there is none."""
@@ -97,12 +117,15 @@ class Sweep:
         table = self.table(list(measure.columns))
         return measure.of(lambda name: table[name].to_numpy().astype(float))
 
+    @cached_property
+    def _dataset(self) -> ds.Dataset:
+        """The parts as one; kept, so that what they say of themselves is read once."""
+        return ds.dataset([str(path) for path in self.parts], format='parquet')
+
     def table(self, columns: list[str]) -> pa.Table:
         """Some columns of all rows, in the order of the parts."""
         try:
-            return ds.dataset([str(path) for path in self.parts], format='parquet').to_table(
-                columns
-            )
+            return self._dataset.to_table(columns)
         except (pa.ArrowInvalid, OSError) as error:
             for path in self.parts:
                 _read(path, columns)

@@ -1,7 +1,6 @@
 """Controllers held against each other in the same rollouts."""
 
 from collections.abc import Iterator
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -27,10 +26,9 @@ def paired(sweep: Sweep, values: np.ndarray, measure: Measure) -> Iterator[Row]:
     """
     at = ordered(values, measure.unit)
     usable = (sweep.status == 0) & ~np.isnan(at)
-    for first, second in combinations(range(len(sweep.controllers)), 2):
-        mine, other = (np.flatnonzero(usable & (sweep.controller == i)) for i in (first, second))
-        _, i, j = np.intersect1d(sweep.index[mine], sweep.index[other], return_indices=True)
-        a, b = at[mine[i]], at[other[j]]
+    for first, second, mine, other in sweep.pairs:
+        both = usable[mine] & usable[other]
+        a, b = at[mine[both]], at[other[both]]
         if len(a) == 0:
             continue
         comparable = np.isfinite(a) & np.isfinite(b) & (b > 0)

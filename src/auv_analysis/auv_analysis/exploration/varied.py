@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pyarrow as pa
@@ -10,6 +11,7 @@ import pyarrow.compute as pc
 
 from auv_analysis.changes import split
 from auv_analysis.exploration.opening import Sweep
+from auv_analysis.exploration.quantiles import by_group
 from auv_analysis.report.text import plain
 from auv_analysis.schema_paths import said_of
 from auv_dynamics.files import shorten
@@ -45,6 +47,14 @@ class Varied:
     edges: np.ndarray | None
     binned: bool
 
+    @cached_property
+    def middles(self) -> np.ndarray:
+        """Median number of each group (groups,), over all rows; NaN of what is no number."""
+        if self.numbers is None:
+            return np.full(len(self.labels), np.nan)
+        groups = by_group(self.numbers, self.codes, len(self.labels))
+        return np.array([np.median(group) for group in groups])
+
     @property
     def differs(self) -> bool:
         """Whether it takes more than one value."""
@@ -69,9 +79,10 @@ def _varied(sweep: Sweep, path: str) -> Varied:
         numbers = column.to_numpy().astype(float)
         codes, edges, binned = _groups(numbers)
         labels = [_label(*pair) for pair in edges]
+        codes = codes.astype(np.int32)
         return Varied(path, unit, meaning, numbers, codes, labels, edges, binned)
     codes, labels = _categories(column)
-    return Varied(path, unit, meaning, None, codes, labels, None, False)
+    return Varied(path, unit, meaning, None, codes.astype(np.int32), labels, None, False)
 
 
 def _said(sweep: Sweep, path: str) -> tuple[str, str]:

@@ -1,8 +1,9 @@
-"""The report of case1's first seconds in a browser."""
+"""What tests of reports share: the report of case1's first seconds in a browser, quick figures."""
 
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import pytest
 from browser import Watched, chromium
@@ -51,3 +52,16 @@ def report(browser, report_path) -> Iterator[Watched]:
     watched.page.wait_for_selector('.with-panels')
     yield watched
     watched.close()
+
+
+@pytest.fixture
+def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are composed but not rendered, which takes most of the time of a report."""
+
+    def save(figure: Any, folder: Path, name: str) -> tuple[Path, Path]:
+        paths = folder / f'{name}.png', folder / f'{name}.pdf'
+        for path in paths:
+            path.write_bytes(b'not rendered')
+        return paths
+
+    monkeypatch.setattr(plotting, 'save', save)

@@ -9,12 +9,12 @@ from auv_analysis.report.document import Cell, Column, Section, Sentence, Table,
 from auv_analysis.report.figures import FigureRecord
 from auv_analysis.report.grids import ALWAYS
 from auv_analysis.report.rendering import write_document
+from auv_analysis.report.tables.sources import VELOCITY, WRENCH, pointer
 from auv_analysis.report.text import join, number
 from auv_dynamics.signals import DOFS
 
 PERCENT = 100.0
-VELOCITY = ('m/s', 'rad/s')
-KINDS = {'delta_xi': ('Δξ', VELOCITY), 'delta_pi': ('Δπ', ('N', 'N m'))}
+KINDS = {'delta_xi': ('Δξ', VELOCITY), 'delta_pi': ('Δπ', WRENCH)}
 MEASURE = (
     'With D = diag(M), the kinetic energy is 1/2 ν^T M ν = 1/2 y^T R y with y = D^1/2 ν and the '
     'inertial correlation R = D^-1/2 M D^-1/2. R is 1 on its diagonal; what is beside it are cross '
@@ -105,7 +105,7 @@ def ranking(charts: Sequence[Chart]) -> Table:
     ]
     rows = []
     for chart in charts:
-        known, base = chart.couplings, f'{DOCUMENT}:/vehicles/{chart.name}'
+        known, base = chart.couplings, pointer(DOCUMENT, 'vehicles', chart.name)
         rows.append((
             Cell(chart.name, remark='Upsilon = I' if known.is_diagonal else ''),
             cell(PERCENT * known.strength, f'{base}/strength_percent'),
@@ -140,7 +140,7 @@ def pairs(charts: Sequence[Chart]) -> Table:
     ]
     rows = []
     for chart in charts:
-        known, base = chart.couplings, f'{DOCUMENT}:/vehicles/{chart.name}'
+        known, base = chart.couplings, pointer(DOCUMENT, 'vehicles', chart.name)
         for first, second in known.pairs:
             i, j = DOFS.index(first), DOFS.index(second)
             rows.append((
@@ -171,7 +171,7 @@ def reached(charts: Sequence[Chart], kind: str) -> Table:
 
 
 def _peaks(chart: Chart, kind: str) -> tuple[Cell, ...]:
-    base, always = f'{DOCUMENT}:/vehicles/{chart.name}/case1', chart.couplings.zeros[kind]
+    base, always = pointer(DOCUMENT, 'vehicles', chart.name, 'case1'), chart.couplings.zeros[kind]
     cells = [Cell(chart.name)]
     for i, dof in enumerate(DOFS):
         value, source = chart.reached[f'{kind}_max'][i], f'{base}/{kind}_max/{i}'

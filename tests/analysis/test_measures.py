@@ -72,7 +72,7 @@ def test_measures_sum_up_their_columns(values) -> None:
 def test_every_column_says_its_unit() -> None:
     for name in (*BY_NAME, *(f'{family}.{dof}' for family in FAMILIES for dof in DOFS)):
         label, unit, meaning = described(name)
-        assert label and unit and meaning, name
+        assert all((label, unit, meaning)), name
     assert described('effort.rms.surge')[1] == 'N'
     assert described('effort.rms.roll')[1] == 'N m'
     assert len({measure.label for measure in MEASURES}) == len(MEASURES)

@@ -9,8 +9,9 @@ import pytest
 from closed_loops import PER_AXIS
 from numpy.testing import assert_allclose
 
-from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis import batch, load_scenario, simulate, summarize
 from auv_analysis.changes import changed_scenario
+from auv_analysis.kernels import kernels
 from auv_analysis.reduction import COLUMNS
 from auv_analysis.study import sensitivity as module
 from auv_analysis.study.gains import gain_factors
@@ -175,6 +176,42 @@ def test_gains_left_to_their_defaults_are_factors_too():
     found = sensitivity(scenario, 'a.pid', method='morris', count=2)
     assert found.rollouts == 2 * 6 + 1
     assert {index.gain for index in found.variables[0].indices} == set(pid.names)
+
+
+LAW = """
+from typing import NamedTuple
+
+class Push(NamedTuple):
+    k_A: object
+    k_B: object = 2.0
+    STATES = 0
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return (gains.k_A[0] / gains.k_B[0] ** 2, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0,) * 6
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return ()
+"""
+
+
+def test_a_users_own_law_is_studied_as_it_runs(monkeypatch, tmp_path):
+    """As plain Python, by few trajectories; its input is a known power of its gains."""
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / 'own_push.py').write_text(LAW)
+    values = {
+        'duration': 0.02,
+        'controllers': {'own': {'law': 'own_push:Push', 'k_A': 3.0}},
+    }
+    scenario = changed_scenario(load_scenario('case1'), values)
+    monkeypatch.setattr(batch, 'kernels', lambda law, hold: kernels(law, hold)[-1:])
+    found = sensitivity(scenario, 'own')
+    assert (found.method, found.count, found.rollouts) == ('morris', 4, 4 * 3 + 1)
+    push = found.of('effort.max')['surge']
+    assert push.value == pytest.approx(0.75)
+    assert [index.elasticity for index in push.indices] == pytest.approx([1.0, -2.0])
+    assert push.main.gain == 'k_B'
 
 
 def test_wrong_input_is_refused():

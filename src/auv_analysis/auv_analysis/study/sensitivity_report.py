@@ -145,11 +145,15 @@ def _headline(of: Sensitivity, first: Variable) -> str:
         else f'place {first.rank_low} to {first.rank_high} of {count}'
     )
     sign = '−' if main.doubled < 0 else '+'
-    share = '' if main.ST is None else f'makes {number(100 * main.ST, 2)} % of its variance, and '
+    share = (
+        ''
+        if main.ST is None
+        else f'{main.gain} makes {number(100 * main.ST, 2)} % of its variance, and '
+    )
     return (
         f'Under {of.controller} the {first.figure.words} that follows the gains most is that of '
-        f'{first.figure.dof} (spread {number(first.spread, 2)}, {sure}): {main.gain} {share}'
-        f'doubling it changes the figure by about {sign}{number(abs(main.doubled), 2)} %.'
+        f'{first.figure.dof} (spread {number(first.spread, 2)}, {sure}): {share}'
+        f'doubling {main.gain} changes the figure by about {sign}{number(abs(main.doubled), 2)} %.'
     )
 
 

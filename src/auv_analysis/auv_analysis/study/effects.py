@@ -75,6 +75,11 @@ class Variable:
     indices: tuple[Index, ...]
 
     @property
+    def spread_conf(self) -> float:
+        """Half of the 95 % interval of the spread."""
+        return 0.5 * (self.spread_high - self.spread_low)
+
+    @property
     def main(self) -> Index:
         """The gain that does most of it."""
         return max(self.indices, key=lambda index: index.weight)

@@ -11,8 +11,8 @@ from auv_analysis.study.parquet import write_table
 
 FILE = 'sensitivity.parquet'
 OF_VARIABLE = (
-    'value', 'smallest', 'largest', 'spread', 'spread_low', 'spread_high', 'rank', 'rank_low',
-    'rank_high',
+    'value', 'smallest', 'largest', 'spread', 'spread_conf', 'spread_low', 'spread_high', 'rank',
+    'rank_low', 'rank_high',
 )  # fmt: skip
 OF_INDEX = (
     'elasticity', 'S1', 'S1_conf', 'ST', 'ST_conf', 'mu_star', 'mu_star_conf', 'sigma',
@@ -23,8 +23,10 @@ def write_sensitivities(folder: Path, found: Sequence[Sensitivity]) -> Path:
     """Write the sensitivities of all controllers.
 
     Columns: controller, law, figure, dof, unit, those of `Variable`, gain, those of `Index`,
-    method, count, rollouts, span, span_asked, diverged (at all spans together), seed, and reason:
-    why a figure, or all of them, has no indices.
+    doubled (change in % when the gain is doubled), alike (how many degrees of freedom the rank is
+    among), method, count, rollouts, span, span_asked,
+    diverged (at all spans together), seed, and reason: why a figure, or all of them, has no
+    indices.
 
     """
     rows = [row for sensitivity in found for row in _rows(sensitivity)]
@@ -59,6 +61,8 @@ def _row(
         **{name: None if value is None else float(value) for name, value in numbers.items()},
         'gain': parts.get('gain', ''),
         **{name: parts.get(name) for name in OF_INDEX},
+        'doubled': index.doubled if index else None,
+        'alike': of.alike[figure.name] if variable and figure else None,
         'method': of.method,
         'count': of.count,
         'rollouts': of.rollouts,

@@ -62,15 +62,14 @@ def _row(variable: Variable, weight: str, found: Sensitivity) -> list[Cell]:
         of('value', f'{number(v.value)} {v.figure.unit}'),
         of(
             'spread',
-            f'{number(v.spread, 2)} ± {number(0.5 * (v.spread_high - v.spread_low), 1)}',
-            spread_low=v.spread_low,
-            spread_high=v.spread_high,
+            f'{number(v.spread, 2)} ± {number(v.spread_conf, 1)}',
+            spread_conf=v.spread_conf,
         ),
-        of('rank', f'{ends} of {count}', rank_low=low, rank_high=high),
+        of('rank', f'{ends} of {count}', rank_low=low, rank_high=high, alike=count),
         Cell(
             f'{main.gain} {sign}{number(abs(main.doubled), 2)} %',
             main.doubled,
-            f'{FILE}:elasticity',
+            f'{FILE}:doubled',
         ),
         *(_index(index, weight) for index in v.indices),
     ]

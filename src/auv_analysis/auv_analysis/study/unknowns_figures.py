@@ -36,14 +36,14 @@ def unknowns_figure(found: Unknowns, folder: Path) -> FigureRecord:
         grid[0].set_ylabel('number of the claim')
         keys = [Patch(color=c) for c in VERDICT_COLOURS]
         figure.legend(keys, DECIDED, loc='outside lower center', ncols=len(keys))
-        files = plotting.save(figure, folder, 'unknowns')
+        files = plotting.save(figure, folder, 'open_claims')
     title = 'Claims over what the paper leaves open'
     caption = (
         f'{title}, runs of {found.windows[last]:g} s: a row per claim, a column per variant, by '
         'rising damping (linear and quadratic factors added); (a) the exponents of (39) read '
         'with −, (b) with +. A tick marks the shipped vehicle.'
     )
-    return FigureRecord('unknowns', title, caption, *files)
+    return FigureRecord('open_claims', title, caption, *files)
 
 
 def _order(variant: Variant) -> tuple[float, float]:

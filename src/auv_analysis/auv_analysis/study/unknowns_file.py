@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from auv_analysis.energy import shares
 from auv_analysis.report.claims_rows import ROWS
 from auv_analysis.report.evidence import DECIDED
+from auv_analysis.report.paper import KINETIC_ENERGY
 from auv_analysis.study.parquet import write_table
 from auv_analysis.study.robustness import Held, Robustness
 from auv_analysis.study.unknowns import NAMES
@@ -63,6 +66,11 @@ def _of_split(held: Held, name: str) -> float | None:
     return float(getattr(held.split, name)) if held.split else None
 
 
+def to_paper(energy: np.ndarray) -> np.ndarray:
+    """Difference of energies, J, to the paper's, in % of that."""
+    return 100.0 * (energy / KINETIC_ENERGY - 1.0)
+
+
 def _energy(folder: Path, found: Unknowns) -> Path:
     """Mean kinetic energy over 0 to T: first variant, smallest and largest of all, its shares."""
     total = found.energy.sum(axis=2)
@@ -72,6 +80,7 @@ def _energy(folder: Path, found: Unknowns) -> Path:
         'energy': total[0].tolist(),
         'energy_low': total.min(axis=0).tolist(),
         'energy_high': total.max(axis=0).tolist(),
+        'to_paper_percent': to_paper(total[0]).tolist(),
         **{f'share.{dof}': parts[:, i].tolist() for i, dof in enumerate(DOFS)},
     }
     return write_table(folder / ENERGY, columns)

@@ -11,8 +11,9 @@ from auv_analysis.report.text import fixed, join, number
 from auv_analysis.study.attribution import Split
 from auv_analysis.study.robustness import FAILS, HOLDS, Held, Robustness, energy_ranges, met
 from auv_analysis.study.unknowns import DAMPING, M46, MASS
-from auv_analysis.study.unknowns_file import CLAIMS, ENERGY
+from auv_analysis.study.unknowns_file import CLAIMS, ENERGY, to_paper
 from auv_analysis.study.unknowns_run import Unknowns
+from auv_dynamics.signals import DOFS
 
 WORDS = {  # unknown -> how it is called, and its unit
     'mass': ('the mass', ' kg'),
@@ -118,8 +119,11 @@ def energy_table(found: Unknowns) -> Table:
             _fixed(line[0], 2, 'energy'),
             _fixed(line.min(), 2, 'energy_low'),
             _fixed(line.max(), 2, 'energy_high'),
-            _fixed(100 * (line[0] / paper.KINETIC_ENERGY - 1), 1, 'energy'),
-            *(cell(float(part), f'{ENERGY}:share') for part in parts[k]),
+            _fixed(float(to_paper(line[0])), 1, 'to_paper_percent'),
+            *(
+                cell(float(part), f'{ENERGY}:share.{dof}')
+                for dof, part in zip(DOFS, parts[k], strict=True)
+            ),
         ])  # fmt: skip
     caption = (
         'Mean kinetic energy of GVC over 0 to T, over all variants; the paper prints '

@@ -1,0 +1,147 @@
+"""`auv study`: every number of the report is found in the files beside it."""
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+import yaml
+from pages import Page, at, tokens
+
+from auv_analysis import cli, load_scenario, simulate, summarize
+from auv_analysis.report import paper
+from auv_analysis.report.document import NUMBERS
+from auv_analysis.report.tables.sources import numbers_in
+
+NO_NUMBER = re.compile(r'[ξπτΔ]+_?[1-6]|M46|equation \(\d+\)|\(39\)|m/s2|1/s2')
+PRINTED = {*paper.N, *paper.SHARES, paper.KINETIC_ENERGY}
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp('study') / 'case1'
+    cli.main(['study', 'case1', '--samples', '8', '--window', '0', '10.28', '--out', str(out)])
+    return out
+
+
+@pytest.fixture(scope='module')
+def rows(folder) -> list[dict]:
+    return parquet.read_table(folder / NUMBERS).to_pylist()
+
+
+@cache
+def names_of(path: Path) -> set[str]:
+    return set(parquet.read_schema(path).names)
+
+
+def test_every_number_of_every_table_is_found_where_its_source_says(folder, rows):
+    summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
+    scenario = yaml.safe_load((folder / 'scenario.yaml').read_text(encoding='utf-8'))
+    given = {value for _, value in numbers_in(scenario)}
+    columns: dict[tuple[str, str], set] = {}
+    for row in rows:
+        source, _, factor = row['source'].partition('*')
+        file, _, place = source.partition(':')
+        wanted = row['value'] / float(factor or 1.0)
+        if file == 'summary.json' and not row['name']:
+            assert at(summary, place) == pytest.approx(wanted, rel=1e-14), row
+        elif file.endswith('.parquet'):
+            # of a cell with several numbers, the name is that of the column
+            key = file, (row['name'] if row['name'] in names_of(folder / file) else place)
+            if key not in columns:
+                values = parquet.read_table(folder / file, columns=[key[1]]).column(0).to_pylist()
+                columns[key] = {float(value) for value in values if value is not None}
+            assert any(abs(x - wanted) <= 1e-14 * abs(wanted) for x in columns[key]), row
+        elif file == 'scenario.yaml':
+            assert wanted in given or row['name'].endswith(' in %'), row
+        else:
+            known = file == 'paper' and wanted in PRINTED
+            assert known or (file == 'summary.json' and row['name']), row
+
+
+def test_every_cell_with_a_number_is_kept_and_is_what_it_shows(folder, rows):
+    page = Page((folder / 'report.html').read_text(encoding='utf-8'))
+    shown = [float(v) for table in page.tables.values() for r in table for _, v in r if v]
+    assert sorted(shown) == sorted(row['value'] for row in rows if not row['name'])
+    cells: dict[tuple, list[float]] = {}
+    for row in rows:
+        cells.setdefault((row['table'], row['row'], row['column'], row['text']), []).append(
+            row['value']
+        )
+    for place, values in cells.items():
+        for value, half in tokens(NO_NUMBER.sub('', place[-1])):
+            near = half + 1e-12 * abs(value)
+            assert any(min(abs(value - x), abs(value + x)) <= near for x in values), (place, value)
+
+
+def test_the_summary_is_that_of_a_fresh_run(folder):
+    summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
+    scenario = load_scenario(folder / 'scenario.yaml')
+    for name in scenario.controllers:
+        fresh = summarize(simulate(scenario, name), windows=[(0.0, 10.28)])
+        assert summary[name] == json.loads(json.dumps(fresh))
+
+
+def test_the_report_takes_the_steps_of_the_procedure(folder):
+    page = Page((folder / 'report.html').read_text(encoding='utf-8'))
+    steps = ['gains', 'tracking', 'sensitivity', 'energy', 'couplings', 'discussion', 'claims']
+    steps += ['unknowns', 'quantities']
+    assert [name for name in page.ids if name in steps] == steps
+    assert set(page.links) <= set(page.ids)
+    assert len(set(page.ids)) == len(page.ids)
+    verdicts = [row[-1][0].strip() for row in page.tables['claims']]
+    assert len(verdicts) == 21
+    assert set(verdicts) <= {'reproduced', 'partly', 'not reproduced'}
+    windows = {row['value'] for row in parquet.read_table(folder / NUMBERS).to_pylist()
+               if row['table'] == 'energy' and row['column'] == 'to'}  # fmt: skip
+    assert windows == {10.0, 10.28, 30.0}
+
+
+def test_pieces_and_shares_of_the_files_add_up(folder):
+    summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
+    for entry in summary.values():
+        assert sum(entry['kinetic_energy']['shares_percent']) == pytest.approx(100.0, rel=1e-12)
+        for terms in entry['coupling_terms'].values():
+            for dof in {term['to'] for term in terms}:
+                shares = [term['share_percent'] for term in terms if term['to'] == dof]
+                assert sum(shares) == pytest.approx(100.0, rel=1e-9)
+    samples = parquet.read_table(folder / 'gvc.parquet').to_pandas()
+    energies = samples.filter(regex=r'^kinetic_energy\.')
+    by_component = summary['gvc']['kinetic_energy']['mean_by_component']
+    np.testing.assert_allclose(energies.mean(axis=0), by_component, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('options', 'line'),
+    [
+        (
+            ['--window', '5', '3'],
+            '--window: expected two times, FROM < TO, from 0 to 30 s, found 5 3',
+        ),
+        (['--window', '0', '31'], '--window: expected two times'),
+        (['--span', '1'], '--span: expected a number above 1'),
+        (['--samples', '6'], '--samples: expected a power of two from 2 on, found 6'),
+        (['--seed', '-1'], '--seed: expected a whole number from 0 on, found -1'),
+        (['--controller', 'x'], 'expected one of gvc, cl'),
+    ],
+)
+def test_wrong_options_end_in_one_line(tmp_path, capsys, options, line):
+    with pytest.raises(SystemExit) as end:
+        cli.main(['study', 'case1', *options, '--out', str(tmp_path / 'out')])
+    assert end.value.code == 2
+    error = capsys.readouterr().err
+    assert line in error
+    assert error.count('\n') == 1
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_study_of_another_vehicle_has_no_claims(tmp_path):
+    out = tmp_path / 'out'
+    cli.main(['study', 'case1_bluerov2_heavy', '--sensitivity', 'none', '--out', str(out)])
+    page = Page((out / 'report.html').read_text(encoding='utf-8'))
+    assert 'claims' not in page.tables
+    assert 'sensitivity' not in page.ids
+    assert 'discussion' in page.ids

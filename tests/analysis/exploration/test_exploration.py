@@ -9,9 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from made_sweeps import change_manifest, make_sweep
+from pyarrow import parquet
 from scipy.stats import f_oneway, spearmanr
 from strategies import QUICK
 
+from auv_analysis import cli
 from auv_analysis.exploration.dependence import merged
 from auv_analysis.exploration.influence import explained
 from auv_analysis.exploration.opening import open_sweep
@@ -281,3 +283,46 @@ def test_the_document_has_no_nan(results: Results) -> None:
     from auv_analysis.exploration.files import document
 
     assert json.loads(json.dumps(document(results), allow_nan=False))['rows'] == 1600
+
+
+@pytest.mark.usefixtures('unrendered')
+@pytest.mark.parametrize(('campaign', 'known'), [(SIMPLE, simple), (MIXED, mixed)])
+def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known) -> None:
+    out = tmp_path / 'report'
+    cli.main(['analyze', str(make_sweep(tmp_path, campaign, known)), '--out', str(out)])
+    document = json.loads((out / 'analysis.json').read_text())
+    numbers = parquet.read_table(out / 'numbers.parquet').to_pylist()
+    assert len(numbers) > 100
+    tables: dict[str, list[dict]] = {}
+    for number in numbers:
+        file, _, place = number['source'].partition(':')
+        if file == 'analysis.json':
+            value = document
+            for key in place.removeprefix('/').split('/'):
+                value = value[int(key)] if isinstance(value, list) else value[key]
+        else:
+            rows_ = tables.setdefault(file, parquet.read_table(out / file).to_pylist())
+            name, _, row = place.removesuffix(']').rpartition('[')
+            value = rows_[int(row)][name]
+        assert value == number['value'], number['source']
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_an_unfinished_sweep_says_so(tmp_path: Path, capsys) -> None:
+    out = make_sweep(tmp_path, SIMPLE, simple, range(0, 16, 3))
+    cli.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
+    assert 'note: not finished, 600 of 1600 rows are there' in capsys.readouterr().err
+    report = (tmp_path / 'report/report.html').read_text(encoding='utf-8')
+    assert 'The sweep is not finished: 600 of 1600 rows are there.' in report
+
+
+def test_a_sweep_without_figures_is_a_failure(tmp_path: Path, capsys) -> None:
+    def refused(controller, values, index):
+        return {'status': np.full(len(index), 'refused', object)}
+
+    out = make_sweep(tmp_path, SIMPLE, refused, range(2))
+    with pytest.raises(SystemExit) as end:
+        cli.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
+    assert end.value.code == 1
+    assert capsys.readouterr().err.splitlines()[-1] == f'{out}: none of 200 rows has figures'
+    assert not (tmp_path / 'report').exists()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import LogNorm, Normalize
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 from auv_analysis.atlas.collect import Chart
 from auv_analysis.report import plotting
 from auv_analysis.report.figures import FigureRecord
-from auv_analysis.report.grids import ALWAYS, Grid, draw_grid, grid_figure
+from auv_analysis.report.grids import ALWAYS, Grid, draw_grid, grid_figure, scale_bar
 from auv_analysis.report.plotting import COLOURS
 from auv_analysis.report.text import join
 from auv_dynamics.signals import DOFS
@@ -128,10 +129,8 @@ def _panels(grids: dict[str, Grid]) -> Figure | None:
     for axes in panels[len(grids) :]:
         axes.set_axis_off()
     one = next(iter(grids.values()))
-    figure.colorbar(
-        panels[0].images[0], ax=list(panels), location='bottom', label=one.label, aspect=60,
-        fraction=0.03,
-    )  # fmt: skip
+    place: dict[str, Any] = {'location': 'bottom', 'aspect': 60, 'fraction': 0.03}
+    scale_bar(figure, panels[0].images[0], one.label, ax=list(panels), **place)
     return figure
 
 

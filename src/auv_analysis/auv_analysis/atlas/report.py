@@ -9,7 +9,7 @@ from auv_analysis.report.document import Cell, Column, Section, Sentence, Table,
 from auv_analysis.report.figures import FigureRecord
 from auv_analysis.report.grids import ALWAYS
 from auv_analysis.report.rendering import write_document
-from auv_analysis.report.tables.sources import VELOCITY, WRENCH, pointer
+from auv_analysis.report.tables.sources import VELOCITY, WRENCH, count, pointer
 from auv_analysis.report.text import join, number
 from auv_dynamics.signals import DOFS
 
@@ -111,7 +111,7 @@ def ranking(charts: Sequence[Chart]) -> Table:
             cell(PERCENT * known.strength, f'{base}/strength_percent'),
             cell(PERCENT * known.largest, f'{base}/largest_correlation_percent'),
             Cell('–'.join(known.pairs[0]) if known.pairs else 'none'),
-            cell(len(known.pairs), f'{base}/pair_count'),
+            count(len(known.pairs), f'{base}/pair_count'),
             *(Cell(_words(known.zeros[kind])) for kind in KINDS),
             Cell(', '.join('–'.join(pair) for pair in known.damped) or 'none'),
         ))  # fmt: skip

@@ -145,8 +145,8 @@ def _ranking(ranking: Ranking) -> Drawn:
     axes = figure.axes[0]
     axes.tick_params(axis='x', labelrotation=60, labelsize=7.5)
     text = (
-        f'{title}: each measure as a multiple of its median over the runs, in powers of two: '
-        f'1 is twice the median, −1 half of it; crossed out: there is none. '
+        f'{title}: each measure as a multiple of its median over the runs where it is not zero, in '
+        'powers of two: 1 is twice the median, −1 half of it; crossed out: none, or zero. '
         'Sorted by the mean rank.'
     )
     return figure, title, text

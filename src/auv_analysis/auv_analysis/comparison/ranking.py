@@ -21,7 +21,7 @@ class Ranking:
     values : (n, m), NaN where a run has none
     ranks : (n, m), 1 for the smallest, equal values share one; NaN where there is no value, but
         what does not settle comes last
-    ratios : (n, m) log2 of value / median of the runs; NaN where there is none or it is zero
+    ratios : (n, m) log2 of value / median of the positive ones; NaN where there is none or zero
     mean_rank : (n,)
 
     """
@@ -75,6 +75,5 @@ def _ranks(values: np.ndarray, measure: Measure) -> np.ndarray:
 
 
 def _ratios(values: np.ndarray) -> np.ndarray:
-    with np.errstate(divide='ignore', invalid='ignore'):
-        ratios = np.log2(values / np.nanmedian(values, axis=0))
-    return np.where(np.isfinite(ratios), ratios, np.nan)
+    positive = np.where(values > 0, values, np.nan)
+    return np.log2(positive / np.nanmedian(positive, axis=0)) if len(values) else values

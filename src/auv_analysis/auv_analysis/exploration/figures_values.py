@@ -11,7 +11,7 @@ from auv_analysis.exploration.names import cut, short_names
 from auv_analysis.exploration.results import Results, Row
 from auv_analysis.measures import Measure
 from auv_analysis.report import plotting
-from auv_analysis.report.grids import Grid, draw_grid
+from auv_analysis.report.grids import Grid, draw_grid, scale_bar
 from auv_analysis.report.plotting import COLOURS, GREY
 from auv_analysis.report.text import typeset
 
@@ -45,7 +45,7 @@ def together(results: Results, measures: Sequence[Measure]) -> Drawn:
             axes.set_ylabel(names[first.path])
             axes.set_xlabel(names[second.path])
             axes.xaxis.set_label_position('bottom')
-            figure.colorbar(axes.images[0], ax=axes, label=measure.unit, fraction=0.05)
+            scale_bar(figure, axes.images[0], measure.unit, ax=axes, fraction=0.05)
     title = 'The two paths that matter most'
     caption = (
         f'{title}, together: median of the rows of each combination of {first.path} and '

@@ -8,6 +8,7 @@ from auv_analysis.exploration.opening import STATUSES
 from auv_analysis.exploration.results import DOCUMENT, Results
 from auv_analysis.measures import BY_NAME
 from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.tables.sources import count, pointer
 
 QUANTILES = {
     'smallest': ('smallest', ''),
@@ -31,7 +32,8 @@ def counts(results: Results) -> Table:
     columns += [Column(status, '', meanings[status]) for status in STATUSES]
     rows = [
         [Cell(row['controller']),
-         *(cell(row[key], f'{DOCUMENT}:/controllers/{i}/{key}') for key in ('rows', *STATUSES))]
+         *(count(row[key], pointer(DOCUMENT, 'controllers', i, key))
+           for key in ('rows', *STATUSES))]
         for i, row in enumerate(results.counts())
     ]  # fmt: skip
     return Table('counts', 'Rows of each controller.', columns, rows)
@@ -40,7 +42,7 @@ def counts(results: Results) -> Table:
 def paths(results: Results) -> Table:
     """What was varied, and how."""
     columns = [
-        Column('path', '', 'where the value stands in the scenario, or in the vehicle file'),
+        Column('path', '', 'where the value stands: scenario, or vehicle file', numeric=False),
         Column('unit', numeric=False),
         Column('meaning', numeric=False),
         Column('group', '', 'how the campaign chooses its values', numeric=False),
@@ -50,7 +52,7 @@ def paths(results: Results) -> Table:
     rows = []
     for i, varied in enumerate(results.varied):
         kind, spec = results.sweep.spread_of(varied.path)
-        groups = cell(len(varied.labels), f'{DOCUMENT}:/paths/{i}/groups')
+        groups = count(len(varied.labels), pointer(DOCUMENT, 'paths', i, 'groups'))
         words = (varied.unit, varied.meaning, kind, _said(spec))
         rows.append([Cell(varied.path), *map(Cell, words), groups])
     return Table('paths', 'What varies.', columns, rows)
@@ -78,8 +80,8 @@ def spreads(results: Results) -> Table:
         if row['figure'] not in {measure.name for measure in results.measures}:
             continue
         head = [Cell(row['label']), Cell(row['controller']), Cell(row['unit'])]
-        keys = ('known', *QUANTILES)
-        rows.append([*head, *(cell(row[k], f'quantiles.parquet:{k}[{i}]') for k in keys)])
+        head.append(count(row['known'], f'quantiles.parquet:known[{i}]'))
+        rows.append([*head, *(cell(row[k], f'quantiles.parquet:{k}[{i}]') for k in QUANTILES)])
     caption = 'Distribution of the measures over the rollouts. Every figure: quantiles.parquet.'
     note = 'An en dash: more rows than that have no such value, such as a time to settle.'
     return Table('quantiles', caption, columns, rows, stub=2, note=note)
@@ -96,9 +98,10 @@ def against(results: Results) -> Table:
         Column('equal in', '%', 'rollouts where both are equal'),
         Column('median ratio', '', 'of the first to the second, where both values exist'),
     ]
-    keys = ('rollouts', 'smaller_percent', 'equal_percent', 'median_ratio')
+    keys = ('smaller_percent', 'equal_percent', 'median_ratio')
     rows = [
         [Cell(row['label']), Cell(row['controller']), Cell(row['other']),
+         count(row['rollouts'], f'paired.parquet:rollouts[{i}]'),
          *(cell(row[key], f'paired.parquet:{key}[{i}]') for key in keys)]
         for i, row in enumerate(results.tables['paired'])
     ]  # fmt: skip

@@ -7,8 +7,10 @@ from auv_analysis.exploration.names import short_names
 from auv_analysis.exploration.results import DOCUMENT, Results, Row
 from auv_analysis.measures import BY_NAME
 from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.tables.sources import count, pointer
 
 MOST_FAILURES = 20
+SHARES = ('diverged_percent', 'refused_percent')
 WORDS = ('measure', 'controller', 'path', 'with', 'case')  # of an index
 
 
@@ -52,8 +54,8 @@ def _indices(
     body = []
     for i, row in rows:
         words = BY_NAME[row['figure']].label, row['controller'], names[row['path']]
-        keys = ('points', *heads)
-        numbers = (cell(row[key], f'indices.parquet:{key}[{i}]') for key in keys)
+        numbers = [count(row['points'], f'indices.parquet:points[{i}]')]
+        numbers += [cell(row[key], f'indices.parquet:{key}[{i}]') for key in heads]
         other = names.get(row['with'] or '', '')
         body.append([*map(Cell, words), Cell(other), Cell(row['case']), *numbers])
     caption = {'sobol': 'Sensitivity indices of Sobol.', 'morris': 'Elementary effects of Morris.'}
@@ -80,7 +82,9 @@ def best(results: Results) -> Table:
 
 
 def _any(value: Any, source: str) -> Cell:
-    if isinstance(value, int | float) and not isinstance(value, bool):
+    if isinstance(value, int) and not isinstance(value, bool):
+        return count(value, source)
+    if isinstance(value, float):
         return cell(value, source, digits=4)
     return Cell('–' if value is None else str(value))
 
@@ -97,8 +101,8 @@ def failures(results: Results) -> Table:
     numbered.sort(key=lambda e: -(e[1]['diverged'] + e[1]['refused']) / max(e[1]['rows'], 1))
     rows = []
     for i, row in numbered[:MOST_FAILURES]:
-        keys = ('rows', 'diverged_percent', 'refused_percent')
-        numbers = (cell(row[key], f'failures.parquet:{key}[{i}]') for key in keys)
+        numbers = [count(row['rows'], f'failures.parquet:rows[{i}]')]
+        numbers += [cell(row[key], f'failures.parquet:{key}[{i}]') for key in SHARES]
         rows.append([Cell(row['path']), Cell(row['value']), Cell(row['controller']), *numbers])
     caption = 'Values at which most rows fail.'
     left = len(numbered) - MOST_FAILURES
@@ -113,7 +117,7 @@ def reasons(results: Results) -> Table:
         [
             Cell(row['status']),
             Cell(row['reason']),
-            cell(row['rows'], f'{DOCUMENT}:/reasons/{i}/rows'),
+            count(row['rows'], pointer(DOCUMENT, 'reasons', i, 'rows')),
         ]
         for i, row in enumerate(results.reasons())
     ]

@@ -2,17 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import LogLocator
 
 from auv_analysis.report import plotting
 from auv_analysis.report.plotting import GREY
-from auv_analysis.report.text import fixed, number, typeset
+from auv_analysis.report.text import fixed, number, plain, typeset
 
 MOST_NAMED = 60  # rows whose names and numbers still have room
 TALLEST = 11.0  # in
@@ -81,10 +84,20 @@ def grid_figure(
     for i, (axes, grid) in enumerate(zip(panels, grids, strict=True)):
         draw_grid(axes, grid, size if len(rows) <= MOST_NAMED else 0.0)
         name_rows(axes, rows if i == 0 else [], len(rows))
-        figure.colorbar(
-            axes.images[0], ax=axes, location='bottom', label=grid.label, aspect=30, fraction=0.05
-        )
+        place: dict[str, Any] = {'location': 'bottom', 'aspect': 30, 'fraction': 0.05}
+        scale_bar(figure, axes.images[0], grid.label, ax=axes, **place)
     return figure
+
+
+def scale_bar(figure: Figure, image: ScalarMappable, label: str, **place: Any) -> None:
+    """Colour bar with few enough numbers."""
+    bar = figure.colorbar(image, label=label, **place)
+    if isinstance(image.norm, LogNorm):
+        bar.ax.minorticks_off()
+        axis = bar.ax.xaxis if bar.orientation == 'horizontal' else bar.ax.yaxis
+        low, high = np.log10(image.get_clim())
+        axis.set_major_locator(LogLocator(subs=(1.0,) if high - low > 2.2 else (1.0, 2.0, 5.0)))
+        axis.set_major_formatter(lambda x, _: typeset(plain(x, 1)))
 
 
 def name_rows(axes: Axes, rows: Sequence[str], count: int) -> None:

@@ -3,6 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from auv_analysis.report.document import Cell
+from auv_analysis.report.text import fixed
+
 Summaries = Mapping[str, Mapping[str, Any]]
 VELOCITIES, WRENCHES = 'uvwpqr', 'XYZKMN'
 VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
@@ -17,6 +20,11 @@ def pointer(file: str, *keys: object) -> str:
     """Where a number stands in a JSON file, as a JSON pointer behind the file's name."""
     parts = (str(key).replace('~', '~0').replace('/', '~1') for key in keys)
     return f'{file}:/{"/".join(parts)}'
+
+
+def count(value: int, source: str) -> Cell:
+    """Cell of a whole number, without decimals."""
+    return Cell(fixed(value, 0), float(value), source, 'zero' if value == 0 else '')
 
 
 def numbers_in(data: Any, path: str = '') -> Iterator[tuple[str, float]]:

@@ -25,7 +25,9 @@ from auv_dynamics.config import shipped
 
 AUV = Path(sys.executable).with_name('auv')
 REXROV = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
-COMMANDS = ['run', 'simulate', 'watch', 'sweep', 'analyze', 'info', 'params', 'check-vehicle']
+COMMANDS = [
+    'run', 'simulate', 'watch', 'sweep', 'analyze', 'atlas', 'info', 'params', 'check-vehicle',
+]  # fmt: skip
 WRONG_LINES = {  # what is typed -> what the one line names
     '': 'COMMAND',
     'fly': 'fly',
@@ -68,6 +70,12 @@ WRONG_LINES = {  # what is typed -> what the one line names
     'params case1 --controller gvc --out taken --overwrite': 'taken: --out',
     'analyze': 'BAG',
     'analyze gone': 'gone',
+    'analyze taken': 'taken',
+    'analyze case1 gone.npz': 'gone.npz',
+    'analyze case1 --out taken': 'taken: --out',
+    'atlas nautilus': 'nautilus',
+    'atlas --out taken': 'taken: --out',
+    'atlas --only': 'VEHICLE',
     'info gone.mcap': 'gone.mcap',
     'info taken': 'taken',
     'info taken/notes.md': 'taken/notes.md',

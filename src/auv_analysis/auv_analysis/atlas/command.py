@@ -8,6 +8,7 @@ from auv_analysis.atlas.collect import charts, shipped_vehicles, write_atlas
 from auv_analysis.commands.conclude import console, say
 from auv_analysis.folder import check_free, prepare
 from auv_dynamics.config import shipped
+from auv_dynamics.files import InputError
 
 FOLDER = Path('runs') / 'atlas'
 
@@ -15,7 +16,9 @@ FOLDER = Path('runs') / 'atlas'
 def atlas(options: argparse.Namespace) -> dict[str, Any]:
     """Couplings of the shipped vehicles and of the given ones, or of these alone."""
     given = list(dict.fromkeys(options.vehicles))
-    known = [] if options.only and given else shipped_vehicles()
+    if options.only and not given:
+        raise InputError('--only', '', 'VEHICLE, one at least', 'none')
+    known = [] if options.only else shipped_vehicles()
     vehicles = [*known, *(vehicle for vehicle in given if vehicle not in known)]
     out = options.out or FOLDER
     check_free(out, overwrite=options.overwrite)

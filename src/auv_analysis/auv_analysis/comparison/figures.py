@@ -128,7 +128,7 @@ def _energy(table: pa.Table) -> Drawn:
 
 def _ranking(ranking: Ranking) -> Drawn:
     title = 'Ranking'
-    labels = [measure.label.replace(', ', '\n') for measure in ranking.measures]
+    labels = [measure.label for measure in ranking.measures]
     caption = f'{title} by the measures that sum up a run, rank 1 is the smallest value. '
     if len(ranking.runs) <= MOST_LINES:
         return _parallel(ranking, labels), title, caption + 'Equal values share a rank.'
@@ -140,10 +140,11 @@ def _ranking(ranking: Ranking) -> Drawn:
         'log2 of value / median of the runs',
         'PuOr_r',
         Normalize(-end, end),
+        decimals=1,
     )
     figure = grid_figure(ranking.runs, [grid])
     axes = figure.axes[0]
-    axes.tick_params(axis='x', labelrotation=60, labelsize=7.5)
+    axes.tick_params(axis='x', labelrotation=90, labelsize='small')
     text = (
         f'{title}: each measure as a multiple of its median over the runs where it is not zero, in '
         'powers of two: 1 is twice the median, −1 half of it; crossed out: none, or zero. '
@@ -161,7 +162,7 @@ def _parallel(ranking: Ranking, labels: Sequence[str]) -> Figure:
         style = look(i)
         axes.plot(places, ranking.ranks[i], marker='o', markersize=4, label=run, **style)
     axes.set(ylim=(len(ranking.runs) + 0.4, 0.6), xlim=(-0.3, len(labels) - 0.7), ylabel='rank')
-    axes.set_xticks(places, labels, rotation=60, fontsize=7.5)
+    axes.set_xticks(places, labels, rotation=90, fontsize='small')
     axes.set_yticks(range(1, len(ranking.runs) + 1))
     figure.legend(loc='outside right upper', handlelength=2.6)
     return figure

@@ -73,8 +73,8 @@ def _groups(entries: Sequence[Entry]) -> dict[str, dict[str, Sketch]]:
 
 
 def _panels(groups: Mapping[str, Mapping[str, Sketch]], labels: Sequence[str]) -> Figure:
-    across = min(len(groups), ACROSS)
-    down = -(-len(groups) // across)
+    down = -(-len(groups) // ACROSS)
+    across = -(-len(groups) // down)
     figure = plotting.new_figure(0.5 + 1.75 * down)
     panels = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True).ravel()
     looks = {label: look(i) for i, label in enumerate(labels)}
@@ -89,10 +89,12 @@ def _panels(groups: Mapping[str, Mapping[str, Sketch]], labels: Sequence[str]) -
     panels[0].set_ylim(max(low, SMALLEST), min(high, LARGEST))
     for axes in panels[len(groups) :]:
         axes.set_axis_off()
+    for axes in panels[max(len(groups) - across, 0) : len(groups)]:
+        axes.tick_params(labelbottom=True)  # nothing is below it
     handles = [Line2D([], [], **looks[label]) for label in labels]
     figure.legend(handles, labels, loc='outside upper right', ncols=4, handlelength=2.6)
-    figure.supxlabel('$t$ (s)', fontsize=9.5)
-    figure.supylabel('error still to come / band', fontsize=9.5)
+    figure.supxlabel('$t$ (s)', fontsize='medium')
+    figure.supylabel('error still to come / band', fontsize='medium')
     return figure
 
 

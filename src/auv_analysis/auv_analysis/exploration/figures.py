@@ -96,9 +96,9 @@ def _distributions(results: Results) -> Drawn:
             axes.plot(x, y, drawstyle='steps-post', label=controller, **look(i))
             shown.append(x)
         logarithmic(axes, 'x', np.concatenate(shown))
-        axes.set_title(measure.label, loc='left', fontsize=8.5)
-        axes.set_xlabel(measure.unit, fontsize=8.5)
-        axes.tick_params(labelsize=7.5)
+        axes.set_title(measure.label, loc='left', fontsize='medium')
+        axes.set_xlabel(measure.unit, fontsize='medium')
+        axes.tick_params(labelsize='small')
         axes.set_ylim(0, 102)
         axes.margins(x=0.05)
     for axes in panels[len(results.measures) :]:
@@ -157,7 +157,7 @@ def _influence(results: Results) -> Drawn:
         )
     figure = grid_figure([m.label for m in results.measures], grids)
     for axes in figure.axes[: len(grids)]:
-        axes.tick_params(axis='x', labelrotation=90 if len(paths) > 2 else 0, labelsize=7.5)
+        axes.tick_params(axis='x', labelrotation=90 if len(paths) > 2 else 0, labelsize='small')
     title = 'What matters'
     caption = (
         f'{title}: share of the variance of the ranks of a figure that lies between the groups of '

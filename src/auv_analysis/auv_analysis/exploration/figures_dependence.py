@@ -47,7 +47,7 @@ def dependence(
     for axes in panels[len(measures) :]:
         axes.set_axis_off()
     name = with_unit(short_names(results.varied)[varied.path], varied)
-    figure.supxlabel(name, fontsize=9.5)
+    figure.supxlabel(name, fontsize='medium')
     handles = [panels[0].plot([], [], **look(results.sweep.controllers.index(c)))[0]
                for c in controllers]  # fmt: skip
     figure.legend(handles, controllers, loc='outside upper right', ncols=6, handlelength=2.6)
@@ -95,9 +95,9 @@ def _bars(axes: Axes, rows: Sequence[Row], style: dict[str, Any], offset: float)
 
 
 def _finish(axes: Axes, varied: Varied, measure: Measure) -> None:
-    axes.set_title(measure.label, loc='left', fontsize=8.5)
-    axes.set_ylabel(measure.unit, fontsize=8.5)
-    axes.tick_params(labelsize=7.5)
+    axes.set_title(measure.label, loc='left', fontsize='medium')
+    axes.set_ylabel(measure.unit, fontsize='medium')
+    axes.tick_params(labelsize='small')
     axes.margins(x=0.03, y=0.08)
     if varied.binned and varied.numbers is not None:
         low, high = varied.numbers.min(), varied.numbers.max()

@@ -38,7 +38,7 @@ def total_indices(results: Results) -> Drawn:
         grids.append(Grid(known, heads, label, 'Blues', Normalize(0.0, 1.0), decimals=2))
     figure = grid_figure([BY_NAME[name].label for name in figures], grids)
     for axes in figure.axes[: len(grids)]:
-        axes.tick_params(axis='x', labelrotation=90 if len(paths) > 2 else 0, labelsize=7.5)
+        axes.tick_params(axis='x', labelrotation=90 if len(paths) > 2 else 0, labelsize='small')
     title = 'Total sensitivity indices'
     caption = (
         f'{title} of Sobol: the share of the variance of a figure that would be left if all but '
@@ -68,15 +68,15 @@ def effects(results: Results, measures: Sequence[Measure]) -> Drawn:
             axes.plot(row['mu_star'], row['sigma'], marker, color=style['color'], markersize=5)
         ends = [0.0, max((row['mu_star'] for row in mine), default=1.0) * 1.1]
         axes.plot(ends, ends, color=plotting.GREY, linewidth=0.7, linestyle=(0, (1, 2)))
-        axes.set_title(f'{measure.label} ({measure.unit})', loc='left', fontsize=8.5)
-        axes.tick_params(labelsize=7.5)
+        axes.set_title(f'{measure.label} ({measure.unit})', loc='left', fontsize='medium')
+        axes.tick_params(labelsize='small')
         axes.margins(0.1)
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(lambda x, _: typeset(plain(x, 3)))
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
-    figure.supxlabel(r'$\mu^*$: mean size of the effect', fontsize=9.5)
-    figure.supylabel(r'$\sigma$: its spread', fontsize=9.5)
+    figure.supxlabel(r'$\mu^*$: mean size of the effect', fontsize='medium')
+    figure.supylabel(r'$\sigma$: its spread', fontsize='medium')
     handles = [panels[0].plot([], [], 'o', color=look(i)['color'])[0] for i in range(len(paths))]
     labels = [names[path] for path in paths]
     for i, controller in enumerate(controllers if len(controllers) > 1 else []):

@@ -41,7 +41,7 @@ def together(results: Results, measures: Sequence[Measure]) -> Drawn:
                 if (cell['controller'], cell['figure']) == (controller, measure.name)
             ]
             _one_pair(axes, cells, measure.label, scale)
-            axes.set_title(f'{controller}: {measure.label}', loc='left', pad=22, fontsize=8.5)
+            axes.set_title(f'{controller}: {measure.label}', loc='left', pad=22, fontsize='medium')
             axes.set_ylabel(names[first.path])
             axes.set_xlabel(names[second.path])
             axes.xaxis.set_label_position('bottom')
@@ -90,7 +90,7 @@ def failures(results: Results) -> Drawn:
             bottom += share
         heads = [typeset(cut(label)) for label in labels]
         axes.set_xticks(range(len(labels)), heads, rotation=90, fontsize=7)
-        axes.set_title(names[path], loc='left', fontsize=8.5)
+        axes.set_title(names[path], loc='left', fontsize='medium')
         axes.grid(axis='x', visible=False)
     for axes in panels[::across]:
         axes.set_ylabel('rows (%)')

@@ -144,7 +144,7 @@ def _text(value: float, grid: Grid) -> str:
     if value == 0.0:
         return '0'
     if grid.decimals is not None:
-        return fixed(value, grid.decimals)
+        return fixed(round(value, grid.decimals) + 0.0, grid.decimals)  # never a minus zero
     return typeset(number(value, 2))
 
 

@@ -1,0 +1,52 @@
+"""Numbers as coloured cells: their scale, their texts and what is marked."""
+
+import numpy as np
+import pytest
+from matplotlib.colors import LogNorm
+
+from auv_analysis.report import plotting
+from auv_analysis.report.grids import ALWAYS, Grid, draw_grid, grid_figure
+from auv_analysis.report.text import number, typeset
+
+
+def texts(grid: Grid) -> list[str]:
+    axes = plotting.new_figure(2.0).subplots()
+    draw_grid(axes, grid)
+    return [text.get_text() for text in axes.texts]
+
+
+def test_scale_is_logarithmic_only_where_it_has_to_be() -> None:
+    columns = ('a', 'b')
+    assert not isinstance(Grid(np.array([[1.0, 10.0]]), columns, '').norm(), LogNorm)
+    far = Grid(np.array([[1.0, 1e9]]), columns, '').norm()
+    assert isinstance(far, LogNorm)
+    assert (far.vmin, far.vmax) == pytest.approx((1e5, 1e9)), 'four decades at most'
+    assert (Grid(np.array([[-1.0, 1e9]]), columns, '').norm().vmin) == -1.0
+    assert Grid(np.array([[np.nan, 0.0]]), columns, '').norm().vmax == 0.0
+    assert Grid(np.array([[np.nan]]), ('a',), '').norm().vmax == 1.0
+
+
+def test_cells_say_zero_always_zero_and_nothing() -> None:
+    values, always = (
+        np.array([[0.0, 0.0, np.nan, 1.25e-7]]),
+        np.array([[False, True, False, False]]),
+    )
+    grid = Grid(values, 'abcd', '', structural=always)
+    assert texts(grid) == ['0', ALWAYS, r'$1.2\cdot10^{-7}$']
+    assert texts(Grid(np.array([[-0.04, 2.26]]), 'ab', '', decimals=1)) == ['0.0', '2.3']
+
+
+def test_names_and_numbers_give_way_where_rows_are_many() -> None:
+    many = grid_figure([f'run {i}' for i in range(150)], [Grid(np.ones((150, 3)), 'abc', 'x')])
+    axes = many.axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()][:2] == ['run 0', 'run 3']
+    assert axes.texts == []
+
+
+@pytest.mark.parametrize('value', [1.5e9, -2.5e-7, 0.25, -12345.0])
+def test_numbers_of_figures_have_no_raised_digits(value: float) -> None:
+    text = typeset(number(value))
+    assert not set(text) & set('⁻⁰¹²³⁴⁵⁶⁷⁸⁹')
+    if text.startswith('$'):
+        mantissa, power = text.strip('$').replace('}', '').split(r'\cdot10^{')
+        assert float(mantissa) * 10.0 ** int(power) == pytest.approx(value)

@@ -13,7 +13,7 @@ from auv_dynamics.files import InputError, reason
 
 OURS = (
     'summary.json', 'report.html', 'numbers.parquet', 'figures', 'logs', 'scenario.yaml',
-    'vehicle.yaml', 'setpoint.csv',
+    'vehicle.yaml', 'setpoint.csv', 'design.json', 'summary_before.json', 'vehicle_before.yaml',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
 MANIFEST, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep

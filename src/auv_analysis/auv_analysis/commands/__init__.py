@@ -12,6 +12,7 @@ _HOME = {
     'info': 'inspect_bag',
     'params': 'params',
     'check-vehicle': 'check_vehicle',
+    'design': 'design',
     'sweep': 'auv_analysis.sweep.command',
 }
 

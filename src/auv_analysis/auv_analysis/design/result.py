@@ -1,0 +1,215 @@
+"""A design as files in a folder and as one JSON document."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from auv_analysis.design.changed_file import changed_data, changed_text
+from auv_analysis.design.comparison import HALF, Candidate
+from auv_analysis.design.couplings import COUPLINGS, UNITS
+from auv_analysis.design.outcome import Outcome, coupled_in, measures
+from auv_analysis.design.search import parts_of
+from auv_analysis.design.statements import (
+    ASSUMPTIONS,
+    nothing_statement,
+    rest_of,
+    result_statement,
+    warnings_of,
+)
+from auv_analysis.design.study import Study
+from auv_analysis.design.words import change_words, values_of
+from auv_analysis.scenario import Scenario, load_scenario
+from auv_dynamics.vehicle import Vehicle
+from auv_gvc_controller.decomposition import decompose
+
+LONGEST = 92  # of a scenario's name, with room for the word behind it
+DESIGN, BEFORE, AFTER = 'design.json', 'summary_before.json', 'summary.json'
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A design with its runs.
+
+    Attributes
+    ----------
+    study : what was found
+    document : what `--json` prints
+    before, after : runs of every controller; None where there is nothing to reduce
+
+    """
+
+    study: Study
+    document: dict[str, Any]
+    before: Outcome | None = None
+    after: Outcome | None = None
+
+
+def concluded(found: Study, out: Path) -> Result:
+    """Write the changed vehicle and its scenario, run both vehicles, write the figures.
+
+    Parameters
+    ----------
+    found : of `study`
+    out : folder, which exists
+
+    Returns
+    -------
+    result : its document also stands in design.json; the runs after the change are those of the
+        scenario and the vehicle as they were read back from the folder
+
+    """
+    setting = found.setting
+    scenario = _write_inputs(found, out)
+    document = _head(found, out)
+    if found.target is None or found.before is None:
+        name = setting.space.vehicle.name
+        document['statement'] = nothing_statement(name, found.asked, found.there)
+        _write(out / DESIGN, document)
+        return Result(found, document)
+    before = Outcome.of(setting.scenario, setting.hold)
+    after = Outcome.of(scenario, setting.hold)
+    _write(out / BEFORE, before.summaries)
+    _write(out / AFTER, after.summaries)
+    document |= _body(found, scenario.vehicle, before, after)
+    _write(out / DESIGN, document)
+    return Result(found, document, before, after)
+
+
+def _write_inputs(found: Study, out: Path) -> Scenario:
+    """Both vehicles, and the scenario with the changed one, read back."""
+    setting, best = found.setting, found.best
+    (out / 'vehicle_before.yaml').write_text(setting.vehicle_text, encoding='utf-8')
+    text = setting.vehicle_text
+    if best is not None and found.target is not None:
+        words = '; '.join(change_words(setting.space, best.x))
+        name = setting.space.vehicle.name
+        about = (
+            f'{name}, changed by auv design against {COUPLINGS[found.target]}: {words}.\n'
+            'vehicle_before.yaml beside it is the vehicle as it was, with its comments.'
+        )
+        text = changed_text(changed_data(setting.space, best.x, words), about)
+    (out / 'vehicle.yaml').write_text(text, encoding='utf-8')
+    data = dict(setting.scenario.data)
+    data['vehicle'] = 'vehicle.yaml'
+    data['name'] = f'{data["name"][:LONGEST]}_changed'
+    if 'setpoint.csv' in setting.scenario.attachments:
+        data['setpoint'] = {'file': 'setpoint.csv'}
+        csv = setting.scenario.attachments['setpoint.csv']
+        (out / 'setpoint.csv').write_text(csv, encoding='utf-8')
+    header = f'# {setting.scenario.name} with the vehicle beside it, every default filled in\n'
+    body = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
+    (out / 'scenario.yaml').write_text(header + body, encoding='utf-8')
+    return load_scenario(out / 'scenario.yaml')
+
+
+def _head(found: Study, out: Path) -> dict[str, Any]:
+    setting = found.setting
+    return {
+        'measures': [],
+        'statement': '',
+        'vehicle': setting.space.vehicle.name,
+        'scenario': setting.scenario.name,
+        'controller': setting.controller,
+        'hold': setting.hold,
+        'reduce': found.asked if found.target is None else COUPLINGS[found.target],
+        'asked': found.asked,
+        'couplings': found.there,
+        'folder': str(out),
+    }
+
+
+def _body(found: Study, changed: Vehicle, before: Outcome, after: Outcome) -> dict[str, Any]:
+    setting, best, target = found.setting, found.best, found.target
+    assert target is not None
+    assert found.before is not None
+    x = setting.space.unchanged if best is None else best.x
+    words = change_words(setting.space, x)
+    vehicle, main = setting.space.vehicle, setting.controller
+    coupled = coupled_in(vehicle, changed)
+    by = f'simulated with {main} ({setting.hold})'
+    return {
+        'measures': measures(before.summaries[main], after.summaries[main], coupled),
+        'statement': result_statement(target, float(found.before.peaks[target]), best, words, by),
+        'halved': best is not None and best.ratio is not None and best.ratio <= HALF,
+        'proposal': {
+            'parts': parts_of(x),
+            'words': words,
+            'values': values_of(x),
+            'Upsilon_before': decompose(vehicle.M)[0].tolist(),
+            'Upsilon_after': decompose(changed.M)[0].tolist(),
+        },
+        'parameters': _parameters(found, x),
+        'ranking': _ranking(found),
+        'alternatives': [_candidate(one, one is best) for one in found.candidates],
+        'at_rest': {'before': rest_of(vehicle), 'after': rest_of(changed)},
+        'controllers': _controllers(before, after, coupled),
+        'assumptions': list(ASSUMPTIONS),
+        'warnings': warnings_of(vehicle, changed),
+    }
+
+
+def _parameters(found: Study, x: np.ndarray) -> list[dict[str, Any]]:
+    parts = parts_of(x)
+    return [
+        {
+            'name': one.name,
+            'unit': one.unit,
+            'value': float(value) if one.part in parts else None,
+            'lower': one.lower,
+            'upper': one.upper,
+            'reason': one.reason,
+        }
+        for one, value in zip(found.setting.space.parameters, x, strict=True)
+    ]
+
+
+def _ranking(found: Study) -> list[dict[str, Any]]:
+    assert found.before is not None
+    peaks, shares = found.before.peaks, found.before.shares
+    places = [k for k in np.argsort(-shares, kind='stable') if COUPLINGS[k] in found.there]
+    return [
+        {
+            'coupling': COUPLINGS[k],
+            'share': float(shares[k]),
+            'largest': float(peaks[k]),
+            'unit': UNITS[COUPLINGS[k]],
+        }
+        for k in places
+    ]
+
+
+def _candidate(one: Candidate, proposed: bool) -> dict[str, Any]:
+    return {
+        'coupling': COUPLINGS[one.target],
+        'part': one.part,
+        'predicted': one.predicted,
+        'ratio': one.ratio,
+        'score': one.score if np.isfinite(one.score) else None,
+        'values': values_of(one.x),
+        'failure': one.failure or None,
+        'proposed': proposed,
+    }
+
+
+def _controllers(
+    before: Outcome, after: Outcome, coupled: Mapping[str, set[str]]
+) -> dict[str, dict[str, Any]]:
+    """Measures of every controller that came to its end with both vehicles, or why it did not."""
+    found: dict[str, dict[str, Any]] = {}
+    for name in dict.fromkeys([*before.summaries, *before.failures]):
+        failure = before.failures.get(name) or after.failures.get(name)
+        rows = []
+        if failure is None:
+            rows = measures(before.summaries[name], after.summaries[name], coupled)
+        found[name] = {'failure': failure, 'measures': rows}
+    return found
+
+
+def _write(path: Path, document: Mapping[str, Any]) -> None:
+    text = json.dumps(document, indent=2, allow_nan=False)
+    path.write_text(text + '\n', encoding='utf-8')

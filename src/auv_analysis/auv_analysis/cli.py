@@ -70,11 +70,7 @@ def parser() -> argparse.ArgumentParser:
     sweep.add_argument('--scheduler', metavar='ADDRESS', help='of dask, such as tcp://host:8786')
     sweep.add_argument('--workers', metavar='N', help='threads or processes; default: the cores')
     design = command('design', 'which change of a vehicle removes which coupling, simulated')
-    design.add_argument('vehicle', help='a vehicle file, or the bare name of a shipped one')
-    design.add_argument('--scenario', help=f'{SCENARIO}, with this vehicle in it')
-    design.add_argument('--reduce', metavar='COUPLING', help='such as delta_pi.pitch')
-    text = 'NAME=LOWER:UPPER of a parameter, such as shift.x=-0.05:0.05; may be repeated'
-    design.add_argument('--bound', action='append', default=[], help=text)
+    _add_design_options(design)
     info = command('info', 'what lies in a bag', writes=False)
     info.add_argument('bag', type=Path, metavar='BAG')
     params = command('params', 'the ROS parameter file of a scenario', writes=True)
@@ -84,6 +80,14 @@ def parser() -> argparse.ArgumentParser:
     check = command('check-vehicle', 'inertia, couplings and limits of a vehicle', writes=False)
     check.add_argument('vehicle', metavar='FILE', help='a vehicle file, or a shipped bare name')
     return main
+
+
+def _add_design_options(design: argparse.ArgumentParser) -> None:
+    design.add_argument('vehicle', help='a vehicle file, or the bare name of a shipped one')
+    design.add_argument('--scenario', help=f'{SCENARIO}, with this vehicle in it')
+    design.add_argument('--reduce', metavar='COUPLING', help='such as delta_pi.pitch')
+    text = 'NAME=LOWER:UPPER of a parameter, such as shift.x=-0.05:0.05; may be repeated'
+    design.add_argument('--bound', action='append', default=[], help=text)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -10,9 +10,9 @@ from rich.progress import BarColumn, Progress, TextColumn
 from auv_analysis.commands.conclude import console, say
 from auv_analysis.design.parameters import NAMES
 from auv_analysis.design.printed import print_design
+from auv_analysis.design.proposal import Proposal, propose
 from auv_analysis.design.result import concluded
 from auv_analysis.design.setting import Setting, open_setting
-from auv_analysis.design.study import Study, study
 from auv_analysis.folder import prepare
 from auv_analysis.scaling import UNFIT
 from auv_analysis.warm_up import announce
@@ -42,12 +42,17 @@ def design(options: argparse.Namespace) -> dict[str, Any]:
     found = _found(setting, options.reduce)
     with console.status('simulating the vehicle before and after'):
         result = concluded(found, out)
+    from auv_analysis.design.report import write_design_report  # with matplotlib, which is slow
+
+    with console.status('drawing figures, writing the report'):
+        report = write_design_report(result, out)
     if not options.json:
         print_design(result.document)
+    say(f'report: {report}')
     return result.document
 
 
-def _found(setting: Setting, reduce: str | None) -> Study:
+def _found(setting: Setting, reduce: str | None) -> Proposal:
     columns = (
         TextColumn('{task.description}'),
         BarColumn(bar_width=40),
@@ -55,7 +60,7 @@ def _found(setting: Setting, reduce: str | None) -> Study:
     )
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task('searching', total=1)
-        return study(setting, reduce, lambda done, of: bar.update(task, completed=done, total=of))
+        return propose(setting, reduce, lambda done, of: bar.update(task, completed=done, total=of))
 
 
 def _bound(text: str) -> tuple[str, float, float]:

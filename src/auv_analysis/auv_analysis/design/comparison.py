@@ -97,7 +97,9 @@ class Comparison:
             yield self._simulated(objective, part, x, self.prediction)
         best = min(singles, key=lambda x: float(objective.value(x)))
         spread = self._spreads[ALL]
-        x = search(objective, spread, [best, *spread.best(objective, starts)])
+        x = search(
+            objective, spread, [best, np.sum(singles, axis=0), *spread.best(objective, starts)]
+        )
         yield self._simulated(objective, ALL, x, self.prediction)
 
     def at_any_cost(self, target: int, starts: int) -> Candidate:

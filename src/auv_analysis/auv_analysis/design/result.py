@@ -11,8 +11,9 @@ import yaml
 
 from auv_analysis.design.changed_file import changed_data, changed_text
 from auv_analysis.design.comparison import HALF, Candidate
-from auv_analysis.design.couplings import COUPLINGS, UNITS
+from auv_analysis.design.couplings import COUPLINGS, UNITS, present
 from auv_analysis.design.outcome import Outcome, coupled_in, measures
+from auv_analysis.design.proposal import Proposal
 from auv_analysis.design.search import parts_of
 from auv_analysis.design.statements import (
     ASSUMPTIONS,
@@ -21,7 +22,6 @@ from auv_analysis.design.statements import (
     result_statement,
     warnings_of,
 )
-from auv_analysis.design.study import Study
 from auv_analysis.design.words import change_words, values_of
 from auv_analysis.scenario import Scenario, load_scenario
 from auv_dynamics.vehicle import Vehicle
@@ -37,24 +37,24 @@ class Result:
 
     Attributes
     ----------
-    study : what was found
+    proposal : what was found
     document : what `--json` prints
     before, after : runs of every controller; None where there is nothing to reduce
 
     """
 
-    study: Study
+    proposal: Proposal
     document: dict[str, Any]
     before: Outcome | None = None
     after: Outcome | None = None
 
 
-def concluded(found: Study, out: Path) -> Result:
+def concluded(found: Proposal, out: Path) -> Result:
     """Write the changed vehicle and its scenario, run both vehicles, write the figures.
 
     Parameters
     ----------
-    found : of `study`
+    found : of `propose`
     out : folder, which exists
 
     Returns
@@ -80,7 +80,7 @@ def concluded(found: Study, out: Path) -> Result:
     return Result(found, document, before, after)
 
 
-def _write_inputs(found: Study, out: Path) -> Scenario:
+def _write_inputs(found: Proposal, out: Path) -> Scenario:
     """Both vehicles, and the scenario with the changed one, read back."""
     setting, best = found.setting, found.best
     (out / 'vehicle_before.yaml').write_text(setting.vehicle_text, encoding='utf-8')
@@ -107,7 +107,7 @@ def _write_inputs(found: Study, out: Path) -> Scenario:
     return load_scenario(out / 'scenario.yaml')
 
 
-def _head(found: Study, out: Path) -> dict[str, Any]:
+def _head(found: Proposal, out: Path) -> dict[str, Any]:
     setting = found.setting
     return {
         'measures': [],
@@ -123,7 +123,7 @@ def _head(found: Study, out: Path) -> dict[str, Any]:
     }
 
 
-def _body(found: Study, changed: Vehicle, before: Outcome, after: Outcome) -> dict[str, Any]:
+def _body(found: Proposal, changed: Vehicle, before: Outcome, after: Outcome) -> dict[str, Any]:
     setting, best, target = found.setting, found.best, found.target
     assert target is not None
     assert found.before is not None
@@ -144,7 +144,7 @@ def _body(found: Study, changed: Vehicle, before: Outcome, after: Outcome) -> di
             'Upsilon_after': decompose(changed.M)[0].tolist(),
         },
         'parameters': _parameters(found, x),
-        'ranking': _ranking(found),
+        'ranking': _ranking(found, changed),
         'alternatives': [_candidate(one, one is best) for one in found.candidates],
         'at_rest': {'before': rest_of(vehicle), 'after': rest_of(changed)},
         'controllers': _controllers(before, after, coupled),
@@ -153,7 +153,7 @@ def _body(found: Study, changed: Vehicle, before: Outcome, after: Outcome) -> di
     }
 
 
-def _parameters(found: Study, x: np.ndarray) -> list[dict[str, Any]]:
+def _parameters(found: Proposal, x: np.ndarray) -> list[dict[str, Any]]:
     parts = parts_of(x)
     return [
         {
@@ -168,16 +168,19 @@ def _parameters(found: Study, x: np.ndarray) -> list[dict[str, Any]]:
     ]
 
 
-def _ranking(found: Study) -> list[dict[str, Any]]:
+def _ranking(found: Proposal, changed: Vehicle) -> list[dict[str, Any]]:
+    """Couplings of either vehicle, the largest share before first."""
     assert found.before is not None
-    peaks, shares = found.before.peaks, found.before.shares
-    places = [k for k in np.argsort(-shares, kind='stable') if COUPLINGS[k] in found.there]
+    before, best = found.before, found.best
+    after = before if best is None or best.sizes is None else best.sizes
+    named = {*found.there, *present(changed)}
+    places = [k for k in np.argsort(-before.shares, kind='stable') if COUPLINGS[k] in named]
     return [
         {
             'coupling': COUPLINGS[k],
-            'share': float(shares[k]),
-            'largest': float(peaks[k]),
             'unit': UNITS[COUPLINGS[k]],
+            'share': {'before': float(before.shares[k]), 'after': float(after.shares[k])},
+            'largest': {'before': float(before.peaks[k]), 'after': float(after.peaks[k])},
         }
         for k in places
     ]

@@ -11,7 +11,7 @@ from auv_analysis.design.objective import Objective
 from auv_analysis.design.parameters import ALL, NAMES, PARTS, SWITCHES, indices_of, rounded
 from auv_analysis.design.prediction import Figures, Prediction
 
-POINTS = 7  # two to this power: changes that are looked at for a start
+POINTS = 8  # two to this power: changes that are looked at for a start
 SEED = 0
 ITERATIONS = 60
 USELESS = 0.005  # a part that lowers the score by less than this is left out

@@ -9,14 +9,14 @@ from auv_analysis.design.search import parts_of
 from auv_analysis.design.setting import Setting
 from auv_analysis.run import Run
 
-STARTS = 3  # of a search for the proposal
+STARTS = 4  # of a search for the proposal
 FEW = 1  # of one for the table of what helps against the other couplings
 
 Told = Callable[[int, int], None]  # how many couplings are done, and of how many
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Proposal:
     """What was found of a vehicle in a setting.
 
     Attributes
@@ -41,7 +41,7 @@ class Study:
     best: Candidate | None = None
 
 
-def study(setting: Setting, reduce: str | None, told: Told = lambda done, of: None) -> Study:
+def propose(setting: Setting, reduce: str | None, told: Told = lambda done, of: None) -> Proposal:
     """Find the change of a vehicle that removes a coupling, and what removes the others.
 
     Parameters
@@ -59,11 +59,11 @@ def study(setting: Setting, reduce: str | None, told: Told = lambda done, of: No
     there = present(setting.space.vehicle)
     asked = None if reduce is None else coupling_named(reduce, there)
     if not there or (asked is not None and asked not in there):
-        return Study(setting, there, asked)
+        return Proposal(setting, there, asked)
     run, before = setting.simulated(setting.space.unchanged)
     target = int(before.shares.argmax()) if asked is None else COUPLINGS.index(asked)
     if before.shares[target] < REST:
-        return Study(setting, there, asked, run, before)
+        return Proposal(setting, there, asked, run, before)
     comparison = Comparison(setting, run, before)
     others = [k for k in comparison.targets() if k != target]
     told(0, 1 + len(others))
@@ -78,4 +78,6 @@ def study(setting: Setting, reduce: str | None, told: Told = lambda done, of: No
         found += comparison.candidates(k, FEW)
     told(1 + len(others), 1 + len(others))
     helps = best.ratio is not None and best.ratio < 1 and parts_of(best.x)
-    return Study(setting, there, asked, run, before, target, tuple(found), best if helps else None)
+    return Proposal(
+        setting, there, asked, run, before, target, tuple(found), best if helps else None
+    )

@@ -19,6 +19,7 @@ HALF = 0.5
 AGREES = 0.02  # of the magnitude before: a prediction that is as near is not made again
 ROUNDS = 2
 TRIED = 0.01  # of the largest share: smaller couplings are not searched for a remedy
+MOST = 6  # couplings that are
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ class Comparison:
         """Couplings worth a remedy, the largest share first."""
         shares = self.before.shares
         order = np.argsort(-shares, kind='stable')
-        return [int(k) for k in order if shares[k] > TRIED * shares.max()]
+        return [int(k) for k in order[:MOST] if shares[k] > TRIED * shares.max()]
 
     def candidates(self, target: int, starts: int) -> Iterator[Candidate]:
         """The best change of each part and of all together, each simulated.
@@ -139,7 +140,7 @@ class Comparison:
         figures = Figures(
             np.array([ratio]),
             sizes.shares,
-            sizes.effort / self.before.effort,
+            sizes.effort / self.before.by_effort,
             space.size(x),
             True,
         )

@@ -33,6 +33,11 @@ class Sizes(NamedTuple):
     shares: np.ndarray
     effort: float
 
+    @property
+    def by_effort(self) -> float:
+        """What an effort is divided by: inf, so that it does not count, where there was none."""
+        return self.effort if self.effort > 0 else np.inf
+
 
 def sizes_of(run: Run, M_inv: np.ndarray) -> Sizes:
     """Sizes of the couplings of a run; M_inv (6, 6) weighs the effort."""

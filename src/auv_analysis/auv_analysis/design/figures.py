@@ -131,9 +131,9 @@ def _upsilon(result: Result):
         figure = plotting.new_figure(3.4)
         grid = figure.subplots(1, 2)
         for i, (axes, (key, U)) in enumerate(zip(grid, pair.items(), strict=True)):
-            axes.imshow(sizes[key], cmap='cividis_r', vmin=0.0, vmax=top)
+            axes.imshow(sizes[key], cmap='Blues', vmin=0.0, vmax=top)
             for row, column in zip(*np.nonzero(np.triu(np.abs(sizes[key]) > 1e-12)), strict=True):
-                dark = sizes[key][row, column] > 0.55 * top
+                dark = sizes[key][row, column] > 0.6 * top
                 text = f'{U[row, column]:.2g}'.replace('-', '−')
                 colour = 'white' if dark else 'black'
                 axes.text(column, row, text, ha='center', va='center', fontsize=6.5, color=colour)

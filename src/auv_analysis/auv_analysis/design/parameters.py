@@ -21,7 +21,7 @@ NAMES = (
 SWITCHES = ('ballast.mass', 'disc.radius')  # zero: the part is not there
 SHIFTED = 0.1  # of the semi-axes: how far the centre of gravity may go
 BALLASTED = 0.05  # of the mass: the largest ballast
-DISC_SHARE = 0.1  # of the mass: the largest added mass of the disc
+DISC_SHARE = 0.1  # of the mean of M11, M22, M33: the largest added mass of the disc
 KEPT = 0.5  # of the static stability: what must be left of it
 THINNEST = 0.05  # of the largest semi-axis: the smallest
 STEPS = 1000.0  # of a range, at least, to which a proposal is rounded
@@ -94,7 +94,8 @@ def parameters_of(
     """
     axes, which = semi_axes(vehicle, data)
     mass, density = float(data['rigid_body']['mass']), data['environment']['water_density']
-    radius = float(np.cbrt(DISC_SHARE * mass / (DISC * density)))
+    moved = np.trace(vehicle.M[:3, :3]) / 3
+    radius = min(float(np.cbrt(DISC_SHARE * moved / (DISC * density))), float(axes.mean()))
     found = {}
     for i, axis in enumerate('xyz'):
         reach = SHIFTED * axes[i]
@@ -104,7 +105,7 @@ def parameters_of(
             found[f'{part}.{axis}'] = ('m', *place, f'centre of buoyancy +- the {which}')
     found['shift.z'] = _stable(vehicle, found['shift.z'])
     found['ballast.mass'] = ('kg', 0.0, BALLASTED * mass, f'{BALLASTED:g} of the mass')
-    text = f'added mass of {DISC_SHARE:g} of the mass'
+    text = f'added mass of {DISC_SHARE:g} of the mean of M11, M22, M33; at most the mean semi-axis'
     found['disc.radius'] = ('m', 0.0, radius, text)
     for angle in ('azimuth', 'elevation'):
         found[f'disc.{angle}'] = ('deg', -90.0, 90.0, 'every direction')

@@ -79,7 +79,7 @@ class Prediction:
         return Figures(
             ratios=smooth_peak(deformed[..., targets]) / self.smooth[list(targets)],
             shares=shares_of(deformed[..., :6], deformed[..., 6:], N, xi, pi, weights),
-            effort=effort_of(tau, self.M_inv, weights) / self.before.effort,
+            effort=effort_of(tau, self.M_inv, weights) / self.before.by_effort,
             size=self.space.size(x),
             definite=(N.real > 0).all(axis=-1),
         )

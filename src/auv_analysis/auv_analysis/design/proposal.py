@@ -65,7 +65,7 @@ def propose(setting: Setting, reduce: str | None, told: Told = lambda done, of: 
     if before.shares[target] < REST:
         return Proposal(setting, there, asked, run, before)
     comparison = Comparison(setting, run, before)
-    others = [k for k in comparison.targets() if k != target]
+    others = [k for k in comparison.targets() if k != target] if setting.is_quick else []
     told(0, 1 + len(others))
     found = list(comparison.candidates(target, STARTS))
     if all(one.ratio is None or one.ratio > HALF for one in found):

@@ -16,7 +16,9 @@ from auv_analysis.scenario import SCHEMA, Scenario, scenario_from
 from auv_analysis.simulation import Hold, simulate
 from auv_dynamics.config import shipped
 from auv_dynamics.files import check, read_text, read_yaml
+from auv_gvc_controller.sampled import is_compiled
 
+MANY_STEPS = 30_000
 LAW = 'gvc'  # the first controller of this law is the one that a design is judged by
 
 
@@ -49,6 +51,12 @@ class Setting:
         """'continuous', but 'zoh' where actuators or sensors act on samples."""
         sampled = {'actuators', 'sensors'} & set(self.scenario.data)
         return 'zoh' if sampled else 'continuous'
+
+    @property
+    def is_quick(self) -> bool:
+        """Whether some dozens of runs take seconds: a compiled law, and not too many steps."""
+        one = self.scenario
+        return is_compiled(one.gains(self.controller)) and one.steps <= MANY_STEPS
 
     def with_vehicle(self, data: Mapping[str, Any]) -> Scenario:
         """The same scenario with another vehicle, checked as if it had been written so."""

@@ -122,7 +122,8 @@ class Space:
         a coordinate that does nothing stays there.
         """
         lower, upper = self.bounds
-        reach = np.maximum(np.maximum(-lower, upper), np.finfo(float).tiny)
+        reach = np.maximum(-lower, upper)
+        reach = np.where(reach > 0, reach, np.inf)  # what is held does not count
         way = (x[..., 0:3] / reach[0:3]) ** 2
         ballast = x[..., 3] / reach[3]
         disc = disc_mass(x[..., 7], 1.0) / disc_mass(reach[7], 1.0)

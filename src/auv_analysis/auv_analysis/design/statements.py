@@ -18,7 +18,7 @@ ASSUMPTIONS = (
     'its drag counts in each degree of freedom by itself.',
     'The damping is otherwise that of the file, and the controllers keep their gains.',
 )
-TILT = np.radians(2.0)  # of the vehicle at rest: more than this is worth a warning
+TILT = np.radians(1.0)  # more of it at rest is worth a warning
 
 
 def nothing_statement(vehicle: str, target: str | None, there: Sequence[str]) -> str:
@@ -71,14 +71,14 @@ def warnings_of(before: Vehicle, after: Vehicle) -> list[str]:
     stable, now = stability(before), stability(after)
     if now <= 0 < stable:
         found.append('the changed vehicle is statically unstable')
-    elif now < stable * (1 - 1e-9):
+    elif now < stable - 1e-9 * abs(stable):
         found.append(
             f'the static stability W z_G - B z_B falls from {number(stable)} to {number(now)} N m'
         )
     level, tilted = tilt(before), tilt(after)
-    if tilted is not None and tilted > max(level or 0.0, TILT):
-        was = 'none' if level is None else f'{np.degrees(level):.1f}'
-        found.append(f'at rest it tilts by {np.degrees(tilted):.1f} deg, before {was}')
+    if level is not None and tilted is not None and tilted > level + TILT:
+        angles = (np.degrees(angle) for angle in (tilted, level))
+        found.append('at rest it tilts by {:.1f} deg, before {:.1f}'.format(*angles))
     return found
 
 

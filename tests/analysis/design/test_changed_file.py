@@ -132,3 +132,27 @@ def test_foam_carries_the_ballast():
     foam = after['hydrostatics']['volume'] - data['hydrostatics']['volume']
     assert foam * space.density == pytest.approx(0.5)
     assert after['rigid_body']['mass'] == pytest.approx(data['rigid_body']['mass'] + 0.5)
+
+
+def test_what_is_worse_at_rest():
+    space = Space.of(read_yaml(shipped('vehicles', 'bluerov2'), 'vehicle'), 'x')
+    couple = space.vehicle.weight * space.vehicle.r_G - space.vehicle.buoyancy * space.vehicle.r_B
+    rights = couple[2]
+    assert rights > 0
+    assert space.unrest(space.unchanged) == 0.0
+    for sign in (-1, 1):
+        for name in ('shift_x', 'shift_y'):
+            x = change_at(space, **{name: 0.01 * sign})
+            turned = (space.vehicle.weight * 0.01 / rights) ** 2
+            assert space.unrest(x) == pytest.approx(turned, rel=1e-9)
+    assert space.unrest(change_at(space, shift_z=0.01)) == 0.0
+    lost = space.unrest(change_at(space, shift_z=-0.01))
+    assert lost == pytest.approx((space.vehicle.weight * 0.01 / rights) ** 2)
+    trimmed = change_at(space, ballast_mass=0.5, ballast_x=0.1, disc_radius=0.05)
+    assert space.unrest(trimmed) == 0.0
+
+
+def test_a_vehicle_that_comes_nearer_to_level_is_better_at_rest():
+    space = Space.of(read_yaml(shipped('vehicles', 'herman2018'), 'vehicle'), 'x')
+    aft, forward = (space.unrest(change_at(space, shift_x=d)) for d in (-0.04, 0.04))
+    assert aft < 0 < forward

@@ -82,6 +82,7 @@ def test_the_unchanged_vehicle_is_predicted_as_it_was(prediction):
     assert found.effort == pytest.approx(1.0, rel=0.05)  # a mean over some of the samples
     assert_allclose(found.shares, before.shares, rtol=0.1, atol=1e-3 * before.shares.max())
     assert found.size == pytest.approx(0.0, abs=0.05)
+    assert found.unrest == 0.0
     weights = predicted.motion.weights
     assert weights.sum() == pytest.approx(1.0)
     assert (weights > 0).all()
@@ -165,13 +166,14 @@ def test_the_smooth_peak_of_nothing_has_no_slope():
         ({'ratios': [1.5]}, False),
         ({'effort': 2.0}, False),
         ({'size': 1.0}, False),
+        ({'unrest': 0.1}, False),
         ({'shares': 2.0}, False),
         ({'definite': False}, False),
     ],
 )
 def test_what_the_score_asks_for(prediction, change, better):
     before = prediction[0].before
-    same = Figures(np.array([1.0]), before.shares, 1.0, 0.0, True)
+    same = Figures(np.array([1.0]), before.shares, 1.0, 0.0, 0.0, True)
     values = {key: np.array(value) for key, value in change.items()}
     if 'shares' in change:
         values['shares'] = change['shares'] * before.shares

@@ -195,6 +195,12 @@ def test_bounds_that_do_not_allow_half_are_told(share, words, short, tmp_path):
     assert f'{100 * (1 - row["after"] / row["before"]):.1f} %' in document['statement'] or not share
 
 
+def test_the_same_input_gives_the_same_proposal(short):
+    first, second = (propose(open_setting('herman2018', short), None) for _ in range(2))
+    assert first.best.x.tolist() == second.best.x.tolist()
+    assert first.best.ratio == second.best.ratio
+
+
 def test_a_part_that_is_held_is_not_changed(short, tmp_path):
     own = [('ballast.mass', 0.0, 0.0), ('disc.radius', 0.0, 0.0), ('shift.x', 0.0, 0.05)]
     result, _ = designed('rexrov', tmp_path, short, None, own)

@@ -7,10 +7,10 @@ import numpy as np
 
 from auv_analysis.design.couplings import Sizes
 from auv_analysis.design.motion import Motion
-from auv_analysis.design.objective import OTHERS, Objective, score
+from auv_analysis.design.objective import PART, Objective, score
 from auv_analysis.design.parameters import ALL, PARTS
 from auv_analysis.design.prediction import Figures, Prediction
-from auv_analysis.design.search import Spread, search
+from auv_analysis.design.search import Spread, parts_of, search
 from auv_analysis.design.setting import Setting
 from auv_analysis.run import Run
 from auv_dynamics.files import InputError
@@ -33,7 +33,7 @@ class Candidate:
     x : (13,) the change
     predicted : largest magnitude of the coupling after by before, in the motion of an earlier run
     ratio : the same of the changed vehicle's own run; None: it cannot be run, `failure` says why
-    score : of `score`, of its own run
+    score : of `score`, of its own run, and the cost of its parts
     run, sizes : its own run
     failure : one line
 
@@ -138,11 +138,12 @@ class Comparison:
             return replace(found, failure=str(error).splitlines()[0])
         ratio = float(sizes.peaks[target] / self.before.peaks[target])
         figures = Figures(
-            np.array([ratio]),
-            sizes.shares,
-            sizes.effort / self.before.by_effort,
-            space.size(x),
-            True,
+            ratios=np.array([ratio]),
+            shares=sizes.shares,
+            effort=sizes.effort / self.before.by_effort,
+            unrest=space.unrest(x),
+            size=space.size(x),
+            definite=True,
         )
-        value = float(score(figures, self.before, target, OTHERS))
+        value = float(score(figures, self.before, target)) + PART * len(parts_of(x))
         return replace(found, ratio=ratio, score=value, run=run, sizes=sizes)

@@ -8,14 +8,16 @@ from auv_analysis.design.couplings import Sizes
 from auv_analysis.design.prediction import Figures, Prediction
 
 OTHERS = 0.1  # weight of the other couplings and of the effort beside the one to be reduced
+UNREST = 0.3  # weight of what gets worse at rest
 SIZE = 0.01  # weight of the size of the change
+PART = 0.02  # cost of every part that is changed: shift, ballast, disc
 LEAST = 0.01  # of all couplings before: the least by which the others are judged
 IMPOSSIBLE = 1e6  # score of a change whose M is not positive definite
 STEP = 1e-20  # of the complex step: there is no cancellation that would ask for a larger one
 
 
 def score(found: Figures, before: Sizes, target: int, others: float = OTHERS) -> np.ndarray:
-    """r^2 + 0.1 (o^2 + e^2) + 0.01 size.
+    """r^2 + 0.1 (o^2 + e^2) + 0.3 unrest + 0.01 size.
 
     r is the largest magnitude of the coupling, o the root sum square of the shares of all others,
     e the root of the effort: each after by before.
@@ -31,7 +33,8 @@ def score(found: Figures, before: Sizes, target: int, others: float = OTHERS) ->
     rest = _without(found.shares, target) / (
         _without(before.shares, target) + LEAST * (before.shares @ before.shares)
     )
-    value = found.ratios[..., 0] ** 2 + others * (rest + found.effort) + SIZE * found.size
+    burden = UNREST * found.unrest + SIZE * found.size
+    value = found.ratios[..., 0] ** 2 + others * (rest + found.effort) + burden
     return np.where(found.definite, value, IMPOSSIBLE)
 
 

@@ -22,6 +22,7 @@ class Figures(NamedTuple):
     ratios : (..., m) largest magnitudes of some couplings, after by before
     shares : (..., 12) of `shares_of`
     effort : (...,) mean of tau^T M^-1 tau, after by before
+    unrest : (...,) how much worse the vehicle is at rest, see `Space.unrest`
     size : (...,) of the change, see `Space.size`
     definite : (...,) whether M is positive definite
 
@@ -30,6 +31,7 @@ class Figures(NamedTuple):
     ratios: np.ndarray
     shares: np.ndarray
     effort: Any
+    unrest: Any
     size: Any
     definite: Any
 
@@ -80,6 +82,7 @@ class Prediction:
             ratios=smooth_peak(deformed[..., targets]) / self.smooth[list(targets)],
             shares=shares_of(deformed[..., :6], deformed[..., 6:], N, xi, pi, weights),
             effort=effort_of(tau, self.M_inv, weights) / self.before.by_effort,
+            unrest=self.space.unrest(x),
             size=self.space.size(x),
             definite=(N.real > 0).all(axis=-1),
         )

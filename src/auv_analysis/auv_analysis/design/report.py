@@ -6,7 +6,7 @@ from pathlib import Path
 from auv_analysis.design import tables
 from auv_analysis.design.couplings import UNITS
 from auv_analysis.design.figures import draw_design
-from auv_analysis.design.objective import OTHERS, SIZE
+from auv_analysis.design.objective import OTHERS, PART, SIZE, UNREST
 from auv_analysis.design.result import Result
 from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.figures import FigureRecord
@@ -21,14 +21,15 @@ METHOD = (
     'A change adds to M, to the restoring moment and to the damping; Υ follows from M. The search '
     'takes the motion of the simulated vehicle as it was and computes by (1) what input the '
     'changed vehicle would need for it. It makes small r² + '
-    f'{OTHERS:g} (o² + e²) + {SIZE:g} s, where r is the largest magnitude of the coupling '
-    '(in place of it the mean of eighth powers, which is smooth), o the root sum square of the '
-    'shares of the other couplings, e the root of the mean of τ^T M^-1 τ, each after by before, '
-    'and s the size of the change. Gradients are by the complex step, the search is L-BFGS-B '
-    'within the bounds from several starts.',
+    f'{OTHERS:g} (o² + e²) + {UNREST:g} b + {SIZE:g} s, where r is the largest magnitude of the '
+    'coupling (in place of it the mean of eighth powers, which is smooth), o the root sum square '
+    'of the shares of the other couplings, e the root of the mean of τ^T M^-1 τ, each after by '
+    'before, b what turns the vehicle from level at rest or rights it less, in proportion to what '
+    'rights it, and s the size of the change. Gradients are by the complex step, the search is '
+    'SLSQP within the bounds from several starts.',
     'Every change in the tables was then simulated with its own vehicle. Of those that halve the '
-    'coupling the one with the lowest score is proposed; where none does, the one that lowers it '
-    'most.',
+    'coupling the one with the lowest score is proposed, where every part that is changed costs '
+    f'{PART:g}; where none does, the one that lowers it most.',
 )
 
 

@@ -7,15 +7,14 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from auv_analysis.design.objective import Objective
+from auv_analysis.design.objective import PART, Objective
 from auv_analysis.design.parameters import ALL, NAMES, PARTS, SWITCHES, indices_of, rounded
 from auv_analysis.design.prediction import Figures, Prediction
 
 POINTS = 8  # two to this power: changes that are looked at for a start
 SEED = 0
 ITERATIONS = 60
-USELESS = 0.005  # a part that lowers the score by less than this is left out
-IDLE = 0.0005  # a coordinate or angle that does is put to zero
+IDLE = 0.0005  # a coordinate or angle that lowers the score by less is put to zero
 PLACED = [i for i, name in enumerate(NAMES) if name not in SWITCHES]
 
 
@@ -75,7 +74,7 @@ def search(objective: Objective, spread: Spread, starts: Sequence[np.ndarray]) -
 
 
 def _descended(objective: Objective, start: np.ndarray, free: list[int]) -> np.ndarray:
-    """L-BFGS-B from a start, in units of the bounds."""
+    """SLSQP from a start, in units of the bounds: few steps, and little work in each."""
     lower, upper = (bound[free] for bound in objective.prediction.space.bounds)
     width = upper - lower
 
@@ -89,7 +88,7 @@ def _descended(objective: Objective, start: np.ndarray, free: list[int]) -> np.n
         return value, gradient * width
 
     found = minimize(
-        function, (start[free] - lower) / width, jac=True, method='L-BFGS-B',
+        function, (start[free] - lower) / width, jac=True, method='SLSQP',
         bounds=[(0.0, 1.0)] * len(free), options={'maxiter': ITERATIONS, 'ftol': 1e-6},
     )  # fmt: skip
     return placed(found.x)
@@ -101,7 +100,7 @@ def _lean(objective: Objective, x: np.ndarray, part: str) -> np.ndarray:
     lower, upper = space.bounds
     parts = PARTS if part == ALL else (part,)
     allowed = [i for i in PLACED if lower[i] <= 0 <= upper[i]]
-    trials = [(indices_of(one), USELESS) for one in parts]
+    trials = [(indices_of(one), PART) for one in parts]
     trials += [([i], IDLE) for one in parts for i in indices_of(one) if i in allowed]
     for places, gain in trials:
         without = x.copy()

@@ -14,13 +14,14 @@ from auv_analysis.design.bodies import (
     normal_of,
     point_mass,
 )
-from auv_analysis.design.parameters import NAMES, Parameter, bounds, parameters_of
+from auv_analysis.design.parameters import NAMES, Parameter, bounds, parameters_of, semi_axes
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import vehicle_from_dict
 
 UPPER = np.triu_indices(6)
 WIDTH = len(UPPER[0]) + 3 + 6  # numbers of a `Difference` as one row
 PLACES = [i for i, name in enumerate(NAMES) if name[-2:] in ('.x', '.y', '.z') and i > 2]
+LEAST_RIGHTING = 0.01  # of weight times length: less static stability than that counts as this
 ASIDE = 0.2  # of a part at its bound: what a place at the edge of the vehicle counts for
 
 
@@ -113,6 +114,25 @@ class Space:
             couple=self.vehicle.weight * shift,
             drag=disc_drag(radius, centre, normal, self.density),
         )
+
+    def unrest(self, x: np.ndarray) -> np.ndarray:
+        """How much worse the vehicle is at rest: (..., 13) to (...), real or complex.
+
+        What turns it from level, squared, in proportion to what rights it, and the loss of what
+        rights it, likewise; negative where it is nearer to level than before.
+        """
+        vehicle, change = self.vehicle, self.difference(x).couple
+        before = vehicle.weight * vehicle.r_G - vehicle.buoyancy * vehicle.r_B
+        rights = max(before[2], LEAST_RIGHTING * vehicle.weight * self._length)
+        turns = (((before + change)[..., :2] ** 2).sum(axis=-1) - before[:2] @ before[:2]) / (
+            before[:2] @ before[:2] + rights**2
+        )
+        lost = np.where(change[..., 2].real < 0, change[..., 2], 0.0) / rights
+        return turns + lost**2
+
+    @cached_property
+    def _length(self) -> float:
+        return float(semi_axes(self.vehicle, self.data)[0].mean())
 
     def size(self, x: np.ndarray) -> np.ndarray:
         """How large a change is: 0 none, 1 for each part that is at its bound; (..., 13) to (...).

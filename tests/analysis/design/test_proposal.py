@@ -82,6 +82,8 @@ def test_the_largest_coupling_is_halved_and_a_fresh_run_says_so(name, tmp_path):
         for row in rows:
             assert row['after'] == figure(summary, row['name']), row['name']
             assert row['before'] == figure(before, row['name']), row['name']
+        kept = json.loads((out / 'summary_before.json').read_text())[controller]
+        assert kept == json.loads(json.dumps(before))
     assert document['measures'] == document['controllers']['gvc']['measures']
 
     proposed = [one for one in document['alternatives'] if one['proposed']]
@@ -290,7 +292,15 @@ def test_a_change_in_words():
 
 @pytest.mark.parametrize(
     ('before', 'after', 'text'),
-    [(2.0, 1.0, '-50.0 %'), (0.0, 1.0, 'new'), (1.0, 1.0, '='), (0.0, 0.0, '='), (None, 1.0, '')],
+    [
+        (2.0, 1.0, '−50.0 %'),
+        (1.0, 2.5, '+150.0 %'),
+        (1.0, 1.0001, '0.0 %'),
+        (0.0, 1.0, 'new'),
+        (1.0, 1.0, '='),
+        (0.0, 0.0, '='),
+        (None, 1.0, ''),
+    ],
 )
 def test_a_change_in_per_cent(before, after, text):
     assert change(before, after) == text

@@ -102,7 +102,7 @@ def parameters_of(
         place = (float(vehicle.r_B[i] - axes[i]), float(vehicle.r_B[i] + axes[i]))
         found[f'shift.{axis}'] = ('m', -reach, reach, f'{SHIFTED:g} of the {which}')
         for part in (BALLAST, DISC_PART):
-            found[f'{part}.{axis}'] = ('m', *place, f'centre of buoyancy +- the {which}')
+            found[f'{part}.{axis}'] = ('m', *place, f'centre of buoyancy ± the {which}')
     found['shift.z'] = _stable(vehicle, found['shift.z'])
     found['ballast.mass'] = ('kg', 0.0, BALLASTED * mass, f'{BALLASTED:g} of the mass')
     text = f'added mass of {DISC_SHARE:g} of the mean of M11, M22, M33; at most the mean semi-axis'

@@ -51,7 +51,10 @@ def change(before: float | None, after: float | None) -> str:
         return ''
     if abs(after - before) <= NEAR * max(abs(before), abs(after)):
         return '='
-    return 'new' if before == 0 else f'{100 * (after / before - 1):+.1f} %'
+    if before == 0:
+        return 'new'
+    text = f'{100 * (after / before - 1):+.1f} %'
+    return '0.0 %' if text[1:] == '0.0 %' else text.replace('-', '−')
 
 
 def _alternatives(document: Mapping[str, Any]) -> Table:

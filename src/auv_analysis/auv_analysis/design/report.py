@@ -15,7 +15,7 @@ from auv_analysis.report.text import join, number
 
 METHOD = (
     'Every coupling is judged by its share in the motion. A deformed velocity counts by the '
-    'kinetic energy, Σ N_i ξ_i² = ν^T M ν, a deformed input by the dual of it, Σ π_i² / N_i = '
+    'kinetic energy, Σ N_i ξ_i^2 = ν^T M ν, a deformed input by the dual of it, Σ π_i^2 / N_i = '
     'τ^T M^-1 τ; both are free of units. Unless a coupling is asked for, the one with the largest '
     'share is reduced.',
     'A change adds to M, to the restoring moment and to the damping; Υ follows from M. The search '

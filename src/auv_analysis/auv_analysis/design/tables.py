@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-from auv_analysis.design.printed import change, share
+from auv_analysis.design.printed import change
 from auv_analysis.design.words import part_words
 from auv_analysis.report.document import Cell, Column, Table, cell
-from auv_analysis.report.text import MISSING, plain
+from auv_analysis.report.text import MISSING, fixed, plain
 
 FILE = 'design.json:'
 Document = Mapping[str, Any]
@@ -41,7 +41,9 @@ def ranking_table(document: Document) -> Table:
         shares = [cell(row['share'][key], f'{where}/share/{key}') for key in PHASES]
         peaks = [cell(row['largest'][key], f'{where}/largest/{key}') for key in PHASES]
         rows.append([Cell(row['coupling']), *shares, *peaks, Cell(row['unit'])])
-    meaning = 'sqrt(mean(N_i Δξ_i²) / mean(ν^T M ν)) or sqrt(mean(Δπ_i²/N_i) / mean(τ^T M^-1 τ))'
+    meaning = (
+        'root of mean(N_i Δξ_i^2) / mean(ν^T M ν), or of mean(Δπ_i^2 / N_i) / mean(τ^T M^-1 τ)'
+    )
     columns = (
         Column('', meaning='coupling', numeric=False),
         Column('before', meaning=meaning, group='share'),
@@ -70,7 +72,8 @@ def matrix_table(document: Document) -> Table:
             where = f'{FILE}/alternatives/{i}/ratio'
             good = 'good' if ratio is not None and ratio <= 0.5 else ''
             value = None if ratio is None else 100 * ratio
-            cells.append(Cell(share(ratio), value, where, good))
+            text = 'cannot be run' if value is None else fixed(value, 1)
+            cells.append(Cell(text, value, where, good))
         rows.append([Cell(coupling), *cells])
     columns = [
         Column('', meaning='coupling that the change was made for', numeric=False),

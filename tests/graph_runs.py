@@ -21,9 +21,9 @@ def start(scenario: Path, out: Path, *options: str) -> subprocess.Popen:
     return subprocess.Popen([*command, *options], env=environ, stderr=subprocess.PIPE, text=True)
 
 
-def record(scenario: Path, out: Path) -> subprocess.Popen:
+def record(scenario: Path, out: Path, domain: int | None = None) -> subprocess.Popen:
     """Start the nodes of `auv run` and record, without the analysis and the report behind it."""
-    environ = environment(fresh_domain())
+    environ = environment(fresh_domain() if domain is None else domain)
     command = [sys.executable, __file__, str(scenario), str(out)]
     return subprocess.Popen(command, env=environ, stderr=subprocess.PIPE, text=True)
 

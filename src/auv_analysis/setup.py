@@ -37,15 +37,16 @@ setup(
         'matplotlib>=3.6',
         'Pillow>=9',
         'Jinja2>=3.0',
+        'bokeh>=3.4,<4',
         'psutil>=5.9.4',
         'rich>=13',
         'pyarrow>=17',
         'scipy>=1.15',
+        'SALib>=1.5',
     ],
     extras_require={
         'test': ['pytest', 'pillow'],
         'dask': ['distributed>=2024.8'],
-        'salib': ['SALib>=1.5'],
     },
     zip_safe=False,
     entry_points={

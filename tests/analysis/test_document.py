@@ -2,77 +2,17 @@
 
 import json
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pyarrow.parquet as parquet
 import pytest
 import yaml
+from pages import Page, at, tokens
 
 from auv_analysis import cli
 from auv_analysis.report import document, rendering
 from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
 from auv_analysis.report.text import MISSING
-
-TOKEN = re.compile(r'−?\d(?:[\d\u202f]*)(?:\.\d+)?(?:·10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?')
-POWERS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
-
-
-class Page(HTMLParser):
-    """Tables of a page: name -> rows of (text, value) of the body's cells; ids; links."""
-
-    def __init__(self, text: str):
-        super().__init__()
-        self.tables: dict[str, list[list[tuple[str, str | None]]]] = {}
-        self.ids: list[str] = []
-        self.links: list[str] = []
-        self._table: list | None = None
-        self._cell: list[str] | None = None
-        self._value: str | None = None
-        self._body = False
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        values = dict(attributes)
-        self.ids += [values['id']] if 'id' in values else []
-        self.links += [values['href'][1:]] if tag == 'a' else []
-        if tag == 'table':
-            self._table = self.tables.setdefault(values['data-name'], [])
-        elif tag == 'tbody':
-            self._body = True
-        elif tag == 'tr' and self._body:
-            self._table.append([])
-        elif tag in ('td', 'th') and self._body:
-            self._cell, self._value = [], values.get('data-value')
-
-    def handle_endtag(self, tag):
-        if tag == 'tbody':
-            self._body = False
-        elif tag in ('td', 'th') and self._body:
-            self._table[-1].append((''.join(self._cell), self._value))
-            self._cell = None
-
-    def handle_data(self, data):
-        if self._cell is not None:
-            self._cell.append(data)
-
-
-def tokens(text: str) -> list[tuple[float, float]]:
-    """Numbers in a text, each with half a unit of its last digit."""
-    found = []
-    for match in TOKEN.finditer(text):
-        mantissa, _, power = match[0].replace('\u202f', '').replace('−', '-').partition('·10')
-        scale = 10.0 ** int(power.translate(POWERS)) if power else 1.0
-        decimals = len(mantissa.partition('.')[2])
-        found.append((float(mantissa) * scale, 0.5000001 * 10.0**-decimals * scale))
-    return found
-
-
-def at(document, pointer: str):
-    for part in pointer.split('/')[1:]:
-        key = part.replace('~1', '/').replace('~0', '~')
-        document = document[int(key)] if isinstance(document, list) else document[key]
-    return document
 
 
 @pytest.fixture(scope='module')

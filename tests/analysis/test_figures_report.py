@@ -20,7 +20,8 @@ from auv_analysis.report.text import fixed, join, number, plain, tied
 from auv_analysis.report.traces import decimate
 from auv_analysis.run import Run
 
-EMPTY_TAGS = {'meta', 'img', 'br'}
+EMPTY_TAGS = {'meta', 'img', 'br', 'input'}
+SCRIPTS = re.compile(r'<script.*?</script>', re.DOTALL)
 
 
 def _runs(name: str) -> dict[str, Run]:
@@ -84,7 +85,7 @@ def _uncoupled(run: Run) -> Run:
 
 
 def _text(report: str) -> str:
-    body = report[report.index('<body>') : report.rindex('<script>')]
+    body = report[report.index('<body>') : report.index('<script>')]
     return unescape(re.sub(r'\s+', ' ', re.sub(r'<[^>]+>', '', body))).replace('\u00a0', ' ')
 
 
@@ -95,6 +96,19 @@ def test_every_figure_is_a_png_and_a_pdf_with_something_on_it(figures):
         pixels = np.asarray(Image.open(figure.png).convert('L'), float)
         assert pixels.std() > 5.0, figure.name
         assert (pixels < 200).mean() > 0.003, figure.name
+
+
+def test_figures_are_what_the_journal_prints(figures):
+    """At the width of its text, of lines and embedded fonts, without images and transparency."""
+    for figure in figures.values():
+        pdf = figure.pdf.read_bytes()
+        left, _, right, _ = map(float, re.search(rb'/MediaBox \[([^]]*)\]', pdf)[1].split())
+        assert right - left == pytest.approx(72 * 6.27, abs=0.5), figure.name
+        assert set(re.findall(rb'/Subtype /(\w+)', pdf)) == {b'Type0', b'CIDFontType2'}
+        assert pdf.count(b'/FontFile2') == pdf.count(b'/Subtype /CIDFontType2') > 0
+        assert set(re.findall(rb'/(?:ca|CA) ([0-9.]+)', pdf)) <= {b'0', b'1'}
+        with Image.open(figure.png) as image:
+            assert image.size[0] == pytest.approx(184 * 6.27, abs=1.0)
 
 
 def test_the_paper_figures_are_all_there(figures, tmp_path, quick):
@@ -218,7 +232,7 @@ def test_report_needs_nothing_but_itself(report):
     assert page.open == []
     inline = 'data:image/png;base64,'
     assert [item[:40] for item in page.loaded if not item.startswith(inline)] == []
-    assert not re.search(r'@import|url\(|https?://', report)
+    assert not re.search(r'@import|url\(|https?://', SCRIPTS.sub('', report))
     assert len(report) < 6_000_000
     assert len(page.images) >= 7
     assert all(len(image['alt']) > 30 for image in page.images)

@@ -1,12 +1,12 @@
 """What varies in a sweep: distributions, designs and grids, the same however they are asked for."""
 
 import itertools
-import sys
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from SALib.sample import sobol
 from scipy import stats
 from scipy.stats import qmc
 from strategies import QUICK
@@ -123,7 +123,7 @@ def test_sobol_is_the_sequence_of_scipy() -> None:
 
 @pytest.mark.parametrize('second_order', [False, True])
 def test_saltelli_is_what_salib_samples(second_order: bool) -> None:
-    sample = pytest.importorskip('SALib.sample.sobol').sample
+    sample = sobol.sample
     problem = {'num_vars': 3, 'names': PATHS, 'bounds': [[0, 1]] * 3}
     expected = sample(problem, 8, calc_second_order=second_order, seed=stream())
     assert (whole('saltelli', count=8, second_order=second_order) == expected).all()
@@ -191,10 +191,3 @@ def test_group_that_makes_no_values_is_refused(group: dict, words: str) -> None:
     assert MOST_AT_ONCE == 10_000_000
     with pytest.raises(InputError, match=words):
         make_group(group, SEED, 2, 'campaign.yaml')
-
-
-def test_morris_without_salib_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in [n for n in sys.modules if n.split('.')[0] == 'SALib'] + ['SALib']:
-        monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(InputError, match='pip install SALib'):
-        make_group({'morris': {'a': UNIFORM}, 'count': 2}, SEED, 0, 'campaign.yaml')

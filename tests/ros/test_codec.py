@@ -10,16 +10,18 @@ from hypothesis import strategies as st
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from strategies import QUICK
 
 from auv_dynamics import interface
 from auv_dynamics.interface import BadMessageError, Frames
 from auv_dynamics.ros.codec import KINDS, Codec, Layout, first_stamp, verified_layout
+from auv_dynamics.signals import DOFS
 
 FRAMES = Frames()
 STAMPS = st.integers(0, (2**31 - 1) * 10**9 + 10**9 - 1)
-READ = (Odometry, TwistStamped, AccelStamped, WrenchStamped)
+READ = (Odometry, TwistStamped, AccelStamped, WrenchStamped, JointState)
 ANY = st.floats(allow_nan=False, allow_infinity=False)
 UNIT = (0.5, -0.5, 0.5, 0.5)
 
@@ -122,6 +124,25 @@ def test_no_unit_quaternion_is_refused_alike() -> None:
     data = as_bytes(Odometry, 3, (1.0,) * 13)
     for codec in (Codec(Odometry, FRAMES, 'odom'), long_way(Odometry)):
         with pytest.raises(BadMessageError, match='expected a unit quaternion, found norm 2'):
+            codec.decode(data)
+
+
+@pytest.mark.parametrize(
+    ('names', 'effort'),
+    [
+        (['sway', 'surge', 'heave', 'roll', 'pitch', 'yaw'], [1.0] * 6),
+        (['surge', 'sway', 'pitch', 'roll', 'heave', 'yaw'], [1.0] * 6),  # of equal length
+        (['surge', 'sway', 'heave', 'roll', 'pitch'], [1.0] * 5),
+        (list(DOFS), [1.0] * 5),
+        ([], []),
+    ],
+)
+def test_joints_that_are_no_degrees_of_freedom_are_refused_alike(names, effort) -> None:
+    message = as_message(JointState, 3, (1.0,) * 6)
+    message.name, message.effort = names, effort
+    data = bytes(serialize_message(message))
+    for codec in (Codec(JointState, FRAMES, 'topic'), long_way(JointState)):
+        with pytest.raises(BadMessageError, match=r"topic: name: expected \['surge'"):
             codec.decode(data)
 
 

@@ -25,7 +25,8 @@ from auv_dynamics.config import shipped
 
 AUV = Path(sys.executable).with_name('auv')
 REXROV = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
-COMMANDS = ['run', 'simulate', 'sweep', 'analyze', 'info', 'params', 'check-vehicle', 'design']
+COMMANDS = ['run', 'simulate', 'watch', 'sweep', 'analyze', 'info', 'params', 'check-vehicle',
+            'design']  # fmt: skip
 WRONG_LINES = {  # what is typed -> what the one line names
     '': 'COMMAND',
     'fly': 'fly',
@@ -45,6 +46,13 @@ WRONG_LINES = {  # what is typed -> what the one line names
     'run case1 --domain-id text': '--domain-id',
     'run case1 --domain-id 102': '--domain-id',
     'run case1 --out taken': 'taken: --out',
+    'watch --domain-id 102': '--domain-id',
+    'watch --rate 0': '--rate',
+    'watch --rate 31': '--rate',
+    'watch --for -1': '--for',
+    'watch --for nan': '--for',
+    'watch --vehicle gone': 'gone',
+    'watch --namespace 1/a': '--namespace',
     'sweep': 'campaign',
     'sweep case9': 'case9',
     'sweep case1_gains --out taken': 'taken: --out',
@@ -139,7 +147,7 @@ def test_help(arguments: list[str], capsys: pytest.CaptureFixture) -> None:
     text = capsys.readouterr().out
     assert text.startswith(' '.join(['usage: auv', *arguments]))
     words = COMMANDS if not arguments else ['--json']
-    writes = arguments not in ([], ['info'], ['check-vehicle'])
+    writes = arguments not in ([], ['watch'], ['info'], ['check-vehicle'])
     words = [*words, '--out', '--overwrite'] if writes else words
     assert all(word in text for word in words)
 

@@ -31,6 +31,22 @@ def chosen_domain(option: int | str | None) -> tuple[int, bool]:
     return next((domain for domain in candidates if is_free(domain)), 1), True
 
 
+def joined_domain(option: int | str | None) -> int:
+    """Domain id of a graph that is there already.
+
+    Parameters
+    ----------
+    option : of the command line; none: $ROS_DOMAIN_ID, else 0 as for every ROS program
+
+    Raises
+    ------
+    InputError : not a number from 0 to 101
+
+    """
+    asked = option is not None or os.environ.get(VARIABLE)
+    return chosen_domain(option)[0] if asked else 0
+
+
 def _checked(value: object, name: str) -> int:
     try:
         domain = int(str(value))

@@ -13,7 +13,12 @@ from auv_dynamics.files import InputError, reason
 
 OURS = (
     'summary.json', 'report.html', 'numbers.parquet', 'figures', 'logs', 'scenario.yaml',
-    'vehicle.yaml', 'setpoint.csv', 'design.json', 'summary_before.json', 'vehicle_before.yaml',
+    'vehicle.yaml', 'setpoint.csv', 'claims.parquet', 'sensitivity.parquet', 'unknowns.parquet',
+    'unknowns_claims.parquet', 'energy_window.parquet', 'comparison.parquet', 'comparison.csv',
+    'atlas.json', 'atlas.parquet', 'analysis.json', 'quantiles.parquet', 'influence.parquet',
+    'dependence.parquet', 'together.parquet', 'failures.parquet', 'paired.parquet',
+    'indices.parquet', 'best.parquet', 'design.json', 'summary_before.json',
+    'vehicle_before.yaml',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
 MANIFEST, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep
@@ -39,9 +44,7 @@ def prepare(
 
     """
     try:
-        if out.is_dir() and any(out.iterdir()):
-            if not overwrite:
-                raise InputError(out, '--out', 'a new folder, or --overwrite', 'an existing folder')
+        if check_free(out, overwrite=overwrite):
             _clear(out, [path.resolve() for path in inputs], new)
         out.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=out).close()
@@ -49,6 +52,18 @@ def prepare(
         found = reason(error)
         raise InputError(out, '--out', 'a folder that can be written', found) from None
     return out
+
+
+def check_free(out: Path, *, overwrite: bool) -> bool:
+    """Whether a folder has something in it; InputError where that must not be overwritten."""
+    try:
+        taken = out.is_dir() and any(out.iterdir())
+    except OSError as error:
+        found = reason(error)
+        raise InputError(out, '--out', 'a folder that can be written', found) from None
+    if taken and not overwrite:
+        raise InputError(out, '--out', 'a new folder, or --overwrite', 'an existing folder')
+    return taken
 
 
 def _clear(out: Path, inputs: list[Path], new: Iterable[str]) -> None:

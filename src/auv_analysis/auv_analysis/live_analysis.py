@@ -2,18 +2,25 @@
 
 import numpy as np
 
-from auv_analysis.coupling import delta_pi, delta_xi
+from auv_analysis.coupling import delta_pi, delta_xi, structural_zeros
 from auv_analysis.energy import kinetic_energy, shares
 from auv_dynamics.vehicle import Vehicle
 from auv_gvc_controller.decomposition import decompose, inverse_upper
 
 
 class LiveAnalysis:
-    """Analyses samples of one vehicle: (6,) in, (6,) out, body frame and SI."""
+    """Analyses samples of one vehicle: (6,) in, (6,) out, body frame and SI.
+
+    Attributes
+    ----------
+    structural_zeros : degrees of freedom whose delta_xi or delta_pi vanishes for every motion
+
+    """
 
     def __init__(self, vehicle: Vehicle):
         self._Upsilon, self._N = decompose(vehicle.M)
         self._Upsilon_inv = inverse_upper(self._Upsilon)
+        self.structural_zeros = structural_zeros(self._Upsilon, self._Upsilon_inv)
 
     def energy(self, nu: tuple) -> tuple[np.ndarray, np.ndarray]:
         """Kinetic energy by component in J and its shares in %, (30)."""

@@ -1,6 +1,7 @@
 """What the schemas of scenario and vehicle files say of the value at a dotted path."""
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -18,6 +19,8 @@ from auv_analysis.changes import (
 from auv_analysis.scenario import SCHEMA, Scenario
 from auv_dynamics.files import InputError, dotted, schema
 from auv_dynamics.vehicle_file import SCHEMA as VEHICLE_SCHEMA
+
+UNIT = re.compile(r'\(([^()]+)\)$')  # ends a title: 'a positive number (kg)'
 
 
 def check_paths(scenario: Scenario, paths: Iterable[str]) -> None:
@@ -112,3 +115,26 @@ def _applicable(node: Any, root: dict[str, Any], data: Any) -> Iterator[dict[str
     if 'if' in node:
         holds = jsonschema.Draft202012Validator(node['if']).is_valid(data)
         yield from _applicable(node.get('then' if holds else 'else'), root, data)
+
+
+def said_of(data: Any, vehicle: Any, path: str) -> tuple[str, str]:
+    """Unit and description of the value at a path; '' what the schemas do not say.
+
+    Parameters
+    ----------
+    data, vehicle : contents of a scenario file and of its vehicle file
+    path : see `changed_scenario`
+
+    """
+    try:
+        if of_vehicle(path):
+            root, place = schema(VEHICLE_SCHEMA), split(below_vehicle(path))
+            nodes = _nodes_at(root, vehicle, place, 'vehicle')
+        else:
+            nodes = _nodes_at(schema(SCHEMA), data, split(path), 'scenario')
+    except (InputError, IndexError, KeyError, TypeError):
+        return '', ''
+    titles = [node['title'] for node in nodes if 'title' in node]
+    units = [found[1] for found in map(UNIT.search, titles) if found]
+    descriptions = [node['description'] for node in nodes if 'description' in node]
+    return (units or [''])[0], (descriptions or [''])[0]

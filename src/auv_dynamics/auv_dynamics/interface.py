@@ -8,8 +8,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from auv_dynamics.signals import DOFS
+
 NANOSECONDS = 10**9
 PARENT = 'AUV_GVC_PARENT'  # variable with the process id of `auv run`: nodes do not outlive it
+OBSERVER = 'auv_watch'  # name of a node that only looks on: nobody waits for it
 
 ODOM = 'odom'
 TWIST = 'twist'
@@ -106,3 +109,11 @@ def read_accel(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
 def read_wrench(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
     """Stamp in ns and six floats of a WrenchStamped; BadMessageError when it must not be used."""
     return _stamped(topic, message, _six(message.wrench.force, message.wrench.torque), frames)
+
+
+def read_joint_state(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
+    """Stamp in ns and `effort` of a JointState that has an entry per degree of freedom."""
+    if tuple(message.name) != DOFS or len(message.effort) != len(DOFS):
+        found = f'{list(message.name)} with {len(message.effort)} numbers'
+        raise BadMessageError(f'{topic}: name: expected {list(DOFS)}, found {found}')
+    return _stamped(topic, message, tuple(message.effort), frames)

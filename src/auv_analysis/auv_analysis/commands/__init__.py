@@ -12,6 +12,8 @@ _HOME = {
     'info': 'inspect_bag',
     'params': 'params',
     'check-vehicle': 'check_vehicle',
+    'watch': 'watch',
+    'atlas': 'auv_analysis.atlas.command',
     'design': 'design',
     'sweep': 'auv_analysis.sweep.command',
 }

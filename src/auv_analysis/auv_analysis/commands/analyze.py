@@ -1,37 +1,66 @@
-"""`auv analyze`: summary and report of bags that are there already."""
+"""`auv analyze`: summary and report of runs, recorded or simulated, and of sweeps."""
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.bag import bag_files, open_bag
 from auv_analysis.commands.conclude import conclude, console
-from auv_analysis.folder import prepare
-from auv_analysis.run import AnyRun
+from auv_analysis.comparison.opening import named, open_source
+from auv_analysis.comparison.sources import Source, is_sweep, sources_of
+from auv_analysis.folder import check_free, prepare
+from auv_dynamics.files import InputError
+
+FEW = 3  # runs up to which the report shows every figure of each
+LONGEST = 80  # of a folder's name
 
 
 def analyze(options: argparse.Namespace) -> dict[str, Any]:
-    """Summary and report of bags that are there already."""
-    runs: dict[str, AnyRun] = {}
-    texts: dict[str, dict[str, str]] = {'scenario.yaml': {}, 'vehicle.yaml': {}}
-    for bag in options.bags:
-        with console.status(f'reading {bag}'):
-            run, attachments = open_bag(bag, options.vehicle)
-        name = _free_name(run.controller, runs)
-        runs[name] = run
-        for file, by_name in texts.items():
-            by_name[name] = attachments.get(file, '')
-    name = '_'.join(dict.fromkeys(run.scenario for run in runs.values()))
+    """Summary and report of runs, recorded or simulated, or of a sweep."""
+    sweeps = [argument for argument in options.results if is_sweep(argument)]
+    if sweeps:
+        if len(options.results) > 1:
+            found = f'{len(options.results)} arguments'
+            raise InputError(sweeps[0], '', 'a sweep alone, without other results', found)
+        from auv_analysis.exploration.explore import explore
+
+        return explore(Path(sweeps[0]), options)
+    sources = sources_of(options.results)
+    if options.out:
+        check_free(options.out, overwrite=options.overwrite)
+    return _few(sources, options) if len(sources) <= FEW else _many(sources, options)
+
+
+def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
+    opened = []
+    for source in sources:
+        with console.status(f'reading {source.path}'):
+            opened.append(open_source(source, options.vehicle))
+    pairs = [(source, entry.run) for source, entry in zip(sources, opened, strict=True)]
+    names = named(pairs, join='_')
+    out = _prepared([entry.run.scenario for entry in opened], sources, options)
+    runs = dict(zip(names, (entry.run for entry in opened), strict=True))
+    scenario_texts = dict(zip(names, (entry.scenario_text for entry in opened), strict=True))
+    vehicle_texts = dict(zip(names, (entry.vehicle_text for entry in opened), strict=True))
+    return conclude(out, runs, scenario_texts, vehicle_texts)
+
+
+def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
+    from auv_analysis.comparison.compare import conclude_comparison, entries_of
+
+    entries = entries_of(sources, options.vehicle)
+    out = _prepared([entry.scenario for entry in entries], sources, options)
+    return conclude_comparison(out, entries)
+
+
+def _prepared(
+    scenarios: Sequence[str], sources: Sequence[Source], options: argparse.Namespace
+) -> Path:
+    """Folder of the results, only now that all has been read."""
+    names = list(dict.fromkeys(scenarios))
+    name = '_'.join(names)
+    if len(names) > FEW or len(name) > LONGEST:
+        name = f'{names[0]}_and_{len(names) - 1}_more'
+    files = [file for source in sources for file in source.files]
     out = options.out or Path('runs') / f'analyze_{name}'
-    files = [file for bag in options.bags for file in bag_files(bag)]
-    out = prepare(out, overwrite=options.overwrite, inputs=files)
-    return conclude(out, runs, texts['scenario.yaml'], texts['vehicle.yaml'])
-
-
-def _free_name(name: str, taken: Iterable[str]) -> str:
-    taken = list(taken)
-    number, free = 2, name
-    while free in taken:
-        free, number = f'{name}_{number}', number + 1
-    return free
+    return prepare(out, overwrite=options.overwrite, inputs=files)

@@ -7,14 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-import numpy as np
 from rich.console import Console
-from rich.table import Table
 
+from auv_analysis.commands.terminal import comparison_table, summary_tables
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
 from auv_analysis.summary import Window, summarize
-from auv_dynamics.signals import DOFS
 
 console = Console(stderr=True)
 
@@ -71,7 +69,7 @@ def conclude(
     vehicle_text: str | dict[str, str],
     study: Study | None = None,
 ) -> dict[str, Any]:
-    """Write summary and report, show the table; returns the summaries.
+    """Write summary and report, show the tables; returns the summaries.
 
     Parameters
     ----------
@@ -91,31 +89,11 @@ def conclude(
     more = study.examine(runs, summaries) if study else {}
     with console.status('drawing figures, writing the report'):
         report = write_report(out, runs, summaries, scenario_text, vehicle_text, **more)
-    for name, run in runs.items():
-        for note in run.notes:
-            say(f'note: {name}: {note}')
-    _show(summaries)
+    console.print(summary_tables(summaries))
     say(f'report: {report}')
     return summaries
 
 
-def _show(summaries: dict[str, dict[str, Any]]) -> None:
-    table = Table(box=None, header_style='bold')
-    for column in ('controller', 'kinetic energy', 'settled', 'largest error after 2 s', 'by'):
-        table.add_column(column)
-    for name, summary in summaries.items():
-        energy = summary['kinetic_energy']
-        times = summary['velocity_error']['settling_time']
-        settled = 'not all' if None in times else f'{max(times):.2f} s'
-        worst, dof = _worst(summary['velocity_error']['max_after_2s'])
-        mean = 'unknown' if energy['mean'] is None else f'{energy["mean"]:.2f} J'
-        window = f'{energy["window"][0]:g}-{energy["window"][1]:g} s'
-        table.add_row(name, f'{mean} ({window})', settled, worst, dof)
-    console.print(table)
-
-
-def _worst(errors: list[float] | None) -> tuple[str, str]:
-    if errors is None:
-        return 'unknown', ''
-    i = int(np.argmax(errors))
-    return f'{errors[i]:.4f} {"m/s" if i < 3 else "rad/s"}', DOFS[i]
+def show(summaries: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print a row per run on stderr."""
+    console.print(comparison_table(summaries))

@@ -1,15 +1,13 @@
 """`auv simulate`: a scenario in this process, by the same kernel."""
 
 import argparse
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from auv_analysis.commands.conclude import Outcome, console, finish
 from auv_analysis.commands.scenarios import open_scenario, prepare_out
 from auv_analysis.experiment import write_inputs
-from auv_analysis.run import AnyRun, Run
+from auv_analysis.run import AnyRun
+from auv_analysis.samples import ENDING, write_samples
 from auv_analysis.scenario import Scenario
 from auv_analysis.simulation import check_hold
 from auv_analysis.simulation import simulate as simulate_run
@@ -38,11 +36,5 @@ def simulated(options: argparse.Namespace, scenario: Scenario, names: list[str])
             failure = failure or error
             continue
         runs[name] = run
-        _write_samples(run, out / f'{name}.npz')
+        write_samples(run, out / f'{name}{ENDING}')
     return Outcome(out, runs, failure)
-
-
-def _write_samples(run: Run, path: Path) -> None:
-    motion, forces = ('t', 'eta', 'nu', 'nu_measured', 'nu_d', 'nu_d_dot'), ('tau', 'tau_applied')
-    names = (*motion, *forces, 'disturbance', 'disturbance_estimate')
-    np.savez_compressed(path, **{name: getattr(run, name) for name in names})

@@ -1,28 +1,43 @@
 """`auv study`: the paper's procedure, steps 1 to 6, as one report."""
 
 import argparse
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.commands.conclude import console, finish
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from auv_analysis.commands.conclude import console, finish, say
 from auv_analysis.commands.run import recorded
 from auv_analysis.commands.scenarios import open_scenario
 from auv_analysis.commands.simulate import simulated
-from auv_analysis.report.document import Section
+from auv_analysis.report.document import Section, Sentence
+from auv_analysis.report.paper import CASES
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
 from auv_analysis.study.discussion import discussion
+from auv_analysis.study.effects import Sensitivity
+from auv_analysis.study.indices import Design, Method
+from auv_analysis.study.paper_claims import PaperClaims, paper_claims
 from auv_analysis.study.samples import write_samples
+from auv_analysis.study.sections import claims_sentences, sensitivity_section, unknowns_section
+from auv_analysis.study.sensitivity import sensitivity
+from auv_analysis.study.unknowns_run import unknowns
 from auv_analysis.summary import Window
 from auv_dynamics.files import InputError
+
+LARGEST_SPAN = 1e3
 
 
 def study(options: argparse.Namespace) -> dict[str, Any]:
     """The paper's procedure, by `simulate` or on the node graph."""
     scenario, names = open_scenario(options)
     windows = [_window(scenario, first, last) for first, last in options.window]
+    _check(options)
+    if options.run:
+        options.hold = 'zoh'  # as the nodes do
     outcome = (recorded if options.run else simulated)(options, scenario, names)
     return finish(*outcome, scenario, Procedure(scenario, outcome.out, windows, options))
 
@@ -32,6 +47,21 @@ def _window(scenario: Scenario, first: float, last: float) -> Window:
         expected = f'two times, FROM < TO, from 0 to {scenario.duration:g} s'
         raise InputError('--window', '', expected, f'{first:g} {last:g}')
     return first, last
+
+
+def _check(options: argparse.Namespace) -> None:
+    if not 1.0 < options.span <= LARGEST_SPAN:
+        expected = f'a number above 1, up to {LARGEST_SPAN:g}'
+        raise InputError('--span', '', expected, f'{options.span:g}')
+    if options.seed < 0:
+        raise InputError('--seed', '', 'a whole number from 0 on', str(options.seed))
+    if options.samples is not None:
+        method: Method = 'morris' if options.sensitivity == 'morris' else 'sobol'
+        try:
+            Design(method, ('gain',), options.samples, 0)
+        except ValueError as error:
+            expected = str(error).partition('expected ')[2].partition(', found')[0]
+            raise InputError('--samples', '', expected, str(options.samples)) from None
 
 
 @dataclass(frozen=True)
@@ -59,6 +89,70 @@ class Procedure:
         for name, run in runs.items():
             with console.status(f'writing {name}.parquet'):
                 write_samples(run, self.out / f'{name}.parquet')
+        found = self._sensitivities(list(runs))
+        claims = self._claims(runs, found)
+        said = claims_sentences(claims) if claims else []
         leading = min(runs.values(), key=lambda run: run.law != 'gvc').controller
+        more: dict[str, list[Section]] = {}
         sentences = discussion(summaries, leading)
-        return {'more': {'couplings': [Section('discussion', 'Step 6: discussion', sentences)]}}
+        if found:
+            section, gains = sensitivity_section(self.out, list(found.values()))
+            more['tracking'] = [section]
+            sentences += gains
+            said = [*gains[:1], *said]
+        more['couplings'] = [Section('discussion', 'Step 6: discussion', sentences)]
+        if claims and claims.claims and self._as_shipped(claims):
+            section, open_ones = self._unknowns()
+            more['claims'] = [section]
+            said += open_ones[:1]
+        judged = claims.claims if claims else None
+        return {'more': more, 'sentences': said, 'claims': judged}
+
+    def _sensitivities(self, names: list[str]) -> dict[str, Sensitivity]:
+        options = self.options
+        if options.sensitivity == 'none':
+            return {}
+        found = {}
+        for name in names:
+            with console.status(f'{self.scenario.name} {name}: varying the gains'):
+                found[name] = sensitivity(
+                    self.scenario, name, method=options.sensitivity, count=options.samples,
+                    span=options.span, seed=options.seed, hold=options.hold, threads=_threads(),
+                )  # fmt: skip
+            if found[name].refusal:
+                say(f'note: {name}: no sensitivity to the gains: {found[name].refusal}')
+        return found
+
+    def _claims(
+        self, runs: Mapping[str, AnyRun], found: Mapping[str, Sensitivity]
+    ) -> PaperClaims | None:
+        """The 21 claims; None for a scenario that is none of the paper's."""
+        with console.status('judging the claims of the paper'):
+            claims = paper_claims(
+                self.scenario, runs, found, hold=self.options.hold, threads=_threads()
+            )
+        return claims if claims.claims or self.scenario.name in CASES else None
+
+    @staticmethod
+    def _as_shipped(claims: PaperClaims) -> bool:
+        return all(path == 'duration' for path, *_ in claims.departures)
+
+    def _unknowns(self) -> tuple[Section, list[Sentence]]:
+        with _bar() as bar:
+            task = bar.add_task('what the paper leaves open', total=None)
+            found = unknowns(
+                self.scenario,
+                seed=self.options.seed,
+                threads=_threads(),
+                progress=lambda done, total: bar.update(task, completed=done, total=total),
+            )
+        return unknowns_section(self.out, found)
+
+
+def _bar() -> Progress:
+    columns = TextColumn('{task.description}'), BarColumn(bar_width=40), TimeRemainingColumn()
+    return Progress(*columns, console=console, transient=True)
+
+
+def _threads() -> int:
+    return os.cpu_count() or 1

@@ -67,7 +67,7 @@ def _panel(axes: Axes, run: Sketch, i: int, bound: float | None) -> bool:
     axes.set_ylim(-ROOM * seen, ROOM * seen)
     peak = command.low[i] if command.low[i] == -command.peak[i] else command.high[i]
     reached = f'{number(peak)} {plotting.INPUT.unit(i)} at {command.at[i]:.2f} s'
-    axes.set_title(f'command to {reached}', loc='right', fontsize=8.5)
+    axes.set_title(f'command to {reached}', loc='right', fontsize=7.5)
     return True
 
 

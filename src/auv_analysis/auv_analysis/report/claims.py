@@ -1,10 +1,10 @@
 """What Herman 2018 reports, held against the runs at hand: the claims table."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
-from auv_analysis.report.claims_rows import BOTH, ROWS, Row
+from auv_analysis.report.claim import BOTH, Claim, Row
+from auv_analysis.report.claims_rows import ROWS
 from auv_analysis.report.evidence import Evidence, Signals, Verdict
 from auv_analysis.report.paper import CASES, is_plain, paper_run
 from auv_analysis.report.sketch import Sketch
@@ -18,30 +18,6 @@ GAINS = {
     ('case2', 'gvc'): '(36), (37)',
     ('case2', 'cl'): '(40)',
 }
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One row of the table.
-
-    Attributes
-    ----------
-    number : of the row
-    claim, paper : what the paper says, and its value where it prints one
-    ours : computed from the runs; an en dash where nothing is
-    verdict : by the criterion
-    criterion : when the claim counts as reproduced, or why it is not evaluated
-    remark : what a reader must know to weigh the verdict
-
-    """
-
-    number: int
-    claim: str
-    paper: str
-    ours: str
-    verdict: Verdict
-    criterion: str
-    remark: str = ''
 
 
 def claims_table(
@@ -69,28 +45,45 @@ def claims_table(
     known = sketches({law: run for law, run in found.items() if run is not None})
     signals = {law: Signals(run) for law, run in known.items()}
     N = next(iter(summaries.values()))['decomposition']['N']
-    evidence = Evidence(signals, tuple(N))
-    return [_claim(i, row, scenario, evidence) for i, row in enumerate(ROWS, start=1)]
+    return judged({scenario: Evidence(signals, tuple(N))})
 
 
-def _claim(index: int, row: Row, scenario: str, evidence: Evidence) -> Claim:
-    verdict, reason = _obstacle(row, scenario, evidence)
+def judged(cases: Mapping[str, Evidence]) -> list[Claim]:
+    """The 21 claims, judged by what is known of the paper's cases.
+
+    Parameters
+    ----------
+    cases : 'case1', 'case2' or both -> evidence; a claim on either goes by the first
+
+    """
+    return [_claim(i, row, cases) for i, row in enumerate(ROWS, start=1)]
+
+
+def _claim(index: int, row: Row, cases: Mapping[str, Evidence]) -> Claim:
+    case = next((name for name in cases if name in row.cases), row.cases[0])
+    verdict, reason = _obstacle(row, case, cases.get(case))
+    texts = index, row.claim, row.paper
     if verdict:
-        return Claim(index, row.claim, row.paper, MISSING, verdict, row.criterion, reason)
-    finding = row.judge(evidence)
-    return Claim(index, row.claim, row.paper, *finding, row.criterion, row.remark)
+        return Claim(*texts, MISSING, verdict, row.criterion, reason, case, printed=row.printed)
+    found = row.judge(cases[case])
+    return Claim(
+        *texts, found.ours, found.verdict, row.criterion, row.remark, case, found.window,
+        found.values, row.printed,
+    )  # fmt: skip
 
 
-def _obstacle(row: Row, scenario: str, evidence: Evidence) -> tuple[Verdict | None, str]:
+def _obstacle(row: Row, case: str, evidence: Evidence | None) -> tuple[Verdict | None, str]:
     """Why a row cannot be judged: its verdict and the reason; None and nothing when it can."""
-    if scenario not in row.cases:
-        return 'other case', f'Belongs to Case {row.cases[0][-1]}.'
+    if evidence is None:
+        return 'other case', f'Belongs to Case {case[-1]}.'
     for law in row.laws:
         signals = evidence.signals.get(law)
         if signals is None:
-            return 'not evaluated', f'No run of law {law} with gains {GAINS[scenario, law]}.'
+            return 'not evaluated', f'No run of law {law} with gains {GAINS[case, law]}.'
         if signals.run.duration < row.seconds:
             return 'not evaluated', f'Needs a run of at least {row.seconds:g} s.'
         if row.knows_F and not signals.run.knows_disturbance:
             return 'not evaluated', 'F is not known for this run.'
+        if row.responds and law not in evidence.responses:
+            return 'not evaluated', 'Needs a study of the gains: two laws are none.'
     return None, ''

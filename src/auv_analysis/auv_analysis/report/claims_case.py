@@ -2,71 +2,92 @@
 
 import numpy as np
 
-from auv_analysis.report.claims_motion import U, W
-from auv_analysis.report.evidence import Evidence, Finding, grade, listed, seconds
+from auv_analysis.report.claims_motion import ERRORS, U, W
+from auv_analysis.report.evidence import Evidence, Finding, Verdict, grade, settled, spell
+from auv_analysis.report.quotes import Quotes, percent, short
 from auv_analysis.report.sketching import NEAR_ZERO
-from auv_analysis.report.text import number
 from auv_analysis.summary import TRANSIENT
 
 SLIGHTLY = 0.10  # relative difference of inputs that differ 'only slightly'
 COMPARABLE = 0.05  # of efforts that are 'comparable'
-ERRORS = ('Δu', 'Δv', 'Δw', 'Δp', 'Δq', 'Δr')
+INPUTS = ('τ_X', 'τ_Y', 'τ_Z', 'τ_K', 'τ_M', 'τ_N')
 
 
 def inputs_similar(of: Evidence) -> Finding:
     """Row 14: inputs of both laws with the same gains."""
     gvc, cl = (run.peak('tau') for run in of.both)
-    change = _rms_change(of)
-    text = (
-        f'peak τ_X {number(gvc[U])} against {number(cl[U])} N, '
-        f'τ_Z {number(gvc[W])} against {number(cl[W])} N; '
-        f'RMS after 2 s, CL relative to GVC: {_percent(change)} % (surge to yaw)'
-    )
+    change, quote = _rms_change(of), Quotes()
+    text = f'peak {_pairs(quote, gvc[[U, W]], cl[[U, W]])}; {_changes(quote, change)}'
+    window = spell((0.0, of.gvc.run.duration), (TRANSIENT, of.gvc.run.duration))
     if np.abs(change).max() > SLIGHTLY:
-        return Finding(text, 'not reproduced')
+        return Finding(text, 'not reproduced', quote.values, window)
     same_peak = np.abs(_change(gvc, cl)).max() <= SLIGHTLY
-    return Finding(text, 'reproduced' if same_peak else 'partly')
+    return Finding(text, 'reproduced' if same_peak else 'partly', quote.values, window)
 
 
 def earlier(of: Evidence) -> Finding:
     """Row 17: time to the final errors."""
-    times = [run.run.settled for run in of.both]
-    text = ' against '.join(seconds(time, of.gvc.run.duration) for time in times)
-    return Finding(f'{text} to {NEAR_ZERO:g}', grade([times[0] < times[1]]))
+    times, quote = [run.run.settled for run in of.both], Quotes()
+    both = zip(('gvc', 'cl'), of.both, strict=True)
+    text = ' against '.join(settled(quote, law, run.run) for law, run in both)
+    text += f' to {quote("near zero", NEAR_ZERO, "m/s, rad/s", short)}'
+    window = spell((0.0, of.gvc.run.duration))
+    return Finding(text, grade([times[0] < times[1]]), quote.values, window)
 
 
 def oscillates(of: Evidence) -> Finding:
     """Row 18: total variation of the errors."""
     gvc, cl = (run.part('error').path for run in of.both)
     seen = np.maximum(*(run.peak('error') for run in of.both)) > NEAR_ZERO
+    quote, unit = Quotes(), ('m/s', 'rad/s')
     text = '; '.join(
-        f'{ERRORS[i]} {number(cl[i], 2)} against {number(gvc[i], 2)}' for i in np.flatnonzero(seen)
+        f'{ERRORS[i]} {quote(f"path of {ERRORS[i]}, cl", cl[i], unit[i // 3], 2)} against '
+        f'{quote(f"path of {ERRORS[i]}, gvc", gvc[i], unit[i // 3], 2)}'
+        for i in np.flatnonzero(seen)
     )
-    return Finding(f'total variation, CL against GVC: {text}', grade(cl[seen] > gvc[seen]))
+    text = f'total variation, CL against GVC: {text}'
+    window = spell((0.0, of.gvc.run.duration))
+    return Finding(text, grade(cl[seen] > gvc[seen]), quote.values, window)
 
 
 def efforts_comparable(of: Evidence) -> Finding:
     """Row 19: RMS of the inputs after 2 s, per axis."""
-    change = _rms_change(of)
+    change, quote = _rms_change(of), Quotes()
     near = np.abs(change) <= COMPARABLE
-    gvc, cl = (run.late_rms('tau') for run in of.both)
-    text = (
-        f'RMS after 2 s, CL relative to GVC: {_percent(change)} % (surge to yaw); '
-        f'GVC {listed(gvc)}, CL {listed(cl)} N, N m'
+    of_gvc, of_cl = (
+        quote.listed([f'RMS of {name}, {law}' for name in INPUTS], run.late_rms('tau'), 'N, N m')
+        for law, run in zip(('gvc', 'cl'), of.both, strict=True)
     )
-    if near.all():
-        return Finding(text, 'reproduced')
-    return Finding(text, 'partly' if near.sum() >= 4 else 'not reproduced')
+    text = f'{_changes(quote, change)}; GVC {of_gvc}, CL {of_cl} N, N m'
+    verdict: Verdict = (
+        'reproduced' if near.all() else 'partly' if near.sum() >= 4 else 'not reproduced'
+    )
+    return Finding(text, verdict, quote.values, spell((TRANSIENT, of.gvc.run.duration)))
 
 
 def larger_start(of: Evidence) -> Finding:
     """Row 20: inputs of the first instants."""
     gvc, cl = (run.peak('tau', 0.0, TRANSIENT)[[U, W]] for run in of.both)
-    text = (
-        f'τ_X {number(gvc[0])} against {number(cl[0])} N, '
-        f'τ_Z {number(gvc[1])} against {number(cl[1])} N'
+    quote = Quotes()
+    text, window = _pairs(quote, gvc, cl), spell((0.0, min(TRANSIENT, of.gvc.run.duration)))
+    return Finding(text, grade(gvc > cl), quote.values, window)
+
+
+def _pairs(quote: Quotes, gvc: np.ndarray, cl: np.ndarray) -> str:
+    """Peaks (2,) of surge and heave under both laws."""
+    return ', '.join(
+        f'{name} {quote(f"peak of {name}, gvc", a, "N")} against '
+        f'{quote(f"peak of {name}, cl", b, "N")} N'
+        for name, a, b in zip(('τ_X', 'τ_Z'), gvc, cl, strict=True)
     )
-    return Finding(text, grade(gvc > cl))
+
+
+def _changes(quote: Quotes, change: np.ndarray) -> str:
+    """Relative changes (6,) of the RMS inputs."""
+    after = quote('transient', TRANSIENT, 's', short)
+    names = [f'change of the RMS of {name}' for name in INPUTS]
+    listed = quote.listed(names, 100 * change, '%', percent)
+    return f'RMS after {after} s, CL relative to GVC: {listed} % (surge to yaw)'
 
 
 def _rms_change(of: Evidence) -> np.ndarray:
@@ -77,7 +98,3 @@ def _rms_change(of: Evidence) -> np.ndarray:
 def _change(gvc: np.ndarray, cl: np.ndarray) -> np.ndarray:
     """(cl - gvc) / gvc; inf where only GVC is zero, 0 where both are."""
     return np.divide(cl - gvc, gvc, out=np.where(cl > 0, np.inf, 0.0), where=gvc > 0)
-
-
-def _percent(change: np.ndarray) -> str:
-    return ', '.join(f'{round(100 * x, 1) + 0.0:+.1f}'.replace('-', '−') for x in change)

@@ -1,41 +1,16 @@
 """The 21 claims of Herman 2018, each with its judge and the criterion that it goes by."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 from auv_analysis.report import claims_case as case
 from auv_analysis.report import claims_coupling as coupling
 from auv_analysis.report import claims_motion as motion
-from auv_analysis.report.evidence import Evidence, Finding
-from auv_analysis.report.paper import CASES
+from auv_analysis.report import paper
+from auv_analysis.report.claim import BOTH, Row
+from auv_analysis.report.quotes import Value
+from auv_analysis.report.text import fixed
 
-BOTH = ('gvc', 'cl')
 
-
-@dataclass(frozen=True)
-class Row:
-    """A claim before it is judged.
-
-    Attributes
-    ----------
-    claim, paper, criterion, remark : as in `Claim`
-    judge : the finding from the evidence
-    laws : whose runs, with the paper's gains, it needs
-    cases : scenarios that it belongs to
-    seconds : shortest run that decides it
-    knows_F : whether it needs the true lumped uncertainty
-
-    """
-
-    claim: str
-    paper: str
-    criterion: str
-    judge: Callable[[Evidence], Finding]
-    laws: tuple[str, ...] = ('gvc',)
-    cases: tuple[str, ...] = ('case1',)
-    seconds: float = 0.0
-    knows_F: bool = False
-    remark: str = ''
+def _listed(name: str, values: tuple[float, ...], unit: str) -> tuple[Value, ...]:
+    return tuple(Value(f'{name}{i}', value, unit) for i, value in enumerate(values, start=1))
 
 
 ROWS = (
@@ -104,22 +79,25 @@ ROWS = (
     ),
     Row(
         'total kinetic energy',
-        '519.47 J',
+        f'{fixed(paper.KINETIC_ENERGY, 2)} J',
         'mean within 2 % over 0–10 s; at best partly, since the paper prints no window',
         coupling.kinetic_energy_mean,
+        printed=(Value('kinetic energy', paper.KINETIC_ENERGY, 'J'),),
     ),
     Row(
         'shares of kinetic energy',
-        '23.34, 0.00, 76.57, 0.01, 0.00, 0.08 %',
+        f'{", ".join(fixed(share, 2) for share in paper.SHARES)} %',
         'each within 1 percentage point in both windows',
         coupling.kinetic_energy_shares,
+        printed=_listed('share of ξ', paper.SHARES, '%'),
     ),
     Row(
         'Δξ: sway deformed, about 0.01 m/s',
-        '0.01 m/s',
+        f'{fixed(paper.SWAY_DEFORMATION, 2)} m/s',
         'largest linear Δξ, and 0.01 when rounded to two decimals',
         coupling.sway_deformed,
         remark='Scales with the mass, which is reconstructed.',
+        printed=(Value('Δξ2', paper.SWAY_DEFORMATION, 'm/s'),),
     ),
     Row(
         'Δξ: roll deformed',
@@ -143,11 +121,15 @@ ROWS = (
         seconds=2.5,
     ),
     Row(
-        'q strongly coupled with the others and sensitive to gains',
+        'q strongly coupled with the others, and sensitive',
         'yes',
-        'none; it needs a sweep of the gains, and two laws are no sweep',
+        'Δπ of pitch above ten times that of every other axis; under each law the RMS of Δq is the '
+        'one of the six that follows the set-points of the others most, and the gains most',
         coupling.pitch_sensitive,
         laws=BOTH,
+        remark='The paper’s sentence names changes of other velocities and disturbances; its step '
+        '3 asks for a change of gains.',
+        responds=True,
     ),
     Row(
         'energy mainly in ξ3 and ξ1',
@@ -192,11 +174,12 @@ ROWS = (
     ),
     Row(
         'N',
-        '300.0, 500.0, 500.0, 40.0, 175.5, 141.1',
+        ', '.join(fixed(entry, 1) for entry in paper.N),
         'equal when rounded to the printed decimal',
         coupling.decomposition,
         laws=(),
-        cases=CASES,
+        cases=paper.CASES,
         remark='M was reconstructed from this N: it tests the decomposition.',
+        printed=_listed('N', paper.N, 'kg, kg m2'),
     ),
 )

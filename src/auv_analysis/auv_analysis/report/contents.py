@@ -8,8 +8,9 @@ import numpy as np
 
 from auv_analysis.report import paper, tables
 from auv_analysis.report.claims import Claim
-from auv_analysis.report.document import Block, Section
+from auv_analysis.report.document import Block, Gallery, Section
 from auv_analysis.report.figures import FigureRecord, reference
+from auv_analysis.report.panel import PanelSet
 from auv_analysis.report.quantities import QUANTITIES
 from auv_analysis.report.rendering import prose
 from auv_analysis.report.set_up import SetUp
@@ -38,6 +39,7 @@ class Contents:
     scenes : names of the runs that share a scenario -> what is said of it
     figures : all that were drawn
     claims : the paper's, none where they do not apply
+    panels : part of the report -> its panels
 
     """
 
@@ -46,6 +48,7 @@ class Contents:
     scenes: Mapping[tuple[str, ...], SetUp]
     figures: Sequence[FigureRecord]
     claims: Sequence[Claim]
+    panels: Mapping[str, PanelSet]
 
     def sections(self) -> list[Section]:
         """All sections in their order."""
@@ -66,6 +69,16 @@ class Contents:
 
     def _drawn(self, part: str) -> list[FigureRecord]:
         return [figure for figure in self.figures if figure.name.startswith(FIGURES[part])]
+
+    def _shown(self, part: str) -> Iterator[Block]:
+        """Panels of a part with the figures that they stand for, then its other figures."""
+        drawn, panels = self._drawn(part), self.panels.get(part)
+        if panels is None:
+            yield from drawn
+            return
+        stills = [figure for figure in drawn if figure.png and panels.stands_for(figure.name)]
+        yield Gallery(panels, stills)
+        yield from (figure for figure in drawn if figure not in stills)
 
     def _experiment(self) -> Iterator[Block]:
         scenarios = list(dict.fromkeys(run.scenario for run in self.runs.values()))
@@ -89,11 +102,11 @@ class Contents:
     def _tracking(self) -> Iterator[Block]:
         without = [name for name, run in self.runs.items() if not run.estimates]
         yield tables.key_figures_table(self.summaries, without)
-        yield from self._drawn('errors')
+        yield from self._shown('errors')
         if not self._drawn('estimates'):
             yield NO_F
-        yield from self._drawn('estimates')
-        yield from self._drawn('inputs')
+        yield from self._shown('estimates')
+        yield from self._shown('inputs')
         yield prose('certificate', sampled=_sampled(self.summaries))
         certificate = tables.certificate_table(self.summaries)
         if certificate is not None:
@@ -102,13 +115,13 @@ class Contents:
             yield f'({mark}) {", ".join(names)}: {text}.'
         if not self._drawn('certificates'):
             yield NO_CERTIFICATE
-        yield from self._drawn('certificates')
+        yield from self._shown('certificates')
 
     def _energy(self) -> Iterator[Block]:
         original = paper.paper_run(self.runs, 'gvc') is not None
         yield prose('energy', has_original=original)
         yield tables.energy_table(self.summaries, original=original)
-        yield from self._drawn('energy')
+        yield from self._shown('energy')
 
     def _couplings(self) -> Iterator[Block]:
         vehicles = tables.decompositions(self.runs, self.summaries)
@@ -119,7 +132,7 @@ class Contents:
         terms = tables.terms_table(leading, self.summaries[leading])
         if terms is not None:
             yield terms
-        yield from self._drawn('couplings')
+        yield from self._shown('couplings')
 
     def _basis(self) -> Iterator[Block]:
         if any(run.vehicle.name.startswith('herman2018') for run in self.runs.values()):

@@ -13,6 +13,7 @@ from markupsafe import Markup
 from pyarrow import parquet
 
 from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.panel import PanelSet
 from auv_analysis.report.text import MISSING, number
 
 Kind = TypeVar('Kind')
@@ -130,7 +131,15 @@ class Prose:
     html: Markup
 
 
-Block = str | Prose | Sentence | Table | FigureRecord
+@dataclass(frozen=True)
+class Gallery:
+    """Panels, and the still figures that stand for them on paper and where no script runs."""
+
+    panels: PanelSet
+    figures: Sequence[FigureRecord]
+
+
+Block = str | Prose | Sentence | Table | FigureRecord | Gallery
 
 
 @dataclass(frozen=True)
@@ -142,8 +151,10 @@ class Section:
     blocks: Sequence[Block]
 
     def of(self, kind: type[Kind]) -> Iterator[Kind]:
-        """Blocks of one kind."""
-        return (block for block in self.blocks if isinstance(block, kind))
+        """Blocks of one kind, those in galleries too."""
+        for block in self.blocks:
+            members = block.figures if isinstance(block, Gallery) else (block,)
+            yield from (member for member in members if isinstance(member, kind))
 
 
 def cell(value: float | None, source: str = '', *, digits: int = 3, kind: str = '') -> Cell:

@@ -1,24 +1,37 @@
 """What the claims are judged by: the signals of a run and a few questions to them."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from auv_analysis.report.quotes import Quotes, Value, decimals, short
 from auv_analysis.report.sketch import FOREVER, Sketch, last_third
 from auv_analysis.report.statistics import Part
-from auv_analysis.report.text import number
+from auv_analysis.report.text import MISSING
 from auv_analysis.summary import TRANSIENT
 
 Verdict = Literal['reproduced', 'partly', 'not reproduced', 'other case', 'not evaluated']
+DECIDED: tuple[Verdict, ...] = ('reproduced', 'partly', 'not reproduced')
 
 
 class Finding(NamedTuple):
-    """Our value as text, and the verdict."""
+    """What a judge says.
+
+    Attributes
+    ----------
+    ours : our value as text
+    verdict : by the criterion
+    values : every number of the text
+    window : time that the numbers are of, in words
+
+    """
 
     ours: str
     verdict: Verdict
+    values: tuple[Value, ...] = ()
+    window: str = MISSING
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +61,22 @@ class Signals:
         return self.part(name, last_third(self.run))
 
 
+@dataclass(frozen=True, eq=False)
+class Response:
+    """How the RMS velocity errors under one law answer to what is changed.
+
+    Attributes
+    ----------
+    gains : (6,) standard deviation of ln(error) when every gain varies on its own
+    others : (6,) relative change of the error per relative change of the set-points of the other
+        degrees of freedom, root of the sum of squares
+
+    """
+
+    gains: np.ndarray
+    others: np.ndarray
+
+
 @dataclass(frozen=True)
 class Evidence:
     """The runs with the paper's gains; a judge is only asked when those that it needs exist.
@@ -56,11 +85,13 @@ class Evidence:
     ----------
     signals : law -> signals of its run
     N : (6,) of the decomposition, kg and kg m2
+    responses : law -> what its errors follow; empty where nobody has looked
 
     """
 
     signals: Mapping[str, Signals]
     N: tuple[float, ...]
+    responses: Mapping[str, Response] = field(default_factory=dict)
 
     @property
     def gvc(self) -> Signals:
@@ -84,11 +115,13 @@ def grade(parts: Iterable[bool]) -> Verdict:
     return 'reproduced' if all(parts) else 'partly' if any(parts) else 'not reproduced'
 
 
-def listed(values: Iterable[float], digits: int = 3) -> str:
-    """Numbers separated by commas."""
-    return ', '.join(number(value, digits) for value in values)
+def spell(*ends: tuple[float, float]) -> str:
+    """Windows (from, to) in s as words: '0–10 s; 0–30 s'."""
+    return '; '.join(f'{first:g}–{last:g} s' for first, last in dict.fromkeys(ends))
 
 
-def seconds(time: float, duration: float, word: str = '') -> str:
+def settled(quote: Quotes, law: str, run: Sketch, word: str = '') -> str:
     """'1.68 s' with a word before it, or that it did not happen in the run."""
-    return f'{word}{time:.2f} s' if time < FOREVER else f'not in {duration:g} s'
+    if run.settled < FOREVER:
+        return f'{word}{quote(f"settled, {law}", run.settled, "s", decimals(2))} s'
+    return f'not in {quote(f"length of the run, {law}", run.duration, "s", short)} s'

@@ -13,6 +13,7 @@ from auv_analysis.lyapunov import OF_THE_MOTION
 from auv_analysis.report import overview, plotting
 from auv_analysis.report.applied import applied_figure
 from auv_analysis.report.certificates import certificate_figure, is_drawn
+from auv_analysis.report.panels import different_disturbances
 from auv_analysis.report.paper import paper_figure
 from auv_analysis.report.plotting import Quantity
 from auv_analysis.report.sketch import Sketch
@@ -75,7 +76,6 @@ def draw_figures(
     figures : in the order of the report; lumped errors only where F is known and estimated
 
     """
-    folder.mkdir(parents=True, exist_ok=True)
     drawn = {name: replace(run, controller=name) for name, run in sketches(runs).items()}
     figures: list[FigureRecord] = []
 
@@ -90,7 +90,7 @@ def draw_figures(
         for run in drawn.values():
             if run.knows_disturbance:
                 add(f'lumped_error_{run.controller}', *_lumped(run))
-        for run in _different_disturbances(drawn):
+        for run in different_disturbances(drawn).values():
             add(f'uncertainty_{run.controller}', *_uncertainty(run))
         for name, run in drawn.items():
             add(f'inputs_{name}', *_inputs(run, (limits or {}).get(name)))
@@ -193,15 +193,6 @@ def _deformation(kind: str, run: Sketch) -> Drawn:
     drawn = six_signals(kind, run, plotting.DELTA_PI, zeros)
     note = ' Of the commanded wrench.' if run.acting and drawn[0] is not None else ''
     return drawn[0], drawn[1], drawn[2] + note
-
-
-def _different_disturbances(runs: Mapping[str, Sketch]) -> list[Sketch]:
-    """Runs with a known F that no run before them has."""
-    kept: dict[bytes, Sketch] = {}
-    for run in runs.values():
-        if run.knows_disturbance:
-            kept.setdefault(run.F_digest, run)
-    return [*kept.values()]
 
 
 def _peaks(part: Part, quantity: Quantity, drawn: Sequence[int]) -> str:

@@ -11,10 +11,12 @@ from auv_analysis.report.contents import Contents
 from auv_analysis.report.document import Section, Sentence
 from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.findings import findings
+from auv_analysis.report.interactive import interactive
 from auv_analysis.report.rendering import write_document
 from auv_analysis.report.set_up import set_up
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
+from auv_analysis.report.tables.claims import write_claims
 from auv_analysis.report.text import join
 from auv_analysis.run import AnyRun
 
@@ -36,7 +38,8 @@ def write_report(
 
     Parameters
     ----------
-    out : folder; gets `report.html`, `numbers.parquet` and `figures/`
+    out : folder; gets `report.html`, `numbers.parquet`, `figures/` and, of the paper's cases,
+        `claims.parquet`
     runs : name -> run, one at least
     summaries : name -> `summarize(run)`
     scenario_text, vehicle_text : the files as they were read, shown as listings: one of all runs,
@@ -60,7 +63,10 @@ def write_report(
     limits = {name: scene.limit for names, scene in scenes.items() for name in names}
     figures = draw_figures(shown, out / 'figures', summaries, limits)
     judged = claims_table(shown, summaries) if claims is None else claims
-    sections = Contents(shown, summaries, scenes, figures, judged).sections()
+    if judged:
+        write_claims(out, judged)
+    panels = interactive(shown)
+    sections = Contents(shown, summaries, scenes, figures, judged, panels.sets).sections()
     scenarios = list(dict.fromkeys(run.scenario for run in shown.values()))
     vehicles = list(dict.fromkeys(run.vehicle.name for run in shown.values()))
     return write_document(
@@ -73,6 +79,7 @@ def write_report(
             *_listings(shown, 'Vehicle file', vehicle_text),
             *_listings(shown, 'Scenario file', scenario_text),
         ],
+        panels,
     )
 
 

@@ -22,6 +22,7 @@ CL_GAINS = {'case1': GVC_GAINS, 'case2': {**GVC_GAINS, 'k_D': 1000.0, 'Gamma': 6
 N = (300.0, 500.0, 500.0, 40.0, 175.5, 141.1)  # kg, kg m2; (38)
 KINETIC_ENERGY = 519.47  # J; section 5, step 4
 SHARES = (23.34, 0.00, 76.57, 0.01, 0.00, 0.08)  # %; section 5, step 4
+SWAY_DEFORMATION = 0.01  # m/s; section 5, step 5
 SHARES_DIGIT = 0.005  # %, half of the last digit that is printed
 ENERGY_WINDOW = summary.ENERGY_WINDOW  # s
 

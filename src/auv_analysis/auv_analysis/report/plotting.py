@@ -23,17 +23,17 @@ from auv_dynamics.signals import DOFS
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#D55E00', '#56B4E9')  # Okabe and Ito
 DASHES = ('-', (0, (4, 1.6)), (0, (1, 1.3)), (0, (6, 1.4, 1, 1.4)), (0, (9, 2)), (0, (3, 1, 1, 1)))
 GREY = '#6b6b6b'
-PALETTE = 255  # colours of a PNG
-WIDTH = 7.2  # in, two columns of a journal
-DPI = 160
+PALETTE = 64  # colours of a PNG
+WIDTH = 6.27  # in, text of Taylor & Francis's LaTeX class in large format: A4, margins of 1 in
+DPI = 184
 GROUPS = (range(3), range(3, 6))  # linear, angular
 STYLE = {
     'font.family': 'STIXGeneral',
     'mathtext.fontset': 'stix',
-    'font.size': 9.5,
-    'axes.labelsize': 9.5,
-    'axes.titlesize': 9.5,
-    'axes.titlepad': 5.0,
+    'font.size': 8.3,
+    'axes.labelsize': 8.3,
+    'axes.titlesize': 8.3,
+    'axes.titlepad': 4.4,
     'axes.linewidth': 0.6,
     'axes.spines.top': False,
     'axes.spines.right': False,
@@ -43,14 +43,14 @@ STYLE = {
     'axes.formatter.limits': (-5, 6),
     'grid.color': '#e6e6e6',
     'grid.linewidth': 0.5,
-    'lines.linewidth': 1.1,
+    'lines.linewidth': 1.0,
     'lines.solid_joinstyle': 'round',
     'xtick.major.width': 0.6,
     'ytick.major.width': 0.6,
-    'xtick.labelsize': 8.5,
-    'ytick.labelsize': 8.5,
+    'xtick.labelsize': 7.5,
+    'ytick.labelsize': 7.5,
     'legend.frameon': False,
-    'legend.fontsize': 9.0,
+    'legend.fontsize': 7.8,
     'legend.handlelength': 1.6,
     'legend.columnspacing': 1.2,
     'legend.borderaxespad': 0.0,
@@ -105,12 +105,13 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 
 def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     """Write <name>.png and <name>.pdf, the same bytes every time; return both paths."""
+    folder.mkdir(parents=True, exist_ok=True)
     png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
     drawn = io.BytesIO()
     figure.savefig(drawn)
     with Image.open(
         drawn
-    ) as image:  # few colours: a third of the bytes, so that a report stays small
+    ) as image:  # few colours: a fifth of the bytes, so that a report stays small
         few = image.convert('RGB').quantize(PALETTE, dither=Image.Dither.NONE)
     few.save(png, optimize=True, dpi=(DPI, DPI))
     figure.set_layout_engine('none')  # laid out once is enough

@@ -13,6 +13,7 @@ import markupsafe
 from auv_analysis.report.document import (
     NUMBERS,
     Block,
+    Gallery,
     Prose,
     Section,
     Sentence,
@@ -20,11 +21,19 @@ from auv_analysis.report.document import (
     write_numbers,
 )
 from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.interactive import Interactive
 from auv_analysis.report.provenance import provenance
 from auv_analysis.report.text import fixed, join, number, plain, tied
 
 HERE = Path(__file__).parent
-KINDS = {Prose: 'prose', Table: 'table', FigureRecord: 'picture', Sentence: 'sentence', str: 'text'}
+KINDS = {
+    Prose: 'prose',
+    Table: 'table',
+    FigureRecord: 'picture',
+    Gallery: 'gallery',
+    Sentence: 'sentence',
+    str: 'text',
+}
 
 
 def write_document(
@@ -34,6 +43,7 @@ def write_document(
     findings: Sequence[Sentence],
     sections: Sequence[Section],
     listings: Sequence[tuple[str, str]] = (),
+    interactive: Interactive | None = None,
 ) -> Path:
     """Write `report.html`, and beside it `numbers.parquet` with every number of its tables.
 
@@ -45,6 +55,7 @@ def write_document(
     findings : sentences of the summary, first on the page
     sections : in their order; those without blocks are left out
     listings : name and text of files that are shown in full at the end
+    interactive : what the panels of its galleries show; none: it has no galleries
 
     Returns
     -------
@@ -63,6 +74,7 @@ def write_document(
             section_numbers={s.name: i for i, s in enumerate(sections, start=1)},
             names=names_of(sections),
             listings=listings,
+            interactive=interactive,
             provenance=provenance(),
         )
     )

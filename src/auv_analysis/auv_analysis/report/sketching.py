@@ -18,7 +18,7 @@ from auv_analysis.summary import TRANSIENT
 from auv_gvc_controller.model import ControlModel, control_model
 
 SPLIT = ('error', 'lumped_error', 'tau', 'delta_pi')  # begin with a peak that dwarfs the rest
-WHOLE = ('F', 'delta_xi', 'applied', 'kinetic', 'wanted')
+WHOLE = ('F', 'delta_xi', 'applied', 'kinetic', 'wanted', 'energy')
 NEAR_ZERO = 0.005  # m/s, rad/s: what counts as a settled error
 SHARE_COLUMNS = 600  # of the stacked shares
 
@@ -34,20 +34,21 @@ def common_window(runs: Mapping[str, Facts]) -> float:
     return min([paper.ENERGY_WINDOW, *(run.duration for run in runs.values())])
 
 
-def sketch(run: AnyRun, window: float = paper.ENERGY_WINDOW) -> Sketch:
+def sketch(run: AnyRun, window: float = paper.ENERGY_WINDOW, *, lines: bool = True) -> Sketch:
     """Sketch of a run.
 
     Parameters
     ----------
     run : of `simulate`, `load_run` or `open_bag`
     window : time of interest, s from the start: statistics may be asked for that end there
+    lines : whether its lines are kept as well, and those of its certificate
 
     """
-    builder = _Builder(run, window)
+    builder = _Builder(run, window, lines=lines)
     for block in run.blocks():
         builder.add(block)
     true = run.knows_disturbance and not (run.sensing or run.acting)
-    if true and run.law in LAWS and run.gains:
+    if lines and true and run.law in LAWS and run.gains:
         builder.add_certificate()
     return builder.built()
 
@@ -82,8 +83,8 @@ def is_split(run: AnyRun | Sketch) -> bool:
 class _Builder:
     """Takes the blocks of a run in their order."""
 
-    def __init__(self, run: AnyRun, window: float):
-        self._run, self._model = run, control_model(run.vehicle)
+    def __init__(self, run: AnyRun, window: float, *, lines: bool):
+        self._run, self._model, self._lines = run, control_model(run.vehicle), lines
         behind = [cut_behind(run, time) for time in (TRANSIENT, paper.ENERGY_WINDOW, window)]
         before = [cut_before(run, time) for time in (TRANSIENT, last_third(run))]
         self._statistics = Statistics([*behind, *before])
@@ -106,7 +107,7 @@ class _Builder:
             starts = [0, *stops[:-1]]
             self._columns = {n: slice(a, b) for n, a, b in zip(found, starts, stops, strict=True)}
         self._statistics.add(block.t, np.concatenate([*found.values()], axis=1))
-        for name, values in found.items():
+        for name, values in found.items() if self._lines else ():
             self._draw(name, block.t, values)
         self._add_shares(block.t, found['energy'])
         far = np.flatnonzero(np.abs(found['error']).max(axis=1) > NEAR_ZERO)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 MISSING = '–'
+_RAISED = '-0123456789'
 _SUPERSCRIPT = str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹')
 
 
@@ -40,6 +41,16 @@ def fixed(value: float | None, decimals: int) -> str:
     if value is None:
         return MISSING
     return f'{value:,.{decimals}f}'.replace(',', '\u202f').replace('-', '−')
+
+
+def typeset(text: str) -> str:
+    """The same text for a figure: its font has no raised digits, powers are set as formulas."""
+    powers = str.maketrans(''.join(map(chr, _SUPERSCRIPT.values())), _RAISED)
+    return re.sub(
+        r'([−\d.\u202f]+)·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)',
+        lambda m: f'${m[1].replace("−", "-")}\\cdot10^{{{m[2].translate(powers)}}}$',
+        text,
+    )
 
 
 def tied(text: str) -> str:

@@ -40,7 +40,13 @@ class Trace:
 
 
 def thinned(
-    t: np.ndarray, y: np.ndarray, begin: float, end: float, *, logarithmic: bool = False
+    t: np.ndarray,
+    y: np.ndarray,
+    begin: float,
+    end: float,
+    *,
+    logarithmic: bool = False,
+    columns: int = COLUMNS,
 ) -> Line:
     """The first and the last sample, and every column's smallest and largest.
 
@@ -49,6 +55,7 @@ def thinned(
     t, y : (n,) samples, t rising
     begin, end : times between which the columns lie
     logarithmic : columns of equal width on a logarithmic time axis; t > 0 then
+    columns : how many
 
     Returns
     -------
@@ -56,7 +63,7 @@ def thinned(
 
     """
     place, (left, right) = (np.log(t), np.log([begin, end])) if logarithmic else (t, (begin, end))
-    column = np.floor((place - left) / (right - left) * (COLUMNS - 1)).clip(0, COLUMNS - 2)
+    column = np.floor((place - left) / (right - left) * (columns - 1)).clip(0, columns - 2)
     starts = np.flatnonzero(np.diff(column, prepend=-1.0))
     owner = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(t)))
     low = np.flatnonzero(y == np.minimum.reduceat(y, starts)[owner])

@@ -143,10 +143,8 @@ def _latin_hypercube(
 
 
 def _morris(paths: list[str], spec: dict[str, Any], seed: np.random.SeedSequence) -> Design:
-    try:
-        from SALib.sample import morris
-    except ImportError:
-        raise ValueError('SALib installed: pip install SALib', 'no such module') from None
+    from SALib.sample import morris
+
     width = len(paths)
     problem = {'num_vars': width, 'names': paths, 'bounds': [[0.0, 1.0]] * width}
     number, levels = int(seed.generate_state(1)[0]), spec.get('levels', 4)

@@ -49,6 +49,12 @@ class BulkMixin:
         if not PLAIN:
             self.data_subscriptions().append(subscription)
 
+    def drop_data(self, subscription: Subscription) -> None:
+        """End a subscription of the data path."""
+        if subscription in self.data_subscriptions():
+            self.data_subscriptions().remove(subscription)
+        super().destroy_subscription(subscription)  # type: ignore[misc]  # as above
+
     def take_data(self) -> int:
         """Hand everything that has arrived to its callbacks; how many messages that were."""
         count = 0

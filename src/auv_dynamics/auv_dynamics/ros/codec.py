@@ -21,6 +21,7 @@ from auv_dynamics import interface
 from auv_dynamics.interface import NANOSECONDS, Frames
 from auv_dynamics.ros import convert
 from auv_dynamics.ros.private import PLAIN
+from auv_dynamics.signals import DOFS
 
 STAMP = 'iI'  # Time: seconds and nanoseconds
 FIRST_FIELD = 4  # bytes of the CDR encapsulation come before it
@@ -29,12 +30,13 @@ PROBES = (0.1, -7e300)  # numbers that a template is tried with
 
 
 class Kind(NamedTuple):
-    """How messages of a type are made, read and checked; `size` numbers each."""
+    """How messages of a type are made, read and checked; `size` numbers each, `words` in all."""
 
     size: int
     make: Callable[[int, Any, Frames], Any]
     read: Callable[[Any, Frames, str], tuple[int, tuple]] | None = None
     check: Callable[[str, tuple], tuple] | None = None
+    words: tuple[str, ...] = ()
 
 
 KINDS = {
@@ -42,7 +44,9 @@ KINDS = {
     TwistStamped: Kind(6, convert.twist, interface.read_twist, interface.check_finite),
     AccelStamped: Kind(6, convert.accel, interface.read_accel, interface.check_finite),
     WrenchStamped: Kind(6, convert.wrench, interface.read_wrench, interface.check_finite),
-    JointState: Kind(6, convert.joint_state),
+    JointState: Kind(
+        6, convert.joint_state, interface.read_joint_state, interface.check_finite, DOFS
+    ),
     Clock: Kind(0, lambda ns, _, __: Clock(clock=convert.stamp(ns))),
 }
 
@@ -88,7 +92,7 @@ class Layout:
         self._runs = _runs([places[i] for i in wire], order)
         self._length, self._buffer = len(data), bytearray(data)
         self._fixed = [(0, data[:2])]  # the encoding
-        for text in {frames.odom, frames.base}:
+        for text in {frames.odom, frames.base, *kind.words}:
             encoded = struct.pack(f'{order}I', len(text.encode()) + 1) + text.encode() + b'\0'
             self._fixed += [(at, encoded) for at in _all(data, encoded)]
 

@@ -19,6 +19,7 @@ from auv_dynamics.files import InputError
 from auv_dynamics.interface import BadMessageError, Frames
 from auv_dynamics.ros.codec import Codec
 from auv_dynamics.ros.convert import stamp
+from auv_dynamics.ros.endpoints import onlookers
 from auv_dynamics.ros.parameters import declare
 from auv_dynamics.ros.topics import (
     ANALYSIS_TOPICS,
@@ -190,6 +191,8 @@ class Graph:
         for topic, count in self._expected.items():
             publisher = self.publishers.get(topic)
             found = publisher.get_subscription_count() if publisher else 0
+            if found >= count:  # who only looks on is not waited for, and so is not counted
+                found -= onlookers(self.node, topic)
             if found < count:
                 return f'{topic}: expected {count} subscribers, found {found}'
         return ''

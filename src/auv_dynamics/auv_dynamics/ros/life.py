@@ -41,7 +41,8 @@ def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> i
     stop = threading.Event()
     for number in SIGNALS:
         signal.signal(number, lambda *_: stop.set())
-    _give_way(makes)
+    if not any(getattr(make, 'prompt', False) for make in makes):
+        give_way()
     nodes: list[Any] = []
     code = 0
     try:
@@ -68,11 +69,10 @@ def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> i
     return code
 
 
-def _give_way(makes: Sequence[Any]) -> None:
+def give_way() -> None:
     """Let a process that only observes not interrupt those whose answers are waited for."""
-    if not any(getattr(make, 'prompt', False) for make in makes):
-        with contextlib.suppress(OSError, AttributeError):  # not every system has it
-            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    with contextlib.suppress(OSError, AttributeError):  # not every system has it
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def _spin(nodes: list[Any], executor: SingleThreadedExecutor, stop: threading.Event) -> None:
@@ -84,13 +84,13 @@ def _spin(nodes: list[Any], executor: SingleThreadedExecutor, stop: threading.Ev
 
     while not (stop.is_set() or ended() or _orphaned()):
         if PLAIN:
-            _serve(nodes[0], executor, POLL)
+            serve(nodes[0], executor, POLL)
             continue
         data.serve(_next_look(nodes), ended)
         for node in nodes:
             node.follow_clock()
         for _ in range(CALLBACKS):
-            if not _serve(nodes[0], executor, 0.0):
+            if not serve(nodes[0], executor, 0.0):
                 break
 
 
@@ -101,8 +101,8 @@ def _next_look(nodes: list[Any]) -> float:
     return time.monotonic() + min([SERVE, *(max(0, ns) / 1e9 for ns in left if ns is not None)])
 
 
-def _serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> bool:
-    """Run a callback that is ready, if there is one."""
+def serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> bool:
+    """Run a callback that is ready within so many s; whether there was one."""
     try:
         callback, _, node = executor.wait_for_ready_callbacks(timeout_sec=timeout)
         callback()

@@ -3,20 +3,20 @@
 import time
 from collections.abc import Iterable
 
-import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
+from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
 from auv_dynamics import interface
+from auv_dynamics.ros.endpoints import observes
+from auv_dynamics.ros.participant import Participant
 from auv_dynamics.ros.peers import ASK_AGAIN
 from auv_dynamics.ros.topics import PROGRESS, one_at_a_time
 
 
-class Watcher:
+class Watcher(Participant):
     """A participant of one domain that starts the plant and follows the recorder.
 
     Parameters
@@ -27,18 +27,7 @@ class Watcher:
     """
 
     def __init__(self, domain: int, plant: str = 'plant_node'):
-        self._context = Context()
-        rclpy.init(
-            args=[],
-            context=self._context,
-            domain_id=domain,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
-        self._node = rclpy.create_node(
-            'auv', context=self._context, start_parameter_services=False, enable_rosout=False
-        )
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
+        super().__init__(domain, _silent_node)
         self._node.create_subscription(
             PROGRESS.type, PROGRESS.name, self._on_progress, one_at_a_time()
         )
@@ -48,12 +37,6 @@ class Watcher:
         self.complete_ns = -1
         self.running = False
         self.waits_for = f'{plant} to appear'
-
-    def spin(self, seconds: float) -> None:
-        """Handle what comes in for so long."""
-        until = time.monotonic() + seconds
-        while (left := until - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left)
 
     def ask_to_run(self) -> bool:
         """Ask the plant to run, without waiting; True once it has agreed."""
@@ -69,7 +52,10 @@ class Watcher:
         return self.running
 
     def endpoints(self, names: Iterable[str] = (interface.WRENCH, interface.ODOM)) -> list[str]:
-        """Nodes that already publish or subscribe topics of such names, in any namespace."""
+        """Nodes that publish or subscribe topics of such names already, in any namespace.
+
+        Observers are no strangers: they hold nothing up.
+        """
         found: set[str] = set()
         for topic, _ in self._node.get_topic_names_and_types():
             if topic.rpartition('/')[2] in names:
@@ -77,14 +63,13 @@ class Watcher:
                     self._node.get_publishers_info_by_topic,
                     self._node.get_subscriptions_info_by_topic,
                 ):
-                    found.update(f'{info.node_name} on {topic}' for info in look(topic))
+                    others = [info for info in look(topic) if not observes(info)]
+                    found.update(f'{info.node_name} on {topic}' for info in others)
         return sorted(found)
 
     def _on_progress(self, message: Header) -> None:
         self.complete_ns = max(self.complete_ns, interface.nanoseconds(message.stamp))
 
-    def close(self) -> None:
-        """Leave the domain."""
-        self._node.destroy_node()
-        self._executor.shutdown()
-        rclpy.try_shutdown(context=self._context)
+
+def _silent_node(context: Context) -> Node:
+    return Node('auv', context=context, start_parameter_services=False, enable_rosout=False)

@@ -11,6 +11,7 @@ from auv_analysis.report.words import gain_text
 from auv_analysis.run import Facts
 from auv_gvc_controller.laws import SHIPPED
 
+SCENARIO = 'scenario.yaml'
 ORIGIN = {'bag': 'recorded on the node graph', 'simulate': 'simulated in process'}
 COLUMNS = (
     Column('controller', meaning='name of the run', numeric=False),
@@ -43,7 +44,7 @@ def _controller(name: str, run: Facts) -> list[Cell]:
     return [
         Cell(name),
         Cell(run.law),
-        Cell(', '.join(texts), figures=gains, source='scenario.yaml:/controllers'),
+        Cell(', '.join(texts), figures=gains, source=SCENARIO),
         Cell(plain(run.duration, 9), run.duration, facts['duration']),
         Cell(f'{run.step:g}', run.step, facts['step']),
         Cell(fixed(run.samples, 0), run.samples, facts['samples']),
@@ -66,7 +67,7 @@ def set_up_table(name: str, scene: SetUp, runs: Sequence[str], *, several: bool)
     caption += f': {join(runs)}.' if several else '.'
     columns = Column('what', numeric=False), Column('how', numeric=False)
     rows = [
-        [Cell(what), Cell('\n'.join(lines), figures=dict(scene.numbers(what)))]
+        [Cell(what), Cell('\n'.join(lines), source=SCENARIO, figures=dict(scene.numbers(what)))]
         for what, lines in scene.rows
     ]
     return Table(name, caption, columns, rows)

@@ -10,8 +10,13 @@ VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
 
 def summary_source(*keys: object) -> str:
     """Where a number stands in summary.json, as a JSON pointer behind the file's name."""
+    return pointer('summary.json', *keys)
+
+
+def pointer(file: str, *keys: object) -> str:
+    """Where a number stands in a JSON file, as a JSON pointer behind the file's name."""
     parts = (str(key).replace('~', '~0').replace('/', '~1') for key in keys)
-    return f'summary.json:/{"/".join(parts)}'
+    return f'{file}:/{"/".join(parts)}'
 
 
 def numbers_in(data: Any, path: str = '') -> Iterator[tuple[str, float]]:

@@ -1,0 +1,35 @@
+"""`auv atlas`: couplings by inertia of vehicles, side by side."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from auv_analysis.atlas.collect import charts, shipped_vehicles, write_atlas
+from auv_analysis.commands.conclude import console, say
+from auv_analysis.folder import check_free, prepare
+from auv_dynamics.config import shipped
+
+FOLDER = Path('runs') / 'atlas'
+
+
+def atlas(options: argparse.Namespace) -> dict[str, Any]:
+    """Couplings of the shipped vehicles and of the given ones, or of these alone."""
+    given = list(dict.fromkeys(options.vehicles))
+    known = [] if options.only and given else shipped_vehicles()
+    vehicles = [*known, *(vehicle for vehicle in given if vehicle not in known)]
+    out = options.out or FOLDER
+    check_free(out, overwrite=options.overwrite)
+    with console.status(f'case 1 on {len(vehicles)} vehicles'):
+        found = charts(vehicles)
+    files = [shipped('vehicles', vehicle) for vehicle in vehicles]
+    prepare(out, overwrite=options.overwrite, inputs=files)
+    document = write_atlas(found, out)
+    from auv_analysis.atlas.figures import draw  # with matplotlib, which loads slowly
+    from auv_analysis.atlas.report import findings, write_report
+
+    with console.status('drawing figures, writing the report'):
+        report = write_report(out, found, draw(found, out / 'figures'))
+    for sentence in findings(found):
+        say(sentence.text)
+    say(f'report: {report}')
+    return document

@@ -1,0 +1,166 @@
+"""The grammar of the `auv` command: its subcommands in the order of the help, and their options."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+SCENARIO = 'a scenario file, or the bare name of a shipped one'
+VEHICLE = 'a vehicle file, or the bare name of a shipped one'
+RESULT = 'a bag, a folder of results or of a sweep, or a scenario, which is simulated'
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose complaint is one line."""
+
+    def error(self, message: str) -> Any:
+        """Exit 2 with one line instead of usage and a line."""
+        text = message.replace(' (choose from ', '; expected one of (')
+        expected = text if 'expected' in text else f'expected a valid command line, found: {text}'
+        found = '' if 'found' in expected else f', found none; see {self.prog} --help'
+        print(f'{self.prog}: {expected}{found}', file=sys.stderr, flush=True)
+        sys.exit(2)
+
+
+def parser() -> argparse.ArgumentParser:
+    """Command line of `auv`."""
+    main = Parser(prog='auv', description='The auv command: experiments and their analysis.')
+    commands = main.add_subparsers(dest='command', required=True, metavar='COMMAND')
+    for name, (text, add_options, writes) in COMMANDS.items():
+        command = commands.add_parser(name, help=text, description=text)
+        if writes:
+            command.add_argument('--out', type=Path, help='folder of the results')
+            command.add_argument('--overwrite', action='store_true', help='replace earlier results')
+        command.add_argument('--json', action='store_true', help='one JSON document on stdout')
+        add_options(command)
+    return main
+
+
+def _scenario(command: argparse.ArgumentParser) -> None:
+    command.add_argument('scenario', help=SCENARIO)
+    command.add_argument('--controller', action='append', help='only this one; may be repeated')
+
+
+def _graph(command: argparse.ArgumentParser, when: str = '') -> None:
+    text = f'{when}ROS domain, default: a free one'
+    command.add_argument('--domain-id', help=text)
+    text = f'{when}all nodes in one process: faster'
+    command.add_argument('--composed', action='store_true', help=text)
+
+
+def _hold(command: argparse.ArgumentParser) -> None:
+    text = 'law in every stage of the integrator, or sampled and held; default: continuous'
+    command.add_argument('--hold', choices=('continuous', 'zoh'), default='continuous', help=text)
+
+
+def _run(command: argparse.ArgumentParser) -> None:
+    _scenario(command)
+    _graph(command)
+
+
+def _simulate(command: argparse.ArgumentParser) -> None:
+    _scenario(command)
+    _hold(command)
+
+
+def _study(command: argparse.ArgumentParser) -> None:
+    _scenario(command)
+    _hold(command)
+    text = 'real nodes, recorded, in place of this process'
+    command.add_argument('--run', action='store_true', help=text)
+    _graph(command, 'with --run: ')
+    command.add_argument(
+        '--window', nargs=2, action='append', type=float, metavar=('FROM', 'TO'), default=[],
+        help='kinetic energy over this window as well, s; may be repeated',
+    )  # fmt: skip
+    text = 'of the figures to the gains; default: sobol'
+    command.add_argument('--sensitivity', choices=('sobol', 'morris', 'none'), help=text)
+    text = 'base points of sobol, a power of two; trajectories of morris'
+    command.add_argument('--samples', type=int, metavar='N', help=text)
+    text = 'gains vary from 1/SPAN to SPAN times their value; default: 2'
+    command.add_argument('--span', type=float, default=2.0, help=text)
+    command.add_argument('--seed', type=int, default=0, help='of what is drawn; default: 0')
+
+
+def _analyze(command: argparse.ArgumentParser) -> None:
+    command.add_argument('results', nargs='+', metavar='BAG', help=RESULT)
+    command.add_argument('--by', metavar='MEASURE', help='of a sweep: what sorts the best rows')
+    command.add_argument('--vehicle', help='for bags that do not carry their own')
+
+
+def _atlas(command: argparse.ArgumentParser) -> None:
+    text = 'beside the shipped ones'
+    command.add_argument('vehicles', nargs='*', metavar='VEHICLE', help=text)
+    command.add_argument('--only', action='store_true', help='the given ones alone')
+
+
+def _design(command: argparse.ArgumentParser) -> None:
+    command.add_argument('vehicle', help=VEHICLE)
+    command.add_argument('--scenario', help=f'{SCENARIO}, with this vehicle in it')
+    text = 'such as delta_pi.pitch; default: the largest'
+    command.add_argument('--reduce', metavar='COUPLING', help=text)
+    text = 'NAME=LOWER:UPPER of a parameter, such as shift.x=-0.05:0.05; may be repeated'
+    command.add_argument('--bound', action='append', default=[], help=text)
+
+
+def _sweep(command: argparse.ArgumentParser) -> None:
+    text = 'a campaign file, or the bare name of a shipped one'
+    command.add_argument('campaign', help=text)
+    command.add_argument('--executor', choices=('threads', 'dask'), help='default: threads')
+    command.add_argument('--scheduler', metavar='ADDRESS', help='of dask, such as tcp://host:8786')
+    text = 'threads or processes; default: the cores'
+    command.add_argument('--workers', metavar='N', help=text)
+
+
+def _watch(command: argparse.ArgumentParser) -> None:
+    command.add_argument('--domain-id', help='ROS domain, default: $ROS_DOMAIN_ID, else 0')
+    command.add_argument('--namespace', default='/', help='of the graph, such as /auv1')
+    text = 'for energy and couplings where no analysis_node runs'
+    command.add_argument('--vehicle', help=text)
+    text = 'refreshes per second; default: 4, in a pipe 1'
+    command.add_argument('--rate', metavar='HZ', help=text)
+    command.add_argument('--once', action='store_true', help='print a single snapshot')
+    text = 'print the last snapshot after so long'
+    command.add_argument('--for', dest='limit', metavar='SECONDS', help=text)
+    command.add_argument('--odom-frame', help='frame of poses, default: odom_ned')
+    command.add_argument('--base-frame', help='body frame, default: base_link_fsd')
+
+
+def _info(command: argparse.ArgumentParser) -> None:
+    command.add_argument('bag', type=Path, metavar='BAG')
+
+
+def _params(command: argparse.ArgumentParser) -> None:
+    command.add_argument('scenario', help=SCENARIO)
+    command.add_argument('--controller', required=True)
+    command.add_argument('--real-time', action='store_true', help='paced by the clock')
+
+
+def _check_vehicle(command: argparse.ArgumentParser) -> None:
+    command.add_argument('vehicle', metavar='FILE', help=VEHICLE)
+
+
+class Command(NamedTuple):
+    """A subcommand: its line of help, what adds its options, whether it writes a folder."""
+
+    text: str
+    add_options: Callable[[argparse.ArgumentParser], None]
+    writes: bool = True
+
+
+COMMANDS = {
+    'run': Command('run a scenario on real nodes, record, analyse and report', _run),
+    'simulate': Command('simulate a scenario in this process, analyse and report', _simulate),
+    'study': Command('the procedure of the paper, steps 1 to 6, as one report', _study),
+    'analyze': Command('summary and report of bags, folders of results, or a sweep', _analyze),
+    'atlas': Command('couplings by inertia of the shipped vehicles, side by side', _atlas),
+    'design': Command('which change of a vehicle removes which coupling, simulated', _design),
+    'sweep': Command('many rollouts of a scenario, with values that vary, to Parquet', _sweep),
+    'watch': Command('live dashboard in the terminal', _watch, writes=False),
+    'info': Command('what lies in a bag', _info, writes=False),
+    'params': Command('the ROS parameter file of a scenario', _params),
+    'check-vehicle': Command(
+        'inertia, couplings and limits of a vehicle', _check_vehicle, writes=False
+    ),
+}

@@ -1,0 +1,163 @@
+"""What `auv analyze` is given: bags, samples, folders of results, scenarios; sweeps apart."""
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import yaml
+
+from auv_analysis.bag import bag_files
+from auv_analysis.folder import MANIFEST
+from auv_analysis.samples import ENDING
+from auv_analysis.scenario import Scenario, load_scenario
+from auv_dynamics.config import shipped_by_name
+from auv_dynamics.files import InputError, reason
+
+EXPECTED = 'a bag, a folder of results or of a sweep, or a scenario'
+YAML = ('.yaml', '.yml')
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where one run comes from.
+
+    Attributes
+    ----------
+    kind : 'bag', 'samples' of `auv simulate`, or 'scenario' that is simulated now
+    path : of the bag, the samples or the scenario
+    controller : its name; '' of a bag, which says so itself
+    scenario : of samples and scenarios, loaded
+
+    """
+
+    kind: Literal['bag', 'samples', 'scenario']
+    path: Path
+    controller: str = ''
+    scenario: Scenario | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """Files that are read, which no result may take the place of."""
+        if self.kind == 'bag':
+            return bag_files(self.path)
+        return [*([self.path] if self.kind == 'samples' else []), *self._inputs]
+
+    @property
+    def _inputs(self) -> Iterable[Path]:
+        return self.scenario.inputs if self.scenario else ()
+
+
+def is_sweep(argument: str) -> bool:
+    """Whether an argument is a folder of `auv sweep`."""
+    return os.path.isfile(os.path.join(argument, MANIFEST))
+
+
+def sources_of(arguments: Sequence[str]) -> list[Source]:
+    """The runs that arguments stand for, in their order.
+
+    Parameters
+    ----------
+    arguments : an .mcap file or a folder with such files is a bag; a folder of `auv simulate`,
+        `auv run` or `auv study` is all runs in it; an .npz file is one simulated run; a .yaml file
+        or the bare name of a shipped scenario is simulated, all its controllers
+
+    Raises
+    ------
+    InputError : it is none of them, or two of them
+
+    """
+    return [source for argument in arguments for source in _sources(argument)]
+
+
+def _sources(argument: str) -> list[Source]:
+    path = Path(argument)
+    if os.path.isdir(path):
+        _refuse_two_meanings(argument, path)
+        return _of_folder(path)
+    if os.path.isfile(path):
+        return _of_file(argument, path)
+    if path.suffix in YAML:
+        return _simulated(load_scenario(path))
+    if len(path.parts) == 1 and not path.suffix:
+        return _simulated(load_scenario(_shipped(argument)))
+    raise InputError(path, '', EXPECTED, 'no such file or folder')
+
+
+def _of_file(argument: str, path: Path) -> list[Source]:
+    if path.suffix in YAML:
+        return _simulated(load_scenario(path))
+    if path.suffix == ENDING:
+        scenario = _scenario_beside(path)
+        scenario.controller(path.stem)
+        return [Source('samples', path, path.stem, scenario)]
+    _refuse_two_meanings(argument, path)
+    return [Source('bag', path)]
+
+
+def _scenario_beside(samples: Path) -> Scenario:
+    beside = samples.parent / 'scenario.yaml'
+    if not beside.is_file():
+        expected = 'the scenario.yaml that `auv simulate` wrote beside it'
+        raise InputError(samples, '', expected, 'no such file')
+    return load_scenario(beside)
+
+
+def _refuse_two_meanings(argument: str, path: Path) -> None:
+    if argument != path.name:
+        return  # with a slash in it, it is no bare name
+    try:
+        named = shipped_by_name('scenarios', argument)
+    except InputError:
+        return
+    kind = 'folder' if os.path.isdir(path) else 'file'
+    expected = f'./{argument} for the {kind}, or {named} for the shipped scenario'
+    raise InputError(argument, '', expected, 'a name of both')
+
+
+def _shipped(name: str) -> Path:
+    try:
+        return shipped_by_name('scenarios', name)
+    except InputError as error:
+        _, _, names = error.expected.partition('scenarios: ')
+        found = 'no such file, folder or name'
+        raise InputError(name, '', f'{EXPECTED}, shipped: {names}', found) from None
+
+
+def _of_folder(folder: Path) -> list[Source]:
+    """Runs of a folder: a bag is one, results are as many as lie in them."""
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError as error:
+        raise InputError(folder, '', EXPECTED, reason(error)) from None
+    if any(entry.suffix == '.mcap' for entry in entries):
+        return [Source('bag', folder)]
+    names = _controllers(folder)
+    bags = [e for e in entries if e.is_dir() and any(e.glob('*.mcap'))]
+    samples = [folder / f'{name}{ENDING}' for name in names]
+    samples = [path for path in samples if path.is_file()]
+    if bags and samples:
+        found = f'both {bags[0].name}/ and {samples[0].name}'
+        raise InputError(folder, '', 'bags or samples in a folder, or name one of them', found)
+    if samples:
+        scenario = load_scenario(folder / 'scenario.yaml')
+        return [Source('samples', path, path.stem, scenario) for path in samples]
+    if not bags:
+        raise InputError(folder, '', EXPECTED, 'a folder without .mcap files or samples')
+    order = {name: i for i, name in enumerate(names)}
+    bags.sort(key=lambda bag: order.get(bag.name, len(order)))
+    return [Source('bag', bag) for bag in bags]
+
+
+def _controllers(folder: Path) -> list[str]:
+    """Controllers of the scenario of a folder of results, in its order; none without it."""
+    try:
+        data = yaml.safe_load((folder / 'scenario.yaml').read_text(encoding='utf-8'))
+        return [str(name) for name in data['controllers']]
+    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
+        return []
+
+
+def _simulated(scenario: Scenario) -> list[Source]:
+    return [Source('scenario', scenario.path, name, scenario) for name in scenario.controllers]

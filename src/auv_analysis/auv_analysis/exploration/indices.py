@@ -1,0 +1,188 @@
+"""Sensitivity indices of a campaign whose design was made for them: Sobol's and Morris's."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from auv_analysis.exploration.opening import Sweep
+from auv_analysis.measures import Measure
+from auv_analysis.sweep.designs import make_design
+from auv_analysis.sweep.groups import Group, kind_of, make_group
+
+Row = dict[str, Any]
+METHODS = ('saltelli', 'morris')
+FIRST_AND_TOTAL, SECOND = ('S1', 'S1_conf', 'ST', 'ST_conf'), ('S2', 'S2_conf')
+EFFECTS = ('mu', 'mu_star', 'mu_star_conf', 'sigma')
+MOST_OTHERS = 8  # combinations of the other groups of which each has indices of its own
+FEWEST = 8  # base points or trajectories
+SEED = 0  # of the bootstrap of the confidence intervals
+MISSING = 'sensitivity indices need SALib: pip install SALib'
+
+
+class Designed(NamedTuple):
+    """A group of a campaign whose design allows indices.
+
+    Attributes
+    ----------
+    kind : 'saltelli' or 'morris'
+    paths : names of its coordinates
+    spec : the group in the campaign file
+    step : rows of one base point or trajectory
+    positions : (n,) place of each row of the sweep in the design
+    others : (n,) which combination of the other groups it has
+    cases : what each of these is, '' where it is the only one
+    points : (size, k) of the unit cube; None of saltelli, which needs none
+
+    """
+
+    kind: str
+    paths: list[str]
+    spec: dict[str, Any]
+    step: int
+    positions: np.ndarray
+    others: np.ndarray
+    cases: list[str]
+    points: np.ndarray | None
+
+
+def designed(sweep: Sweep) -> tuple[list[Designed], list[str]]:
+    """Groups of a sweep that allow indices, and what has to be said of those that do not."""
+    specs, seed = sweep.campaign['vary'], sweep.campaign['seed']
+    if not any(kind_of(spec) in METHODS for spec in specs):
+        return [], []
+    try:
+        import SALib  # noqa: F401  its parts are imported where they are used
+    except ImportError:
+        return [], [MISSING]
+    groups = [make_group(spec, seed, i, sweep.folder) for i, spec in enumerate(specs)]
+    found, notes = [], []
+    for i, spec in enumerate(specs):
+        if kind_of(spec) not in METHODS:
+            continue
+        entry = _designed(sweep, groups, i, spec)
+        if len(entry.cases) > MOST_OTHERS:
+            notes.append(
+                f'no indices of {", ".join(entry.paths)}: {len(entry.cases)} combinations of '
+                f'the other groups, of at most {MOST_OTHERS}'
+            )
+        elif not _is_the_same(sweep, groups[i], entry):
+            notes.append(f'no indices of {", ".join(entry.paths)}: the design drawn now is another')
+        else:
+            found.append(entry)
+    return found, notes
+
+
+def _designed(sweep: Sweep, groups: list[Group], number: int, spec: dict[str, Any]) -> Designed:
+    sizes = [group.size for group in groups]
+    inner = int(np.prod(sizes[number + 1 :], dtype=np.int64))
+    positions = sweep.index // inner % sizes[number]
+    outer = sweep.index // (inner * sizes[number])
+    kind = kind_of(spec)
+    paths = list(spec[kind])
+    points = None
+    if kind == 'morris':
+        options = {key: int(value) for key, value in spec.items() if key != kind}
+        design = make_design(kind, paths, options, sweep.campaign['seed'], number)
+        points = design.at(np.arange(design.size))
+    step = sizes[number] // int(spec['count'])
+    others = outer * inner + sweep.index % inner
+    cases = _cases(sweep, others, paths, sweep.manifest['rollouts'] // sizes[number])
+    return Designed(kind, paths, spec, step, positions, others, cases, points)
+
+
+def _cases(sweep: Sweep, others: np.ndarray, paths: list[str], count: int) -> list[str]:
+    """What else varies, in each combination that has rows."""
+    beside = [path for path in sweep.paths if path not in paths]
+    if not beside or count > MOST_OTHERS:
+        return [''] * count
+    table, cases = sweep.table(beside), []
+    for case in range(count):
+        rows = np.flatnonzero(others == case)
+        values = table.slice(rows[0], 1).to_pylist()[0] if len(rows) else {}
+        cases.append(', '.join(f'{path} = {value}' for path, value in values.items()))
+    return cases
+
+
+def _is_the_same(sweep: Sweep, group: Group, entry: Designed) -> bool:
+    """Whether the design that is drawn now gives the values that the rows have."""
+    drawn = group.at(entry.positions)
+    for path in entry.paths:
+        there, here = sweep.table([path])[path].to_pylist(), drawn[path]
+        if isinstance(here, np.ndarray) and here.dtype.kind == 'f':
+            if not np.allclose(here, there, rtol=1e-12, atol=0.0):
+                return False
+        elif list(here) != there:
+            return False
+    return True
+
+
+def indices(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure) -> Iterator[Row]:
+    """Indices of a measure: of each controller and each combination of the other groups.
+
+    A base point or trajectory with a row that is missing, failed or has no such figure is left
+    out, as a whole.
+
+    Parameters
+    ----------
+    sweep : whose rows they are
+    entry : of `designed`
+    values : (n,) of the measure in all rows
+    measure : what it is
+
+    """
+    analyze = _sobol if entry.kind == 'saltelli' else _morris
+    size = int(entry.spec['count']) * entry.step
+    for i, controller in enumerate(sweep.controllers):
+        for other, case in enumerate(entry.cases):
+            rows = (sweep.controller == i) & (sweep.status == 0) & (entry.others == other)
+            Y = np.full(size, np.nan)
+            Y[entry.positions[rows]] = values[rows]
+            blocks = Y.reshape(-1, entry.step)
+            whole = np.isfinite(blocks).all(axis=1)
+            used = blocks[whole]
+            if len(used) < FEWEST or np.ptp(used) <= 1e-12 * np.abs(used).max():
+                continue
+            names: Row = {'method': 'sobol' if entry.kind == 'saltelli' else 'morris'}
+            names |= {'controller': controller, 'figure': measure.name, 'unit': measure.unit}
+            names |= {'case': case, 'points': len(used), 'of': int(entry.spec['count'])}
+            yield from (names | row for row in _quiet(analyze, entry, used, whole))
+
+
+def _quiet(analyze: Callable[..., Iterator[Row]], *arguments: Any) -> list[Row]:
+    with np.errstate(all='ignore'):
+        return list(analyze(*arguments))
+
+
+def _problem(entry: Designed) -> dict[str, Any]:
+    width = len(entry.paths)
+    return {'num_vars': width, 'names': entry.paths, 'bounds': [[0.0, 1.0]] * width}
+
+
+def _sobol(entry: Designed, Y: np.ndarray, whole: np.ndarray) -> Iterator[Row]:
+    from SALib.analyze import sobol
+
+    second = bool(entry.spec.get('second_order'))
+    found = sobol.analyze(_problem(entry), Y.ravel(), calc_second_order=second, seed=SEED)
+    for i, path in enumerate(entry.paths):
+        yield {'path': path, 'with': None} | {key: _known(found[key][i]) for key in FIRST_AND_TOTAL}
+    if second:
+        for i, path in enumerate(entry.paths):
+            for j in range(i + 1, len(entry.paths)):
+                row = {key: _known(found[key][i, j]) for key in SECOND}
+                yield {'path': path, 'with': entry.paths[j]} | row
+
+
+def _morris(entry: Designed, Y: np.ndarray, whole: np.ndarray) -> Iterator[Row]:
+    from SALib.analyze import morris
+
+    assert entry.points is not None
+    X = entry.points.reshape(len(whole), entry.step, -1)[whole].reshape(Y.size, -1)
+    levels = int(entry.spec.get('levels', 4))
+    found = morris.analyze(_problem(entry), X, Y.ravel(), num_levels=levels, seed=SEED)
+    for i, path in enumerate(entry.paths):
+        yield {'path': path, 'with': None} | {key: _known(found[key][i]) for key in EFFECTS}
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,188 @@
+"""What holds whatever the paper leaves open, as tables and sentences."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from auv_analysis.energy import shares
+from auv_analysis.report import paper
+from auv_analysis.report.document import Cell, Column, Sentence, Table, cell
+from auv_analysis.report.text import fixed, join, number
+from auv_analysis.study.attribution import Split
+from auv_analysis.study.robustness import FAILS, HOLDS, Held, Robustness, energy_ranges, met
+from auv_analysis.study.unknowns import DAMPING, M46, MASS
+from auv_analysis.study.unknowns_file import CLAIMS, ENERGY
+from auv_analysis.study.unknowns_run import Unknowns
+
+WORDS = {  # unknown -> how it is called, and its unit
+    'mass': ('the mass', ' kg'),
+    'M46': ('the roll-yaw term M46', ' kg m²'),
+    'linear': ('the linear damping', ' times'),
+    'quadratic': ('the quadratic damping', ' times'),
+    'exponent_sign': ('the sign of the exponents of (39)', ''),
+    'window': ('the window', ' s'),
+}
+LITTLE = 0.25  # of the impurity: a question that takes away less decides nothing
+ENDS = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)  # s, of the rows on energy
+EVERY, READ = 'all variants', 'exponents −'
+BEST = 'the best verdict that occurs'
+
+
+def unknowns_table(found: Unknowns, rows: Sequence[Robustness]) -> Table:
+    """Every claim over all variants and windows."""
+    windows = join([f'0–{window:g} s' for window in found.windows])
+    columns = (
+        Column('no.', meaning='number of the claim'),
+        Column('claim', numeric=False),
+        Column('shipped', meaning=f'verdicts of the shipped vehicle over {windows}', numeric=False),
+        *(
+            Column(name, unit, numeric=bool(unit), group=group)
+            for group in (EVERY, READ)
+            for name, unit in (('reproduced', '%'), ('partly', '%'), ('not', '%'), ('outcome', ''))
+        ),
+        Column(
+            'decided by', numeric=False, group=EVERY,
+            meaning=f'the unknown that parts the verdicts best, and how often {BEST} is on its '
+            'two sides',
+        ),
+        Column('decided by', numeric=False, group=READ),
+    )  # fmt: skip
+    caption = (
+        f'Claims over {len(found.variants)} variants of what the paper leaves open, judged over '
+        f'{windows}: mass {MASS[0]:g}–{MASS[1]:g} kg and M46 {_interval(M46[0])} or '
+        f'{_interval(M46[1])} kg m² with the printed N, linear and quadratic damping '
+        f'{DAMPING[0]:g} to {DAMPING[1]:g} times the reconstruction, either sign of the exponents '
+        'of (39). Corners and points inside count alike: shares are of this design, no '
+        'probabilities.'
+    )
+    return Table('unknowns', caption, columns, [_row(row) for row in rows], stub=2)
+
+
+def _interval(ends: tuple[float, float]) -> str:
+    return f'{fixed(ends[0], 0)} to {fixed(ends[1], 0)}'
+
+
+def _row(row: Robustness) -> list[Cell]:
+    shipped = list(dict.fromkeys(row.shipped))
+    cells = [
+        Cell(str(row.number), row.number, f'{CLAIMS}:number', anchor=f'unknowns-{row.number}'),
+        Cell(row.claim),
+        Cell(', then '.join(shipped), kind='badge' if len(shipped) == 1 else ''),
+    ]
+    for held in (row.every, row.as_read):
+        for verdict, part in held.percent.items():
+            source = f'{CLAIMS}:{verdict.replace(" ", "_")}'
+            cells.append(Cell(fixed(part, 0), part, source, 'zero' if part == 0 else ''))
+        kind = {HOLDS: 'good', FAILS: 'bad'}.get(held.outcome, '')
+        cells.append(Cell(held.outcome, source=f'{CLAIMS}:outcome', kind=kind))
+    return [*cells, *(_decided(held) for held in (row.every, row.as_read))]
+
+
+def _decided(held: Held) -> Cell:
+    if held.split is None:
+        return Cell('')
+    figures = {name: getattr(held.split, name) for name in ('threshold', 'below', 'above')}
+    text = _question(held.split)
+    if held.split.explained < LITTLE:
+        text = f'no single one; most by {text}'
+    return Cell(text, source=f'{CLAIMS}:threshold', figures=figures)
+
+
+def _question(split: Split) -> str:
+    name, unit = WORDS[split.unknown]
+    name = name.removeprefix('the ')
+    below, above = (f'{fixed(part, 0)} %' for part in (split.below, split.above))
+    if split.unknown == 'exponent_sign':
+        return f'{name}: {below} with −, {above} with +'
+    level = f'{number(split.threshold)}{unit}'
+    return f'{name}: {below} below {level}, {above} above'
+
+
+def energy_table(found: Unknowns) -> Table:
+    """Mean kinetic energy over 0 to T for some T, and what the unknowns make of it."""
+    total, parts = found.energy.sum(axis=2), shares(found.energy[0])
+    columns = (
+        Column('T', 's', 'end of the window, which begins at 0'),
+        Column('shipped', 'J', 'mean kinetic energy of GVC with the shipped vehicle'),
+        Column('from', 'J', 'smallest of all variants'),
+        Column('to', 'J', 'largest of all variants'),
+        Column('to the paper', '%', 'shipped relative to the paper’s 519.47 J'),
+        *(Column(f'ξ{i + 1}', '%', group='shares') for i in range(6)),
+    )
+    rows = []
+    for end in ENDS:
+        k = int(np.argmin(np.abs(found.ends - end)))
+        line = total[:, k]
+        rows.append([
+            Cell(f'{end:g}', end, f'{ENERGY}:end'),
+            _fixed(line[0], 2, 'energy'),
+            _fixed(line.min(), 2, 'energy_low'),
+            _fixed(line.max(), 2, 'energy_high'),
+            _fixed(100 * (line[0] / paper.KINETIC_ENERGY - 1), 1, 'energy'),
+            *(cell(float(part), f'{ENERGY}:share') for part in parts[k]),
+        ])  # fmt: skip
+    caption = (
+        'Mean kinetic energy of GVC over 0 to T, over all variants; the paper prints '
+        f'{fixed(paper.KINETIC_ENERGY, 2)} J and no window.'
+    )
+    return Table('energy_window', caption, columns, rows)
+
+
+def _fixed(value: float, decimals: int, column: str) -> Cell:
+    return Cell(fixed(float(value), decimals), float(value), f'{ENERGY}:{column}')
+
+
+def unknowns_sentences(found: Unknowns, rows: Sequence[Robustness]) -> list[Sentence]:
+    """What is sure and what is not."""
+    return [Sentence(text, source) for text, source in _sentences(found, rows)]
+
+
+def _sentences(found: Unknowns, rows: Sequence[Robustness]) -> Iterator[tuple[str, str]]:
+    table, energy = 'table-unknowns', 'table-energy_window'
+    every, read = (
+        [row.number for row in rows if getattr(row, of).outcome == HOLDS]
+        for of in ('every', 'as_read')
+    )
+    yield (
+        f'{_claims(every)} over all {len(found.variants)} variants of what the paper leaves open, '
+        f'and {len(read)} (no. {join([str(n) for n in read])}) where the exponents of (39) are '
+        'read with −.',
+        table,
+    )
+    for of, where in (('every', ''), ('as_read', ' where the exponents are read with −')):
+        for name, numbers in _deciding([(row.number, getattr(row, of)) for row in rows]):
+            yield f'{name[0].upper()}{name[1:]} decides most of no. {numbers}{where}.', table
+    if found.failed:
+        yield f'{len(found.failed)} variants diverge and are left out.', table
+    for entry in energy_ranges(found):
+        yield (
+            f'Over 0–{entry.window:g} s the mean kinetic energy is {fixed(entry.low, 2)} to '
+            f'{fixed(entry.high, 2)} J over all variants, at most {fixed(entry.away, 1)} % from '
+            f'the paper’s {fixed(paper.KINETIC_ENERGY, 2)} J.',
+            energy,
+        )
+    times = met(found)
+    if times:
+        yield (
+            f'{fixed(paper.KINETIC_ENERGY, 2)} J would be met over 0–{fixed(times[0], 2)} s '
+            f'({fixed(times[1], 2)} to {fixed(times[2], 2)} s over the variants): '
+            'a fit, not a finding.',
+            'energy_window',
+        )
+
+
+def _deciding(rows: Sequence[tuple[int, Held]]) -> list[tuple[str, str]]:
+    """Unknowns that decide claims, the one with most of them first, and the claims' numbers."""
+    found: dict[str, list[str]] = {}
+    for number_, held in rows:
+        if held.split and held.split.explained >= LITTLE:
+            found.setdefault(WORDS[held.split.unknown][0], []).append(str(number_))
+    return [(name, join(found[name])) for name in sorted(found, key=lambda n: -len(found[n]))]
+
+
+def _claims(numbers: list[int]) -> str:
+    listed = join([str(number) for number in numbers])
+    return {
+        0: 'No claim holds',
+        1: f'One claim (no. {listed}) holds',
+    }.get(len(numbers), f'{len(numbers)} claims (no. {listed}) hold')

@@ -1,0 +1,60 @@
+"""What ends a dashboard: the key q, Ctrl-C, or a signal."""
+
+import os
+import select
+import signal
+import sys
+import termios
+import time
+import tty
+from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Keyboard:
+    """Reads single keys while it is entered; terminal and signals are as before afterwards.
+
+    Attributes
+    ----------
+    ended : whether somebody wants an end
+
+    """
+
+    def __init__(self) -> None:
+        self.ended = False
+        self._file = sys.stdin.fileno() if _has_keys() else None
+
+    def __enter__(self) -> 'Keyboard':
+        self._signals = {number: signal.signal(number, self._end) for number in SIGNALS}
+        if self._file is not None:
+            self._terminal = termios.tcgetattr(self._file)
+            tty.setcbreak(self._file)
+        return self
+
+    def _end(self, number: int, frame: FrameType | None) -> None:
+        self.ended = True
+
+    def wait(self, seconds: float) -> None:
+        """Wait for a key, at most so many s."""
+        if self._file is None:
+            time.sleep(seconds)
+        elif select.select([self._file], [], [], seconds)[0]:
+            keys = os.read(self._file, 64)
+            self.ended = self.ended or not keys or b'q' in keys.lower()
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            termios.tcsetattr(self._file, termios.TCSADRAIN, self._terminal)
+        for number, handler in self._signals.items():
+            signal.signal(number, handler)
+
+
+def _has_keys() -> bool:
+    """Whether there is a terminal, and this process in front: one behind would be stopped."""
+    if sys.stdin is None or sys.stdin.closed or not sys.stdin.isatty():
+        return False
+    try:
+        return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except OSError:  # not the terminal of this session
+        return True

@@ -1,0 +1,49 @@
+"""A node of its own context in one domain, beside whatever else the process does."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+
+class Participant:
+    """A node that is served whenever there is time for it; signals stay with the program.
+
+    Parameters
+    ----------
+    domain : ROS domain id
+    make : builds the node in a context
+
+    """
+
+    def __init__(self, domain: int, make: Callable[[Context], Any]):
+        self._context = Context()
+        rclpy.init(
+            args=[],
+            context=self._context,
+            domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        try:
+            self._node = make(self._context)
+        except BaseException:
+            rclpy.try_shutdown(context=self._context)
+            raise
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+
+    def spin(self, seconds: float) -> None:
+        """Handle what comes in for so long."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._node.destroy_node()
+        self._executor.shutdown()
+        rclpy.try_shutdown(context=self._context)

@@ -1,0 +1,170 @@
+"""What the arguments of `auv analyze` stand for, and what runs are called."""
+
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.comparison.opening import named, open_source
+from auv_analysis.comparison.sources import Source, is_sweep, sources_of
+from auv_analysis.experiment import write_inputs
+from auv_analysis.samples import load_samples, write_samples
+from auv_dynamics import InputError
+
+ROOT = Path(__file__).parents[3]
+SHORT = (ROOT / 'config/scenarios/case1.yaml').read_text().replace('30.0', '0.3')
+NOISY = SHORT + '\nsensors: {velocity_noise: 0.01}\nactuators: {lag: 0.02}\n'
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def results(folder: Path) -> Path:
+    """What `auv simulate` leaves, as far as it is read."""
+    (folder / 'short.yaml').write_text(SHORT)
+    return _simulated(folder / 'runs/short', folder / 'short.yaml', 'continuous')
+
+
+def _simulated(out: Path, path: Path, hold: str) -> Path:
+    out.mkdir(parents=True)
+    scenario = load_scenario(path)
+    write_inputs(scenario, out)
+    for name in scenario.controllers:
+        write_samples(simulate(scenario, name, hold), out / f'{name}.npz')
+    return out
+
+
+def kinds(*arguments: object) -> list[tuple[str, str]]:
+    return [(s.kind, s.controller) for s in sources_of([str(a) for a in arguments])]
+
+
+@pytest.mark.parametrize(('text', 'hold'), [(SHORT, 'continuous'), (SHORT, 'zoh'), (NOISY, 'zoh')])
+def test_samples_make_the_run_again(folder: Path, text: str, hold: str) -> None:
+    (folder / 'short.yaml').write_text(text)
+    out = _simulated(folder / 'out', folder / 'short.yaml', hold)
+    for name in ('gvc', 'cl'):
+        run = simulate(load_scenario(folder / 'short.yaml'), name, hold)
+        again = load_samples(out / f'{name}.npz', load_scenario(out / 'scenario.yaml'))
+        assert (again.hold, again.sensing, again.acting) == (hold, run.sensing, run.acting)
+        for signal, values in run.arrays().items():
+            assert np.array_equal(getattr(again, signal), values), signal
+        assert summarize(again) == summarize(run)
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'words'),
+    [
+        (lambda path: path.write_bytes(b'no archive'), 'cut, damaged or no archive'),
+        (lambda path: path.write_bytes(path.read_bytes()[:-400]), 'cut, damaged or no archive'),
+        (lambda path: np.savez(path, t=np.arange(3.0)), 'eta: expected an array of samples'),
+        (lambda path: _change(path, nu=np.zeros((3, 6))), r'nu: expected \(31, 6\) numbers'),
+        (lambda path: _change(path, t=np.zeros((31, 1))), 't: expected the times'),
+        (lambda path: _change(path, hold=np.array('foh')), 'hold: expected continuous or zoh'),
+    ],
+)
+def test_broken_samples_are_refused(results: Path, spoil, words: str) -> None:
+    spoil(results / 'gvc.npz')
+    with pytest.raises(InputError, match=words):
+        open_source(sources_of([str(results / 'gvc.npz')])[0])
+
+
+def _change(path: Path, **arrays: np.ndarray) -> None:
+    with np.load(path) as file:
+        found = {name: file[name] for name in file.files}
+    np.savez(path, **(found | arrays))
+
+
+def test_every_kind_of_argument(folder: Path, results: Path) -> None:
+    both = [('samples', 'gvc'), ('samples', 'cl')]
+    assert kinds('runs/short') == both
+    assert kinds('runs/short/cl.npz') == both[1:]
+    assert kinds('short.yaml') == [('scenario', 'gvc'), ('scenario', 'cl')]
+    assert kinds('case1') == kinds('short.yaml')
+    (results / 'gvc.npz').unlink()
+    assert kinds('runs/short', 'case2') == [*both[1:], ('scenario', 'gvc'), ('scenario', 'cl')]
+
+
+def test_bags_of_a_folder_in_the_order_of_its_scenario(folder: Path, results: Path) -> None:
+    for name in ('cl', 'gvc', 'later'):
+        (results / f'{name}.npz').unlink(missing_ok=True)
+        (results / name).mkdir()
+        (results / name / f'{name}_0.mcap').write_bytes(b'')
+    found = sources_of(['runs/short'])
+    assert [(s.kind, s.path.name) for s in found] == [
+        ('bag', 'gvc'), ('bag', 'cl'), ('bag', 'later'),
+    ]  # fmt: skip
+    assert [s.path for s in sources_of(['runs/short/cl'])] == [Path('runs/short/cl')]
+
+
+def test_a_sweep_is_known_by_its_manifest(folder: Path) -> None:
+    (folder / 'sweep').mkdir()
+    assert not is_sweep('sweep')
+    (folder / 'sweep/sweep.json').write_text('{}')
+    assert is_sweep('sweep')
+    assert not is_sweep('case1')
+
+
+def test_a_name_of_two_things_is_refused(folder: Path, results: Path) -> None:
+    shutil.copytree(results, folder / 'case1')
+    with pytest.raises(InputError, match=r'expected \./case1 for the folder, or .*case1\.yaml'):
+        sources_of(['case1'])
+    assert kinds('./case1') == kinds('case1/') == kinds('runs/short')
+
+
+def test_bags_and_samples_in_one_folder_are_refused(folder: Path, results: Path) -> None:
+    (results / 'gvc').mkdir()
+    (results / 'gvc/gvc_0.mcap').write_bytes(b'')
+    with pytest.raises(InputError, match=r'found both gvc/ and gvc\.npz'):
+        sources_of(['runs/short'])
+
+
+@pytest.mark.parametrize(
+    ('argument', 'words'),
+    [
+        ('gone', 'shipped: case1, .*found no such file, folder or name'),
+        ('gone/gvc', 'expected a bag, a folder of results or of a sweep, or a scenario'),
+        ('empty', r'found a folder without \.mcap files or samples'),
+        ('lonely.npz', 'the scenario.yaml that'),
+        ('runs/short/pid.npz', 'controllers: expected one of gvc, cl'),
+    ],
+)
+def test_what_is_nothing_is_refused(folder: Path, results: Path, argument, words) -> None:
+    (folder / 'empty').mkdir()
+    (folder / 'lonely.npz').write_bytes(b'')
+    (results / 'pid.npz').write_bytes(b'')
+    with pytest.raises(InputError, match=words):
+        sources_of([argument])
+
+
+# names
+
+
+def _names(*runs: tuple[str, str, str], join: str = '/') -> list[str]:
+    pairs = [
+        (Source('bag', Path(path)), SimpleNamespace(scenario=scenario, controller=controller))
+        for path, scenario, controller in runs
+    ]
+    return named(pairs, join)
+
+
+def test_names_are_as_short_as_they_can_be() -> None:
+    assert _names(('a/gvc', 'case1', 'gvc'), ('a/cl', 'case1', 'cl')) == ['gvc', 'cl']
+    assert _names(('a/gvc', 'case1', 'gvc'), ('b/gvc', 'case2', 'gvc')) == [
+        'case1/gvc', 'case2/gvc',
+    ]  # fmt: skip
+    assert _names(('a/gvc', 'x', 'gvc'), ('b/gvc', 'y', 'gvc'), join='_') == ['x_gvc', 'y_gvc']
+
+
+def test_runs_of_one_name_are_told_apart_by_their_folders() -> None:
+    found = _names(('/1/a/gvc', 'x', 'gvc'), ('/1/b/gvc', 'x', 'gvc'), ('/1/b/cl', 'x', 'cl'))
+    assert found == ['1/a/gvc', '1/b/gvc', 'x/cl']
+    assert _names(*(('/1/a/gvc', 'x', 'gvc') for _ in range(3))) == [
+        '1/a/gvc', '1/a/gvc_2', '1/a/gvc_3',
+    ]  # fmt: skip

@@ -1,0 +1,67 @@
+"""What tests of reports share: the report of case1's first seconds in a browser, quick figures."""
+
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browser import Watched, chromium
+from PIL import Image
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.report import plotting
+from auv_analysis.report.page import write_report
+from auv_analysis.run import Run
+
+
+@pytest.fixture(scope='session')
+def browser() -> Iterator:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope='session')
+def short_runs() -> dict[str, Run]:
+    scenario = load_scenario('case1')
+    found = {name: simulate(scenario, name) for name in scenario.controllers}
+    return {name: run.part(run.t <= 5.0) for name, run in found.items()}
+
+
+@pytest.fixture(scope='session')
+def report_path(browser, short_runs, tmp_path_factory) -> Path:
+    """Of a report whose still figures are composed but not rendered: that takes long."""
+
+    heights = count()  # the same image twice would be one in a PDF
+
+    def save(figure, folder, name):
+        png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
+        Image.new('RGB', (720, 300 + next(heights)), 'white').save(png)
+        return png, pdf
+
+    out = tmp_path_factory.mktemp('report')
+    summaries = {name: summarize(run) for name, run in short_runs.items()}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plotting, 'save', save)
+        return write_report(out, short_runs, summaries, 'a: 1', 'b: 2')
+
+
+@pytest.fixture
+def report(browser, report_path) -> Iterator[Watched]:
+    watched = Watched(browser, report_path)
+    watched.page.wait_for_selector('.with-panels')
+    yield watched
+    watched.close()
+
+
+@pytest.fixture
+def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are composed but not rendered, which takes most of the time of a report."""
+
+    def save(figure: Any, folder: Path, name: str) -> tuple[Path, Path]:
+        paths = folder / f'{name}.png', folder / f'{name}.pdf'
+        for path in paths:
+            path.write_bytes(b'not rendered')
+        return paths
+
+    monkeypatch.setattr(plotting, 'save', save)

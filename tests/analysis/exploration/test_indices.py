@@ -1,0 +1,115 @@
+"""Sensitivity indices of designed campaigns against those that are known in closed form."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_sweeps import make_sweep
+
+from auv_analysis.exploration.indices import designed
+from auv_analysis.exploration.opening import open_sweep
+from auv_analysis.exploration.results import analysed
+
+pytest.importorskip('SALib')
+ENERGY = 'kinetic_energy.mean'
+A, B, C = 'controllers.*.k_D', 'controllers.*.k_I', 'setpoint.surge.offset'
+UNIFORM = '\n'.join(f'      {path}: {{uniform: {{from: 1.0, to: 2.0}}}}' for path in (A, B, C))
+SALTELLI = f"""
+name: salt
+scenario: case1
+controllers: [gvc]
+block: 64
+vary:
+  - grid: {{integrator: [ode5, rk4]}}
+  - saltelli:
+{UNIFORM}
+    count: 256
+    second_order: true
+"""
+MORRIS = f"""
+name: morr
+scenario: case1
+controllers: [gvc]
+vary:
+  - morris:
+{UNIFORM}
+    count: 12
+"""
+
+
+def linear(controller, values, index):
+    return {ENERGY: 10.0 + 3.0 * values[A] - 1.0 * values[B]}
+
+
+def indices(out: Path) -> list[dict]:
+    return [r for r in analysed(open_sweep(out)).tables['indices'] if r['figure'] == ENERGY]
+
+
+def test_sobol_of_a_linear_figure(tmp_path: Path) -> None:
+    found = indices(make_sweep(tmp_path, SALTELLI, linear))
+    assert {row['case'] for row in found} == {'integrator = ode5', 'integrator = rk4'}
+    for row in found:
+        if row['with'] is None:
+            expected = {A: 0.9, B: 0.1, C: 0.0}[row['path']]
+            assert row['S1'] == pytest.approx(expected, abs=0.05)
+            assert row['ST'] == pytest.approx(expected, abs=0.05)
+        else:
+            assert row['S2'] == pytest.approx(0.0, abs=0.1)
+        assert (row['points'], row['of']) == (256, 256)
+
+
+def test_a_base_point_with_a_failed_row_is_left_out_whole(tmp_path: Path) -> None:
+    def failing(controller, values, index):
+        columns = linear(controller, values, index)
+        status = np.where(index % 80 == 5, 'diverged', 'ok').astype(object)
+        columns[ENERGY] = np.where(status == 'ok', columns[ENERGY], np.nan)
+        return columns | {'status': status}
+
+    found = [row for row in indices(make_sweep(tmp_path, SALTELLI, failing))
+             if row['with'] is None and row['case'] == 'integrator = ode5']  # fmt: skip
+    lost = len({index // 8 for index in range(5, 2048, 80)})
+    assert {row['points'] for row in found} == {256 - lost}
+    for row in found:
+        assert row['S1'] == pytest.approx({A: 0.9, B: 0.1, C: 0.0}[row['path']], abs=0.06)
+
+
+def test_an_unfinished_design_uses_its_whole_base_points(tmp_path: Path) -> None:
+    out = make_sweep(tmp_path, SALTELLI, linear, range(20))  # 20 * 64 of 2 * 2048 rollouts
+    found = [row for row in indices(out) if row['with'] is None]
+    assert {(row['case'], row['points']) for row in found} == {('integrator = ode5', 160)}
+
+
+def test_morris_of_a_linear_figure(tmp_path: Path) -> None:
+    found = {row['path']: row for row in indices(make_sweep(tmp_path, MORRIS, linear))}
+    for path, slope in ((A, 3.0), (B, -1.0), (C, 0.0)):
+        assert found[path]['mu'] == pytest.approx(slope)
+        assert found[path]['mu_star'] == pytest.approx(abs(slope))
+        assert found[path]['sigma'] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_values_of_another_design_are_not_taken_for_it(tmp_path: Path) -> None:
+    out = make_sweep(tmp_path, SALTELLI.replace('name: salt', 'name: salt\nseed: 3'), linear)
+    manifest = (out / 'sweep.json').read_text()
+    (out / 'sweep.json').write_text(manifest.replace('"seed": 3', '"seed": 4'))
+    found, notes = designed(open_sweep(out))
+    assert found == []
+    assert 'another' in notes[0]
+
+
+def test_many_other_combinations_are_said(tmp_path: Path) -> None:
+    many = "grid: {'initial.nu[0]': [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]}"
+    text = SALTELLI.replace('grid: {integrator: [ode5, rk4]}', many).replace('256', '8')
+    found, notes = designed(open_sweep(make_sweep(tmp_path, text, linear)))
+    assert found == []
+    assert '9 combinations' in notes[0]
+
+
+def test_without_salib_it_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    out = make_sweep(tmp_path, MORRIS, linear)
+    monkeypatch.setitem(sys.modules, 'SALib', None)
+    results = analysed(open_sweep(out))
+    assert results.notes == ['sensitivity indices need SALib: pip install SALib']
+    assert results.tables['indices'] == []
+    assert results.tables['influence']

@@ -1,0 +1,107 @@
+"""A headless Chromium of this machine, and what tests ask of a page in it."""
+
+import io
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable')
+FIGURE = (
+    """(name) => Bokeh.documents.flatMap((doc) => doc.roots()).find((root) => root.name === name)"""
+)
+SHOWN = f"""(name) => {{
+  const figure = ({FIGURE})(name);
+  const {'{'} start, end {'}'} = figure.x_range;
+  return {{
+    window: [start, end],
+    values: [figure.y_range.start, figure.y_range.end],
+    lines: figure.renderers.filter((line) => line.visible).map((line) => line.name),
+    axis: figure.left[0].type,
+    ink: figure.left[0].axis_label_text_color,
+    cursor: [...figure.references()].find((model) => model.name === 'cursor').location,
+  }};
+}}"""
+
+DRAWN = """(name) => {
+  const version = document.querySelector('.panel-controls').dataset.version;
+  return document.querySelector(`[data-panel="${name}"]`).dataset.version === version;
+}"""
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """The browser; the test that asks for it is skipped where there is none."""
+    playwright = pytest.importorskip('playwright.sync_api', reason='playwright is not installed')
+    found = next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        pytest.skip(f'no browser: none of {", ".join(NAMES)} is on the PATH')
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=found)
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+class Watched:
+    """A page of which every request and every complaint is kept."""
+
+    def __init__(self, browser: Any, path: Path, anchor: str = '', **context: Any):
+        self.path = path
+        self.requests: list[str] = []
+        self.complaints: list[str] = []
+        self.page = browser.new_context(
+            viewport={'width': 1280, 'height': 900}, **context
+        ).new_page()
+        self.page.set_default_timeout(20_000)
+        self.page.on('request', lambda request: self.requests.append(request.url))
+        self.page.on('pageerror', lambda error: self.complaints.append(str(error)))
+        self.page.on('console', self._heard)
+        self.page.goto(path.as_uri() + anchor)
+
+    def _heard(self, message: Any) -> None:
+        if message.type in ('error', 'warning'):
+            self.complaints.append(message.text)
+
+    def close(self) -> None:
+        """Close the page, which asked for nothing but itself and complained of nothing."""
+        self.page.context.close()
+        assert self.complaints == []
+        asked = {url.partition('#')[0] for url in self.requests if not url.startswith('blob:')}
+        assert asked == {self.path.as_uri()}
+
+    def panel(self, name: str) -> Any:
+        """Element of a panel, in view and drawn as was last asked for."""
+        panel = self.page.locator(f'[data-panel="{name}"]')
+        panel.scroll_into_view_if_needed()
+        self.page.wait_for_function(DRAWN, arg=name)
+        return panel
+
+    def shown(self, name: str) -> dict[str, Any]:
+        """What Bokeh's models of a panel say, after everything asked for has been done."""
+        self.panel(name)
+        return self.page.evaluate(SHOWN, name)
+
+    def settle(self) -> None:
+        """Wait for two frames: what is asked for is done in the first."""
+        self.page.evaluate(
+            '() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))'
+        )
+
+
+def pixels(element: Any) -> np.ndarray:
+    """Screenshot of an element, (rows, columns, 3)."""
+    with Image.open(io.BytesIO(element.screenshot())) as image:
+        return np.asarray(image.convert('RGB')).astype(int)
+
+
+def coloured(image: np.ndarray, colour: str) -> int:
+    """Number of pixels of a colour, '#rrggbb', antialiased ones left out."""
+    wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return int((np.abs(image - wanted).max(axis=2) < 12).sum())

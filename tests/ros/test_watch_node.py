@@ -1,0 +1,167 @@
+"""The listener of `auv watch` beside real publishers: it hears, and it changes nothing."""
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from harness import PATIENCE, Peer, fresh_domain, graph, parameters
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from auv_analysis.watch.gauge import Gauge
+from auv_analysis.watch.snapshot import Snapshot, TopicState
+from auv_analysis.watch_node import Listener
+from auv_dynamics import interface
+from auv_dynamics.interface import Frames
+from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.watcher import Watcher
+
+FRAMES = Frames()
+STEP = 10_000_000
+STATE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, *[0.1] * 6)
+BEST_EFFORT = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, depth=10, reliability=ReliabilityPolicy.BEST_EFFORT
+)
+
+
+class Ears:
+    """A listener, its gauge, and a peer that publishes."""
+
+    def __init__(self, peer: Peer, domain: int, namespace: str = '/'):
+        self.peer = peer
+        self.gauge = Gauge(domain, namespace, begin=time.monotonic())
+        self.listener = Listener(domain, namespace, FRAMES, self.gauge)
+
+    def snapshot(self) -> Snapshot:
+        return self.gauge.snapshot(time.monotonic())
+
+    def topic(self, topic: topics.Topic) -> TopicState:
+        return next(one for one in self.snapshot().topics if one.name == topic.name)
+
+    def until(self, done: Callable[[], Any], *, listening: bool = True) -> None:
+        limit = time.monotonic() + PATIENCE
+        while not done():
+            assert time.monotonic() < limit, self.snapshot().document()
+            self.listener.listen(listening=listening)
+            self.peer.executor.spin_once(timeout_sec=0.02)
+
+    def publisher(self, topic: topics.Topic, qos: Any = None, kind: type | None = None) -> Any:
+        """Publisher that the listener has matched."""
+        made = self.peer.node.create_publisher(
+            kind or topic.type, topic.name, qos or topics.every_step()
+        )
+        if kind is None:
+            self.until(lambda: made.get_subscription_count() > 0)
+        return made
+
+    def troubles(self) -> str:
+        return '\n'.join(trouble.text for trouble in self.snapshot().troubles)
+
+
+@pytest.fixture
+def ears() -> Iterator[Ears]:
+    domain = fresh_domain()
+    peer = Peer(domain)
+    made = Ears(peer, domain)
+    try:
+        yield made
+    finally:
+        made.listener.close()
+        peer.close()
+
+
+def test_numbers_of_every_kind_come_in_and_broken_messages_are_errors(ears: Ears) -> None:
+    publish = {
+        topic: ears.publisher(topic).publish
+        for topic in (topics.ODOM, topics.CMD_VEL, topics.WRENCH, topics.KINETIC_ENERGY)
+    }
+    shares = ears.publisher(topics.KINETIC_ENERGY_SHARES, BEST_EFFORT)
+    publish[topics.CMD_VEL](convert.twist(0, (0.4,) * 6, FRAMES))
+    for k in range(20):
+        publish[topics.ODOM](convert.odometry(k * STEP, STATE, FRAMES))
+        publish[topics.WRENCH](convert.wrench(k * STEP, (2.0,) * 6, FRAMES))
+    publish[topics.KINETIC_ENERGY](convert.joint_state(0, range(6), FRAMES))
+    shares.publish(convert.joint_state(0, [100.0, 0, 0, 0, 0, 0], FRAMES))
+    ears.until(lambda: ears.topic(topics.WRENCH).heard == 20)
+    ears.until(lambda: ears.snapshot().kinetic_energy)
+    found = ears.snapshot()
+    assert found.velocity_error.now == pytest.approx((0.3,) * 6)
+    assert found.tau == (2.0,) * 6
+    assert found.kinetic_energy.total == 15.0
+    assert (found.time, found.troubles) == (0.19, ())
+    odometry = ears.topic(topics.ODOM)
+    assert (odometry.heard, odometry.gaps, odometry.repeats) == (20, 0, 0)
+
+    publish[topics.WRENCH](convert.wrench(20 * STEP, (float('nan'), *[0.0] * 5), FRAMES))
+    publish[topics.ODOM](convert.odometry(20 * STEP, STATE, Frames('map', FRAMES.base)))
+    ears.until(lambda: ears.topic(topics.WRENCH).refused and ears.topic(topics.ODOM).refused)
+    assert "odom: header.frame_id: expected 'odom_ned', found 'map'" in ears.troubles()
+    assert 'wrench: expected finite numbers, found (nan' in ears.troubles()
+    assert ears.snapshot().tau == (2.0,) * 6, 'what is refused is not shown'
+
+
+def test_who_does_not_fit_is_named_with_topic_and_policy(ears: Ears) -> None:
+    ears.peer.listen(topics.ODOM)  # reliable
+    ears.publisher(topics.ODOM, BEST_EFFORT)
+    ears.publisher(topics.WRENCH, kind=String)
+    for word in ('odom: incompatible QoS of test_peer and test_peer: best effort publisher',
+                 'wrench: expected the type of this topic, found std_msgs/msg/String'):  # fmt: skip
+        ears.until(lambda word=word: word in ears.troubles())
+
+
+def test_it_publishes_nothing_and_leaves_with_the_last_publisher(ears: Ears) -> None:
+    odometry = ears.publisher(topics.ODOM)
+    node = ears.peer.node
+    published = node.get_publisher_names_and_types_by_node(interface.OBSERVER, '/')
+    assert [name for name, _ in published] == ['/parameter_events']  # rclpy's; nothing is said
+    assert node.count_subscribers(topics.WRENCH.name) == 0, 'only what is published'
+    node.destroy_publisher(odometry)
+    ears.until(lambda: node.count_subscribers(topics.ODOM.name) == 0)
+
+
+def test_in_a_pause_only_set_points_and_what_is_rare_are_heard(ears: Ears) -> None:
+    heard = (topics.ODOM, topics.CMD_VEL, topics.DIAGNOSTICS)
+    odometry, *_ = [ears.publisher(topic) for topic in heard]
+    counts = [ears.peer.node.count_subscribers] * 3
+    ears.until(lambda: counts[0](topics.ODOM.name) == 0, listening=False)
+    assert all(count(topic.name) for count, topic in zip(counts, heard, strict=True) if topic
+               is not topics.ODOM)  # fmt: skip
+    ears.until(lambda: odometry.get_subscription_count() == 1)
+
+
+def test_another_namespace_is_found(ears: Ears) -> None:
+    ears.peer.node.create_publisher(topics.ODOM.type, '/auv7/odom', topics.every_step())
+    ears.peer.node.create_publisher(topics.ODOM.type, '/ground_truth/odom', topics.every_step())
+    ears.until(lambda: ears.listener.elsewhere() == ['/auv7'])
+
+
+def test_it_is_no_stranger_on_a_domain(ears: Ears) -> None:
+    ears.publisher(topics.ODOM)
+    watcher = Watcher(ears.gauge.domain)
+    try:
+        limit = time.monotonic() + PATIENCE
+        while watcher.endpoints() != ['test_peer on /odom']:
+            assert time.monotonic() < limit, watcher.endpoints()
+            watcher.spin(0.05)
+    finally:
+        watcher.close()
+
+
+def test_nobody_waits_for_it_and_it_does_not_start_a_run() -> None:
+    """The start barrier counts subscribers: an onlooker is not the recorder that is expected."""
+    expected = ['-p', 'expected_subscribers:=["odom=1"]']
+    plant = ('plant_node', [*parameters(vehicle='herman2018', lockstep=True), *expected])
+    with graph(plant) as (peer, _):
+        beside = Ears(peer, peer.context.get_domain_id())
+        try:
+            beside.until(lambda: peer.node.count_subscribers('odom') == 1)
+            answer = peer.call(Trigger, 'plant_node/ready')
+            assert not answer.success
+            assert answer.message == 'odom: expected 1 subscribers, found 0'
+            peer.listen(topics.ODOM)
+            beside.until(lambda: peer.heard['odom'])
+            assert peer.call(Trigger, 'plant_node/ready').success
+        finally:
+            beside.listener.close()

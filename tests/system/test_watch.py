@@ -1,0 +1,106 @@
+"""`auv watch` beside a run: it sees what happens, and nothing is otherwise for it, even stopped."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+from graph_runs import every_message, node_of, record
+from harness import PATIENCE, auv, environment, fresh_domain
+
+from auv_dynamics import interface
+
+AUV = str(Path(sys.executable).with_name('auv'))
+PACED = ('/diagnostics', '/recorder/progress', '/controller_node/transition_event')  # by the wall
+SCENARIO = {
+    'name': 'watched',
+    'vehicle': 'herman2018',
+    'duration': 30.0,
+    'step': 0.01,
+    'controllers': {'gvc': {'law': 'gvc', 'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}},
+    'setpoint': {'surge': {'offset': 0.5}, 'yaw': {'offset': 0.1}},
+    'disturbance': {'kind': 'herman2018'},
+}
+
+
+def start_watch(domain: int, *options: str, **kinds) -> subprocess.Popen:
+    command = [AUV, 'watch', '--domain-id', str(domain), *options]
+    kinds = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, **kinds}
+    return subprocess.Popen(command, env=environment(domain), text=True, **kinds)
+
+
+@pytest.fixture(scope='module')
+def scenario(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp('watched') / 'watched.yaml'
+    path.write_text(yaml.safe_dump(SCENARIO, sort_keys=False))
+    return path
+
+
+def test_a_run_is_the_same_beside_a_watch_that_is_even_stopped(scenario, tmp_path) -> None:
+    domain = fresh_domain()
+    beside = start_watch(domain, '--json')
+    try:
+        assert f'ROS_DOMAIN_ID={domain}' in beside.stderr.readline()
+        run = record(scenario, tmp_path / 'watched', domain)
+        plant = node_of(tmp_path / 'watched', 'plant_node')
+        beside.send_signal(signal.SIGSTOP)
+        assert plant.is_running(), 'it was stopped while the run was under way'
+        _, errors = run.communicate(timeout=120)
+        assert run.returncode == 0, errors
+        beside.send_signal(signal.SIGCONT)
+        beside.send_signal(signal.SIGINT)
+        output, errors = beside.communicate(timeout=PATIENCE)
+    finally:
+        beside.kill()
+    assert beside.returncode == 0, errors
+    seen = {topic['name']: topic for topic in json.loads(output)['topics']}
+    for topic in (interface.ODOM, interface.WRENCH, interface.CMD_VEL, interface.DELTA_PI):
+        assert seen[topic]['heard'] > 0, topic
+        assert seen[topic]['gaps'] == seen[topic]['repeats'] == seen[topic]['refused'] == 0
+
+    alone = record(scenario, tmp_path / 'alone')
+    assert alone.wait(timeout=120) == 0
+    bags = [every_message(tmp_path / name / 'gvc', *PACED) for name in ('watched', 'alone')]
+    assert bags[0].keys() == bags[1].keys()
+    for topic, messages in bags[0].items():
+        assert messages == bags[1][topic], topic
+    assert len(bags[0]['/odom']) == 3001
+
+
+def test_without_a_graph_it_says_where_it_waits_and_ends_with_1() -> None:
+    domain = fresh_domain()
+    ended = auv('watch', '--domain-id', str(domain), '--for', '0.5', '--json')
+    assert ended.returncode == 1
+    assert ended.stdout == ''
+    first, last = ended.stderr.splitlines()
+    assert first.startswith(f'listens on ROS_DOMAIN_ID={domain}, this machine only')
+    for word in ('nobody publishes odom, cmd_vel or wrench', f'={domain}', 'gave up after 0.5 s'):
+        assert word in last
+
+
+def test_on_a_terminal_q_ends_it_and_the_terminal_is_given_back() -> None:
+    ours, its = pty.openpty()
+    process = start_watch(fresh_domain(), stdin=its, stdout=its, stderr=subprocess.PIPE)
+    os.close(its)
+    shown = b''
+    limit = time.monotonic() + PATIENCE
+    while b'nobody publishes' not in shown:  # the dashboard is up
+        assert time.monotonic() < limit
+        shown += os.read(ours, 4096)
+    os.write(ours, b'xq')
+    while process.poll() is None:
+        assert time.monotonic() < limit
+        try:
+            shown += os.read(ours, 4096)
+        except OSError:  # the other end is closed
+            break
+    assert process.wait(PATIENCE) == 0, process.stderr.read()
+    assert b'\x1b[?1049h' in shown, 'a screen of its own'
+    assert shown.rindex(b'\x1b[?1049l') > shown.rindex(b'\x1b[?1049h'), 'and the old one again'
+    os.close(ours)

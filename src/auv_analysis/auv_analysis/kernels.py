@@ -40,6 +40,7 @@ def run_held_batch(loop, tables, grid, tableau, motion, work, record, first, las
 
 IN_LANES = {'continuous': run_continuous_batch, 'zoh': run_held_batch}
 ALONE = {'continuous': run_continuous, 'zoh': run_held}
+IN_PYTHON = 'as plain Python'
 
 
 class Kernel(NamedTuple):
@@ -76,7 +77,7 @@ def kernels(law: Any, hold: str) -> Sequence[Kernel]:
 @cache
 def _of_user(law: Any, hold: str) -> Sequence[Kernel]:
     """Kernels of their own for each law: numba takes two classes of one name for the same."""
-    in_python = Kernel(_one_by_one(plain(ALONE[hold])), True, 'as plain Python')
+    in_python = Kernel(_one_by_one(plain(ALONE[hold])), True, IN_PYTHON)
     if not JITTED:
         return [in_python]
     return [

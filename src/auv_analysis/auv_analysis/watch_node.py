@@ -65,6 +65,8 @@ class WatchNode(BulkNode):
         self._gauge = gauge
         self._frames = frames
         self._topics = [topic for topic in topics.TOPICS if topic.name in HEARD]
+        # made once: which messages are laid out how takes some time to find out
+        self._callbacks: dict[topics.Topic, Any] = {t: self._callback(t) for t in self._topics}
         self._subscribed: dict[topics.Topic, Subscription] = {}
         self._now = 0.0
 
@@ -92,9 +94,13 @@ class WatchNode(BulkNode):
             incompatible_qos=lambda event: self._incompatible(topic, event),
             use_default_callbacks=False,
         )
-        callback: Any = self._callback(topic)  # rclpy looks how many arguments it takes
         subscription = self.create_subscription(
-            topic.type, topic.name, callback, _sight(), event_callbacks=events, raw=True
+            topic.type,
+            topic.name,
+            self._callbacks[topic],
+            _sight(),
+            event_callbacks=events,
+            raw=True,
         )
         self.add_data(subscription)
         # set-points come first, so that the one of an odometry is there before it

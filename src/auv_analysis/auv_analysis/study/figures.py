@@ -63,6 +63,26 @@ class Figure:
         """Words with the degree of freedom."""
         return self.words if self.dof == 'all' else f'{self.words}, {self.dof}'
 
+    @property
+    def short(self) -> str:
+        """The same in fewer words."""
+        return SHORT[self.name] if self.dof == 'all' else f'{SHORT[self.name]}, {self.dof}'
+
+
+SHORT = {  # for heads of rows
+    'velocity_error.rms': 'RMS error',
+    'velocity_error.max_after_2s': 'error after 2 s',
+    'velocity_error.settling_time': 'settling time',
+    'effort.rms': 'RMS input',
+    'effort.max': 'largest input',
+    'lumped_error.rms': 'RMS w',
+    'lumped_error.max_after_2s': 'w after 2 s',
+    'coupling.delta_xi_max': 'largest Δξ',
+    'coupling.delta_pi_max': 'largest Δπ',
+    'kinetic_energy.shares_percent': 'energy share',
+    TOTAL: 'mean energy',
+}
+
 
 @dataclass(frozen=True)
 class Excluded:

@@ -57,10 +57,17 @@ class Design:
         if self.method == 'sobol':
             from SALib.sample import sobol
 
-            return sobol.sample(self._problem, self.count, calc_second_order=False, seed=self.seed)
+            return sobol.sample(
+                self._problem, self.count, calc_second_order=False, seed=self._salib_seed
+            )
         from SALib.sample import morris
 
-        return morris.sample(self._problem, self.count, num_levels=LEVELS, seed=self.seed)
+        return morris.sample(self._problem, self.count, num_levels=LEVELS, seed=self._salib_seed)
+
+    @property
+    def _salib_seed(self) -> int:
+        """Never 0, which SALib takes for none."""
+        return self.seed + 1
 
     @property
     def _problem(self) -> dict[str, Any]:
@@ -91,7 +98,7 @@ class Design:
 
         found = sobol.analyze(
             self._problem, y, calc_second_order=False, num_resamples=RESAMPLES,
-            conf_level=CONFIDENCE, seed=self.seed,
+            conf_level=CONFIDENCE, seed=self._salib_seed,
         )  # fmt: skip
         return {name: np.asarray(found[name], float) for name in SOBOL}
 
@@ -100,7 +107,7 @@ class Design:
 
         found = morris.analyze(
             self._problem, self.points, y, num_resamples=RESAMPLES, conf_level=CONFIDENCE,
-            num_levels=LEVELS, seed=self.seed,
+            num_levels=LEVELS, seed=self._salib_seed,
         )  # fmt: skip
         # SALib divides by the step on the unit cube: the change over the whole range
         return {name: np.asarray(found[name], float) for name in MORRIS}

@@ -19,7 +19,7 @@ from auv_analysis.study.unknowns_file import write_unknowns
 from auv_analysis.study.unknowns_report import (
     energy_table,
     unknowns_sentences,
-    unknowns_table,
+    unknowns_tables,
 )
 from auv_analysis.study.unknowns_run import Unknowns
 
@@ -73,7 +73,7 @@ def unknowns_section(out: Path, found: Unknowns) -> Part:
     sentences = unknowns_sentences(found, rows)
     figures = out / 'figures'
     blocks: list[Block] = [
-        OPEN, *sentences, unknowns_figure(found, figures), unknowns_table(found, rows),
+        OPEN, *sentences, unknowns_figure(found, figures), *unknowns_tables(found, rows),
         energy_window_figure(found, figures), energy_table(found),
     ]  # fmt: skip
     return Section('unknowns', 'What the paper leaves open', blocks), sentences

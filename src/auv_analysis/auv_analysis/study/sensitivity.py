@@ -5,16 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from auv_analysis.rollouts import rollouts
+from auv_analysis.batch import kernel_of
+from auv_analysis.kernels import IN_PYTHON
+from auv_analysis.rollouts import batch_of, rollouts
 from auv_analysis.scenario import Scenario
 from auv_analysis.simulation import Hold
 from auv_analysis.study.effects import Index, Sensitivity, Variable
 from auv_analysis.study.figures import Figure, sort_out
 from auv_analysis.study.gains import GainFactors, gain_factors
 from auv_analysis.study.indices import Design, Method, spreads
-from auv_gvc_controller.sampled import is_compiled
+from auv_analysis.variants import packed_variants
+from auv_gvc_controller.laws import SHIPPED
 
 COUNTS = {'sobol': 256, 'morris': 32}  # default base points, trajectories
+OWN_COUNTS = {'sobol': 64, 'morris': 16}  # of a user's law, whose every loop is packed on its own
 SLOW_COUNT = 4  # trajectories of a law that runs as plain Python
 SHRINKS = 4  # how often the span is tried, each time with the square root of the last
 
@@ -58,10 +62,10 @@ def sensitivity(
     if not span > 1.0:
         raise ValueError(f'span: expected a number above 1, found {span}')
     factors = gain_factors(scenario, controller)
-    slow = not is_compiled(scenario.gains(controller))
-    method = method or ('morris' if slow else 'sobol')
-    count = count or (SLOW_COUNT if slow and method == 'morris' else COUNTS[method])
     law = scenario.controller(controller)['law']
+    slow = (method is None or count is None) and _in_python(scenario, controller, hold)
+    method = method or ('morris' if slow else 'sobol')
+    count = count or _default_count(law, method, slow=slow)
     result = Sensitivity(
         controller, law, method, count, seed, 0, span, span, {}, factors.names, factors.left_out
     )
@@ -79,6 +83,21 @@ def sensitivity(
         if not failed:
             return _judged(replace(result, span=used), design, found, factors)
     return replace(result, span=used, refusal=_refusal(result, found))
+
+
+def _in_python(scenario: Scenario, controller: str, hold: Hold) -> bool:
+    """Whether a controller's law is one that numba does not compile."""
+    if scenario.controller(controller)['law'] in SHIPPED:
+        return False
+    one, seed = np.array([0]), np.array([scenario.data['seed']])
+    variants, _ = packed_variants(scenario, controller, {}, one, seed)
+    return kernel_of(batch_of(variants, hold)).how == IN_PYTHON
+
+
+def _default_count(law: str, method: Method, *, slow: bool) -> int:
+    if slow and method == 'morris':
+        return SLOW_COUNT
+    return (COUNTS if law in SHIPPED else OWN_COUNTS).get(method, 0)
 
 
 def _rollouts(

@@ -7,16 +7,13 @@ from matplotlib.axes import Axes
 
 from auv_analysis.report import plotting
 from auv_analysis.report.figures import FigureRecord
-from auv_analysis.report.text import number
+from auv_analysis.report.text import plain
 from auv_analysis.study.effects import Sensitivity, Variable
 
-SHOWN = {  # what is drawn of step 3, with a short name
-    'velocity_error.rms': 'RMS error',
-    'velocity_error.max_after_2s': 'error after 2 s',
-    'lumped_error.rms': 'RMS w',
-    'effort.rms': 'RMS input',
-    'effort.max': 'largest input',
-}
+SHOWN = (  # what is drawn of step 3
+    'velocity_error.rms', 'velocity_error.max_after_2s', 'lumped_error.rms', 'effort.rms',
+    'effort.max',
+)  # fmt: skip
 ROW = 0.185  # in, height of a row
 
 
@@ -44,8 +41,8 @@ def sensitivity_figure(found: Sensitivity, folder: Path) -> FigureRecord:
     )
     caption = (
         f'{title}: (a) standard deviation of the logarithm of a figure when every gain is '
-        f'multiplied by a number of its own between 1/{number(found.span)} and '
-        f'{number(found.span)}; (b) {what}.'
+        f'multiplied by a number of its own between 1/{plain(found.span)} and '
+        f'{plain(found.span)}; (b) {what}.'
     )
     return FigureRecord(name, title, caption, *files)
 
@@ -56,15 +53,13 @@ def _bars(axes: Axes, shown: list[Variable]) -> None:
         np.array([getattr(variable, name) for variable in shown])
         for name in ('spread', 'spread_low', 'spread_high')
     )
-    kinds = list(SHOWN)
-    colours = [plotting.COLOURS[kinds.index(variable.figure.name)] for variable in shown]
+    colours = [plotting.COLOURS[SHOWN.index(variable.figure.name)] for variable in shown]
     axes.barh(rows, spread, color=colours, height=0.72)
     axes.errorbar(
         spread, rows, xerr=[np.maximum(spread - low, 0.0), np.maximum(high - spread, 0.0)],
         fmt='none', ecolor='#222222', elinewidth=0.9, capsize=1.6,
     )  # fmt: skip
-    labels = [f'{SHOWN[variable.figure.name]}, {variable.figure.dof}' for variable in shown]
-    axes.set_yticks(rows, labels)
+    axes.set_yticks(rows, [variable.figure.short for variable in shown])
     axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.set_xlim(0.0, 1.04 * float(high.max()))
     axes.grid(visible=False, axis='y')

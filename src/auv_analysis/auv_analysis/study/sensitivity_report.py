@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
-from auv_analysis.report.document import Cell, Column, Sentence, Table, cell
-from auv_analysis.report.text import fixed, join, number
-from auv_analysis.study.effects import Sensitivity, Variable
+from auv_analysis.report.document import Cell, Column, Sentence, Table
+from auv_analysis.report.text import fixed, join, number, plain
+from auv_analysis.study.effects import Index, Sensitivity, Variable
 from auv_analysis.study.sensitivity_file import FILE
 
 HEADLINES = ('velocity_error.rms', 'lumped_error.rms', 'effort.rms', 'effort.max')
@@ -16,27 +16,27 @@ MEANINGS = {
     'interval',
 }
 
+GROUPS = {'ST': 'total index', 'mu_star': 'effect μ*'}
+
 
 def sensitivity_table(found: Sensitivity) -> Table:
     """Every figure of a controller by falling spread, with the gains that move it."""
     weight = 'ST' if found.method == 'sobol' else 'mu_star'
     columns = (
         Column('figure', numeric=False),
-        Column('with these gains', meaning='its value with the gains of the scenario'),
-        Column('unit', numeric=False),
-        Column('spread', meaning='standard deviation of its logarithm: about its relative change'),
-        Column('from', meaning='lower end of the 95 % interval of the spread'),
-        Column('to', meaning='upper end of that interval'),
-        Column('place', meaning='by spread among the degrees of freedom of this figure'),
-        Column('places', meaning='95 % interval of the place', numeric=False),
-        Column('range', meaning='largest over smallest value of all rollouts'),
-        Column('main gain', meaning='the gain that does most of it', numeric=False),
-        Column('twice of it', '%', 'change of the figure when the main gain is doubled, by a fit'),
-        *(Column(gain, meaning=MEANINGS[weight], group=weight) for gain in found.gains),
+        Column('value', meaning='with the gains of the scenario'),
+        Column(
+            'spread',
+            meaning='standard deviation of its logarithm: about its relative change; ± half of its '
+            '95 % interval',
+        ),
+        Column('place', meaning='by spread among the degrees of freedom, its 95 % interval'),
+        Column('main gain × 2', meaning='the gain that does most, and what twice of it does'),
+        *(Column(gain, meaning=MEANINGS[weight], group=GROUPS[weight]) for gain in found.gains),
     )
     text = (
         f'How the figures of {found.controller} change when every gain is multiplied by a number '
-        f'of its own between 1/{number(found.span)} and {number(found.span)} (log-uniform): '
+        f'of its own between 1/{plain(found.span)} and {plain(found.span)} (log-uniform): '
         f'{found.rollouts} runs, indices after {_method(found)}.'
     )
     rows = [_row(variable, weight, found) for variable in found.variables]
@@ -48,35 +48,38 @@ def _method(found: Sensitivity) -> str:
 
 
 def _row(variable: Variable, weight: str, found: Sensitivity) -> list[Cell]:
-    def of(column: str, value: float, digits: int = 3) -> Cell:
-        return cell(value, f'{FILE}:{column}', digits=digits)
+    def of(name: str, text: str, **more: float) -> Cell:
+        value = float(getattr(variable, name))
+        figures = {key: float(extent) for key, extent in more.items()}
+        return Cell(text.replace(' ', '\u00a0'), value, f'{FILE}:{name}', figures=figures)
 
-    low, high, count = variable.rank_low, variable.rank_high, found.alike[variable.figure.name]
-    ratio = variable.largest / variable.smallest
-    indices = []
-    for index in variable.indices:
-        value, margin = (float(getattr(index, name)) for name in (weight, f'{weight}_conf'))
-        text = f'{fixed(value, 2)} ± {fixed(margin, 2)}'
-        figures = {weight: value, f'{weight}_conf': margin}
-        indices.append(Cell(text, source=f'{FILE}:{weight}', figures=figures))
+    v, main, count = variable, variable.main, found.alike[variable.figure.name]
+    low, high = v.rank_low, v.rank_high
+    ends = str(low) if low == high else f'{low}–{high}'
+    sign = '−' if main.doubled < 0 else '+'
     return [
-        Cell(variable.figure.label),
-        of('value', variable.value),
-        Cell(variable.figure.unit),
-        of('spread', variable.spread),
-        of('spread_low', variable.spread_low),
-        of('spread_high', variable.spread_high),
-        Cell(str(variable.rank), variable.rank, f'{FILE}:rank'),
-        Cell(
-            f'{low} of {count}' if low == high else f'{low}–{high} of {count}',
-            source=f'{FILE}:rank_low',
-            figures={'rank_low': low, 'rank_high': high},
+        Cell(v.figure.short),
+        of('value', f'{number(v.value)} {v.figure.unit}'),
+        of(
+            'spread',
+            f'{number(v.spread, 2)} ± {number(0.5 * (v.spread_high - v.spread_low), 1)}',
+            spread_low=v.spread_low,
+            spread_high=v.spread_high,
         ),
-        Cell(number(ratio), ratio, f'{FILE}:largest'),
-        Cell(variable.main.gain),
-        of('elasticity', variable.main.doubled, 2),
-        *indices,
+        of('rank', f'{ends} of {count}', rank_low=low, rank_high=high),
+        Cell(
+            f'{main.gain} {sign}{number(abs(main.doubled), 2)} %',
+            main.doubled,
+            f'{FILE}:elasticity',
+        ),
+        *(_index(index, weight) for index in v.indices),
     ]
+
+
+def _index(index: Index, weight: str) -> Cell:
+    value, margin = (float(getattr(index, name)) for name in (weight, f'{weight}_conf'))
+    text = f'{fixed(value, 2)} ± {fixed(margin, 2)}'
+    return Cell(text, value, f'{FILE}:{weight}', figures={f'{weight}_conf': margin})
 
 
 def left_out_table(found: Sequence[Sensitivity]) -> Table | None:
@@ -116,7 +119,7 @@ def _sentences(of: Sensitivity) -> Iterator[tuple[str, str]]:
     for span, failed in of.failed.items():
         yield (
             f'Under {of.controller}, {failed} rollouts failed with gains within a factor of '
-            f'{number(span)}; its study takes a factor of {number(of.span)}.',
+            f'{plain(span)}; its study takes a factor of {plain(of.span)}.',
             table,
         )
     for name in HEADLINES:
@@ -142,11 +145,15 @@ def _headline(of: Sensitivity, first: Variable) -> str:
         else f'place {first.rank_low} to {first.rank_high} of {count}'
     )
     sign = '−' if main.doubled < 0 else '+'
-    share = '' if main.ST is None else f'makes {number(100 * main.ST, 2)} % of its variance, and '
+    share = (
+        ''
+        if main.ST is None
+        else f'{main.gain} makes {number(100 * main.ST, 2)} % of its variance, and '
+    )
     return (
         f'Under {of.controller} the {first.figure.words} that follows the gains most is that of '
-        f'{first.figure.dof} (spread {number(first.spread, 2)}, {sure}): {main.gain} {share}'
-        f'doubling it changes the figure by about {sign}{number(abs(main.doubled), 2)} %.'
+        f'{first.figure.dof} (spread {number(first.spread, 2)}, {sure}): {share}'
+        f'doubling {main.gain} changes the figure by about {sign}{number(abs(main.doubled), 2)} %.'
     )
 
 

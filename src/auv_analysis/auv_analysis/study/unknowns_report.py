@@ -24,78 +24,78 @@ WORDS = {  # unknown -> how it is called, and its unit
 }
 LITTLE = 0.25  # of the impurity: a question that takes away less decides nothing
 ENDS = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0)  # s, of the rows on energy
-EVERY, READ = 'all variants', 'exponents −'
-BEST = 'the best verdict that occurs'
+KINDS = {HOLDS: 'good', FAILS: 'bad'}
 
 
-def unknowns_table(found: Unknowns, rows: Sequence[Robustness]) -> Table:
-    """Every claim over all variants and windows."""
+def unknowns_tables(found: Unknowns, rows: Sequence[Robustness]) -> list[Table]:
+    """Every claim over all variants and windows, and over those with the exponents read with −."""
     windows = join([f'0–{window:g} s' for window in found.windows])
     columns = (
         Column('no.', meaning='number of the claim'),
         Column('claim', numeric=False),
         Column('shipped', meaning=f'verdicts of the shipped vehicle over {windows}', numeric=False),
-        *(
-            Column(name, unit, numeric=bool(unit), group=group)
-            for group in (EVERY, READ)
-            for name, unit in (('reproduced', '%'), ('partly', '%'), ('not', '%'), ('outcome', ''))
-        ),
+        Column('reproduced', '%', 'share of the variants and windows'),
+        Column('partly', '%'),
+        Column('not', '%'),
         Column(
-            'decided by', numeric=False, group=EVERY,
-            meaning=f'the unknown that parts the verdicts best, and how often {BEST} is on its '
-            'two sides',
+            'outcome', numeric=False,
+            meaning='where the verdict varies: the unknown that parts the verdicts best, and how '
+            'often the best verdict that occurs is found on its two sides',
         ),
-        Column('decided by', numeric=False, group=READ),
     )  # fmt: skip
-    caption = (
-        f'Claims over {len(found.variants)} variants of what the paper leaves open, judged over '
-        f'{windows}: mass {MASS[0]:g}–{MASS[1]:g} kg and M46 {_interval(M46[0])} or '
+    read = sum(variant.exponent_sign < 0 for variant in found.variants)
+    captions = {
+        'every': f'Claims over {len(found.variants)} variants of what the paper leaves open, '
+        f'judged over {windows}: mass {MASS[0]:g}–{MASS[1]:g} kg and M46 {_interval(M46[0])} or '
         f'{_interval(M46[1])} kg m² with the printed N, linear and quadratic damping '
         f'{DAMPING[0]:g} to {DAMPING[1]:g} times the reconstruction, either sign of the exponents '
         'of (39). Corners and points inside count alike: shares are of this design, no '
-        'probabilities.'
-    )
-    return Table('unknowns', caption, columns, [_row(row) for row in rows], stub=2)
+        'probabilities.',
+        'as_read': f'The same over those {read} variants whose exponents of (39) are read with −.',
+    }
+    names = {'every': 'unknowns', 'as_read': 'unknowns_as_read'}
+    return [
+        Table(names[of], caption, columns, [_row(row, of) for row in rows], stub=2)
+        for of, caption in captions.items()
+    ]
 
 
 def _interval(ends: tuple[float, float]) -> str:
     return f'{fixed(ends[0], 0)} to {fixed(ends[1], 0)}'
 
 
-def _row(row: Robustness) -> list[Cell]:
-    shipped = list(dict.fromkeys(row.shipped))
-    cells = [
-        Cell(str(row.number), row.number, f'{CLAIMS}:number', anchor=f'unknowns-{row.number}'),
+def _row(row: Robustness, of: str) -> list[Cell]:
+    shipped, held = list(dict.fromkeys(row.shipped)), getattr(row, of)
+    shares = (
+        Cell(fixed(part, 0), part, f'{CLAIMS}:{verdict.replace(" ", "_")}', '' if part else 'zero')
+        for verdict, part in held.percent.items()
+    )
+    return [
+        Cell(str(row.number), row.number, f'{CLAIMS}:number'),
         Cell(row.claim),
         Cell(', then '.join(shipped), kind='badge' if len(shipped) == 1 else ''),
+        *shares,
+        _outcome(held),
     ]
-    for held in (row.every, row.as_read):
-        for verdict, part in held.percent.items():
-            source = f'{CLAIMS}:{verdict.replace(" ", "_")}'
-            cells.append(Cell(fixed(part, 0), part, source, 'zero' if part == 0 else ''))
-        kind = {HOLDS: 'good', FAILS: 'bad'}.get(held.outcome, '')
-        cells.append(Cell(held.outcome, source=f'{CLAIMS}:outcome', kind=kind))
-    return [*cells, *(_decided(held) for held in (row.every, row.as_read))]
 
 
-def _decided(held: Held) -> Cell:
-    if held.split is None:
-        return Cell('')
-    figures = {name: getattr(held.split, name) for name in ('threshold', 'below', 'above')}
-    text = _question(held.split)
-    if held.split.explained < LITTLE:
-        text = f'no single one; most by {text}'
-    return Cell(text, source=f'{CLAIMS}:threshold', figures=figures)
+def _outcome(held: Held) -> Cell:
+    split, source = held.split, f'{CLAIMS}:outcome'
+    if split is None:
+        return Cell(held.outcome, source=source, kind=KINDS.get(held.outcome, ''))
+    if split.explained < LITTLE:
+        return Cell(f'{held.outcome}, by no single unknown', source=source)
+    figures = {name: getattr(split, name) for name in ('threshold', 'below', 'above')}
+    text = f'{held.outcome}, most by {WORDS[split.unknown][0]}'
+    return Cell(text, source=f'{CLAIMS}:threshold', figures=figures, remark=_question(split))
 
 
 def _question(split: Split) -> str:
-    name, unit = WORDS[split.unknown]
-    name = name.removeprefix('the ')
     below, above = (f'{fixed(part, 0)} %' for part in (split.below, split.above))
     if split.unknown == 'exponent_sign':
-        return f'{name}: {below} with −, {above} with +'
-    level = f'{number(split.threshold)}{unit}'
-    return f'{name}: {below} below {level}, {above} above'
+        return f'{below} with −, {above} with +'
+    level = f'{number(split.threshold)}{WORDS[split.unknown][1]}'
+    return f'{below} below {level}, {above} above'
 
 
 def energy_table(found: Unknowns) -> Table:
@@ -138,7 +138,8 @@ def unknowns_sentences(found: Unknowns, rows: Sequence[Robustness]) -> list[Sent
 
 
 def _sentences(found: Unknowns, rows: Sequence[Robustness]) -> Iterator[tuple[str, str]]:
-    table, energy = 'table-unknowns', 'table-energy_window'
+    tables = {'every': 'table-unknowns', 'as_read': 'table-unknowns_as_read'}
+    table, energy = tables['every'], 'table-energy_window'
     every, read = (
         [row.number for row in rows if getattr(row, of).outcome == HOLDS]
         for of in ('every', 'as_read')
@@ -151,7 +152,7 @@ def _sentences(found: Unknowns, rows: Sequence[Robustness]) -> Iterator[tuple[st
     )
     for of, where in (('every', ''), ('as_read', ' where the exponents are read with −')):
         for name, numbers in _deciding([(row.number, getattr(row, of)) for row in rows]):
-            yield f'{name[0].upper()}{name[1:]} decides most of no. {numbers}{where}.', table
+            yield f'{name[0].upper()}{name[1:]} decides most of no. {numbers}{where}.', tables[of]
     if found.failed:
         yield f'{len(found.failed)} variants diverge and are left out.', table
     for entry in energy_ranges(found):

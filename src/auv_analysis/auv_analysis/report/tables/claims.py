@@ -24,8 +24,7 @@ COLUMNS = (
     ),
     Column('paper', meaning='as it is printed; yes: in words only', numeric=False),
     Column('ours', meaning='computed from the runs', numeric=False),
-    Column('case', meaning='whose runs ours is of', numeric=False),
-    Column('window', meaning='time from the start that ours is of', numeric=False),
+    Column('window', meaning='case, and time from the start, that ours is of', numeric=False),
     Column('verdict', meaning='by the criterion', numeric=False),
 )
 CAPTION = (
@@ -50,8 +49,7 @@ def _row(claim: Claim) -> list[Cell]:
         Cell(
             claim.ours, source=f'{FILE}:value', figures=_figures(claim.values), remark=claim.remark
         ),
-        Cell(claim.case),
-        Cell(claim.window),
+        Cell(claim.window, remark=claim.case),
         Cell(claim.verdict, kind='badge'),
     ]
 

@@ -1,0 +1,245 @@
+"""Sensitivity to the gains: known laws of the figures, every form of a gain, honest failures."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+from closed_loops import PER_AXIS
+from numpy.testing import assert_allclose
+
+from auv_analysis import batch, load_scenario, simulate, summarize
+from auv_analysis.changes import changed_scenario
+from auv_analysis.kernels import kernels
+from auv_analysis.reduction import COLUMNS
+from auv_analysis.study import sensitivity as module
+from auv_analysis.study.gains import gain_factors
+from auv_analysis.study.sensitivity import sensitivity
+from auv_analysis.study.sensitivity_file import write_sensitivities
+from auv_analysis.study.sensitivity_report import (
+    left_out_table,
+    sensitivity_sentences,
+    sensitivity_table,
+)
+from auv_dynamics.files import InputError
+
+SPREAD = math.log(2.0) / math.sqrt(3.0)  # of one log-uniform factor up to 2
+
+
+@cache
+def short(controller: str = 'gvc'):
+    return changed_scenario(load_scenario('case1'), {'duration': 3.0})
+
+
+def known(monkeypatch, limit: float = np.inf, **figures) -> None:
+    """Put figures that are known functions of k_D and Gamma in the place of rollouts."""
+
+    def made(scenario, controller, changes, **_):
+        k_D, Gamma = (
+            changes[f"controllers.'{controller}'.{name}"] / value
+            for name, value in (('k_D', 12.0), ('Gamma', 60.0))
+        )
+        found = {name: np.zeros(len(k_D)) for name in COLUMNS}
+        found |= {name: function(k_D, Gamma) for name, function in figures.items()}
+        failed = np.maximum(k_D, Gamma) > limit
+        found['status'] = np.where(failed, 'diverged', 'ok')
+        found['reason'] = np.where(failed, 'not finite from t = 1 s', '')
+        return found
+
+    monkeypatch.setattr(module, 'rollouts', made)
+
+
+NAMES = ('velocity_error.rms.surge', 'velocity_error.rms.sway', 'velocity_error.rms.heave')
+LAWS = dict(zip(NAMES, [
+    lambda k_D, Gamma: 3.0 / (k_D * Gamma),
+    lambda k_D, Gamma: 5.0 * k_D**2 / Gamma,
+    lambda k_D, Gamma: 1.0 + 0.0 * k_D,
+], strict=True))  # fmt: skip
+
+
+@pytest.mark.parametrize('method', ['sobol', 'morris'])
+def test_powers_of_the_gains_are_found(monkeypatch, method):
+    known(monkeypatch, **LAWS)
+    found = sensitivity(short(), 'gvc', method=method, count=256)
+    surge, sway = (found.of('velocity_error.rms')[dof] for dof in ('surge', 'sway'))
+    expected = {'surge': (-1.0, 0.0, 0.0, -1.0), 'sway': (2.0, 0.0, 0.0, -1.0)}
+    for variable in (surge, sway):
+        powers = np.array(expected[variable.figure.dof])
+        assert_allclose([i.elasticity for i in variable.indices], powers, atol=1e-9)
+        if method == 'sobol':
+            assert_allclose(variable.spread, SPREAD * np.sqrt((powers**2).sum()), rtol=0.02)
+            shares = powers**2 / (powers**2).sum()
+            assert_allclose([i.ST for i in variable.indices], shares, atol=0.02)
+            assert all(index.mu_star is None for index in variable.indices)
+        else:
+            whole = 2.0 * math.log(2.0) * np.abs(powers)
+            assert_allclose([i.mu_star for i in variable.indices], whole, atol=1e-9)
+            assert all(index.ST is None for index in variable.indices)
+    assert [v.figure.dof for v in found.variables] == ['sway', 'surge']
+    assert (surge.rank, sway.rank) == (2, 1)
+    assert sway.main.gain == 'k_D'
+    assert sway.main.doubled == pytest.approx(300.0)
+    assert surge.value == pytest.approx(3.0)
+    reasons = {e.figure.column: e.reason for e in found.excluded}
+    assert reasons['velocity_error.rms.heave'] == 'the same whatever the gains'
+    assert reasons['velocity_error.rms.yaw'] == 'zero throughout'
+    assert len(found.variables) + len(found.excluded) == 61
+
+
+def test_what_cannot_be_followed_is_named(monkeypatch):
+    figures = {
+        'velocity_error.settling_time.surge': lambda k, G: np.where(k > 1.0, np.nan, k),
+        'velocity_error.settling_time.sway': lambda k, G: np.where(k > 1.0, 0.0, k),
+        'effort.rms.heave': lambda k, G: k,
+        'effort.rms.surge': lambda k, G: 1e-15 * k,
+        'lumped_error.rms.surge': lambda k, G: np.nan * k,
+        'coupling.delta_xi_max.yaw': lambda k, G: 1e-17 * k,
+    }
+    known(monkeypatch, **figures)
+    found = sensitivity(short(), 'gvc', count=16)
+    reasons = {e.figure.column: e.reason for e in found.excluded}
+    assert 'does not settle in' in reasons['velocity_error.settling_time.surge']
+    assert 'zero in' in reasons['velocity_error.settling_time.sway']
+    assert 'rounding' in reasons['effort.rms.surge']
+    assert 'does not exist in any' in reasons['lumped_error.rms.surge']
+    assert 'structure of M' in reasons['coupling.delta_xi_max.yaw']
+    assert [v.figure.column for v in found.variables] == ['effort.rms.heave']
+
+
+def test_diverging_loops_narrow_the_span_and_are_counted(monkeypatch):
+    known(monkeypatch, limit=1.5, **LAWS)
+    found = sensitivity(short(), 'gvc', count=32)
+    assert found.span == pytest.approx(2.0**0.5)
+    assert list(found.failed) == [2.0]
+    assert 0 < found.failed[2.0] < 32 * 6
+    surge = found.of('velocity_error.rms')['surge']
+    assert surge.spread == pytest.approx(0.5 * SPREAD * np.sqrt(2), rel=0.1)
+    assert_allclose([i.elasticity for i in surge.indices], [-1, 0, 0, -1], atol=1e-9)
+    text = ' '.join(s.text for s in sensitivity_sentences([found]))
+    assert f'{found.failed[2.0]} rollouts failed' in text
+
+
+def test_loops_that_always_diverge_are_a_refusal_with_its_reason(monkeypatch, tmp_path):
+    known(monkeypatch, limit=1.01, **LAWS)
+    found = sensitivity(short(), 'gvc', count=32)
+    assert len(found.failed) == 4
+    assert 'not finite from t = 1 s' in found.refusal
+    known(monkeypatch, limit=0.5, **LAWS)
+    own = sensitivity(short(), 'gvc', count=32)
+    assert 'own gains' in own.refusal
+    assert not own.variables
+    table = left_out_table([own])
+    assert own.refusal in [cell.text for row in table.rows for cell in row]
+    path = write_sensitivities(tmp_path, [own, found])
+    assert set(parquet.read_table(path)['reason'].to_pylist()) == {own.refusal, found.refusal}
+
+
+def test_elasticity_is_the_derivative():
+    """Against a central difference of two runs, within a span that is almost a point."""
+    found = sensitivity(short(), 'gvc', count=16, span=1.02)
+    errors = []
+    for factor in (1 / 1.01, 1.01):
+        run = simulate(changed_scenario(short(), {'controllers.gvc.Gamma': 60.0 * factor}), 'gvc')
+        errors.append(summarize(run)['velocity_error']['rms'])
+    slopes = np.log(np.divide(*errors)) / -np.log(1.01**2)
+    of_Gamma = [v.indices[3].elasticity for v in _six(found)]
+    assert_allclose(of_Gamma, slopes, atol=0.01)
+    assert min(of_Gamma) < -0.1
+    value = summarize(simulate(short(), 'gvc'))['velocity_error']['rms']
+    assert_allclose([v.value for v in _six(found)], value, rtol=1e-9)
+
+
+def _six(found):
+    of = found.of('velocity_error.rms')
+    return [of[dof] for dof in ('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw')]
+
+
+@pytest.mark.parametrize('value', [[12.0] * 6, (12.0 * np.eye(6)).tolist()])
+def test_every_form_of_a_gain_is_multiplied(value):
+    plain = sensitivity(short(), 'gvc', count=4)
+    other = sensitivity(changed_scenario(short(), {'controllers.gvc.k_D': value}), 'gvc', count=4)
+    assert other.gains == plain.gains == ('k_D', 'k_I', 'Lambda', 'Gamma')
+    assert_allclose([v.spread for v in _six(other)], [v.spread for v in _six(plain)], rtol=1e-12)
+
+
+def test_gains_left_to_their_defaults_are_factors_too():
+    controllers = {
+        'a.pid': {'law': 'pid', 'k_P': 500.0, 'k_I': 50.0, 'k_D': 20.0},
+        'smc': {'law': 'smc', 'k_D': PER_AXIS['k_D'], 'Lambda': 0.8, 'Gamma': 60.0},
+    }
+    scenario = changed_scenario(short(), {'controllers': controllers})
+    pid, smc = (gain_factors(scenario, name) for name in controllers)
+    assert pid.names == ('k_P', 'k_I', 'k_D', 'omega_f', 'k_FF')
+    assert smc.names == ('k_D', 'Lambda', 'Gamma', 'phi')
+    assert list(smc.left_out) == ['k_S']
+    found = sensitivity(scenario, 'a.pid', method='morris', count=2)
+    assert found.rollouts == 2 * 6 + 1
+    assert {index.gain for index in found.variables[0].indices} == set(pid.names)
+
+
+LAW = """
+from typing import NamedTuple
+
+class Push(NamedTuple):
+    k_A: object
+    k_B: object = 2.0
+    STATES = 0
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return (gains.k_A[0] / gains.k_B[0] ** 2, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0,) * 6
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return ()
+"""
+
+
+def test_a_users_own_law_is_studied_as_it_runs(monkeypatch, tmp_path):
+    """As plain Python, by few trajectories; its input is a known power of its gains."""
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / 'own_push.py').write_text(LAW)
+    values = {
+        'duration': 0.02,
+        'controllers': {'own': {'law': 'own_push:Push', 'k_A': 3.0}},
+    }
+    scenario = changed_scenario(load_scenario('case1'), values)
+    monkeypatch.setattr(batch, 'kernels', lambda law, hold: kernels(law, hold)[-1:])
+    found = sensitivity(scenario, 'own')
+    assert (found.method, found.count, found.rollouts) == ('morris', 4, 4 * 3 + 1)
+    push = found.of('effort.max')['surge']
+    assert push.value == pytest.approx(0.75)
+    assert [index.elasticity for index in push.indices] == pytest.approx([1.0, -2.0])
+    assert push.main.gain == 'k_B'
+
+
+def test_wrong_input_is_refused():
+    with pytest.raises(ValueError, match='above 1'):
+        sensitivity(short(), 'gvc', span=1.0)
+    with pytest.raises(InputError, match='nobody'):
+        sensitivity(short(), 'nobody')
+
+
+def test_table_sentences_and_file_say_the_same(monkeypatch, tmp_path):
+    known(monkeypatch, **LAWS)
+    found = sensitivity(short(), 'gvc', count=64)
+    sway = found.variables[0]
+    table = sensitivity_table(found)
+    assert [row[0].text for row in table.rows] == ['RMS error, sway', 'RMS error, surge']
+    assert table.rows[0][2].value == sway.spread
+    rows = parquet.read_table(write_sensitivities(tmp_path, [found])).to_pylist()
+    first = rows[0]
+    assert (first['figure'], first['dof'], first['gain']) == ('velocity_error.rms', 'sway', 'k_D')
+    assert (first['spread'], first['ST']) == (sway.spread, sway.indices[0].ST)
+    assert first['mu_star'] is None
+    assert sum(row['figure'] == 'velocity_error.rms' for row in rows) == 2 * 4 + 4
+    (text,) = (s.text for s in sensitivity_sentences([found]) if 'follows' in s.text)
+    assert 'RMS velocity error that follows the gains most is that of sway' in text
+    assert 'k_D makes' in text
+    assert '+300 %' in text
+    turned = {NAMES[1]: lambda k, G: 5.0 / k**2}
+    known(monkeypatch, **turned)
+    (text,) = (s.text for s in sensitivity_sentences([sensitivity(short(), 'gvc', count=64)])
+               if 'follows' in s.text)  # fmt: skip
+    assert '−75 %' in text

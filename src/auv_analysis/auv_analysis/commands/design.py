@@ -8,6 +8,7 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TextColumn
 
 from auv_analysis.commands.conclude import console, say
+from auv_analysis.design.couplings import coupling_named, present
 from auv_analysis.design.parameters import NAMES
 from auv_analysis.design.printed import print_design
 from auv_analysis.design.proposal import Proposal, propose
@@ -27,8 +28,6 @@ def design(options: argparse.Namespace) -> dict[str, Any]:
     own = [_bound(text) for text in options.bound]
     setting = open_setting(options.vehicle, options.scenario, own)
     if options.reduce is not None:
-        from auv_analysis.design.couplings import coupling_named, present
-
         coupling_named(options.reduce, present(setting.space.vehicle))
     name = UNFIT.sub('_', setting.space.vehicle.name)[:LONGEST]
     out = prepare(

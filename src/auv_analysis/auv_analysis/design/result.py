@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
-from auv_analysis.design.changed_file import changed_data, changed_text
 from auv_analysis.design.comparison import HALF, Candidate
 from auv_analysis.design.couplings import COUPLINGS, UNITS, present
+from auv_analysis.design.inputs import write_inputs
 from auv_analysis.design.outcome import Outcome, coupled_in, measures
 from auv_analysis.design.proposal import Proposal
 from auv_analysis.design.search import parts_of
@@ -23,11 +22,9 @@ from auv_analysis.design.statements import (
     warnings_of,
 )
 from auv_analysis.design.words import change_words, values_of
-from auv_analysis.scenario import Scenario, load_scenario
 from auv_dynamics.vehicle import Vehicle
 from auv_gvc_controller.decomposition import decompose
 
-LONGEST = 92  # of a scenario's name, with room for the word behind it
 DESIGN, BEFORE, AFTER = 'design.json', 'summary_before.json', 'summary.json'
 
 
@@ -64,7 +61,7 @@ def concluded(found: Proposal, out: Path) -> Result:
 
     """
     setting = found.setting
-    scenario = _write_inputs(found, out)
+    scenario = write_inputs(found, out)
     document = _head(found, out)
     if found.target is None or found.before is None:
         name = setting.space.vehicle.name
@@ -78,33 +75,6 @@ def concluded(found: Proposal, out: Path) -> Result:
     document |= _body(found, scenario.vehicle, before, after)
     _write(out / DESIGN, document)
     return Result(found, document, before, after)
-
-
-def _write_inputs(found: Proposal, out: Path) -> Scenario:
-    """Both vehicles, and the scenario with the changed one, read back."""
-    setting, best = found.setting, found.best
-    (out / 'vehicle_before.yaml').write_text(setting.vehicle_text, encoding='utf-8')
-    text = setting.vehicle_text
-    if best is not None and found.target is not None:
-        words = '; '.join(change_words(setting.space, best.x))
-        name = setting.space.vehicle.name
-        about = (
-            f'{name}, changed by auv design against {COUPLINGS[found.target]}: {words}.\n'
-            'vehicle_before.yaml beside it is the vehicle as it was, with its comments.'
-        )
-        text = changed_text(changed_data(setting.space, best.x, words), about)
-    (out / 'vehicle.yaml').write_text(text, encoding='utf-8')
-    data = dict(setting.scenario.data)
-    data['vehicle'] = 'vehicle.yaml'
-    data['name'] = f'{data["name"][:LONGEST]}_changed'
-    if 'setpoint.csv' in setting.scenario.attachments:
-        data['setpoint'] = {'file': 'setpoint.csv'}
-        csv = setting.scenario.attachments['setpoint.csv']
-        (out / 'setpoint.csv').write_text(csv, encoding='utf-8')
-    header = f'# {setting.scenario.name} with the vehicle beside it, every default filled in\n'
-    body = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
-    (out / 'scenario.yaml').write_text(header + body, encoding='utf-8')
-    return load_scenario(out / 'scenario.yaml')
 
 
 def _head(found: Proposal, out: Path) -> dict[str, Any]:

@@ -26,7 +26,8 @@ class Page(HTMLParser):
         self.ids += [values['id']] if 'id' in values else []
         self.links += [values['href'][1:]] if tag == 'a' else []
         if tag == 'table':
-            self._table = self.tables.setdefault(values['data-name'], [])
+            name = values.get('data-name')  # the keys of panels are tables without one
+            self._table = self.tables.setdefault(name, []) if name else []
         elif tag == 'tbody':
             self._body = True
         elif tag == 'tr' and self._body:

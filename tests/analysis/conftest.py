@@ -30,19 +30,10 @@ def short_runs() -> dict[str, Run]:
 
 @pytest.fixture(scope='session')
 def report_path(browser, short_runs, tmp_path_factory) -> Path:
-    """Of a report whose still figures are composed but not rendered: that takes long."""
-
-    heights = count()  # the same image twice would be one in a PDF
-
-    def save(figure, folder, name):
-        png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
-        Image.new('RGB', (720, 300 + next(heights)), 'white').save(png)
-        return png, pdf
-
     out = tmp_path_factory.mktemp('report')
     summaries = {name: summarize(run) for name, run in short_runs.items()}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plotting, 'save', save)
+        _compose_only(patch)
         return write_report(out, short_runs, summaries, 'a: 1', 'b: 2')
 
 
@@ -57,11 +48,17 @@ def report(browser, report_path) -> Iterator[Watched]:
 @pytest.fixture
 def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are composed but not rendered, which takes most of the time of a report."""
+    _compose_only(monkeypatch)
+
+
+def _compose_only(patch: pytest.MonkeyPatch) -> None:
+    heights = count(300)  # the same image twice would be one in a printed page
 
     def save(figure: Any, folder: Path, name: str) -> tuple[Path, Path]:
-        paths = folder / f'{name}.png', folder / f'{name}.pdf'
-        for path in paths:
-            path.write_bytes(b'not rendered')
-        return paths
+        folder.mkdir(parents=True, exist_ok=True)
+        png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
+        Image.new('RGB', (720, next(heights)), 'white').save(png)
+        pdf.write_bytes(b'not rendered')
+        return png, pdf
 
-    monkeypatch.setattr(plotting, 'save', save)
+    patch.setattr(plotting, 'save', save)

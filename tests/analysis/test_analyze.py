@@ -1,31 +1,15 @@
 """`auv analyze` of bags that were written without a node graph."""
 
 from html import unescape
-from pathlib import Path
-from typing import Any
 
 import pytest
 from made_bags import make_bag
 
 from auv_analysis import cli
 from auv_analysis.bag import reading
-from auv_analysis.report import plotting
 
 
-@pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures are composed but not rendered."""
-
-    def save(figure: Any, folder: Path, name: str) -> tuple[Path, Path]:
-        paths = folder / f'{name}.png', folder / f'{name}.pdf'
-        for path in paths:
-            path.write_bytes(b'not rendered')
-        return paths
-
-    monkeypatch.setattr(plotting, 'save', save)
-
-
-@pytest.mark.usefixtures('quick')
+@pytest.mark.usefixtures('unrendered')
 def test_every_bag_is_read_once_and_shows_its_own_files(tmp_path, monkeypatch) -> None:
     bags = [make_bag(tmp_path / name, 300, name) for name in ('case1', 'case2', 'case1_rexrov')]
     read: list[str] = []
@@ -43,7 +27,7 @@ def test_every_bag_is_read_once_and_shows_its_own_files(tmp_path, monkeypatch) -
     assert report.count('<summary>Vehicle file of ') == 2, 'case1 and case2 share theirs'
 
 
-@pytest.mark.usefixtures('quick')
+@pytest.mark.usefixtures('unrendered')
 def test_equal_files_are_shown_once(tmp_path) -> None:
     bag = make_bag(tmp_path / 'case1', 300)
     cli.main(['analyze', str(bag), str(bag), '--out', str(tmp_path / 'out')])

@@ -44,19 +44,6 @@ def figures(case1, folder) -> dict[str, FigureRecord]:
     return {figure.name: figure for figure in draw_figures(case1, folder / 'figures')}
 
 
-@pytest.fixture
-def quick(monkeypatch):
-    """Figures are composed but not rendered, for tests of what is drawn and said, not how."""
-
-    def save(figure, folder, name):
-        paths = folder / f'{name}.png', folder / f'{name}.pdf'
-        for path in paths:
-            path.write_bytes(b'not rendered')
-        return paths
-
-    monkeypatch.setattr(plotting, 'save', save)
-
-
 def _summaries(runs: dict[str, Run]) -> dict:
     return {name: summarize(run) for name, run in runs.items()}
 
@@ -111,7 +98,7 @@ def test_figures_are_what_the_journal_prints(figures):
             assert image.size[0] == pytest.approx(184 * 6.27, abs=1.0)
 
 
-def test_the_paper_figures_are_all_there(figures, tmp_path, quick):
+def test_the_paper_figures_are_all_there(figures, tmp_path, unrendered):
     captions = ' '.join(figure.caption for figure in figures.values())
     assert all(f'the paper’s figure {number}.' in captions for number in '12345')
     case2 = draw_figures({n: _short(r, 3.0) for n, r in _runs('case2').items()}, tmp_path)
@@ -120,13 +107,15 @@ def test_the_paper_figures_are_all_there(figures, tmp_path, quick):
     assert len(case2) >= 7
 
 
-def test_a_figure_is_not_called_the_papers_when_the_gains_are_others(case1, tmp_path, quick):
+def test_a_figure_is_not_called_the_papers_when_the_gains_are_others(case1, tmp_path, unrendered):
     gvc = replace(case1['gvc'], gains=case1['gvc'].gains | {'Gamma': 61.0})
     figures = draw_figures({'gvc': _short(gvc, 1.0)}, tmp_path)
     assert 'the paper’s' not in ' '.join(figure.caption for figure in figures)
 
 
-def test_structural_zeros_are_named_and_not_drawn(figures, monkeypatch, case1, tmp_path, quick):
+def test_structural_zeros_are_named_and_not_drawn(
+    figures, monkeypatch, case1, tmp_path, unrendered
+):
     assert 'not drawn: pitch and yaw.' in figures['delta_xi'].caption
     assert 'not drawn: surge, sway and heave.' in figures['delta_pi'].caption
     drawn = []
@@ -141,7 +130,7 @@ def test_structural_zeros_are_named_and_not_drawn(figures, monkeypatch, case1, t
     assert drawn[-4:] == [(0, 1, 2), (3,), (3, 4, 5), (3, 4, 5)]
 
 
-def test_signals_that_stay_zero_are_named_and_not_drawn(case1, tmp_path, quick):
+def test_signals_that_stay_zero_are_named_and_not_drawn(case1, tmp_path, unrendered):
     still = case1['gvc'].nu_d.copy()
     still[:, 2] = case1['gvc'].nu[:, 2]
     figures = draw_figures({'gvc': replace(case1['gvc'], nu=still)}, tmp_path)
@@ -149,7 +138,7 @@ def test_signals_that_stay_zero_are_named_and_not_drawn(case1, tmp_path, quick):
     assert 'not drawn: surge, sway, roll, pitch and yaw.' in errors.caption
 
 
-def test_diagonal_inertia_has_sentences_in_place_of_coupling_figures(case1, tmp_path, quick):
+def test_diagonal_inertia_has_sentences_in_place_of_coupling_figures(case1, tmp_path, unrendered):
     runs = {'gvc': _uncoupled(case1['gvc'])}
     figures = {figure.name: figure for figure in draw_figures(runs, tmp_path / 'figures')}
     for name, symbol in (('delta_xi', 'Δξ'), ('delta_pi', 'Δπ')):
@@ -161,14 +150,14 @@ def test_diagonal_inertia_has_sentences_in_place_of_coupling_figures(case1, tmp_
     assert 'Δξ vanishes in all six' in text
 
 
-def test_unknown_disturbance_leaves_out_what_needs_it(case1, tmp_path, quick):
+def test_unknown_disturbance_leaves_out_what_needs_it(case1, tmp_path, unrendered):
     runs = {name: replace(run, disturbance=None) for name, run in case1.items()}
     names = [figure.name for figure in draw_figures(runs, tmp_path / 'figures')]
     assert not [name for name in names if name.startswith(('lumped', 'uncertainty'))]
     assert 'is neither drawn nor tabulated' in _text(_write(tmp_path, runs))
 
 
-def test_one_uncertainty_figure_when_all_runs_have_the_same(figures, case1, tmp_path, quick):
+def test_one_uncertainty_figure_when_all_runs_have_the_same(figures, case1, tmp_path, unrendered):
     assert [name for name in figures if name.startswith('uncertainty')] == ['uncertainty_gvc']
     cl = replace(case1['cl'], disturbance=2.0 * case1['cl'].disturbance)
     names = [f.name for f in draw_figures({'gvc': case1['gvc'], 'cl': cl}, tmp_path)]
@@ -273,7 +262,7 @@ def test_report_says_what_it_must(report):
     assert 'None' not in text
 
 
-def test_report_of_one_run_and_of_three(case1, tmp_path, quick):
+def test_report_of_one_run_and_of_three(case1, tmp_path, unrendered):
     one = _text(_write(tmp_path / 'one', {'gvc': _short(case1['gvc'], 5.0)}))
     assert 'Inputs compared' not in one
     assert 'Under cl' not in one
@@ -292,7 +281,7 @@ def test_report_of_one_run_and_of_three(case1, tmp_path, quick):
     assert 'mine:Law' in three
 
 
-def test_report_of_another_vehicle_and_scenario(tmp_path, quick):
+def test_report_of_another_vehicle_and_scenario(tmp_path, unrendered):
     run = simulate(load_scenario('case1'), 'gvc')
     vehicle = replace(run.vehicle, name='other', warnings=('file: key: <odd>',))
     run = replace(run, scenario='mine', vehicle=vehicle, notes=('3 samples dropped',))

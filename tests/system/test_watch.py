@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from graph_runs import every_message, node_of, record
+from graph_runs import every_message, record
 from harness import PATIENCE, auv, environment, fresh_domain
 
 from auv_dynamics import interface
@@ -21,7 +22,7 @@ PACED = ('/diagnostics', '/recorder/progress', '/controller_node/transition_even
 SCENARIO = {
     'name': 'watched',
     'vehicle': 'herman2018',
-    'duration': 30.0,
+    'duration': 15.0,
     'step': 0.01,
     'controllers': {'gvc': {'law': 'gvc', 'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}},
     'setpoint': {'surge': {'offset': 0.5}, 'yaw': {'offset': 0.1}},
@@ -44,13 +45,13 @@ def scenario(tmp_path_factory) -> Path:
 
 def test_a_run_is_the_same_beside_a_watch_that_is_even_stopped(scenario, tmp_path) -> None:
     domain = fresh_domain()
-    beside = start_watch(domain, '--json')
+    beside = start_watch(domain, '--json', '--rate', '20')
     try:
         assert f'ROS_DOMAIN_ID={domain}' in beside.stderr.readline()
         run = record(scenario, tmp_path / 'watched', domain)
-        plant = node_of(tmp_path / 'watched', 'plant_node')
-        beside.send_signal(signal.SIGSTOP)
-        assert plant.is_running(), 'it was stopped while the run was under way'
+        seen = next(line for line in beside.stderr if ' x real time' in line)
+        beside.send_signal(signal.SIGSTOP)  # while the run is under way
+        assert float(re.search(r't = ([\d.]+) s', seen)[1]) < SCENARIO['duration']
         _, errors = run.communicate(timeout=120)
         assert run.returncode == 0, errors
         beside.send_signal(signal.SIGCONT)
@@ -60,7 +61,7 @@ def test_a_run_is_the_same_beside_a_watch_that_is_even_stopped(scenario, tmp_pat
         beside.kill()
     assert beside.returncode == 0, errors
     seen = {topic['name']: topic for topic in json.loads(output)['topics']}
-    for topic in (interface.ODOM, interface.WRENCH, interface.CMD_VEL, interface.DELTA_PI):
+    for topic in (interface.ODOM, interface.WRENCH, interface.CMD_VEL):
         assert seen[topic]['heard'] > 0, topic
         assert seen[topic]['gaps'] == seen[topic]['repeats'] == seen[topic]['refused'] == 0
 
@@ -70,7 +71,7 @@ def test_a_run_is_the_same_beside_a_watch_that_is_even_stopped(scenario, tmp_pat
     assert bags[0].keys() == bags[1].keys()
     for topic, messages in bags[0].items():
         assert messages == bags[1][topic], topic
-    assert len(bags[0]['/odom']) == 3001
+    assert len(bags[0]['/odom']) == 1501
 
 
 def test_without_a_graph_it_says_where_it_waits_and_ends_with_1() -> None:

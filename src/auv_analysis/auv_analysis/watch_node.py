@@ -29,7 +29,8 @@ from auv_dynamics.ros.private import PLAIN
 
 DEPTH = 256  # messages of a topic between two looks; of more, the oldest are dropped
 LOOK = 0.5  # s between two looks at who is there
-SERVED = 200  # callbacks at each look, where the executor brings the messages
+SERVED = 2000  # callbacks at each look, at most; only a plain executor brings messages as well
+BRIEF = 0.001  # s: without any patience it brings one message of each topic, however many wait
 # without a pause: few messages, or set-points, which are published long before their odometry
 ALWAYS = (topics.CMD_VEL, topics.DIAGNOSTICS, topics.PROGRESS)
 
@@ -173,15 +174,15 @@ class Listener(Participant):
         self._node.take()
         now = time.monotonic()
         if PLAIN:
-            self._serve(SERVED)
+            self._serve(BRIEF)
         if self._looked is None or now - self._looked > LOOK or listening != self._listened:
             self._looked, self._listened = now, listening
-            self._serve(SERVED)
+            self._serve(0.0)
             self._node.look(listening=listening)
 
-    def _serve(self, callbacks: int) -> None:
-        for _ in range(callbacks):
-            if not serve(self._node, self._executor, 0.0):
+    def _serve(self, timeout: float) -> None:
+        for _ in range(SERVED):
+            if not serve(self._node, self._executor, timeout):
                 break
 
     def elsewhere(self) -> list[str]:

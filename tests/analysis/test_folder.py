@@ -18,7 +18,7 @@ from auv_dynamics.files import InputError
 OURS = [
     'summary.json', 'report.html', 'figures/nu.png', 'scenario.yaml', 'vehicle.yaml', 'gvc.npz',
     'logs/gvc/plant_node.log', 'gvc/params.yaml', 'gvc/metadata.yaml', 'gvc/gvc_0.mcap',
-    'cl/params.yaml',
+    'cl/params.yaml', 'design.json', 'summary_before.json', 'vehicle_before.yaml',
 ]  # fmt: skip
 THEIRS = [
     'notes.md', 'thesis/chapter.npz', 'thesis/chapter2.npz', 'sea_trial/sea_trial_0.mcap',

@@ -26,7 +26,8 @@ from auv_dynamics.config import shipped
 AUV = Path(sys.executable).with_name('auv')
 REXROV = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
 COMMANDS = [
-    'run', 'simulate', 'watch', 'sweep', 'analyze', 'atlas', 'info', 'params', 'check-vehicle',
+    'run', 'simulate', 'study', 'design', 'analyze', 'atlas', 'sweep', 'watch', 'info', 'params',
+    'check-vehicle',
 ]  # fmt: skip
 WRONG_LINES = {  # what is typed -> what the one line names
     '': 'COMMAND',
@@ -63,6 +64,14 @@ WRONG_LINES = {  # what is typed -> what the one line names
     'sweep case1_gains --executor threads --scheduler tcp://localhost:1': '--scheduler',
     'sweep case1_gains --scheduler tcp://localhost:1 --workers 2': '--workers',
     'sweep case1_gains --scheduler nowhere': '--scheduler',
+    'design': 'vehicle',
+    'design nautilus': 'nautilus',
+    'design rexrov --scenario case9': 'case9',
+    'design rexrov --reduce delta_xi.sideways': '--reduce',
+    'design rexrov --bound shift.x': '--bound',
+    'design rexrov --bound shift.x=a:b': '--bound',
+    'design rexrov --bound shift.x=1:2': '--bound: shift.x',
+    'design rexrov --out taken': 'taken: --out',
     'params case1': '--controller',
     'params case1 --controller pid': 'controllers',
     'params case1 --controller gvc --out taken/notes.md': 'taken/notes.md: --out',

@@ -95,6 +95,15 @@ def _atlas(command: argparse.ArgumentParser) -> None:
     command.add_argument('--only', action='store_true', help='the given ones alone')
 
 
+def _design(command: argparse.ArgumentParser) -> None:
+    command.add_argument('vehicle', help=VEHICLE)
+    command.add_argument('--scenario', help=f'{SCENARIO}, with this vehicle in it')
+    text = 'such as delta_pi.pitch; default: the largest'
+    command.add_argument('--reduce', metavar='COUPLING', help=text)
+    text = 'NAME=LOWER:UPPER of a parameter, such as shift.x=-0.05:0.05; may be repeated'
+    command.add_argument('--bound', action='append', default=[], help=text)
+
+
 def _sweep(command: argparse.ArgumentParser) -> None:
     text = 'a campaign file, or the bare name of a shipped one'
     command.add_argument('campaign', help=text)
@@ -146,6 +155,7 @@ COMMANDS = {
     'study': Command('the procedure of the paper, steps 1 to 6, as one report', _study),
     'analyze': Command('summary and report of bags, folders of results, or a sweep', _analyze),
     'atlas': Command('couplings by inertia of the shipped vehicles, side by side', _atlas),
+    'design': Command('which change of a vehicle removes which coupling, simulated', _design),
     'sweep': Command('many rollouts of a scenario, with values that vary, to Parquet', _sweep),
     'watch': Command('live dashboard in the terminal', _watch, writes=False),
     'info': Command('what lies in a bag', _info, writes=False),

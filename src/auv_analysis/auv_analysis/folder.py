@@ -17,7 +17,8 @@ OURS = (
     'unknowns_claims.parquet', 'energy_window.parquet', 'comparison.parquet', 'comparison.csv',
     'atlas.json', 'atlas.parquet', 'analysis.json', 'quantiles.parquet', 'influence.parquet',
     'dependence.parquet', 'together.parquet', 'failures.parquet', 'paired.parquet',
-    'indices.parquet', 'best.parquet',
+    'indices.parquet', 'best.parquet', 'design.json', 'summary_before.json',
+    'vehicle_before.yaml',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
 MANIFEST, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep

@@ -13,8 +13,8 @@ from auv_dynamics.thrusters import Thrusters
 
 
 def skew(a: np.ndarray) -> np.ndarray:
-    """S(a) with S(a) b = a x b: (..., 3) to (..., 3, 3)."""
-    x, y, z = np.moveaxis(np.asarray(a, float), -1, 0)
+    """S(a) with S(a) b = a x b: (..., 3) to (..., 3, 3); complex stays complex."""
+    x, y, z = np.moveaxis(np.asarray(a), -1, 0)
     o = np.zeros_like(x)
     rows = [[o, -z, y], [z, o, -x], [-y, x, o]]
     return np.stack([np.stack(row, -1) for row in rows], -2)
@@ -23,7 +23,7 @@ def skew(a: np.ndarray) -> np.ndarray:
 def rigid_body_matrix(
     mass: float | np.ndarray, r_G: np.ndarray, inertia: np.ndarray, reference: str
 ) -> np.ndarray:
-    """M_RB about the body origin, Fossen 1994; any number of leading axes.
+    """M_RB about the body origin, Fossen 1994; any number of leading axes, complex stays complex.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def rigid_body_matrix(
     M_RB : (..., 6, 6) symmetric
 
     """
-    S, m = skew(r_G), np.asarray(mass, float)[..., None, None]
+    S, m = skew(r_G), np.asarray(mass)[..., None, None]
     about_origin = inertia - m * S @ S if reference == 'cg' else inertia
     return np.block([[m * np.eye(3), -m * S], [m * S, about_origin]])
 

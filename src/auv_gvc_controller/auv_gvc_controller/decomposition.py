@@ -42,7 +42,7 @@ def decompose(M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def inverse_upper(U: np.ndarray) -> np.ndarray:
     """Inverse of upper triangular (..., 6, 6) matrices of unit diagonal, exactly of that form."""
-    inverse = np.broadcast_to(np.eye(6), U.shape).copy()
+    inverse = np.broadcast_to(np.eye(6, dtype=U.dtype), U.shape).copy()
     for i in reversed(range(5)):
         row = U[..., i : i + 1, i + 1 :]
         inverse[..., i, i + 1 :] = -(row @ inverse[..., i + 1 :, i + 1 :])[..., 0, :]

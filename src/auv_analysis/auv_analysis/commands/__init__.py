@@ -14,6 +14,7 @@ _HOME = {
     'check-vehicle': 'check_vehicle',
     'watch': 'watch',
     'atlas': 'auv_analysis.atlas.command',
+    'design': 'design',
     'sweep': 'auv_analysis.sweep.command',
 }
 

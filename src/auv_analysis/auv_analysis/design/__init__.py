@@ -1,0 +1,1 @@
+"""Which change of a vehicle removes which inertial coupling: proposed, then simulated."""

@@ -1,0 +1,52 @@
+"""`auv design` as a user runs it: its claim is what `auv simulate` gives for that vehicle."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+AUV = Path(sys.executable).with_name('auv')
+FILES = {
+    'design.json', 'summary.json', 'summary_before.json', 'vehicle.yaml', 'vehicle_before.yaml',
+    'scenario.yaml', 'report.html', 'numbers.parquet', 'figures',
+}  # fmt: skip
+
+
+def auv(*arguments, folder):
+    done = subprocess.run(
+        [AUV, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_claim_is_what_a_simulation_of_the_changed_vehicle_gives(tmp_path):
+    document = json.loads(auv('design', 'rexrov', '--json', folder=tmp_path))
+    out = tmp_path / 'runs' / 'design_rexrov'
+    assert {path.name for path in out.iterdir()} == FILES
+    assert json.loads((out / 'design.json').read_text()) == document
+    rows = {row['name']: row for row in document['measures']}
+    target = rows[document['reduce'].replace('.', '_max.')]
+    assert target['after'] <= 0.5 * target['before']
+    assert {one['coupling'] for one in document['alternatives']} >= {'delta_xi.surge'}
+
+    scenario = str(out / 'scenario.yaml')
+    summaries = json.loads(auv('simulate', scenario, '--json', '--out', 'after', folder=tmp_path))
+    assert summaries == json.loads((out / 'summary.json').read_text())
+    for i, dof in enumerate(('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw')):
+        for name in ('delta_xi_max', 'delta_pi_max'):
+            row = rows.get(f'{name}.{dof}')
+            if row is not None:
+                assert row['after'] == summaries['gvc']['coupling'][name][i]
+        assert rows[f'effort.rms.{dof}']['after'] == summaries['gvc']['effort']['rms'][i]
+    assert rows['kinetic_energy.mean']['after'] == summaries['gvc']['kinetic_energy']['mean']
+
+
+@pytest.mark.parametrize('options', [[], ['--json'], ['--reduce', 'delta_xi.surge']])
+def test_a_vehicle_without_couplings_is_told_so(options, tmp_path):
+    text = auv('design', 'lauv', *options, folder=tmp_path)
+    assert 'M is diagonal' in text
+    if '--json' in options:
+        assert json.loads(text)['measures'] == []

@@ -11,7 +11,6 @@ from auv_analysis.report.claims import Claim
 from auv_analysis.report.document import Block, Gallery, Section
 from auv_analysis.report.figures import FigureRecord, reference
 from auv_analysis.report.panel import PanelSet
-from auv_analysis.report.quantities import QUANTITIES
 from auv_analysis.report.rendering import prose
 from auv_analysis.report.set_up import SetUp
 from auv_analysis.report.sketch import Sketch
@@ -64,8 +63,7 @@ class Contents:
             table = tables.claims_table(self.claims)
             found.append(Section('claims', title, [prose('claims'), table]))
         found.append(Section('basis', 'What this rests on', [*self._basis()]))
-        quantities = [prose('quantities', entries=QUANTITIES)]
-        return [*found, Section('quantities', 'Quantities', quantities)]
+        return found
 
     def _drawn(self, part: str) -> list[FigureRecord]:
         return [figure for figure in self.figures if figure.name.startswith(FIGURES[part])]

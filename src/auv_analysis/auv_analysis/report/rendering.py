@@ -23,6 +23,7 @@ from auv_analysis.report.document import (
 from auv_analysis.report.figures import FigureRecord
 from auv_analysis.report.interactive import Interactive
 from auv_analysis.report.provenance import provenance
+from auv_analysis.report.quantities import QUANTITIES
 from auv_analysis.report.text import fixed, join, number, plain, tied
 
 HERE = Path(__file__).parent
@@ -53,7 +54,7 @@ def write_document(
     title : of the page
     about : a line below it: vehicles, controllers, source
     findings : sentences of the summary, first on the page
-    sections : in their order; those without blocks are left out
+    sections : in their order; those without blocks are left out, the list of quantities follows
     listings : name and text of files that are shown in full at the end
     interactive : what the panels of its galleries show; none: it has no galleries
 
@@ -62,7 +63,8 @@ def write_document(
     path : of report.html
 
     """
-    sections = [section for section in sections if section.blocks]
+    quantities = Section('quantities', 'Quantities', [prose('quantities', entries=QUANTITIES)])
+    sections = [section for section in (*sections, quantities) if section.blocks]
     text = (
         environment()
         .get_template('document.html.j2')

@@ -331,7 +331,7 @@ def stopped(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     monkeypatch.setattr(
         analyze, 'prepare', lambda out, **options: asked.append(out) or prepare(out, **options)
     )
-    monkeypatch.setattr(conclude, 'summarize', lambda *_: sys.exit(0))
+    monkeypatch.setattr(conclude, 'summarize', lambda *_, **__: sys.exit(0))
     return asked
 
 

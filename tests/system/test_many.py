@@ -5,10 +5,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from PIL import Image
 from sweeps import run as run_sweep
 from sweeps import write_files
+
+from auv_analysis import load_scenario, simulate
+from auv_analysis.experiment import write_inputs
+from auv_analysis.samples import write_samples
 
 AUV = [sys.executable, '-m', 'auv_analysis.cli']
 
@@ -42,35 +45,29 @@ def test_a_sweep_is_explored(tmp_path: Path) -> None:
     report = (out / 'report.html').read_text(encoding='utf-8')
     assert report.count('<figure') == len(drawn(out))
     assert 'Warning' not in ended.stderr
-    again = auv(tmp_path, 'analyze', 'runs/small')
-    assert (again.returncode, len(again.stderr.splitlines())) == (2, 1)
-    (out / 'notes.md').write_text('mine')
-    replaced = auv(tmp_path, 'analyze', 'runs/small', '--overwrite', '--by', 'kinetic_energy.mean')
-    assert replaced.returncode == 0, replaced.stderr
-    assert (out / 'notes.md').read_text() == 'mine'
-    assert (tmp_path / 'runs/small/sweep.json').exists()
 
 
-@pytest.mark.parametrize('vehicle', ['bluerov2'])
-def test_the_atlas_is_drawn(tmp_path: Path, vehicle: str) -> None:
-    ended = auv(tmp_path, 'atlas', vehicle, '--only', '--json')
+def test_the_atlas_is_drawn(tmp_path: Path) -> None:
+    ended = auv(tmp_path, 'atlas', 'bluerov2', '--only', '--json')
     assert ended.returncode == 0, ended.stderr
-    assert list(json.loads(ended.stdout)['vehicles']) == [vehicle]
+    assert list(json.loads(ended.stdout)['vehicles']) == ['bluerov2']
     figures = {'strength', 'correlation', 'shares', 'case1_delta_xi', 'case1_delta_pi'}
     assert drawn(tmp_path / 'runs/atlas') == figures
     assert 'Warning' not in ended.stderr
 
 
-def test_folders_of_results_are_compared(tmp_path: Path) -> None:
-    (write_files(tmp_path) / 'scenario.yaml').rename(tmp_path / 'short.yaml')
-    for out in ('runs/a', 'runs/b'):
-        ended = auv(tmp_path, 'simulate', 'short.yaml', '--out', out, '--json')
-        assert ended.returncode == 0, ended.stderr
-    original = json.loads(ended.stdout)
-    ended = auv(tmp_path, 'analyze', 'runs/a', 'runs/b', '--out', 'both', '--json')
+def test_results_and_scenarios_are_compared(tmp_path: Path) -> None:
+    write_files(tmp_path)
+    scenario, out = load_scenario(tmp_path / 'scenario.yaml'), tmp_path / 'runs/a'
+    out.mkdir(parents=True)
+    write_inputs(scenario, out)
+    for name in scenario.controllers:
+        write_samples(simulate(scenario, name), out / f'{name}.npz')
+    ended = auv(tmp_path, 'analyze', 'runs/a', 'scenario.yaml', '--out', 'both', '--json')
     assert ended.returncode == 0, ended.stderr
     summaries = json.loads(ended.stdout)
-    assert summaries == {f'runs/{folder}/{name}': original[name]
-                         for folder in 'ab' for name in ('gvc', 'cl')}  # fmt: skip
+    places = 'a', 'simulated/scenario'
+    assert list(summaries) == [f'{place}/{name}' for place in places for name in ('gvc', 'cl')]
+    assert summaries['a/gvc'] == summaries['simulated/scenario/gvc']
     assert {'ranking', 'errors', 'kinetic_energy', 'delta_xi'} <= drawn(tmp_path / 'both')
     assert 'Warning' not in ended.stderr

@@ -164,7 +164,12 @@ def test_names_are_as_short_as_they_can_be() -> None:
 
 def test_runs_of_one_name_are_told_apart_by_their_folders() -> None:
     found = _names(('/1/a/gvc', 'x', 'gvc'), ('/1/b/gvc', 'x', 'gvc'), ('/1/b/cl', 'x', 'cl'))
-    assert found == ['1/a/gvc', '1/b/gvc', 'x/cl']
-    assert _names(*(('/1/a/gvc', 'x', 'gvc') for _ in range(3))) == [
-        '1/a/gvc', '1/a/gvc_2', '1/a/gvc_3',
-    ]  # fmt: skip
+    assert found == ['a/gvc', 'b/gvc', 'x/cl']
+    found = _names(('/1/a/gvc', 'x', 'gvc'), ('/2/a/gvc', 'x', 'gvc'))
+    assert found == ['1/a/gvc', '2/a/gvc']
+
+
+def test_one_run_twice_is_numbered() -> None:
+    assert _names(*3 * (('/1/a/gvc', 'x', 'gvc'),)) == ['x/gvc', 'x/gvc_2', 'x/gvc_3']
+    twice = ('/1/a/gvc', 'x', 'gvc')
+    assert _names(twice, twice, ('/1/b/gvc', 'x', 'gvc')) == ['a/gvc', 'a/gvc_2', 'b/gvc']

@@ -326,3 +326,23 @@ def test_a_sweep_without_figures_is_a_failure(tmp_path: Path, capsys) -> None:
     assert end.value.code == 1
     assert capsys.readouterr().err.splitlines()[-1] == f'{out}: none of 200 rows has figures'
     assert not (tmp_path / 'report').exists()
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_results_are_replaced_only_when_asked_and_the_rest_stays(tmp_path: Path, capsys) -> None:
+    sweep, out = make_sweep(tmp_path, MIXED, mixed), tmp_path / 'report'
+    command = ['analyze', str(sweep), '--out', str(out)]
+    cli.main(command)
+    (out / 'notes.md').write_text('mine')
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as end:
+        cli.main(command)
+    assert (end.value.code, len(capsys.readouterr().err.splitlines())) == (2, 1)
+    cli.main([*command, '--overwrite', '--by', ENERGY, '--json'])
+    document = json.loads(capsys.readouterr().out)
+    assert document == json.loads((out / 'analysis.json').read_text())
+    assert {row['by'] for row in document['best']} == {ENERGY}
+    assert (out / 'notes.md').read_text() == 'mine'
+    with pytest.raises(SystemExit):
+        cli.main(['analyze', str(sweep), '--out', str(sweep), '--overwrite'])
+    assert (sweep / 'sweep.json').exists()

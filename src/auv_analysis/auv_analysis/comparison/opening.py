@@ -1,6 +1,5 @@
 """Sources opened as runs, with names that tell them apart."""
 
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -11,6 +10,8 @@ from auv_analysis.run import AnyRun
 from auv_analysis.samples import load_samples
 from auv_analysis.simulation import Hold, simulate
 from auv_analysis.warm_up import announce
+
+DEEPEST = 4  # folders of a path in a name
 
 
 class Named(Protocol):
@@ -74,29 +75,31 @@ def named(runs: Sequence[tuple[Source, Named]], join: str = '/') -> list[str]:
     join : stands between the parts of a name
 
     """
-    candidates = [
-        (
-            run.controller,
-            f'{run.scenario}{join}{run.controller}',
-            join.join((*_folder(source), run.controller)),
-        )
-        for source, run in runs
-    ]
-    for level in range(2):
-        names = [candidate[level] for candidate in candidates]
-        if len(set(names)) == len(names):
-            return names
-    doubled = Counter(names)
-    names = [c[2] if doubled[c[1]] > 1 else c[1] for c in candidates]
+    controllers = [run.controller for _, run in runs]
+    if len(set(controllers)) == len(runs):
+        return controllers
+    names = [f'{run.scenario}{join}{run.controller}' for _, run in runs]
+    for name in set(names):
+        same = [i for i, other in enumerate(names) if other == name]
+        found = _by_folder([runs[i][0] for i in same])
+        for i, parts in zip(same, found, strict=True):
+            names[i] = join.join((*parts, runs[i][1].controller)) if parts else name
     return numbered(names)
 
 
-def _folder(source: Source) -> tuple[str, ...]:
-    """Last parts of the path that a run was read from, without the part that names the run."""
+def _by_folder(sources: Sequence[Source]) -> list[tuple[str, ...]]:
+    """Folders that tell sources apart, as few as do; none where they are all the same."""
+    options = [[_folders(source, depth) for source in sources] for depth in range(1, DEEPEST + 1)]
+    apart = [len(set(parts)) for parts in options]
+    best = max(apart)
+    return options[apart.index(best)] if best > 1 else [()] * len(sources)
+
+
+def _folders(source: Source, depth: int) -> tuple[str, ...]:
+    """Last folders of the path that a run was read from, without the part that names the run."""
     if source.kind == 'scenario':
         return ('simulated', source.path.stem)
-    parts = Path(source.path).resolve().parent.parts
-    return parts[-2:] if len(parts) > 2 else parts[-1:]
+    return Path(source.path).resolve().parent.parts[1:][-depth:]
 
 
 def numbered(names: Sequence[str]) -> list[str]:

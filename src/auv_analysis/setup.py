@@ -14,7 +14,16 @@ setup(
     maintainer='auv_gvc developers',
     maintainer_email='auv-gvc@users.noreply.github.com',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['*.json', 'report/*.j2', 'report/*.css', 'report/*.js', 'sweep/*.json']},
+    package_data={
+        NAME: [
+            '*.json',
+            'report/*.j2',
+            'report/*.css',
+            'report/*.js',
+            'sweep/*.json',
+            'foreign/*.json',
+        ]
+    },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -42,6 +51,7 @@ setup(
         'rich>=13',
         'pyarrow>=17',
         'scipy>=1.15',
+        'rosbags>=0.10',
         'SALib>=1.5',
     ],
     extras_require={

@@ -87,6 +87,21 @@ def _analyze(command: argparse.ArgumentParser) -> None:
     command.add_argument('results', nargs='+', metavar='BAG', help=RESULT)
     command.add_argument('--by', metavar='MEASURE', help='of a sweep: what sorts the best rows')
     command.add_argument('--vehicle', help='for bags that do not carry their own')
+    _foreign(command.add_argument_group('bags of other systems'))
+
+
+def _foreign(group: argparse._ArgumentGroup) -> None:
+    """Options that tell what the topics of a foreign bag hold."""
+    group.add_argument('--map', metavar='FILE', help='mapping file; options replace its keys')
+    group.add_argument('--odom', dest='odometry', metavar='TOPIC', help='nav_msgs/Odometry')
+    group.add_argument('--wrench', metavar='TOPIC', help='the commanded WrenchStamped or Wrench')
+    group.add_argument('--setpoint', metavar='TOPIC', help='TwistStamped, Twist or Odometry')
+    group.add_argument('--frames', choices=('ned_fsd', 'enu_flu'), help='axes of all topics')
+    text = 'axes in which the odometry writes the velocity, default: child'
+    group.add_argument('--twist-frame', choices=('child', 'world'), help=text)
+    text = 'common time base, default: the median period of the velocity'
+    group.add_argument('--step', type=float, metavar='S', help=text)
+    group.add_argument('--gap', type=float, metavar='S', help='longer pauses are gaps')
 
 
 def _atlas(command: argparse.ArgumentParser) -> None:

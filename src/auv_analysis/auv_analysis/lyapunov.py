@@ -81,6 +81,7 @@ def lyapunov(run: AnyRun, model: ControlModel) -> dict[str, Any]:
         sensors=run.sensing,
         actuators=run.acting,
         sampled=run.hold == 'zoh',
+        gaps=len(run.gaps),
     )
 
 
@@ -169,17 +170,19 @@ def _summary(
     sensors: bool,
     actuators: bool,
     sampled: bool,
+    gaps: int = 0,
 ) -> dict[str, Any]:
     """The summary from the certificates of consecutive blocks, none where there is none."""
     reasons = [
         applicability(law, gains, model),
         _against_15(knows_F, kinds),
         'the law does not see the true velocity, so that (26) is not L_dot' if sensors else '',
+        'the run has gaps, across which nothing has a rate' if gaps else '',
         'the wrench applied is not that of the law, so that (26) is not L_dot' if actuators else '',
     ]
     reason = '; '.join(filter(None, reasons))
     summary = {'applicable': not reason, 'reason': reason, **dict.fromkeys(FIGURES)}
-    if law in LAWS and gains is not None:
+    if law in LAWS and gains is not None and not gaps:
         summary |= as_figures(found, start)
         if sensors or actuators or _no_identity(form_of(law, gains, model)):
             summary |= dict.fromkeys(SHARES)

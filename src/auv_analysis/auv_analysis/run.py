@@ -9,6 +9,7 @@ import numpy as np
 
 from auv_dynamics.vehicle import Vehicle
 
+FOREIGN = 'foreign_bag'  # source of a run that another system recorded
 BLOCK = 8192  # samples that are worked on together: their arrays fit into a processor's cache
 
 
@@ -23,10 +24,12 @@ class Facts(ABC):
     controller, law : name of the controller and of its law
     gains : the law's gains as the scenario gives them
     step : control period, s
-    source : 'simulate' or 'bag'
+    source : 'simulate', 'bag' or 'foreign_bag'
     hold : 'continuous' or 'zoh': whether the wrench was held between the samples
     kinds : kinds of the disturbances, None where they are not known
     notes : what is worth saying about the run, one line each
+    gaps : (last time before, first time behind) of each time without samples, s as in t
+    acceleration : of a run with `unexplained`: how nu_dot was estimated, and its error
 
     """
 
@@ -40,6 +43,8 @@ class Facts(ABC):
     hold: str = 'zoh'
     kinds: frozenset[str] | None = None
     notes: tuple[str, ...] = field(default=())
+    gaps: tuple[tuple[float, float], ...] = field(default=())
+    acceleration: dict[str, Any] | None = None
 
     @property
     @abstractmethod
@@ -62,6 +67,12 @@ class Facts(ABC):
         return self.extent.end - self.extent.start
 
     @property
+    def valid_share(self) -> float:
+        """Share of the run's length that has samples."""
+        lost = sum(end - begin - self.step for begin, end in self.gaps)
+        return 1.0 - lost / (self.duration + self.step)
+
+    @property
     def sensing(self) -> bool:
         """Whether the law saw measurements in place of the true velocity."""
         return self.extent.sensing
@@ -75,6 +86,11 @@ class Facts(ABC):
     def knows_disturbance(self) -> bool:
         """Whether the lumped uncertainty F is known."""
         return self.extent.knows_disturbance
+
+    @property
+    def knows_setpoint(self) -> bool:
+        """Whether there is a set-point, and errors with it."""
+        return self.extent.knows_setpoint
 
     def facts(self) -> dict[str, Any]:
         """Name -> value of what every kind of run has, for building another one."""
@@ -90,6 +106,7 @@ class Extent(NamedTuple):
     sensing: bool
     acting: bool
     knows_disturbance: bool
+    knows_setpoint: bool = True
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -101,13 +118,15 @@ class Run(Facts):
     t : (n + 1,) s
     eta : (n + 1, 6) position in m (NED), ZYX Euler angles in rad, psi unwrapped
     nu : (n + 1, 6) body velocity, m/s and rad/s
-    nu_d, nu_d_dot : (n + 1, 6) set-point and its derivative
+    nu_d, nu_d_dot : (n + 1, 6) set-point and its derivative, NaN where they are not known
     tau : (n + 1, 6) commanded wrench, N and N m, body frame
     disturbance : (n + 1, 6) lumped uncertainty F of (1), or None where it is not known
     disturbance_estimate : (n + 1, 6) f of the law
     measured : (n + 1, 6) velocity that the law saw; None: the true one
     applied : (n + 1, 6) wrench that the actuators delivered; None: the command
     law_state : (n + 1, m) the law's integrals, None where they are not known
+    unexplained, unexplained_error : (n + 1, 6) F of (1) as estimated from measurements, and its
+        standard error; None: not estimated
 
     The other attributes are those of `Facts`.
 
@@ -124,6 +143,8 @@ class Run(Facts):
     measured: np.ndarray | None = None
     applied: np.ndarray | None = None
     law_state: np.ndarray | None = None
+    unexplained: np.ndarray | None = None
+    unexplained_error: np.ndarray | None = None
 
     def part(self, keep: Any) -> 'Run':
         """Run of the samples that an index, slice or mask of samples keeps."""
@@ -149,7 +170,8 @@ class Run(Facts):
     def extent(self) -> Extent:
         """Length and optional signals, from the arrays."""
         signals = self.measured, self.applied, self.disturbance
-        known = (signal is not None for signal in signals)
+        known = [signal is not None for signal in signals]
+        known.append(not np.isnan(self.nu_d[0, 0]))
         return Extent(len(self.t), float(self.t[0]), float(self.t[-1]), *known)
 
     @property

@@ -17,7 +17,7 @@ from auv_analysis.coupling import (
 from auv_analysis.energy import shares
 from auv_analysis.lyapunov import lyapunov
 from auv_analysis.moments import Moments, Tally, maps_of
-from auv_analysis.run import AnyRun, Run
+from auv_analysis.run import AnyRun, LongRun, Run
 from auv_gvc_controller.gains import body_gains
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.model import control_model
@@ -80,11 +80,7 @@ def summarize(
         'kinetic_energy': energies[chosen],
         'kinetic_energy_windows': [energies[entry] for entry in listed],
         'velocity': {'rms': velocities.rms, 'max': velocities.peaks.tolist()},
-        'velocity_error': {
-            'rms': whole.rms(moments.ERROR),
-            'max_after_2s': _peak(after, moments.ERROR),
-            'settling_time': _settling(run, whole.peaks[moments.SETPOINT]),
-        },
+        'velocity_error': _errors(run, whole, after),
         'lumped_error': {
             'rms': whole.rms(moments.LUMPED) if run.knows_disturbance else None,
             'max_after_2s': _peak(after, moments.LUMPED) if run.knows_disturbance else None,
@@ -102,6 +98,9 @@ def summarize(
         'gains': {'K_D': gains[0], 'K_f': gains[1]},
         'decomposition': {'Upsilon': Upsilon.tolist(), 'N': model.N.tolist()},
         'lyapunov': lyapunov(run, model),
+        'acceleration': run.acceleration,
+        'unexplained': _unexplained(run),
+        'gaps': _gaps(run),
         'notes': list(run.notes),
     }
 
@@ -162,6 +161,35 @@ def _cuts(run: AnyRun, window: Window) -> Window:
     """Cuts before the first and behind the last sample of a window."""
     first, last = window
     return first - run.step / 2, float(np.nextafter(last + run.step / 2, np.inf))
+
+
+def _errors(run: AnyRun, whole: Moments, after: Moments) -> dict[str, Any]:
+    if not run.knows_setpoint:
+        return dict.fromkeys(('rms', 'max_after_2s', 'settling_time'))
+    return {
+        'rms': whole.rms(moments.ERROR),
+        'max_after_2s': _peak(after, moments.ERROR),
+        'settling_time': _settling(run, whole.peaks[moments.SETPOINT]),
+    }
+
+
+def _gaps(run: AnyRun) -> dict[str, Any]:
+    spans = [{'window': list(span)} for span in run.gaps]
+    return {'valid_share': run.valid_share, 'spans': spans}
+
+
+def _unexplained(run: AnyRun) -> dict[str, list[float]] | None:
+    """Figures of F as estimated from measurements, N and N m; None where it is not."""
+    if isinstance(run, LongRun) or run.unexplained is None or run.unexplained_error is None:
+        return None
+    F, error = run.unexplained, run.unexplained_error
+    found = {
+        'mean': F.mean(axis=0),
+        'rms': np.sqrt((F**2).mean(axis=0)),
+        'max': np.abs(F).max(axis=0),
+        'error_rms': np.sqrt((error**2).mean(axis=0)),
+    }
+    return {name: values.tolist() for name, values in found.items()}
 
 
 def _energy(inside: Moments, window: tuple[float, float]) -> dict[str, Any]:

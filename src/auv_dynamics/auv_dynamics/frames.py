@@ -12,8 +12,12 @@ REP-103 (Standard Units of Measure and Coordinate Conventions), NED and FSD thos
 (draft: coordinate frame conventions for marine robots) and of Fossen.
 """
 
+import re
+
 import numpy as np
 
+NED_FSD, ENU_FLU = 'ned_fsd', 'enu_flu'
+_WORDS = {'ned': NED_FSD, 'fsd': NED_FSD, 'frd': NED_FSD, 'enu': ENU_FLU, 'flu': ENU_FLU}
 _S = np.array([1.0, -1.0, -1.0])  # diagonal of S
 _S6 = np.concatenate([_S, _S])
 
@@ -24,6 +28,13 @@ def _checked(values: np.ndarray, *shape: int) -> np.ndarray:
         expected = ', '.join(map(str, ('...', *shape)))
         raise ValueError(f'expected shape ({expected}), found {values.shape}')
     return values
+
+
+def named_axes(frame_id: str) -> str | None:
+    """Axes that a frame id names by a word of its own, such as ned in 'world_ned'; else None."""
+    parts = re.split(r'[^a-z]+', frame_id.lower())
+    named = {_WORDS[part] for part in parts if part in _WORDS}
+    return named.pop() if len(named) == 1 else None
 
 
 def swap_position(p: np.ndarray) -> np.ndarray:

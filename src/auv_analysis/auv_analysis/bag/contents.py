@@ -4,7 +4,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from auv_dynamics.files import InputError
+from auv_dynamics.interface import Frames
+
 Series = tuple[np.ndarray, np.ndarray]  # stamps (n,) in ns, values (n, 6) or (n, 13)
+
+
+class NotOursError(InputError):
+    """A bag whose topics are not those that our nodes publish."""
 
 
 @dataclass
@@ -20,6 +27,7 @@ class Contents:
     first, last : ns, None when the bag is empty
     messages : topic -> stamps (n,) in ns and values (n, 6) or (n, 13), of our topics
     notes : what is odd, one line each
+    frames : namespace -> frames of its first odometry
 
     """
 
@@ -31,6 +39,7 @@ class Contents:
     last: int | None = None
     messages: dict[str, Series] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    frames: dict[str, Frames] = field(default_factory=dict)
 
     def span(self, first: int, last: int) -> None:
         """Note that there are messages logged from `first` to `last`, ns."""

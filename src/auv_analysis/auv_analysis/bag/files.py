@@ -5,6 +5,29 @@ from pathlib import Path
 
 from auv_dynamics.files import InputError
 
+BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file'
+OTHERS = ('.db3', '.bag')  # endings of files that rosbags reads
+
+
+def is_mcap(bag: Path) -> bool:
+    """Whether our own reader reads this bag; InputError when there is no bag at all."""
+    if os.path.isdir(bag):
+        if any(bag.glob('*.mcap')):
+            return True
+        if not any(bag.glob('*.db3*')):
+            raise InputError(bag, '', BAG, 'a folder with neither .mcap nor .db3 files')
+        return False
+    if not os.path.isfile(bag):
+        raise InputError(bag, '', BAG, 'no such file or folder')
+    return bag.suffix not in OTHERS
+
+
+def files_of(bag: Path) -> list[Path]:
+    """Files that a bag of any kind consists of, which results must not overwrite."""
+    if is_mcap(bag):
+        return bag_files(bag)
+    return sorted(bag.iterdir()) if bag.is_dir() else [bag]
+
 
 def bag_files(bag: str | Path) -> list[Path]:
     """MCAP files of a bag, in order; InputError when there are none."""

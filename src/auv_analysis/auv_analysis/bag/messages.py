@@ -38,16 +38,13 @@ class FileReader:
     ----------
     path : the file
     contents : of the whole bag, filled here but for its messages
-    frames : namespace -> frames of its first odometry in the bag, filled here
     decode : whether the messages of our topics are read, or only counted
 
     """
 
-    def __init__(
-        self, path: Path, contents: Contents, frames: dict[str, interface.Frames], decode: bool
-    ):
+    def __init__(self, path: Path, contents: Contents, decode: bool):
         self._path, self._contents, self._decode = path, contents, decode
-        self._frames = frames
+        self._frames = contents.frames
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._decoders: dict[int, Decoder] = {}

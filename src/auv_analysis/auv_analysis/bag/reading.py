@@ -8,7 +8,6 @@ from auv_analysis.bag.files import bag_files
 from auv_analysis.bag.messages import Batch, FileReader
 from auv_analysis.bag.records import records
 from auv_analysis.bag.steps import joined_series
-from auv_dynamics import interface
 
 TOGETHER = 64  # chunks whose small arrays are joined at once: thousands of them scatter the memory
 
@@ -27,9 +26,8 @@ def batches(bag: str | Path, contents: Contents, *, decode: bool = True) -> Iter
     InputError : not a bag, or a message that must not be used
 
     """
-    frames: dict[str, interface.Frames] = {}
     for path in bag_files(bag):
-        reader = FileReader(path, contents, frames, decode)
+        reader = FileReader(path, contents, decode)
         for item in records(path, contents.notes):
             yield from reader.take(item)
 

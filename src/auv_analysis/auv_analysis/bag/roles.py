@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from auv_analysis.bag.contents import NotOursError
 from auv_dynamics import interface
-from auv_dynamics.files import InputError
 
 ODOMETRIES = (interface.ODOM, interface.GROUND_TRUTH)
 ODOMETRY = 'nav_msgs/msg/Odometry'
@@ -50,4 +50,4 @@ def check_type(path: Path, topic: str, found: str) -> None:
     """Raise InputError when a topic with one of our names is of another type."""
     expected = KINDS[role_of(topic)]
     if found != expected:
-        raise InputError(path, topic, expected, found)
+        raise NotOursError(path, topic, expected, found)

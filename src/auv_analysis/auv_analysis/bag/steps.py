@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from auv_analysis.bag.contents import Contents, Series
+from auv_analysis.bag.contents import Contents, NotOursError, Series
 from auv_analysis.bag.roles import READERS, namespace_of, role_of
 from auv_dynamics import interface
-from auv_dynamics.files import InputError
+from auv_dynamics.frames import NED_FSD, named_axes
 
 REQUIRED = (interface.ODOM, interface.WRENCH)
 Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> values
@@ -32,13 +32,19 @@ def topics_of_one_graph(topics: Iterable[str], contents: Contents, bag: Path) ->
     spaces = sorted(namespace_of(t) for t in topics if role_of(t) == interface.ODOM)
     found = ', '.join(sorted(contents.types)) or 'no topics'
     if not spaces:
-        raise InputError(bag, interface.ODOM, 'messages', found)
+        raise NotOursError(bag, interface.ODOM, 'messages', found)
     if len(spaces) > 1:
         contents.notes.append(f'several vehicles in the bag: read {spaces[0]}, left {spaces[1:]}')
+    frames = contents.frames[spaces[0]]
+    named = all(named_axes(name) == NED_FSD for name in (frames.odom, frames.base))
+    if 'params.yaml' not in contents.attachments and not named:
+        expected = 'frames whose names say that they are NED and FSD'
+        found = f'{frames.odom}, {frames.base}'
+        raise NotOursError(bag, f'{spaces[0]}{interface.ODOM}: frame_id', expected, found)
     ours = {role: f'{spaces[0]}{role}' for role in READERS if f'{spaces[0]}{role}' in topics}
     for role in REQUIRED:
         if role not in ours:
-            raise InputError(bag, role, 'messages', found)
+            raise NotOursError(bag, role, 'messages', found)
     return ours
 
 
@@ -133,7 +139,7 @@ def dropped(counts: dict[str, int], steps: int, bag: Path) -> list[str]:
 
     """
     if steps < 2:
-        raise InputError(bag, '', 'at least two steps that are complete on all step topics', '0')
+        raise NotOursError(bag, '', 'at least two steps that are complete on all step topics', '0')
     return [
         f'{role}: {count - steps} of {count} messages are not complete on all topics'
         for role, count in counts.items()

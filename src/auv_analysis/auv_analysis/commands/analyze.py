@@ -9,6 +9,7 @@ from auv_analysis.commands.conclude import conclude, console
 from auv_analysis.comparison.opening import named, open_source
 from auv_analysis.comparison.sources import Source, is_sweep, sources_of
 from auv_analysis.folder import check_free, prepare
+from auv_analysis.foreign.mapping import OPTIONS, TopicMap, read_mapping
 from auv_dynamics.files import InputError
 
 FEW = 3  # runs up to which the report shows every figure of each
@@ -25,10 +26,19 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
         from auv_analysis.exploration.explore import explore
 
         return explore(Path(sweeps[0]), options)
-    sources = sources_of(options.results)
+    mapping = _mapping(options)
+    sources = sources_of(options.results, mapping)
     if options.out:
         check_free(options.out, overwrite=options.overwrite)
     return _few(sources, options) if len(sources) <= FEW else _many(sources, options)
+
+
+def _mapping(options: argparse.Namespace) -> TopicMap | None:
+    """What is told of bags of other systems; None where nothing is."""
+    given = {key: getattr(options, key) for key in OPTIONS}
+    if options.map is None and all(value is None for value in given.values()):
+        return None
+    return read_mapping(options.map, given | {'vehicle': options.vehicle})
 
 
 def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
@@ -62,5 +72,6 @@ def _prepared(
     if len(names) > FEW or len(name) > LONGEST:
         name = f'{names[0]}_and_{len(names) - 1}_more'
     files = [file for source in sources for file in source.files]
+    files += [Path(options.map)] if options.map else []
     out = options.out or Path('runs') / f'analyze_{name}'
     return prepare(out, overwrite=options.overwrite, inputs=files)

@@ -6,17 +6,18 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from auv_analysis.bag import bag_files, read_bag
+from auv_analysis.bag.files import files_of
+from auv_analysis.foreign.candidates import candidates, survey
 
 
 def info(options: argparse.Namespace) -> dict[str, Any]:
     """What lies in a bag."""
-    contents = read_bag(options.bag, decode=False)
+    contents = survey(options.bag)
     first, last = contents.first, contents.last
     span = None if first is None or last is None else (last - first) / 1e9
     document = {
         'bag': str(options.bag),
-        'files': [path.name for path in bag_files(options.bag)],
+        'files': [path.name for path in files_of(options.bag)],
         'duration': span,
         'messages': sum(contents.counts.values()),
         'topics': {
@@ -24,6 +25,7 @@ def info(options: argparse.Namespace) -> dict[str, Any]:
             for topic, kind in sorted(contents.types.items())
         },
         'attachments': sorted(contents.attachments),
+        'candidates': candidates(contents),
         'notes': contents.notes,
     }
     if not options.json:
@@ -42,5 +44,8 @@ def _print_info(document: dict[str, Any]) -> None:
         table.add_row(topic, entry['type'], str(entry['messages']))
     out.print(table)
     out.print(f'attachments: {", ".join(document["attachments"]) or "none"}')
+    for role, topics in document['candidates'].items():
+        if topics:
+            out.print(f'could be mapped as {role}: {", ".join(topics)}')
     for note in document['notes']:
         out.print(f'note: {note}')

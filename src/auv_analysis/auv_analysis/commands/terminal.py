@@ -82,7 +82,7 @@ def _remarks(summary: Mapping[str, Any]) -> Iterable[str]:
     if named:
         yield f'{ZERO} in every motion: {"; ".join(named)}'
     times = summary['velocity_error']['settling_time']
-    late = [dof for dof, time in zip(DOFS, times, strict=True) if time is None]
+    late = [dof for dof, time in zip(DOFS, times or (), strict=bool(times)) if time is None]
     if late:
         yield f'not settled at the end: {join(late)}'
 
@@ -95,7 +95,7 @@ def comparison_table(summaries: Mapping[str, Mapping[str, Any]]) -> Table:
         table.add_column(column, justify='right' if column != 'in' else 'left')
     for name, summary in summaries.items():
         times = summary['velocity_error']['settling_time']
-        settled = MISSING if None in times else number(max(times))
+        settled = MISSING if times is None or None in times else number(max(times))
         worst = _worst(summary['velocity_error']['max_after_2s'])
         mean = number(summary['kinetic_energy']['mean'], 5)
         table.add_row(Text(name), mean, settled, *worst)

@@ -57,7 +57,7 @@ def draw(
     with plotting.style():
         for name, make in drawn.items():
             figure, title, caption = make()
-            files = plotting.save(figure, folder, name)
+            files = (None, None) if figure is None else plotting.save(figure, folder, name)
             figures[name] = FigureRecord(name, title, caption, *files)
     return figures
 

@@ -20,7 +20,7 @@ MOST_PANELS = 12
 ACROSS = 4  # panels in a row
 SMALLEST, LARGEST = 1e-3, 1e4  # of the axis, multiples of the band
 TIMES = 240  # columns of the rows of colours
-Drawn = tuple[Figure, str, str]
+Drawn = tuple[Figure | None, str, str]
 
 
 def still_to_come(run: Sketch) -> tuple[np.ndarray, np.ndarray]:
@@ -53,12 +53,14 @@ def errors(entries: Sequence[Entry]) -> Drawn:
         'degrees of freedom, divided by the band in which it counts as settled '
         f'({100 * BAND:g} % of the peak of its set-point, at least {SMALLEST_BAND:g}). '
     )
+    if not groups:
+        return None, title, f'{title}: without set-points there is none.'
     if len(groups) <= MOST_PANELS and len(labels) <= MOST_LINES:
         caption += 'A run has settled where its line falls below the dotted 1. '
         figure = _panels(groups, labels)
     else:
         caption += 'Each row is a run; it has settled where its colours end. '
-        figure = _rows([entry for entry in entries if entry.sketch])
+        figure = _rows([e for e in entries if e.sketch and e.sketch.knows_setpoint])
     return figure, title, caption + 'Time is logarithmic.'
 
 
@@ -66,7 +68,7 @@ def _groups(entries: Sequence[Entry]) -> dict[str, dict[str, Sketch]]:
     """Scenario -> label in its panel -> run."""
     groups: dict[str, dict[str, Sketch]] = {}
     for entry in entries:
-        if entry.sketch is not None:
+        if entry.sketch is not None and entry.sketch.knows_setpoint:
             label = entry.name.removeprefix(f'{entry.scenario}/')
             groups.setdefault(entry.scenario, {})[label] = entry.sketch
     return groups

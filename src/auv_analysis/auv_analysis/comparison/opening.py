@@ -5,7 +5,11 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from auv_analysis.bag import open_bag
+from auv_analysis.bag.contents import NotOursError
+from auv_analysis.bag.files import is_mcap
+from auv_analysis.bag.load import Recording
 from auv_analysis.comparison.sources import Source
+from auv_analysis.foreign.candidates import with_candidates
 from auv_analysis.run import AnyRun
 from auv_analysis.samples import load_samples
 from auv_analysis.simulation import Hold, simulate
@@ -49,8 +53,7 @@ def open_source(source: Source, vehicle: str | None = None) -> Opened:
 
     """
     if source.scenario is None:
-        run, attachments = open_bag(source.path, vehicle)
-        texts = attachments
+        run, texts = _open_bag(source, vehicle)
     else:
         scenario, texts = source.scenario, source.scenario.attachments
         if source.kind == 'samples':
@@ -61,6 +64,20 @@ def open_source(source: Source, vehicle: str | None = None) -> Opened:
             hold: Hold = 'zoh' if sampled else 'continuous'
             run = simulate(scenario, source.controller, hold)
     return Opened(run, texts.get('scenario.yaml', ''), texts.get('vehicle.yaml', ''))
+
+
+def _open_bag(source: Source, vehicle: str | None) -> Recording:
+    bag = source.path
+    if source.mapping is not None:
+        from auv_analysis.foreign.load import load_foreign  # with libraries that load slowly
+
+        return load_foreign(bag, source.mapping)
+    try:
+        if not is_mcap(bag):
+            raise NotOursError(bag, '', 'an MCAP bag of our nodes', 'a bag of another kind')
+        return open_bag(bag, vehicle)
+    except NotOursError as error:
+        raise with_candidates(error) from None
 
 
 def named(runs: Sequence[tuple[Source, Named]], join: str = '/') -> list[str]:

@@ -9,6 +9,8 @@ from scipy.stats import rankdata
 
 from auv_analysis.measures import MEASURES, Measure
 
+ERRORS = 'overall.velocity_error.rms.linear'
+
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
@@ -47,8 +49,10 @@ def rank(table: pa.Table) -> Ranking:
     ]
     measures = [MEASURES[j] for j in differ]
     values = values[:, differ]
+    errors = [v is not None for v in table[ERRORS].to_pylist()]
+    tracks = np.array(errors)[there]  # whether there is a set-point, and so something to settle
     ranks = (
-        np.stack([_ranks(values[:, j], m) for j, m in enumerate(measures)], axis=1)
+        np.stack([_ranks(values[:, j], m, tracks) for j, m in enumerate(measures)], axis=1)
         if measures
         else np.zeros((len(values), 0))
     )
@@ -64,12 +68,13 @@ def rank(table: pa.Table) -> Ranking:
     )
 
 
-def _ranks(values: np.ndarray, measure: Measure) -> np.ndarray:
+def _ranks(values: np.ndarray, measure: Measure, tracks: np.ndarray) -> np.ndarray:
     """Ranks (n,); a time that does not exist is later than every other."""
     known = np.isfinite(values)
     ranks = np.full(len(values), np.nan)
     if measure.unit == 's':
-        return rankdata(np.where(known, values, np.inf))
+        ranks[tracks] = rankdata(np.where(known, values, np.inf)[tracks])
+        return ranks
     ranks[known] = rankdata(values[known])
     return ranks
 

@@ -2,14 +2,15 @@
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import yaml
 
-from auv_analysis.bag import bag_files
+from auv_analysis.bag.files import OTHERS, files_of
 from auv_analysis.folder import MANIFEST
+from auv_analysis.foreign.mapping import TopicMap
 from auv_analysis.samples import ENDING
 from auv_analysis.scenario import Scenario, load_scenario
 from auv_dynamics.config import shipped_by_name
@@ -29,6 +30,7 @@ class Source:
     path : of the bag, the samples or the scenario
     controller : its name; '' of a bag, which says so itself
     scenario : of samples and scenarios, loaded
+    mapping : of a bag of another system, what its topics hold; None: nothing was told
 
     """
 
@@ -36,12 +38,13 @@ class Source:
     path: Path
     controller: str = ''
     scenario: Scenario | None = None
+    mapping: TopicMap | None = None
 
     @property
     def files(self) -> list[Path]:
         """Files that are read, which no result may take the place of."""
         if self.kind == 'bag':
-            return bag_files(self.path)
+            return files_of(self.path)
         return [*([self.path] if self.kind == 'samples' else []), *self._inputs]
 
     @property
@@ -54,21 +57,23 @@ def is_sweep(argument: str) -> bool:
     return os.path.isfile(os.path.join(argument, MANIFEST))
 
 
-def sources_of(arguments: Sequence[str]) -> list[Source]:
+def sources_of(arguments: Sequence[str], mapping: TopicMap | None = None) -> list[Source]:
     """The runs that arguments stand for, in their order.
 
     Parameters
     ----------
-    arguments : an .mcap file or a folder with such files is a bag; a folder of `auv simulate`,
+    arguments : an .mcap, .db3 or .bag file or a folder with such is a bag; a folder of `auv simulate`,
         `auv run` or `auv study` is all runs in it; an .npz file is one simulated run; a .yaml file
         or the bare name of a shipped scenario is simulated, all its controllers
+    mapping : of all bags; None: they are those of our nodes
 
     Raises
     ------
     InputError : it is none of them, or two of them
 
     """
-    return [source for argument in arguments for source in _sources(argument)]
+    found = [source for argument in arguments for source in _sources(argument)]
+    return [replace(one, mapping=mapping) if one.kind == 'bag' else one for one in found]
 
 
 def _sources(argument: str) -> list[Source]:
@@ -131,7 +136,7 @@ def _of_folder(folder: Path) -> list[Source]:
         entries = sorted(folder.iterdir())
     except OSError as error:
         raise InputError(folder, '', EXPECTED, reason(error)) from None
-    if any(entry.suffix == '.mcap' for entry in entries):
+    if any(entry.suffix in ('.mcap', OTHERS[0]) for entry in entries):
         return [Source('bag', folder)]
     names = _controllers(folder)
     bags = [e for e in entries if e.is_dir() and any(e.glob('*.mcap'))]

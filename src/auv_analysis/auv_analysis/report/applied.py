@@ -54,9 +54,10 @@ def applied_figure(run: Sketch, limit: np.ndarray | None) -> tuple[Figure, str, 
 def _panel(axes: Axes, run: Sketch, i: int, bound: float | None) -> bool:
     """Draw one degree of freedom; whether its command was cut off by the axis."""
     command = run.part('tau')
-    axes.plot(*run.line('tau', i), **COMMAND)
-    axes.plot(*run.line('applied', i), color=COLOURS[i], linewidth=1.4)
+    axes.plot(*run.drawn('tau', i), **COMMAND)
+    axes.plot(*run.drawn('applied', i), color=COLOURS[i], linewidth=1.4)
     axes.set_xlim(run.start, run.start + run.duration)
+    plotting.shade_gaps(axes, run)
     seen = run.part('applied').peak[i]
     if bound is not None and bound <= BEYOND * max(seen, command.peak[i]):
         seen = max(seen, bound)

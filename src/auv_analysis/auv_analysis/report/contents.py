@@ -15,10 +15,11 @@ from auv_analysis.report.rendering import prose
 from auv_analysis.report.set_up import SetUp
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.tables.controllers import notes
+from auv_analysis.run import FOREIGN
 
 FIGURES = {  # part of the report -> beginnings of the names of its figures
     'errors': ('errors_', 'settling'),
-    'estimates': ('lumped_error_', 'uncertainty_'),
+    'estimates': ('lumped_error_', 'uncertainty_', 'unexplained_'),
     'inputs': ('inputs_',),
     'certificates': ('certificate_',),
     'energy': ('kinetic_energy', 'energy_shares'),
@@ -81,7 +82,8 @@ class Contents:
     def _experiment(self) -> Iterator[Block]:
         scenarios = list(dict.fromkeys(run.scenario for run in self.runs.values()))
         commanded = any(run.acting for run in self.runs.values())
-        yield prose('experiment', scenarios=scenarios, commanded=commanded)
+        foreign = any(run.source == FOREIGN for run in self.runs.values())
+        yield prose('experiment', scenarios=scenarios, commanded=commanded, foreign=foreign)
         yield tables.controllers_table(self.runs)
         several = len(self.scenes) > 1
         for number, (names, scene) in enumerate(self.scenes.items(), start=1):
@@ -98,11 +100,13 @@ class Contents:
         yield from tables.gains_tables(self.runs, self.summaries)
 
     def _tracking(self) -> Iterator[Block]:
-        without = [name for name, run in self.runs.items() if not run.estimates]
+        known = {name: run for name, run in self.runs.items() if run.knows_disturbance}
+        without = [name for name, run in known.items() if not run.estimates]
         yield tables.key_figures_table(self.summaries, without)
         yield from self._shown('errors')
-        if not self._drawn('estimates'):
+        if not known:
             yield NO_F
+        yield from tables.unexplained_tables(self.summaries)
         yield from self._shown('estimates')
         yield from self._shown('inputs')
         yield prose('certificate', sampled=_sampled(self.summaries))

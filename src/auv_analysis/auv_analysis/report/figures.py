@@ -20,6 +20,7 @@ from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
 from auv_analysis.report.statistics import Part
 from auv_analysis.report.text import join, number
+from auv_analysis.report.unexplained import unexplained_figure
 from auv_analysis.run import AnyRun
 from auv_analysis.summary import TRANSIENT
 from auv_dynamics.signals import DOFS
@@ -90,6 +91,9 @@ def draw_figures(
         for run in drawn.values():
             if run.knows_disturbance:
                 add(f'lumped_error_{run.controller}', *_lumped(run))
+        for name, run in drawn.items():
+            if 'unexplained' in run.columns:
+                add(f'unexplained_{name}', *unexplained_figure(run))
         for run in different_disturbances(drawn).values():
             add(f'uncertainty_{run.controller}', *_uncertainty(run))
         for name, run in drawn.items():
@@ -129,6 +133,8 @@ def six_signals(kind: str, run: Sketch, quantity: Quantity, zeros: Sequence[str]
     """
     title = f'{quantity.name.capitalize()}, {run.controller}'
     signal = SIGNALS[kind]
+    if signal not in run.columns:
+        return None, title, f'{title}: without a set-point there is none.'
     drawn = plotting.moving(run.part(signal), zeros)
     structure = structure_sentence(kind, zeros)
     if not drawn:
@@ -142,6 +148,7 @@ def six_signals(kind: str, run: Sketch, quantity: Quantity, zeros: Sequence[str]
     still = [dof for i, dof in enumerate(DOFS) if i not in drawn and dof not in zeros]
     if still:
         caption.append(f'Zero throughout this run and not drawn: {join(still)}.')
+    caption.append(plotting.gap_sentence(run).strip())
     figure = (_split_panels if split else _whole_panels)(run, signal, quantity, drawn)
     return figure, title, ' '.join(filter(None, caption))
 

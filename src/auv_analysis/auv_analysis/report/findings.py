@@ -11,6 +11,7 @@ from auv_analysis.report.document import Sentence
 from auv_analysis.report.figures import reference
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.text import fixed, join, number
+from auv_analysis.report.unexplained import unexplained_finding
 from auv_dynamics.signals import DOFS
 
 Summaries = Mapping[str, Mapping[str, Any]]
@@ -38,6 +39,9 @@ def findings(
     found = [Sentence(_settling(n, run, summaries[n]), figures) for n, run in runs.items()]
     found += [Sentence(_late_errors(summaries), figures), Sentence(_inputs(summaries), figures)]
     found += [Sentence(_applied(runs), 'inputs_compared')]
+    found += [
+        Sentence(unexplained_finding(n, s), f'table-unexplained_{n}') for n, s in summaries.items()
+    ]
     found += [Sentence(_energy(runs, leading, mine), 'table-energy')]
     found += [Sentence(_couplings(mine, leading), 'table-couplings')]
     found += [Sentence(_claims(claims), 'table-claims')]
@@ -46,6 +50,8 @@ def findings(
 
 def _settling(name: str, run: Sketch, summary: Mapping[str, Any]) -> str:
     times = summary['velocity_error']['settling_time']
+    if times is None:
+        return f'Of {name} no set-point is known, and so no error.'
     missing = [dof for dof, time in zip(DOFS, times, strict=True) if time is None]
     if not missing:
         return f'Under {name} every velocity error has settled after {max(times):.2f} s.'

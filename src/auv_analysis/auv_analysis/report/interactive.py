@@ -12,7 +12,7 @@ from auv_analysis.report.panel_models import DASHES, model
 from auv_analysis.report.panels import panel_sets
 from auv_analysis.report.plotting import COLOURS
 from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.traces import COLUMNS, Line, thinned
+from auv_analysis.report.traces import COLUMNS, Line, broken, thinned
 from auv_analysis.summary import TRANSIENT
 from auv_dynamics.signals import DOFS
 
@@ -113,7 +113,7 @@ def _entry(panel: Panel, packer: Packer, columns: int) -> dict[str, Any]:
 
 
 def _packed_line(line: PanelLine, packer: Packer, columns: int) -> dict[str, Any]:
-    t, y = _thinned(line.line, columns)
+    t, y = broken(_thinned(line.line, columns), line.gaps, line.step)
     return {
         'run': line.run,
         'key': line.key,

@@ -17,6 +17,7 @@ from auv_analysis.report.text import join
 from auv_analysis.summary import BAND, SMALLEST_BAND
 from auv_dynamics.signals import DOFS
 
+GREY_LINE = ', and in grey that of a vehicle that moves exactly as the set-point asks'
 MARKERS = 'os^vPX'
 SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
 RUNS = ('#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00')  # of three runs and more
@@ -24,13 +25,18 @@ APART = 20.0  # ratio of peaks from which runs share no linear scale
 XI = tuple(rf'$\xi_{i}$' for i in range(1, 7))
 
 
-def settling(runs: Mapping[str, Sketch]) -> tuple[Figure, str, str]:
+def settling(runs: Mapping[str, Sketch]) -> tuple[Figure | None, str, str]:
     """The largest error still to come, per degree of freedom and controller.
 
     The envelope max of abs(nu_err) over [t, end] falls monotonically: where it crosses the band
-    the error has settled. Returns figure, title and caption.
+    the error has settled. Returns figure, title and caption; no figure where no run
+    has a set-point.
 
     """
+    runs = {name: run for name, run in runs.items() if run.knows_setpoint}
+    title = 'Error still to come'
+    if not runs:
+        return None, title, f'{title}: without a set-point there is none.'
     figure, panels = _six_panels(runs)
     for i, axes in enumerate(panels):
         band = 0.0
@@ -43,7 +49,6 @@ def settling(runs: Mapping[str, Sketch]) -> tuple[Figure, str, str]:
         plotting.logarithmic(axes, 'x', 'y')
     for row, unit in zip((0, 3), plotting.VELOCITY, strict=True):
         panels[row].set_ylabel(rf'$\max_{{s\,\geq\,t}}|\Delta\nu(s)|$ ({unit})')
-    title = 'Error still to come'
     caption = (
         f'{title}: the largest velocity error between t and the end of the run, '
         f'{_named_dashes(runs)}. An error has settled where its line falls below the dotted band '
@@ -61,7 +66,7 @@ def inputs(runs: Mapping[str, Sketch]) -> tuple[Figure, str, str]:
         path = [run.part('tau').path[i] for run in runs.values()]
         above = 3.0 - np.argsort(np.argsort(path)) / len(runs)  # smooth lines over restless ones
         for look, run, order in zip(_looks(runs, COLOURS[i]), runs.values(), above, strict=True):
-            axes.plot(*run.line('tau', i, 'log'), zorder=order, **look)
+            axes.plot(*run.drawn('tau', i, 'log'), zorder=order, **look)
         plotting.logarithmic(axes, 'x')
         apart = _symmetric(axes, [run.part('tau').peak[i] for run in runs.values()]) or apart
     for i, unit in enumerate(3 * plotting.WRENCH[:1] + 3 * plotting.WRENCH[1:]):
@@ -86,13 +91,15 @@ def energy(runs: Mapping[str, Sketch], leading: Sketch) -> tuple[Figure, str, st
     """Kinetic energy over time and its shares. Returns figure, title and caption."""
     figure = plotting.new_figure(2.7)
     left, right = figure.subplots(1, 2)
-    left.plot(*leading.line('wanted'), color='#b5b5b5', linewidth=3.2)
-    handles = [Line2D([], [], color='#b5b5b5', linewidth=3.2)]
+    handles, wanted = [], []
+    if leading.knows_setpoint:
+        wanted = ['set-point']
+        handles = left.plot(*leading.drawn('wanted'), color='#b5b5b5', linewidth=3.2)
     for look, run in zip(_looks(runs), runs.values(), strict=True):
-        handles += left.plot(*run.line('kinetic'), **look)
+        handles += left.plot(*run.drawn('kinetic'), **look)
     left.legend(
         handles,
-        ['set-point', *runs],
+        [*wanted, *runs],
         loc='lower right',
         bbox_to_anchor=(1.0, 1.02),
         ncols=3,
@@ -100,14 +107,17 @@ def energy(runs: Mapping[str, Sketch], leading: Sketch) -> tuple[Figure, str, st
     left.set_ylim(bottom=0.0)
     left.set_ylabel('kinetic energy (J)')
     _stack(right, leading)
+    for axes in (left, right):
+        plotting.shade_gaps(axes, leading)
     for index, axes in enumerate((left, right)):
         axes.set_xlim(leading.start, leading.start + leading.duration)
         axes.set_xlabel('$t$ (s)')
         plotting.letter(axes, index)
     title = 'Kinetic energy'
     caption = (
-        f'{title}: (a) of each controller, and in grey that of a vehicle that moves exactly as '
-        f'the set-point asks; (b) shares of the components of {leading.controller}, equation (30).'
+        f'{title}: (a) of each controller{GREY_LINE if wanted else ""}; '
+        f'(b) shares of the components of {leading.controller}, equation (30).'
+        f'{plotting.gap_sentence(leading)}'
     )
     return figure, title, caption
 
@@ -172,7 +182,7 @@ def _mark(marker: str, label: str, colour: str = 'black') -> Line2D:
 
 def _stack(axes: Axes, run: Sketch) -> None:
     """Shares (30) over time, stacked; long runs as means over columns of samples."""
-    t, part = run.stack
+    t, part = run.shares()
     axes.stackplot(t, part.T, colors=COLOURS, linewidth=0)
     shown = [i for i in range(6) if part[:, i].max(initial=0.0) > 1.0]
     patches = [Line2D([], [], color=COLOURS[i], linewidth=6) for i in shown]

@@ -29,12 +29,13 @@ class Key:
 
 @dataclass(frozen=True, eq=False)
 class PanelLine:
-    """Line of a run in a panel: of its `keys[key]`, times and values (n,) each."""
+    """Line of a run in a panel: of its `keys[key]`, times and values (n,) each; broken at gaps."""
 
     run: str
     key: int
     line: Line
     step: float
+    gaps: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

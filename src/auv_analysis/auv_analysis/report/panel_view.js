@@ -137,7 +137,7 @@ class PanelView {
     for (const cell of this.cells) {
       const line = this.content.lines[cell.dataset.line];
       const i = pointed === null || !this.shows(line) ? -1 : nearest(line.t, pointed);
-      cell.textContent = i < 0 ? '' : digits(line.y[i]);
+      cell.textContent = i < 0 || Number.isNaN(line.y[i]) ? '' : digits(line.y[i]);
     }
   }
 

@@ -23,13 +23,14 @@ SIX = {  # signal of `Sketch` -> what it is, whether its size also shows on a lo
     'F': (plotting.UNCERTAINTY, False),
     'tau': (plotting.INPUT, False),
     'applied': (Quantity('applied wrench', (), plotting.WRENCH), False),
+    'unexplained': (Quantity('unexplained wrench', (), plotting.WRENCH), False),
     'energy': (ENERGY, False),
     'delta_xi': (plotting.DELTA_XI, False),
     'delta_pi': (plotting.DELTA_PI, False),
 }
 SECTIONS = {  # set of panels -> its signals, beginnings of the names of the figures it stands for
     'errors': (('error',), ('errors_',)),
-    'estimates': (('lumped_error', 'F'), ('lumped_error_', 'uncertainty_')),
+    'estimates': (('lumped_error', 'F', 'unexplained'), ('lumped_error_', 'uncertainty_')),
     'inputs': (('tau', 'applied'), ('inputs_',)),
     'certificates': ((), ('certificate_',)),
     'energy': (('energy',), ('kinetic_energy',)),
@@ -126,7 +127,7 @@ def _kinetic(runs: Mapping[str, Sketch]) -> Panel:
 def _shares(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
     keys = tuple(Key(dof, colour) for dof, colour in zip(DOFS, COLOURS, strict=True))
     for name, run in runs.items():
-        t, parts = run.stack
+        t, parts = run.shares()
         if len(t):
             lines = tuple(PanelLine(name, i, (t, parts[:, i]), run.step) for i in range(6))
             title = f'Shares of ξ1 to ξ6 in the kinetic energy, {name}'
@@ -136,7 +137,8 @@ def _shares(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
 def _lines(runs: Mapping[str, Sketch], signals: Sequence[tuple[str, int]]) -> Iterator[PanelLine]:
     for name, run in runs.items():
         for key, (signal, column) in enumerate(signals):
-            yield PanelLine(name, key, _whole(run, signal, column), run.step)
+            if any((signal, part) in run.traces for part in ('whole', 'early')):
+                yield PanelLine(name, key, _whole(run, signal, column), run.step, run.gaps)
 
 
 def _whole(run: Sketch, signal: str, column: int) -> Line:

@@ -22,6 +22,7 @@ from auv_dynamics.signals import DOFS
 
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#D55E00', '#56B4E9')  # Okabe and Ito
 DASHES = ('-', (0, (4, 1.6)), (0, (1, 1.3)), (0, (6, 1.4, 1, 1.4)), (0, (9, 2)), (0, (3, 1, 1, 1)))
+NOTHING = '#ececec'  # where there are no samples
 GREY = '#6b6b6b'
 PALETTE = 64  # colours of a PNG
 WIDTH = 6.27  # in, text of Taylor & Francis's LaTeX class in large format: A4, margins of 1 in
@@ -134,10 +135,24 @@ def draw_lines(axes: Axes, run: Sketch, signal: str, part: str, columns: Sequenc
     """Lines of some columns of a signal over a part of the time, in their colours."""
     ends = []
     for i in columns:
-        t, y = run.line(signal, i, part)
+        t, y = run.drawn(signal, i, part)
         axes.plot(t, y, color=COLOURS[i])
         ends = [t[0], t[-1]]
     axes.set_xlim(*ends)
+    shade_gaps(axes, run)
+
+
+def shade_gaps(axes: Axes, run: Sketch) -> None:
+    """Grey where a run has no samples, over whatever is drawn there; the limits stay."""
+    limits = axes.get_xlim()
+    for begin, end in run.gaps:
+        axes.axvspan(begin, end, color=NOTHING, linewidth=0, zorder=2.5)
+    axes.set_xlim(limits)
+
+
+def gap_sentence(run: Sketch) -> str:
+    """What the grey spans of a run with gaps are, to be added to a caption."""
+    return ' Grey spans: no samples.' if run.gaps else ''
 
 
 def key(axes: Axes, quantity: Quantity, columns: Sequence[int]) -> None:

@@ -17,7 +17,7 @@ from auv_analysis.report.words import (
     per_axis,
     rotations,
 )
-from auv_analysis.run import Facts
+from auv_analysis.run import FOREIGN, Facts
 from auv_analysis.scenario import SCHEMA
 from auv_dynamics.files import InputError, check, parse_yaml
 from auv_dynamics.signals import DOFS
@@ -25,6 +25,7 @@ from auv_gvc_controller.gains import sampling_warning
 
 VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
 KEYS = {'set-point': 'setpoint', 'start': 'initial', 'disturbances': 'disturbance'}
+ELSEWHERE = 'not known: another system ran the law; the notes say how its bag was read'
 KINDS = {
     'herman2018': herman2018,
     'harmonic': lambda spec: f'harmonic, opposing τ: {harmonics(spec, DOFS, WRENCH)}',
@@ -133,7 +134,8 @@ def _shared(
     }
     holds: dict[str, list[str]] = {}
     for name, run in runs.items():
-        holds.setdefault(words.get(run.hold, run.hold), []).append(name)
+        text = ELSEWHERE if run.source == FOREIGN else words.get(run.hold, run.hold)
+        holds.setdefault(text, []).append(name)
     lines = [
         text + (f' ({join(names)})' if len(holds) > 1 else '') for text, names in holds.items()
     ]

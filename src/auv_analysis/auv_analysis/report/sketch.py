@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from auv_analysis.report.statistics import Part, Statistics
-from auv_analysis.report.traces import Line, Trace
+from auv_analysis.report.traces import Line, Trace, broken
 from auv_analysis.run import Extent, Facts
 
 FOREVER = float('inf')
@@ -15,10 +15,11 @@ FOREVER = float('inf')
 class Sketch(Facts):
     """A run as the report sees it: never more than some thousand points of each signal.
 
-    Signals of six columns: `error`, `nu`, `nu_d`, `tau`, `delta_xi`, `delta_pi`, `energy`, and
-    where they are there `F`, `lumped_error` and `applied`. Of one column: `kinetic` and `wanted`,
-    the energies of the run and of its set-point, and of a certificate `L`, `L_dot`, `identity`,
-    `bound` and `increasing`, which is 1 where the identity is positive, else 0.
+    Signals of six columns: `nu`, `tau`, `delta_xi`, `delta_pi`, `energy`, and where they are there
+    `error`, `nu_d`, `F`, `lumped_error`, `applied` and, of an F that was estimated, `unexplained`
+    with `least` and `most`, two standard errors around it. Of one column: `kinetic` and `wanted`,
+    the energies of the run and of its set-point, if there is one, and of a certificate `L`,
+    `L_dot`, `identity`, `bound` and `increasing`, 1 where the identity is positive, else 0.
 
     Attributes
     ----------
@@ -56,6 +57,23 @@ class Sketch(Facts):
     def line(self, name: str, column: int = 0, part: str = 'whole') -> Line:
         """Line of a column of a signal."""
         return self.traces[name, part][column].line()
+
+    def shares(self) -> Line:
+        """The stacked shares, nothing in gaps."""
+        t, parts = self.stack
+        for begin, end in self.gaps:
+            outside = (t <= begin) | (t >= end)  # a column of samples may lie across
+            t, parts = t[outside], parts[outside]
+            at = np.searchsorted(t, [begin + self.step, end - self.step])
+            t = np.insert(t, at, [begin + self.step, end - self.step])
+            parts = np.insert(parts, at, 0.0, axis=0)
+        return t, parts
+
+    def drawn(self, name: str, column: int = 0, part: str = 'whole') -> Line:
+        """The same line with a NaN in every gap, so that it breaks there."""
+        origin = self.start if part == 'log' else 0.0
+        gaps = [(begin - origin, end - origin) for begin, end in self.gaps]
+        return broken(self.line(name, column, part), gaps, self.step)
 
     def part(self, name: str, first: float = 0.0, last: float = FOREVER) -> Part:
         """Statistics of a signal in [first, last], s from the start.

@@ -18,7 +18,9 @@ from auv_analysis.summary import TRANSIENT
 from auv_gvc_controller.model import ControlModel, control_model
 
 SPLIT = ('error', 'lumped_error', 'tau', 'delta_pi')  # begin with a peak that dwarfs the rest
-WHOLE = ('F', 'delta_xi', 'applied', 'kinetic', 'wanted', 'energy')
+WHOLE = (
+    'F', 'delta_xi', 'applied', 'kinetic', 'wanted', 'energy', 'unexplained', 'least', 'most',
+)  # fmt: skip
 NEAR_ZERO = 0.005  # m/s, rad/s: what counts as a settled error
 SHARE_COLUMNS = 600  # of the stacked shares
 
@@ -58,16 +60,21 @@ def signals(run: Run, model: ControlModel) -> dict[str, np.ndarray]:
     Upsilon, Upsilon_inv = (m.reshape(6, 6) for m in (model.Upsilon, model.Upsilon_inv))
     energy = kinetic_energy(Upsilon_inv, model.N, run.nu)
     found = {
-        'error': run.nu_d - run.nu,
         'nu': run.nu,
-        'nu_d': run.nu_d,
         'tau': run.tau,
         'delta_xi': delta_xi(Upsilon_inv, run.nu),
         'delta_pi': delta_pi(Upsilon, run.tau),
         'energy': energy,
         'kinetic': energy.sum(axis=1, keepdims=True),
-        'wanted': kinetic_energy(Upsilon_inv, model.N, run.nu_d).sum(axis=1, keepdims=True),
     }
+    if run.knows_setpoint:
+        wanted = kinetic_energy(Upsilon_inv, model.N, run.nu_d)
+        found |= {'error': run.nu_d - run.nu, 'nu_d': run.nu_d}
+        found['wanted'] = wanted.sum(axis=1, keepdims=True)
+    if run.unexplained is not None and run.unexplained_error is not None:
+        apart = 2.0 * run.unexplained_error
+        found['unexplained'] = run.unexplained
+        found |= {'least': run.unexplained - apart, 'most': run.unexplained + apart}
     if run.applied is not None:
         found['applied'] = run.applied
     if run.disturbance is not None:
@@ -110,7 +117,8 @@ class _Builder:
         for name, values in found.items() if self._lines else ():
             self._draw(name, block.t, values)
         self._add_shares(block.t, found['energy'])
-        far = np.flatnonzero(np.abs(found['error']).max(axis=1) > NEAR_ZERO)
+        error = found.get('error', np.zeros((1, 6)))
+        far = np.flatnonzero(np.abs(error).max(axis=1) > NEAR_ZERO)
         if len(far):
             self._outside = float(block.t[far[-1]] - self._run.start)
         self._estimates |= bool(np.any(block.disturbance_estimate != 0.0))
@@ -135,7 +143,7 @@ class _Builder:
         run = self._run
         if name in SPLIT:
             self._in_phases(name, t, values)
-        if name in WHOLE or (name == 'tau' and run.acting):
+        if name in WHOLE or (name == 'tau' and (run.acting or run.acceleration is not None)):
             self._all('whole', name, t, values)
         if name == 'tau':  # the sample at t = 0 stands at the left edge
             self._all('log', name, np.maximum(t - run.start, run.step), values)

@@ -1,5 +1,7 @@
 """Lines with few points that look the same: the extremes of every column of pixels."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 COLUMNS = 2000  # finer than the pixels of a panel; a line has at most two points in each
@@ -72,6 +74,15 @@ def thinned(
     high = high[np.diff(owner[high], append=len(starts)) > 0]  # and the last that is largest
     keep = np.unique(np.concatenate([low, high, [0, len(t) - 1]]))
     return t[keep], y[keep]
+
+
+def broken(line: Line, gaps: Iterable[tuple[float, float]], step: float) -> Line:
+    """The same line with a NaN a step behind the begin of every gap that it crosses."""
+    t, y = line
+    places = np.array([begin + step for begin, _ in gaps])
+    at = np.searchsorted(t, places)
+    inside = (at > 0) & (at < len(t))
+    return np.insert(t, at[inside], places[inside]), np.insert(y, at[inside], np.nan)
 
 
 def decimate(t: np.ndarray, y: np.ndarray, *, logarithmic: bool = False) -> Line:

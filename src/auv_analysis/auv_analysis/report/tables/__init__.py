@@ -7,6 +7,7 @@ from auv_analysis.report.tables.couplings import couplings_table, terms_table
 from auv_analysis.report.tables.energy import energy_table
 from auv_analysis.report.tables.gains import decompositions, gains_tables, scalar_gains
 from auv_analysis.report.tables.key_figures import key_figures_table
+from auv_analysis.report.tables.unexplained import unexplained_tables
 
 __all__ = [
     'certificate_table',
@@ -21,4 +22,5 @@ __all__ = [
     'scalar_gains',
     'set_up_table',
     'terms_table',
+    'unexplained_tables',
 ]

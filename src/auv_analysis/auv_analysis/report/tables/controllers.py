@@ -8,11 +8,15 @@ from auv_analysis.report.set_up import SetUp
 from auv_analysis.report.tables.sources import numbers_in, summary_source
 from auv_analysis.report.text import fixed, join, plain
 from auv_analysis.report.words import gain_text
-from auv_analysis.run import Facts
+from auv_analysis.run import FOREIGN, Facts
 from auv_gvc_controller.laws import SHIPPED
 
 SCENARIO = 'scenario.yaml'
-ORIGIN = {'bag': 'recorded on the node graph', 'simulate': 'simulated in process'}
+ORIGIN = {
+    'bag': 'recorded on the node graph',
+    'simulate': 'simulated in process',
+    FOREIGN: 'recorded by another system',
+}
 COLUMNS = (
     Column('controller', meaning='name of the run', numeric=False),
     Column('law', meaning='the control law, shipped or module:Class', numeric=False),

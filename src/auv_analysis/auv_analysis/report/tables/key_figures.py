@@ -49,7 +49,8 @@ def _row(name: str, summary: Any, i: int) -> list[Cell]:
         values = summary[group][figure]
         return cell(values and values[i], summary_source(name, group, figure, i))
 
-    time = summary['velocity_error']['settling_time'][i]
+    times = summary['velocity_error']['settling_time']
+    time = times and times[i]
     where = summary_source(name, 'velocity_error', 'settling_time', i)
     return [
         Cell(name),

@@ -1,0 +1,1 @@
+"""Bags of other systems: any topics that hold odometry and wrench, read as a `Run`."""

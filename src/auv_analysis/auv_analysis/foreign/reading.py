@@ -1,0 +1,132 @@
+"""The mapped topics of a bag, message by message, into arrays."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.foreign.candidates import survey
+from auv_analysis.foreign.containers import messages
+from auv_analysis.foreign.kinds import READERS, Reading, are_usable
+from auv_analysis.foreign.mapping import Source, TopicMap
+from auv_analysis.foreign.signals import Recorded
+from auv_dynamics.files import InputError
+
+TOGETHER = 4096  # messages that wait as objects before they become rows of arrays
+
+
+def read_sources(bag: Path, mapping: TopicMap, notes: list[str]) -> dict[str, Recorded]:
+    """Role -> its messages, in their order in the bag.
+
+    Parameters
+    ----------
+    bag : folder or file
+    mapping : its topics
+    notes : gets a line for everything that is odd
+
+    Raises
+    ------
+    InputError : a topic is not in the bag, of another type, empty or of no use
+
+    """
+    types = survey(bag).types
+    found = {role: _Messages(bag, source, types) for role, source in mapping.sources.items()}
+    by_topic: dict[str, list[_Messages]] = {}
+    for one in found.values():
+        by_topic.setdefault(one.source.topic, []).append(one)
+    for topic, log, message in messages(bag, by_topic.keys(), notes):
+        for one in by_topic[topic]:
+            one.add(log, message)
+    return {role: one.recorded(notes) for role, one in found.items()}
+
+
+class _Messages:
+    """Takes the messages of one topic for one role.
+
+    Parameters
+    ----------
+    bag : for refusals
+    source : the topic
+    types : topic -> type, of the bag
+
+    """
+
+    def __init__(self, bag: Path, source: Source, types: dict[str, str]):
+        self.source, self._bag = source, bag
+        self._read = self._reader(types)
+        self._waiting: list[tuple[int, Reading]] = []
+        self._parts: list[tuple[np.ndarray, np.ndarray]] = []
+        self._frames: set[tuple[str, str]] = set()
+        self._width, self._stamped = 0, False
+
+    def _reader(self, types: dict[str, str]) -> Callable[[Any], Reading]:
+        readers, topic = READERS[self.source.role], self.source.topic
+        kind = types.get(topic)
+        if kind is None:
+            fitting = [topic for topic in sorted(types) if types[topic] in readers]
+            expected = f'a topic of the bag{": " if fitting else ""}{", ".join(fitting)}'
+            raise InputError(self._bag, self.source.role, expected, topic)
+        if kind not in readers:
+            raise InputError(self._bag, topic, ' or '.join(readers), kind)
+        return readers[kind]
+
+    def add(self, log: int, message: Any) -> None:
+        """Take the next message, logged at a time in ns."""
+        try:
+            reading = self._read(message)
+        except (AttributeError, TypeError, ValueError) as error:  # other fields than its type has
+            raise self._refusal('messages of its type', str(error)) from None
+        self._width = self._width or len(reading.row)
+        if len(reading.row) != self._width:
+            expected = f'{self._width} numbers in each message'
+            raise self._refusal(expected, f'{len(reading.row)}')
+        self._frames.add((reading.frame, reading.child))
+        if len(self._frames) > 1:
+            ids = sorted(' '.join(filter(None, pair)) or 'none' for pair in self._frames)
+            raise self._refusal('the same frame_id in all messages', '; '.join(ids))
+        self._stamped = reading.stamp is not None
+        self._waiting.append((log, reading))
+        if len(self._waiting) == TOGETHER:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Turn what waits into arrays."""
+        times = [(log, log if one.stamp is None else one.stamp) for log, one in self._waiting]
+        rows = np.array([one.row for _, one in self._waiting], float)
+        self._parts.append((np.array(times, np.int64), rows))
+        self._waiting.clear()
+
+    def recorded(self, notes: list[str]) -> Recorded:
+        """All messages; those without usable numbers are left out, and counted in the notes."""
+        topic = self.source.topic
+        if self._waiting:
+            self._settle()
+        if not self._parts:
+            raise self._refusal('messages', 'none')
+        times, rows = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        self._parts.clear()
+        log, stamps = times.T
+        stamped = self._stamped and self.source.stamps == 'header'
+        if stamped and not stamps.any():
+            notes.append(f'{topic}: every stamp is zero, so the time of logging is taken')
+            stamped = False
+        elif not self._stamped:
+            notes.append(f'{topic}: messages without stamp, so the time of logging is taken')
+        usable = are_usable(rows, self.source.role)
+        if not usable.any():
+            raise self._refusal('finite numbers and unit quaternions', 'none')
+        if not usable.all():
+            lost = np.count_nonzero(~usable)
+            notes.append(
+                f'{topic}: {lost} of {len(rows)} messages were left out: not finite, or without '
+                'a unit quaternion'
+            )
+        frame, child = next(iter(self._frames))
+        found = Recorded(
+            self._bag, self.source, frame, child, log, stamps if stamped else log, stamped, rows
+        )
+        return found.part(usable)
+
+    def _refusal(self, expected: str, found: str) -> InputError:
+        return InputError(self._bag, self.source.topic, expected, found)

@@ -1,0 +1,86 @@
+"""Bags that the rosbags library reads: rosbag2's SQLite files and ROS 1 files."""
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rosbags.interfaces import Connection, MessageDefinitionFormat
+from rosbags.rosbag1 import Reader as Rosbag1
+from rosbags.rosbag2 import Reader as Rosbag2
+
+from auv_analysis.bag.contents import Contents
+from auv_analysis.foreign.decoders import Decoder, Logged, decoded, decoder_of, refusal
+
+
+def survey_of_rosbags(bag: Path) -> Contents:
+    """Topics, types, counts and span of a bag, without its messages."""
+    contents = Contents()
+    for part in _parts(bag):
+        with _opened(part) as reader:
+            for connection in reader.connections:
+                topic = connection.topic
+                contents.types[topic] = connection.msgtype
+                contents.counts[topic] = contents.counts.get(topic, 0) + connection.msgcount
+            if reader.message_count:
+                contents.span(reader.start_time, reader.end_time - 1)
+    return contents
+
+
+def messages_of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[Logged]:
+    """Messages of some topics, in the order of logging."""
+    for part in _parts(bag):
+        yield from _messages(part, topics)
+
+
+def _messages(bag: Path, topics: Collection[str]) -> Iterator[Logged]:
+    with _opened(bag) as reader:
+        wanted = [c for c in reader.connections if c.topic in topics]
+        if not wanted:
+            return
+        decoders = {c.id: _of_connection(bag, c) for c in wanted}
+        found = reader.messages(connections=wanted)
+        while True:
+            try:
+                connection, log_time, data = next(found)
+            except StopIteration:
+                return
+            except Exception as error:  # whatever the library meets in a damaged file
+                raise refusal(bag, '', 'a bag that can be read to its end', error) from None
+            topic = connection.topic
+            message = decoded(bag, topic, decoders[connection.id], bytes(data))
+            yield Logged(topic, log_time, message)
+
+
+def _of_connection(bag: Path, connection: Connection) -> Decoder:
+    definition = connection.msgdef
+    known = definition.format != MessageDefinitionFormat.NONE
+    language = 'idl' if definition.format == MessageDefinitionFormat.IDL else 'msg'
+    encoding = 'ros1' if _is_ros1(bag) else 'cdr'
+    text = definition.data if known else ''
+    return decoder_of(bag, connection.topic, (connection.msgtype, text, language, encoding))
+
+
+def _parts(bag: Path) -> list[Path]:
+    """What rosbags opens: a folder whose recorder was killed has no metadata, but its files."""
+    if bag.is_dir() and not (bag / 'metadata.yaml').exists():
+        return sorted(bag.glob('*.db3'))
+    return [bag]
+
+
+def _is_ros1(bag: Path) -> bool:
+    return bag.suffix == '.bag' and not bag.is_dir()
+
+
+@contextmanager
+def _opened(bag: Path) -> Iterator[Any]:
+    """An open reader of the rosbags library."""
+    try:
+        reader: Any = Rosbag1(bag) if _is_ros1(bag) else Rosbag2(bag)
+        reader.open()
+    except Exception as error:  # of SQLite, of YAML, of the library: by what the file is
+        raise refusal(bag, '', 'a bag that rosbags can open', error) from None
+    try:
+        yield reader
+    finally:
+        reader.close()

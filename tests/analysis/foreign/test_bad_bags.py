@@ -1,0 +1,100 @@
+"""Files that are no bags, or damaged ones: one line that names file and reason, nothing else."""
+
+import pytest
+from foreign_bags import UNNAMED, Maker, loaded, motion, simple, simulated, write, write_chunks
+
+from auv_analysis.bag.files import files_of, is_mcap
+from auv_analysis.run import Run
+from auv_dynamics.files import InputError
+
+KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
+
+
+@pytest.fixture(scope='module')
+def run() -> Run:
+    return simulated(duration=0.5)
+
+
+def listed(run: Run, maker: Maker) -> list:
+    return simple(motion(run, enu=True), maker, '/o', '/w', UNNAMED)
+
+
+@pytest.mark.parametrize('name', ['x.db3', 'x.bag', 'x.mcap'])
+@pytest.mark.parametrize('data', [b'', b'no bag at all', b'SQLite format 3\0', b'#ROSBAG V2.0\n'])
+def test_what_is_no_bag_is_refused(name, data, tmp_path) -> None:
+    path = tmp_path / name
+    path.write_bytes(data)
+    with pytest.raises(InputError) as refusal:
+        loaded(path, **KEYS)
+    assert str(path) in str(refusal.value)
+
+
+def test_no_bag_is_refused(tmp_path) -> None:
+    for path in (tmp_path, tmp_path / 'gone', tmp_path / ('x' * 300)):
+        with pytest.raises(InputError, match=r'expected a bag: a folder, an \.mcap, a \.db3 or a'):
+            is_mcap(path)
+
+
+def test_a_damaged_ros_1_bag_is_refused(run, tmp_path) -> None:
+    maker = Maker(ros1=True)
+    path = write(tmp_path / 'whole', listed(run, maker), maker, kind='bag')
+    data = path.read_bytes()
+    for cut in (100, 4096, len(data) // 2, len(data) - 50):
+        path.write_bytes(data[:cut])
+        with pytest.raises(InputError) as refusal:
+            loaded(path, **KEYS)
+        assert str(path) in str(refusal.value)
+
+
+def test_a_damaged_chunk_ends_an_mcap(run, tmp_path) -> None:
+    path = write_chunks(tmp_path / 'x.mcap', listed(run, Maker()), Maker())
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 255
+    path.write_bytes(data)
+    found = loaded(path, **KEYS)
+    assert any('damaged' in note for note in found.notes)
+    assert found.samples < run.samples
+
+
+@pytest.mark.parametrize('kind', ['mcap', 'sqlite3', 'bag'])
+def test_results_must_not_overwrite_the_files_of_a_bag(kind, run, tmp_path) -> None:
+    maker = Maker(ros1=kind == 'bag')
+    path = write(tmp_path / 'dive', listed(run, maker), maker, kind=kind)
+    found = files_of(path)
+    assert found
+    assert all(file.is_file() for file in found)
+
+
+def test_messages_of_another_definition_are_refused(run, tmp_path) -> None:
+    from mcap.writer import Writer
+
+    path = tmp_path / 'x.mcap'
+    writer = Writer(str(path))
+    writer.start(profile='ros2', library='test')
+    for topic, kind in (('/o', 'nav_msgs/msg/Odometry'), ('/w', 'geometry_msgs/msg/Wrench')):
+        schema = writer.register_schema(kind, 'ros2msg', b'float64 depth\n')
+        channel = writer.register_channel(topic, 'cdr', schema)
+        writer.add_message(channel, 0, b'\0\1\0\0' + bytes(8), 0)
+    writer.finish()
+    with pytest.raises(InputError, match='/o: expected messages of its type, found'):
+        loaded(path, **KEYS)
+
+
+@pytest.mark.parametrize(
+    ('language', 'encoding'), [('jsonschema', 'json'), ('protobuf', 'protobuf')]
+)
+def test_other_encodings_are_refused(language, encoding, tmp_path) -> None:
+    from mcap.writer import Writer
+
+    path = tmp_path / 'x.mcap'
+    writer = Writer(str(path))
+    writer.start(profile='', library='test')
+    schema = writer.register_schema('nav_msgs/msg/Odometry', language, b'{}')
+    other = writer.register_schema('geometry_msgs/msg/Wrench', language, b'{}')
+    for topic, one in (('/o', schema), ('/w', other)):
+        writer.add_message(writer.register_channel(topic, encoding, one), 0, b'{}', 0)
+    writer.finish()
+    with pytest.raises(
+        InputError, match=f'/o: expected a definition of its type, found messages in {encoding}'
+    ):
+        loaded(path, **KEYS)

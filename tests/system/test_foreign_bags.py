@@ -1,0 +1,108 @@
+"""`auv analyze` and `auv info` of bags of other systems, as the user runs them."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from foreign_bags import Maker, motion, nanoseconds, simple, simulated, write
+
+from auv_analysis import cli
+
+AUV = Path(sys.executable).with_name('auv')
+TOPICS = '/rexrov/pose_gt', '/rexrov/thruster_manager/input'
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """SQLite, ENU and FLU, a pause of the odometry, a set-point without stamps."""
+    run = simulated(duration=3.0)
+    maker, seen = Maker(), motion(run, enu=True, keep=(run.t < 1.0) | (run.t > 1.4))
+    whole = motion(run, enu=True)
+    messages = simple(seen, maker, *TOPICS, ('world', 'base_link'), whole)
+    for i, ns in enumerate(nanoseconds(whole.t).tolist()):
+        messages.append(('/rexrov/cmd_vel', ns, maker.six('Twist', whole.nu_d[i])))
+        if i % 10 == 0:
+            messages.append(('/chatter', ns, maker.new('std_msgs/msg/String', 'hello')))
+    return write(tmp_path_factory.mktemp('foreign') / 'dive', messages, maker, kind='sqlite3')
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture) -> str:
+    with pytest.raises(SystemExit) as end:
+        cli.main(arguments)
+    captured = capsys.readouterr()
+    assert (end.value.code, captured.out) == (2, '')
+    (line,) = captured.err.splitlines()
+    return line
+
+
+def test_info_names_what_could_be_mapped(bag, capsys) -> None:
+    cli.main(['info', str(bag), '--json'])
+    document = json.loads(capsys.readouterr().out)
+    assert document['candidates'] == {
+        'odometry': [TOPICS[0]], 'pose': [], 'twist': [], 'wrench': [TOPICS[1]],
+        'setpoint': ['/rexrov/cmd_vel'], 'thrusters': [],
+    }  # fmt: skip
+    assert document['topics'][TOPICS[1]] == {
+        'type': 'geometry_msgs/msg/WrenchStamped', 'messages': 301,
+    }  # fmt: skip
+    assert document['duration'] == pytest.approx(3.002, abs=1e-3)
+    cli.main(['info', str(bag)])
+    assert f'could be mapped as odometry: {TOPICS[0]}' in capsys.readouterr().out
+
+
+def test_without_a_mapping_one_line_says_which_options_would_map_it(bag, capsys) -> None:
+    line = refused(['analyze', str(bag)], capsys)
+    for words in (
+        str(bag),
+        f'--odom {TOPICS[0]}',
+        f'--wrench {TOPICS[1]}',
+        '--frames',
+        '--vehicle',
+    ):
+        assert words in line
+
+
+def test_nothing_is_turned_in_silence(bag, capsys) -> None:
+    options = ['--odom', TOPICS[0], '--wrench', TOPICS[1], '--vehicle', 'rexrov']
+    line = refused(['analyze', str(bag), *options], capsys)
+    assert f'{TOPICS[0]}: frame_id: expected --frames ned_fsd or enu_flu' in line
+    assert line.endswith("found 'world', 'base_link'")
+
+
+def test_installed_command_analyses_it(bag, tmp_path) -> None:
+    mapping: dict[str, Any] = {
+        'odometry': TOPICS[0], 'wrench': TOPICS[1], 'setpoint': '/rexrov/cmd_vel',
+        'frames': 'enu_flu', 'vehicle': 'rexrov', 'step': 0.02,
+    }  # fmt: skip
+    (tmp_path / 'map.yaml').write_text(yaml.safe_dump(mapping))
+    done = subprocess.run(
+        [AUV, 'analyze', bag, '--map', 'map.yaml', '--out', 'out', '--json'],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)['dive']
+    assert json.loads((tmp_path / 'out' / 'summary.json').read_text())['dive'] == summary
+    assert summary['source'] == 'foreign_bag'
+    assert summary['step'] == 0.02
+    assert len(summary['gaps']['spans']) == 1
+    assert 0.8 < summary['gaps']['valid_share'] < 0.9
+    assert all(error > 0 for error in summary['unexplained']['error_rms'])
+    assert summary['velocity_error']['rms'] is not None
+    report = (tmp_path / 'out' / 'report.html').read_text()
+    for words in ('Unexplained wrench of dive', 'enu_flu as told', 'recorded by another system'):
+        assert words in report
+    assert (tmp_path / 'out' / 'figures' / 'unexplained_dive.pdf').exists()
+
+
+def test_a_bag_with_our_names_in_axes_that_nobody_told_is_refused(tmp_path, capsys) -> None:
+    maker, run = Maker(), simulated(duration=0.2)
+    m = motion(run, enu=True)
+    messages = simple(m, maker, '/rexrov/odom', '/rexrov/wrench', ('odom', 'base_link'))
+    bag = write(tmp_path / 'other', messages, maker)
+    line = refused(['analyze', str(bag), '--vehicle', 'rexrov'], capsys)
+    assert '/rexrov/odom: frame_id: expected frames whose names say that they are NED' in line
+    assert '--odom /rexrov/odom, --wrench /rexrov/wrench' in line

@@ -62,9 +62,9 @@ def sources_of(arguments: Sequence[str], mapping: TopicMap | None = None) -> lis
 
     Parameters
     ----------
-    arguments : an .mcap, .db3 or .bag file or a folder with such is a bag; a folder of `auv simulate`,
-        `auv run` or `auv study` is all runs in it; an .npz file is one simulated run; a .yaml file
-        or the bare name of a shipped scenario is simulated, all its controllers
+    arguments : an .mcap, .db3 or .bag file or a folder with such is a bag; a folder of
+        `auv simulate`, `auv run` or `auv study` is all runs in it; an .npz file is one simulated
+        run; a .yaml file or the bare name of a shipped scenario is simulated, all its controllers
     mapping : of all bags; None: they are those of our nodes
 
     Raises

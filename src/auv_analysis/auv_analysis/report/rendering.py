@@ -133,6 +133,6 @@ def maths(text: str) -> markupsafe.Markup:
     """Text with its indices lowered: w_X, K_D, ξ3; Lambda and Gamma become letters."""
     safe = str(markupsafe.escape(tied(text))).replace('Lambda', 'Λ').replace('Gamma', 'Γ')
     safe = safe.replace('omega', 'ω').replace('phi', 'φ')
-    safe = re.sub(r'\b(Δ?[A-Za-zτξπωνΓΛΥ])_([A-Za-z0-9]|FF)\b', r'\1<sub>\2</sub>', safe)
-    safe = re.sub(r'\^([-−]?[A-Za-z0-9]+)', r'<sup>\1</sup>', safe).replace('<sup>-', '<sup>−')
+    safe = re.sub(r'\b(Δ?[A-Za-zτξπωνΓΛΥ])_([A-Za-z0-9]{1,2})\b', r'\1<sub>\2</sub>', safe)
+    safe = re.sub(r'\^([-−]?[A-Za-z0-9]+(?:/\d)?)', r'<sup>\1</sup>', safe).replace('<sup>-', '<sup>−')
     return markupsafe.Markup(re.sub(r'(?<=[ξπ])([1-6])\b', r'<sub>\1</sub>', safe))

@@ -15,9 +15,10 @@ from auv_analysis.coupling import (
     velocity_deformation,
 )
 from auv_analysis.energy import shares
+from auv_analysis.foreign.figures import gap_figures, unexplained_figures
 from auv_analysis.lyapunov import lyapunov
 from auv_analysis.moments import Moments, Tally, maps_of
-from auv_analysis.run import AnyRun, LongRun, Run
+from auv_analysis.run import AnyRun, Run
 from auv_gvc_controller.gains import body_gains
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.model import control_model
@@ -99,8 +100,8 @@ def summarize(
         'decomposition': {'Upsilon': Upsilon.tolist(), 'N': model.N.tolist()},
         'lyapunov': lyapunov(run, model),
         'acceleration': run.acceleration,
-        'unexplained': _unexplained(run),
-        'gaps': _gaps(run),
+        'unexplained': unexplained_figures(run),
+        'gaps': gap_figures(run),
         'notes': list(run.notes),
     }
 
@@ -171,25 +172,6 @@ def _errors(run: AnyRun, whole: Moments, after: Moments) -> dict[str, Any]:
         'max_after_2s': _peak(after, moments.ERROR),
         'settling_time': _settling(run, whole.peaks[moments.SETPOINT]),
     }
-
-
-def _gaps(run: AnyRun) -> dict[str, Any]:
-    spans = [{'window': list(span)} for span in run.gaps]
-    return {'valid_share': run.valid_share, 'spans': spans}
-
-
-def _unexplained(run: AnyRun) -> dict[str, list[float]] | None:
-    """Figures of F as estimated from measurements, N and N m; None where it is not."""
-    if isinstance(run, LongRun) or run.unexplained is None or run.unexplained_error is None:
-        return None
-    F, error = run.unexplained, run.unexplained_error
-    found = {
-        'mean': F.mean(axis=0),
-        'rms': np.sqrt((F**2).mean(axis=0)),
-        'max': np.abs(F).max(axis=0),
-        'error_rms': np.sqrt((error**2).mean(axis=0)),
-    }
-    return {name: values.tolist() for name, values in found.items()}
 
 
 def _energy(inside: Moments, window: tuple[float, float]) -> dict[str, Any]:

@@ -38,6 +38,7 @@ def _one(name: str, summary: Mapping[str, Any]) -> list[RenderableType]:
     facts = f': law {law}, {duration} s in steps of {step} s, by {summary["source"]}'
     title = Text(name, 'bold').append(facts, 'not bold')
     parts: list[RenderableType] = [title, _tracking(summary), _couplings(summary)]
+    parts += [_unexplained(summary)] if summary['unexplained'] else []
     parts += [Text(line, 'dim') for line in _remarks(summary)]
     parts += [Text(f'note: {note}', 'yellow') for note in summary['notes']]
     return parts
@@ -67,6 +68,17 @@ def _couplings(summary: Mapping[str, Any]) -> Table:
         ('energy\nmean\nJ', _numbers(energy['mean_by_component'])),
         ('share\n\n%', [MISSING] * 6 if shares is None else [f'{x:.2f}' for x in shares]),
         bars=[] if shares is None else [share_bar(share, BAR) for share in shares],
+    )
+
+
+def _unexplained(summary: Mapping[str, Any]) -> Table:
+    """F by (1) of a recorded motion with its error, a line per degree of freedom."""
+    heads = {'mean': 'mean', 'rms': 'rms', 'max': 'max', 'error_rms': 'error'}
+    return _table(
+        *(
+            (f'F by (1)\n{head}\n{WRENCH}', _numbers(summary['unexplained'][key]))
+            for key, head in heads.items()
+        )
     )
 
 

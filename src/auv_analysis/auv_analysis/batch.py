@@ -49,6 +49,7 @@ class Batch:
     hold : 'continuous' or 'zoh'
     shared : gives the tables of all vehicles; None: `own` gives those of each
     own : for the indices of some vehicles, a function of the same kind with tables (count, T, ...)
+    record : what is kept of the samples: a named tuple with `start` and `fill_record`, as `Figures`
 
     """
 
@@ -61,12 +62,13 @@ class Batch:
     hold: str
     shared: Known | None
     own: Callable[[range], Known] | None = None
+    record: Any = Figures
 
     def __len__(self) -> int:
         return len(self.x)
 
 
-def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) -> Figures:
+def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) -> Any:
     """Run all loops of a batch.
 
     Parameters
@@ -77,7 +79,7 @@ def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) 
 
     Returns
     -------
-    figures : Figures with arrays (B, n)
+    figures : `batch.record` with arrays (B, n)
 
     """
     job = _job(batch, kernel_of(batch))
@@ -98,7 +100,7 @@ class _Job(NamedTuple):
     kernel: Kernel
     lanes: int
     loop: Loop
-    record: Figures
+    record: Any
     tables: Sequence[tuple[Grid, Tables]] | None
 
 
@@ -131,7 +133,7 @@ def _job(batch: Batch, kernel: Kernel) -> _Job:
     lanes = 1 if kernel.alone else width(len(batch))
     loop, band = pack(batch.loop, lanes), packed(batch.band, lanes)
     count = -(-len(batch) // lanes)
-    record = Figures.start(loop.model, band, batch.step, partial(_full, count, lanes))
+    record = batch.record.start(loop.model, band, batch.step, partial(_full, count, lanes))
     return _Job(batch, kernel, lanes, loop, record, _listed(batch))
 
 

@@ -128,6 +128,31 @@ def _sweep(command: argparse.ArgumentParser) -> None:
     command.add_argument('--workers', metavar='N', help=text)
 
 
+def _tune(command: argparse.ArgumentParser) -> None:
+    command.add_argument('scenario', help=SCENARIO)
+    text = 'controller to equal; default: the first under gvc'
+    command.add_argument('--reference', metavar='NAME', help=text)
+    text = "only this one beside the reference's own; may be repeated; default: all shipped"
+    laws = ('gvc', 'cl', 'pid', 'smc')
+    command.add_argument('--law', action='append', choices=laws, help=text)
+    text = 'what the laws are given alike; default: effort'
+    command.add_argument('--equal', choices=('effort', 'error'), default='effort', help=text)
+    text = 'of the error: weighted by time, or the plain mean; default: time'
+    command.add_argument('--index', choices=('time', 'mean'), default='time', help=text)
+    structures = ('best', 'scalar', 'mass', 'diagonal', 'inertia')
+    text = 'of gains: times I, M_ii, six numbers, times M; default: the better of the first two'
+    command.add_argument('--structure', choices=structures, default='best', help=text)
+    text = 'relative, of the equality; default: 0.001'
+    command.add_argument('--tolerance', type=float, default=0.001, help=text)
+    text = 'draws of the Monte Carlo; 0: none; default: 256'
+    command.add_argument('--samples', type=int, metavar='N', default=256, help=text)
+    text = 'how far draws go, such as damping=0.3 or current=0.1; may be repeated'
+    command.add_argument('--spread', action='append', metavar='NAME=VALUE', help=text)
+    _hold(command)
+    text = 'of search and draws; default: 0'
+    command.add_argument('--seed', type=int, default=0, help=text)
+
+
 def _watch(command: argparse.ArgumentParser) -> None:
     command.add_argument('--domain-id', help='ROS domain, default: $ROS_DOMAIN_ID, else 0')
     command.add_argument('--namespace', default='/', help='of the graph, such as /auv1')
@@ -172,6 +197,7 @@ COMMANDS = {
     'atlas': Command('couplings by inertia of the shipped vehicles, side by side', _atlas),
     'design': Command('which change of a vehicle removes which coupling, simulated', _design),
     'sweep': Command('many rollouts of a scenario, with values that vary, to Parquet', _sweep),
+    'tune': Command('laws tuned to equal effort or error, and compared over draws', _tune),
     'watch': Command('live dashboard in the terminal', _watch, writes=False),
     'info': Command('what lies in a bag', _info, writes=False),
     'params': Command('the ROS parameter file of a scenario', _params),

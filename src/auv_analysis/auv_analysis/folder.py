@@ -19,6 +19,7 @@ OURS = (
     'dependence.parquet', 'together.parquet', 'failures.parquet', 'paired.parquet',
     'indices.parquet', 'best.parquet', 'design.json', 'summary_before.json',
     'vehicle_before.yaml',
+    'tune.json', 'search.parquet', 'monte_carlo.parquet',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
 MANIFEST, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep

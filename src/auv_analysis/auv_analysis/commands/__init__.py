@@ -12,6 +12,7 @@ _HOME = {
     'info': 'inspect_bag',
     'params': 'params',
     'check-vehicle': 'check_vehicle',
+    'tune': 'tune',
     'watch': 'watch',
     'atlas': 'auv_analysis.atlas.command',
     'design': 'design',

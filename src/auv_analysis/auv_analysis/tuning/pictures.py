@@ -56,10 +56,10 @@ def trade_off(outcome: Outcome) -> Drawn:
     axes.legend(loc='upper right')
     title = f'What effort buys: {label} of all gains that were tried'
     caption = (
-        f'{title}, a dot each; lines: the least found at that effort or below, by law, searched only '
-        f'where equality is. Star: {name}; dashed: equal {outcome.goal.equal}; circles: the gains '
-        f'that the search chose; diamonds: other controllers as the scenario has them, where they '
-        f'lie inside. Gains too fast for the control period are left out.'
+        f'{title}, a dot each; lines: the least found at that effort or below, by law, searched '
+        f'only where equality is. Star: {name}; dashed: equal {outcome.goal.equal}; circles: the '
+        f'gains that the search chose; diamonds: other controllers as the scenario has them, where '
+        f'they lie inside. Gains too fast for the control period are left out.'
     )
     return figure, title, caption
 

@@ -190,8 +190,8 @@ def paired_table(document: Mapping[str, Any]) -> Table:
                  kind={-1: 'good', 1: 'bad', 0: ''}[c['verdict']]),
         ])  # fmt: skip
     note = (
-        f'The correction is for all {len(rows)} rows. Draws are made, not found: their number makes '
-        'any p small in the end, so that the ratio and its interval are what counts.'
+        f'The correction is for all {len(rows)} rows. Draws are made, not found: their number '
+        'makes any p small in the end, so that the ratio and its interval are what counts.'
     )
     caption = f'Paired over the draws: {len(COMPARED)} measures of each pair.'
     return Table('paired', caption, columns, rows, stub=3, note=note)

@@ -28,7 +28,7 @@ def monte_carlo(
     ----------
     scenario : with the controllers to compare
     spread : how far the draws go
-    samples : number of draws
+    samples : number of draws, one at least
     seed : of the draws
     hold : 'continuous' or 'zoh'
     threads : how many draws run at a time
@@ -45,7 +45,7 @@ def monte_carlo(
         progress()
         return found
 
-    rows = [one(0)] if samples else []  # alone: it may compile
+    rows = [one(0)]  # alone: it may compile
     with ThreadPoolExecutor(threads) as pool:
         try:
             rows += pool.map(one, range(1, samples))

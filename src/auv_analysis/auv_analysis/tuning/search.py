@@ -106,7 +106,11 @@ class _Problem:
         self.space, self.goal, self.tried = space, goal, Tried()
         self._evaluate = evaluate
         self._last: tuple[bytes, list[tuple[float, np.ndarray]]] = (b'', [])
-        self.calls = 0
+        self._calls = 0
+
+    def allow(self, calls: int) -> None:
+        """Forget the last point, and evaluate so many more."""
+        self._calls, self._last = calls, (b'', [])
 
     def logs(
         self, x: np.ndarray, stages: Sequence[str]
@@ -125,9 +129,9 @@ class _Problem:
     def with_gradients(self, x: np.ndarray) -> list[tuple[float, np.ndarray]]:
         """Objective, equality and room at a point (n,), each with its gradient."""
         if self._last[0] != x.tobytes():
-            if self.calls == 0:
+            if self._calls == 0:
                 raise _EnoughError
-            self.calls -= 1
+            self._calls -= 1
             shifts = DIFFERENCE * np.eye(len(x))
             points = np.concatenate([x[None], x + shifts, x - shifts])
             found = self.logs(points, ['refine', *['gradient'] * (len(points) - 1)])
@@ -199,7 +203,8 @@ def _refine(problem: _Problem, start: np.ndarray, calls: int) -> np.ndarray:
     def slope(which: int) -> Callable[[np.ndarray], np.ndarray]:
         return lambda x: problem.with_gradients(x)[which][1].copy()  # the solver writes into it
 
-    first, problem.calls = len(problem.tried.batches), calls
+    first = len(problem.tried.batches)
+    problem.allow(calls)
     with suppress(_EnoughError):
         minimize(
             value(0),
@@ -233,7 +238,7 @@ def _conclude(problem: _Problem) -> Found:
 
 def _price(problem: _Problem, x: np.ndarray) -> float | None:
     """Multiplier of the equality: along its gradient, within the bounds that x does not touch."""
-    problem.calls = 1
+    problem.allow(1)
     (_, a), (_, b), _ = problem.with_gradients(x)
     space = problem.space
     free = (x > space.low + DIFFERENCE) & (x < space.high - DIFFERENCE)

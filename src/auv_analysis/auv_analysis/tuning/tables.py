@@ -49,7 +49,7 @@ def tuned_table(document: Mapping[str, Any]) -> Table:
         ordered = dict(zip(Measures._fields, measures, strict=True))
         equality = entry['equality']
         rows.append([
-            Cell(name, kind='paper' if name == document['reference'] else ''),
+            Cell(name),
             Cell(entry['law']),
             Cell(entry.get('structure', 'as given')),
             *(ordered[m] for m in MEANINGS),

@@ -51,14 +51,16 @@ def work(request: Request, draws: Draws, out: Path, progress: Progress) -> Outco
     scenario = load_scenario(written['scenario.yaml'])
     nominal = of_each(scenario, request.hold)
     deviation = _checked(scenario, request, nominal, progress)
-    advance = progress(f'{draws.samples} draws of model error and disturbance', draws.samples)
-    found = monte_carlo(
-        scenario, draws.spread, draws.samples, draws.seed, request.hold, request.threads, advance
-    )  # fmt: skip
-    compared = _compared(request, scenario, rivals, found, draws.seed) if draws.samples else []
-    drawn = found if draws.samples else {}
+    found, compared = {}, []
+    if draws.samples:
+        advance = progress(f'{draws.samples} draws of model error and disturbance', draws.samples)
+        found = monte_carlo(
+            scenario, draws.spread, draws.samples, draws.seed, request.hold, request.threads,
+            advance,
+        )  # fmt: skip
+        compared = _compared(request, scenario, rivals, found, draws.seed)
     return Outcome(
-        request, goal, scenario, rivals, nominal, deviation, draws.spread, drawn, compared
+        request, goal, scenario, rivals, nominal, deviation, draws.spread, found, compared
     )
 
 

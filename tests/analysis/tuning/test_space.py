@@ -1,0 +1,62 @@
+"""Gains as logarithms: there and back, within bounds, and no faster than the samples."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import QUICK
+
+from auv_analysis.tuning.space import LAWS, STRUCTURES, Space, make_space
+from auv_dynamics.vehicle_file import load_vehicle
+from auv_gvc_controller.gains import sampling_warning
+from auv_gvc_controller.laws import make_gains
+from auv_gvc_controller.model import control_model
+
+VEHICLE = load_vehicle('rexrov')
+STEP = 0.01
+
+
+def space_of(law: str, structure: str) -> Space:
+    return make_space(law, structure, control_model(VEHICLE), STEP, 1 / STEP)
+
+
+@pytest.mark.parametrize('structure', STRUCTURES)
+@pytest.mark.parametrize('law', LAWS)
+@QUICK
+@given(data=st.data())
+def test_gains_lead_back_to_their_point(law: str, structure: str, data: st.DataObject) -> None:
+    space = space_of(law, structure)
+    unit = np.array(data.draw(st.lists(st.floats(0, 1), min_size=len(space.names),
+                                       max_size=len(space.names))))  # fmt: skip
+    x = space.low + unit * (space.high - space.low)
+    entry = space.entry(x)
+    assert entry.pop('law') == law
+    np.testing.assert_allclose(space.nearest(entry), x, atol=1e-9)
+    gains = make_gains(law, entry)
+    assert all(np.all(np.linalg.eigvalsh(np.reshape(g, (6, 6))) > 0) for g in gains[: len(entry)])
+
+
+def test_structures_are_what_they_say() -> None:
+    M, x = VEHICLE.M, np.log([2.0, 3.0, 4.0, 5.0])
+    gains = {s: space_of('cl', s).entry(x) for s in ('scalar', 'mass', 'inertia')}
+    assert gains['scalar']['k_D'] == pytest.approx(2.0)
+    np.testing.assert_allclose(gains['mass']['Gamma'], 5.0 * np.diagonal(M))
+    np.testing.assert_allclose(gains['inertia']['k_I'], 3.0 * M)
+    assert [gains[s]['Lambda'] for s in gains] == pytest.approx([4.0] * 3)
+
+
+def test_room_ends_where_the_sampled_loop_begins_to_ring() -> None:
+    space = space_of('cl', 'inertia')
+    x = np.log([[0.99 / STEP, 1.0, 1.0, 1.0], [1.01 / STEP, 1.0, 1.0, 1.0]])
+    np.testing.assert_allclose(space.room(x), -np.log([0.99, 1.01]), atol=1e-9)
+    warned = [sampling_warning(k * VEHICLE.M, VEHICLE.M, STEP) for k in np.exp(x[:, 0])]
+    assert [w is None for w in warned] == [True, False]
+
+
+def test_gains_outside_come_to_the_border_and_negative_ones_to_none() -> None:
+    space = space_of('gvc', 'mass')
+    far = {'k_D': 1e9, 'k_I': 1.0, 'Lambda': 1e-9, 'Gamma': 1.0}
+    x = space.nearest(far)
+    assert x is not None
+    assert (x[0], x[2]) == (space.high[0], space.low[2])
+    assert space.nearest(far | {'k_I': 0.0}) is None

@@ -1,4 +1,4 @@
-"""Small scenarios for tests of `auv tune`: a vehicle whose axes are integrators, another with all."""
+"""Small scenarios for tests of `auv tune`, of a vehicle whose M is diagonal."""
 
 from pathlib import Path
 from typing import Any

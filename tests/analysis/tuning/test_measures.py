@@ -1,4 +1,4 @@
-"""Measures gathered in the kernel are those of the samples, with M and its inverse as they stand."""
+"""Measures gathered in the kernel are those of the samples, with M and its inverse."""
 
 from dataclasses import replace
 

@@ -90,7 +90,7 @@ STEPPED = {'surge': {'offset': 1.0}}
 
 @pytest.mark.parametrize('law', ['gvc', 'cl', 'pid'])
 def test_of_an_integrator_no_law_beats_proportional_feedback(tmp_path, monkeypatch, law) -> None:
-    """LQR: m u_dot = tau with cost e^2 + r tau^2 has tau = k e, so that k = 6 m is the best there is."""
+    """LQR: m u_dot = tau with cost e^2 + r tau^2 has tau = k e, so that nothing beats k = 6 m."""
     monkeypatch.setattr(rivals, 'POINTS', 128)
     alone = {'law': 'gvc', 'k_D': 6.0, 'k_I': 1e-9, 'Lambda': 1e-9, 'Gamma': 1e-9}
     base = scenario(

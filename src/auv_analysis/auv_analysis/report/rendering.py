@@ -134,5 +134,6 @@ def maths(text: str) -> markupsafe.Markup:
     safe = str(markupsafe.escape(tied(text))).replace('Lambda', 'Λ').replace('Gamma', 'Γ')
     safe = safe.replace('omega', 'ω').replace('phi', 'φ')
     safe = re.sub(r'\b(Δ?[A-Za-zτξπωνΓΛΥ])_([A-Za-z0-9]{1,2})\b', r'\1<sub>\2</sub>', safe)
-    safe = re.sub(r'\^([-−]?[A-Za-z0-9]+(?:/\d)?)', r'<sup>\1</sup>', safe).replace('<sup>-', '<sup>−')
+    safe = re.sub(r'\^([-−]?[A-Za-z0-9]+(?:/\d)?)', r'<sup>\1</sup>', safe)
+    safe = safe.replace('<sup>-', '<sup>−')
     return markupsafe.Markup(re.sub(r'(?<=[ξπ])([1-6])\b', r'<sub>\1</sub>', safe))

@@ -40,7 +40,7 @@ def test_names_and_numbers_give_way_where_rows_are_many() -> None:
     many = grid_figure([f'run {i}' for i in range(150)], [Grid(np.ones((150, 3)), 'abc', 'x')])
     axes = many.axes[0]
     assert [label.get_text() for label in axes.get_yticklabels()][:2] == ['run 0', 'run 3']
-    assert axes.texts == []
+    assert len(axes.texts) == 0
 
 
 @pytest.mark.parametrize('value', [1.5e9, -2.5e-7, 0.25, -12345.0])

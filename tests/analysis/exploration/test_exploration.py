@@ -15,6 +15,7 @@ from strategies import QUICK
 
 from auv_analysis import cli
 from auv_analysis.exploration.dependence import merged
+from auv_analysis.exploration.figures import draw
 from auv_analysis.exploration.influence import explained
 from auv_analysis.exploration.opening import open_sweep
 from auv_analysis.exploration.quantiles import by_group, distribution, quantiles, spread
@@ -346,3 +347,32 @@ def test_results_are_replaced_only_when_asked_and_the_rest_stays(tmp_path: Path,
     with pytest.raises(SystemExit):
         cli.main(['analyze', str(sweep), '--out', str(sweep), '--overwrite'])
     assert (sweep / 'sweep.json').exists()
+
+
+def test_values_that_vary_side_by_side_are_said(tmp_path: Path) -> None:
+    text = """
+name: tied
+scenario: case1
+vary:
+  - zip: {controllers.gvc.k_D: [1, 2, 3], controllers.gvc.k_I: [4, 5, 6]}
+"""
+    results = analysed(open_sweep(make_sweep(tmp_path, text, lambda *_: {})))
+    assert results.notes == [
+        'controllers.gvc.k_D and controllers.gvc.k_I vary side by side: '
+        'what one explains may be the work of another'
+    ]
+    assert results.measures == []
+
+
+def test_few_rows_still_show_what_they_depend_on(tmp_path: Path) -> None:
+    text = 'name: few\nscenario: case1\nvary: [{grid: {controllers.*.k_D: [1, 2, 3]}}]'
+
+    def square(controller, values, index):
+        return {ENERGY: values[K_D].astype(float) ** 2}
+
+    results = analysed(open_sweep(make_sweep(tmp_path, text, square)))
+    assert results.tables['influence'] == []
+    assert [v.path for v in results.most_influential()] == [K_D]
+    found = rows(results, 'dependence', figure=ENERGY, controller='cl')
+    assert [(row['value'], row['median']) for row in found] == [('1', 1.0), ('2', 4.0), ('3', 9.0)]
+    assert {'distributions', 'dependence_1'} == set(draw(results, tmp_path / 'figures'))

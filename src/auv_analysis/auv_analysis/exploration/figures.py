@@ -50,6 +50,7 @@ def draw(results: Results, folder: Path) -> dict[str, FigureRecord]:
         drawn['distributions'] = partial(_distributions, results)
     if tables['influence']:
         drawn['influence'] = partial(_influence, results)
+    if tables['dependence']:
         for i, varied in enumerate(results.most_influential()[:MOST_PATHS], start=1):
             drawn[f'dependence_{i}'] = partial(dependence, results, varied, chosen)
     if tables['together']:

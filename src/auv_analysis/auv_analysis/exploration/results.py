@@ -1,6 +1,6 @@
 """All that is computed of a sweep, and the files that hold it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +14,8 @@ from auv_analysis.exploration.paired import paired
 from auv_analysis.exploration.quantiles import distribution, figures_spread, varying
 from auv_analysis.exploration.varied import Varied, varied_paths
 from auv_analysis.measures import BY_NAME, MEASURES, Measure
+from auv_analysis.report.text import join
+from auv_analysis.sweep.groups import kind_of
 
 DOCUMENT = 'analysis.json'
 TABLES = ('quantiles', 'influence', 'dependence', 'together', 'failures', 'paired', 'indices',
@@ -84,8 +86,8 @@ class Results:
         shares: dict[str, list[float]] = {}
         for row in self.tables['influence']:
             shares.setdefault(row['path'], []).append(row['explained_percent'])
-        known = [v for v in self.varied if v.path in shares]
-        return sorted(known, key=lambda v: -float(np.mean(shares[v.path])))
+        differing = [v for v in self.varied if v.differs]
+        return sorted(differing, key=lambda v: -float(np.mean(shares.get(v.path, 0.0))))
 
 
 def analysed(
@@ -102,7 +104,8 @@ def analysed(
     """
     progress('varied values')
     results = Results(sweep, varied_paths(sweep), {name: [] for name in TABLES})
-    groups, results.notes = designed(sweep)
+    groups, notes = designed(sweep)
+    results.notes = [*notes, *_tied(sweep)]
     for measure in MEASURES:
         progress(measure.label)
         _one_measure(results, measure, groups)
@@ -116,6 +119,14 @@ def analysed(
     progress('quantiles of every figure')
     results.tables['quantiles'] = list(figures_spread(sweep))
     return results
+
+
+def _tied(sweep: Sweep) -> Iterator[str]:
+    """What cannot be told apart because the campaign varies it side by side."""
+    for spec in sweep.campaign['vary']:
+        if kind_of(spec) == 'zip' and len(spec['zip']) > 1:
+            names = join(list(spec['zip']))
+            yield f'{names} vary side by side: what one explains may be the work of another'
 
 
 def _one_measure(results: Results, measure: Measure, groups: Sequence[Any]) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from auv_analysis.exploration.results import Results
 from auv_analysis.reduction import COLUMNS
 from auv_analysis.sweep.campaign import Campaign, load_campaign
 from auv_analysis.sweep.folder import SweepFolder
@@ -14,6 +15,52 @@ from auv_analysis.sweep.table import table_of
 
 Values = dict[str, np.ndarray]
 Known = Callable[[str, Values, np.ndarray], dict[str, np.ndarray]]
+ENERGY, SETTLED = 'kinetic_energy.mean', 'overall.velocity_error.settling_time'
+SIMPLE = """
+name: simple
+scenario: case1
+block: 50
+vary:
+  - random:
+      controllers.*.k_D: {uniform: {from: 1.0, to: 3.0}}
+      vehicle.damping.linear[0]: {uniform: {from: 0.0, to: 1.0}}
+      controllers.cl.k_I: {loguniform: {from: 0.1, to: 10.0}}
+    count: 400
+  - grid: {integrator: [ode5, rk4]}
+"""
+K_D, DAMPING = 'controllers.*.k_D', 'vehicle.damping.linear[0]'
+
+
+def simple(controller, values, index):
+    bent = 4 * (values[DAMPING] - 0.5) ** 2  # its rank correlation is nothing
+    factor = 1.0 if controller == 'gvc' else 1.5
+    heave = np.where(values[K_D] > 2.0, 1.0, np.nan)  # settles in half of the rows
+    return {ENERGY: factor * values[K_D] ** 2, 'effort.max.roll': 2.0 + bent,
+            'velocity_error.settling_time.heave': heave}  # fmt: skip
+
+
+MIXED = """
+name: mixed
+scenario: case1
+block: 4
+vary:
+  - grid:
+      vehicle: [herman2018, rexrov]
+      controllers.gvc.k_D: [[1, 1, 1, 1, 1, 1], [2, 2, 2, 2, 2, 2]]
+      vehicle.rigid_body.mass: [-1.0, 250.0, 300.0]
+"""
+
+
+def mixed(controller, values, index):
+    count = len(index)
+    status, reason = np.full(count, 'ok', object), np.full(count, '', object)
+    lost = values['vehicle.rigid_body.mass'] < 0
+    status[lost], reason[lost] = 'refused', 'too light'
+    wild = ~lost & (np.array(values['vehicle']) == 'rexrov') & (controller == 'cl')
+    status[wild], reason[wild] = 'diverged', 'not finite'
+    gain = np.array([entry[0] for entry in values['controllers.gvc.k_D']])
+    energy = np.where(lost | wild, np.nan, gain + (controller == 'cl'))
+    return {'status': status, 'reason': reason, ENERGY: energy}
 
 
 def make_sweep(folder: Path, campaign: str, known: Known, blocks: range | None = None) -> Path:
@@ -56,3 +103,8 @@ def change_manifest(out: Path, **entries: object) -> None:
     """Replace entries of the manifest."""
     path = out / 'sweep.json'
     path.write_text(json.dumps(json.loads(path.read_text()) | entries))
+
+
+def rows(results: Results, table: str, **names: object) -> list[dict]:
+    """Rows of a table of what was found, with these entries."""
+    return [r for r in results.tables[table] if all(r[k] == v for k, v in names.items())]

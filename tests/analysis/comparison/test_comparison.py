@@ -1,21 +1,15 @@
 """Many runs side by side: the table, the ranking, the figures that scale, the report."""
 
-import csv
-import json
 from dataclasses import replace
-from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
-from pyarrow import parquet
 
-from auv_analysis import cli, load_scenario, simulate, summarize
+from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.comparison import figures, lines
 from auv_analysis.comparison.entries import Entry, comparison_table
 from auv_analysis.comparison.ranking import rank
-from auv_analysis.measures import BY_NAME
 from auv_analysis.report.sketching import sketch
 from auv_analysis.summary import band_of
 
@@ -132,91 +126,3 @@ def test_structural_zeros_are_told_from_what_is_zero(entries, table) -> None:
     assert always[2].all()
     assert not always[4].any()
     assert not figures.structural(table, 'effort.rms').any()
-
-
-# the command
-
-
-@pytest.fixture
-def scenarios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Short scenarios of different durations, one of which diverges under cl."""
-    monkeypatch.chdir(tmp_path)
-    names = {'one': 0.4, 'two': 0.2, 'wild': 0.4}
-    for name, duration in names.items():
-        data = SCENARIO.data | {'name': name, 'duration': duration, 'vehicle': 'lauv'}
-        data['controllers'] = dict(data['controllers'])
-        if name == 'wild':
-            data['controllers']['cl'] = data['controllers']['cl'] | {'k_D': 1e9}
-        (tmp_path / f'{name}.yaml').write_text(yaml.safe_dump(data, sort_keys=False))
-    return [f'{name}.yaml' for name in names]
-
-
-@pytest.mark.usefixtures('unrendered')
-def test_command_compares_scenarios_by_name(scenarios, capsys) -> None:
-    cli.main(['analyze', *scenarios, '--json'])
-    captured = capsys.readouterr()
-    summaries = json.loads(captured.out)
-    assert list(summaries) == ['one/gvc', 'one/cl', 'two/gvc', 'two/cl', 'wild/gvc', 'wild/cl']
-    assert summaries['wild/cl'] is None
-    assert summaries['one/gvc'] == summarize(simulate(load_scenario('one.yaml'), 'gvc'))
-    out = Path('runs/analyze_one_two_wild')
-    assert json.loads((out / 'summary.json').read_text()) == summaries
-    rows = list(csv.DictReader((out / 'comparison.csv').open()))
-    assert [row['run'] for row in rows] == list(summaries)
-    assert float(rows[2]['duration']) == 0.2
-    report = unescape((out / 'report.html').read_text(encoding='utf-8')).replace('\xa0', ' ')
-    assert 'Durations differ: 0.4 s (3 runs) and 0.2 s (2 runs)' in report
-    assert '1 of 6 runs diverged and have no figures: wild/cl.' in report
-    assert 'lauv has a diagonal M: Upsilon = I, nothing is coupled by inertia.' in report
-    assert any('wild/cl' in line and 'diverges' in line for line in captured.err.splitlines())
-
-
-@pytest.mark.usefixtures('unrendered')
-def test_every_number_of_the_report_is_in_the_table(scenarios) -> None:
-    cli.main(['analyze', *scenarios])
-    out = Path('runs/analyze_one_two_wild')
-    table = parquet.read_table(out / 'comparison.parquet').to_pylist()
-    numbers = parquet.read_table(out / 'numbers.parquet').to_pylist()
-    assert len(numbers) > 200
-    for number in numbers:
-        file, _, place = number['source'].partition(':')
-        name, _, row = place.removesuffix(']').rpartition('[')
-        assert (file, table[int(row)][name]) == ('comparison.parquet', number['value'])
-    assert {f'rank.{name}' for name in BY_NAME} & set(table[0])
-
-
-def test_all_diverged_is_a_failure(scenarios, capsys, monkeypatch) -> None:
-    from auv_analysis.comparison import compare
-    from auv_analysis.simulation import DivergedError
-
-    def diverge(*_):
-        raise DivergedError('it diverges')
-
-    monkeypatch.setattr(compare, 'open_source', diverge)
-    with pytest.raises(SystemExit) as end:
-        cli.main(['analyze', *scenarios])
-    assert end.value.code == 1
-    assert (
-        capsys.readouterr().err.splitlines()[-1] == 'all of 6 runs failed, the first: it diverges'
-    )
-    assert not Path('runs').exists()
-
-
-@pytest.mark.parametrize(
-    ('line', 'words'),
-    [
-        ('sweep one.yaml', 'sweep: expected a sweep alone'),
-        ('sweep --by speed', r'--by: expected one of kinetic_energy.mean'),
-        ('one.yaml two.yaml --out taken', 'taken: --out: expected a new folder'),
-        ('one.yaml gone.yaml', 'gone.yaml'),
-    ],
-)
-def test_wrong_arguments_are_refused_in_one_line(scenarios, line: str, words: str, capsys) -> None:
-    for name in ('sweep', 'taken'):
-        Path(name).mkdir()
-        (Path(name) / 'sweep.json').write_text('{}')
-    with pytest.raises(SystemExit) as end:
-        cli.main(['analyze', *line.split()])
-    lines_ = capsys.readouterr().err.splitlines()
-    assert (end.value.code, len(lines_)) == (2, 1), lines_
-    assert words in lines_[0]

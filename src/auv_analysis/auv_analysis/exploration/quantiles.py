@@ -89,7 +89,11 @@ def by_group(values: np.ndarray, codes: np.ndarray, count: int) -> list[np.ndarr
     return [values[order[a:b]] for a, b in pairwise(ends)]
 
 
-def varying(values: Sequence[np.ndarray]) -> bool:
-    """Whether there is more than one value among those that exist."""
-    known = np.concatenate([v[np.isfinite(v)] for v in values])
-    return len(known) > 0 and bool(np.ptp(known) > 1e-12 * np.abs(known).max())
+def varying(values: Sequence[np.ndarray], unit: str) -> bool:
+    """Whether there is more than one value; of a time, one that does not exist is one as well."""
+    whole = np.concatenate(values)
+    known = whole[np.isfinite(whole)]
+    if len(known) == 0:
+        return False
+    late = unit == 's' and len(known) < len(whole)
+    return late or bool(np.ptp(known) > 1e-12 * np.abs(known).max())

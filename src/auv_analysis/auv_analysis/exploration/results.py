@@ -133,7 +133,7 @@ def _one_measure(results: Results, measure: Measure, groups: Sequence[Any]) -> N
     sweep, tables = results.sweep, results.tables
     values = results.values[measure.name] = sweep.measure(measure)
     ok = [results.rows_of(name) for name in sweep.controllers]
-    if not varying([values[rows] for rows in ok]):
+    if not varying([values[rows] for rows in ok], measure.unit):
         known = values[np.isfinite(values) & (sweep.status == 0)]
         results.fixed[measure.name] = float(known[0]) if len(known) else None
         return

@@ -1,0 +1,13 @@
+"""A sweep whose figures are known functions of what varies."""
+
+import pytest
+from made_sweeps import SIMPLE, make_sweep, simple
+
+from auv_analysis.exploration.opening import open_sweep
+from auv_analysis.exploration.results import Results, analysed
+
+
+@pytest.fixture(scope='session')
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """All that is found in it."""
+    return analysed(open_sweep(make_sweep(tmp_path_factory.mktemp('simple'), SIMPLE, simple)))

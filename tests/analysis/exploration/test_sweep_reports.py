@@ -1,0 +1,192 @@
+"""Sweeps with words, lists and failures, broken and unfinished ones, and their reports."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_sweeps import ENERGY, K_D, MIXED, SIMPLE, change_manifest, make_sweep, mixed, rows, simple
+from pyarrow import parquet
+
+from auv_analysis import cli
+from auv_analysis.exploration.dependence import merged
+from auv_analysis.exploration.figures import draw
+from auv_analysis.exploration.opening import open_sweep
+from auv_analysis.exploration.results import Results, analysed
+from auv_analysis.exploration.varied import varied_paths
+from auv_dynamics import InputError
+
+
+def test_words_lists_and_failures(tmp_path: Path) -> None:
+    results = analysed(open_sweep(make_sweep(tmp_path, MIXED, mixed)))
+    assert {v.path: list(v.labels) for v in results.varied} == {
+        'vehicle': ['herman2018', 'rexrov'],
+        'controllers.gvc.k_D': ['[1.0, 1.0, 1.0, 1.0, 1.0, 1.0]', '[2.0, 2.0, 2.0, 2.0, 2.0, 2.0]'],
+        'vehicle.rigid_body.mass': ['−1', '250', '300'],
+    }
+    assert results.counts() == [
+        {'controller': 'gvc', 'rows': 12, 'ok': 8, 'diverged': 0, 'refused': 4},
+        {'controller': 'cl', 'rows': 12, 'ok': 4, 'diverged': 4, 'refused': 4},
+    ]
+    assert results.reasons()[0] == {'status': 'refused', 'reason': 'too light', 'rows': 8}
+    (light,) = rows(
+        results, 'failures', controller='cl', path='vehicle.rigid_body.mass', value='−1'
+    )
+    assert (light['refused_percent'], light['diverged_percent']) == (100.0, 0.0)
+    (rexrov,) = rows(results, 'failures', controller='cl', path='vehicle', value='rexrov')
+    assert (rexrov['diverged'], rexrov['rows']) == (4, 6)
+    (row,) = rows(results, 'influence', controller='gvc', figure=ENERGY, path='controllers.gvc.k_D')
+    assert row['explained_percent'] == pytest.approx(100.0)
+
+
+def test_a_sweep_that_is_not_finished_is_analysed(tmp_path: Path) -> None:
+    sweep = open_sweep(make_sweep(tmp_path, SIMPLE, simple, range(0, 16, 3)))
+    assert (sweep.rows, sweep.planned) == (600, 1600)
+    results = analysed(sweep)
+    assert results.counts()[0]['rows'] == 300
+    (row,) = rows(results, 'paired', figure=ENERGY)
+    assert row['rollouts'] == 300
+
+
+def test_bins_are_joined_where_they_are_many(results: Results) -> None:
+    varied = next(v for v in varied_paths(results.sweep) if v.path == K_D)
+    codes, labels = merged(varied)
+    assert len(varied.labels) > 10 >= len(labels)
+    assert labels[0].split('–')[0] == varied.labels[0].split('–')[0]
+    assert labels[-1].split('–')[1] == varied.labels[-1].split('–')[1]
+    assert codes.max() == len(labels) - 1
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'words'),
+    [
+        (lambda out: _part(out).write_bytes(b'PAR1'), 'part-00000001.parquet: expected a finished'),
+        (lambda out: _damage(_part(out)), 'part-00000001.parquet: expected a finished part'),
+        (lambda out: _without(_part(out)), 'part-00000001.parquet: controllers.*expected a column'),
+        (lambda out: (out / 'sweep.json').write_text('{'), 'sweep.json: expected the manifest'),
+        (lambda out: (out / 'sweep.json').write_text('[]'), 'expected campaign and rollouts'),
+        (lambda out: change_manifest(out, campaign={}), 'expected campaign and rollouts'),
+        (lambda out: [p.unlink() for p in (out / 'rollouts').iterdir()], 'no part-'),
+        (lambda out: (out / 'rollouts').rename(out / 'gone'), 'expected the rows of a sweep'),
+    ],
+)
+def test_a_broken_sweep_is_refused_in_one_line(tmp_path: Path, spoil, words: str) -> None:
+    out = make_sweep(tmp_path, SIMPLE, simple, range(3))
+    spoil(out)
+    with pytest.raises(InputError, match=words) as refusal:
+        analysed(open_sweep(out))
+    assert '\n' not in str(refusal.value)
+
+
+def _part(out: Path) -> Path:
+    return out / 'rollouts/part-00000001.parquet'
+
+
+def _damage(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[4 : len(data) // 2] = bytes(len(data) // 2 - 4)
+    path.write_bytes(data)
+
+
+def _without(path: Path) -> None:
+    from pyarrow import parquet
+
+    parquet.write_table(parquet.read_table(path).drop_columns([K_D]), path)
+
+
+def test_the_document_has_no_nan(results: Results) -> None:
+    from auv_analysis.exploration.files import document
+
+    assert json.loads(json.dumps(document(results), allow_nan=False))['rows'] == 1600
+
+
+@pytest.mark.usefixtures('unrendered')
+@pytest.mark.parametrize(('campaign', 'known'), [(SIMPLE, simple), (MIXED, mixed)])
+def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known) -> None:
+    out = tmp_path / 'report'
+    cli.main(['analyze', str(make_sweep(tmp_path, campaign, known)), '--out', str(out)])
+    document = json.loads((out / 'analysis.json').read_text())
+    numbers = parquet.read_table(out / 'numbers.parquet').to_pylist()
+    assert len(numbers) > 100
+    tables: dict[str, list[dict]] = {}
+    for number in numbers:
+        file, _, place = number['source'].partition(':')
+        if file == 'analysis.json':
+            value = document
+            for key in place.removeprefix('/').split('/'):
+                value = value[int(key)] if isinstance(value, list) else value[key]
+        else:
+            rows_ = tables.setdefault(file, parquet.read_table(out / file).to_pylist())
+            name, _, row = place.removesuffix(']').rpartition('[')
+            value = rows_[int(row)][name]
+        assert value == number['value'], number['source']
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_an_unfinished_sweep_says_so(tmp_path: Path, capsys) -> None:
+    out = make_sweep(tmp_path, SIMPLE, simple, range(0, 16, 3))
+    cli.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
+    assert 'note: not finished, 600 of 1600 rows are there' in capsys.readouterr().err
+    report = (tmp_path / 'report/report.html').read_text(encoding='utf-8')
+    assert 'The sweep is not finished: 600 of 1600 rows are there.' in report
+
+
+def test_a_sweep_without_figures_is_a_failure(tmp_path: Path, capsys) -> None:
+    def refused(controller, values, index):
+        return {'status': np.full(len(index), 'refused', object)}
+
+    out = make_sweep(tmp_path, SIMPLE, refused, range(2))
+    with pytest.raises(SystemExit) as end:
+        cli.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
+    assert end.value.code == 1
+    assert capsys.readouterr().err.splitlines()[-1] == f'{out}: none of 200 rows has figures'
+    assert not (tmp_path / 'report').exists()
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_results_are_replaced_only_when_asked_and_the_rest_stays(tmp_path: Path, capsys) -> None:
+    sweep, out = make_sweep(tmp_path, MIXED, mixed), tmp_path / 'report'
+    command = ['analyze', str(sweep), '--out', str(out)]
+    cli.main(command)
+    (out / 'notes.md').write_text('mine')
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as end:
+        cli.main(command)
+    assert (end.value.code, len(capsys.readouterr().err.splitlines())) == (2, 1)
+    cli.main([*command, '--overwrite', '--by', ENERGY, '--json'])
+    document = json.loads(capsys.readouterr().out)
+    assert document == json.loads((out / 'analysis.json').read_text())
+    assert {row['by'] for row in document['best']} == {ENERGY}
+    assert (out / 'notes.md').read_text() == 'mine'
+    with pytest.raises(SystemExit):
+        cli.main(['analyze', str(sweep), '--out', str(sweep), '--overwrite'])
+    assert (sweep / 'sweep.json').exists()
+
+
+def test_values_that_vary_side_by_side_are_said(tmp_path: Path) -> None:
+    text = """
+name: tied
+scenario: case1
+vary:
+  - zip: {controllers.gvc.k_D: [1, 2, 3], controllers.gvc.k_I: [4, 5, 6]}
+"""
+    results = analysed(open_sweep(make_sweep(tmp_path, text, lambda *_: {})))
+    assert results.notes == [
+        'controllers.gvc.k_D and controllers.gvc.k_I vary side by side: '
+        'what one explains may be the work of another'
+    ]
+    assert results.measures == []
+
+
+def test_few_rows_still_show_what_they_depend_on(tmp_path: Path) -> None:
+    text = 'name: few\nscenario: case1\nvary: [{grid: {controllers.*.k_D: [1, 2, 3]}}]'
+
+    def square(controller, values, index):
+        return {ENERGY: values[K_D].astype(float) ** 2}
+
+    results = analysed(open_sweep(make_sweep(tmp_path, text, square)))
+    assert results.tables['influence'] == []
+    assert [v.path for v in results.most_influential()] == [K_D]
+    found = rows(results, 'dependence', figure=ENERGY, controller='cl')
+    assert [(row['value'], row['median']) for row in found] == [('1', 1.0), ('2', 4.0), ('3', 9.0)]
+    assert {'distributions', 'dependence_1'} == set(draw(results, tmp_path / 'figures'))

@@ -3,44 +3,56 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from tunings import GVC, scenario
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.changes import changed_scenario
+from auv_analysis.records import Sample
+from auv_analysis.summary import band_of
 from auv_analysis.tuning.loops import measured
-from auv_analysis.tuning.measures import MEANINGS, Measures, measures_of_run
+from auv_analysis.tuning.measures import MEANINGS, Measures, measures_of, measures_of_run
 from auv_analysis.tuning.monte_carlo import of_each
+from auv_analysis.tuning.record import Cost
+from auv_gvc_controller.model import control_model
 
 ROUGH = [{'kind': 'model_error', 'mass': 0.1, 'added_mass': -0.2, 'damping': 0.3},
          {'kind': 'current', 'velocity': [0.2, -0.1, 0.0]}]  # fmt: skip
-LIMITS = {'limit': [40, 40, 60, 8, 8, 8], 'lag': 0.05}
-NOISE = {'velocity_noise': 0.02, 'attitude_noise': 0.01}
+LIMITS = {'limit': [400, 400, 600, 80, 80, 80], 'lag': 0.05}
 
 
-@pytest.mark.parametrize(
-    ('hold', 'changes'),
-    [
-        ('continuous', {'disturbance': ROUGH}),
-        ('zoh', {'disturbance': ROUGH, 'actuators': LIMITS, 'sensors': NOISE}),
-    ],
-)
-def test_measures_of_a_batch_are_those_of_the_samples(hold: str, changes: dict) -> None:
+def test_measures_of_a_batch_are_those_of_the_samples() -> None:
     base = load_scenario('case1')
     one = {'gvc': base.controllers['gvc']}  # a law more is a kernel more to compile
-    values = {'vehicle': 'rexrov', 'duration': 2.5, 'controllers': one, **changes}
+    values = {'vehicle': 'rexrov', 'duration': 2.5, 'controllers': one, 'disturbance': ROUGH}
     base = changed_scenario(base, values)
-    found = of_each(base, hold)
-    for name in base.controllers:
-        expected = measures_of_run(simulate(base, name, hold))
-        for measure in Measures._fields:
-            np.testing.assert_allclose(
-                getattr(found[name], measure),
-                getattr(expected, measure),
-                rtol=1e-9,
-                err_msg=measure,
-            )
+    found, expected = of_each(base, 'continuous')['gvc'], measures_of_run(simulate(base, 'gvc'))
+    for measure in Measures._fields:
+        np.testing.assert_allclose(
+            getattr(found, measure), getattr(expected, measure), rtol=1e-9, err_msg=measure
+        )
     assert set(MEANINGS) == set(Measures._fields)
+
+
+def test_effort_is_that_of_the_wrench_applied(tmp_path) -> None:
+    """The record without a kernel, sample by sample, of a run with actuators in between."""
+    base = scenario(tmp_path, {'gvc': GVC}, vehicle='rexrov', duration=2.5, actuators=LIMITS)
+    run = simulate(base, 'gvc', 'zoh')
+    model, band = control_model(base.vehicle), band_of(np.abs(run.nu_d).max(axis=0))
+    cost = Cost.start(model, band, run.step, np.full)
+    for k in range(run.samples):
+        x = np.concatenate([np.zeros(7), run.nu[k]])
+        six = (tuple(v[k]) for v in (run.nu_d, run.tau, run.tau_applied))
+        Cost.fill_record(cost, k, Sample(x, x, np.zeros(12), *six, (0.0,) * 6, (0.0,) * 6))
+    batch = Cost(
+        *(v if name in Cost._fields[:5] else v[None] for name, v in cost._asdict().items())
+    )
+    found, expected = measures_of(batch, run.samples, run.step), measures_of_run(run)
+    for measure in Measures._fields:
+        np.testing.assert_allclose(
+            getattr(found, measure), getattr(expected, measure), rtol=1e-9, err_msg=measure
+        )
+    commanded = measures_of_run(replace(run, applied=None))
+    assert found.effort[0] < 0.9 * commanded.effort[0]
 
 
 def test_error_and_effort_are_the_same_in_another_body_frame(tmp_path) -> None:

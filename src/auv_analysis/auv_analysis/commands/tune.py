@@ -128,7 +128,7 @@ def _show(document: dict[str, Any]) -> None:
     heads = ('controller', 'structure', 'error, J', 'effort, J/s²', 'from equality', 'settled')
     for head in heads:
         table.add_column(head)
-    table.add_column('over draws')
+    table.add_column('ratio over draws')
     medians = {
         c['controller']: c
         for c in (document['monte_carlo'] or {}).get('comparisons', [])
@@ -144,6 +144,6 @@ def _show(document: dict[str, Any]) -> None:
             number(measures['effort'], 4),
             '–' if equality is None else f'{100 * equality:+.3f} %',
             'not all' if settled is None else f'{settled:.2f} s',
-            '' if compared is None else f'{number(compared["median"])} × reference’s',
+            '' if compared is None else number(compared['median']),
         )
     console.print(table)

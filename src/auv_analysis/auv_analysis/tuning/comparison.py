@@ -57,7 +57,7 @@ class Comparison:
 def compare(
     found: Mapping[str, Measures], pairs: Iterable[tuple[str, str]], seed: int
 ) -> list[Comparison]:
-    """Compare pairs of controllers in every measure.
+    """Compare pairs of controllers in every measure that exists, of a loop in a draw at least.
 
     Parameters
     ----------
@@ -70,10 +70,15 @@ def compare(
     comparisons : corrected for their number
 
     """
+    known = [
+        measure
+        for measure in COMPARED
+        if any(np.isfinite(getattr(measures, measure)).any() for measures in found.values())
+    ]
     rows = [
         _compared(a, b, measure, log_ratios(found[a], found[b], measure), seed)
         for a, b in pairs
-        for measure in COMPARED
+        for measure in known
     ]
     adjusted = holm([row.p for row in rows])
     return [replace(row, p_holm=p) for row, p in zip(rows, adjusted, strict=True)]

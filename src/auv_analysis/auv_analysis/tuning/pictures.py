@@ -110,7 +110,12 @@ def _front(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def distributions(outcome: Outcome) -> Drawn:
     """Empirical distribution functions of error and effort over the draws."""
     figure = plotting.new_figure(3.2)
-    shown = outcome.goal.index, 'effort', 'late_error'
+    every = outcome.draws.values()
+    shown = [
+        measure
+        for measure in (outcome.goal.index, 'effort', 'late_error')
+        if any(np.isfinite(getattr(draws, measure)).any() for draws in every)
+    ]
     for i, measure in enumerate(shown):
         axes = figure.add_subplot(1, len(shown), i + 1)
         for name, draws in outcome.draws.items():

@@ -6,7 +6,6 @@ from typing import Any
 from auv_analysis.report.document import Cell, Column, Table, cell
 from auv_analysis.report.text import MISSING, number
 from auv_analysis.report.words import gain_text
-from auv_analysis.tuning.comparison import COMPARED
 from auv_analysis.tuning.measures import MEANINGS, Measures
 from auv_analysis.tuning.verdict import p_text
 
@@ -193,7 +192,7 @@ def paired_table(document: Mapping[str, Any]) -> Table:
         f'The correction is for all {len(rows)} rows. Draws are made, not found: their number '
         'makes any p small in the end, so that the ratio and its interval are what counts.'
     )
-    caption = f'Paired over the draws: {len(COMPARED)} measures of each pair.'
+    caption = 'Paired over the draws, in every measure that exists.'
     return Table('paired', caption, columns, rows, stub=3, note=note)
 
 

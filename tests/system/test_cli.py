@@ -26,8 +26,8 @@ from auv_dynamics.config import shipped
 AUV = Path(sys.executable).with_name('auv')
 REXROV = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
 COMMANDS = [
-    'run', 'simulate', 'study', 'design', 'analyze', 'atlas', 'sweep', 'watch', 'info', 'params',
-    'check-vehicle',
+    'run', 'simulate', 'study', 'design', 'analyze', 'atlas', 'sweep', 'tune', 'watch', 'info',
+    'params', 'check-vehicle',
 ]  # fmt: skip
 WRONG_LINES = {  # what is typed -> what the one line names
     '': 'COMMAND',

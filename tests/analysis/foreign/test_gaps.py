@@ -1,14 +1,17 @@
 """Pauses of topics: marked, never interpolated across, and seen as such by all that follows."""
 
+import io
 import json
 
 import numpy as np
 import pytest
 from foreign_bags import UNNAMED, Maker, loaded, motion, simple, simulated, write
 from numpy.testing import assert_allclose, assert_array_equal
+from rich.console import Console
 from scipy.integrate import trapezoid
 
 from auv_analysis import summarize
+from auv_analysis.commands.terminal import summary_tables
 from auv_analysis.foreign.time_base import sensible_step, time_base
 from auv_analysis.foreign.tracks import Track, at_times, integral, means_over, usual_limit
 from auv_analysis.lyapunov import lyapunov
@@ -205,3 +208,12 @@ def test_integrals_and_means_of_what_is_held_and_of_lines() -> None:
     assert_allclose(integral(held, ns)[:, 0], [0.5, 1.0 + 3.0, 1.0 + 6.0])
     assert_allclose(at_times(held, ns)[:, 0], [1.0, 3.0, -1.0])
     assert_allclose(means_over(held, ns[:1], ns[1:2])[:, 0], [(0.5 * 1.0 + 3.0) / 1.5])
+
+
+def test_the_terminal_shows_the_unexplained_wrench(run, tmp_path) -> None:
+    summary = summarize(holed(run, tmp_path, (1.0, 1.5), (9.0, 9.0)))
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(summary_tables({'dive': summary}))
+    text = console.export_text()
+    assert text.count('F by (1)') == 4, text
+    assert 'not settled' not in text, 'without a set-point there is nothing to settle'

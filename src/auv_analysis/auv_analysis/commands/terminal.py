@@ -38,7 +38,7 @@ def _one(name: str, summary: Mapping[str, Any]) -> list[RenderableType]:
     facts = f': law {law}, {duration} s in steps of {step} s, by {summary["source"]}'
     title = Text(name, 'bold').append(facts, 'not bold')
     parts: list[RenderableType] = [title, _tracking(summary), _couplings(summary)]
-    parts += [_unexplained(summary)] if summary['unexplained'] else []
+    parts += [_unexplained(summary)] if summary.get('unexplained') else []
     parts += [Text(line, 'dim') for line in _remarks(summary)]
     parts += [Text(f'note: {note}', 'yellow') for note in summary['notes']]
     return parts
@@ -102,7 +102,7 @@ def _remarks(summary: Mapping[str, Any]) -> Iterable[str]:
 def comparison_table(summaries: Mapping[str, Mapping[str, Any]]) -> Table:
     """Each run in a line."""
     table = Table(box=None, header_style='bold', pad_edge=False)
-    table.add_column('', overflow='fold')
+    table.add_column('')
     for column in ('energy, J', 'settled, s', 'largest error after 2 s', 'in'):
         table.add_column(column, justify='right' if column != 'in' else 'left')
     for name, summary in summaries.items():

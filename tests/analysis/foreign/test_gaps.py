@@ -18,8 +18,10 @@ from auv_analysis.lyapunov import lyapunov
 from auv_analysis.report import plotting
 from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.sketching import sketch
+from auv_analysis.report.text import number
 from auv_analysis.run import Run
 from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.signals import DOFS
 from auv_gvc_controller.model import control_model
 
 KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu', 'step': 0.01}
@@ -215,5 +217,10 @@ def test_the_terminal_shows_the_unexplained_wrench(run, tmp_path) -> None:
     console = Console(width=80, record=True, file=io.StringIO())
     console.print(summary_tables({'dive': summary}))
     text = console.export_text()
-    assert text.count('F by (1)') == 4, text
+    head = next(
+        line for line in text.splitlines() if line.split() == ['mean', 'rms', 'max', 'error']
+    )
+    rows = text[text.index(head) :].splitlines()[2:8]
+    assert [row.split()[0] for row in rows] == list(DOFS)
+    assert rows[0].split()[1] == number(summary['unexplained']['mean'][0])
     assert 'not settled' not in text, 'without a set-point there is nothing to settle'

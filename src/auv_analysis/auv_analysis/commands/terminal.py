@@ -102,7 +102,7 @@ def _remarks(summary: Mapping[str, Any]) -> Iterable[str]:
 def comparison_table(summaries: Mapping[str, Mapping[str, Any]]) -> Table:
     """Each run in a line."""
     table = Table(box=None, header_style='bold', pad_edge=False)
-    table.add_column('')
+    table.add_column('', overflow='fold')
     for column in ('energy, J', 'settled, s', 'largest error after 2 s', 'in'):
         table.add_column(column, justify='right' if column != 'in' else 'left')
     for name, summary in summaries.items():

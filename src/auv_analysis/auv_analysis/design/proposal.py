@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from auv_analysis.design.comparison import HALF, Candidate, Comparison
 from auv_analysis.design.couplings import COUPLINGS, REST, Sizes, coupling_named, present
 from auv_analysis.design.search import parts_of
@@ -61,7 +63,7 @@ def propose(setting: Setting, reduce: str | None, told: Told = lambda done, of: 
     if not there or (asked is not None and asked not in there):
         return Proposal(setting, there, asked)
     run, before = setting.simulated(setting.space.unchanged)
-    target = int(before.shares.argmax()) if asked is None else COUPLINGS.index(asked)
+    target = int(np.argmax(before.shares)) if asked is None else COUPLINGS.index(asked)
     if before.shares[target] < REST:
         return Proposal(setting, there, asked, run, before)
     comparison = Comparison(setting, run, before)

@@ -52,7 +52,7 @@ def _ballast(_: Space, x: np.ndarray) -> str:
 def _disc(space: Space, x: np.ndarray) -> str:
     mass = float(disc_mass(x[7], space.density))
     normal = normal_of(x[11], x[12])
-    normal = normal * np.sign(normal[np.abs(normal).argmax()])  # a disc has two of them
+    normal = normal * np.sign(normal[int(np.argmax(np.abs(normal)))])  # a disc has two of them
     facing = _place(normal, '')
     return (
         f'fit a thin flat disc of {number(x[7])} m radius at {_place(x[8:11])}, its normal along '

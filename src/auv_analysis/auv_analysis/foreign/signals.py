@@ -78,9 +78,9 @@ def longest_stretch(of: Recorded, notes: list[str]) -> Recorded:
         return of
     parts = np.split(np.arange(len(of.stamps)), cuts)
     kept = max(parts, key=len)
-    back = -np.diff(of.stamps)[cuts - 1] / NANOSECONDS
+    back = np.max(-np.diff(of.stamps)[cuts - 1]) / NANOSECONDS
     notes.append(
-        f'{of.source.topic}: the clock jumps back {len(cuts)} times, by up to {back.max():.6g} s; '
+        f'{of.source.topic}: the clock jumps back {len(cuts)} times, by up to {back:.6g} s; '
         f'read the longest of {len(parts)} stretches, left {len(of.stamps) - len(kept)} messages'
     )
     return of.part(kept)

@@ -39,7 +39,7 @@ class TimeBase:
     def spans(self) -> tuple[tuple[float, float], ...]:
         """Gaps between the samples: last time before and first behind each, s from the start."""
         t = self.t
-        where = np.flatnonzero(np.diff(self.ns) > self.step)
+        where = np.flatnonzero(np.diff(self.ns) > self.step).tolist()
         return tuple((float(t[i]), float(t[i + 1])) for i in where)
 
 

@@ -43,7 +43,7 @@ def oscillates(of: Evidence) -> Finding:
     text = '; '.join(
         f'{ERRORS[i]} {quote(f"path of {ERRORS[i]}, cl", cl[i], unit[i // 3], 2)} against '
         f'{quote(f"path of {ERRORS[i]}, gvc", gvc[i], unit[i // 3], 2)}'
-        for i in np.flatnonzero(seen)
+        for i in np.flatnonzero(seen).tolist()
     )
     text = f'total variation, CL against GVC: {text}'
     window = spell((0.0, of.gvc.run.duration))

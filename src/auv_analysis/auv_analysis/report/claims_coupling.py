@@ -19,7 +19,7 @@ def kinetic_energy_mean(of: Evidence) -> Finding:
     """Row 9: total kinetic energy, a mean over a window that the paper does not print."""
     windows, quote = _windows(of.gvc), Quotes()
     text = '; '.join(
-        f'{quote(f"kinetic energy, 0–{end:g} s", part.sum(), "J", decimals(2))} J '
+        f'{quote(f"kinetic energy, 0–{end:g} s", float(part.sum()), "J", decimals(2))} J '
         f'({_window(quote, end)})'
         for end, part in windows.items()
     )
@@ -50,9 +50,9 @@ def energy_in_two(of: Evidence) -> Finding:
     """Row 16: energy mainly in xi_3 and xi_1."""
     part, quote = shares(of.gvc.part('energy').mean), Quotes()
     order = np.argsort(part)[::-1]
-    first = quote('component with the largest share', order[0] + 1, '', short)
-    second = quote('component with the second share', order[1] + 1, '', short)
-    together = quote('their share', part[order[:2]].sum(), '%', decimals(2))
+    first = quote('component with the largest share', int(order[0]) + 1, '', short)
+    second = quote('component with the second share', int(order[1]) + 1, '', short)
+    together = quote('their share', float(part[order[:2]].sum()), '%', decimals(2))
     text = f'ξ{first} and ξ{second}, together {together} %'
     verdict = grade([tuple(order[:2]) == (2, 0), bool(part[[0, 2]].sum() > 99.0)])
     return Finding(text, verdict, quote.values, _whole(of.gvc))

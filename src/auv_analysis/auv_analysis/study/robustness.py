@@ -140,7 +140,7 @@ def met(found: Unknowns) -> tuple[float, float, float] | None:
 def crossings(ends: np.ndarray, energy: np.ndarray, level: float) -> Iterator[float]:
     """Times at which a line (K,) over `ends` (K,) meets a level, linear between its points."""
     above = energy - level
-    for i in np.flatnonzero(np.sign(above[:-1]) * np.sign(above[1:]) < 0):
+    for i in np.flatnonzero(np.sign(above[:-1]) * np.sign(above[1:]) < 0).tolist():
         part = above[i] / (above[i] - above[i + 1])
         yield float(ends[i] + part * (ends[i + 1] - ends[i]))
 

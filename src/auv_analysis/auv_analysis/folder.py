@@ -1,11 +1,13 @@
 """The folder of a run's results: made, checked and, when asked, cleared of what we left there."""
 
+import json
 import os
 import re
 import shutil
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -65,6 +67,12 @@ def check_free(out: Path, *, overwrite: bool) -> bool:
     if taken and not overwrite:
         raise InputError(out, '--out', 'a new folder, or --overwrite', 'an existing folder')
     return taken
+
+
+def write_json(path: Path, document: Any) -> None:
+    """Write a document as `--json` prints it, for people: indented; NaN is a ValueError."""
+    text = json.dumps(document, indent=2, allow_nan=False)
+    path.write_text(text + '\n', encoding='utf-8')
 
 
 def _clear(out: Path, inputs: list[Path], new: Iterable[str]) -> None:

@@ -60,15 +60,7 @@ class Figures(NamedTuple):
         like : function that makes an array of (n,) or lanes of it, all of one number
 
         """
-        known = {
-            'late': int(np.ceil((TRANSIENT - 1e-9) / step)),
-            'Upsilon': model.Upsilon,
-            'Upsilon_inv': model.Upsilon_inv,
-            'N': model.N,
-            'band': band,
-            'outside': like(6, -1.0),
-            'diverged': like(1, np.inf),
-        }
+        known = at_start(model, band, step, like)
         return cls(**{name: known.get(name, like(6, 0.0)) for name in cls._fields})
 
     @staticmethod
@@ -88,9 +80,34 @@ class Figures(NamedTuple):
             keep_largest(record.error_late, error)
             keep_largest(record.w_late, w)
         keep_last(record.outside, error, record.band, float(k))
-        good = size_of(sample) < LARGEST
-        first = select(record.diverged[0] < k, record.diverged[0], float(k))
-        record.diverged[0] = select(good, record.diverged[0], first)
+        keep_divergence(record.diverged, k, sample)
+
+
+def at_start(model: ControlModel, band: np.ndarray, step: float, like: Any) -> dict[str, Any]:
+    """What every record has before the first sample; the parameters are those of `Figures.start`.
+
+    Returns
+    -------
+    known : `late`, `Upsilon`, `Upsilon_inv`, `N`, `band`, `outside` and `diverged` of `Figures`
+
+    """
+    return {
+        'late': int(np.ceil((TRANSIENT - 1e-9) / step)),
+        'Upsilon': model.Upsilon,
+        'Upsilon_inv': model.Upsilon_inv,
+        'N': model.N,
+        'band': band,
+        'outside': like(6, -1.0),
+        'diverged': like(1, np.inf),
+    }
+
+
+@jitable
+def keep_divergence(diverged, k, sample):
+    """Index k where sample k is the first that is not finite, in place."""
+    good = size_of(sample) < LARGEST
+    first = select(diverged[0] < k, diverged[0], float(k))
+    diverged[0] = select(good, diverged[0], first)
 
 
 @helper

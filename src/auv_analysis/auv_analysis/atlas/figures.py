@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from auv_analysis.atlas.collect import Chart
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figures import FigureRecord, save_figures
 from auv_analysis.report.grids import ALWAYS, Grid, draw_grid, grid_figure, scale_bar
 from auv_analysis.report.plotting import COLOURS
 from auv_analysis.report.text import join
@@ -32,7 +32,6 @@ def draw(charts: Sequence[Chart], folder: Path) -> dict[str, FigureRecord]:
     folder : where the files go; made when it is not there
 
     """
-    folder.mkdir(parents=True, exist_ok=True)
     drawn: dict[str, Callable[[], Drawn]] = {
         'strength': lambda: _strength(charts),
         'correlation': lambda: _correlation(charts),
@@ -40,13 +39,7 @@ def draw(charts: Sequence[Chart], folder: Path) -> dict[str, FigureRecord]:
         'case1_delta_xi': lambda: _reached(charts, 'delta_xi'),
         'case1_delta_pi': lambda: _reached(charts, 'delta_pi'),
     }
-    figures = {}
-    with plotting.style():
-        for name, make in drawn.items():
-            figure, title, caption = make()
-            files = (None, None) if figure is None else plotting.save(figure, folder, name)
-            figures[name] = FigureRecord(name, title, caption, *files)
-    return figures
+    return save_figures(folder, drawn)
 
 
 def coupled(charts: Sequence[Chart]) -> list[tuple[str, Chart]]:

@@ -1,6 +1,5 @@
 """How commands end: summary, report and a table of the runs."""
 
-import json
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -10,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 from rich.console import Console
 
 from auv_analysis.commands.terminal import comparison_table, summary_tables
+from auv_analysis.folder import write_json
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
 from auv_analysis.summary import Window, summarize
@@ -82,8 +82,7 @@ def conclude(
     windows = study.windows if study else ()
     with console.status('computing the figures of summary.json'):
         summaries = {name: summarize(run, windows=windows) for name, run in runs.items()}
-    text = json.dumps(summaries, indent=2, allow_nan=False)
-    (out / 'summary.json').write_text(text + '\n', encoding='utf-8')
+    write_json(out / 'summary.json', summaries)
     from auv_analysis.report.page import write_report  # with matplotlib, which loads slowly
 
     more = study.examine(runs, summaries) if study else {}

@@ -1,7 +1,6 @@
 """`auv tune`: laws tuned to equal effort or equal error, then compared over random changes."""
 
 import argparse
-import json
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +10,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from auv_analysis.commands.conclude import console, say
-from auv_analysis.folder import prepare
+from auv_analysis.folder import prepare, write_json
 from auv_analysis.report.text import number
 from auv_analysis.scenario import Scenario, load_scenario
 from auv_analysis.simulation import check_hold
@@ -101,8 +100,7 @@ def _conclude(outcome: Outcome, out: Path) -> dict[str, Any]:
     sentences = verdict(outcome)
     document = outcome.document()
     document['verdict'] = [{'text': s.text, 'source': s.source} for s in sentences]
-    text = json.dumps(document, indent=2, allow_nan=False)
-    (out / DOCUMENT).write_text(f'{text}\n', encoding='utf-8')
+    write_json(out / DOCUMENT, document)
     write_search(out / SEARCH, outcome.rivals)
     if outcome.draws:
         write_draws(out / MONTE_CARLO, outcome.draws)

@@ -1,6 +1,5 @@
 """Many runs, one after the other, into a comparison: table, figures, report."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +12,7 @@ from auv_analysis.comparison.opening import named, open_source
 from auv_analysis.comparison.ranking import rank
 from auv_analysis.comparison.sources import Source
 from auv_analysis.failure import FailedError
+from auv_analysis.folder import write_json
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.summary import summarize
 from auv_dynamics.vehicle import Vehicle
@@ -104,8 +104,7 @@ def conclude_comparison(out: Path, entries: Sequence[Entry]) -> dict[str, Any]:
 
     """
     summaries = {entry.name: entry.summary or None for entry in entries}
-    text = json.dumps(summaries, indent=2, allow_nan=False)
-    (out / 'summary.json').write_text(text + '\n', encoding='utf-8')
+    write_json(out / 'summary.json', summaries)
     table = comparison_table(entries)
     ranking = rank(table)
     write_table(table, ranking, out)

@@ -15,7 +15,7 @@ from auv_analysis.comparison.lines import MOST_LINES, Drawn, errors, look
 from auv_analysis.comparison.ranking import Ranking
 from auv_analysis.measures import FAMILIES
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figures import FigureRecord, save_figures
 from auv_analysis.report.grids import ALWAYS, MARGIN, ROW, TALLEST, Grid, grid_figure, name_rows
 from auv_analysis.report.overview import XI
 from auv_analysis.report.plotting import COLOURS
@@ -46,20 +46,13 @@ def draw(
     folder : where the files go; made when it is not there
 
     """
-    folder.mkdir(parents=True, exist_ok=True)
     drawn: dict[str, Callable[[], Drawn]] = {
         'ranking': partial(_ranking, ranking),
         'errors': partial(errors, entries),
         'kinetic_energy': partial(_energy, table),
         **{name: partial(_six, name, table) for name in SIX},
     }
-    figures = {}
-    with plotting.style():
-        for name, make in drawn.items():
-            figure, title, caption = make()
-            files = (None, None) if figure is None else plotting.save(figure, folder, name)
-            figures[name] = FigureRecord(name, title, caption, *files)
-    return figures
+    return save_figures(folder, drawn)
 
 
 def column(table: pa.Table, name: str) -> np.ndarray:

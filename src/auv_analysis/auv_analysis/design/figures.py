@@ -1,6 +1,7 @@
 """The figures of a design, before and after: couplings, the reduced one over time, Upsilon."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 
 from auv_analysis.design.result import Result
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figures import Drawn, FigureRecord, save_figures
 from auv_analysis.report.sketching import sketches
 from auv_analysis.summary import TRANSIENT
 from auv_dynamics.signals import DOFS
@@ -31,18 +32,17 @@ def draw_design(result: Result, folder: Path) -> list[FigureRecord]:
     """
     if result.before is None or result.after is None:
         return []
-    folder.mkdir(parents=True, exist_ok=True)
-    document, found = result.document, []
-    drawn = (
-        ('couplings', 'Couplings before and after', *_couplings(document)),
-        ('reduced', 'The reduced coupling over time', *_reduced(result)),
-        ('Upsilon', 'Upsilon before and after', *_upsilon(result)),
-    )
-    with plotting.style():
-        for name, title, draw, caption in drawn:
-            figure = draw()
-            found.append(FigureRecord(name, title, caption, *plotting.save(figure, folder, name)))
-    return found
+    drawn = {
+        'couplings': ('Couplings before and after', *_couplings(result.document)),
+        'reduced': ('The reduced coupling over time', *_reduced(result)),
+        'Upsilon': ('Upsilon before and after', *_upsilon(result)),
+    }
+
+    def made(title: str, draw: Callable[[], Figure], caption: str) -> Drawn:
+        return draw(), title, caption
+
+    parts = {name: partial(made, *entry) for name, entry in drawn.items()}
+    return list(save_figures(folder, parts).values())
 
 
 def _symbol(coupling: str) -> str:

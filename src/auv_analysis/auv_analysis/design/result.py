@@ -1,6 +1,5 @@
 """A design as files in a folder and as one JSON document."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from auv_analysis.design.statements import (
     warnings_of,
 )
 from auv_analysis.design.words import change_words, values_of
+from auv_analysis.folder import write_json
 from auv_dynamics.vehicle import Vehicle
 from auv_gvc_controller.decomposition import decompose
 
@@ -66,14 +66,14 @@ def concluded(found: Proposal, out: Path) -> Result:
     if found.target is None or found.before is None:
         name = setting.space.vehicle.name
         document['statement'] = nothing_statement(name, found.asked, found.there)
-        _write(out / DESIGN, document)
+        write_json(out / DESIGN, document)
         return Result(found, document)
     before = Outcome.of(setting.scenario, setting.hold)
     after = Outcome.of(scenario, setting.hold)
-    _write(out / BEFORE, before.summaries)
-    _write(out / AFTER, after.summaries)
+    write_json(out / BEFORE, before.summaries)
+    write_json(out / AFTER, after.summaries)
     document |= _body(found, scenario.vehicle, before, after)
-    _write(out / DESIGN, document)
+    write_json(out / DESIGN, document)
     return Result(found, document, before, after)
 
 
@@ -181,8 +181,3 @@ def _controllers(
             rows = measures(before.summaries[name], after.summaries[name], coupled)
         found[name] = {'failure': failure, 'measures': rows}
     return found
-
-
-def _write(path: Path, document: Mapping[str, Any]) -> None:
-    text = json.dumps(document, indent=2, allow_nan=False)
-    path.write_text(text + '\n', encoding='utf-8')

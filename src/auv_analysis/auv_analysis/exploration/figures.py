@@ -17,8 +17,8 @@ from auv_analysis.exploration.names import short_names
 from auv_analysis.exploration.results import Results
 from auv_analysis.measures import Measure
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord
-from auv_analysis.report.grids import Grid, grid_figure
+from auv_analysis.report.figures import FigureRecord, save_figures
+from auv_analysis.report.grids import Grid, grid_figure, small_heads
 from auv_analysis.report.text import join
 
 ACROSS = 4
@@ -43,7 +43,6 @@ def draw(results: Results, folder: Path) -> dict[str, FigureRecord]:
     folder : where the files go; made when it is not there
 
     """
-    folder.mkdir(parents=True, exist_ok=True)
     chosen, tables = main_measures(results), results.tables
     drawn: dict[str, Callable[[], Drawn]] = {}
     if results.measures:
@@ -62,13 +61,7 @@ def draw(results: Results, folder: Path) -> dict[str, FigureRecord]:
         drawn['total_indices'] = partial(total_indices, results)
     if 'morris' in methods:
         drawn['elementary_effects'] = partial(effects, results, chosen)
-    figures = {}
-    with plotting.style():
-        for name, make in drawn.items():
-            figure, title, caption = make()
-            files = plotting.save(figure, folder, name)
-            figures[name] = FigureRecord(name, title, caption, *files)
-    return figures
+    return save_figures(folder, drawn)
 
 
 def main_measures(results: Results, count: int = 6) -> list[Measure]:
@@ -157,8 +150,7 @@ def _influence(results: Results) -> Drawn:
             )
         )
     figure = grid_figure([m.label for m in results.measures], grids)
-    for axes in figure.axes[: len(grids)]:
-        axes.tick_params(axis='x', labelrotation=90 if len(paths) > 2 else 0, labelsize='small')
+    small_heads(figure, grids)
     title = 'What matters'
     caption = (
         f'{title}: share of the variance of the ranks of a figure that lies between the groups of '

@@ -11,7 +11,7 @@ from auv_analysis.exploration.names import short_names
 from auv_analysis.exploration.results import Results
 from auv_analysis.measures import BY_NAME, Measure
 from auv_analysis.report import plotting
-from auv_analysis.report.grids import Grid, grid_figure
+from auv_analysis.report.grids import Grid, grid_figure, small_heads
 from auv_analysis.report.text import plain, typeset
 
 LETTERS = 'abcd'  # of grids side by side
@@ -37,8 +37,7 @@ def total_indices(results: Results) -> Drawn:
         known = np.array(values, float)
         grids.append(Grid(known, heads, label, 'Blues', Normalize(0.0, 1.0), decimals=2))
     figure = grid_figure([BY_NAME[name].label for name in figures], grids)
-    for axes in figure.axes[: len(grids)]:
-        axes.tick_params(axis='x', labelrotation=90 if len(paths) > 2 else 0, labelsize='small')
+    small_heads(figure, grids)
     title = 'Total sensitivity indices'
     caption = (
         f'{title} of Sobol: the share of the variance of a figure that would be left if all but '

@@ -1,6 +1,6 @@
 """The figures of a study: what the paper draws, and what makes the comparison readable."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,26 @@ class FigureRecord:
     pdf: Path | None
 
 
+def saved(folder: Path, name: str, figure: Figure | None, title: str, caption: str) -> FigureRecord:
+    """Save what was drawn; None: nothing, and the caption says why."""
+    files = (None, None) if figure is None else plotting.save(figure, folder, name)
+    return FigureRecord(name, title, caption, *files)
+
+
+def save_figures(folder: Path, drawn: Mapping[str, Callable[[], Drawn]]) -> dict[str, FigureRecord]:
+    """Draw and save figures, one after the other, in the style of reports.
+
+    Parameters
+    ----------
+    folder : where the files go; made when it is not there
+    drawn : name -> what makes the figure, its title and its caption
+
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with plotting.style():
+        return {name: saved(folder, name, *make()) for name, make in drawn.items()}
+
+
 def draw_figures(
     runs: Mapping[str, AnyRun | Sketch],
     folder: Path,
@@ -81,8 +101,7 @@ def draw_figures(
     figures: list[FigureRecord] = []
 
     def add(name: str, figure: Figure | None, title: str, caption: str) -> None:
-        files = (None, None) if figure is None else plotting.save(figure, folder, name)
-        figures.append(FigureRecord(name, title, caption, *files))
+        figures.append(saved(folder, name, figure, title, caption))
 
     with plotting.style():
         for run in drawn.values():

@@ -89,6 +89,13 @@ def grid_figure(
     return figure
 
 
+def small_heads(figure: Figure, grids: Sequence[Grid]) -> None:
+    """Heads that are paths: small, and upright where there are more than two."""
+    for axes, grid in zip(figure.axes, grids, strict=False):
+        angle = 90 if len(grid.columns) > 2 else 0
+        axes.tick_params(axis='x', labelrotation=angle, labelsize='small')
+
+
 def scale_bar(figure: Figure, image: ScalarMappable, label: str, **place: Any) -> None:
     """Colour bar with few enough numbers."""
     bar = figure.colorbar(image, label=label, **place)

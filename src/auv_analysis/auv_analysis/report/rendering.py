@@ -3,6 +3,7 @@
 import base64
 import re
 from collections.abc import Sequence
+from functools import cache
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -97,6 +98,7 @@ def names_of(sections: Sequence[Section]) -> dict[str, str]:
     return names | {anchor: f'figure {i}' for i, anchor in enumerate(figures, start=1)}
 
 
+@cache
 def environment() -> jinja2.Environment:
     """Where the report's templates are, with the filters that they use."""
     found = jinja2.Environment(

@@ -1,6 +1,7 @@
 """The figures of a tuning: what effort buys, and what the draws do to it."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figures import FigureRecord, save_figures
 from auv_analysis.report.plotting import COLOURS, DASHES, GREY
 from auv_analysis.tuning.comparison import DIVERGED, log_ratios
 from auv_analysis.tuning.measures import MEANINGS, Measures
@@ -24,17 +25,11 @@ Drawn = tuple[Figure, str, str]
 
 def pictures(outcome: Outcome, folder: Path) -> list[FigureRecord]:
     """Draw the figures of an outcome as PNG and PDF into a folder, made when it is not there."""
-    folder.mkdir(parents=True, exist_ok=True)
     drawn = {'trade_off': trade_off}
     if outcome.draws:
         drawn |= {'draws': distributions, 'paired': paired}
-    records = []
-    with plotting.style():
-        for name, draw in drawn.items():
-            figure, title, caption = draw(outcome)
-            png, pdf = plotting.save(figure, folder, name)
-            records.append(FigureRecord(name, title, caption, png, pdf))
-    return records
+    made = {name: partial(draw, outcome) for name, draw in drawn.items()}
+    return list(save_figures(folder, made).values())
 
 
 def trade_off(outcome: Outcome) -> Drawn:

@@ -4,9 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_analysis.reduction import keep_last, size_of
-from auv_analysis.summary import TRANSIENT
-from auv_dynamics.files import LARGEST
+from auv_analysis.reduction import at_start, keep_divergence, keep_last
 from auv_dynamics.jit import helper
 from auv_dynamics.lanes import select
 from auv_dynamics.six import diag, sub, upper, upper_T, vector
@@ -45,15 +43,7 @@ class Cost(NamedTuple):
     @classmethod
     def start(cls, model: ControlModel, band: np.ndarray, step: float, like: Any) -> 'Cost':
         """Cost before the first sample; the parameters are those of `Figures.start`."""
-        known = {
-            'late': int(np.ceil((TRANSIENT - 1e-9) / step)),
-            'Upsilon': model.Upsilon,
-            'Upsilon_inv': model.Upsilon_inv,
-            'N': model.N,
-            'band': band,
-            'outside': like(6, -1.0),
-            'diverged': like(1, np.inf),
-        }
+        known = at_start(model, band, step, like)
         return cls(**{name: known.get(name, like(1, 0.0)) for name in cls._fields})
 
     @staticmethod
@@ -72,9 +62,7 @@ class Cost(NamedTuple):
             largest = record.late_error[0]
             record.late_error[0] = select(energy > largest, energy, largest)
         keep_last(record.outside, error, record.band, float(k))
-        good = size_of(sample) < LARGEST
-        first = select(record.diverged[0] < k, record.diverged[0], float(k))
-        record.diverged[0] = select(good, record.diverged[0], first)
+        keep_divergence(record.diverged, k, sample)
 
 
 @helper

@@ -1,6 +1,7 @@
 """The kernel gives the same numbers compiled, with numba switched off, and without numba."""
 
 import os
+import stat
 import subprocess
 import sys
 from dataclasses import replace
@@ -118,3 +119,58 @@ def test_plain_gives_the_python_function():
     assert jit.plain(function) is function
     assert jit.plain(jit.compiled(function)) is function
     assert jit.plain(jit.helper(function)) is function
+
+
+def mode(folder):
+    return stat.S_IMODE(folder.stat().st_mode)
+
+
+def test_the_folder_of_compiled_code_is_its_users_alone(tmp_path):
+    assert jit.is_private(tmp_path / 'new' / 'inner')
+    assert mode(tmp_path / 'new' / 'inner') == 0o700
+    (tmp_path / 'old').mkdir()
+    (tmp_path / 'old').chmod(0o777)
+    assert jit.is_private(tmp_path / 'old')
+    assert mode(tmp_path / 'old') == 0o700
+
+
+def test_a_folder_that_somebody_else_made_is_not_used(tmp_path, monkeypatch):
+    (tmp_path / 'link').symlink_to(tmp_path)
+    assert not jit.is_private(tmp_path / 'link')
+    (tmp_path / 'file').touch()
+    assert not jit.is_private(tmp_path / 'file')
+    monkeypatch.setattr(os, 'getuid', lambda: 12345)  # the folders are then of another user
+    (tmp_path / 'theirs').mkdir(mode=0o755)
+    theirs = os.stat(tmp_path / 'theirs')
+    assert jit.is_private(tmp_path / 'theirs') == (theirs.st_uid == 0), 'root may install it'
+    (tmp_path / 'theirs').chmod(0o777)
+    assert not jit.is_private(tmp_path / 'theirs')
+
+
+@pytest.mark.skipif(not jit.JITTED, reason='numba is absent or switched off here')
+@pytest.mark.parametrize('private', [True, False])
+def test_code_in_a_folder_of_somebody_else_is_neither_loaded_nor_kept(tmp_path, private):
+    cache = tmp_path / 'cache' / jit.kernels_digest()
+    cache.parent.mkdir()
+    if not private:
+        cache.symlink_to(tmp_path, target_is_directory=True)
+    script = tmp_path / 'script.py'
+    script.write_text(
+        'from auv_dynamics.jit import compiled\n'
+        '@compiled\n'
+        'def next_one(x):\n'
+        '    return x + 1\n'
+        'print(next_one(1))\n'
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        env=os.environ | {'AUV_GVC_CACHE_DIR': str(cache.parent)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == '2\n'
+    assert bool(list(tmp_path.glob('**/*.nb?'))) == private
+    said = [] if private else [f'warning: {cache}: not yours alone: compiled code is neither kept '
+                               'nor loaded']  # fmt: skip
+    assert done.stderr.splitlines() == said

@@ -91,7 +91,9 @@ def test_a_number_that_is_not_finite_is_refused_alike(kind: type, place: int, ba
     data = as_bytes(kind, 3, tuple(values))
     texts = []
     for codec in (Codec(kind, FRAMES, 'topic'), long_way(kind)):
-        with pytest.raises(BadMessageError, match='topic: expected finite numbers') as refusal:
+        with pytest.raises(
+            BadMessageError, match='topic: not finite: expected finite numbers'
+        ) as refusal:
             codec.decode(data)
         texts.append(str(refusal.value))
     assert texts[0] == texts[1]

@@ -1,9 +1,6 @@
 """YAML files checked against a JSON schema: one line names file, key, expected and found."""
 
-import itertools
 import json
-import re
-import reprlib
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -11,88 +8,29 @@ from typing import Any
 
 import jsonschema
 import numpy as np
-import yaml
 
-PLAIN = re.compile(r'[^\W\d](?:[\w ./:-]{0,55}\w)?')  # a word or two
-LONGEST = 200  # characters of what was found
-MOST_ENTRIES = 100_000  # of a file, with its aliases written out
+from auv_dynamics.refusal import InputError, reason, shorten
+from auv_dynamics.yaml_text import parse_any_yaml, parse_yaml
+
+__all__ = [
+    'InputError', 'check', 'dotted', 'matrix6', 'parse_any_yaml', 'parse_yaml', 'read_text',
+    'read_yaml', 'reason', 'schema', 'shorten',
+]  # fmt: skip
 LARGEST = 1e100  # products of a few such numbers are still finite
-_repr = reprlib.Repr()
-_repr.maxlevel, _repr.maxlist, _repr.maxdict, _repr.maxstring = 3, 10, 5, 57
-
-
-class InputError(ValueError):
-    """Wrong input from the user; its text is one line fit for a terminal."""
-
-    def __init__(self, file: object, key: str, expected: str, found: object):
-        self.file, self.key, self.expected = str(file), key, expected
-        self.found = found if isinstance(found, str) else shorten(found)
-        if len(self.found) > LONGEST:
-            self.found = f'{self.found[: LONGEST - 3]}...'
-        place = f'{self.file}: {key}' if key else self.file
-        line = f'{place}: expected {expected}, found {self.found}'
-        super().__init__(' '.join(line.split()))
-
-
-def reason(error: OSError) -> str:
-    """What the system said, as a few words for a message."""
-    return (error.strerror or str(error)).lower()
-
-
-def shorten(value: object) -> str:
-    """One short line that shows a value."""
-    if isinstance(value, str) and PLAIN.fullmatch(value):
-        return value  # only what looks like no word is quoted: '', '1', control characters
-    text = 'nothing' if value is None else _repr.repr(value)
-    text = ' '.join(text.split())
-    return text if len(text) <= 60 else text[:57] + '...'
-
-
-class _Loader(yaml.SafeLoader):
-    """Scalars of YAML 1.2's core schema: `1e-3` is a number, `on` a word; a key stands once."""
-
-    yaml_implicit_resolvers = {}  # noqa: RUF012  not PyYAML's: 1:30 is not 90, 010 not 8
-
-
-for _tag, _pattern, _first in (
-    ('bool', r'true|True|TRUE|false|False|FALSE', 'tTfF'),
-    ('null', r'~|null|Null|NULL|', ['~', 'n', 'N', '']),
-    ('int', r'[-+]?(?:0|[1-9]\d*)', '-+0123456789'),
-    ('float', r'[-+]?(?:\.\d+|(?:0|[1-9]\d*)(?:\.\d*)?)(?:[eE][-+]?\d+)?', '-+.0123456789'),
-    ('float', r'[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)', '-+.'),
-    ('merge', r'<<', '<'),
-):
-    _Loader.add_implicit_resolver(
-        f'tag:yaml.org,2002:{_tag}', re.compile(f'^(?:{_pattern})$'), list(_first)
-    )
-
-
-def _unique_mapping(loader: _Loader, node: yaml.MappingNode) -> dict:
-    if not isinstance(node, yaml.MappingNode):
-        raise yaml.constructor.ConstructorError(problem='no mapping', problem_mark=node.start_mark)
-    seen: dict = {}
-    for key_node, value_node in node.value:
-        if key_node.tag == 'tag:yaml.org,2002:merge':
-            mark = key_node.start_mark
-            raise InputError(mark.name, f'line {mark.line + 1}', 'keys written out', 'merge key <<')
-        key = loader.construct_object(key_node, deep=True)
-        if not isinstance(key, str):
-            mark = key_node.start_mark
-            raise InputError(mark.name, f'line {mark.line + 1}', 'a word as key', key)
-        if key in seen:
-            mark = key_node.start_mark
-            raise InputError(mark.name, key, 'each key once', f'again in line {mark.line + 1}')
-        seen[key] = loader.construct_object(value_node, deep=True)
-    return seen
-
-
-_Loader.add_constructor('tag:yaml.org,2002:map', _unique_mapping)
+LARGEST_FILE = 1 << 28  # bytes of a text file
+PIECE = 1 << 22  # bytes that are read at once
 
 
 def read_text(path: Path, kind: str) -> str:
     """Text of a file; InputError when it is missing, a folder, unreadable or not UTF-8."""
     try:
-        return path.read_text(encoding='utf-8-sig')
+        data = b''
+        with path.open('rb') as file:  # a device does not say how long it is
+            while len(data) <= LARGEST_FILE and (piece := file.read(PIECE)):
+                data += piece
+        if len(data) <= LARGEST_FILE:
+            return data.decode('utf-8-sig').replace('\r\n', '\n').replace('\r', '\n')
+        found = f'more than {LARGEST_FILE} bytes'
     except FileNotFoundError:
         found = 'no such file'
     except UnicodeDecodeError as error:
@@ -107,33 +45,6 @@ def read_text(path: Path, kind: str) -> str:
 def read_yaml(path: Path, kind: str) -> dict[str, Any]:
     """Mapping in a YAML file; InputError when it cannot be read or is no mapping."""
     return parse_yaml(read_text(path, kind), path, kind)
-
-
-def parse_yaml(text: str, path: object, kind: str) -> dict[str, Any]:
-    """Mapping in a YAML text; InputError, which names `path`, when there is none."""
-    try:
-        loader = _Loader(text)
-        loader.name = str(path)
-        data = loader.get_single_data()
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = f'line {mark.line + 1}, column {mark.column + 1}' if mark else ''
-        problem = re.sub('^(but )?found ', '', error.problem or 'an error')
-        raise InputError(path, where, 'valid YAML', problem) from None
-    except InputError:
-        raise
-    except RecursionError:
-        raise InputError(path, '', 'valid YAML', 'too many levels') from None
-    except (yaml.YAMLError, ValueError, TypeError, LookupError) as error:
-        # PyYAML's constructors of tagged scalars raise what their conversions raise
-        found = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(path, '', 'valid YAML', found) from None
-    if sum(1 for _ in itertools.islice(_leaves(data), MOST_ENTRIES + 1)) > MOST_ENTRIES:
-        expected = f'at most {MOST_ENTRIES} entries with all aliases written out'
-        raise InputError(path, '', expected, 'more')
-    if not isinstance(data, dict):
-        raise InputError(path, '', f'a mapping with the keys of a {kind} file', data)
-    return data
 
 
 @lru_cache

@@ -11,6 +11,7 @@ from typing import Any
 from auv_dynamics.signals import DOFS
 
 NANOSECONDS = 10**9
+UNIT = 1e-3  # deviation of a quaternion's norm from 1 that is accepted
 PARENT = 'AUV_GVC_PARENT'  # variable with the process id of `auv run`: nodes do not outlive it
 OBSERVER = 'auv_watch'  # name of a node that only looks on: nobody waits for it
 
@@ -45,6 +46,9 @@ class Frames:
     base: str = 'base_link_fsd'
 
 
+ROS_FRAMES = Frames('odom', 'base_link')  # of REP-105: here `odom` is ENU, `base` FLU
+
+
 class BadMessageError(ValueError):
     """A message that must not be used; its text names topic, expected and found."""
 
@@ -54,6 +58,14 @@ def nanoseconds(time: Any) -> int:
     return time.sec * NANOSECONDS + time.nanosec
 
 
+def check_stamp(topic: str, sec: int, nanosec: int) -> int:
+    """Return a stamp in ns; BadMessageError when it is none: negative, or beyond a second."""
+    if sec < 0 or nanosec >= NANOSECONDS:
+        found = f'{sec} s and {nanosec} ns'
+        raise BadMessageError(f'{topic}: no stamp: expected 0 s or later, found {found}')
+    return sec * NANOSECONDS + nanosec
+
+
 def _six(linear: Any, angular: Any) -> tuple:
     return (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
 
@@ -61,7 +73,7 @@ def _six(linear: Any, angular: Any) -> tuple:
 def check_finite(topic: str, values: tuple) -> tuple:
     """Return the numbers of a message; BadMessageError when one is not finite."""
     if not all(map(math.isfinite, values)):
-        raise BadMessageError(f'{topic}: expected finite numbers, found {values}')
+        raise BadMessageError(f'{topic}: not finite: expected finite numbers, found {values}')
     return values
 
 
@@ -69,7 +81,7 @@ def check_state(topic: str, x: tuple) -> tuple:
     """Return a state (13 floats); BadMessageError: not finite, or no unit quaternion."""
     check_finite(topic, x)
     norm = math.hypot(*x[3:7])
-    if abs(norm - 1.0) > 1e-3:
+    if abs(norm - 1.0) > UNIT:
         raise BadMessageError(
             f'{topic}: orientation: expected a unit quaternion, found norm {norm:g}'
         )
@@ -81,19 +93,33 @@ def _frame(topic: str, key: str, expected: str, found: str) -> None:
         raise BadMessageError(f'{topic}: {key}: expected {expected!r}, found {found!r}')
 
 
+def _stamp(topic: str, message: Any) -> int:
+    return check_stamp(topic, message.header.stamp.sec, message.header.stamp.nanosec)
+
+
 def read_odometry(message: Any, frames: Frames, topic: str = ODOM) -> tuple[int, tuple]:
     """Stamp in ns and state (13 floats); BadMessageError when it must not be used."""
     _frame(topic, 'header.frame_id', frames.odom, message.header.frame_id)
     _frame(topic, 'child_frame_id', frames.base, message.child_frame_id)
+    x = check_state(topic, state_of(message))
+    return _stamp(topic, message), x
+
+
+def state_of(message: Any) -> tuple:
+    """State (13 floats) of an Odometry as it was sent: position, quaternion w x y z, twist."""
     p, q = message.pose.pose.position, message.pose.pose.orientation
     nu = _six(message.twist.twist.linear, message.twist.twist.angular)
-    x = check_state(topic, (p.x, p.y, p.z, q.w, q.x, q.y, q.z, *nu))
-    return nanoseconds(message.header.stamp), x
+    return (p.x, p.y, p.z, q.w, q.x, q.y, q.z, *nu)
+
+
+def wrench_of(message: Any) -> tuple:
+    """Six floats of a WrenchStamped as they were sent."""
+    return _six(message.wrench.force, message.wrench.torque)
 
 
 def _stamped(topic: str, message: Any, values: tuple, frames: Frames) -> tuple[int, tuple]:
     _frame(topic, 'header.frame_id', frames.base, message.header.frame_id)
-    return nanoseconds(message.header.stamp), check_finite(topic, values)
+    return _stamp(topic, message), check_finite(topic, values)
 
 
 def read_twist(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
@@ -108,7 +134,7 @@ def read_accel(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
 
 def read_wrench(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
     """Stamp in ns and six floats of a WrenchStamped; BadMessageError when it must not be used."""
-    return _stamped(topic, message, _six(message.wrench.force, message.wrench.torque), frames)
+    return _stamped(topic, message, wrench_of(message), frames)
 
 
 def read_joint_state(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:

@@ -8,13 +8,15 @@ is for that.
 
 Compiled code is kept in one explicit folder whose name changes with every source file that the
 kernels can depend on, so that a stale binary cannot be loaded: numba itself only looks at the file
-of the outermost function.
+of the outermost function. To load it is to run it: the folder is its user's alone.
 """
 
 import hashlib
 import importlib.util
 import os
 import re
+import stat
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -75,6 +77,19 @@ def cache_folder() -> Path:
     return Path(root or Path(cache) / 'auv_gvc') / kernels_digest()
 
 
+def is_private(folder: Path) -> bool:
+    """Make a folder that nobody else can write to; False where somebody else made it, or can."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.lstat()
+        if found.st_uid == os.getuid() and stat.S_ISDIR(found.st_mode):
+            folder.chmod(0o700)
+            return True
+    except OSError:
+        return False
+    return found.st_uid == 0 and stat.S_ISDIR(found.st_mode) and not found.st_mode & 0o022
+
+
 try:
     import numba
     from numba.extending import overload, register_jitable
@@ -85,10 +100,17 @@ config: Any = numba and numba.config
 JITTED = numba is not None and not config.DISABLE_JIT
 
 if JITTED:
-    config.CACHE_DIR = str(cache_folder())
+    KEPT = is_private(cache_folder())
+    if KEPT:
+        config.CACHE_DIR = str(cache_folder())
+    else:
+        text = (
+            f'warning: {cache_folder()}: not yours alone: compiled code is neither kept nor loaded'
+        )
+        print(text, file=sys.stderr, flush=True)
     OPTIONS: Any = {'fastmath': {'contract'}, 'error_model': 'numpy'}
     helper = numba.njit(forceinline=True, **OPTIONS)
-    compiled = numba.njit(cache=True, nogil=True, **OPTIONS)
+    compiled = numba.njit(cache=KEPT, nogil=True, **OPTIONS)
     uncached = numba.njit(nogil=True, **OPTIONS)
     jitable: Any = register_jitable(forceinline=True, **OPTIONS)
 else:

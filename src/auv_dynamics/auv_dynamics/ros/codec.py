@@ -18,7 +18,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from auv_dynamics import interface
-from auv_dynamics.interface import NANOSECONDS, Frames
+from auv_dynamics.interface import NANOSECONDS, BadMessageError, Frames
 from auv_dynamics.ros import convert
 from auv_dynamics.ros.private import PLAIN
 from auv_dynamics.signals import DOFS
@@ -60,9 +60,14 @@ _FIRST_STAMP = {order: struct.Struct(f'{order}{STAMP}') for order in '<>'}
 
 
 def first_stamp(data: bytes) -> int:
-    """Nanoseconds of a serialized message that begins with a Header or a Time."""
+    """Nanoseconds of a serialized message that begins with a Header or a Time.
+
+    BadMessageError where it ends before.
+    """
+    if len(data) < FIRST_FIELD + 8:
+        raise BadMessageError(f'expected a message with a stamp, found {len(data)} bytes')
     sec, nanosec = _FIRST_STAMP[byte_order(data)].unpack_from(data, FIRST_FIELD)
-    return sec * NANOSECONDS + nanosec
+    return interface.check_stamp('', sec, nanosec)
 
 
 class Layout:
@@ -113,6 +118,8 @@ class Layout:
             if not data.startswith(expected, at):
                 return None
         sec, nanosec = self._stamp.unpack_from(data, self._at)
+        if sec < 0 or nanosec >= NANOSECONDS:
+            return None  # nor is it a stamp, which will be said of the message
         wire: tuple = ()
         for numbers, at, _, _ in self._runs:
             wire += numbers.unpack_from(data, at)
@@ -176,9 +183,18 @@ class Codec:
         found = self.layout.unpack(data) if self.layout is not None else None
         kind = self._kind
         if found is None:
-            message = deserialize_message(data, self._type)
-            return kind.read(message, self._frames, self._topic)  # type: ignore[misc]
+            return kind.read(self._message(data), self._frames, self._topic)  # type: ignore[misc]
         return found[0], kind.check(self._topic, found[1])  # type: ignore[misc]
+
+    def _message(self, data: bytes) -> Any:
+        try:
+            return deserialize_message(data, self._type)
+        except Exception as error:  # whatever the middleware says to bytes from outside
+            name, text = self._type.__name__, str(error).splitlines()[0]
+            raise BadMessageError(
+                f'{self._topic}: not a message: expected a serialized {name}, '
+                f'found {len(data)} bytes ({text})'
+            ) from None
 
 
 def verified_layout(kind: type, frames: Frames) -> Layout | None:

@@ -1,6 +1,8 @@
 """A node's part of the graph: publishers, subscriptions, the start barrier, diagnostics."""
 
+import re
 import time
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -32,6 +34,7 @@ from auv_dynamics.ros.topics import (
 
 STEP_TOPICS_BY_NAME = [topic.name for topic in STEP_TOPICS]
 LOUD = 1.0  # s between two reports of the same kind
+NUMBER = re.compile(r'[-+]?\d')  # with the first one reports of the same kind may begin to differ
 
 
 def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Timer:
@@ -50,12 +53,13 @@ class Graph:
         self.node = node
         self.publishers: dict[str, Publisher] = {}
         self.trouble = ''
-        self.refused = 0
+        self.refused: Counter[str] = Counter()  # how often, by what was wrong
         self.latest_ns = 0
         self.facts: dict[str, Any] = {}
         self._said: dict[str, float] = {}
         self._ready = False
         self._not_ready: Callable[[], str] = str
+        self._lasting: Callable[[], str] = str
         self._expected: dict[str, int] = {}
         self.frames = Frames()
         self.must_hold = 0  # messages: a publisher of step topics needs a greater depth
@@ -103,22 +107,24 @@ class Graph:
         """Subscription to the stamps in ns and the numbers of a topic; broken ones are refused."""
         codec = Codec(topic.type, self.frames, topic.name)
 
-        def take(data: bytes, _: dict) -> None:
-            try:
-                callback(*codec.decode(data))
-            except BadMessageError as error:
-                self.refuse(str(error))
-
-        self.subscribe(topic, take, qos)
+        self.subscribe(topic, lambda data, _: callback(*codec.decode(data)), qos)
 
     def subscribe(
         self, topic: Topic, callback: Callable[[bytes, dict], None], qos: QoSProfile
     ) -> None:
         """Subscription to the serialized messages of a topic, in the node's data path.
 
-        The callback gets what rclpy knows of a message's way as well. An incompatible publisher is
-        an error that is heard.
+        The callback gets what rclpy knows of a message's way as well; a message for which it raises
+        BadMessageError is refused. An incompatible publisher is an error that is heard.
         """
+
+        def take(data: bytes, way: dict) -> None:
+            try:
+                callback(data, way)
+            except BadMessageError as error:
+                text = str(error).removeprefix(': ')
+                self.refuse(text if text.startswith(topic.name) else f'{topic.name}: {text}')
+
         events = SubscriptionEventCallbacks(
             incompatible_qos=lambda event: self._incompatible(topic, event),
             use_default_callbacks=False,
@@ -126,7 +132,7 @@ class Graph:
         subscription = self.node.create_subscription(
             topic.type,
             topic.name,
-            callback,
+            take,
             qos,
             event_callbacks=events,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
@@ -143,26 +149,35 @@ class Graph:
         """Add a condition to `~/ready`: `reason` says why not, or gives an empty text."""
         self._not_ready = reason
 
+    def in_trouble_while(self, reason: Callable[[], str]) -> None:
+        """Let the diagnostics say what is wrong for as long as `reason` gives a text."""
+        self._lasting = reason
+
     def refuse(self, text: str) -> None:
         """Say loudly that a message was refused."""
-        self.refused += 1
+        self.refused[text.partition('expected')[0].rstrip(': ')] += 1
         self.complain(f'refused: {text}')
 
     def complain(self, text: str) -> None:
-        """Log an error and keep it for the diagnostics; the same one at most once a second."""
+        """Log an error and keep it for the diagnostics; the like of it at most once a second."""
         # rclpy's own throttling looks at the simulated clock, which may stand still
-        now = time.monotonic()
-        if now - self._said.get(text, -LOUD) >= LOUD:
-            self._said = {text: now}
+        now, kind = time.monotonic(), NUMBER.split(text, maxsplit=1)[0]
+        if now - self._said.get(kind, -LOUD) >= LOUD:
+            self._said = {k: at for k, at in self._said.items() if now - at < LOUD}
+            self._said[kind] = now
             self.node.get_logger().error(text)
         self.trouble = text
 
     def publish_diagnostics(self) -> None:
         """Publish this node's health, stamped with the latest step."""
         status = DiagnosticStatus(name=self.node.get_fully_qualified_name())
-        status.level = DiagnosticStatus.ERROR if self.trouble else DiagnosticStatus.OK
-        status.message = self.trouble or 'ok'
-        facts = {'ready': self._ready, 'refused': self.refused, **self.facts}
+        trouble = self._lasting() or self.trouble
+        status.level = DiagnosticStatus.ERROR if trouble else DiagnosticStatus.OK
+        status.message = trouble or 'ok'
+        refused = {f'refused {kind}': count for kind, count in sorted(self.refused.items())}
+        facts = {
+            'ready': self._ready, 'refused': self.refused.total(), **self.facts, **refused
+        }  # fmt: skip
         status.values = [KeyValue(key=key, value=str(value)) for key, value in facts.items()]
         message = DiagnosticArray(status=[status])
         message.header.stamp, message.header.frame_id = stamp(self.latest_ns), self.frames.base

@@ -1,12 +1,16 @@
 """Message types by name, and how a publisher's quality of service is written down."""
 
 import importlib
+import importlib.util
+import re
+from pathlib import Path
 from typing import Any
 
 from rclpy.qos import QoSProfile
 
 from auv_dynamics import interface
 
+NAME = re.compile(r'([a-z]\w*)/msg/([A-Z]\w*)', re.ASCII)
 STAMPED_TYPES = ('std_msgs/msg/Header', 'rosgraph_msgs/msg/Clock')
 
 
@@ -17,9 +21,16 @@ def type_name(kind: type) -> str:
 
 
 def message_class(name: str) -> type:
-    """Class of a message by its name; ImportError or AttributeError where there is none."""
-    package, folder, message = name.split('/')
-    return getattr(importlib.import_module(f'{package}.{folder}'), message)
+    """Class of a message by its name; ImportError or AttributeError where there is none.
+
+    Whoever publishes chooses the name: nothing is imported but packages with messages.
+    """
+    match = NAME.fullmatch(name)
+    spec = importlib.util.find_spec(match[1]) if match else None
+    places = (spec.submodule_search_locations if spec else None) or ()
+    if not match or not any((Path(place) / 'msg/__init__.py').is_file() for place in places):
+        raise ImportError(f'{name}: no message that is installed here')
+    return getattr(importlib.import_module(f'{match[1]}.msg'), match[2])
 
 
 def begins_with_stamp(kind: Any) -> bool:

@@ -1,6 +1,7 @@
 """A node's life as a process: start, spin, end on a signal or by itself, exit code."""
 
 import contextlib
+import faulthandler
 import os
 import signal
 import sys
@@ -16,10 +17,13 @@ from rclpy.signals import SignalHandlerOptions
 from auv_dynamics.files import InputError
 from auv_dynamics.interface import PARENT
 from auv_dynamics.ros.bulk import DataPath
-from auv_dynamics.ros.private import PLAIN, RCLError
+from auv_dynamics.ros.private import PLAIN, RCLError, RMWError
+from auv_dynamics.ros.reach import say_local, stay_local
+from auv_dynamics.ros.security import asked
 
 POLL = 0.1  # s, longest wait before a signal is noticed
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+TEARDOWN = 4.0  # s to leave the graph, after the last words; then the process ends anyway
 SERVE = 0.02  # s of data between two looks at parameters, services and timers
 CALLBACKS = 50  # that are served at each look, at most
 
@@ -46,24 +50,29 @@ def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> i
     nodes: list[Any] = []
     code = 0
     try:
+        unset = stay_local()
+        asked()
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         executor = SingleThreadedExecutor()
         for make in makes:
             nodes.append(make())
             executor.add_node(nodes[-1])
+        if unset:
+            say_local()
         _spin(nodes, executor, stop)
     except InputError as error:
         print(error, file=sys.stderr, flush=True)
         code = 2
     except (rclpy.exceptions.ROSInterruptException, ExternalShutdownException):
         code = 0
-    except RCLError as error:  # e.g. a parameter file that is no YAML
+    # a parameter file that is no YAML, keys that are not there; what rclpy declares itself
+    except (RCLError, rclpy.exceptions.ParameterException) as error:
         print(str(error).splitlines()[0], file=sys.stderr, flush=True)
         code = 2
     finally:
         closed = _close(nodes)
         code = code or closed
-        rclpy.try_shutdown()
+        _tear_down(nodes)
         for number in SIGNALS:  # one that comes while Python tears down does not change the code
             signal.signal(number, signal.SIG_IGN)
     return code
@@ -109,7 +118,7 @@ def serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> bool:
         callback.result()
     except TimeoutException:
         return False
-    except RCLError as error:  # e.g. a lifecycle transition that does not exist from here
+    except (RCLError, RMWError) as error:  # a transition that does not exist, a broken request
         node.get_logger().error(f'refused: {str(error).splitlines()[0]}')
     return True
 
@@ -119,7 +128,7 @@ def _close(nodes: list[Any]) -> int:
     failed = {node.get_name(): node.exit_code for node in nodes if node.exit_code}
     with contextlib.ExitStack() as stack:
         for node in nodes:
-            stack.callback(_close_node, node)
+            stack.callback(node.close)
     codes = [node.exit_code for node in nodes if node.exit_code]
     if len(nodes) > 1:
         for name, code in failed.items():
@@ -127,10 +136,14 @@ def _close(nodes: list[Any]) -> int:
     return codes[0] if codes else 0
 
 
-def _close_node(node: Any) -> None:
-    node.close()
-    with contextlib.suppress(Exception):
-        node.destroy_node()
+def _tear_down(nodes: list[Any]) -> None:
+    """Leave the graph; the middleware has been seen to turn in circles there, with the GIL held."""
+    faulthandler.dump_traceback_later(TEARDOWN, exit=True)
+    for node in reversed(nodes):
+        with contextlib.suppress(Exception):
+            node.destroy_node()
+    rclpy.try_shutdown()
+    faulthandler.cancel_dump_traceback_later()
 
 
 def _orphaned() -> bool:

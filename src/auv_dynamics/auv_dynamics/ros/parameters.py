@@ -1,7 +1,8 @@
 """ROS parameters: declared with description and range, read-only unless said, unknown refused."""
 
+import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
@@ -9,8 +10,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from auv_dynamics.files import InputError
+from auv_dynamics.interface import NANOSECONDS
 from auv_dynamics.ros.private import declared, overrides
 
+LONGEST = 1e9  # s of a step or a run: stamps end in 2038
 KNOWN_TO_ALL = ('use_sim_time', 'start_type_description_service')
 TYPE_WORDS = {
     Parameter.Type.BOOL: 'true or false',
@@ -86,9 +89,46 @@ def declare(
         raise InputError(node.get_name(), name, f'a number from {expected}', found) from None
     if one_of and value not in one_of:
         raise InputError(node.get_name(), name, f'one of {", ".join(one_of)}', value)
+    if value is None and (default is not None or name in overrides(node)):
+        raise InputError(node.get_name(), name, TYPE_WORDS[TYPES[kind]], None)
     if hasattr(value, 'tolist'):
         value = value.tolist()
-    return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
+    value = list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
+    numbers: Any = value if isinstance(value, list) else [value]
+    if kind in (float, list[float]) and value is not None and not all(map(math.isfinite, numbers)):
+        raise InputError(node.get_name(), name, 'finite numbers', value)
+    return value
+
+
+class Grid(NamedTuple):
+    """The steps of a run.
+
+    Attributes
+    ----------
+    step : s
+    step_ns : the same in ns
+    duration : s, 0: no end
+    last : number of the last step, None: no end
+
+    """
+
+    step: float
+    step_ns: int
+    duration: float
+    last: int | None
+
+
+def declare_grid(node: Node) -> Grid:
+    """Declare `step` and `duration`; InputError where they make no grid of whole nanoseconds."""
+    step = declare(node, 'step', float, 0.01, 's between steps', at_least=1e-9, at_most=LONGEST)
+    duration = declare(node, 'duration', float, 0.0, 's, 0: no end', at_least=0.0, at_most=LONGEST)
+    step_ns = round(step * NANOSECONDS)
+    if abs(step_ns - step * NANOSECONDS) > 1e-6 * max(1.0, step):
+        raise InputError(node.get_name(), 'step', 'a whole number of nanoseconds', step)
+    last = round(duration / step) if duration else None
+    if last is not None and abs(duration / step - last) > 1e-9 * last:
+        raise InputError(node.get_name(), 'duration', f'a multiple of step ({step} s)', duration)
+    return Grid(step, step_ns, duration, last)
 
 
 def _coerce(node: Node, name: str, kind: Any) -> None:

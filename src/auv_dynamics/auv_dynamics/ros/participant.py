@@ -9,6 +9,8 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from auv_dynamics.ros.security import enclave, require
+
 
 class Participant:
     """A node that is served whenever there is time for it; signals stay with the program.
@@ -17,13 +19,19 @@ class Participant:
     ----------
     domain : ROS domain id
     make : builds the node in a context
+    executable : whose keys it joins with, where security is switched on
+
+    Raises
+    ------
+    InputError : DDS security is asked for and cannot be had
 
     """
 
-    def __init__(self, domain: int, make: Callable[[Context], Any]):
+    def __init__(self, domain: int, make: Callable[[Context], Any], executable: str = 'auv'):
+        require(executable)
         self._context = Context()
         rclpy.init(
-            args=[],
+            args=enclave(executable),
             context=self._context,
             domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,

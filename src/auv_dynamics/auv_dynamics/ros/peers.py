@@ -2,10 +2,12 @@
 
 import time
 
+from rclpy.exceptions import InvalidServiceNameException
 from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+from auv_dynamics.files import InputError
 from auv_dynamics.ros.graph import steady_timer
 
 ASK_AGAIN = 1.0  # s: an answer is lost when it comes before both ends have matched
@@ -19,10 +21,17 @@ class Peers:
     node : that asks
     names : of the nodes, relative to its namespace
 
+    Raises
+    ------
+    InputError : a node cannot have such a name
+
     """
 
     def __init__(self, node: Node, names: list[str]):
-        self._clients = {name: node.create_client(Trigger, f'{name}/ready') for name in names}
+        try:
+            self._clients = {name: node.create_client(Trigger, f'{name}/ready') for name in names}
+        except InvalidServiceNameException:
+            raise InputError(node.get_name(), 'start_after', 'names of nodes', names) from None
         self._pending: dict[str, tuple[float, Future]] = {}
         self._ready: set[str] = set()
         if names:

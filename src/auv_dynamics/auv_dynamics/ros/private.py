@@ -17,10 +17,10 @@ try:
     from rclpy.impl.implementation_singleton import rclpy_implementation
 
     WaitSet = rclpy_implementation.WaitSet
-    RCLError = rclpy_implementation.RCLError
+    RCLError, RMWError = rclpy_implementation.RCLError, rclpy_implementation.RMWError
     FOUND = hasattr(rclpy_implementation.Subscription, 'take_message')
 except (ImportError, AttributeError):
-    FOUND, RCLError = False, RuntimeError
+    FOUND, RCLError, RMWError = False, RuntimeError, RuntimeError
 
 PLAIN = not FOUND or os.environ.get('AUV_GVC_EXECUTOR') == 'plain'
 

@@ -1,0 +1,38 @@
+"""Wrong input: one line that names file, key, what was expected and what was found."""
+
+import re
+import reprlib
+
+from auv_dynamics.printable import printable
+
+PLAIN = re.compile(r'[^\W\d](?:[\w ./:-]{0,55}\w)?')  # a word or two
+LONGEST = 200  # characters of what was found
+_repr = reprlib.Repr()
+_repr.maxlevel, _repr.maxlist, _repr.maxdict, _repr.maxstring = 3, 10, 5, 57
+
+
+class InputError(ValueError):
+    """Wrong input from the user; its text is one line fit for a terminal."""
+
+    def __init__(self, file: object, key: str, expected: str, found: object):
+        self.file, self.key, self.expected = str(file), key, expected
+        self.found = found if isinstance(found, str) else shorten(found)
+        if len(self.found) > LONGEST:
+            self.found = f'{self.found[: LONGEST - 3]}...'
+        place = f'{self.file}: {key}' if key else self.file
+        line = f'{place}: expected {expected}, found {self.found}'
+        super().__init__(printable(' '.join(line.split())))
+
+
+def reason(error: OSError) -> str:
+    """What the system said, as a few words for a message."""
+    return (error.strerror or str(error)).lower()
+
+
+def shorten(value: object) -> str:
+    """One short line that shows a value."""
+    if isinstance(value, str) and PLAIN.fullmatch(value):
+        return value  # only what looks like no word is quoted: '', '1', control characters
+    text = 'nothing' if value is None else _repr.repr(value)
+    text = ' '.join(text.split())
+    return text if len(text) <= 60 else text[:57] + '...'

@@ -1,0 +1,68 @@
+"""DDS security as the user asked for it: never less in silence.
+
+ROS reads its variables letter by letter: `ROS_SECURITY_ENABLE=1` is a no, and every strategy but
+`Enforce` lets a node without keys talk in the clear. Both would pass unnoticed.
+"""
+
+import os
+import subprocess
+import sys
+
+from auv_dynamics.files import InputError
+
+ENABLE, STRATEGY = 'ROS_SECURITY_ENABLE', 'ROS_SECURITY_STRATEGY'
+KEYSTORE = 'ROS_SECURITY_KEYSTORE'
+WORDS = {ENABLE: ('true', 'false'), STRATEGY: ('Enforce', 'Permissive')}
+TRIAL = """
+import sys, rclpy
+rclpy.init(args=sys.argv[1:])
+rclpy.create_node(sys.argv[-1].rpartition('/')[2], start_parameter_services=False, enable_rosout=False)
+"""  # noqa: E501  what a participant does when it joins
+
+
+def enclave(executable: str) -> list[str]:
+    """Arguments that name the enclave of an executable: that of the shipped policy."""
+    return ['--ros-args', '--enclave', f'/auv_gvc/{executable}']
+
+
+def asked() -> bool:
+    """Whether security is switched on, with a warning where it is not enforced.
+
+    Raises
+    ------
+    InputError : a word that ROS would take for something else than what it says; no keys named
+
+    """
+    for name, words in WORDS.items():
+        value = os.environ.get(name, '')
+        if value and value not in words:
+            raise InputError(name, '', f'{" or ".join(words)}, letter by letter', value)
+    if os.environ.get(ENABLE) != 'true':
+        return False
+    if os.environ.get(STRATEGY) != 'Enforce':
+        text = f'warning: {STRATEGY} is not Enforce: a node without keys talks in the clear'
+        print(text, file=sys.stderr, flush=True)
+    elif not os.environ.get(KEYSTORE):
+        raise InputError(KEYSTORE, '', 'the folder of the keys, since security is enforced', None)
+    return True
+
+
+def require(executable: str) -> None:
+    """Try to join with the keys of an executable, where security is switched on.
+
+    It is tried in another process: what the middleware prints when it refuses is long.
+
+    Raises
+    ------
+    InputError : this middleware has no DDS security, or there are no keys for the enclave
+
+    """
+    if not asked():
+        return
+    arguments = enclave(executable)
+    command = [sys.executable, '-c', TRIAL, *arguments]
+    tried = subprocess.run(command, capture_output=True, text=True, check=False)
+    if tried.returncode != 0:
+        lines = [line for line in tried.stderr.splitlines() if 'Error: ' in line] or ['a crash']
+        expected = f'a middleware with DDS security, and keys of {arguments[-1]}'
+        raise InputError(f'{ENABLE}=true', '', expected, lines[-1].partition('Error: ')[2])

@@ -1,0 +1,29 @@
+"""Message types by the name that a publisher gives them."""
+
+import sys
+
+import pytest
+from geometry_msgs.msg import WrenchStamped
+
+from auv_dynamics.ros.kinds import message_class, type_name
+
+
+def test_a_message_is_found_by_its_name() -> None:
+    assert message_class('geometry_msgs/msg/WrenchStamped') is WrenchStamped
+    assert type_name(WrenchStamped) == 'geometry_msgs/msg/WrenchStamped'
+
+
+@pytest.mark.parametrize(
+    'name',
+    ['antigravity/msg/X', 'this/msg/X', 'HelloWorld', 'a/b', '', '../os/msg/X', 'a_msgs/srv/X',
+     'no_such_msgs/msg/X', 'numpy/msg/X', 'geometry_msgs/msg/__doc__', 'a/msg/X\n'],
+)  # fmt: skip
+def test_a_name_that_somebody_makes_up_imports_nothing(name: str) -> None:
+    with pytest.raises(ImportError, match='no message that is installed here'):
+        message_class(name)
+    assert not {'antigravity', 'this'} & set(sys.modules)
+
+
+def test_a_message_that_its_package_lacks_is_missed() -> None:
+    with pytest.raises(AttributeError, match='NoSuchMessage'):
+        message_class('geometry_msgs/msg/NoSuchMessage')

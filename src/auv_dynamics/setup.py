@@ -24,5 +24,10 @@ setup(
     install_requires=['setuptools', 'numpy>=1.26', 'PyYAML>=6', 'jsonschema>=4.10'],
     extras_require={'fast': ['numba'], 'test': ['pytest']},
     zip_safe=False,
-    entry_points={'console_scripts': ['plant_node = auv_dynamics.plant_node:main']},
+    entry_points={
+        'console_scripts': [
+            'frame_converter_node = auv_dynamics.frame_converter_node:main',
+            'plant_node = auv_dynamics.plant_node:main',
+        ]
+    },
 )

@@ -1,13 +1,14 @@
 """Test oracle: closed-loop underwater vehicle after P. Herman (2018), written apart from src.
 
-Equation numbers are those of the article; what goes beyond it is that of docs/model.md.  The names
-below are the whole interface:
+Equation numbers are those of the article; what goes beyond it is that of docs/model.md
+and docs/faults.md.  The names below are the whole interface:
 
 reference_vehicle  6x6 matrices of a vehicle file, kinematics, decomposition
 reference_signals  set-points, explicit F(t), current
 reference_plant    model errors and current: the plant that the controller does not know
 reference_laws     gvc, cl, pid, smc
 reference_devices  actuators, anti-windup, sensors
+reference_faults   faults of these
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from reference_devices import Actuators, Sensors, not_wound_up, thruster_matrix
+from reference_faults import Faults
 from reference_laws import control_law, make_law
 from reference_plant import Plant, kirchhoff, newton_euler, plant_matrices
 from reference_signals import DOFS, current, disturbance, setpoint
@@ -155,7 +157,8 @@ def simulate(
     ----------
     vehicle, scenario : contents of the two files; a set-point from a CSV as {'table': (m, 7) array}
     controller : name of the entry
-    hold : 'continuous' (the law inside every stage) or 'zoh'; actuators and sensors: 'zoh' only
+    hold : 'continuous' (the law inside every stage) or 'zoh', which
+        actuators, sensors and faults need
     duration : s, in place of the scenario's
     attitude : 'euler', or 'matrix', which passes theta = 90 deg
 
@@ -169,8 +172,10 @@ def simulate(
     """
     if hold not in ('continuous', 'zoh'):
         raise ValueError('hold must be continuous or zoh')
-    if hold == 'continuous' and (scenario.get('actuators') or scenario.get('sensors')):
-        raise ValueError('actuators and sensors need hold zoh')
+    if hold == 'continuous' and any(
+        scenario.get(key) for key in ('actuators', 'sensors', 'faults')
+    ):
+        raise ValueError('actuators, sensors and faults need hold zoh')
     entry, target = scenario['controllers'][controller], scenario['setpoint']
     h = float(scenario['step'])
     length = float(scenario['duration']) if duration is None else duration
@@ -184,8 +189,11 @@ def simulate(
     plant = Plant(vehicle, scenario.get('disturbance'))
     size, law = control_law(known, entry)
     pose = ATTITUDES[attitude]
-    actuators = Actuators(scenario.get('actuators') or {}, vehicle, h)
-    sensors = Sensors(scenario.get('sensors') or {}, int(scenario.get('seed', 0)))
+    seed, faults = int(scenario.get('seed', 0)), None
+    if scenario.get('faults'):
+        faults = Faults(scenario['faults'], h, seed)
+    actuators = Actuators(scenario.get('actuators') or {}, vehicle, h, faults)
+    sensors = Sensors(scenario.get('sensors') or {}, seed, faults)
     c_nodes, a_rows, b_weights = TABLEAUX[scenario.get('integrator', 'ode5')]
     stage_rows, weights = [np.array(row) for row in a_rows], np.array(b_weights)
     n = pose.size

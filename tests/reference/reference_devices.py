@@ -1,4 +1,4 @@
-"""Actuators, anti-windup and sensors at the samples of a zero-order hold (docs/model.md)."""
+"""Actuators, anti-windup, sensors and their faults at samples (docs/model.md, docs/faults.md)."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from math import exp
 from typing import Any
 
 import numpy as np
+from reference_faults import AXES, Faults, weakened
 from reference_vehicle import Array, rodrigues
 
 NOISE_OF_ROUNDING = 1e-9  # of the sum of all |d|: what lies below is not cut
@@ -27,9 +28,15 @@ def thruster_matrix(thrusters: list[dict[str, Any]]) -> tuple[Array, Array, Arra
 
 
 class Actuators:
-    """Delay, thrusters, limit, lag and rate, in this order; call once per sample."""
+    """Loss, delay, thrusters, limit, axes, lag and rate, in this order; call once per sample."""
 
-    def __init__(self, spec: dict[str, Any], vehicle: dict[str, Any], h: float):
+    def __init__(
+        self,
+        spec: dict[str, Any],
+        vehicle: dict[str, Any],
+        h: float,
+        faults: Faults | None = None,
+    ):
         unknown = set(spec) - {'limit', 'rate', 'lag', 'delay', 'thrusters'}
         if unknown:
             raise ValueError(f'actuators do not know {sorted(unknown)}')
@@ -49,6 +56,38 @@ class Actuators:
             self.T, self.lowest, self.highest = thruster_matrix(vehicle['thrusters'])
             self.T_plus = np.linalg.pinv(self.T)
         self.cuts = self.T is not None or bool(np.isfinite(self.limit).any())
+        self.faults, self.k, self.heard_at, self.h = faults, -1, -1, h
+        self.names = [one['name'] for one in vehicle.get('thrusters', [])]
+        self.heard = np.zeros(6)
+
+    def receive(self, tau: Array) -> Array:
+        """h_k: what arrives of tau_k."""
+        lost = self.faults.now('wrench_loss', self.k)
+        if not lost:
+            self.heard, self.heard_at = tau.copy(), self.k
+        silence = (self.k - self.heard_at) * self.h
+        within = [
+            one['timeout'] for one in self.faults.there('wrench_loss', self.k) if 'timeout' in one
+        ]
+        if lost and within and silence > min(within) + 1e-9:
+            self.heard = np.zeros(6)
+        return self.heard
+
+    def let_through(self, tau: Array) -> Array:
+        """c_k of what the delay lets through, with the faults of thrusters and axes."""
+        at_thrusters = self.faults.there('thruster', self.k)
+        at_axes = self.faults.there('actuator', self.k)
+        if self.T is not None and at_thrusters:
+            u = self.T_plus @ tau
+            limit = np.where(u > 0.0, self.highest, self.lowest)
+            u = u / max(1.0, (u / limit).max())
+            for i, name in enumerate(self.names):
+                u[i] = weakened(u[i], [one for one in at_thrusters if one['thruster'] in (name, i)])
+            c = np.clip(self.T @ u, -self.limit, self.limit)
+        else:
+            c = self.saturate(tau)
+        c = [weakened(c[i], [o for o in at_axes if o['axis'] == AXES[i]]) for i in range(6)]
+        return np.array(c)
 
     def saturate(self, tau: Array) -> Array:
         """What thrusters and limits let through of tau, at once."""
@@ -77,8 +116,11 @@ class Actuators:
 
     def __call__(self, tau: Array) -> Array:
         """a_k of tau_k, N and N m."""
-        self.under_way.append(tau)
-        step = self.factor * (self.saturate(self.under_way.pop(0)) - self.applied)
+        self.k += 1
+        self.under_way.append(tau if self.faults is None else self.receive(tau))
+        command = self.under_way.pop(0)
+        c = self.saturate(command) if self.faults is None else self.let_through(command)
+        step = self.factor * (c - self.applied)
         self.applied = self.applied + np.clip(step, -self.rate, self.rate)
         return self.applied
 
@@ -105,7 +147,7 @@ def not_wound_up(
 class Sensors:
     """Noise on velocity and attitude, and lost samples; call once per sample."""
 
-    def __init__(self, spec: dict[str, Any], seed: int):
+    def __init__(self, spec: dict[str, Any], seed: int, faults: Faults | None = None):
         unknown = set(spec) - {'velocity_noise', 'attitude_noise', 'drop_out'}
         if unknown:
             raise ValueError(f'sensors do not know {sorted(unknown)}')
@@ -116,11 +158,27 @@ class Sensors:
         self.attitude = np.broadcast_to(np.asarray(spec.get('attitude_noise', 0.0), float), 3)
         self.drop_out = float(spec.get('drop_out', 0.0))
         self.last: tuple[Array, Array, Array] | None = None
+        self.faults, self.k, self.newest = faults, -1, 0
+        self.made: list[tuple[Array, Array, Array]] = []
 
     def __call__(self, position: Array, R: Array, nu: Array) -> tuple[Array, Array, Array]:
         """Measured position, rotation body to NED, and velocity; both generators always turn."""
         normal, uniform = self.noise.standard_normal(9), self.loss.random()
-        if self.last is None or uniform >= self.drop_out:
-            turned = R @ rodrigues(self.attitude * normal[6:])  # q exp(noise / 2), as matrices
-            self.last = position.copy(), turned, nu + self.velocity * normal[:6]
-        return self.last
+        moved, turn, lost = self.velocity * normal[:6], self.attitude * normal[6:], False
+        if self.faults is not None:
+            self.k += 1
+            lost = bool(self.faults.now('sensor_drop_out', self.k))
+            for bias in self.faults.there('sensor_bias', self.k):
+                moved = moved + bias.get('velocity', np.zeros(6))
+                turn = turn + bias.get('attitude', np.zeros(3))
+        if self.last is None or not (lost or uniform < self.drop_out):
+            turned = R @ rodrigues(turn)  # q exp(noise / 2), as matrices
+            self.last = position.copy(), turned, nu + moved
+        return self.last if self.faults is None else self.arrived()
+
+    def arrived(self) -> tuple[Array, Array, Array]:
+        """z_k: the newest measurement that has come through the delay."""
+        self.made.append(self.last)
+        delay = sum(one['delay'] for one in self.faults.there('sensor_delay', self.k))
+        self.newest = max(self.newest, self.k - round(delay / self.faults.h))
+        return self.made[self.newest]

@@ -6,6 +6,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ from auv_analysis.closed_loop import (
 from auv_analysis.kernels import Kernel, kernels
 from auv_analysis.reduction import Figures
 from auv_analysis.trees import kept, mapped
+from auv_dynamics.actuators import memory
+from auv_dynamics.faulty_devices import history_shape
 from auv_dynamics.integrator import TABLEAUS, stage_times
 from auv_dynamics.jit import numba
 from auv_dynamics.lanes import empty, packed, unpacked, width
@@ -196,12 +199,14 @@ def _run_part(job: _Job, blocks: range, *, trial: bool = False) -> None:
     batch, lanes = job.batch, job.lanes
     tableau, size = TABLEAUS[batch.integrator], batch.x.shape[1]
     x = packed(batch.x[blocks.start * lanes : blocks.stop * lanes], lanes)
-    count, delay = len(x), job.loop.actuators.delay
+    count, faults = len(x), job.loop.faults
+    held, history = memory(job.loop.actuators, faults=faults.any).shape, history_shape(faults)
     motion = Motion(
         x,
         x[:, :SIZE].copy(),
         _full(count, lanes, size - SIZE, 0.0),
-        _full(count, lanes, (1 + delay) * 6, 0.0).reshape(count, 1 + delay, 6, lanes),
+        _full(count, lanes, prod(held), 0.0).reshape(count, *held, lanes),
+        _full(count, lanes, prod(history), 0.0).reshape(count, *history, lanes),
     )
     work = Workspace(empty((1, len(tableau.b), size, lanes)), empty((1, size, lanes)))
     here = slice(blocks.start, blocks.stop)

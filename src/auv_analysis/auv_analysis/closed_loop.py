@@ -9,6 +9,8 @@ import numpy as np
 
 from auv_analysis.records import Sample, fill_record
 from auv_dynamics.actuators import Actuators, fill_applied
+from auv_dynamics.faults import FaultShape
+from auv_dynamics.faulty_devices import fill_arrived, fill_faulty
 from auv_dynamics.integrator import fill_step
 from auv_dynamics.jit import compiled, jitable
 from auv_dynamics.lanes import uncounted
@@ -35,6 +37,7 @@ class Loop(NamedTuple):
     actuators : between the command and the applied wrench
     gains, model : the law's gains and what it knows of the vehicle
     guard : what stops its integrals
+    faults : what of them there is
 
     """
 
@@ -43,6 +46,7 @@ class Loop(NamedTuple):
     gains: Any
     model: ControlModel
     guard: AntiWindup
+    faults: FaultShape
 
 
 class LawInside(NamedTuple):
@@ -117,6 +121,7 @@ class Tables(NamedTuple):
     F : (T, s, 6) external disturbance, N, N m
     current : (T, s, 6) v_c, v_c_dot in NED; (T, 0, 6) in still water
     noise : (T, 11) of the sensors; (0, 11): they are perfect
+    faults : (T, 14 + 2 n), see `faulty_devices`; (0, 0): there are none
 
     """
 
@@ -124,6 +129,7 @@ class Tables(NamedTuple):
     F: np.ndarray
     current: np.ndarray
     noise: np.ndarray
+    faults: np.ndarray
 
 
 class SharedTables(Tables):
@@ -140,7 +146,8 @@ class Motion(NamedTuple):
     x : (13 + m,) state of the plant, then of the law
     measured : (13,) what the law last saw of the plant
     rate : (m,) of the law's state, held between samples
-    memory : (1 + delay, 6) of the actuators
+    memory : (1 + delay, 6) of the actuators; with faults one row more
+    history : (delay + 2, 13) measurements that are under way where sensors are late, else (0, 13)
 
     """
 
@@ -148,6 +155,7 @@ class Motion(NamedTuple):
     measured: np.ndarray
     rate: np.ndarray
     memory: np.ndarray
+    history: np.ndarray
 
 
 class Workspace(NamedTuple):
@@ -180,11 +188,15 @@ def fill_continuous(loop, tables, grid, tableau, motion, work, record):
 def fill_held(loop, tables, grid, tableau, motion, work, record):
     """Take a block of steps with the law at the samples, the wrench held between."""
     truth, x, measured = loop.truth, motion.x, motion.measured
+    late = motion.history.shape[0] > 0
     body, state = x[:SIZE], x[SIZE:]
     for row in range(grid.t.shape[0]):
         k = grid.first + row
         reference, F, current = tables.reference[row], tables.F[row], tables.current[row]
-        if tables.noise.shape[0] > 0:
+        if late:
+            fill_measured(tables.noise[row], body, motion.history[motion.history.shape[0] - 1])
+            fill_arrived(tables.faults[row], k, motion.history, measured)
+        elif tables.noise.shape[0] > 0:
             fill_measured(tables.noise[row], body, measured)
         else:
             for i in range(SIZE):
@@ -195,7 +207,10 @@ def fill_held(loop, tables, grid, tableau, motion, work, record):
             grid.t[row, 0], dt, vector(measured, 7), attitude_of(measured), nu_d, nu_d_dot,
             state, motion.rate, loop.gains, loop.model, loop.guard,
         )  # fmt: skip
-        applied = fill_applied(loop.actuators, k, tau, motion.memory)
+        if loop.faults.any:
+            applied = fill_faulty(loop.actuators, tables.faults[row], k, tau, motion.memory)
+        else:
+            applied = fill_applied(loop.actuators, k, tau, motion.memory)
         total = lumped(truth, attitude_of(x), vector(x, 7), applied, vector(F[0], 0), current)
         fill_record(record, k, Sample(body, measured, state, nu_d, tau, applied, f, total))
         if k < grid.last:

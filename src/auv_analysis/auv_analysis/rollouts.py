@@ -16,7 +16,9 @@ from auv_analysis.schema_paths import check_paths
 from auv_analysis.simulation import Hold, check_hold, reference, tables
 from auv_analysis.summary import band_of
 from auv_analysis.variants import Variants, merged, packed_variants
+from auv_dynamics.fault_rows import FaultRows
 from auv_dynamics.files import InputError
+from auv_dynamics.sensors import SensorNoise
 from auv_gvc_controller.setpoint import Setpoint
 
 BLOCK = 256  # steps whose set-points are looked at together for their peak
@@ -53,7 +55,7 @@ def rollouts(
 
     Raises
     ------
-    InputError : no such controller or path; actuators or sensors with hold 'continuous'
+    InputError : no such controller or path; actuators, sensors or faults, hold 'continuous'
     ValueError : values of different lengths
 
     """
@@ -208,16 +210,17 @@ def _peak(setpoint: Setpoint, scenario: Scenario) -> np.ndarray:
 def _shared(variants: Variants) -> Known | None:
     """Tables of all vehicles where they are the same."""
     first, *others = variants.scenarios
-    if variants.setpoint or 'sensors' in first.data or any(s.texts != first.texts for s in others):
+    own = variants.setpoint or first.senses or first.faults.entries
+    if own or any(s.texts != first.texts for s in others):
         return None
-    return lambda t: tables(first, t, None)
+    return lambda t: tables(first, t)
 
 
 def _own(variants: Variants, vehicles: range) -> Known:
     """Tables of some vehicles, each with its own."""
     used = [variants.scenarios[variants.of[i]] for i in vehicles]
-    noises = [s.noise(int(variants.seeds[i])) for s, i in zip(used, vehicles, strict=True)]
-
+    seeded = [(s, int(variants.seeds[i])) for s, i in zip(used, vehicles, strict=True)]
+    noises, faults = zip(*((s.noise(seed), s.fault_rows(seed)) for s, seed in seeded), strict=True)
     varying = variants.setpoint and variants.setpoint.part(slice(vehicles.start, vehicles.stop))
 
     def references(t: np.ndarray) -> np.ndarray:
@@ -232,10 +235,14 @@ def _own(variants: Variants, vehicles: range) -> Known:
             references(t),
             np.stack([acting[s.texts[1]][0] for s in used]),
             np.stack([acting[s.texts[1]][1] for s in used]),
-            np.stack([np.zeros((0, 0)) if n is None else n.rows(len(t)) for n in noises]),
+            *(np.stack([_rows(of, len(t)) for of in each]) for each in (noises, faults)),
         )
 
     return known
+
+
+def _rows(of: SensorNoise | FaultRows | None, count: int) -> np.ndarray:
+    return np.zeros((0, 0)) if of is None else of.rows(count)
 
 
 def _once(scenarios: Sequence[Scenario], which: int, function: Any) -> dict[str, Any]:

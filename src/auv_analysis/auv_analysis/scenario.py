@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.scenario_devices import Devices
 from auv_analysis.scenario_values import (
     NANOSECONDS,
     check_names,
@@ -15,10 +16,9 @@ from auv_analysis.scenario_values import (
     resolved,
     vehicle_path_of,
 )
-from auv_dynamics.actuators import Actuators, Reach, make_actuators, make_reach
+from auv_dynamics.actuators import Reach, make_reach
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError, check, read_text, read_yaml
-from auv_dynamics.sensors import SensorNoise
 from auv_dynamics.uncertainty import Uncertainty, make_uncertainty
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import vehicle_from_dict
@@ -31,7 +31,7 @@ SCHEMA = Path(__file__).with_name('scenario.schema.json')
 
 
 @dataclass(frozen=True, eq=False)
-class Scenario:
+class Scenario(Devices):
     """A checked scenario.
 
     Attributes
@@ -124,11 +124,6 @@ class Scenario:
         return make_uncertainty(self.vehicle, specs, self.path, places)
 
     @cached_property
-    def actuators(self) -> Actuators:
-        """Between the command and the applied wrench."""
-        return make_actuators(self.data.get('actuators'), self.vehicle, self.step, self.path)
-
-    @cached_property
     def texts(self) -> tuple[str, str]:
         """Texts that are the same for scenarios whose set-point, or disturbance, is."""
         setpoint = self.data['setpoint'], self.attachments.get('setpoint.csv')
@@ -150,13 +145,6 @@ class Scenario:
             for warning in filter(None, (loop, state_warning(gains, self.step))):
                 found.append(f'{self.path}: controllers.{name}: {warning}')
         return found
-
-    def noise(self, seed: int | None = None) -> SensorNoise | None:
-        """Random numbers of the sensors from the first sample on; None: they are perfect."""
-        spec = self.data.get('sensors')
-        return (
-            None if spec is None else SensorNoise(spec, self.data['seed'] if seed is None else seed)
-        )
 
     @property
     def inputs(self) -> list[Path]:
@@ -234,7 +222,7 @@ def scenario_from(
     vehicle = vehicle_from_dict(vehicle_data, vehicle_path)
     result = Scenario(path, vehicle_path, vehicle, vehicle_data, data, attachments)
     # made and checked now, so that errors come first
-    _ = (result.setpoint, result.uncertainty, result.actuators)
+    _ = (result.setpoint, result.uncertainty, result.actuators, result.faults)
     for name in result.controllers:
         _check_gains(result, name)
     return result

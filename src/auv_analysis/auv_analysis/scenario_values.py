@@ -24,6 +24,8 @@ def resolved(data: dict[str, Any]) -> dict[str, Any]:
         data['initial'][key] = [float(x) for x in data['initial'].get(key, [0.0] * 6)]
     disturbance = data.get('disturbance', [])
     data['disturbance'] = disturbance if isinstance(disturbance, list) else [disturbance]
+    if data.get('faults') == []:
+        del data['faults']
     return data
 
 

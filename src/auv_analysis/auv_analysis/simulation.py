@@ -18,6 +18,8 @@ from auv_analysis.records import Log
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario
 from auv_dynamics.actuators import memory
+from auv_dynamics.fault_rows import FaultRows
+from auv_dynamics.faulty_devices import history_shape
 from auv_dynamics.files import LARGEST, InputError
 from auv_dynamics.integrator import TABLEAUS, stage_times
 from auv_dynamics.jit import plain
@@ -53,7 +55,7 @@ def simulate(scenario: Scenario, controller: str, hold: Hold = 'continuous') -> 
 
     Raises
     ------
-    InputError : no controller of that name; actuators or sensors with hold 'continuous'
+    InputError : no controller of that name; actuators, sensors or faults with hold 'continuous'
     ValueError : no such hold
     DivergedError : a value stopped being finite; the text says when
 
@@ -66,7 +68,6 @@ def simulate(scenario: Scenario, controller: str, hold: Hold = 'continuous') -> 
     nu_d_dot = _run_kernel(scenario, controller, hold, gains, log)
     t = np.arange(scenario.steps + 1) * scenario.step
     _check_finite(log, t, scenario, controller)
-    sensing, acting = 'sensors' in scenario.data, 'actuators' in scenario.data
     return Run(
         t=t,
         eta=unwrapped_eta(log.x),
@@ -84,34 +85,41 @@ def simulate(scenario: Scenario, controller: str, hold: Hold = 'continuous') -> 
         step=scenario.step,
         source='simulate',
         hold=hold,
-        measured=log.measured[:, 7:] if sensing else None,
-        applied=log.applied if acting else None,
+        measured=log.measured[:, 7:] if scenario.senses else None,
+        applied=log.applied if scenario.acts else None,
         law_state=log.state,
         kinds=scenario.kinds,
+        faults=scenario.marks,
     )
 
 
 def check_hold(scenario: Scenario, hold: Hold) -> None:
     """Raise InputError where the scenario has something that acts on samples only."""
-    for key in ('actuators', 'sensors'):
-        if hold == 'continuous' and key in scenario.data:
-            expected = "hold 'zoh' (--hold zoh): they act on samples"
-            raise InputError(scenario.path, key, expected, "hold 'continuous'")
+    if hold == 'continuous' and scenario.sampled:
+        expected = "hold 'zoh' (--hold zoh): they act on samples"
+        raise InputError(scenario.path, scenario.sampled[0], expected, "hold 'continuous'")
 
 
 def blocks(scenario: Scenario) -> Iterator[tuple[Grid, Tables]]:
     """What is known of a run before it starts, a block of steps at a time."""
     tableau, count = TABLEAUS[scenario.data['integrator']], scenario.steps + 1
-    noise = scenario.noise()
+    noise, faults = scenario.noise(), scenario.fault_rows()
     for first in range(0, count, BLOCK):
         t = stage_times(tableau, scenario.step, first, min(BLOCK, count - first))
-        yield Grid(t, scenario.step, first, count - 1), tables(scenario, t, noise)
+        yield Grid(t, scenario.step, first, count - 1), tables(scenario, t, noise, faults)
 
 
-def tables(scenario: Scenario, t: np.ndarray, noise: SensorNoise | None) -> Tables:
-    """Set-points, disturbance, current and the next rows of noise at the stage times t (T, s)."""
+def tables(
+    scenario: Scenario,
+    t: np.ndarray,
+    noise: SensorNoise | None = None,
+    faults: FaultRows | None = None,
+) -> Tables:
+    """Set-points, disturbance, current and the next rows of noise and faults at t (T, s)."""
     rows = np.zeros((0, WIDTH)) if noise is None else noise.rows(len(t))
-    return Tables(reference(scenario.setpoint, t), *scenario.uncertainty.tables(t), rows)
+    failing = np.zeros((0, 0)) if faults is None else faults.rows(len(t))
+    known = scenario.uncertainty.tables(t)
+    return Tables(reference(scenario.setpoint, t), *known, rows, failing)
 
 
 def reference(setpoint: Setpoint, t: np.ndarray) -> np.ndarray:
@@ -143,7 +151,7 @@ def one_loop(scenario: Scenario, controller: str) -> Loop:
     gains = scenario.gains(controller)
     guard = anti_windup(gains, scenario.reach(controller))
     model, actuators = control_model(scenario.vehicle), scenario.actuators
-    return Loop(scenario.uncertainty.truth, actuators, gains, model, guard)
+    return Loop(scenario.uncertainty.truth, actuators, gains, model, guard, scenario.faults.shape)
 
 
 def at_start(scenario: Scenario, loop: Loop) -> tuple[Motion, Workspace]:
@@ -151,7 +159,9 @@ def at_start(scenario: Scenario, loop: Loop) -> tuple[Motion, Workspace]:
     states = type(loop.gains).STATES
     x = np.concatenate([initial_state(*scenario.initial), np.zeros(states)])
     stages = len(TABLEAUS[scenario.data['integrator']].b)
-    motion = Motion(x, x[:SIZE].copy(), np.zeros(states), memory(loop.actuators))
+    faults = loop.faults
+    held, history = memory(loop.actuators, faults=faults.any), np.zeros(history_shape(faults))
+    motion = Motion(x, x[:SIZE].copy(), np.zeros(states), held, history)
     return motion, Workspace(np.zeros((stages, len(x))), np.zeros(len(x)))
 
 

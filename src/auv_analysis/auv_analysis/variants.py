@@ -58,10 +58,11 @@ class Variants:
         """What closed loops must have in common to run in one batch."""
         scenario, loop = self.scenarios[0], self.loop
         sizes = tuple(np.shape(array)[1:] for array in arrays(loop))
-        numbers_in_common = loop.truth.exact, loop.actuators.ideal, loop.actuators.delay
+        actuators = loop.actuators.ideal, loop.actuators.delay
+        numbers_in_common = loop.truth.exact, *actuators, loop.faults
         guard = loop.guard.integrals, loop.guard.reach.bounded, loop.actuators.reach.bounded
         time = scenario.step, scenario.steps, scenario.data['integrator']
-        water = scenario.uncertainty.current is None, 'sensors' in scenario.data
+        water = scenario.uncertainty.current is None, scenario.senses, scenario.faults.thrusters
         waves = self.setpoint and tuple(terms.shape[1] for terms in self.setpoint.terms)
         return type(loop.gains), sizes, numbers_in_common, guard, time, water, waves
 
@@ -95,7 +96,8 @@ def loop_of(scenario: Scenario, controller: str) -> Loop:
     """Vehicle and controller of one scenario, arrays without a leading axis."""
     gains, reach = scenario.gains(controller), scenario.reach(controller)
     truth, model = scenario.uncertainty.truth, control_model(scenario.vehicle)
-    return Loop(truth, scenario.actuators, gains, model, anti_windup(gains, reach))
+    guard = anti_windup(gains, reach)
+    return Loop(truth, scenario.actuators, gains, model, guard, scenario.faults.shape)
 
 
 def packed_variants(

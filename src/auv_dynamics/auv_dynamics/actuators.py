@@ -7,9 +7,10 @@ import numpy as np
 
 from auv_dynamics.files import InputError
 from auv_dynamics.jit import compiled, helper
-from auv_dynamics.lanes import clip, select
+from auv_dynamics.lanes import select
+from auv_dynamics.servo import fill_slowed, waited
 from auv_dynamics.signals import DOFS
-from auv_dynamics.six import clipped, copied, fill_vector, vector
+from auv_dynamics.six import clipped
 from auv_dynamics.vehicle import Vehicle
 
 MOST_STEPS = 1_000_000  # of a delay
@@ -124,9 +125,12 @@ def _six(value: Any) -> np.ndarray:
 IDEAL = Actuators(True, make_reach(None, None), np.full(6, np.inf), np.ones(6), 0)
 
 
-def memory(actuators: Actuators) -> np.ndarray:
-    """State (1 + delay, 6) at the start: the applied wrench, then the commands under way."""
-    return np.zeros((1 + actuators.delay, 6))
+def memory(actuators: Actuators, *, faults: bool = False) -> np.ndarray:
+    """State (1 + delay, 6) at the start: the applied wrench, then the commands under way.
+
+    With faults it has one more row: the last command that arrived.
+    """
+    return np.zeros((1 + actuators.delay + faults, 6))
 
 
 @helper
@@ -210,36 +214,12 @@ def reachable(reach, tau):
 
 
 @helper
-def _servo(applied, command, follow, slew):
-    """First-order servo with a slew limit, Fossen 2021, section 9.5, over one step."""
-    move = follow * (command - applied)
-    near = select(follow == 1.0, command, applied + move)
-    return select(abs(move) > slew, applied + clip(move, -slew, slew), near)
-
-
-@helper
 def fill_applied(actuators, k, tau, state):
     """Wrench applied from sample k on for the command tau; `state` of `memory` in place."""
     if actuators.ideal:
         return tau
-    command = tau
-    if actuators.delay > 0:
-        slot = 1 + k % actuators.delay
-        command = copied(vector(state[slot], 0))
-        fill_vector(state[slot], 0, tau)
-    c = reachable(actuators.reach, command)
-    a = state[0]
-    follow, slew = actuators.follow, actuators.slew
-    applied = (
-        _servo(a[0], c[0], follow[0], slew[0]),
-        _servo(a[1], c[1], follow[1], slew[1]),
-        _servo(a[2], c[2], follow[2], slew[2]),
-        _servo(a[3], c[3], follow[3], slew[3]),
-        _servo(a[4], c[4], follow[4], slew[4]),
-        _servo(a[5], c[5], follow[5], slew[5]),
-    )
-    fill_vector(a, 0, applied)
-    return applied
+    c = reachable(actuators.reach, waited(actuators, k, tau, state))
+    return fill_slowed(actuators, c, state[0])
 
 
 @compiled

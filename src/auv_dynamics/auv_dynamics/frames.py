@@ -20,6 +20,8 @@ NED_FSD, ENU_FLU = 'ned_fsd', 'enu_flu'
 _WORDS = {'ned': NED_FSD, 'fsd': NED_FSD, 'frd': NED_FSD, 'enu': ENU_FLU, 'flu': ENU_FLU}
 _S = np.array([1.0, -1.0, -1.0])  # diagonal of S
 _S6 = np.concatenate([_S, _S])
+_E = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+_E6 = np.kron(np.eye(2), _E)
 
 
 def _checked(values: np.ndarray, *shape: int) -> np.ndarray:
@@ -142,6 +144,27 @@ def swap_body_matrix(A: np.ndarray) -> np.ndarray:
 
     """
     return _checked(A, 6, 6) * np.outer(_S6, _S6)
+
+
+def swap_earth_matrix(A: np.ndarray) -> np.ndarray:
+    """Matrix between 6-vectors in earth axes: T A T with T = diag(E, E), its own inverse.
+
+    For the covariance of a pose, whose rotations are about the fixed axes.
+
+    Parameters
+    ----------
+    A : (..., 6, 6) in NED or in ENU, SI
+
+    Returns
+    -------
+    A : (..., 6, 6) in ENU or in NED, SI
+
+    Raises
+    ------
+    ValueError : another shape
+
+    """
+    return _E6 @ _checked(A, 6, 6) @ _E6
 
 
 def swap_inertia(inertia: np.ndarray) -> np.ndarray:

@@ -4,12 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_dynamics.actuators import IDEAL, Actuators, applied_wrench, memory
+from auv_dynamics.actuators import IDEAL, Actuators
+from auv_dynamics.devices import Acting, Sensing
+from auv_dynamics.fault_rows import FaultRows
+from auv_dynamics.faults import NONE, Faults
+from auv_dynamics.faulty_devices import WRENCH
 from auv_dynamics.integrator import TABLEAUS, fill_step, stage_times
 from auv_dynamics.jit import compiled, helper
 from auv_dynamics.kinematics import attitude_rate, euler, position_rate, quaternion
 from auv_dynamics.lanes import sqrt
-from auv_dynamics.sensors import LOST, SensorNoise, fill_measurement
+from auv_dynamics.sensors import SensorNoise
 from auv_dynamics.six import fill_vector, vector
 from auv_dynamics.uncertainty import Truth, Uncertainty, lumped, true_acceleration
 
@@ -93,6 +97,9 @@ class Plant:
     x : (13,) initial state, copied
     actuators : between the command and the applied wrench; default: the command is applied
     noise : of the sensors; None: they are perfect
+    faults : what fails of actuators, links and the delay of sensors; the other faults of sensors
+        are part of `noise`
+    seed : of the faults
 
     """
 
@@ -104,12 +111,16 @@ class Plant:
         x: np.ndarray,
         actuators: Actuators = IDEAL,
         noise: SensorNoise | None = None,
+        faults: Faults = NONE,
+        seed: int = 0,
     ):
         self._uncertainty, self._step = uncertainty, step
         self._tableau = TABLEAUS[integrator]
         self._stages = np.zeros((len(self._tableau.b), SIZE))
         self._trial = np.zeros(SIZE)
-        self._actuators, self._noise = actuators, noise
+        self._sensing, self._acting = Sensing(noise, faults), Acting(actuators, faults)
+        self._fault_rows = FaultRows(faults, seed) if faults.entries else None
+        self._faults = np.zeros((0, 0))
         self._first = 0
         self._F, self._current = (np.zeros((0, 0, 6)) for _ in range(2))
         self._rows = np.zeros((0, 0))
@@ -125,22 +136,43 @@ class Plant:
     def reset(self) -> None:
         """Put the vehicle and its actuators back to where they started; time goes on."""
         self.x = self._start.copy()
-        self.measured = self.x.copy()
-        self._memory = memory(self._actuators)
+        self._sensing.reset(self.x)
+        self._acting.reset()
         self._applied: tuple = (0.0,) * 6
 
     @property
+    def measured(self) -> np.ndarray:
+        """(13,) what is known of the state at this step."""
+        return self._sensing.measured
+
+    @property
+    def measured_at(self) -> int:
+        """Step at which that was measured, this one unless sensors are late."""
+        return self.k - self._sensing.age
+
+    @property
     def lost(self) -> bool:
-        """Whether the sample of this step is lost: `measured` is an older one."""
-        return self._noise is not None and bool(self._rows[self._row, LOST])
+        """Whether no new measurement has come at this step: `measured` is that of the last."""
+        return self._sensing.lost
+
+    @property
+    def deaf(self) -> bool:
+        """Whether a wrench that comes at this step is lost."""
+        fault = self._fault
+        return fault is not None and bool(fault[WRENCH])
 
     @property
     def diverged(self) -> bool:
         """Whether a velocity has left what any vehicle could have, or the finite numbers."""
         return not (np.abs(self.x[7:]) < DIVERGED).all()
 
-    def answer(self, tau: tuple) -> tuple[tuple, tuple]:
+    def answer(self, tau: tuple, *, heard: bool = False) -> tuple[tuple, tuple]:
         """Take the command of this step: six floats, N and N m.
+
+        Parameters
+        ----------
+        tau : the command
+        heard : it is what the actuators have: a fault that loses commands does nothing to it
 
         Returns
         -------
@@ -148,9 +180,7 @@ class Plant:
 
         """
         truth, row = self._uncertainty.truth, self._row
-        self._applied = tau
-        if not self._actuators.ideal:
-            self._applied = applied_wrench(self._actuators, self.k, tau, self._memory)
+        self._applied = self._acting.apply(self.k, tau, self._fault, heard=heard)
         if truth.exact:
             return self._applied, tuple(self._F[row, 0])
         F, current = self._F[row], self._current[row]
@@ -168,19 +198,21 @@ class Plant:
     def _row(self) -> int:
         return self.k - self._first
 
+    @property
+    def _fault(self) -> np.ndarray | None:
+        return None if self._fault_rows is None else self._faults[self._row]
+
     def _tabulate(self) -> None:
         """What is known of the next block of steps."""
         self._first = self.k
         times = stage_times(self._tableau, self._step, self.k, BLOCK)
         self._F, self._current = self._uncertainty.tables(times)
-        if self._noise is not None:
-            self._rows = self._noise.rows(BLOCK)
+        self._rows = self._sensing.rows(BLOCK)
+        if self._fault_rows is not None:
+            self._faults = self._fault_rows.rows(BLOCK)
 
     def _measure(self) -> None:
-        if self._noise is None:
-            self.measured = self.x
-        else:
-            fill_measurement(self._rows[self._row], self.x, self.measured)
+        self._sensing.measure(self.k, self.x, self._rows[self._row], self._fault)
 
     def _integrate(self) -> None:
         row = self._row

@@ -42,7 +42,7 @@ class LockStep:
         if not self._started:
             self._started = self._published = True
             self._since = time.monotonic()
-            self._node.publish_state()
+            self._node.publish_state(self._node.plant.k)
 
     def resume(self) -> None:
         """Go on after a pause."""
@@ -83,7 +83,7 @@ class LockStep:
             return
         self._published = True
         self._since = time.monotonic()
-        self._node.publish_state()
+        self._node.publish_state(self._node.plant.k)
 
     def _on_progress(self, message: bytes, _: dict) -> None:
         self._ack = max(self._ack, first_stamp(message) // self._node.step_ns)
@@ -148,7 +148,8 @@ class RealTime:
                 f'wrench: stamp: expected newer than the last, found {ns} ns'
             )
         self._answered = ns // self._node.step_ns
-        self._tau, self._heard = tau, time.monotonic()
+        if not self._node.plant.deaf:
+            self._tau, self._heard = tau, time.monotonic()
 
     def _held(self) -> tuple:
         node = self._node
@@ -166,8 +167,8 @@ class RealTime:
             return
         due = self._first + int((time.monotonic() - self._began) * 1e9) // node.step_ns
         while plant.k <= due and self._ended is None:
-            node.publish_state(measured=not plant.lost)
-            node.publish_forces(plant.k, *plant.answer(self._held()))
+            node.publish_state(None if plant.lost else plant.measured_at)
+            node.publish_forces(plant.k, *plant.answer(self._held(), heard=True))
             if plant.k == node.last:
                 self._ended = time.monotonic()
             else:

@@ -4,8 +4,10 @@ import numpy as np
 from rclpy.duration import Duration
 from std_srvs.srv import SetBool, Trigger
 
-from auv_dynamics import interface, load_vehicle
+from auv_dynamics import load_vehicle
 from auv_dynamics.actuators import make_actuators
+from auv_dynamics.fault_checks import FaultSetting, make_faults
+from auv_dynamics.fault_parameters import fault_specs
 from auv_dynamics.files import InputError
 from auv_dynamics.integrator import TABLEAUS
 from auv_dynamics.plant import Plant, initial_state
@@ -20,12 +22,10 @@ from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
-from auv_dynamics.ros.parameters import declare, refuse_unknown
+from auv_dynamics.ros.parameters import declare, declare_grid, refuse_unknown
 from auv_dynamics.ros.peers import Peers
 from auv_dynamics.sensors import SensorNoise
 from auv_dynamics.uncertainty import make_uncertainty
-
-NANOSECONDS = interface.NANOSECONDS
 
 
 class PlantNode(BulkNode):
@@ -59,16 +59,8 @@ class PlantNode(BulkNode):
         path = declare(self, 'vehicle', str, '', 'vehicle file, or bare name of a shipped one')
         if not path:
             raise InputError(self.get_name(), 'vehicle', 'a vehicle file', None)
-        step = declare(self, 'step', float, 0.01, 'integration step, s', at_least=1e-9)
-        duration = declare(self, 'duration', float, 0.0, 's, 0: no end', at_least=0.0)
-        self.step_ns = round(step * NANOSECONDS)
-        if abs(self.step_ns - step * NANOSECONDS) > 1e-6 * max(1.0, step):
-            raise InputError(self.get_name(), 'step', 'a whole number of nanoseconds', step)
-        self.last = round(duration / step) if duration else None
-        if self.last is not None and abs(duration / step - self.last) > 1e-9 * self.last:
-            raise InputError(
-                self.get_name(), 'duration', f'a multiple of step ({step} s)', duration
-            )
+        grid = declare_grid(self)
+        self.step_ns, self.last = grid.step_ns, grid.last
         self.lockstep = declare(self, 'lockstep', bool, False, 'advance on the wrench, not on time')
         self._start_paused = declare(self, 'start_paused', bool, False, 'wait for ~/run')
         self.window = declare(
@@ -89,15 +81,25 @@ class PlantNode(BulkNode):
             's: real time: then zero wrench; lock-step: then the run ends', at_least=0.0,
         )  # fmt: skip
         specs, actuators, sensors = disturbance_specs(self), actuator_spec(self), sensor_spec(self)
-        self._acts, self._senses = actuators is not None, sensors is not None
         name, vehicle = self.get_name(), load_vehicle(path)
+        allocated = bool((actuators or {}).get('thrusters', False))
+        faults = make_faults(
+            *fault_specs(self),
+            FaultSetting(
+                grid.step, grid.duration, vehicle.thrusters, allocated, vehicle.name, name
+            ),
+        )
+        self._acts = actuators is not None or faults.acting
+        self._senses = sensors is not None or faults.sensing
         self.plant = Plant(
             make_uncertainty(vehicle, specs, name, disturbance_prefixes(self)),
-            step,
+            grid.step,
             integrator,
             initial_state(eta, nu),
-            make_actuators(actuators, vehicle, step, name),
-            SensorNoise(sensors, seed) if sensors is not None else None,
+            make_actuators(actuators, vehicle, grid.step, name),
+            SensorNoise(sensors or {}, seed, faults) if self._senses else None,
+            faults,
+            seed,
         )
 
     def _six(self, name: str) -> np.ndarray:
@@ -110,14 +112,17 @@ class PlantNode(BulkNode):
         if self.graph.ready() and not self.peers.not_ready() and not self.paused:
             self.pace.start()
 
-    def publish_state(self, *, measured: bool = True) -> None:
-        """Publish step k; odometry first, since the controller waits for it."""
+    def publish_state(self, measured: int | None) -> None:
+        """Publish step k; odometry first, since the controller waits for it.
+
+        `measured` is the step that odometry and twist are stamped with, None withholds them.
+        """
         plant, ns = self.plant, self.plant.k * self.step_ns
-        if measured:
-            self._say_odometry(ns, plant.measured)
+        if measured is not None:
+            self._say_odometry(measured * self.step_ns, plant.measured)
         self._say_clock(ns, ())
-        if measured:
-            self._say_twist(ns, plant.measured[7:])
+        if measured is not None:
+            self._say_twist(measured * self.step_ns, plant.measured[7:])
         if self._say_truth is not None:
             self._say_truth(ns, plant.x)
         self.graph.latest_ns = ns

@@ -43,7 +43,7 @@ def _spec(node: Node, prefix: str) -> dict[str, Any]:
                 spec[key] = value
         return spec
     if kind == 'current':
-        velocity = _numbers(node, f'{prefix}velocity', 'm/s, NED', (3,))
+        velocity = numbers(node, f'{prefix}velocity', 'm/s, NED', (3,))
         waves = harmonic_parameters(node, prefix, 'm/s', tuple(AXES))
         return {'kind': kind, **({'velocity': velocity} if velocity else {}), **waves}
     return {'kind': kind, **harmonic_parameters(node, prefix, 'N, N m')}
@@ -53,7 +53,7 @@ def actuator_spec(node: Node) -> dict[str, Any] | None:
     """Declare `actuators.*` and return them as a scenario writes them; None when there are none."""
     spec: dict[str, Any] = {}
     for key, unit in (('limit', 'N, N m'), ('rate', 'N/s, N m/s')):
-        values = _numbers(node, f'actuators.{key}', unit, (1, 6))
+        values = numbers(node, f'actuators.{key}', unit, (1, 6))
         if values and min(values) <= 0:
             raise InputError(node.get_name(), f'actuators.{key}', 'positive numbers', values)
         spec[key] = (values[0] if len(values) == 1 else values) if values else None
@@ -61,7 +61,7 @@ def actuator_spec(node: Node) -> dict[str, Any] | None:
         spec[key] = declare(node, f'actuators.{key}', float, None, 's', at_least=0.0)
     text = 'allocate to the thrusters of the vehicle file'
     spec['thrusters'] = declare(node, 'actuators.thrusters', bool, None, text)
-    return _what_is_given(spec)
+    return what_is_given(spec)
 
 
 def sensor_spec(node: Node) -> dict[str, Any] | None:
@@ -71,7 +71,7 @@ def sensor_spec(node: Node) -> dict[str, Any] | None:
         ('velocity_noise', 'm/s, rad/s', 6, 10),
         ('attitude_noise', 'rad', 3, 10),
     ):
-        values = _numbers(node, f'sensors.{key}', f'standard deviation, {unit}', (1, count))
+        values = numbers(node, f'sensors.{key}', f'standard deviation, {unit}', (1, count))
         if values and not all(0 <= value <= most for value in values):
             raise InputError(node.get_name(), f'sensors.{key}', f'numbers from 0 to {most}', values)
         spec[key] = (values[0] if len(values) == 1 else values) if values else None
@@ -79,14 +79,16 @@ def sensor_spec(node: Node) -> dict[str, Any] | None:
     spec['drop_out'] = declare(
         node, 'sensors.drop_out', float, None, text, at_least=0.0, at_most=1.0
     )
-    return _what_is_given(spec)
+    return what_is_given(spec)
 
 
-def _what_is_given(spec: dict[str, Any]) -> dict[str, Any] | None:
+def what_is_given(spec: dict[str, Any]) -> dict[str, Any] | None:
+    """The entries that are not None; None when there are none."""
     return {key: value for key, value in spec.items() if value is not None} or None
 
 
-def _numbers(node: Node, name: str, text: str, lengths: tuple[int, ...]) -> list[float]:
+def numbers(node: Node, name: str, text: str, lengths: tuple[int, ...]) -> list[float]:
+    """Declare a list of finite numbers of one of some lengths; empty when it is not given."""
     values = declare(node, name, list[float], None, text) or []
     if values and len(values) not in lengths:
         expected = f'{" or ".join(map(str, lengths))} numbers'
@@ -97,7 +99,7 @@ def _numbers(node: Node, name: str, text: str, lengths: tuple[int, ...]) -> list
 
 
 def _matrices(node: Node, prefix: str, keys: tuple[str, ...]) -> dict[str, list[float]]:
-    found = {key: _numbers(node, f'{prefix}{key}', '6x6', (1, 6, 36)) for key in keys}
+    found = {key: numbers(node, f'{prefix}{key}', '6x6', (1, 6, 36)) for key in keys}
     return {key: value for key, value in found.items() if value}
 
 

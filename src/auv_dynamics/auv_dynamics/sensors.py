@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from auv_dynamics.fault_rows import MeasurementFaults
+from auv_dynamics.faults import NONE, Faults
 from auv_dynamics.jit import compiled, helper
 from auv_dynamics.lanes import select
 
@@ -20,10 +22,11 @@ class SensorNoise:
     spec : `velocity_noise` (1 or 6 standard deviations, m/s and rad/s), `attitude_noise` (1 or 3,
         rad, about the body axes), `drop_out` (probability that a sample is lost)
     seed : of the scenario; `SeedSequence(seed).spawn(2)` gives the streams of noise and of losses
+    faults : whose biases and drop-outs come on top
 
     """
 
-    def __init__(self, spec: Mapping[str, Any], seed: int):
+    def __init__(self, spec: Mapping[str, Any], seed: int, faults: Faults = NONE):
         self._noise, self._loss = (
             np.random.Generator(np.random.PCG64(child))
             for child in np.random.SeedSequence(seed).spawn(2)
@@ -32,19 +35,23 @@ class SensorNoise:
         attitude = np.broadcast_to(np.asarray(spec.get('attitude_noise', 0.0), float), 3)
         self._deviation = np.concatenate([velocity, attitude])
         self._drop_out = float(spec.get('drop_out', 0.0))
+        self._faults = MeasurementFaults(faults, seed) if faults.sensing else None
         self._begun = False
 
     def rows(self, count: int) -> np.ndarray:
         """The next `count` rows (count, 11).
 
         Noise of nu in m/s and rad/s; exp(noise / 2) of the attitude as a quaternion w, x, y, z; 1
-        where the sample is lost, which the first of a run never is.
+        where the sample is lost, which the first of a run never is. Noise includes biases.
         """
         noise = self._noise.standard_normal((count, 9)) * self._deviation
+        lost = self._loss.random(count) < self._drop_out
+        if self._faults is not None:
+            bias, dropped = self._faults.rows(count)
+            noise, lost = noise + bias, lost | dropped
         half = 0.5 * noise[:, 6:]
         angle = np.sqrt((half**2).sum(axis=1))
         scale = np.divide(np.sin(angle), angle, out=np.ones(count), where=angle > 0)
-        lost = self._loss.random(count) < self._drop_out
         if not self._begun:
             lost[:1], self._begun = False, True
         return np.column_stack([noise[:, :6], np.cos(angle), half * scale[:, None], lost])

@@ -57,7 +57,7 @@ def _panel(axes: Axes, run: Sketch, i: int, bound: float | None) -> bool:
     axes.plot(*run.drawn('tau', i), **COMMAND)
     axes.plot(*run.drawn('applied', i), color=COLOURS[i], linewidth=1.4)
     axes.set_xlim(run.start, run.start + run.duration)
-    plotting.shade_gaps(axes, run)
+    plotting.shade(axes, run)
     seen = run.part('applied').peak[i]
     if bound is not None and bound <= BEYOND * max(seen, command.peak[i]):
         seen = max(seen, bound)
@@ -98,4 +98,4 @@ def _caption(
     parts.append(f'Largest applied: {number(force)} N and {number(moment)} N m.')
     if not missed:
         parts.append('The two never differ in this run.')
-    return ' '.join(parts)
+    return ' '.join(parts) + plotting.shade_sentence(run)

@@ -167,7 +167,7 @@ def six_signals(kind: str, run: Sketch, quantity: Quantity, zeros: Sequence[str]
     still = [dof for i, dof in enumerate(DOFS) if i not in drawn and dof not in zeros]
     if still:
         caption.append(f'Zero throughout this run and not drawn: {join(still)}.')
-    caption.append(plotting.gap_sentence(run).strip())
+    caption.append(plotting.shade_sentence(run).strip())
     figure = (_split_panels if split else _whole_panels)(run, signal, quantity, drawn)
     return figure, title, ' '.join(filter(None, caption))
 

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from auv_analysis.fault_words import Mark
 from auv_analysis.report.packing import Packer, packed
 from auv_analysis.report.panel import Panel, PanelLine, PanelSet
 from auv_analysis.report.panel_models import DASHES, model
@@ -36,6 +37,7 @@ class Interactive:
     library : source of BokehJS
     scripts : ours
     start, end : of the time axis, s
+    faults : what is shaded, in words
     dofs : degree of freedom -> colour
     transient : length of the first phase, s
 
@@ -49,6 +51,7 @@ class Interactive:
     scripts: str
     start: float
     end: float
+    faults: str
 
     dofs: ClassVar = dict(zip(DOFS, COLOURS, strict=True))
     transient: ClassVar = TRANSIENT
@@ -67,12 +70,13 @@ def interactive(runs: Mapping[str, Sketch]) -> Interactive:
     sets = panel_sets(runs)
     panels = [panel for members in sets.values() for panel in members.panels]
     names, packer = list(runs), Packer()
+    marks = _marks(runs)
     columns = _columns(panels)
     start = min(run.start for run in runs.values())
     end = max(run.start + run.duration for run in runs.values())
     index: dict[str, Any] = {
         'panels': {panel.name: _entry(panel, packer, columns) for panel in panels},
-        'models': {name: model(*form) for name, form in _forms(panels).items()},
+        'models': {name: model(*form, marks) for name, form in _forms(panels).items()},
         'axes': packer.axes,
         'runs': {name: DASHES[i % len(DASHES)] for i, name in enumerate(names)},
         'start': start,
@@ -87,7 +91,14 @@ def interactive(runs: Mapping[str, Sketch]) -> Interactive:
         scripts='\n'.join((HERE / name).read_text(encoding='utf-8') for name in SCRIPTS),
         start=start,
         end=end,
+        faults='; '.join(f'{mark.number} {mark.label}, {mark.times}' for mark in marks),
     )
+
+
+def _marks(runs: Mapping[str, Sketch]) -> tuple[Mark, ...]:
+    """Faults that all runs have."""
+    of_each = {run.faults for run in runs.values()}
+    return next(iter(of_each)) if len(of_each) == 1 else ()
 
 
 def _columns(panels: list[Panel]) -> int:

@@ -108,7 +108,7 @@ def energy(runs: Mapping[str, Sketch], leading: Sketch) -> tuple[Figure, str, st
     left.set_ylabel('kinetic energy (J)')
     _stack(right, leading)
     for axes in (left, right):
-        plotting.shade_gaps(axes, leading)
+        plotting.shade(axes, leading)
     for index, axes in enumerate((left, right)):
         axes.set_xlim(leading.start, leading.start + leading.duration)
         axes.set_xlabel('$t$ (s)')
@@ -117,7 +117,7 @@ def energy(runs: Mapping[str, Sketch], leading: Sketch) -> tuple[Figure, str, st
     caption = (
         f'{title}: (a) of each controller{GREY_LINE if wanted else ""}; '
         f'(b) shares of the components of {leading.controller}, equation (30).'
-        f'{plotting.gap_sentence(leading)}'
+        f'{plotting.shade_sentence(leading)}'
     )
     return figure, title, caption
 

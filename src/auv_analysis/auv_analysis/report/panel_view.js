@@ -150,6 +150,7 @@ class PanelView {
       if (model.type.endsWith('Axis')) model.setv(axis);
       else if (model.type === 'Grid') model.grid_line_color = hair;
       else if (model.type === 'Span') model.line_color = soft;
+      else if (model.type === 'Label') model.text_color = soft;
     }
     this.content.lines.forEach(({ key }, i) => {
       const shade = this.content.keys[key].colour;

@@ -23,6 +23,7 @@ from auv_dynamics.signals import DOFS
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#D55E00', '#56B4E9')  # Okabe and Ito
 DASHES = ('-', (0, (4, 1.6)), (0, (1, 1.3)), (0, (6, 1.4, 1, 1.4)), (0, (9, 2)), (0, (3, 1, 1, 1)))
 NOTHING = '#ececec'  # where there are no samples
+FAULT, FAULT_INK = '#fcefd6', '#8a5a00'  # where something has failed, and its number
 GREY = '#6b6b6b'
 PALETTE = 64  # colours of a PNG
 WIDTH = 6.27  # in, text of Taylor & Francis's LaTeX class in large format: A4, margins of 1 in
@@ -139,20 +140,38 @@ def draw_lines(axes: Axes, run: Sketch, signal: str, part: str, columns: Sequenc
         axes.plot(t, y, color=COLOURS[i])
         ends = [t[0], t[-1]]
     axes.set_xlim(*ends)
-    shade_gaps(axes, run)
+    shade(axes, run)
 
 
-def shade_gaps(axes: Axes, run: Sketch) -> None:
-    """Grey where a run has no samples, over whatever is drawn there; the limits stay."""
+def shade(axes: Axes, run: Sketch) -> None:
+    """Grey where a run has no samples, over whatever is drawn there; the limits stay.
+
+    Under it, in another colour and with its number, every fault.
+    """
     limits = axes.get_xlim()
     for begin, end in run.gaps:
         axes.axvspan(begin, end, color=NOTHING, linewidth=0, zorder=2.5)
+    for mark in run.faults:
+        begin, end = max(mark.start, limits[0]), min(mark.end, limits[1])
+        if begin >= end:
+            continue
+        axes.axvspan(begin, end, color=FAULT, linewidth=0, zorder=0.4)
+        level = sum(
+            other.start <= mark.start < other.end for other in run.faults[: mark.number - 1]
+        )
+        axes.text(
+            (begin + end) / 2, 0.985 - 0.11 * (level % 4), f'{mark.number}',
+            transform=axes.get_xaxis_transform(), ha='center', va='top', fontsize=6.5,
+            color=FAULT_INK, zorder=3.5,
+        )  # fmt: skip
     axes.set_xlim(limits)
 
 
-def gap_sentence(run: Sketch) -> str:
-    """What the grey spans of a run with gaps are, to be added to a caption."""
-    return ' Grey spans: no samples.' if run.gaps else ''
+def shade_sentence(run: Sketch) -> str:
+    """What the spans that `shade` draws are, to be added to a caption."""
+    listed = '; '.join(f'{mark.number} {mark.label}, {mark.times}' for mark in run.faults)
+    text = ' Grey spans: no samples.' if run.gaps else ''
+    return f'{text} Shaded: {listed}.' if listed else text
 
 
 def key(axes: Axes, quantity: Quantity, columns: Sequence[int]) -> None:

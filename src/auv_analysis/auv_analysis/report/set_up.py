@@ -1,11 +1,12 @@
 """The set-up of a study in words: what acts on the plant, and what lies between it and the law."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from auv_analysis.fault_words import Mark, marks_of
 from auv_analysis.report.tables.sources import numbers_in
 from auv_analysis.report.text import join, number, plain
 from auv_analysis.report.words import (
@@ -19,6 +20,7 @@ from auv_analysis.report.words import (
 )
 from auv_analysis.run import FOREIGN, Facts
 from auv_analysis.scenario import SCHEMA
+from auv_dynamics.faults import ACTING, SENSING
 from auv_dynamics.files import InputError, check, parse_yaml
 from auv_dynamics.signals import DOFS
 from auv_gvc_controller.gains import sampling_warning
@@ -57,7 +59,7 @@ class SetUp:
         key = KEYS.get(what, what)
         for path, value in numbers_in(self.data.get(key), key):
             yield path, value
-            if path.rpartition('/')[2] in RELATIVE:
+            if path.rpartition('/')[2] in (*RELATIVE, 'efficiency', 'probability'):
                 yield f'{path} in %', 100.0 * value
 
 
@@ -79,12 +81,16 @@ def set_up(runs: Mapping[str, Facts], summaries: Mapping[str, Any], scenario_tex
     start = _start(data.get('initial', {}))
     rows += [('start', [start])] if start else []
     rows += [('disturbances', _disturbances(data.get('disturbance', [])))]
-    rows += [('actuators', _actuators(actuators, mine))]
+    faults = data.get('faults', [])
+    marks = marks_of(faults, next(iter(mine.values())).vehicle)
+    rows += [('actuators', _but(_actuators(actuators, mine), marks, ACTING))]
     if actuators and ('limit' in actuators or actuators.get('thrusters')):
         rows += [('anti-windup', [_anti_windup(data['controllers'], mine)])]
-    rows += [('sensors', [_sensors(sensors)])]
-    seed = f'{data.get("seed", 0)}'
-    rows += [('seed', [seed if sensors else f'{seed}; nothing in this scenario is random'])]
+    rows += [('sensors', _but([_sensors(sensors)], marks, SENSING))]
+    rows += [('faults', [f'{mark.label}, {mark.times}' for mark in marks])] if marks else []
+    seed, drawn = f'{data.get("seed", 0)}', any('probability' in spec for spec in faults)
+    quiet = f'{seed}; nothing in this scenario is random'
+    rows += [('seed', [seed if sensors or drawn else quiet])]
     rows += _shared(runs, summaries, str(data.get('integrator', 'ode5')))
     limit = (actuators or {}).get('limit')
     bounds = None if limit is None else np.broadcast_to(np.asarray(limit, float), 6)
@@ -180,6 +186,13 @@ def _actuators(spec: Mapping[str, Any] | None, runs: Mapping[str, Facts]) -> lis
     slow = [f'{key} {plain(spec[key])} s' for key in ('lag', 'delay') if spec.get(key)]
     parts += [', '.join(slow)] if slow else []
     return parts or ['ideal: the commanded wrench is the applied one']
+
+
+def _but(lines: list[str], marks: Sequence[Mark], kinds: Sequence[str]) -> list[str]:
+    """The same lines, and that there are faults of these kinds as well."""
+    if not any(mark.kind in kinds for mark in marks):
+        return lines
+    return [*lines[:-1], f'{lines[-1]}; but for the faults']
 
 
 def _thrusters(run: Facts) -> str:

@@ -34,7 +34,7 @@ def unexplained_figure(run: Sketch) -> tuple[Figure, str, str]:
         axes.fill_between(t, low, _at(t, *run.drawn('most', i)), color=COLOURS[i], alpha=BAND, lw=0)
         axes.plot(*run.drawn('unexplained', i), color=COLOURS[i])
         axes.set_xlim(run.start, run.start + run.duration)
-        plotting.shade_gaps(axes, run)
+        plotting.shade(axes, run)
         _cut(axes, run, acted, i)
         axes.set_ylabel(f'{plotting.UNCERTAINTY.symbols[i]} ({plotting.UNCERTAINTY.unit(i)})')
         plotting.letter(axes, i, dof)
@@ -52,7 +52,7 @@ def unexplained_figure(run: Sketch) -> tuple[Figure, str, str]:
         'estimate about it, beside the wrench (thin, grey). It is what the vehicle file does not '
         'explain of the recorded motion: errors of the model, disturbances, and a wrench that was '
         'not the one recorded. Positive F opposes τ, which is cut off and told above the panel '
-        f'where it is far larger.{plotting.gap_sentence(run)}'
+        f'where it is far larger.{plotting.shade_sentence(run)}'
     )
     return figure, title, caption
 

@@ -1,0 +1,122 @@
+"""Faults on a real plant node: simulated inside it in lock-step, really withheld in real time."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from harness import PACKAGES, Peer, assert_one_line, graph, parameters, run_node
+from numpy.testing import assert_allclose, assert_array_equal
+
+from auv_dynamics import interface
+from auv_dynamics.interface import Frames
+from auv_dynamics.ros import convert, topics
+
+STEP = 10_000_000
+HEARD = (topics.ODOM, topics.GROUND_TRUTH, topics.WRENCH_APPLIED)
+PLANT = 'plant_node'
+assert PLANT in PACKAGES
+
+
+def faults(**entries: dict[str, Any]) -> list[str]:
+    """Parameters of faults by name; `_from` is `from`."""
+    names = ', '.join(f'"{name}"' for name in entries)
+    given = ['-p', f'faults.names:=[{names}]']
+    for name, entry in entries.items():
+        given += parameters(**{f'faults__{name}__{k.strip("_")}': v for k, v in entry.items()})
+    return given
+
+
+def step_of(message: Any) -> int:
+    return interface.nanoseconds(message.header.stamp) // STEP
+
+
+def velocity(message: Any) -> float:
+    return message.twist.twist.linear.x
+
+
+def lock_step(peer: Peer, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Answer steps 0 ... n - 1, wrench k is k + 1 N in surge: measured, true surge, applied."""
+    peer.listen(*HEARD)
+    odom, truth, applied = (peer.heard[topic.name] for topic in HEARD)
+    for k in range(n):
+        peer.until(lambda k=k: len(odom) > k, f'odometry {k}')
+        peer.publish(topics.WRENCH, convert.wrench(k * STEP, (k + 1.0, 0, 0, 0, 0, 0), Frames()))
+    peer.until(lambda: len(applied) == n and len(truth) > n, 'all answers')
+    assert [step_of(m) for m in odom[:n]] == list(range(n)), 'no message is withheld'
+    assert [step_of(m) for m in applied] == list(range(n))
+    series = [velocity(m) for m in odom[:n]], [velocity(m) for m in truth[:n]]
+    return *map(np.array, series), np.array([m.wrench.force.x for m in applied])
+
+
+def test_lock_step_repeats_delays_biases_and_keeps() -> None:
+    given = faults(
+        gone={'kind': 'sensor_drop_out', '_from': 0.05, 'to': 0.1},
+        late={'kind': 'sensor_delay', 'delay': 0.03, '_from': 0.15, 'to': 0.2},
+        tilt={'kind': 'sensor_bias', 'velocity': '[0.5, 0.0, 0.0, 0.0, 0.0, 0.0]', '_from': 0.25},
+        mute={'kind': 'wrench_loss', '_from': 0.05, 'to': 0.1, 'timeout': 0.03},
+        half={'kind': 'actuator', 'axis': 'surge', 'efficiency': 0.5, '_from': 0.2, 'to': 0.25},
+        jam={'kind': 'actuator', 'axis': 'surge', 'stuck': -7.0, '_from': 0.25},
+    )
+    ready = ['-p', 'expected_subscribers:=["odom=1", "wrench_applied=1", "ground_truth/odom=1"]']
+    plant = parameters(vehicle='herman2018', lockstep=True, duration=1.0)
+    with graph((PLANT, [*plant, *ready, *given])) as (peer, _):
+        measured, true, applied = lock_step(peer, 30)
+    assert (np.diff(true) != 0).all(), 'the vehicle goes on'
+    assert_array_equal(measured[:5], true[:5])
+    assert_array_equal(measured[5:10], [true[4]] * 5)
+    assert_array_equal(measured[10:15], true[10:15])
+    assert_array_equal(measured[15:20], true[[14, 14, 14, 15, 16]])
+    assert_array_equal(measured[20:25], true[20:25])
+    assert_allclose(measured[25:], true[25:] + 0.5, rtol=1e-12)
+    assert_array_equal(applied[:10], [1, 2, 3, 4, 5, 5, 5, 5, 0, 0])
+    assert_array_equal(applied[10:20], np.arange(11, 21))
+    assert_array_equal(applied[20:25], np.arange(21, 26) / 2)
+    assert_array_equal(applied[25:], [-7.0] * 5)
+
+
+def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
+    given = faults(
+        gone={'kind': 'sensor_drop_out', '_from': 0.3, 'to': 0.5},
+        late={'kind': 'sensor_delay', 'delay': 0.2, '_from': 0.6, 'to': 1.0},
+        mute={'kind': 'wrench_loss', '_from': 1.2, 'to': 1.8},
+    )
+    plant = parameters(vehicle='herman2018', duration=2.5, wrench_timeout=0.3)
+    ready = ['-p', 'expected_subscribers:=["odom=2", "wrench_applied=1", "ground_truth/odom=1"]']
+    with graph((PLANT, [*plant, *ready, *given])) as (peer, _):
+        peer.listen(*HEARD)
+        say = peer.node.create_publisher(topics.WRENCH.type, topics.WRENCH.name, 10)
+
+        def answer(message: Any) -> None:
+            k = step_of(message)
+            say.publish(convert.wrench(k * STEP, (k + 1.0, 0, 0, 0, 0, 0), Frames()))
+
+        qos = topics.every_step()
+        peer.node.create_subscription(topics.ODOM.type, topics.ODOM.name, answer, qos)
+        truth = peer.heard[topics.GROUND_TRUTH.name]
+        peer.until(lambda: truth and step_of(truth[-1]) == 250, 'the end')
+        peer.until(lambda: len(peer.heard[topics.WRENCH_APPLIED.name]) == 251, 'every wrench')
+        stamps = [step_of(m) for m in peer.heard[topics.ODOM.name]]
+        applied = np.array([m.wrench.force.x for m in peer.heard[topics.WRENCH_APPLIED.name]])
+    assert [step_of(m) for m in truth] == list(range(251))
+    # lost from 30 to before 50; what was measured from 80 on was still under way at 100
+    assert stamps == [*range(30), *range(50, 80), *range(100, 251)]
+    assert not set(applied) & set(range(122, 180)), 'no wrench that came meanwhile is applied'
+    assert applied[125] > 100, 'the last one is held'
+    assert (applied[165:180] == 0).all(), 'then the watchdog has zeroed it'
+    assert applied[-10:].min() > 180, 'and wrenches are heard again'
+
+
+@pytest.mark.parametrize(
+    ('entry', 'words'),
+    [
+        ({'kind': 'sensor_freeze'}, ('faults.a.kind', 'sensor_drop_out')),
+        ({'kind': 'sensor_bias'}, ('faults.a.velocity', 'attitude')),
+        ({'kind': 'sensor_drop_out', '_from': 0.5, 'to': 0.2}, ('faults.a.to', 'after from')),
+        ({'kind': 'actuator', 'axis': 'yaw'}, ('faults.a', 'efficiency or stuck')),
+        ({'kind': 'thruster', 'thruster': 'one', 'stuck': 1.0}, ('faults.a.thruster', 'has none')),
+        ({'kind': 'wrench_loss', 'delay': 1.0}, ('faults.a.delay', 'one of')),
+    ],
+)
+def test_wrong_faults_end_with_one_line(entry: dict[str, Any], words: tuple[str, ...]) -> None:
+    plant = parameters(vehicle='herman2018', lockstep=True, duration=1.0)
+    assert_one_line(run_node(PLANT, *plant, *faults(a=entry)), *words)

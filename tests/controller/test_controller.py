@@ -7,14 +7,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 from auv_dynamics import load_vehicle
-from auv_gvc_controller.controller import ZERO, VelocityController
+from auv_gvc_controller.controller import Timeouts, VelocityController
+from auv_gvc_controller.hand_over import HandOver
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.laws.gvc import GVC
-from auv_gvc_controller.limits import Limits
+from auv_gvc_controller.limits import ZERO, Limits
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.odometry_guard import OdometryGuard
 from auv_gvc_controller.pairing import DIFFERENCE, SAME, Pairing
 from auv_gvc_controller.sampled import SampledLaw
+from auv_gvc_controller.stamp_age import Now
 
 MS = 1_000_000
 PAPER = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
@@ -29,27 +31,43 @@ def odometry(u: float = 0.1) -> tuple:
 
 
 class Bench:
-    """A controller with its pairing, and the law alone for comparison."""
+    """A controller with its pairing, and the law alone for comparison.
 
-    def __init__(self, lockstep=False, exact=False, acceleration=DIFFERENCE, limit=(), gains=GAINS):
+    In real time the clock on the wall shows what the stamps show, unless `at` (s) says otherwise.
+    """
+
+    def __init__(
+        self,
+        lockstep=False,
+        exact=False,
+        acceleration=DIFFERENCE,
+        limit=(math.inf,) * 6,
+        gains=GAINS,
+        ramp=0.0,
+        odometry=0.2,
+        setpoint=0.05,
+    ):
         self.pairing = Pairing(exact, acceleration)
         self.controller = VelocityController(
             SampledLaw(gains, MODEL),
             self.pairing,
-            OdometryGuard(100 * MS, Limits(50.0, 50.0), lockstep),
-            lockstep=lockstep,
+            OdometryGuard(100 * MS, Limits(50.0, 50.0), lockstep, patience=odometry),
+            HandOver(limit, ramp=ramp),
             exact=exact,
-            setpoint_timeout_ns=50 * MS,
-            wrench_limit=limit,
+            timeouts=None if lockstep else Timeouts(odometry, setpoint),
         )
         self.law = SampledLaw(gains, MODEL)
 
-    def setpoint(self, ms: float, nu_d: tuple = NU_D) -> None:
-        self.pairing.setpoint(round(ms * MS), nu_d)
+    def setpoint(self, ms: float, nu_d: tuple = NU_D, at: float | None = None) -> None:
+        self.pairing.setpoint(round(ms * MS), nu_d, ms / 1000 if at is None else at)
         self.pairing.derivative(round(ms * MS), NU_D_DOT)
 
-    def odometry(self, ms: float, u: float = 0.1):
-        return self.controller.odometry(round(ms * MS), odometry(u))
+    def odometry(self, ms: float, u: float = 0.1, at: float | None = None):
+        now = Now(ms / 1000 if at is None else at)
+        return self.controller.odometry(round(ms * MS), odometry(u), now)
+
+    def watch(self, at: float):
+        return self.controller.watch(Now(at))
 
     def alone(self, t: float, dt: float, u: float = 0.1, nu_d=NU_D, nu_d_dot=ZERO):
         x = odometry(u)
@@ -136,7 +154,7 @@ def test_a_gap_is_refused_then_believed_and_not_integrated():
     bench.setpoint(0)
     bench.odometry(0)
     bench.alone(0.0, 0.0)
-    with pytest.raises(ValueError, match='stamp: expected at most'):
+    with pytest.raises(ValueError, match='stamp jumped: expected at most'):
         bench.odometry(2000)
     bench.setpoint(2005)
     answer = bench.odometry(2010)
@@ -152,7 +170,7 @@ def test_refused_odometry_changes_nothing():
             one.setpoint(ms)
         one.odometry(0)
     for ms in (0, -10, 5000):
-        with pytest.raises(ValueError, match='stamp: expected'):
+        with pytest.raises(ValueError, match=r'stamp [a-z ]+: expected'):
             bench.odometry(ms)
     with pytest.raises(ValueError, match=r'twist\.linear: expected at most 50 m/s'):
         bench.odometry(10, 60.0)
@@ -231,9 +249,9 @@ def test_silence_answers_the_last_odometry_with_zero():
     bench.setpoint(0)
     bench.odometry(0)
     bench.odometry(10)
-    answer = bench.controller.silence('inactive')
+    answer = bench.controller.silence()
     assert (answer.ns, answer.tau, answer.f) == (10 * MS, ZERO, ZERO)
-    assert answer.trouble == 'inactive: zero wrench'
+    assert answer.trouble == ''
     assert bench.controller.unanswered is None
     bench.setpoint(10)
     assert bench.controller.answer() is None
@@ -265,3 +283,119 @@ def test_time_between_answers_is_integrated_when_an_odometry_goes_unanswered():
     bench.setpoint(20)
     tau = bench.odometry(20).tau
     assert tau == bench.alone(0.02, 0.02, nu_d_dot=NU_D_DOT)
+
+
+def test_odometry_that_falls_silent_takes_the_wrench_back_over_the_ramp():
+    bench = Bench(ramp=0.2, odometry=0.5, setpoint=10.0)
+    for ms in range(0, 500, 10):
+        bench.setpoint(ms)
+        last = bench.odometry(ms)
+    assert bench.watch(0.98) is None  # 0.49 s without
+    found = [bench.watch(0.99 + 0.02 * i) for i in range(20)]
+    assert found[0] is None
+    said = [answer for answer in found if answer is not None]
+    sizes = [abs(answer.tau[0]) for answer in said]
+    assert abs(last.tau[0]) == sizes[0] > sizes[3] > 0
+    assert sizes == sorted(sizes, reverse=True)
+    assert said[-1].tau == ZERO
+    assert said[-1].trouble == 'no odometry for 0.5 s: zero wrench'
+    assert all(answer.ns == 490 * MS and answer.f == ZERO for answer in said)
+    assert found[-1] is None  # it has been said
+    assert (bench.controller.watchdog, bench.controller.trips) == ('no odometry for 0.5 s', 1)
+
+
+def test_it_recovers_when_odometry_returns_and_comes_in_over_the_ramp():
+    bench = Bench(ramp=0.2, odometry=0.5, setpoint=10.0)
+    for ms in range(0, 500, 10):
+        bench.setpoint(ms)
+        held = bench.odometry(ms)
+    for i in range(30):
+        bench.watch(1.0 + 0.02 * i)
+    answers = []
+    with pytest.raises(ValueError, match='stamp jumped'):
+        bench.odometry(1990)
+    for ms in range(2000, 2500, 10):
+        bench.setpoint(ms)
+        answers.append(bench.odometry(ms))
+    sizes = [abs(answer.tau[0]) for answer in answers]
+    assert 0 < sizes[0] < 0.2 * abs(held.tau[0])
+    assert sizes[:15] == sorted(sizes[:15])
+    assert sizes[-1] > 0.9 * abs(held.tau[0])
+    assert answers[-1].trouble == bench.controller.watchdog == ''
+
+
+def test_silence_of_set_points_counts_by_the_clock_on_the_wall_as_well():
+    """Time stands nearly still in the stamps: their age alone would never tell."""
+    bench = Bench(setpoint=0.5)
+    bench.setpoint(0, at=0.0)
+    assert bench.odometry(1, at=0.1).trouble == ''
+    assert bench.odometry(2, at=0.49).trouble == ''
+    silent = bench.odometry(3, at=0.51)
+    assert silent.tau == ZERO
+    assert silent.trouble == 'no set-point heard for 0.5 s: zero wrench'
+    bench.setpoint(4, at=0.52)
+    assert bench.odometry(5, at=0.53).trouble == ''
+
+
+def test_set_points_that_were_published_ahead_are_followed_to_their_end():
+    bench = Bench(setpoint=0.5)
+    for ms in range(0, 2000, 10):
+        bench.setpoint(ms, at=0.0)
+    found = [bench.odometry(ms).trouble for ms in range(0, 3000, 10)]
+    assert not any(found[:199])
+    assert all(found[-40:])
+
+
+def test_exact_pairing_in_real_time_lets_go_when_set_points_stay_away():
+    bench = Bench(exact=True, acceleration=SAME, setpoint=0.3, odometry=0.5)
+    for ms in range(0, 100, 10):
+        bench.setpoint(ms)
+        assert bench.odometry(ms).tau[0] != 0.0
+    heard = []
+    for ms in range(100, 600, 10):  # odometry goes on
+        heard += [bench.odometry(ms), bench.watch(ms / 1000 + 0.005)]
+    said = [answer for answer in heard if answer is not None]
+    assert said[0].tau == ZERO
+    assert said[0].trouble == 'no set-point of its stamp: zero wrench'
+    assert said[0].ns == 400 * MS
+    bench.setpoint(610)
+    assert bench.odometry(610).trouble == ''
+
+
+def test_stamps_that_begin_anew_are_believed_after_a_pause_and_the_law_goes_on():
+    seen = []
+
+    class Clock(GVC):
+        @staticmethod
+        def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+            seen.append(round(t, 9))
+            return ZERO, ZERO
+
+    bench = Bench(gains=Clock(*make_gains('gvc', PAPER)), odometry=0.2)
+    for ms in (50_000, 50_010):
+        bench.setpoint(ms)
+        bench.odometry(ms)
+    seen.clear()
+    for ms in (10, 20):  # the driver was started again, but those could also be late
+        with pytest.raises(ValueError, match='stamp went back'):
+            bench.odometry(ms, at=50.02)
+    with pytest.raises(ValueError, match='stamp went back'):
+        bench.odometry(1000, at=51.0)
+    again = bench.odometry(1010, at=51.01)
+    assert again.trouble == 'no set-point yet: zero wrench'  # those of the old time are forgotten
+    bench.setpoint(1015, at=51.015)
+    assert bench.odometry(1020, at=51.02).trouble == ''
+    assert bench.odometry(1030, at=51.03).trouble == ''
+    assert seen == [0.02, 0.03]
+
+
+def test_trips_are_counted_once_each():
+    bench = Bench(setpoint=0.05)
+    bench.odometry(0)
+    assert bench.controller.trips == 0  # it was never in charge
+    for start in (10, 200):
+        bench.setpoint(start)
+        bench.odometry(start)
+        for ms in (70, 80, 90):
+            bench.odometry(start + ms)
+    assert bench.controller.trips == 2

@@ -87,7 +87,7 @@ def test_a_stamp_not_newer_than_the_one_in_use_is_refused(keep):
     pairing.find(2 * MS)
     for ns in (MS, 2 * MS):
         with pytest.raises(
-            ValueError, match=f'stamp: expected later than {2 * MS} ns, found {ns} ns'
+            ValueError, match=f'stamp late: expected later than {2 * MS} ns, found {ns} ns'
         ):
             getattr(pairing, keep)(ns, six(9))
     assert pairing.find(2 * MS).nu_d == six(1)

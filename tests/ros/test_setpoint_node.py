@@ -78,3 +78,23 @@ def test_refuses_odometry_in_another_frame() -> None:
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
     assert_one_line(run_node('setpoint_node', *arguments), key, expected)
+
+
+def test_goes_on_when_the_driver_starts_again_with_its_clock_at_zero() -> None:
+    """What it says next belongs to the time of the vehicle that it was at."""
+    with graph(('setpoint_node', SURGE)) as (peer, _):
+        peer.listen(topics.CMD_VEL)
+        old = 100 * 10**9
+        for k in range(3):
+            peer.publish(topics.ODOM, odometry(old + k * STEP))
+        peer.until(lambda: len(peer.heard['cmd_vel']) >= 8, 'eight set-points')
+        peer.spin(0.5)  # it was away
+        for k in range(3):
+            peer.publish(topics.ODOM, odometry(10**9 + k * STEP))
+        peer.until(lambda: stamps(peer, 'cmd_vel')[-1] == 10**9 + 7 * STEP, 'set-points')
+        new = [m for m in peer.heard['cmd_vel'] if interface.nanoseconds(m.header.stamp) < old]
+        assert [interface.nanoseconds(m.header.stamp) for m in new] == [
+            10**9 + k * STEP for k in range(1, 8)
+        ]
+        t = np.arange(2, 9) * 0.01
+        assert np.allclose([m.twist.linear.x for m in new], 0.2 + np.sin(2 * t), atol=1e-15)

@@ -2,21 +2,37 @@
 
 from dataclasses import dataclass
 
-from auv_gvc_controller.odometry_guard import OdometryGuard
-from auv_gvc_controller.pairing import Pairing
+from auv_gvc_controller.hand_over import HandOver
+from auv_gvc_controller.limits import ZERO
+from auv_gvc_controller.odometry_guard import UNTIMED, OdometryGuard
+from auv_gvc_controller.pairing import Pairing, Reference
 from auv_gvc_controller.sampled import SampledLaw
-
-ZERO = (0.0,) * 6
+from auv_gvc_controller.stamp_age import Now
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What the controller says to an odometry: wrench and estimate, and why they are zero."""
+    """What the controller says to an odometry: wrench and estimate, and why it lets go."""
 
     ns: int
     tau: tuple
     f: tuple
     trouble: str = ''
+
+
+@dataclass(frozen=True)
+class Timeouts:
+    """Real time: after what the law lets go, s.
+
+    Attributes
+    ----------
+    odometry : silence on `odom`
+    setpoint : silence on `cmd_vel`, or age of the newest set-point by its stamp
+
+    """
+
+    odometry: float
+    setpoint: float
 
 
 class VelocityController:
@@ -27,9 +43,13 @@ class VelocityController:
     law : with its gains, its model and its state
     pairing : which set-point belongs to an odometry
     guard : which odometry may be used
-    lockstep : wait for the set-point; else answer every odometry, with zero if need be
-    setpoint_timeout_ns : real time: age from which a set-point is not followed any more
-    wrench_limit : (6,) largest absolute wrench per axis, N and N m; empty: no limit
+    output : what the wrench passes before it is published
+    timeouts : of the watchdogs; None in lock-step: it waits for the set-point, whatever the time
+
+    Attributes
+    ----------
+    watchdog : why the law is not in charge, empty while it is
+    trips : how often it had to let go
 
     """
 
@@ -38,25 +58,33 @@ class VelocityController:
         law: SampledLaw,
         pairing: Pairing,
         guard: OdometryGuard,
+        output: HandOver,
         *,
-        lockstep: bool,
         exact: bool,
-        setpoint_timeout_ns: int,
-        wrench_limit: tuple,
+        timeouts: Timeouts | None,
     ):
-        self._law, self._pairing, self._guard = law, pairing, guard
-        self._lockstep, self._exact = lockstep, exact
-        self._timeout, self._limit = setpoint_timeout_ns, wrench_limit
+        self._law, self._pairing, self._guard, self._output = law, pairing, guard, output
+        self._exact, self._timeouts = exact, timeouts
         self._waiting: tuple[int, tuple, float] | None = None
         self._origin: int | None = None
+        self._heard: float | None = None  # steady s of the last odometry; None: none is missed
+        self._unanswered_since = 0.0
         self._bridge = False  # the law was silent: its old rate must not be integrated
+        self._in_charge = False
+        self.watchdog, self.trips = '', 0
 
     def reset(self) -> None:
         """Forget the integrals."""
         self._law.reset()
 
-    def odometry(self, ns: int, x: tuple) -> Answer | None:
-        """Take an odometry: state x = position, quaternion, nu (13 floats).
+    def odometry(self, ns: int, x: tuple, now: Now = UNTIMED) -> Answer | None:
+        """Take an odometry.
+
+        Parameters
+        ----------
+        ns : its stamp
+        x : state: position, quaternion, nu (13 floats)
+        now : when it arrived; without meaning in lock-step
 
         Returns
         -------
@@ -67,56 +95,91 @@ class VelocityController:
         ValueError : the odometry must not be used
 
         """
-        dt = self._guard.elapsed(ns, x[7:])
+        last, restarts = self._guard.last or 0, self._guard.restarts
+        dt = self._guard.elapsed(ns, x[7:], now)
         if self._origin is None:
             self._origin = ns
-        if self._waiting is not None:
+        if self._guard.restarts > restarts:
+            self._origin += ns - last  # the time of the law goes on
+            self._waiting = None
+            self._pairing.forget()
+        self._heard = now.steady
+        if self._waiting is None:
+            self._unanswered_since = now.steady
+        else:
             dt += self._waiting[2]  # the one before was never answered: its time counts as well
         self._waiting = (ns, x, dt)
-        return self.answer()
+        return self.answer(now)
 
-    def answer(self) -> Answer | None:
+    def answer(self, now: Now = UNTIMED) -> Answer | None:
         """Answer the odometry that waits, once its set-point is here."""
         if self._waiting is None:
             return None
         ns, x, dt = self._waiting
         reference = self._pairing.find(ns)
         if reference is None:
-            return None if self._exact else self._zero(ns, 'no set-point yet')
-        if not self._lockstep and ns - reference.ns > self._timeout:
-            return self._zero(ns, f'no set-point for {(ns - reference.ns) / 1e9:.3g} s')
+            return None if self._exact else self._let_go(ns, 'no set-point yet', now)
+        stale = self._stale(ns, reference, now)
+        if stale:
+            return self._let_go(ns, stale, now)
         self._waiting = None
         if self._bridge:
             self._law.forget_rate()
             self._bridge = False
+        t = (ns - (self._origin or 0)) / 1e9
         try:
-            tau, f = self._law.sample(
-                (ns - (self._origin or 0)) / 1e9,
-                dt,
-                x[7:],
-                x[3:7],
-                reference.nu_d,
-                reference.nu_d_dot,
-            )
+            tau, f = self._law.sample(t, dt, x[7:], x[3:7], reference.nu_d, reference.nu_d_dot)
         except ArithmeticError as error:
-            return self._zero(ns, str(error))
-        return Answer(ns, self._limited(tau), f)
+            return self._let_go(ns, str(error), now)
+        self.watchdog, self._in_charge = '', True
+        return Answer(ns, self._output.follow(tau, self._clock(ns, now)), f)
+
+    def watch(self, now: Now) -> Answer | None:
+        """What has to be said without a new odometry: real time, to be asked again and again."""
+        late = self._timeouts
+        if late is None or self._heard is None:
+            return None
+        waits = self._waiting is not None and now.steady - self._unanswered_since > late.setpoint
+        if self._waiting is not None and (waits or self.watchdog):
+            return self._let_go(self._waiting[0], 'no set-point of its stamp', now)
+        if now.steady - self._heard <= late.odometry:
+            return None
+        answer = self._let_go(self._guard.last or 0, f'no odometry for {late.odometry:g} s', now)
+        if self._output.idle:
+            self._heard = None  # said
+        return answer
 
     @property
     def unanswered(self) -> int | None:
         """Stamp of the odometry that still waits for its answer."""
         return self._waiting[0] if self._waiting else None
 
-    def silence(self, why: str = '') -> Answer:
-        """Zero wrench because the law lets go, stamped with the last odometry."""
-        return self._zero(self._guard.last or 0, why)
+    def silence(self) -> Answer:
+        """Zero wrench at once, stamped with the last odometry: the controller leaves."""
+        self._waiting, self._heard, self._bridge = None, None, True
+        return Answer(self._guard.last or 0, self._output.drop(), ZERO)
 
-    def _zero(self, ns: int, trouble: str) -> Answer:
+    def _stale(self, ns: int, reference: Reference, now: Now) -> str:
+        """Why a set-point is not followed any more, or an empty text."""
+        if self._timeouts is None:
+            return ''
+        most, age = self._timeouts.setpoint, (ns - reference.ns) / 1e9
+        if age > most:
+            return f'no set-point for {age:.3g} s'
+        # one who publishes ahead may be silent until his set-points are used up
+        if now.steady - self._pairing.heard > most and not self._pairing.is_ahead(ns):
+            return f'no set-point heard for {most:g} s'
+        return ''
+
+    def _let_go(self, ns: int, trouble: str, now: Now) -> Answer:
         self._waiting = None
         self._bridge = True
-        return Answer(ns, ZERO, ZERO, f'{trouble}: zero wrench' if trouble else '')
+        self.trips += self._in_charge
+        self.watchdog, self._in_charge = trouble, False
+        tau = self._output.release(self._clock(ns, now))
+        how = 'zero wrench' if self._output.idle else 'the wrench goes to zero'
+        return Answer(ns, tau, ZERO, f'{trouble}: {how}')
 
-    def _limited(self, tau: tuple) -> tuple:
-        if not self._limit:
-            return tau
-        return tuple(min(max(a, -most), most) for a, most in zip(tau, self._limit, strict=True))
+    def _clock(self, ns: int, now: Now) -> float:
+        """Seconds that do not go back: of the stamps in lock-step, else of the steady clock."""
+        return ns / 1e9 if self._timeouts is None else now.steady

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Callable
+from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -15,8 +16,11 @@ from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import refuse_unknown
 from auv_gvc_controller.controller import Answer, VelocityController
 from auv_gvc_controller.controller_parameters import ControllerParameters
+from auv_gvc_controller.odometry_guard import UNTIMED
 from auv_gvc_controller.pairing import SAME
+from auv_gvc_controller.stamp_age import Now
 
+WATCH = 0.02  # s between two looks at what stays away
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
@@ -35,14 +39,14 @@ class ControllerNode(BulkMixin, LifecycleNode):
         )
         self._controller: VelocityController  # exists once configured
         self._active = False
-        self._heard: float | None = None
         self._held: Answer | None = None
         self._say_wrench = self.graph.output(topics.WRENCH)
         self._say_estimate = self.graph.output(topics.DISTURBANCE_ESTIMATE)
         self.graph.also_ready_when(lambda: '' if self._active else 'inactive')
+        self.graph.in_trouble_while(lambda: self._controller.watchdog if self._active else '')
         self._subscribe()
         self.create_service(Trigger, '~/reset', self._on_reset)
-        steady_timer(self, 0.05, self._watch)
+        steady_timer(self, WATCH, self._watch)
         if self._settings.autostart:
             self._autostart()
 
@@ -50,7 +54,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         p = self._settings
         odometry = topics.one_at_a_time() if p.lockstep else topics.newest_measurement()
         self.graph.listen(topics.ODOM, self._on_odometry, odometry)
-        self._keep(topics.CMD_VEL, p.pairing.setpoint)
+        self._keep(topics.CMD_VEL, lambda ns, nu_d: p.pairing.setpoint(ns, nu_d, time.monotonic()))
         if p.acceleration == SAME:
             self._keep(topics.CMD_ACCEL, p.pairing.derivative)
 
@@ -67,7 +71,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         """Start from zero integrals with the parameters of this moment."""
         if not self._build():
             return FAILURE
-        self._active, self._heard = True, None
+        self._active = True
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -82,6 +86,12 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self._active = False
         return super().on_shutdown(state)
 
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Leave the vehicle without a wrench; success leads to unconfigured, and on from there."""
+        self._let_go()
+        self._active = False
+        return super().on_error(state)
+
     def _build(self) -> bool:
         try:
             self._controller = self._settings.build()
@@ -95,10 +105,14 @@ class ControllerNode(BulkMixin, LifecycleNode):
         if not self._active:
             return
         try:
-            self._say(self._controller.odometry(ns, x))
-            self._heard = time.monotonic()
+            self._say(self._controller.odometry(ns, x, self._now()))
         except ValueError as error:
             self.graph.refuse(f'{topics.ODOM.name}: {error}')
+
+    def _now(self) -> Now:
+        if self._settings.lockstep:
+            return UNTIMED
+        return Now(time.monotonic(), self.get_clock().now().nanoseconds)
 
     def _keep(self, topic: topics.Topic, keep: Callable[[int, tuple], None]) -> None:
         """Subscribe to set-points; one may be what an odometry has been waiting for."""
@@ -110,7 +124,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
                 self.graph.refuse(f'{topic.name}: {error}')
                 return
             if self._active:
-                self._say(self._controller.answer())
+                self._say(self._controller.answer(self._now()))
 
         self.graph.listen(topic, take, topics.every_step())
 
@@ -127,20 +141,24 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self.graph.latest_ns = answer.ns
 
     def _watch(self) -> None:
-        """Say what is held back; in real time, let go when odometry falls silent."""
+        """Say what is held back; in real time, let go when odometry or set-points stay away."""
+        if self._active:
+            self._say(self._controller.watch(self._now()))
         if self._held is not None:
             self._say(self._held)
-        if self._settings.lockstep or not self._active or self._heard is None:
-            return
-        if time.monotonic() - self._heard > self._settings.odometry_timeout:
-            self._heard = None
-            self._say(self._controller.silence('no odometry'))
+        self.graph.facts.update(self._health())
+
+    def _health(self) -> dict[str, Any]:
+        """What the diagnostics say of the controller."""
+        if not self._active:
+            return {'active': False}
+        c = self._controller
+        return {'active': True, 'watchdog': c.watchdog or 'none', 'watchdog trips': c.trips}
 
     def _let_go(self) -> None:
         if not self._active:
             return
-        lockstep = self._settings.lockstep
-        if not lockstep or self._controller.unanswered is not None:
+        if not self._settings.lockstep or self._controller.unanswered is not None:
             self._say(self._controller.silence())
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

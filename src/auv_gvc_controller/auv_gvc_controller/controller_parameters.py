@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -12,13 +13,15 @@ from auv_dynamics.actuators import Reach, make_reach
 from auv_dynamics.files import InputError
 from auv_dynamics.ros.parameters import declare, given
 from auv_dynamics.vehicle import Vehicle
-from auv_gvc_controller.controller import VelocityController
-from auv_gvc_controller.laws import SHIPPED, law_class, make_gains, refusal, try_law
+from auv_gvc_controller.controller import Timeouts, VelocityController
+from auv_gvc_controller.hand_over import HandOver
+from auv_gvc_controller.laws import SHIPPED, is_unasked, law_class, make_gains, refusal, try_law
 from auv_gvc_controller.limits import Limits
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.odometry_guard import OdometryGuard
 from auv_gvc_controller.pairing import DIFFERENCE, SAME, Pairing
 from auv_gvc_controller.sampled import SampledLaw
+from auv_gvc_controller.stamp_age import AUTO, CLOCKS, StampAge
 
 GAINS = {gain for law in SHIPPED.values() for gain in law._fields}
 WRITABLE = 'gains.'
@@ -30,7 +33,7 @@ class ControllerParameters:
 
     def __init__(self, node: Node):
         self._node = node
-        declare(node, 'law', str, '', LAWS, writable=True)
+        self._named = declare(node, 'law', str, '', LAWS, writable=True)
         names = {*(f'{WRITABLE}{gain}' for gain in GAINS), *given(node, WRITABLE)}
         for name in sorted(names):
             text = '1 number (times identity), 6 (diagonal) or 36 (row-major)'
@@ -52,8 +55,12 @@ class ControllerParameters:
             node, 'setpoint_acceleration', str, DIFFERENCE, 'where nu_d_dot comes from',
             one_of=(SAME, DIFFERENCE),
         )  # fmt: skip
-        self.odometry_timeout = self._time('odometry_timeout', 0.5, 'silence: zero wrench')
-        self._setpoint_timeout = self._time('setpoint_timeout', 0.5, 'older: zero wrench')
+        self._odometry_timeout = self._time(
+            'odometry_timeout', 0.5, 'silence or age of the stamp: zero wrench'
+        )
+        self._setpoint_timeout = self._time(
+            'setpoint_timeout', 0.5, 'silence or age of the stamp: zero wrench'
+        )
         self._gap = self._time('limits.gap', 1.0, 'longest step of time that is integrated')
         self._limits = Limits(
             self._size('limits.speed', 20.0, 'm/s'),
@@ -61,6 +68,14 @@ class ControllerParameters:
             self._size('limits.acceleration', 100.0, 'm/s2, rad/s2'),
         )
         self._wrench_limit = self._six('limits.wrench', 'clips the wrench')
+        self._slew = self._six('limits.wrench_rate', 'per s, limits its change')
+        self._ramp = self._time('ramp', 0.2, 'real time: from no wrench to all of it, and back')
+        self._stamp_clock = declare(
+            node, 'stamp_clock', str, AUTO,
+            "that odometry is stamped with: the node's own (ros), a free-running one (own), "
+            'or auto: ros if they count from the same beginning, else its age is not judged',
+            one_of=CLOCKS,
+        )  # fmt: skip
         self._known_limit = self._six('actuators.limit', 'of the actuators, for anti-windup')
         self._thrusters = declare(
             node, 'actuators.thrusters', bool, False, "anti-windup knows the vehicle's thrusters"
@@ -115,15 +130,23 @@ class ControllerParameters:
             key = f'{WRITABLE}{gain}' if gain else 'law'
             raise InputError(name, key, expected, found) from None
         self.pairing.reset()
-        return VelocityController(
-            SampledLaw(gains, control_model(vehicle), self._reach(vehicle)),
-            self.pairing,
-            OdometryGuard(round(self._gap * 1e9), self._limits, self.lockstep),
-            lockstep=self.lockstep,
-            exact=self.exact,
-            setpoint_timeout_ns=round(self._setpoint_timeout * 1e9),
-            wrench_limit=self._wrench_limit,
-        )
+        law = SampledLaw(gains, control_model(vehicle), self._reach(vehicle))
+        gap, limit = round(self._gap * 1e9), self._wrench_limit or self._believable(vehicle)
+        if self.lockstep:
+            guard = OdometryGuard(gap, self._limits, lockstep=True)
+            output = HandOver(limit, self._slew)
+            return VelocityController(
+                law, self.pairing, guard, output, exact=self.exact, timeouts=None
+            )
+        late = Timeouts(self._odometry_timeout, self._setpoint_timeout)
+        age = StampAge(self._stamp_clock, round(late.odometry * 1e9))
+        guard = OdometryGuard(gap, self._limits, lockstep=False, patience=late.odometry, age=age)
+        output = HandOver(limit, self._slew, self._ramp)
+        return VelocityController(law, self.pairing, guard, output, exact=self.exact, timeouts=late)
+
+    def _believable(self, vehicle: Vehicle) -> tuple:
+        """Largest wrench of a controller without limits: what accelerations beyond belief take."""
+        return tuple((np.abs(vehicle.M).sum(axis=1) * self._limits.acceleration).tolist())
 
     def _gains(self, law: str) -> dict[str, Any]:
         values = {}
@@ -144,7 +167,7 @@ class ControllerParameters:
                 return SetParametersResult(successful=False, reason=reason)
             try:
                 if parameter.name == 'law':
-                    law_class(parameter.value)
+                    self._check_law(parameter.value)
                 elif len(parameter.value) not in (1, 6, 36) or not all(
                     map(math.isfinite, parameter.value)
                 ):
@@ -154,3 +177,10 @@ class ControllerParameters:
                 reason = f'{parameter.name}: {error}'
                 return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
+
+    def _check_law(self, name: str) -> None:
+        """Refuse a module that only the network names: to import it is to run it."""
+        if is_unasked(name) and name != self._named:
+            expected = f'one of {", ".join(SHIPPED)}, or the law that was named at the start'
+            raise ValueError(f'expected {expected}, found {name!r}')
+        law_class(name)

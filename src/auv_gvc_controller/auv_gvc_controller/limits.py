@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+ZERO = (0.0,) * 6
+
 
 @dataclass(frozen=True)
 class Limits:

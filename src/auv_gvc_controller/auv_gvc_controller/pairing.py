@@ -29,6 +29,10 @@ class Pairing:
         backward difference of the set-points, zero at the first and over a jump
     limits : velocities and accelerations that are believed
 
+    Attributes
+    ----------
+    heard : when the newest set-point came, s of the steady clock
+
     """
 
     def __init__(self, exact: bool, acceleration: str, limits: Limits = UNLIMITED):
@@ -36,15 +40,33 @@ class Pairing:
         self._nu_d: OrderedDict[int, tuple] = OrderedDict()
         self._nu_d_dot: OrderedDict[int, tuple] = OrderedDict()
         self._used: Reference | None = None
+        self.heard = 0.0
 
     def reset(self) -> None:
         """Forget which set-point was used last, as at activation; the buffers stay."""
         self._used = None
 
-    def setpoint(self, ns: int, nu_d: tuple) -> None:
-        """Keep a set-point; ValueError when it is not believed or not newer than the one in use."""
+    def forget(self) -> None:
+        """Forget everything, as when the stamps begin anew."""
+        self._used = None
+        self._nu_d.clear()
+        self._nu_d_dot.clear()
+
+    def setpoint(self, ns: int, nu_d: tuple, steady: float = 0.0) -> None:
+        """Keep a set-point that came at `steady` s.
+
+        Raises
+        ------
+        ValueError : it is not believed, not newer than the one in use, or there already
+
+        """
         self._limits.check_velocity(nu_d)
         self._keep(self._nu_d, ns, nu_d)
+        self.heard = steady
+
+    def is_ahead(self, ns: int) -> bool:
+        """Whether there is a set-point for a time after `ns`: its publisher is not behind."""
+        return any(stamp > ns for stamp in reversed(self._nu_d))
 
     def derivative(self, ns: int, nu_d_dot: tuple) -> None:
         """Keep a derivative; ValueError when it is not believed or not newer than that in use."""
@@ -53,7 +75,9 @@ class Pairing:
 
     def _keep(self, buffer: OrderedDict[int, tuple], ns: int, values: tuple) -> None:
         if self._used is not None and ns <= self._used.ns:
-            raise ValueError(f'stamp: expected later than {self._used.ns} ns, found {ns} ns')
+            raise ValueError(f'stamp late: expected later than {self._used.ns} ns, found {ns} ns')
+        if ns in buffer:
+            raise ValueError(f'stamp repeated: expected each stamp once, found {ns} ns again')
         buffer[ns] = values
         if len(buffer) > CAPACITY:
             buffer.popitem(last=False)

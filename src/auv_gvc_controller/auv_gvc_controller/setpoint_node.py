@@ -1,5 +1,6 @@
 """Set-points as a node: `cmd_vel` and `cmd_accel`, published ahead of the odometry."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,15 @@ from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
-from auv_dynamics.ros.parameters import declare, given, refuse_unknown
+from auv_dynamics.ros.parameters import declare, declare_grid, given, refuse_unknown
 from auv_dynamics.signals import DOFS
+from auv_gvc_controller.limits import Limits
+from auv_gvc_controller.odometry_guard import OdometryGuard
 from auv_gvc_controller.setpoint import Setpoint, make_setpoint
+from auv_gvc_controller.stamp_age import Now
 
 BLOCK = 256  # set-points that are evaluated at once
+PATIENCE = 0.3  # s without odometry after which stamps that have gone back are believed
 
 
 class SetpointNode(BulkNode):
@@ -24,19 +29,19 @@ class SetpointNode(BulkNode):
     def __init__(self) -> None:
         super().__init__('setpoint_node')
         self.graph = Graph(self)
-        step = declare(self, 'step', float, 0.01, 'time between set-points, s', at_least=1e-9)
-        duration = declare(self, 'duration', float, 0.0, 's, 0: no end', at_least=0.0)
+        grid = declare_grid(self)
         self._horizon = declare(
             self, 'horizon', int, 200, 'steps ahead of odom', at_least=0, at_most=topics.DEPTH - 1
         )
-        self._step_ns = round(step * interface.NANOSECONDS)
-        self._last = round(duration / step) if duration else None
-        self._setpoint = self._declare_setpoint(duration)
+        self._step_ns, self._last = grid.step_ns, grid.last
+        self._setpoint = self._declare_setpoint(grid.duration)
         refuse_unknown(self)
         self.graph.must_hold = self._horizon
         self._say_velocity = self.graph.output(topics.CMD_VEL)
         self._say_acceleration = self.graph.output(topics.CMD_ACCEL)
         self.graph.listen(topics.ODOM, self._on_odometry, topics.one_at_a_time())
+        gap = max(interface.NANOSECONDS, 10 * self._step_ns)
+        self._guard = OdometryGuard(gap, Limits(), lockstep=False, patience=PATIENCE)
         self._origin: int | None = None
         self._newest = -1
         self._next = 0
@@ -55,9 +60,18 @@ class SetpointNode(BulkNode):
             return make_setpoint({'file': Path(file)}, duration)
         return make_setpoint(spec, duration)
 
-    def _on_odometry(self, ns: int, _: tuple) -> None:
+    def _on_odometry(self, ns: int, x: tuple) -> None:
+        last, restarts = self._guard.last or 0, self._guard.restarts
+        try:
+            self._guard.elapsed(ns, x[7:], Now(time.monotonic()))
+        except ValueError as error:
+            self.graph.refuse(f'{topics.ODOM.name}: {error}')
+            return
         if self._origin is None:
             self._origin = ns
+        if self._guard.restarts > restarts:  # the driver was started again: go on from here
+            self._origin += ns - last
+            self._next = self._newest
         self._newest = max(self._newest, (ns - self._origin) // self._step_ns)
         self._publish()
 

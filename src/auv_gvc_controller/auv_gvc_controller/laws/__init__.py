@@ -15,6 +15,7 @@ from auv_gvc_controller.laws.pid import PID
 from auv_gvc_controller.laws.smc import SMC
 
 SHIPPED: dict[str, Any] = {'gvc': GVC, 'cl': CL, 'pid': PID, 'smc': SMC}
+_asked: set[str] = set()  # own laws that somebody in this process has asked for by name
 
 
 def law_class(name: str) -> Any:
@@ -59,7 +60,16 @@ def law_class(name: str) -> Any:
         text = 'a named tuple of gains with wrench, state_rate and STATES'
         raise ValueError(f'expected {text}, found {name!r} without {", ".join(missing)}')
     _check_counts(law, name)
+    _asked.add(name)
     return law
+
+
+def is_unasked(name: object) -> bool:
+    """Whether this names an own law that `law_class` has not been asked for in this process.
+
+    What somebody else's bag or results name is not imported: to import a module is to run it.
+    """
+    return isinstance(name, str) and ':' in name and name not in _asked
 
 
 def _check_counts(law: Any, name: str) -> None:

@@ -1,0 +1,359 @@
+"""The controller beside a real driver: each fault, the promised reaction, and the way back."""
+
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from harness import CONTROLLER, Peer, environment, fresh_domain, graph, parameters, stop
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import SetParameters
+
+from auv_dynamics import interface
+from auv_dynamics.interface import Frames
+from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.topics import DIAGNOSTICS
+
+FRAMES = Frames()
+PERIOD = 0.02
+X = np.array([0, 0, 0, 1, 0, 0, 0, 0.1, 0, 0, 0, 0, 0], float)
+REAL = [*CONTROLLER, *parameters(odometry_timeout=0.3, setpoint_timeout=0.3, ramp=0.2)]
+
+
+class Driver:
+    """Odometry and set-points at 50 Hz, stamped by the clock on the wall unless it is set wrong."""
+
+    def __init__(self, peer: Peer):
+        self.peer, self.x = peer, X.copy()
+        self.odometry = self.setpoints = True
+        self.clock = time.time_ns
+        self.setpoint_age = 0
+        peer.listen(topics.WRENCH, DIAGNOSTICS)
+        peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
+
+    @property
+    def surge(self) -> list[float]:
+        """Every force heard so far."""
+        return [message.wrench.force.x for message in self.peer.heard['wrench']]
+
+    def step(self) -> None:
+        now = self.clock()
+        if self.setpoints:
+            nu_d = (0.5, 0, 0, 0, 0, 0)
+            self.peer.publish(topics.CMD_VEL, convert.twist(now - self.setpoint_age, nu_d, FRAMES))
+        if self.odometry:
+            self.peer.publish(topics.ODOM, convert.odometry(now, self.x, FRAMES))
+        self.peer.spin(PERIOD)
+
+    def until(self, done: Callable[[], bool], what: str) -> None:
+        limit = time.monotonic() + 30.0
+        while not done():
+            assert time.monotonic() < limit, what
+            self.step()
+
+    def works(self) -> None:
+        """Drive until the law is in charge, past its ramp."""
+        seen = len(self.surge)
+        self.until(
+            lambda: len(self.surge) > seen + 15 and min(map(abs, self.surge[-5:])) > 1.0,
+            'a wrench',
+        )
+
+    def lets_go(self) -> list[float]:
+        """Drive until the wrench is zero; the forces on the way."""
+        seen = len(self.surge)
+        self.until(lambda: self.surge[seen:][-1:] == [0.0], 'a zero wrench')
+        return self.surge[seen:]
+
+    def health(self, wanted: Callable[[dict], bool]) -> dict:
+        """Diagnostics of the controller, once they say what is wanted."""
+        found: list[dict] = []
+
+        def told() -> bool:
+            for array in self.peer.heard[DIAGNOSTICS.name]:
+                for status in array.status:
+                    if status.name == '/controller_node':
+                        values = {entry.key: entry.value for entry in status.values}
+                        found.append({'message': status.message, 'level': status.level, **values})
+            return any(map(wanted, found))
+
+        self.until(told, 'diagnostics')
+        return next(filter(wanted, reversed(found)))
+
+
+@pytest.fixture
+def driver():
+    with graph(('controller_node', REAL)) as (peer, _):
+        yield Driver(peer)
+
+
+def assert_ramp(forces: list[float]) -> None:
+    """Down in steps, never up, to zero."""
+    sizes = [abs(force) for force in forces[-6:]]
+    assert sizes == sorted(sizes, reverse=True)
+    assert 0 < sizes[-2] < max(map(abs, forces)), 'over a ramp'
+    assert sizes[-1] == 0.0
+
+
+def freeze(driver: Driver) -> None:
+    now = time.time_ns()
+    driver.clock = lambda: now
+
+
+FAULTS: dict[str, tuple[Callable[[Driver], None], str]] = {
+    'odometry falls silent': (lambda d: setattr(d, 'odometry', False), 'no odometry for 0.3 s'),
+    'set-points fall silent': (lambda d: setattr(d, 'setpoints', False), 'no set-point'),
+    'old set-points': (lambda d: setattr(d, 'setpoint_age', 10**9), 'no set-point for'),
+    'odometry is late': (
+        lambda d: setattr(d, 'clock', lambda: time.time_ns() - 10**9), 'no odometry for 0.3 s',
+    ),
+    'odometry is not a number': (lambda d: d.x.__setitem__(7, math.nan), 'no odometry for 0.3 s'),
+    'its stamp is frozen': (freeze, 'no odometry for 0.3 s'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('fault', FAULTS)
+def test_the_wrench_goes_to_zero_over_a_ramp_and_comes_back(driver: Driver, fault: str) -> None:
+    break_it, said = FAULTS[fault]
+    driver.works()
+    kept = vars(driver).copy()
+    break_it(driver)
+    assert_ramp(driver.lets_go())
+    health = driver.health(lambda h: h.get('watchdog', '').startswith(said))
+    assert health['message'].startswith(said), 'for as long as it lasts'
+    assert health['level'] == b'\x02'
+    assert int(health['watchdog trips']) >= 1
+    vars(driver).update(kept)
+    driver.x = X.copy()
+    driver.works()
+    assert driver.health(lambda h: h['message'] == 'ok')['watchdog'] == 'none'
+
+
+def newest(peer: Peer) -> int:
+    """Stamp of the last wrench, ns."""
+    return interface.nanoseconds(peer.heard['wrench'][-1].header.stamp)
+
+
+def test_a_driver_that_starts_again_with_its_clock_at_zero_is_believed_after_a_pause() -> None:
+    """ros2_controllers#1683: a controller that never recovers."""
+    with graph(('controller_node', REAL)) as (peer, _):
+        driver = Driver(peer)
+        start = time.time_ns()
+        driver.clock = lambda: time.time_ns() - start + 100 * 10**9  # since it was switched on
+        driver.works()
+        again = time.time_ns()
+        driver.clock = lambda: time.time_ns() - again
+        driver.until(lambda: newest(peer) < 50 * 10**9, 'an answer in the new time')
+        driver.works()
+        health = driver.health(lambda h: 'refused odom: stamp went back' in h)
+        assert int(health['refused odom: stamp went back']) >= 2
+
+
+@pytest.mark.parametrize('jump', [3600, -3600], ids=['forward', 'back'])
+def test_a_jump_of_the_clock_is_survived(jump: int) -> None:
+    """Driver, set-points and controller follow one simulated clock, which jumps."""
+    with graph(('controller_node', [*REAL, *parameters(use_sim_time=True)])) as (peer, _):
+        driver = Driver(peer)
+        origin = time.time_ns() - 7200 * 10**9
+
+        def clock() -> int:
+            now = time.time_ns() - origin
+            peer.publish(topics.CLOCK, topics.CLOCK.type(clock=convert.stamp(now)))
+            return now
+
+        driver.clock = clock
+        driver.works()
+        origin -= jump * 10**9
+        driver.until(
+            lambda: abs(newest(peer) - (time.time_ns() - origin)) < 5 * 10**9,
+            'an answer in the new time',
+        )
+        driver.works()
+        word = 'jumped' if jump > 0 else 'went back'
+        health = driver.health(lambda h: any(word in key or 'clock' in key for key in h))
+        assert int(health['refused']) >= 1
+
+
+def bad(x: np.ndarray, **values: float) -> np.ndarray:
+    x = x.copy()
+    for place, value in values.items():
+        x[int(place[1:])] = value
+    return x
+
+
+BROKEN: dict[str, Callable[[int], object]] = {
+    'odom: not finite': lambda ns: convert.odometry(ns, bad(X, _7=math.nan), FRAMES),
+    'odom: orientation': lambda ns: convert.odometry(ns, bad(X, _3=1.1), FRAMES),
+    'odom: header.frame_id': lambda ns: convert.odometry(ns, X, Frames(odom='map')),
+    'odom: child_frame_id': lambda ns: convert.odometry(ns, X, Frames(base='base_link')),
+    'odom: twist.linear': lambda ns: convert.odometry(ns, bad(X, _8=1e6), FRAMES),
+    'odom: stamp went back': lambda ns: convert.odometry(ns - 10**8, X, FRAMES),
+    'odom: stamp jumped': lambda ns: convert.odometry(ns + 2 * 10**9, X, FRAMES),
+    'odom: stamp ahead of the clock': lambda ns: convert.odometry(ns + 7 * 10**8, X, FRAMES),
+    'cmd_vel: not finite': lambda ns: convert.twist(ns, (math.inf, 0, 0, 0, 0, 0), FRAMES),
+    'cmd_vel: header.frame_id': lambda ns: convert.twist(ns, (1, 0, 0, 0, 0, 0), Frames(base='x')),
+    'cmd_vel: twist.angular': lambda ns: convert.twist(ns, (0, 0, 0, 1e6, 0, 0), FRAMES),
+}
+
+
+def test_broken_messages_among_good_ones_are_refused_counted_and_never_forwarded() -> None:
+    still = parameters(  # without integrals, the wrench stays what it is
+        law='gvc', vehicle='herman2018', gains__k_D='[12.0]', gains__k_I='[0.0]',
+        gains__Lambda='[1e-9]', gains__Gamma='[0.0]', odometry_timeout=0.3, setpoint_timeout=0.3,
+    )  # fmt: skip
+    with graph(('controller_node', still)) as (peer, processes):
+        driver = Driver(peer)
+        driver.works()
+        driver.works()  # well past the ramp
+        usual = driver.surge[-1]
+        seen = len(driver.surge)
+        for _ in range(3):
+            for kind, make in BROKEN.items():
+                driver.step()
+                topic = topics.ODOM if kind.startswith('odom') else topics.CMD_VEL
+                peer.publish(topic, make(time.time_ns()))
+        driver.step()
+        wanted = [f'refused {kind}' for kind in BROKEN]
+        health = driver.health(lambda h: all(int(h.get(key, 0)) >= 3 for key in wanted))
+        assert int(health['refused']) == sum(
+            int(count) for key, count in health.items() if key.startswith('refused ')
+        )
+        forces = driver.surge[seen:]
+        assert len(forces) > 30
+        assert all(map(math.isfinite, forces))
+        assert forces == pytest.approx([usual] * len(forces), rel=1e-6)
+        code, output = stop(processes['controller_node'])
+        assert code == 0
+        for kind in BROKEN:
+            assert f'refused: {kind}' in output
+
+
+def change(peer: Peer, transition: int) -> bool:
+    request = ChangeState.Request(transition=Transition(id=transition))
+    return peer.call(ChangeState, 'controller_node/change_state', request).success
+
+
+def state(peer: Peer) -> str:
+    return peer.call(GetState, 'controller_node/get_state').current_state.label
+
+
+def set_parameter(peer: Peer, name: str, value: ParameterValue) -> bool:
+    request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
+    return peer.call(SetParameters, 'controller_node/set_parameters', request).results[0].successful
+
+
+def test_the_whole_life_of_the_controller(driver: Driver) -> None:
+    """Zero wrench whenever it leaves (ros2_controllers#2602), nothing while it is away."""
+    peer = driver.peer
+    for leave, back in (
+        ([Transition.TRANSITION_DEACTIVATE], [Transition.TRANSITION_ACTIVATE]),
+        (
+            [Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP],
+            [Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE],
+        ),
+    ):
+        driver.works()
+        for transition in leave:
+            assert change(peer, transition)
+        peer.until(lambda: driver.surge[-1] == 0.0, 'a zero wrench')
+        count = len(driver.surge)
+        for _ in range(20):
+            driver.step()
+        assert len(driver.surge) == count, 'inactive, it says nothing'
+        for transition in back:
+            assert change(peer, transition)
+    driver.works()
+    assert change(peer, Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert state(peer) == 'finalized'
+    peer.until(lambda: driver.surge[-1] == 0.0, 'a zero wrench')
+
+
+def test_a_change_of_law_and_gains_is_no_bump(driver: Driver) -> None:
+    """mvp_control#10, ros2_controllers#1840: nothing of the old law is left in the new one."""
+    peer = driver.peer
+    driver.works()
+    gvc = driver.surge[-1]
+    assert not set_parameter(peer, 'law', ParameterValue(type=4, string_value='cl'))
+    assert change(peer, Transition.TRANSITION_DEACTIVATE)
+    assert set_parameter(peer, 'law', ParameterValue(type=4, string_value='cl'))
+    assert set_parameter(peer, 'gains.k_D', ParameterValue(type=8, double_array_value=[300.0]))
+    peer.until(lambda: driver.surge[-1] == 0.0, 'a zero wrench')
+    count = len(driver.surge)
+    assert change(peer, Transition.TRANSITION_ACTIVATE)
+    driver.works()
+    forces = [0.0, *driver.surge[count:]]
+    steps = np.abs(np.diff(forces))
+    assert max(steps) < 0.15 * max(map(abs, forces)), 'it comes in over the ramp'
+    assert not math.isclose(forces[-1], gvc, rel_tol=0.05), 'and it is another law'
+
+
+def test_the_network_cannot_name_a_module_to_run(driver: Driver) -> None:
+    peer = driver.peer
+    assert change(peer, Transition.TRANSITION_DEACTIVATE)
+    value = ParameterValue(type=4, string_value='this:Zen')
+    request = SetParameters.Request(parameters=[Parameter(name='law', value=value)])
+    result = peer.call(SetParameters, 'controller_node/set_parameters', request).results[0]
+    assert not result.successful
+    assert "found 'this:Zen'" in result.reason
+
+
+BROKEN_BUILD = """
+from auv_gvc_controller import controller_node
+from auv_gvc_controller.controller_parameters import ControllerParameters
+
+build, calls = ControllerParameters.build, []
+
+
+def second_fails(self):
+    calls.append(self)
+    if len(calls) == 2:
+        raise KeyError('what nobody thought of')
+    return build(self)
+
+
+ControllerParameters.build = second_fails
+controller_node.main()
+"""
+
+
+def test_an_error_inside_a_transition_leaves_no_wrench_and_can_be_mended() -> None:
+    domain = fresh_domain()
+    peer = Peer(domain)
+    arguments = ['--ros-args', *REAL, *parameters(autostart=False)]
+    process = subprocess.Popen(
+        [sys.executable, '-c', BROKEN_BUILD, *arguments], env=environment(domain)
+    )
+    try:
+        driver = Driver(peer)
+        assert change(peer, Transition.TRANSITION_CONFIGURE)
+        assert not change(peer, Transition.TRANSITION_ACTIVATE)
+        assert state(peer) == 'unconfigured'
+        assert change(peer, Transition.TRANSITION_CONFIGURE)
+        assert change(peer, Transition.TRANSITION_ACTIVATE)
+        driver.works()
+    finally:
+        peer.close()
+        process.terminate()
+        assert process.wait(timeout=30) == 0
+
+
+def test_the_wrench_changes_no_faster_than_its_limit() -> None:
+    arguments = [
+        *CONTROLLER,
+        *parameters(lockstep=True, setpoint_pairing='exact', limits__wrench_rate='[100.0]'),
+    ]
+    with graph(('controller_node', arguments)) as (peer, _):
+        peer.listen(topics.WRENCH)
+        peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
+        for k in range(20):
+            ns = k * 10_000_000
+            peer.publish(topics.CMD_VEL, convert.twist(ns, (0.5, 0, 0, 0, 0, 0), FRAMES))
+            peer.publish(topics.ODOM, convert.odometry(ns, X, FRAMES))
+            peer.until(lambda k=k: len(peer.heard['wrench']) > k, f'wrench {k}')
+        forces = [message.wrench.force.x for message in peer.heard['wrench']]
+        np.testing.assert_allclose(forces, 1.0 * np.arange(20), atol=1e-9)

@@ -1,13 +1,15 @@
 """A bag message by message, as plainly as it can be said: what the quick reader must equal."""
 
 import struct
+import zlib
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from mcap.exceptions import EndOfFile, McapError
-from mcap.records import Attachment, Channel, Footer, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
 from mcap_ros2.decoder import DecoderFactory
 from zstandard import ZstdError
 
@@ -80,26 +82,77 @@ def slow_read_bag(bag: str | Path) -> Contents:
 
 
 def _records(path: Path, notes: list[str]) -> Iterator[Any]:
-    finished = False
-    with path.open('rb') as stream:
+    """Record by record: one that reaches beyond the file is its end, any other fault is damage."""
+    data, place, finished = path.read_bytes(), len(MAGIC), False
+    if not data.startswith(MAGIC) and not MAGIC.startswith(data):
+        raise InputError(path, '', 'an MCAP file', 'another beginning')
+    while place < len(data):
+        length = int.from_bytes(data[place + 1 : place + 9], 'little')
+        opcode, body = data[place], data[place + 9 : place + 9 + length]
+        if len(data) < place + 9 or (len(body) < length and _is_opcode(opcode)):
+            break
         try:
-            for record in StreamReader(stream, validate_crcs=True).records:
-                finished = finished or isinstance(record, Footer)
-                yield record
-        except (EndOfFile, struct.error):
-            head = path.read_bytes()[: len(MAGIC)]
-            if 0 < stream.tell() < len(MAGIC) or not MAGIC.startswith(head):
-                raise InputError(path, '', 'an MCAP file', 'another beginning') from None
+            found = _parsed(opcode, body, data[:place])
         except (
-            McapError, ValueError, KeyError, OverflowError, RuntimeError, MemoryError, ZstdError,
+            EndOfFile, struct.error, McapError, ValueError, KeyError, OverflowError, RuntimeError,
+            MemoryError, ZstdError,
         ) as error:  # fmt: skip
-            if stream.tell() <= 64:
-                found = (str(error) or repr(error)).splitlines()[0]
-                raise InputError(path, '', 'an MCAP file', found) from None
-            notes.append(f'{path.name}: damaged from byte {stream.tell()}, read up to there')
+            if place <= len(MAGIC):
+                words = (str(error) or repr(error)).splitlines()[0]
+                raise InputError(path, '', 'an MCAP file', words) from None
+            notes.append(f'{path.name}: damaged from byte {place}, read up to there')
             finished = True
+            break
+        yield from found
+        place += 9 + length
+        if opcode == 2:
+            finished = True
+            if not MAGIC.startswith(data[place : place + 8]):
+                notes.append(f'{path.name}: damaged from byte {place}, read up to there')
+            break
     if not finished:
         notes.append(f'{path.name}: was not finished, its writer was killed; read to the end')
+
+
+def _is_opcode(opcode: int) -> bool:
+    return 1 <= opcode <= 15 or opcode >= 128
+
+
+def _parsed(opcode: int, body: bytes, before: bytes) -> list[Any]:
+    """Records in a record; the library reads them, but takes less than they declare as well."""
+    if not _is_opcode(opcode):
+        raise McapError(f'no record has the opcode {opcode}')
+    if opcode == 7:
+        (size,) = struct.unpack('<I', body[2:6])
+        if size > len(body) - 6 or size % 16:
+            raise McapError('a record that is shorter than its fields')
+        return []
+    head = opcode.to_bytes(1, 'little') + len(body).to_bytes(8, 'little')
+    stream = StreamReader(_Whole(head + body), skip_magic=True, emit_chunks=True)
+    record = next(stream.records, None)
+    if isinstance(record, Attachment):
+        used = 32 + len(record.name.encode()) + len(record.media_type.encode()) + len(record.data)
+        told = int.from_bytes(body[used : used + 4], 'little')
+        if told and told != zlib.crc32(body[:used]):
+            raise McapError('an attachment that is not what its checksum says')
+    if isinstance(record, DataEnd) and record.data_section_crc not in (0, zlib.crc32(before)):
+        raise McapError('data that is not what its checksum says')
+    if not isinstance(record, Chunk):
+        return [record]
+    content, length = get_chunk_data_stream(record, validate_crc=True)
+    if length != record.uncompressed_size or record.compression not in ('', 'zstd', 'lz4'):
+        raise McapError('sizes that do not agree')
+    return breakup_chunk(Chunk('', content.read(length), 0, 0, 0, length))
+
+
+class _Whole(BytesIO):
+    """Bytes of which none may be missing."""
+
+    def read(self, size: int | None = -1) -> bytes:
+        data = super().read(size)
+        if size is not None and len(data) < size:
+            raise McapError('a record that is shorter than its fields')
+        return data
 
 
 def _role(topic: str) -> str:

@@ -1,11 +1,13 @@
 """The recorder node: everything on disk after a signal, after a kill, and loud when it is not."""
 
+import itertools
 import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 from harness import PATIENCE, assert_one_line, graph, parameters, run_node, stop
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from auv_analysis.bag import read_bag
@@ -178,3 +180,30 @@ def test_refuses_a_folder_that_holds_a_bag(tmp_path: Path) -> None:
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str) -> None:
     assert_one_line(run_node('recorder_node', *arguments), key)
     assert not Path('x').exists()
+
+
+def test_a_driver_with_best_effort_is_heard_where_that_is_asked_for(tmp_path: Path) -> None:
+    one = ['-p', 'topics:=["odom"]']
+    wanted = parameters(bag=tmp_path / 'heard', strict=False)
+    wanted += ['-p', 'qos_overrides./odom.subscription.reliability:=best_effort']
+    deaf = [*one, *parameters(bag=tmp_path / 'deaf', strict=False), '-r', '__node:=deaf']
+    with graph(('recorder_node', [*one, *wanted])) as (peer, _):
+        peer.listen(topics.PROGRESS)
+        qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+        output = peer.node.create_publisher(topics.ODOM.type, 'odom', qos)
+        k = itertools.count()
+
+        def progress() -> list:
+            output.publish(convert.odometry(next(k) * STEP, UPRIGHT, FRAMES))
+            return peer.heard['recorder/progress']
+
+        peer.until(progress, 'a recorded step')
+    with graph(('recorder_node', deaf)) as (peer, _):
+        output = peer.node.create_publisher(topics.ODOM.type, 'odom', qos)
+        peer.listen(topics.DIAGNOSTICS)
+
+        def said() -> bool:
+            found = [status.message for a in peer.heard['/diagnostics'] for status in a.status]
+            return any('odom: incompatible QoS' in m and 'reliability' in m for m in found)
+
+        peer.until(said, 'the report of the deaf one')

@@ -19,6 +19,8 @@ from auv_analysis.node_parameters import (
 )
 from auv_analysis.scenario import Scenario
 from auv_analysis.supervisor import NodeDiedError, Supervisor, executable
+from auv_dynamics.ros.reach import loopback
+from auv_dynamics.ros.security import enclave
 
 PACKAGES = {
     RECORDER: 'auv_analysis',
@@ -43,17 +45,6 @@ class Graph(Protocol):
 
     def ask_to_run(self) -> bool:
         """Whether the plant has agreed to run."""
-
-
-def loopback() -> dict[str, str]:
-    """Environment variables that keep a graph on this machine, with quick discovery."""
-    from auv_dynamics import ros
-
-    profile = Path(ros.__file__).with_name('fastdds.xml')
-    return {
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile),
-    }
 
 
 def environment(domain: int) -> dict[str, str]:
@@ -130,8 +121,8 @@ def run_controller(
     supervisor = Supervisor(out / 'logs' / controller, environment(domain))
     try:
         for name, package in ({COMPOSED: PACKAGES[RECORDER]} if composed else PACKAGES).items():
-            command = [str(executable(package, name)), '--ros-args', '--params-file', str(path)]
-            supervisor.start(name, command)
+            arguments = [*enclave(name), '--params-file', str(path)]
+            supervisor.start(name, [str(executable(package, name)), *arguments])
         _start(supervisor, graph)
         _follow(supervisor, COMPOSED if composed else RECORDER, graph, scenario, progress)
     finally:

@@ -9,9 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from auv_dynamics.files import InputError, reason
+from auv_dynamics.files import InputError, read_yaml, reason
 
 OURS = (
     'summary.json', 'report.html', 'numbers.parquet', 'figures', 'logs', 'scenario.yaml',
@@ -21,9 +19,11 @@ OURS = (
     'dependence.parquet', 'together.parquet', 'failures.parquet', 'paired.parquet',
     'indices.parquet', 'best.parquet', 'design.json', 'summary_before.json',
     'vehicle_before.yaml',
-    'tune.json', 'search.parquet', 'monte_carlo.parquet',
+    'tune.json', 'search.parquet', 'monte_carlo.parquet', 'open_loop.json', 'check.json',
+    'samples.parquet', 'wrenches.parquet', 'faults.parquet',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
+OF_A_BAG = re.compile(r'.*\.mcap(\.damaged(\.\d+)?)?')
 MANIFEST, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep
 PART = re.compile(r'part-(\d{8})\.parquet')
 UNFINISHED = '.unfinished'  # ends the name of a file that is being written
@@ -104,9 +104,9 @@ def _samples(out: Path) -> set[str]:
     names: set[str] = set()
     for file, key in (('summary.json', None), ('scenario.yaml', 'controllers')):
         try:
-            data = yaml.safe_load((out / file).read_text(encoding='utf-8'))
+            data = read_yaml(out / file, 'results')
             names.update(data[key] if key else data)
-        except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
+        except (OSError, ValueError, TypeError, KeyError):
             continue
     return {f'{name}{ending}' for name in names for ending in ('.npz', '.parquet')}
 
@@ -114,7 +114,12 @@ def _samples(out: Path) -> set[str]:
 def _is_run(folder: Path) -> bool:
     names = [entry.name for entry in folder.iterdir()]
     # params.yaml is written before anything else: without it the bag is somebody else's
-    return 'params.yaml' in names and all(n in OURS_IN_RUN or n.endswith('.mcap') for n in names)
+    return 'params.yaml' in names and all(_is_ours_in_run(name) for name in names)
+
+
+def _is_ours_in_run(name: str) -> bool:
+    name = name.removesuffix(UNFINISHED)
+    return name in OURS_IN_RUN or OF_A_BAG.fullmatch(name) is not None
 
 
 def _is_of_sweep(entry: Path) -> bool:

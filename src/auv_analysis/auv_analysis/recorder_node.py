@@ -7,8 +7,8 @@ from std_msgs.msg import Header
 
 from auv_analysis.ledger import LostStepError, PublicationLedger, StepLedger
 from auv_analysis.recorder_parameters import recorder_parameters
+from auv_analysis.recording import RecordingError
 from auv_analysis.schemas import schema_text
-from auv_dynamics.files import reason
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.codec import first_stamp
@@ -27,11 +27,13 @@ class RecorderNode(BulkNode):
         super().__init__('recorder_node')
         self._settings = p = recorder_parameters(self)
         self._writer = p.writer
-        self._ledger = StepLedger(p.topics, p.step_ns, p.strict)
+        # in real time set-points lie on a grid of their own, ahead of the odometry
+        ahead = () if p.strict else (topics.CMD_VEL.name, topics.CMD_ACCEL.name)
+        self._counted = [topic for topic in p.topics if topic not in ahead] or list(p.topics)
+        self._ledger = StepLedger(self._counted, p.step_ns, p.strict)
         self._publications = PublicationLedger(p.strict)
         self._latest = 0  # stamp of the newest step message, for messages without one
         self._analysed = -1
-        self._broken = False  # the disk takes no more
         self._reported = -1
         self._known: set[str] = set()
         self.graph = Graph(self, barrier=False)
@@ -44,7 +46,7 @@ class RecorderNode(BulkNode):
 
     def _record(self, name: str, kind: type, topic: topics.Topic | None = None) -> None:
         resolved = self.resolve_topic_name(name)
-        step_topic = topic.name if topic and topic.name in self._settings.topics else ''
+        step_topic = topic.name if topic and topic.name in self._counted else ''
         numbered, due = topic in NUMBERED, topic == topics.LUMPED_ERROR
         stamped = begins_with_stamp(kind)
 
@@ -60,15 +62,16 @@ class RecorderNode(BulkNode):
         self.graph.subscribe(topic or topics.Topic(resolved, kind), callback, topics.every_step())
 
     def _take(self, topic: str, kind: type, message: bytes, ns: int) -> None:
-        if self._broken:
+        if self._writer.broken:
             return
-        if not self._writer.has_channel(topic):
-            self._add_channel(topic, type_name(kind))
         try:
+            if not self._writer.has_channel(topic):
+                self._add_channel(topic, type_name(kind))
             self._writer.write(topic, ns, message)
-        except OSError as error:
-            self._broken = True
-            self._end(1, f'{self._writer.path}: {reason(error)}')
+        except RecordingError as error:
+            self._end(1, str(error))
+        if self._writer.trouble:
+            self._end(1, self._writer.trouble)
 
     def _add_channel(self, topic: str, kind: str) -> None:
         endpoints = self.get_publishers_info_by_topic(topic)
@@ -88,6 +91,8 @@ class RecorderNode(BulkNode):
 
     def _report(self) -> None:
         """Publish the last complete step when it is new, and end when it is the last one."""
+        if self._writer.trouble:
+            self._end(1, self._writer.trouble)
         complete = self._ledger.complete
         if complete > self._reported:
             self._reported = complete
@@ -104,8 +109,7 @@ class RecorderNode(BulkNode):
             self._progress.publish(message)
 
     def _keep(self) -> None:
-        """Close chunks in time; repeat the progress for whoever has joined since."""
-        self._writer.flush_due()
+        """Repeat the progress for whoever has joined since."""
         self._say_progress()
         self.graph.latest_ns = self._latest
         self.graph.facts.update(complete=self._ledger.complete, behind=self._ledger.behind())
@@ -129,17 +133,17 @@ class RecorderNode(BulkNode):
             return
         if text:
             self.get_logger().error(text)
-        self._progress.wait_for_all_acked(Duration(seconds=1.0))
         self.exit_code = code
+        self._progress.wait_for_all_acked(Duration(seconds=1.0))
 
     def close(self) -> None:
         """Finish the bag with everything that has arrived."""
         self.take_data()
         try:
             self._writer.close()
-        except OSError as error:
-            text = reason(error)
-            self.get_logger().error(f'{self._writer.path}: not finished: {text}')
+        except RecordingError as error:
+            if self.exit_code != 1:
+                self.get_logger().error(str(error))
             self.exit_code = 1
         lost = {topic: gaps for topic, gaps in self._ledger.gaps.items() if gaps}
         if lost or self._publications.gaps:

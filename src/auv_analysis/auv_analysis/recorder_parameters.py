@@ -1,11 +1,14 @@
 """The recorder's ROS parameters."""
 
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 from rclpy.node import Node
 
-from auv_analysis.bag_writer import COMPRESSIONS, BagWriter
+from auv_analysis.bag import recording as described
+from auv_analysis.recording import COMPRESSIONS, BagWriter, Storage
+from auv_analysis.recording.storage import FREE_SPACE, LARGEST_CHUNK, LEAST_DURATION, LEAST_SIZE
 from auv_dynamics import interface
 from auv_dynamics.files import InputError, read_text, reason
 from auv_dynamics.ros import topics
@@ -49,10 +52,8 @@ def recorder_parameters(node: Node) -> RecorderParameters:
         at_least=0,
     )  # fmt: skip
     strict = declare(node, 'strict', bool, True, 'a lost or doubled step ends the recording')
-    compression = declare(
-        node, 'storage.compression', str, 'zstd', 'of chunks', one_of=list(COMPRESSIONS)
-    )
-    size = declare(node, 'storage.chunk_size', int, 1 << 20, 'bytes', at_least=1024)
+    pace = node.resolve_topic_name(expected[0]) if expected else ''
+    storage = _storage(node, pace)
     files = declare(node, 'attachments', list[str], None, 'name=path of files kept in the bag')
     refuse_unknown(node)
     unknown = [topic for topic in expected if topic not in known]
@@ -65,12 +66,63 @@ def recorder_parameters(node: Node) -> RecorderParameters:
         label, equals, path = entry.partition('=')
         source = Path(path if equals else label)
         attachments[label if equals else source.name] = read_text(source, 'attachment')
-    try:
-        writer = BagWriter(Path(bag), attachments, compression, size)
-    except OSError as error:
-        found = reason(error)
-        raise InputError(bag, '', 'a folder without a bag that can be written', found) from None
+    names = remapped(node)
+    if names or not strict:
+        attachments[described.NAME] = described.recording_text(strict, names)
+    writer = _writer(name, Path(bag), attachments, storage)
     last = round(duration / step) if duration else None
     step_ns = round(step * interface.NANOSECONDS)
     due = last // every * every * step_ns if last is not None and every else None
     return RecorderParameters(writer, tuple(expected), step_ns, last, due, strict)
+
+
+def remapped(node: Node) -> dict[str, str]:
+    """Topics of ours that have another name here -> what they would be called in this namespace."""
+    space = node.get_namespace().rstrip('/')
+    names = {}
+    for topic in topics.TOPICS:
+        usual = topic.name if topic.name.startswith('/') else f'{space}/{topic.name}'
+        if (resolved := node.resolve_topic_name(topic.name)) != usual:
+            names[resolved] = usual
+    return names
+
+
+def _storage(node: Node, pace: str) -> Storage:
+    compression = declare(
+        node, 'storage.compression', str, 'zstd', 'of chunks', one_of=list(COMPRESSIONS)
+    )
+    chunk_size = declare(
+        node, 'storage.chunk_size', int, 1 << 20, 'bytes', at_least=1024, at_most=LARGEST_CHUNK
+    )
+    text = 'bytes of a file at most, 0: one file'
+    max_size = declare(node, 'storage.max_size', int, 0, text, at_least=0)
+    text = 's of log time in a file at most, 0: one file'
+    max_duration = declare(
+        node, 'storage.max_duration', float, 0.0, text, at_least=0.0, at_most=1e9
+    )
+    text = 'bytes that stay free on the file system: with less, the recording ends'
+    free_space = declare(node, 'storage.free_space', int, FREE_SPACE, text, at_least=0)
+    if 0 < max_duration < LEAST_DURATION:
+        expected = f'0 for one file, or at least {LEAST_DURATION:g} s'
+        raise InputError(node.get_name(), 'storage.max_duration', expected, max_duration)
+    longest = round(max_duration * interface.NANOSECONDS)
+    return Storage(compression, chunk_size, max_size, longest, pace, free_space)
+
+
+def _writer(name: str, bag: Path, attachments: dict[str, str], storage: Storage) -> BagWriter:
+    """Open the bag."""
+    least = LEAST_SIZE + sum(len(text.encode()) for text in attachments.values())
+    if 0 < storage.max_size < least:
+        expected = f'0 for one file, or at least {least} bytes with these attachments'
+        raise InputError(name, 'storage.max_size', expected, storage.max_size)
+    if storage.free_space:
+        there = next((folder for folder in bag.absolute().parents if folder.is_dir()), Path('/'))
+        free = shutil.disk_usage(there).free
+        if free < storage.free_space:
+            expected = f'at most what is free on the file system of {bag}'
+            raise InputError(name, 'storage.free_space', expected, f'{free} bytes free')
+    try:
+        return BagWriter(bag, attachments, storage)
+    except OSError as error:
+        found = reason(error)
+        raise InputError(bag, '', 'a folder without a bag that can be written', found) from None

@@ -5,6 +5,7 @@ import shutil
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import IO
 
 import psutil
 
@@ -51,20 +52,22 @@ class Supervisor:
         self._logs = logs
         self._environment = {**environment, PARENT: str(os.getpid())}
         self._processes: dict[str, psutil.Popen] = {}
+        self._outputs: dict[str, IO[bytes]] = {}  # open: the folder may be removed under us
 
     def start(self, name: str, command: list[str]) -> None:
         """Start one process; its output goes to <logs>/<name>.log."""
         self._logs.mkdir(parents=True, exist_ok=True)
-        with (self._logs / f'{name}.log').open('wb') as log:
-            # a session of its own: Ctrl-C reaches `auv`, which ends the nodes in order
-            self._processes[name] = psutil.Popen(
-                command,
-                env=self._environment,
-                stdin=-3,  # subprocess.DEVNULL
-                stdout=log,
-                stderr=log,
-                start_new_session=True,
-            )
+        log = (self._logs / f'{name}.log').open('w+b')
+        self._outputs[name] = log
+        # a session of its own: Ctrl-C reaches `auv`, which ends the nodes in order
+        self._processes[name] = psutil.Popen(
+            command,
+            env=self._environment,
+            stdin=-3,  # subprocess.DEVNULL
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+        )
 
     def ended(self) -> dict[str, int]:
         """Name -> exit code of the processes that have ended."""
@@ -85,17 +88,20 @@ class Supervisor:
 
     def last_lines(self, name: str, count: int = 8) -> str:
         """End of a process' output, indented, for a message."""
-        path = self._logs / f'{name}.log'
-        lines = path.read_text(errors='replace').splitlines() if path.is_file() else []
-        return ''.join(f'\n    {line}' for line in lines[-count:])
+        return ''.join(f'\n    {line}' for line in self._lines(name)[-count:])
+
+    def _lines(self, name: str) -> list[str]:
+        log = self._outputs[name]
+        size = os.fstat(log.fileno()).st_size
+        return os.pread(log.fileno(), size, 0).decode(errors='replace').splitlines()
 
     def _complaints(self, besides: str) -> str:
         """Last error of each other process: often the cause."""
         text = ''
-        for path in sorted(self._logs.glob('*.log')):
-            errors = [x for x in path.read_text(errors='replace').splitlines() if '[ERROR]' in x]
-            if errors and path.stem != besides:
-                text += f'\n    {path.stem}: {errors[-1]}'
+        for name in sorted(self._outputs):
+            errors = [line for line in self._lines(name) if '[ERROR]' in line]
+            if errors and name != besides:
+                text += f'\n    {name}: {errors[-1]}'
         return text
 
     def stop(self) -> dict[str, int]:
@@ -107,4 +113,6 @@ class Supervisor:
         for process in alive:
             process.kill()
         psutil.wait_procs(alive, timeout=GRACE)
+        for log in self._outputs.values():
+            log.close()
         return self.ended()

@@ -5,12 +5,16 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.bag.contents import Contents
-from auv_dynamics.files import InputError, parse_yaml
+from auv_analysis.fault_words import Mark, marks_of
+from auv_analysis.scenario import SCHEMA
+from auv_dynamics.files import InputError, check, parse_yaml
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import load_vehicle, vehicle_from_dict
-from auv_gvc_controller.laws import make_gains
+from auv_gvc_controller.laws import is_unasked, make_gains
 
 NAME = re.compile('[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}')
+LAW = re.compile(r'[A-Za-z_][\w.]*:[A-Za-z_]\w*', re.ASCII)  # module:Class
+UNFIT = re.compile('[^A-Za-z0-9_.+-]+')
 UNKNOWN = 'unknown'  # law of a bag without params.yaml
 
 
@@ -40,15 +44,18 @@ def step_of(parameters: dict[str, dict[str, Any]], bag: Path) -> float | None:
 
 
 def controller_name(parameters: dict[str, dict[str, Any]], bag: Path) -> str:
-    """Name of the controller: that of the folder that was recorded into."""
+    """Name of the controller: that of the folder that was recorded into, as a word.
+
+    It becomes part of names of files and stands in figures.
+    """
     recorded = parameters.get('recorder_node', {}).get('bag', str(bag))
     if not isinstance(recorded, str):
         raise InputError(f'{bag}: params.yaml', 'recorder_node: bag', 'a folder', recorded)
-    return Path(recorded).name
+    return UNFIT.sub('_', Path(recorded).name)[:100].lstrip('_.+-') or 'controller'
 
 
 def law_and_gains(controller: dict[str, Any], bag: Path) -> tuple[str, dict[str, Any]]:
-    """Law and gains, from the parameters of the controller node."""
+    """Law and gains, from the parameters of the controller node; no gains of an unasked law."""
     gains = {}
     for key, value in controller.items():
         if key.startswith('gains.'):
@@ -58,11 +65,22 @@ def law_and_gains(controller: dict[str, Any], bag: Path) -> tuple[str, dict[str,
     file = f'{bag}: params.yaml'
     if law is None:
         return UNKNOWN, {}  # a bag that somebody else recorded says nothing of it
+    if is_unasked(law):
+        if not LAW.fullmatch(law):
+            raise InputError(file, 'controller_node', 'a law, shipped or module:Class', law)
+        return law, {}
     try:
         make_gains(law, gains)
     except ValueError as error:
         raise InputError(file, 'controller_node', str(error), 'another law or gain') from None
     return law, gains
+
+
+def notes_on(law: str) -> list[str]:
+    """What is worth saying of a law."""
+    if not is_unasked(law):
+        return []
+    return [f'gains of {law} not looked at: a bag brings no code; --law {law} imports its module']
 
 
 def vehicle_of(contents: Contents, bag: Path, vehicle: str | Path | None) -> Vehicle:
@@ -74,6 +92,18 @@ def vehicle_of(contents: Contents, bag: Path, vehicle: str | Path | None) -> Veh
         raise InputError(bag, 'vehicle.yaml', 'an attachment, or --vehicle FILE', None)
     file = f'{bag}: vehicle.yaml'
     return vehicle_from_dict(parse_yaml(text, file, 'vehicle'), file)
+
+
+def faults_of(contents: Contents, vehicle: Vehicle) -> tuple[Mark, ...]:
+    """Faults of the scenario that the bag carries, none where that is not one."""
+    try:
+        data = parse_yaml(
+            contents.attachments.get('scenario.yaml', ''), 'scenario.yaml', 'scenario'
+        )
+        check(data, SCHEMA, 'scenario.yaml')
+    except InputError:
+        return ()
+    return marks_of(data.get('faults', []), vehicle)
 
 
 def kinds_of(contents: Contents, bag: Path) -> frozenset[str] | None:

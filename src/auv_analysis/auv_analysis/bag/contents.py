@@ -28,6 +28,7 @@ class Contents:
     messages : topic -> stamps (n,) in ns and values (n, 6) or (n, 13), of our topics
     notes : what is odd, one line each
     frames : namespace -> frames of its first odometry
+    names : recorded topic -> our name of it, where the recorder's topics were remapped
 
     """
 
@@ -40,6 +41,7 @@ class Contents:
     messages: dict[str, Series] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     frames: dict[str, Frames] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
 
     def span(self, first: int, last: int) -> None:
         """Note that there are messages logged from `first` to `last`, ns."""

@@ -33,13 +33,25 @@ def bag_files(bag: str | Path) -> list[Path]:
     """MCAP files of a bag, in order; InputError when there are none."""
     path = Path(bag)
     is_folder = os.path.isdir(path)  # Path.is_dir raises for a name that is too long
-    files = sorted(path.glob('*.mcap'), key=_split_order) if is_folder else [path]
+    files = sorted(path.glob('*.mcap'), key=split_order) if is_folder else [path]
     if not files or not os.path.isfile(files[0]):
         found = 'a folder without .mcap files' if is_folder else 'no such file or folder'
         raise InputError(path, '', 'a bag folder or an .mcap file', found)
+    for file in files:
+        check_regular(file, path if is_folder else file.resolve().parent)
     return files
 
 
-def _split_order(path: Path) -> tuple[int, str]:
+def check_regular(path: Path, folder: Path) -> None:
+    """Refuse what is no file, such as a pipe, or lies outside of the folder of its bag."""
+    if not os.path.isfile(path):
+        raise InputError(path, '', 'a file', 'something else of that name')
+    if not path.resolve().is_relative_to(folder.resolve()):
+        expected = 'a file in the folder of its bag, or the file itself'
+        raise InputError(path, '', expected, f'a link to {path.resolve()}')
+
+
+def split_order(path: Path) -> tuple[int, str]:
+    """Place of a file in its bag: by the number at the end of its name."""
     number = path.stem.rpartition('_')[2]
     return (int(number) if number.isdigit() else 0, path.name)

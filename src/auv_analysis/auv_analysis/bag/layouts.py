@@ -70,7 +70,8 @@ class Layout:
             return None
         head = gather(data, starts, self.strings)
         sec, nanosec = head[:, STAMP].copy().view('<u4').astype(np.int64).T
-        if not self._alike(head) or np.any(sec >= LATEST):
+        odd = (sec >= LATEST) | (nanosec >= interface.NANOSECONDS)
+        if not self._alike(head) or np.any(odd):
             return None
         parts = [gather(data, starts + at, 8 * count).view('<f8') for at, count in self.runs]
         rows = np.concatenate(parts, axis=1)[:, self.order] if self.is_state else parts[0]

@@ -9,6 +9,7 @@ import numpy as np
 
 from auv_analysis.bag import attached
 from auv_analysis.bag.contents import Contents
+from auv_analysis.bag.held import SETPOINTS, held_parts, held_series, holds
 from auv_analysis.bag.reading import batches, read_bag
 from auv_analysis.bag.steps import (
     Steps,
@@ -87,30 +88,47 @@ def open_bag(bag: str | Path, vehicle: str | Path | None = None, whole: int = WH
 def _whole(contents: Contents, bag: Path, vehicle: str | Path | None) -> Run:
     topics = topics_of_one_graph(contents.messages, contents, bag)
     series = {role: contents.messages[topic] for role, topic in topics.items()}
+    held = _holds(contents, bag)
+    if held:
+        series = held_series(series)
     steps = complete(series)
     ns = steps[0]
-    notes = dropped({role: len(stamps) for role, (stamps, _) in series.items()}, len(ns), bag)
+    counts = {role: len(stamps) for role, (stamps, _) in series.items()}
+    notes = dropped(_step_by_step(counts, held), len(ns), bag)
     facts = _facts(contents, bag, vehicle, float(np.median(np.diff(ns))), notes)
     return _with_slope(_run(steps, int(ns[0]), facts))
 
 
 def _long(contents: Contents, survey: Survey, bag: Path, vehicle: str | Path | None) -> LongRun:
     topics = topics_of_one_graph(survey.counts, contents, bag)
-    number, first, last, interval = survey.steps(topics)
-    notes = dropped({role: survey.counts[topic] for role, topic in topics.items()}, number, bag)
+    held = _holds(contents, bag)
+    number, first, last, interval = survey.steps(topics, held=held)
+    counts = {role: survey.counts[topic] for role, topic in topics.items()}
+    notes = dropped(_step_by_step(counts, held), number, bag)
     facts = _facts(contents, bag, vehicle, interval, notes)
-    ends = {role: survey.last[topic] for role, topic in topics.items()}
+    ends = survey.ends(topics, held=held)
     roles = {topic: role for role, topic in topics.items()}
 
     def blocks(rows: int) -> Iterator[Run]:
         found = batches(bag, Contents())
         parts = ((roles.get(b.topic, ''), (b.stamps, b.rows)) for b in found)
-        return _blocks(complete_blocks(parts, ends, rows), first, facts)
+        steps = complete_blocks(held_parts(parts) if held else parts, ends, rows)
+        return _blocks(steps, first, facts)
 
     optional = interface.GROUND_TRUTH, interface.WRENCH_APPLIED, interface.DISTURBANCE
     duration = (last - first) / interface.NANOSECONDS
     extent = Extent(number, 0.0, duration, *(role in topics for role in optional))
     return LongRun(**facts, known_extent=extent, source_of_blocks=blocks)
+
+
+def _holds(contents: Contents, bag: Path) -> bool:
+    controller = attached.parameters_of(contents, bag).get('controller_node', {})
+    return holds(contents, controller, bag)
+
+
+def _step_by_step(counts: dict[str, int], held: bool) -> dict[str, int]:
+    """Counts of the roles that have a message for every step."""
+    return {role: count for role, count in counts.items() if not (held and role in SETPOINTS)}
 
 
 def _facts(
@@ -120,8 +138,9 @@ def _facts(
     parameters = attached.parameters_of(contents, bag)
     step = attached.step_of(parameters, bag)
     law, gains = attached.law_and_gains(parameters.get('controller_node', {}), bag)
+    known = attached.vehicle_of(contents, bag, vehicle)
     return {
-        'vehicle': attached.vehicle_of(contents, bag, vehicle),
+        'vehicle': known,
         'scenario': attached.scenario_name(contents, bag),
         'controller': attached.controller_name(parameters, bag),
         'law': law,
@@ -129,7 +148,8 @@ def _facts(
         'step': interval / interface.NANOSECONDS if step is None else step,
         'source': 'bag',
         'kinds': attached.kinds_of(contents, bag),
-        'notes': (*contents.notes, *notes),
+        'faults': attached.faults_of(contents, known),
+        'notes': (*contents.notes, *attached.notes_on(law), *notes),
     }
 
 

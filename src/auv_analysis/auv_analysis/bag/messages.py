@@ -13,8 +13,10 @@ import numpy as np
 from mcap.records import Attachment, Channel, McapRecord, Metadata, Schema
 from mcap_ros2.decoder import DecoderFactory
 
+from auv_analysis.bag import recording
 from auv_analysis.bag.contents import Contents, Series
 from auv_analysis.bag.layouts import Layout, learned
+from auv_analysis.bag.limits import LARGEST_ATTACHMENT
 from auv_analysis.bag.roles import ODOMETRIES, READERS, check_type, namespace_of, role_of
 from auv_analysis.bag.tables import Table
 from auv_dynamics import interface
@@ -59,9 +61,26 @@ class FileReader:
         elif isinstance(item, Channel):
             self._channel(item)
         elif isinstance(item, Attachment):
-            self._contents.attachments[item.name] = item.data.decode('utf-8', 'replace')
+            self._attachment(item)
         elif isinstance(item, Metadata):
             self._contents.metadata[item.name] = dict(item.metadata)
+
+    def _attachment(self, item: Attachment) -> None:
+        kept = self._contents.attachments
+        held = sum(len(text) for name, text in kept.items() if name != item.name)
+        if held + len(item.data) > LARGEST_ATTACHMENT:
+            note = f'{self._path.name}: attachment {item.name!r} not read, they are too many'
+            self._contents.notes.append(note)
+            return
+        text = item.data.decode('utf-8', 'replace')
+        kept[item.name] = text
+        if item.name == recording.NAME:
+            self._contents.names = recording.names_of(text, self._path)
+
+    def _topic(self, channel: int) -> str:
+        """Our name of a channel's topic."""
+        topic = self._channels[channel].topic
+        return self._contents.names.get(topic, topic)
 
     def _channel(self, channel: Channel) -> None:
         if channel.id in self._channels:
@@ -70,8 +89,8 @@ class FileReader:
         schema = self._schemas.get(channel.schema_id)
         kind = schema.name if schema else ''
         self._contents.types[channel.topic] = kind
-        if self._decode and role_of(channel.topic) in READERS:
-            check_type(self._path, channel.topic, kind)
+        if self._decode and role_of(self._topic(channel.id)) in READERS:
+            check_type(self._path, self._topic(channel.id), kind)
             try:  # a factory of its own per file: schema ids are only unique within one
                 decoder = DecoderFactory().decoder_for(channel.message_encoding, schema)
             except Exception as error:  # whatever its parser stumbles over
@@ -114,7 +133,7 @@ class FileReader:
         since = self._meet(table, members)
         found: dict[str, list[tuple[np.ndarray, Series]]] = {}
         for channel, index in members.items():
-            topic = self._channels[channel].topic
+            topic = self._topic(channel)
             first = since.get(namespace_of(topic), len(table.starts))
             series = self._at_once(table, channel, index, first)
             if series is None:
@@ -127,7 +146,7 @@ class FileReader:
         since = dict.fromkeys(self._frames, 0)
         met: dict[str, tuple[int, int]] = {}
         for channel, index in members.items():
-            topic = self._channels[channel].topic
+            topic = self._topic(channel)
             namespace = namespace_of(topic)
             if role_of(topic) in ODOMETRIES and namespace not in self._frames:
                 first = int(index[0]), channel
@@ -139,7 +158,7 @@ class FileReader:
 
     def _at_once(self, table: Table, channel: int, index: np.ndarray, first: int) -> Series | None:
         """Stamps and rows of a channel; None where its messages must be looked at one by one."""
-        topic, like = self._channels[channel].topic, table.payload(index[0])
+        topic, like = self._topic(channel), table.payload(index[0])
         layout = self._layouts.get(channel)
         if layout is None or not layout.fits(like):
             layout = learned(like, role_of(topic), self._decoders[channel])
@@ -153,7 +172,7 @@ class FileReader:
 
     def _one_by_one(self, table: Table, channel: int, index: np.ndarray, first: int) -> Series:
         """Stamps and rows of a channel, by its decoder; messages from `first` on have frames."""
-        topic = self._channels[channel].topic
+        topic = self._topic(channel)
         frames = self._frames.get(namespace_of(topic))
         values = [
             self._value(topic, self._message(table, i, channel), frames if i >= first else None)
@@ -166,7 +185,7 @@ class FileReader:
         """Refuse the first message of a table that must be refused."""
         for i, channel in enumerate(table.channels.tolist()):
             if channel in self._decoders:
-                topic = self._channels[channel].topic
+                topic = self._topic(channel)
                 message, namespace = self._message(table, i, channel), namespace_of(topic)
                 if role_of(topic) in ODOMETRIES and namespace not in frames:
                     frames[namespace] = self._frames_of(table, i, channel)

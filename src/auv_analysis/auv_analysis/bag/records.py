@@ -1,47 +1,31 @@
 """The records of an MCAP file in order, finished or not, damaged or not."""
 
-import struct
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-from mcap.exceptions import EndOfFile, McapError
-from mcap.opcode import Opcode
-from mcap.records import Chunk, Footer, McapRecord, Message
-from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
-from zstandard import ZstdError
+from mcap.exceptions import McapError
+from mcap.records import Chunk, DataEnd, Footer, McapRecord, Message
+from mcap.stream_reader import breakup_chunk
 
+from auv_analysis.bag.framing import (
+    DAMAGES,
+    MAGIC,
+    PREFIX,
+    CutError,
+    Frame,
+    LongAttachment,
+    MessageIndex,
+    frame_at,
+    record_of,
+)
+from auv_analysis.bag.limits import TooLargeError, decompressed
 from auv_analysis.bag.tables import Table, parts_of_chunk, table_of_messages
 from auv_dynamics.files import InputError
 
-MAGIC = b'\x89MCAP0\r\n'
-ENTRY = np.dtype([('log_time', '<u8'), ('place', '<u8')])  # of a message index
-PIECE = 1 << 24  # bytes
 TOGETHER = 4096  # messages outside chunks that are read together
-ENDS = (EndOfFile, struct.error)  # the reader unpacks a record that is cut without asking
-DAMAGES = (McapError, ValueError, KeyError, OverflowError, RuntimeError, MemoryError, ZstdError)
-
-
-class _Index(McapRecord):
-    """A message index: where the messages of one channel lie in the chunk before it."""
-
-    def __init__(self, places: np.ndarray):
-        self.places = places
-
-
-class _Reader(StreamReader):
-    """The same records, but whole chunks, and message indices without a tuple per message."""
-
-    def _read_record(self, opcode: int, length: int) -> McapRecord | None:
-        if opcode != Opcode.MESSAGE_INDEX:
-            return super()._read_record(opcode, length)
-        self._stream.read2()
-        size = -(-self._stream.read4() // ENTRY.itemsize) * ENTRY.itemsize
-        data = b''
-        while len(data) < size:  # in pieces: a damaged size may be that of the whole memory
-            data += self._stream.read(min(size - len(data), PIECE))
-        return _Index(np.frombuffer(data, ENTRY)['place'].astype(np.int64))
 
 
 class _Pending:
@@ -53,10 +37,14 @@ class _Pending:
 
     def parts(self) -> list[Table | McapRecord]:
         """What lies in the chunk, in order."""
-        stream, length = get_chunk_data_stream(self.chunk, validate_crc=True)
-        data = stream.read(length)
+        data = decompressed(self.chunk)
         found = parts_of_chunk(data, np.concatenate(self.places) if self.places else None)
-        return [*breakup_chunk(self.chunk)] if found is None else found
+        return records_of(data) if found is None else found
+
+
+def records_of(data: bytes) -> list[Table | McapRecord]:
+    """Records of a decompressed chunk, one by one."""
+    return [*breakup_chunk(Chunk('', data, 0, 0, 0, len(data)))]
 
 
 def records(path: Path, notes: list[str]) -> Iterator[Table | McapRecord]:
@@ -69,7 +57,7 @@ def records(path: Path, notes: list[str]) -> Iterator[Table | McapRecord]:
 
     Raises
     ------
-    InputError : not an MCAP file
+    InputError : not an MCAP file, or one that would take too much memory
 
     """
     finished = False
@@ -86,6 +74,8 @@ def records(path: Path, notes: list[str]) -> Iterator[Table | McapRecord]:
                 messages.append(item)
             elif isinstance(item, Exception):
                 finished = _ended(path, item, position, notes, finished)
+            elif isinstance(item, LongAttachment):
+                notes.append(f'{path.name}: attachment {item.name!r} of {item.size} bytes not read')
             else:
                 finished = finished or isinstance(item, Footer)
                 yield item
@@ -95,11 +85,11 @@ def records(path: Path, notes: list[str]) -> Iterator[Table | McapRecord]:
 
 def _ended(path: Path, error: Exception, position: int, notes: list[str], finished: bool) -> bool:
     """Note why a file was not read further; whether nothing more is to be said of its end."""
-    if isinstance(error, ENDS):
-        if 0 < position < len(MAGIC) or not MAGIC.startswith(_head(path)):
-            raise InputError(path, '', 'an MCAP file', 'another beginning') from None
+    if isinstance(error, CutError):
         return finished
-    if position <= 64:
+    if isinstance(error, TooLargeError):
+        raise InputError(path, f'byte {position}', *error.args) from None
+    if position <= len(MAGIC):
         found = (str(error) or repr(error)).splitlines()[0]
         raise InputError(path, '', 'an MCAP file', found) from None
     notes.append(f'{path.name}: damaged from byte {position}, read up to there')
@@ -107,16 +97,16 @@ def _ended(path: Path, error: Exception, position: int, notes: list[str], finish
 
 
 def _opened(stream: IO[bytes]) -> Iterator[tuple[Any, int]]:
-    """Records and the places where they end, chunks opened; an exception is the last one."""
+    """Records and the places where they begin, chunks opened; an exception may be the last one."""
     pending: _Pending | None = None
     for item, position in _closed(stream):
-        if pending is not None and isinstance(item, _Index):
-            pending.places.append(item.places)
+        if pending is not None and isinstance(item, MessageIndex):
+            pending.places.append(item.entries['place'].astype(np.int64))
             continue
         if pending is not None:
             try:
                 parts = pending.parts()
-            except (*ENDS, *DAMAGES) as error:
+            except DAMAGES as error:
                 yield error, pending.position
                 return
             for part in parts:
@@ -130,15 +120,35 @@ def _opened(stream: IO[bytes]) -> Iterator[tuple[Any, int]]:
 
 def _closed(stream: IO[bytes]) -> Iterator[tuple[Any, int]]:
     """Records as they stand in the file, then an exception or None."""
+    position = 0
     try:
-        for record in _Reader(stream, emit_chunks=True, validate_crcs=True).records:
-            yield record, stream.tell()
-    except (*ENDS, *DAMAGES) as error:
-        yield error, stream.tell()
+        _check_magic(stream, 'another beginning')
+        position, record = len(MAGIC), None
+        checksum: int | None = zlib.crc32(MAGIC)
+        while not isinstance(record, Footer):
+            frame = frame_at(stream, position)
+            record = record_of(frame)
+            told = record.data_section_crc if isinstance(record, DataEnd) else 0
+            if told and checksum is not None and told != checksum:
+                raise McapError('data that is not what its checksum says')
+            yield record, position
+            checksum, position = _checksum(frame, checksum), frame.end
+        _check_magic(stream, 'another end')
+    except (CutError, *DAMAGES) as error:
+        yield error, position
     else:
-        yield None, stream.tell()
+        yield None, position
 
 
-def _head(path: Path) -> bytes:
-    with path.open('rb') as stream:
-        return stream.read(len(MAGIC))
+def _checksum(frame: Frame, before: int | None) -> int | None:
+    """Checksum up to the end of a record; None where not all has been read."""
+    length = frame.end - frame.start - PREFIX.size
+    if before is None or len(frame.body) < length:
+        return None
+    return zlib.crc32(frame.body, zlib.crc32(PREFIX.pack(frame.opcode, length), before))
+
+
+def _check_magic(stream: IO[bytes], found: str) -> None:
+    data = stream.read(len(MAGIC))
+    if data != MAGIC:
+        raise CutError if MAGIC.startswith(data) else McapError(found)

@@ -6,9 +6,11 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from auv_analysis.bag.contents import Series
+from auv_analysis.bag.held import SETPOINTS, held_parts
 from auv_analysis.bag.messages import Batch
 from auv_analysis.bag.steps import complete_blocks
 from auv_analysis.run import BLOCK
+from auv_dynamics import interface
 
 
 class Survey:
@@ -49,18 +51,27 @@ class Survey:
         elif self.kept is not None:
             self.kept.setdefault(topic, []).append((stamps, rows))
 
-    def steps(self, topics: Mapping[str, str]) -> tuple[int, int, int, float]:
+    def ends(self, topics: Mapping[str, str], *, held: bool) -> dict[str, int]:
+        """Role -> stamp of its last message; of set-points that are held, the odometry's."""
+        sources = {
+            role: topics[interface.ODOM] if held and role in SETPOINTS else topic
+            for role, topic in topics.items()
+        }
+        return {role: self.last[topic] for role, topic in sources.items()}
+
+    def steps(self, topics: Mapping[str, str], *, held: bool) -> tuple[int, int, int, float]:
         """Number of complete steps, first and last stamp in ns, median time between them in ns.
 
         Parameters
         ----------
         topics : role -> topic
+        held : set-points are held to the odometry
 
         """
         number, first, last = 0, 0, 0
         intervals: Counter[int] = Counter()
-        ends = {topic: self.last[topic] for topic in topics.values()}
-        for ns, _ in complete_blocks(self._series(), ends, BLOCK):
+        parts, ends = self._series(topics), self.ends(topics, held=held)
+        for ns, _ in complete_blocks(held_parts(parts) if held else parts, ends, BLOCK):
             if number:
                 intervals[int(ns[0]) - last] += 1
             else:
@@ -70,10 +81,11 @@ class Survey:
             number, last = number + len(ns), int(ns[-1])
         return number, first, last, _median(intervals)
 
-    def _series(self) -> Iterator[tuple[str, Series]]:
+    def _series(self, topics: Mapping[str, str]) -> Iterator[tuple[str, Series]]:
+        roles = {topic: role for role, topic in topics.items()}
         for topic, stamps in self._stamps:
             ns = np.array(stamps, np.int64)
-            yield topic, (ns, np.zeros((len(ns), 0)))
+            yield roles.get(topic, ''), (ns, np.zeros((len(ns), 0)))
 
 
 def _median(counts: Mapping[int, int]) -> float:

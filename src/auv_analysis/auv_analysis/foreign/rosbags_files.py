@@ -1,16 +1,21 @@
 """Bags that the rosbags library reads: rosbag2's SQLite files and ROS 1 files."""
 
+import shutil
+import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import zstandard
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as Rosbag1
 from rosbags.rosbag2 import Reader as Rosbag2
 
 from auv_analysis.bag.contents import Contents
+from auv_analysis.bag.files import check_regular
 from auv_analysis.foreign.decoders import Decoder, Logged, decoded, decoder_of, refusal
+from auv_dynamics.files import InputError, read_yaml
 
 
 def survey_of_rosbags(bag: Path) -> Contents:
@@ -63,9 +68,47 @@ def _of_connection(bag: Path, connection: Connection) -> Decoder:
 
 def _parts(bag: Path) -> list[Path]:
     """What rosbags opens: a folder whose recorder was killed has no metadata, but its files."""
-    if bag.is_dir() and not (bag / 'metadata.yaml').exists():
-        return sorted(bag.glob('*.db3'))
-    return [bag]
+    if not bag.is_dir():
+        return [bag]
+    if (bag / 'metadata.yaml').exists():
+        _check_metadata(bag)
+        return [bag]
+    files = sorted(bag.glob('*.db3'))
+    for file in files:
+        check_regular(file, bag)
+    return files
+
+
+def _check_metadata(bag: Path) -> None:
+    """Refuse a metadata.yaml that leads out of its folder or decompresses to more than fits."""
+    path = bag / 'metadata.yaml'
+    check_regular(path, bag)
+    told = read_yaml(path, 'metadata').get('rosbag2_bagfile_information')
+    listed = told.get('relative_file_paths') if isinstance(told, dict) else None
+    if not isinstance(told, dict) or not isinstance(listed, list):
+        raise InputError(path, 'relative_file_paths', 'a list of files', listed)
+    for name in listed:
+        if not isinstance(name, str) or Path(name).is_absolute() or '..' in Path(name).parts:
+            expected = 'names of files in the folder of the bag'
+            raise InputError(path, 'relative_file_paths', expected, name)
+        file = bag / Path(name).name  # as rosbags reads it, which some versions write with folders
+        check_regular(file, bag)
+        if str(told.get('compression_mode', '')).lower() == 'file':
+            _check_size(file)
+
+
+def _check_size(file: Path) -> None:
+    """Refuse a compressed file that rosbags would fill the disk with."""
+    with file.open('rb') as stream:
+        head = stream.read(18)
+    try:
+        size = zstandard.frame_content_size(head)
+    except zstandard.ZstdError:
+        size = -1
+    free = shutil.disk_usage(tempfile.gettempdir()).free
+    if not 0 <= size <= free:
+        expected = f'a zstd file that says that it holds at most the {free} bytes that are free'
+        raise InputError(file, '', expected, 'no size' if size < 0 else f'{size} bytes')
 
 
 def _is_ros1(bag: Path) -> bool:

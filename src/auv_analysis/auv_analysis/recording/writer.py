@@ -1,0 +1,211 @@
+"""A rosbag2-style bag: a folder with metadata.yaml and MCAP files that survive a kill."""
+
+import contextlib
+import errno
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from auv_analysis.recording.bag_file import BagFile
+from auv_analysis.recording.guard import Guard
+from auv_analysis.recording.keeper import Keeper
+from auv_analysis.recording.metadata import (
+    NAME,
+    Definition,
+    Extent,
+    as_text,
+    metadata,
+    write_metadata,
+)
+from auv_analysis.recording.output import sync_folder
+from auv_analysis.recording.storage import Storage
+from auv_dynamics.files import reason
+
+CHUNK_PERIOD = 0.7  # s, after which a chunk is closed and handed to the system
+SYNC_PERIOD = 0.7  # s between two waits for the disk
+CHECK_PERIOD = 0.5  # s between two looks at the file under us and at the space that is left
+
+
+class BagWriter:
+    """Writes raw messages; a kill loses less than a second of them.
+
+    A thread closes chunks in time, waits for the disk, finishes the files of a split bag, and
+    looks whether the file is still there and how much space is left.
+
+    Parameters
+    ----------
+    folder : of the bag, made here; it must not hold a bag yet
+    attachments : name -> text, written before the first message of each file
+    storage : how it is stored; default: one file, zstd
+
+    Raises
+    ------
+    OSError : the folder cannot be written, or holds a bag
+
+    """
+
+    def __init__(
+        self, folder: Path, attachments: Mapping[str, str], storage: Storage | None = None
+    ):
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.glob('*.mcap')):
+            raise FileExistsError(errno.EEXIST, 'a bag that is there already', str(folder))
+        self._folder, self._name = folder, folder.resolve().name
+        self._attachments, self._storage = attachments, storage or Storage()
+        self._guard, self._closed = Guard(self._storage.free_space), False
+        self._definitions: dict[str, tuple[Definition, str]] = {}
+        self._extents: list[Extent] = []
+        self._full: list[BagFile] = []  # files that are to be finished, in their order
+        self._lock = threading.Lock()
+        self._waits_since: float | None = None  # the first message of the chunk
+        self._synced = self._checked = time.monotonic()
+        self._file = self._next_file()
+        sync_folder(folder)
+        self._keeper = Keeper(self._look)
+
+    @property
+    def trouble(self) -> str:
+        """File and cause, when the recording must end; else empty."""
+        return self._guard.trouble
+
+    @property
+    def broken(self) -> bool:
+        """Whether the bag cannot even be finished."""
+        return self._guard.broken
+
+    @property
+    def path(self) -> Path:
+        """File that is being written."""
+        return self._file.output.path
+
+    def _next_file(self) -> BagFile:
+        path = self._folder / f'{self._name}_{len(self._extents)}.mcap'
+        file = BagFile(path, self._attachments, self._storage)
+        for definition, schema in self._definitions.values():
+            file.define(definition, schema)
+        self._extents.append(file.extent)
+        self._waits_since = None
+        return file
+
+    def add_channel(self, topic: str, kind: str, schema: str, qos: list[dict], digest: str) -> None:
+        """Register a topic; RecordingError when the bag takes no more.
+
+        Parameters
+        ----------
+        topic : full name
+        kind : message type, 'package/msg/Name'
+        schema : full ros2msg text
+        qos : offered profiles as rosbag2 writes them
+        digest : RIHS01 type hash
+
+        """
+        definition = Definition(topic, kind, qos=qos, digest=digest)
+        with self._lock:
+            self._guard.refuse_broken()
+            try:
+                self._file.define(definition, schema)
+            except OSError as error:
+                self._guard.fail(self._file, error)
+                self._guard.refuse_broken()
+            self._definitions[topic] = definition, schema
+
+    def has_channel(self, topic: str) -> bool:
+        """Whether a topic is registered."""
+        return topic in self._definitions
+
+    def write(self, topic: str, log_time: int, data: bytes) -> None:
+        """Write one serialized message, stamped in ns; RecordingError when no more is taken."""
+        with self._lock:
+            self._guard.refuse_broken()
+            try:
+                if self._file.is_full(topic, log_time, len(data)):
+                    self._split()
+                closed = self._file.write(topic, log_time, data)
+                if closed:
+                    self._waits_since = None
+                    self._guard.follow(self._file)
+                elif self._waits_since is None:
+                    self._waits_since = time.monotonic()
+                else:
+                    self._flush_due()
+            except OSError as error:
+                self._guard.fail(self._file, error)
+                self._guard.refuse_broken()
+
+    def _split(self) -> None:
+        """Go on in a new file; what the old one still needs is left to the thread."""
+        full = self._file
+        full.flush()
+        self._file = self._next_file()
+        self._full.append(full)  # last: from now on the thread may close it
+
+    def _flush_due(self) -> None:
+        """Close the chunk when its first message has waited for long enough."""
+        since = self._waits_since
+        if since is not None and time.monotonic() - since >= CHUNK_PERIOD:
+            self._file.flush()
+            self._waits_since = None
+
+    def _look(self) -> None:
+        """What the thread does every tenth of a second."""
+        if self.broken:
+            return
+        with self._lock:
+            try:
+                self._flush_due()
+            except OSError as error:
+                self._guard.fail(self._file, error)
+        self._finish_full()
+        file = self._file  # open until the next look, even if it is full by now
+        now = time.monotonic()
+        if now - self._checked >= CHECK_PERIOD:
+            self._checked = now
+            self._guard.check(file)
+        if now - self._synced >= SYNC_PERIOD and not self.broken:
+            try:
+                file.output.sync()
+            except OSError as error:
+                self._guard.fail(file, error)
+            self._synced = time.monotonic()
+
+    def _finish_full(self) -> None:
+        while self._full and not self.broken:
+            file = self._full[0]
+            try:
+                file.finish()
+            except OSError as error:
+                self._guard.fail(file, error)
+            else:
+                self._full.pop(0)
+
+    def close(self) -> None:
+        """Finish the bag and write metadata.yaml; a second call does nothing.
+
+        Raises
+        ------
+        RecordingError : it cannot be finished; what the system took stays readable
+
+        """
+        if self._closed:
+            return
+        self._closed = True
+        if not self._keeper.stop():
+            self._guard.give_up(f'{self.path}: the disk does not answer')
+            self._guard.refuse_broken()
+        self._full.append(self._file)
+        if not self.broken:
+            self._guard.check(self._file)
+        self._finish_full()
+        for file in self._full:
+            if self._guard.displaced:
+                with contextlib.suppress(OSError):
+                    file.finish()
+            file.output.close()
+        self._guard.refuse_broken()
+        definitions = [definition for definition, _ in self._definitions.values()]
+        try:
+            write_metadata(self._folder, as_text(metadata(definitions, self._extents)))
+        except OSError as error:
+            self._guard.give_up(f'{self._folder / NAME}: {reason(error)}')
+        self._guard.refuse_broken()

@@ -1,0 +1,133 @@
+"""`auv replay --law`: what another law would have commanded on what was recorded."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+
+from auv_analysis.bag.attached import UNKNOWN
+from auv_analysis.commands.conclude import console, say
+from auv_analysis.folder import check_free, prepare, write_json
+from auv_analysis.replay.compared import Compared, compared, figures_of, listed
+from auv_analysis.replay.open_loop import OpenLoop, RecordedLoop, open_loop, recorded_loop
+from auv_analysis.report.text import number
+from auv_dynamics.files import InputError
+from auv_dynamics.signals import DOFS
+from auv_gvc_controller.laws import is_unasked, law_class, refusal
+
+DOCUMENT = 'open_loop.json'
+UNITS = ('N', 'N m')
+
+
+def answered(options: argparse.Namespace) -> dict[str, Any]:
+    """What a law would have commanded; returns both wrenches in figures."""
+    if options.out:
+        check_free(options.out, overwrite=options.overwrite)
+    _ask_for(options.law)
+    with console.status(f'reading {options.bag}'):
+        recorded = recorded_loop(options.bag, options.vehicle)
+    own = recorded.controller
+    gains = own.gains_of(options.law, _gains(options.gain))
+    answers = _answers(recorded, options.law, gains)
+    known = own.law != UNKNOWN
+    again = _answers(recorded, own.law, own.gains) if known and not is_unasked(own.law) else None
+    both = compared(recorded, answers)
+    out = prepare(
+        options.out or _folder(recorded, options.law),
+        overwrite=options.overwrite,
+        inputs=[options.bag],
+    )
+    document = {
+        'bag': str(options.bag),
+        'scenario': recorded.scenario,
+        'controller': recorded.name,
+        'recorded': {'law': own.law if known else None, 'gains': listed(own.gains)},
+        'answered': {'law': options.law, 'gains': listed(gains)},
+        'samples': len(both.t),
+        'wrench': figures_of(both),
+        'not_used': answers.refused,
+        'reproduced_within': _reproduced(recorded, again),
+        'notes': [*recorded.notes, *_remarks(answers)],
+    }
+    write_json(out / DOCUMENT, document)
+    _conclude(document, both, out)
+    return document
+
+
+def _ask_for(law: str) -> None:
+    """Import the law that the user has named; one that only the bag names is not."""
+    try:
+        law_class(law)
+    except ValueError as error:
+        raise InputError('--law', '', *refusal(error)[1:]) from None
+
+
+def _answers(recorded: RecordedLoop, law: str, gains: dict[str, Any]) -> OpenLoop:
+    columns = (TextColumn(f'{law:<16}'), BarColumn(), TextColumn('{task.completed}/{task.total}'))
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(law, total=recorded.samples)
+        return open_loop(recorded, law, gains, lambda done: bar.update(task, completed=done))
+
+
+def _gains(listed_options: list[str]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for entry in listed_options:
+        name, _, text = entry.partition('=')
+        try:
+            numbers = [float(part) for part in text.split(',')]
+        except ValueError:
+            numbers = []
+        if not name or not numbers or not np.all(np.isfinite(numbers)):
+            expected = 'NAME=VALUE of 1, 6 or 36 numbers with commas between them'
+            raise InputError('--gain', '', expected, entry)
+        found[name] = numbers[0] if len(numbers) == 1 else numbers
+    return found
+
+
+def _folder(recorded: RecordedLoop, law: str) -> Path:
+    plain = law.replace(':', '_').replace('.', '_').replace('/', '_')
+    return Path('runs') / f'replay_{recorded.scenario}_{recorded.name}_{plain}'
+
+
+def _reproduced(recorded: RecordedLoop, again: OpenLoop | None) -> float | None:
+    """Largest difference of the recorded wrench to the recorded law's own answers, N and N m."""
+    both = compared(recorded, again) if again is not None else None
+    if both is None or not len(both.t):
+        return None
+    return float(np.abs(both.answered - both.recorded).max())
+
+
+def _remarks(answers: OpenLoop) -> list[str]:
+    if not answers.refused:
+        return []
+    return [f'{answers.refused} messages without an answer of the law; first: {answers.trouble}']
+
+
+def _conclude(document: dict[str, Any], both: Compared, out: Path) -> None:
+    """Draw, and show the figures."""
+    from auv_analysis.replay.pictures import draw  # with matplotlib, which loads slowly
+
+    law, wrench = document['answered']['law'], document['wrench']
+    names = f'recorded ({document["recorded"]["law"] or "unknown law"})', f'{law}, open loop'
+    with console.status('drawing the figure'):
+        figure = draw(both, names, out / 'figures')
+    table = Table(box=None, header_style='bold')
+    table.add_column('')
+    for head in ('recorded\nrms', 'max', f'{law}\nrms', 'max', 'difference\nrms', 'max'):
+        table.add_column(head, justify='right')
+    for i, dof in enumerate(DOFS):
+        cells = [
+            number(None if values is None else values[i])
+            for part in wrench.values()
+            for values in part.values()
+        ]
+        table.add_row(f'{dof}, {UNITS[i // 3]}', *cells)
+    console.print(table)
+    for note in document['notes']:
+        say(f'note: {note}')
+    if (within := document['reproduced_within']) is not None:
+        say(f'the recorded law itself gives the recorded wrench within {number(within)}')
+    say(f'figure: {figure}')

@@ -1,0 +1,1 @@
+"""Recorded bags played again: what is published, in which order, when, and what is not."""

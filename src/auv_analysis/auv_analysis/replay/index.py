@@ -1,0 +1,143 @@
+"""What lies in a bag that is to be played: channels, span, and in which order its tables come."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from mcap.records import Channel, McapRecord, Schema
+
+from auv_analysis.bag.files import bag_files
+from auv_analysis.bag.records import records
+from auv_analysis.bag.tables import Table
+from auv_dynamics.files import InputError
+from auv_dynamics.interface import NANOSECONDS
+
+NEVER = 1 << 64  # ns, later than every log time
+LATEST = (1 << 31) * NANOSECONDS  # of a ROS time
+
+
+@dataclass
+class PlayedFile:
+    """One file of a bag.
+
+    Attributes
+    ----------
+    path : of the file
+    least : ns, an entry per table of messages: the earliest log time in it or behind it
+
+    """
+
+    path: Path
+    least: list[int]
+
+
+@dataclass(frozen=True)
+class PlayedTopic:
+    """How a topic was recorded.
+
+    Attributes
+    ----------
+    kind : message type, 'package/msg/Name'
+    encoding : of its messages, 'cdr' for ROS 2
+    qos : offered profiles as rosbag2 writes them, a YAML text
+    digest : RIHS01 type hash; empty where it was not recorded
+
+    """
+
+    kind: str
+    encoding: str
+    qos: str = ''
+    digest: str = ''
+
+
+@dataclass
+class BagIndex:
+    """A bag before it is played.
+
+    Attributes
+    ----------
+    bag : its folder or file
+    files : in the order of the recording
+    topics : recorded name -> how it was recorded
+    counts : recorded name -> number of messages
+    first, last : log times in ns
+    clashes : topics that were recorded in more than one way
+    notes : what is odd, one line each
+
+    """
+
+    bag: Path
+    files: list[PlayedFile] = field(default_factory=list)
+    topics: dict[str, PlayedTopic] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+    first: int = NEVER
+    last: int = -1
+    clashes: set[str] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+
+
+def index_bag(bag: str | Path) -> BagIndex:
+    """Read a bag once, in memory that does not grow with it.
+
+    Parameters
+    ----------
+    bag : folder or .mcap file, finished or not, damaged or not
+
+    Raises
+    ------
+    InputError : no MCAP bag, no message in it, or a log time that is none
+
+    """
+    index = BagIndex(Path(bag))
+    for path in bag_files(bag):
+        index.files.append(_indexed(path, index))
+    if index.last < 0:
+        raise InputError(bag, '', 'a bag with messages', 'none')
+    if index.last >= LATEST:
+        expected = f'log times below {LATEST} ns, what a ROS time can hold'
+        raise InputError(bag, '', expected, f'{index.last} ns')
+    return index
+
+
+def _indexed(path: Path, index: BagIndex) -> PlayedFile:
+    schemas: dict[int, Schema] = {}
+    names: dict[int, str] = {}
+    earliest: list[int] = []
+    for item in records(path, index.notes):
+        if isinstance(item, Table):
+            _count(item, names, path, index)
+            earliest.append(int(item.log_times.min()))
+        else:
+            _meet(item, schemas, names, index)
+    least = np.minimum.accumulate(np.array(earliest[::-1], np.uint64))[::-1]
+    return PlayedFile(path, [int(ns) for ns in least])
+
+
+def _meet(
+    item: McapRecord, schemas: dict[int, Schema], names: dict[int, str], index: BagIndex
+) -> None:
+    if isinstance(item, Schema):
+        schemas[item.id] = item
+    elif isinstance(item, Channel) and item.id not in names:
+        names[item.id] = item.topic
+        schema, about = schemas.get(item.schema_id), item.metadata
+        topic = PlayedTopic(
+            schema.name if schema else '',
+            item.message_encoding,
+            about.get('offered_qos_profiles', ''),
+            about.get('topic_type_hash', ''),
+        )
+        known = index.topics.setdefault(item.topic, topic)
+        if (known.kind, known.encoding) != (topic.kind, topic.encoding):
+            index.clashes.add(item.topic)
+
+
+def _count(table: Table, names: dict[int, str], path: Path, index: BagIndex) -> None:
+    counts = np.bincount(table.channels)
+    for channel in np.flatnonzero(counts).tolist():
+        if channel not in names:
+            raise InputError(path, f'channel {channel}', 'a channel before its messages', None)
+        topic = names[channel]
+        index.counts[topic] = index.counts.get(topic, 0) + int(counts[channel])
+    index.first = min(index.first, int(table.log_times.min()))
+    index.last = max(index.last, int(table.log_times.max()))

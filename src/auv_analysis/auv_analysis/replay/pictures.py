@@ -1,0 +1,49 @@
+"""The picture of two wrenches: what was commanded, and what a law would have commanded."""
+
+from functools import partial
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from auv_analysis.replay.compared import Compared
+from auv_analysis.report import plotting
+from auv_analysis.report.figures import save_figures
+from auv_analysis.report.plotting import COLOURS, DASHES, INPUT
+from auv_analysis.report.traces import FEW, thinned
+from auv_dynamics.signals import DOFS
+
+NAME = 'open_loop_wrench'
+ORDER = (0, 3, 1, 4, 2, 5)  # forces left, moments right
+
+
+def draw(both: Compared, names: tuple[str, str], folder: Path) -> Path:
+    """Draw both wrenches, a panel per degree of freedom, as PNG and PDF; the path of the PNG.
+
+    Parameters
+    ----------
+    both : wrenches
+    names : of the recorded law and of the other one
+    folder : of the figures, made when it is not there
+
+    """
+    save_figures(folder, {NAME: partial(_figure, both, names)})
+    return folder / f'{NAME}.png'
+
+
+def _figure(both: Compared, names: tuple[str, str]) -> tuple[Figure, str, str]:
+    figure = plotting.new_figure(5.2)
+    panels = figure.subplots(3, 2, sharex=True)
+    for axes, i in zip(panels.flat, ORDER, strict=True):
+        pairs = zip(names, (both.recorded, both.answered), DASHES, strict=False)
+        for k, (name, wrench, dash) in enumerate(pairs):
+            t, tau = both.t, wrench[:, i]
+            if len(t) > FEW:
+                t, tau = thinned(t, tau, t[0], t[-1])
+            axes.plot(t, tau, color=COLOURS[k], linestyle=dash, label=name)
+        axes.set_ylabel(f'{INPUT.symbols[i]} {DOFS[i]} ({INPUT.unit(i)})')
+    for axes in panels[-1]:
+        axes.set_xlabel('$t$ (s)')
+    panels[0, 1].legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
+    title = f'What {names[1]} would have commanded'
+    caption = f'{title} at the recorded velocity and set-point, beside the recorded wrench.'
+    return figure, title, caption

@@ -1,0 +1,202 @@
+"""What a law would have commanded: the order of its messages, its limits, its gains, refusals."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from made_messages import Bag, odometry, serialized, stamped
+
+from auv_analysis import cli
+from auv_analysis.bag.roles import ACCEL, ODOMETRY, TWIST, WRENCH
+from auv_analysis.replay.compared import compared, figures_of
+from auv_analysis.replay.open_loop import OpenLoop, open_loop, recorded_loop
+from auv_dynamics import load_vehicle
+from auv_dynamics.config import shipped
+from auv_dynamics.files import InputError
+from auv_gvc_controller.laws import make_gains
+from auv_gvc_controller.model import control_model
+from auv_gvc_controller.sampled import SampledLaw
+
+STEP = 10_000_000
+GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
+COUNT = 40
+VEHICLE = 'bluerov2_heavy'
+
+
+def rows(count: int, width: int) -> np.ndarray:
+    values = 0.3 * np.sin(np.add.outer(0.05 * np.arange(count), np.arange(1.0, width + 1.0)))
+    if width == 13:
+        values[:, 3:7] /= np.linalg.norm(values[:, 3:7], axis=1)[:, None]
+    return values
+
+
+def write(
+    path: Path, *, late: int = 0, accel: bool = True, lost: tuple = (), params: dict | None = None,
+) -> Path:  # fmt: skip
+    """Bag of a controller's messages; set-points are logged `late` steps behind their stamps."""
+    bag = Bag(path)
+    bag.attach('vehicle.yaml', shipped('vehicles', VEHICLE).read_text())
+    own = {'law': 'gvc', 'lockstep': True, **{f'gains.{k}': [v] for k, v in GAINS.items()}}
+    nodes = {'controller_node': {**own, **(params or {})}}
+    bag.attach('params.yaml', yaml.safe_dump({n: {'ros__parameters': v} for n, v in nodes.items()}))
+    x, nu_d, slope = rows(COUNT, 13), rows(COUNT, 6), rows(COUNT, 6)
+    for k in range(COUNT):
+        ns = k * STEP
+        if k not in lost:
+            bag.add('/odom', ODOMETRY, ns, serialized(odometry(ns, x[k])))
+        bag.add('/wrench', WRENCH, ns, serialized(stamped('Wrench', ns, np.full(6, 1.0 * k))))
+    for k in range(COUNT):
+        ns = k * STEP
+        data = serialized(stamped('Twist', ns, nu_d[k]))
+        bag.add('/cmd_vel', TWIST, ns + late * STEP, data)
+        if accel:
+            data = serialized(stamped('Accel', ns, slope[k]))
+            bag.add('/cmd_accel', ACCEL, ns, data)
+    return bag.close()
+
+
+def by_hand(law: str, slope: np.ndarray, keep: list[int]) -> np.ndarray:
+    """The sampled law on the rows, a sample after the other."""
+    sampled = SampledLaw(make_gains(law, GAINS), control_model(load_vehicle(VEHICLE)))
+    x, nu_d = rows(COUNT, 13).tolist(), rows(COUNT, 6).tolist()
+    found, last = [], None
+    for k in keep:
+        dt = 0.0 if last is None else (k - last) * STEP / 1e9
+        arguments = (x[k][7:], x[k][3:7], nu_d[k], slope[k].tolist())
+        found.append(sampled.sample(k * STEP / 1e9, dt, *map(tuple, arguments))[0])
+        last = k
+    return np.array(found)
+
+
+@pytest.mark.parametrize('law', ['gvc', 'cl'])
+@pytest.mark.parametrize('late', [0, 5])
+def test_it_is_the_sampled_law(tmp_path: Path, law: str, late: int) -> None:
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', late=late))
+    found = open_loop(loop, law, GAINS)
+    assert np.array_equal(found.tau, by_hand(law, rows(COUNT, 6), list(range(COUNT))))
+    assert found.ns.tolist() == [k * STEP for k in range(COUNT)]
+    assert not found.trouble
+
+
+def test_odometry_that_is_missing_is_integrated_over(tmp_path: Path) -> None:
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', lost=(3, 4)))
+    keep = [k for k in range(COUNT) if k not in (3, 4)]
+    assert np.array_equal(open_loop(loop, 'gvc', GAINS).tau, by_hand('gvc', rows(COUNT, 6), keep))
+
+
+def test_without_derivatives_differences_are_taken(tmp_path: Path) -> None:
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', accel=False))
+    slope = np.diff(rows(COUNT, 6), axis=0, prepend=rows(1, 6)) / (STEP / 1e9)
+    assert np.array_equal(
+        open_loop(loop, 'gvc', GAINS).tau, by_hand('gvc', slope, list(range(COUNT)))
+    )
+
+
+def test_limits_of_the_recorded_controller_hold(tmp_path: Path) -> None:
+    free = recorded_loop(write(tmp_path / 'free.mcap'))
+    bound = recorded_loop(
+        write(tmp_path / 'bound.mcap', params={'limits.wrench': [2.0], 'anti_windup': False})
+    )
+    tau = open_loop(free, 'gvc', GAINS).tau
+    assert np.abs(tau).max() > 4.0
+    assert np.array_equal(open_loop(bound, 'gvc', GAINS).tau, tau.clip(-2.0, 2.0))
+
+
+def test_anti_windup_knows_the_recorded_limits(tmp_path: Path) -> None:
+    told = {'limits.wrench': [2.0]}
+    with_it, without = (
+        open_loop(
+            recorded_loop(write(tmp_path / f'{on}.mcap', params={**told, 'anti_windup': on})),
+            'gvc',
+            GAINS,
+        ).f
+        for on in (True, False)
+    )
+    assert np.abs(with_it).max() < np.abs(without).max()
+
+
+def test_unusable_messages_are_counted(tmp_path: Path) -> None:
+    loop = recorded_loop(write(tmp_path / 'bag.mcap', params={'limits.speed': 0.2}))
+    found = open_loop(loop, 'gvc', GAINS)
+    assert found.refused > 0
+    assert 'twist.linear: expected at most 0.2 m/s' in found.trouble
+    assert len(found.ns) < COUNT
+
+
+def test_gains_as_recorded_but_for_those_that_are_given(tmp_path: Path) -> None:
+    own = recorded_loop(write(tmp_path / 'bag.mcap')).controller
+    assert (own.law, own.gains) == ('gvc', GAINS)
+    assert own.gains_of('cl', {'k_D': [1.0] * 6}) == {**GAINS, 'k_D': [1.0] * 6}
+    assert own.gains_of('smc', {}).keys() <= GAINS.keys()
+
+
+def test_wrenches_are_compared_where_there_are_both(tmp_path: Path) -> None:
+    loop = recorded_loop(write(tmp_path / 'bag.mcap'))
+    ns = np.array([2, 3, 90]) * STEP
+    both = compared(
+        loop, OpenLoop(ns, np.array([[5.0] * 6, [7.0] * 6, [0.0] * 6]), np.zeros((3, 6)))
+    )
+    assert both.t.tolist() == [0.02, 0.03]
+    assert both.recorded[:, 0].tolist() == [2.0, 3.0]
+    figures = figures_of(both)
+    assert figures['difference']['max'] == [4.0] * 6
+    assert figures['difference']['rms'] == [12.5**0.5] * 6
+    none = compared(loop, OpenLoop(ns[2:], np.zeros((1, 6)), np.zeros((1, 6))))
+    assert figures_of(none)['answered'] == {'rms': None, 'max': None}
+
+
+@pytest.mark.parametrize(
+    ('law', 'gains', 'words'),
+    [
+        ('warp', GAINS, '--law: expected gvc, cl, pid, smc or module:Class'),
+        ('cl', {'k_D': 1.0}, '--gain: k_I: expected .* found nothing'),
+        ('cl', {**GAINS, 'k_P': 1.0}, '--gain: k_P: expected one of'),
+        ('cl', {**GAINS, 'k_D': [1.0, 2.0]}, '--gain: k_D: expected'),
+    ],
+)
+def test_refuses_other_laws_and_gains(tmp_path: Path, law: str, gains: dict, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        open_loop(recorded_loop(write(tmp_path / 'bag.mcap')), law, gains)
+
+
+@pytest.mark.parametrize(
+    'params', [{'limits.wrench': [1.0, 2.0]}, {'limits.gap': 'x'}, {'limits.wrench': [-1.0]}]
+)
+def test_refuses_parameters_that_are_none(tmp_path: Path, params: dict) -> None:
+    with pytest.raises(InputError, match=r'params\.yaml: controller_node: limits'):
+        recorded_loop(write(tmp_path / 'bag.mcap', params=params))
+
+
+def test_the_command_leaves_figures_and_refuses_a_taken_folder(tmp_path, capsys) -> None:
+    bag, out = write(tmp_path / 'bag.mcap'), tmp_path / 'out'
+    command = ['replay', str(bag), '--law', 'cl', '--gain', 'k_D=1,2,3,4,5,6', '--out', str(out)]
+    cli.main([*command, '--json'])
+    document = json.loads(capsys.readouterr().out)
+    assert document['answered']['gains']['k_D'] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert document == json.loads((out / 'open_loop.json').read_text())
+    assert document['reproduced_within'] > 1.0, 'the wrenches of this bag are no law of ours'
+    with pytest.raises(SystemExit) as ended:
+        cli.main(command)
+    assert ended.value.code == 2
+    assert 'a new folder, or --overwrite' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        (['--law', 'cl', '--gain', 'k_D'], '--gain: expected NAME=VALUE'),
+        (['--law', 'cl', '--gain', 'k_D=nan'], '--gain: expected NAME=VALUE'),
+        (['--gain', 'k_D=1'], '--gain: expected --law beside it'),
+        (['--vehicle', 'rexrov'], '--vehicle: expected --law beside it'),
+        (['--rate', '-1'], '--rate: expected a number of at least 0 or max, found -1'),
+        (['--duration', '0'], '--duration: expected a number above 0, found 0'),
+        (['--start', 'soon'], '--start: expected a number of at least 0, found soon'),
+    ],
+)
+def test_wrong_options_are_named(tmp_path: Path, options: list[str], words: str, capsys) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main(['replay', str(write(tmp_path / 'bag.mcap')), *options])
+    assert ended.value.code == 2
+    assert words in capsys.readouterr().err

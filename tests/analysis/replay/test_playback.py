@@ -1,0 +1,91 @@
+"""Bag time against the steady clock: exact over hours, whatever the rate, paused or not."""
+
+import pytest
+
+from auv_analysis.replay.playback import HELD, Playback
+
+SECOND = 10**9
+NOW = 50_000.0  # s, what a steady clock may say
+
+
+def test_due_times_do_not_drift() -> None:
+    playback = Playback(rate=4.0)
+    assert playback.wait(NOW, 7 * SECOND) == 0.0
+    for k in range(0, 10**6, 997):
+        ns = 7 * SECOND + k * SECOND // 100
+        assert playback.wait(NOW + 0.25 * k / 100 - 1.0, ns) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize('ns', [0, SECOND, 10**6 * SECOND])
+def test_as_fast_as_possible_never_waits(ns: int) -> None:
+    playback = Playback(rate=0.0)
+    playback.wait(NOW, 0)
+    assert playback.wait(NOW, ns) == 0.0
+
+
+def test_a_pause_holds_the_place_between_two_messages() -> None:
+    playback = Playback(rate=2.0)
+    playback.wait(NOW, 0)
+    playback.played(0)
+    playback.pause(NOW + 0.3, SECOND)  # 0.6 s of the bag
+    assert playback.wait(NOW + 9.0, SECOND) == HELD
+    playback.run(NOW + 100.0)
+    assert playback.wait(NOW + 100.0, SECOND) == pytest.approx(0.2)
+
+
+def test_what_was_held_up_is_not_owed_after_a_pause() -> None:
+    """Subscribers had no room for ten seconds: the place in the bag is that of the next message."""
+    playback = Playback(rate=1.0)
+    playback.wait(NOW, 0)
+    playback.played(0)
+    playback.pause(NOW + 10.0, SECOND)
+    playback.run(NOW + 20.0)
+    assert playback.wait(NOW + 20.0, SECOND) == pytest.approx(0.0)
+    assert playback.wait(NOW + 20.0, 2 * SECOND) == pytest.approx(1.0)
+
+
+def test_steps_while_paused_and_goes_on_from_there() -> None:
+    playback = Playback(rate=1.0, paused=True)
+    assert playback.wait(NOW, 5 * SECOND) == HELD
+    playback.step(5 * SECOND)
+    assert playback.wait(NOW, 5 * SECOND) == 0.0
+    assert playback.wait(NOW, 6 * SECOND) == HELD
+    playback.played(5 * SECOND)
+    playback.run(NOW + 3.0)
+    assert playback.wait(NOW + 3.0, 6 * SECOND) == pytest.approx(1.0)
+
+
+def test_a_step_before_the_first_look() -> None:
+    playback = Playback(rate=1.0, paused=True)
+    playback.step(SECOND)
+    assert playback.wait(NOW, SECOND) == 0.0
+
+
+@pytest.mark.parametrize('paused', [False, True])
+def test_another_rate_holds_from_now_on(paused: bool) -> None:
+    playback = Playback(rate=1.0)
+    playback.wait(NOW, 0)
+    playback.played(0)
+    if paused:
+        playback.pause(NOW + 0.5, SECOND)
+    playback.change_rate(NOW + 0.5, SECOND, 0.1)
+    if paused:
+        playback.run(NOW + 0.5)
+    assert playback.wait(NOW + 0.5, SECOND) == pytest.approx(5.0)
+
+
+def test_from_full_speed_to_a_rate() -> None:
+    playback = Playback(rate=0.0)
+    playback.wait(NOW, 0)
+    playback.played(40 * SECOND)
+    playback.change_rate(NOW + 0.1, 41 * SECOND, 1.0)
+    assert playback.wait(NOW + 0.1, 41 * SECOND) == pytest.approx(1.0)
+
+
+def test_a_loop_begins_where_it_is() -> None:
+    playback = Playback(rate=1.0)
+    playback.wait(NOW, 0)
+    playback.played(30 * SECOND)
+    playback.restart()
+    assert playback.wait(NOW + 31.0, 0) == 0.0
+    assert playback.wait(NOW + 31.0, SECOND) == pytest.approx(1.0)

@@ -1,0 +1,130 @@
+"""What of a bag is played under which names, and what counts as a command."""
+
+from pathlib import Path
+
+import pytest
+
+from auv_analysis.bag.roles import ODOMETRY, TWIST, WRENCH
+from auv_analysis.replay.index import BagIndex, PlayedTopic
+from auv_analysis.replay.selection import Wish, is_command, select
+from auv_dynamics import interface
+from auv_dynamics.files import InputError
+
+STRING = 'std_msgs/msg/String'
+KINDS = {
+    '/odom': ODOMETRY,
+    '/twist': TWIST,
+    '/cmd_vel': TWIST,
+    '/cmd_accel': 'geometry_msgs/msg/AccelStamped',
+    '/wrench': WRENCH,
+    '/disturbance': WRENCH,
+    '/disturbance_estimate': WRENCH,
+    '/wrench_applied': WRENCH,
+    '/ground_truth/odom': ODOMETRY,
+    **{f'/{topic}': WRENCH for topic in interface.ANALYSIS_TOPICS},
+    '/recorder/progress': 'std_msgs/msg/Header',
+    '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
+    '/clock': 'rosgraph_msgs/msg/Clock',
+    '/remark': STRING,
+}
+DERIVED = {f'/{topic}' for topic in interface.ANALYSIS_TOPICS} | {
+    '/recorder/progress', '/diagnostics', '/clock'
+}  # fmt: skip
+COMMANDS = {'/wrench', '/cmd_vel', '/cmd_accel'}
+
+
+def index(kinds: dict[str, str] = KINDS, encoding: str = 'cdr') -> BagIndex:
+    topics = {topic: PlayedTopic(kind, encoding) for topic, kind in kinds.items()}
+    return BagIndex(Path('bag'), topics=topics)
+
+
+def resolved(name: str) -> str:
+    return name if name.startswith('/') else f'/{name}'
+
+
+def test_everything_but_what_is_derived_comes_under_replay() -> None:
+    found = select(index(), Wish(), resolved)
+    assert found.names == {t: f'replay{t}' for t in KINDS if t not in DERIVED}
+    assert found.left_out.keys() == DERIVED
+    assert not found.guarded
+
+
+def test_all_is_all() -> None:
+    found = select(index(), Wish(everything=True), resolved)
+    assert found.names.keys() == KINDS.keys()
+
+
+@pytest.mark.parametrize('names', [{'original_names': True}, {'namespace': '/auv1'}])
+def test_outside_of_replay_commands_are_left_out(names: dict) -> None:
+    root = '' if 'original_names' in names else '/auv1'
+    found = select(index(), Wish(**names), resolved)
+    assert found.names == {t: f'{root}{t}' for t in KINDS if t not in DERIVED | COMMANDS}
+    assert found.left_out.keys() == DERIVED | COMMANDS
+    told = select(index(), Wish(**names, commands=True), resolved)
+    assert told.guarded == COMMANDS
+    assert told.left_out.keys() == DERIVED
+
+
+def test_there_is_one_clock_whatever_is_asked_for() -> None:
+    wish = Wish(original_names=True, everything=True, commands=True)
+    found = select(index(), wish, resolved)
+    assert found.left_out == {'/clock': 'the time of the replay stands there'}
+
+
+def test_a_name_counts_after_remapping() -> None:
+    remaps = {'replay/wrench': '/wrench', 'replay/cmd_vel': '/other/replay/cmd_vel'}
+    found = select(index(), Wish(), lambda name: remaps.get(name, resolved(name)))
+    assert found.left_out.keys() == DERIVED | {'/wrench'}
+
+
+def test_patterns_choose_topics() -> None:
+    found = select(index(), Wish(topics=('odom', '/dist*', 'analysis/delta_xi')), resolved)
+    assert found.names.keys() == {
+        '/odom', '/disturbance', '/disturbance_estimate', '/analysis/delta_xi'
+    }  # fmt: skip
+    assert found.remarks() == []
+
+
+def test_a_vehicle_in_a_namespace_has_the_same_topics() -> None:
+    spaced = {f'/auv1{topic}' if topic not in ('/clock', '/diagnostics') else topic: kind
+              for topic, kind in KINDS.items()}  # fmt: skip
+    found = select(index(spaced), Wish(original_names=True), resolved)
+    left = {t if t in ('/clock', '/diagnostics') else f'/auv1{t}' for t in DERIVED | COMMANDS}
+    assert found.left_out.keys() == left
+
+
+@pytest.mark.parametrize(
+    ('topic', 'kind', 'expected'),
+    [
+        ('/thruster_manager/input', WRENCH, True),
+        ('/mavros/setpoint_velocity/cmd_vel_unstamped', 'geometry_msgs/msg/Twist', True),
+        ('/mavros/rc/override', 'mavros_msgs/msg/OverrideRCIn', True),
+        ('/auv1/thrusters/3/input', 'std_msgs/msg/Float64', True),
+        ('/joy', 'sensor_msgs/msg/Joy', False),
+        ('/auv1/odom', ODOMETRY, False),
+        ('/auv1/disturbance', WRENCH, False),
+        ('/auv1/wrench_applied', WRENCH, False),
+        ('/thrust', STRING, True),
+        ('/thrusting', STRING, False),
+        ('/go', STRING, True),
+    ],
+)
+def test_what_a_command_is(topic: str, kind: str, expected: bool) -> None:
+    assert is_command(topic, kind, ['go']) == expected
+
+
+@pytest.mark.parametrize(
+    ('wish', 'bag', 'words'),
+    [
+        (Wish(topics=('sonar',)), index(), 'topics: expected topics of .* found sonar'),
+        (Wish(topics=('clock',), original_names=True), index(), 'the time of the replay'),
+        (Wish(original_names=True), index({'/wrench': WRENCH}), '--commands publishes it'),
+        (Wish(), index({}), 'expected a topic that can be played'),
+        (Wish(), index(encoding='ros1'), 'its messages are ros1, not cdr'),
+        (Wish(), index({'/a-b': STRING}), 'not a name of a ROS topic'),
+        (Wish(), index({'//a': STRING}), 'not a name of a ROS topic'),
+    ],
+)
+def test_refuses_to_play_nothing(wish: Wish, bag: BagIndex, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        select(bag, wish, resolved)

@@ -1,0 +1,120 @@
+"""The order of what is played: by log time whatever the bag, in little memory."""
+
+import tracemalloc
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from made_messages import STRING, Bag, new, serialized
+
+from auv_analysis.replay.index import index_bag
+from auv_analysis.replay.stream import messages
+from auv_dynamics.files import InputError
+
+TOPICS = ('/a', '/b', '/c')
+quick = settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+TIMES = st.lists(st.tuples(st.integers(0, 30), st.integers(0, 2)), max_size=40)
+
+
+def write(folder: Path, files: list[list[tuple[int, int]]], **options) -> list:
+    """Bag of files with (log time, topic) each; its messages in the order of the bag."""
+    everything = []
+    for path in folder.glob('*.mcap'):
+        path.unlink()
+    for number, entries in enumerate(files):
+        bag = Bag(folder / f'bag_{number}.mcap', **options)
+        for ns, topic in entries:
+            data = serialized(new(STRING, f'{len(everything)}'))
+            bag.add(TOPICS[topic], STRING, ns, data)
+            everything.append((ns, TOPICS[topic], data))
+        bag.close()
+    return everything
+
+
+@quick
+@given(
+    st.lists(TIMES, min_size=1, max_size=4).filter(any),
+    st.sets(st.sampled_from(TOPICS)),
+    st.integers(0, 30),
+    st.integers(0, 30),
+    st.sampled_from([{'chunk_size': 200}, {'chunk_size': 1}, {'use_chunking': False}]),
+)
+def test_by_log_time_and_then_as_in_the_bag(tmp_path, files, topics, begin, end, options) -> None:
+    everything = write(tmp_path, files, **options)
+    wanted = [one for one in everything if one[1] in topics and begin <= one[0] <= end]
+    index = index_bag(tmp_path)
+    found = [tuple(one) for one in messages(index, topics, begin, end)]
+    assert found == sorted(wanted, key=lambda one: one[0])
+    assert (index.first, index.last) == (
+        min(ns for ns, *_ in everything), max(ns for ns, *_ in everything)
+    )  # fmt: skip
+    assert sum(index.counts.values()) == len(everything)
+
+
+@pytest.mark.parametrize('beside', [False, True], ids=['one file', 'two files of the same time'])
+def test_memory_does_not_grow_with_the_bag(tmp_path: Path, beside: bool) -> None:
+    text, most = 'x' * 2000, {}
+    for count in (500, 4000):
+        folder = tmp_path / f'{count}'
+        for number in range(1 + beside):
+            bag = Bag(folder / f'bag_{number}.mcap', chunk_size=20_000)
+            data = serialized(new(STRING, text))
+            for k in range(count):
+                bag.add('/a', STRING, k, data)
+            bag.close()
+        tracemalloc.start()
+        stream = messages(index_bag(folder), TOPICS)
+        assert all(one.ns == k // (1 + beside) for k, one in enumerate(stream))
+        most[count] = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert most[4000] - most[500] < 0.05 * 3500 * len(text)  # the index of a chunk, no message
+
+
+def test_a_file_is_opened_when_its_time_has_come(tmp_path: Path, monkeypatch) -> None:
+    write(tmp_path, [[(k * 10 + i, 0) for i in range(10)] for k in range(20)])
+    index = index_bag(tmp_path)
+    opened = []
+    from auv_analysis.replay import stream
+
+    real = stream.records
+    monkeypatch.setattr(stream, 'records', lambda p, n: (opened.append(p.name), real(p, n))[1])
+    played = messages(index, TOPICS)
+    for _ in range(55):
+        next(played)
+    assert opened == [f'bag_{k}.mcap' for k in range(6)]
+
+
+def test_a_bag_that_grows_is_played_up_to_where_it_was(tmp_path: Path) -> None:
+    write(tmp_path, [[(k, 0) for k in range(50)]], chunk_size=200)
+    whole = (tmp_path / 'bag_0.mcap').read_bytes()
+    (tmp_path / 'bag_0.mcap').write_bytes(whole[: len(whole) // 2])
+    index = index_bag(tmp_path)
+    assert 'not finished' in index.notes[0]
+    known = sum(index.counts.values())
+    (tmp_path / 'bag_0.mcap').write_bytes(whole)
+    assert [one.ns for one in messages(index, TOPICS, end=index.last)] == list(range(known))
+
+
+def test_says_how_a_topic_was_recorded(tmp_path: Path) -> None:
+    write(tmp_path, [[(0, 0)]])
+    bag = Bag(tmp_path / 'bag_1.mcap')
+    schema = bag._writer.register_schema('std_msgs/msg/Header', 'ros2msg', b'uint8 x')
+    channel = bag._writer.register_channel('/a', 'cdr', schema)
+    bag._writer.add_message(channel, 0, b'\0\1\0\0', 0)
+    bag.close()
+    index = index_bag(tmp_path)
+    assert index.topics['/a'].kind == STRING
+    assert index.clashes == {'/a'}
+
+
+@pytest.mark.parametrize(
+    ('files', 'words'),
+    [([[]], 'expected a bag with messages'), ([[(1 << 63, 0)]], 'what a ROS time can hold')],
+)
+def test_refuses_what_cannot_be_played(tmp_path: Path, files: list, words: str) -> None:
+    write(tmp_path, files)
+    with pytest.raises(InputError, match=words):
+        index_bag(tmp_path)

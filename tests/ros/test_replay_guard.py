@@ -1,0 +1,138 @@
+"""A replay beside a vehicle: it gets no recorded command unless somebody says so, and no clock."""
+
+from pathlib import Path
+
+import pytest
+from harness import assert_one_line, graph, parameters, run_node, stop
+from made_messages import Bag, serialized, stamped
+from played_bags import STEP, ended, made, playing, process, steps_of, there
+
+from auv_analysis.bag import read_bag
+from auv_dynamics.interface import nanoseconds
+from auv_dynamics.ros import topics
+
+ODOM = there(topics.ODOM)
+AS_RECORDED = {'original_names': True, 'commands': True}
+FORCED = {**AS_RECORDED, 'allow_commands_to_foreign': True, 'rate': 0.0}
+
+
+def test_a_foreign_listener_gets_no_command(tmp_path: Path) -> None:
+    with process(made(tmp_path / 'bag'), **AS_RECORDED, rate=0.0) as (peer, replay):
+        peer.listen(topics.ODOM, topics.WRENCH, topics.CLOCK)
+        assert ended(peer, replay) == 2
+        _, output = stop(replay)
+    assert len(output.strip().splitlines()) == 1, output
+    assert '/wrench: expected nobody who acts on recorded commands, found /test_peer' in output
+    assert not any(peer.heard.values()), 'nothing is published'
+
+
+def test_commands_stop_when_a_foreign_listener_comes(tmp_path: Path) -> None:
+    with process(made(tmp_path / 'bag', 1000), **AS_RECORDED, rate=4.0) as (peer, replay):
+        peer.listen(topics.ODOM)
+        peer.until(lambda: len(peer.heard['odom']) > 10, 'odometry')
+        peer.listen(topics.WRENCH)
+        assert ended(peer, replay) == 1
+        peer.until(lambda: steps_of(peer, topics.ODOM)[-1] == 999, 'the rest')
+        _, output = stop(replay)
+    assert 'commands are not published any more: /test_peer on /wrench' in output
+    assert peer.heard['wrench'] == []
+
+
+def test_our_own_observers_are_no_strangers(tmp_path: Path) -> None:
+    recorder = parameters(bag=tmp_path / 'again', strict=False)
+    waits = ('-p', 'expected_subscribers:=["wrench=1", "odom=1"]')
+    played = [*parameters(bag=made(tmp_path / 'bag'), **AS_RECORDED, rate=0.0), *waits]
+    with graph(('recorder_node', recorder), ('replay_node', played)) as (peer, processes):
+        assert ended(peer, processes['replay_node']) == 0
+        assert stop(processes['recorder_node'])[0] == 0
+    counts = read_bag(tmp_path / 'again', decode=False).counts
+    assert counts['/wrench'] == counts['/odom'] == counts['/clock'] == 50
+
+
+def test_commands_to_a_vehicle_end_with_a_zero_wrench(tmp_path: Path) -> None:
+    """Only on demand; a vehicle is not left with the last wrench of a bag."""
+    with playing(made(tmp_path / 'bag'), **FORCED) as (peer, replay):
+        peer.listen(topics.WRENCH)
+        assert ended(peer, replay) == 0
+        replay.close()
+        peer.until(lambda: len(peer.heard['wrench']) == 51, 'the zero wrench')
+    forces = [message.wrench.force.x for message in peer.heard['wrench']]
+    assert forces == [*map(float, range(50)), 0.0]
+    assert nanoseconds(peer.heard['wrench'][-1].header.stamp) == 49 * STEP
+
+
+def test_a_wrench_that_is_not_finite_is_refused(tmp_path: Path, capfd) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    for k, value in enumerate((1.0, float('nan'), 3.0)):
+        data = serialized(stamped('Wrench', k * STEP, (value,) * 6))
+        bag.add('/wrench', 'geometry_msgs/msg/WrenchStamped', k * STEP, data)
+    bag.add('/wrench', 'geometry_msgs/msg/WrenchStamped', 3 * STEP, b'\0\1\0\0')
+    with playing(bag.close(), **FORCED) as (peer, replay):
+        peer.listen(topics.WRENCH)
+        assert ended(peer, replay) == 0
+        peer.until(lambda: len(peer.heard['wrench']) == 2, 'two wrenches')
+    assert [message.wrench.force.x for message in peer.heard['wrench']] == [1.0, 3.0]
+    error = capfd.readouterr().err
+    assert '/wrench: not finite: expected finite numbers' in error
+    assert '/wrench: expected a message' in error
+
+
+@pytest.mark.parametrize('root', ['', 'auv1/'])
+def test_without_commands_a_vehicle_hears_none(tmp_path: Path, root: str) -> None:
+    names = {'namespace': root.strip('/')} if root else {'original_names': True}
+    with playing(made(tmp_path / 'bag'), **names, rate=0.0) as (peer, replay):
+        assert replay.remarks() == [
+            'left out: /cmd_vel, /wrench: a command outside of /replay; --commands publishes it'
+        ]
+        odom, wrench = (
+            topics.Topic(f'{root}{t.name}', t.type) for t in (topics.ODOM, topics.WRENCH)
+        )
+        peer.listen(odom, wrench)
+        assert ended(peer, replay) == 0
+        peer.until(lambda: len(peer.heard[odom.name]) == 50, 'odometry')
+    assert len(peer.heard[odom.name]) == 50
+    assert peer.heard[wrench.name] == []
+
+
+def test_a_remapping_does_not_smuggle_commands(tmp_path: Path) -> None:
+    remapped = ('-r', 'replay/wrench:=/wrench')
+    with process(made(tmp_path / 'bag'), *remapped, rate=0.0) as (peer, replay):
+        peer.listen(topics.WRENCH, ODOM)
+        assert ended(peer, replay) == 0
+        peer.until(lambda: len(peer.heard[ODOM.name]) == 50, 'odometry')
+    assert peer.heard['wrench'] == []
+    assert len(peer.heard[ODOM.name]) == 50
+
+
+def test_there_is_one_clock(tmp_path: Path) -> None:
+    with process(made(tmp_path / 'bag')) as (peer, replay):
+        peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 10)
+        peer.listen(ODOM)
+        assert ended(peer, replay) == 2
+        _, output = stop(replay)
+    assert '/clock: expected no other publisher' in output
+    assert 'found /test_peer' in output
+    assert peer.heard[ODOM.name] == []
+
+
+def test_a_second_clock_ends_the_replay(tmp_path: Path) -> None:
+    with playing(made(tmp_path / 'bag'), rate=0.01) as (peer, replay):
+        peer.listen(ODOM)
+        peer.until(lambda: peer.heard[ODOM.name], 'odometry')
+        peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 10)
+        assert ended(peer, replay) == 1
+    assert '/clock: expected no other publisher' in replay.failure
+
+
+@pytest.mark.parametrize('root', ['', 'replay/'])
+def test_no_odometry_beside_that_of_a_vehicle(tmp_path: Path, root: str) -> None:
+    """Its controller would believe both; in the namespace of the replay there is none."""
+    with playing(made(tmp_path / 'bag'), original_names=not root, rate=0.0) as (peer, replay):
+        peer.node.create_publisher(topics.ODOM.type, f'{root}odom', 10)
+        peer.listen(there(topics.ODOM) if root else topics.ODOM)
+        assert ended(peer, replay) == (0 if root else 2)
+    assert root or peer.heard['odom'] == []
+
+
+def test_wrong_input_is_one_line(tmp_path: Path) -> None:
+    assert_one_line(run_node('replay_node', *parameters(bag=tmp_path / 'none')), 'none')

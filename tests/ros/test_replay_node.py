@@ -1,0 +1,307 @@
+"""The replay node: everything again, in order and in time, as long as there is room for it."""
+
+import signal
+from pathlib import Path
+
+import pytest
+from harness import CONTROLLER, PATIENCE, Peer, fresh_domain, parameters, start_node, stop
+from made_messages import STRING, Bag, new, odometry, serialized
+from played_bags import (
+    STATE,
+    STEP,
+    ended,
+    fill,
+    made,
+    odometry_alone,
+    playing,
+    process,
+    steps_of,
+    there,
+)
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+from auv_analysis.bag import read_bag
+from auv_analysis.replay_node import ReplayNode
+from auv_dynamics.files import InputError
+from auv_dynamics.interface import nanoseconds
+from auv_dynamics.ros import topics
+from auv_dynamics.ros.receivers import WINDOW
+
+ODOM, WRENCH, CMD_VEL = there(topics.ODOM), there(topics.WRENCH), there(topics.CMD_VEL)
+REMARK = topics.Topic('replay/remark', String)
+WAITS = {'expected_subscribers': ['odom=1', '/wrench=1', 'cmd_vel=1']}
+SLOW = 0.001  # rate at which 10 ms take ten seconds
+
+
+def clocks(peer: Peer) -> list[int]:
+    return [nanoseconds(message.clock) // STEP for message in peer.heard[topics.CLOCK.name]]
+
+
+def set_rate(peer: Peer, rate: float) -> None:
+    value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=rate)
+    request = SetParameters.Request(parameters=[Parameter(name='rate', value=value)])
+    answer = peer.call(SetParameters, 'replay_node/set_parameters', request)
+    assert answer.results[0].successful
+
+
+def asks(replay: ReplayNode) -> bool:
+    """Whether there is somebody who says what he has taken."""
+    clients = replay.player._receivers._clients.values()
+    return any(client.service_is_ready() for client in clients)
+
+
+def all_heard(peer: Peer, count: int, *heard: topics.Topic) -> None:
+    """Wait for what is still under way to the peer, which cannot be asked."""
+    peer.until(lambda: all(len(peer.heard[t.name]) >= count for t in heard), f'{count} messages')
+
+
+@pytest.mark.parametrize('files', [1, 3])
+def test_plays_everything_in_order(tmp_path: Path, files: int) -> None:
+    with playing(made(tmp_path / 'bag', 300, files), **WAITS, rate=0.0) as (peer, replay):
+        peer.listen(ODOM, WRENCH, CMD_VEL, REMARK, topics.CLOCK)
+        assert ended(peer, replay) == 0
+        all_heard(peer, 300, ODOM, WRENCH, CMD_VEL, REMARK, topics.CLOCK)
+    for topic in (ODOM, WRENCH, CMD_VEL):
+        assert steps_of(peer, topic) == list(range(300)), topic.name
+    assert [m.data for m in peer.heard[REMARK.name]][-1] == 'step 299'
+    assert clocks(peer) == list(range(300))
+    assert peer.heard[WRENCH.name][7].wrench.torque.z == 7.0
+
+
+def test_keeps_to_the_barrier(tmp_path: Path) -> None:
+    with playing(made(tmp_path / 'bag'), **WAITS, rate=0.0) as (peer, replay):
+        peer.listen(ODOM, topics.CLOCK)
+        peer.until(lambda: 'wrench' in peer.call(Trigger, 'replay_node/ready').message, 'odom')
+        assert not peer.call(Trigger, 'replay_node/ready').success
+        peer.spin(1.5)
+        assert peer.heard == {ODOM.name: [], topics.CLOCK.name: []}
+        peer.listen(WRENCH, CMD_VEL)
+        assert ended(peer, replay) == 0
+        all_heard(peer, 50, ODOM, WRENCH)
+    assert steps_of(peer, ODOM) == steps_of(peer, WRENCH) == list(range(50))
+
+
+def test_steps_pauses_and_goes_on(tmp_path: Path) -> None:
+    bag = made(tmp_path / 'bag')
+    with playing(bag, **WAITS, start_paused=True, rate=0.0) as (peer, replay):
+        peer.listen(ODOM, WRENCH, CMD_VEL, topics.CLOCK)
+        peer.until(lambda: peer.call(Trigger, 'replay_node/ready').success, 'the peer')
+        assert peer.call(Trigger, 'replay_node/step').message == 'to 0 s of the bag'
+        peer.until(lambda: len(peer.heard[WRENCH.name]) == 1, 'step 0')
+        assert peer.call(Trigger, 'replay_node/step').success
+        peer.until(lambda: len(peer.heard[WRENCH.name]) == 2, 'step 1')
+        peer.spin(0.3)
+        assert steps_of(peer, ODOM) == steps_of(peer, CMD_VEL) == clocks(peer) == [0, 1]
+        set_rate(peer, SLOW)
+        assert peer.call(SetBool, 'replay_node/run', SetBool.Request(data=True)).success
+        assert not peer.call(Trigger, 'replay_node/step').success
+        peer.call(SetBool, 'replay_node/run', SetBool.Request(data=False))
+        set_rate(peer, 0.0)
+        peer.spin(0.3)
+        assert steps_of(peer, ODOM) == [0, 1], 'paused'
+        peer.call(SetBool, 'replay_node/run', SetBool.Request(data=True))
+        assert ended(peer, replay) == 0
+        all_heard(peer, 50, ODOM)
+    assert steps_of(peer, ODOM) == list(range(50))
+
+
+def test_keeps_the_time_of_the_bag(tmp_path: Path) -> None:
+    with playing(made(tmp_path / 'bag'), **WAITS, rate=SLOW) as (peer, replay):
+        peer.listen(ODOM, WRENCH, CMD_VEL)
+        peer.until(lambda: len(peer.heard[WRENCH.name]) == 1, 'step 0')
+        peer.spin(0.5)
+        assert steps_of(peer, ODOM) == [0], 'step 1 is due after ten seconds'
+        set_rate(peer, 10.0)
+        assert ended(peer, replay) == 0
+        all_heard(peer, 50, ODOM)
+    assert steps_of(peer, ODOM) == list(range(50))
+
+
+def test_plays_a_part_again_and_again(tmp_path: Path) -> None:
+    """Stamps and clock begin again as well; a signal is a good end."""
+    waits = ('-p', 'expected_subscribers:=["odom=1"]')
+    part = {'start': 0.1, 'duration': 0.05, 'loop': True, 'rate': 0.0}
+    with process(made(tmp_path / 'bag'), *waits, **part) as (peer, replay):
+        peer.listen(ODOM, topics.CLOCK)
+        peer.until(lambda: len(peer.heard[ODOM.name]) >= 18, 'three loops')
+        assert stop(replay)[0] == 0
+    once = list(range(10, 16))
+    assert steps_of(peer, ODOM)[:18] == 3 * once
+    assert clocks(peer)[-6:] in [once[k:] + once[:k] for k in range(6)]
+
+
+def test_a_controller_follows_into_the_next_loop(tmp_path: Path) -> None:
+    """It refuses the jump back in time at first, says so, and starts anew."""
+    other = topics.Topic('replay/other', topics.WRENCH.type)
+    domain = fresh_domain()
+    renamed = ('-r', '__ns:=/replay', '-r', 'wrench:=other')
+    controller = start_node('controller_node', domain, *renamed, *CONTROLLER)
+    values = {'expected_subscribers': ['odom=1', 'cmd_vel=1'], 'loop': True}
+    values |= {'topics': ['odom', 'cmd_vel']}
+    try:
+        with playing(made(tmp_path / 'bag', 150), domain=domain, **values) as (peer, replay):
+            peer.listen(other)
+            peer.until(lambda: replay.player.loops == 1, 'the first loop')
+            assert steps_of(peer, other)[-1] > 100
+            peer.until(lambda: 0 < steps_of(peer, other)[-1] < 100, 'the next one')
+            peer.until(lambda: steps_of(peer, other)[-1] > 100, 'its end')
+    finally:
+        _, output = stop(controller)
+    assert 'stamp went back' in output
+
+
+def test_waits_for_answers_in_lock_step(tmp_path: Path) -> None:
+    """A law beside a replay is asked as the plant asks it: no odometry before the answer."""
+    other = topics.Topic('other/wrench', topics.WRENCH.type)
+    with playing(made(tmp_path / 'bag'), **WAITS, rate=0.0, answers=other.name) as (peer, replay):
+        peer.listen(ODOM, WRENCH, CMD_VEL)
+        for k in range(50):
+            peer.until(lambda k=k: len(peer.heard[ODOM.name]) == k + 1, f'odometry {k}')
+            if k in (0, 30):
+                peer.spin(0.2)
+                assert len(peer.heard[ODOM.name]) == k + 1
+            peer.publish(other, topics.WRENCH.type(header=peer.heard[ODOM.name][k].header))
+        assert ended(peer, replay) == 0
+
+
+def test_names_the_answer_that_does_not_come(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr('auv_analysis.replay.answers.PATIENCE', 0.5)
+    with playing(made(tmp_path / 'bag'), rate=0.0, answers='other/wrench') as (peer, replay):
+        assert ended(peer, replay) == 1
+    assert replay.failure.startswith('no answer on other/wrench to the odometry of 0 s')
+
+
+def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:
+    """At full speed, with more messages than a subscription keeps: none is lost, none is late."""
+    steps, domain = 8000, fresh_domain()
+    bag = odometry_alone(tmp_path / 'bag.mcap', steps)
+    recorder = start_node(
+        'recorder_node', domain, '-p', 'topics:=["odom"]',
+        *parameters(bag=tmp_path / 'again', duration=(steps - 1) * STEP / 1e9),
+    )  # fmt: skip
+    values = {'original_names': True, 'expected_subscribers': ['odom=1'], 'start_paused': True}
+    try:
+        with playing(bag, domain=domain, **values, rate=0.0) as (peer, replay):
+            peer.until(lambda: replay.playing and asks(replay), 'the recorder')
+            recorder.send_signal(signal.SIGSTOP)
+            replay.player.run()
+            peer.until(lambda: replay.player.published['/odom'] == WINDOW, 'a window')
+            peer.spin(0.5)
+            assert replay.player.published['/odom'] == WINDOW
+            recorder.send_signal(signal.SIGCONT)
+            assert ended(peer, replay) == 0
+        assert recorder.wait(PATIENCE) == 0
+    finally:
+        recorder.send_signal(signal.SIGCONT)
+        print(stop(recorder))
+    assert read_bag(tmp_path / 'again', decode=False).counts['/odom'] == steps
+
+
+def test_gives_up_a_subscriber_that_stays_silent(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr('auv_dynamics.ros.receivers.PATIENCE', 0.5)
+    domain = fresh_domain()
+    recorder = start_node('recorder_node', domain, *parameters(bag=tmp_path / 'again'))
+    values = {'original_names': True, 'expected_subscribers': ['odom=1'], 'start_paused': True}
+    try:
+        with playing(made(tmp_path / 'bag'), domain=domain, **values, rate=0.0) as (peer, replay):
+            peer.until(lambda: replay.playing and asks(replay), 'the recorder')
+            recorder.send_signal(signal.SIGSTOP)
+            replay.player.run()
+            assert ended(peer, replay) == 0
+            assert '/recorder_node' in replay.player.silent
+    finally:
+        recorder.send_signal(signal.SIGCONT)
+        stop(recorder)
+
+
+def test_leaves_out_what_is_not_installed(tmp_path: Path) -> None:
+    """What a bag names as a type is not imported to see whether it is one."""
+    bag = Bag(tmp_path / 'bag' / 'bag_0.mcap')
+    fill(bag, range(20))
+    for topic, kind in (
+        ('/sonar', 'sonar_msgs/msg/Ping'),
+        ('/evil', 'antigravity/msg/Ping'),
+        ('/two words', STRING),
+    ):
+        schema = bag._writer.register_schema(kind, 'ros2msg', b'uint8 x')
+        channel = bag._writer.register_channel(topic, 'cdr', schema)
+        bag._writer.add_message(channel, 0, b'\0\1\0\0\1', 0)
+    bag.close()
+    with playing(tmp_path / 'bag', rate=0.0) as (peer, replay):
+        assert replay.remarks() == [
+            'left out: /two words: not a name of a ROS topic',
+            'left out: /evil: its type antigravity/msg/Ping is not installed',
+            'left out: /sonar: its type sonar_msgs/msg/Ping is not installed',
+        ]
+        peer.listen(ODOM)
+        assert ended(peer, replay) == 0
+        all_heard(peer, 20, ODOM)
+    assert len(peer.heard[ODOM.name]) == 20
+
+
+def test_leaves_out_a_type_that_has_changed_since(tmp_path: Path) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    fill(bag, range(20))
+    schema = bag._writer.register_schema(STRING, 'ros2msg', b'uint8 x')
+    digest = {'topic_type_hash': f'RIHS01_{0:064x}'}
+    bag._writer.register_channel('/other', 'cdr', schema, digest)
+    with playing(bag.close(), rate=0.0) as (_, replay):
+        text = f'left out: /other: its type {STRING} is defined in another way here'
+        assert replay.remarks() == [text]
+
+
+def test_a_bag_that_was_cut_is_played_up_to_there(tmp_path: Path) -> None:
+    path = made(tmp_path / 'bag', 300) / 'bag_0.mcap'
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with playing(path.parent, rate=0.0) as (peer, replay):
+        assert 'bag_0.mcap: was not finished' in replay.remarks()[0]
+        peer.listen(ODOM)
+        assert ended(peer, replay) == 0
+        all_heard(peer, replay.player.published['/odom'], ODOM)
+    heard = steps_of(peer, ODOM)
+    assert 100 < len(heard) < 300
+    assert heard == list(range(len(heard)))
+
+
+def test_late_comers_get_what_was_kept_for_them(tmp_path: Path) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    text = '- {history: keep_last, depth: 1, reliability: reliable, durability: transient_local}'
+    kind = bag._writer.register_schema(STRING, 'ros2msg', b'string data')
+    channel = bag._writer.register_channel('/chart', 'cdr', kind, {'offered_qos_profiles': text})
+    data = serialized(new(STRING, 'the harbour'))
+    bag._writer.add_message(channel, 0, data, 0)
+    bag.add('/odom', 'nav_msgs/msg/Odometry', 10**11, serialized(odometry(10**11, STATE)))
+    with playing(bag.close()) as (peer, _):
+        peer.listen(topics.CLOCK)
+        peer.until(lambda: peer.heard[topics.CLOCK.name], 'the first message')
+        late = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        heard: list[String] = []
+        peer.node.create_subscription(String, 'replay/chart', heard.append, late)
+        peer.until(lambda: heard, 'the chart')
+    assert heard[0].data == 'the harbour'
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        ({'bag': ''}, 'bag: expected a bag folder'),
+        ({'bag': 'none'}, 'none: expected a bag folder'),
+        ({'rate': -1.0}, 'rate: expected a number from'),
+        ({'start': 9.0}, 'start: expected at most 0.49 s'),
+        ({'namespace': 'a b'}, 'namespace: expected a namespace'),
+        ({'speed': 2.0}, 'speed: expected one of'),
+        ({'topics': ['sonar']}, 'topics: expected topics of /cmd_vel.*found sonar'),
+        ({'expected_subscribers': ['sonar=1']}, 'expected_subscribers: expected topic=count'),
+        ({'original_names': True, 'topics': ['wrench']}, 'expected a topic .* --commands'),
+    ],
+)
+def test_wrong_parameters_are_named(tmp_path: Path, values: dict, words: str) -> None:
+    with (
+        pytest.raises(InputError, match=words),
+        playing(made(tmp_path / 'bag'), **values),
+    ):
+        pass

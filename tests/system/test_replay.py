@@ -1,0 +1,253 @@
+"""A recorded run played again: analysis says the same, laws answer it, `auv replay` as typed."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from graph_runs import every_message, record
+from harness import (
+    PATIENCE,
+    Peer,
+    environment,
+    fresh_domain,
+    graph,
+    parameters,
+    start_node,
+    stop,
+)
+from played_bags import ended, made, there
+
+from auv_analysis.bag import load_run
+from auv_analysis.replay.open_loop import open_loop, recorded_loop
+from auv_dynamics import interface
+from auv_dynamics.interface import nanoseconds
+from auv_dynamics.ros import topics
+
+GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
+SCENARIO = {
+    'name': 'played',
+    'vehicle': 'rexrov',
+    'duration': 2.0,
+    'step': 0.01,
+    'initial': {'eta': [1.0, 2.0, 3.0, 0.2, -0.3, 1.2], 'nu': [0.3, -0.1, 0.2, 0.05, 0.02, -0.1]},
+    'controllers': {'gvc': {'law': 'gvc', **GAINS}},
+    'setpoint': {'surge': {'offset': 0.2, 'terms': [{'amplitude': 0.1, 'omega': 0.5}]}},
+    'disturbance': {'kind': 'herman2018'},
+    'actuators': {'limit': 900.0},
+}
+PACED = ('/diagnostics', '/recorder/progress', '/controller_node/transition_event')  # by the wall
+COMMAND = Path(sys.executable).with_name('auv')
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that was recorded in lock-step, with saturation."""
+    folder = tmp_path_factory.mktemp('played')
+    (folder / 'played.yaml').write_text(yaml.safe_dump(SCENARIO))
+    process = record(folder / 'played.yaml', folder / 'out')
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    return folder / 'out' / 'gvc'
+
+
+def start_replay(domain: int, *options: str, **streams: Any) -> subprocess.Popen:
+    environ = environment(domain)
+    return subprocess.Popen([COMMAND, 'replay', *options], env=environ, text=True, **streams)
+
+
+def test_live_analysis_of_a_replay_is_the_recorded_one(bag: Path) -> None:
+    """Every message of every topic, to the last bit."""
+    heard = [topics.Topic(f'replay/{t.name}', t.type) for t in topics.ANALYSIS_TOPICS]
+    counts = ', '.join(f'"{topic.name}=1"' for topic in topics.ANALYSIS_TOPICS)
+    analysis = ['-r', '__ns:=/replay', '-p', f'expected_subscribers:=[{counts}]']
+    analysis += parameters(vehicle=bag.parent / 'vehicle.yaml')
+    waits = '["odom=1", "cmd_vel=1", "wrench=1", "disturbance=1", "disturbance_estimate=1"]'
+    replay = [*parameters(bag=bag, rate=0.0), '-p', f'expected_subscribers:={waits}']
+    with graph(('analysis_node', analysis), ('replay_node', replay)) as (peer, processes):
+        peer.listen(*heard)
+        assert ended(peer, processes['replay_node']) == 0
+        peer.until(lambda: all(len(peer.heard[t.name]) >= 21 for t in heard), 'the last sample')
+    recorded = every_message(bag)
+    for topic in topics.ANALYSIS_TOPICS:
+        messages = peer.heard[f'replay/{topic.name}']
+        again = [(nanoseconds(m.header.stamp), numbers(m)) for m in messages]
+        assert len(again) == 21
+        assert again == [(ns, flat(message)) for ns, message in recorded[f'/{topic.name}']], topic
+
+
+def numbers(message: Any) -> list:
+    """Everything in a message of rclpy in its order, without its header's stamp."""
+    found: list = []
+    for name in message.get_fields_and_field_types():
+        value = getattr(message, name)
+        if name == 'stamp':
+            continue
+        if hasattr(value, 'get_fields_and_field_types'):
+            found += numbers(value)
+        else:
+            found += list(value) if not isinstance(value, str | float | int) else [value]
+    return found
+
+
+def flat(message: Any) -> list:
+    """The same of a decoded message as tuples: header first, the stamp first in it."""
+    (_, frame), *rest = message
+    return [frame, *leaves(rest)]
+
+
+def leaves(value: Any) -> list:
+    if not isinstance(value, list | tuple):
+        return [value]
+    return [leaf for entry in value for leaf in leaves(entry)]
+
+
+def test_a_replay_that_is_recorded_is_the_same_bag(bag: Path, tmp_path: Path) -> None:
+    """Under the recorded names, as fast as it goes: our observers lose nothing."""
+    domain, again = fresh_domain(), tmp_path / 'again'
+    counts = ', '.join(f'"{topic.name}=1"' for topic in topics.ANALYSIS_TOPICS)
+    recorder = parameters(bag=again, duration=2.0, analysis_every=10)
+    recorder += ['-p', 'topics:=["odom", "wrench", "cmd_vel", "twist", "wrench_applied"]']
+    analysis = parameters(vehicle=bag.parent / 'vehicle.yaml')
+    analysis += ['-p', f'expected_subscribers:=[{counts}]']
+    processes = [
+        start_node('recorder_node', domain, *recorder),
+        start_node('analysis_node', domain, *analysis),
+    ]
+    try:
+        waits = ['odom=2', 'cmd_vel=2', 'wrench=2', 'disturbance=2', 'disturbance_estimate=2']
+        waits += ['twist=1', 'cmd_accel=1', 'wrench_applied=1']
+        options = ['--original-names', '--commands', '--rate', 'max', '--json']
+        options += [word for entry in waits for word in ('--expect', entry)]
+        replay = start_replay(domain, str(bag), *options, stdout=-1, stderr=-1)
+        output, errors = replay.communicate(timeout=PATIENCE)
+        assert replay.returncode == 0, errors
+        assert processes[0].wait(PATIENCE) == 0, 'the recorder has all'
+    finally:
+        for process in processes:
+            print(stop(process))
+    document = json.loads(output)
+    assert document['topics']['/wrench']['messages'] == 201
+    assert document['left_out'].keys() == {
+        '/clock', *PACED[:2], *(f'/{topic}' for topic in interface.ANALYSIS_TOPICS)
+    }  # fmt: skip
+    first, second = (every_message(folder, *PACED) for folder in (bag, again))
+    assert first.keys() == second.keys()
+    for topic, messages in first.items():
+        assert sorted(messages) == sorted(second[topic]), topic
+
+
+def test_the_recorded_law_gives_the_recorded_wrench(bag: Path) -> None:
+    loop = recorded_loop(bag)
+    again = open_loop(loop, 'gvc', loop.controller.gains)
+    assert np.array_equal(again.tau, load_run(bag).tau)
+    assert np.array_equal(again.f, loop.series[interface.DISTURBANCE_ESTIMATE][1])
+    assert not again.trouble
+
+
+def test_another_law_answers_recorded_odometry_as_in_process(bag: Path) -> None:
+    """A real node in lock-step against the same law in this process, to the last bit."""
+    other = topics.Topic('replay/other', topics.WRENCH.type)
+    controller = ['-r', '__ns:=/replay', '-r', 'wrench:=other']
+    controller += ['-r', 'disturbance_estimate:=other_estimate', '-p', 'actuators.limit:=[900.0]']
+    controller += ['-p', 'expected_subscribers:=["wrench=2"]']
+    values: dict[str, Any] = {f'gains__{name}': f'[{value}]' for name, value in GAINS.items()}
+    values |= {'law': 'cl', 'vehicle': bag.parent / 'vehicle.yaml', 'lockstep': True}
+    values |= {'setpoint_pairing': 'exact', 'setpoint_acceleration': 'topic'}
+    replay = parameters(bag=bag, rate=0.0, answers='replay/other')
+    replay += ['-p', 'topics:=["odom", "cmd_vel", "cmd_accel"]']
+    replay += ['-p', 'expected_subscribers:=["odom=1", "cmd_vel=1", "cmd_accel=1"]']
+    nodes = ('controller_node', [*controller, *parameters(**values)]), ('replay_node', replay)
+    with graph(*nodes) as (peer, processes):
+        peer.listen(other)
+        assert ended(peer, processes['replay_node']) == 0
+        peer.until(lambda: len(peer.heard[other.name]) >= 201, 'the last answer')
+    expected = open_loop(recorded_loop(bag), 'cl', GAINS)
+    messages = peer.heard[other.name]
+    live = [[*vector(m.wrench.force), *vector(m.wrench.torque)] for m in messages]
+    assert [nanoseconds(m.header.stamp) for m in messages] == expected.ns.tolist()
+    assert np.array_equal(live, expected.tau)
+    assert len(live) == 201
+    assert np.abs(expected.tau - load_run(bag).tau).max() > 10.0, 'it is another law'
+
+
+def vector(message: Any) -> tuple:
+    return message.x, message.y, message.z
+
+
+def test_a_signal_ends_it_well(tmp_path: Path) -> None:
+    domain = fresh_domain()
+    peer = Peer(domain)
+    try:
+        odom = there(topics.ODOM)
+        peer.listen(odom)
+        options = (str(made(tmp_path / 'bag', 500)), '--rate', '0.1', '--json', '--topics', 'odom')
+        process = start_replay(domain, *options, stdout=-1, stderr=-1)
+        peer.until(lambda: peer.heard[odom.name], 'odometry')
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=PATIENCE)
+    finally:
+        peer.close()
+    assert process.returncode == 0, errors
+    document = json.loads(output)
+    assert document['interrupted']
+    assert 0 < document['messages'] < 500
+    assert document['topics'].keys() == {'/odom'}
+
+
+def test_keys_step_and_go_on(tmp_path: Path) -> None:
+    domain = fresh_domain()
+    peer = Peer(domain)
+    ours, its = pty.openpty()
+    odom = there(topics.ODOM)
+    options = (str(made(tmp_path / 'bag')), '--paused', '--rate', 'max', '--expect', 'odom=1')
+    process = start_replay(domain, *options, stdin=its, stdout=-1, stderr=-1)
+    os.close(its)
+    try:
+        peer.listen(odom)
+        sent = 0
+
+        def stepped() -> bool:
+            nonlocal sent
+            if not peer.heard[odom.name] and time.monotonic() > sent:
+                os.write(ours, b'\x1b[C')
+                sent = time.monotonic() + 0.5
+            return bool(peer.heard[odom.name])
+
+        peer.until(stepped, 'a step')
+        os.write(ours, b' ')
+        peer.until(lambda: process.poll() is not None, 'the end')
+        peer.until(lambda: len(peer.heard[odom.name]) >= 50, 'the rest')
+    finally:
+        peer.close()
+        os.close(ours)
+    _, errors = process.communicate()
+    assert process.returncode == 0, errors
+    assert 'space: pause, go on' in errors
+    assert len(peer.heard[odom.name]) == 50
+
+
+def test_a_foreign_listener_is_named_by_the_command(tmp_path: Path) -> None:
+    domain = fresh_domain()
+    peer = Peer(domain)
+    try:
+        peer.listen(topics.WRENCH, topics.ODOM)
+        options = (str(made(tmp_path / 'bag')), '--original-names', '--commands', '--json')
+        process = start_replay(domain, *options, stdout=-1, stderr=-1)
+        peer.until(lambda: process.poll() is not None, 'the end')
+    finally:
+        peer.close()
+    output, errors = process.communicate()
+    assert process.returncode == 2
+    assert output == ''
+    refusal = errors.strip().splitlines()[-1]
+    assert '/wrench: expected nobody who acts on recorded commands, found /test_peer' in refusal
+    assert peer.heard == {'wrench': [], 'odom': []}

@@ -21,8 +21,9 @@ from auv_analysis.experiment import environment
 from auv_analysis.supervisor import executable
 from auv_dynamics import load_vehicle
 from auv_dynamics.interface import Frames
-from auv_dynamics.plant import eta_of, initial_state
+from auv_dynamics.plant import Plant, initial_state
 from auv_dynamics.ros import convert
+from auv_dynamics.uncertainty import make_uncertainty
 
 PERIOD = 0.02  # s: 50 Hz, as a navigation filter may give
 SURGE = 0.4  # m/s, the set-point
@@ -41,23 +42,23 @@ class StubDriver(Node):
 
     def __init__(self) -> None:
         super().__init__('stub_driver')
-        self._vehicle = load_vehicle('herman2018_neutral')
-        self.x = initial_state(np.zeros(6), np.zeros(6))
-        self.tau = np.zeros(6)
+        vehicle, start = load_vehicle('herman2018_neutral'), np.zeros(6)
+        truth = make_uncertainty(vehicle, [], 'stub_driver', [])
+        self.plant = Plant(truth, PERIOD, 'rk4', initial_state(start, start))
+        self.tau = (0.0,) * 6
         self._odom = self.create_publisher(Odometry, 'odom', 10)
         self.create_subscription(WrenchStamped, 'wrench', self._on_wrench, 1)
         self.create_timer(PERIOD, self._tick)
 
     def _on_wrench(self, message: WrenchStamped) -> None:
         force, torque = message.wrench.force, message.wrench.torque
-        self.tau = np.array([force.x, force.y, force.z, torque.x, torque.y, torque.z])
+        self.tau = (force.x, force.y, force.z, torque.x, torque.y, torque.z)
 
     def _tick(self) -> None:
-        eta, nu = eta_of(self.x), self.x[7:]
-        nu += PERIOD * self._vehicle.forward_dynamics(eta, nu, self.tau)
-        self.x[0] += PERIOD * nu[0]  # it goes straight ahead: attitude stays upright
+        self.plant.answer(self.tau)
+        self.plant.advance()
         now = self.get_clock().now().nanoseconds
-        self._odom.publish(convert.odometry(now, self.x, Frames()))
+        self._odom.publish(convert.odometry(now, self.plant.measured, Frames()))
 
 
 def main() -> None:
@@ -78,14 +79,14 @@ def main() -> None:
         until = None
         while until is None or time.monotonic() < until:
             rclpy.spin_once(driver, timeout_sec=0.1)
-            if until is None and driver.tau.any():
+            if until is None and any(driver.tau):
                 until = time.monotonic() + options.seconds  # from the first wrench on
     finally:
         for process in processes:
             process.terminate()
         for process in processes:
             process.wait()
-        reached = driver.x[7]
+        reached = driver.plant.x[7]
         driver.destroy_node()
         rclpy.try_shutdown()
     print(f'surge {reached:.3f} m/s, set-point {SURGE} m/s')

@@ -1,0 +1,54 @@
+"""A simulated BlueROV2 with an ArduSub-like autopilot, over UDP, in real time.
+
+python examples/bluerov2_mavlink/ardusub_endpoint.py --connection udpout:127.0.0.1:14550
+"""
+
+import argparse
+import select
+import signal
+import time
+
+from ardusub_autopilot import MODES, Autopilot, Settings
+from udp import UdpPort
+
+PERIOD = 0.005  # s
+
+
+def main() -> None:
+    """Run until SIGTERM, SIGINT or the end of `--seconds`."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--connection', default='udpout:127.0.0.1:14550')
+    parser.add_argument('--system', type=int, default=1, help='MAVLink id of the vehicle')
+    parser.add_argument('--vehicle', default='bluerov2_heavy')
+    parser.add_argument('--thrusters', choices=('square', 'measured'), default='square')
+    parser.add_argument('--voltage', type=float, default=16.0)
+    parser.add_argument('--gain', type=float, default=0.5, help='pilot gain of MANUAL_CONTROL')
+    parser.add_argument('--mode', choices=MODES.values(), default='MANUAL', help='at boot')
+    parser.add_argument('--eta', type=float, nargs=6, default=[0.0] * 6, help='NED, rad')
+    parser.add_argument('--seconds', type=float, default=float('inf'))
+    options = parser.parse_args()
+    mode = next(number for number, name in MODES.items() if name == options.mode)
+    settings = Settings(
+        options.vehicle, tuple(options.eta), (0.0,) * 6,
+        options.thrusters, options.voltage, options.gain, mode,
+    )  # fmt: skip
+    port = UdpPort(options.connection, options.system, 1)
+    autopilot = Autopilot(settings, port.send)
+    stopped = []
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stopped.append(True))
+    boot = time.monotonic_ns()
+    print(f'{options.vehicle}: {options.connection}', flush=True)
+    while not stopped and (now := time.monotonic_ns() - boot) < options.seconds * 1e9:
+        for message, address in port.receive():
+            port.answer(address)
+            autopilot.receive(message, time.monotonic_ns() - boot)
+        autopilot.advance(now)
+        select.select([port], [], [], PERIOD)
+    port.close()
+    state = 'armed' if autopilot.armed else 'disarmed'
+    print(f'{state}, motors {autopilot.pulses}', flush=True)
+
+
+if __name__ == '__main__':
+    main()

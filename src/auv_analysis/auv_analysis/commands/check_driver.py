@@ -1,0 +1,134 @@
+"""`auv check-driver`: whether a vehicle driver offers what our nodes need."""
+
+import argparse
+import time
+from contextlib import ExitStack
+from typing import Any
+
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from auv_analysis.commands.actuating import actuate, refusal
+from auv_analysis.commands.conclude import console, say
+from auv_analysis.commands.graphs import (
+    checked_namespace,
+    checked_topic,
+    join_domain,
+    place_of,
+    positive,
+    short_place,
+)
+from auv_analysis.console import TextConsole
+from auv_analysis.domain import joined_domain
+from auv_analysis.driver_check.checks import findings_of
+from auv_analysis.driver_check.outcome import Commands, Result, document_of, failure_of, judged
+from auv_analysis.driver_check.plan import SPEED, plan_of
+from auv_analysis.driver_check.settings import Settings
+from auv_analysis.driver_check.terminal import findings_table
+from auv_analysis.failure import FailedError
+from auv_analysis.folder import check_free, prepare
+from auv_dynamics import interface, load_vehicle
+from auv_dynamics.config import shipped
+from auv_dynamics.files import InputError
+from auv_dynamics.interface import Frames
+
+USUAL = 10.0  # s of listening
+LONGEST = 600.0  # s
+APPEARS = 5.0  # s within which discovery finds a driver that is there
+LOOK = 0.1  # s between two looks
+FASTEST = 0.5  # m/s and rad/s that may be asked for
+PASSIVE = 'nothing is sent without --actuate'
+
+
+def check_driver(options: argparse.Namespace) -> dict[str, Any]:
+    """Listen to a driver and judge it; FailedError where a check fails."""
+    seconds = positive(options.seconds, '--seconds', LONGEST) or USUAL
+    commands, settings = _commands(options), _settings(options)
+    names = {
+        interface.ODOM: checked_topic(options.odom or interface.ODOM, '--odom'),
+        interface.WRENCH: checked_topic(options.wrench or interface.WRENCH, '--wrench'),
+    }
+    domain = joined_domain(options.domain_id)
+    namespace = checked_namespace(options.namespace)
+    if options.out is not None:
+        check_free(options.out, overwrite=options.overwrite)
+    join_domain(domain)
+    # the middleware reads its environment when it is loaded
+    from auv_analysis.driver_check_node import Ear
+
+    with ExitStack() as stack:
+        ear = Ear(domain, namespace, names, settings.frames, commands=options.actuate)
+        stack.callback(ear.close)
+        say(f'listens on {place_of(domain, namespace)}')
+        began = _listen(ear, seconds)
+        scene = ear.scene(short_place(domain, namespace))
+        findings = findings_of(scene, ear.recording(began), settings)
+        why = refusal(findings) if commands else PASSIVE
+        actuation = None
+        if commands and not why:
+            actuation = actuate(ear, commands.plan, settings.timeout)
+        recording = ear.recording(began)
+    result = judged(scene, recording, settings, why, actuation, commands)
+    return _conclude(options, result)
+
+
+def _settings(options: argparse.Namespace) -> Settings:
+    usual = Frames()
+    return Settings(
+        frames=Frames(options.odom_frame or usual.odom, options.base_frame or usual.base),
+        rate=positive(options.expect_rate, '--expect-rate', 1e4),
+        sim_time=options.use_sim_time,
+        actuates=options.actuate,
+    )
+
+
+def _commands(options: argparse.Namespace) -> Commands | None:
+    """What is going to be sent; None without --actuate."""
+    speed = positive(options.speed, '--speed', FASTEST) or SPEED
+    force, torque = positive(options.force, '--force'), positive(options.torque, '--torque')
+    vehicle = None if options.vehicle is None else load_vehicle(options.vehicle)
+    if not options.actuate:
+        return None
+    if vehicle is None:
+        expected = 'a vehicle file with --actuate: it bounds the wrenches and predicts the answer'
+        raise InputError('--vehicle', '', expected, None)
+    plan = plan_of(vehicle, options.axis or (), speed, force, torque)
+    if not plan.trials:
+        expected = f'axes that the thrusters of {vehicle.name} can move'
+        raise InputError('--axis', '', expected, ', '.join(options.axis or ()))
+    return Commands(vehicle, plan)
+
+
+def _listen(ear: Any, seconds: float) -> int:
+    """Listen for so long from the first odometry on; the time of the first, ns."""
+    appears = time.monotonic() + APPEARS
+    while not len(ear.tape) and time.monotonic() < appears:
+        ear.listen(LOOK)
+    began, first = time.time_ns(), time.monotonic()
+    if not len(ear.tape) and not ear.publishes():
+        return began
+    columns = TextColumn('{task.description}'), BarColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task('listens', total=seconds)
+        while (spent := time.monotonic() - first) < seconds:
+            text = f'{len(ear.tape)} messages'
+            progress.update(task, completed=spent, description=text)
+            ear.listen(min(LOOK, seconds - spent))
+    return began
+
+
+def _conclude(options: argparse.Namespace, result: Result) -> dict[str, Any]:
+    document = document_of(result)
+    if not options.json:
+        TextConsole(highlight=False).print(findings_table(result.findings))
+    if options.out is not None:
+        from auv_analysis.driver_check.report import write_results  # matplotlib loads slowly
+
+        inputs = [shipped('vehicles', options.vehicle)] if options.vehicle else []
+        prepare(options.out, overwrite=options.overwrite, inputs=inputs)
+        with console.status('drawing figures, writing the report'):
+            report = write_results(options.out, result, document)
+        say(f'report: {report}')
+    failure = failure_of(result.findings)
+    if failure:
+        raise FailedError(failure, document)
+    return document

@@ -1,0 +1,33 @@
+"""What a driver is checked against: the defaults of the controller's parameters."""
+
+from dataclasses import dataclass, field
+
+from auv_dynamics.interface import Frames
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is expected of odometry.
+
+    Attributes
+    ----------
+    frames : frame ids
+    rate : Hz that is promised; None: enough for the watchdog
+    sim_time : stamps are those of `/clock`
+    actuates : a wrench is going to be sent
+    timeout : s, `odometry_timeout` of the controller
+    gap : s, its `limits.gap`
+    speed, turning : m/s and rad/s, its `limits.speed` and `limits.rate`
+    acceleration : m/s2 and rad/s2, its `limits.acceleration`
+
+    """
+
+    frames: Frames = field(default_factory=Frames)
+    rate: float | None = None
+    sim_time: bool = False
+    actuates: bool = False
+    timeout: float = 0.5
+    gap: float = 1.0
+    speed: float = 20.0
+    turning: float = 20.0
+    acceleration: float = 100.0

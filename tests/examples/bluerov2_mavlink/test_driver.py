@@ -1,0 +1,192 @@
+"""The driver as a process, with a simulated vehicle on the other side of a wire."""
+
+import socket
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from harness import PATIENCE, Peer, fresh_domain, parameters, stop
+from mavlink_relay import Relay, free_port, start_program
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from std_srvs.srv import SetBool
+
+from auv_dynamics import interface
+from auv_dynamics.interface import NANOSECONDS, Frames
+from auv_dynamics.ros import convert, topics
+
+FRAMES = Frames()
+PUSH = (12.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Sea:
+    """Driver, wire and vehicle, and a controller of the test's own: it answers with one wrench."""
+
+    def __init__(self) -> None:
+        self.domain, port = fresh_domain(), free_port()
+        self.relay = Relay(port)
+        self.driver = start_program(
+            'driver.py', self.domain, '--ros-args',
+            *parameters(connection=f'udpin:127.0.0.1:{port}', disarm_timeout=1.0, autoarm=True),
+        )  # fmt: skip
+        self.vehicle = self.launch()
+        self.peer = Peer(self.domain)
+        self.peer.listen(topics.DIAGNOSTICS)
+        self.odometry: list[tuple[int, np.ndarray]] = []
+        self.tau: tuple | None = None
+        self._wrench = self.peer.node.create_publisher(topics.WRENCH.type, 'wrench', 10)
+        self.peer.node.create_subscription(
+            topics.ODOM.type, 'odom', self._on_odometry, topics.every_step()
+        )
+
+    def launch(self):
+        """A vehicle that has just been booted."""
+        return start_program(
+            'ardusub_endpoint.py',
+            self.domain,
+            '--connection',
+            f'udpout:127.0.0.1:{self.relay.port}',
+        )
+
+    def say(self, tau: tuple, ns: int) -> None:
+        self._wrench.publish(convert.wrench(ns, tau, FRAMES))
+
+    def _on_odometry(self, message) -> None:
+        ns, x = interface.read_odometry(message, FRAMES)
+        self.odometry.append((ns, np.array(x)))
+        if self.tau is not None:
+            self.say(self.tau, ns)
+
+    @property
+    def surge(self) -> float:
+        return self.odometry[-1][1][7] if self.odometry else 0.0
+
+    def facts(self) -> dict[str, str]:
+        """What the driver's diagnostics said last."""
+        for array in reversed(self.peer.heard['/diagnostics']):
+            for status in array.status:
+                if status.name == '/bluerov2_driver':
+                    return {'': status.message, **{v.key: v.value for v in status.values}}
+        return {}
+
+    def until(self, done, what: str) -> None:
+        self.peer.until(done, what)
+
+    def more(self, count: int = 10) -> None:
+        """Wait for so many more odometry messages."""
+        enough = len(self.odometry) + count
+        self.until(lambda: len(self.odometry) >= enough, 'odometry')
+
+    def close(self) -> None:
+        self.peer.close()
+        self.relay.close()
+        for process in (self.driver, self.vehicle):
+            if process.poll() is None:
+                process.kill()
+            if not process.stdout.closed:
+                print(process.communicate(timeout=PATIENCE)[0])
+
+
+@pytest.fixture(scope='module')
+def running():
+    sea = Sea()
+    try:
+        yield sea
+        stamps = [ns for ns, _ in sea.odometry]
+        assert all(a < b for a, b in pairwise(stamps)), 'whatever happened, time goes forward'
+        assert stop(sea.driver)[0] == 0
+        code, output = stop(sea.vehicle)
+        assert code == 0
+        assert 'disarmed, motors [1500' in output, 'the driver leaves no vehicle behind that runs'
+    finally:
+        sea.close()
+
+
+@pytest.fixture
+def sea(running):
+    """The vehicle under way; a test that needs it otherwise puts it back."""
+    running.tau = PUSH
+    if 'not commanded' in running.facts().get('', ''):
+        running.peer.call(SetBool, 'bluerov2_driver/arm', SetBool.Request(data=True))
+    running.until(lambda: running.surge > 0.2, 'the vehicle to go ahead')
+    running.peer.heard['/diagnostics'].clear()  # what they say from now on is of now
+    return running
+
+
+def test_a_push_ahead_goes_ahead_and_stamps_are_of_now(sea) -> None:
+    ns, x = sea.odometry[-1]
+    now = sea.peer.node.get_clock().now().nanoseconds
+    assert -0.05 < (now - ns) / NANOSECONDS < 0.5
+    assert x[0] > 0.0
+    assert np.abs(x[8:]).max() < 0.1
+
+
+def test_a_wrench_that_falls_silent_is_let_go_and_taken_up_again(sea) -> None:
+    sea.tau = None
+    sea.until(lambda: sea.facts().get('armed') == 'False', 'a disarmed vehicle')
+    sea.until(lambda: sea.surge < 0.2, 'the water to brake it')
+    sea.tau = PUSH
+    sea.until(lambda: sea.surge > 0.2, 'the vehicle to go ahead')
+
+
+def test_a_cut_link_gives_no_odometry_and_says_so_until_it_is_back(sea) -> None:
+    sea.relay.cut = True
+    try:
+        sea.until(lambda: sea.facts().get('') == 'vehicle not heard', 'the report')
+        before = len(sea.odometry)
+        sea.peer.spin(0.3)
+        assert len(sea.odometry) == before, 'nothing old is repeated'
+    finally:
+        sea.relay.cut = False
+    sea.more()
+    sea.until(lambda: sea.facts().get('vehicle heard') == 'True', 'the report')
+
+
+def test_a_vehicle_that_is_started_anew_is_not_armed_unasked(sea) -> None:
+    last = sea.odometry[-1][0]
+    sea.vehicle.kill()
+    sea.vehicle.communicate(timeout=PATIENCE)
+    sea.vehicle = sea.launch()
+    sea.until(lambda: 'not commanded: vehicle restarted' in sea.facts().get('', ''), 'the report')
+    sea.more()
+    assert sea.odometry[-1][0] > last
+    assert sea.surge == 0.0
+    assert sea.facts()['armed'] == 'False'
+    sea.peer.call(SetBool, 'bluerov2_driver/arm', SetBool.Request(data=True))
+    sea.until(lambda: sea.surge > 0.2, 'the vehicle to go ahead')
+
+
+def test_broken_and_foreign_packets_are_counted_and_change_nothing(sea) -> None:
+    stranger = mavlink.MAVLink(None, srcSystem=9, srcComponent=1)
+    false = mavlink.MAVLink_local_position_ned_message(10**8, *[50.0] * 6).pack(stranger)
+    for data in (bytes(false), bytes(false[:-2]) + b'\0\0', b'no message at all', bytes(false[:9])):
+        sea.relay.inject(data)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as elsewhere:  # as if it were the vehicle
+        vehicle = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+        elsewhere.sendto(
+            mavlink.MAVLink_local_position_ned_message(10**8, *[50.0] * 6).pack(vehicle),
+            sea.relay.driver,
+        )
+    sea.until(lambda: int(sea.facts().get('MAVLink refused', 0)) > 1, 'the strangers counted')
+    sea.until(lambda: int(sea.facts().get('MAVLink broken', 0)) > 1, 'the broken ones counted')
+    sea.more()
+    assert 0.1 < sea.surge < 2.0
+
+
+@pytest.mark.parametrize(
+    ('kind', 'tau', 'age'), [('age', PUSH, 2.0), ('', (np.nan,) * 6, 0.0)], ids=['old', 'nan']
+)
+def test_a_wrench_that_must_not_be_used_is_refused(sea, kind, tau, age) -> None:
+    def refused() -> int:
+        return sum(
+            int(count) for key, count in sea.facts().items()
+            if key.startswith('refused wrench') and kind in key
+        )  # fmt: skip
+
+    before, limit = refused(), time.monotonic() + PATIENCE
+    while refused() == before:
+        assert time.monotonic() < limit
+        sea.say(tau, sea.peer.node.get_clock().now().nanoseconds - round(age * NANOSECONDS))
+        sea.peer.spin(0.2)
+    sea.more()
+    assert np.isfinite(sea.odometry[-1][1]).all()

@@ -1,0 +1,238 @@
+"""The link against an ArduSub-like autopilot: what it asks, refuses, lets go and takes up."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from ardusub_autopilot import Settings
+from mavlink_pair import SECOND, Pair, nothing
+from numpy.testing import assert_allclose
+from pilot import MANUAL
+from pilot_messages import MANUAL_CONTROL
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from vehicle_link import LinkSettings
+
+MOVING = Settings(eta=(1.0, -2.0, 3.0, 0.2, -0.3, 2.0), nu=(0.5, -0.3, 0.2, 0.1, 0.2, -0.3))
+PUSH = np.array([10.0, 0, 0, 0, 0, 0])
+
+
+def sent(pair: Pair, kind: str) -> list:
+    return [message for message in pair.sent if message.get_type() == kind]
+
+
+def orders(pair: Pair, command: int) -> list:
+    return [message for message in sent(pair, 'COMMAND_LONG') if message.command == command]
+
+
+def said(pair: Pair, *words: str) -> bool:
+    return any(all(word in line for word in words) for line in pair.said)
+
+
+def pulses(pair: Pair) -> list[int]:
+    return pair.autopilot.pulses
+
+
+def test_odometry_is_the_state_of_the_vehicle_at_its_stamp() -> None:
+    pair = Pair(MOVING)
+    pair.run(2.0)
+    assert len(pair.samples) > 60
+    sample, plant = pair.samples[-1], pair.autopilot.plant
+    behind = pair.now - sample.ns
+    assert 0 <= behind <= 40_000_000
+    turned = 0.5 * 0.04  # by which it may have moved on since
+    assert_allclose(sample.x, plant.x, atol=turned)
+    assert np.linalg.norm(sample.x[3:7]) == pytest.approx(1.0, abs=1e-9)
+    assert np.abs(np.diff([s.ns for s in pair.samples]) - 0.02 * SECOND).max() <= 0.006 * SECOND
+
+
+def test_the_vehicle_is_asked_for_what_is_needed_and_nothing_moves_unasked() -> None:
+    pair = Pair()
+    pair.run(2.0, tau=PUSH)
+    asked = {int(m.param1) for m in orders(pair, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)}
+    assert asked == {1, 31, 32}
+    assert len(sent(pair, 'HEARTBEAT')) == 2
+    assert not orders(pair, mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
+    assert not sent(pair, 'RC_CHANNELS_OVERRIDE')
+    assert not pair.autopilot.armed
+
+
+def test_mode_is_set_and_armed_once_wrenches_come() -> None:
+    pair = Pair(Settings(mode=2))
+    pair.link.pilot.want(True, pair.now)
+    pair.run(2.0)
+    assert (pair.autopilot.mode, pair.autopilot.armed) == (MANUAL, False)
+    pair.run(2.0, tau=PUSH)
+    assert pair.autopilot.armed
+    assert pair.autopilot.plant.x[7] > 0.1
+
+
+def test_a_refused_order_is_said() -> None:
+    pair = Pair()
+    pair.autopilot.receive = lambda message, _: (
+        message.get_type() == 'COMMAND_LONG'
+        and (pair._downs.send(mavlink.MAVLink_command_ack_message(message.command, 4)))
+    )
+    pair.run(0.1)
+    assert said(pair, 'MAV_CMD_SET_MESSAGE_INTERVAL: MAV_RESULT_FAILED')
+
+
+def test_silence_of_the_wrench_is_neutral_then_disarmed_and_arms_again_with_it() -> None:
+    pair = Pair().flown(PUSH)
+    assert max(pulses(pair)) > 1550
+    pair.run(0.8)
+    assert pulses(pair) == [1500] * 8
+    assert pair.autopilot.armed
+    pair.run(3.0)
+    assert not pair.autopilot.armed
+    pair.run(2.5, tau=PUSH)
+    assert pair.autopilot.armed
+    assert max(pulses(pair)) > 1550
+
+
+def test_asked_to_let_go_it_is_neutral_and_disarmed() -> None:
+    pair = Pair().flown(PUSH)
+    pair.link.pilot.want(False, pair.now)
+    pair.run(0.2, tau=PUSH)
+    assert not pair.autopilot.armed
+    pair.run(1.0, tau=PUSH)  # until the next heartbeat says so
+    before = len(sent(pair, 'RC_CHANNELS_OVERRIDE'))
+    pair.run(2.0, tau=PUSH)
+    assert not pair.autopilot.armed
+    assert len(sent(pair, 'RC_CHANNELS_OVERRIDE')) == before
+
+
+def test_the_last_words_disarm() -> None:
+    pair = Pair().flown(PUSH)
+    pair.link.leave()
+    pair.run(0.02)
+    assert not pair.autopilot.armed
+
+
+def test_a_short_loss_of_the_link_gives_no_odometry_no_old_command_and_recovers() -> None:
+    pair = Pair().flown(PUSH)
+    pair.down, before = nothing, len(pair.samples)
+    pair.run(1.5, tau=PUSH)
+    assert len(pair.samples) == before
+    assert pulses(pair) == [1500] * 8
+    assert said(pair, 'vehicle not heard: neutral')
+    pair.down = bytes
+    pair.run(0.5, tau=PUSH)
+    assert said(pair, 'heard again')
+    assert max(pulses(pair)) > 1550
+    stamps = [sample.ns for sample in pair.samples]
+    assert all(a < b for a, b in pairwise(stamps))
+
+
+def test_a_long_loss_is_disarmed_by_the_vehicle_and_wants_to_be_asked_again() -> None:
+    pair = Pair().flown(PUSH)
+    pair.up = pair.down = nothing
+    pair.run(4.0, tau=PUSH)
+    assert not pair.autopilot.armed, 'the failsafe of ArduSub'
+    pair.up = pair.down = bytes
+    pair.run(3.0, tau=PUSH)
+    assert not pair.autopilot.armed
+    assert said(pair, 'disarmed by the vehicle or by somebody else', '~/arm')
+    pair.link.pilot.want(True, pair.now)
+    pair.run(2.0, tau=PUSH)
+    assert pair.autopilot.armed
+
+
+def test_what_a_pilot_takes_is_not_taken_back() -> None:
+    pair = Pair().flown(PUSH)
+    pair.autopilot._set_mode(2)
+    pair.run(2.0, tau=PUSH)
+    assert pair.autopilot.mode == 2
+    assert said(pair, 'mode 2 set by somebody else')
+    before = len(sent(pair, 'RC_CHANNELS_OVERRIDE'))
+    pair.run(1.0, tau=PUSH)
+    assert len(sent(pair, 'RC_CHANNELS_OVERRIDE')) == before, 'it would override the pilot'
+
+
+def test_a_restart_of_the_vehicle_is_noticed_and_stamps_go_on() -> None:
+    pair = Pair().flown(PUSH)
+    pair.run(1.0, tau=PUSH)
+    before, last = len(pair.samples), pair.samples[-1].ns
+    pair.boot()
+    pair.run(3.0, tau=PUSH)
+    assert said(pair, 'vehicle restarted')
+    assert not pair.autopilot.armed
+    after = [sample.ns for sample in pair.samples[before:]]
+    assert len(after) > 50
+    assert min(after) > last
+    assert all(0 <= pair.now - ns <= 4 * SECOND for ns in after)
+    assert_allclose(pair.samples[-1].x[7:], pair.autopilot.plant.x[7:], atol=0.01)
+
+
+def test_messages_of_others_are_dropped_and_counted() -> None:
+    pair = Pair(MOVING)
+    pair.run(1.0)
+    refused, before = pair.link.refused, len(pair.samples)
+    stranger = mavlink.MAVLink(None, srcSystem=7, srcComponent=1)
+    bad = mavlink.MAVLink_local_position_ned_message(10**6, 9, 9, 9, 9, 9, 9).pack(stranger)
+    pair._downs.write(bytes(bad))
+    pair.run(0.004)
+    assert pair.link.refused == refused + 1
+    pair.run(1.0)
+    assert len(pair.samples) > before + 40
+
+
+@pytest.mark.parametrize('spoil', [lambda d: d[:-3] + b'xyz', lambda d: d[: len(d) // 2],
+                                   lambda d: b'noise', lambda d: b'\xfd' + d])  # fmt: skip
+def test_broken_datagrams_are_counted_and_harm_nothing_behind_them(spoil) -> None:
+    pair = Pair(MOVING)
+    pair.run(1.0)
+    count = iter(range(10**6))
+    pair.down = lambda data: spoil(data) if next(count) % 2 else data
+    before, refused = len(pair.samples), pair.link.refused
+    pair.run(1.0)
+    assert pair.link.refused == refused
+    assert len(pair.samples) > before
+    pair.down = bytes
+    pair.run(1.0)
+    assert_allclose(pair.samples[-1].x[7:], pair.autopilot.plant.x[7:], atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ('kind', 'part', 'text'),
+    [
+        ('position', 'vx', 'LOCAL_POSITION_NED: expected finite numbers'),
+        ('attitude', 'q1', 'expected a unit quaternion'),
+        ('attitude', 'yawspeed', 'expected a unit quaternion and finite rates'),
+    ],
+)
+def test_numbers_that_are_none_are_refused_and_said(kind, part, text) -> None:
+    pair = Pair()
+    pair.run(1.0)
+    refused, before = pair.link.refused, len(pair.samples)
+    message = {
+        'position': mavlink.MAVLink_local_position_ned_message(2000, *[0.0] * 6),
+        'attitude': mavlink.MAVLink_attitude_quaternion_message(2000, 1.0, *[0.0] * 6),
+    }[kind]
+    setattr(message, part, math.nan)
+    pair._downs.send(message)
+    pair.run(0.004)
+    assert pair.link.refused == refused + 1
+    assert said(pair, 'refused', text)
+    assert all(np.isfinite(sample.x).all() for sample in pair.samples[before:])
+
+
+def test_a_copter_is_no_submarine() -> None:
+    pair = Pair()
+    pair._downs.send(mavlink.MAVLink_heartbeat_message(2, 3, 128, 19, 4, 3))
+    pair.run(0.004)
+    assert said(pair, 'expected a submarine of ArduPilot (12, 3), found (2, 3)')
+    assert not pair.link.pilot.armed
+
+
+def test_manual_control_waits_for_the_pilot_gain_and_undoes_it() -> None:
+    pair = Pair(Settings(gain=0.5), LinkSettings(how=MANUAL_CONTROL))
+    pair.flown()
+    assert pair.link.gain == 0.5
+    pair.run(0.4, tau=[8.0, 6.0, 10.0, 0.0, 0.0, 1.0])
+    assert len(sent(pair, 'MANUAL_CONTROL')) > 20
+    assert not sent(pair, 'RC_CHANNELS_OVERRIDE')
+    nu = pair.autopilot.plant.x[7:]
+    assert all(nu[i] > 0.05 for i in (0, 1, 2, 5))
+    pair.run(0.5, tau=[200.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert pair.share * 200.0 < 40.0, 'a gain of 0.5 leaves a quarter of the thrust'

@@ -1,0 +1,176 @@
+"""`auv check-driver` beside real drivers: each fault fails its check, and nothing is published."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from faulty_drivers import NAMES
+from geometry_msgs.msg import WrenchStamped
+from harness import PATIENCE, Peer, environment, fresh_domain
+
+from auv_analysis.commands.actuating import refusal
+from auv_analysis.driver_check.checks import findings_of
+from auv_analysis.driver_check.finding import FAIL, NOT_CHECKED, PASS, Finding
+from auv_analysis.driver_check.settings import Settings
+from auv_analysis.driver_check_node import COMMANDER, Ear
+from auv_dynamics import interface
+from auv_dynamics.interface import Frames
+from auv_dynamics.ros import topics
+
+SECONDS = 3.0  # of listening
+TOPICS = {interface.ODOM: interface.ODOM, interface.WRENCH: interface.WRENCH}
+# a machine that is busy with other tests may keep all of them waiting
+PATIENT = Settings(timeout=4.0)
+
+
+@pytest.fixture(scope='module')
+def domain() -> Iterator[int]:
+    """Domain with all faulty drivers in it."""
+    found = fresh_domain()
+    path = Path(__file__).parents[1] / 'faulty_drivers.py'
+    process = subprocess.Popen(
+        [sys.executable, str(path)], env=environment(found), stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout.readline() == 'ready\n'
+        yield found
+    finally:
+        process.kill()
+        process.communicate(timeout=PATIENCE)
+
+
+@pytest.fixture(scope='module')
+def judged(domain: int) -> dict[str, dict[str, Finding]]:
+    """Driver -> check -> finding."""
+    ears = {name: Ear(domain, f'/{name}', TOPICS, Frames()) for name in NAMES}
+    found = {}
+    try:
+        limit = time.monotonic() + PATIENCE
+        until = None
+        while until is None or time.monotonic() < until:
+            assert time.monotonic() < limit
+            for ear in ears.values():
+                ear.listen(0.005)
+            if until is None and all(len(ear.tape) for ear in ears.values()):
+                until = time.monotonic() + SECONDS
+        for name, ear in ears.items():
+            settings = Settings() if name == 'slow' else PATIENT
+            heard = ear.recording(int(ear.tape.recording(0, 0).arrived_ns[0]))
+            listed = findings_of(ear.scene('the test'), heard, settings)
+            found[name] = {one.id: one for one in listed}
+    finally:
+        for ear in ears.values():
+            ear.close()
+    return found
+
+
+def failed(found: dict[str, Finding]) -> set[str]:
+    return {id for id, one in found.items() if one.verdict == FAIL}
+
+
+def test_a_healthy_driver_passes(judged) -> None:
+    found = judged['healthy']
+    assert failed(found) == set()
+    passed = {id for id, one in found.items() if one.verdict == PASS}
+    assert passed > {'odom_publisher', 'wrench_subscriber', 'qos_recorder', 'qos_wrench', 'frames'}
+    assert passed > {'stamps', 'age', 'twist_frame', 'angular_frame', 'axis_surge', 'axis_sway'}
+    assert '/healthy/driver' in found['odom_publisher'].found
+
+
+@pytest.mark.parametrize(
+    ('driver', 'ids', 'words'),
+    [
+        ('ros_frames', {'frames'}, 'frame_converter_node'),
+        ('world_twist', {'twist_frame'}, 'R(q)^T v'),
+        ('w_first', {'upright', 'twist_frame', 'angular_frame'}, 'w written first'),
+        ('nan', {'finite'}, 'no measurement'),
+        ('best_effort', {'qos_recorder'}, 'publish reliable'),
+        ('frozen', {'stamps', 'age'}, 'the time at which its numbers were measured'),
+        ('old', {'age'}, 'publish at once'),
+        ('plain_wrench', {'wrench_subscriber'}, 'without its stamp'),
+    ],
+)
+def test_a_faulty_driver_fails_the_check_of_its_fault_alone(judged, driver, ids, words) -> None:
+    found = judged[driver]
+    assert failed(found) == ids
+    assert any(words in found[id].advice for id in ids)
+
+
+def test_a_slow_driver_fails_by_its_rate(judged) -> None:
+    finding = judged['slow']['rate']
+    assert finding.verdict == FAIL
+    assert finding.numbers['rate_hz'] == pytest.approx(2.0, rel=0.2)
+
+
+def test_a_conflict_of_policies_is_that_of_the_middleware(judged) -> None:
+    finding = judged['best_effort']['qos_recorder']
+    assert 'reliability best_effort' in finding.found
+    assert 'best effort publisher and reliable subscription' in finding.found
+
+
+def test_what_there_is_elsewhere_is_named(domain: int) -> None:
+    ear = Ear(domain, '/', TOPICS, Frames())
+    try:
+        limit = time.monotonic() + PATIENCE
+        while len(named := ear.scene('here').elsewhere) < len(NAMES) or not all(
+            node.endswith('/driver') for nodes in named.values() for node in nodes
+        ):
+            assert time.monotonic() < limit
+            ear.listen(0.1)
+        found = findings_of(ear.scene('here'), ear.recording(0), Settings())
+    finally:
+        ear.close()
+    assert found[0].verdict == FAIL
+    assert 'nav_msgs/msg/Odometry is on' in found[0].found
+    assert '/healthy/odom of /healthy/driver' in found[0].found
+    assert {one.verdict for one in found if one.id in ('rate', 'frames')} == {NOT_CHECKED}
+
+
+@pytest.mark.parametrize('commands', [False, True])
+def test_nothing_is_published_until_it_speaks(commands: bool) -> None:
+    domain = fresh_domain()
+    peer, ear = Peer(domain), Ear(domain, '/', TOPICS, Frames(), commands=commands)
+    name = COMMANDER if commands else interface.OBSERVER
+    try:
+
+        def listens() -> bool:
+            ear.listen(0.01)
+            return peer.node.count_subscribers('odom') > 0 and name in peer.node.get_node_names()
+
+        peer.until(listens)
+        published = peer.node.get_publisher_names_and_types_by_node
+        assert published(name, '/') == []
+        assert peer.node.get_client_names_and_types_by_node(name, '/') == []
+        if not commands:
+            with pytest.raises(RuntimeError, match='no voice'):
+                ear.speak()
+            return
+        ear.speak()
+        peer.until(
+            lambda: published(name, '/') == [('/wrench', ['geometry_msgs/msg/WrenchStamped'])]
+        )
+        with pytest.raises(RuntimeError, match='odometry'):
+            ear.send((0.0,) * 6)  # nothing has been heard yet
+        ear.hush()
+        peer.until(lambda: published(name, '/') == [])
+    finally:
+        ear.close()
+        peer.close()
+
+
+def test_with_another_commander_nothing_is_sent(domain: int) -> None:
+    peer = Peer(domain)
+    peer.node.create_publisher(WrenchStamped, '/healthy/wrench', topics.every_step())
+    ear = Ear(domain, '/healthy', TOPICS, Frames(), commands=True)
+    try:
+        peer.until(lambda: ear.listen(0.05) or (len(ear.tape) > 50 and ear.others()))
+        settings = Settings(timeout=4.0, actuates=True)
+        found = findings_of(ear.scene('here'), ear.recording(0), settings)
+        assert ear.others() == ['/test_peer']
+        assert 'wrench_publishers did not pass' in refusal(found)
+    finally:
+        ear.close()
+        peer.close()

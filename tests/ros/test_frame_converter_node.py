@@ -1,0 +1,196 @@
+"""The frame converter node: a vehicle behind two mirrors is the same vehicle, step by step."""
+
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+from harness import (
+    CONTROLLER,
+    assert_one_line,
+    fresh_domain,
+    graph,
+    parameters,
+    run_node,
+    stop,
+)
+from numpy.testing import assert_allclose
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_srvs.srv import Trigger
+
+from auv_dynamics import interface
+from auv_dynamics.interface import Frames
+from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.topics import Topic
+
+ENU, NED = Frames('odom', 'base_link'), Frames()
+ENU_ODOM = Topic('enu_flu/odom', topics.ODOM.type)
+ENU_WRENCH = Topic('enu_flu/wrench', topics.WRENCH.type)
+ENU_CMD_VEL = Topic('enu_flu/cmd_vel', topics.CMD_VEL.type)
+ENU_CMD_ACCEL = Topic('enu_flu/cmd_accel', topics.CMD_ACCEL.type)
+STEPS = 60
+UPRIGHT = np.array([0, 0, 0, 1, 0, 0, 0, 0.1, 0.2, 0.3, 0.01, 0.02, 0.03], float)
+PLANT = [
+    *parameters(vehicle='rexrov', lockstep=True, duration=STEPS * 0.01),
+    '-p', 'initial.eta:=[1.0, -2.0, 3.0, 0.3, -0.4, 2.0]',
+    '-p', 'initial.nu:=[0.4, -0.2, 0.3, 0.1, -0.2, 0.15]',
+]  # fmt: skip
+SETPOINT = [
+    *parameters(duration=STEPS * 0.01, setpoint__surge__offset=0.5, setpoint__heave__offset=-0.3),
+    *('-p', 'setpoint.sway.amplitude:=[0.2]', '-p', 'setpoint.sway.omega:=[0.5]'),
+    *('-p', 'setpoint.sway.phase:=[0.0]', '-p', 'setpoint.yaw.offset:=0.1'),
+    *('-p', 'expected_subscribers:=["cmd_vel=1", "cmd_accel=1"]'),
+]
+LAW = [
+    *[word.replace('herman2018', 'rexrov') for word in CONTROLLER],
+    *parameters(lockstep=True, setpoint_pairing='exact', setpoint_acceleration='topic'),
+    *('-p', 'expected_subscribers:=["wrench=2"]'),
+]
+
+
+def remapped(**names: str) -> list[str]:
+    return [word for a, b in names.items() for word in ('-r', f'{a.replace("__", "/")}:={b}')]
+
+
+def run(*, mirrored: bool) -> dict[str, np.ndarray]:
+    """Odometry and wrenches of a run, those of the plant and those of the controller."""
+    domain = fresh_domain()
+    waits = ['setpoint_node', 'controller_node']
+    plant, nodes = list(PLANT), [('setpoint_node', SETPOINT), ('controller_node', LAW)]
+    with ExitStack() as stack:
+        if mirrored:
+            waits += ['mirror', 'frame_converter_node']
+            plant += remapped(odom='plant/odom', wrench='plant/wrench')
+            plant += parameters(odom_frame='inertial', base_frame='body')
+            there = [
+                *parameters(enu_frame='inertial', flu_frame='body', lockstep=True),
+                *parameters(odom_frame='odom', base_frame='base_link'),
+                *remapped(enu_flu__odom='plant/odom', odom='enu_flu/odom'),
+                *remapped(wrench='enu_flu/wrench', enu_flu__wrench='plant/wrench'),
+                *remapped(cmd_vel='unused/cmd_vel', cmd_accel='unused/cmd_accel'),
+                *('-r', '__node:=mirror', '-p', 'expected_subscribers:=["odom=1"]'),
+            ]
+            stack.enter_context(graph(('frame_converter_node', there), domain=domain))
+            here = [*parameters(lockstep=True), '-p', 'expected_subscribers:=["odom=3"]']
+            nodes.append(('frame_converter_node', here))
+        plant += ['-p', f'start_after:={waits}'.replace("'", '"')]
+        plant += ['-p', f'expected_subscribers:=["odom={2 if mirrored else 3}"]']
+        nodes += [('plant_node', plant)]
+        peer, processes = stack.enter_context(graph(*nodes, domain=domain))
+        names = ('plant/odom', 'plant/wrench') if mirrored else ('odom', 'wrench')
+        kinds = (topics.ODOM, topics.WRENCH)
+        heard = [Topic(n, k.type) for n, k in zip(names, kinds, strict=True)]
+        peer.listen(*{topic.name: topic for topic in (*heard, *kinds)}.values())
+        peer.until(lambda: len(peer.heard[names[1]]) == STEPS + 1, 'the last wrench')
+        peer.until(lambda: processes['plant_node'].poll() is not None, 'the end of the plant')
+        assert processes['plant_node'].returncode == 0
+        plant_frames = Frames('inertial', 'body') if mirrored else NED
+        return {
+            'plant odom': rows(peer.heard[names[0]], interface.read_odometry, plant_frames),
+            'plant wrench': rows(peer.heard[names[1]], wrench, plant_frames),
+            'odom': rows(peer.heard['odom'], interface.read_odometry, NED),
+            'wrench': rows(peer.heard['wrench'], wrench, NED),
+        }
+
+
+def wrench(message, frames: Frames) -> tuple:
+    return interface.read_wrench(message, frames, 'wrench')
+
+
+def rows(messages: list, read, frames: Frames) -> np.ndarray:
+    """Stamps and numbers (n, 1 + m) of messages; a quaternion's sign makes no difference."""
+    table = np.array([[ns, *values] for ns, values in (read(m, frames) for m in messages)])
+    if table.shape[1] == 14:
+        table[:, 4:8] *= np.sign(table[:, 4:5])
+    return table
+
+
+def test_a_run_behind_two_mirrors_is_the_run_without() -> None:
+    straight, mirrored = run(mirrored=False), run(mirrored=True)
+    assert len(straight['odom']) == STEPS + 1
+    x = straight['odom'][:, 1:]
+    assert np.abs(x - x[0]).max(axis=0).min() > 1e-4, 'everything moves'
+    assert np.abs(straight['wrench'][-1, 1:]).min() > 1.0, 'every axis is commanded'
+    for name, table in straight.items():
+        assert_allclose(mirrored[name], table, rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+@pytest.fixture(scope='module')
+def running():
+    with graph(('frame_converter_node', [])) as (peer, processes):
+        answer = peer.call(Trigger, 'frame_converter_node/ready')
+        assert (answer.success, answer.message) == (
+            False, 'enu_flu/wrench: expected a subscriber, found none'
+        )  # fmt: skip
+        peer.listen(topics.ODOM, topics.CMD_VEL, topics.CMD_ACCEL, topics.DIAGNOSTICS, ENU_WRENCH)
+        yield peer
+        assert stop(processes['frame_converter_node'])[0] == 0
+
+
+@pytest.fixture
+def peer(running):
+    running.spin(0.1)  # what is still under way
+    for heard in running.heard.values():
+        heard.clear()
+    return running
+
+
+def test_set_points_and_wrenches_pass_and_stamps_are_kept(peer) -> None:
+    there, here = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (1.0, -2.0, -3.0, 4.0, -5.0, -6.0)
+    for source, target, make, read, frames in (
+        (ENU_CMD_VEL, 'cmd_vel', convert.twist, interface.read_twist, (ENU, NED)),
+        (ENU_CMD_ACCEL, 'cmd_accel', convert.accel, interface.read_accel, (ENU, NED)),
+        (topics.WRENCH, 'enu_flu/wrench', convert.wrench, interface.read_wrench, (NED, ENU)),
+    ):
+        peer.publish(source, make(1_234_567_890, there, frames[0]))
+        found = peer.until(lambda name=target: peer.heard[name], target)[0]
+        assert read(found, frames[1], target) == (1_234_567_890, here)
+    assert peer.call(Trigger, 'frame_converter_node/ready').success
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'said'),
+    [
+        (lambda m: setattr(m.pose.pose.orientation, 'w', 0.5), 'a unit quaternion'),
+        (lambda m: setattr(m.header, 'frame_id', 'odom_ned'), "expected 'odom', found 'odom_ned'"),
+        (lambda m: setattr(m.twist.twist.linear, 'y', np.nan), 'finite numbers'),
+    ],
+    ids=['quaternion', 'frame', 'nan'],
+)
+def test_broken_odometry_is_refused_counted_and_reported(peer, spoil, said) -> None:
+    broken = convert.odometry(1, UPRIGHT, ENU)
+    spoil(broken)
+
+    def reported() -> bool:
+        peer.publish(ENU_ODOM, broken)  # best effort: the first ones may be lost
+        peer.spin(0.1)
+        found = [status for array in peer.heard['/diagnostics'] for status in array.status]
+        counts = [int({v.key: v.value for v in s.values}['refused']) for s in found]
+        return max(counts, default=0) > 1 and any(said in s.message for s in found)
+
+    peer.until(reported, f'"{said}" in the diagnostics')
+    assert not peer.heard['odom'], 'nothing broken is forwarded'
+    peer.publish(ENU_ODOM, convert.odometry(4, UPRIGHT, ENU))
+    peer.until(lambda: peer.heard['odom'], 'odometry that is right again')
+    assert interface.nanoseconds(peer.heard['odom'][0].header.stamp) == 4
+
+
+def test_a_driver_with_best_effort_is_heard(peer) -> None:
+    qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+    output = peer.node.create_publisher(topics.ODOM.type, 'enu_flu/odom', qos)
+
+    def heard() -> bool:
+        output.publish(convert.odometry(9, UPRIGHT, ENU))
+        return bool(peer.heard['odom'])
+
+    peer.until(heard, 'converted odometry')
+
+
+@pytest.mark.parametrize(('key', 'value'), [('flu_frame', 'base_frd'), ('odom_frame', 'odom_enu')])
+def test_frames_that_name_the_other_side_are_refused(key: str, value: str) -> None:
+    ended = run_node('frame_converter_node', *parameters(**{key: value}))
+    assert_one_line(ended, 'frame_converter_node', key, value)
+
+
+def test_another_twist_frame_is_refused() -> None:
+    ended = run_node('frame_converter_node', *parameters(twist_frame='body'))
+    assert_one_line(ended, 'twist_frame', 'child, world', 'body')

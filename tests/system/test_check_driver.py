@@ -1,0 +1,172 @@
+"""`auv check-driver --actuate` on vehicles: healthy, with a reversed axis, interrupted."""
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from harness import Peer, environment, fresh_domain, parameters, start_node, stop
+
+from auv_analysis.driver_check.catalogue import CHECKS
+from auv_analysis.driver_check.finding import FAIL, PASS
+from auv_analysis.driver_check.procedure import GOODBYE, PERIOD
+from auv_dynamics.interface import Frames, wrench_of
+from auv_dynamics.ros import convert, topics
+
+AUV = str(Path(sys.executable).with_name('auv'))
+VEHICLE = parameters(vehicle='bluerov2_heavy', step=0.02, initial__eta='[0.0,0.0,5.0,0.0,0.0,0.8]')
+LIMIT = 180.0  # s
+RATE = 50.0  # Hz
+ZERO = (0.0,) * 6
+AT_REST = np.eye(13)[3]
+
+
+def start_check(domain: int, *options: str) -> subprocess.Popen:
+    command = [AUV, 'check-driver', '--domain-id', str(domain), '--vehicle', 'bluerov2_heavy',
+               '--actuate', '--seconds', '1.5', '--json', *options]  # fmt: skip
+    return subprocess.Popen(
+        command, env=environment(domain), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+class Relay:
+    """Hands the wrench on to a plant, with the sign of sway reversed."""
+
+    def __init__(self, peer: Peer):
+        node = peer.node
+        self._output = node.create_publisher(topics.WRENCH.type, 'reversed', topics.every_step())
+        node.create_subscription(
+            topics.WRENCH.type, topics.WRENCH.name, self._on_wrench, topics.newest_command()
+        )
+
+    def _on_wrench(self, message: Any) -> None:
+        message.wrench.force.y *= -1.0
+        self._output.publish(message)
+
+
+class Interrupted:
+    """A vehicle at rest that sends a signal to whoever moves it."""
+
+    def __init__(self, peer: Peer, name: str, number: int):
+        self.namespace, self.wrenches, self._number = f'/{name}', [], number
+        self.commander: subprocess.Popen | None = None
+        node = peer.node
+        self._odom = node.create_publisher(
+            topics.ODOM.type, f'{self.namespace}/odom', topics.every_step()
+        )
+        node.create_subscription(
+            topics.WRENCH.type, f'{self.namespace}/wrench', self._on_wrench, topics.every_step()
+        )
+        node.create_timer(1.0 / RATE, lambda: self._publish(node.get_clock().now().nanoseconds))
+
+    def _publish(self, now: int) -> None:
+        self._odom.publish(convert.odometry(now, AT_REST, Frames()))
+
+    def _on_wrench(self, message: Any) -> None:
+        tau = wrench_of(message)
+        if tau != ZERO and all(before == ZERO for before in self.wrenches):
+            self.commander.send_signal(self._number)
+        self.wrenches.append(tau)
+
+
+class Ended:
+    """A check that has come to its end."""
+
+    def __init__(self, process: subprocess.Popen):
+        self.output, self.errors = process.communicate(timeout=LIMIT)
+        self.code = process.returncode
+
+    @property
+    def checks(self) -> dict[str, dict[str, Any]]:
+        """Check -> what was found."""
+        return {one['id']: one for one in json.loads(self.output)['checks']}
+
+
+class Runs:
+    """All checks at once, since they mostly wait."""
+
+    def __init__(self, out: Path):
+        healthy, other, third = fresh_domain(), fresh_domain(), fresh_domain()
+        peers = [Peer(other), Peer(third)]
+        self.relay = Relay(peers[0])
+        self.vehicle = Interrupted(peers[1], 'auv1', signal.SIGTERM)
+        over = threading.Event()
+        thread = threading.Thread(target=self._spin, args=(peers, over))
+        plants = [
+            start_node('plant_node', healthy, *VEHICLE),
+            start_node('plant_node', other, *VEHICLE, '-r', 'wrench:=reversed'),
+        ]
+        thread.start()
+        try:
+            time_of_plant = '--use-sim-time'
+            processes = {
+                'healthy': start_check(healthy, time_of_plant, '--axis', 'sway', '--out', str(out)),
+                'reversed': start_check(other, time_of_plant, '--axis', 'sway'),
+            }  # fmt: skip
+            options = ['--namespace', self.vehicle.namespace, '--axis', 'surge']
+            processes['interrupted'] = self.vehicle.commander = start_check(third, *options)
+            self.ended = {name: Ended(process) for name, process in processes.items()}
+        finally:
+            over.set()
+            thread.join()
+            for plant in plants:
+                stop(plant)
+            for peer in peers:
+                peer.close()
+
+    @staticmethod
+    def _spin(peers: list[Peer], over: threading.Event) -> None:
+        while not over.is_set():
+            for peer in peers:
+                peer.executor.spin_once(timeout_sec=0.001)
+
+
+@pytest.fixture(scope='module')
+def out(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp('driver') / 'check'
+
+
+@pytest.fixture(scope='module')
+def runs(out: Path) -> Iterator[Runs]:
+    return Runs(out)
+
+
+def test_a_healthy_vehicle_passes_and_leaves_a_report(runs: Runs, out: Path) -> None:
+    ended = runs.ended['healthy']
+    assert ended.code == 0, ended.errors
+    assert list(ended.checks) == list(CHECKS)
+    passed = {id for id, one in ended.checks.items() if one['verdict'] == PASS}
+    assert passed > {'response_sway', 'response_delay', 'silence', 'actuation'}
+    assert passed > {'clock', 'age', 'drift', 'twist_frame', 'wrench_publishers', 'qos_recorder'}
+    assert json.loads((out / 'check.json').read_text()) == json.loads(ended.output)
+    assert (out / 'report.html').is_file()
+    before = ended.errors.partition('begins in')[0]
+    assert 'THE VEHICLE WILL MOVE' in before
+    assert 'sway ±' in before
+
+
+def test_a_reversed_axis_fails(runs: Runs) -> None:
+    ended = runs.ended['reversed']
+    assert ended.code == 1
+    failed = {id for id, one in ended.checks.items() if one['verdict'] == FAIL}
+    assert failed == {'response_sway'}
+    assert 'sign is reversed' in ended.checks['response_sway']['advice']
+    assert ended.errors.splitlines()[-1] == f'1 of {len(CHECKS)} checks failed: response_sway'
+
+
+def test_a_signal_in_the_middle_ends_it_with_zero(runs: Runs) -> None:
+    ended, vehicle = runs.ended['interrupted'], runs.vehicle
+    assert ended.code == 1, ended.errors
+    assert ended.errors.splitlines()[-1] == 'interrupted'
+    assert ended.output == ''
+    moving = [i for i, tau in enumerate(vehicle.wrenches) if tau != ZERO]
+    assert moving
+    zeros = vehicle.wrenches[moving[-1] + 1 :]
+    assert zeros == [ZERO] * round(GOODBYE / PERIOD)
+    assert vehicle.wrenches[: moving[0]] == [ZERO] * moving[0] != []

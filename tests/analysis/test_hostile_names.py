@@ -1,0 +1,108 @@
+"""Names and texts of strangers are text: in reports, in file names, in figures, in a terminal."""
+
+import io
+from contextlib import nullcontext
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+import yaml
+from rich.table import Table
+from rich.text import Text
+from stranger_bags import SCENARIO, write
+
+from auv_analysis import cli, load_run
+from auv_analysis.console import TextConsole
+from auv_dynamics import load_vehicle
+from auv_dynamics.files import InputError
+from auv_dynamics.printable import MARK, printable
+
+HTML = '<xss onload="x()">&amp;</script></style></title></textarea><xss>\'"{{7*7}}'
+ESCAPES = '\x1b[2J\x1b]0;mine\x07\r\x9b31m\u202e[red]x[/red]'
+
+
+class Found(HTMLParser):
+    """Elements of a page, and what stands in its scripts."""
+
+    def __init__(self, page: str):
+        super().__init__()
+        self.tags: set[str] = set()
+        self.attributes: set[str] = set()
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list) -> None:
+        self.tags.add(tag)
+        self.attributes |= {name for name, _ in attrs}
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_a_report_shows_what_a_bag_says_as_text(tmp_path: Path) -> None:
+    plain = write(tmp_path / 'plain.mcap')
+    bag = write(tmp_path / 'bag.mcap', controller=HTML.replace('/', '_'), vehicle=HTML, remark=HTML)
+    for name in ('plain', 'bag'):
+        cli.main(['analyze', str(tmp_path / f'{name}.mcap'), '--out', str(tmp_path / name)])
+    pages = [(tmp_path / name / 'report.html').read_text() for name in ('plain', 'bag')]
+    usual, found = map(Found, pages)
+    assert plain != bag
+    assert found.tags == usual.tags
+    assert found.attributes == usual.attributes
+    assert pages[1].count('</script>') == pages[0].count('</script>')
+    assert '&lt;xss' in pages[1]
+    assert '{{7*7}}' in pages[1]
+
+
+@pytest.mark.parametrize('name', ['../../out', '$\\frac$', 'x' * 3000, '..', ESCAPES, '-rf', 'a b'])
+def test_the_controller_of_a_bag_is_a_word(tmp_path: Path, name: str) -> None:
+    found = load_run(write(tmp_path / 'bag.mcap', controller=name)).controller
+    assert 0 < len(found) <= 100
+    assert set(found) <= set('ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.+-')
+    assert found[0].isalnum()
+
+
+@pytest.mark.parametrize('name', ['', '$x$', 'a\x1b[2J', 'a\nb', 'a\n', 'x' * 201, 'a\u202eb'])
+def test_a_vehicle_whose_name_would_be_obeyed_is_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / 'vehicle.yaml'
+    path.write_text(yaml.safe_dump({**SCENARIO.vehicle_data, 'name': name}))
+    with pytest.raises(InputError, match='name: expected a word or more, at most') as error:
+        load_vehicle(path)
+    assert printable(str(error.value)) == str(error.value)
+
+
+def test_a_vehicle_may_have_any_other_name(tmp_path: Path) -> None:
+    path = tmp_path / 'vehicle.yaml'
+    path.write_text(yaml.safe_dump({**SCENARIO.vehicle_data, 'name': 'Łódź <2> & Söhne'}))
+    assert load_vehicle(path).name == 'Łódź <2> & Söhne'
+
+
+@pytest.mark.parametrize('command', ['info', 'analyze'])
+def test_a_terminal_obeys_no_bag(tmp_path: Path, capsys, command: str) -> None:
+    bag = write(tmp_path / 'bag.mcap', topic=f'/{ESCAPES}', remark=ESCAPES, samples=2)
+    with pytest.raises(SystemExit) if command == 'analyze' else nullcontext():
+        cli.main([command, str(bag), *(['--vehicle', ESCAPES] if command == 'analyze' else [])])
+    out, err = capsys.readouterr()
+    assert printable(out + err) == out + err
+    assert MARK in out + err
+    if command == 'info':
+        assert '[red]x[/red]' in out.replace('\n', '')
+
+
+def test_a_console_shows_texts_and_keeps_its_own_colours() -> None:
+    out = io.StringIO()
+    console = TextConsole(
+        file=out, force_terminal=True, width=80, color_system='standard', highlight=False
+    )
+    table = Table()
+    table.add_column(ESCAPES)
+    table.add_row(Text(ESCAPES, 'red'))
+    console.print(table, ESCAPES)
+    shown = out.getvalue()
+    for obeyed in ('\x1b[2J', '\x1b]0', '\x07', '\r', '\x9b', '\u202e'):
+        assert obeyed not in shown
+    assert '\x1b[31m' in shown
+    assert '[red]x[/red]' in shown
+
+
+def test_lines_of_an_error_stay_lines() -> None:
+    assert printable('a\nb\x1bc\td') == f'a\nb{MARK}c{MARK}d'
+    assert printable('Δξ – ½ · 漢\u00a0字') == 'Δξ – ½ · 漢\u00a0字'

@@ -1,0 +1,196 @@
+"""What a process is open to: DDS security as it was asked for, the loopback unless opened."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import networks
+import policies
+import psutil
+import pytest
+import yaml
+from harness import EXECUTABLES, PATIENCE, auv, environment, fresh_domain, stop
+
+from auv_analysis import load_scenario
+from auv_analysis.supervisor import executable
+from auv_dynamics.files import InputError
+from auv_dynamics.ros.reach import PROFILE, RANGE, loopback, stay_local
+from auv_dynamics.ros.security import asked, require
+
+TESTS = Path(__file__).resolve().parents[1]
+PLANT = ('--ros-args', '-p', 'vehicle:=herman2018')
+ENFORCED = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce'}
+DDS_PORTS = range(7000, 32768)  # above them are those that the system hands out for sending
+
+
+def bare(**extra: str) -> dict[str, str]:
+    """Environment of somebody who has set nothing, in a domain of its own."""
+    unset = (
+        RANGE,
+        PROFILE,
+        'ROS_SECURITY_ENABLE',
+        'ROS_SECURITY_STRATEGY',
+        'ROS_SECURITY_KEYSTORE',
+    )
+    environ = {name: value for name, value in os.environ.items() if name not in unset}
+    return {**environ, 'ROS_DOMAIN_ID': str(fresh_domain()), 'PYTHONUNBUFFERED': '1', **extra}
+
+
+@contextmanager
+def plant(environ: dict[str, str], *before: str) -> Iterator[subprocess.Popen]:
+    """A plant node, started as by hand."""
+    command = [*before, str(executable('auv_dynamics', 'plant_node')), *PLANT]
+    process = subprocess.Popen(
+        command, env=environ, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    try:
+        yield process
+    finally:
+        print(stop(process))
+
+
+def listening(process: subprocess.Popen) -> set[str]:
+    """Addresses at which a node waits for others, as soon as it does."""
+    limit = time.monotonic() + PATIENCE
+    while time.monotonic() < limit:
+        assert process.poll() is None, process.communicate()[0]
+        listed = psutil.Process(process.pid).net_connections('inet')
+        bound = {one.laddr.ip for one in listed if one.laddr and one.laddr.port in DDS_PORTS}
+        if bound:
+            return bound
+        time.sleep(0.05)
+    raise AssertionError('the node binds no socket')
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'words'),
+    [
+        ('ROS_SECURITY_ENABLE', '1', 'true or false'),
+        ('ROS_SECURITY_ENABLE', 'True', 'true or false'),
+        ('ROS_SECURITY_STRATEGY', 'enforce', 'Enforce or Permissive'),
+    ],
+)
+def test_what_ros_would_take_for_a_no_is_refused(monkeypatch, name, value, words) -> None:
+    monkeypatch.setenv(name, value)
+    with pytest.raises(InputError, match=f'{name}: expected {words}, letter by letter, found'):
+        asked()
+
+
+def test_security_that_is_not_asked_for_is_not_looked_for(monkeypatch, capsys) -> None:
+    monkeypatch.delenv('ROS_SECURITY_ENABLE', raising=False)
+    require('auv')
+    assert capsys.readouterr().err == ''
+
+
+def test_security_that_is_not_enforced_is_said(monkeypatch, capsys) -> None:
+    monkeypatch.setenv('ROS_SECURITY_ENABLE', 'true')
+    monkeypatch.delenv('ROS_SECURITY_STRATEGY', raising=False)
+    assert asked()
+    assert 'not Enforce: a node without keys talks in the clear' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('command', 'keys', 'found'),
+    [
+        ('run', False, 'ROS_SECURITY_KEYSTORE: expected the folder of the keys'),
+        ('run', True, 'the security libraries'),  # that the middleware of the wheels lacks
+        ('watch', True, 'the security libraries'),
+    ],
+)
+def test_auv_never_runs_without_the_security_that_is_enforced(
+    tmp_path, command, keys, found
+) -> None:
+    if 'security libraries' in found and shutil.which('ros2'):
+        pytest.skip('a middleware that may have DDS security')
+    environ = dict(ENFORCED)
+    if keys:
+        environ['ROS_SECURITY_KEYSTORE'] = str(tmp_path / 'keys')
+        for name in ('auv', 'auv_watch'):
+            (tmp_path / 'keys/enclaves/auv_gvc' / name).mkdir(parents=True)
+    out = str(tmp_path / 'out')
+    arguments = ('run', 'case1', '--out', out) if command == 'run' else ('watch', '--once')
+    ended = auv(*arguments, **environ)
+    assert ended.returncode == 2, ended.stderr
+    assert len(ended.stderr.splitlines()) == 1, ended.stderr
+    for word in ('ROS_SECURITY_', 'expected', 'found', found):
+        assert word in ended.stderr
+    assert not os.path.exists(out)
+
+
+@pytest.mark.parametrize('keys', [False, True])
+def test_a_node_never_runs_without_the_security_that_is_enforced(tmp_path, keys) -> None:
+    environ = bare(**ENFORCED)
+    if keys:
+        (tmp_path / 'enclaves/auv_gvc/plant_node').mkdir(parents=True)
+        environ['ROS_SECURITY_KEYSTORE'] = str(tmp_path)
+    command = [str(executable('auv_dynamics', 'plant_node')), *PLANT]
+    command += ['--enclave', '/auv_gvc/plant_node']
+    ended = subprocess.run(
+        command, env=environ, capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+    assert ended.returncode == 2, ended.stderr
+    expected = 'error creating node' if keys else 'ROS_SECURITY_KEYSTORE: expected'
+    assert ended.stderr.splitlines()[-1].startswith(expected)
+
+
+def test_a_node_listens_on_the_loopback_alone_unless_it_is_opened() -> None:
+    with plant(bare()) as process:
+        assert 'this machine only' in process.stdout.readline()
+        assert listening(process) == {'127.0.0.1'}
+    with plant(bare(**{RANGE: 'SUBNET'})) as process:
+        assert '0.0.0.0' in listening(process)
+
+
+@pytest.mark.parametrize('chosen', ['SUBNET', 'OFF'])
+def test_what_the_user_has_chosen_stays(monkeypatch, chosen) -> None:
+    monkeypatch.setenv(RANGE, chosen)
+    monkeypatch.delenv(PROFILE, raising=False)
+    assert not stay_local()
+    assert os.environ[RANGE] == chosen
+    assert PROFILE not in os.environ
+
+
+def found(machine: networks.Machine, environ: dict[str, str], seconds: float = PATIENCE) -> str:
+    """Nodes that a participant finds on a machine within so long."""
+    command = machine.command(sys.executable, str(TESTS / 'outsider.py'), str(seconds))
+    environ = {**environ, **({} if RANGE in environ else loopback())}
+    return subprocess.run(
+        command, env=environ, capture_output=True, text=True, timeout=2 * PATIENCE, check=True
+    ).stdout.strip()
+
+
+def test_nothing_leaves_the_machine_and_nobody_outside_gets_in() -> None:
+    with networks.two_machines() as (inside, outside):
+        environ = bare()
+        knows = {**environ, RANGE: 'SUBNET', 'ROS_STATIC_PEERS': networks.INSIDE}
+        with plant(environ, *inside.command()):
+            assert found(inside, environ) == 'plant_node'
+            assert inside.sent() == 0
+            assert found(outside, knows, 3.0) == ''
+        before = inside.sent()
+        with plant({**environ, RANGE: 'SUBNET'}, *inside.command()):
+            assert found(outside, knows) == 'plant_node'
+            assert inside.sent() > before
+
+
+@pytest.mark.long
+def test_nothing_of_a_run_leaves_the_machine(tmp_path) -> None:
+    data = {**load_scenario('case1').data, 'vehicle': 'herman2018', 'duration': 0.2}
+    path = tmp_path / 'short.yaml'
+    path.write_text(yaml.safe_dump(data))
+    with networks.two_machines() as (inside, _):
+        command = inside.command(sys.executable, str(TESTS / 'graph_runs.py'), str(path))
+        environ = environment(fresh_domain())
+        subprocess.run([*command, str(tmp_path / 'out')], env=environ, timeout=120, check=True)
+        assert inside.sent() == 0
+    assert list(tmp_path.glob('out/*/*.mcap'))
+
+
+def test_every_executable_has_an_enclave() -> None:
+    listed = policies.allowed(policies.tree())
+    assert {f'/auv_gvc/{name}' for name in EXECUTABLES} <= set(listed)

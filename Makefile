@@ -22,10 +22,12 @@ endif
 COUNT ?= 10
 SEED ?= 0
 STEPS ?= 1000000
+KILLS ?= 200
+DAY ?= 86400
 EXAMPLES ?= 500
 MUTANTS ?= 500
 
-.PHONY: help setup case1 case2 test soak properties mutation bench bench-growth build lint format interop clean
+.PHONY: help setup case1 case2 test soak fuzz properties mutation audit bench bench-growth build lint format interop clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/:/' | column -t -s:
@@ -47,9 +49,13 @@ case1 case2: setup  ## the paper's experiment: GVC against CL on real nodes, wit
 test: setup  ## the tests
 	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
-soak: setup  ## COUNT random runs on the node graph by SEED, one of STEPS, what else takes long
-	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) AUV_GVC_STEPS=$(STEPS) \
-	  $(BIN)/python -m pytest -m long tests
+soak: setup  ## COUNT random runs by SEED, KILLS of nodes, a run of STEPS, one of DAY s, what else takes long
+	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) AUV_GVC_STEPS=$(STEPS) AUV_GVC_KILLS=$(KILLS) \
+	  AUV_GVC_DAY=$(DAY) $(BIN)/python -m pytest -m long tests
+
+# COUNT is that of soak's runs unless it is given
+fuzz: setup  ## broken files, messages and bags: COUNT inputs (100000) drawn by SEED
+	$(BIN)/python tests/fuzz/run.py --count $(if $(filter command line,$(origin COUNT)),$(COUNT),100000) --seed $(SEED)
 
 properties: setup  ## the property tests with EXAMPLES examples each, drawn by SEED
 	AUV_GVC_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n 2 --hypothesis-seed=$(SEED) \
@@ -61,6 +67,11 @@ mutation: setup  ## mutants of the mathematics: MUTANTS=count or all, SEED=numbe
 	$(VENV)/mutation/bin/python -m pip install --quiet -r requirements-mutation.txt
 	$(VENV)/mutation/bin/python tests/mutation/run.py --python $(abspath $(BIN))/python \
 	    --mutants $(MUTANTS) --seed $(SEED)
+
+audit: setup  ## known vulnerabilities of what is installed; exit code 3: nothing was audited
+	test -x $(VENV)/audit/bin/python || $(PYTHON) -m venv $(VENV)/audit
+	$(VENV)/audit/bin/python -m pip install --quiet -r requirements-audit.txt
+	$(VENV)/audit/bin/python tests/audit/run.py --python $(abspath $(BIN))/python
 
 # without the peers of the registry, what is measured against them is reported as not measured
 bench: setup  ## speed against scalar C, ping-pong, readers and peers: benchmarks/README.md

@@ -11,8 +11,8 @@ import yaml
 from rosbags.typesys import Stores, get_typestore
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.bag_writer import BagWriter
 from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis.recording import BagWriter, Storage
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario
 from auv_dynamics.interface import NANOSECONDS, Frames
@@ -70,7 +70,7 @@ def write_run(run: Run, scenario: Scenario, folder: Path, **how: Any) -> Path:
     """Write a run as the bag that the node graph would have recorded of its step topics."""
     parameters = node_parameters(scenario, run.controller, bag=folder)
     texts = dict(scenario.attachments) | {'params.yaml': parameter_file(parameters, 'made')}
-    writer = BagWriter(folder, texts, **how)
+    writer = BagWriter(folder, texts, Storage(**how))
     for topic, (kind, _) in COLUMNS.items():
         text = TYPES.generate_msgdef(kind, ros_version=2)[0]
         writer.add_channel(f'/{topic}', kind, text, [], TYPES.hash_rihs01(kind))

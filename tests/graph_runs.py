@@ -9,9 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
+import yaml
 from harness import EXECUTABLES, environment, fresh_domain
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+
+from auv_analysis import load_scenario
 
 
 def start(scenario: Path, out: Path, *options: str) -> subprocess.Popen:
@@ -26,6 +29,16 @@ def record(scenario: Path, out: Path, domain: int | None = None) -> subprocess.P
     environ = environment(fresh_domain() if domain is None else domain)
     command = [sys.executable, __file__, str(scenario), str(out)]
     return subprocess.Popen(command, env=environ, stderr=subprocess.PIPE, text=True)
+
+
+def long_run(folder: Path, steps: int) -> Path:
+    """Case 1 of another length, GVC alone."""
+    case1 = load_scenario('case1')
+    controllers = {'gvc': case1.data['controllers']['gvc']}
+    data = {**case1.data, 'vehicle': 'herman2018', 'controllers': controllers}
+    path = folder / 'long.yaml'
+    path.write_text(yaml.safe_dump({**data, 'name': 'long', 'duration': steps * case1.step}))
+    return path
 
 
 def nodes(folder: Path) -> dict[str, psutil.Process]:
@@ -78,7 +91,6 @@ def plain(value: object) -> object:
 def main(path: str, out: str) -> None:
     """Record the first controller of a scenario."""
     from auv_analysis.experiment import run_controller
-    from auv_analysis.scenario import load_scenario
     from auv_analysis.warm_up import warm_up
     from auv_dynamics.ros.watcher import Watcher
 

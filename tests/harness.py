@@ -17,9 +17,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from auv_analysis.domain import is_free
-from auv_analysis.experiment import loopback
 from auv_analysis.supervisor import executable
 from auv_dynamics.ros import topics
+from auv_dynamics.ros.reach import loopback
 
 PACKAGES = {
     'plant_node': 'auv_dynamics',
@@ -27,8 +27,13 @@ PACKAGES = {
     'controller_node': 'auv_gvc_controller',
     'recorder_node': 'auv_analysis',
     'analysis_node': 'auv_analysis',
+    'replay_node': 'auv_analysis',
 }
-EXECUTABLES = {**PACKAGES, 'composed_graph': 'auv_analysis'}
+EXECUTABLES = {
+    **PACKAGES,
+    'composed_graph': 'auv_analysis',
+    'frame_converter_node': 'auv_dynamics',
+}
 PATIENCE = 30.0  # s, after which a test that waits has failed
 _domains = itertools.count()
 
@@ -174,9 +179,11 @@ class Peer:
 
 
 @contextmanager
-def graph(*nodes: tuple[str, list[str]]) -> Iterator[tuple[Peer, dict[str, subprocess.Popen]]]:
-    """Nodes in a fresh domain with a peer beside them; all are ended afterwards."""
-    domain = fresh_domain()
+def graph(
+    *nodes: tuple[str, list[str]], domain: int | None = None
+) -> Iterator[tuple[Peer, dict[str, subprocess.Popen]]]:
+    """Nodes in a domain, by default a fresh one, and a peer beside them; all are ended after it."""
+    domain = fresh_domain() if domain is None else domain
     peer = Peer(domain)
     processes = {name: start_node(name, domain, *arguments) for name, arguments in nodes}
     try:

@@ -31,6 +31,9 @@ setup(
         (f'share/{NAME}/config/scenarios', glob('config/scenarios/*.yaml')),
         (f'share/{NAME}/config/params', glob('config/params/*.yaml')),
         (f'share/{NAME}/config/campaigns', glob('config/campaigns/*.yaml')),
+        (f'share/{NAME}/config/security', glob('config/security/*.xml')),
+        (f'share/{NAME}/config/security/common', glob('config/security/common/*.xml')),
+        (f'share/{NAME}/config/security/profiles', glob('config/security/profiles/*.xml')),
     ],
     python_requires='>=3.11',
     install_requires=[
@@ -43,6 +46,7 @@ setup(
         'mcap>=1.5',
         'mcap-ros2-support>=0.5.5',
         'zstandard>=0.19',
+        'lz4>=4.0',
         'matplotlib>=3.6',
         'Pillow>=9',
         'Jinja2>=3.0',
@@ -64,6 +68,7 @@ setup(
             'auv = auv_analysis.cli:main',
             'recorder_node = auv_analysis.recorder_node:main',
             'analysis_node = auv_analysis.analysis_node:main',
+            'replay_node = auv_analysis.replay_node:main',
             'composed_graph = auv_analysis.composed_graph:main',
         ]
     },

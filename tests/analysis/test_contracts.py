@@ -44,8 +44,9 @@ def test_there_are_sources() -> None:
 def test_mathematics_never_imports_ros(path: Path) -> None:
     allowed = path.stem.endswith('_node') or path.parent.name == 'ros'
     # wiring of nodes that is split from a *_node.py to keep it short
-    wiring = path.stem in ('plant_clock', 'plant_parameters', 'controller_parameters',
-                           'recorder_parameters')  # fmt: skip
+    wiring = path.stem in ('plant_clock', 'plant_parameters', 'fault_parameters',
+                           'controller_parameters', 'recorder_parameters',
+                           'replay_parameters')  # fmt: skip
     if not (allowed or wiring):
         assert not [m for m in imported(path) if is_ros(m)]
 

@@ -33,9 +33,18 @@ CONTRACT = {  # every name of the contract's table that is not optional
 }  # fmt: skip
 WORDS = {
     'vehicle', 'integrator', 'law', 'setpoint_pairing', 'setpoint_acceleration', 'bag',
-    'odom_frame', 'base_frame', 'storage.compression', 'kind',
+    'odom_frame', 'base_frame', 'storage.compression', 'kind', 'stamp_clock',
 }  # fmt: skip
-WHOLE = {'seed', 'recorder_window', 'horizon', 'every', 'analysis_every', 'storage.chunk_size'}
+WHOLE = {
+    'storage.max_size',
+    'storage.free_space',
+    'seed',
+    'recorder_window',
+    'horizon',
+    'every',
+    'analysis_every',
+    'storage.chunk_size',
+}
 SWITCHES = {
     'lockstep', 'start_paused', 'autostart', 'use_sim_time', 'strict', 'ground_truth', 'thrusters',
     'anti_windup',

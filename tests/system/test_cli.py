@@ -18,8 +18,8 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 
 from auv_analysis import cli, load_scenario
-from auv_analysis.bag_writer import BagWriter
 from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis.recording import BagWriter, Storage
 from auv_analysis.schemas import schema_text
 from auv_dynamics.config import shipped
 
@@ -27,7 +27,7 @@ AUV = Path(sys.executable).with_name('auv')
 REXROV = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
 COMMANDS = [
     'run', 'simulate', 'study', 'design', 'analyze', 'atlas', 'sweep', 'tune', 'watch', 'info',
-    'params', 'check-vehicle',
+    'params', 'check-vehicle', 'replay', 'check-driver',
 ]  # fmt: skip
 WRONG_LINES = {  # what is typed -> what the one line names
     '': 'COMMAND',
@@ -55,6 +55,10 @@ WRONG_LINES = {  # what is typed -> what the one line names
     'watch --for nan': '--for',
     'watch --vehicle gone': 'gone',
     'watch --namespace 1/a': '--namespace',
+    'replay gone': 'gone',
+    'replay gone --rate fast': '--rate',
+    'replay gone --law cl': 'gone',
+    'replay gone --overwrite': '--overwrite',
     'sweep': 'campaign',
     'sweep case9': 'case9',
     'sweep case1_gains --out taken': 'taken: --out',
@@ -175,6 +179,23 @@ def test_params_prints_the_parameter_file(options, folder, capsys) -> None:
     assert json.loads(capsys.readouterr().out) == nodes
 
 
+def test_params_for_a_driver_know_neither_plant_nor_simulated_time(folder, capsys) -> None:
+    cli.main(['params', 'case1', '--controller', 'gvc', '--no-plant', '--out', 'driver.yaml'])
+    capsys.readouterr()
+    data = yaml.safe_load((folder / 'driver.yaml').read_text())
+    nodes = {name.rpartition('/')[2]: entry['ros__parameters'] for name, entry in data.items()}
+    assert set(nodes) == {'setpoint_node', 'controller_node', 'analysis_node', 'recorder_node'}
+    assert not any(values['use_sim_time'] for values in nodes.values())
+    assert nodes['controller_node']['lockstep'] is False
+    recorder = nodes['recorder_node']
+    assert recorder['strict'] is False
+    assert recorder['topics'] == ['odom', 'cmd_vel', 'cmd_accel', 'wrench', 'disturbance_estimate']
+    attached = dict(entry.split('=') for entry in recorder['attachments'])
+    assert attached['params.yaml'] == str(folder / 'driver.yaml')
+    assert Path(attached['vehicle.yaml']).name == 'herman2018.yaml'
+    assert 'wrench=2' in nodes['controller_node']['expected_subscribers']
+
+
 SHORT = """
 name: short
 vehicle: herman2018_neutral
@@ -220,7 +241,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     def write(**attachments: str | None) -> Path:
         named = {name.replace('_', '.'): text for name, text in attachments.items()}
         kept = {k: text for k, text in {**usual, **named}.items() if text is not None}
-        writer = BagWriter(tmp_path_factory.mktemp('bag') / 'gvc', kept, compression='none')
+        writer = BagWriter(tmp_path_factory.mktemp('bag') / 'gvc', kept, Storage('none'))
         odom, wrench = Odometry(child_frame_id='base_link_fsd'), WrenchStamped()
         odom.header.frame_id, wrench.header.frame_id = 'odom_ned', 'base_link_fsd'
         for topic, kind in (('/odom', 'nav_msgs/msg/Odometry'),
@@ -357,7 +378,7 @@ def test_analyze_keeps_the_bags_that_it_reads(given, out, recording, folder) -> 
 
 @pytest.mark.parametrize('cut', [3, 20, 100])
 def test_analyze_refuses_messages_that_cannot_be_decoded(cut, folder, capsys) -> None:
-    writer = BagWriter(folder / 'taken' / 'gvc', {}, compression='none')
+    writer = BagWriter(folder / 'taken' / 'gvc', {}, Storage('none'))
     kind = 'nav_msgs/msg/Odometry'
     writer.add_channel('/odom', kind, schema_text(kind), [], '')
     writer.write('/odom', 0, serialize_message(Odometry())[:cut])
@@ -368,7 +389,7 @@ def test_analyze_refuses_messages_that_cannot_be_decoded(cut, folder, capsys) ->
 
 
 def test_analyze_refuses_a_topic_of_another_type(folder, capsys) -> None:
-    writer = BagWriter(folder / 'taken' / 'gvc', {}, compression='none')
+    writer = BagWriter(folder / 'taken' / 'gvc', {}, Storage('none'))
     kind = 'geometry_msgs/msg/WrenchStamped'
     writer.add_channel('/odom', kind, schema_text(kind), [], '')
     writer.write('/odom', 0, serialize_message(WrenchStamped()))

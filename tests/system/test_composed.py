@@ -41,7 +41,7 @@ def write(folder: Path, **changes) -> Path:
     return path
 
 
-@pytest.mark.parametrize('executor', ['', 'plain'])
+@pytest.mark.parametrize('executor', ['', pytest.param('plain', marks=pytest.mark.long)])
 def test_the_bag_is_that_of_five_processes(tmp_path: Path, executor: str) -> None:
     """Message for message, analysis and clock included."""
     bags = []

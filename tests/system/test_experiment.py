@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from graph_runs import every_message, node_of, nodes, start
-from harness import PACKAGES, auv, fresh_domain
+from harness import auv, fresh_domain
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
@@ -157,27 +157,6 @@ def test_a_run_can_be_repeated_from_what_it_left(done: Path, tmp_path: Path) -> 
     again = simulate(load_scenario(left), 'gvc', 'zoh')
     first = simulate(load_scenario(done / 'six_dofs.yaml'), 'gvc', 'zoh')
     assert np.array_equal(again.nu, first.nu)
-
-
-QUICKLY = ('controller_node', 'recorder_node')  # the others take as long and need `make soak`
-NODES = [
-    name if name in QUICKLY else pytest.param(name, marks=pytest.mark.long)
-    for name in sorted(PACKAGES)
-]
-
-
-@pytest.mark.parametrize('name', NODES)
-def test_a_node_that_dies_ends_the_run_and_loses_nothing(tmp_path: Path, name: str) -> None:
-    out = tmp_path / 'out'
-    process = start(write(tmp_path / 's.yaml', duration=600.0), out)
-    node_of(out, name).kill()
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 1
-    assert f'{name} ended with exit code -9' in errors
-    assert not nodes(out)
-    run = load_run(out / 'gvc')
-    assert len(run.t) > 10
-    assert np.isfinite(run.nu).all()
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGKILL])

@@ -1,9 +1,12 @@
 """A bag of ours read by three readers that are not ours: equal values, whole schemas."""
 
 import json
+import os
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +16,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from auv_analysis.bag import load_run
+from auv_analysis.bag import bag_files, load_run, read_bag
+from auv_analysis.recording import BagWriter, Storage
 from auv_dynamics import interface
 
 HERE = Path(__file__).parent
@@ -106,23 +110,97 @@ def test_schemas_hashes_and_attachments(bag: Path) -> None:
     assert information['message_count'] == summary.statistics.message_count
 
 
-@pytest.mark.skipif(shutil.which('npm') is None, reason='npm is not installed')
-def test_npm_mcap_core(bag: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope='module')
+def core(tmp_path_factory) -> Callable[[Path], dict[str, Any]]:
+    """What @mcap/core reads from a file."""
+    if shutil.which('npm') is None:
+        pytest.skip('npm is not installed')
+    folder = tmp_path_factory.mktemp('npm')
     for name in ('package.json', 'read.mjs'):
-        shutil.copy(CHECK / name, tmp_path)
-    installed = subprocess.run(
-        ['npm', 'install', '--no-audit', '--no-fund', '--silent'],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert installed.returncode == 0, installed.stderr
-    ended = subprocess.run(
-        ['node', 'read.mjs', str(mcap_of(bag))],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert ended.returncode == 0, ended.stderr
-    document = json.loads(ended.stdout)
+        shutil.copy(CHECK / name, folder)
+
+    def run(*command: str) -> str:
+        ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        assert ended.returncode == 0, ended.stderr
+        return ended.stdout
+
+    run('npm', 'install', '--no-audit', '--no-fund', '--silent')
+    return lambda path: json.loads(run('node', 'read.mjs', str(path)))
+
+
+def test_npm_mcap_core(bag: Path, core: Callable[[Path], dict[str, Any]]) -> None:
+    document = core(mcap_of(bag))
     run = load_run(bag)
     assert np.array_equal(document['wrench'], run.tau)
     assert document['stamps'] == [k * 10_000_000 for k in range(201)]
     assert document['counts']['/odom'] == 201
     assert set(document['attachments']) >= {'scenario.yaml', 'vehicle.yaml', 'params.yaml'}
+
+
+def written_again(bag: Path, folder: Path, storage: Storage) -> Path:
+    """The bag once more, stored in another way."""
+    attached = {name: (bag.parent / name).read_text() for name in ('scenario.yaml', 'vehicle.yaml')}
+    attached['params.yaml'] = (bag / 'params.yaml').read_text()
+    writer = BagWriter(folder, attached, storage)
+    with mcap_of(bag).open('rb') as stream:
+        for schema, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            if not writer.has_channel(channel.topic):
+                qos = yaml.safe_load(channel.metadata['offered_qos_profiles'])
+                digest = channel.metadata['topic_type_hash']
+                text = schema.data.decode()
+                writer.add_channel(channel.topic, schema.name, text, qos, digest)
+            writer.write(channel.topic, message.log_time, message.data)
+    writer.close()
+    return folder
+
+
+@pytest.fixture(scope='module')
+def repaired(bag: Path, tmp_path_factory) -> Path:
+    """The bag without its end, repaired."""
+    folder = tmp_path_factory.mktemp('repaired') / 'gvc'
+    path = mcap_of(written_again(bag, folder, Storage(chunk_size=50_000)))
+    with path.open('rb') as stream:
+        chunks = make_reader(stream).get_summary().chunk_indexes
+    os.truncate(path, chunks[-1].chunk_start_offset + 10)
+    (folder / 'metadata.yaml').unlink()
+    ended = auv('recover', str(folder))
+    assert ended.returncode == 0, ended.stderr
+    return folder
+
+
+@pytest.fixture(scope='module')
+def split(bag: Path, tmp_path_factory) -> Path:
+    """The bag in several files."""
+    storage = Storage(max_duration=500_000_000, pace='/odom')
+    folder = written_again(bag, tmp_path_factory.mktemp('split') / 'gvc', storage)
+    assert len(list(folder.glob('*.mcap'))) > 3
+    return folder
+
+
+@pytest.mark.parametrize('name', ['repaired', 'split'])
+def test_repaired_and_split_bags(
+    name: str, core: Callable[[Path], dict[str, Any]], request: pytest.FixtureRequest, bag: Path
+) -> None:
+    """rosbags, mcap-ros2-support and @mcap/core read the same wrenches as our reader."""
+    folder = request.getfixturevalue(name)
+    wrenches: dict[str, dict[int, list[float]]] = {'rosbags': {}, 'mcap_ros2': {}, 'core': {}}
+    with AnyReader([folder]) as reader:
+        for c, stamp, raw in reader.messages():
+            if c.topic == '/wrench':
+                wrenches['rosbags'][stamp] = wrench_row(reader.deserialize(raw, c.msgtype))
+    for path in bag_files(folder):
+        with path.open('rb') as stream:
+            read = make_reader(stream, decoder_factories=[DecoderFactory()], validate_crcs=True)
+            for _, c, m, decoded in read.iter_decoded_messages():
+                if c.topic == '/wrench':
+                    wrenches['mcap_ros2'][m.log_time] = wrench_row(decoded)
+        document = core(path)
+        wrenches['core'].update(zip(document['stamps'], document['wrench'], strict=True))
+        assert set(document['attachments']) >= {'scenario.yaml', 'vehicle.yaml', 'params.yaml'}
+    stamps, rows = read_bag(folder).messages['/wrench']
+    for found in wrenches.values():
+        assert sorted(found) == stamps.tolist()
+        assert np.array_equal([found[stamp] for stamp in stamps.tolist()], rows[:, :6])
+    run, whole = load_run(folder), load_run(bag)
+    assert np.array_equal(run.tau, whole.tau[: len(run.t)])
+    assert name == 'repaired' or len(run.t) == len(whole.t)

@@ -5,6 +5,7 @@ both. Nothing may be lost or doubled, which is checked by reading the bag; the r
 this promise says so.
 """
 
+import contextlib
 import os
 import re
 import subprocess
@@ -16,7 +17,7 @@ import numpy as np
 import psutil
 import pytest
 import yaml
-from graph_runs import node_of, nodes, raw_messages, record, start
+from graph_runs import long_run, node_of, nodes, raw_messages, record, start
 from harness import auv
 
 from auv_analysis import load_scenario, simulate
@@ -28,6 +29,7 @@ from auv_dynamics.signals import DOFS
 COUNT = int(os.environ.get('AUV_GVC_COUNT', '10'))
 SEED = int(os.environ.get('AUV_GVC_SEED', '0'))
 STEPS = int(os.environ.get('AUV_GVC_STEPS', '1000000'))
+DAY = float(os.environ.get('AUV_GVC_DAY', '86400'))  # s of vehicle time
 VEHICLES = ('herman2018', 'herman2018_neutral', 'rexrov', 'bluerov2_heavy', 'girona500')
 PAPER = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 SIGNALS = ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate',
@@ -91,16 +93,6 @@ def test_a_random_run_loses_nothing_and_equals_its_simulation(i: int, tmp_path: 
         assert np.all(np.abs(a - b) <= 1e-9 * np.maximum(1, np.abs(b))), name
 
 
-def long_run(folder: Path, steps: int) -> Path:
-    """Case 1 of another length, GVC alone."""
-    case1 = load_scenario('case1')
-    controllers = {'gvc': case1.data['controllers']['gvc']}
-    data = {**case1.data, 'vehicle': 'herman2018', 'controllers': controllers}
-    path = folder / 'long.yaml'
-    path.write_text(yaml.safe_dump({**data, 'name': 'long', 'duration': steps * case1.step}))
-    return path
-
-
 def ended_within(process: subprocess.Popen, seconds: float) -> bool:
     try:
         process.wait(timeout=seconds)
@@ -130,7 +122,7 @@ def hold_up(recorder: psutil.Process, process: subprocess.Popen, sizes: list[dic
                     break
             done[kind] += 1
     except psutil.NoSuchProcess:
-        process.wait(timeout=60)
+        process.wait(timeout=300)
     return done
 
 
@@ -172,7 +164,30 @@ def test_a_recorder_stopped_and_slowed_at_random_loses_and_doubles_nothing(tmp_p
 
 @pytest.mark.long
 def test_a_million_steps_lose_and_double_nothing_in_bounded_memory(tmp_path: Path) -> None:
-    sizes = held_up_run(tmp_path, STEPS, record)
+    assert_flat(held_up_run(tmp_path, STEPS, record))
+
+
+@pytest.mark.long
+def test_a_day_of_vehicle_time_keeps_its_memory(tmp_path: Path) -> None:
+    """At 20 Hz, in lock-step: no node holds more than in the first third."""
+    path, out = long_run(tmp_path, 0), tmp_path / 'out'
+    data = yaml.safe_load(path.read_text()) | {'step': 0.05, 'duration': DAY}
+    path.write_text(yaml.safe_dump(data))
+    process = record(path, out)
+    node_of(out, 'recorder_node')
+    running, sizes = nodes(out), []
+    with contextlib.suppress(psutil.NoSuchProcess):
+        while not ended_within(process, 1.0):
+            sizes.append({name: node.memory_info().rss / 1e6 for name, node in running.items()})
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    counts = read_bag(out / 'gvc', decode=False).counts
+    assert all(counts[f'/{topic}'] == round(DAY / 0.05) + 1 for topic in interface.STEP_TOPICS)
+    assert_flat(sizes)
+
+
+def assert_flat(sizes: list[dict]) -> None:
+    """No node grows by 20 MB from the first third of its samples to the last."""
     first, last = sizes[: len(sizes) // 3], sizes[-len(sizes) // 3 :]
     for node in sizes[0]:
         before, after = (max(sample[node] for sample in part) for part in (first, last))

@@ -3,6 +3,7 @@
 import json
 import os
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from auv_analysis.command_line import parser
@@ -16,9 +17,7 @@ def main(arguments: list[str] | None = None) -> None:
     from auv_dynamics.files import InputError
 
     try:
-        result = function(options.command)(options)
-        if options.json:
-            print(json.dumps(result, allow_nan=False), flush=True)
+        _work(function(options.command), options)
     except InputError as error:
         _say(str(error))
         sys.exit(2)
@@ -33,8 +32,26 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(1)
 
 
-def _say(text: Any) -> None:
-    print(text, file=sys.stderr, flush=True)
+def _work(command: Callable[..., dict[str, Any]], options: Any) -> None:
+    from auv_analysis.failure import FailedError
+
+    try:
+        _print(options, command(options))
+    except FailedError as error:
+        if error.document is not None:
+            _print(options, error.document)
+        raise
+
+
+def _print(options: Any, document: dict[str, Any]) -> None:
+    if options.json:
+        print(json.dumps(document, allow_nan=False), flush=True)
+
+
+def _say(text: str) -> None:
+    from auv_dynamics.printable import printable
+
+    print(printable(text), file=sys.stderr, flush=True)
 
 
 if __name__ == '__main__':

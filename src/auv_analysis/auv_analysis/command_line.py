@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from auv_analysis.replay.options import add_options as add_replay
+
 SCENARIO = 'a scenario file, or the bare name of a shipped one'
 VEHICLE = 'a vehicle file, or the bare name of a shipped one'
 RESULT = 'a bag, a folder of results or of a sweep, or a scenario, which is simulated'
@@ -87,6 +89,8 @@ def _analyze(command: argparse.ArgumentParser) -> None:
     command.add_argument('results', nargs='+', metavar='BAG', help=RESULT)
     command.add_argument('--by', metavar='MEASURE', help='of a sweep: what sorts the best rows')
     command.add_argument('--vehicle', help='for bags that do not carry their own')
+    text = 'own law that results may name, as its code may run; may be repeated'
+    command.add_argument('--law', metavar='MODULE:CLASS', action='append', help=text)
     _foreign(command.add_argument_group('bags of other systems'))
 
 
@@ -175,10 +179,18 @@ def _params(command: argparse.ArgumentParser) -> None:
     command.add_argument('scenario', help=SCENARIO)
     command.add_argument('--controller', required=True)
     command.add_argument('--real-time', action='store_true', help='paced by the clock')
+    text = "for a vehicle driver in the plant's place: in real time, without simulated time"
+    command.add_argument('--no-plant', action='store_true', help=text)
 
 
 def _check_vehicle(command: argparse.ArgumentParser) -> None:
     command.add_argument('vehicle', metavar='FILE', help=VEHICLE)
+
+
+def _check_driver(command: argparse.ArgumentParser) -> None:
+    from auv_analysis.driver_check.options import add_options
+
+    add_options(command)
 
 
 class Command(NamedTuple):
@@ -199,9 +211,12 @@ COMMANDS = {
     'sweep': Command('many rollouts of a scenario, with values that vary, to Parquet', _sweep),
     'tune': Command('laws tuned to equal effort or error, and compared over draws', _tune),
     'watch': Command('live dashboard in the terminal', _watch, writes=False),
+    'replay': Command('a bag as live topics again, or what another law makes of it', add_replay),
     'info': Command('what lies in a bag', _info, writes=False),
+    'recover': Command('repair a bag that was cut or damaged, in place', _info, writes=False),
     'params': Command('the ROS parameter file of a scenario', _params),
     'check-vehicle': Command(
         'inertia, couplings and limits of a vehicle', _check_vehicle, writes=False
     ),
+    'check-driver': Command('whether a vehicle driver offers what our nodes need', _check_driver),
 }

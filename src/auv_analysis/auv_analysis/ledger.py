@@ -21,6 +21,7 @@ class StepLedger:
     def __init__(self, topics: Sequence[str], step_ns: int, strict: bool = True):
         self._step, self._strict = step_ns, strict
         self._newest = dict.fromkeys(topics, -1)
+        self._last: dict[str, int] = {}
         self._origin: int | None = None
         self.gaps = dict.fromkeys(topics, 0)
 
@@ -34,7 +35,9 @@ class StepLedger:
             due = self._origin + expected * self._step
             text = f'{topic}: expected step {expected} ({due} ns), found {ns} ns'
             raise LostStepError(f'{text}: {"doubled" if k < expected else "lost"}')
-        self.gaps[topic] += max(0, k - expected)
+        if topic in self._last:  # without a grid: by the time since the message before
+            self.gaps[topic] += max(0, round((ns - self._last[topic]) / self._step) - 1)
+        self._last[topic] = max(ns, self._last.get(topic, ns))
         self._newest[topic] = max(self._newest[topic], k)
 
     @property

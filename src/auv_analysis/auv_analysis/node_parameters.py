@@ -4,13 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 
+from auv_analysis.node_values import disturbance_values, fault_values, flat
 from auv_analysis.scenario import Scenario
 from auv_dynamics import interface
-from auv_dynamics.current import AXES
-from auv_dynamics.files import matrix6
 from auv_dynamics.signals import harmonic_columns
 
 PLANT, SETPOINT, CONTROLLER = 'plant_node', 'setpoint_node', 'controller_node'
@@ -20,6 +18,7 @@ WINDOW = 2000  # steps that the plant may be ahead of the recorder
 HORIZON = 200  # steps that set-points are published ahead
 WRENCH_TIMEOUT = 30.0  # s of silence that end a lock-step run
 TIMEOUT = 0.5  # s, the real-time watchdogs
+RAMP = 0.2  # s, in real time, from no wrench to all of the law's and back
 OF_PLANT_ALONE = (  # no driver has to offer them
     *(interface.TWIST, interface.DISTURBANCE),
     *(interface.WRENCH_APPLIED, interface.GROUND_TRUTH),
@@ -85,7 +84,7 @@ def node_parameters(
         SETPOINT: {**clock, **grid, 'horizon': HORIZON, **_setpoint(scenario)},
         CONTROLLER: {**clock, **_controller(scenario, controller, vehicle, lockstep)},
     }
-    sensing = plant and 'sensors' in scenario.data
+    sensing = plant and scenario.senses
     if analysis:
         parameters[ANALYSIS] = {
             **clock, 'vehicle': vehicle, 'every': EVERY, 'ground_truth': sensing
@@ -115,6 +114,9 @@ def node_parameters(
             'analysis_every': EVERY if analysis and plant else 0,
             'storage.compression': 'zstd',
             'storage.chunk_size': 1 << 20,
+            'storage.max_size': 0,
+            'storage.max_duration': 0.0,
+            'storage.free_space': 1 << 25,
             'attachments': [f'{name}={path}' for name, path in (attachments or {}).items()],
         }
     return {node: _without_empty_lists(values) for node, values in parameters.items()}
@@ -122,9 +124,9 @@ def node_parameters(
 
 def _published(scenario: Scenario) -> list[str]:
     """Topics of which something is published in this scenario."""
-    absent = {interface.WRENCH_APPLIED: 'actuators', interface.GROUND_TRUTH: 'sensors'}
+    there = {interface.WRENCH_APPLIED: scenario.acts, interface.GROUND_TRUTH: scenario.senses}
     listed = (*interface.STEP_TOPICS, *interface.OPTIONAL_STEP_TOPICS, *interface.ANALYSIS_TOPICS)
-    return [topic for topic in listed if absent.get(topic, 'name') in scenario.data]
+    return [topic for topic in listed if there.get(topic, True)]
 
 
 def _listens(node: str, topic: str, sensing: bool) -> bool:
@@ -156,30 +158,14 @@ def _plant(scenario: Scenario, vehicle: str, nodes: list[str], lockstep: bool) -
     names = []
     for i, spec in enumerate(scenario.data['disturbance'], start=1):
         names.append(f'd{i}_{spec["kind"]}')
-        values = _disturbance(spec)
+        values = disturbance_values(spec)
         parameters.update({f'disturbance.{names[-1]}.{key}': v for key, v in values.items()})
     for group in ('actuators', 'sensors'):
         for key, value in scenario.data.get(group, {}).items():
             listed = key in ('limit', 'rate', 'velocity_noise', 'attitude_noise')
-            kind = _flat if listed else bool if key == 'thrusters' else float
+            kind = flat if listed else bool if key == 'thrusters' else float
             parameters[f'{group}.{key}'] = kind(value)
-    return {**parameters, 'disturbance.names': names}
-
-
-def _disturbance(spec: Mapping[str, Any]) -> dict[str, Any]:
-    values = {
-        'herman2018': {'exponent_sign': float(spec.get('exponent_sign', -1))},
-        'harmonic': harmonic_columns(spec),
-        'current': harmonic_columns(spec, tuple(AXES)),
-        'model_error': {},
-    }[spec['kind']]
-    for key in ('mass', 'added_mass', 'damping', 'buoyancy'):
-        if key in spec:
-            values[key] = float(spec[key])
-    for key in ('scale', 'dM', 'dD', 'velocity'):
-        if key in spec:
-            values[key] = _flat(spec[key])
-    return {'kind': spec['kind'], **values}
+    return {**parameters, 'disturbance.names': names, **fault_values(scenario)}
 
 
 def _setpoint(scenario: Scenario) -> dict[str, Any]:
@@ -203,12 +189,14 @@ def _controller(
         'setpoint_acceleration': 'topic',
         'setpoint_timeout': TIMEOUT,
         'odometry_timeout': TIMEOUT,
+        'ramp': RAMP,
+        'stamp_clock': 'auto',
         'limits.gap': max(1.0, 10 * scenario.step),
         **{f'limits.{name}': value for name, value in _limits(lockstep).items()},
         'autostart': True,
     }
     gains = scenario.gain_values(controller)
-    return {**parameters, **{f'gains.{name}': _flat(value) for name, value in gains.items()}}
+    return {**parameters, **{f'gains.{name}': flat(value) for name, value in gains.items()}}
 
 
 def _anti_windup(scenario: Scenario, controller: str) -> dict[str, Any]:
@@ -216,7 +204,7 @@ def _anti_windup(scenario: Scenario, controller: str) -> dict[str, Any]:
     spec = scenario.data['actuators']
     told: dict[str, Any] = {'anti_windup': scenario.controller(controller).get('anti_windup', True)}
     if 'limit' in spec:
-        told['actuators.limit'] = _flat(spec['limit'])
+        told['actuators.limit'] = flat(spec['limit'])
     if spec.get('thrusters'):
         told['actuators.thrusters'] = True
     return told
@@ -227,13 +215,6 @@ def _limits(lockstep: bool) -> dict[str, float]:
     if lockstep:
         return {'speed': 120.0, 'rate': 120.0, 'acceleration': 1e5}
     return {'speed': 20.0, 'rate': 20.0, 'acceleration': 100.0}
-
-
-def _flat(value: Any) -> list[float]:
-    """Shortest list of numbers that a parameter takes: as it is, 36 for a matrix."""
-    if np.ndim(value) < 2:
-        return [float(number) for number in np.atleast_1d(value)]
-    return matrix6(value).ravel().tolist()
 
 
 def _without_empty_lists(parameters: dict[str, Any]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from auv_analysis.fault_words import Mark
 from auv_dynamics.vehicle import Vehicle
 
 FOREIGN = 'foreign_bag'  # source of a run that another system recorded
@@ -29,6 +30,7 @@ class Facts(ABC):
     kinds : kinds of the disturbances, None where they are not known
     notes : what is worth saying about the run, one line each
     gaps : (last time before, first time behind) of each time without samples, s as in t
+    faults : of the simulated vehicle
     acceleration : of a run with `unexplained`: how nu_dot was estimated, and its error
 
     """
@@ -44,6 +46,7 @@ class Facts(ABC):
     kinds: frozenset[str] | None = None
     notes: tuple[str, ...] = field(default=())
     gaps: tuple[tuple[float, float], ...] = field(default=())
+    faults: tuple[Mark, ...] = field(default=())
     acceleration: dict[str, Any] | None = None
 
     @property

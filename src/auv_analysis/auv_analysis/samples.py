@@ -54,13 +54,9 @@ def load_samples(path: Path, scenario: Scenario) -> Run:
     hold = str(arrays.pop('hold', 'continuous'))
     if hold not in HOLDS:
         raise InputError(path, 'hold', ' or '.join(HOLDS), hold)
-    there = {'nu_measured': 'sensors', 'tau_applied': 'actuators'}  # without, the same as nu, tau
+    there = {'nu_measured': scenario.senses, 'tau_applied': scenario.acts}  # else nu, tau
     signals: dict[str, Any] = {name: arrays[name] for name in (*MOTION, *FORCES)}
-    signals |= {
-        name: arrays.get(key)
-        for key, name in OPTIONAL.items()
-        if key not in there or there[key] in scenario.data
-    }
+    signals |= {name: arrays.get(key) for key, name in OPTIONAL.items() if there.get(key, True)}
     return Run(
         **signals,
         vehicle=scenario.vehicle,
@@ -72,6 +68,7 @@ def load_samples(path: Path, scenario: Scenario) -> Run:
         source='simulate',
         hold=hold,
         kinds=scenario.kinds,
+        faults=scenario.marks,
     )
 
 

@@ -6,6 +6,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from auv_analysis.console import TextConsole
 from auv_dynamics.signals import DOFS
 
 
@@ -18,7 +19,7 @@ def print_check(document: dict[str, Any], out: Console | None = None) -> None:
     out : none: standard output
 
     """
-    out = out or Console(highlight=False)
+    out = out or TextConsole(highlight=False)
     _say(out, f'{document["name"]}: {document["source"] or "no source is given"}')
     _inertia(document, out)
     _couplings(document, out)

@@ -41,7 +41,7 @@ def warm_up(scenario: Scenario, controllers: list[str]) -> None:
             SampledLaw(gains, model, scenario.reach(name))
     x = initial_state(np.zeros(6), np.zeros(6))
     integrator = scenario.data['integrator']
-    noise = scenario.noise()
-    Plant(scenario.uncertainty, scenario.step, integrator, x, scenario.actuators, noise)
+    devices = scenario.actuators, scenario.noise(), scenario.faults
+    Plant(scenario.uncertainty, scenario.step, integrator, x, *devices)
     if time.monotonic() - begin > NOTICE_AFTER:
         print(f'kernel ready after {time.monotonic() - begin:.1f} s', file=sys.stderr)

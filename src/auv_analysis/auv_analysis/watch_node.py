@@ -165,7 +165,10 @@ class Listener(Participant):
     """
 
     def __init__(self, domain: int, namespace: str, frames: Frames, gauge: Gauge):
-        super().__init__(domain, lambda context: WatchNode(context, namespace, frames, gauge))
+        def make(context: Context) -> WatchNode:
+            return WatchNode(context, namespace, frames, gauge)
+
+        super().__init__(domain, make, interface.OBSERVER)
         self._looked: float | None = None
         self._listened = False
 

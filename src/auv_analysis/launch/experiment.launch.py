@@ -21,9 +21,11 @@ from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from auv_analysis.experiment import PACKAGES, loopback, write_inputs
+from auv_analysis.experiment import PACKAGES, write_inputs
 from auv_analysis.node_parameters import PLANT, RECORDER, node_parameters, parameter_file
 from auv_analysis.scenario import load_scenario
+from auv_dynamics.ros.reach import loopback
+from auv_dynamics.ros.security import enclave
 
 ARGUMENTS = {
     'scenario': ('case1', 'scenario file, or the bare name of a shipped one'),
@@ -69,6 +71,7 @@ def _nodes(context: LaunchContext) -> list:
             name=name,
             namespace=values['namespace'],
             parameters=[str(path)],
+            ros_arguments=enclave(name)[1:],
             output='screen',
         )
         for name in parameters
@@ -80,7 +83,7 @@ def _nodes(context: LaunchContext) -> list:
             OnProcessExit(target_action=last, on_exit=[EmitEvent(event=Shutdown())])
         )
     ]
-    # a real vehicle may be on another machine: only a simulation is kept on the loopback
+    # a driver may be on another machine: then the user's discovery range holds, by default this one
     local = [SetEnvironmentVariable(*item) for item in loopback().items()] if plant else []
     return [*local, *nodes.values(), *(end if last else [])]
 

@@ -11,6 +11,7 @@ from auv_analysis.comparison.sources import Source, is_sweep, sources_of
 from auv_analysis.folder import check_free, prepare
 from auv_analysis.foreign.mapping import OPTIONS, TopicMap, read_mapping
 from auv_dynamics.files import InputError
+from auv_gvc_controller.laws import law_class, refusal
 
 FEW = 3  # runs up to which the report shows every figure of each
 LONGEST = 80  # of a folder's name
@@ -26,11 +27,22 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
         from auv_analysis.exploration.explore import explore
 
         return explore(Path(sweeps[0]), options)
+    _import_laws(options.law or ())
     mapping = _mapping(options)
     sources = sources_of(options.results, mapping)
     if options.out:
         check_free(options.out, overwrite=options.overwrite)
     return _few(sources, options) if len(sources) <= FEW else _many(sources, options)
+
+
+def _import_laws(names: Sequence[str]) -> None:
+    """Import the own laws that may be: bags and results that name them do not."""
+    for name in names:
+        try:
+            law_class(name)
+        except ValueError as error:
+            _, expected, found = refusal(error)
+            raise InputError('--law', '', expected, found) from None
 
 
 def _mapping(options: argparse.Namespace) -> TopicMap | None:

@@ -1,20 +1,18 @@
 """How commands end: summary, report and a table of the runs."""
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from rich.console import Console
-
 from auv_analysis.commands.terminal import comparison_table, summary_tables
+from auv_analysis.console import TextConsole, say
 from auv_analysis.folder import write_json
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
 from auv_analysis.summary import Window, summarize
 
-console = Console(stderr=True)
+console = TextConsole(stderr=True)
 
 
 class Study(Protocol):
@@ -28,11 +26,6 @@ class Study(Protocol):
         self, runs: Mapping[str, AnyRun], summaries: Mapping[str, Mapping[str, Any]]
     ) -> dict[str, Any]:
         """Further arguments of `write_report`."""
-
-
-def say(text: str) -> None:
-    """Print a line on stderr."""
-    print(text, file=sys.stderr, flush=True)
 
 
 class Outcome(NamedTuple):
@@ -83,9 +76,17 @@ def conclude(
     with console.status('computing the figures of summary.json'):
         summaries = {name: summarize(run, windows=windows) for name, run in runs.items()}
     write_json(out / 'summary.json', summaries)
-    from auv_analysis.report.page import write_report  # with matplotlib, which loads slowly
+    # with matplotlib, which loads slowly
+    from auv_analysis.report.faults import fault_part
+    from auv_analysis.report.page import write_report
 
-    more = study.examine(runs, summaries) if study else {}
+    more: dict[str, Any] = study.examine(runs, summaries) if study else {}
+    part = fault_part(out, runs)
+    if part is not None:
+        section, sentences = part
+        behind = more.get('more', {})
+        more['more'] = {**behind, 'tracking': [section, *behind.get('tracking', ())]}
+        more['sentences'] = [*sentences, *more.get('sentences', ())]
     with console.status('drawing figures, writing the report'):
         report = write_report(out, runs, summaries, scenario_text, vehicle_text, **more)
     console.print(summary_tables(summaries))

@@ -3,10 +3,10 @@
 import argparse
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from auv_analysis.bag.files import files_of
+from auv_analysis.console import TextConsole
 from auv_analysis.foreign.candidates import candidates, survey
 
 
@@ -34,7 +34,7 @@ def info(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _print_info(document: dict[str, Any]) -> None:
-    out = Console()
+    out = TextConsole()
     span = 'no messages' if document['duration'] is None else f'{document["duration"]:g} s'
     out.print(f'{document["bag"]}: {document["messages"]} messages, {span}')
     table = Table(box=None, header_style='bold')

@@ -12,14 +12,20 @@ from auv_dynamics.files import InputError, reason
 def params(options: argparse.Namespace) -> dict[str, Any]:
     """The parameter file that `auv run` would write, for plain `ros2 run`."""
     scenario = load_scenario(options.scenario)
-    lockstep = not options.real_time
+    plant = not options.no_plant
+    attachments = {}
+    if not plant and options.out is not None:  # what a bag needs to be read by itself
+        attachments = {'params.yaml': options.out, 'vehicle.yaml': scenario.vehicle_path}
     bag = Path('runs') / scenario.name / options.controller
     parameters = node_parameters(
         scenario,
         options.controller,
         bag=bag,
-        lockstep=lockstep,
+        plant=plant,
+        lockstep=plant and not options.real_time,
+        use_sim_time=plant,
         vehicle=scenario.shipped_vehicle,
+        attachments={name: path.resolve() for name, path in attachments.items()},
     )
     text = parameter_file(
         parameters, f'auv params {scenario.name} --controller {options.controller}'

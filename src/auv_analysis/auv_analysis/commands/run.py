@@ -65,6 +65,8 @@ def recorded(options: argparse.Namespace, scenario: Scenario, names: list[str]) 
             done.append(name)
     finally:
         graph.close()
+    if failure is not None and not out.is_dir():
+        raise failure  # the results were removed under us: there is nothing to report
     return Outcome(out, {name: open_bag(out / name).run for name in done}, failure)
 
 

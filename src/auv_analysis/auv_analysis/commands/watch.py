@@ -3,19 +3,15 @@
 import argparse
 import io
 import math
-import os
-import re
 import sys
 import time
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
-from rich.console import Console
-
-from auv_analysis.commands.conclude import say
-from auv_analysis.domain import VARIABLE, joined_domain
-from auv_analysis.experiment import loopback
+from auv_analysis.commands.graphs import checked_namespace, join_domain, place_of, positive
+from auv_analysis.console import TextConsole, say
+from auv_analysis.domain import joined_domain
 from auv_analysis.failure import FailedError
 from auv_analysis.watch.display import Display, Live, Printed
 from auv_analysis.watch.gauge import Gauge
@@ -24,11 +20,8 @@ from auv_analysis.watch.panels import BASIC
 from auv_analysis.watch.sampling import Sampling
 from auv_analysis.watch.snapshot import Snapshot, Trouble
 from auv_dynamics import load_vehicle
-from auv_dynamics.files import InputError
 from auv_dynamics.interface import Frames
 
-RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
-HERE = 'LOCALHOST'
 LOOK = 0.05  # s between two looks at what has come
 PATIENCE = 3.0  # s after which it is said what is waited for
 SETTLED = 2.0  # s after the first message, when rates are known
@@ -38,14 +31,14 @@ ON_SCREEN, IN_PIPE = 4.0, 1.0  # refreshes per second where nothing is asked for
 
 def watch(options: argparse.Namespace) -> dict[str, Any]:
     """Live dashboard in the terminal; returns the last snapshot."""
-    rate = _positive(options.rate, '--rate', FASTEST)
-    limit = _positive(options.limit, '--for', math.inf) or math.inf
+    rate = positive(options.rate, '--rate', FASTEST)
+    limit = positive(options.limit, '--for', math.inf) or math.inf
     vehicle = None if options.vehicle is None else load_vehicle(options.vehicle)
     domain = joined_domain(options.domain_id)
-    namespace = _namespace(options.namespace)
+    namespace = checked_namespace(options.namespace)
     with ExitStack() as stack:
         keyboard = stack.enter_context(Keyboard())  # from here on Ctrl-C is an end like another
-        _join(domain)
+        join_domain(domain)
         # the middleware reads its environment when it is loaded
         from auv_analysis.watch_node import Listener
         from auv_dynamics.ros.life import give_way
@@ -56,7 +49,7 @@ def watch(options: argparse.Namespace) -> dict[str, Any]:
         frames = Frames(options.odom_frame or usual.odom, options.base_frame or usual.base)
         listener = Listener(domain, namespace, frames, gauge)
         stack.callback(listener.close)
-        say(f'listens on {_place(domain, namespace)}')
+        say(f'listens on {place_of(domain, namespace)}')
         console = _console(stderr=options.json)
         single = options.once or limit < math.inf
         live = console.is_terminal and not single
@@ -66,11 +59,11 @@ def watch(options: argparse.Namespace) -> dict[str, Any]:
         return session.run(keyboard, limit, once=options.once).document()
 
 
-def _console(*, stderr: bool) -> Console:
+def _console(*, stderr: bool) -> TextConsole:
     stream = sys.stderr if stderr else sys.stdout
     if isinstance(stream, io.TextIOWrapper):
         stream.reconfigure(errors='replace')  # bars and dashes, where the encoding has none
-    return Console(stderr=stderr, highlight=False)
+    return TextConsole(stderr=stderr, highlight=False)
 
 
 class _Session:
@@ -124,44 +117,6 @@ class _Session:
     def _waits_for(self, snapshot: Snapshot) -> str:
         what = 'nothing comes of' if snapshot.published else 'nobody publishes'
         names = f'{", ".join(BASIC[:-1])} or {BASIC[-1]}'
-        text = f'{what} {names} on {_place(snapshot.domain, snapshot.namespace)}'
+        text = f'{what} {names} on {place_of(snapshot.domain, snapshot.namespace)}'
         elsewhere = ' or '.join(self._listener.elsewhere())
         return f'{text}, but odometry in {elsewhere}: see --namespace' if elsewhere else text
-
-
-def _join(domain: int) -> None:
-    """Set the environment of the middleware, as far as the user has not."""
-    os.environ[VARIABLE] = str(domain)
-    ours = loopback()
-    os.environ.setdefault(RANGE, ours.pop(RANGE))
-    if os.environ[RANGE] == HERE:
-        for name, value in ours.items():
-            os.environ.setdefault(name, value)
-
-
-def _place(domain: int, namespace: str) -> str:
-    where = os.environ[RANGE]
-    reach = f'this machine only ({RANGE}={HERE})' if where == HERE else f'{RANGE}={where}'
-    inside = '' if namespace == '/' else f', namespace {namespace}'
-    return f'{VARIABLE}={domain}{inside}, {reach}'
-
-
-def _namespace(text: str) -> str:
-    namespace = '/' + text.strip('/')
-    if not re.fullmatch(r'/|(/[A-Za-z_][A-Za-z0-9_]*)+', namespace):
-        raise InputError('--namespace', '', 'a ROS namespace such as /auv1', text)
-    return namespace
-
-
-def _positive(text: str | None, name: str, most: float) -> float | None:
-    """Positive number of an option, None where it is not given."""
-    if text is None:
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value <= most or value == math.inf:
-        limit = '' if most == math.inf else f', at most {most:g}'
-        raise InputError(name, '', f'a number above 0{limit}', text)
-    return value

@@ -60,8 +60,7 @@ def open_source(source: Source, vehicle: str | None = None) -> Opened:
             run = load_samples(source.path, scenario)
         else:
             announce(scenario, [source.controller])
-            sampled = 'actuators' in scenario.data or 'sensors' in scenario.data
-            hold: Hold = 'zoh' if sampled else 'continuous'
+            hold: Hold = 'zoh' if scenario.sampled else 'continuous'
             run = simulate(scenario, source.controller, hold)
     return Opened(run, texts.get('scenario.yaml', ''), texts.get('vehicle.yaml', ''))
 

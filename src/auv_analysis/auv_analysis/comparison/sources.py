@@ -6,15 +6,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-import yaml
-
 from auv_analysis.bag.files import OTHERS, files_of
 from auv_analysis.folder import MANIFEST
 from auv_analysis.foreign.mapping import TopicMap
 from auv_analysis.samples import ENDING
 from auv_analysis.scenario import Scenario, load_scenario
 from auv_dynamics.config import shipped_by_name
-from auv_dynamics.files import InputError, reason
+from auv_dynamics.files import InputError, read_yaml, reason
+from auv_gvc_controller.laws import is_unasked
 
 EXPECTED = 'a bag, a folder of results or of a sweep, or a scenario'
 YAML = ('.yaml', '.yml')
@@ -106,7 +105,18 @@ def _scenario_beside(samples: Path) -> Scenario:
     if not beside.is_file():
         expected = 'the scenario.yaml that `auv simulate` wrote beside it'
         raise InputError(samples, '', expected, 'no such file')
-    return load_scenario(beside)
+    return _brought(beside)
+
+
+def _brought(path: Path) -> Scenario:
+    """Scenario that came with results: it was not asked for, and neither was code that it names."""
+    listed = read_yaml(path, 'scenario').get('controllers')
+    for name, entry in listed.items() if isinstance(listed, dict) else ():
+        law = entry.get('law') if isinstance(entry, dict) else None
+        if is_unasked(law):
+            expected = 'a shipped law, or --law for one whose module may be imported'
+            raise InputError(path, f'controllers.{name}.law', expected, law)
+    return load_scenario(path)
 
 
 def _refuse_two_meanings(argument: str, path: Path) -> None:
@@ -146,7 +156,7 @@ def _of_folder(folder: Path) -> list[Source]:
         found = f'both {bags[0].name}/ and {samples[0].name}'
         raise InputError(folder, '', 'bags or samples in a folder, or name one of them', found)
     if samples:
-        scenario = load_scenario(folder / 'scenario.yaml')
+        scenario = _brought(folder / 'scenario.yaml')
         return [Source('samples', path, path.stem, scenario) for path in samples]
     if not bags:
         raise InputError(folder, '', EXPECTED, 'a folder without .mcap files or samples')
@@ -158,9 +168,9 @@ def _of_folder(folder: Path) -> list[Source]:
 def _controllers(folder: Path) -> list[str]:
     """Controllers of the scenario of a folder of results, in its order; none without it."""
     try:
-        data = yaml.safe_load((folder / 'scenario.yaml').read_text(encoding='utf-8'))
+        data = read_yaml(folder / 'scenario.yaml', 'scenario')
         return [str(name) for name in data['controllers']]
-    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
+    except (OSError, ValueError, TypeError, KeyError):
         return []
 
 

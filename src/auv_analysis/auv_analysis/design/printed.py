@@ -6,6 +6,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from auv_analysis.console import TextConsole
 from auv_analysis.design.words import part_words
 from auv_analysis.report.text import number
 
@@ -21,7 +22,7 @@ def print_design(document: Mapping[str, Any], out: Console | None = None) -> Non
     out : none: standard output
 
     """
-    out = out or Console(highlight=False)
+    out = out or TextConsole(highlight=False)
     if document['measures']:
         out.print(_measures(document))
         _say(out, '')

@@ -48,9 +48,8 @@ class Setting:
 
     @property
     def hold(self) -> Hold:
-        """'continuous', but 'zoh' where actuators or sensors act on samples."""
-        sampled = {'actuators', 'sensors'} & set(self.scenario.data)
-        return 'zoh' if sampled else 'continuous'
+        """'continuous', but 'zoh' where actuators, sensors or faults act on samples."""
+        return 'zoh' if self.scenario.sampled else 'continuous'
 
     @property
     def is_quick(self) -> bool:

@@ -19,7 +19,6 @@ from auv_analysis.study.responses import response
 from auv_analysis.study.sensitivity import sensitivity
 from auv_gvc_controller.model import control_model
 
-DEVICES = ('actuators', 'sensors')
 COMPARED = ('duration', 'step', 'integrator', 'initial', 'setpoint', 'disturbance')
 SENSITIVE_CASE = 'case1'  # whose gains the claim on sensitivity is of
 
@@ -65,7 +64,7 @@ def paper_claims(
     """
     if scenario.name not in paper.CASES:
         return PaperClaims((), reason=f'{scenario.name} is no case of the paper')
-    has = [key for key in DEVICES if key in scenario.data]
+    has = list(scenario.sampled)
     has += sorted(scenario.kinds - {'herman2018'})
     if has or 'file' in scenario.data['setpoint']:
         words = ', '.join([key.replace('_', ' ') for key in has] or ['a set-point from a file'])

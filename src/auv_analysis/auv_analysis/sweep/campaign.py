@@ -9,6 +9,7 @@ import numpy as np
 
 from auv_analysis.changes import VEHICLE, Parts, changed_scenario, split
 from auv_analysis.scenario import Scenario, load_scenario
+from auv_analysis.scenario_devices import SAMPLED
 from auv_analysis.schema_paths import check_paths
 from auv_analysis.simulation import Hold, check_hold
 from auv_analysis.sweep.groups import Group, kind_of, make_group
@@ -205,7 +206,7 @@ def _check_path(campaign: Campaign, path: str) -> None:
     parts, names = split(path), campaign.controllers
     if path in NOT_VARIED:
         raise InputError(path, '', NOT_VARIED[path], path)
-    if campaign.hold == 'continuous' and parts[0] in ('actuators', 'sensors'):
+    if campaign.hold == 'continuous' and parts[0] in SAMPLED:
         expected = 'hold: zoh in the campaign: they act on samples'
         raise InputError(path, '', expected, 'hold: continuous')
     for scenario in campaign.scenarios.values():

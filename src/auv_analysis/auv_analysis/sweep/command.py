@@ -2,16 +2,15 @@
 
 import argparse
 import os
-import sys
 from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from auv_analysis.console import TextConsole, say
 from auv_analysis.failure import FailedError
 from auv_analysis.sweep.campaign import Campaign, load_campaign
 from auv_analysis.sweep.engine import REFUSED, Outcome, SweepStoppedError
@@ -22,7 +21,7 @@ from auv_analysis.warm_up import announce
 from auv_dynamics.files import InputError
 
 STATUSES = ('ok', 'diverged', REFUSED)
-console = Console(stderr=True)
+console = TextConsole(stderr=True)
 
 
 def sweep(options: argparse.Namespace) -> dict[str, Any]:
@@ -33,7 +32,7 @@ def sweep(options: argparse.Namespace) -> dict[str, Any]:
         folder = SweepFolder(out, campaign, overwrite=options.overwrite)
         try:
             for warning in campaign.scenario.warnings:
-                _say(f'warning: {warning}')
+                say(f'warning: {warning}')
             if folder.new:
                 _announce(campaign)
             outcome = _run(campaign, folder, *executor, overwrite=options.overwrite)
@@ -47,7 +46,7 @@ def _announce(campaign: Campaign) -> None:
     announce(campaign.scenario, [name for name in campaign.controllers if name not in own])
     for name, law in own.items():
         how = 'as plain Python, slower, where numba cannot compile it'
-        _say(f'{name}: the law {law.__name__} runs {how}')
+        say(f'{name}: the law {law.__name__} runs {how}')
 
 
 def _workers(text: str | None) -> int | None:
@@ -79,7 +78,7 @@ def _run(
         line = f'{folder.out}: {stopped}; {done} are finished, {how} goes on from there'
         raise FailedError(line) from None
     except KeyboardInterrupt:  # the second one: running blocks are not waited for
-        _say(f'{folder.out}: interrupted; the same command goes on from there')
+        say(f'{folder.out}: interrupted; the same command goes on from there')
         os._exit(1)
 
 
@@ -117,8 +116,8 @@ def _conclude(campaign: Campaign, folder: SweepFolder, outcome: Outcome) -> dict
     refused = sum(row[REFUSED] for row in counts.values())
     rows = sum(outcome.counts.values())
     if refused:
-        _say(f'warning: {refused} of {rows} rows refused, the first: {outcome.reason}')
-    _say(f"rollouts: {rows} rows, pandas.read_parquet('{folder.data}')")
+        say(f'warning: {refused} of {rows} rows refused, the first: {outcome.reason}')
+    say(f"rollouts: {rows} rows, pandas.read_parquet('{folder.data}')")
     if refused == rows:
         raise FailedError('every rollout was refused: its values make no scenario')
     return {
@@ -131,7 +130,3 @@ def _conclude(campaign: Campaign, folder: SweepFolder, outcome: Outcome) -> dict
         'controllers': counts,
         'paths': list(campaign.values(0, 1)),
     }
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)

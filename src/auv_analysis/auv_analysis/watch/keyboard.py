@@ -1,4 +1,4 @@
-"""What ends a dashboard: the key q, Ctrl-C, or a signal."""
+"""Keys pressed in a terminal, and what ends a dashboard: the key q, Ctrl-C, or a signal."""
 
 import os
 import select
@@ -35,13 +35,20 @@ class Keyboard:
     def _end(self, number: int, frame: FrameType | None) -> None:
         self.ended = True
 
-    def wait(self, seconds: float) -> None:
-        """Wait for a key, at most so many s."""
+    @property
+    def there(self) -> bool:
+        """Whether there is a terminal to press keys in."""
+        return self._file is not None
+
+    def wait(self, seconds: float) -> bytes:
+        """Wait for a key, at most so many s; the keys that were pressed."""
         if self._file is None:
             time.sleep(seconds)
         elif select.select([self._file], [], [], seconds)[0]:
             keys = os.read(self._file, 64)
             self.ended = self.ended or not keys or b'q' in keys.lower()
+            return keys
+        return b''
 
     def __exit__(self, *_: object) -> None:
         if self._file is not None:

@@ -1,0 +1,189 @@
+"""Targets that read files: each input is understood, or refused with one line."""
+
+import contextlib
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from made_messages import ODOMETRY, Bag, odometry, serialized, stamped
+from watchman import playground, watched
+
+from auv_analysis import cli, load_scenario, simulate, summarize
+from auv_analysis.failure import FailedError
+from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_dynamics.files import InputError
+from auv_dynamics.vehicle_file import load_vehicle
+
+ROOT = Path(__file__).resolve().parents[2]
+TOPICS = {
+    '/twist': 'Twist', '/cmd_vel': 'Twist', '/cmd_accel': 'Accel', '/wrench': 'Wrench',
+    '/disturbance': 'Wrench', '/disturbance_estimate': 'Wrench',
+}  # fmt: skip
+EXPECTED = (InputError, FailedError, ArithmeticError)
+STEPS = 60  # that a scenario is simulated for
+
+
+class CrashError(AssertionError):
+    """Something ended without a message."""
+
+
+def shipped(folder: str) -> list[Path]:
+    """Files that are shipped in a folder of config/."""
+    return sorted((ROOT / 'config' / folder).glob('*.yaml'))
+
+
+def dumped(data: Any) -> bytes:
+    """A file of nested mappings and lists, as far as YAML can say it."""
+    return yaml.safe_dump(data, sort_keys=False).encode('utf-8', 'surrogatepass')
+
+
+def command(*arguments: str) -> int:
+    """Run `auv` in this process; its exit code.
+
+    Raises
+    ------
+    CrashError : another code than 0, 1 and 2, or no line that says why
+
+    """
+    said, printed = io.StringIO(), io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(printed):
+            cli.main(list(arguments))
+        return 0
+    except SystemExit as error:
+        code = error.code
+    lines = [line for line in said.getvalue().splitlines() if line.strip()]
+    if code not in (1, 2) or not lines:
+        raise CrashError(f'exit code {code}, said {lines}')
+    if code == 2 and len(lines) != 1:
+        raise CrashError(f'wrong input is one line, found {lines}')
+    return int(code)
+
+
+def understood(read: Any, *arguments: Any) -> Any:
+    """What a function gives, or None where it refuses with one line."""
+    try:
+        return read(*arguments)
+    except EXPECTED as error:
+        if not str(error).strip() or len(str(error).splitlines()) != 1:
+            raise CrashError(f'a refusal is one line, found {str(error)!r}') from error
+        return None
+
+
+def try_vehicle(text: bytes) -> str:
+    """A vehicle file."""
+    with playground() as folder:
+        path = folder / 'vehicle.yaml'
+        path.write_bytes(text)
+        with watched(folder):
+            vehicle = understood(load_vehicle, path)
+            if vehicle is None:
+                return 'refused'
+            command('check-vehicle', str(path), '--json')
+            nu = np.array([0.5, -0.2, 0.1, 0.05, -0.1, 0.2])
+            rate = vehicle.forward_dynamics(np.zeros(6), nu, np.ones(6))
+            if not np.all(np.isfinite(rate)):
+                raise CrashError(f'an accepted vehicle accelerates by {rate}')
+            return 'accepted'
+
+
+def try_scenario(text: bytes) -> str:
+    """A scenario file; short ones are simulated."""
+    with playground() as folder:
+        path = folder / 'scenario.yaml'
+        path.write_bytes(text)
+        with watched(folder):
+            scenario = understood(load_scenario, path)
+            if scenario is None:
+                return 'refused'
+            for name in scenario.controllers:
+                understood(lambda n=name: node_parameters(scenario, n, bag=folder / 'bag'))
+            if scenario.steps > STEPS:
+                return 'accepted'
+            for name in scenario.controllers:
+                run = understood(simulate, scenario, name, 'zoh')
+                if run is not None and not np.all(np.isfinite(run.tau)):
+                    raise CrashError(f'{name}: a wrench that is not finite')
+                if run is not None:
+                    understood(summarize, run)
+            return 'simulated'
+
+
+def try_bag(data: bytes) -> str:
+    """A bag: read whole and in blocks, listed, analysed, recovered."""
+    from auv_analysis.bag import load_run, open_bag
+
+    with playground() as folder:
+        bag = folder / 'bag'
+        bag.mkdir()
+        (bag / 'bag_0.mcap').write_bytes(data)
+        with watched(folder):
+            run = understood(load_run, bag)
+            understood(lambda: summarize(open_bag(bag, whole=64).run))
+            codes = [command('info', str(bag), '--json')]
+            if 'recover' in cli.parser().format_help():
+                codes.append(command('recover', str(bag), '--json'))
+                understood(load_run, bag)
+            left = {entry.name for entry in folder.iterdir()}
+            if left != {'bag'}:
+                raise CrashError(f'files beside the bag: {left}')
+            return 'refused' if run is None else 'read' if max(codes) == 0 else 'partly'
+
+
+def try_text(data: bytes) -> str:
+    """Bytes as a vehicle file and as a scenario file."""
+    return f'{try_vehicle(data)}/{try_scenario(data)}'
+
+
+def texts() -> list[bytes]:
+    """Shipped vehicle and scenario files."""
+    return [path.read_bytes() for path in (*shipped('vehicles'), *shipped('scenarios'))]
+
+
+def bags() -> list[bytes]:
+    """Short bags with all that `auv analyze` asks for: compressed, and not even in chunks."""
+    scenario = load_scenario('case1')
+    parameters = node_parameters(scenario, 'gvc', bag=Path('gvc'), vehicle='vehicle.yaml')
+    attached = {**scenario.attachments, 'params.yaml': parameter_file(parameters, 'fuzzed')}
+    made = []
+    with playground() as folder:
+        for name, options in (('zstd', {}), ('plain', {'use_chunking': False})):
+            bag = Bag(folder / f'{name}.mcap', chunk_size=4000, **options)
+            for file, text in attached.items():
+                bag.attach(file, text)
+            for k in range(12):
+                ns, row = k * 10_000_000, np.sin(np.arange(1.0, 7.0) * (k + 1))
+                state = np.array([0, 0, 0, 1, 0, 0, 0, *row])
+                bag.add('/odom', ODOMETRY, ns, serialized(odometry(ns, state)))
+                for topic, kind in TOPICS.items():
+                    message = stamped(kind, ns, row)
+                    bag.add(topic, message.__msgtype__, ns, serialized(message))
+            made.append(bag.close().read_bytes())
+    return made
+
+
+def originals(folder: str) -> list[Any]:
+    """Shipped files as nested mappings; scenarios short, with everything that may stand in one."""
+    found = [yaml.safe_load(path.read_text()) for path in shipped(folder)]
+    if folder != 'scenarios':
+        return found
+    short = [{**data, 'duration': STEPS * data['step'] / 2} for data in found[:3]]
+    return [*found, *short, {**short[0], **EVERYTHING}]
+
+
+EVERYTHING = {
+    'disturbance': [
+        {'kind': 'herman2018'},
+        {
+            'kind': 'harmonic',
+            'heave': {'offset': -3.0, 'terms': [{'amplitude': 1.0, 'omega': 1.0}]},
+        },
+        {'kind': 'model_error', 'mass': 0.05, 'added_mass': -0.1, 'damping': 0.2},
+        {'kind': 'current', 'velocity': [0.1, 0.0, 0.0]},
+    ],
+    'vehicle': 'rexrov',
+    'actuators': {'limit': [900.0] * 6, 'rate': [5000.0] * 6, 'lag': 0.05, 'delay': 0.02},
+    'sensors': {'velocity_noise': 0.01, 'attitude_noise': 0.001, 'drop_out': 0.1},
+}

@@ -1,0 +1,166 @@
+"""Fuzzing of everything that comes from outside: `make fuzz`, see README.md beside this file."""
+
+import argparse
+import json
+import os
+import random
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+SHARES = {  # of all inputs
+    'vehicles': 0.22, 'scenarios': 0.16, 'parameters': 0.04, 'text': 0.08, 'messages': 0.25,
+    'decoding': 0.15, 'bags': 0.08, 'guided_bags': 0.02,
+}  # fmt: skip
+GUIDED = {'text': 'text', 'decoding': 'decoding', 'guided_bags': 'bags'}
+
+
+def structured(attempt: Callable[[Any], str], originals: list[Any], count: int, seed: int) -> Any:
+    """Let Hypothesis alter good files; how often each verdict was given."""
+    import hypothesis
+    from structures import altered
+
+    verdicts: Counter[str] = Counter()
+
+    @hypothesis.seed(seed)
+    @hypothesis.settings(
+        max_examples=count, deadline=None, database=None, print_blob=False,
+        suppress_health_check=list(hypothesis.HealthCheck),
+    )  # fmt: skip
+    @hypothesis.given(altered(originals))
+    def every(data: Any) -> None:
+        verdicts[attempt(data)] += 1
+
+    every()
+    return verdicts
+
+
+def vehicles(count: int, seed: int) -> Any:
+    """Vehicle files."""
+    from files import dumped, originals, try_vehicle
+
+    return structured(lambda x: try_vehicle(dumped(x)), originals('vehicles'), count, seed)
+
+
+def scenarios(count: int, seed: int) -> Any:
+    """Scenario files."""
+    from files import dumped, originals, try_scenario
+
+    return structured(lambda x: try_scenario(dumped(x)), originals('scenarios'), count, seed)
+
+
+def parameters(count: int, seed: int) -> Any:
+    """Parameter files of the nodes."""
+    from harness import environment, fresh_domain
+    from start_up import originals, try_parameters
+
+    os.environ.update(environment(fresh_domain()))
+    return structured(try_parameters, originals(), count, seed)
+
+
+def messages(count: int, seed: int) -> Any:
+    """Serialized messages on real nodes."""
+    from nodes import NODES, fuzz_node
+
+    told: Counter[str] = Counter()
+    with tempfile.TemporaryDirectory() as folder:
+        for name in NODES:
+            for key, number in fuzz_node(name, count // len(NODES), seed, Path(folder)).items():
+                told[f'{name} {key}'] += number
+    return told
+
+
+def bags(count: int, seed: int) -> Any:
+    """Bags with bytes changed."""
+    import files
+    from scramble import scrambled
+
+    rng, good, verdicts = random.Random(seed), files.bags(), Counter[str]()
+    for i in range(count):
+        data = scrambled(rng.choice(good), rng, good)
+        try:
+            verdicts[files.try_bag(data)] += 1
+        except Exception:
+            folder = Path(os.environ.get('AUV_GVC_FUZZ_FAILURES', 'fuzz-failures'))
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / f'bag-{seed}-{i}.mcap').write_bytes(data)
+            raise
+    return verdicts
+
+
+def guided(target: str, count: int, seed: int) -> Any:
+    """Let atheris look for inputs; it ends its process itself."""
+    command = [sys.executable, str(HERE / 'guided.py'), GUIDED[target], str(count), str(seed)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    if ended.returncode:
+        raise AssertionError(f'{ended.stdout[-3000:]}\n{ended.stderr[-3000:]}')
+    tried = re.search(r'number_of_executed_units: (\d+)', ended.stdout + ended.stderr)
+    if tried is None:
+        raise AssertionError(f'atheris does not say what it tried: {ended.stderr[-2000:]}')
+    return {'tried': int(tried[1])}
+
+
+OWN: dict[str, Callable[[int, int], Any]] = {
+    'vehicles': vehicles, 'scenarios': scenarios, 'parameters': parameters,
+    'messages': messages, 'bags': bags,
+}  # fmt: skip
+
+
+def one(target: str, count: int, seed: int) -> int:
+    """Try one target in this process; 1 where something failed, which is printed."""
+    began = time.monotonic()
+    try:
+        told = guided(target, count, seed) if target in GUIDED else OWN[target](count, seed)
+    except BaseException as error:
+        for line in (f'{type(error).__name__}: {error}', *getattr(error, '__notes__', [])):
+            print(line, file=sys.stderr)
+        again = f'python tests/fuzz/run.py --only {target} --count {count} --seed {seed}'
+        print(f'FAILED: {target}; again: {again}', file=sys.stderr)
+        return 1
+    line = {'inputs': count, 'seconds': round(time.monotonic() - began), **told}
+    print(f'{target}, seed {seed}: {json.dumps(line)}', flush=True)
+    return 0
+
+
+def together(targets: Iterable[str], count: int, seed: int, jobs: int) -> int:
+    """Try targets in processes of their own."""
+
+    def start(target: str) -> int:
+        number = max(1, round(count * SHARES[target]))
+        command = [
+            *(sys.executable, str(HERE / 'run.py'), '--only', target),
+            *('--count', str(number), '--seed', str(seed)),
+        ]
+        return subprocess.run(command, check=False).returncode
+
+    with ThreadPoolExecutor(jobs) as pool:
+        codes = list(pool.map(start, targets))
+    failed = sum(map(bool, codes))
+    print(f'{count} inputs, seed {seed}: {failed or "none"} of {len(codes)} targets failed')
+    return int(failed > 0)
+
+
+def main() -> None:
+    """Try everything, or one target."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--count', type=int, default=100_000, help='inputs')
+    parser.add_argument('--seed', type=int, default=0)
+    parser.add_argument('--jobs', type=int, default=2, help='targets at a time')
+    parser.add_argument('--only', choices=SHARES, help='one target, with all the inputs')
+    options = parser.parse_args()
+    if options.only:
+        sys.exit(one(options.only, options.count, options.seed))
+    sys.exit(together(SHARES, options.count, options.seed, options.jobs))
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,77 @@
+"""Parameter files: a node starts with one, or ends with one line and exit code 2."""
+
+import os
+import signal
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from files import CrashError, dumped
+from watchman import playground, watched
+
+from auv_analysis.node_parameters import node_parameters
+from auv_analysis.recorder_node import RecorderNode
+from auv_analysis.scenario import load_scenario
+from auv_dynamics.plant_node import PlantNode
+from auv_dynamics.ros.life import SIGNALS, live
+from auv_gvc_controller.controller_node import ControllerNode
+from auv_gvc_controller.setpoint_node import SetpointNode
+
+NODES: dict[str, Callable[[], Any]] = {
+    'plant_node': PlantNode,
+    'setpoint_node': SetpointNode,
+    'controller_node': ControllerNode,
+    'recorder_node': RecorderNode,
+}
+
+
+def originals() -> list[dict[str, Any]]:
+    """Node name and parameters of each, as a scenario with everything has them."""
+    scenario = load_scenario('case1')
+    found = node_parameters(scenario, 'gvc', bag=Path('bag'), vehicle='herman2018')
+    return [{'node': name, 'parameters': dict(found[name])} for name in NODES]
+
+
+def try_parameters(data: Any) -> str:
+    """Start a node with a parameter file and end it at once."""
+    name = data.get('node') if isinstance(data, dict) else None
+    values = data.get('parameters') if isinstance(data, dict) else None
+    node = NODES.get(name if isinstance(name, str) else '', PlantNode)
+    if isinstance(values, dict) and 'bag' in values:
+        values = {**values, 'bag': 'bag'}  # where it is told to write, it may
+    with playground() as folder:
+        path = folder / 'params.yaml'
+        path.write_bytes(dumped({'/**': {'ros__parameters': values}}))
+        with watched(folder):
+            code, said = _started(node, path)
+    lines = [line for line in said.splitlines() if line.strip()]
+    if code not in (0, 2) or 'Traceback' in said or (code == 2 and not lines):
+        raise CrashError(f'{node.__name__}: exit code {code}, said {said[-2000:]}')
+    return 'started' if code == 0 else 'refused'
+
+
+def _started(make: Callable[[], Any], path: Path) -> tuple[int, str]:
+    """Exit code of a node that is ended as soon as it stands, and what it said."""
+
+    def made() -> Any:
+        node = make()
+        if node.exit_code is None:
+            node.exit_code = 0
+        return node
+
+    kept = {number: signal.getsignal(number) for number in SIGNALS}
+    with tempfile.TemporaryFile(dir='.') as said:
+        screens = os.dup(1), os.dup(2)
+        try:
+            os.dup2(said.fileno(), 1)
+            os.dup2(said.fileno(), 2)
+            code = live([made], ['--ros-args', '--params-file', str(path)])
+        finally:
+            for screen, number in zip(screens, (1, 2), strict=True):
+                os.dup2(screen, number)
+                os.close(screen)
+            for number, handler in kept.items():
+                signal.signal(number, handler)
+        said.seek(0)
+        return code, said.read().decode(errors='replace')

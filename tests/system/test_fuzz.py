@@ -1,0 +1,24 @@
+"""A hundredth of `make fuzz`, with a fixed seed."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('atheris', reason='atheris has no wheel for this Python')
+
+RUN = Path(__file__).resolve().parents[1] / 'fuzz' / 'run.py'
+COUNT, SEED = 1000, 20181
+
+
+def test_nothing_from_outside_breaks_anything(tmp_path: Path) -> None:
+    command = [sys.executable, str(RUN), '--count', str(COUNT), '--seed', str(SEED)]
+    ended = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, timeout=540, check=False
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr[-6000:]
+    counts = [int(found) for found in re.findall(r'"inputs": (\d+)', ended.stdout)]
+    assert sum(counts) >= COUNT
+    assert not list(tmp_path.rglob('*crash*'))

@@ -14,6 +14,7 @@ from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 
 from auv_dynamics.interface import NANOSECONDS, Frames
 from auv_dynamics.kinematics import rotation
@@ -49,7 +50,10 @@ STATES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     'w_first': w_first,
     'nan': not_a_number,
 }
-NAMES = (HEALTHY, *STATES, 'ros_frames', 'best_effort', 'frozen', 'old', 'slow', 'plain_wrench')
+NAMES = (
+    *(HEALTHY, *STATES, 'ros_frames', 'best_effort', 'frozen', 'old', 'slow', 'plain_wrench'),
+    'garbled',
+)
 
 
 class Driver(Node):
@@ -73,7 +77,10 @@ class Driver(Node):
         stamp = {'frozen': self._began, 'old': stamp - OLD}.get(self._name, stamp)
         if at > self._k or self._name == 'frozen':
             self._k = at
-            self._odom.publish(convert.odometry(stamp, x, frames))
+            message = convert.odometry(stamp, x, frames)
+            if self._name == 'garbled' and at % 10 == 0:
+                message = bytes(serialize_message(message))[:100]
+            self._odom.publish(message)
 
 
 def main() -> None:

@@ -141,11 +141,13 @@ class Peer:
         self.until(lambda: output.get_subscription_count() >= subscribers, f'match {topic.name}')
         output.publish(message)
 
-    def until(self, done: Callable[[], Any], what: str = 'condition') -> Any:
+    def until(
+        self, done: Callable[[], Any], what: str = 'condition', patience: float = PATIENCE
+    ) -> Any:
         """Spin until something is true; fail when it takes too long."""
-        limit = time.monotonic() + PATIENCE
+        limit = time.monotonic() + patience
         while not (result := done()):
-            assert time.monotonic() < limit, f'{what} within {PATIENCE:g} s'
+            assert time.monotonic() < limit, f'{what} within {patience:g} s'
             self.executor.spin_once(timeout_sec=0.05)
         return result
 

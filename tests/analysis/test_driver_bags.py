@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_messages import ODOMETRY, Bag, odometry, serialized, stamped
+from made_messages import FRAMES, ODOMETRY, Bag, odometry, serialized, stamped
 from numpy.testing import assert_array_equal
 
 from auv_analysis import load_scenario
@@ -150,3 +150,37 @@ def test_steps_that_are_not_of_one_length_are_no_gaps() -> None:
     assert ledger.complete == 5
     ledger.add('odom', 165 * MS)
     assert ledger.gaps == {'odom': 2}
+
+
+def with_unusable_messages(path: Path, *, strict: bool) -> Path:
+    """Sixty steps: an odometry in another frame, one of NaN, one that is cut, a wrench of inf."""
+    bag = Bag(path, chunk_size=100_000)
+    bag.attach('vehicle.yaml', VEHICLE)
+    bag.attach(NAME, recording_text(strict, {}))
+    for k in range(60):
+        ns, values = k * 10 * MS, state(k)
+        values[7] = np.nan if k == 20 else 1.0
+        made = odometry(ns, values, ('elsewhere', FRAMES[1]) if k == 30 else FRAMES)
+        data = serialized(made)
+        bag.add('/odom', ODOMETRY, ns, data[: len(data) // 2] if k == 0 else data)
+        for topic, kind in (('/wrench', 'Wrench'), ('/cmd_vel', 'Twist')):
+            made = stamped(kind, ns, [np.inf if (k, kind) == (40, 'Wrench') else float(k)] * 6)
+            bag.add(topic, made.__msgtype__, ns, serialized(made))
+    return bag.close()
+
+
+def test_messages_that_nobody_could_use_are_left_out_and_counted(tmp_path: Path) -> None:
+    """As the controller did that heard them."""
+    bag = with_unusable_messages(tmp_path / 'bag.mcap', strict=False)
+    run = load_run(bag)
+    kept = [k for k in range(60) if k not in (0, 20, 30, 40)]
+    assert_array_equal(run.tau[:, 0], np.array(kept, float))
+    notes = ' '.join(run.notes)
+    assert 'bag.mcap: /odom: 3 unusable messages left out, the first one: ' in notes
+    assert 'bag.mcap: /wrench: 1 unusable messages left out, the first one: ' in notes
+    assert_array_equal(joined([*open_bag(bag, whole=16).run.blocks(7)]).tau, run.tau)
+
+
+def test_in_lock_step_they_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match='/odom: expected messages of its type, found'):
+        load_run(with_unusable_messages(tmp_path / 'bag.mcap', strict=True))

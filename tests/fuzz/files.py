@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import os
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,10 @@ from watchman import playground, watched
 from auv_analysis import cli, load_scenario, simulate, summarize
 from auv_analysis.failure import FailedError
 from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis.replay.index import LATEST, index_bag
+from auv_analysis.replay.open_loop import open_loop, recorded_loop
+from auv_analysis.replay.selection import Wish, select
+from auv_analysis.replay.stream import messages
 from auv_dynamics.files import InputError
 from auv_dynamics.vehicle_file import load_vehicle
 
@@ -112,24 +117,38 @@ def try_scenario(text: bytes) -> str:
 
 
 def try_bag(data: bytes) -> str:
-    """A bag: read whole and in blocks, listed, analysed, recovered."""
+    """A bag: read whole and in blocks, listed, played, analysed, recovered."""
     from auv_analysis.bag import load_run, open_bag
 
     with playground() as folder:
         bag = folder / 'bag'
         bag.mkdir()
-        (bag / 'bag_0.mcap').write_bytes(data)
+        file = bag / 'bag_0.mcap'
+        file.write_bytes(data)
+        os.utime(file, (0, 0))  # nobody writes it any more, which a repair would wait to see
         with watched(folder):
             run = understood(load_run, bag)
             understood(lambda: summarize(open_bag(bag, whole=64).run))
             codes = [command('info', str(bag), '--json')]
-            if 'recover' in cli.parser().format_help():
-                codes.append(command('recover', str(bag), '--json'))
-                understood(load_run, bag)
+            understood(try_replay, bag)
+            codes.append(command('recover', str(bag), '--json'))
+            understood(load_run, bag)
             left = {entry.name for entry in folder.iterdir()}
             if left != {'bag'}:
                 raise CrashError(f'files beside the bag: {left}')
             return 'refused' if run is None else 'read' if max(codes) == 0 else 'partly'
+
+
+def try_replay(bag: Path) -> None:
+    """Read what a replay would publish, and let a law answer what was recorded."""
+    index = index_bag(bag)
+    selection = select(index, Wish(), lambda name: name)
+    for message in messages(index, selection.names, 0, LATEST):
+        if not 0 <= message.ns <= LATEST:
+            raise CrashError(f'a message at {message.ns} ns')
+    answers = open_loop(recorded_loop(bag), 'cl', {'k_D': 12.0, 'k_I': 1.0})
+    if not np.all(np.isfinite(answers.tau)):
+        raise CrashError('a wrench that is not finite')
 
 
 def try_text(data: bytes) -> str:
@@ -186,4 +205,11 @@ EVERYTHING = {
     'vehicle': 'rexrov',
     'actuators': {'limit': [900.0] * 6, 'rate': [5000.0] * 6, 'lag': 0.05, 'delay': 0.02},
     'sensors': {'velocity_noise': 0.01, 'attitude_noise': 0.001, 'drop_out': 0.1},
+    'faults': [
+        {'kind': 'sensor_drop_out', 'probability': 0.5, 'from': 0.02, 'to': 0.1},
+        {'kind': 'sensor_delay', 'delay': 0.03, 'from': 0.1, 'to': 0.2},
+        {'kind': 'sensor_bias', 'velocity': [0.01] * 6, 'attitude': [0.0, 0.01, 0.0], 'from': 0.1},
+        {'kind': 'actuator', 'axis': 'surge', 'efficiency': 0.5, 'from': 0.0},
+        {'kind': 'wrench_loss', 'probability': 0.2, 'from': 0.2, 'timeout': 0.1},
+    ],
 }

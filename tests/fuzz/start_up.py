@@ -1,5 +1,6 @@
 """Parameter files: a node starts with one, or ends with one line and exit code 2."""
 
+import functools
 import os
 import signal
 import tempfile
@@ -7,12 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from files import CrashError, dumped
+from files import CrashError, bags, dumped
 from watchman import playground, watched
 
+from auv_analysis.analysis_node import AnalysisNode
 from auv_analysis.node_parameters import node_parameters
 from auv_analysis.recorder_node import RecorderNode
+from auv_analysis.replay_node import ReplayNode
 from auv_analysis.scenario import load_scenario
+from auv_dynamics.frame_converter_node import FrameConverterNode
 from auv_dynamics.plant_node import PlantNode
 from auv_dynamics.ros.life import SIGNALS, live
 from auv_gvc_controller.controller_node import ControllerNode
@@ -22,15 +26,37 @@ NODES: dict[str, Callable[[], Any]] = {
     'plant_node': PlantNode,
     'setpoint_node': SetpointNode,
     'controller_node': ControllerNode,
+    'analysis_node': AnalysisNode,
     'recorder_node': RecorderNode,
+    'frame_converter_node': FrameConverterNode,
+    'replay_node': ReplayNode,
 }
+BESIDE: dict[str, dict[str, Any]] = {  # nodes that are in no run
+    'frame_converter_node': {
+        'enu_frame': 'odom', 'flu_frame': 'base_link', 'odom_frame': 'odom_ned',
+        'base_frame': 'base_link_fsd', 'twist_frame': 'world', 'lockstep': True,
+    },
+    'replay_node': {
+        'bag': 'bag', 'namespace': 'replay', 'start': 0.01, 'duration': 0.1, 'rate': 2.0,
+        'loop': True, 'start_paused': False, 'clock': True, 'topics': ['/odom', '/w*'],
+        'command_topics': ['/remark'], 'expected_subscribers': ['/odom=1'], 'answers': '/wrench',
+        'original_names': False, 'commands': False, 'all': True,
+    },
+}  # fmt: skip
 
 
 def originals() -> list[dict[str, Any]]:
-    """Node name and parameters of each, as a scenario with everything has them."""
+    """Node name and parameters of each."""
     scenario = load_scenario('case1')
     found = node_parameters(scenario, 'gvc', bag=Path('bag'), vehicle='herman2018')
+    found = {**found, **BESIDE}
     return [{'node': name, 'parameters': dict(found[name])} for name in NODES]
+
+
+@functools.cache
+def good_bag() -> bytes:
+    """What there is to be replayed."""
+    return bags()[0]
 
 
 def try_parameters(data: Any) -> str:
@@ -42,6 +68,9 @@ def try_parameters(data: Any) -> str:
         values = {**values, 'bag': 'bag'}  # where it is told to write, it may
     with playground() as folder:
         path = folder / 'params.yaml'
+        if node is ReplayNode:
+            (folder / 'bag').mkdir()
+            (folder / 'bag' / 'bag_0.mcap').write_bytes(good_bag())
         path.write_bytes(dumped({'/**': {'ros__parameters': values}}))
         with watched(folder):
             code, said = _started(node, path)

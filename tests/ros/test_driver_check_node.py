@@ -87,6 +87,7 @@ def test_a_healthy_driver_passes(judged) -> None:
         ('world_twist', {'twist_frame'}, 'R(q)^T v'),
         ('w_first', {'upright', 'twist_frame', 'angular_frame'}, 'w written first'),
         ('nan', {'finite'}, 'no measurement'),
+        ('garbled', {'finite'}, 'no measurement'),
         ('best_effort', {'qos_recorder'}, 'publish reliable'),
         ('frozen', {'stamps', 'age'}, 'the time at which its numbers were measured'),
         ('old', {'age'}, 'publish at once'),

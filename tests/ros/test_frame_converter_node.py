@@ -15,6 +15,7 @@ from harness import (
 )
 from numpy.testing import assert_allclose
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from std_srvs.srv import Trigger
 
 from auv_dynamics import interface
@@ -153,12 +154,13 @@ def test_set_points_and_wrenches_pass_and_stamps_are_kept(peer) -> None:
         (lambda m: setattr(m.pose.pose.orientation, 'w', 0.5), 'a unit quaternion'),
         (lambda m: setattr(m.header, 'frame_id', 'odom_ned'), "expected 'odom', found 'odom_ned'"),
         (lambda m: setattr(m.twist.twist.linear, 'y', np.nan), 'finite numbers'),
+        (lambda m: bytes(serialize_message(m))[:50], 'expected a serialized Odometry'),
     ],
-    ids=['quaternion', 'frame', 'nan'],
+    ids=['quaternion', 'frame', 'nan', 'cut'],
 )
 def test_broken_odometry_is_refused_counted_and_reported(peer, spoil, said) -> None:
     broken = convert.odometry(1, UPRIGHT, ENU)
-    spoil(broken)
+    broken = spoil(broken) or broken
 
     def reported() -> bool:
         peer.publish(ENU_ODOM, broken)  # best effort: the first ones may be lost

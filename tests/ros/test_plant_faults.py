@@ -100,7 +100,8 @@ def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
     assert [step_of(m) for m in truth] == list(range(251))
     # lost from 30 to before 50; what was measured from 80 on was still under way at 100
     assert stamps == [*range(30), *range(50, 80), *range(100, 251)]
-    assert not set(applied) & set(range(122, 180)), 'no wrench that came meanwhile is applied'
+    meanwhile = set(applied[120:180]) - {0.0}
+    assert len(meanwhile) <= 1, 'the last one is held, then none: none that came meanwhile'
     assert applied[125] > 100, 'the last one is held'
     assert (applied[165:180] == 0).all(), 'then the watchdog has zeroed it'
     assert applied[-10:].min() > 180, 'and wrenches are heard again'

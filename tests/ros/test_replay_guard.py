@@ -74,7 +74,7 @@ def test_a_wrench_that_is_not_finite_is_refused(tmp_path: Path, capfd) -> None:
     assert [message.wrench.force.x for message in peer.heard['wrench']] == [1.0, 3.0]
     error = capfd.readouterr().err
     assert '/wrench: not finite: expected finite numbers' in error
-    assert '/wrench: expected a message' in error
+    assert '/wrench: not a message: expected a serialized WrenchStamped' in error
 
 
 @pytest.mark.parametrize('root', ['', 'auv1/'])

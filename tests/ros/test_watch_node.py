@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from harness import PATIENCE, Peer, fresh_domain, graph, parameters
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -100,6 +101,10 @@ def test_numbers_of_every_kind_come_in_and_broken_messages_are_errors(ears: Ears
     assert "odom: header.frame_id: expected 'odom_ned', found 'map'" in ears.troubles()
     assert 'wrench: not finite: expected finite numbers, found (nan' in ears.troubles()
     assert ears.snapshot().tau == (2.0,) * 6, 'what is refused is not shown'
+    for topic in (topics.WRENCH, topics.DIAGNOSTICS):
+        before = ears.topic(topic).refused
+        ears.publisher(topic).publish(bytes(serialize_message(topic.type()))[:6])
+        ears.until(lambda t=topic, n=before: ears.topic(t).refused > n)
 
 
 def test_who_does_not_fit_is_named_with_topic_and_policy(ears: Ears) -> None:

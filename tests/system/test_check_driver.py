@@ -35,6 +35,16 @@ def start_check(domain: int, *options: str) -> subprocess.Popen:
     )
 
 
+def await_odometry(domain: int) -> None:
+    """Wait for the first odometry: a plant may have to compile its kernel before."""
+    peer = Peer(domain)
+    try:
+        peer.listen(topics.ODOM)
+        peer.until(lambda: peer.heard[topics.ODOM.name], 'odometry', LIMIT)
+    finally:
+        peer.close()
+
+
 class Relay:
     """Hands the wrench on to a plant, with the sign of sway reversed."""
 
@@ -104,6 +114,8 @@ class Runs:
         ]
         thread.start()
         try:
+            for domain in (healthy, other):
+                await_odometry(domain)
             time_of_plant = '--use-sim-time'
             processes = {
                 'healthy': start_check(healthy, time_of_plant, '--axis', 'sway', '--out', str(out)),

@@ -15,7 +15,6 @@ from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.publisher import Publisher
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 
 from auv_analysis.driver_check.recording import Recording, Tape
 from auv_analysis.driver_check.scene import Scene
@@ -24,7 +23,7 @@ from auv_dynamics import interface
 from auv_dynamics.interface import Frames
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode, DataPath
-from auv_dynamics.ros.codec import Codec, first_stamp
+from auv_dynamics.ros.codec import Codec, first_stamp, message_of
 from auv_dynamics.ros.participant import Participant
 from auv_dynamics.ros.private import PLAIN
 
@@ -75,15 +74,21 @@ class CheckNode(BulkNode):
             self._hear(WrenchStamped, topics.WRENCH_APPLIED.name, self._on_applied)
 
     def _hear(self, kind: type, topic: str, callback: Any) -> None:
+        def take(data: bytes, info: dict[str, Any]) -> None:
+            try:
+                callback(data, info)
+            except interface.BadMessageError:
+                number = info.get('publication_sequence_number') if topic == self.odom else None
+                self.tape.unreadable(topic, number)
+
+        hear: Any = take  # rclpy's types do not know that it may be told the way of a message
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
         self.add_data(
-            self.create_subscription(
-                kind, topic, callback, _sight(), event_callbacks=events, raw=True
-            )
+            self.create_subscription(kind, topic, hear, _sight(), event_callbacks=events, raw=True)
         )
 
     def _on_odometry(self, data: bytes, info: dict[str, Any]) -> None:
-        message = deserialize_message(data, Odometry)
+        message = message_of(data, Odometry, self.odom)
         frames = (message.header.frame_id, message.child_frame_id)
         x, number = interface.state_of(message), info.get('publication_sequence_number')
         self.tape.odometry(_arrived(info), first_stamp(data), x, frames, number)
@@ -92,7 +97,7 @@ class CheckNode(BulkNode):
         self.tape.clock(_arrived(info), first_stamp(data))
 
     def _on_applied(self, data: bytes, info: dict[str, Any]) -> None:
-        message = deserialize_message(data, WrenchStamped)
+        message = message_of(data, WrenchStamped, topics.WRENCH_APPLIED.name)
         self.tape.wrench_applied(_arrived(info), interface.wrench_of(message))
 
 

@@ -35,6 +35,7 @@ class RecorderNode(BulkNode):
         self._latest = 0  # stamp of the newest step message, for messages without one
         self._analysed = -1
         self._reported = -1
+        self._complaints: set[str] = set()
         self._known: set[str] = set()
         self.graph = Graph(self, barrier=False)
         self._progress = self.graph.publisher(topics.PROGRESS, topics.one_at_a_time())
@@ -132,9 +133,14 @@ class RecorderNode(BulkNode):
         if self.exit_code is not None:
             return
         if text:
-            self.get_logger().error(text)
+            self._complain(text)
         self.exit_code = code
         self._progress.wait_for_all_acked(Duration(seconds=1.0))
+
+    def _complain(self, text: str) -> None:
+        if text not in self._complaints:
+            self.get_logger().error(text)
+        self._complaints.add(text)
 
     def close(self) -> None:
         """Finish the bag with everything that has arrived."""
@@ -142,8 +148,7 @@ class RecorderNode(BulkNode):
         try:
             self._writer.close()
         except RecordingError as error:
-            if self.exit_code != 1:
-                self.get_logger().error(str(error))
+            self._complain(str(error))
             self.exit_code = 1
         lost = {topic: gaps for topic, gaps in self._ledger.gaps.items() if gaps}
         if lost or self._publications.gaps:

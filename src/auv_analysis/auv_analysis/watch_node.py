@@ -12,7 +12,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from auv_analysis.watch.gauge import HEARD, Gauge
@@ -21,7 +20,7 @@ from auv_dynamics import interface
 from auv_dynamics.interface import BadMessageError, Frames
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
-from auv_dynamics.ros.codec import KINDS, Codec, first_stamp
+from auv_dynamics.ros.codec import KINDS, Codec, first_stamp, message_of
 from auv_dynamics.ros.endpoints import Endpoints, endpoints
 from auv_dynamics.ros.life import serve
 from auv_dynamics.ros.participant import Participant
@@ -98,7 +97,7 @@ class WatchNode(BulkNode):
         subscription = self.create_subscription(
             topic.type,
             topic.name,
-            self._callbacks[topic],
+            self._guarded(topic),
             _sight(),
             event_callbacks=events,
             raw=True,
@@ -108,6 +107,17 @@ class WatchNode(BulkNode):
         setpoints = self.resolve_topic_name(topics.CMD_VEL.name)
         self.data_subscriptions().sort(key=lambda one: one.topic_name != setpoints)
         return subscription
+
+    def _guarded(self, topic: topics.Topic) -> Any:
+        """The callback of a topic, with bytes that are no message refused."""
+
+        def take(data: bytes, info: dict[str, Any]) -> None:
+            try:
+                self._callbacks[topic](data, info)
+            except BadMessageError as error:
+                self._gauge.refuse(self._now, topic.name, str(error))
+
+        return take
 
     def _callback(self, topic: topics.Topic) -> Callable[[bytes, dict], None]:
         if topic is topics.DIAGNOSTICS:
@@ -128,7 +138,7 @@ class WatchNode(BulkNode):
     def _on_diagnostics(self, data: bytes, info: dict[str, Any]) -> None:
         now, name = self._now, topics.DIAGNOSTICS.name
         self._gauge.hear(now, name, _number(info), first_stamp(data), None)
-        for status in deserialize_message(data, DiagnosticArray).status:
+        for status in message_of(data, DiagnosticArray, name).status:
             level = LEVELS[min(int.from_bytes(status.level, 'little'), len(LEVELS) - 1)]
             facts = {pair.key: pair.value for pair in status.values}
             state = NodeState(status.name, level, status.message, 0.0, facts)

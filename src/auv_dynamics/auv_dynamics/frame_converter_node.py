@@ -8,13 +8,13 @@ from typing import Any
 
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
-from rclpy.serialization import deserialize_message
 
 from auv_dynamics import frames
 from auv_dynamics.files import InputError
-from auv_dynamics.interface import ROS_FRAMES, BadMessageError, Frames, nanoseconds
+from auv_dynamics.interface import ROS_FRAMES, Frames, nanoseconds
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.codec import message_of
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.mirror import CHILD, WORLD, mirrored, mirrored_odometry
@@ -77,12 +77,8 @@ class FrameConverterNode(BulkNode):
         self.graph.facts[count] = 0
 
         def take(data: bytes, _: dict) -> None:
-            message = deserialize_message(data, source.type)
-            try:
-                converted = convert(message, topic=source.name)
-            except BadMessageError as error:
-                self.graph.refuse(str(error))
-                return
+            message = message_of(data, source.type, source.name)
+            converted = convert(message, topic=source.name)
             self.graph.facts[count] += 1
             self._held.append((publisher, converted))
             self._say_held()

@@ -29,6 +29,7 @@ class Contents:
     notes : what is odd, one line each
     frames : namespace -> frames of its first odometry
     names : recorded topic -> our name of it, where the recorder's topics were remapped
+    lenient : whether a driver was free to say anything: what cannot be used is left out
 
     """
 
@@ -42,6 +43,7 @@ class Contents:
     notes: list[str] = field(default_factory=list)
     frames: dict[str, Frames] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
+    lenient: bool = False
 
     def span(self, first: int, last: int) -> None:
         """Note that there are messages logged from `first` to `last`, ns."""

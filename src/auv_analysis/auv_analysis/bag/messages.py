@@ -2,27 +2,28 @@
 
 A channel is taken at once where all its messages in a table have one layout, the same strings and
 usable numbers. Whatever differs goes through the decoder, and where a message is refused, so does
-the whole table, in the order of the file: the refusal is that of its first bad message.
+the whole table, in the order of the file: the refusal is that of its first bad message. Only where
+the recording says that a driver was free to say anything, bad messages are left out and counted:
+the controller has refused them as well.
 """
 
-from collections.abc import Callable, Iterator
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from mcap.records import Attachment, Channel, McapRecord, Metadata, Schema
-from mcap_ros2.decoder import DecoderFactory
 
 from auv_analysis.bag import recording
 from auv_analysis.bag.contents import Contents, Series
+from auv_analysis.bag.decoding import Decoding
 from auv_analysis.bag.layouts import Layout, learned
 from auv_analysis.bag.limits import LARGEST_ATTACHMENT
 from auv_analysis.bag.roles import ODOMETRIES, READERS, check_type, namespace_of, role_of
 from auv_analysis.bag.tables import Table
 from auv_dynamics import interface
 from auv_dynamics.files import InputError
-
-Decoder = Callable[[bytes], Any]
 
 
 class Batch(NamedTuple):
@@ -49,8 +50,15 @@ class FileReader:
         self._frames = contents.frames
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
-        self._decoders: dict[int, Decoder] = {}
+        self._decoders = Decoding(path)
         self._layouts: dict[int, Layout] = {}
+        self._left_out: dict[str, list[str]] = {}  # topic -> why, of each message
+
+    def finish(self) -> None:
+        """Note what was left out."""
+        for topic, reasons in self._left_out.items():
+            counted = f'{self._path.name}: {topic}: {len(reasons)} unusable messages left out'
+            self._contents.notes.append(f'{counted}, the first one: {reasons[0]}')
 
     def take(self, item: Table | McapRecord) -> Iterator[Batch]:
         """Read a record, or a table of messages."""
@@ -76,6 +84,7 @@ class FileReader:
         kept[item.name] = text
         if item.name == recording.NAME:
             self._contents.names = recording.names_of(text, self._path)
+            self._contents.lenient = not recording.was_strict(text, self._path)
 
     def _topic(self, channel: int) -> str:
         """Our name of a channel's topic."""
@@ -91,12 +100,7 @@ class FileReader:
         self._contents.types[channel.topic] = kind
         if self._decode and role_of(self._topic(channel.id)) in READERS:
             check_type(self._path, self._topic(channel.id), kind)
-            try:  # a factory of its own per file: schema ids are only unique within one
-                decoder = DecoderFactory().decoder_for(channel.message_encoding, schema)
-            except Exception as error:  # whatever its parser stumbles over
-                raise self._refusal(channel.topic, 'a schema of its type', error) from None
-            if decoder is not None:
-                self._decoders[channel.id] = decoder
+            self._decoders.add(channel, schema)
 
     def _table(self, table: Table) -> Iterator[Batch]:
         counts = np.bincount(table.channels)
@@ -136,25 +140,40 @@ class FileReader:
             topic = self._topic(channel)
             first = since.get(namespace_of(topic), len(table.starts))
             series = self._at_once(table, channel, index, first)
-            if series is None:
-                series = self._one_by_one(table, channel, index, first)
-            found.setdefault(topic, []).append((index, series))
+            entry = (index, series) if series else self._one_by_one(table, channel, index, first)
+            if len(entry[0]):
+                found.setdefault(topic, []).append(entry)
         return found
 
     def _meet(self, table: Table, members: dict[int, np.ndarray]) -> dict[str, int]:
         """Namespace -> number of the message of the table from which its frames hold."""
         since = dict.fromkeys(self._frames, 0)
-        met: dict[str, tuple[int, int]] = {}
+        met: dict[str, tuple[int, interface.Frames]] = {}
         for channel, index in members.items():
             topic = self._topic(channel)
             namespace = namespace_of(topic)
             if role_of(topic) in ODOMETRIES and namespace not in self._frames:
-                first = int(index[0]), channel
-                met[namespace] = min(met.get(namespace, first), first)
-        for namespace, (i, channel) in met.items():
-            self._frames[namespace] = self._frames_of(table, i, channel)
+                told = self._told(table, index, channel)
+                if told and (namespace not in met or told[0] < met[namespace][0]):
+                    met[namespace] = told
+        for namespace, (i, frames) in met.items():
+            self._frames[namespace] = frames
             since[namespace] = i
         return since
+
+    def _told(
+        self, table: Table, index: np.ndarray, channel: int
+    ) -> tuple[int, interface.Frames] | None:
+        """The first odometry that may be left in, and its frames."""
+        if not self._contents.lenient:
+            return int(index[0]), self._decoders.frames_of(table, int(index[0]), channel)
+        for i in index.tolist():
+            with contextlib.suppress(InputError):
+                frames = self._decoders.frames_of(table, i, channel)
+                odometry = self._decoders.message(table, i, channel)
+                self._decoders.value(self._topic(channel), odometry, frames)
+                return i, frames
+        return None
 
     def _at_once(self, table: Table, channel: int, index: np.ndarray, first: int) -> Series | None:
         """Stamps and rows of a channel; None where its messages must be looked at one by one."""
@@ -170,54 +189,36 @@ class FileReader:
         strangers = index[-1] >= first and not layout.is_in(frames)
         return None if strangers else layout.read(table.data, starts, sizes)
 
-    def _one_by_one(self, table: Table, channel: int, index: np.ndarray, first: int) -> Series:
-        """Stamps and rows of a channel, by its decoder; messages from `first` on have frames."""
+    def _one_by_one(
+        self, table: Table, channel: int, index: np.ndarray, first: int
+    ) -> tuple[np.ndarray, Series]:
+        """Numbers of the messages that are taken, stamps and rows, by the channel's decoder.
+
+        Messages from `first` on have frames.
+        """
         topic = self._topic(channel)
         frames = self._frames.get(namespace_of(topic))
-        values = [
-            self._value(topic, self._message(table, i, channel), frames if i >= first else None)
-            for i in index.tolist()
-        ]
-        stamps, rows = zip(*values, strict=True)
-        return np.array(stamps, np.int64), np.array(rows, float)
+        taken, stamps, rows = [], [], []
+        for i in index.tolist():
+            try:
+                message = self._decoders.message(table, i, channel)
+                ns, row = self._decoders.value(topic, message, frames if i >= first else None)
+            except InputError as error:
+                if not self._contents.lenient:
+                    raise
+                self._left_out.setdefault(topic, []).append(str(error.found))
+            else:
+                taken.append(i)
+                stamps.append(ns)
+                rows.append(row)
+        return np.array(taken, np.int64), (np.array(stamps, np.int64), np.array(rows, float))
 
     def _in_order(self, table: Table, frames: dict[str, interface.Frames]) -> None:
         """Refuse the first message of a table that must be refused."""
         for i, channel in enumerate(table.channels.tolist()):
             if channel in self._decoders:
                 topic = self._topic(channel)
-                message, namespace = self._message(table, i, channel), namespace_of(topic)
+                message, namespace = self._decoders.message(table, i, channel), namespace_of(topic)
                 if role_of(topic) in ODOMETRIES and namespace not in frames:
-                    frames[namespace] = self._frames_of(table, i, channel)
-                self._value(topic, message, frames.get(namespace))
-
-    def _message(self, table: Table, i: int, channel: int) -> Any:
-        try:
-            return self._decoders[channel](table.payload(i))
-        except Exception as error:  # by its schema, a message may be anything
-            topic = self._channels[channel].topic
-            raise self._refusal(topic, 'messages of its type', error) from None
-
-    def _value(
-        self, topic: str, message: Any, frames: interface.Frames | None
-    ) -> tuple[int, tuple]:
-        """Stamp and row of a message; those before the first odometry are free in their frame."""
-        try:
-            known = frames or interface.Frames(base=message.header.frame_id)
-            return READERS[role_of(topic)](message, known)
-        except interface.BadMessageError as error:
-            raise self._refusal(topic, 'usable messages', error) from None
-        except (AttributeError, TypeError) as error:  # a schema with other fields
-            raise self._refusal(topic, 'messages of its type', error) from None
-
-    def _frames_of(self, table: Table, i: int, channel: int) -> interface.Frames:
-        odometry = self._message(table, i, channel)
-        try:
-            return interface.Frames(odometry.header.frame_id, odometry.child_frame_id)
-        except AttributeError as error:  # a schema with other fields
-            topic = self._channels[channel].topic
-            raise self._refusal(topic, 'messages of its type', error) from None
-
-    def _refusal(self, topic: str, expected: str, error: Exception) -> InputError:
-        lines = str(error).splitlines()
-        return InputError(self._path, topic, expected, lines[0] if lines else repr(error))
+                    frames[namespace] = self._decoders.frames_of(table, i, channel)
+                self._decoders.value(topic, message, frames.get(namespace))

@@ -30,6 +30,7 @@ def batches(bag: str | Path, contents: Contents, *, decode: bool = True) -> Iter
         reader = FileReader(path, contents, decode)
         for item in records(path, contents.notes):
             yield from reader.take(item)
+        reader.finish()
 
 
 def read_bag(bag: str | Path, *, decode: bool = True) -> Contents:

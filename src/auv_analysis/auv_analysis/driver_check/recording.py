@@ -22,6 +22,7 @@ class Recording:
     x : (n, 13) position in m, quaternion w, x, y, z, velocity in m/s and rad/s, as they were sent
     frames : (header.frame_id, child_frame_id) -> in how many messages
     lost : messages that were numbered but did not arrive
+    unreadable : topic -> how many messages were none of its type
     clock_arrived_ns, clock_ns : (c,) of /clock
     applied_arrived_ns, applied : (m,) and (m, 6) of wrench_applied, N and N m
 
@@ -38,6 +39,7 @@ class Recording:
     clock_ns: np.ndarray = field(default_factory=NONE.copy)
     applied_arrived_ns: np.ndarray = field(default_factory=NONE.copy)
     applied: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
+    unreadable: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def seconds(self) -> float:
@@ -67,6 +69,7 @@ class Tape:
         self._applied: list[tuple[int, tuple]] = []
         self._number: int | None = None
         self._lost = 0
+        self._unreadable: Counter[str] = Counter()
 
     def __len__(self) -> int:
         return len(self._odometry)
@@ -86,6 +89,14 @@ class Tape:
         """Take an odometry; `number` is the middleware's, of its publisher."""
         self._odometry.append((arrived, stamp, x))
         self._frames[frames] += 1
+        self._follow(number)
+
+    def unreadable(self, topic: str, number: int | None) -> None:
+        """Take bytes that are no message; `number` as of an odometry."""
+        self._unreadable[topic] += 1
+        self._follow(number)
+
+    def _follow(self, number: int | None) -> None:
         if number is not None:
             if self._number is not None and number > self._number:
                 self._lost += number - self._number - 1
@@ -114,4 +125,5 @@ class Tape:
             np.array([row[1] for row in clock], np.int64),
             np.array([row[0] for row in applied], np.int64),
             np.array([row[1] for row in applied], float).reshape(-1, 6),
+            dict(self._unreadable),
         )

@@ -60,6 +60,9 @@ def _finite(recording: Recording) -> Finding:
             name for name, part in zip(names, parts, strict=True) if not np.isfinite(part).all()
         ]
         found += f', in {join(broken)}'
+    for topic, count in recording.unreadable.items():
+        found += f'; {count} of {topic} are no messages of its type'
+        bad += count
     advice = 'publish nothing while there is no measurement: the controller refuses such messages'
     return judged('finite', not bad, 'finite numbers in every message', found, advice, messages=bad)
 

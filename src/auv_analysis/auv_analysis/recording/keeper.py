@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 
 LOOK = 0.1  # s between two looks
-PATIENCE = 5.0  # s for a disk that does not answer
+PATIENCE = 30.0  # s for a disk that does not answer; a sync behind much else may take several
 
 
 class Keeper:

@@ -70,6 +70,18 @@ def first_stamp(data: bytes) -> int:
     return interface.check_stamp('', sec, nanosec)
 
 
+def message_of(data: bytes, kind: Any, topic: str) -> Any:
+    """Message of its serialized form; BadMessageError, which names the topic, where it is none."""
+    try:
+        return deserialize_message(data, kind)
+    except Exception as error:  # whatever the middleware says to bytes from outside
+        text = str(error).splitlines()[0]
+        raise BadMessageError(
+            f'{topic}: not a message: expected a serialized {kind.__name__}, '
+            f'found {len(data)} bytes ({text})'
+        ) from None
+
+
 class Layout:
     """Where stamp, numbers and frame ids stand in the serialized messages of a kind.
 
@@ -183,18 +195,9 @@ class Codec:
         found = self.layout.unpack(data) if self.layout is not None else None
         kind = self._kind
         if found is None:
-            return kind.read(self._message(data), self._frames, self._topic)  # type: ignore[misc]
+            message = message_of(data, self._type, self._topic)
+            return kind.read(message, self._frames, self._topic)  # type: ignore[misc]
         return found[0], kind.check(self._topic, found[1])  # type: ignore[misc]
-
-    def _message(self, data: bytes) -> Any:
-        try:
-            return deserialize_message(data, self._type)
-        except Exception as error:  # whatever the middleware says to bytes from outside
-            name, text = self._type.__name__, str(error).splitlines()[0]
-            raise BadMessageError(
-                f'{self._topic}: not a message: expected a serialized {name}, '
-                f'found {len(data)} bytes ({text})'
-            ) from None
 
 
 def verified_layout(kind: type, frames: Frames) -> Layout | None:

@@ -5,10 +5,9 @@ from collections.abc import Mapping
 from geometry_msgs.msg import WrenchStamped
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
-from rclpy.serialization import deserialize_message
 
-from auv_dynamics.interface import BadMessageError, Frames
-from auv_dynamics.ros.codec import KINDS
+from auv_dynamics.interface import Frames
+from auv_dynamics.ros.codec import KINDS, message_of
 
 ACKNOWLEDGED = Duration(seconds=0.5)
 
@@ -33,11 +32,7 @@ class Commands:
         kind = KINDS.get(publisher.msg_type) if publisher is not None else None
         if publisher is None or kind is None or kind.read is None:
             return
-        try:
-            message = deserialize_message(data, publisher.msg_type)
-        except RuntimeError as error:  # of the middleware, whatever it stumbles over
-            found = str(error).splitlines()[0]
-            raise BadMessageError(f'{name}: expected a message, found {found}') from None
+        message = message_of(data, publisher.msg_type, name)
         child = getattr(message, 'child_frame_id', message.header.frame_id)
         kind.read(message, Frames(message.header.frame_id, child), name)
         if isinstance(message, WrenchStamped):

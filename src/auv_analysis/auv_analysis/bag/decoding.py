@@ -1,0 +1,75 @@
+"""One message at a time, by its schema: decoded, checked, or refused in one line."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from mcap.records import Channel, Schema
+from mcap_ros2.decoder import DecoderFactory
+
+from auv_analysis.bag.roles import READERS, role_of
+from auv_analysis.bag.tables import Table
+from auv_dynamics import interface
+from auv_dynamics.files import InputError
+
+Decoder = Callable[[bytes], Any]
+
+
+class Decoding:
+    """Decoders of the channels of one file; what must not be used raises InputError.
+
+    Parameters
+    ----------
+    path : the file, for the refusals
+
+    """
+
+    def __init__(self, path: Path):
+        self._path = path
+        self._decoders: dict[int, Decoder] = {}
+        self._topics: dict[int, str] = {}
+
+    def add(self, channel: Channel, schema: Schema | None) -> None:
+        """Learn to decode a channel, where its encoding is known."""
+        try:  # a factory of its own per file: schema ids are only unique within one
+            decoder = DecoderFactory().decoder_for(channel.message_encoding, schema)
+        except Exception as error:  # whatever its parser stumbles over
+            raise self._refusal(channel.topic, 'a schema of its type', error) from None
+        if decoder is not None:
+            self._decoders[channel.id] = decoder
+            self._topics[channel.id] = channel.topic
+
+    def __contains__(self, channel: int) -> bool:
+        return channel in self._decoders
+
+    def __getitem__(self, channel: int) -> Decoder:
+        return self._decoders[channel]
+
+    def message(self, table: Table, i: int, channel: int) -> Any:
+        """Message number i of a table."""
+        try:
+            return self._decoders[channel](table.payload(i))
+        except Exception as error:  # by its schema, a message may be anything
+            raise self._refusal(self._topics[channel], 'messages of its type', error) from None
+
+    def value(self, topic: str, message: Any, frames: interface.Frames | None) -> tuple[int, tuple]:
+        """Stamp and row of a message; those before the first odometry are free in their frame."""
+        try:
+            known = frames or interface.Frames(base=message.header.frame_id)
+            return READERS[role_of(topic)](message, known)
+        except interface.BadMessageError as error:
+            raise self._refusal(topic, 'usable messages', error) from None
+        except (AttributeError, TypeError) as error:  # a schema with other fields
+            raise self._refusal(topic, 'messages of its type', error) from None
+
+    def frames_of(self, table: Table, i: int, channel: int) -> interface.Frames:
+        """Frames that an odometry names."""
+        odometry = self.message(table, i, channel)
+        try:
+            return interface.Frames(odometry.header.frame_id, odometry.child_frame_id)
+        except AttributeError as error:  # a schema with other fields
+            raise self._refusal(self._topics[channel], 'messages of its type', error) from None
+
+    def _refusal(self, topic: str, expected: str, error: Exception) -> InputError:
+        lines = str(error).splitlines()
+        return InputError(self._path, topic, expected, lines[0] if lines else repr(error))

@@ -47,6 +47,7 @@ case1 case2: setup  ## the paper's experiment: GVC against CL on real nodes, wit
 
 # four workers on two cores: the tests of the nodes mostly wait
 test: setup  ## the tests
+	$(BIN)/python tests/compile_kernels.py
 	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
 soak: setup  ## COUNT random runs by SEED, KILLS of nodes, a run of STEPS, one of DAY s, what else takes long

@@ -90,7 +90,8 @@ def _replace(draw: st.DrawFn, _: Any, holder: Any, key: Any) -> None:
 
 
 def _scale(draw: st.DrawFn, _: Any, holder: Any, key: Any) -> None:
-    if isinstance(holder[key], int | float) and not isinstance(holder[key], bool):
+    value = holder[key]
+    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300:
         holder[key] *= draw(st.sampled_from((-1.0, 0.0, 1e-6, 0.5, 2.0, 1e6)))
     else:
         holder[key] = draw(ODD)

@@ -16,6 +16,8 @@ from mcap_ros2.decoder import DecoderFactory
 
 from auv_analysis import load_scenario
 
+ENOUGH = 150_000  # bytes of a bag in which there are steps
+
 
 def start(scenario: Path, out: Path, *options: str) -> subprocess.Popen:
     """Start `auv run`."""
@@ -29,6 +31,14 @@ def record(scenario: Path, out: Path, domain: int | None = None) -> subprocess.P
     environ = environment(fresh_domain() if domain is None else domain)
     command = [sys.executable, __file__, str(scenario), str(out)]
     return subprocess.Popen(command, env=environ, stderr=subprocess.PIPE, text=True)
+
+
+def recorded(scenario: Path, out: Path) -> Path:
+    """Record to the end; the folder."""
+    process = record(scenario, out)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    return out
 
 
 def long_run(folder: Path, steps: int) -> Path:
@@ -57,7 +67,7 @@ def node_of(out: Path, name: str) -> psutil.Process:
     limit = time.monotonic() + 60
     while time.monotonic() < limit:
         bags = list(out.glob('*/*.mcap'))
-        if bags and bags[0].stat().st_size > 50_000 and name in (running := nodes(out)):
+        if bags and bags[0].stat().st_size > ENOUGH and name in (running := nodes(out)):
             return running[name]
         time.sleep(0.05)
     raise AssertionError(f'{name} does not run')
@@ -89,18 +99,18 @@ def plain(value: object) -> object:
 
 
 def main(path: str, out: str) -> None:
-    """Record the first controller of a scenario."""
+    """Record every controller of a scenario."""
     from auv_analysis.experiment import run_controller
     from auv_analysis.warm_up import warm_up
     from auv_dynamics.ros.watcher import Watcher
 
     scenario, domain = load_scenario(path), int(os.environ['ROS_DOMAIN_ID'])
-    name = next(iter(scenario.controllers))
     Path(out).mkdir()
-    warm_up(scenario, [name])
+    warm_up(scenario, list(scenario.controllers))
     graph = Watcher(domain)
     try:
-        run_controller(scenario, name, Path(out), domain, graph, lambda _: None)
+        for name in scenario.controllers:
+            run_controller(scenario, name, Path(out), domain, graph, lambda _: None)
     finally:
         graph.close()
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from graph_runs import recorded
 from harness import auv
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -36,9 +37,7 @@ def bag(tmp_path_factory) -> Path:
             'disturbance': {'kind': 'herman2018'},
         })
     )  # fmt: skip
-    ended = auv('run', str(scenario), '--out', str(root / 'out'))
-    assert ended.returncode == 0, ended.stderr
-    return root / 'out' / 'gvc'
+    return recorded(scenario, root / 'out') / 'gvc'
 
 
 def mcap_of(bag: Path) -> Path:

@@ -1,6 +1,5 @@
 """How the figures look: symbols, colours, panels, honest decimation and saving."""
 
-import io
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import NullLocator
@@ -109,15 +109,16 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     """Write <name>.png and <name>.pdf, the same bytes every time; return both paths."""
     folder.mkdir(parents=True, exist_ok=True)
     png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
-    drawn = io.BytesIO()
-    figure.savefig(drawn)
-    with Image.open(
-        drawn
-    ) as image:  # few colours: a fifth of the bytes, so that a report stays small
-        few = image.convert('RGB').quantize(PALETTE, dither=Image.Dither.NONE)
+    # once each by the canvases themselves: savefig would draw every figure twice
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert('RGB')
+    # few colours: a fifth of the bytes, so that a report stays small
+    few = drawn.quantize(PALETTE, dither=Image.Dither.NONE)
     few.save(png, optimize=True, dpi=(DPI, DPI))
     figure.set_layout_engine('none')  # laid out once is enough
-    figure.savefig(pdf, metadata={'CreationDate': None, 'Creator': None, 'Producer': None})
+    dates = {'CreationDate': None, 'Creator': None, 'Producer': None}
+    FigureCanvasPdf(figure).print_pdf(pdf, metadata=dates)
     return png, pdf
 
 

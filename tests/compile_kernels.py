@@ -1,23 +1,45 @@
 """Compile what the tests call, once and before they start: workers would do it side by side.
 
-Two processes share it, as there are two cores on a small machine.
+Two processes share it, as there are two cores on a small machine. What is missing here is compiled
+by the test that calls it first.
 """
 
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import yaml
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.rollouts import rollouts
 from auv_analysis.scenario import Scenario
+from auv_analysis.simulation import Hold
+from auv_analysis.tuning.loops import measured
 from auv_analysis.warm_up import warm_up
 
-SOURCES = {'case1': ('gvc', 'cl'), 'faults_bluerov2_heavy': ('pid', 'smc')}  # every law once
-HOLDS = ('zoh', 'continuous')
 STEPS = 20
+SHARED, OWN = 'controllers.{}.k_D', 'setpoint.surge.offset'  # set-points that are shared, or not
+
+
+class Called(NamedTuple):
+    """How the tests call a law: in which scenario, and in which batches."""
+
+    scenario: str
+    batches: Sequence[tuple[str, Hold]]
+    is_tuned: bool = False
+
+
+LAWS = {
+    'gvc': Called('case1', [(SHARED, 'continuous'), (OWN, 'continuous'), (OWN, 'zoh')], True),
+    'cl': Called('case1', [(SHARED, 'continuous'), (OWN, 'continuous')], True),
+    'pid': Called('faults_bluerov2_heavy', [(SHARED, 'continuous')], True),
+    'smc': Called('faults_bluerov2_heavy', [(SHARED, 'zoh'), (OWN, 'zoh')]),
+}
+TOGETHER = (('gvc', 'smc'), ('cl', 'pid'))
 
 
 def shortened(name: str, folder: Path) -> Scenario:
@@ -31,33 +53,35 @@ def shortened(name: str, folder: Path) -> Scenario:
     return load_scenario(path)
 
 
-def compile_sampled(name: str) -> None:
-    """What nodes, the sampled simulation and the figures of a run call, for the laws of `name`."""
+def compile_sampled(law: str) -> None:
+    """What nodes, the sampled simulation and the figures of a run call."""
+    name = LAWS[law].scenario
     with tempfile.TemporaryDirectory() as folder:
-        scenario = shortened(name, Path(folder))
-        warm_up(load_scenario(name), list(SOURCES[name]))
-        for law in SOURCES[name]:
-            summarize(simulate(scenario, law, 'zoh'))
+        warm_up(load_scenario(name), [law])
+        summarize(simulate(shortened(name, Path(folder)), law, 'zoh'))
 
 
-def compile_all(name: str) -> None:
-    """What everything else calls as well, for the laws of `name`."""
-    compile_sampled(name)
+def compile_all(law: str) -> None:
+    """What everything else calls as well."""
+    compile_sampled(law)
+    called = LAWS[law]
     with tempfile.TemporaryDirectory() as folder:
-        scenario = shortened(name, Path(folder))
-        for law in SOURCES[name]:
-            simulate(scenario, law, 'continuous')
-            for hold in HOLDS:
-                rollouts(scenario, law, {f'controllers.{law}.k_D': [10.0, 11.0]}, hold=hold)
+        scenario = shortened(called.scenario, Path(folder))
+        simulate(scenario, law, 'continuous')
+        for path, hold in called.batches:
+            rollouts(scenario, law, {path.format(law): [0.1, 0.2]}, hold=hold)
+        if called.is_tuned:
+            measured(scenario, law, {'k_D': np.array([0.1, 0.2])}, 'continuous', 1)
 
 
 def main() -> None:
-    """Compile what a scenario is named for, or all, in processes of their own."""
-    if sys.argv[1:]:
-        compile_all(sys.argv[1])
-        return
-    started = [subprocess.Popen([sys.executable, __file__, name]) for name in SOURCES]
-    sys.exit(max(process.wait() for process in started))
+    """Compile for the laws that are named, or for all in processes of their own."""
+    for law in sys.argv[1:]:
+        compile_all(law)
+    if not sys.argv[1:]:
+        print('compiling the kernels that the tests call ...', flush=True)
+        started = [subprocess.Popen([sys.executable, __file__, *laws]) for laws in TOGETHER]
+        sys.exit(max(process.wait() for process in started))
 
 
 if __name__ == '__main__':

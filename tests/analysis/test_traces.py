@@ -107,6 +107,7 @@ def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
     assert np.ptp(columns) <= 6, 'and a few pixels wide'
 
 
+@pytest.mark.long
 def test_a_report_does_not_grow_with_the_run(run, tmp_path) -> None:
     """The page is flat; a PDF grows until its lines are full, 4000 points each."""
     sizes = []

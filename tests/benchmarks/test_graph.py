@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from harness import environment, fresh_domain
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / 'benchmarks'
@@ -20,6 +21,7 @@ json.dump({name: asdict(measured) for name, measured in found.items()}, sys.stdo
 """
 
 
+@pytest.mark.long
 def test_graph_measures_ping_pong_and_both_graphs() -> None:
     ended = subprocess.run(
         [sys.executable, '-c', SCRIPT], cwd=BENCHMARKS,

@@ -134,10 +134,10 @@ def one(target: str, count: int, seed: int) -> int:
 def together(targets: Iterable[str], count: int, seed: int, jobs: int) -> int:
     """Try targets in processes of their own."""
 
-    from compile_kernels import SOURCES, compile_sampled
+    from compile_kernels import LAWS, compile_sampled
 
-    for name in SOURCES:  # no input waits for the compiler
-        compile_sampled(name)
+    for law in LAWS:  # no input waits for the compiler
+        compile_sampled(law)
 
     def start(target: str) -> int:
         number = max(1, round(count * SHARES[target]))

@@ -151,6 +151,7 @@ def test_every_node_has_its_services_and_life(tmp_path: Path) -> None:
     assert read_bag(tmp_path / 'bag', decode=False).notes == []
 
 
+@pytest.mark.long
 def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
     out = tmp_path / 'out'
     process = start(write(tmp_path, duration=80.0), out, '--composed')

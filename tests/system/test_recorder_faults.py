@@ -55,7 +55,8 @@ def steps_of(bag: Path) -> int:
     return min(counts)
 
 
-@pytest.mark.parametrize('composed', [False, pytest.param(True, marks=pytest.mark.long)])
+@pytest.mark.long  # test_kills has one of the recorder alone
+@pytest.mark.parametrize('composed', [False, True])
 def test_a_recorder_that_is_killed(tmp_path: Path, composed: bool) -> None:
     """The bag is repaired, and analysed as any other."""
     out = tmp_path / 'out'

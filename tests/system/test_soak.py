@@ -153,7 +153,7 @@ def held_up_run(folder: Path, steps: int, begin: Callable = start) -> list[dict]
 
 
 def test_a_recorder_stopped_and_slowed_at_random_loses_and_doubles_nothing(tmp_path: Path) -> None:
-    held_up_run(tmp_path, 10_000)
+    held_up_run(tmp_path, 10_000, record)
     recorded = load_run(tmp_path / 'out' / 'gvc')
     simulated = simulate(load_scenario(tmp_path / 'long.yaml'), 'gvc', 'zoh')
     for name in SIGNALS:

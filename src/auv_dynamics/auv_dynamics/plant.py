@@ -180,6 +180,7 @@ class Plant:
 
         """
         truth, row = self._uncertainty.truth, self._row
+        tau = tuple(map(float, tau))  # whole numbers would be another kernel, compiled on the spot
         self._applied = self._acting.apply(self.k, tau, self._fault, heard=heard)
         if truth.exact:
             return self._applied, tuple(self._F[row, 0])

@@ -182,6 +182,10 @@ class SampledLaw:
         A sample that is not finite leaves the state as it was and raises ArithmeticError.
 
         """
+        # whole numbers would be another kernel, compiled on the spot
+        nu, attitude, nu_d, nu_d_dot = (
+            tuple(map(float, values)) for values in (nu, attitude, nu_d, nu_d_dot)
+        )
         state, rate = self._state.copy(), self._rate.copy()
         with np.errstate(all='ignore'), user_law(self._gains):
             tau, f = self._sample(

@@ -202,9 +202,10 @@ def graph(
 
 
 def auv(*arguments: str, cwd: Path | None = None, **extra: str) -> subprocess.CompletedProcess:
-    """Run the installed `auv` command."""
+    """Run the installed `auv` command, in a domain of the test's."""
     command = [str(Path(sys.executable).with_name('auv')), *arguments]
-    environ = {k: v for k, v in os.environ.items() if k != 'ROS_DOMAIN_ID'}
+    # not a domain of its own choice: a parallel test may be about to use the same
+    environ = {**os.environ, 'ROS_DOMAIN_ID': str(fresh_domain())}
     return subprocess.run(
         command, cwd=cwd, env={**environ, **extra}, capture_output=True, text=True, timeout=600,
         check=False,

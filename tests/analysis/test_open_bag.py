@@ -128,6 +128,7 @@ def test_a_bag_with_bad_messages_is_refused_when_it_is_opened(tmp_path) -> None:
         open_bag(path, whole=3)
 
 
+@pytest.mark.long
 def test_memory_does_not_grow_with_the_bag(tmp_path) -> None:
     """Four times the steps: what is held more are the entries of four times the chunks."""
     peaks = []

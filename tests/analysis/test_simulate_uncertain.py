@@ -71,6 +71,7 @@ SAMPLED = {
         'seed': 11,
     },
 }
+DURATIONS = [8.0, pytest.param(30.0, marks=pytest.mark.long)]  # s
 BASE = {'setpoint': SIX, 'initial': TURNED, 'duration': 4.0}
 
 
@@ -124,18 +125,20 @@ LONG = {
 }
 
 
+@pytest.mark.parametrize('duration', DURATIONS)
 @pytest.mark.parametrize('name', LONG)
-def test_thirty_seconds(name):
+def test_long_runs(name, duration):
     hold = ('continuous', 'zoh')[list(LONG).index(name) % 2]
     changes = dict(LONG[name])
     vehicle = file_of(changes.pop('vehicle', 'herman2018'))
-    compare(*pair('gvc', hold, vehicle, **changes, duration=30.0))
+    compare(*pair('gvc', hold, vehicle, **changes, duration=duration))
 
 
+@pytest.mark.parametrize('duration', DURATIONS)
 @pytest.mark.parametrize('hold', ['continuous', 'zoh'])
 @pytest.mark.parametrize(('case', 'law'), [('case1', 'gvc'), ('case1', 'cl'), ('case2', 'cl')])
-def test_thirty_seconds_of_the_papers_cases(case, law, hold):
-    compare(*pair(law, hold, file_of('herman2018'), base=case, duration=30.0))
+def test_long_runs_of_the_papers_cases(case, law, hold, duration):
+    compare(*pair(law, hold, file_of('herman2018'), base=case, duration=duration))
 
 
 @settings(QUICK, max_examples=8)

@@ -38,6 +38,7 @@ class Graph(Protocol):
     """What an experiment sees of the node graph."""
 
     complete_ns: int
+    running: bool
     waits_for: str
 
     def spin(self, seconds: float) -> None:
@@ -117,7 +118,7 @@ def run_controller(
     parameters[PLANT]['start_paused'] = True
     text = parameter_file(parameters, f'{scenario.name}, controller {controller}: auv run')
     path.write_text(text, encoding='utf-8')
-    graph.complete_ns = -1
+    graph.complete_ns, graph.running = -1, False
     supervisor = Supervisor(out / 'logs' / controller, environment(domain))
     try:
         for name, package in ({COMPOSED: PACKAGES[RECORDER]} if composed else PACKAGES).items():

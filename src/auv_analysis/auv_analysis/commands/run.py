@@ -51,7 +51,6 @@ def recorded(options: argparse.Namespace, scenario: Scenario, names: list[str]) 
         say(f'export {VARIABLE}={domain}')
         failure, done = None, []
         for name in names:
-            graph.running = False
             with _progress() as bar:
                 task = bar.add_task(f'{scenario.name} {name}', total=scenario.steps)
                 show = partial(_show_step, bar, task)

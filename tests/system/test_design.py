@@ -22,6 +22,7 @@ def auv(*arguments, folder):
     return done.stdout
 
 
+@pytest.mark.long
 def test_the_claim_is_what_a_simulation_of_the_changed_vehicle_gives(tmp_path):
     document = json.loads(auv('design', 'rexrov', '--json', folder=tmp_path))
     out = tmp_path / 'runs' / 'design_rexrov'

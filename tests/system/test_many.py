@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from PIL import Image
 from sweeps import run as run_sweep
 from sweeps import write_files
@@ -33,6 +34,7 @@ def drawn(out: Path) -> set[str]:
     return names
 
 
+@pytest.mark.long
 def test_a_sweep_is_explored(tmp_path: Path) -> None:
     run_sweep(write_files(tmp_path), out='runs/small')
     ended = auv(tmp_path, 'analyze', 'runs/small', '--json')

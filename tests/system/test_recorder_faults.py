@@ -88,6 +88,7 @@ def test_a_recorder_that_is_killed(tmp_path: Path, composed: bool) -> None:
     assert summary['samples'] == len(load_run(bag).t) > 10
 
 
+@pytest.mark.long
 def test_what_was_finished_before_is_still_reported(tmp_path: Path) -> None:
     """The recorder of the second controller is killed: the first has its summary and report."""
     controllers = {'one': {'law': 'gvc', **GAINS}, 'two': {'law': 'cl', **GAINS}}

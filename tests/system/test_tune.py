@@ -21,6 +21,7 @@ def auv(folder: Path, *arguments: str) -> dict:
     return json.loads(done.stdout)
 
 
+@pytest.mark.long
 def test_simulate_repeats_what_was_tuned(tmp_path: Path) -> None:
     write(tmp_path, {'gvc': GVC, 'cl': SAME_CL | {'k_D': 300.0}}, duration=0.2)
     arguments = ('tune', 's.yaml', '--law', 'cl', '--structure', 'mass', '--samples', '10')

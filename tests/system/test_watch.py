@@ -52,6 +52,7 @@ def scenario(tmp_path_factory) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_a_run_is_the_same_beside_a_watch_that_is_even_stopped(scenario, tmp_path) -> None:
     domain = fresh_domain()
     beside = start_watch(domain, '--json', '--rate', '20')

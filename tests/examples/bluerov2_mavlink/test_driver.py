@@ -106,9 +106,14 @@ def running():
 def sea(running):
     """The vehicle under way; a test that needs it otherwise puts it back."""
     running.tau = PUSH
-    if 'not commanded' in running.facts().get('', ''):
-        running.peer.call(SetBool, 'bluerov2_driver/arm', SetBool.Request(data=True))
-    running.until(lambda: running.surge > 0.2, 'the vehicle to go ahead')
+
+    def ahead() -> bool:
+        if 'not commanded' in running.facts().get('', ''):
+            running.peer.heard['/diagnostics'].clear()
+            running.peer.call(SetBool, 'bluerov2_driver/arm', SetBool.Request(data=True))
+        return running.surge > 0.2
+
+    running.until(ahead, 'the vehicle to go ahead')
     running.peer.heard['/diagnostics'].clear()  # what they say from now on is of now
     return running
 

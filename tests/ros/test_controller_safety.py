@@ -71,11 +71,12 @@ class Driver:
         return self.surge[seen:]
 
     def health(self, wanted: Callable[[dict], bool]) -> dict:
-        """Diagnostics of the controller, once they say what is wanted."""
+        """Diagnostics of the controller, once those from now on say what is wanted."""
         found: list[dict] = []
+        heard, before = self.peer.heard[DIAGNOSTICS.name], len(self.peer.heard[DIAGNOSTICS.name])
 
         def told() -> bool:
-            for array in self.peer.heard[DIAGNOSTICS.name]:
+            for array in heard[before:]:
                 for status in array.status:
                     if status.name == '/controller_node':
                         values = {entry.key: entry.value for entry in status.values}
@@ -107,7 +108,7 @@ def freeze(driver: Driver) -> None:
 
 FAULTS: dict[str, tuple[Callable[[Driver], None], str]] = {
     'odometry falls silent': (lambda d: setattr(d, 'odometry', False), 'no odometry for 0.3 s'),
-    'set-points fall silent': (lambda d: setattr(d, 'setpoints', False), 'no set-point'),
+    'set-points fall silent': (lambda d: setattr(d, 'setpoints', False), 'no set-point for'),
     'old set-points': (lambda d: setattr(d, 'setpoint_age', 10**9), 'no set-point for'),
     'odometry is late': (
         lambda d: setattr(d, 'clock', lambda: time.time_ns() - 10**9), 'no odometry for 0.3 s',

@@ -9,12 +9,12 @@ from typing import Any
 import jsonschema
 import numpy as np
 
-from auv_dynamics.refusal import InputError, reason, shorten
+from auv_dynamics.refusal import InputError, first_line, reason, shorten
 from auv_dynamics.yaml_text import parse_any_yaml, parse_yaml
 
 __all__ = [
-    'InputError', 'check', 'dotted', 'matrix6', 'parse_any_yaml', 'parse_yaml', 'read_text',
-    'read_yaml', 'reason', 'schema', 'shorten',
+    'InputError', 'check', 'dotted', 'first_line', 'matrix6', 'parse_any_yaml', 'parse_yaml',
+    'read_text', 'read_yaml', 'reason', 'schema', 'shorten',
 ]  # fmt: skip
 LARGEST = 1e100  # products of a few such numbers are still finite
 LARGEST_FILE = 1 << 28  # bytes of a text file

@@ -45,15 +45,16 @@ class FrameConverterNode(BulkNode):
         refuse_unknown(self)
         self._check_axes(ours, theirs)
         self._held: deque[tuple[Publisher, Any]] = deque(maxlen=topics.DEPTH)
-        inward, outward = partial(_from, theirs, ours), partial(_from, ours, theirs)
+        inward = partial(mirrored, here=theirs, there=ours)
+        outward = partial(mirrored, here=ours, there=theirs)
         lockstep, every = topics.one_at_a_time(), topics.every_step()
         odometry = lockstep if self.lockstep else topics.newest_measurement()
         command = lockstep if self.lockstep else topics.newest_command()
         odom = partial(mirrored_odometry, here=theirs, there=ours, twist_frame=self._twist_frame)
         self._pass(_theirs(topics.ODOM), topics.ODOM, odom, odometry)
         for setpoint in (topics.CMD_VEL, topics.CMD_ACCEL):
-            self._pass(_theirs(setpoint), setpoint, inward(), every)
-        self._commanded = self._pass(topics.WRENCH, _theirs(topics.WRENCH), outward(), command)
+            self._pass(_theirs(setpoint), setpoint, inward, every)
+        self._commanded = self._pass(topics.WRENCH, _theirs(topics.WRENCH), outward, command)
         self.graph.also_ready_when(self._untaken)
         steady_timer(self, 0.05, self._say_held)
 
@@ -102,10 +103,6 @@ class FrameConverterNode(BulkNode):
 def _theirs(topic: Topic) -> Topic:
     """The driver's topic of one of ours."""
     return replace(topic, name=f'{ENU_FLU}/{topic.name}')
-
-
-def _from(here: Frames, there: Frames) -> Callable[..., Any]:
-    return partial(mirrored, here=here, there=there)
 
 
 def main() -> None:

@@ -29,6 +29,11 @@ def reason(error: OSError) -> str:
     return (error.strerror or str(error)).lower()
 
 
+def first_line(error: BaseException) -> str:
+    """What a library said of an error, as one line; its type where it said nothing."""
+    return (str(error) or type(error).__name__).splitlines()[0]
+
+
 def shorten(value: object) -> str:
     """One short line that shows a value."""
     if isinstance(value, str) and PLAIN.fullmatch(value):

@@ -5,7 +5,7 @@ from typing import Any
 
 import yaml
 
-from auv_dynamics.refusal import InputError
+from auv_dynamics.refusal import InputError, first_line
 
 MOST_ENTRIES = 100_000  # of a text, with its aliases written out
 LONGEST_TEXT = 4 << 20  # characters
@@ -80,8 +80,7 @@ def parse_any_yaml(text: str, path: object) -> Any:
         raise InputError(path, '', 'valid YAML', 'too many levels') from None
     except (yaml.YAMLError, ValueError, TypeError, LookupError) as error:
         # PyYAML's constructors of tagged scalars raise what their conversions raise
-        found = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(path, '', 'valid YAML', found) from None
+        raise InputError(path, '', 'valid YAML', first_line(error)) from None
     if not _is_small(data):
         expected = f'at most {MOST_ENTRIES} entries with all aliases written out'
         raise InputError(path, '', expected, 'more')

@@ -66,7 +66,6 @@ class VelocityController:
         self._law, self._pairing, self._guard, self._output = law, pairing, guard, output
         self._exact, self._timeouts = exact, timeouts
         self._waiting: tuple[int, tuple, float] | None = None
-        self._origin: int | None = None
         self._heard: float | None = None  # steady s of the last odometry; None: none is missed
         self._unanswered_since = 0.0
         self._bridge = False  # the law was silent: its old rate must not be integrated
@@ -95,12 +94,9 @@ class VelocityController:
         ValueError : the odometry must not be used
 
         """
-        last, restarts = self._guard.last or 0, self._guard.restarts
+        restarts = self._guard.restarts
         dt = self._guard.elapsed(ns, x[7:], now)
-        if self._origin is None:
-            self._origin = ns
         if self._guard.restarts > restarts:
-            self._origin += ns - last  # the time of the law goes on
             self._waiting = None
             self._pairing.forget()
         self._heard = now.steady
@@ -126,7 +122,7 @@ class VelocityController:
         if self._bridge:
             self._law.forget_rate()
             self._bridge = False
-        t = (ns - (self._origin or 0)) / 1e9
+        t = (ns - self._guard.origin) / 1e9
         try:
             tau, f = self._law.sample(t, dt, x[7:], x[3:7], reference.nu_d, reference.nu_d_dot)
         except ArithmeticError as error:

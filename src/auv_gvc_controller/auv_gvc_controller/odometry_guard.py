@@ -20,6 +20,7 @@ class OdometryGuard:
     Attributes
     ----------
     last : stamp that was accepted last, ns
+    origin : stamp from which the time of a run counts: it goes on where stamps begin anew
     restarts : how often the stamps began anew, at an earlier time
 
     """
@@ -39,6 +40,7 @@ class OdometryGuard:
     def reset(self) -> None:
         """Forget everything, as at activation."""
         self.last: int | None = None
+        self.origin = 0
         self.restarts = 0
         self._candidate: int | None = None
         self._accepted_at = 0.0
@@ -64,6 +66,10 @@ class OdometryGuard:
                 self._age.reset()
             self._age.check(ns, now)
             self._age.accept(ns, now)
+        if self.last is None:
+            self.origin = ns
+        elif restarted:
+            self.origin += ns - self.last
         self.restarts += restarted
         self.last, self._candidate, self._accepted_at = ns, None, now.steady
         return dt

@@ -42,7 +42,6 @@ class SetpointNode(BulkNode):
         self.graph.listen(topics.ODOM, self._on_odometry, topics.one_at_a_time())
         gap = max(interface.NANOSECONDS, 10 * self._step_ns)
         self._guard = OdometryGuard(gap, Limits(), lockstep=False, patience=PATIENCE)
-        self._origin: int | None = None
         self._newest = -1
         self._next = 0
         self._first, self._rows = 0, np.zeros((0, 12))
@@ -61,22 +60,19 @@ class SetpointNode(BulkNode):
         return make_setpoint(spec, duration)
 
     def _on_odometry(self, ns: int, x: tuple) -> None:
-        last, restarts = self._guard.last or 0, self._guard.restarts
+        restarts = self._guard.restarts
         try:
             self._guard.elapsed(ns, x[7:], Now(time.monotonic()))
         except ValueError as error:
             self.graph.refuse(f'{topics.ODOM.name}: {error}')
             return
-        if self._origin is None:
-            self._origin = ns
         if self._guard.restarts > restarts:  # the driver was started again: go on from here
-            self._origin += ns - last
             self._next = self._newest
-        self._newest = max(self._newest, (ns - self._origin) // self._step_ns)
+        self._newest = max(self._newest, (ns - self._guard.origin) // self._step_ns)
         self._publish()
 
     def _publish(self) -> None:
-        if self._origin is None or not self.graph.ready():
+        if self._guard.last is None or not self.graph.ready():
             return
         until = self._newest + self._horizon
         until = until if self._last is None else min(until, self._last)
@@ -85,7 +81,7 @@ class SetpointNode(BulkNode):
             self._next = max(self._next, self._newest - self._horizon)
         while self._next <= until:
             row = self._row(self._next)
-            ns = self._origin + self._next * self._step_ns
+            ns = self._guard.origin + self._next * self._step_ns
             self._say_velocity(ns, row[:6])
             self._say_acceleration(ns, row[6:])
             self.graph.latest_ns = ns

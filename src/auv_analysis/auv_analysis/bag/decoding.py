@@ -10,7 +10,7 @@ from mcap_ros2.decoder import DecoderFactory
 from auv_analysis.bag.roles import READERS, role_of
 from auv_analysis.bag.tables import Table
 from auv_dynamics import interface
-from auv_dynamics.files import InputError
+from auv_dynamics.files import InputError, first_line
 
 Decoder = Callable[[bytes], Any]
 
@@ -34,7 +34,7 @@ class Decoding:
         try:  # a factory of its own per file: schema ids are only unique within one
             decoder = DecoderFactory().decoder_for(channel.message_encoding, schema)
         except Exception as error:  # whatever its parser stumbles over
-            raise self._refusal(channel.topic, 'a schema of its type', error) from None
+            raise refusal(self._path, channel.topic, 'a schema of its type', error) from None
         if decoder is not None:
             self._decoders[channel.id] = decoder
             self._topics[channel.id] = channel.topic
@@ -50,7 +50,9 @@ class Decoding:
         try:
             return self._decoders[channel](table.payload(i))
         except Exception as error:  # by its schema, a message may be anything
-            raise self._refusal(self._topics[channel], 'messages of its type', error) from None
+            raise refusal(
+                self._path, self._topics[channel], 'messages of its type', error
+            ) from None
 
     def value(self, topic: str, message: Any, frames: interface.Frames | None) -> tuple[int, tuple]:
         """Stamp and row of a message; those before the first odometry are free in their frame."""
@@ -58,18 +60,20 @@ class Decoding:
             known = frames or interface.Frames(base=message.header.frame_id)
             return READERS[role_of(topic)](message, known)
         except interface.BadMessageError as error:
-            raise self._refusal(topic, 'usable messages', error) from None
+            raise refusal(self._path, topic, 'usable messages', error) from None
         except (AttributeError, TypeError) as error:  # a schema with other fields
-            raise self._refusal(topic, 'messages of its type', error) from None
+            raise refusal(self._path, topic, 'messages of its type', error) from None
 
-    def frames_of(self, table: Table, i: int, channel: int) -> interface.Frames:
-        """Frames that an odometry names."""
-        odometry = self.message(table, i, channel)
+    def frames_of(self, channel: int, odometry: Any) -> interface.Frames:
+        """Frames that an odometry of a channel names."""
         try:
             return interface.Frames(odometry.header.frame_id, odometry.child_frame_id)
         except AttributeError as error:  # a schema with other fields
-            raise self._refusal(self._topics[channel], 'messages of its type', error) from None
+            raise refusal(
+                self._path, self._topics[channel], 'messages of its type', error
+            ) from None
 
-    def _refusal(self, topic: str, expected: str, error: Exception) -> InputError:
-        lines = str(error).splitlines()
-        return InputError(self._path, topic, expected, lines[0] if lines else repr(error))
+
+def refusal(path: Path, topic: str, expected: str, error: Exception) -> InputError:
+    """What a library said, as one line of ours."""
+    return InputError(path, topic, expected, first_line(error))

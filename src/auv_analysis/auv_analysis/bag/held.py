@@ -5,11 +5,9 @@ have no stamps in common.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 
 import numpy as np
 
-from auv_analysis.bag import recording
 from auv_analysis.bag.contents import Contents, Series
 from auv_dynamics import interface
 
@@ -17,20 +15,18 @@ SETPOINTS = (interface.CMD_VEL, interface.CMD_ACCEL)
 LATEST = 'latest'
 
 
-def holds(contents: Contents, controller: Mapping[str, object], bag: Path) -> bool:
+def holds(contents: Contents, controller: Mapping[str, object]) -> bool:
     """Whether the recorded controller held its set-points.
 
     Parameters
     ----------
     contents : of the bag
     controller : parameters of the controller node; empty: not recorded
-    bag : for the refusal
 
     """
     if 'setpoint_pairing' in controller:
         return controller['setpoint_pairing'] == LATEST
-    text = contents.attachments.get(recording.NAME)
-    return text is not None and not recording.was_strict(text, bag)
+    return contents.lenient
 
 
 def held_series(series: Mapping[str, Series]) -> dict[str, Series]:

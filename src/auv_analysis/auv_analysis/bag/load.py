@@ -123,7 +123,7 @@ def _long(contents: Contents, survey: Survey, bag: Path, vehicle: str | Path | N
 
 def _holds(contents: Contents, bag: Path) -> bool:
     controller = attached.parameters_of(contents, bag).get('controller_node', {})
-    return holds(contents, controller, bag)
+    return holds(contents, controller)
 
 
 def _step_by_step(counts: dict[str, int], held: bool) -> dict[str, int]:

@@ -8,6 +8,7 @@ the controller has refused them as well.
 """
 
 import contextlib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -52,13 +53,14 @@ class FileReader:
         self._channels: dict[int, Channel] = {}
         self._decoders = Decoding(path)
         self._layouts: dict[int, Layout] = {}
-        self._left_out: dict[str, list[str]] = {}  # topic -> why, of each message
+        self._left_out: Counter[str] = Counter()
+        self._reasons: dict[str, str] = {}  # topic -> why its first message was left out
 
     def finish(self) -> None:
         """Note what was left out."""
-        for topic, reasons in self._left_out.items():
-            counted = f'{self._path.name}: {topic}: {len(reasons)} unusable messages left out'
-            self._contents.notes.append(f'{counted}, the first one: {reasons[0]}')
+        for topic, count in self._left_out.items():
+            counted = f'{self._path.name}: {topic}: {count} unusable messages left out'
+            self._contents.notes.append(f'{counted}, the first one: {self._reasons[topic]}')
 
     def take(self, item: Table | McapRecord) -> Iterator[Batch]:
         """Read a record, or a table of messages."""
@@ -165,13 +167,15 @@ class FileReader:
         self, table: Table, index: np.ndarray, channel: int
     ) -> tuple[int, interface.Frames] | None:
         """The first odometry that may be left in, and its frames."""
+        known = self._decoders
         if not self._contents.lenient:
-            return int(index[0]), self._decoders.frames_of(table, int(index[0]), channel)
+            i = int(index[0])
+            return i, known.frames_of(channel, known.message(table, i, channel))
         for i in index.tolist():
             with contextlib.suppress(InputError):
-                frames = self._decoders.frames_of(table, i, channel)
-                odometry = self._decoders.message(table, i, channel)
-                self._decoders.value(self._topic(channel), odometry, frames)
+                odometry = known.message(table, i, channel)
+                frames = known.frames_of(channel, odometry)
+                known.value(self._topic(channel), odometry, frames)
                 return i, frames
         return None
 
@@ -206,7 +210,8 @@ class FileReader:
             except InputError as error:
                 if not self._contents.lenient:
                     raise
-                self._left_out.setdefault(topic, []).append(str(error.found))
+                self._left_out[topic] += 1
+                self._reasons.setdefault(topic, error.found)
             else:
                 taken.append(i)
                 stamps.append(ns)
@@ -220,5 +225,5 @@ class FileReader:
                 topic = self._topic(channel)
                 message, namespace = self._decoders.message(table, i, channel), namespace_of(topic)
                 if role_of(topic) in ODOMETRIES and namespace not in frames:
-                    frames[namespace] = self._decoders.frames_of(table, i, channel)
+                    frames[namespace] = self._decoders.frames_of(channel, message)
                 self._decoders.value(topic, message, frames.get(namespace))

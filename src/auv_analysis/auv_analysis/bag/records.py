@@ -23,7 +23,7 @@ from auv_analysis.bag.framing import (
 )
 from auv_analysis.bag.limits import TooLargeError, decompressed
 from auv_analysis.bag.tables import Table, parts_of_chunk, table_of_messages
-from auv_dynamics.files import InputError
+from auv_dynamics.files import InputError, first_line
 
 TOGETHER = 4096  # messages outside chunks that are read together
 
@@ -90,8 +90,7 @@ def _ended(path: Path, error: Exception, position: int, notes: list[str], finish
     if isinstance(error, TooLargeError):
         raise InputError(path, f'byte {position}', *error.args) from None
     if position <= len(MAGIC):
-        found = (str(error) or repr(error)).splitlines()[0]
-        raise InputError(path, '', 'an MCAP file', found) from None
+        raise InputError(path, '', 'an MCAP file', first_line(error)) from None
     notes.append(f'{path.name}: damaged from byte {position}, read up to there')
     return True
 

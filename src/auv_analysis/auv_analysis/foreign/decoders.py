@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
-from auv_dynamics.files import InputError
+from auv_analysis.bag.decoding import refusal
 
 Result = TypeVar('Result')
 Decoder = Callable[[bytes], Any]
@@ -67,9 +67,3 @@ def _guarded(path: Path, topic: str, expected: str, work: Callable[[], Result]) 
         return work()
     except Exception as error:  # by its definition, a message may be anything
         raise refusal(path, topic, expected, error) from None
-
-
-def refusal(path: Path, topic: str, expected: str, error: Exception) -> InputError:
-    """What a library said, as one line of ours."""
-    lines = str(error).splitlines()
-    return InputError(path, topic, expected, lines[0] if lines else repr(error))

@@ -13,8 +13,9 @@ from rosbags.rosbag1 import Reader as Rosbag1
 from rosbags.rosbag2 import Reader as Rosbag2
 
 from auv_analysis.bag.contents import Contents
+from auv_analysis.bag.decoding import refusal
 from auv_analysis.bag.files import check_regular
-from auv_analysis.foreign.decoders import Decoder, Logged, decoded, decoder_of, refusal
+from auv_analysis.foreign.decoders import Decoder, Logged, decoded, decoder_of
 from auv_dynamics.files import InputError, read_yaml
 
 

@@ -5,9 +5,8 @@ import struct
 from collections.abc import Callable, Iterator
 from typing import IO
 
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, Message, Schema
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Schema
 
 from auv_analysis.bag.framing import DAMAGES, PREFIX, CutError, Frame, frame_at, record_of
 from auv_analysis.bag.limits import LARGEST_CHUNK, decompressed
@@ -62,28 +61,30 @@ class Anchors:
                     yield begin + match.start()
             begin += WINDOW
 
-    def _frame(self, place: int) -> Frame | None:
+    def _record(self, place: int) -> tuple[Frame, McapRecord | None] | None:
+        """The record at a place and its bytes; None where there is none, or a damaged one."""
         self._stream.seek(place)
         try:
-            return frame_at(self._stream, place, LARGEST_CHUNK)
-        except (CutError, McapError):
+            frame = frame_at(self._stream, place, LARGEST_CHUNK)
+            self._patience -= len(frame.body)
+            return frame, record_of(frame)
+        except (CutError, *DAMAGES):
             return None
 
     def _is_proven(self, place: int) -> bool:
         if not self._is_consistent(place):
             return False
-        frame = self._frame(place)
-        if frame is None:
+        found = self._record(place)
+        if found is None:
             return False
-        self._patience -= len(frame.body)
-        try:
-            record = record_of(frame)
-            if isinstance(record, Chunk):
-                self._patience -= record.uncompressed_size
+        frame, record = found
+        if isinstance(record, Chunk):
+            self._patience -= record.uncompressed_size
+            try:
                 content = decompressed(record)  # by checksum, else by what is in it
                 return record.uncompressed_crc != 0 or parts_of_chunk(content, None) is not None
-        except DAMAGES:
-            return False
+            except DAMAGES:
+                return False
         return isinstance(record, Attachment) and frame.body[-4:] != bytes(4)
 
     def _is_consistent(self, place: int) -> bool:
@@ -108,15 +109,8 @@ class Anchors:
 
     def _is_chain(self, place: int) -> bool:
         for _ in range(CHAIN):
-            frame = self._frame(place)
-            if frame is None:
+            found = self._record(place)
+            if found is None or not isinstance(found[1], Schema | Channel | Message):
                 return False
-            self._patience -= len(frame.body)
-            try:
-                record = record_of(frame)
-            except DAMAGES:
-                return False
-            if not isinstance(record, Schema | Channel | Message):
-                return False
-            place = frame.end
+            place = found[0].end
         return True

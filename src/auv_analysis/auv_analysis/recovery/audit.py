@@ -1,6 +1,5 @@
 """A file from its beginning to its end: what can be kept of it, and whether anything is wrong."""
 
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO
@@ -18,7 +17,7 @@ from mcap.records import (
 )
 
 from auv_analysis.recovery.definitions import BETWEEN, CHUNK, SUMMARY, Definitions
-from auv_analysis.recovery.indices import Indices, summary_fits
+from auv_analysis.recovery.indices import Indices, checksum_of, summary_fits
 from auv_analysis.recovery.parts import Messages, parts_of
 from auv_analysis.recovery.scan import Found, Lost, Scan
 from auv_analysis.recovery.spacing import Spacing
@@ -105,7 +104,7 @@ class Audit:
             self.header = self.header or record
         elif isinstance(record, DataEnd):
             self._data_end, self._summary = True, found.end
-            if record.data_section_crc not in (0, _checksum(stream, found.start)):
+            if record.data_section_crc not in (0, checksum_of(stream, 0, found.start)):
                 self._indices.faults.add('the data is not what its checksum says')
         elif isinstance(record, Footer):
             self._footer = True
@@ -135,12 +134,3 @@ class Audit:
         found += sorted(self._indices.faults)
         found += [f'{name} is defined twice' for name in sorted(self.definitions.doubtful)]
         return list(dict.fromkeys(found))
-
-
-def _checksum(stream: IO[bytes], end: int) -> int:
-    stream.seek(0)
-    checksum = 0
-    while end:
-        data = stream.read(min(end, 1 << 20))
-        checksum, end = zlib.crc32(data, checksum), end - len(data)
-    return checksum

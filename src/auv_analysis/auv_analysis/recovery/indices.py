@@ -113,11 +113,16 @@ def summary_fits(stream: IO[bytes], footer: Footer, start: int) -> bool:
     begin = footer.summary_start or start
     if begin > start:
         return False
+    return checksum_of(stream, begin, start + PREFIX.size + FOOTER) == footer.summary_crc
+
+
+def checksum_of(stream: IO[bytes], begin: int, end: int) -> int | None:
+    """Checksum of the bytes from a place to another; None where the file ends before."""
     stream.seek(begin)
-    checksum, left = 0, start + PREFIX.size + FOOTER - begin
+    checksum, left = 0, end - begin
     while left:
         data = stream.read(min(left, 1 << 20))
         if not data:
-            return False
+            return None
         checksum, left = zlib.crc32(data, checksum), left - len(data)
-    return checksum == footer.summary_crc
+    return checksum

@@ -12,7 +12,7 @@ from auv_dynamics.interface import NANOSECONDS, OPTIONAL_STEP_TOPICS, STEP_TOPIC
 
 @dataclass
 class FileReport:
-    """What became of a file: 'healthy', 'repaired', 'finished' or 'left out'."""
+    """What became of a file: 'healthy', 'repaired' or 'left out'."""
 
     audit: Audit
     name: str

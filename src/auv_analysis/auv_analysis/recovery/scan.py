@@ -23,6 +23,7 @@ from auv_analysis.bag.limits import LARGEST_CHUNK, check_length, decompressed
 from auv_analysis.bag.records import records_of
 from auv_analysis.bag.tables import Table, parts_of_chunk
 from auv_analysis.recovery.anchors import CHUNK_HEAD, Anchors
+from auv_dynamics.files import first_line
 
 COMPRESSIONS = (b'', b'lz4', b'zstd')
 
@@ -110,11 +111,11 @@ class Scan:
         except CutError:
             return 0, 'the file ends within a record'
         except McapError as error:
-            return 0, words(error)
+            return 0, first_line(error)
         try:
             return frame.end, self._found(frame)
         except DAMAGES as error:
-            return frame.end, words(error)
+            return frame.end, first_line(error)
 
     def _found(self, frame: Frame) -> Found:
         record = record_of(frame)
@@ -178,9 +179,3 @@ class Scan:
     def _bytes(self, place: int, count: int) -> bytes:
         self._stream.seek(place)
         return self._stream.read(count)
-
-
-def words(error: Exception) -> str:
-    """An error of a library as one line."""
-    lines = str(error).splitlines()
-    return lines[0] if lines else type(error).__name__

@@ -20,6 +20,7 @@ from auv_analysis.sweep.block import BlockError, block_figures, contents_of
 from auv_analysis.sweep.campaign import Campaign
 from auv_analysis.sweep.folder import SweepFolder
 from auv_analysis.sweep.values import Values
+from auv_dynamics.files import first_line
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -115,7 +116,7 @@ def _why(error: Exception) -> str | None:
     if of_dask or isinstance(error, CancelledError | BrokenExecutor):
         return f'the workers are lost ({type(error).__name__})'
     if isinstance(error, BlockError | ArithmeticError | OSError):
-        return (str(error) or type(error).__name__).splitlines()[0]
+        return first_line(error)
     return None
 
 

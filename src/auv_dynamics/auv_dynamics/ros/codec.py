@@ -18,6 +18,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from auv_dynamics import interface
+from auv_dynamics.files import first_line
 from auv_dynamics.interface import NANOSECONDS, BadMessageError, Frames
 from auv_dynamics.ros import convert
 from auv_dynamics.ros.private import PLAIN
@@ -75,10 +76,9 @@ def message_of(data: bytes, kind: Any, topic: str) -> Any:
     try:
         return deserialize_message(data, kind)
     except Exception as error:  # whatever the middleware says to bytes from outside
-        text = str(error).splitlines()[0]
         raise BadMessageError(
             f'{topic}: not a message: expected a serialized {kind.__name__}, '
-            f'found {len(data)} bytes ({text})'
+            f'found {len(data)} bytes ({first_line(error)})'
         ) from None
 
 

@@ -14,7 +14,7 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.signals import SignalHandlerOptions
 
-from auv_dynamics.files import InputError
+from auv_dynamics.files import InputError, first_line
 from auv_dynamics.interface import PARENT
 from auv_dynamics.ros.bulk import DataPath
 from auv_dynamics.ros.private import PLAIN, RCLError, RMWError
@@ -67,7 +67,7 @@ def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> i
         code = 0
     # a parameter file that is no YAML, keys that are not there; what rclpy declares itself
     except (RCLError, rclpy.exceptions.ParameterException) as error:
-        print(str(error).splitlines()[0], file=sys.stderr, flush=True)
+        print(first_line(error), file=sys.stderr, flush=True)
         code = 2
     finally:
         closed = _close(nodes)
@@ -119,7 +119,7 @@ def serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> bool:
     except TimeoutException:
         return False
     except (RCLError, RMWError) as error:  # a transition that does not exist, a broken request
-        node.get_logger().error(f'refused: {str(error).splitlines()[0]}')
+        node.get_logger().error(f'refused: {first_line(error)}')
     return True
 
 

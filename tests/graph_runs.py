@@ -8,15 +8,20 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import psutil
 import yaml
 from harness import EXECUTABLES, environment, fresh_domain
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from auv_analysis import load_scenario
+from auv_analysis import load_scenario, simulate
+from auv_analysis.bag import load_run
+from auv_analysis.run import Run
 
 ENOUGH = 150_000  # bytes of a bag in which there are steps
+SIGNALS = ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate',
+           'nu_measured', 'tau_applied')  # fmt: skip
 
 
 def start(scenario: Path, out: Path, *options: str) -> subprocess.Popen:
@@ -71,6 +76,20 @@ def node_of(out: Path, name: str) -> psutil.Process:
             return running[name]
         time.sleep(0.05)
     raise AssertionError(f'{name} does not run')
+
+
+def both(out: Path, scenario: Path, controller: str = 'gvc') -> tuple[Run, Run]:
+    """What was recorded of a controller, and what the simulation has of it."""
+    return load_run(out / controller), simulate(load_scenario(scenario), controller, 'zoh')
+
+
+def assert_same(recorded: Run, simulated: Run) -> None:
+    """Nothing is missing, and every signal is the simulated one."""
+    assert recorded.notes == ()
+    for name in SIGNALS:
+        a, b = getattr(recorded, name), getattr(simulated, name)
+        assert a.shape == b.shape, name
+        assert np.all(np.abs(a - b) <= 1e-9 * np.maximum(1, np.abs(b))), name
 
 
 def raw_messages(bag: Path) -> Iterator[tuple[str, int, bytes]]:

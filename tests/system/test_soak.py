@@ -17,11 +17,11 @@ import numpy as np
 import psutil
 import pytest
 import yaml
-from graph_runs import long_run, node_of, nodes, raw_messages, record, start
+from graph_runs import assert_same, both, long_run, node_of, nodes, raw_messages, record, start
 from harness import auv
 
-from auv_analysis import load_scenario, simulate
-from auv_analysis.bag import load_run, read_bag
+from auv_analysis import load_scenario
+from auv_analysis.bag import read_bag
 from auv_dynamics import interface
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.signals import DOFS
@@ -32,8 +32,6 @@ STEPS = int(os.environ.get('AUV_GVC_STEPS', '1000000'))
 DAY = float(os.environ.get('AUV_GVC_DAY', '86400'))  # s of vehicle time
 VEHICLES = ('herman2018', 'herman2018_neutral', 'rexrov', 'bluerov2_heavy', 'girona500')
 PAPER = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
-SIGNALS = ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate',
-           'nu_measured', 'tau_applied')  # fmt: skip
 
 
 def drawn(i: int) -> dict:
@@ -87,10 +85,7 @@ def test_a_random_run_loses_nothing_and_equals_its_simulation(i: int, tmp_path: 
     for topic in interface.STEP_TOPICS:
         assert contents.counts[f'/{topic}'] == scenario.steps + 1, topic
     assert contents.counts['/analysis/lumped_error'] == scenario.steps // 10 + 1
-    recorded, simulated = load_run(tmp_path / 'out' / 'gvc'), simulate(scenario, 'gvc', 'zoh')
-    for name in SIGNALS:
-        a, b = getattr(recorded, name), getattr(simulated, name)
-        assert np.all(np.abs(a - b) <= 1e-9 * np.maximum(1, np.abs(b))), name
+    assert_same(*both(tmp_path / 'out', path))
 
 
 def ended_within(process: subprocess.Popen, seconds: float) -> bool:
@@ -154,12 +149,7 @@ def held_up_run(folder: Path, steps: int, begin: Callable = start) -> list[dict]
 
 def test_a_recorder_stopped_and_slowed_at_random_loses_and_doubles_nothing(tmp_path: Path) -> None:
     held_up_run(tmp_path, 10_000, record)
-    recorded = load_run(tmp_path / 'out' / 'gvc')
-    simulated = simulate(load_scenario(tmp_path / 'long.yaml'), 'gvc', 'zoh')
-    for name in SIGNALS:
-        np.testing.assert_allclose(
-            getattr(recorded, name), getattr(simulated, name), rtol=1e-9, atol=1e-9, err_msg=name
-        )
+    assert_same(*both(tmp_path / 'out', tmp_path / 'long.yaml'))
 
 
 @pytest.mark.long

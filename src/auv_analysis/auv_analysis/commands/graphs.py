@@ -3,6 +3,7 @@
 import math
 import os
 import re
+from collections.abc import Callable
 
 from auv_analysis.domain import VARIABLE
 from auv_dynamics.files import InputError
@@ -45,13 +46,24 @@ def checked_topic(text: str, option: str) -> str:
 
 def positive(text: str | None, name: str, most: float = math.inf) -> float | None:
     """Positive number of an option, None where it is not given."""
+    limit = '' if most == math.inf else f', at most {most:g}'
+    return _number(text, name, f'a number above 0{limit}', lambda value: 0 < value <= most)
+
+
+def not_negative(text: str | None, name: str, others: str = '') -> float | None:
+    """Number of an option from 0 on, None where it is not given; `others`: what else is taken."""
+    return _number(text, name, f'a number of at least 0{others}', lambda value: value >= 0)
+
+
+def _number(
+    text: str | None, name: str, expected: str, fits: Callable[[float], bool]
+) -> float | None:
     if text is None:
         return None
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not 0 < value <= most or value == math.inf:
-        limit = '' if most == math.inf else f', at most {most:g}'
-        raise InputError(name, '', f'a number above 0{limit}', text)
+    if not (math.isfinite(value) and fits(value)):
+        raise InputError(name, '', expected, text)
     return value

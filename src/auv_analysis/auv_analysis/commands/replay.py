@@ -1,7 +1,6 @@
 """`auv replay`: a bag as live topics again; with `--law`, what another law makes of it."""
 
 import argparse
-import math
 import sys
 import time
 from contextlib import ExitStack
@@ -10,7 +9,7 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TextColumn
 
 from auv_analysis.commands.conclude import console, say
-from auv_analysis.commands.graphs import join_domain, place_of
+from auv_analysis.commands.graphs import join_domain, not_negative, place_of, positive
 from auv_analysis.domain import joined_domain
 from auv_analysis.failure import FailedError
 from auv_analysis.watch.keyboard import Keyboard
@@ -55,12 +54,12 @@ def replay(options: argparse.Namespace) -> dict[str, Any]:
 
 def _parameters(options: argparse.Namespace) -> dict[str, Any]:
     """Parameters of the node; None where its default holds."""
-    rate = 0.0 if options.rate == FASTEST else _number(options.rate, '--rate')
+    fastest = options.rate == FASTEST
     return {
         'bag': str(options.bag),
-        'rate': rate,
-        'start': _number(options.start, '--start'),
-        'duration': _number(options.duration, '--duration', above=0.0),
+        'rate': 0.0 if fastest else not_negative(options.rate, '--rate', f' or {FASTEST}'),
+        'start': not_negative(options.start, '--start'),
+        'duration': positive(options.duration, '--duration'),
         'loop': options.loop,
         'start_paused': options.paused,
         'topics': options.topics,
@@ -73,20 +72,6 @@ def _parameters(options: argparse.Namespace) -> dict[str, Any]:
         'expected_subscribers': options.expect,
         'answers': options.answers,
     }
-
-
-def _number(text: str | None, name: str, above: float = -math.inf) -> float | None:
-    if text is None:
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not max(above, 0.0) <= value < math.inf or value == above:
-        others = f' or {FASTEST}' if name == '--rate' else ''
-        kind = 'above' if above == 0.0 else 'of at least'
-        raise InputError(name, '', f'a number {kind} 0{others}', text)
-    return value
 
 
 def _play(running: Any, keyboard: Keyboard, *, quiet: bool) -> None:

@@ -31,16 +31,18 @@ def start(scenario: Path, out: Path, *options: str) -> subprocess.Popen:
     return subprocess.Popen([*command, *options], env=environ, stderr=subprocess.PIPE, text=True)
 
 
-def record(scenario: Path, out: Path, domain: int | None = None) -> subprocess.Popen:
+def record(
+    scenario: Path, out: Path, *controllers: str, domain: int | None = None
+) -> subprocess.Popen:
     """Start the nodes of `auv run` and record, without the analysis and the report behind it."""
     environ = environment(fresh_domain() if domain is None else domain)
-    command = [sys.executable, __file__, str(scenario), str(out)]
+    command = [sys.executable, __file__, str(scenario), str(out), *controllers]
     return subprocess.Popen(command, env=environ, stderr=subprocess.PIPE, text=True)
 
 
-def recorded(scenario: Path, out: Path) -> Path:
-    """Record to the end; the folder."""
-    process = record(scenario, out)
+def recorded(scenario: Path, out: Path, *controllers: str) -> Path:
+    """Record to the end, all controllers or these; the folder."""
+    process = record(scenario, out, *controllers)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
     return out
@@ -117,18 +119,19 @@ def plain(value: object) -> object:
     return tuple(map(plain, value)) if isinstance(value, list | tuple) else value
 
 
-def main(path: str, out: str) -> None:
-    """Record every controller of a scenario."""
+def main(path: str, out: str, *controllers: str) -> None:
+    """Record controllers of a scenario, all where none is named."""
     from auv_analysis.experiment import run_controller
     from auv_analysis.warm_up import warm_up
     from auv_dynamics.ros.watcher import Watcher
 
     scenario, domain = load_scenario(path), int(os.environ['ROS_DOMAIN_ID'])
     Path(out).mkdir()
-    warm_up(scenario, list(scenario.controllers))
+    names = controllers or tuple(scenario.controllers)
+    warm_up(scenario, list(names))
     graph = Watcher(domain)
     try:
-        for name in scenario.controllers:
+        for name in names:
             run_controller(scenario, name, Path(out), domain, graph, lambda _: None)
     finally:
         graph.close()

@@ -1,6 +1,7 @@
 """What tests of reports share: the report of case1's first seconds in a browser, quick figures."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -32,8 +33,7 @@ def short_runs() -> dict[str, Run]:
 def report_path(browser, short_runs, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp('report')
     summaries = {name: summarize(run) for name, run in short_runs.items()}
-    with pytest.MonkeyPatch.context() as patch:
-        _compose_only(patch)
+    with _composing():
         return write_report(out, short_runs, summaries, 'a: 1', 'b: 2')
 
 
@@ -46,12 +46,20 @@ def report(browser, report_path) -> Iterator[Watched]:
 
 
 @pytest.fixture
-def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
+def unrendered() -> Iterator[None]:
     """Figures are composed but not rendered, which takes most of the time of a report."""
-    _compose_only(monkeypatch)
+    with _composing():
+        yield
 
 
-def _compose_only(patch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope='session')
+def composing() -> Callable[[], AbstractContextManager[None]]:
+    """The same for a part of a test, or for a fixture that several tests share."""
+    return _composing
+
+
+@contextmanager
+def _composing() -> Iterator[None]:
     heights = count(300)  # the same image twice would be one in a printed page
 
     def save(figure: Any, folder: Path, name: str) -> tuple[Path, Path]:
@@ -61,4 +69,6 @@ def _compose_only(patch: pytest.MonkeyPatch) -> None:
         pdf.write_bytes(b'not rendered')
         return png, pdf
 
-    patch.setattr(plotting, 'save', save)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plotting, 'save', save)
+        yield

@@ -16,9 +16,10 @@ from auv_analysis.report.text import MISSING
 
 
 @pytest.fixture(scope='module')
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory, composing) -> Path:
     out = tmp_path_factory.mktemp('document') / 'out'
-    cli.main(['simulate', 'case1', '--out', str(out)])
+    with composing():
+        cli.main(['simulate', 'case1', '--out', str(out)])
     return out
 
 

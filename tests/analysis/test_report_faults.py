@@ -53,11 +53,12 @@ def runs(tmp_path_factory) -> dict[str, Run]:
 
 
 @pytest.fixture(scope='module')
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory, composing) -> Path:
     root = tmp_path_factory.mktemp('report')
     (root / 'failing.yaml').write_text(TEXT, encoding='utf-8')
     arguments = ['simulate', str(root / 'failing.yaml'), '--hold', 'zoh', '--out']
-    cli.main([*arguments, str(root / 'out')])
+    with composing():
+        cli.main([*arguments, str(root / 'out')])
     return root / 'out'
 
 

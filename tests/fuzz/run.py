@@ -145,7 +145,10 @@ def together(targets: Iterable[str], count: int, seed: int, jobs: int) -> int:
             *(sys.executable, str(HERE / 'run.py'), '--only', target),
             *('--count', str(number), '--seed', str(seed)),
         ]
-        return subprocess.run(command, check=False).returncode
+        code = subprocess.run(command, check=False).returncode
+        if code:
+            print(f'{target} ended with exit code {code}', file=sys.stderr)
+        return code
 
     with ThreadPoolExecutor(jobs) as pool:
         codes = list(pool.map(start, targets))

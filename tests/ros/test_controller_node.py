@@ -3,10 +3,12 @@
 import itertools
 import math
 import signal
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
-from harness import CONTROLLER, GAINS, assert_one_line, graph, parameters, run_node, stop
+from harness import CONTROLLER, GAINS, assert_one_line, graph, parameters, stop
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterValue
@@ -75,32 +77,44 @@ def test_answers_the_odometry_whose_setpoint_has_come(lockstep) -> None:
     peer.until(lambda: peer.heard['disturbance_estimate'], 'an estimate')
 
 
-BAD = {
-    'nan': lambda: odometry(1, np.where(np.arange(13) == 7, np.nan, X)),
-    'inf': lambda: odometry(1, np.where(np.arange(13) == 12, np.inf, X)),
-    'pose frame': lambda: convert.odometry(STEP, X, Frames(odom='map')),
-    'child frame': lambda: convert.odometry(STEP, X, Frames(base='base_link')),
-    'old stamp': lambda: odometry(0),
-    'far stamp': lambda: odometry(10**9),
-    'no quaternion': lambda: odometry(1, np.where((np.arange(13) > 2) & (np.arange(13) < 7), 0, X)),
-    'impossible speed': lambda: odometry(1, np.where(np.arange(13) == 7, 1e9, X)),
+def changed(**parts: float) -> np.ndarray:
+    """The state with some of its numbers changed: `x7=1.0`."""
+    return np.array([parts.get(f'x{i}', value) for i, value in enumerate(X)])
+
+
+BAD: dict[str, Callable[[int], Any]] = {  # in place of odometry k
+    'nan': lambda k: odometry(k, changed(x7=math.nan)),
+    'inf': lambda k: odometry(k, changed(x12=math.inf)),
+    'pose frame': lambda k: convert.odometry(k * STEP, X, Frames(odom='map')),
+    'child frame': lambda k: convert.odometry(k * STEP, X, Frames(base='base_link')),
+    'old stamp': lambda k: odometry(k - 1),
+    'far stamp': lambda k: odometry(10**9 + k),
+    'no quaternion': lambda k: odometry(k, changed(x3=0.0, x4=0.0, x5=0.0, x6=0.0)),
+    'impossible speed': lambda k: odometry(k, changed(x7=1e9)),
 }
 
 
-@pytest.mark.parametrize('kind', BAD)
-def test_refuses_broken_odometry_and_goes_on(lockstep, kind: str) -> None:
+def test_refuses_broken_odometry_and_goes_on(lockstep) -> None:
     peer, process = lockstep
-    for k in range(3):
+    peer.listen(topics.DIAGNOSTICS)
+    for k in range(len(BAD) + 1):
         peer.publish(topics.CMD_VEL, setpoint(k))
     peer.publish(topics.ODOM, odometry(0))
     answered(peer, 1)
-    peer.publish(topics.ODOM, BAD[kind]())
-    peer.publish(topics.ODOM, odometry(1))
-    wrenches = answered(peer, 2)
-    assert stamps(wrenches) == [0, 1]
-    forces = [m.wrench.force.x for m in wrenches]
-    assert all(map(math.isfinite, forces))
-    assert abs(forces[1] - forces[0]) < 100, 'the refused one left no trace'
+    for k, (kind, broken) in enumerate(BAD.items(), start=1):
+        peer.publish(topics.ODOM, broken(k))
+        peer.publish(topics.ODOM, odometry(k))
+        wrenches = answered(peer, k + 1)
+        assert stamps(wrenches) == [*range(k + 1)], kind
+        forces = [m.wrench.force.x for m in wrenches[-2:]]
+        assert all(map(math.isfinite, forces)), kind
+        assert abs(forces[1] - forces[0]) < 100, f'{kind} left no trace'
+
+    def refused() -> int:
+        (status,) = peer.heard[topics.DIAGNOSTICS.name][-1].status
+        return sum(int(v.value) for v in status.values if v.key.startswith('refused odom'))
+
+    peer.until(lambda: peer.heard[topics.DIAGNOSTICS.name] and refused() == len(BAD), 'the count')
     code, output = stop(process)
     assert code == 0
     assert 'refused: odom' in output
@@ -243,8 +257,10 @@ def test_real_time_lets_go_when_odometry_falls_silent() -> None:
         ([*CONTROLLER, *parameters(vehicle='nothing')], 'nothing', 'herman2018'),
     ],
 )
-def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
-    assert_one_line(run_node('controller_node', *arguments), key, expected)
+def test_wrong_parameters_end_in_one_line(
+    started: Callable, arguments: list[str], key: str, expected: str
+) -> None:
+    assert_one_line(started('controller_node', *arguments), key, expected)
 
 
 @pytest.mark.parametrize(
@@ -281,6 +297,6 @@ def test_without_anti_windup_they_do_not_stop() -> None:
         assert estimates[-1].wrench.force.x > 0.0
 
 
-def test_thrusters_that_the_vehicle_has_not_are_refused() -> None:
+def test_thrusters_that_the_vehicle_has_not_are_refused(started: Callable) -> None:
     extra = parameters(actuators__thrusters=True)
-    assert_one_line(run_node('controller_node', *CONTROLLER, *extra), 'actuators.thrusters')
+    assert_one_line(started('controller_node', *CONTROLLER, *extra), 'actuators.thrusters')

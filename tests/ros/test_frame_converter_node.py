@@ -1,5 +1,6 @@
 """The frame converter node: a vehicle behind two mirrors is the same vehicle, step by step."""
 
+from collections.abc import Callable
 from contextlib import ExitStack
 
 import numpy as np
@@ -10,7 +11,6 @@ from harness import (
     fresh_domain,
     graph,
     parameters,
-    run_node,
     stop,
 )
 from numpy.testing import assert_allclose
@@ -188,11 +188,13 @@ def test_a_driver_with_best_effort_is_heard(peer) -> None:
 
 
 @pytest.mark.parametrize(('key', 'value'), [('flu_frame', 'base_frd'), ('odom_frame', 'odom_enu')])
-def test_frames_that_name_the_other_side_are_refused(key: str, value: str) -> None:
-    ended = run_node('frame_converter_node', *parameters(**{key: value}))
+def test_frames_that_name_the_other_side_are_refused(
+    started: Callable, key: str, value: str
+) -> None:
+    ended = started('frame_converter_node', *parameters(**{key: value}))
     assert_one_line(ended, 'frame_converter_node', key, value)
 
 
-def test_another_twist_frame_is_refused() -> None:
-    ended = run_node('frame_converter_node', *parameters(twist_frame='body'))
+def test_another_twist_frame_is_refused(started: Callable) -> None:
+    ended = started('frame_converter_node', *parameters(twist_frame='body'))
     assert_one_line(ended, 'twist_frame', 'child, world', 'body')

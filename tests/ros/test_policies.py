@@ -130,7 +130,7 @@ def long(tmp_path: Path) -> Path:
 
 def test_policy_is_that_of_a_run_in_lock_step_and_of_those_who_look_on(tmp_path, long) -> None:
     domain = fresh_domain()
-    run = graph_runs.record(long, tmp_path / 'out', domain)
+    run = graph_runs.record(long, tmp_path / 'out', domain=domain)
     watch = [str(Path(sys.executable).with_name('auv')), 'watch', '--for', '120']
     watched = subprocess.Popen(watch, env=environment(domain), stdout=subprocess.DEVNULL)
     with ended(run, watched):

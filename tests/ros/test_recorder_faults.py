@@ -232,16 +232,12 @@ WRONG = {
 
 @pytest.mark.parametrize(
     ('name', 'value'),
-    [
-        pytest.param(name, value, marks=[pytest.mark.long] * (i > 0))  # each starts a node
-        for name, values in WRONG.items()
-        for i, value in enumerate(values)
-    ],
+    [(name, value) for name, values in WRONG.items() for value in values],
 )
 def test_a_wrong_storage_parameter_ends_in_one_line(
-    tmp_path: Path, name: str, value: object
+    started: Callable, tmp_path: Path, name: str, value: object
 ) -> None:
-    ended = run_node('recorder_node', *parameters(bag=tmp_path / 'bag', **{name: value}))
+    ended = started('recorder_node', *parameters(bag=tmp_path / 'bag', **{name: value}))
     assert_one_line(ended, name.replace('__', '.'))
     assert not (tmp_path / 'bag').exists()
 

@@ -206,17 +206,30 @@ setpoint: {surge: {offset: OFFSET}}
 """
 
 
-@pytest.mark.parametrize('offset', ['0.5', '0'], ids=['moving', 'at rest'])
-def test_simulate_prints_one_document_and_leaves_its_files(offset, folder, capsys) -> None:
+@pytest.mark.parametrize(
+    ('offset', 'options'),
+    [('0.5', ('--no-report',)), ('0', ())],
+    ids=['moving, without a report', 'at rest'],
+)
+def test_simulate_prints_one_document_and_leaves_its_files(offset, options, folder, capsys) -> None:
     Path('short.yaml').write_text(SHORT.replace('OFFSET', offset).replace('GAIN', '12'))
-    assert _exit_code('simulate', 'short.yaml', '--json') == 0
+    assert _exit_code('simulate', 'short.yaml', '--json', *options) == 0
     summaries = json.loads(capsys.readouterr().out)
     assert list(summaries) == ['gvc']
     assert summaries['gvc']['samples'] == 6
     results = folder / 'runs' / 'short'
     assert json.loads((results / 'summary.json').read_text()) == summaries
-    left = {'report.html', 'figures', 'scenario.yaml', 'vehicle.yaml', 'gvc.npz'}
-    assert left <= {path.name for path in results.iterdir()}
+    left = {'scenario.yaml', 'vehicle.yaml', 'gvc.npz', 'summary.json'}
+    report = {'report.html', 'figures', 'numbers.parquet'}
+    assert {path.name for path in results.iterdir()} == (left if options else left | report)
+
+
+def test_a_report_of_a_sweep_cannot_be_left_out(folder, capsys) -> None:
+    Path('sweep').mkdir()
+    Path('sweep/campaign.yaml').write_text('{}')
+    code = _exit_code('analyze', 'sweep', '--no-report')
+    captured = capsys.readouterr()
+    _is_refusal(code, captured.out, captured.err, '--no-report', folder)
 
 
 def test_work_that_fails_ends_in_one_line_with_code_1(folder, capsys) -> None:

@@ -59,8 +59,8 @@ def test_own_law_runs_in_process_and_on_the_nodes(tmp_path: Path) -> None:
         text = (EXAMPLES / name).read_text()
         (tmp_path / name).write_text(text.replace('duration: 10.0', 'duration: 4.0'))
     reached = {}
-    for how in (['simulate', '--hold', 'zoh'], ['run']):
-        options = (*how[1:], '--controller', 'mine', '--json', '--out', how[0])
+    for how in (['simulate', '--hold', 'zoh'], ['run', '--composed']):
+        options = (*how[1:], '--controller', 'mine', '--json', '--no-report', '--out', how[0])
         ended = auv(how[0], 'own_law.yaml', *options, cwd=tmp_path)
         assert ended.returncode == 0, ended.stderr
         assert 'ComputedTorque runs as plain Python' in ended.stderr

@@ -43,7 +43,8 @@ faults:
 def done(tmp_path_factory) -> Path:
     root = tmp_path_factory.mktemp('failing')
     (root / 'failing.yaml').write_text(SCENARIO)
-    ended = auv('run', str(root / 'failing.yaml'), '--out', str(root / 'out'), '--json')
+    options = '--out', str(root / 'out'), '--json', '--composed'
+    ended = auv('run', str(root / 'failing.yaml'), *options)
     assert ended.returncode == 0, ended.stderr
     json.loads(ended.stdout)
     return root

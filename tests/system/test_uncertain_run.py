@@ -40,7 +40,8 @@ sensors: {velocity_noise: 0.01, attitude_noise: 0.02, drop_out: 0.2}
 def done(tmp_path_factory) -> Path:
     root = tmp_path_factory.mktemp('uncertain')
     (root / 'uncertain.yaml').write_text(SCENARIO)
-    ended = auv('run', str(root / 'uncertain.yaml'), '--out', str(root / 'out'), '--json')
+    options = '--out', str(root / 'out'), '--json', '--composed', '--no-report'
+    ended = auv('run', str(root / 'uncertain.yaml'), *options)
     assert ended.returncode == 0, ended.stderr
     (root / 'summary.json').write_text(ended.stdout)
     return root

@@ -58,7 +58,7 @@ def test_a_run_is_the_same_beside_a_watch_that_is_even_stopped(scenario, tmp_pat
     beside = start_watch(domain, '--json', '--rate', '20')
     try:
         assert f'ROS_DOMAIN_ID={domain}' in beside.stderr.readline()
-        run = record(scenario, tmp_path / 'watched', domain)
+        run = record(scenario, tmp_path / 'watched', domain=domain)
         seen = first_look(beside, run)
         beside.send_signal(signal.SIGSTOP)  # while the run is under way
         assert float(re.search(r't = ([\d.]+) s', seen)[1]) < SCENARIO['duration']

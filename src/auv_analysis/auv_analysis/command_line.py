@@ -51,6 +51,11 @@ def _graph(command: argparse.ArgumentParser, when: str = '') -> None:
     command.add_argument('--composed', action='store_true', help=text)
 
 
+def _no_report(command: argparse.ArgumentParser) -> None:
+    text = 'summary.json alone: no figures, no page'
+    command.add_argument('--no-report', action='store_true', help=text)
+
+
 def _hold(command: argparse.ArgumentParser) -> None:
     text = 'law in every stage of the integrator, or sampled and held; default: continuous'
     command.add_argument('--hold', choices=('continuous', 'zoh'), default='continuous', help=text)
@@ -58,11 +63,13 @@ def _hold(command: argparse.ArgumentParser) -> None:
 
 def _run(command: argparse.ArgumentParser) -> None:
     _scenario(command)
+    _no_report(command)
     _graph(command)
 
 
 def _simulate(command: argparse.ArgumentParser) -> None:
     _scenario(command)
+    _no_report(command)
     _hold(command)
 
 
@@ -89,6 +96,7 @@ def _analyze(command: argparse.ArgumentParser) -> None:
     command.add_argument('results', nargs='+', metavar='BAG', help=RESULT)
     command.add_argument('--by', metavar='MEASURE', help='of a sweep: what sorts the best rows')
     command.add_argument('--vehicle', help='for bags that do not carry their own')
+    _no_report(command)
     text = 'own law that results may name, as its code may run; may be repeated'
     command.add_argument('--law', metavar='MODULE:CLASS', action='append', help=text)
     _foreign(command.add_argument_group('bags of other systems'))

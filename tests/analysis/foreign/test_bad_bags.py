@@ -4,6 +4,8 @@ import pytest
 from foreign_bags import UNNAMED, Maker, loaded, motion, simple, simulated, write, write_chunks
 
 from auv_analysis.bag.files import files_of, is_mcap
+from auv_analysis.foreign.candidates import survey
+from auv_analysis.recording import BagWriter, Storage
 from auv_analysis.run import Run
 from auv_dynamics.files import InputError
 
@@ -54,6 +56,17 @@ def test_a_damaged_chunk_ends_an_mcap(run, tmp_path) -> None:
     found = loaded(path, **KEYS)
     assert any('damaged' in note for note in found.notes)
     assert found.samples < run.samples
+
+
+def test_a_type_without_a_package_is_named_and_nobodys(tmp_path) -> None:
+    bag = BagWriter(tmp_path / 'bag', {}, Storage('none'))
+    bag.add_channel('/o', 'Odometry', 'float64 x', [], '')
+    bag.write('/o', 0, bytes(12))
+    bag.close()
+    path = tmp_path / 'bag' / 'bag_0.mcap'
+    assert survey(path).types == {'/o': 'Odometry'}
+    with pytest.raises(InputError, match='/o: expected'):
+        loaded(path, odometry='/o', wrench='/o', frames='enu_flu')
 
 
 @pytest.mark.parametrize('kind', ['mcap', 'sqlite3', 'bag'])

@@ -21,9 +21,10 @@ PRINTED = {*paper.N, *paper.SHARES, paper.KINETIC_ENERGY}
 
 
 @pytest.fixture(scope='module')
-def folder(tmp_path_factory) -> Path:
+def folder(tmp_path_factory, composing) -> Path:
     out = tmp_path_factory.mktemp('study') / 'case1'
-    cli.main(['study', 'case1', '--samples', '8', '--window', '0', '10.28', '--out', str(out)])
+    with composing():
+        cli.main(['study', 'case1', '--samples', '8', '--window', '0', '10.28', '--out', str(out)])
     return out
 
 
@@ -138,6 +139,7 @@ def test_wrong_options_end_in_one_line(tmp_path, capsys, options, line):
     assert not (tmp_path / 'out').exists()
 
 
+@pytest.mark.usefixtures('unrendered')
 def test_a_study_of_another_vehicle_has_no_claims(tmp_path):
     out = tmp_path / 'out'
     cli.main(['study', 'case1_bluerov2_heavy', '--sensitivity', 'none', '--out', str(out)])

@@ -110,6 +110,7 @@ def _drawn(document: dict, folder: Path) -> None:
             assert row['smaller'] == pytest.approx((ratios < 1 - 1e-9).mean())
 
 
+@pytest.mark.usefixtures('unrendered')
 def test_same_seed_same_document_another_seed_another(command: Callable) -> None:
     arguments = ('--json', '--law', 'cl', '--samples', '10', '--structure', 'mass', '--overwrite')
     first, again, other = (
@@ -119,6 +120,7 @@ def test_same_seed_same_document_another_seed_another(command: Callable) -> None
     assert first['monte_carlo']['controllers'] != other['monte_carlo']['controllers']
 
 
+@pytest.mark.usefixtures('unrendered')
 def test_equal_error_and_no_draws(command: Callable, tmp_path: Path) -> None:
     (tmp_path / 'runs/tune_small').mkdir(parents=True)
     (tmp_path / 'runs/tune_small/notes.md').write_text('mine')
@@ -138,6 +140,7 @@ def test_equal_error_and_no_draws(command: Callable, tmp_path: Path) -> None:
     assert not (tmp_path / 'runs/tune_small/monte_carlo.parquet').exists()
 
 
+@pytest.mark.usefixtures('unrendered')
 def test_scenario_without_gvc_needs_a_reference(command: Callable, tmp_path: Path) -> None:
     write(tmp_path, {'cl': SAME_CL}, duration=0.5)
     code, _, lines = command(*QUICK)
@@ -148,6 +151,7 @@ def test_scenario_without_gvc_needs_a_reference(command: Callable, tmp_path: Pat
     assert [n for n, e in json.loads(out)['controllers'].items() if e['tuned']] == ['cl_tuned']
 
 
+@pytest.mark.usefixtures('unrendered')
 def test_effort_out_of_reach_is_said_plainly(command: Callable, tmp_path: Path) -> None:
     weak = {'law': 'pid', 'k_P': 1e-3, 'k_I': 1e-3, 'k_D': 1e-3, 'k_FF': 0.0}
     write(tmp_path, {'lazy': weak}, disturbance=[])
@@ -185,6 +189,7 @@ def test_actuators_need_sampling(command: Callable, tmp_path: Path) -> None:
     assert 'actuators: expected hold' in lines[0]
 
 
+@pytest.mark.usefixtures('unrendered')
 def test_names_that_are_taken_stay_what_they_are(command: Callable, tmp_path: Path) -> None:
     write(tmp_path, {'gvc': GVC, 'cl_tuned': SAME_CL}, duration=0.3)
     code, out, _ = command(*QUICK[:2], '--samples', '0', '--json')

@@ -111,7 +111,7 @@ def test_the_stamps_of_the_wrench_are_those_of_the_odometry(dive) -> None:
 
 def test_auv_analyze_reads_it(dive, tmp_path: Path) -> None:
     bag, _ = dive
-    ended = auv('analyze', str(bag), '--out', str(tmp_path / 'out'), '--json')
+    ended = auv('analyze', str(bag), '--out', str(tmp_path / 'out'), '--json', '--no-report')
     assert ended.returncode == 0, ended.stderr
     figures = json.loads(ended.stdout)['gvc']
     assert figures['source'] == 'bag'

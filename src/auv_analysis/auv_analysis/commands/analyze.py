@@ -24,6 +24,8 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
         if len(options.results) > 1:
             found = f'{len(options.results)} arguments'
             raise InputError(sweeps[0], '', 'a sweep alone, without other results', found)
+        if options.no_report:
+            raise InputError('--no-report', '', 'runs', f'{sweeps[0]}, a sweep')
         from auv_analysis.exploration.explore import explore
 
         return explore(Path(sweeps[0]), options)
@@ -64,7 +66,7 @@ def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, An
     runs = dict(zip(names, (entry.run for entry in opened), strict=True))
     scenario_texts = dict(zip(names, (entry.scenario_text for entry in opened), strict=True))
     vehicle_texts = dict(zip(names, (entry.vehicle_text for entry in opened), strict=True))
-    return conclude(out, runs, scenario_texts, vehicle_texts)
+    return conclude(out, runs, scenario_texts, vehicle_texts, report=not options.no_report)
 
 
 def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
@@ -72,7 +74,7 @@ def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, A
 
     entries = entries_of(sources, options.vehicle)
     out = _prepared([entry.scenario for entry in entries], sources, options)
-    return conclude_comparison(out, entries)
+    return conclude_comparison(out, entries, report=not options.no_report)
 
 
 def _prepared(

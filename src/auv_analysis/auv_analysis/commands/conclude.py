@@ -42,6 +42,8 @@ def finish(
     failure: Exception | None,
     scenario: Scenario,
     study: Study | None = None,
+    *,
+    report: bool = True,
 ) -> dict[str, Any]:
     """Summary and report of the runs that came to their end; then the failure of another one."""
     texts, document = scenario.attachments, {}
@@ -49,7 +51,8 @@ def finish(
         note = f'another controller did not come to its end: {str(failure).splitlines()[0]}'
         runs = {name: replace(run, notes=(*run.notes, note)) for name, run in runs.items()}
     if runs:
-        document = conclude(out, runs, texts['scenario.yaml'], texts['vehicle.yaml'], study)
+        given = texts['scenario.yaml'], texts['vehicle.yaml']
+        document = conclude(out, runs, *given, study, report=report)
     if failure is not None:
         raise failure
     return document
@@ -61,6 +64,8 @@ def conclude(
     scenario_text: str | dict[str, str],
     vehicle_text: str | dict[str, str],
     study: Study | None = None,
+    *,
+    report: bool = True,
 ) -> dict[str, Any]:
     """Write summary and report, show the tables; returns the summaries.
 
@@ -70,12 +75,27 @@ def conclude(
     runs : name -> run
     scenario_text, vehicle_text : as for `write_report`
     study : what the report has beside the runs, made from their summaries
+    report : whether there is a report, with its figures
 
     """
     windows = study.windows if study else ()
     with console.status('computing the figures of summary.json'):
         summaries = {name: summarize(run, windows=windows) for name, run in runs.items()}
     write_json(out / 'summary.json', summaries)
+    page = _report(out, runs, summaries, scenario_text, vehicle_text, study) if report else None
+    console.print(summary_tables(summaries))
+    say(f'report: {page}' if page else f'summary: {out / "summary.json"}')
+    return summaries
+
+
+def _report(
+    out: Path,
+    runs: Mapping[str, AnyRun],
+    summaries: dict[str, Any],
+    scenario_text: str | dict[str, str],
+    vehicle_text: str | dict[str, str],
+    study: Study | None,
+) -> Path:
     # with matplotlib, which loads slowly
     from auv_analysis.report.faults import fault_part
     from auv_analysis.report.page import write_report
@@ -88,10 +108,7 @@ def conclude(
         more['more'] = {**behind, 'tracking': [section, *behind.get('tracking', ())]}
         more['sentences'] = [*sentences, *more.get('sentences', ())]
     with console.status('drawing figures, writing the report'):
-        report = write_report(out, runs, summaries, scenario_text, vehicle_text, **more)
-    console.print(summary_tables(summaries))
-    say(f'report: {report}')
-    return summaries
+        return write_report(out, runs, summaries, scenario_text, vehicle_text, **more)
 
 
 def show(summaries: Mapping[str, Mapping[str, Any]]) -> None:

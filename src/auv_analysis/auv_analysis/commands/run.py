@@ -32,7 +32,7 @@ DISCOVERY = 3.0  # s: discovery may take so long
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Real nodes, in lock-step, recorded."""
     scenario, names = open_scenario(options)
-    return finish(*recorded(options, scenario, names), scenario)
+    return finish(*recorded(options, scenario, names), scenario, report=not options.no_report)
 
 
 def recorded(options: argparse.Namespace, scenario: Scenario, names: list[str]) -> Outcome:

@@ -17,7 +17,7 @@ from auv_analysis.warm_up import announce
 def simulate(options: argparse.Namespace) -> dict[str, Any]:
     """In this process, by the same kernel."""
     scenario, names = open_scenario(options)
-    return finish(*simulated(options, scenario, names), scenario)
+    return finish(*simulated(options, scenario, names), scenario, report=not options.no_report)
 
 
 def simulated(options: argparse.Namespace, scenario: Scenario, names: list[str]) -> Outcome:

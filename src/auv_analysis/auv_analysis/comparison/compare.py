@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import pyarrow as pa
 from rich.progress import track
 
 from auv_analysis.commands.conclude import console, say, show
 from auv_analysis.comparison.entries import Entry, comparison_table, write_table
 from auv_analysis.comparison.opening import named, open_source
-from auv_analysis.comparison.ranking import rank
+from auv_analysis.comparison.ranking import Ranking, rank
 from auv_analysis.comparison.sources import Source
 from auv_analysis.failure import FailedError
 from auv_analysis.folder import write_json
@@ -90,13 +91,16 @@ def _entry(name: str, found: _Found) -> Entry:
     )
 
 
-def conclude_comparison(out: Path, entries: Sequence[Entry]) -> dict[str, Any]:
+def conclude_comparison(
+    out: Path, entries: Sequence[Entry], *, report: bool = True
+) -> dict[str, Any]:
     """Write summary.json, table, figures and report.
 
     Parameters
     ----------
     out : folder, prepared
     entries : of `entries_of`
+    report : whether there is a report, with its figures
 
     Returns
     -------
@@ -108,15 +112,20 @@ def conclude_comparison(out: Path, entries: Sequence[Entry]) -> dict[str, Any]:
     table = comparison_table(entries)
     ranking = rank(table)
     write_table(table, ranking, out)
+    page = _report(out, entries, table, ranking) if report else None
+    for entry in entries:
+        for note in [entry.failure] if entry.failure else entry.summary['notes']:
+            say(f'note: {entry.name}: {note}')
+    show({entry.name: entry.summary for entry in entries if entry.summary})
+    say(f'report: {page}' if page else f'summary: {out / "summary.json"}')
+    return summaries
+
+
+def _report(out: Path, entries: Sequence[Entry], table: pa.Table, ranking: Ranking) -> Path:
+    # with matplotlib, which loads slowly
     from auv_analysis.comparison.figures import draw
     from auv_analysis.comparison.report import write_comparison
 
     with console.status('drawing figures, writing the report'):
         figures = draw(entries, table, ranking, out / 'figures')
-        report = write_comparison(out, entries, table, ranking, figures)
-    for entry in entries:
-        for note in [entry.failure] if entry.failure else entry.summary['notes']:
-            say(f'note: {entry.name}: {note}')
-    show({entry.name: entry.summary for entry in entries if entry.summary})
-    say(f'report: {report}')
-    return summaries
+        return write_comparison(out, entries, table, ranking, figures)

@@ -12,9 +12,12 @@ Numbers = tuple[float, ...]
 
 
 def type_name(name: str) -> str:
-    """A message type as ROS 2 writes it: 'nav_msgs/Odometry' becomes 'nav_msgs/msg/Odometry'."""
-    package, *_, message = name.split('/')
-    return f'{package}/msg/{message}' if '/' in name else name
+    """A message type as ROS 2 writes it: 'nav_msgs/Odometry' becomes 'nav_msgs/msg/Odometry'.
+
+    A name without a package stays as it is: nobody's type, but a schema may be called so.
+    """
+    package, slash, rest = name.partition('/')
+    return f'{package}/msg/{rest.rpartition("/")[2]}' if slash else name
 
 
 class Reading(NamedTuple):

@@ -37,7 +37,7 @@ setup: $(READY)  ## the environment in .venv
 $(READY): Makefile $(REQUIREMENTS) $(SOURCES)
 	@$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "Python 3.11 or newer is needed, found " + sys.version.split()[0]'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV_OPTIONS) $(VENV)
-	$(BIN)/python -m pip install --quiet $(foreach r,$(REQUIREMENTS),-r $(r))
+	$(BIN)/python -m pip install --quiet --no-compile $(foreach r,$(REQUIREMENTS),-r $(r))
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --use-pep517 $(foreach p,$(PACKAGES),-e src/$(p))
 	@touch $@
 

@@ -25,21 +25,24 @@ STEPS = 20
 SHARED, OWN = 'controllers.{}.k_D', 'setpoint.surge.offset'  # set-points that are shared, or not
 
 
+HOLDS: tuple[Hold, ...] = ('continuous', 'zoh')
+
+
 class Called(NamedTuple):
     """How the tests call a law: in which scenario, and in which batches."""
 
     scenario: str
-    batches: Sequence[tuple[str, Hold]]
+    batches: Sequence[tuple[str, Hold]] = ()
     is_tuned: bool = False
 
 
 LAWS = {
-    'gvc': Called('case1', [(SHARED, 'continuous'), (OWN, 'continuous'), (OWN, 'zoh')], True),
+    'gvc': Called('case1', [(path, hold) for path in (SHARED, OWN) for hold in HOLDS], True),
     'cl': Called('case1', [(SHARED, 'continuous'), (OWN, 'continuous')], True),
-    'pid': Called('faults_bluerov2_heavy', [(SHARED, 'continuous')], True),
-    'smc': Called('faults_bluerov2_heavy', [(SHARED, 'zoh'), (OWN, 'zoh')]),
+    'pid': Called('faults_bluerov2_heavy'),
+    'smc': Called('faults_bluerov2_heavy'),
 }
-TOGETHER = (('gvc', 'smc'), ('cl', 'pid'))
+TOGETHER = (('gvc',), ('cl', 'pid', 'smc'))
 
 
 def shortened(name: str, folder: Path) -> Scenario:

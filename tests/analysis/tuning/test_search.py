@@ -88,7 +88,7 @@ INTEGRATORS = {
 STEPPED = {'surge': {'offset': 1.0}}
 
 
-@pytest.mark.parametrize('law', ['gvc', 'cl', 'pid'])
+@pytest.mark.parametrize('law', ['gvc', 'cl', pytest.param('pid', marks=pytest.mark.long)])
 def test_of_an_integrator_no_law_beats_proportional_feedback(tmp_path, monkeypatch, law) -> None:
     """LQR: m u_dot = tau with cost e^2 + r tau^2 has tau = k e, so that nothing beats k = 6 m."""
     monkeypatch.setattr(rivals, 'POINTS', 128)

@@ -18,6 +18,7 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 
 from auv_analysis import cli, load_scenario
+from auv_analysis.folder import MANIFEST
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.recording import BagWriter, Storage
 from auv_analysis.schemas import schema_text
@@ -225,9 +226,8 @@ def test_simulate_prints_one_document_and_leaves_its_files(offset, options, fold
 
 
 def test_a_report_of_a_sweep_cannot_be_left_out(folder, capsys) -> None:
-    Path('sweep').mkdir()
-    Path('sweep/campaign.yaml').write_text('{}')
-    code = _exit_code('analyze', 'sweep', '--no-report')
+    Path('taken', MANIFEST).write_text('{}')
+    code = _exit_code('analyze', 'taken', '--no-report')
     captured = capsys.readouterr()
     _is_refusal(code, captured.out, captured.err, '--no-report', folder)
 

@@ -46,7 +46,7 @@ def started(make: Callable[[], Any], arguments: Sequence[str]) -> tuple[int, str
 
     life.TEARDOWN = PATIENCE  # a node that is torn down too slowly ends its process
     kept = {number: signal.getsignal(number) for number in SIGNALS}
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile(dir='.') as said:  # where the fuzzing lets files be written
         screens = os.dup(1), os.dup(2)
         try:
             os.dup2(said.fileno(), 1)

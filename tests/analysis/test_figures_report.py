@@ -171,6 +171,7 @@ def test_one_uncertainty_figure_when_all_runs_have_the_same(figures, case1, tmp_
     assert {'uncertainty_gvc', 'uncertainty_cl'} <= set(names)
 
 
+@pytest.mark.long
 def test_figures_are_the_same_bytes_every_time_and_leave_matplotlib_alone(case1, tmp_path):
     runs = {'gvc': _short(case1['gvc'], 1.0)}
     settings = dict(matplotlib.rcParams)

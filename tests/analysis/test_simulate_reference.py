@@ -34,7 +34,7 @@ def check(ours, theirs, tolerance=1e-8, series=SERIES) -> None:
 @pytest.mark.parametrize('law', ['gvc', 'cl'])
 @pytest.mark.parametrize('case', ['case1', 'case2'])
 def test_the_papers_cases(case, law, hold):
-    check(*pair(law, hold, file_of('herman2018'), base=case, duration=5.0))
+    check(*pair(law, hold, file_of('herman2018'), base=case, duration=3.0))
 
 
 @pytest.mark.parametrize('hold', ['continuous', 'zoh'])

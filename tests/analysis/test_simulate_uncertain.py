@@ -72,7 +72,7 @@ SAMPLED = {
     },
 }
 DURATIONS = [8.0, pytest.param(30.0, marks=pytest.mark.long)]  # s
-BASE = {'setpoint': SIX, 'initial': TURNED, 'duration': 4.0}
+BASE = {'setpoint': SIX, 'initial': TURNED, 'duration': 2.0}
 
 
 def compare(ours, theirs, tolerance=1e-8) -> None:
@@ -180,7 +180,14 @@ def test_kinetic_energy_of_case_1_does_not_depend_on_the_attitudes_form():
         assert mean == pytest.approx(energy, rel=1e-9)
 
 
-@pytest.mark.parametrize(('factor', 'change'), [(0.0, 0.02), (5.0, -0.06), (20.0, -0.18)])
+@pytest.mark.parametrize(
+    ('factor', 'change'),
+    [
+        pytest.param(0.0, 0.02, marks=pytest.mark.long),
+        pytest.param(5.0, -0.06, marks=pytest.mark.long),
+        (20.0, -0.18),
+    ],
+)
 def test_kinetic_energy_of_case_1_hardly_depends_on_the_damping(factor, change):
     """vehicle.md of the reconstruction: damping x0, x5, x20 moves it by +0.02, -0.06, -0.18 %."""
     from auv_analysis import summarize

@@ -111,6 +111,7 @@ class Proportional(NamedTuple):
 """
 
 
+@pytest.mark.long
 def test_own_law_runs_as_plain_python_and_says_so(command, files: Path, monkeypatch) -> None:
     (files / 'my_sweep_law.py').write_text(OWN_LAW)
     monkeypatch.syspath_prepend(str(files))

@@ -67,8 +67,8 @@ class Driver:
     def lets_go(self) -> list[float]:
         """Drive until the wrench is zero; the forces on the way."""
         seen = len(self.surge)
-        self.until(lambda: self.surge[seen:][-1:] == [0.0], 'a zero wrench')
-        return self.surge[seen:]
+        self.until(lambda: 0.0 in self.surge[seen:], 'a zero wrench')
+        return self.surge[seen : self.surge.index(0.0, seen) + 1]
 
     def health(self, wanted: Callable[[dict], bool]) -> dict:
         """Diagnostics of the controller, once those from now on say what is wanted."""
@@ -134,14 +134,16 @@ def test_the_wrench_goes_to_zero_over_a_ramp_and_comes_back(recovering: Driver, 
     driver.works()
     trips = int(driver.health(lambda h: h['message'] == 'ok')['watchdog trips'])
     kept = vars(driver).copy()
-    break_it(driver)
-    assert_ramp(driver.lets_go())
-    health = driver.health(lambda h: h.get('watchdog', '').startswith(said))
+    try:
+        break_it(driver)
+        assert_ramp(driver.lets_go())
+        health = driver.health(lambda h: h.get('watchdog', '').startswith(said))
+    finally:
+        vars(driver).update(kept)
+        driver.x = X.copy()
     assert health['message'].startswith(said), 'for as long as it lasts'
     assert health['level'] == b'\x02'
     assert int(health['watchdog trips']) > trips
-    vars(driver).update(kept)
-    driver.x = X.copy()
     driver.works()
     assert driver.health(lambda h: h['message'] == 'ok')['watchdog'] == 'none'
 

@@ -26,6 +26,7 @@ def run(name: str, *arguments: str, cwd: Path) -> str:
     return ended.stdout
 
 
+@pytest.mark.long
 def test_change_the_law(tmp_path: Path) -> None:
     scenario = {
         'name': 'short', 'vehicle': 'herman2018', 'duration': 3.0, 'step': 0.01,

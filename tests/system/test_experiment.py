@@ -82,6 +82,7 @@ def test_two_runs_are_equal(done: Path) -> None:
         assert np.array_equal(values, two[topic][1])
 
 
+@pytest.mark.long
 def test_the_plain_executor_gives_the_same_run(
     done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -172,6 +173,7 @@ def test_ending_auv_ends_its_nodes(tmp_path: Path, how: int) -> None:
     assert 'not finished' not in notes, 'the recorder has closed its bag'
 
 
+@pytest.mark.long
 def test_a_diverging_loop_says_so(tmp_path: Path) -> None:
     unstable = {'bad': {'law': 'cl', **GAINS, 'k_D': -1e6}}
     scenario = write(tmp_path / 's.yaml', controllers=unstable)

@@ -73,6 +73,7 @@ def test_nothing_is_turned_in_silence(bag, capsys) -> None:
     assert line.endswith("found 'world', 'base_link'")
 
 
+@pytest.mark.long
 def test_installed_command_analyses_it(bag, tmp_path) -> None:
     mapping: dict[str, Any] = {
         'odometry': TOPICS[0], 'wrench': TOPICS[1], 'setpoint': '/rexrov/cmd_vel',

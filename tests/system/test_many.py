@@ -49,6 +49,7 @@ def test_a_sweep_is_explored(tmp_path: Path) -> None:
     assert 'Warning' not in ended.stderr
 
 
+@pytest.mark.long
 def test_the_atlas_is_drawn(tmp_path: Path) -> None:
     ended = auv(tmp_path, 'atlas', 'bluerov2', '--only', '--json')
     assert ended.returncode == 0, ended.stderr
@@ -58,6 +59,7 @@ def test_the_atlas_is_drawn(tmp_path: Path) -> None:
     assert 'Warning' not in ended.stderr
 
 
+@pytest.mark.long
 def test_results_and_scenarios_are_compared(tmp_path: Path) -> None:
     write_files(tmp_path)
     scenario, out = load_scenario(tmp_path / 'scenario.yaml'), tmp_path / 'runs/a'

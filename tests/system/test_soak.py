@@ -104,7 +104,7 @@ def hold_up(recorder: psutil.Process, process: subprocess.Popen, sizes: list[dic
     try:
         while not ended_within(process, g.uniform(0.1, 1.5)):
             sizes.append({name: node.memory_info().rss / 1e6 for name, node in running.items()})
-            kind = str(g.choice(['stop', 'slow']))
+            kind = ('stop', 'slow')[len(done)] if len(done) < 2 else str(g.choice([*done]))
             longest = 2.5 if g.random() < 0.9 else 10.0
             pauses = [g.uniform(0.1, longest)] if kind == 'stop' else g.uniform(0.01, 0.06, 15)
             for pause in pauses:

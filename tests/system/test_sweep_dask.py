@@ -106,6 +106,7 @@ def test_rows_are_the_same_when_a_worker_is_killed_half_way(cluster, files: Path
     assert parts(files / 'dask') == parts(files / 'threads')
 
 
+@pytest.mark.long
 def test_sweep_is_stopped_on_dask_and_finished_with_threads(cluster, files, monkeypatch, capsys):
     address, workers = cluster
     monkeypatch.chdir(files)

@@ -24,7 +24,7 @@ PRINTED = {*paper.N, *paper.SHARES, paper.KINETIC_ENERGY}
 def folder(tmp_path_factory, composing) -> Path:
     out = tmp_path_factory.mktemp('study') / 'case1'
     with composing():
-        cli.main(['study', 'case1', '--samples', '8', '--window', '0', '10.28', '--out', str(out)])
+        cli.main(['study', 'case1', '--samples', '4', '--window', '0', '10.28', '--out', str(out)])
     return out
 
 

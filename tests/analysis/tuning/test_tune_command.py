@@ -111,6 +111,7 @@ def _drawn(document: dict, folder: Path) -> None:
 
 
 @pytest.mark.usefixtures('unrendered')
+@pytest.mark.long
 def test_same_seed_same_document_another_seed_another(command: Callable) -> None:
     arguments = ('--json', '--law', 'cl', '--samples', '10', '--structure', 'mass', '--overwrite')
     first, again, other = (

@@ -25,6 +25,9 @@ STEPS = 20
 SHARED, OWN = 'controllers.{}.k_D', 'setpoint.surge.offset'  # set-points that are shared, or not
 
 
+HOLDS: tuple[Hold, ...] = ('continuous', 'zoh')
+
+
 class Called(NamedTuple):
     """How the tests call a law: in which scenario, and in which batches."""
 
@@ -34,7 +37,7 @@ class Called(NamedTuple):
 
 
 LAWS = {
-    'gvc': Called('case1', [(SHARED, 'continuous'), (SHARED, 'zoh'), (OWN, 'continuous')], True),
+    'gvc': Called('case1', [(path, hold) for path in (SHARED, OWN) for hold in HOLDS], True),
     'cl': Called('case1', [(SHARED, 'continuous'), (OWN, 'continuous')], True),
     'pid': Called('faults_bluerov2_heavy'),
     'smc': Called('faults_bluerov2_heavy'),

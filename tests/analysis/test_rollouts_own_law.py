@@ -57,7 +57,7 @@ def scenario(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ('name', 'before', 'how'),
     [
-        ('own_plain_arithmetic', '', 'in vector registers'),
+        pytest.param('own_plain_arithmetic', '', 'in vector registers', marks=pytest.mark.long),
         pytest.param('own_branch', BRANCHES, 'compiled', marks=pytest.mark.long),
         pytest.param('own_python', NOT_FOR_NUMBA, 'as plain Python', marks=pytest.mark.long),
     ],

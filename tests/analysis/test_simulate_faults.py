@@ -101,7 +101,6 @@ def rms(found: dict) -> np.ndarray:
     return np.stack([found[f'velocity_error.rms.{name}'] for name in names], axis=-1)
 
 
-@pytest.mark.long
 def test_a_batch_with_faults_is_its_loops_one_by_one():
     one = scenario(actuators=THRUSTERS, sensors=SENSORS)
     changes = {

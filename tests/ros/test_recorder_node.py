@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from harness import PATIENCE, assert_one_line, graph, parameters, run_node, stop
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from auv_analysis.bag import read_bag
@@ -51,6 +52,29 @@ def test_records_every_step_and_leaves_when_it_has_all(tmp_path: Path) -> None:
     assert contents.attachments == {'scenario.yaml': 'name: by_hand\n'}
     assert contents.notes == []
     assert (contents.first, contents.last) == (0, 20 * STEP), 'log time is the header stamp'
+
+
+@pytest.mark.parametrize('goes_on', [True, False])
+def test_the_clock_of_the_last_steps_is_waited_for(tmp_path: Path, goes_on: bool) -> None:
+    """A recorder that was held up has all steps before all of the clock."""
+    arguments = [*TOPICS, *parameters(bag=tmp_path / 'bag', duration=0.2)]
+    with graph(('recorder_node', arguments)) as (peer, processes):
+        peer.listen(topics.PROGRESS)
+        for k in range(21):
+            publish_step(peer, k)
+            if k < 15:
+                peer.publish(topics.CLOCK, Clock(clock=convert.stamp(k * STEP)))
+        acknowledged(peer, 20)
+        peer.spin(0.5)
+        process = processes['recorder_node']
+        assert process.poll() is None
+        for k in range(15, 21) if goes_on else ():
+            peer.publish(topics.CLOCK, Clock(clock=convert.stamp(k * STEP)))
+        peer.until(lambda: process.poll() is not None, 'the end')
+        assert process.returncode == 0
+    counts = read_bag(tmp_path / 'bag', decode=False).counts
+    assert counts['/clock'] == (21 if goes_on else 15)
+    assert counts['/odom'] == 21
 
 
 @pytest.mark.parametrize('how', [signal.SIGTERM, signal.SIGINT])

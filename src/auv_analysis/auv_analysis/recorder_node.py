@@ -1,5 +1,6 @@
 """The recorder as a node: every topic of the graph into an MCAP bag, every step checked."""
 
+import time
 from typing import Any
 
 from rclpy.duration import Duration
@@ -17,6 +18,7 @@ from auv_dynamics.ros.kinds import begins_with_stamp, message_class, qos_entry, 
 from auv_dynamics.ros.life import main_of
 
 UNRECORDED = ('/rosout', '/parameter_events')
+PATIENCE = 2.0  # s for the clock of the last steps, which nothing else waits for
 NUMBERED = (*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK)  # with one publisher each
 
 
@@ -33,7 +35,8 @@ class RecorderNode(BulkNode):
         self._ledger = StepLedger(self._counted, p.step_ns, p.strict)
         self._publications = PublicationLedger(p.strict)
         self._latest = 0  # stamp of the newest step message, for messages without one
-        self._analysed = -1
+        self._analysed = self._clocked = -1
+        self._whole_since: float | None = None  # steady s
         self._reported = -1
         self._complaints: set[str] = set()
         self._known: set[str] = set()
@@ -58,6 +61,8 @@ class RecorderNode(BulkNode):
                 self._count(name, step_topic, ns, info.get('publication_sequence_number'))
             if due:
                 self._analysed = max(self._analysed, ns)
+            elif topic == topics.CLOCK:
+                self._clocked = max(self._clocked, ns)
 
         self._known.add(resolved)
         self.graph.subscribe(topic or topics.Topic(resolved, kind), callback, topics.every_step())
@@ -100,8 +105,15 @@ class RecorderNode(BulkNode):
             self._say_progress()
         p = self._settings
         analysed = p.last_due is None or self._analysed >= p.last_due
-        if p.last is not None and complete >= p.last and analysed:
+        if p.last is not None and complete >= p.last and analysed and self._clock_is_whole():
             self._end(0)
+
+    def _clock_is_whole(self) -> bool:
+        """Whether the clock, if there is one, has come to the last step too, or stands still."""
+        now = time.monotonic()
+        self._whole_since = self._whole_since or now
+        late = 0 <= self._clocked < self._ledger.complete_ns
+        return not late or now - self._whole_since > PATIENCE
 
     def _say_progress(self) -> None:
         if self._reported >= 0:

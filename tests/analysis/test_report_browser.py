@@ -38,7 +38,9 @@ def test_a_controller_is_switched_off_in_all_panels(report):
 def test_panels_share_one_time_axis(report):
     for name in PANELS:
         report.panel(name)
-    plot = report.panel('error-linear').locator('.plot').bounding_box()
+    panel = report.panel('error-linear')
+    report.settle()  # what is drawn above it moves it
+    plot = panel.locator('.plot').bounding_box()
     row = plot['y'] + 80
     report.page.mouse.move(plot['x'] + 300, row)
     report.page.mouse.down()

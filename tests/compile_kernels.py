@@ -23,8 +23,6 @@ from auv_analysis.warm_up import warm_up
 
 STEPS = 20
 SHARED, OWN = 'controllers.{}.k_D', 'setpoint.surge.offset'  # set-points that are shared, or not
-
-
 HOLDS: tuple[Hold, ...] = ('continuous', 'zoh')
 
 

@@ -7,7 +7,6 @@ was said. A node of its own process takes a second before it reads its first par
 import json
 import os
 import signal
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -62,31 +61,11 @@ def started(make: Callable[[], Any], arguments: Sequence[str]) -> tuple[int, str
         return code, said.read().decode(errors='replace')
 
 
-class Starter:
-    """The process, from outside."""
-
-    def __init__(self, environment: dict[str, str]):
-        self._process = subprocess.Popen(
-            [sys.executable, __file__],
-            env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        )  # fmt: skip
-
-    def start(self, name: str, *arguments: str) -> tuple[int, str]:
-        """Exit code of a node that is ended as soon as it stands, and what it said."""
-        print(json.dumps([name, arguments]), file=self._process.stdin, flush=True)
-        code, said = json.loads(self._process.stdout.readline())
-        return code, said
-
-    def close(self) -> None:
-        """End it."""
-        self._process.communicate()
-
-
 def main() -> None:
     """Start what is asked for, until nothing more is."""
     answers = os.fdopen(os.dup(1), 'w')
     for line in sys.stdin:
-        name, arguments = json.loads(line)
+        name, *arguments = json.loads(line)
         print(json.dumps(started(NODES[name], arguments)), file=answers, flush=True)
 
 

@@ -106,7 +106,10 @@ def test_columns_give_what_single_runs_give(law, hold):
     same_as_alone(scenario, law, changes, hold, columns, (0, 6, 10))
 
 
-@pytest.mark.parametrize('law', ['gvc'] if JITTED else LAWS)
+SMC = pytest.param('smc', marks=pytest.mark.long)
+
+
+@pytest.mark.parametrize('law', ['gvc', SMC] if JITTED else LAWS)
 def test_actuators_sensors_and_a_current_act_on_each_rollout(law):
     thrusters = {'thrusters': True, **LIMITS}
     scenario = scenario_of(

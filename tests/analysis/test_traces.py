@@ -78,8 +78,8 @@ def run() -> Run:
 
 
 def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
-    """One sample in a hundred thousand, on the picture itself."""
-    n, quiet = 100_000, replace(run, nu=0.0 * run.nu, nu_d=0.0 * run.nu_d, tau=0.0 * run.tau)
+    """One sample in half a million, on the picture itself."""
+    n, quiet = 500_000, replace(run, nu=0.0 * run.nu, nu_d=0.0 * run.nu_d, tau=0.0 * run.tau)
     pictures = []
     for spike in (0.0, 5.0):
         long = in_memory(quiet, n)
@@ -88,7 +88,7 @@ def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
             for block in long.blocks(rows):
                 nu_d = block.nu_d.copy()
                 nu_d[:, 2] += 1e-3 * np.sin(block.t)
-                nu_d[block.t == 321.0, 2] = spike
+                nu_d[block.t == 3210.0, 2] = spike
                 yield replace(block, nu_d=nu_d)
 
         drawn = sketch(replace(long, source_of_blocks=blocks))

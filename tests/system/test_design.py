@@ -47,7 +47,7 @@ def test_the_claim_is_what_a_simulation_of_the_changed_vehicle_gives(tmp_path):
     assert rows['kinetic_energy.mean']['after'] == summaries['gvc']['kinetic_energy']['mean']
 
 
-@pytest.mark.parametrize('options', [[], ['--json', '--reduce', 'delta_xi.surge']])
+@pytest.mark.parametrize('options', [[], ['--json'], ['--reduce', 'delta_xi.surge']])
 def test_a_vehicle_without_couplings_is_told_so(options, tmp_path):
     text = auv('design', 'lauv', *options, folder=tmp_path)
     assert 'M is diagonal' in text

@@ -57,7 +57,7 @@ def done(tmp_path_factory) -> Path:
     assert ended.returncode == 0, ended.stderr
     assert json.loads(ended.stdout).keys() == {'gvc', 'cl'}
     assert 'export ROS_DOMAIN_ID=' in ended.stderr
-    recorded(scenario, root / 'two', 'gvc')
+    recorded(scenario, root / 'two')
     assert not nodes(root)
     return root
 
@@ -73,8 +73,9 @@ def test_the_graph_equals_the_simulation(done: Path, controller: str) -> None:
     assert recorded.gains == simulated.gains
 
 
-def test_two_runs_are_equal(done: Path) -> None:
-    one, two = (read_bag(done / name / 'gvc').messages for name in ('one', 'two'))
+@pytest.mark.parametrize('controller', ['gvc', 'cl'])
+def test_two_runs_are_equal(done: Path, controller: str) -> None:
+    one, two = (read_bag(done / name / controller).messages for name in ('one', 'two'))
     assert one.keys() == two.keys()
     assert {topic.strip('/') for topic in one} == set(interface.STEP_TOPICS) - {'twist'}
     for topic, (stamps, values) in one.items():

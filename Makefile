@@ -34,6 +34,7 @@ help:  ## this list
 
 setup: $(READY)  ## the environment in .venv
 
+# what nobody imports need not be compiled
 $(READY): Makefile $(REQUIREMENTS) $(SOURCES)
 	@$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "Python 3.11 or newer is needed, found " + sys.version.split()[0]'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV_OPTIONS) $(VENV)

@@ -35,7 +35,7 @@ class RecorderNode(BulkNode):
         self._ledger = StepLedger(self._counted, p.step_ns, p.strict)
         self._publications = PublicationLedger(p.strict)
         self._latest = 0  # stamp of the newest step message, for messages without one
-        self._analysed = self._clocked = -1
+        self._newest = {topics.LUMPED_ERROR.name: -1, topics.CLOCK.name: -1}  # stamps, ns
         self._whole_since: float | None = None  # steady s
         self._reported = -1
         self._complaints: set[str] = set()
@@ -51,7 +51,7 @@ class RecorderNode(BulkNode):
     def _record(self, name: str, kind: type, topic: topics.Topic | None = None) -> None:
         resolved = self.resolve_topic_name(name)
         step_topic = topic.name if topic and topic.name in self._counted else ''
-        numbered, due = topic in NUMBERED, topic == topics.LUMPED_ERROR
+        numbered = topic in NUMBERED
         stamped = begins_with_stamp(kind)
 
         def callback(message: bytes, info: dict[str, Any]) -> None:
@@ -59,10 +59,8 @@ class RecorderNode(BulkNode):
             self._take(resolved, kind, message, ns)
             if numbered:
                 self._count(name, step_topic, ns, info.get('publication_sequence_number'))
-            if due:
-                self._analysed = max(self._analysed, ns)
-            elif topic == topics.CLOCK:
-                self._clocked = max(self._clocked, ns)
+            if name in self._newest:
+                self._newest[name] = max(self._newest[name], ns)
 
         self._known.add(resolved)
         self.graph.subscribe(topic or topics.Topic(resolved, kind), callback, topics.every_step())
@@ -104,7 +102,7 @@ class RecorderNode(BulkNode):
             self._reported = complete
             self._say_progress()
         p = self._settings
-        analysed = p.last_due is None or self._analysed >= p.last_due
+        analysed = p.last_due is None or self._newest[topics.LUMPED_ERROR.name] >= p.last_due
         if p.last is not None and complete >= p.last and analysed and self._clock_is_whole():
             self._end(0)
 
@@ -112,7 +110,7 @@ class RecorderNode(BulkNode):
         """Whether the clock, if there is one, has come to the last step too, or stands still."""
         now = time.monotonic()
         self._whole_since = self._whole_since or now
-        late = 0 <= self._clocked < self._ledger.complete_ns
+        late = 0 <= self._newest[topics.CLOCK.name] < self._ledger.complete_ns
         return not late or now - self._whole_since > PATIENCE
 
     def _say_progress(self) -> None:

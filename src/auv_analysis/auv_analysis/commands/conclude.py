@@ -11,6 +11,7 @@ from auv_analysis.folder import write_json
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
 from auv_analysis.summary import Window, summarize
+from auv_dynamics.files import first_line
 
 console = TextConsole(stderr=True)
 
@@ -48,11 +49,12 @@ def finish(
     """Summary and report of the runs that came to their end; then the failure of another one."""
     texts, document = scenario.attachments, {}
     if failure is not None:
-        note = f'another controller did not come to its end: {str(failure).splitlines()[0]}'
+        note = f'another controller did not come to its end: {first_line(failure)}'
         runs = {name: replace(run, notes=(*run.notes, note)) for name, run in runs.items()}
     if runs:
-        given = texts['scenario.yaml'], texts['vehicle.yaml']
-        document = conclude(out, runs, *given, study, report=report)
+        document = conclude(
+            out, runs, texts['scenario.yaml'], texts['vehicle.yaml'], study, report=report
+        )
     if failure is not None:
         raise failure
     return document
@@ -84,8 +86,13 @@ def conclude(
     write_json(out / 'summary.json', summaries)
     page = _report(out, runs, summaries, scenario_text, vehicle_text, study) if report else None
     console.print(summary_tables(summaries))
-    say(f'report: {page}' if page else f'summary: {out / "summary.json"}')
+    say_where(out, page)
     return summaries
+
+
+def say_where(out: Path, page: Path | None) -> None:
+    """Say where the results lie: the page, or the summary alone where there is none."""
+    say(f'report: {page}' if page else f'summary: {out / "summary.json"}')
 
 
 def _report(

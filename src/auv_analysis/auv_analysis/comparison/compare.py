@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 from rich.progress import track
 
-from auv_analysis.commands.conclude import console, say, show
+from auv_analysis.commands.conclude import console, say, say_where, show
 from auv_analysis.comparison.entries import Entry, comparison_table, write_table
 from auv_analysis.comparison.opening import named, open_source
 from auv_analysis.comparison.ranking import Ranking, rank
@@ -16,6 +16,7 @@ from auv_analysis.failure import FailedError
 from auv_analysis.folder import write_json
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.summary import summarize
+from auv_dynamics.files import first_line
 from auv_dynamics.vehicle import Vehicle
 
 
@@ -60,7 +61,7 @@ def entries_of(sources: Sequence[Source], vehicle: str | None = None) -> list[En
         try:
             run = open_source(source, vehicle).run
         except ArithmeticError as error:  # it diverges, or a user's own law fails
-            found.append(_Found(source, _plan(source), {}, str(error).splitlines()[0]))
+            found.append(_Found(source, _plan(source), {}, first_line(error)))
         else:
             found.append(_Found(source, sketch(run), summarize(run), ''))
     if all(entry.failure for entry in found):
@@ -117,7 +118,7 @@ def conclude_comparison(
         for note in [entry.failure] if entry.failure else entry.summary['notes']:
             say(f'note: {entry.name}: {note}')
     show({entry.name: entry.summary for entry in entries if entry.summary})
-    say(f'report: {page}' if page else f'summary: {out / "summary.json"}')
+    say_where(out, page)
     return summaries
 
 

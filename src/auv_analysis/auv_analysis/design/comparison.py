@@ -13,7 +13,7 @@ from auv_analysis.design.prediction import Figures, Prediction
 from auv_analysis.design.search import Spread, parts_of, search
 from auv_analysis.design.setting import Setting
 from auv_analysis.run import Run
-from auv_dynamics.files import InputError
+from auv_dynamics.files import InputError, first_line
 
 HALF = 0.5
 AGREES = 0.02  # of the magnitude before: a prediction that is as near is not made again
@@ -135,7 +135,7 @@ class Comparison:
         try:
             run, sizes = self.setting.simulated(x)
         except (ArithmeticError, InputError) as error:
-            return replace(found, failure=str(error).splitlines()[0])
+            return replace(found, failure=first_line(error))
         ratio = float(sizes.peaks[target] / self.before.peaks[target])
         figures = Figures(
             ratios=np.array([ratio]),

@@ -9,6 +9,7 @@ from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario
 from auv_analysis.simulation import Hold, simulate
 from auv_analysis.summary import summarize
+from auv_dynamics.files import first_line
 from auv_dynamics.signals import DOFS
 from auv_dynamics.vehicle import Vehicle
 
@@ -53,7 +54,7 @@ class Outcome:
             try:
                 runs[name] = simulate(scenario, name, hold)
             except ArithmeticError as error:
-                failures[name] = str(error).splitlines()[0]
+                failures[name] = first_line(error)
         return cls(runs, {name: summarize(run) for name, run in runs.items()}, failures)
 
 

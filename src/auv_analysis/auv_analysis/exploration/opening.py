@@ -17,7 +17,7 @@ from pyarrow import parquet
 from auv_analysis.folder import MANIFEST, PART, ROLLOUTS
 from auv_analysis.measures import Measure
 from auv_analysis.sweep.groups import kind_of
-from auv_dynamics.files import InputError, reason
+from auv_dynamics.files import InputError, first_line, reason
 
 STATUSES = ('ok', 'diverged', 'refused')
 OWN = ('index', 'controller', 'seed', 'status', 'reason')
@@ -129,7 +129,7 @@ class Sweep:
         except (pa.ArrowInvalid, OSError) as error:
             for path in self.parts:
                 _read(path, columns)
-            raise InputError(self.folder, '', BROKEN, str(error).splitlines()[0]) from None
+            raise InputError(self.folder, '', BROKEN, first_line(error)) from None
 
     def spread_of(self, path: str) -> tuple[str, Any]:
         """Kind of a path's group and what the campaign says of it."""
@@ -195,7 +195,7 @@ def _checked(path: Path, needed: Sequence[str]) -> int:
         metadata = parquet.read_metadata(path)
         names = set(metadata.schema.to_arrow_schema().names)
     except (pa.ArrowInvalid, OSError) as error:
-        raise InputError(path, '', BROKEN, str(error).splitlines()[0]) from None
+        raise InputError(path, '', BROKEN, first_line(error)) from None
     for name in needed:
         if name not in names:
             raise InputError(path, name, 'a column of every part', 'nothing')
@@ -206,4 +206,4 @@ def _read(path: Path, columns: list[str]) -> None:
     try:
         parquet.ParquetFile(path).read(columns)
     except (pa.ArrowInvalid, OSError) as error:
-        raise InputError(path, '', BROKEN, str(error).splitlines()[0]) from None
+        raise InputError(path, '', BROKEN, first_line(error)) from None

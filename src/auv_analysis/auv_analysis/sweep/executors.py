@@ -6,7 +6,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 
 from auv_analysis.failure import FailedError
-from auv_dynamics.files import InputError
+from auv_dynamics.files import InputError, first_line
 
 AHEAD = 2  # blocks handed over for each worker: one runs, one waits
 PATIENCE = 30.0  # s for a scheduler and its first worker
@@ -64,7 +64,7 @@ def _dask(scheduler: str | None, count: int) -> Iterator[Opened]:
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError, ImportError) as error:
             expected = 'the address of a dask scheduler, such as tcp://host:8786'
-            found = f'{scheduler} ({str(error).splitlines()[0]})'
+            found = f'{scheduler} ({first_line(error)})'
             raise InputError('--scheduler', '', expected, found) from None
         stack.enter_context(client)
         try:

@@ -138,12 +138,15 @@ def test_ends_on_a_signal(lockstep, how: int) -> None:
 
 def test_an_incompatible_publisher_is_heard(lockstep) -> None:
     peer, process = lockstep
+    peer.listen(topics.DIAGNOSTICS)
+    said = peer.heard[topics.DIAGNOSTICS.name]
+    peer.until(lambda: said, 'diagnostics')
     weak = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     peer.node.create_publisher(topics.ODOM.type, 'odom', weak)
-    peer.spin(2.0)
+    peer.until(lambda: 'odom: incompatible QoS' in said[-1].status[0].message, 'the report')
+    assert 'reliability' in said[-1].status[0].message
     _, output = stop(process)
     assert 'odom: incompatible QoS' in output
-    assert 'reliability' in output
 
 
 def change(peer, transition: int) -> bool:

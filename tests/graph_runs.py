@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import psutil
 import yaml
-from harness import EXECUTABLES, environment, fresh_domain
+from harness import environment, fresh_domain
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from nursery import NODES
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run
@@ -64,7 +65,7 @@ def nodes(folder: Path) -> dict[str, psutil.Process]:
     for process in psutil.process_iter(['cmdline']):
         command = process.info['cmdline'] or []
         if any(str(folder) in part for part in command):
-            names = [name for name in EXECUTABLES for part in command if part.endswith(name)]
+            names = [name for name in NODES for part in command if part.endswith(name)]
             found.update(dict.fromkeys(names, process))
     return found
 

@@ -8,32 +8,20 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import rclpy
+from nursery import Node, Nursery
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from auv_analysis.domain import is_free
-from auv_analysis.supervisor import executable
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.reach import loopback
 
-PACKAGES = {
-    'plant_node': 'auv_dynamics',
-    'setpoint_node': 'auv_gvc_controller',
-    'controller_node': 'auv_gvc_controller',
-    'recorder_node': 'auv_analysis',
-    'analysis_node': 'auv_analysis',
-    'replay_node': 'auv_analysis',
-}
-EXECUTABLES = {
-    **PACKAGES,
-    'composed_graph': 'auv_analysis',
-    'frame_converter_node': 'auv_dynamics',
-}
 PATIENCE = 30.0  # s, after which a test that waits has failed
 _domains = itertools.count()
 
@@ -53,18 +41,16 @@ def environment(domain: int) -> dict[str, str]:
     return {**os.environ, **loopback(), 'ROS_DOMAIN_ID': str(domain), 'PYTHONUNBUFFERED': '1'}
 
 
-def start_node(name: str, domain: int, *arguments: str) -> subprocess.Popen:
+@cache
+def nursery() -> Nursery:
+    """The process that forks the nodes of this worker."""
+    return Nursery()
+
+
+def start_node(name: str, domain: int, *arguments: str) -> Node:
     """Start one of our nodes; its output is captured."""
-    command = [str(executable(EXECUTABLES[name], name))]
-    if arguments:
-        command += ['--ros-args', *arguments]
-    return subprocess.Popen(
-        command,
-        env=environment(domain),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+    given = ['--ros-args', *arguments] if arguments else []
+    return nursery().start(name, given, environment(domain))
 
 
 def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess:

@@ -14,7 +14,8 @@ import policies
 import psutil
 import pytest
 import yaml
-from harness import EXECUTABLES, PATIENCE, auv, environment, fresh_domain, stop
+from harness import PATIENCE, auv, environment, fresh_domain, stop
+from nursery import NODES
 
 from auv_analysis import load_scenario
 from auv_analysis.supervisor import executable
@@ -193,4 +194,4 @@ def test_nothing_of_a_run_leaves_the_machine(tmp_path) -> None:
 
 def test_every_executable_has_an_enclave() -> None:
     listed = policies.allowed(policies.tree())
-    assert {f'/auv_gvc/{name}' for name in EXECUTABLES} <= set(listed)
+    assert {f'/auv_gvc/{name}' for name in NODES} <= set(listed)

@@ -100,7 +100,9 @@ def bags(count: int, seed: int) -> Any:
 def guided(target: str, count: int, seed: int) -> Any:
     """Let atheris look for inputs; it ends its process itself."""
     command = [sys.executable, str(HERE / 'guided.py'), GUIDED[target], str(count), str(seed)]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    with tempfile.TemporaryDirectory() as folder:  # libFuzzer ends without clearing up
+        environ = {**os.environ, 'TMPDIR': folder}
+        ended = subprocess.run(command, env=environ, capture_output=True, text=True, check=False)
     if ended.returncode:
         raise AssertionError(f'{ended.stdout[-3000:]}\n{ended.stderr[-3000:]}')
     tried = re.search(r'number_of_executed_units: (\d+)', ended.stdout + ended.stderr)

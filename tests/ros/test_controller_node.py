@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from harness import CONTROLLER, GAINS, assert_one_line, graph, parameters, stop
+from harness import CONTROLLER, GAINS, assert_one_line, graph, parameters, run_node, stop
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterValue
@@ -260,10 +260,8 @@ def test_real_time_lets_go_when_odometry_falls_silent() -> None:
         ([*CONTROLLER, *parameters(vehicle='nothing')], 'nothing', 'herman2018'),
     ],
 )
-def test_wrong_parameters_end_in_one_line(
-    started: Callable, arguments: list[str], key: str, expected: str
-) -> None:
-    assert_one_line(started('controller_node', *arguments), key, expected)
+def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
+    assert_one_line(run_node('controller_node', *arguments), key, expected)
 
 
 @pytest.mark.parametrize(
@@ -300,6 +298,6 @@ def test_without_anti_windup_they_do_not_stop() -> None:
         assert estimates[-1].wrench.force.x > 0.0
 
 
-def test_thrusters_that_the_vehicle_has_not_are_refused(started: Callable) -> None:
+def test_thrusters_that_the_vehicle_has_not_are_refused() -> None:
     extra = parameters(actuators__thrusters=True)
-    assert_one_line(started('controller_node', *CONTROLLER, *extra), 'actuators.thrusters')
+    assert_one_line(run_node('controller_node', *CONTROLLER, *extra), 'actuators.thrusters')

@@ -1,18 +1,10 @@
 """The frame converter node: a vehicle behind two mirrors is the same vehicle, step by step."""
 
-from collections.abc import Callable
 from contextlib import ExitStack
 
 import numpy as np
 import pytest
-from harness import (
-    CONTROLLER,
-    assert_one_line,
-    fresh_domain,
-    graph,
-    parameters,
-    stop,
-)
+from harness import CONTROLLER, assert_one_line, fresh_domain, graph, parameters, run_node, stop
 from numpy.testing import assert_allclose
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -188,13 +180,11 @@ def test_a_driver_with_best_effort_is_heard(peer) -> None:
 
 
 @pytest.mark.parametrize(('key', 'value'), [('flu_frame', 'base_frd'), ('odom_frame', 'odom_enu')])
-def test_frames_that_name_the_other_side_are_refused(
-    started: Callable, key: str, value: str
-) -> None:
-    ended = started('frame_converter_node', *parameters(**{key: value}))
+def test_frames_that_name_the_other_side_are_refused(key: str, value: str) -> None:
+    ended = run_node('frame_converter_node', *parameters(**{key: value}))
     assert_one_line(ended, 'frame_converter_node', key, value)
 
 
-def test_another_twist_frame_is_refused(started: Callable) -> None:
-    ended = started('frame_converter_node', *parameters(twist_frame='body'))
+def test_another_twist_frame_is_refused() -> None:
+    ended = run_node('frame_converter_node', *parameters(twist_frame='body'))
     assert_one_line(ended, 'twist_frame', 'child, world', 'body')

@@ -1,11 +1,10 @@
 """Faults on a real plant node: simulated inside it in lock-step, really withheld in real time."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from harness import Peer, assert_one_line, graph, parameters
+from harness import Peer, assert_one_line, graph, parameters, run_node
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_dynamics import interface
@@ -118,8 +117,6 @@ def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
         ({'kind': 'wrench_loss', 'delay': 1.0}, ('faults.a.delay', 'one of')),
     ],
 )
-def test_wrong_faults_end_with_one_line(
-    started: Callable, entry: dict[str, Any], words: tuple[str, ...]
-) -> None:
+def test_wrong_faults_end_with_one_line(entry: dict[str, Any], words: tuple[str, ...]) -> None:
     plant = parameters(vehicle='herman2018', lockstep=True, duration=1.0)
-    assert_one_line(started(PLANT, *plant, *faults(a=entry)), *words)
+    assert_one_line(run_node(PLANT, *plant, *faults(a=entry)), *words)

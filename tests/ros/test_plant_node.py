@@ -1,11 +1,10 @@
 """The plant node: lock-step on the wrench's stamp, start barrier, watchdog, reset, real time."""
 
 import itertools
-from collections.abc import Callable
 
 import numpy as np
 import pytest
-from harness import assert_one_line, graph, parameters, stop
+from harness import assert_one_line, graph, parameters, run_node, stop
 from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics import interface
@@ -249,10 +248,8 @@ def test_real_time_holds_the_last_wrench_then_lets_go() -> None:
         ),
     ],
 )
-def test_wrong_parameters_end_in_one_line(
-    started: Callable, arguments: list[str], key: str, expected: str
-) -> None:
-    assert_one_line(started('plant_node', *arguments), key, expected)
+def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
+    assert_one_line(run_node('plant_node', *arguments), key, expected)
 
 
 def test_actuators_and_sensors_have_topics_of_their_own() -> None:
@@ -312,5 +309,5 @@ def test_real_time_withholds_a_lost_sample() -> None:
         ),
     ],
 )  # fmt: skip
-def test_wrong_uncertainty_ends_with_one_line(started: Callable, extra, words) -> None:
-    assert_one_line(started('plant_node', *LOCKSTEP, *parameters(**extra)), *words)
+def test_wrong_uncertainty_ends_with_one_line(extra, words) -> None:
+    assert_one_line(run_node('plant_node', *LOCKSTEP, *parameters(**extra)), *words)

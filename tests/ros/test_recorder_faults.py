@@ -235,9 +235,9 @@ WRONG = {
     [(name, value) for name, values in WRONG.items() for value in values],
 )
 def test_a_wrong_storage_parameter_ends_in_one_line(
-    started: Callable, tmp_path: Path, name: str, value: object
+    tmp_path: Path, name: str, value: object
 ) -> None:
-    ended = started('recorder_node', *parameters(bag=tmp_path / 'bag', **{name: value}))
+    ended = run_node('recorder_node', *parameters(bag=tmp_path / 'bag', **{name: value}))
     assert_one_line(ended, name.replace('__', '.'))
     assert not (tmp_path / 'bag').exists()
 

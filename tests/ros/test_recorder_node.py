@@ -3,7 +3,6 @@
 import itertools
 import signal
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -203,10 +202,8 @@ def test_refuses_a_folder_that_holds_a_bag(tmp_path: Path) -> None:
         (parameters(bag='x', lockstep=True), 'lockstep'),
     ],
 )
-def test_wrong_parameters_end_in_one_line(
-    started: Callable, arguments: list[str], key: str
-) -> None:
-    assert_one_line(started('recorder_node', *arguments), key)
+def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str) -> None:
+    assert_one_line(run_node('recorder_node', *arguments), key)
     assert not Path('x').exists()
 
 

@@ -1,10 +1,8 @@
 """The set-point node: silent before the first odometry, ahead of it, and at an end."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
-from harness import assert_one_line, graph, parameters
+from harness import assert_one_line, graph, parameters, run_node
 
 from auv_dynamics import interface
 from auv_dynamics.interface import Frames
@@ -78,10 +76,8 @@ def test_refuses_odometry_in_another_frame() -> None:
         (parameters(setpoint__file='none.csv', setpoint__yaw__offset=1.0), 'setpoint.yaw', 'alone'),
     ],
 )
-def test_wrong_parameters_end_in_one_line(
-    started: Callable, arguments: list[str], key: str, expected: str
-) -> None:
-    assert_one_line(started('setpoint_node', *arguments), key, expected)
+def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
+    assert_one_line(run_node('setpoint_node', *arguments), key, expected)
 
 
 def test_goes_on_when_the_driver_starts_again_with_its_clock_at_zero() -> None:

@@ -107,12 +107,13 @@ class Runs:
         self.relay = Relay(peers[0])
         self.vehicle = Interrupted(peers[1], 'auv1', signal.SIGTERM)
         over = threading.Event()
-        thread = threading.Thread(target=self._spin, args=(peers, over))
+        threads = [threading.Thread(target=self._spin, args=(peer, over)) for peer in peers]
         plants = [
             start_node('plant_node', healthy, *VEHICLE),
             start_node('plant_node', other, *VEHICLE, '-r', 'wrench:=reversed'),
         ]
-        thread.start()
+        for thread in threads:
+            thread.start()
         try:
             for domain in (healthy, other):
                 await_odometry(domain)
@@ -126,17 +127,17 @@ class Runs:
             self.ended = {name: Ended(process) for name, process in processes.items()}
         finally:
             over.set()
-            thread.join()
+            for thread in threads:
+                thread.join()
             for plant in plants:
                 stop(plant)
             for peer in peers:
                 peer.close()
 
     @staticmethod
-    def _spin(peers: list[Peer], over: threading.Event) -> None:
+    def _spin(peer: Peer, over: threading.Event) -> None:
         while not over.is_set():
-            for peer in peers:
-                peer.executor.spin_once(timeout_sec=0.001)
+            peer.executor.spin_once(timeout_sec=0.1)
 
 
 @pytest.fixture(scope='module')

@@ -40,6 +40,11 @@ def test_there_are_sources() -> None:
     assert len(SOURCES) > 50
 
 
+def test_modules_are_short() -> None:
+    lengths = {str(path): len(path.read_text().splitlines()) for path in SOURCES}
+    assert not {path: length for path, length in lengths.items() if length > 250}
+
+
 @pytest.mark.parametrize('path', SOURCES, ids=lambda p: p.stem)
 def test_mathematics_never_imports_ros(path: Path) -> None:
     allowed = path.stem.endswith('_node') or path.parent.name == 'ros'

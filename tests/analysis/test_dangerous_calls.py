@@ -33,7 +33,7 @@ METHODS = {'extractall', 'unsafe_load'}  # of archives: a member may lie outside
 KEYWORDS = {('shell', True), ('allow_pickle', True), ('autoescape', False)}
 LISTED = {
     ('auv_dynamics/jit.py', 'exec'),  # of argument names that stand in our own source
-    ('auv_dynamics/simd.py', 'exec'),  # the same
+    ('auv_dynamics/simd_memory.py', 'exec'),  # the same
     ('auv_gvc_controller/laws/__init__.py', 'importlib.import_module'),  # a user's own law
     ('auv_dynamics/ros/kinds.py', 'importlib.import_module'),  # installed messages
     ('auv_analysis/commands/__init__.py', 'importlib.import_module'),  # names of ours, as below

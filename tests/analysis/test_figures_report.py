@@ -14,7 +14,8 @@ from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord, draw_figures
+from auv_analysis.report.figure_files import FigureRecord
+from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.page import write_report
 from auv_analysis.report.rendering import maths
 from auv_analysis.report.text import fixed, join, number, plain, tied

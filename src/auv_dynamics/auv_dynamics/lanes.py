@@ -14,6 +14,7 @@ import numpy as np
 
 from auv_dynamics.jit import JITTED, helper
 
+Number = Any  # a float, or that of each of several vehicles: a lane
 ALIGNMENT = 64  # bytes of a cache line
 
 
@@ -29,23 +30,23 @@ def _register() -> int:
 LANES = _register()
 
 
-def select(condition, a, b):
+def select(condition: Any, a: Number, b: Number) -> Number:
     """`a` where the condition holds, else `b`."""
     return np.where(condition, a, b) if isinstance(condition, np.ndarray) else a if condition else b
 
 
-def anywhere(condition):
+def anywhere(condition: Any) -> bool:
     """Whether a condition holds for any of the vehicles."""
     return bool(np.any(condition))
 
 
 @helper
-def clip(x, low, high):
+def clip(x: Number, low: Number, high: Number) -> Number:
     """`x` brought between two bounds; NaN stays what it is."""
     return select(x < low, low, select(x > high, high, x))
 
 
-def sqrt(x):
+def sqrt(x: Number) -> Number:
     """Square root."""
     return np.sqrt(x)
 
@@ -130,4 +131,6 @@ def empty(shape: tuple[int, ...]) -> np.ndarray:
 
 
 if JITTED:
-    import auv_dynamics.simd  # noqa: F401  gives the functions above their compiled form
+    # both give the functions above their compiled form
+    import auv_dynamics.simd
+    import auv_dynamics.simd_memory  # noqa: F401

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from auv_analysis.atlas.collect import Chart
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord, save_figures
+from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.grids import ALWAYS, Grid, draw_grid, grid_figure, scale_bar
 from auv_analysis.report.plotting import COLOURS
 from auv_analysis.report.text import join

@@ -6,7 +6,7 @@ from pathlib import Path
 from auv_analysis.atlas.collect import DOCUMENT, TABLE, Chart
 from auv_analysis.atlas.figures import uncoupled
 from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.grids import ALWAYS
 from auv_analysis.report.rendering import write_document
 from auv_analysis.report.tables.sources import VELOCITY, WRENCH, count, pointer

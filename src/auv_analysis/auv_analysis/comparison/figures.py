@@ -15,7 +15,7 @@ from auv_analysis.comparison.lines import MOST_LINES, Drawn, errors, look
 from auv_analysis.comparison.ranking import Ranking
 from auv_analysis.measures import FAMILIES
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord, save_figures
+from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.grids import ALWAYS, MARGIN, ROW, TALLEST, Grid, grid_figure, name_rows
 from auv_analysis.report.overview import XI
 from auv_analysis.report.plotting import COLOURS

@@ -12,7 +12,7 @@ from auv_analysis.comparison.findings import findings
 from auv_analysis.comparison.ranking import Ranking
 from auv_analysis.measures import FAMILIES, MEASURES, described
 from auv_analysis.report.document import Cell, Column, Section, Table, cell
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.grids import ALWAYS
 from auv_analysis.report.rendering import write_document
 from auv_analysis.report.text import join

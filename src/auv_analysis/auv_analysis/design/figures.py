@@ -11,13 +11,14 @@ from matplotlib.figure import Figure
 
 from auv_analysis.design.result import Result
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import Drawn, FigureRecord, save_figures
+from auv_analysis.report.figure_files import Drawn, FigureRecord, save_figures
 from auv_analysis.report.sketching import sketches
 from auv_analysis.summary import TRANSIENT
 from auv_dynamics.signals import DOFS
 
 WAS, IS = plotting.GREY, plotting.COLOURS[0]
 FAINT = 1e-4  # of the largest share: smaller couplings are not drawn
+Picture = tuple[Callable[[], Figure], str]  # what draws it, and its caption
 SYMBOLS = {'delta_xi': r'\Delta\xi', 'delta_pi': r'\Delta\pi'}
 
 
@@ -50,7 +51,7 @@ def _symbol(coupling: str) -> str:
     return f'${SYMBOLS[kind]}_{DOFS.index(dof) + 1}$ {dof}'
 
 
-def _couplings(document: Mapping[str, Any]):
+def _couplings(document: Mapping[str, Any]) -> Picture:
     largest = document['ranking'][0]['share']['before']
     rows = [row for row in document['ranking'] if max(row['share'].values()) > FAINT * largest]
 
@@ -88,7 +89,7 @@ def _key(axes: Axes) -> None:
     axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
 
 
-def _reduced(result: Result):
+def _reduced(result: Result) -> Picture:
     assert result.before is not None
     assert result.after is not None
     document = result.document
@@ -119,7 +120,7 @@ def _reduced(result: Result):
     return draw, caption
 
 
-def _upsilon(result: Result):
+def _upsilon(result: Result) -> Picture:
     document = result.document
     M = result.proposal.setting.space.vehicle.M
     weight = np.sqrt(np.diag(M)[:, None] / np.diag(M))

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from auv_analysis.design import tables
 from auv_analysis.design.couplings import UNITS
@@ -9,7 +10,7 @@ from auv_analysis.design.figures import draw_design
 from auv_analysis.design.objective import OTHERS, PART, SIZE, UNREST
 from auv_analysis.design.result import Result
 from auv_analysis.report.document import Block, Section, Sentence
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.rendering import write_document
 from auv_analysis.report.text import join, number
 
@@ -74,7 +75,7 @@ def _findings(result: Result) -> Iterator[Sentence]:
         yield Sentence(f'{warning[:1].upper()}{warning[1:]}.', 'table-at_rest')
 
 
-def _largest(first: dict, rest: Sequence[dict]) -> str:
+def _largest(first: dict[str, Any], rest: Sequence[dict[str, Any]]) -> str:
     share = number(100 * first['share']['before'], 2)
     name = first['coupling']
     text = f'The largest coupling of the vehicle as it was is {name}, {share} % of the motion'
@@ -84,7 +85,7 @@ def _largest(first: dict, rest: Sequence[dict]) -> str:
     return f'{text}.'
 
 
-def _grows(row: dict, document: dict) -> bool:
+def _grows(row: dict[str, Any], document: dict[str, Any]) -> bool:
     """Whether another coupling that counts gets larger by more than a tenth."""
     top = document['ranking'][0]['share']['before']
     share = row['share']
@@ -94,7 +95,7 @@ def _grows(row: dict, document: dict) -> bool:
     )
 
 
-def _way(row: dict) -> str:
+def _way(row: dict[str, Any]) -> str:
     unit = UNITS[row['coupling']]
     return f'{number(row["largest"]["before"])} to {number(row["largest"]["after"])} {unit}'
 

@@ -12,7 +12,7 @@ from auv_analysis.driver_check.outcome import Result
 from auv_analysis.driver_check.time_checks import reference_ns
 from auv_analysis.driver_check.trials import Answered
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord, save_figures
+from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.plotting import COLOURS, GREY
 from auv_dynamics.interface import NANOSECONDS
 from auv_dynamics.signals import DOFS

@@ -17,7 +17,7 @@ from auv_analysis.exploration.names import short_names
 from auv_analysis.exploration.results import Results
 from auv_analysis.measures import Measure
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord, save_figures
+from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.grids import Grid, grid_figure, small_heads
 from auv_analysis.report.text import join
 

@@ -7,7 +7,7 @@ from auv_analysis.exploration import tables, tables_rows
 from auv_analysis.exploration.findings import findings
 from auv_analysis.exploration.results import DOCUMENT, Results
 from auv_analysis.report.document import Block, Section
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.rendering import write_document
 
 LISTING = 'campaign.yaml'

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from auv_analysis.replay.compared import Compared
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import save_figures
+from auv_analysis.report.figure_files import save_figures
 from auv_analysis.report.plotting import COLOURS, DASHES, INPUT
 from auv_analysis.report.traces import FEW, thinned
 from auv_dynamics.signals import DOFS

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.report import paper, tables
-from auv_analysis.report.claims import Claim
+from auv_analysis.report.claim import Claim
 from auv_analysis.report.document import Block, Gallery, Section
-from auv_analysis.report.figures import FigureRecord, reference
+from auv_analysis.report.figure_files import FigureRecord
+from auv_analysis.report.figures import reference
 from auv_analysis.report.panel import PanelSet
 from auv_analysis.report.rendering import prose
 from auv_analysis.report.set_up import SetUp

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pyarrow as pa
 from markupsafe import Markup
 from pyarrow import parquet
 
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.panel import PanelSet
 from auv_analysis.report.text import MISSING, number
 
@@ -181,7 +181,7 @@ def write_numbers(path: Path, tables: Sequence[Table]) -> None:
     parquet.write_table(pa.table(dict(zip(columns, values, strict=True))), path)
 
 
-def _numbers(table: Table) -> Iterator[tuple]:
+def _numbers(table: Table) -> Iterator[tuple[Any, ...]]:
     for row in table.rows:
         name = ', '.join(entry.text for entry in row[: table.stub])
         for column, entry in zip(table.columns, row, strict=True):

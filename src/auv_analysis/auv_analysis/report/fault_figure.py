@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import Drawn, FigureRecord, save_figures
+from auv_analysis.report.figure_files import Drawn, FigureRecord, save_figures
 from auv_analysis.report.overview import RUNS
 from auv_analysis.report.plotting import DASHES, GREY
 from auv_analysis.report.sketch import Sketch
@@ -73,7 +74,7 @@ def _panel(axes: Axes, runs: Mapping[str, Sketch], i: int) -> None:
     plotting.shade(axes, next(iter(runs.values())))
 
 
-def _look(n: int) -> dict:
+def _look(n: int) -> dict[str, Any]:
     return {
         'linestyle': DASHES[n % len(DASHES)],
         'color': RUNS[n % len(RUNS)],

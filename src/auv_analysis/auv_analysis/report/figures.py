@@ -1,7 +1,7 @@
 """The figures of a study: what the paper draws, and what makes the comparison readable."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from auv_analysis.lyapunov import OF_THE_MOTION
 from auv_analysis.report import overview, plotting
 from auv_analysis.report.applied import applied_figure
 from auv_analysis.report.certificates import certificate_figure, is_drawn
+from auv_analysis.report.figure_files import Drawn, FigureRecord, saved
 from auv_analysis.report.panels import different_disturbances
 from auv_analysis.report.paper import paper_figure
 from auv_analysis.report.plotting import Quantity
@@ -34,47 +35,7 @@ SIGNALS = {  # kind of figure -> signal of `Sketch`
     'delta_xi': 'delta_xi',
     'delta_pi': 'delta_pi',
 }
-Drawn = tuple[Figure | None, str, str]  # with title and caption
 SYMBOLS = {'delta_xi': 'Δξ', 'delta_pi': 'Δπ'}
-
-
-@dataclass(frozen=True)
-class FigureRecord:
-    """One figure of the report.
-
-    Attributes
-    ----------
-    name : of its files, without ending
-    title, caption : plain text
-    png, pdf : its files; None where there is nothing to draw and the caption says why
-
-    """
-
-    name: str
-    title: str
-    caption: str
-    png: Path | None
-    pdf: Path | None
-
-
-def saved(folder: Path, name: str, figure: Figure | None, title: str, caption: str) -> FigureRecord:
-    """Save what was drawn; None: nothing, and the caption says why."""
-    files = (None, None) if figure is None else plotting.save(figure, folder, name)
-    return FigureRecord(name, title, caption, *files)
-
-
-def save_figures(folder: Path, drawn: Mapping[str, Callable[[], Drawn]]) -> dict[str, FigureRecord]:
-    """Draw and save figures, one after the other, in the style of reports.
-
-    Parameters
-    ----------
-    folder : where the files go; made when it is not there
-    drawn : name -> what makes the figure, its title and its caption
-
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    with plotting.style():
-        return {name: saved(folder, name, *make()) for name, make in drawn.items()}
 
 
 def draw_figures(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.report import paper
-from auv_analysis.report.claims import Claim
+from auv_analysis.report.claim import Claim
 from auv_analysis.report.document import Sentence
 from auv_analysis.report.figures import reference
 from auv_analysis.report.sketch import Sketch

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.report import paper
-from auv_analysis.report.claims import Claim, claims_table
+from auv_analysis.report.claim import Claim
+from auv_analysis.report.claims import claims_table
 from auv_analysis.report.contents import Contents
 from auv_analysis.report.document import Section, Sentence
 from auv_analysis.report.figures import draw_figures

@@ -92,7 +92,7 @@ INPUT = Quantity('input', _six(r'\tau_{}', 'XYZKMN'), WRENCH)
 UNCERTAINTY = Quantity('lumped uncertainty', _six('F_{}', 'XYZKMN'), WRENCH)
 
 
-def style() -> AbstractContextManager:
+def style() -> AbstractContextManager[None]:
     """Context in which figures are drawn and saved; the caller's settings come back after it."""
     return matplotlib.style.context(['default', STYLE])
 

@@ -21,7 +21,7 @@ from auv_analysis.report.document import (
     Table,
     write_numbers,
 )
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.interactive import Interactive
 from auv_analysis.report.provenance import provenance
 from auv_analysis.report.quantities import QUANTITIES

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.text import plain
 from auv_analysis.study.effects import Sensitivity, Variable
 

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 
 from auv_analysis.report import plotting
 from auv_analysis.report.evidence import DECIDED
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.paper import KINETIC_ENERGY
 from auv_analysis.report.text import fixed
 from auv_analysis.study.robustness import met

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from auv_analysis.report import plotting
-from auv_analysis.report.figures import FigureRecord, save_figures
+from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.plotting import COLOURS, DASHES, GREY
 from auv_analysis.tuning.comparison import DIVERGED, log_ratios
 from auv_analysis.tuning.measures import MEANINGS, Measures

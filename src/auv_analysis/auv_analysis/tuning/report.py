@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.report.document import Block, Section, Sentence
-from auv_analysis.report.figures import FigureRecord
+from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.rendering import write_document
 from auv_analysis.tuning import tables
 

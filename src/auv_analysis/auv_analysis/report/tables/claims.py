@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 from pyarrow import parquet
@@ -67,7 +68,7 @@ def write_claims(folder: Path, claims: Sequence[Claim]) -> Path:
     return path
 
 
-def _rows(claim: Claim) -> Iterator[tuple]:
+def _rows(claim: Claim) -> Iterator[tuple[Any, ...]]:
     facts = (
         claim.number, claim.case, claim.claim, claim.paper, claim.ours, claim.verdict,
         claim.criterion, claim.remark, claim.window,

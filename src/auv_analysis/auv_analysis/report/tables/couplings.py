@@ -1,6 +1,7 @@
 """Step 5 of the paper's procedure: how much the degrees of freedom deform each other, and which."""
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def _rows(kind: str, summaries: Summaries) -> Iterator[list[Cell]]:
         yield [Cell(f'{symbol}_{i + 1}'), Cell(dof), shown, *values, Cell(units[i // 3])]
 
 
-def terms_table(name: str, summary: Mapping) -> Table | None:
+def terms_table(name: str, summary: Mapping[str, Any]) -> Table | None:
     """Pieces of (31) and (32) of a run, with their part in what they add to; None without any.
 
     Parameters

@@ -5,6 +5,7 @@ import sys
 import rclpy
 from nav_msgs.msg import Odometry
 from rclpy.executors import ExternalShutdownException
+from rclpy.utilities import try_shutdown
 
 from auv_dynamics import interface
 from auv_dynamics.ros.topics import every_step
@@ -27,7 +28,7 @@ def main() -> None:
     try:
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
-        rclpy.try_shutdown()
+        try_shutdown()
 
 
 if __name__ == '__main__':

@@ -50,6 +50,7 @@ def _ping(seconds: float) -> float:
     import rclpy
     from geometry_msgs.msg import WrenchStamped
     from nav_msgs.msg import Odometry
+    from rclpy.utilities import try_shutdown
 
     rclpy.init()
     node = rclpy.create_node('ping')
@@ -79,7 +80,7 @@ def _ping(seconds: float) -> float:
     while time.monotonic() - begin < seconds:
         executor.spin_once(timeout_sec=1.0)
     rate = (trips - first) / (time.monotonic() - begin)
-    rclpy.try_shutdown()
+    try_shutdown()
     return rate
 
 
@@ -88,6 +89,7 @@ def _pong() -> None:
     import rclpy
     from geometry_msgs.msg import WrenchStamped
     from nav_msgs.msg import Odometry
+    from rclpy.utilities import try_shutdown
 
     rclpy.init()
     node = rclpy.create_node('pong')
@@ -96,7 +98,7 @@ def _pong() -> None:
     try:
         rclpy.spin(node)
     except (KeyboardInterrupt, rclpy.executors.ExternalShutdownException):
-        rclpy.try_shutdown()
+        try_shutdown()
 
 
 def graph_rate(steps: int, *, composed: bool = False) -> float:

@@ -8,6 +8,7 @@ little.
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -132,7 +133,7 @@ def python_control(rate: Rate, x: np.ndarray, duration: float) -> np.ndarray:
     """Final state (25,) by python-control's `input_output_response` of a nonlinear system."""
     import control
 
-    def update(t: float, x: np.ndarray, u: np.ndarray, params: dict) -> np.ndarray:
+    def update(t: float, x: np.ndarray, u: np.ndarray, params: dict[str, Any]) -> np.ndarray:
         return rate(t, x)
 
     system = control.nlsys(update, None, inputs=0, states=len(x), outputs=len(x))

@@ -9,7 +9,7 @@ from auv_analysis.changes import changed_scenario
 from auv_analysis.rollouts import rollouts
 from auv_dynamics.jit import JITTED
 
-# all have the same name, which numba alone would not tell apart
+# all have the same name, which numba alone would not tell apart; types change nothing
 LAW = """
 from typing import NamedTuple
 import numpy as np
@@ -21,7 +21,7 @@ class PI(NamedTuple):
     STATES = 6
 
     @staticmethod
-    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    def wrench(t: float, nu: tuple, attitude, nu_d, nu_d_dot, state, gains: 'PI', model) -> tuple:
         {before}
         error = sub(nu_d, nu)
         return add(mul(gains.k_P, error), mul(gains.k_I, vector(state, 0))), (0.0,) * 6

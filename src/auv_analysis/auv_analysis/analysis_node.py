@@ -1,6 +1,7 @@
 """Live analysis as a node: kinetic energy, couplings and lumped error of every tenth step."""
 
 from collections import OrderedDict
+from typing import Any
 
 import numpy as np
 
@@ -41,14 +42,14 @@ class AnalysisNode(BulkNode):
         self._waiting: dict[topics.Topic, OrderedDict[int, bytes]] = {
             topic: OrderedDict() for topic in HEARD
         }
-        self._values: dict[int, dict[topics.Topic, tuple]] = {}
+        self._values: dict[int, dict[topics.Topic, tuple[float, ...]]] = {}
         self._outputs = {topic: self.graph.output(topic) for topic in topics.ANALYSIS_TOPICS}
         self._codecs = {t: Codec(t.type, self.graph.frames, t.name) for t in HEARD}
         for topic in HEARD:
             self._watch(topic)
 
     def _watch(self, topic: topics.Topic) -> None:
-        def callback(message: bytes, _: dict) -> None:
+        def callback(message: bytes, _: dict[str, Any]) -> None:
             self._take(topic, first_stamp(message), message)
 
         source = self._odometry if topic is topics.ODOM else topic
@@ -87,7 +88,9 @@ class AnalysisNode(BulkNode):
                 while waiting and next(iter(waiting)) <= ns:
                     waiting.popitem(last=False)
 
-    def _publish(self, ns: int, topic: topics.Topic, values: dict) -> None:
+    def _publish(
+        self, ns: int, topic: topics.Topic, values: dict[topics.Topic, tuple[float, ...]]
+    ) -> None:
         publish = self._send
         if topic is topics.ODOM:
             nu = values[topic][7:]

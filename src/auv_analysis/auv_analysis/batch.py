@@ -25,7 +25,6 @@ from auv_analysis.trees import kept, mapped
 from auv_dynamics.actuators import memory
 from auv_dynamics.faulty_devices import history_shape
 from auv_dynamics.integrator import TABLEAUS, stage_times
-from auv_dynamics.jit import numba
 from auv_dynamics.lanes import empty, packed, unpacked, width
 from auv_dynamics.plant import SIZE
 from auv_gvc_controller.sampled import user_law
@@ -123,11 +122,13 @@ def _works(batch: Batch, kernel: Kernel, last: Kernel) -> bool:
     """Whether numba compiles a kernel, tried on no steps; the last one needs no trial."""
     if kernel is last:
         return True
+    from numba.core.errors import NumbaError
+
     try:
         with warnings.catch_warnings():
             warnings.simplefilter('ignore')  # what numba thinks of a user's code
             _run_part(_job(batch, kernel), range(1), trial=True)
-    except numba.core.errors.NumbaError:
+    except NumbaError:
         return False
     return True
 
@@ -142,7 +143,7 @@ def _job(batch: Batch, kernel: Kernel) -> _Job:
 
 def pack(value: Any, lanes: int) -> Any:
     """Lanes of every array (B, ...) or (1, ...); one that stands in several places only once."""
-    done: dict[tuple, np.ndarray] = {}
+    done: dict[tuple[Any, ...], np.ndarray] = {}
 
     def once(array: np.ndarray) -> np.ndarray:
         place = array.ctypes.data, array.shape, array.strides

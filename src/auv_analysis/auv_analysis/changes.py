@@ -46,7 +46,9 @@ def split(path: str) -> Parts:
     return tuple(parts)
 
 
-def changed(data: Mapping[str, Any], path: str, value: Any, file: object = 'path') -> dict:
+def changed(
+    data: Mapping[str, Any], path: str, value: Any, file: object = 'path'
+) -> dict[str, Any]:
     """Copy of nested mappings and lists with one value replaced; what is not on its way is shared.
 
     Parameters

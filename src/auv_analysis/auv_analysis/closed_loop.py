@@ -11,18 +11,12 @@ from auv_analysis.records import Sample, fill_record
 from auv_dynamics.actuators import Actuators, fill_applied
 from auv_dynamics.faults import FaultShape
 from auv_dynamics.faulty_devices import fill_arrived, fill_faulty
-from auv_dynamics.integrator import fill_step
+from auv_dynamics.integrator import Tableau, fill_step
 from auv_dynamics.jit import compiled, jitable
 from auv_dynamics.lanes import uncounted
-from auv_dynamics.plant import (
-    SIZE,
-    HeldWrench,
-    attitude_of,
-    fill_plant_rate,
-    fill_unit_attitude,
-)
+from auv_dynamics.plant import SIZE, HeldWrench, attitude_of, fill_plant_rate, fill_unit_attitude
 from auv_dynamics.sensors import fill_measured
-from auv_dynamics.six import vector
+from auv_dynamics.six import Numbers, Vector, vector
 from auv_dynamics.uncertainty import Truth, lumped
 from auv_gvc_controller.model import ControlModel
 from auv_gvc_controller.sampled import AntiWindup, fill_sample, state_rate, wrench
@@ -69,14 +63,14 @@ class LawInside(NamedTuple):
     current: np.ndarray
 
     @staticmethod
-    def fill_rate(system, stage, x, rate):
+    def fill_rate(system: 'LawInside', stage: int, x: np.ndarray, rate: np.ndarray) -> None:
         """x_dot at one stage."""
         tau, _, change = answer(system, stage, x)
         fill_answered(system, stage, x, tau, change, rate)
 
 
 @jitable
-def answer(system, stage, x):
+def answer(system: LawInside, stage: int, x: np.ndarray) -> tuple[Numbers, Numbers, Vector]:
     """(tau, f, state rate) of the law at a stage of the step."""
     t, nu, attitude, state = system.t[stage], vector(x, 7), attitude_of(x), x[SIZE:]
     nu_d, nu_d_dot = vector(system.reference[stage], 0), vector(system.reference[stage], 6)
@@ -87,7 +81,9 @@ def answer(system, stage, x):
 
 
 @jitable
-def fill_answered(system, stage, x, tau, change, rate):
+def fill_answered(
+    system: LawInside, stage: int, x: np.ndarray, tau: Vector, change: Vector, rate: np.ndarray
+) -> None:
     """Write x_dot at a stage of the step at which the law has answered into `rate`."""
     F = vector(system.F[stage], 0)
     fill_plant_rate(system.loop.truth, x, tau, F, system.current, stage, rate)
@@ -166,7 +162,10 @@ class Workspace(NamedTuple):
 
 
 @jitable
-def fill_continuous(loop, tables, grid, tableau, motion, work, record):
+def fill_continuous(
+    loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
+    record: Any,
+) -> None:  # fmt: skip
     """Take a block of steps with the law inside every stage."""
     x = motion.x
     body, state = x[:SIZE], x[SIZE:]
@@ -185,7 +184,10 @@ def fill_continuous(loop, tables, grid, tableau, motion, work, record):
 
 
 @jitable
-def fill_held(loop, tables, grid, tableau, motion, work, record):
+def fill_held(
+    loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
+    record: Any,
+) -> None:  # fmt: skip
     """Take a block of steps with the law at the samples, the wrench held between."""
     truth, x, measured = loop.truth, motion.x, motion.measured
     late = motion.history.shape[0] > 0
@@ -220,7 +222,10 @@ def fill_held(loop, tables, grid, tableau, motion, work, record):
 
 
 @compiled
-def run_continuous(loop, tables, grid, tableau, motion, work, record):
+def run_continuous(
+    loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
+    record: Any,
+) -> None:  # fmt: skip
     """`fill_continuous` for one vehicle, to be called from Python."""
     fill_continuous(
         uncounted(loop), uncounted(tables), uncounted(grid), uncounted(tableau),
@@ -229,7 +234,10 @@ def run_continuous(loop, tables, grid, tableau, motion, work, record):
 
 
 @compiled
-def run_held(loop, tables, grid, tableau, motion, work, record):
+def run_held(
+    loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
+    record: Any,
+) -> None:  # fmt: skip
     """`fill_held` for one vehicle, to be called from Python."""
     fill_held(
         uncounted(loop), uncounted(tables), uncounted(grid), uncounted(tableau),

@@ -173,7 +173,7 @@ class Ear(Participant):
             self._publisher = self._node.create_publisher(WrenchStamped, self._node.wrench, qos)
         return self._publisher.get_subscription_count() > 0
 
-    def send(self, tau: tuple) -> int:
+    def send(self, tau: tuple[float, ...]) -> int:
         """Publish a wrench with the stamp of the newest odometry; the time at which it left, ns."""
         if self._publisher is None or self.tape.newest is None:
             raise RuntimeError('no wrench before speak() and an odometry')

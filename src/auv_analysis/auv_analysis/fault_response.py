@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -141,10 +142,10 @@ class _Tally:
             for i, dof in enumerate(DOFS)
         ]
 
-    def _roots(self, sums: np.ndarray, i: int) -> tuple:
+    def _roots(self, sums: np.ndarray, i: int) -> tuple[Any, ...]:
         return self._of_parts(np.sqrt(sums[:, i] / np.maximum(self._count, 1)))
 
-    def _of_parts(self, values: np.ndarray) -> tuple:
+    def _of_parts(self, values: np.ndarray) -> tuple[Any, ...]:
         pairs = zip(values, self._count, strict=True)
         return tuple(float(value) if count else None for value, count in pairs)
 

@@ -9,15 +9,29 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
-from auv_analysis.closed_loop import fill_continuous, fill_held, run_continuous, run_held
+from auv_analysis.closed_loop import (
+    Grid,
+    Loop,
+    Motion,
+    Tables,
+    Workspace,
+    fill_continuous,
+    fill_held,
+    run_continuous,
+    run_held,
+)
 from auv_analysis.trees import mapped
+from auv_dynamics.integrator import Tableau
 from auv_dynamics.jit import JITTED, compiled, plain, uncached
 from auv_dynamics.lanes import align_stack, of_block, uncounted
 from auv_gvc_controller.laws import SHIPPED
 
 
 @compiled
-def run_continuous_batch(loop, tables, grid, tableau, motion, work, record, first, last):
+def run_continuous_batch(
+    loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
+    record: Any, first: int, last: int,
+) -> None:  # fmt: skip
     """`fill_continuous` for the blocks of lanes from `first` to before `last`."""
     align_stack()
     for b in range(first, last):
@@ -28,7 +42,10 @@ def run_continuous_batch(loop, tables, grid, tableau, motion, work, record, firs
 
 
 @compiled
-def run_held_batch(loop, tables, grid, tableau, motion, work, record, first, last):
+def run_held_batch(
+    loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
+    record: Any, first: int, last: int,
+) -> None:  # fmt: skip
     """`fill_held` for the blocks of lanes from `first` to before `last`."""
     align_stack()
     for b in range(first, last):
@@ -90,7 +107,10 @@ def _of_user(law: Any, hold: str) -> Sequence[Kernel]:
 def _one_by_one(function: Callable[..., None]) -> Callable[..., None]:
     """A kernel of one vehicle as one of blocks, each of one vehicle."""
 
-    def run(loop, tables, grid, tableau, motion, work, record, first, last):
+    def run(
+        loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
+        record: Any, first: int, last: int,
+    ) -> None:  # fmt: skip
         def only(value: Any, b: int) -> Any:
             return mapped(lambda lanes: lanes[..., 0], of_block(value, b))
 

@@ -22,15 +22,15 @@ class LiveAnalysis:
         self._Upsilon_inv = inverse_upper(self._Upsilon)
         self.structural_zeros = structural_zeros(self._Upsilon, self._Upsilon_inv)
 
-    def energy(self, nu: tuple) -> tuple[np.ndarray, np.ndarray]:
+    def energy(self, nu: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
         """Kinetic energy by component in J and its shares in %, (30)."""
         components = kinetic_energy(self._Upsilon_inv, self._N, np.array(nu))
         return components, shares(components)
 
-    def delta_xi(self, nu: tuple) -> np.ndarray:
+    def delta_xi(self, nu: tuple[float, ...]) -> np.ndarray:
         """Xi - nu, (33)."""
         return delta_xi(self._Upsilon_inv, np.array(nu))
 
-    def delta_pi(self, tau: tuple) -> np.ndarray:
+    def delta_pi(self, tau: tuple[float, ...]) -> np.ndarray:
         """Pi - tau, (34)."""
         return delta_pi(self._Upsilon, np.array(tau))

@@ -19,6 +19,7 @@ from auv_analysis.windows import Windows
 from auv_dynamics.jit import JITTED, compiled, jitable
 from auv_dynamics.lanes import LANES, of_block, uncounted
 from auv_dynamics.six import (
+    Vector,
     add,
     add_products,
     fill_vector,
@@ -27,7 +28,7 @@ from auv_dynamics.six import (
     sub,
     upper,
     vector,
-)
+)  # fmt: skip
 from auv_gvc_controller.model import ControlModel
 
 NAMES = ('error', 'lumped_error', 'tau', 'delta_xi', 'delta_pi', 'energy', 'nu_d')
@@ -51,7 +52,9 @@ def maps_of(model: ControlModel) -> Maps:
 
 
 @jitable
-def signals(nu, nu_d, tau, f, F, maps):
+def signals(
+    nu: Vector, nu_d: Vector, tau: Vector, f: Vector, F: Vector, maps: Maps
+) -> tuple[Vector, ...]:
     """The signals of `NAMES`, six numbers each: m/s, rad/s; N, N m; J."""
     xi, N = upper(maps.Upsilon_inv, nu), maps.N
     energy = (
@@ -74,7 +77,10 @@ def signals(nu, nu_d, tau, f, F, maps):
 
 
 @jitable
-def add_sample(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
+def add_sample(
+    nu: Vector, nu_d: Vector, tau: Vector, f: Vector, F: Vector, maps: Maps, sums: np.ndarray,
+    squares: np.ndarray, peaks: np.ndarray,
+) -> None:  # fmt: skip
     """Add one sample, or lanes of them, to what (7, 6) is known of those before it.
 
     Only the sum of the energy, the squares of errors and input, and no peak of the energy are
@@ -94,7 +100,7 @@ def add_sample(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
 
 
 @jitable
-def fill_beside(beside, first, flat, k, lanes):
+def fill_beside(beside: np.ndarray, first: int, flat: np.ndarray, k: int, lanes: int) -> None:
     """Put six numbers each of the samples from index `k` side by side, from row `first`."""
     for i in range(6):
         for w in range(lanes):
@@ -102,7 +108,10 @@ def fill_beside(beside, first, flat, k, lanes):
 
 
 @jitable
-def fill_signals(beside, nu, nu_d, tau, f, F, k, lanes):
+def fill_signals(
+    beside: np.ndarray, nu: np.ndarray, nu_d: np.ndarray, tau: np.ndarray, f: np.ndarray,
+    F: np.ndarray, k: int, lanes: int,
+) -> None:  # fmt: skip
     """Put the numbers of `lanes` samples from index `k` side by side: (1, 30, LANES)."""
     fill_beside(beside, 0, nu, k, lanes)
     fill_beside(beside, 6, nu_d, k, lanes)
@@ -112,7 +121,10 @@ def fill_signals(beside, nu, nu_d, tau, f, F, k, lanes):
 
 
 @compiled
-def add_samples(nu, nu_d, tau, f, F, maps, beside, sums, squares, peaks):
+def add_samples(
+    nu: np.ndarray, nu_d: np.ndarray, tau: np.ndarray, f: np.ndarray, F: np.ndarray, maps: Maps,
+    beside: np.ndarray, sums: np.ndarray, squares: np.ndarray, peaks: np.ndarray,
+) -> None:  # fmt: skip
     """Add samples, flat arrays (6 n,), to lanes (1, 7, 6, LANES): as many at a time as fit.
 
     `beside` (1, 30, LANES) is workspace. Zeros, which fill up the last register, add nothing.
@@ -131,7 +143,10 @@ def add_samples(nu, nu_d, tau, f, F, maps, beside, sums, squares, peaks):
         )  # fmt: skip
 
 
-def add_compiled(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
+def add_compiled(
+    nu: np.ndarray, nu_d: np.ndarray, tau: np.ndarray, f: np.ndarray, F: np.ndarray, maps: Maps,
+    sums: np.ndarray, squares: np.ndarray, peaks: np.ndarray,
+) -> None:  # fmt: skip
     """Add samples, flat arrays (6 n,), to what (7, 6) is known of those before them."""
     lanes = np.zeros((3, 1, *sums.shape, LANES))
     add_samples(nu, nu_d, tau, f, F, maps, np.empty((1, 30, LANES)), *lanes)
@@ -140,10 +155,15 @@ def add_compiled(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
     np.maximum(peaks, lanes[2, 0].max(axis=-1), out=peaks)
 
 
-def add_columns(nu, nu_d, tau, f, F, maps, sums, squares, peaks):
+def add_columns(
+    nu: np.ndarray, nu_d: np.ndarray, tau: np.ndarray, f: np.ndarray, F: np.ndarray, maps: Maps,
+    sums: np.ndarray, squares: np.ndarray, peaks: np.ndarray,
+) -> None:  # fmt: skip
     """The same without a compiler: the samples as columns."""
-    columns = (np.ascontiguousarray(flat.reshape(-1, 6).T) for flat in (nu, nu_d, tau, f, F))
-    for s, signal in enumerate(signals(*columns, maps)):
+    nu, nu_d, tau, f, F = (
+        np.ascontiguousarray(flat.reshape(-1, 6).T) for flat in (nu, nu_d, tau, f, F)
+    )
+    for s, signal in enumerate(signals(nu, nu_d, tau, f, F, maps)):
         for i, values in enumerate(signal):
             sums[s, i] += values.sum()
             squares[s, i] += values @ values

@@ -1,12 +1,12 @@
 """What a closed loop leaves of its samples: a full log, here, or figures, see `reduction`."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from auv_dynamics.jit import specialised
 from auv_dynamics.plant import SIZE
-from auv_dynamics.six import fill_vector
+from auv_dynamics.six import Vector, fill_vector
 
 
 class Sample(NamedTuple):
@@ -22,15 +22,15 @@ class Sample(NamedTuple):
     x: np.ndarray
     measured: np.ndarray
     state: np.ndarray
-    nu_d: tuple
-    tau: tuple
-    applied: tuple
-    f: tuple
-    F: tuple
+    nu_d: Vector
+    tau: Vector
+    applied: Vector
+    f: Vector
+    F: Vector
 
 
 @specialised('record')
-def fill_record(record, k, sample):
+def fill_record(record: Any, k: int, sample: Sample) -> None:
     """Keep what `record` keeps of sample k."""
     type(record).fill_record(record, k, sample)
 
@@ -56,7 +56,7 @@ class Log(NamedTuple):
     F: np.ndarray
 
     @staticmethod
-    def fill_record(record, k, sample):
+    def fill_record(record: 'Log', k: int, sample: Sample) -> None:
         """Write row k."""
         for i in range(SIZE):
             record.x[k, i] = sample.x[i]

@@ -4,12 +4,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from auv_analysis.records import Sample
 from auv_analysis.summary import TRANSIENT
 from auv_dynamics.files import LARGEST
 from auv_dynamics.jit import helper, jitable
-from auv_dynamics.lanes import select
+from auv_dynamics.lanes import Number, select
 from auv_dynamics.signals import DOFS
-from auv_dynamics.six import add, add_products, diag, keep_largest, sub, upper, upper_T, vector
+from auv_dynamics.six import (
+    Six,
+    Vector,
+    add,
+    add_products,
+    diag,
+    keep_largest,
+    sub,
+    upper,
+    upper_T,
+    vector,
+)
 from auv_gvc_controller.model import ControlModel
 
 
@@ -64,7 +76,7 @@ class Figures(NamedTuple):
         return cls(**{name: known.get(name, like(6, 0.0)) for name in cls._fields})
 
     @staticmethod
-    def fill_record(record, k, sample):
+    def fill_record(record: 'Figures', k: int, sample: Sample) -> None:
         """Add sample k."""
         nu, tau = vector(sample.x, 7), sample.tau
         xi = upper(record.Upsilon_inv, nu)
@@ -103,7 +115,7 @@ def at_start(model: ControlModel, band: np.ndarray, step: float, like: Any) -> d
 
 
 @jitable
-def keep_divergence(diverged, k, sample):
+def keep_divergence(diverged: np.ndarray, k: int, sample: Sample) -> None:
     """Index k where sample k is the first that is not finite, in place."""
     good = size_of(sample) < LARGEST
     first = select(diverged[0] < k, diverged[0], float(k))
@@ -111,7 +123,7 @@ def keep_divergence(diverged, k, sample):
 
 
 @helper
-def keep_last(last, a, band, k):
+def keep_last(last: np.ndarray, a: Vector, band: Vector, k: float) -> None:
     """Index k where a is outside its band, by component and in place."""
     last[0] = select(abs(a[0]) > band[0], k, last[0])
     last[1] = select(abs(a[1]) > band[1], k, last[1])
@@ -122,13 +134,13 @@ def keep_last(last, a, band, k):
 
 
 @helper
-def sizes(a):
+def sizes(a: Vector) -> Six:
     """Absolute values, by component."""
     return (abs(a[0]), abs(a[1]), abs(a[2]), abs(a[3]), abs(a[4]), abs(a[5]))
 
 
 @jitable
-def size_of(sample):
+def size_of(sample: Sample) -> Number:
     """Sum of the absolute values of a sample; NaN or inf where one is not finite."""
     x, state = sample.x, sample.state
     total = sizes(sample.tau)  # six sums that do not wait for each other

@@ -27,7 +27,7 @@ BLOCK = 256  # steps whose set-points are looked at together for their peak
 def rollouts(
     scenario: Scenario,
     controller: str,
-    changes: Mapping[str, Sequence | np.ndarray],
+    changes: Mapping[str, Sequence[Any] | np.ndarray],
     *,
     seeds: np.ndarray | None = None,
     hold: Hold = 'continuous',
@@ -80,7 +80,7 @@ def rollouts(
     return {name: result[name] for name in ('status', 'reason', *COLUMNS)}
 
 
-def _array(values: Sequence | np.ndarray) -> np.ndarray:
+def _array(values: Sequence[Any] | np.ndarray) -> np.ndarray:
     """Numbers, or lists of numbers, as one array; anything else as objects."""
     if isinstance(values, np.ndarray):
         return values

@@ -54,7 +54,7 @@ class Variants:
         return replace(self, loop=kept(self.loop, keep), setpoint=setpoint, **arrays)
 
     @property
-    def structure(self) -> tuple:
+    def structure(self) -> tuple[Any, ...]:
         """What closed loops must have in common to run in one batch."""
         scenario, loop = self.scenarios[0], self.loop
         sizes = tuple(np.shape(array)[1:] for array in arrays(loop))

@@ -6,7 +6,7 @@ import time
 import numpy as np
 
 from auv_analysis.scenario import Scenario
-from auv_dynamics.jit import JITTED, cache_folder, numba
+from auv_dynamics.jit import JITTED, cache_folder, config
 from auv_dynamics.plant import Plant, initial_state
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.sampled import SampledLaw, is_compiled
@@ -22,7 +22,7 @@ def announce(scenario: Scenario, controllers: list[str]) -> None:
             law = type(gains).__name__
             print(f'{name}: the law {law} runs as plain Python', file=sys.stderr)
     if not JITTED:
-        why = 'numba is switched off' if numba else 'numba is not installed'
+        why = 'numba is switched off' if config else 'numba is not installed'
         print(f'{why}: the kernel runs as plain Python, slower', file=sys.stderr)
     elif not any(cache_folder().glob('**/*.nbi')):
         print('compiling the kernel for this machine, once ...', file=sys.stderr, flush=True)

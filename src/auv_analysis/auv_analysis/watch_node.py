@@ -119,7 +119,7 @@ class WatchNode(BulkNode):
 
         return take
 
-    def _callback(self, topic: topics.Topic) -> Callable[[bytes, dict], None]:
+    def _callback(self, topic: topics.Topic) -> Callable[[bytes, dict[str, Any]], None]:
         if topic is topics.DIAGNOSTICS:
             return self._on_diagnostics
         known = topic.type in KINDS

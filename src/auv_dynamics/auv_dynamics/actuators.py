@@ -7,10 +7,10 @@ import numpy as np
 
 from auv_dynamics.files import InputError
 from auv_dynamics.jit import compiled, helper
-from auv_dynamics.lanes import select
+from auv_dynamics.lanes import Number, select
 from auv_dynamics.servo import fill_slowed, waited
 from auv_dynamics.signals import DOFS
-from auv_dynamics.six import clipped
+from auv_dynamics.six import Numbers, Six, Vector, clipped
 from auv_dynamics.vehicle import Vehicle
 
 MOST_STEPS = 1_000_000  # of a delay
@@ -134,7 +134,7 @@ def memory(actuators: Actuators, *, faults: bool = False) -> np.ndarray:
 
 
 @helper
-def thrust(reach, i, tau):
+def thrust(reach: Reach, i: int, tau: Vector) -> Number:
     """u_i of u = T^+ tau in N, without limits."""
     T_inv = reach.T_inv
     return (
@@ -148,7 +148,7 @@ def thrust(reach, i, tau):
 
 
 @helper
-def share_within(reach, tau):
+def share_within(reach: Reach, tau: Vector) -> Number:
     """Largest share of the thrusts T^+ tau, at most 1, that is within every thruster's limits."""
     share = 1.0
     for i in range(reach.T.shape[1]):
@@ -160,7 +160,7 @@ def share_within(reach, tau):
 
 
 @helper
-def _delivered_in(reach, j, tau, share):
+def _delivered_in(reach: Reach, j: int, tau: Vector, share: Number) -> Number:
     total = 0.0 * tau[j]
     for i in range(reach.T.shape[1]):
         total = total + reach.T[j, i] * thrust(reach, i, tau) * share
@@ -168,7 +168,7 @@ def _delivered_in(reach, j, tau, share):
 
 
 @helper
-def delivered(reach, tau, share):
+def delivered(reach: Reach, tau: Vector, share: Number) -> Six:
     """T u with u a share of T^+ tau: six floats, N and N m."""
     return (
         _delivered_in(reach, 0, tau, share),
@@ -181,7 +181,7 @@ def delivered(reach, tau, share):
 
 
 @helper
-def demanded(reach, tau):
+def demanded(reach: Reach, tau: Numbers) -> Numbers:
     """What the command asks of the actuators: T T^+ tau, had the thrusters no limits.
 
     A degree of freedom without a wrench of its own keeps its command: it is never delivered.
@@ -200,7 +200,7 @@ def demanded(reach, tau):
 
 
 @helper
-def allocated(reach, tau):
+def allocated(reach: Reach, tau: Numbers) -> Numbers:
     """T u with u = T^+ tau, scaled down together until every thrust is within its limits."""
     if reach.T.shape[1] == 0:
         return tau
@@ -208,13 +208,13 @@ def allocated(reach, tau):
 
 
 @helper
-def reachable(reach, tau):
+def reachable(reach: Reach, tau: Numbers) -> Six:
     """The wrench that is had for the command tau: thruster allocation, then the axis limits."""
     return clipped(allocated(reach, tau), reach.limit)
 
 
 @helper
-def fill_applied(actuators, k, tau, state):
+def fill_applied(actuators: Actuators, k: int, tau: Numbers, state: np.ndarray) -> Numbers:
     """Wrench applied from sample k on for the command tau; `state` of `memory` in place."""
     if actuators.ideal:
         return tau
@@ -223,6 +223,6 @@ def fill_applied(actuators, k, tau, state):
 
 
 @compiled
-def applied_wrench(actuators, k, tau, state):
+def applied_wrench(actuators: Actuators, k: int, tau: Numbers, state: np.ndarray) -> Numbers:
     """`fill_applied` to be called from Python: one call is one step of the actuators."""
     return fill_applied(actuators, k, tau, state)

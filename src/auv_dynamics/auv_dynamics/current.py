@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from auv_dynamics.jit import helper
-from auv_dynamics.model import acceleration
+from auv_dynamics.lanes import Number
+from auv_dynamics.model import Model, acceleration
 from auv_dynamics.signals import Harmonics
-from auv_dynamics.six import add, mul
+from auv_dynamics.six import Six, Vector, add, mul
 
 Current = Callable[[np.ndarray], np.ndarray]  # t (n,) in s -> (n, 6): v_c, v_c_dot in NED
 AXES = {'north': 'surge', 'east': 'sway', 'down': 'heave'}
@@ -57,7 +58,7 @@ def varies(spec: Mapping[str, Any]) -> bool:
 
 
 @helper
-def to_body(attitude, v):
+def to_body(attitude: Vector, v: Vector) -> tuple[Number, Number, Number]:
     """R(q)^T v: a vector in NED seen in the body frame."""
     w, x, y, z = attitude
     a, b, c = v
@@ -69,7 +70,15 @@ def to_body(attitude, v):
 
 
 @helper
-def acceleration_in_current(model, M_RB, attitude, nu, tau, F, flow):
+def acceleration_in_current(
+    model: Model,
+    M_RB: np.ndarray,
+    attitude: Vector,
+    nu: Vector,
+    tau: Vector,
+    F: Vector,
+    flow: Vector,
+) -> Six:
     """nu_dot in a current `flow` = (v_c, v_c_dot) in NED.
 
     (1) in nu_r = nu - (R^T v_c, 0) with M_RB (R^T v_c_dot, 0) on its left-hand side, then

@@ -84,7 +84,9 @@ class Acting:
         """Forget every command."""
         self._memory = memory(self._actuators, faults=self._faulty)
 
-    def apply(self, k: int, tau: tuple, fault: np.ndarray | None, *, heard: bool) -> tuple:
+    def apply(
+        self, k: int, tau: tuple[float, ...], fault: np.ndarray | None, *, heard: bool
+    ) -> tuple[float, ...]:
         """Wrench applied from step k on for the command tau.
 
         `heard` says that tau is what the actuators have, whatever the fault does to messages.

@@ -5,12 +5,14 @@ arrived in steps, a factor per axis (6), an offset per axis (6), a factor and an
 (2 n). The rows are those of `fault_rows`.
 """
 
-from auv_dynamics.actuators import share_within, thrust
+import numpy as np
+
+from auv_dynamics.actuators import Actuators, Reach, share_within, thrust
 from auv_dynamics.faults import FaultShape
 from auv_dynamics.jit import compiled, helper
-from auv_dynamics.lanes import anywhere, select
+from auv_dynamics.lanes import Number, anywhere, select
 from auv_dynamics.servo import fill_slowed, waited
-from auv_dynamics.six import clipped, fill_vector
+from auv_dynamics.six import Numbers, Six, Vector, clipped, fill_vector
 
 SIZE = 13  # of a state
 WRENCH, AGE, AXES, THRUSTERS = 0, 1, 2, 14
@@ -23,7 +25,7 @@ def history_shape(faults: FaultShape) -> tuple[int, int]:
 
 
 @helper
-def fill_arrived(fault, k, history, measured):
+def fill_arrived(fault: np.ndarray, k: int, history: np.ndarray, measured: np.ndarray) -> None:
     """Write the newest measurement that has arrived at step k into `measured` (13,).
 
     `history` (delay + 2, 13): a ring of the last measurements, then that of step k.
@@ -40,19 +42,19 @@ def fill_arrived(fault, k, history, measured):
 
 
 @compiled
-def fill_arrival(fault, k, history, measured):
+def fill_arrival(fault: np.ndarray, k: int, history: np.ndarray, measured: np.ndarray) -> None:
     """`fill_arrived` to be called from Python."""
     fill_arrived(fault, k, history, measured)
 
 
 @helper
-def _kept_in(fault, i, tau, held):
+def _kept_in(fault: np.ndarray, i: int, tau: Vector, held: np.ndarray) -> Number:
     kept = select(fault[WRENCH] == HELD, held[i], 0.0 * tau[i])
     return select(fault[WRENCH] == 0.0, tau[i], kept)
 
 
 @helper
-def fill_heard(fault, tau, held):
+def fill_heard(fault: np.ndarray, tau: Vector, held: np.ndarray) -> Six:
     """The command that the actuators hear; `held` (6,) is the last one, in place."""
     heard = (
         _kept_in(fault, 0, tau, held),
@@ -67,7 +69,7 @@ def fill_heard(fault, tau, held):
 
 
 @helper
-def _left_in(reach, fault, j, tau, share):
+def _left_in(reach: Reach, fault: np.ndarray, j: int, tau: Vector, share: Number) -> Number:
     n = reach.T.shape[1]
     total = 0.0 * tau[j]
     for i in range(n):
@@ -78,7 +80,7 @@ def _left_in(reach, fault, j, tau, share):
 
 
 @helper
-def left_of_thrusters(reach, fault, tau):
+def left_of_thrusters(reach: Reach, fault: np.ndarray, tau: Numbers) -> Numbers:
     """T u', u' what the faults leave of the thrusts; the allocation does not know of them."""
     if reach.T.shape[1] == 0:
         return tau
@@ -94,7 +96,7 @@ def left_of_thrusters(reach, fault, tau):
 
 
 @helper
-def left_of_axes(fault, c):
+def left_of_axes(fault: np.ndarray, c: Vector) -> Six:
     """What the faults of whole axes leave of a wrench."""
     return (
         fault[AXES] * c[0] + fault[AXES + 6],
@@ -107,7 +109,9 @@ def left_of_axes(fault, c):
 
 
 @helper
-def fill_faulty(actuators, fault, k, tau, state):
+def fill_faulty(
+    actuators: Actuators, fault: np.ndarray, k: int, tau: Vector, state: np.ndarray
+) -> Numbers:
     """`fill_applied` of actuators with faults; the last row of `state` is the last command."""
     heard = fill_heard(fault, tau, state[state.shape[0] - 1])
     command = waited(actuators, k, heard, state)
@@ -117,6 +121,8 @@ def fill_faulty(actuators, fault, k, tau, state):
 
 
 @compiled
-def faulty_wrench(actuators, fault, k, tau, state):
+def faulty_wrench(
+    actuators: Actuators, fault: np.ndarray, k: int, tau: Vector, state: np.ndarray
+) -> Numbers:
     """`fill_faulty` to be called from Python: one call is one step of the actuators."""
     return fill_faulty(actuators, fault, k, tau, state)

@@ -66,7 +66,7 @@ def check(data: dict[str, Any], schema_path: Path, file: object) -> None:
         raise _as_input_error(errors[0], root, file)
 
 
-def _rank(error: jsonschema.ValidationError) -> tuple:
+def _rank(error: jsonschema.ValidationError) -> tuple[Any, ...]:
     # unknown keys first (a misspelt key also leaves a missing one), then in file order
     order = {'additionalProperties': 0, 'unevaluatedProperties': 0, 'required': 2}
     return order.get(error.validator, 1), [str(part) for part in error.absolute_path]
@@ -129,7 +129,7 @@ def _title(error: jsonschema.ValidationError, root: dict[str, Any]) -> str:
     return title or error.message
 
 
-def _shape(value: list) -> str:
+def _shape(value: list[Any]) -> str:
     numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
     if numbers:
         return f'{len(value)} numbers {shorten(value)}'
@@ -141,7 +141,7 @@ def _shape(value: list) -> str:
     return shorten(value)
 
 
-def _leaves(value: Any, path: tuple = ()) -> Iterator[tuple[tuple, Any]]:
+def _leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:
     if isinstance(value, dict):
         for key, entry in value.items():
             yield from _leaves(entry, (*path, key))

@@ -77,7 +77,7 @@ class FrameConverterNode(BulkNode):
         count = f'{target.name} converted'
         self.graph.facts[count] = 0
 
-        def take(data: bytes, _: dict) -> None:
+        def take(data: bytes, _: dict[str, Any]) -> None:
             message = message_of(data, source.type, source.name)
             converted = convert(message, topic=source.name)
             self.graph.facts[count] += 1

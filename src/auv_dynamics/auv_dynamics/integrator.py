@@ -1,6 +1,6 @@
 """Fixed-step Runge-Kutta integration: a tableau plus one step function."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,13 +40,21 @@ TABLEAUS = {
 
 
 @specialised('system')
-def fill_rate(system, stage, x, rate):
+def fill_rate(system: Any, stage: int, x: np.ndarray, rate: np.ndarray) -> None:
     """Write x_dot of `system` at `x` and at stage `stage` of the step into `rate`."""
     type(system).fill_rate(system, stage, x, rate)
 
 
 @jitable
-def fill_step(system, x, step, tableau, stages, trial, known=0):
+def fill_step(
+    system: Any,
+    x: np.ndarray,
+    step: float,
+    tableau: Tableau,
+    stages: np.ndarray,
+    trial: np.ndarray,
+    known: int = 0,
+) -> None:
     """Advance x (n,) in place by one step of `step` s.
 
     `stages` (s, n) and `trial` (n,) are workspace, of which the first `known` stages are there
@@ -61,7 +69,14 @@ def fill_step(system, x, step, tableau, stages, trial, known=0):
 
 
 @jitable
-def fill_sum(total, x, step, weights, stages, count):
+def fill_sum(
+    total: np.ndarray,
+    x: np.ndarray,
+    step: float,
+    weights: np.ndarray,
+    stages: np.ndarray,
+    count: int,
+) -> None:
     """Write x + step * sum of weights[j] stages[j], j below `count`, into `total`."""
     size, odd = x.shape[0], count % 2
     if odd:

@@ -66,18 +66,18 @@ def check_stamp(topic: str, sec: int, nanosec: int) -> int:
     return sec * NANOSECONDS + nanosec
 
 
-def _six(linear: Any, angular: Any) -> tuple:
+def _six(linear: Any, angular: Any) -> tuple[float, ...]:
     return (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
 
 
-def check_finite(topic: str, values: tuple) -> tuple:
+def check_finite(topic: str, values: tuple[float, ...]) -> tuple[float, ...]:
     """Return the numbers of a message; BadMessageError when one is not finite."""
     if not all(map(math.isfinite, values)):
         raise BadMessageError(f'{topic}: not finite: expected finite numbers, found {values}')
     return values
 
 
-def check_state(topic: str, x: tuple) -> tuple:
+def check_state(topic: str, x: tuple[float, ...]) -> tuple[float, ...]:
     """Return a state (13 floats); BadMessageError: not finite, or no unit quaternion."""
     check_finite(topic, x)
     norm = math.hypot(*x[3:7])
@@ -97,7 +97,7 @@ def _stamp(topic: str, message: Any) -> int:
     return check_stamp(topic, message.header.stamp.sec, message.header.stamp.nanosec)
 
 
-def read_odometry(message: Any, frames: Frames, topic: str = ODOM) -> tuple[int, tuple]:
+def read_odometry(message: Any, frames: Frames, topic: str = ODOM) -> tuple[int, tuple[float, ...]]:
     """Stamp in ns and state (13 floats); BadMessageError when it must not be used."""
     _frame(topic, 'header.frame_id', frames.odom, message.header.frame_id)
     _frame(topic, 'child_frame_id', frames.base, message.child_frame_id)
@@ -105,39 +105,41 @@ def read_odometry(message: Any, frames: Frames, topic: str = ODOM) -> tuple[int,
     return _stamp(topic, message), x
 
 
-def state_of(message: Any) -> tuple:
+def state_of(message: Any) -> tuple[float, ...]:
     """State (13 floats) of an Odometry as it was sent: position, quaternion w x y z, twist."""
     p, q = message.pose.pose.position, message.pose.pose.orientation
     nu = _six(message.twist.twist.linear, message.twist.twist.angular)
     return (p.x, p.y, p.z, q.w, q.x, q.y, q.z, *nu)
 
 
-def wrench_of(message: Any) -> tuple:
+def wrench_of(message: Any) -> tuple[float, ...]:
     """Six floats of a WrenchStamped as they were sent."""
     return _six(message.wrench.force, message.wrench.torque)
 
 
-def _stamped(topic: str, message: Any, values: tuple, frames: Frames) -> tuple[int, tuple]:
+def _stamped(
+    topic: str, message: Any, values: tuple[float, ...], frames: Frames
+) -> tuple[int, tuple[float, ...]]:
     _frame(topic, 'header.frame_id', frames.base, message.header.frame_id)
     return _stamp(topic, message), check_finite(topic, values)
 
 
-def read_twist(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
+def read_twist(message: Any, frames: Frames, topic: str) -> tuple[int, tuple[float, ...]]:
     """Stamp in ns and six floats of a TwistStamped; BadMessageError when it must not be used."""
     return _stamped(topic, message, _six(message.twist.linear, message.twist.angular), frames)
 
 
-def read_accel(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
+def read_accel(message: Any, frames: Frames, topic: str) -> tuple[int, tuple[float, ...]]:
     """Stamp in ns and six floats of an AccelStamped; BadMessageError when it must not be used."""
     return _stamped(topic, message, _six(message.accel.linear, message.accel.angular), frames)
 
 
-def read_wrench(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
+def read_wrench(message: Any, frames: Frames, topic: str) -> tuple[int, tuple[float, ...]]:
     """Stamp in ns and six floats of a WrenchStamped; BadMessageError when it must not be used."""
     return _stamped(topic, message, wrench_of(message), frames)
 
 
-def read_joint_state(message: Any, frames: Frames, topic: str) -> tuple[int, tuple]:
+def read_joint_state(message: Any, frames: Frames, topic: str) -> tuple[int, tuple[float, ...]]:
     """Stamp in ns and `effort` of a JointState that has an entry per degree of freedom."""
     if tuple(message.name) != DOFS or len(message.effort) != len(DOFS):
         found = f'{list(message.name)} with {len(message.effort)} numbers'

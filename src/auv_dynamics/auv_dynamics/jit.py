@@ -19,11 +19,19 @@ import stat
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
 COMPILES = re.compile(rb'^@(?:helper|compiled|uncached|jitable|specialised)\b', re.M)
 IMPORT = re.compile(rb'^\s*(?:from|import)\s+(auv_[\w.]+)(?:\s+import\s+(\([^)]*\)|.*))?', re.M)
+Function = TypeVar('Function', bound=Callable[..., Any])
+
+
+class Decorator(Protocol):
+    """What compiles a function and leaves how it is called as it was."""
+
+    def __call__(self, function: Function, /) -> Function:
+        """Compile a function."""
 
 
 def _sources() -> dict[str, bytes]:
@@ -109,47 +117,47 @@ if JITTED:
         )
         print(text, file=sys.stderr, flush=True)
     OPTIONS: Any = {'fastmath': {'contract'}, 'error_model': 'numpy'}
-    helper = numba.njit(forceinline=True, **OPTIONS)
-    compiled = numba.njit(cache=KEPT, nogil=True, **OPTIONS)
-    uncached = numba.njit(nogil=True, **OPTIONS)
-    jitable: Any = register_jitable(forceinline=True, **OPTIONS)
+    helper: Decorator = numba.njit(forceinline=True, **OPTIONS)
+    compiled: Decorator = numba.njit(cache=KEPT, nogil=True, **OPTIONS)
+    uncached: Decorator = numba.njit(nogil=True, **OPTIONS)
+    jitable: Decorator = register_jitable(forceinline=True, **OPTIONS)
 else:
 
-    def helper(function: Callable) -> Callable:
+    def helper(function: Function, /) -> Function:
         """Return the function as it is: numba is absent or switched off."""
         return function
 
     compiled = uncached = jitable = helper
 
 
-def plain(function: Callable) -> Callable:
+def plain(function: Function) -> Function:
     """Return the un-jitted form of a function."""
     return getattr(function, 'py_func', function)
 
 
-def specialised(argument: str) -> Callable[[Callable], Callable]:
+def specialised(argument: str) -> Decorator:
     """Let a generic function be compiled for the class of one of its arguments.
 
     The decorated function says in Python what it does: call the static method of its own name of
     the class of `argument`, a named tuple. Under numba, the method itself is compiled.
     """
 
-    def decorate(generic: Callable) -> Callable:
+    def decorate(generic: Function, /) -> Function:
         if not JITTED:
             return generic
         names = generic.__code__.co_varnames[: generic.__code__.co_argcount]
         position = names.index(argument)
 
-        def choose(*types: Any) -> Callable:
+        def choose(*types: Any) -> Callable[..., Any]:
             return getattr(types[position].instance_class, generic.__name__)
 
         # numba asks for an implementation through a function with the same argument names
         scope: dict[str, Any] = {'choose': choose}
         listed = ', '.join(names)
         exec(f'def overloading({listed}): return choose({listed})', scope)
-        overload(generic, jit_options={'forceinline': True, **OPTIONS}, strict=True)(
-            scope['overloading']
-        )
+        # not strict: numba would take an argument with an annotation for another one
+        options: Any = {'forceinline': True, **OPTIONS}
+        overload(generic, jit_options=options, strict=False)(scope['overloading'])
         return generic
 
     return decorate

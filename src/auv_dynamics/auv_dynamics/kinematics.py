@@ -6,6 +6,8 @@ Inside the kernel attitude is the unit quaternion q = (w, x, y, z) from body to 
 import numpy as np
 
 from auv_dynamics.jit import helper
+from auv_dynamics.lanes import Number
+from auv_dynamics.six import Vector
 
 GIMBAL = 1e-12  # distance of |sin(theta)| from 1 below which phi is put to 0 and psi takes the rest
 
@@ -113,7 +115,7 @@ def jacobian(eta: np.ndarray) -> np.ndarray:
 
 
 @helper
-def position_rate(attitude, nu):
+def position_rate(attitude: Vector, nu: Vector) -> tuple[Number, Number, Number]:
     """R(q) nu_1: velocity in NED, m/s."""
     w, x, y, z = attitude
     u, v, h = nu[0], nu[1], nu[2]
@@ -125,7 +127,7 @@ def position_rate(attitude, nu):
 
 
 @helper
-def attitude_rate(attitude, nu):
+def attitude_rate(attitude: Vector, nu: Vector) -> tuple[Number, Number, Number, Number]:
     """q_dot = 1/2 q * (0, p, q, r), 1/s."""
     w, x, y, z = attitude
     p, q, r = nu[3], nu[4], nu[5]

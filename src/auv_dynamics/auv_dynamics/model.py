@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from auv_dynamics.jit import helper
-from auv_dynamics.six import mul
+from auv_dynamics.lanes import Number
+from auv_dynamics.six import Six, Vector, mul
 
 
 class Model(NamedTuple):
@@ -31,7 +32,7 @@ class Model(NamedTuple):
 
 
 @helper
-def coriolis(M, nu, x):
+def coriolis(M: np.ndarray, nu: Vector, x: Vector) -> Six:
     """C(nu) x with Fossen's C = [[0, -S(a)], [-S(a), -S(b)]], (a, b) = M nu, below (8)."""
     a0, a1, a2, b0, b1, b2 = mul(M, nu)
     return (
@@ -45,7 +46,7 @@ def coriolis(M, nu, x):
 
 
 @helper
-def damping(model, nu, x):
+def damping(model: Model, nu: Vector, x: Vector) -> Six:
     """D(nu) x, D = D_linear + D_quadratic diag(abs(nu)); positive D opposes motion, (1)."""
     drag = (
         abs(nu[0]) * x[0],
@@ -68,14 +69,14 @@ def damping(model, nu, x):
 
 
 @helper
-def down(attitude):
+def down(attitude: Vector) -> tuple[Number, Number, Number]:
     """Direction of gravity in the body frame: the third row of R(q), q = (w, x, y, z)."""
     w, x, y, z = attitude
     return (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
 
 
 @helper
-def restoring(model, attitude):
+def restoring(model: Model, attitude: Vector) -> Six:
     """g(eta): weight at r_G, buoyancy at r_B, on the left-hand side of (1)."""
     d0, d1, d2 = down(attitude)
     heavy = model.hydrostatics[0]
@@ -91,7 +92,7 @@ def restoring(model, attitude):
 
 
 @helper
-def acceleration(model, attitude, nu, tau, F):
+def acceleration(model: Model, attitude: Vector, nu: Vector, tau: Vector, F: Vector) -> Six:
     """nu_dot = M^-1 (tau - C(nu) nu - D(nu) nu - g(eta) - F), equation (1)."""
     c = coriolis(model.M, nu, nu)
     d = damping(model, nu, nu)

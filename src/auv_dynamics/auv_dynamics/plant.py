@@ -9,12 +9,12 @@ from auv_dynamics.devices import Acting, Sensing
 from auv_dynamics.fault_rows import FaultRows
 from auv_dynamics.faults import NONE, Faults
 from auv_dynamics.faulty_devices import WRENCH
-from auv_dynamics.integrator import TABLEAUS, fill_step, stage_times
+from auv_dynamics.integrator import TABLEAUS, Tableau, fill_step, stage_times
 from auv_dynamics.jit import compiled, helper
 from auv_dynamics.kinematics import attitude_rate, euler, position_rate, quaternion
-from auv_dynamics.lanes import sqrt
+from auv_dynamics.lanes import Number, sqrt
 from auv_dynamics.sensors import SensorNoise
-from auv_dynamics.six import fill_vector, vector
+from auv_dynamics.six import Numbers, Vector, fill_vector, vector
 from auv_dynamics.uncertainty import Truth, Uncertainty, lumped, true_acceleration
 
 SIZE = 13
@@ -23,13 +23,16 @@ BLOCK = 256  # steps whose disturbance is tabulated at once
 
 
 @helper
-def attitude_of(x):
+def attitude_of(x: np.ndarray) -> tuple[Number, Number, Number, Number]:
     """Quaternion w, x, y, z of a state."""
     return (x[3], x[4], x[5], x[6])
 
 
 @helper
-def fill_plant_rate(truth, x, tau, F, current, stage, rate):
+def fill_plant_rate(
+    truth: Truth, x: np.ndarray, tau: Vector, F: Vector, current: np.ndarray, stage: int,
+    rate: np.ndarray,
+) -> None:  # fmt: skip
     """Write (2) and (1) at state x, under wrench tau and external disturbance F, into `rate`."""
     attitude, nu = attitude_of(x), vector(x, 7)
     rate[0], rate[1], rate[2] = position_rate(attitude, nu)
@@ -38,7 +41,7 @@ def fill_plant_rate(truth, x, tau, F, current, stage, rate):
 
 
 @helper
-def fill_unit_attitude(x):
+def fill_unit_attitude(x: np.ndarray) -> None:
     """Renormalise the quaternion of a state in place."""
     norm = sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6])
     x[3] /= norm
@@ -51,26 +54,31 @@ class HeldWrench(NamedTuple):
     """The plant over one step with tau held: `F`, `current` (s, 6) at the stages of this step."""
 
     truth: Truth
-    tau: tuple
+    tau: Vector
     F: np.ndarray
     current: np.ndarray
 
     @staticmethod
-    def fill_rate(system, stage, x, rate):
+    def fill_rate(system: 'HeldWrench', stage: int, x: np.ndarray, rate: np.ndarray) -> None:
         """x_dot at one stage."""
         F = vector(system.F[stage], 0)
         fill_plant_rate(system.truth, x, system.tau, F, system.current, stage, rate)
 
 
 @compiled
-def fill_plant_step(truth, x, tau, F, current, step, tableau, stages, trial):
+def fill_plant_step(
+    truth: Truth, x: np.ndarray, tau: Vector, F: np.ndarray, current: np.ndarray, step: float,
+    tableau: Tableau, stages: np.ndarray, trial: np.ndarray,
+) -> None:  # fmt: skip
     """Advance the plant's state x (13,) in place by one step under a held wrench."""
     fill_step(HeldWrench(truth, tau, F, current), x, step, tableau, stages, trial)
     fill_unit_attitude(x)
 
 
 @compiled
-def lumped_uncertainty(truth, x, tau, F, current):
+def lumped_uncertainty(
+    truth: Truth, x: np.ndarray, tau: Vector, F: np.ndarray, current: np.ndarray
+) -> Numbers:
     """F of (1) and (3) at the state x under the applied wrench tau, see `lumped`."""
     return lumped(truth, attitude_of(x), vector(x, 7), tau, vector(F[0], 0), current)
 
@@ -104,16 +112,10 @@ class Plant:
     """
 
     def __init__(
-        self,
-        uncertainty: Uncertainty,
-        step: float,
-        integrator: str,
-        x: np.ndarray,
-        actuators: Actuators = IDEAL,
-        noise: SensorNoise | None = None,
-        faults: Faults = NONE,
+        self, uncertainty: Uncertainty, step: float, integrator: str, x: np.ndarray,
+        actuators: Actuators = IDEAL, noise: SensorNoise | None = None, faults: Faults = NONE,
         seed: int = 0,
-    ):
+    ):  # fmt: skip
         self._uncertainty, self._step = uncertainty, step
         self._tableau = TABLEAUS[integrator]
         self._stages = np.zeros((len(self._tableau.b), SIZE))
@@ -138,7 +140,7 @@ class Plant:
         self.x = self._start.copy()
         self._sensing.reset(self.x)
         self._acting.reset()
-        self._applied: tuple = (0.0,) * 6
+        self._applied: tuple[float, ...] = (0.0,) * 6
 
     @property
     def measured(self) -> np.ndarray:
@@ -166,7 +168,9 @@ class Plant:
         """Whether a velocity has left what any vehicle could have, or the finite numbers."""
         return not (np.abs(self.x[7:]) < DIVERGED).all()
 
-    def answer(self, tau: tuple, *, heard: bool = False) -> tuple[tuple, tuple]:
+    def answer(
+        self, tau: tuple[float, ...], *, heard: bool = False
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Take the command of this step: six floats, N and N m.
 
         Parameters

@@ -53,7 +53,7 @@ class LockStep:
     def pause(self) -> None:
         """Hold the next step."""
 
-    def wrench(self, ns: int, tau: tuple) -> None:
+    def wrench(self, ns: int, tau: tuple[float, ...]) -> None:
         """Take the answer to the step that was published last."""
         node, plant = self._node, self._node.plant
         expected = plant.k * node.step_ns
@@ -85,7 +85,7 @@ class LockStep:
         self._since = time.monotonic()
         self._node.publish_state(self._node.plant.k)
 
-    def _on_progress(self, message: bytes, _: dict) -> None:
+    def _on_progress(self, message: bytes, _: dict[str, Any]) -> None:
         self._ack = max(self._ack, first_stamp(message) // self._node.step_ns)
         self._go_on()
 
@@ -122,7 +122,8 @@ class RealTime:
         self._node = node
         self._began: float | None = None
         self._first = 0  # step published at `_began`
-        self._tau, self._heard = self.ZERO, -float('inf')
+        self._tau: tuple[float, ...] = self.ZERO
+        self._heard = -float('inf')
         self._answered = -1
         self._ended: float | None = None
 
@@ -141,7 +142,7 @@ class RealTime:
         """Hold the clock."""
         self._began, self._first = None, self._node.plant.k
 
-    def wrench(self, ns: int, tau: tuple) -> None:
+    def wrench(self, ns: int, tau: tuple[float, ...]) -> None:
         """Hold this wrench from now on."""
         if ns // self._node.step_ns < self._answered:
             raise interface.BadMessageError(
@@ -151,7 +152,7 @@ class RealTime:
         if not self._node.plant.deaf:
             self._tau, self._heard = tau, time.monotonic()
 
-    def _held(self) -> tuple:
+    def _held(self) -> tuple[float, ...]:
         node = self._node
         if time.monotonic() - self._heard <= node.wrench_timeout:
             return self._tau

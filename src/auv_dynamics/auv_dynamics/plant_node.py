@@ -128,7 +128,7 @@ class PlantNode(BulkNode):
         self.graph.latest_ns = ns
         self.graph.facts['step'] = plant.k
 
-    def publish_forces(self, k: int, applied: tuple, F: tuple) -> None:
+    def publish_forces(self, k: int, applied: tuple[float, ...], F: tuple[float, ...]) -> None:
         """Publish what was applied at step k and F, what opposed it in (1)."""
         self._say_disturbance(k * self.step_ns, F)
         if self._say_applied is not None:

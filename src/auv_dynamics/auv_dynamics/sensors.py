@@ -58,7 +58,7 @@ class SensorNoise:
 
 
 @helper
-def fill_measured(noise, x, measured):
+def fill_measured(noise: np.ndarray, x: np.ndarray, measured: np.ndarray) -> None:
     """Write what is measured of the state x (13,); a lost sample changes nothing.
 
     nu + noise; q * exp(noise / 2), a small rotation about the body axes; the position is true.
@@ -77,6 +77,6 @@ def fill_measured(noise, x, measured):
 
 
 @compiled
-def fill_measurement(noise, x, measured):
+def fill_measurement(noise: np.ndarray, x: np.ndarray, measured: np.ndarray) -> None:
     """`fill_measured` to be called from Python."""
     fill_measured(noise, x, measured)

@@ -1,12 +1,19 @@
 """What takes time between a command and the applied wrench: delay, lag and slew limit."""
 
+from typing import TYPE_CHECKING
+
+import numpy as np
+
 from auv_dynamics.jit import helper
-from auv_dynamics.lanes import clip, select
-from auv_dynamics.six import copied, fill_vector, vector
+from auv_dynamics.lanes import Number, clip, select
+from auv_dynamics.six import Numbers, Six, Vector, copied, fill_vector, vector
+
+if TYPE_CHECKING:
+    from auv_dynamics.actuators import Actuators
 
 
 @helper
-def _servo(applied, command, follow, slew):
+def _servo(applied: Number, command: Number, follow: Number, slew: Number) -> Number:
     """First-order servo with a slew limit, Fossen 2021, section 9.5, over one step."""
     move = follow * (command - applied)
     near = select(follow == 1.0, command, applied + move)
@@ -14,7 +21,7 @@ def _servo(applied, command, follow, slew):
 
 
 @helper
-def waited(actuators, k, tau, state):
+def waited(actuators: 'Actuators', k: int, tau: Numbers, state: np.ndarray) -> Numbers:
     """The command that the delay lets through at step k; `state` of `memory` in place."""
     if actuators.delay == 0:
         return tau
@@ -25,7 +32,7 @@ def waited(actuators, k, tau, state):
 
 
 @helper
-def fill_slowed(actuators, c, a):
+def fill_slowed(actuators: 'Actuators', c: Vector, a: np.ndarray) -> Six:
     """The wrench c behind lag and slew limit; the applied wrench `a` (6,) in place."""
     follow, slew = actuators.follow, actuators.slew
     applied = (

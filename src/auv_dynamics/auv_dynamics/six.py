@@ -4,12 +4,18 @@ Tuples keep the kernel in registers when it is compiled and readable when it is 
 is a flat row-major array (36,); a triangular one is stored in full and used by its own functions.
 """
 
+import numpy as np
+
 from auv_dynamics.jit import helper
-from auv_dynamics.lanes import clip, select
+from auv_dynamics.lanes import Number, clip, select
+
+Six = tuple[Number, Number, Number, Number, Number, Number]
+Numbers = tuple[Number, ...]
+Vector = np.ndarray | Numbers  # what is only read, by index
 
 
 @helper
-def vector(array, start):
+def vector(array: Vector, start: int) -> Six:
     """Six numbers of a 1-D array from index `start`."""
     return (
         array[start],
@@ -22,7 +28,7 @@ def vector(array, start):
 
 
 @helper
-def fill_vector(array, start, a):
+def fill_vector(array: np.ndarray, start: int, a: Vector) -> None:
     """Write a 6-vector into a 1-D array from index `start`."""
     array[start] = a[0]
     array[start + 1] = a[1]
@@ -33,25 +39,25 @@ def fill_vector(array, start, a):
 
 
 @helper
-def copied(a):
+def copied(a: Vector) -> Six:
     """The same numbers, also where those of `a` are views of lanes that will be overwritten."""
     return (1.0 * a[0], 1.0 * a[1], 1.0 * a[2], 1.0 * a[3], 1.0 * a[4], 1.0 * a[5])
 
 
 @helper
-def add(a, b):
+def add(a: Vector, b: Vector) -> Six:
     """A + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
 
 
 @helper
-def sub(a, b):
+def sub(a: Vector, b: Vector) -> Six:
     """A - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3], a[4] - b[4], a[5] - b[5])
 
 
 @helper
-def clipped(a, limit):
+def clipped(a: Vector, limit: Vector) -> Six:
     """A within -limit ... limit, by component."""
     return (
         clip(a[0], -limit[0], limit[0]),
@@ -64,13 +70,13 @@ def clipped(a, limit):
 
 
 @helper
-def diag(N, a):
+def diag(N: Vector, a: Vector) -> Six:
     """N a with the diagonal N (6,)."""
     return (N[0] * a[0], N[1] * a[1], N[2] * a[2], N[3] * a[3], N[4] * a[4], N[5] * a[5])
 
 
 @helper
-def _row(A, i, a):
+def _row(A: np.ndarray, i: int, a: Vector) -> Number:
     return (
         A[i] * a[0]
         + A[i + 1] * a[1]
@@ -82,7 +88,7 @@ def _row(A, i, a):
 
 
 @helper
-def mul(A, a):
+def mul(A: np.ndarray, a: Vector) -> Six:
     """A a with the full matrix A (36,)."""
     return (
         _row(A, 0, a),
@@ -95,7 +101,7 @@ def mul(A, a):
 
 
 @helper
-def upper(U, a):
+def upper(U: np.ndarray, a: Vector) -> Six:
     """U a with U (36,) upper triangular of unit diagonal."""
     return (
         a[0] + U[1] * a[1] + U[2] * a[2] + U[3] * a[3] + U[4] * a[4] + U[5] * a[5],
@@ -108,7 +114,7 @@ def upper(U, a):
 
 
 @helper
-def upper_T(U, a):
+def upper_T(U: np.ndarray, a: Vector) -> Six:
     """U^T a with U (36,) upper triangular of unit diagonal."""
     return (
         a[0],
@@ -121,7 +127,7 @@ def upper_T(U, a):
 
 
 @helper
-def add_products(total, a, b):
+def add_products(total: np.ndarray, a: Vector, b: Vector) -> None:
     """Total += a b, by component and in place."""
     total[0] = total[0] + a[0] * b[0]
     total[1] = total[1] + a[1] * b[1]
@@ -132,7 +138,7 @@ def add_products(total, a, b):
 
 
 @helper
-def keep_largest(largest, a):
+def keep_largest(largest: np.ndarray, a: Vector) -> None:
     """Largest absolute values so far, by component and in place."""
     largest[0] = select(abs(a[0]) > largest[0], abs(a[0]), largest[0])
     largest[1] = select(abs(a[1]) > largest[1], abs(a[1]), largest[1])

@@ -11,7 +11,7 @@ from auv_dynamics.disturbance import Disturbance, make_disturbance
 from auv_dynamics.files import InputError, matrix6
 from auv_dynamics.jit import helper
 from auv_dynamics.model import Model, acceleration, coriolis, damping, restoring
-from auv_dynamics.six import add, mul, sub, vector
+from auv_dynamics.six import Numbers, Six, Vector, add, mul, sub, vector
 from auv_dynamics.vehicle import Vehicle, row_major
 from auv_dynamics.vehicle_file import ASYMMETRY, is_definite
 
@@ -165,7 +165,15 @@ def _sum(errors: Sequence[Mapping[str, Any]], key: str) -> Any:
 
 
 @helper
-def true_acceleration(truth, attitude, nu, tau, F, current, stage):
+def true_acceleration(
+    truth: Truth,
+    attitude: Vector,
+    nu: Vector,
+    tau: Vector,
+    F: Vector,
+    current: np.ndarray,
+    stage: int,
+) -> Six:
     """nu_dot of the plant at a stage of the step; `current` (s, 6), or (0, 6) in still water."""
     if current.shape[0] == 0:
         return acceleration(truth.model, attitude, nu, tau, F)
@@ -174,7 +182,9 @@ def true_acceleration(truth, attitude, nu, tau, F, current, stage):
 
 
 @helper
-def lumped(truth, attitude, nu, tau, F, current):
+def lumped(
+    truth: Truth, attitude: Vector, nu: Vector, tau: Vector, F: Numbers, current: np.ndarray
+) -> Numbers:
     """F := tau - [M nu_dot + C nu + D nu + g] with the vehicle file's coefficients, (1), (3).
 
     `tau` is the wrench really applied, `F` the external part, `current` at the stages of the step.

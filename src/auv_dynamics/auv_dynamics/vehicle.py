@@ -1,5 +1,6 @@
 """A vehicle's coefficients and the dynamics (1) as matrices, for people and for the kernel."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -153,5 +154,5 @@ class Vehicle:
         return tau if F is None else tau + F
 
 
-def _columns(product) -> np.ndarray:
+def _columns(product: Callable[[tuple[float, ...]], Any]) -> np.ndarray:
     return np.array([product(tuple(unit)) for unit in np.eye(6)]).T

@@ -30,10 +30,10 @@ for _tag, _pattern, _first in (
     )
 
 
-def _unique_mapping(loader: _Loader, node: yaml.MappingNode) -> dict:
+def _unique_mapping(loader: _Loader, node: yaml.MappingNode) -> dict[str, Any]:
     if not isinstance(node, yaml.MappingNode):
         raise yaml.constructor.ConstructorError(problem='no mapping', problem_mark=node.start_mark)
-    seen: dict = {}
+    seen: dict[str, Any] = {}
     for key_node, value_node in node.value:
         if key_node.tag == 'tag:yaml.org,2002:merge':
             mark = key_node.start_mark

@@ -15,8 +15,8 @@ class Answer:
     """What the controller says to an odometry: wrench and estimate, and why it lets go."""
 
     ns: int
-    tau: tuple
-    f: tuple
+    tau: tuple[float, ...]
+    f: tuple[float, ...]
     trouble: str = ''
 
 
@@ -65,7 +65,7 @@ class VelocityController:
     ):
         self._law, self._pairing, self._guard, self._output = law, pairing, guard, output
         self._exact, self._timeouts = exact, timeouts
-        self._waiting: tuple[int, tuple, float] | None = None
+        self._waiting: tuple[int, tuple[float, ...], float] | None = None
         self._heard: float | None = None  # steady s of the last odometry; None: none is missed
         self._unanswered_since = 0.0
         self._bridge = False  # the law was silent: its old rate must not be integrated
@@ -76,7 +76,7 @@ class VelocityController:
         """Forget the integrals."""
         self._law.reset()
 
-    def odometry(self, ns: int, x: tuple, now: Now = UNTIMED) -> Answer | None:
+    def odometry(self, ns: int, x: tuple[float, ...], now: Now = UNTIMED) -> Answer | None:
         """Take an odometry.
 
         Parameters

@@ -101,7 +101,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
             return False
         return True
 
-    def _on_odometry(self, ns: int, x: tuple) -> None:
+    def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
         if not self._active:
             return
         try:
@@ -114,10 +114,10 @@ class ControllerNode(BulkMixin, LifecycleNode):
             return UNTIMED
         return Now(time.monotonic(), self.get_clock().now().nanoseconds)
 
-    def _keep(self, topic: topics.Topic, keep: Callable[[int, tuple], None]) -> None:
+    def _keep(self, topic: topics.Topic, keep: Callable[[int, tuple[float, ...]], None]) -> None:
         """Subscribe to set-points; one may be what an odometry has been waiting for."""
 
-        def take(ns: int, values: tuple) -> None:
+        def take(ns: int, values: tuple[float, ...]) -> None:
             try:
                 keep(ns, values)
             except ValueError as error:

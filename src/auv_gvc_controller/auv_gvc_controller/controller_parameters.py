@@ -92,7 +92,7 @@ class ControllerParameters:
     def _time(self, name: str, default: float, text: str) -> float:
         return declare(self._node, name, float, default, f's, {text}', at_least=0.0)
 
-    def _six(self, name: str, text: str) -> tuple:
+    def _six(self, name: str, text: str) -> tuple[float, ...]:
         node = self._node
         text = f'1 or 6 numbers, N, N m, {text}; none: off'
         values = declare(node, name, list[float], None, text) or []
@@ -144,7 +144,7 @@ class ControllerParameters:
         output = HandOver(limit, self._slew, self._ramp)
         return VelocityController(law, self.pairing, guard, output, exact=self.exact, timeouts=late)
 
-    def _believable(self, vehicle: Vehicle) -> tuple:
+    def _believable(self, vehicle: Vehicle) -> tuple[float, ...]:
         """Largest wrench of a controller without limits: what accelerations beyond belief take."""
         return tuple((np.abs(vehicle.M).sum(axis=1) * self._limits.acceleration).tolist())
 

@@ -19,14 +19,14 @@ class HandOver:
 
     """
 
-    def __init__(self, limit: tuple, slew: tuple = (), ramp: float = 0.0):
+    def __init__(self, limit: tuple[float, ...], slew: tuple[float, ...] = (), ramp: float = 0.0):
         self._limit, self._slew, self._ramp = limit, slew, ramp
         self.drop()
 
-    def drop(self) -> tuple:
+    def drop(self) -> tuple[float, ...]:
         """Zero wrench at once, as at deactivation."""
         self._share = 0.0  # of the law's wrench
-        self._tau: tuple = ZERO
+        self._tau: tuple[float, ...] = ZERO
         self._at: float | None = None
         self._falling = False
         return ZERO
@@ -36,7 +36,7 @@ class HandOver:
         """Whether the last wrench was zero because the law is not in charge."""
         return self._share == 0.0
 
-    def follow(self, tau: tuple, now: float) -> tuple:
+    def follow(self, tau: tuple[float, ...], now: float) -> tuple[float, ...]:
         """Wrench to publish while the law is in charge.
 
         Parameters
@@ -63,7 +63,7 @@ class HandOver:
         self._tau, self._at, self._falling = tuple(wanted), now, False
         return self._tau
 
-    def release(self, now: float) -> tuple:
+    def release(self, now: float) -> tuple[float, ...]:
         """Wrench to publish while the law is not in charge: on its way to zero."""
         if self._share == 0.0 or self._ramp <= 0.0:
             return self.drop()

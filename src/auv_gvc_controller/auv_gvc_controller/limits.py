@@ -21,16 +21,18 @@ class Limits:
     rate: float = math.inf
     acceleration: float = math.inf
 
-    def check_velocity(self, nu: tuple) -> None:
+    def check_velocity(self, nu: tuple[float, ...]) -> None:
         """Raise ValueError for a velocity (6,) that no vehicle has."""
         self._check('twist', nu, (self.speed, self.rate), ('m/s', 'rad/s'))
 
-    def check_acceleration(self, nu_dot: tuple) -> None:
+    def check_acceleration(self, nu_dot: tuple[float, ...]) -> None:
         """Raise ValueError for an acceleration (6,) that no vehicle has."""
         self._check('accel', nu_dot, (self.acceleration,) * 2, ('m/s2', 'rad/s2'))
 
     @staticmethod
-    def _check(key: str, values: tuple, most: tuple, units: tuple) -> None:
+    def _check(
+        key: str, values: tuple[float, ...], most: tuple[float, ...], units: tuple[str, ...]
+    ) -> None:
         for part, first, limit, unit in zip(
             ('linear', 'angular'), (0, 3), most, units, strict=True
         ):

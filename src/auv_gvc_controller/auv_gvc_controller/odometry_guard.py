@@ -45,7 +45,7 @@ class OdometryGuard:
         self._candidate: int | None = None
         self._accepted_at = 0.0
 
-    def elapsed(self, ns: int, nu: tuple, now: Now = UNTIMED) -> float:
+    def elapsed(self, ns: int, nu: tuple[float, ...], now: Now = UNTIMED) -> float:
         """Seconds to integrate over since the last accepted odometry, 0 at the first.
 
         Parameters

@@ -15,8 +15,8 @@ class Reference(NamedTuple):
     """A set-point: stamp in ns, nu_d and nu_d_dot as six floats each."""
 
     ns: int
-    nu_d: tuple
-    nu_d_dot: tuple
+    nu_d: tuple[float, ...]
+    nu_d_dot: tuple[float, ...]
 
 
 class Pairing:
@@ -37,8 +37,8 @@ class Pairing:
 
     def __init__(self, exact: bool, acceleration: str, limits: Limits = UNLIMITED):
         self._exact, self._acceleration, self._limits = exact, acceleration, limits
-        self._nu_d: OrderedDict[int, tuple] = OrderedDict()
-        self._nu_d_dot: OrderedDict[int, tuple] = OrderedDict()
+        self._nu_d: OrderedDict[int, tuple[float, ...]] = OrderedDict()
+        self._nu_d_dot: OrderedDict[int, tuple[float, ...]] = OrderedDict()
         self._used: Reference | None = None
         self.heard = 0.0
 
@@ -52,7 +52,7 @@ class Pairing:
         self._nu_d.clear()
         self._nu_d_dot.clear()
 
-    def setpoint(self, ns: int, nu_d: tuple, steady: float = 0.0) -> None:
+    def setpoint(self, ns: int, nu_d: tuple[float, ...], steady: float = 0.0) -> None:
         """Keep a set-point that came at `steady` s.
 
         Raises
@@ -68,12 +68,14 @@ class Pairing:
         """Whether there is a set-point for a time after `ns`: its publisher is not behind."""
         return any(stamp > ns for stamp in reversed(self._nu_d))
 
-    def derivative(self, ns: int, nu_d_dot: tuple) -> None:
+    def derivative(self, ns: int, nu_d_dot: tuple[float, ...]) -> None:
         """Keep a derivative; ValueError when it is not believed or not newer than that in use."""
         self._limits.check_acceleration(nu_d_dot)
         self._keep(self._nu_d_dot, ns, nu_d_dot)
 
-    def _keep(self, buffer: OrderedDict[int, tuple], ns: int, values: tuple) -> None:
+    def _keep(
+        self, buffer: OrderedDict[int, tuple[float, ...]], ns: int, values: tuple[float, ...]
+    ) -> None:
         if self._used is not None and ns <= self._used.ns:
             raise ValueError(f'stamp late: expected later than {self._used.ns} ns, found {ns} ns')
         if ns in buffer:
@@ -109,7 +111,7 @@ class Pairing:
         earlier = [stamp for stamp in self._nu_d if stamp <= ns and self._complete(stamp)]
         return max(earlier, default=self._used.ns if self._used else None)
 
-    def _difference(self, chosen: int) -> tuple:
+    def _difference(self, chosen: int) -> tuple[float, ...]:
         before = [(stamp, self._nu_d[stamp]) for stamp in self._nu_d if stamp < chosen]
         if self._used is not None:
             before.append((self._used.ns, self._used.nu_d))

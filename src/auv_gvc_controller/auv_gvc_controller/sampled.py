@@ -9,6 +9,7 @@ import numpy as np
 from auv_dynamics.actuators import Reach, demanded, make_reach, reachable
 from auv_dynamics.jit import JITTED, compiled, jitable, specialised
 from auv_dynamics.lanes import anywhere, select
+from auv_dynamics.six import Numbers, Vector
 from auv_gvc_controller.laws import SHIPPED
 from auv_gvc_controller.model import ControlModel
 
@@ -16,7 +17,16 @@ ROUNDING = 1e-9
 
 
 @specialised('gains')
-def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+def wrench(
+    t: float,
+    nu: Vector,
+    attitude: Vector,
+    nu_d: Vector,
+    nu_d_dot: Vector,
+    state: Vector,
+    gains: Any,
+    model: ControlModel,
+) -> tuple[Numbers, Numbers]:
     """(tau, f) of the law to which `gains` belongs."""
     tau, f = type(gains).wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
     return tuple(map(number, tau)), tuple(map(number, f))
@@ -28,7 +38,16 @@ def number(value: Any) -> Any:
 
 
 @specialised('gains')
-def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+def state_rate(
+    t: float,
+    nu: Vector,
+    attitude: Vector,
+    nu_d: Vector,
+    nu_d_dot: Vector,
+    state: Vector,
+    gains: Any,
+    model: ControlModel,
+) -> Vector:
     """Rate of the state of the law to which `gains` belongs."""
     return type(gains).state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
 
@@ -62,7 +81,19 @@ def anti_windup(gains: Any, reach: Reach | None) -> AntiWindup:
 
 
 @jitable
-def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model, guard):
+def fill_sample(
+    t: float,
+    dt: float,
+    nu: Vector,
+    attitude: Vector,
+    nu_d: Vector,
+    nu_d_dot: Vector,
+    state: np.ndarray,
+    rate: np.ndarray,
+    gains: Any,
+    model: ControlModel,
+    guard: AntiWindup,
+) -> tuple[Numbers, Numbers]:
     """Take one sample: state += dt * rate of the last sample, in place, then (tau, f).
 
     `rate` receives the rate at this sample, as anti-windup lets it; dt = 0 at the first one.
@@ -90,7 +121,7 @@ def fill_sample(t, dt, nu, attitude, nu_d, nu_d_dot, state, rate, gains, model, 
 
 
 @jitable
-def cut(wanted, had, i):
+def cut(wanted: Vector, had: Vector, i: int) -> Any:
     """Whether the actuators keep axis i from what is wanted, by more than rounding.
 
     Conditional integration (Astrom & Hagglund 2006, section 3.5; Visioli 2006, chapter 3): an
@@ -164,8 +195,14 @@ class SampledLaw:
         self._rate[:] = 0.0
 
     def sample(
-        self, t: float, dt: float, nu: tuple, attitude: tuple, nu_d: tuple, nu_d_dot: tuple
-    ) -> tuple[tuple, tuple]:
+        self,
+        t: float,
+        dt: float,
+        nu: tuple[float, ...],
+        attitude: tuple[float, ...],
+        nu_d: tuple[float, ...],
+        nu_d_dot: tuple[float, ...],
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """One sample.
 
         Parameters

@@ -59,7 +59,7 @@ class SetpointNode(BulkNode):
             return make_setpoint({'file': Path(file)}, duration)
         return make_setpoint(spec, duration)
 
-    def _on_odometry(self, ns: int, x: tuple) -> None:
+    def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
         restarts = self._guard.restarts
         try:
             self._guard.elapsed(ns, x[7:], Now(time.monotonic()))

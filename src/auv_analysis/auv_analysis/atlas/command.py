@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.atlas.collect import charts, shipped_vehicles, write_atlas
-from auv_analysis.commands.conclude import console, say
+from auv_analysis.commands.conclude import console
+from auv_analysis.console import say
 from auv_analysis.folder import check_free, prepare
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError

@@ -54,7 +54,9 @@ class Decoding:
                 self._path, self._topics[channel], 'messages of its type', error
             ) from None
 
-    def value(self, topic: str, message: Any, frames: interface.Frames | None) -> tuple[int, tuple]:
+    def value(
+        self, topic: str, message: Any, frames: interface.Frames | None
+    ) -> tuple[int, tuple[float, ...]]:
         """Stamp and row of a message; those before the first odometry are free in their frame."""
         try:
             known = frames or interface.Frames(base=message.header.frame_id)

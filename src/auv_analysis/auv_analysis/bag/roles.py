@@ -29,7 +29,7 @@ _BY_KIND = {
     ACCEL: interface.read_accel,
     WRENCH: interface.read_wrench,
 }
-READERS: dict[str, Callable[[Any, interface.Frames], tuple[int, tuple]]] = {
+READERS: dict[str, Callable[[Any, interface.Frames], tuple[int, tuple[float, ...]]]] = {
     role: partial(_BY_KIND[kind], topic=role) for role, kind in KINDS.items()
 }
 

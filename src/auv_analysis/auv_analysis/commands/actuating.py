@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from auv_analysis.commands.conclude import say
+from auv_analysis.console import say
 from auv_analysis.driver_check.finding import PASS, Finding
 from auv_analysis.driver_check.plan import Plan
 from auv_analysis.driver_check.procedure import Actuation, StoppedError, carry_out

@@ -8,7 +8,7 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from auv_analysis.commands.actuating import actuate, refusal
-from auv_analysis.commands.conclude import console, say
+from auv_analysis.commands.conclude import console
 from auv_analysis.commands.graphs import (
     checked_namespace,
     checked_topic,
@@ -17,7 +17,7 @@ from auv_analysis.commands.graphs import (
     positive,
     short_place,
 )
-from auv_analysis.console import TextConsole
+from auv_analysis.console import TextConsole, say
 from auv_analysis.domain import joined_domain
 from auv_analysis.driver_check.checks import findings_of
 from auv_analysis.driver_check.outcome import Commands, Result, document_of, failure_of, judged

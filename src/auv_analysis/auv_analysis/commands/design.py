@@ -7,7 +7,8 @@ from typing import Any
 
 from rich.progress import BarColumn, Progress, TextColumn
 
-from auv_analysis.commands.conclude import console, say
+from auv_analysis.commands.conclude import console
+from auv_analysis.console import say
 from auv_analysis.design.couplings import coupling_named, present
 from auv_analysis.design.parameters import NAMES
 from auv_analysis.design.printed import print_design

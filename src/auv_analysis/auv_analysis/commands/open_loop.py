@@ -9,7 +9,8 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
 from auv_analysis.bag.attached import UNKNOWN
-from auv_analysis.commands.conclude import console, say
+from auv_analysis.commands.conclude import console
+from auv_analysis.console import say
 from auv_analysis.folder import check_free, prepare, write_json
 from auv_analysis.replay.compared import Compared, compared, figures_of, listed
 from auv_analysis.replay.open_loop import OpenLoop, RecordedLoop, open_loop, recorded_loop

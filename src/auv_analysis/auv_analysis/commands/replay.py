@@ -8,8 +8,9 @@ from typing import Any
 
 from rich.progress import BarColumn, Progress, TextColumn
 
-from auv_analysis.commands.conclude import console, say
+from auv_analysis.commands.conclude import console
 from auv_analysis.commands.graphs import join_domain, not_negative, place_of, positive
+from auv_analysis.console import say
 from auv_analysis.domain import joined_domain
 from auv_analysis.failure import FailedError
 from auv_analysis.watch.keyboard import Keyboard

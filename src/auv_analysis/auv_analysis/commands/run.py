@@ -17,8 +17,9 @@ from rich.progress import (
 )
 
 from auv_analysis.bag import open_bag
-from auv_analysis.commands.conclude import Outcome, console, finish, say
+from auv_analysis.commands.conclude import Outcome, console, finish
 from auv_analysis.commands.scenarios import open_scenario, prepare_out
+from auv_analysis.console import say
 from auv_analysis.domain import VARIABLE, chosen_domain
 from auv_analysis.experiment import environment, run_controller
 from auv_analysis.scenario import Scenario

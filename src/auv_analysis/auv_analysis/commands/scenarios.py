@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from auv_analysis.commands.conclude import say
+from auv_analysis.console import say
 from auv_analysis.folder import prepare
 from auv_analysis.scenario import Scenario, load_scenario
 

@@ -9,10 +9,11 @@ from typing import Any
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from auv_analysis.commands.conclude import console, finish, say
+from auv_analysis.commands.conclude import console, finish
 from auv_analysis.commands.run import recorded
 from auv_analysis.commands.scenarios import open_scenario
 from auv_analysis.commands.simulate import simulated
+from auv_analysis.console import say
 from auv_analysis.report.document import Section, Sentence
 from auv_analysis.report.paper import CASES
 from auv_analysis.run import AnyRun

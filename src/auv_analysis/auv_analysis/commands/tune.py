@@ -9,7 +9,8 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from auv_analysis.commands.conclude import console, say
+from auv_analysis.commands.conclude import console
+from auv_analysis.console import say
 from auv_analysis.folder import prepare, write_json
 from auv_analysis.report.text import number
 from auv_analysis.scenario import Scenario, load_scenario

@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 from rich.progress import track
 
-from auv_analysis.commands.conclude import console, say, say_where, show
+from auv_analysis.commands.conclude import console, say_where, show
 from auv_analysis.comparison.entries import Entry, comparison_table, write_table
 from auv_analysis.comparison.opening import named, open_source
 from auv_analysis.comparison.ranking import Ranking, rank
 from auv_analysis.comparison.sources import Source
+from auv_analysis.console import say
 from auv_analysis.failure import FailedError
 from auv_analysis.folder import write_json
 from auv_analysis.report.sketch import Sketch

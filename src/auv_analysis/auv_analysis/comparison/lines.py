@@ -1,6 +1,7 @@
 """The error still to come of many runs: lines in a panel per scenario, or rows of colours."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -100,7 +101,7 @@ def _panels(groups: Mapping[str, Mapping[str, Sketch]], labels: Sequence[str]) -
     return figure
 
 
-def look(index: int) -> dict:
+def look(index: int) -> dict[str, Any]:
     """Colour and dashes of one of `MOST_LINES` lines."""
     return {'color': MANY[index % len(MANY)], 'linestyle': DASHES[index % len(DASHES)]}
 

@@ -130,7 +130,7 @@ def _about_gravity(mass: float, r_G: np.ndarray, inertia: np.ndarray) -> np.ndar
     return inertia - mass * (r_G @ r_G * np.eye(3) - np.outer(r_G, r_G))
 
 
-def _stable(vehicle: Vehicle, found: tuple) -> tuple:
+def _stable(vehicle: Vehicle, found: tuple[Any, ...]) -> tuple[Any, ...]:
     """Bounds of `shift.z`: as much static stability as must be left is left."""
     unit, lower, upper, reason = found
     stability = vehicle.weight * vehicle.r_G[2] - vehicle.buoyancy * vehicle.r_B[2]

@@ -94,7 +94,8 @@ class Compared(NamedTuple):
         """Root mean squares of path rate, velocity and their difference, less the noise."""
         pair = self.path_noise + self.velocity_noise
         parts = (self.path, self.path_noise), (self.velocity, self.velocity_noise)
-        return *(_size(*part) for part in parts), _size(self.path - self.velocity, pair)  # type: ignore[return-value]
+        along, told = (_size(*part) for part in parts)
+        return along, told, _size(self.path - self.velocity, pair)
 
     def noise(self) -> float:
         """Root mean square of the noise in their difference."""

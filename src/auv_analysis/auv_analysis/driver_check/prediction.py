@@ -16,7 +16,9 @@ ACCURATE = 1e-6  # m/s, rad/s, and relative
 STEPS = 0.02  # s between two values of a prediction
 
 
-def pieces(steps: Sequence[tuple[float, tuple]], end: float) -> list[tuple[float, float, tuple]]:
+def pieces(
+    steps: Sequence[tuple[float, tuple[float, ...]]], end: float
+) -> list[tuple[float, float, tuple[float, ...]]]:
     """Begin, end and wrench of the pieces of time in which one wrench was held.
 
     Parameters
@@ -47,7 +49,7 @@ class Predicted(NamedTuple):
 
 
 def predicted(
-    vehicle: Vehicle, x: np.ndarray, held: Sequence[tuple[float, float, tuple]]
+    vehicle: Vehicle, x: np.ndarray, held: Sequence[tuple[float, float, tuple[float, ...]]]
 ) -> Predicted:
     """Velocity with and without wrenches, by (1) and (2).
 
@@ -64,7 +66,7 @@ def predicted(
 
 
 def _velocity(
-    vehicle: Vehicle, x: np.ndarray, held: Sequence[tuple[float, float, tuple]]
+    vehicle: Vehicle, x: np.ndarray, held: Sequence[tuple[float, float, tuple[float, ...]]]
 ) -> tuple[np.ndarray, np.ndarray]:
     y = np.concatenate([eta_of(x), x[7:]])
     times, rows = [np.array([held[0][0]])], [y[None, 6:]]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -25,7 +25,7 @@ class Voice(Protocol):
     def tape(self) -> Tape:
         """What has been heard so far."""
 
-    def send(self, tau: tuple) -> int:
+    def send(self, tau: tuple[float, ...]) -> int:
         """Publish a wrench; when it left, ns of this machine's clock."""
 
     def listen(self, seconds: float) -> None:
@@ -51,7 +51,7 @@ class Sent:
     """
 
     trial: Trial
-    steps: list[tuple[int, tuple]] = field(default_factory=list)
+    steps: list[tuple[int, tuple[float, ...]]] = field(default_factory=list[Any])
     ended_ns: int = 0
 
 
@@ -168,10 +168,10 @@ def _send(voice: Voice, watch: Watch, sent: Sent) -> None:
 
 def _hold(
     voice: Voice,
-    tau: tuple,
+    tau: tuple[float, ...],
     seconds: float,
     look: Callable[[], None],
-    steps: list[tuple[int, tuple]],
+    steps: list[tuple[int, tuple[float, ...]]],
 ) -> None:
     """Send one wrench again and again."""
     for _ in range(round(seconds / PERIOD)):

@@ -63,10 +63,10 @@ class Tape:
     """Takes what arrives, message by message, until it is asked for a recording."""
 
     def __init__(self) -> None:
-        self._odometry: list[tuple[int, int, tuple]] = []
+        self._odometry: list[tuple[int, int, tuple[float, ...]]] = []
         self._frames: Counter[tuple[str, str]] = Counter()
         self._clock: list[tuple[int, int]] = []
-        self._applied: list[tuple[int, tuple]] = []
+        self._applied: list[tuple[int, tuple[float, ...]]] = []
         self._number: int | None = None
         self._lost = 0
         self._unreadable: Counter[str] = Counter()
@@ -75,7 +75,7 @@ class Tape:
         return len(self._odometry)
 
     @property
-    def newest(self) -> tuple[int, int, tuple] | None:
+    def newest(self) -> tuple[int, int, tuple[float, ...]] | None:
         """Arrival in ns, stamp in ns and state (13 floats) of the last odometry."""
         return self._odometry[-1] if self._odometry else None
 
@@ -84,7 +84,12 @@ class Tape:
         return np.array([row[2] for row in self._odometry[-count:]], float).reshape(-1, 13)
 
     def odometry(
-        self, arrived: int, stamp: int, x: tuple, frames: tuple[str, str], number: int | None
+        self,
+        arrived: int,
+        stamp: int,
+        x: tuple[float, ...],
+        frames: tuple[str, str],
+        number: int | None,
     ) -> None:
         """Take an odometry; `number` is the middleware's, of its publisher."""
         self._odometry.append((arrived, stamp, x))
@@ -106,7 +111,7 @@ class Tape:
         """Take a simulated time."""
         self._clock.append((arrived, ns))
 
-    def wrench_applied(self, arrived: int, tau: tuple) -> None:
+    def wrench_applied(self, arrived: int, tau: tuple[float, ...]) -> None:
         """Take a wrench that the actuators delivered."""
         self._applied.append((arrived, tau))
 

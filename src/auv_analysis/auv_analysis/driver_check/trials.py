@@ -36,7 +36,7 @@ class Heard:
     t: np.ndarray
     nu: np.ndarray
     x: np.ndarray
-    held: list[tuple[float, float, tuple]]
+    held: list[tuple[float, float, tuple[float, ...]]]
     applied_t: np.ndarray
     applied: np.ndarray
     silent_from: float

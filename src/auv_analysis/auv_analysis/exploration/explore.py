@@ -6,7 +6,8 @@ from typing import Any
 
 from rich.table import Table
 
-from auv_analysis.commands.conclude import console, say
+from auv_analysis.commands.conclude import console
+from auv_analysis.console import say
 from auv_analysis.exploration.files import write_results
 from auv_analysis.exploration.opening import open_sweep
 from auv_analysis.exploration.results import BEST_BY, Results, analysed

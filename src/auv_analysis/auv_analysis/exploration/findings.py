@@ -1,6 +1,7 @@
 """What a sweep found, in sentences computed from its rows."""
 
 from collections.abc import Iterator
+from typing import Any
 
 from auv_analysis.exploration.names import short_names
 from auv_analysis.exploration.opening import STATUSES
@@ -91,7 +92,7 @@ def _failed(results: Results) -> Iterator[Sentence]:
             yield Sentence(text, 'failures')
 
 
-def _worst(rows: list[dict]) -> str:
+def _worst(rows: list[dict[str, Any]]) -> str:
     """Where the largest share fails, if it is more than everywhere."""
     rows = [row for row in rows if row['rows']]
     shares = [(row['diverged'] + row['refused']) / row['rows'] for row in rows]

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from auv_analysis.recording.bag_file import BagFile
 from auv_analysis.recording.guard import Guard
@@ -88,7 +89,9 @@ class BagWriter:
         self._waits_since = None
         return file
 
-    def add_channel(self, topic: str, kind: str, schema: str, qos: list[dict], digest: str) -> None:
+    def add_channel(
+        self, topic: str, kind: str, schema: str, qos: list[dict[str, Any]], digest: str
+    ) -> None:
         """Register a topic; RecordingError when the bag takes no more.
 
         Parameters

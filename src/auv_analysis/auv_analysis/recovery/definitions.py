@@ -28,7 +28,7 @@ class Definitions:
         else:
             self._add(self._channels, record, trust, record.topic)
 
-    def _add(self, known: dict, record: Schema | Channel, trust: int, name: str) -> None:
+    def _add(self, known: dict[int, Any], record: Schema | Channel, trust: int, name: str) -> None:
         old = known.get(record.id)
         if old is not None and old[1] != record:
             self.doubtful.add(name)

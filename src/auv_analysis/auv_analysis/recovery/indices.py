@@ -1,7 +1,8 @@
 """Whether the indices and the summary of a file say what is in it."""
 
 import zlib
-from typing import IO
+from collections.abc import Iterable
+from typing import IO, Any
 
 import numpy as np
 from mcap.records import AttachmentIndex, ChunkIndex, Footer, McapRecord, Statistics
@@ -99,9 +100,9 @@ class Indices:
         return None if self._statistics is None else self._statistics.message_count
 
 
-def _rows(parts: object) -> np.ndarray:
+def _rows(parts: Iterable[Iterable[Any]]) -> np.ndarray:
     """Rows of place, time and channel, in the order of places."""
-    rows = [np.stack([np.asarray(c, np.uint64) for c in part]) for part in parts]  # type: ignore[attr-defined]
+    rows = [np.stack([np.asarray(c, np.uint64) for c in part]) for part in parts]
     joined = np.concatenate(rows, axis=1) if rows else np.zeros((3, 0), np.uint64)
     return joined[:, np.argsort(joined[0], kind='stable')]
 

@@ -1,6 +1,7 @@
 """Answers to replayed odometry: each is waited for before the next odometry goes out."""
 
 import time
+from typing import Any
 
 from auv_analysis.bag.roles import ODOMETRY, role_of
 from auv_dynamics import interface
@@ -29,7 +30,7 @@ class Answers:
         wrench = topics.Topic(topic, topics.WRENCH.type)
         graph.subscribe(wrench, self._take, topics.every_step())
 
-    def _take(self, data: bytes, _: dict) -> None:
+    def _take(self, data: bytes, _: dict[str, Any]) -> None:
         if first_stamp(data) == self._asked:
             self._asked = None
 

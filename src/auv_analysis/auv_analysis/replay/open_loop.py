@@ -155,7 +155,7 @@ def open_loop(
 
 
 def _tell(
-    controller: VelocityController, pairing: Pairing, role: str, ns: int, values: tuple
+    controller: VelocityController, pairing: Pairing, role: str, ns: int, values: tuple[float, ...]
 ) -> Answer | None:
     if role == interface.ODOM:
         return controller.odometry(ns, values)
@@ -164,11 +164,11 @@ def _tell(
     return controller.answer()
 
 
-def _in_order(series: Mapping[str, Series]) -> Iterator[tuple[int, str, tuple]]:
+def _in_order(series: Mapping[str, Series]) -> Iterator[tuple[int, str, tuple[float, ...]]]:
     """Messages by stamp, set-points before the odometry that they belong to."""
     told = (interface.CMD_ACCEL, interface.CMD_VEL, interface.ODOM)
 
-    def of(order: int, role: str) -> Iterator[tuple[int, int, str, tuple]]:
+    def of(order: int, role: str) -> Iterator[tuple[int, int, str, tuple[float, ...]]]:
         stamps, rows = series[role]
         for ns, row in zip(stamps.tolist(), rows.tolist(), strict=True):
             yield ns, order, role, tuple(row)

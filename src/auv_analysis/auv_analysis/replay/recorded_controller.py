@@ -106,7 +106,7 @@ class RecordedController:
             raise InputError(self._file, f'{KEY}{key}', 'a number of at least 0', value)
         return float(value)
 
-    def _six(self, key: str) -> tuple:
+    def _six(self, key: str) -> tuple[float, ...]:
         """Six positive numbers; none where there is no such parameter."""
         value = self._parameters.get(key, [])
         listed = value * 6 if isinstance(value, list) and len(value) == 1 else value

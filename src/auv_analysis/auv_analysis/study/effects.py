@@ -38,7 +38,7 @@ class Index:
     @property
     def weight(self) -> float:
         """What gains are ordered by: ST, or mu_star."""
-        return float(self.mu_star if self.ST is None else self.ST)  # type: ignore[arg-type]
+        return float(self.mu_star if self.ST is None else self.ST)  # type: ignore[arg-type]  # one of both
 
     @property
     def doubled(self) -> float:

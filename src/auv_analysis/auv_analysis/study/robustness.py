@@ -78,6 +78,7 @@ def held(unknowns: Mapping[str, np.ndarray], verdicts: np.ndarray) -> Held:
     percent = {str(v): 100.0 * int(np.sum(verdicts == v)) / total for v in DECIDED}
     best = next((verdict for verdict, part in percent.items() if part > 0), DECIDED[0])
     whole = dict(zip(DECIDED, (HOLDS, PARTLY, FAILS), strict=True))
+    # a verdict is a word
     outcome = whole[best] if percent[best] == 100.0 else VARIES  # type: ignore[index]
     return Held(percent, outcome, best_split(unknowns, verdicts, best))
 

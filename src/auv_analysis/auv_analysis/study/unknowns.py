@@ -102,7 +102,7 @@ def _inside(seed: int, count: int) -> list[tuple[float, float, float, float]]:
         linear, quadratic = (DAMPING[1] * w**2 for w in damping)
         found.append((MASS[0] + u * (MASS[1] - MASS[0]), low + (2 * v % 1) * (high - low),
                       float(linear), float(quadratic)))  # fmt: skip
-    return [tuple(float(x) for x in values) for values in found]  # type: ignore[misc]
+    return [tuple(float(x) for x in values) for values in found]  # type: ignore[misc]  # four
 
 
 def changes_of(variant: Variant, scenario: Scenario) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Files of the study of what is unknown: verdicts, claims, and energy over the window."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def _verdicts(folder: Path, found: Unknowns) -> Path:
         for c in range(len(ROWS))
     ]
     variants = [found.variants[v] for v, _, _ in places]
-    columns: dict[str, list] = {
+    columns: dict[str, list[Any]] = {
         'variant': [v for v, _, _ in places],
         'kind': [variant.kind for variant in variants],
         **{name: [getattr(variant, name) for variant in variants] for name in NAMES},
@@ -47,7 +48,7 @@ def _verdicts(folder: Path, found: Unknowns) -> Path:
 def _claims(folder: Path, rows: list[Robustness]) -> Path:
     """Two rows per claim: over all variants, and over those with the exponents' sign as read."""
     pairs = [(row, of, getattr(row, of)) for row in rows for of in ('every', 'as_read')]
-    columns: dict[str, list] = {
+    columns: dict[str, list[Any]] = {
         'number': [row.number for row, _, _ in pairs],
         'claim': [row.claim for row, _, _ in pairs],
         'of': [of for _, of, _ in pairs],

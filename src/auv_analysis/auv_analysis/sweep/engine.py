@@ -11,7 +11,7 @@ from concurrent.futures import (
     wait,
 )
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -132,7 +132,7 @@ class _Run:
         self._campaign, self._folder, self._executor = campaign, folder, executor
         self._in_flight, self._progress = in_flight, progress
         self._contents = contents_of(campaign)
-        self._pending: dict[Future, _Task] = {}
+        self._pending: dict[Future[Any], _Task] = {}
         self.outcome = Outcome()
         self._done = self._read_finished()
 

@@ -204,7 +204,9 @@ def _refuse_other(out: Path, stored: dict[str, Any], manifest: dict[str, Any]) -
         raise InputError(out, dotted(path), expected, f'{now}')
 
 
-def _difference(a: Any, b: Any, path: tuple = ()) -> tuple[tuple, Any, Any] | None:
+def _difference(
+    a: Any, b: Any, path: tuple[Any, ...] = ()
+) -> tuple[tuple[Any, ...], Any, Any] | None:
     """Where two JSON documents differ first."""
     if isinstance(a, dict) and isinstance(b, dict):
         pairs = [(key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b])]

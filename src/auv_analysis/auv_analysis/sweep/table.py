@@ -4,6 +4,8 @@ The arrays are made of their buffers: `pa.array` imports pandas wherever that is
 takes longer than a thousand rollouts.
 """
 
+from typing import Any
+
 import numpy as np
 import pyarrow as pa
 
@@ -83,5 +85,5 @@ def _buffer(values: np.ndarray) -> pa.Buffer:
     return pa.py_buffer(np.ascontiguousarray(values))
 
 
-def _ends(values: list) -> np.ndarray:
+def _ends(values: list[Any]) -> np.ndarray:
     return np.cumsum([0, *map(len, values)], dtype=np.int32)

@@ -7,7 +7,7 @@ import numpy as np
 
 from auv_dynamics.files import shorten
 
-Values = np.ndarray | list  # numbers and true/false as an array, words and lists as they are
+Values = np.ndarray | list[Any]  # numbers and true/false as an array, words and lists as they are
 LARGEST_INTEGER = 2**63 - 1
 
 
@@ -60,7 +60,7 @@ def _kind(value: Any) -> str:
     return f'list {_dimensions(value)}'
 
 
-def _dimensions(value: list) -> int:
+def _dimensions(value: list[Any]) -> int:
     """Levels of nested lists, which must hold numbers alone."""
     try:
         array = np.array(value, float)

@@ -4,10 +4,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from auv_analysis.records import Sample
 from auv_analysis.reduction import at_start, keep_divergence, keep_last
 from auv_dynamics.jit import helper
-from auv_dynamics.lanes import select
-from auv_dynamics.six import diag, sub, upper, upper_T, vector
+from auv_dynamics.lanes import Number, select
+from auv_dynamics.six import Six, Vector, diag, sub, upper, upper_T, vector
 from auv_gvc_controller.model import ControlModel
 
 
@@ -47,7 +48,7 @@ class Cost(NamedTuple):
         return cls(**{name: known.get(name, like(1, 0.0)) for name in cls._fields})
 
     @staticmethod
-    def fill_record(record, k, sample):
+    def fill_record(record: 'Cost', k: int, sample: Sample) -> None:
         """Add sample k: M = U^-T N U^-1 makes both forms sums of squares."""
         error = sub(sample.nu_d, vector(sample.x, 7))
         in_xi, in_pi = upper(record.Upsilon_inv, error), upper_T(record.Upsilon, sample.applied)
@@ -66,13 +67,13 @@ class Cost(NamedTuple):
 
 
 @helper
-def half_product(a, b):
+def half_product(a: Vector, b: Vector) -> Number:
     """Half of a^T b."""
     whole = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
     return 0.5 * whole
 
 
 @helper
-def quotient(a, N):
+def quotient(a: Vector, N: Vector) -> Six:
     """N^-1 a with the diagonal N (6,)."""
     return (a[0] / N[0], a[1] / N[1], a[2] / N[2], a[3] / N[3], a[4] / N[4], a[5] / N[5])

@@ -35,8 +35,8 @@ class Kind(NamedTuple):
 
     size: int
     make: Callable[[int, Any, Frames], Any]
-    read: Callable[[Any, Frames, str], tuple[int, tuple]] | None = None
-    check: Callable[[str, tuple], tuple] | None = None
+    read: Callable[[Any, Frames, str], tuple[int, tuple[float, ...]]] | None = None
+    check: Callable[[str, tuple[float, ...]], tuple[float, ...]] | None = None
     words: tuple[str, ...] = ()
 
 
@@ -122,7 +122,7 @@ class Layout:
             numbers.pack_into(buffer, at, *wire[first:last])
         return bytes(buffer)
 
-    def unpack(self, data: bytes) -> tuple[int, tuple] | None:
+    def unpack(self, data: bytes) -> tuple[int, tuple[float, ...]] | None:
         """Stamp in ns and numbers; None: laid out in another way, or in other frames."""
         if len(data) != self._length:
             return None
@@ -132,7 +132,7 @@ class Layout:
         sec, nanosec = self._stamp.unpack_from(data, self._at)
         if sec < 0 or nanosec >= NANOSECONDS:
             return None  # nor is it a stamp, which will be said of the message
-        wire: tuple = ()
+        wire: tuple[float, ...] = ()
         for numbers, at, _, _ in self._runs:
             wire += numbers.unpack_from(data, at)
         return sec * NANOSECONDS + nanosec, self._from_wire(wire)
@@ -190,14 +190,15 @@ class Codec:
             return self._kind.make(ns, values, self._frames)
         return self.layout.pack(ns, values.tolist() if hasattr(values, 'tolist') else values)
 
-    def decode(self, data: bytes) -> tuple[int, tuple]:
+    def decode(self, data: bytes) -> tuple[int, tuple[float, ...]]:
         """Stamp in ns and numbers; BadMessageError when the message must not be used."""
         found = self.layout.unpack(data) if self.layout is not None else None
         kind = self._kind
         if found is None:
             message = message_of(data, self._type, self._topic)
+            # whoever decodes a kind has told how it is read
             return kind.read(message, self._frames, self._topic)  # type: ignore[misc]
-        return found[0], kind.check(self._topic, found[1])  # type: ignore[misc]
+        return found[0], kind.check(self._topic, found[1])  # type: ignore[misc]  # as above
 
 
 def verified_layout(kind: type, frames: Frames) -> Layout | None:
@@ -219,7 +220,9 @@ def verified_layout(kind: type, frames: Frames) -> Layout | None:
     return layout if _tells_frames_apart(layout, make, size, frames) else None
 
 
-def _tells_frames_apart(layout: Layout, make: Callable, size: int, frames: Frames) -> bool:
+def _tells_frames_apart(
+    layout: Layout, make: Callable[..., Any], size: int, frames: Frames
+) -> bool:
     """Whether a message in other frames, even of equal length, is seen to be another one."""
     zero = (0.0,) * size
     for other in (

@@ -8,7 +8,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -103,14 +104,16 @@ class Graph:
         encode = Codec(topic.type, self.frames, topic.name).encode
         return lambda ns, values: publish(encode(ns, values))
 
-    def listen(self, topic: Topic, callback: Callable[[int, tuple], None], qos: QoSProfile) -> None:
+    def listen(
+        self, topic: Topic, callback: Callable[[int, tuple[float, ...]], None], qos: QoSProfile
+    ) -> None:
         """Subscription to the stamps in ns and the numbers of a topic; broken ones are refused."""
         codec = Codec(topic.type, self.frames, topic.name)
 
         self.subscribe(topic, lambda data, _: callback(*codec.decode(data)), qos)
 
     def subscribe(
-        self, topic: Topic, callback: Callable[[bytes, dict], None], qos: QoSProfile
+        self, topic: Topic, callback: Callable[[bytes, dict[str, Any]], None], qos: QoSProfile
     ) -> None:
         """Subscription to the serialized messages of a topic, in the node's data path.
 
@@ -118,7 +121,7 @@ class Graph:
         BadMessageError is refused. An incompatible publisher is an error that is heard.
         """
 
-        def take(data: bytes, way: dict) -> None:
+        def take(data: bytes, way: dict[str, Any]) -> None:
             try:
                 callback(data, way)
             except BadMessageError as error:

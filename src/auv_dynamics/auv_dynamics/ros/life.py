@@ -13,6 +13,7 @@ from typing import Any
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
 
 from auv_dynamics.files import InputError, first_line
 from auv_dynamics.interface import PARENT
@@ -142,7 +143,7 @@ def _tear_down(nodes: list[Any]) -> None:
     for node in reversed(nodes):
         with contextlib.suppress(Exception):
             node.destroy_node()
-    rclpy.try_shutdown()
+    try_shutdown()
     faulthandler.cancel_dump_traceback_later()
 
 

@@ -24,12 +24,12 @@ from auv_dynamics.kinematics import rotation
 from auv_dynamics.ros import convert
 
 CHILD, WORLD = 'child', 'world'  # frame in which an odometry's twist is written
-_MAKERS: dict[type, Callable] = {
+_MAKERS: dict[type, Callable[..., Any]] = {
     TwistStamped: convert.twist,
     AccelStamped: convert.accel,
     WrenchStamped: convert.wrench,
 }
-_READERS: dict[type, Callable] = {
+_READERS: dict[type, Callable[..., Any]] = {
     TwistStamped: interface.read_twist,
     AccelStamped: interface.read_accel,
     WrenchStamped: interface.read_wrench,

@@ -8,6 +8,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
 
 from auv_dynamics.ros.security import enclave, require
 
@@ -39,7 +40,7 @@ class Participant:
         try:
             self._node = make(self._context)
         except BaseException:
-            rclpy.try_shutdown(context=self._context)
+            try_shutdown(context=self._context)
             raise
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
@@ -54,4 +55,4 @@ class Participant:
         """Leave the domain."""
         self._node.destroy_node()
         self._executor.shutdown()
-        rclpy.try_shutdown(context=self._context)
+        try_shutdown(context=self._context)

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from auv_dynamics.model import coriolis, damping, restoring
-from auv_dynamics.six import add, mul, sub, vector
+from auv_dynamics.six import Numbers, Vector, add, mul, sub, vector
+from auv_gvc_controller.model import ControlModel
 
 
 class CL(NamedTuple):
@@ -19,7 +20,16 @@ class CL(NamedTuple):
     STATES = 12  # type: ignore[misc]  # no gain, but a constant of the law: z, then the integral of s
 
     @staticmethod
-    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    def wrench(
+        t: float,
+        nu: Vector,
+        attitude: Vector,
+        nu_d: Vector,
+        nu_d_dot: Vector,
+        state: Vector,
+        gains: 'CL',
+        model: ControlModel,
+    ) -> tuple[Numbers, Numbers]:
         """(tau, f): the wrench and its adaptive part, N and N m, body frame."""
         M = model.dynamics.M
         z, S = vector(state, 0), vector(state, 6)
@@ -39,7 +49,16 @@ class CL(NamedTuple):
         return tau, f
 
     @staticmethod
-    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    def state_rate(
+        t: float,
+        nu: Vector,
+        attitude: Vector,
+        nu_d: Vector,
+        nu_d_dot: Vector,
+        state: Vector,
+        gains: 'CL',
+        model: ControlModel,
+    ) -> Vector:
         """Twelve rates: z_dot = nu_err, then s = nu_err + Lambda z, which f integrates."""
         nu_err = sub(nu_d, nu)
         return nu_err + add(nu_err, mul(gains.Lambda, vector(state, 0)))

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from auv_dynamics.model import coriolis, damping, restoring
-from auv_dynamics.six import add, diag, mul, sub, upper, upper_T, vector
+from auv_dynamics.six import Numbers, Vector, add, diag, mul, sub, upper, upper_T, vector
+from auv_gvc_controller.model import ControlModel
 
 
 class GVC(NamedTuple):
@@ -19,7 +20,16 @@ class GVC(NamedTuple):
     STATES = 12  # type: ignore[misc]  # no gain, but a constant of the law: z, then the integral of s_xi
 
     @staticmethod
-    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    def wrench(
+        t: float,
+        nu: Vector,
+        attitude: Vector,
+        nu_d: Vector,
+        nu_d_dot: Vector,
+        state: Vector,
+        gains: 'GVC',
+        model: ControlModel,
+    ) -> tuple[Numbers, Numbers]:
         """(tau, f): the wrench and its adaptive part, N and N m, body frame.
 
         nu = Upsilon xi; U is Upsilon. The terms of (16) stand in its order, those that share a
@@ -60,7 +70,16 @@ class GVC(NamedTuple):
         return upper_T(U_inv, pi), upper_T(U_inv, f_xi)  # (14)
 
     @staticmethod
-    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    def state_rate(
+        t: float,
+        nu: Vector,
+        attitude: Vector,
+        nu_d: Vector,
+        nu_d_dot: Vector,
+        state: Vector,
+        gains: 'GVC',
+        model: ControlModel,
+    ) -> Vector:
         """Twelve rates: z_dot = nu_err (17), then s_xi (19), which (21) integrates."""
         nu_err = sub(nu_d, nu)
         z = vector(state, 0)
@@ -68,7 +87,7 @@ class GVC(NamedTuple):
         return nu_err + s_xi
 
     @staticmethod
-    def body_gains(gains, model):
+    def body_gains(gains: 'GVC', model: ControlModel) -> tuple[np.ndarray, np.ndarray]:
         """(K_D, K_f) = (U^-T N k_D U^-1, U^-T N Gamma U^-1), (6, 6): step 1 of section 4.2."""
         U_inv, N = model.Upsilon_inv.reshape(6, 6), np.diag(model.N)
         k_D, Gamma = gains.k_D.reshape(6, 6), gains.Gamma.reshape(6, 6)

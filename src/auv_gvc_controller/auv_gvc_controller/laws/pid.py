@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_dynamics.model import coriolis, damping, restoring
-from auv_dynamics.six import add, mul, sub, vector
+from auv_dynamics.six import Numbers, Vector, add, mul, sub, vector
+from auv_gvc_controller.model import ControlModel
 
 
 class PID(NamedTuple):
@@ -25,7 +26,16 @@ class PID(NamedTuple):
     INTEGRALS = 6  # type: ignore[misc]  # only z: the filter is no integral
 
     @staticmethod
-    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    def wrench(
+        t: float,
+        nu: Vector,
+        attitude: Vector,
+        nu_d: Vector,
+        nu_d_dot: Vector,
+        state: Vector,
+        gains: 'PID',
+        model: ControlModel,
+    ) -> tuple[Numbers, Numbers]:
         """(tau, 0): the wrench in N and N m, body frame; there is no adaptive part."""
         M = model.dynamics.M
         z, x = vector(state, 0), vector(state, 6)
@@ -42,24 +52,33 @@ class PID(NamedTuple):
         return tau, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     @staticmethod
-    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    def state_rate(
+        t: float,
+        nu: Vector,
+        attitude: Vector,
+        nu_d: Vector,
+        nu_d_dot: Vector,
+        state: Vector,
+        gains: 'PID',
+        model: ControlModel,
+    ) -> Vector:
         """Twelve rates: z_dot = nu_err, then x_dot = omega_f (nu_err - x)."""
         nu_err = sub(nu_d, nu)
         return nu_err + mul(gains.omega_f, sub(nu_err, vector(state, 6)))
 
     @staticmethod
-    def body_gains(gains, model):
+    def body_gains(gains: 'PID', model: ControlModel) -> tuple[np.ndarray, np.ndarray]:
         """(K_D, K_f) (6, 6): what multiplies a fast velocity error, and no adaptation."""
         k_P, k_D, omega_f = (np.reshape(K, (6, 6)) for K in (gains.k_P, gains.k_D, gains.omega_f))
         return k_P + k_D @ omega_f, np.zeros((6, 6))
 
     @staticmethod
-    def own_rate(gains):
+    def own_rate(gains: 'PID') -> float:
         """Cut-off of the fastest filter, 1/s."""
         return np.abs(np.linalg.eigvals(np.reshape(gains.omega_f, (6, 6)))).max()
 
     @staticmethod
-    def check(gains):
+    def check(gains: 'PID') -> None:
         """Raise ValueError for a filter that is not stable."""
         smallest = np.linalg.eigvals(np.reshape(gains.omega_f, (6, 6))).real.min()
         if not smallest > 0:

@@ -7,7 +7,8 @@ import numpy as np
 from auv_dynamics.jit import helper
 from auv_dynamics.lanes import clip
 from auv_dynamics.model import coriolis, damping, restoring
-from auv_dynamics.six import add, mul, sub, vector
+from auv_dynamics.six import Numbers, Six, Vector, add, mul, sub, vector
+from auv_gvc_controller.model import ControlModel
 
 
 class SMC(NamedTuple):
@@ -26,7 +27,16 @@ class SMC(NamedTuple):
     STATES = 18  # type: ignore[misc]  # no gain, but a constant of the law: z, its integral, that of s
 
     @staticmethod
-    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    def wrench(
+        t: float,
+        nu: Vector,
+        attitude: Vector,
+        nu_d: Vector,
+        nu_d_dot: Vector,
+        state: Vector,
+        gains: 'SMC',
+        model: ControlModel,
+    ) -> tuple[Numbers, Numbers]:
         """(tau, f): the wrench and its adaptive part, N and N m, body frame."""
         M = model.dynamics.M
         z = vector(state, 0)
@@ -44,13 +54,22 @@ class SMC(NamedTuple):
         return add(add(equivalent, mul(gains.k_D, s)), add(switched, f)), f
 
     @staticmethod
-    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+    def state_rate(
+        t: float,
+        nu: Vector,
+        attitude: Vector,
+        nu_d: Vector,
+        nu_d_dot: Vector,
+        state: Vector,
+        gains: 'SMC',
+        model: ControlModel,
+    ) -> Vector:
         """Eighteen rates: z_dot = nu_err, z, and s, which f integrates."""
         nu_err = sub(nu_d, nu)
         return nu_err + vector(state, 0) + manifold(nu_err, state, gains)
 
     @staticmethod
-    def body_gains(gains, model):
+    def body_gains(gains: 'SMC', model: ControlModel) -> tuple[np.ndarray, np.ndarray]:
         """(K_D, K_f) (6, 6): what multiplies s, steepest inside the layer, and its integral."""
         k_D, k_S, phi, Gamma = (
             np.reshape(K, (6, 6)) for K in (gains.k_D, gains.k_S, gains.phi, gains.Gamma)
@@ -58,7 +77,7 @@ class SMC(NamedTuple):
         return k_D + k_S / np.diagonal(phi), Gamma
 
     @staticmethod
-    def check(gains):
+    def check(gains: 'SMC') -> None:
         """Raise ValueError for a boundary layer that is no positive diagonal."""
         phi = np.reshape(gains.phi, (6, 6))
         if np.any(phi != np.diag(np.diagonal(phi))) or not np.all(np.diagonal(phi) > 0):
@@ -71,14 +90,14 @@ class SMC(NamedTuple):
 
 
 @helper
-def manifold(nu_err, state, gains):
+def manifold(nu_err: Vector, state: Vector, gains: SMC) -> Six:
     """S = (d/dt + Lambda)^2 of the integral of z: nu_err + 2 Lambda z + Lambda^2 integral(z)."""
     z, Z = vector(state, 0), vector(state, 6)
     return add(nu_err, mul(gains.Lambda, add(add(z, z), mul(gains.Lambda, Z))))
 
 
 @helper
-def saturated(s, phi):
+def saturated(s: Vector, phi: np.ndarray) -> Six:
     """sat(s / phi) by component, phi (36,) a diagonal."""
     return (
         clip(s[0] / phi[0], -1.0, 1.0),

@@ -21,15 +21,9 @@ class CL(NamedTuple):
 
     @staticmethod
     def wrench(
-        t: float,
-        nu: Vector,
-        attitude: Vector,
-        nu_d: Vector,
-        nu_d_dot: Vector,
-        state: Vector,
-        gains: 'CL',
-        model: ControlModel,
-    ) -> tuple[Numbers, Numbers]:
+        t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
+        gains: 'CL', model: ControlModel,
+    ) -> tuple[Numbers, Numbers]:  # fmt: skip
         """(tau, f): the wrench and its adaptive part, N and N m, body frame."""
         M = model.dynamics.M
         z, S = vector(state, 0), vector(state, 6)
@@ -50,15 +44,9 @@ class CL(NamedTuple):
 
     @staticmethod
     def state_rate(
-        t: float,
-        nu: Vector,
-        attitude: Vector,
-        nu_d: Vector,
-        nu_d_dot: Vector,
-        state: Vector,
-        gains: 'CL',
-        model: ControlModel,
-    ) -> Vector:
+        t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
+        gains: 'CL', model: ControlModel,
+    ) -> Vector:  # fmt: skip
         """Twelve rates: z_dot = nu_err, then s = nu_err + Lambda z, which f integrates."""
         nu_err = sub(nu_d, nu)
         return nu_err + add(nu_err, mul(gains.Lambda, vector(state, 0)))

@@ -21,15 +21,9 @@ class GVC(NamedTuple):
 
     @staticmethod
     def wrench(
-        t: float,
-        nu: Vector,
-        attitude: Vector,
-        nu_d: Vector,
-        nu_d_dot: Vector,
-        state: Vector,
-        gains: 'GVC',
-        model: ControlModel,
-    ) -> tuple[Numbers, Numbers]:
+        t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
+        gains: 'GVC', model: ControlModel,
+    ) -> tuple[Numbers, Numbers]:  # fmt: skip
         """(tau, f): the wrench and its adaptive part, N and N m, body frame.
 
         nu = Upsilon xi; U is Upsilon. The terms of (16) stand in its order, those that share a
@@ -71,15 +65,9 @@ class GVC(NamedTuple):
 
     @staticmethod
     def state_rate(
-        t: float,
-        nu: Vector,
-        attitude: Vector,
-        nu_d: Vector,
-        nu_d_dot: Vector,
-        state: Vector,
-        gains: 'GVC',
-        model: ControlModel,
-    ) -> Vector:
+        t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
+        gains: 'GVC', model: ControlModel,
+    ) -> Vector:  # fmt: skip
         """Twelve rates: z_dot = nu_err (17), then s_xi (19), which (21) integrates."""
         nu_err = sub(nu_d, nu)
         z = vector(state, 0)

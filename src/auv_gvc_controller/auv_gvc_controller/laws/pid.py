@@ -27,15 +27,9 @@ class PID(NamedTuple):
 
     @staticmethod
     def wrench(
-        t: float,
-        nu: Vector,
-        attitude: Vector,
-        nu_d: Vector,
-        nu_d_dot: Vector,
-        state: Vector,
-        gains: 'PID',
-        model: ControlModel,
-    ) -> tuple[Numbers, Numbers]:
+        t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
+        gains: 'PID', model: ControlModel,
+    ) -> tuple[Numbers, Numbers]:  # fmt: skip
         """(tau, 0): the wrench in N and N m, body frame; there is no adaptive part."""
         M = model.dynamics.M
         z, x = vector(state, 0), vector(state, 6)
@@ -53,15 +47,9 @@ class PID(NamedTuple):
 
     @staticmethod
     def state_rate(
-        t: float,
-        nu: Vector,
-        attitude: Vector,
-        nu_d: Vector,
-        nu_d_dot: Vector,
-        state: Vector,
-        gains: 'PID',
-        model: ControlModel,
-    ) -> Vector:
+        t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
+        gains: 'PID', model: ControlModel,
+    ) -> Vector:  # fmt: skip
         """Twelve rates: z_dot = nu_err, then x_dot = omega_f (nu_err - x)."""
         nu_err = sub(nu_d, nu)
         return nu_err + mul(gains.omega_f, sub(nu_err, vector(state, 6)))

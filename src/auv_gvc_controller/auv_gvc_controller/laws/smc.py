@@ -28,15 +28,9 @@ class SMC(NamedTuple):
 
     @staticmethod
     def wrench(
-        t: float,
-        nu: Vector,
-        attitude: Vector,
-        nu_d: Vector,
-        nu_d_dot: Vector,
-        state: Vector,
-        gains: 'SMC',
-        model: ControlModel,
-    ) -> tuple[Numbers, Numbers]:
+        t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
+        gains: 'SMC', model: ControlModel,
+    ) -> tuple[Numbers, Numbers]:  # fmt: skip
         """(tau, f): the wrench and its adaptive part, N and N m, body frame."""
         M = model.dynamics.M
         z = vector(state, 0)
@@ -55,15 +49,9 @@ class SMC(NamedTuple):
 
     @staticmethod
     def state_rate(
-        t: float,
-        nu: Vector,
-        attitude: Vector,
-        nu_d: Vector,
-        nu_d_dot: Vector,
-        state: Vector,
-        gains: 'SMC',
-        model: ControlModel,
-    ) -> Vector:
+        t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
+        gains: 'SMC', model: ControlModel,
+    ) -> Vector:  # fmt: skip
         """Eighteen rates: z_dot = nu_err, z, and s, which f integrates."""
         nu_err = sub(nu_d, nu)
         return nu_err + vector(state, 0) + manifold(nu_err, state, gains)

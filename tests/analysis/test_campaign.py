@@ -147,7 +147,7 @@ REPLACED = {  # old text, new text -> what the one line says
     ('seed: 5', 'seed: -1'): 'seed: expected a whole number from 0 to 2.63 - 1, found -1',
     ('seed: 5', 'controllers: [pid]'): 'controllers.0.: expected one of gvc, cl, found pid',
     ('seed: 5', 'controllers: []'): 'controllers: expected a list of at least one',
-    ('seed: 5', 'hold: foh'): 'hold: expected continuous or zoh, found foh',
+    ('seed: 5', 'hold: foh'): 'hold: expected continuous or zoh .*found foh',
     ('seed: 5', 'controllers: [cl]'): 'expected a controller that is swept: cl, found gvc',
     ('controllers.*.k_D', 'controllers.*.kD'): 'grid.controllers...kD: .*nearest: k_D',
     ('controllers.*.k_D', 'controllers.pid.k_D'): 'expected one of gvc, cl',

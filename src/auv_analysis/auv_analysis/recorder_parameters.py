@@ -11,6 +11,7 @@ from auv_analysis.recording import COMPRESSIONS, BagWriter, Storage
 from auv_analysis.recording.storage import FREE_SPACE, LARGEST_CHUNK, LEAST_DURATION, LEAST_SIZE
 from auv_dynamics import interface
 from auv_dynamics.files import InputError, read_text, reason
+from auv_dynamics.nearest import meant
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.parameters import declare, refuse_unknown
 
@@ -58,7 +59,8 @@ def recorder_parameters(node: Node) -> RecorderParameters:
     refuse_unknown(node)
     unknown = [topic for topic in expected if topic not in known]
     if unknown:
-        raise InputError(name, 'topics', f'step topics: {", ".join(known)}', unknown[0])
+        listed = f'step topics: {", ".join(known)}{meant(unknown[0], known)}'
+        raise InputError(name, 'topics', listed, unknown[0])
     if not bag:
         raise InputError(name, 'bag', 'the folder of the bag', None)
     attachments = {}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from auv_dynamics.config import shipped
+from auv_dynamics.config import shipped, shipped_names
 from auv_dynamics.files import read_yaml
 from auv_dynamics.vehicle_file import load_vehicle
 
@@ -115,10 +115,9 @@ def _peak(harmonics: dict[str, Any]) -> float:
 
 def scaled_scenarios() -> Iterator[tuple[str, str]]:
     """File name and text of case1 for each shipped vehicle but the paper's own."""
-    folder = shipped('vehicles', REFERENCE).parent
-    for path in sorted(folder.glob('*.yaml')):
-        if path.stem != REFERENCE:
-            yield f'case1_{path.stem}.yaml', scenario_text(scaled_case1(path.stem))
+    for name in shipped_names('vehicles'):
+        if name != REFERENCE:
+            yield f'case1_{name}.yaml', scenario_text(scaled_case1(name))
 
 
 def write_scaled_scenarios(folder: Path) -> list[Path]:

@@ -19,6 +19,7 @@ from auv_analysis.scenario_values import (
 from auv_dynamics.actuators import Reach, make_reach
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError, check, read_text, read_yaml
+from auv_dynamics.nearest import one_of
 from auv_dynamics.uncertainty import Uncertainty, make_uncertainty
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import vehicle_from_dict
@@ -91,8 +92,7 @@ class Scenario(Devices):
     def controller(self, name: str) -> dict[str, Any]:
         """Law and gains of one controller; InputError when there is none of that name."""
         if name not in self.controllers:
-            expected = f'one of {", ".join(self.controllers)}'
-            raise InputError(self.path, 'controllers', expected, name)
+            raise InputError(self.path, 'controllers', one_of(name, self.controllers), name)
         return self.controllers[name]
 
     def gain_values(self, name: str) -> dict[str, Any]:

@@ -1,6 +1,5 @@
 """What the schemas of scenario and vehicle files say of the value at a dotted path."""
 
-import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
@@ -18,6 +17,7 @@ from auv_analysis.changes import (
 )
 from auv_analysis.scenario import SCHEMA, Scenario
 from auv_dynamics.files import InputError, dotted, schema
+from auv_dynamics.nearest import one_of
 from auv_dynamics.vehicle_file import SCHEMA as VEHICLE_SCHEMA
 
 UNIT = re.compile(r'\(([^()]+)\)$')  # ends a title: 'a positive number (kg)'
@@ -86,17 +86,12 @@ def _nodes_at(root: dict[str, Any], data: Any, parts: Parts, file: object) -> li
             known = dict.fromkeys(k for node in nodes for k in node.get('properties', ()))
             known |= dict.fromkeys(data)
             if part not in known:
-                raise InputError(file, dotted(parts[: depth + 1]), _among(part, known), part)
+                expected = one_of(part, known) if known else 'a single value'
+                raise InputError(file, dotted(parts[: depth + 1]), expected, part)
             below = [_property(node, part) for node in nodes]
             data = data.get(part)
         nodes = [node for inner in below for node in _applicable(inner, root, data)]
     return nodes
-
-
-def _among(part: str, known: Iterable[str]) -> str:
-    nearest = difflib.get_close_matches(part, known, n=1, cutoff=0.0)
-    meant = f' (nearest: {nearest[0]})' if nearest else ''
-    return f'one of {", ".join(known)}{meant}' if known else 'a single value'
 
 
 def _property(node: Mapping[str, Any], key: str) -> Any:

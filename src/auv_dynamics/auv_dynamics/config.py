@@ -5,10 +5,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from auv_dynamics.files import InputError
+from auv_dynamics.nearest import meant
+from auv_dynamics.refusal import InputError
 
 OWNER = {'vehicles': 'auv_dynamics', 'scenarios': 'auv_analysis', 'params': 'auv_analysis',
-         'campaigns': 'auv_analysis'}  # fmt: skip
+         'campaigns': 'auv_analysis', 'laws': 'auv_analysis'}  # fmt: skip
 
 
 def _folders(kind: str) -> Iterator[Path]:
@@ -25,7 +26,7 @@ def shipped(kind: str, name: str | Path) -> Path:
 
     Parameters
     ----------
-    kind : 'vehicles', 'scenarios' or 'params'
+    kind : 'vehicles', 'scenarios', 'campaigns', 'params' or 'laws'
     name : a path, or a bare name without folder and ending
 
     Returns
@@ -43,13 +44,18 @@ def shipped(kind: str, name: str | Path) -> Path:
     return shipped_by_name(kind, str(name))
 
 
+def shipped_names(kind: str) -> list[str]:
+    """Bare names of the shipped files of a kind, sorted."""
+    return sorted({path.stem for folder in _folders(kind) for path in folder.glob('*.yaml')})
+
+
 def shipped_by_name(kind: str, name: str) -> Path:
     """Path of a shipped file by its bare name; InputError when there is none."""
-    found: set[str] = set()
     for folder in _folders(kind):
         candidate = folder / f'{name}.yaml'
         if os.path.isfile(candidate):  # Path.is_file raises for a name that is too long
             return candidate
-        found.update(entry.stem for entry in folder.glob('*.yaml'))
-    expected = f'a file, or one of the shipped {kind}: {", ".join(sorted(found)) or "none"}'
+    found = shipped_names(kind)
+    listed = f'{", ".join(found) or "none"}{meant(name, found)}'
+    expected = f'a file, or one of the shipped {kind}: {listed}'
     raise InputError(name, '', expected, 'no such file or name')

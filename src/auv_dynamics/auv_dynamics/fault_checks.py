@@ -1,6 +1,5 @@
 """Faults as a scenario or a node writes them, checked against vehicle, actuators and time."""
 
-import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -9,6 +8,7 @@ import numpy as np
 from auv_dynamics.actuators import MOST_STEPS, WHOLE
 from auv_dynamics.faults import END, Fault, Faults
 from auv_dynamics.files import InputError
+from auv_dynamics.nearest import one_of
 from auv_dynamics.thrusters import Thrusters
 
 
@@ -99,9 +99,7 @@ def _thruster(spec: Mapping[str, Any], place: str, setting: FaultSetting) -> str
     names = setting.thrusters.names
     if isinstance(given, str):
         if given not in names:
-            nearest = difflib.get_close_matches(given, names, n=1, cutoff=0.0)[0]
-            expected = f'one of {", ".join(names)} (nearest: {nearest})'
-            raise InputError(file, key, expected, given)
+            raise InputError(file, key, one_of(given, names), given)
         name = given
     elif given >= len(names):
         raise InputError(file, key, f'an index below {len(names)}', f'{given:g}')

@@ -3,12 +3,14 @@
 import json
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import numpy as np
 
+from auv_dynamics.nearest import meant, one_of
 from auv_dynamics.refusal import InputError, first_line, reason, shorten
 from auv_dynamics.yaml_text import parse_any_yaml, parse_yaml
 
@@ -19,10 +21,12 @@ __all__ = [
 LARGEST = 1e100  # products of a few such numbers are still finite
 LARGEST_FILE = 1 << 28  # bytes of a text file
 PIECE = 1 << 22  # bytes that are read at once
+MOST_NAMES = 1000  # of a folder, among which one may be meant
 
 
 def read_text(path: Path, kind: str) -> str:
     """Text of a file; InputError when it is missing, a folder, unreadable or not UTF-8."""
+    beside = ''
     try:
         data = b''
         with path.open('rb') as file:  # a device does not say how long it is
@@ -32,14 +36,22 @@ def read_text(path: Path, kind: str) -> str:
             return data.decode('utf-8-sig').replace('\r\n', '\n').replace('\r', '\n')
         found = f'more than {LARGEST_FILE} bytes'
     except FileNotFoundError:
-        found = 'no such file'
+        found, beside = 'no such file', meant(path.name, _names(path.parent))
     except UnicodeDecodeError as error:
         found = f'bytes that are not UTF-8 (offset {error.start})'
     except OSError as error:
         found = reason(error)
     except ValueError as error:  # NUL in the name
         found = str(error)
-    raise InputError(path, '', f'a {kind} file', found)
+    raise InputError(path, '', f'a {kind} file{beside}', found)
+
+
+def _names(folder: Path) -> list[str]:
+    """Names in a folder, as far as a look at it is quick."""
+    try:
+        return [path.name for path in islice(folder.iterdir(), MOST_NAMES)]
+    except OSError:
+        return []
 
 
 def read_yaml(path: Path, kind: str) -> dict[str, Any]:
@@ -100,16 +112,16 @@ def _as_input_error(
         unknown = next(key for key in error.instance if key not in known)
         if len(known) == 1:
             return InputError(file, dotted(path), f'{known[0]} alone', f'{unknown} beside it')
-        return InputError(
-            file, dotted([*path, unknown]), f'one of {", ".join(known)}', 'an unknown key'
-        )
+        return InputError(file, dotted([*path, unknown]), one_of(unknown, known), 'an unknown key')
     if error.validator == 'required':
         missing = next(key for key in error.validator_value if key not in error.instance)
         title = error.schema.get('properties', {}).get(missing, {}).get('title', 'a value')
         return InputError(file, dotted([*path, missing]), title, 'nothing')
     value = error.instance
     found = _shape(value) if isinstance(value, list) else shorten(value)
-    return InputError(file, dotted(path), _title(error, root), found)
+    words = error.validator_value if error.validator == 'enum' else ()
+    likely = meant(value, (word for word in words if isinstance(word, str)))
+    return InputError(file, dotted(path), f'{_title(error, root)}{likely}', found)
 
 
 def _title(error: jsonschema.ValidationError, root: dict[str, Any]) -> str:

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from auv_dynamics.files import InputError, read_text
+from auv_dynamics.nearest import meant
 from auv_dynamics.signals import DOFS, Harmonics
 
 COLUMNS = ('t', *DOFS)
@@ -76,9 +77,9 @@ def load_table(path: Path, duration: float, text: str | None = None) -> Table:
     lines, rows = _rows(path, text)
     header = tuple(name.strip() for name in rows[0]) if rows else ()
     if header != COLUMNS:
-        raise InputError(
-            path, 'line 1', f'the columns {",".join(COLUMNS)}', ','.join(header) or None
-        )
+        wrong = next((name for name in header if name not in COLUMNS), None)
+        expected = f'the columns {",".join(COLUMNS)}{meant(wrong, COLUMNS)}'
+        raise InputError(path, 'line 1', expected, ','.join(header) or None)
     values = np.array([_numbers(path, i, row) for i, row in zip(lines[1:], rows[1:], strict=True)])
     if len(values) < 2:
         raise InputError(path, 't', 'at least two rows', f'{len(values)}')

@@ -10,9 +10,9 @@ import yaml
 from pyarrow import parquet
 
 from auv_analysis import cli, load_scenario, simulate, summarize
-from auv_analysis.atlas.collect import charts, document, shipped_vehicles
+from auv_analysis.atlas.collect import charts, document
 from auv_analysis.atlas.figures import coupled, uncoupled
-from auv_dynamics.config import shipped
+from auv_dynamics.config import shipped, shipped_names
 from auv_dynamics.signals import DOFS
 
 
@@ -89,7 +89,7 @@ def test_vehicles_without_coupling_alone_are_said_not_drawn(tmp_path: Path, caps
 
 
 def test_all_shipped_vehicles_are_taken() -> None:
-    assert len(shipped_vehicles()) >= 8
+    assert len(shipped_names('vehicles')) >= 8
     assert len(DOFS) == np.array(document(charts(['lauv']))['vehicles']['lauv']['N']).size
 
 

@@ -15,7 +15,7 @@ WRONG = {  # what is in the file -> what the one line says
     f'{GOOD}twist: /t\n': 'found odometry and twist',
     f'{GOOD}thrusters: /u\n': 'wrench: expected one of wrench (--wrench) and thrusters, found w',
     f'{GOOD}odom: /o\n': 'odom: expected one of format, name, vehicle, frames',
-    f'{GOOD}frames: enu\n': 'frames: expected ned_fsd or enu_flu, found enu',
+    f'{GOOD}frames: enu\n': 'frames: expected ned_fsd or enu_flu (nearest: enu_flu), found enu',
     f'{GOOD}frames: [enu_flu]\n': 'frames: expected ned_fsd or enu_flu, found [',
     f'{GOOD}step: 0\n': 'step: expected a positive number (s), found 0',
     f'{GOOD}step: quick\n': 'step: expected a positive number (s), found quick',

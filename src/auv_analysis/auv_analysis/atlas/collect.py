@@ -12,8 +12,6 @@ from pyarrow import parquet
 from auv_analysis.atlas.couplings import Couplings, couplings_of
 from auv_analysis.atlas.reached import reached
 from auv_analysis.comparison.opening import numbered
-from auv_analysis.scaling import REFERENCE
-from auv_dynamics.config import shipped
 from auv_dynamics.signals import DOFS
 from auv_dynamics.vehicle_file import load_vehicle
 
@@ -35,11 +33,6 @@ class Chart:
     def name(self) -> str:
         """Name of the vehicle."""
         return self.couplings.name
-
-
-def shipped_vehicles() -> list[str]:
-    """Bare names of the shipped vehicles."""
-    return sorted(path.stem for path in shipped('vehicles', REFERENCE).parent.glob('*.yaml'))
 
 
 def charts(vehicles: Iterable[str]) -> list[Chart]:

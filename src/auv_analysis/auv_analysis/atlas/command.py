@@ -4,11 +4,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.atlas.collect import charts, shipped_vehicles, write_atlas
+from auv_analysis.atlas.collect import charts, write_atlas
 from auv_analysis.commands.conclude import console
 from auv_analysis.console import say
 from auv_analysis.folder import check_free, prepare
-from auv_dynamics.config import shipped
+from auv_dynamics.config import shipped, shipped_names
 from auv_dynamics.files import InputError
 
 FOLDER = Path('runs') / 'atlas'
@@ -19,7 +19,7 @@ def atlas(options: argparse.Namespace) -> dict[str, Any]:
     given = list(dict.fromkeys(options.vehicles))
     if options.only and not given:
         raise InputError('--only', '', 'VEHICLE, one at least', 'none')
-    known = [] if options.only else shipped_vehicles()
+    known = [] if options.only else shipped_names('vehicles')
     vehicles = [*known, *(vehicle for vehicle in given if vehicle not in known)]
     out = options.out or FOLDER
     check_free(out, overwrite=options.overwrite)

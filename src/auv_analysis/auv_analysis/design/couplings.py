@@ -7,6 +7,7 @@ import numpy as np
 from auv_analysis.coupling import delta_pi, delta_xi, structural_zeros
 from auv_analysis.run import Run
 from auv_dynamics.files import InputError
+from auv_dynamics.nearest import one_of
 from auv_dynamics.signals import DOFS
 from auv_dynamics.vehicle import Vehicle
 from auv_gvc_controller.decomposition import decompose, inverse_upper
@@ -108,6 +109,6 @@ def coupling_named(text: str, there: list[str]) -> str:
     """
     name = text.replace('_max.', '.')
     if name not in COUPLINGS:
-        expected = f'one of {", ".join(there)}' if there else 'such as delta_xi.sway'
+        expected = one_of(name, there) if there else 'such as delta_xi.sway'
         raise InputError('--reduce', '', expected, text)
     return name

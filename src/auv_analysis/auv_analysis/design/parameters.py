@@ -8,6 +8,7 @@ import numpy as np
 
 from auv_analysis.design.bodies import DISC
 from auv_dynamics.files import InputError
+from auv_dynamics.nearest import one_of
 from auv_dynamics.vehicle import Vehicle
 
 SHIFT, BALLAST, DISC_PART = 'shift', 'ballast', 'disc'
@@ -143,7 +144,7 @@ def _stable(vehicle: Vehicle, found: tuple[Any, ...]) -> tuple[Any, ...]:
 
 def _own(every: Mapping[str, Parameter], name: str, lower: float, upper: float) -> Parameter:
     if name not in every:
-        raise InputError('--bound', '', f'one of {", ".join(NAMES)}', name)
+        raise InputError('--bound', '', one_of(name, NAMES), name)
     if not -1e6 <= lower <= upper <= 1e6:
         expected = 'LOWER:UPPER, two numbers in ascending order, at most 1e6'
         raise InputError('--bound', name, expected, f'{lower:g}:{upper:g}')

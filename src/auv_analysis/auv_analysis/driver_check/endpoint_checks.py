@@ -1,15 +1,15 @@
 """Checks of who publishes and subscribes what."""
 
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 
 from auv_analysis.driver_check.finding import Finding, judged
 from auv_analysis.driver_check.scene import Endpoint, Scene
 from auv_analysis.driver_check.settings import Settings
 from auv_analysis.report.text import join
 from auv_dynamics import interface
+from auv_dynamics.nearest import nearest
 
-NEAR = 0.6  # of 1: likeness of a name that may have been meant
+NAMED = 3  # topics of a like name
 
 
 def endpoint_findings(scene: Scene, settings: Settings, clocks: int) -> list[Finding]:
@@ -98,5 +98,5 @@ def _instead(
     if there:
         listed = join([f'{topic} of {join(nodes)}' for topic, nodes in sorted(there.items())])
         return f'; {kind} is on {listed}'
-    near = get_close_matches(name, [topic for topic in topics if topic != name], cutoff=NEAR)
+    near = nearest(name, [topic for topic in topics if topic != name], NAMED)
     return f'; nearest names: {join(near)}' if near else f'; {kind} is on no topic there'

@@ -16,6 +16,7 @@ from auv_analysis.folder import check_free, prepare
 from auv_analysis.measures import BY_NAME
 from auv_analysis.report.text import number
 from auv_dynamics.files import InputError
+from auv_dynamics.nearest import one_of
 
 SHOWN = ('overall.velocity_error.settling_time', 'overall.velocity_error.rms.linear',
          'overall.effort.rms.linear')  # fmt: skip
@@ -37,7 +38,7 @@ def explore(folder: Path, options: argparse.Namespace) -> dict[str, Any]:
     """
     by = options.by or BEST_BY
     if by not in BY_NAME:
-        raise InputError('--by', '', f'one of {", ".join(BY_NAME)}', by)
+        raise InputError('--by', '', one_of(by, BY_NAME), by)
     sweep = open_sweep(folder)
     out = options.out or Path('runs') / f'analyze_{sweep.name}'
     check_free(out, overwrite=options.overwrite)

@@ -12,6 +12,7 @@ from auv_analysis.foreign.kinds import READERS, Reading, are_usable
 from auv_analysis.foreign.mapping import Source, TopicMap
 from auv_analysis.foreign.signals import Recorded
 from auv_dynamics.files import InputError
+from auv_dynamics.nearest import meant
 
 TOGETHER = 4096  # messages that wait as objects before they become rows of arrays
 
@@ -64,8 +65,9 @@ class _Messages:
         readers, topic = READERS[self.source.role], self.source.topic
         kind = types.get(topic)
         if kind is None:
-            fitting = [topic for topic in sorted(types) if types[topic] in readers]
-            expected = f'a topic of the bag{": " if fitting else ""}{", ".join(fitting)}'
+            fitting = [name for name in sorted(types) if types[name] in readers]
+            listed = f': {", ".join(fitting)}{meant(topic, fitting)}' if fitting else ''
+            expected = f'a topic of the bag{listed}'
             raise InputError(self._bag, self.source.role, expected, topic)
         if kind not in readers:
             raise InputError(self._bag, topic, ' or '.join(readers), kind)

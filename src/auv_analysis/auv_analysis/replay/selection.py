@@ -9,6 +9,7 @@ from auv_analysis.bag.roles import WRENCH
 from auv_analysis.replay.index import BagIndex
 from auv_dynamics import interface
 from auv_dynamics.files import InputError
+from auv_dynamics.nearest import one_of
 
 REPLAY = 'replay'  # namespace in which nothing of a vehicle listens
 DERIVED = (
@@ -106,8 +107,8 @@ def select(index: BagIndex, wish: Wish, resolve: Callable[[str], str]) -> Select
     """
     for pattern in wish.topics:
         if not any(_is_like(topic, pattern) for topic in index.topics):
-            known = ', '.join(sorted(index.topics))
-            raise InputError(index.bag, 'topics', f'topics of {known}', pattern)
+            expected = one_of(pattern, sorted(index.topics))
+            raise InputError(index.bag, 'topics', expected, pattern)
     found = Selection()
     for topic in sorted(index.topics):
         name = _published(topic, wish)

@@ -16,6 +16,7 @@ from auv_analysis.sweep.groups import Group, kind_of, make_group
 from auv_analysis.sweep.values import Values
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError, check, dotted, read_yaml
+from auv_dynamics.nearest import meant, one_of
 from auv_gvc_controller.laws import SHIPPED
 
 SCHEMA = Path(__file__).with_name('campaign.schema.json')
@@ -149,7 +150,7 @@ def load_campaign(campaign: str | Path) -> Campaign:
     data['seed'] = int(data['seed'])
     for i, name in enumerate(data['controllers']):
         if name not in scenario.controllers:
-            expected = f'one of {", ".join(scenario.controllers)}'
+            expected = one_of(name, scenario.controllers)
             raise InputError(path, f'controllers[{i}]', expected, name)
     check_hold(scenario, data['hold'])
     groups = [make_group(spec, data['seed'], i, path) for i, spec in enumerate(data['vary'])]
@@ -212,7 +213,7 @@ def _check_path(campaign: Campaign, path: str) -> None:
     for scenario in campaign.scenarios.values():
         check_paths(scenario, [of_controller(path, name) for name in names])
     if parts[0] == 'controllers' and len(parts) > 1 and parts[1] not in ('*', *names):
-        expected = f'a controller that is swept: {", ".join(names)}'
+        expected = f'a controller that is swept: {", ".join(names)}{meant(parts[1], names)}'
         raise InputError(path, '', expected, str(parts[1]))
 
 

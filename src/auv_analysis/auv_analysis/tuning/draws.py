@@ -10,6 +10,7 @@ import numpy as np
 from auv_analysis.changes import changed_scenario
 from auv_analysis.scenario import Scenario
 from auv_dynamics.files import InputError
+from auv_dynamics.nearest import one_of
 from auv_dynamics.signals import DOFS
 from auv_dynamics.vehicle import Vehicle
 
@@ -59,7 +60,7 @@ def spread_of(texts: Iterable[str]) -> Spread:
         except ValueError:
             number = math.nan
         if name not in known:
-            expected = f'NAME=VALUE with a name of {", ".join(known)}'
+            expected = f'NAME=VALUE with NAME {one_of(name, known)}'
             raise InputError('--spread', '', expected, text)
         top = 1.0 if name in BELOW_ONE else math.inf
         if not 0 <= number < top:

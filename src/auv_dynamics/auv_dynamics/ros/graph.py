@@ -20,6 +20,7 @@ from std_srvs.srv import Trigger
 
 from auv_dynamics.files import InputError
 from auv_dynamics.interface import BadMessageError, Frames
+from auv_dynamics.nearest import meant
 from auv_dynamics.ros.codec import Codec
 from auv_dynamics.ros.convert import stamp
 from auv_dynamics.ros.endpoints import onlookers
@@ -200,7 +201,7 @@ class Graph:
         for entry in listed:
             topic, _, count = entry.partition('=')
             if topic not in known or not count.isdigit():
-                expected = f'topic=count with a topic of {", ".join(known)}'
+                expected = f'topic=count with a topic of {", ".join(known)}{meant(topic, known)}'
                 raise InputError(self.node.get_name(), 'expected_subscribers', expected, entry)
             counts[topic] = int(count)
         return counts

@@ -9,6 +9,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from auv_dynamics import nearest
 from auv_dynamics.files import InputError
 from auv_dynamics.interface import NANOSECONDS
 from auv_dynamics.ros.private import declared, overrides
@@ -88,7 +89,7 @@ def declare(
         expected = f'{at_least if at_least is not None else "-inf"} to {at_most or "inf"}'
         raise InputError(node.get_name(), name, f'a number from {expected}', found) from None
     if one_of and value not in one_of:
-        raise InputError(node.get_name(), name, f'one of {", ".join(one_of)}', value)
+        raise InputError(node.get_name(), name, nearest.one_of(value, one_of), value)
     if value is None and (default is not None or name in overrides(node)):
         raise InputError(node.get_name(), name, TYPE_WORDS[TYPES[kind]], None)
     if hasattr(value, 'tolist'):
@@ -172,4 +173,5 @@ def refuse_unknown(node: Node) -> None:
             for k in declared(node)
             if k not in KNOWN_TO_ALL and not k.startswith('qos_overrides.')
         ]
-        raise InputError(node.get_name(), name, f'one of {", ".join(own)}', 'an unknown parameter')
+        expected = nearest.one_of(name, own)
+        raise InputError(node.get_name(), name, expected, 'an unknown parameter')

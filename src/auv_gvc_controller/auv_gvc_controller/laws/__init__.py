@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from auv_dynamics.files import matrix6
+from auv_dynamics.nearest import meant, one_of
 from auv_gvc_controller.laws.cl import CL
 from auv_gvc_controller.laws.gvc import GVC
 from auv_gvc_controller.laws.pid import PID
@@ -42,13 +43,14 @@ def law_class(name: str) -> Any:
     expected = f'{", ".join(SHIPPED)} or module:Class'
     module, colon, attribute = name.partition(':')
     if not (colon and module and attribute):
-        raise ValueError(f'expected {expected}, found {name!r}')
+        raise ValueError(f'expected {expected}{meant(name, SHIPPED)}, found {name!r}')
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())  # a user's module may lie where `auv` was started
     try:
         law = getattr(importlib.import_module(module), attribute)
     except AttributeError:
-        raise ValueError(f'expected {expected}, found no {attribute} in {module}') from None
+        likely = meant(attribute, dir(sys.modules.get(module)))
+        raise ValueError(f'expected {expected}{likely}, found no {attribute} in {module}') from None
     except (Exception, SystemExit) as error:  # whatever a user's module does when it is imported
         raise ValueError(f'expected {expected}, found {name!r} ({_short(error)})') from None
     missing = [
@@ -170,9 +172,8 @@ def make_gains(name: str, values: Mapping[str, Any]) -> Any:
     # unknown first: a misspelt gain also leaves a missing one
     unknown = [key for key in values if key not in law._fields]
     if unknown:
-        raise ValueError(
-            f'{unknown[0]}: expected one of {", ".join(law._fields)}, found an unknown gain'
-        )
+        expected = one_of(unknown[0], law._fields)
+        raise ValueError(f'{unknown[0]}: expected {expected}, found an unknown gain')
     values = {**getattr(law, '_field_defaults', {}), **values}
     for key in law._fields:
         if key not in values:

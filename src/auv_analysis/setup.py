@@ -31,6 +31,7 @@ setup(
         (f'share/{NAME}/config/scenarios', glob('config/scenarios/*.yaml')),
         (f'share/{NAME}/config/params', glob('config/params/*.yaml')),
         (f'share/{NAME}/config/campaigns', glob('config/campaigns/*.yaml')),
+        (f'share/{NAME}/config/laws', glob('config/laws/own_law.*')),
         (f'share/{NAME}/config/security', glob('config/security/*.xml')),
         (f'share/{NAME}/config/security/common', glob('config/security/common/*.xml')),
         (f'share/{NAME}/config/security/profiles', glob('config/security/profiles/*.xml')),
@@ -57,6 +58,8 @@ setup(
         'scipy>=1.15',
         'rosbags>=0.10',
         'SALib>=1.5',
+        'argcomplete>=3.1',
+        'packaging>=23',
     ],
     extras_require={
         'test': ['pytest', 'pillow'],

@@ -18,6 +18,7 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 
 from auv_analysis import cli, load_scenario
+from auv_analysis.command_line import COMMANDS
 from auv_analysis.folder import MANIFEST
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.recording import BagWriter, Storage
@@ -26,13 +27,15 @@ from auv_dynamics.config import shipped
 
 AUV = Path(sys.executable).with_name('auv')
 REXROV = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
-COMMANDS = [
-    'run', 'simulate', 'study', 'design', 'analyze', 'atlas', 'sweep', 'tune', 'watch', 'info',
-    'params', 'check-vehicle', 'replay', 'check-driver',
-]  # fmt: skip
 WRONG_LINES = {  # what is typed -> what the one line names
-    '': 'COMMAND',
+    '--jsn': '--jsn',
     'fly': 'fly',
+    'simulte case1': 'nearest: simulate',
+    'simulate case1 --hodl zoh': 'nearest: --hold',
+    'params --controler gvc case1': 'nearest: --controller',
+    'simulate case1 --controller gcv': 'nearest: gvc',
+    'sweep case1_gain': 'nearest: case1_gains',
+    'design rexrov --bound shift.xx=0:1': 'nearest: shift.x',
     'simulate': 'scenario',
     'simulate case1 case2': 'case2',
     'simulate case1 --colour red': '--colour',
@@ -159,8 +162,8 @@ def test_help(arguments: list[str], capsys: pytest.CaptureFixture) -> None:
     assert _exit_code(*arguments, '--help') == 0
     text = capsys.readouterr().out
     assert text.startswith(' '.join(['usage: auv', *arguments]))
-    words = COMMANDS if not arguments else ['--json']
-    writes = arguments not in ([], ['watch'], ['info'], ['check-vehicle'])
+    words = [*COMMANDS] if not arguments else ['--json']
+    writes = bool(arguments) and COMMANDS[arguments[0]].writes
     words = [*words, '--out', '--overwrite'] if writes else words
     assert all(word in text for word in words)
 

@@ -4,17 +4,30 @@ import json
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from auv_analysis.command_line import parser
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command; exit code 0 fine, 1 the work failed, 2 wrong input."""
-    options = parser().parse_args(arguments)
+    """Run the command; exit code 0 fine, 1 the work failed, 2 wrong input.
+
+    It must start where packages are broken, for `auv doctor`: nothing here imports any.
+    """
+    grammar = parser()
+    if '_ARGCOMPLETE' in os.environ:  # the shell asks what could follow
+        from auv_analysis.completion import complete
+
+        complete(grammar)
+    options = grammar.parse_args(arguments)
+    if options.command is None:
+        from auv_analysis.guide import print_guide
+
+        return print_guide(Path())
     from auv_analysis.commands import function
     from auv_analysis.failure import FailedError
-    from auv_dynamics.files import InputError
+    from auv_dynamics.refusal import InputError
 
     try:
         _work(function(options.command), options)
@@ -23,6 +36,11 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(2)
     except (FailedError, ArithmeticError) as error:
         _say(str(error))
+        sys.exit(1)
+    except ImportError as error:
+        if (error.name or '').startswith('auv_'):
+            raise
+        _say(f'{error}: see auv doctor')
         sys.exit(1)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing left to flush

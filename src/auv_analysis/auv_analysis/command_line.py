@@ -1,36 +1,33 @@
 """The grammar of the `auv` command: its subcommands in the order of the help, and their options."""
 
 import argparse
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from auv_analysis.command_parser import Parser
+from auv_analysis.foreign.options import add_options as add_foreign
 from auv_analysis.replay.options import add_options as add_replay
 
 SCENARIO = 'a scenario file, or the bare name of a shipped one'
 VEHICLE = 'a vehicle file, or the bare name of a shipped one'
+LAWS = ('gvc', 'cl', 'pid', 'smc')
 RESULT = 'a bag, a folder of results or of a sweep, or a scenario, which is simulated'
 
 
-class Parser(argparse.ArgumentParser):
-    """A parser whose complaint is one line."""
-
-    def error(self, message: str) -> Any:
-        """Exit 2 with one line instead of usage and a line."""
-        text = message.replace(' (choose from ', '; expected one of (')
-        expected = text if 'expected' in text else f'expected a valid command line, found: {text}'
-        found = '' if 'found' in expected else f', found none; see {self.prog} --help'
-        print(f'{self.prog}: {expected}{found}', file=sys.stderr, flush=True)
-        sys.exit(2)
-
-
-def parser() -> argparse.ArgumentParser:
-    """Command line of `auv`."""
-    main = Parser(prog='auv', description='The auv command: experiments and their analysis.')
-    commands = main.add_subparsers(dest='command', required=True, metavar='COMMAND')
+def parser() -> Parser:
+    """Command line of `auv`; without a command, `command` is None."""
+    main = Parser(
+        prog='auv', description='Experiments with underwater vehicles, and what they say.'
+    )
+    main.groups = {
+        title: {name: command.text for name, command in group.items()}
+        for title, group in GROUPS.items()
+    }
+    commands = main.add_subparsers(dest='command', metavar='COMMAND')
     for name, (text, add_options, writes) in COMMANDS.items():
         command = commands.add_parser(name, help=text, description=text)
+        main.children[name] = command
         if writes:
             command.add_argument('--out', type=Path, help='folder of the results')
             command.add_argument('--overwrite', action='store_true', help='replace earlier results')
@@ -99,21 +96,7 @@ def _analyze(command: argparse.ArgumentParser) -> None:
     _no_report(command)
     text = 'own law that results may name, as its code may run; may be repeated'
     command.add_argument('--law', metavar='MODULE:CLASS', action='append', help=text)
-    _foreign(command.add_argument_group('bags of other systems'))
-
-
-def _foreign(group: argparse._ArgumentGroup) -> None:
-    """Options that tell what the topics of a foreign bag hold."""
-    group.add_argument('--map', metavar='FILE', help='mapping file; options replace its keys')
-    group.add_argument('--odom', dest='odometry', metavar='TOPIC', help='nav_msgs/Odometry')
-    group.add_argument('--wrench', metavar='TOPIC', help='the commanded WrenchStamped or Wrench')
-    group.add_argument('--setpoint', metavar='TOPIC', help='TwistStamped, Twist or Odometry')
-    group.add_argument('--frames', choices=('ned_fsd', 'enu_flu'), help='axes of all topics')
-    text = 'axes in which the odometry writes the velocity, default: child'
-    group.add_argument('--twist-frame', choices=('child', 'world'), help=text)
-    text = 'common time base, default: the median period of the velocity'
-    group.add_argument('--step', type=float, metavar='S', help=text)
-    group.add_argument('--gap', type=float, metavar='S', help='longer pauses are gaps')
+    add_foreign(command.add_argument_group('bags of other systems'))
 
 
 def _atlas(command: argparse.ArgumentParser) -> None:
@@ -145,8 +128,7 @@ def _tune(command: argparse.ArgumentParser) -> None:
     text = 'controller to equal; default: the first under gvc'
     command.add_argument('--reference', metavar='NAME', help=text)
     text = "only this one beside the reference's own; may be repeated; default: all shipped"
-    laws = ('gvc', 'cl', 'pid', 'smc')
-    command.add_argument('--law', action='append', choices=laws, help=text)
+    command.add_argument('--law', action='append', choices=LAWS, help=text)
     text = 'what the laws are given alike; default: effort'
     command.add_argument('--equal', choices=('effort', 'error'), default='effort', help=text)
     text = 'of the error: weighted by time, or the plain mean; default: time'
@@ -201,6 +183,21 @@ def _check_driver(command: argparse.ArgumentParser) -> None:
     add_options(command)
 
 
+def _new(command: argparse.ArgumentParser) -> None:
+    command.add_argument('kind', choices=('vehicle', 'scenario', 'law'), help='what to make')
+    command.add_argument('name', metavar='NAME', help='of the new file, in the working folder')
+    text = f'of a scenario or law: {VEHICLE}'
+    command.add_argument('--vehicle', help=text)
+
+
+def _shell(command: argparse.ArgumentParser) -> None:
+    command.add_argument('shell', choices=('bash', 'zsh', 'fish'))
+
+
+def _nothing(_: argparse.ArgumentParser) -> None:
+    """No option of its own."""
+
+
 class Command(NamedTuple):
     """A subcommand: its line of help, what adds its options, whether it writes a folder."""
 
@@ -209,22 +206,40 @@ class Command(NamedTuple):
     writes: bool = True
 
 
-COMMANDS = {
-    'run': Command('run a scenario on real nodes, record, analyse and report', _run),
-    'simulate': Command('simulate a scenario in this process, analyse and report', _simulate),
-    'study': Command('the procedure of the paper, steps 1 to 6, as one report', _study),
-    'analyze': Command('summary and report of bags, folders of results, or a sweep', _analyze),
-    'atlas': Command('couplings by inertia of the shipped vehicles, side by side', _atlas),
-    'design': Command('which change of a vehicle removes which coupling, simulated', _design),
-    'sweep': Command('many rollouts of a scenario, with values that vary, to Parquet', _sweep),
-    'tune': Command('laws tuned to equal effort or error, and compared over draws', _tune),
-    'watch': Command('live dashboard in the terminal', _watch, writes=False),
-    'replay': Command('a bag as live topics again, or what another law makes of it', add_replay),
-    'info': Command('what lies in a bag', _info, writes=False),
-    'recover': Command('repair a bag that was cut or damaged, in place', _info, writes=False),
-    'params': Command('the ROS parameter file of a scenario', _params),
-    'check-vehicle': Command(
-        'inertia, couplings and limits of a vehicle', _check_vehicle, writes=False
-    ),
-    'check-driver': Command('whether a vehicle driver offers what our nodes need', _check_driver),
+GROUPS = {
+    'To begin with': {
+        'new': Command('a vehicle, a scenario or a law of your own to start from', _new, False),
+        'doctor': Command('what is wrong with the set-up, and what to do', _nothing, False),
+        'completion': Command('names of commands and files by the TAB key', _shell, False),
+    },
+    'Experiments': {
+        'simulate': Command('simulate a scenario in this process, analyse and report', _simulate),
+        'run': Command('run a scenario on real nodes, record, analyse and report', _run),
+        'study': Command('the procedure of the paper, steps 1 to 6, as one report', _study),
+        'watch': Command('live dashboard in the terminal', _watch, False),
+        'params': Command('the ROS parameter file of a scenario', _params),
+    },
+    'Results and bags': {
+        'analyze': Command('summary and report of bags, folders of results, or a sweep', _analyze),
+        'info': Command('what lies in a bag', _info, False),
+        'replay': Command(
+            'a bag as live topics again, or what another law makes of it', add_replay
+        ),
+        'recover': Command('repair a bag that was cut or damaged, in place', _info, False),
+    },
+    'Vehicles and laws compared': {
+        'check-vehicle': Command(
+            'inertia, couplings and limits of a vehicle', _check_vehicle, False
+        ),
+        'design': Command('which change of a vehicle removes which coupling, simulated', _design),
+        'atlas': Command('couplings by inertia of the shipped vehicles, side by side', _atlas),
+        'tune': Command('laws tuned to equal effort or error, and compared over draws', _tune),
+        'sweep': Command('many rollouts of a scenario, with values that vary, to Parquet', _sweep),
+    },
+    'A real vehicle': {
+        'check-driver': Command(
+            'whether a vehicle driver offers what our nodes need', _check_driver
+        ),
+    },
 }
+COMMANDS = {name: command for group in GROUPS.values() for name, command in group.items()}

@@ -4,7 +4,7 @@ import os
 import random
 import socket
 
-from auv_dynamics.files import InputError, shorten
+from auv_dynamics.refusal import InputError, shorten
 
 LARGEST = 101  # above it, DDS ports fall into the range that the system hands out
 VARIABLE = 'ROS_DOMAIN_ID'

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from auv_dynamics.signals import DOFS
+from auv_dynamics.dofs import DOFS
 
 NANOSECONDS = 10**9
 UNIT = 1e-3  # deviation of a quaternion's norm from 1 that is accepted

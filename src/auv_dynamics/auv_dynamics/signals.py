@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-DOFS = ('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw')
+from auv_dynamics.dofs import DOFS
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,9 @@ _HOME = {
     'atlas': 'auv_analysis.atlas.command',
     'design': 'design',
     'sweep': 'auv_analysis.sweep.command',
+    'new': 'new',
+    'completion': 'completion',
+    'doctor': 'auv_analysis.doctor.command',
 }
 
 

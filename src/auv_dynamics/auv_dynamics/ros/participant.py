@@ -51,6 +51,11 @@ class Participant:
         while (left := until - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=left)
 
+    def nodes(self) -> set[str]:
+        """Full names of the nodes that are known so far, its own among them."""
+        found = self._node.get_node_names_and_namespaces()
+        return {f'{namespace.rstrip("/")}/{name}' for name, namespace in found}
+
     def close(self) -> None:
         """Leave the domain."""
         self._node.destroy_node()

@@ -1,0 +1,208 @@
+"""`auv doctor`: each fault of a set-up is provoked and named, with what to do."""
+
+import json
+import os
+import resource
+import shutil
+import subprocess
+import sys
+from collections import namedtuple
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+
+from auv_analysis import cli
+from auv_analysis.doctor import command, graph_checks, machine_checks, python_checks, ros_checks
+from auv_analysis.doctor.finding import Finding, findings_of
+
+RANGE = ros_checks.RANGE
+Usage = namedtuple('Usage', 'total used free')
+
+
+@pytest.fixture(autouse=True)
+def plain(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ('ROS_DISTRO', 'RMW_IMPLEMENTATION', RANGE, 'ROS_LOCALHOST_ONLY', 'ROS_DOMAIN_ID',
+                 'AMENT_PREFIX_PATH', 'PYTHONPATH', 'NUMBA_DISABLE_JIT'):  # fmt: skip
+        monkeypatch.delenv(name, raising=False)
+
+
+def _one(check, verdict: str, *words: str) -> Finding:
+    found = [finding for finding in findings_of([check]) if finding.verdict == verdict]
+    assert found, list(findings_of([check]))
+    assert all(word in found[0].found + found[0].advice for word in words), found[0]
+    return found[0]
+
+
+def _distribution(folder: Path, name: str, version: str, *requires: str, code: str = '') -> None:
+    info = folder / f'{name}-{version}.dist-info'
+    info.mkdir(parents=True)
+    lines = [f'Name: {name}', f'Version: {version}', *(f'Requires-Dist: {r}' for r in requires)]
+    (info / 'METADATA').write_text('Metadata-Version: 2.1\n' + '\n'.join(lines) + '\n')
+    (folder / f'{name}.py').write_text(code)
+
+
+@pytest.mark.parametrize(
+    ('check', 'name', 'value', 'verdict', 'word'),
+    [
+        (ros_checks.distro, 'ROS_DISTRO', 'humble', 'broken', 'humble'),
+        (ros_checks.distro, 'AMENT_PREFIX_PATH', '/opt/ros/iron:/x', 'broken', '/opt/ros/iron'),
+        (ros_checks.distro, 'PYTHONPATH', '/x/lib/python3.8/site-packages', 'broken', '3.8'),
+        (ros_checks.middleware, 'RMW_IMPLEMENTATION', 'rmw_zenoh_cpp', 'warning', 'rmw_zenoh_cpp'),
+        (ros_checks.reach, RANGE, 'SUBNET', 'warning', 'everybody on the network'),
+        (ros_checks.reach, RANGE, 'OFF', 'broken', 'no node finds another'),
+        (ros_checks.reach, RANGE, 'LOCALHSOT', 'broken', 'nearest: LOCALHOST'),
+        (ros_checks.reach, 'ROS_LOCALHOST_ONLY', '1', 'warning', 'ROS_LOCALHOST_ONLY'),
+        (ros_checks.domain, 'ROS_DOMAIN_ID', '102', 'broken', '0 to 101, found '),
+        (ros_checks.domain, 'ROS_DOMAIN_ID', 'x', 'broken', 'found x'),
+        (python_checks.compiler, 'NUMBA_DISABLE_JIT', '1', 'warning', 'unset NUMBA_DISABLE_JIT'),
+    ],
+)
+def test_variables_that_break_something_are_named(check, name, value, verdict, word, monkeypatch):
+    assert {finding.verdict for finding in findings_of([check])} == {'ok'}
+    monkeypatch.setenv(name, value)
+    _one(check, verdict, word)
+
+
+def test_version_of_python_is_judged(monkeypatch):
+    assert next(python_checks.python()).verdict == 'ok'
+    monkeypatch.setattr(python_checks, 'NEWEST', (3, 10))
+    _one(python_checks.python, 'broken', '3.11 to 3.10')
+
+
+def test_packages_that_are_missing_old_or_broken_are_named(tmp_path, monkeypatch):
+    _distribution(tmp_path, 'fake_auv', '1.0', 'not-there>=2', 'fake_old>=3', 'fake_bad>=1')
+    _distribution(tmp_path, 'fake_old', '2.0')
+    _distribution(tmp_path, 'fake_bad', '1.0', code='raise RuntimeError("built for another")')
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    monkeypatch.setattr(python_checks, 'OURS', ('fake_auv',))
+    found = [finding.found for finding in python_checks.packages()]
+    assert found == [
+        'missing: not-there>=2',
+        'wrong version: fake_old 2.0, not fake_old>=3',
+        'fake_bad does not load: RuntimeError: built for another',
+    ]
+
+
+def test_a_package_that_ends_the_process_is_named(tmp_path, monkeypatch):
+    (tmp_path / 'fake_crash.py').write_text('import os\nos._exit(7)\n')
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    failing = python_checks._failing(['json', 'fake_crash', 'csv'])
+    assert failing == {'fake_crash': 'it ends the process with exit code 7'}
+
+
+def test_absent_compiler_is_a_warning(monkeypatch):
+    monkeypatch.setattr(python_checks, '_version', lambda name: None)
+    _one(python_checks.compiler, 'warning', 'numba is not installed')
+
+
+def test_cache_that_cannot_be_written_is_a_warning(tmp_path, monkeypatch):
+    monkeypatch.setenv('AUV_GVC_CACHE_DIR', str(tmp_path / 'good'))
+    assert python_checks._kept().verdict == 'ok'
+    (tmp_path / 'file').touch()  # not a folder: nobody can write into it, not even root
+    monkeypatch.setenv('AUV_GVC_CACHE_DIR', str(tmp_path / 'file'))
+    _one(python_checks.compiler, 'warning', 'at every start', 'AUV_GVC_CACHE_DIR')
+
+
+def test_another_auv_in_front_is_a_warning(tmp_path, monkeypatch):
+    other = tmp_path / 'auv'
+    other.write_text('#!/bin/sh\n')
+    other.chmod(0o755)
+    monkeypatch.setenv('PATH', str(tmp_path))
+    _one(python_checks.executables, 'warning', str(other))
+
+
+@pytest.mark.parametrize(('free', 'verdict'), [(1 << 20, 'broken'), (1 << 30, 'warning')])
+def test_full_disk_is_said(free, verdict, monkeypatch):
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: Usage(1 << 40, 0, free))
+    _one(machine_checks.disk, verdict, 'make room')
+
+
+def test_left_over_segments_are_counted_and_those_in_use_are_not(tmp_path):
+    for i in range(60):
+        (tmp_path / f'fastrtps_{i}').touch()
+    (tmp_path / 'somebody_else').touch()
+    with (tmp_path / 'fastrtps_0').open():
+        left = machine_checks.left_over(tmp_path)
+        assert len(left) == 59
+        assert tmp_path / 'fastrtps_0' not in left
+    _one(lambda: machine_checks.shared_memory(tmp_path), 'warning', '60 files', 'rm ')
+
+
+def test_full_or_absent_shared_memory_is_said(tmp_path, monkeypatch):
+    _one(lambda: machine_checks.shared_memory(tmp_path / 'gone'), 'note', 'is not there')
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: Usage(1 << 20, 1 << 20, 0))
+    _one(lambda: machine_checks.shared_memory(tmp_path), 'broken', '0 MB free')
+
+
+@pytest.mark.parametrize(('limit', 'verdict'), [(64, 'broken'), (512, 'warning'), (4096, 'ok')])
+def test_few_open_files_are_said(limit, verdict, monkeypatch):
+    monkeypatch.setattr(resource, 'getrlimit', lambda _: (limit, limit))
+    _one(machine_checks.files, verdict, f'{limit} per process')
+
+
+def test_clock_before_the_program_was_made_is_said(monkeypatch):
+    monkeypatch.setattr(machine_checks.time, 'time', lambda: 1e6)
+    _one(machine_checks.clock, 'warning', '1970')
+
+
+def test_single_core_and_absent_programs_are_said(monkeypatch):
+    monkeypatch.setattr(os, 'sched_getaffinity', lambda _: {0})
+    _one(machine_checks.cores, 'warning', '--composed')
+    monkeypatch.setattr(shutil, 'which', lambda _: None)
+    assert [finding.check for finding in machine_checks.programs()] == ['chromium', 'ros2']
+
+
+def test_participants_that_cannot_start_are_broken(tmp_path, monkeypatch):
+    (tmp_path / 'rclpy').mkdir()
+    (tmp_path / 'rclpy' / '__init__.py').write_text('raise ImportError("no such library")\n')
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    _one(graph_checks.discovery, 'broken', 'cannot start: ImportError: no such library')
+
+
+def test_a_check_that_fails_is_a_finding_and_the_others_go_on():
+    def bad_check():
+        raise OSError('gone')
+
+    found = list(findings_of([bad_check, machine_checks.cores]))
+    assert found[0].verdict == 'broken'
+    assert 'bad check: could not be looked at: OSError: gone' in found[0].line()
+    assert found[1].check == 'cores'
+
+
+@pytest.mark.parametrize(('verdict', 'code'), [('ok', 0), ('warning', 0), ('broken', 1)])
+def test_exit_code_and_document(verdict, code, monkeypatch, capsys):
+    monkeypatch.setattr(command, 'CHECKS', (lambda: [Finding('x', verdict, 'y', 'z')],))
+    for options in ([], ['--json']):
+        with pytest.raises(SystemExit) if code else nullcontext(None) as end:
+            cli.main(['doctor', *options])
+        assert end is None or end.value.code == 1
+        out = capsys.readouterr().out
+        if not options:
+            assert f'{verdict:<8}  x: y' in out
+    document = json.loads(out)
+    assert document['findings'] == [{'check': 'x', 'verdict': verdict, 'found': 'y', 'advice': 'z'}]
+    assert (document['broken'], document['warnings']) == (code, int(verdict == 'warning'))
+
+
+def test_it_runs_where_everything_is_broken(tmp_path):
+    for name in ('numpy', 'yaml', 'jsonschema', 'rich', 'rclpy', 'psutil', 'numba'):
+        (tmp_path / f'{name}.py').write_text('raise ImportError("broken on purpose")\n')
+    ended = _auv(tmp_path, 'doctor', '--json')
+    assert ended.returncode == 1, ended.stderr
+    document = json.loads(ended.stdout)
+    broken = ' '.join(f['found'] for f in document['findings'] if f['verdict'] == 'broken')
+    assert all(f'{name} does not load' in broken for name in ('numpy', 'yaml', 'rclpy'))
+    assert len(ended.stderr.splitlines()) == 1
+    refused = _auv(tmp_path, 'simulate', 'case1')
+    assert refused.returncode == 1
+    assert refused.stderr.splitlines() == ['broken on purpose: see auv doctor']
+
+
+def _auv(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, '-m', 'auv_analysis.cli', *arguments]
+    environ = {**os.environ, 'PYTHONPATH': str(folder)}
+    return subprocess.run(
+        command, cwd=folder, env=environ, capture_output=True, text=True, check=False
+    )

@@ -1,0 +1,23 @@
+"""`auv doctor` on real participants: discovery on the loopback, and who is in the domain."""
+
+import pytest
+from harness import Peer, fresh_domain
+
+from auv_analysis.doctor import graph_checks
+
+
+def test_two_participants_find_each_other() -> None:
+    (finding,) = graph_checks.discovery()
+    assert (finding.check, finding.verdict) == ('discovery', 'ok'), finding
+
+
+def test_a_foreign_node_in_the_domain_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    domain = fresh_domain()
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+    peer = Peer(domain)
+    try:
+        (finding,) = graph_checks.neighbours()
+    finally:
+        peer.close()
+    assert finding.verdict == 'warning'
+    assert f'domain {domain} is in use by /test_peer' in finding.found

@@ -20,6 +20,7 @@ from auv_analysis.closed_loop import (
     Workspace,
 )
 from auv_analysis.kernels import Kernel, kernels
+from auv_analysis.progress import each
 from auv_analysis.reduction import Figures
 from auv_analysis.trees import kept, mapped
 from auv_dynamics.actuators import memory
@@ -87,13 +88,13 @@ def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) 
     job = _job(batch, kernel_of(batch))
     parts = _parts(len(job.record.outside), job.lanes, threads, own=batch.shared is None)
     if executor is None and (threads == 1 or len(parts) == 1):
-        for part in parts:
+        for part in each(parts, len(parts)):
             _run_part(job, part)
     elif executor is not None:
         list(executor.map(partial(_run_part, job), parts))
     else:
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(partial(_run_part, job), parts))
+            list(each(pool.map(partial(_run_part, job), parts), len(parts)))
     return mapped(lambda blocks: unpacked(blocks, len(batch)), job.record)
 
 

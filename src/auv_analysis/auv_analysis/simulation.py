@@ -14,6 +14,7 @@ from auv_analysis.closed_loop import (
     run_continuous,
     run_held,
 )
+from auv_analysis.progress import each
 from auv_analysis.records import Log
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario
@@ -139,7 +140,7 @@ def _run_kernel(
     function = kernel(run_continuous if hold == 'continuous' else run_held)
     motion, work = at_start(scenario, loop)
     nu_d_dot = np.empty((scenario.steps + 1, 6))
-    for grid, known in blocks(scenario):
+    for grid, known in each(blocks(scenario), scenario.steps // BLOCK + 1):
         nu_d_dot[grid.first : grid.first + len(grid.t)] = known.reference[:, 0, 6:]
         with np.errstate(all='ignore'), user_law(gains):
             function(loop, known, grid, tableau, motion, work, log)

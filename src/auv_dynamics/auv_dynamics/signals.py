@@ -8,6 +8,8 @@ import numpy as np
 
 from auv_dynamics.dofs import DOFS
 
+__all__ = ['DOFS', 'Harmonics', 'harmonic_columns', 'harmonic_spec']
+
 
 @dataclass(frozen=True)
 class Harmonics:

@@ -12,6 +12,7 @@ from pyarrow import parquet
 from auv_analysis.atlas.couplings import Couplings, couplings_of
 from auv_analysis.atlas.reached import reached
 from auv_analysis.comparison.opening import numbered
+from auv_analysis.progress import each
 from auv_dynamics.signals import DOFS
 from auv_dynamics.vehicle_file import load_vehicle
 
@@ -51,7 +52,8 @@ def charts(vehicles: Iterable[str]) -> list[Chart]:
     loaded = [load_vehicle(vehicle) for vehicle in vehicles]
     names = numbered([vehicle.name for vehicle in loaded])
     known = [couplings_of(*pair) for pair in zip(loaded, names, strict=True)]
-    found = [Chart(c, reached(v)) for c, v in zip(known, vehicles, strict=True)]
+    pairs = each(zip(known, vehicles, strict=True), len(vehicles))
+    found = [Chart(couplings, reached(vehicle)) for couplings, vehicle in pairs]
     return sorted(found, key=lambda chart: (-chart.couplings.strength, chart.name))
 
 

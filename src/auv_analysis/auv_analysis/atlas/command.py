@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.atlas.collect import charts, write_atlas
-from auv_analysis.commands.conclude import console
 from auv_analysis.console import say
 from auv_analysis.folder import check_free, prepare
+from auv_analysis.progress import waiting
 from auv_dynamics.config import shipped, shipped_names
 from auv_dynamics.files import InputError
 
@@ -23,7 +23,7 @@ def atlas(options: argparse.Namespace) -> dict[str, Any]:
     vehicles = [*known, *(vehicle for vehicle in given if vehicle not in known)]
     out = options.out or FOLDER
     check_free(out, overwrite=options.overwrite)
-    with console.status(f'case 1 on {len(vehicles)} vehicles'):
+    with waiting(f'case 1 on {len(vehicles)} vehicles'):
         found = charts(vehicles)
     files = [shipped('vehicles', vehicle) for vehicle in vehicles]
     prepare(out, overwrite=options.overwrite, inputs=files)
@@ -31,7 +31,7 @@ def atlas(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.atlas.figures import draw  # with matplotlib, which loads slowly
     from auv_analysis.atlas.report import findings, write_report
 
-    with console.status('drawing figures, writing the report'):
+    with waiting('drawing figures, writing the report'):
         report = write_report(out, found, draw(found, out / 'figures'))
     for sentence in findings(found):
         say(sentence.text)

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.commands.conclude import conclude, console
+from auv_analysis.commands.conclude import conclude
 from auv_analysis.comparison.opening import named, open_source
 from auv_analysis.comparison.sources import Source, is_sweep, sources_of
 from auv_analysis.folder import check_free, prepare
 from auv_analysis.foreign.mapping import OPTIONS, TopicMap, read_mapping
+from auv_analysis.progress import waiting
 from auv_dynamics.files import InputError
 from auv_gvc_controller.laws import law_class, refusal
 
@@ -58,7 +59,7 @@ def _mapping(options: argparse.Namespace) -> TopicMap | None:
 def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
     opened = []
     for source in sources:
-        with console.status(f'reading {source.path}'):
+        with waiting(f'reading {source.path}'):
             opened.append(open_source(source, options.vehicle))
     pairs = [(source, entry.run) for source, entry in zip(sources, opened, strict=True)]
     names = named(pairs, join='_')
@@ -72,7 +73,8 @@ def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, An
 def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.comparison.compare import conclude_comparison, entries_of
 
-    entries = entries_of(sources, options.vehicle)
+    with waiting(f'reading {len(sources)} runs'):
+        entries = entries_of(sources, options.vehicle)
     out = _prepared([entry.scenario for entry in entries], sources, options)
     return conclude_comparison(out, entries, report=not options.no_report)
 

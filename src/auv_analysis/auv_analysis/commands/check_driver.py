@@ -5,10 +5,7 @@ import time
 from contextlib import ExitStack
 from typing import Any
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
 from auv_analysis.commands.actuating import actuate, refusal
-from auv_analysis.commands.conclude import console
 from auv_analysis.commands.graphs import (
     checked_namespace,
     checked_topic,
@@ -26,6 +23,7 @@ from auv_analysis.driver_check.settings import Settings
 from auv_analysis.driver_check.terminal import findings_table
 from auv_analysis.failure import FailedError
 from auv_analysis.folder import check_free, prepare
+from auv_analysis.progress import bar, waiting
 from auv_dynamics import interface, load_vehicle
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError
@@ -106,12 +104,11 @@ def _listen(ear: Any, seconds: float) -> int:
     began, first = time.time_ns(), time.monotonic()
     if not len(ear.tape) and not ear.publishes():
         return began
-    columns = TextColumn('{task.description}'), BarColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task('listens', total=seconds)
+    with bar() as shown:
+        task = shown.add_task('listens', total=seconds)
         while (spent := time.monotonic() - first) < seconds:
             text = f'{len(ear.tape)} messages'
-            progress.update(task, completed=spent, description=text)
+            shown.update(task, completed=spent, description=text)
             ear.listen(min(LOOK, seconds - spent))
     return began
 
@@ -125,7 +122,7 @@ def _conclude(options: argparse.Namespace, result: Result) -> dict[str, Any]:
 
         inputs = [shipped('vehicles', options.vehicle)] if options.vehicle else []
         prepare(options.out, overwrite=options.overwrite, inputs=inputs)
-        with console.status('drawing figures, writing the report'):
+        with waiting('drawing figures, writing the report'):
             report = write_results(options.out, result, document)
         say(f'report: {report}')
     failure = failure_of(result.findings)

@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from argcomplete import shellcode
+from argcomplete.shell_integration import shellcode
 
 
 def completion(options: argparse.Namespace) -> dict[str, Any]:

@@ -6,14 +6,13 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from auv_analysis.commands.terminal import comparison_table, summary_tables
-from auv_analysis.console import TextConsole, say
+from auv_analysis.console import say
 from auv_analysis.folder import write_json
+from auv_analysis.progress import console, waiting
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
 from auv_analysis.summary import Window, summarize
 from auv_dynamics.files import first_line
-
-console = TextConsole(stderr=True)
 
 
 class Study(Protocol):
@@ -81,7 +80,7 @@ def conclude(
 
     """
     windows = study.windows if study else ()
-    with console.status('computing the figures of summary.json'):
+    with waiting('computing the figures of summary.json'):
         summaries = {name: summarize(run, windows=windows) for name, run in runs.items()}
     write_json(out / 'summary.json', summaries)
     page = _report(out, runs, summaries, scenario_text, vehicle_text, study) if report else None
@@ -114,7 +113,7 @@ def _report(
         behind = more.get('more', {})
         more['more'] = {**behind, 'tracking': [section, *behind.get('tracking', ())]}
         more['sentences'] = [*sentences, *more.get('sentences', ())]
-    with console.status('drawing figures, writing the report'):
+    with waiting('drawing figures, writing the report'):
         return write_report(out, runs, summaries, scenario_text, vehicle_text, **more)
 
 

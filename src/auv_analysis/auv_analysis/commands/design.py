@@ -5,9 +5,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-from rich.progress import BarColumn, Progress, TextColumn
-
-from auv_analysis.commands.conclude import console
 from auv_analysis.console import say
 from auv_analysis.design.couplings import coupling_named, present
 from auv_analysis.design.parameters import NAMES
@@ -16,6 +13,7 @@ from auv_analysis.design.proposal import Proposal, propose
 from auv_analysis.design.result import concluded
 from auv_analysis.design.setting import Setting, open_setting
 from auv_analysis.folder import prepare
+from auv_analysis.progress import bar, count, waiting
 from auv_analysis.scaling import UNFIT
 from auv_analysis.warm_up import announce
 from auv_dynamics.files import InputError
@@ -40,11 +38,11 @@ def design(options: argparse.Namespace) -> dict[str, Any]:
         say(f'warning: {warning}')
     announce(setting.scenario, [setting.controller])
     found = _found(setting, options.reduce)
-    with console.status('simulating the vehicle before and after'):
+    with waiting('simulating the vehicle before and after'):
         result = concluded(found, out)
     from auv_analysis.design.report import write_design_report  # with matplotlib, which is slow
 
-    with console.status('drawing figures, writing the report'):
+    with waiting('drawing figures, writing the report'):
         report = write_design_report(result, out)
     if not options.json:
         print_design(result.document)
@@ -53,14 +51,11 @@ def design(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _found(setting: Setting, reduce: str | None) -> Proposal:
-    columns = (
-        TextColumn('{task.description}'),
-        BarColumn(bar_width=40),
-        TextColumn('{task.completed:.0f}/{task.total:.0f} couplings'),
-    )
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task('searching', total=1)
-        return propose(setting, reduce, lambda done, of: bar.update(task, completed=done, total=of))
+    with bar(count('couplings')) as shown:
+        task = shown.add_task('searching', total=1)
+        return propose(
+            setting, reduce, lambda done, of: shown.update(task, completed=done, total=of)
+        )
 
 
 def _bound(text: str) -> tuple[str, float, float]:

@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
 from auv_analysis.bag.attached import UNKNOWN
-from auv_analysis.commands.conclude import console
 from auv_analysis.console import say
 from auv_analysis.folder import check_free, prepare, write_json
+from auv_analysis.progress import bar, console, count, waiting
 from auv_analysis.replay.compared import Compared, compared, figures_of, listed
 from auv_analysis.replay.open_loop import OpenLoop, RecordedLoop, open_loop, recorded_loop
 from auv_analysis.report.text import number
@@ -28,7 +27,7 @@ def answered(options: argparse.Namespace) -> dict[str, Any]:
     if options.out:
         check_free(options.out, overwrite=options.overwrite)
     _ask_for(options.law)
-    with console.status(f'reading {options.bag}'):
+    with waiting(f'reading {options.bag}'):
         recorded = recorded_loop(options.bag, options.vehicle)
     own = recorded.controller
     gains = own.gains_of(options.law, _gains(options.gain))
@@ -67,10 +66,9 @@ def _ask_for(law: str) -> None:
 
 
 def _answers(recorded: RecordedLoop, law: str, gains: dict[str, Any]) -> OpenLoop:
-    columns = (TextColumn(f'{law:<16}'), BarColumn(), TextColumn('{task.completed}/{task.total}'))
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(law, total=recorded.samples)
-        return open_loop(recorded, law, gains, lambda done: bar.update(task, completed=done))
+    with bar(count('samples')) as shown:
+        task = shown.add_task(law, total=recorded.samples)
+        return open_loop(recorded, law, gains, lambda done: shown.update(task, completed=done))
 
 
 def _gains(listed_options: list[str]) -> dict[str, Any]:
@@ -113,7 +111,7 @@ def _conclude(document: dict[str, Any], both: Compared, out: Path) -> None:
 
     law, wrench = document['answered']['law'], document['wrench']
     names = f'recorded ({document["recorded"]["law"] or "unknown law"})', f'{law}, open loop'
-    with console.status('drawing the figure'):
+    with waiting('drawing the figure'):
         figure = draw(both, names, out / 'figures')
     table = Table(box=None, header_style='bold')
     table.add_column('')

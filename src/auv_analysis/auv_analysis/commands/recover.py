@@ -3,11 +3,11 @@
 import argparse
 from typing import Any
 
-from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn
+from rich.progress import DownloadColumn
 from rich.table import Table
 
-from auv_analysis.commands.conclude import console
 from auv_analysis.console import TextConsole
+from auv_analysis.progress import bar
 from auv_analysis.recovery.bag import recover as recover_bag
 
 SHOWN = 5  # damages of a file, and gaps of a topic, that are listed
@@ -15,13 +15,11 @@ SHOWN = 5  # damages of a file, and gaps of a topic, that are listed
 
 def recover(options: argparse.Namespace) -> dict[str, Any]:
     """Repair a bag in place."""
-    columns = TextColumn('{task.description:<28}'), BarColumn(bar_width=40), DownloadColumn()
-    quiet = not console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=quiet) as bar:
-        task = bar.add_task('')
+    with bar(DownloadColumn()) as shown:
+        task = shown.add_task('')
 
         def show(what: str, done: int, of: int) -> None:
-            bar.update(task, description=what, completed=done, total=of)
+            shown.update(task, description=what, completed=done, total=of)
 
         document = recover_bag(options.bag, show).document()
     if not options.json:

@@ -6,13 +6,13 @@ import time
 from contextlib import ExitStack
 from typing import Any
 
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import TextColumn
 
-from auv_analysis.commands.conclude import console
 from auv_analysis.commands.graphs import join_domain, not_negative, place_of, positive
 from auv_analysis.console import say
 from auv_analysis.domain import joined_domain
 from auv_analysis.failure import FailedError
+from auv_analysis.progress import bar, waiting
 from auv_analysis.watch.keyboard import Keyboard
 from auv_dynamics.files import InputError
 from auv_dynamics.interface import NANOSECONDS
@@ -41,14 +41,14 @@ def replay(options: argparse.Namespace) -> dict[str, Any]:
         # the middleware reads its environment when it is loaded
         from auv_analysis.replay_node import Replay
 
-        with console.status(f'reading {options.bag}'):
+        with waiting(f'reading {options.bag}'):
             running = Replay(domain, parameters)
         stack.callback(running.close)
         say(f'plays on {place_of(domain)}')
         for remark in running.node.remarks():
             say(remark)
         began = time.monotonic()
-        _play(running, keyboard, quiet=not console.is_terminal)
+        _play(running, keyboard)
         document = _document(running.node, keyboard, time.monotonic() - began)
     return _concluded(document, running.node)
 
@@ -75,14 +75,14 @@ def _parameters(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def _play(running: Any, keyboard: Keyboard, *, quiet: bool) -> None:
+def _play(running: Any, keyboard: Keyboard) -> None:
     """Play until the end of the bag, or until somebody wants an end."""
     node = running.node
     player, p = node.player, node.settings
     if keyboard.there:
         say(KEYS)
-    with _progress(quiet) as bar:
-        task = bar.add_task('', total=(p.end - p.begin) / NANOSECONDS)
+    with bar(TextColumn('{task.completed:.2f} of {task.total:.2f} s')) as shown:
+        task = shown.add_task('', total=(p.end - p.begin) / NANOSECONDS)
         said = ''
         while node.exit_code is None and not keyboard.ended:
             running.spin(SERVED)
@@ -91,7 +91,7 @@ def _play(running: Any, keyboard: Keyboard, *, quiet: bool) -> None:
             if waits and waits != said:
                 say(f'waits: {waits}')
                 said = waits
-            bar.update(task, completed=done, description=_state(player, waits))
+            shown.update(task, completed=done, description=_state(player, waits))
             _obey(player, keyboard.wait(0.0))
 
 
@@ -111,16 +111,6 @@ def _obey(player: Any, keys: bytes) -> None:
     change = FACTOR ** (keys.count(UP) - keys.count(DOWN))
     if change != 1.0 and player.playback.rate:
         player.change_rate(player.playback.rate * change)
-
-
-def _progress(quiet: bool) -> Progress:
-    return Progress(
-        BarColumn(bar_width=30),
-        TextColumn('{task.completed:>8.2f} of {task.total:.2f} s'),
-        TextColumn('{task.description}'),
-        console=console,
-        disable=quiet,
-    )
 
 
 def _document(node: Any, keyboard: Keyboard, elapsed: float) -> dict[str, Any]:

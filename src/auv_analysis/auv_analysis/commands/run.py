@@ -6,22 +6,15 @@ import time
 from functools import partial
 from typing import Any
 
-from rich.progress import (
-    BarColumn,
-    Progress,
-    ProgressColumn,
-    Task,
-    TaskID,
-    TextColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import Progress, TaskID
 
 from auv_analysis.bag import open_bag
-from auv_analysis.commands.conclude import Outcome, console, finish
+from auv_analysis.commands.conclude import Outcome, finish
 from auv_analysis.commands.scenarios import open_scenario, prepare_out
 from auv_analysis.console import say
 from auv_analysis.domain import VARIABLE, chosen_domain
 from auv_analysis.experiment import environment, run_controller
+from auv_analysis.progress import Speed, bar, count, waiting
 from auv_analysis.scenario import Scenario
 from auv_analysis.supervisor import NodeDiedError
 from auv_analysis.warm_up import warm_up
@@ -48,13 +41,14 @@ def recorded(options: argparse.Namespace, scenario: Scenario, names: list[str]) 
         if not picked:
             _refuse_strangers(graph, domain)
         out = prepare_out(options, scenario, names)
-        warm_up(scenario, names)
+        with waiting('loading or compiling the kernel'):
+            warm_up(scenario, names)
         say(f'export {VARIABLE}={domain}')
         failure, done = None, []
         for name in names:
-            with _progress() as bar:
-                task = bar.add_task(f'{scenario.name} {name}', total=scenario.steps)
-                show = partial(_show_step, bar, task)
+            with bar(count('steps'), Speed('steps'), keep=True) as shown:
+                task = shown.add_task(f'{scenario.name} {name}', total=scenario.steps)
+                show = partial(_show_step, shown, task)
                 try:
                     run_controller(
                         scenario, name, out, domain, graph, show, composed=options.composed
@@ -83,25 +77,5 @@ def _refuse_strangers(graph: Any, domain: int) -> None:
         raise InputError(f'{VARIABLE}={domain}', '', expected, ', '.join(strangers))
 
 
-def _show_step(bar: Progress, task: TaskID, step: int) -> None:
-    bar.update(task, completed=step)
-
-
-class _Speed(ProgressColumn):
-    """Steps per second, of a run that has begun."""
-
-    def render(self, task: Task) -> str:
-        """Text of the column."""
-        speed = task.finished_speed or task.speed
-        return f'{speed:>6.0f} steps/s' if speed else ''
-
-
-def _progress() -> Progress:
-    return Progress(
-        TextColumn('{task.description:<16}'),
-        BarColumn(bar_width=40),
-        TextColumn('{task.completed:>6}/{task.total} steps'),
-        _Speed(),
-        TimeRemainingColumn(),
-        console=console,
-    )
+def _show_step(shown: Progress, task: TaskID, step: int) -> None:
+    shown.update(task, completed=step)

@@ -3,9 +3,10 @@
 import argparse
 from typing import Any
 
-from auv_analysis.commands.conclude import Outcome, console, finish
+from auv_analysis.commands.conclude import Outcome, finish
 from auv_analysis.commands.scenarios import open_scenario, prepare_out
 from auv_analysis.experiment import write_inputs
+from auv_analysis.progress import waiting
 from auv_analysis.run import AnyRun
 from auv_analysis.samples import ENDING, write_samples
 from auv_analysis.scenario import Scenario
@@ -30,7 +31,7 @@ def simulated(options: argparse.Namespace, scenario: Scenario, names: list[str])
     failure = None
     for name in names:
         try:
-            with console.status(f'{scenario.name} {name}: simulating'):
+            with waiting(f'{scenario.name} {name}: simulating'):
                 run = simulate_run(scenario, name, options.hold)
         except ArithmeticError as error:  # it diverges, or a user's own law fails
             failure = failure or error

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-from auv_analysis.commands.conclude import console, finish
+from auv_analysis.commands.conclude import finish
 from auv_analysis.commands.run import recorded
 from auv_analysis.commands.scenarios import open_scenario
 from auv_analysis.commands.simulate import simulated
 from auv_analysis.console import say
+from auv_analysis.progress import bar, waiting
 from auv_analysis.report.document import Section, Sentence
 from auv_analysis.report.paper import CASES
 from auv_analysis.run import AnyRun
@@ -88,7 +87,7 @@ class Procedure:
     ) -> dict[str, Any]:
         """Further arguments of `write_report`, and the Parquet files that they rest on."""
         for name, run in runs.items():
-            with console.status(f'writing {name}.parquet'):
+            with waiting(f'writing {name}.parquet'):
                 write_samples(run, self.out / f'{name}.parquet')
         found = self._sensitivities(list(runs))
         claims = self._claims(runs, found)
@@ -115,7 +114,7 @@ class Procedure:
             return {}
         found = {}
         for name in names:
-            with console.status(f'{self.scenario.name} {name}: varying the gains'):
+            with waiting(f'{self.scenario.name} {name}: varying the gains'):
                 found[name] = sensitivity(
                     self.scenario, name, method=options.sensitivity, count=options.samples,
                     span=options.span, seed=options.seed, hold=options.hold, threads=_threads(),
@@ -128,7 +127,7 @@ class Procedure:
         self, runs: Mapping[str, AnyRun], found: Mapping[str, Sensitivity]
     ) -> PaperClaims | None:
         """The 21 claims; None for a scenario that is none of the paper's."""
-        with console.status('judging the claims of the paper'):
+        with waiting('judging the claims of the paper'):
             claims = paper_claims(
                 self.scenario, runs, found, hold=self.options.hold, threads=_threads()
             )
@@ -139,20 +138,15 @@ class Procedure:
         return all(path == 'duration' for path, *_ in claims.departures)
 
     def _unknowns(self) -> tuple[Section, list[Sentence]]:
-        with _bar() as bar:
-            task = bar.add_task('what the paper leaves open', total=None)
+        with bar() as shown:
+            task = shown.add_task('what the paper leaves open', total=None)
             found = unknowns(
                 self.scenario,
                 seed=self.options.seed,
                 threads=_threads(),
-                progress=lambda done, total: bar.update(task, completed=done, total=total),
+                progress=lambda done, total: shown.update(task, completed=done, total=total),
             )
         return unknowns_section(self.out, found)
-
-
-def _bar() -> Progress:
-    columns = TextColumn('{task.description}'), BarColumn(bar_width=40), TimeRemainingColumn()
-    return Progress(*columns, console=console, transient=True)
 
 
 def _threads() -> int:

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import Progress
 from rich.table import Table
 
-from auv_analysis.commands.conclude import console
 from auv_analysis.console import say
 from auv_analysis.folder import prepare, write_json
+from auv_analysis.progress import bar, console, count, waiting
 from auv_analysis.report.text import number
 from auv_analysis.scenario import Scenario, load_scenario
 from auv_analysis.simulation import check_hold
@@ -40,8 +40,8 @@ def tune(options: argparse.Namespace) -> dict[str, Any]:
     for warning in scenario.warnings:
         say(f'warning: {warning}')
     announce(scenario, [request.reference])
-    with _progress() as bar:
-        outcome = work(request, draws, out, _stages(bar))
+    with bar(count(), keep=True) as shown:
+        outcome = work(request, draws, out, _stages(shown))
     return _conclude(outcome, out)
 
 
@@ -81,17 +81,10 @@ def _samples(samples: int) -> int:
     return samples
 
 
-def _progress() -> Progress:
-    return Progress(
-        TextColumn('{task.description}'), BarColumn(bar_width=30),
-        TextColumn('{task.completed}/{task.total}'), TimeElapsedColumn(), console=console,
-    )  # fmt: skip
-
-
-def _stages(bar: Progress) -> Callable[[str, int], Callable[[], None]]:
+def _stages(shown: Progress) -> Callable[[str, int], Callable[[], None]]:
     def stage(text: str, parts: int) -> Callable[[], None]:
-        task = bar.add_task(text, total=parts)
-        return lambda: bar.advance(task)
+        task = shown.add_task(text, total=parts)
+        return lambda: shown.advance(task)
 
     return stage
 
@@ -108,7 +101,7 @@ def _conclude(outcome: Outcome, out: Path) -> dict[str, Any]:
     from auv_analysis.tuning.pictures import pictures  # with matplotlib, which loads slowly
     from auv_analysis.tuning.report import write_report
 
-    with console.status('drawing figures, writing the report'):
+    with waiting('drawing figures, writing the report'):
         figures = pictures(outcome, out / 'figures')
         listing = (out / 'scenario.yaml').read_text(encoding='utf-8')
         listings = [('scenario.yaml', listing)]

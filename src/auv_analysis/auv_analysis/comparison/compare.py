@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pyarrow as pa
-from rich.progress import track
 
-from auv_analysis.commands.conclude import console, say_where, show
+from auv_analysis.commands.conclude import say_where, show
 from auv_analysis.comparison.entries import Entry, comparison_table, write_table
 from auv_analysis.comparison.opening import named, open_source
 from auv_analysis.comparison.ranking import Ranking, rank
@@ -15,6 +14,7 @@ from auv_analysis.comparison.sources import Source
 from auv_analysis.console import say
 from auv_analysis.failure import FailedError
 from auv_analysis.folder import write_json
+from auv_analysis.progress import each, waiting
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.summary import summarize
 from auv_dynamics.files import first_line
@@ -58,7 +58,7 @@ def entries_of(sources: Sequence[Source], vehicle: str | None = None) -> list[En
     from auv_analysis.report.sketching import sketch  # with matplotlib, which loads slowly
 
     found = []
-    for source in track(sources, 'reading runs', console=console, transient=True):
+    for source in each(sources, len(sources)):
         try:
             run = open_source(source, vehicle).run
         except ArithmeticError as error:  # it diverges, or a user's own law fails
@@ -128,6 +128,6 @@ def _report(out: Path, entries: Sequence[Entry], table: pa.Table, ranking: Ranki
     from auv_analysis.comparison.figures import draw
     from auv_analysis.comparison.report import write_comparison
 
-    with console.status('drawing figures, writing the report'):
+    with waiting('drawing figures, writing the report'):
         figures = draw(entries, table, ranking, out / 'figures')
         return write_comparison(out, entries, table, ranking, figures)

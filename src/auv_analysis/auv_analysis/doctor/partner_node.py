@@ -4,7 +4,6 @@ import json
 import sys
 import time
 
-import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 
@@ -40,4 +39,3 @@ def main() -> None:
 
 if __name__ == '__main__':
     main()
-    rclpy.try_shutdown()

@@ -6,7 +6,6 @@ from typing import Any
 
 from rich.table import Table
 
-from auv_analysis.commands.conclude import console
 from auv_analysis.console import say
 from auv_analysis.exploration.files import write_results
 from auv_analysis.exploration.opening import open_sweep
@@ -14,6 +13,7 @@ from auv_analysis.exploration.results import BEST_BY, Results, analysed
 from auv_analysis.failure import FailedError
 from auv_analysis.folder import check_free, prepare
 from auv_analysis.measures import BY_NAME
+from auv_analysis.progress import console, waiting
 from auv_analysis.report.text import number
 from auv_dynamics.files import InputError
 from auv_dynamics.nearest import one_of
@@ -44,14 +44,14 @@ def explore(folder: Path, options: argparse.Namespace) -> dict[str, Any]:
     check_free(out, overwrite=options.overwrite)
     if not (sweep.status == 0).any():
         raise FailedError(f'{folder}: none of {sweep.rows} rows has figures')
-    with console.status(f'{sweep.rows} rows') as status:
-        results = analysed(sweep, by, lambda what: status.update(f'{sweep.rows} rows: {what}'))
+    with waiting(f'{sweep.rows} rows'):
+        results = analysed(sweep, by)
     prepare(out, overwrite=options.overwrite, inputs=[folder / 'sweep.json', *sweep.parts])
     document = write_results(results, out)
     from auv_analysis.exploration.figures import draw  # with matplotlib, which loads slowly
     from auv_analysis.exploration.report import write_report
 
-    with console.status('drawing figures, writing the report'):
+    with waiting('drawing figures, writing the report'):
         report = write_report(out, results, draw(results, out / 'figures'))
     _show(results)
     say(f'report: {report}')

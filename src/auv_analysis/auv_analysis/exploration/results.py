@@ -1,6 +1,6 @@
 """All that is computed of a sweep, and the files that hold it."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +14,7 @@ from auv_analysis.exploration.paired import paired
 from auv_analysis.exploration.quantiles import distribution, figures_spread, varying
 from auv_analysis.exploration.varied import Varied, varied_paths
 from auv_analysis.measures import BY_NAME, MEASURES, Measure
+from auv_analysis.progress import each
 from auv_analysis.report.text import join
 from auv_analysis.sweep.groups import kind_of
 
@@ -90,33 +91,26 @@ class Results:
         return sorted(differing, key=lambda v: -float(np.mean(shares.get(v.path, 0.0))))
 
 
-def analysed(
-    sweep: Sweep, by: str = BEST_BY, progress: Callable[[str], None] = lambda _: None
-) -> Results:
+def analysed(sweep: Sweep, by: str = BEST_BY) -> Results:
     """Everything that is reported of a sweep.
 
     Parameters
     ----------
     sweep : of `open_sweep`
     by : measure that sorts the best rows
-    progress : told what is computed next
 
     """
-    progress('varied values')
     results = Results(sweep, varied_paths(sweep), {name: [] for name in TABLES})
     groups, notes = designed(sweep)
     results.notes = [*notes, *_tied(sweep)]
-    for measure in MEASURES:
-        progress(measure.label)
+    for measure in each(MEASURES, len(MEASURES)):
         _one_measure(results, measure, groups)
     results.pair = results.most_influential()[:2]
-    progress('pairs of paths')
     _pairs(results)
     _failures(results)
     chosen = BY_NAME[by]
     found = best.smallest(sweep, results.values[by], chosen)
     results.tables['best'] = best.with_values(sweep, found, results.values)
-    progress('quantiles of every figure')
     results.tables['quantiles'] = list(figures_spread(sweep))
     return results
 

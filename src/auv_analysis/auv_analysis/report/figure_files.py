@@ -6,6 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from auv_analysis.progress import each
 from auv_analysis.report import plotting
 
 Drawn = tuple[Figure | None, str, str]  # with title and caption
@@ -47,4 +48,6 @@ def save_figures(folder: Path, drawn: Mapping[str, Callable[[], Drawn]]) -> dict
     """
     folder.mkdir(parents=True, exist_ok=True)
     with plotting.style():
-        return {name: saved(folder, name, *make()) for name, make in drawn.items()}
+        return {
+            name: saved(folder, name, *make()) for name, make in each(drawn.items(), len(drawn))
+        }

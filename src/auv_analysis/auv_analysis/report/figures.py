@@ -1,7 +1,8 @@
 """The figures of a study: what the paper draws, and what makes the comparison readable."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from auv_analysis.lyapunov import OF_THE_MOTION
 from auv_analysis.report import overview, plotting
 from auv_analysis.report.applied import applied_figure
 from auv_analysis.report.certificates import certificate_figure, is_drawn
-from auv_analysis.report.figure_files import Drawn, FigureRecord, saved
+from auv_analysis.report.figure_files import Drawn, FigureRecord, save_figures
 from auv_analysis.report.panels import different_disturbances
 from auv_analysis.report.paper import paper_figure
 from auv_analysis.report.plotting import Quantity
@@ -59,36 +60,31 @@ def draw_figures(
 
     """
     drawn = {name: replace(run, controller=name) for name, run in sketches(runs).items()}
-    figures: list[FigureRecord] = []
-
-    def add(name: str, figure: Figure | None, title: str, caption: str) -> None:
-        figures.append(saved(folder, name, figure, title, caption))
-
-    with plotting.style():
-        for run in drawn.values():
-            add(f'errors_{run.controller}', *_errors(run))
-        add('settling', *overview.settling(drawn))
-        for run in drawn.values():
-            if run.knows_disturbance:
-                add(f'lumped_error_{run.controller}', *_lumped(run))
-        for name, run in drawn.items():
-            if 'unexplained' in run.columns:
-                add(f'unexplained_{name}', *unexplained_figure(run))
-        for run in different_disturbances(drawn).values():
-            add(f'uncertainty_{run.controller}', *_uncertainty(run))
-        for name, run in drawn.items():
-            add(f'inputs_{name}', *_inputs(run, (limits or {}).get(name)))
-        if len(drawn) > 1:
-            add('inputs_compared', *overview.inputs(drawn))
-        for name, run in drawn.items():
-            if summaries is not None and is_drawn(summaries[name]):
-                add(f'certificate_{name}', *certificate_figure(run, summaries[name]))
-        leading = reference(drawn)
-        add('kinetic_energy', *overview.energy(drawn, leading))
-        add('energy_shares', *overview.energy_shares(drawn))
-        add('delta_xi', *_deformation('delta_xi', leading))
-        add('delta_pi', *_deformation('delta_pi', leading))
-    return figures
+    made: dict[str, Callable[[], Drawn]] = {}
+    for run in drawn.values():
+        made[f'errors_{run.controller}'] = partial(_errors, run)
+    made['settling'] = partial(overview.settling, drawn)
+    for run in drawn.values():
+        if run.knows_disturbance:
+            made[f'lumped_error_{run.controller}'] = partial(_lumped, run)
+    for name, run in drawn.items():
+        if 'unexplained' in run.columns:
+            made[f'unexplained_{name}'] = partial(unexplained_figure, run)
+    for run in different_disturbances(drawn).values():
+        made[f'uncertainty_{run.controller}'] = partial(_uncertainty, run)
+    for name, run in drawn.items():
+        made[f'inputs_{name}'] = partial(_inputs, run, (limits or {}).get(name))
+    if len(drawn) > 1:
+        made['inputs_compared'] = partial(overview.inputs, drawn)
+    for name, run in drawn.items():
+        if summaries is not None and is_drawn(summaries[name]):
+            made[f'certificate_{name}'] = partial(certificate_figure, run, summaries[name])
+    leading = reference(drawn)
+    made['kinetic_energy'] = partial(overview.energy, drawn, leading)
+    made['energy_shares'] = partial(overview.energy_shares, drawn)
+    for kind in SYMBOLS:
+        made[kind] = partial(_deformation, kind, leading)
+    return list(save_figures(folder, made).values())
 
 
 def reference(runs: Mapping[str, Sketch]) -> Sketch:

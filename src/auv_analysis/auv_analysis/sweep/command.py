@@ -7,11 +7,11 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from auv_analysis.console import TextConsole, say
+from auv_analysis.console import say
 from auv_analysis.failure import FailedError
+from auv_analysis.progress import Speed, bar, console, count
 from auv_analysis.sweep.campaign import Campaign, load_campaign
 from auv_analysis.sweep.engine import REFUSED, Outcome, SweepStoppedError
 from auv_analysis.sweep.engine import sweep as run_sweep
@@ -21,7 +21,6 @@ from auv_analysis.warm_up import announce
 from auv_dynamics.files import InputError
 
 STATUSES = ('ok', 'diverged', REFUSED)
-console = TextConsole(stderr=True)
 
 
 def sweep(options: argparse.Namespace) -> dict[str, Any]:
@@ -66,10 +65,14 @@ def _run(
     overwrite: bool,
 ) -> Outcome:
     try:
-        with _progress() as bar:
-            task = bar.add_task(campaign.name, total=campaign.rollouts)
+        with bar(count('rollouts'), Speed('rollouts'), keep=True) as shown:
+            task = shown.add_task(campaign.name, total=campaign.rollouts)
             return run_sweep(
-                campaign, folder, executor, in_flight, lambda done: bar.update(task, completed=done)
+                campaign,
+                folder,
+                executor,
+                in_flight,
+                lambda done: shown.update(task, completed=done),
             )
     except SweepStoppedError as stopped:
         stored = folder.stored(campaign.rollouts)  # the interrupt may come when one is just stored
@@ -80,26 +83,6 @@ def _run(
     except KeyboardInterrupt:  # the second one: running blocks are not waited for
         say(f'{folder.out}: interrupted; the same command goes on from there')
         os._exit(1)
-
-
-class _Speed(ProgressColumn):
-    """Rollouts per second."""
-
-    def render(self, task: Task) -> str:
-        """Text of the column."""
-        speed = task.finished_speed or task.speed
-        return f'{speed:>6.0f} rollouts/s' if speed else ''
-
-
-def _progress() -> Progress:
-    return Progress(
-        TextColumn('{task.description}'),
-        BarColumn(bar_width=40),
-        TextColumn('{task.completed}/{task.total} rollouts'),
-        _Speed(),
-        TimeRemainingColumn(),
-        console=console,
-    )
 
 
 def _conclude(campaign: Campaign, folder: SweepFolder, outcome: Outcome) -> dict[str, Any]:

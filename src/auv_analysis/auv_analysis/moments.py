@@ -58,13 +58,9 @@ def signals(
     """The signals of `NAMES`, six numbers each: m/s, rad/s; N, N m; J."""
     xi, N = upper(maps.Upsilon_inv, nu), maps.N
     energy = (
-        component(N[0], xi[0]),
-        component(N[1], xi[1]),
-        component(N[2], xi[2]),
-        component(N[3], xi[3]),
-        component(N[4], xi[4]),
-        component(N[5], xi[5]),
-    )
+        component(N[0], xi[0]), component(N[1], xi[1]), component(N[2], xi[2]),
+        component(N[3], xi[3]), component(N[4], xi[4]), component(N[5], xi[5]),
+    )  # fmt: skip
     return (
         sub(nu_d, nu),
         sub(f, F),

@@ -79,6 +79,7 @@ def test_a_law_runs_as_compiled_as_can_be(scenario, name, before, how):
     assert_array_equal(alone['effort.rms.yaw'], columns['effort.rms.yaw'][3:4])
 
 
+@pytest.mark.long
 def test_a_law_that_fails_is_named(scenario):
     with pytest.raises(ArithmeticError, match="the law PI failed: KeyError: 'lost'"):
         rollouts(scenario('own_failing', FAILS), 'own', {})

@@ -83,6 +83,7 @@ def test_it_does_not_outlive_auv(tmp_path: Path) -> None:
     assert 'not finished' not in ' '.join(load_run(out / 'gvc').notes)
 
 
+@pytest.mark.long
 def test_its_death_ends_the_run_and_loses_nothing_that_was_written(tmp_path: Path) -> None:
     out = tmp_path / 'out'
     process = start(write(tmp_path, duration=600.0), out, '--composed')
@@ -102,7 +103,7 @@ def test_a_node_that_ends_is_named_and_everything_said_before_is_in_the_bag(
     ideal = {k: v for k, v in yaml.safe_load(SCENARIO).items() if k not in ('actuators', 'sensors')}
     path = tmp_path / 's.yaml'
     path.write_text(yaml.safe_dump({**ideal, 'controllers': unstable}))
-    ended = auv('run', str(path), '--out', str(tmp_path / 'out'), '--composed')
+    ended = auv('run', str(path), '--out', str(tmp_path / 'out'), '--composed', '--no-report')
     assert ended.returncode == 1
     assert f'{ALONE} ended with exit code 1' in ended.stderr
     assert 'plant_node ended with exit code 1' in ended.stderr

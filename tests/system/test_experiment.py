@@ -155,7 +155,9 @@ def test_a_run_can_be_repeated_from_what_it_left(done: Path, tmp_path: Path) -> 
     assert np.array_equal(again.nu, first.nu)
 
 
-@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    'how', [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGKILL]
+)
 def test_ending_auv_ends_its_nodes(tmp_path: Path, how: int) -> None:
     out = tmp_path / 'out'
     process = start(write(tmp_path / 's.yaml', duration=600.0), out)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from graph_runs import every_message, record
+from graph_runs import every_message, recorded
 from harness import (
     PATIENCE,
     Peer,
@@ -53,10 +53,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run that was recorded in lock-step, with saturation."""
     folder = tmp_path_factory.mktemp('played')
     (folder / 'played.yaml').write_text(yaml.safe_dump(SCENARIO))
-    process = record(folder / 'played.yaml', folder / 'out')
-    _, errors = process.communicate(timeout=120)
-    assert process.returncode == 0, errors
-    return folder / 'out' / 'gvc'
+    return recorded(folder / 'played.yaml', folder / 'out') / 'gvc'
 
 
 def start_replay(domain: int, *options: str, **streams: Any) -> subprocess.Popen:

@@ -152,6 +152,7 @@ def test_scenario_without_gvc_needs_a_reference(command: Callable, tmp_path: Pat
     assert [n for n, e in json.loads(out)['controllers'].items() if e['tuned']] == ['cl_tuned']
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures('unrendered')
 def test_effort_out_of_reach_is_said_plainly(command: Callable, tmp_path: Path) -> None:
     weak = {'law': 'pid', 'k_P': 1e-3, 'k_I': 1e-3, 'k_D': 1e-3, 'k_FF': 0.0}

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from auv_analysis.command_parser import Parser
 from auv_analysis.foreign.options import add_options as add_foreign
+from auv_analysis.linearization.options import add_options as add_linearize
 from auv_analysis.replay.options import add_options as add_replay
 
 SCENARIO = 'a scenario file, or the bare name of a shipped one'
@@ -232,6 +233,9 @@ GROUPS = {
             'inertia, couplings and limits of a vehicle', _check_vehicle, False
         ),
         'design': Command('which change of a vehicle removes which coupling, simulated', _design),
+        'linearize': Command(
+            'poles and matrices of a vehicle or of its closed loops', add_linearize
+        ),
         'atlas': Command('couplings by inertia of the shipped vehicles, side by side', _atlas),
         'tune': Command('laws tuned to equal effort or error, and compared over draws', _tune),
         'sweep': Command('many rollouts of a scenario, with values that vary, to Parquet', _sweep),

@@ -54,10 +54,16 @@ def laws(**_: Any) -> tuple[str, ...]:
     return LAWS
 
 
+def subjects(prefix: str = '', **options: Any) -> list[str]:
+    """Shipped scenarios and vehicles, and the files of the user."""
+    return [*shipped_names('scenarios'), *_Names('vehicles')(prefix, **options)]
+
+
 COMPLETERS: dict[str, Callable[..., Iterable[str]]] = {
     'scenario': _Names('scenarios'),
     'vehicle': _Names('vehicles'),
     'vehicles': _Names('vehicles'),
+    'subject': subjects,
     'campaign': _Names('campaigns'),
     'results': _Names('scenarios', FilesCompleter()),
     'controller': controllers,

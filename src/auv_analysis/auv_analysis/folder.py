@@ -20,7 +20,7 @@ OURS = (
     'indices.parquet', 'best.parquet', 'design.json', 'summary_before.json',
     'vehicle_before.yaml',
     'tune.json', 'search.parquet', 'monte_carlo.parquet', 'open_loop.json', 'check.json',
-    'samples.parquet', 'wrenches.parquet', 'faults.parquet',
+    'samples.parquet', 'wrenches.parquet', 'faults.parquet', 'linearization.json',
 )  # fmt: skip
 OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
 OF_A_BAG = re.compile(r'.*\.mcap(\.damaged(\.\d+)?)?')
@@ -67,6 +67,18 @@ def check_free(out: Path, *, overwrite: bool) -> bool:
     if taken and not overwrite:
         raise InputError(out, '--out', 'a new folder, or --overwrite', 'an existing folder')
     return taken
+
+
+def write_text(path: Path, text: str, *, overwrite: bool) -> None:
+    """Write a file that was asked for; InputError where it exists or cannot be written."""
+    try:
+        if path.exists() and not overwrite:
+            raise InputError(path, '--out', 'a new file, or --overwrite', 'an existing file')
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding='utf-8')
+    except OSError as error:
+        found = reason(error)
+        raise InputError(path, '--out', 'a file that can be written', found) from None
 
 
 def write_json(path: Path, document: Any) -> None:

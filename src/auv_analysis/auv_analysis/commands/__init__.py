@@ -19,6 +19,7 @@ _HOME = {
     'replay': 'replay',
     'atlas': 'auv_analysis.atlas.command',
     'design': 'design',
+    'linearize': 'auv_analysis.linearization.command',
     'sweep': 'auv_analysis.sweep.command',
     'new': 'new',
     'completion': 'completion',

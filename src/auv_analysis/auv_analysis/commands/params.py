@@ -4,9 +4,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from auv_analysis.folder import write_text
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.scenario import load_scenario
-from auv_dynamics.files import InputError, reason
 
 
 def params(options: argparse.Namespace) -> dict[str, Any]:
@@ -31,14 +31,7 @@ def params(options: argparse.Namespace) -> dict[str, Any]:
         parameters, f'auv params {scenario.name} --controller {options.controller}'
     )
     if options.out is not None:
-        if options.out.exists() and not options.overwrite:
-            raise InputError(options.out, '--out', 'a new file, or --overwrite', 'an existing file')
-        try:
-            options.out.parent.mkdir(parents=True, exist_ok=True)
-            options.out.write_text(text, encoding='utf-8')
-        except OSError as error:
-            found = reason(error)
-            raise InputError(options.out, '--out', 'a file that can be written', found) from None
+        write_text(options.out, text, overwrite=options.overwrite)
     elif not options.json:
         print(text, end='')
     return parameters

@@ -1,0 +1,72 @@
+"""`auv linearize`: poles and matrices of a vehicle, or of a scenario's closed loops."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from auv_analysis.console import say
+from auv_analysis.folder import prepare, write_json
+from auv_analysis.linearization.document import document_of, linear_models
+from auv_analysis.linearization.printed import print_poles
+from auv_analysis.progress import waiting
+from auv_analysis.scaling import UNFIT
+from auv_analysis.scenario import Scenario, load_scenario
+from auv_dynamics.config import shipped
+from auv_dynamics.files import InputError, read_yaml
+from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.vehicle_file import load_vehicle
+
+LONGEST = 90  # of the name in that of the folder
+
+
+def linearize(options: argparse.Namespace) -> dict[str, Any]:
+    """Poles and matrices of a vehicle, or of a scenario's closed loops."""
+    subject, paths = _subject(options.subject)
+    names = _controllers(subject, options.controller, paths[0])
+    eta0 = None if options.attitude is None else [0.0, 0.0, 0.0, *options.attitude]
+    try:
+        with waiting('linearising'):
+            models = linear_models(subject, names, options.nu0, eta0)
+    except ValueError as error:
+        key, _, rest = str(error).partition(': expected ')
+        expected, _, found = rest.partition(', found ')
+        raise InputError(paths[0], key, expected, found) from None
+    folder = f'linearize_{UNFIT.sub("_", subject.name)[:LONGEST]}'
+    out = prepare(options.out or Path('runs') / folder, overwrite=options.overwrite, inputs=paths)
+    left_out = subject.sampled if isinstance(subject, Scenario) else ()
+    document = document_of(subject.name, models, left_out)
+    write_json(out / 'linearization.json', document)
+    from auv_analysis.linearization.figures import draw  # with matplotlib, which loads slowly
+
+    with waiting('drawing the pole map'):
+        figures = draw(models, out / 'figures')
+    if not options.json:
+        print_poles(document)
+    say(f'matrices: {out / "linearization.json"}, pole map: {figures["poles"].png}')
+    return document
+
+
+def _subject(given: str) -> tuple[Vehicle | Scenario, list[Path]]:
+    """What is linearised, a scenario being what has controllers, and the files it was read from."""
+    for kind in ('scenarios', 'vehicles'):
+        try:
+            path = shipped(kind, given)
+        except InputError:
+            continue
+        if 'controllers' in read_yaml(path, 'vehicle or scenario'):
+            scenario = load_scenario(path)
+            return scenario, scenario.inputs
+        return load_vehicle(path), [path]
+    expected = 'a vehicle or scenario file, or the bare name of a shipped one'
+    raise InputError(given, '', expected, 'no such file or name')
+
+
+def _controllers(subject: Vehicle | Scenario, asked: list[str] | None, path: Path) -> list[str]:
+    if isinstance(subject, Scenario):
+        names = list(dict.fromkeys(asked or subject.controllers))
+        for name in names:
+            subject.controller(name)
+        return names
+    if asked:
+        raise InputError(path, '--controller', 'a scenario, which has controllers', 'a vehicle')
+    return []

@@ -1,0 +1,58 @@
+"""`auv linearize`: one document, a table of poles, a pole map."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from auv_analysis import linearize
+from auv_analysis.cli import main
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_a_vehicle_alone(tmp_path, capsys):
+    out = tmp_path / 'out'
+    point = ['--nu0', '0.5', '0', '0', '0', '0', '-0.1', '--attitude', '0.1', '-0.2', '0']
+    main(['linearize', 'rexrov', *point, '--out', str(out), '--json'])
+    document = json.loads(capsys.readouterr().out)
+    assert document == json.loads((out / 'linearization.json').read_text())
+    (name, model), *others = document['models'].items()
+    assert (name, others) == ('open loop', [])
+    expected = linearize('rexrov', [0.5, 0, 0, 0, 0, -0.1], eta0=[0, 0, 0, 0.1, -0.2, 0])
+    for key, matrix in zip('ABCD', expected, strict=True):
+        assert_allclose(model[key], matrix, rtol=1e-12)
+    poles = [complex(*mode['pole']) for mode in model['modes']]
+    every = [*poles, *(p.conjugate() for p in poles if p.imag)]
+    assert_allclose(np.sort(np.real(every)), np.sort(np.linalg.eigvals(expected.A).real), atol=1e-9)
+    assert (out / 'figures' / 'poles.png').is_file()
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_the_loops_of_a_scenario_as_a_table(tmp_path, capsys):
+    main(['linearize', 'case1', '--controller', 'cl', '--out', str(tmp_path / 'out')])
+    text = capsys.readouterr().out
+    for word in ('open loop: 8 states', 'cl: 20 states', 'damping', 'frequency, rad/s', '±'):
+        assert word in text
+    assert 'gvc' not in text
+
+
+@pytest.mark.parametrize(
+    ('line', 'name'),
+    [
+        ('linearize nautilus', 'nautilus'),
+        ('linearize rexrov --controller gvc', '--controller'),
+        ('linearize case1 --controller pid', 'controllers'),
+        ('linearize rexrov --attitude 0 1.5707963267948966 0', 'eta0'),
+        ('linearize rexrov --nu0 nan 0 0 0 0 0', 'nu0'),
+    ],
+)
+def test_refusals_are_one_line(line, name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as end:
+        main(line.split())
+    captured = capsys.readouterr()
+    assert (end.value.code, len(captured.err.splitlines()), captured.out) == (2, 1, '')
+    assert name in captured.err
+    assert 'expected' in captured.err
+    assert not list(tmp_path.iterdir())

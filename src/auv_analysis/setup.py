@@ -52,6 +52,7 @@ setup(
         'Pillow>=9',
         'Jinja2>=3.0',
         'bokeh>=3.4,<4',
+        'defusedxml>=0.7.1',
         'psutil>=5.9.4',
         'rich>=13',
         'pyarrow>=17',

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from auv_analysis.command_parser import Parser
 from auv_analysis.foreign.options import add_options as add_foreign
+from auv_analysis.formats.options import add_export, add_import
 from auv_analysis.linearization.options import add_options as add_linearize
 from auv_analysis.replay.options import add_options as add_replay
 
@@ -236,14 +237,14 @@ GROUPS = {
         'linearize': Command(
             'poles and matrices of a vehicle or of its closed loops', add_linearize
         ),
+        'import-vehicle': Command('a vehicle file from that of another system', add_import),
+        'export-vehicle': Command('a vehicle as an SDF model for Gazebo', add_export),
         'atlas': Command('couplings by inertia of the shipped vehicles, side by side', _atlas),
         'tune': Command('laws tuned to equal effort or error, and compared over draws', _tune),
         'sweep': Command('many rollouts of a scenario, with values that vary, to Parquet', _sweep),
     },
     'A real vehicle': {
-        'check-driver': Command(
-            'whether a vehicle driver offers what our nodes need', _check_driver
-        ),
+        'check-driver': Command('whether a driver offers what our nodes need', _check_driver),
     },
 }
 COMMANDS = {name: command for group in GROUPS.values() for name, command in group.items()}

@@ -19,6 +19,8 @@ _HOME = {
     'replay': 'replay',
     'atlas': 'auv_analysis.atlas.command',
     'design': 'design',
+    'import-vehicle': 'auv_analysis.formats.command',
+    'export-vehicle': 'auv_analysis.formats.command',
     'linearize': 'auv_analysis.linearization.command',
     'sweep': 'auv_analysis.sweep.command',
     'new': 'new',

@@ -1,0 +1,1 @@
+"""Vehicle parameters from and to other systems: uuv_simulator, Gazebo, lists of derivatives."""

@@ -1,0 +1,159 @@
+"""Lists of derivatives as papers and MATLAB files give them: Xudot = -5.5, X_{u|u|} = -18.2, ...
+
+Fossen's conventions: FSD, derivatives of SNAME. What a list cannot say for itself (the sign of
+products of inertia, the point of the tensor) is asked for.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from auv_analysis.formats.draft import SNAME, Choices, Draft
+
+NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
+ASSIGNED = re.compile(rf'([A-Za-z][\w{{}}|\\\']*)\s*[=:]\s*({NUMBER})?')
+BRACED = re.compile(r'\{[^=]*\}')  # X_{\dot u}
+COMMENT = re.compile(r'(%|#|//).*')
+ADDED = re.compile(r'([XYZKMN])(?:([uvwpqr])dot|dot([uvwpqr]))')
+DAMPING = re.compile(r'([XYZKMN])([uvwpqr])([uvwpqr])?')
+ROWS, COLUMNS = 'XYZKMN', 'uvwpqr'
+SCALARS = {
+    'mass': 'm', 'Ixx': 'Ix', 'Iyy': 'Iy', 'Izz': 'Iz', 'volume': 'V', 'nabla': 'V', 'Vol': 'V',
+}  # fmt: skip
+KNOWN = {'m', 'W', 'B', 'V', 'g', 'rho', 'Ix', 'Iy', 'Iz', 'Ixy', 'Ixz', 'Iyz',
+         'xG', 'yG', 'zG', 'xB', 'yB', 'zB'}  # fmt: skip
+APART = 0.005  # relative, beyond which m g and W are two different numbers
+GRAVITY, FRESH = 9.81, 1000.0
+
+
+def read_derivatives(text: str, path: Path, choices: Choices) -> Draft:
+    """Draft of a list; InputError names file, key, expected and found."""
+    draft = Draft(path, choices, path.stem)
+    scalars: dict[str, float] = {}
+    matrices = np.zeros((3, 6, 6))
+    for name, value in _assignments(text, draft):
+        plain = re.sub(r"[_{}|\\']|abs", '', name)
+        scalar = re.sub(r'^([xyz])([gb])$', lambda m: m[1] + m[2].upper(), plain)
+        scalar = SCALARS.get(scalar, scalar)
+        if "'" in name:
+            raise draft.refuse(name, 'a coefficient with a dimension', 'a prime')
+        if scalar in KNOWN:
+            scalars[scalar] = value
+        elif not _placed(draft, matrices, name, plain, value):
+            draft.cannot_hold(name, 'no name of a coefficient')
+    draft.assumed.append('all numbers are in SI units and FSD axes, coefficients with dimensions')
+    _body(draft, scalars)
+    names = ('added_mass', 'damping.linear', 'damping.quadratic')
+    said = ('Xudot ... Nrdot', 'Xu ... Nr', 'Xuu ... Nrr')
+    for key, A, where in zip(names, matrices, said, strict=True):
+        draft.put(key, draft.positive(key, A, SNAME, where), where)
+    return draft
+
+
+def _assignments(text: str, draft: Draft) -> list[tuple[str, float]]:
+    found, seen = [], set()
+    for line in text.splitlines():
+        bare = BRACED.sub(lambda braced: braced[0].replace(' ', ''), COMMENT.sub('', line))
+        for match in ASSIGNED.finditer(bare):
+            name = match[1]
+            if match[2] is None:
+                raise draft.refuse(name, 'a number', line.strip())
+            if name in seen:
+                raise draft.refuse(name, 'each name once', 'again')
+            seen.add(name)
+            found.append((name, float(match[2])))
+    return found
+
+
+def _placed(draft: Draft, matrices: np.ndarray, name: str, plain: str, value: float) -> bool:
+    """Put a coefficient in its matrix; False where its name is none."""
+    added, linear, quadratic = matrices
+    if match := ADDED.fullmatch(plain):
+        added[ROWS.index(match[1]), COLUMNS.index(match[2] or match[3])] = value
+        return True
+    match = DAMPING.fullmatch(plain)
+    if match is None:
+        return False
+    i, j = ROWS.index(match[1]), COLUMNS.index(match[2])
+    if match[3] is None:
+        linear[i, j] = value
+    elif match[3] != match[2]:
+        if value:
+            draft.cannot_hold(name, 'a product of two different velocities')
+    else:
+        if '|' not in name and 'abs' not in name and value:
+            draft.assumed.append(f'{name}: multiplies the velocity and its absolute value')
+        quadratic[i, j] = value
+    return True
+
+
+def _body(draft: Draft, given: dict[str, float]) -> None:
+    """Mass, tensor, centres, water: W = m g and B = rho g V tie them together."""
+    choices = draft.choices
+    for key in ('m', 'W'):
+        if key in given:
+            draft.above_zero(key, given[key])
+    if choices.swap_weight_buoyancy:
+        given['W'], given['B'] = (_needed(draft, given, key) for key in 'BW')
+        draft.traps.append('W, B: swapped, as asked')
+    if 'g' in given:
+        gravity = given['g'], 'g'
+    elif 'W' in given and 'm' in given and abs(given['W'] / given['m'] / GRAVITY - 1) < APART:
+        gravity = given['W'] / given['m'], 'W / m'
+    else:
+        gravity = GRAVITY, 'assumed'
+    rho = (given['rho'], 'rho') if 'rho' in given else None
+    if rho is None and 'B' in given and choices.water_density is None:
+        draft.assumed.append('environment.water_density: 1000 kg/m3; the volume is B / (rho g)')
+        rho = FRESH, 'assumed; the volume belongs to it'
+    draft.environment(rho, gravity)
+    g, density = (draft.values[f'environment.{key}'] for key in ('gravity', 'water_density'))
+    mass = given['m'] if 'm' in given else _needed(draft, given, 'W') / g
+    _check_weight(draft, given, mass * g)
+    r_G = [given.get(f'{axis}G', 0.0) for axis in 'xyz']
+    draft.put('rigid_body.mass', mass, 'm' if 'm' in given else 'W / g')
+    draft.put('rigid_body.center_of_gravity', r_G, 'xG, yG, zG; what is absent is 0')
+    _tensor(draft, given, bool(np.any(r_G)))
+    volume = (given['V'], 'V') if 'V' in given else None
+    if volume is None and 'B' in given:
+        volume = given['B'] / (density * g), 'B / (rho g)'
+    draft.buoyancy(volume, ([0.0] * 3, ''))
+    if choices.center_of_buoyancy is None:
+        r_B = [given.get(f'{axis}B', 0.0) for axis in 'xyz']
+        draft.put('hydrostatics.center_of_buoyancy', r_B, 'xB, yB, zB; what is absent is 0')
+        if not any(f'{axis}B' in given for axis in 'xyz'):
+            draft.assumed.append('hydrostatics.center_of_buoyancy: the origin')
+
+
+def _needed(draft: Draft, given: dict[str, float], key: str) -> float:
+    if key not in given:
+        raise draft.refuse(key, 'a number', None)
+    return given[key]
+
+
+def _check_weight(draft: Draft, given: dict[str, float], weight: float) -> None:
+    if 'W' not in given or abs(given['W'] - weight) <= APART * weight:
+        return
+    expected = f'm g = {weight:.6g} N'
+    if 'B' in given and abs(given['B'] - weight) <= APART * weight:
+        expected += ', which B is: --swap-weight-buoyancy if the two are swapped'
+    raise draft.refuse('W', expected, given['W'])
+
+
+def _tensor(draft: Draft, given: dict[str, float], is_apart: bool) -> None:
+    Ix, Iy, Iz = (_needed(draft, given, f'I{axis}') for axis in 'xyz')
+    xy, xz, yz = (given.get(f'I{pair}', 0.0) for pair in ('xy', 'xz', 'yz'))
+    if xy or xz or yz:
+        if draft.choices.products is None:
+            expected = '--products integral (of x y dm) or tensor (its entry): the list cannot say'
+            raise draft.refuse('Ixy, Ixz, Iyz', expected, [xy, xz, yz])
+        sign = -1.0 if draft.choices.products == 'integral' else 1.0
+        xy, xz, yz = (sign * value for value in (xy, xz, yz))
+        draft.traps.append(f'Ixy, Ixz, Iyz: --products {draft.choices.products}')
+    if is_apart and draft.choices.inertia_reference is None:
+        expected = '--inertia-reference cg or co: the list cannot say which point it is about'
+        raise draft.refuse('Ix, Iy, Iz', expected, [Ix, Iy, Iz])
+    tensor = [[Ix, xy, xz], [xy, Iy, yz], [xz, yz, Iz]]
+    draft.put('rigid_body.inertia', tensor, 'Ix ... Iyz')
+    draft.values['rigid_body.inertia_reference'] = draft.choices.inertia_reference or 'cg'

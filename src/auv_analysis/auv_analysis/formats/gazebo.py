@@ -1,0 +1,160 @@
+"""Gazebo: the hydrodynamics plugin of an SDF model, with the link that it acts on.
+
+In Gazebo everything is in the link's frame, forward-left-up; xDotU and xU, xUabsU are derivatives
+of SNAME, negative where they oppose (gz-sim, systems/hydrodynamics); <fluid_added_mass> of the
+link is a positive matrix. The plugin's C_A has the diagonal of the added mass alone.
+"""
+
+import re
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from auv_analysis.formats.draft import POSITIVE, SNAME, Choices, Draft
+from auv_analysis.formats.rigid_bodies import link_inertia
+from auv_analysis.formats.solids import displaced
+from auv_analysis.formats.xml_text import numbers
+
+ROWS, COLUMNS = 'xyzkmn', 'UVWPQR'
+COEFFICIENT = re.compile(r'([xyzkmn])(Dot)?([UVWPQR])(abs)?([UVWPQR])?')
+FLUID = 'xyzpqr'  # of <fluid_added_mass>: xx, xy, ... rr
+OTHERS = {
+    'link_name', 'namespace', 'water_density', 'default_current', 'disable_coriolis',
+    'disable_added_mass', 'enable_coriolis', 'lookup_current_x', 'lookup_current_y',
+    'lookup_current_z',
+}  # fmt: skip
+
+
+def read_gazebo(root: Element, path: Path, choices: Choices) -> Draft:
+    """Draft of an SDF file; InputError names file, key, expected and found."""
+    draft = Draft(path, choices)
+    plugin = _plugin(root, draft)
+    name = (plugin.findtext('link_name') or '').strip()
+    model, link = _link(root, name, draft)
+    draft.name = model.get('name') or path.stem
+    link_inertia(draft, link)
+    others = [other for other in model.iter('link') if other is not link]
+    masses = [other.findtext('inertial/mass') for other in others]
+    total = sum(numbers(text, 1, path, 'link.mass')[0] for text in masses if text)
+    if others:
+        draft.assumed.append(
+            f'{len(others)} other links of the model are no part of the vehicle: {total:g} kg'
+        )
+    found = displaced(link, path)
+    said = 'collision shapes of the link, which Gazebo computes buoyancy from'
+    draft.buoyancy(
+        None if found is None else (found[0], said), None if found is None else (found[1], said)
+    )
+    draft.environment(_density(root, plugin, draft), _gravity(root, draft))
+    _coefficients(draft, plugin, link)
+    return draft
+
+
+def _plugin(root: Element, draft: Draft) -> Element:
+    found = [
+        plugin
+        for plugin in root.iter('plugin')
+        if any(COEFFICIENT.fullmatch(str(child.tag)) for child in plugin)
+        or 'hydrodynamics' in f'{plugin.get("filename")} {plugin.get("name")}'.lower()
+    ]
+    if len(found) != 1:
+        raise draft.refuse('plugin', 'one plugin with xDotU, xU ...', f'{len(found)} of them')
+    return found[0]
+
+
+def _link(root: Element, name: str, draft: Draft) -> tuple[Element, Element]:
+    wanted = name.rpartition('::')[2]
+    for model in (root, *root.iter('model')) if root.tag == 'model' else root.iter('model'):
+        for link in model.findall('link'):
+            if link.get('name') == wanted:
+                return model, link
+    raise draft.refuse(
+        'plugin.link_name', 'a link of this file (write included models out)', name or None
+    )
+
+
+def _density(root: Element, plugin: Element, draft: Draft) -> tuple[float, str] | None:
+    for element, key in ((root.find('.//uniform_fluid_density'), 'uniform_fluid_density'),
+                         (plugin.find('water_density'), 'water_density')):  # fmt: skip
+        if element is not None:
+            return numbers(element.text, 1, draft.file, key)[0], f'<{key}>'
+    return None
+
+
+def _gravity(root: Element, draft: Draft) -> tuple[float, str]:
+    element = root.find('.//world/gravity') if root.tag != 'world' else root.find('gravity')
+    if element is None:
+        return 9.8, "assumed: SDF's default, as no world is given"
+    vector = np.array(numbers(element.text, 3, draft.file, 'world.gravity'))
+    return float(np.linalg.norm(vector)), '<gravity> of the world'
+
+
+def _coefficients(draft: Draft, plugin: Element, link: Element) -> None:
+    added, linear, quadratic = np.zeros((3, 6, 6))
+    for child in plugin:
+        tag = str(child.tag)
+        match = COEFFICIENT.fullmatch(tag)
+        if match is None or (match[2] and (match[4] or match[5])) or (match[4] and not match[5]):
+            if tag not in OTHERS and isinstance(child.tag, str):
+                draft.cannot_hold(tag, 'no parameter of the hydrodynamics plugin')
+            continue
+        value = numbers(child.text, 1, draft.file, tag)[0]
+        i, j = ROWS.index(match[1]), COLUMNS.index(match[3])
+        if match[2]:
+            added[i, j] = value
+        elif not match[5]:
+            linear[i, j] = value
+        elif value:
+            _quadratic(draft, quadratic, tag, (i, j, match[5], bool(match[4])), value)
+    M_A, convention, said = _added_mass(draft, plugin, link, added)
+    M_A = draft.positive('added_mass', M_A, convention, said)
+    draft.put('added_mass', draft.from_flu('added_mass', M_A), said)
+    for key, A, said in (('linear', linear, 'xU ... nR'), ('quadratic', quadratic, 'xUabsU ...')):
+        name = f'damping.{key}'
+        D = draft.positive(name, A, SNAME, said)
+        draft.put(name, draft.from_flu(name, D), f'{said} of the plugin')
+    draft.traps.append(
+        'C_A: Gazebo takes it from the diagonal of xDotU ... alone (before 2026 with two wrong '
+        'elements); here C follows from the whole of M'
+    )
+
+
+def _quadratic(
+    draft: Draft, A: np.ndarray, tag: str, place: tuple[int, int, str, bool], value: float
+) -> None:
+    i, j, other, is_abs = place
+    if other != COLUMNS[j]:
+        draft.cannot_hold(tag, 'a product of two different velocities')
+        return
+    if not is_abs:
+        if not draft.choices.quadratic_abs:
+            expected = f'{tag[:2]}abs{tag[2]}, or --quadratic-abs if that is meant'
+            raise draft.refuse(tag, expected, f'{value:g}, which newer Gazebo takes without abs')
+        draft.traps.append(f'{tag}: taken for {tag[:2]}abs{tag[2]}, as asked')
+    A[i, j] += value
+
+
+def _added_mass(
+    draft: Draft, plugin: Element, link: Element, added: np.ndarray
+) -> tuple[np.ndarray, str, str]:
+    """Matrix as given, the sign convention that it follows, and where it stands."""
+    is_off = (plugin.findtext('disable_added_mass') or '').strip() in ('true', '1')
+    fluid = link.find('inertial/fluid_added_mass')
+    if fluid is None:
+        if is_off and np.any(added):
+            draft.traps.append('disable_added_mass: Gazebo leaves the added mass out, we do not')
+        return added, SNAME, 'xDotU ... nDotR of the plugin'
+    if np.any(added) and not is_off:
+        expected = 'added mass once, in the plugin or in the link'
+        raise draft.refuse('fluid_added_mass', expected, 'both: Gazebo counts it twice')
+    M_A = np.zeros((6, 6))
+    for child in fluid:
+        tag = str(child.tag)
+        if len(tag) != 2 or tag.strip(FLUID):
+            raise draft.refuse(f'fluid_added_mass.{tag}', 'xx, xy ... rr', tag)
+        i, j = (FLUID.index(letter) for letter in tag)
+        M_A[i, j] = M_A[j, i] = numbers(child.text, 1, draft.file, f'fluid_added_mass.{tag}')[0]
+    if draft.choices.sign is None:
+        draft.traps.append('fluid_added_mass: positive there, unlike xDotU ...: taken as it is')
+    return M_A, POSITIVE, '<fluid_added_mass> of the link'

@@ -1,0 +1,67 @@
+"""A vehicle through Gazebo's format and back, and what Gazebo would make of it."""
+
+import json
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from auv_analysis.cli import main
+from auv_dynamics import load_vehicle
+from auv_dynamics.frames import swap_body
+
+NAMES = ('rexrov', 'bluerov2', 'bluerov2_heavy', 'lauv', 'lrauv_tethys', 'girona500')
+
+
+@pytest.mark.parametrize('place', ['plugin', 'link'])
+@pytest.mark.parametrize('name', NAMES)
+def test_there_and_back(name, place, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    vehicle = load_vehicle(name)
+    main(['export-vehicle', name, '--added-mass', place, '--out', 'there.sdf', '--json'])
+    gravity = str(vehicle.weight / vehicle.M_RB[0, 0])
+    main(['import-vehicle', 'there.sdf', '--gravity', gravity, '--out', 'back.yaml', '--json'])
+    capsys.readouterr()
+    back = load_vehicle(tmp_path / 'back.yaml')
+    for key in ('M_RB', 'M_A', 'D_linear', 'D_quadratic', 'r_G', 'r_B', 'weight', 'buoyancy'):
+        there = np.asarray(getattr(vehicle, key))
+        assert_allclose(getattr(back, key), there, atol=1e-12 * np.abs(there).max(), rtol=1e-9)
+
+
+def test_damping_acts_in_gazebo_as_here(capsys):
+    """The plugin's own sum, its force turned to FSD, is -D(nu) nu."""
+    main(['export-vehicle', 'lauv'])
+    text = capsys.readouterr().out
+    plugin = ElementTree.fromstring(text).find('.//plugin')
+    nu = np.array([0.7, -0.2, 0.3, 0.1, -0.3, 0.2])
+    state, force = swap_body(nu), np.zeros(6)
+    for entry in plugin:
+        rows, columns = 'xyzkmn', 'UVWPQR'
+        if len(entry.tag) == 2:
+            force[rows.index(entry.tag[0])] += (
+                float(entry.text) * state[columns.index(entry.tag[1])]
+            )
+        elif 'abs' in entry.tag:
+            u = state[columns.index(entry.tag[1])]
+            force[rows.index(entry.tag[0])] += float(entry.text) * abs(u) * u
+    assert_allclose(swap_body(force), -load_vehicle('lauv').D(nu) @ nu, atol=1e-12)
+
+
+def test_document_says_what_gazebo_cannot_hold(capsys):
+    main(['export-vehicle', 'rexrov', '--json'])
+    document = json.loads(capsys.readouterr().out)
+    said = ' '.join(document['notes'])
+    assert 'Unstable' in said
+    assert 'off the diagonal' in said
+    assert 'gz-sim-hydrodynamics-system' in document['sdf']
+    main(['export-vehicle', 'rexrov', '--added-mass', 'link', '--json'])
+    assert 'Unstable' not in capsys.readouterr().out
+
+
+def test_vehicle_of_which_only_M_is_known_is_refused(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(['export-vehicle', 'herman2018'])
+    captured = capsys.readouterr()
+    assert (end.value.code, len(captured.err.splitlines()), captured.out) == (2, 1, '')
+    assert 'inertia_matrix: expected inertia and added_mass apart' in captured.err

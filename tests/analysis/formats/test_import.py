@@ -1,0 +1,229 @@
+"""Vehicles of other systems against the shipped files, and what is refused."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from auv_analysis.cli import main
+from auv_dynamics import load_vehicle
+
+# numbers of the rexrov description of uuv_simulator, after Berg 2012
+REXROV_ADDED = """779.79 -6.8773 -103.32 8.5426 -165.54 -7.8033
+  -6.8773 1222 51.29 409.44 -5.8488 62.726  -103.32 51.29 3659.9 6.1112 -386.42 10.774
+  8.5426 409.44 6.1112 534.9 -10.027 21.019  -165.54 -5.8488 -386.42 -10.027 842.69 -1.1162
+  -7.8033 62.726 10.775 21.019 -1.1162 224.32"""
+REXROV = f"""
+mass: 1862.87
+inertial: {{ixx: 525.39, iyy: 794.2, izz: 691.23, ixy: 1.44, ixz: 33.41, iyz: 2.6}}
+cog: [0, 0, 0]
+cob: [0, 0, 0.3]
+volume: 1.83826
+density: 1028.0
+hydrodynamic_model:
+  type: fossen
+  added_mass: {' '.join(REXROV_ADDED.split())}
+  linear_damping: [-74.82, -69.48, -728.4, -268.8, -309.77, -105]
+  quadratic_damping: [-748.22, -992.53, -1821.01, -672, -774.44, -523.27]
+"""
+URDF = f"""<robot name="rexrov">
+  <link name="rexrov/base_link"><inertial><mass value="1862.87"/><origin xyz="0 0 0"/>
+    <inertia ixx="525.39" ixy="1.44" ixz="33.41" iyy="794.20" iyz="2.6" izz="691.23"/>
+  </inertial></link>
+  <gazebo><plugin name="w" filename="libuuv_underwater_object_ros_plugin.so">
+    <fluid_density>1028.0</fluid_density>
+    <link name="rexrov/base_link"><neutrally_buoyant>0</neutrally_buoyant><volume>1.83826</volume>
+      <box><width>1.5</width><length>2.6</length><height>1.6</height></box>
+      <center_of_buoyancy>0.0 0.0 0.3</center_of_buoyancy>
+      <hydrodynamic_model><type>fossen</type><added_mass>{REXROV_ADDED}</added_mass>
+        <linear_damping>-74.82 -69.48 -728.4 -268.8 -309.77 -105</linear_damping>
+        <quadratic_damping>-748.22 -992.53 -1821.01 -672 -774.44 -523.27</quadratic_damping>
+      </hydrodynamic_model></link></plugin></gazebo></robot>"""
+# Wu 2018: the origin is the centre of buoyancy, the tensor is about it
+BLUEROV2 = r"""
+m = 11.5; W = 112.8; B = 114.8;   % N
+Ix = 0.16; Iy = 0.16; Iz = 0.16; zG = 0.02
+Xudot = -5.5, Yvdot = -12.7, Z_{\dot w} = -14.57
+Kpdot = -0.12; Mqdot = -0.12; Nrdot = -0.12;
+X_u = -4.03; Yv = -6.22; Zw = -5.18; Kp = -0.07; Mq = -0.07; Nr = -0.07
+Xuu = -18.18; Y_{v|v|} = -21.66; Z_{w|w|} = -36.99;  # quadratic
+Kp|p| = -1.55; Mq|q| = -1.55; Nr|r| = -1.55
+"""
+LIST = ['--inertia-reference', 'co', '--gravity', '9.81']
+DIGITS = 1e-8  # of the volume that the shipped file rounds
+# a link in FLU: nose heavy, below its buoyancy, with a product of inertia
+SDF = """<sdf version="1.9"><world name="w"><gravity>0 0 -9.81</gravity>
+  <plugin filename="gz-sim-buoyancy-system" name="gz::sim::systems::Buoyancy">
+    <uniform_fluid_density>1000</uniform_fluid_density></plugin>
+  <model name="made"><link name="base_link">
+    <inertial><pose>0.01 0.02 -0.03 0 0 0</pose><mass>10</mass>
+      <inertia><ixx>0.4</ixx><ixy>0.01</ixy><ixz>0.02</ixz><iyy>0.5</iyy><iyz>0.03</iyz><izz>0.6</izz>
+      </inertia>{fluid}</inertial>
+    <collision name="hull"><pose>0 0 0.05 0 0 0</pose>
+      <geometry><box><size>0.2 0.2 0.25</size></box></geometry></collision></link>
+    <plugin filename="gz-sim-hydrodynamics-system" name="gz::sim::systems::Hydrodynamics">
+      <link_name>base_link</link_name>{added}
+      <xU>-4</xU><yV>-6</yV><yR>-1</yR><zW>-5</zW><xUabsU>-18</xUabsU><nR>-3</nR>
+      <nRabsR>-2</nRabsR>{more}
+    </plugin></model></world></sdf>"""
+ADDED = ''.join(f'<{tag}>{value}</{tag}>' for tag, value in {
+    'xDotU': -5, 'yDotV': -12, 'zDotW': -14, 'kDotP': -1, 'mDotQ': -2, 'nDotR': -3,
+    'xDotQ': -0.5, 'mDotU': -0.5, 'xDotV': -0.25, 'yDotU': -0.25}.items())  # fmt: skip
+
+
+def sdf(added=ADDED, fluid='', more=''):
+    return SDF.format(added=added, fluid=fluid, more=more)
+
+
+@pytest.fixture
+def imported(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+
+    def run(name, text, *options):
+        (tmp_path / name).write_text(text, encoding='utf-8')
+        main(['import-vehicle', name, *options, '--out', 'made.yaml', '--overwrite', '--json'])
+        document = json.loads(capsys.readouterr().out)
+        return load_vehicle(tmp_path / 'made.yaml'), document
+
+    return run
+
+
+def assert_same(vehicle, other, rounding=1e-12):
+    for key in ('M_RB', 'M_A', 'D_linear', 'D_quadratic', 'r_G', 'r_B', 'weight', 'buoyancy'):
+        theirs = np.asarray(getattr(other, key))
+        atol = rounding * np.abs(theirs).max()
+        assert_allclose(getattr(vehicle, key), theirs, atol=atol, rtol=rounding)
+
+
+@pytest.mark.parametrize('file', ['rexrov.yaml', 'rexrov.urdf'])
+def test_rexrov_of_uuv_simulator_is_the_shipped_one(imported, file):
+    vehicle, document = imported(file, REXROV if file.endswith('yaml') else URDF)
+    assert document['format'] == 'uuv'
+    assert_same(vehicle, load_vehicle('rexrov'))
+    traps = ' '.join(document['traps'])
+    assert 'rigid_body.inertia: from forward-left-up to FSD, 4 entries turn sign' in traps
+    assert 'not turned again' in traps
+
+
+def test_bluerov2_of_a_list_is_the_shipped_one(imported):
+    vehicle, document = imported('list.m', BLUEROV2, *LIST)
+    assert document['format'] == 'mss'
+    assert_same(vehicle, load_vehicle('bluerov2'), DIGITS)
+    assert any('Xuu' in text for text in document['assumed'])
+
+
+def test_link_of_gazebo_is_turned_to_forward_starboard_down(imported):
+    vehicle, document = imported('made.sdf', sdf())
+    assert document['format'] == 'gazebo'
+    assert_allclose(vehicle.r_G, [0.01, -0.02, 0.03])
+    assert_allclose(vehicle.r_B, [0, 0, -0.05])
+    assert vehicle.buoyancy == pytest.approx(98.1)
+    inertia = document['vehicle']['rigid_body']['inertia']
+    assert_allclose(inertia, [[0.4, -0.01, -0.02], [-0.01, 0.5, 0.03], [-0.02, 0.03, 0.6]])
+    M_A = vehicle.M_A
+    assert_array_equal(np.diagonal(M_A), [5, 12, 14, 1, 2, 3])
+    # one of the two changes sign between the axes: x stays, y and q turn
+    assert (M_A[0, 4], M_A[0, 1]) == (-0.5, -0.25)
+    assert (vehicle.D_linear[1, 5], vehicle.D_linear[0, 0]) == (1.0, 4.0)
+    assert_array_equal(np.diagonal(vehicle.D_quadratic), [18, 0, 0, 0, 0, 2])
+
+
+def test_prefixes_that_nobody_declares(imported):
+    more = '<experimental:params><add name="a" gz:name="b"/></experimental:params>'
+    text = sdf().replace('<model name="made">', f'<model name="made">{more}')
+    assert_same(imported('made.sdf', text)[0], imported('other.sdf', sdf())[0])
+
+
+def test_fluid_added_mass_is_positive_and_counted_once(imported):
+    entries = {'xx': 5, 'yy': 12, 'zz': 14, 'pp': 1, 'qq': 2, 'rr': 3, 'xq': 0.5, 'xy': 0.25}
+    tags = ''.join(f'<{tag}>{value}</{tag}>' for tag, value in entries.items())
+    fluid = f'<fluid_added_mass>{tags}</fluid_added_mass>'
+    vehicle, _ = imported('made.sdf', sdf(added='', fluid=fluid))
+    assert_same(vehicle, imported('other.sdf', sdf())[0])
+    off = '<disable_added_mass>true</disable_added_mass>'
+    assert_same(vehicle, imported('off.sdf', sdf(fluid=fluid, more=off))[0])
+
+
+def test_choices_of_the_user_take_the_place_of_what_is_missing(imported):
+    text = re.sub('<collision.*</collision>', '', sdf(), flags=re.S)
+    point = ['--center-of-buoyancy', '0', '0', '-0.05']
+    vehicle, _ = imported('made.sdf', text, '--volume', '0.01', *point)
+    assert_same(vehicle, imported('other.sdf', sdf())[0])
+    swapped = BLUEROV2.replace('W = 112.8; B = 114.8', 'B = 112.8; W = 114.8')
+    vehicle, _ = imported('list.m', swapped, *LIST, '--swap-weight-buoyancy')
+    assert_same(vehicle, load_vehicle('bluerov2'), DIGITS)
+    positive = re.sub(r'= -', '= ', BLUEROV2)
+    assert_same(imported('list.m', positive, *LIST, '--sign', 'positive')[0], vehicle)
+
+
+def test_products_of_inertia_by_either_convention(imported):
+    text = BLUEROV2.replace('zG = 0.02', 'zG = 0; Ixz = 0.01')
+    for products, entry in (('integral', -0.01), ('tensor', 0.01)):
+        _, document = imported('list.m', text, '--products', products)
+        assert document['vehicle']['rigid_body']['inertia'][0][2] == entry
+
+
+def test_what_a_file_cannot_hold_is_left_out_when_asked(imported):
+    for name, text, word in (
+        ('list.m', BLUEROV2.replace('zG = 0.02', 'Yuv = -3; L = 2'), 'Yuv'),
+        ('made.sdf', sdf(more='<yVabsR>-3</yVabsR>'), 'yVabsR'),
+        ('rexrov.yaml', f'{REXROV}colour: red\n"a\\nname: b": 1\n', 'colour'),
+    ):
+        _, document = imported(name, text, '--leave-out')
+        assert any(word in text for text in document['left_out'])
+        assert document['vehicle']['name'] == 'made'
+
+
+BOMB = '<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><sdf>&b;</sdf>'
+REFUSED = {  # what is wrong -> file, text, options, what the line names
+    'a bomb': ('a.sdf', BOMB, [], 'without document type'),
+    'a file from elsewhere': (
+        'a.sdf', '<!DOCTYPE x SYSTEM "file:///etc/passwd"><sdf/>', [], 'document type'),
+    'no XML': ('a.sdf', '<sdf><', [], 'valid XML'),
+    'nothing known': ('a.txt', 'hello', [], '--format uuv, gazebo or mss'),
+    'no plugin': ('a.sdf', '<sdf><model name="m"/></sdf>', [], 'one plugin'),
+    'no volume': ('a.sdf', sdf().replace('box', 'mesh'), [], '--volume'),
+    'no density': (
+        'a.sdf', re.sub('<uniform.*density>', '', sdf()), [], '--water-density'),
+    'xUU': ('a.sdf', sdf(more='<zWW>-3</zWW>'), [], '--quadratic-abs'),
+    'two velocities': ('a.sdf', sdf(more='<yVabsR>-3</yVabsR>'), [], '--leave-out'),
+    'damping that feeds': ('a.sdf', sdf().replace('-18', '18'), [], '--sign positive'),
+    'added mass twice': (
+        'a.sdf', sdf(fluid='<fluid_added_mass><xx>1</xx></fluid_added_mass>'), [], 'it twice'),
+    'a word for a number': ('a.sdf', sdf().replace('-18', 'much'), [], 'xUabsU: expected'),
+    'not finite': ('a.sdf', sdf().replace('-18', 'nan'), [], 'xUabsU'),
+    'xacro': ('a.urdf', URDF.replace('1.83826', '${volume}'), [], 'expand xacro first'),
+    'positive damping': ('a.yaml', REXROV.replace('[-74.82', '[74.82'), [], 'damping.linear'),
+    'unknown entry': ('a.yaml', f'{REXROV}colour: red\n', [], 'colour'),
+    'scaled': ('a.yaml', f'{REXROV}scaling_damping: 2\n', [], 'scaling_damping'),
+    'no mass': ('a.yaml', REXROV.replace('mass: 1862.87', ''), [], 'mass'),
+    'W and B swapped': (
+        'a.m', BLUEROV2.replace('W = 112.8; B = 114.8', 'W = 114.8; B = 112.8'), [],
+        '--swap-weight-buoyancy'),
+    'which point': ('a.m', BLUEROV2, [], '--inertia-reference'),
+    'products': ('a.m', BLUEROV2 + 'Ixz = 0.01', ['--inertia-reference', 'co'], '--products'),
+    'nondimensional': ('a.m', BLUEROV2 + "Xvv' = 0.01", [], 'a prime'),
+    'a formula': ('a.m', BLUEROV2 + 'V = m/rho', [], 'V: expected a number'),
+    'no gravity': ('a.m', BLUEROV2, [*LIST, '--gravity', '0'], 'environment.gravity'),
+    'no weight': ('a.m', BLUEROV2.replace('m = 11.5', 'm = 0'), LIST, 'm: expected a positive'),
+    'against physics': (
+        'a.m', BLUEROV2.replace('Iz = 0.16', 'Iz = 16'), ['--inertia-reference', 'co'], 'triangle'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('what', REFUSED)
+def test_refusals_are_one_line(what, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    name, text, options, word = REFUSED[what]
+    (tmp_path / name).write_text(text, encoding='utf-8')
+    with pytest.raises(SystemExit) as end:
+        main(['import-vehicle', name, *options, '--out', 'made.yaml'])
+    captured = capsys.readouterr()
+    assert (end.value.code, len(captured.err.splitlines()), captured.out) == (2, 1, ''), (
+        captured.err
+    )
+    assert word in captured.err
+    assert 'expected' in captured.err
+    assert [path.name for path in tmp_path.iterdir()] == [name]

@@ -50,7 +50,7 @@ def _mode(
     return {
         'pole': [real, imaginary],
         'natural_frequency': size,
-        'damping_ratio': -real / size if size else None,
+        'damping_ratio': 0.0 - real / size if size else None,
         'time_constant': -1 / real if real < 0 else None,
         'mostly': mostly,
         'part': parts[mostly],

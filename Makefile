@@ -27,10 +27,11 @@ DAY ?= 86400
 EXAMPLES ?= 500
 MUTANTS ?= 500
 
-.PHONY: help setup case1 case2 test soak fuzz properties mutation audit bench bench-growth build lint format interop clean
+.PHONY: help setup case1 case2 test soak fuzz properties mutation audit bench bench-growth build wheels lint format hooks interop clean
 
 help:  ## this list
-	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/:/' | column -t -s:
+	@sed -nE 's/^([a-z0-9 -]+):[^#]*## *(.*)/\1\t\2/p' $(MAKEFILE_LIST) | column -t -s $$'\t'
+	@echo 'Words in capitals are variables, such as: make soak COUNT=3 SEED=1'
 
 setup: $(READY)  ## the environment in .venv
 
@@ -87,6 +88,12 @@ build: setup  ## colcon build of the workspace
 	AMENT_PREFIX_PATH="$(abspath $(VENV))$${AMENT_PREFIX_PATH:+:$$AMENT_PREFIX_PATH}" \
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m colcon build --symlink-install
 
+# each wheel from its sdist, so that nothing is in it that the sdist lacks
+wheels: setup  ## sdist and wheel of the three packages, in dist/
+	for package in $(PACKAGES); do \
+	  $(BIN)/python -m build --no-isolation --outdir dist src/$$package || exit 1; \
+	done
+
 lint: setup  ## formatting, style, types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -96,8 +103,11 @@ format: setup  ## apply the formatting
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
+hooks: setup  ## the same and some hygiene before every commit of this clone
+	$(BIN)/pre-commit install
+
 interop: setup  ## read a bag with npm's @mcap/core as well
 	$(BIN)/python -m pytest tests/system/test_interop.py
 
 clean:  ## remove what is made here
-	rm -rf $(VENV) build install log runs
+	rm -rf $(VENV) build dist install log runs

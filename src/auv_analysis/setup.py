@@ -11,11 +11,24 @@ setup(
     version='0.1.0',
     description='Experiments, recording, energy and coupling analysis, reports, the auv command',
     license='Apache-2.0',
+    license_files=['LICENSE'],
+    classifiers=[
+        'Intended Audience :: Science/Research',
+        'License :: OSI Approved :: Apache Software License',
+        'Operating System :: POSIX :: Linux',
+        'Programming Language :: Python :: 3.11',
+        'Programming Language :: Python :: 3.12',
+        'Programming Language :: Python :: 3.13',
+        'Topic :: Scientific/Engineering',
+        'Typing :: Typed',
+    ],
+    keywords=['ROS', 'underwater vehicles'],
     maintainer='auv_gvc developers',
     maintainer_email='auv-gvc@users.noreply.github.com',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={
         NAME: [
+            'py.typed',
             '*.json',
             'report/*.j2',
             'report/*.css',
@@ -32,6 +45,7 @@ setup(
         (f'share/{NAME}/config/params', glob('config/params/*.yaml')),
         (f'share/{NAME}/config/campaigns', glob('config/campaigns/*.yaml')),
         (f'share/{NAME}/config/laws', glob('config/laws/own_law.*')),
+        (f'share/{NAME}/config/layouts', glob('config/layouts/*')),
         (f'share/{NAME}/config/security', glob('config/security/*.xml')),
         (f'share/{NAME}/config/security/common', glob('config/security/common/*.xml')),
         (f'share/{NAME}/config/security/profiles', glob('config/security/profiles/*.xml')),
@@ -65,6 +79,7 @@ setup(
     extras_require={
         'test': ['pytest', 'pillow'],
         'dask': ['distributed>=2024.8'],
+        'rerun': ['rerun-sdk>=0.41,<1'],
     },
     zip_safe=False,
     entry_points={

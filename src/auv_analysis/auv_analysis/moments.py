@@ -156,9 +156,7 @@ def add_columns(
     sums: np.ndarray, squares: np.ndarray, peaks: np.ndarray,
 ) -> None:  # fmt: skip
     """The same without a compiler: the samples as columns."""
-    nu, nu_d, tau, f, F = (
-        np.ascontiguousarray(flat.reshape(-1, 6).T) for flat in (nu, nu_d, tau, f, F)
-    )
+    nu, nu_d, tau, f, F = (np.ascontiguousarray(a.reshape(-1, 6).T) for a in (nu, nu_d, tau, f, F))
     for s, signal in enumerate(signals(nu, nu_d, tau, f, F, maps)):
         for i, values in enumerate(signal):
             sums[s, i] += values.sum()

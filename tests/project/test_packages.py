@@ -11,7 +11,18 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
 KEYS = {  # of rosdep, for imports of another name
-    **{name: f'python3-{name}' for name in ('jsonschema', 'matplotlib', 'numpy', 'psutil', 'rich')},
+    **{
+        name: f'python3-{name}'
+        for name in (
+            'argcomplete',
+            'jsonschema',
+            'matplotlib',
+            'numpy',
+            'packaging',
+            'psutil',
+            'rich',
+        )
+    },
     'jinja2': 'python3-jinja2',
     'markupsafe': 'python3-jinja2',  # of which it is a part
     'PIL': 'python3-pil',

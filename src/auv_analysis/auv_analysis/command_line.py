@@ -228,6 +228,7 @@ GROUPS = {
             'a bag as live topics again, or what another law makes of it', add_replay
         ),
         'recover': Command('repair a bag that was cut or damaged, in place', _info, False),
+        'export-rerun': Command('a bag as a file for the rerun viewer', _info),
     },
     'Vehicles and laws compared': {
         'check-vehicle': Command(

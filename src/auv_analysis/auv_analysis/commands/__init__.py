@@ -11,6 +11,7 @@ _HOME = {
     'analyze': 'analyze',
     'info': 'inspect_bag',
     'recover': 'recover',
+    'export-rerun': 'export_rerun',
     'params': 'params',
     'check-vehicle': 'check_vehicle',
     'check-driver': 'check_driver',

@@ -1,0 +1,25 @@
+"""`auv export-rerun`: a bag as a file for the rerun viewer."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from auv_analysis.bag import open_bag
+from auv_analysis.rerun_export import export, library
+from auv_dynamics.files import InputError
+from auv_dynamics.printable import printable
+
+
+def export_rerun(options: argparse.Namespace) -> dict[str, Any]:
+    """Write a bag as a file for the rerun viewer."""
+    library()  # before anything is read
+    bag = Path(options.bag)
+    out = options.out or bag.with_suffix('.rrd')
+    if out.exists() and not options.overwrite:
+        raise InputError(out, '--out', 'a new file, or --overwrite', 'an existing file')
+    run = open_bag(bag).run
+    samples = export(run, out)
+    if not options.json:
+        print(printable(f'{out}: {samples} samples, trajectory, velocity, wrench, energy shares'))
+        print(printable(f'rerun {out}'))
+    return {'file': str(out), 'controller': run.controller, 'samples': samples}

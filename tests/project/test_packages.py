@@ -3,6 +3,7 @@
 import ast
 import re
 import sys
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -37,6 +38,7 @@ FROM_PYPI = {'SALib', 'bokeh', 'lz4', 'mcap', 'mcap_ros2', 'pyarrow', 'rosbags',
 OPTIONAL = {'numba', 'llvmlite', 'distributed', 'rerun'}
 
 
+@cache
 def imported(package: str) -> set[str]:
     """Top-level modules that a package imports, without its own and Python's."""
     folder = ROOT / 'src' / package

@@ -27,7 +27,8 @@ DAY ?= 86400
 EXAMPLES ?= 500
 MUTANTS ?= 500
 
-.PHONY: help setup case1 case2 test soak fuzz properties mutation audit bench bench-growth build wheels lint format hooks interop clean
+.PHONY: help setup case1 case2 test soak fuzz properties mutation audit bench bench-growth build wheels \
+  lint format hooks interop docs docs-links docs-test docs-tools clean
 
 help:  ## this list
 	@sed -nE 's/^([a-z0-9 -]+):[^#]*## *(.*)/\1\t\2/p' $(MAKEFILE_LIST) | column -t -s $$'\t'
@@ -52,7 +53,7 @@ test: setup  ## the tests
 	$(BIN)/python tests/compile_kernels.py
 	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
-soak: setup  ## COUNT random runs by SEED, KILLS of nodes, a run of STEPS, one of DAY s, what else takes long
+soak: setup docs-tools  ## COUNT random runs by SEED, KILLS of nodes, a run of STEPS, one of DAY s, what else takes long
 	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) AUV_GVC_STEPS=$(STEPS) AUV_GVC_KILLS=$(KILLS) \
 	  AUV_GVC_DAY=$(DAY) $(BIN)/python -m pytest -m long tests
 
@@ -109,5 +110,21 @@ hooks: setup  ## the same and some hygiene before every commit of this clone
 interop: setup  ## read a bag with npm's @mcap/core as well
 	$(BIN)/python -m pytest tests/system/test_interop.py
 
+docs-tools: setup
+	$(BIN)/python -m pip install --quiet -r requirements-docs.txt
+
+# every warning, also a dead reference, is an error; what was executed is kept below build/docs
+SPHINX := AUV_GVC_NOTEBOOKS=$(abspath build/docs/notebooks) $(BIN)/sphinx-build -n -W --keep-going \
+  -d build/docs/doctrees docs
+
+docs: docs-tools  ## the documentation as a site that needs no network: build/docs/html/index.html
+	PATH="$(abspath $(BIN)):$$PATH" $(SPHINX) build/docs/html
+
+docs-links: docs-tools  ## ask for every link that leaves the site, and list those that are dead
+	PATH="$(abspath $(BIN)):$$PATH" $(SPHINX) -b linkcheck build/docs/links
+
+docs-test: docs-tools  ## every block of README and docs, both notebooks and the site
+	$(BIN)/python -m pytest tests/docs -m 'long or not long'
+
 clean:  ## remove what is made here
-	rm -rf $(VENV) build dist install log runs
+	rm -rf $(VENV) build dist install log runs docs/_figures

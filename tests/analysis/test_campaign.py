@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from strategies import QUICK
 
 from auv_analysis.sweep.campaign import Campaign, load_campaign
-from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError
 
 SOURCE = """
@@ -102,10 +101,8 @@ def test_scenario_is_named_relative_to_the_campaign(tmp_path: Path, monkeypatch)
     assert load_campaign(path).scenario.name == 'case2'
 
 
-def test_readme_shows_the_shipped_campaign() -> None:
+def test_readme_counts_the_shipped_campaign() -> None:
     readme = (Path(__file__).parents[2] / 'README.md').read_text()
-    shown = readme[readme.index('```yaml\nvary:') + 8 :].split('```')[0]
-    assert shown in shipped('campaigns', 'case1_gains').read_text()
     campaign = load_campaign('case1_gains')
     assert f'{campaign.rollouts} rollouts of each controller' in readme
 

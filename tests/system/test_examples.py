@@ -48,11 +48,8 @@ def test_stub_driver_is_controlled(tmp_path: Path) -> None:
     assert reached == pytest.approx(0.4, abs=0.05)
 
 
-def test_the_law_of_the_readme_is_the_example_and_short() -> None:
-    text = (EXAMPLES.parent / 'README.md').read_text()
-    law = (EXAMPLES / 'own_law.py').read_text()
-    assert re.search(r'```python\n(.*?)```', text, re.DOTALL)[1] == law
-    assert len(law.splitlines()) < 40
+def test_the_law_of_the_readme_is_short() -> None:
+    assert len((EXAMPLES / 'own_law.py').read_text().splitlines()) < 40
 
 
 def test_own_law_runs_in_process_and_on_the_nodes(tmp_path: Path) -> None:

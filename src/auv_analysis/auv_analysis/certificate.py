@@ -114,7 +114,7 @@ def certificate(
     gains: Any,
     model: ControlModel,
 ) -> Certificate:
-    """Evaluate (23), (26) and (28) at every sample of a run.
+    """Evaluate (23), (26) and (28) at every sample of a run, with F_xi = U^T F of (13).
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ class CL(NamedTuple):
         t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
         gains: 'CL', model: ControlModel,
     ) -> tuple[Numbers, Numbers]:  # fmt: skip
-        """(tau, f): the wrench and its adaptive part, N and N m, body frame."""
+        """(tau, f): the wrench and its adaptive part, N and N m, body frame; equation (29)."""
         M = model.dynamics.M
         z, S = vector(state, 0), vector(state, 6)
         nu_err = sub(nu_d, nu)

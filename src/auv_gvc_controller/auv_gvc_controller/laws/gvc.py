@@ -27,7 +27,9 @@ class GVC(NamedTuple):
         """(tau, f): the wrench and its adaptive part, N and N m, body frame.
 
         nu = Upsilon xi; U is Upsilon. The terms of (16) stand in its order, those that share a
-        factor U^T added before it is applied.
+        factor U^T, (10) to (12), added before it is applied.
+
+        Equations (16) to (21), and (14) from pi back to tau.
         """
         M, U, U_inv, N = model.dynamics.M, model.Upsilon, model.Upsilon_inv, model.N
         z, S = vector(state, 0), vector(state, 6)

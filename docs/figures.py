@@ -21,6 +21,7 @@ from auv_gvc_controller import decompose
 
 HERE = Path(__file__).resolve().parent
 FOLDER = HERE / '_figures'
+LATER = 1.0  # s: the jump at the start would flatten what follows
 BASIS = (HERE / 'figures.py', HERE.parent / 'src', HERE.parent / 'config')
 
 
@@ -60,7 +61,7 @@ def energy() -> plt.Figure:
 
 
 def couplings() -> plt.Figure:
-    """Equations (33) and (34) of the RexROV in case 1 scaled to it."""
+    """Equations (33) and (34) of the RexROV in case 1 scaled to it, drawn for what comes later."""
     run = _case1('_rexrov')
     Upsilon, _ = decompose(run.vehicle.M)
     shown = (
@@ -72,8 +73,11 @@ def couplings() -> plt.Figure:
         for column, unit in enumerate(units):
             for i in range(3 * column, 3 * column + 3):
                 axes[column].plot(run.t, values[:, i], color=COLOURS[i], label=DOFS[i])
+            late = values[run.t > LATER, 3 * column : 3 * column + 3]
+            low, high = late.min(), late.max()
+            axes[column].set_ylim(low - 0.1 * (high - low), high + 0.3 * (high - low))
             axes[column].set_ylabel(f'{name} ({unit})')
-            axes[column].legend(ncols=3)
+            axes[column].legend(ncols=3, loc='upper right')
     for axes in rows[1]:
         axes.set_xlabel('t (s)')
     return figure

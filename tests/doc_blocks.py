@@ -23,7 +23,7 @@ from markdown_it.token import Token
 ROOT = Path(__file__).resolve().parents[1]
 NEEDS = ('ubuntu', 'docker', 'ros2', 'vehicle', 'hours')
 RUN = ('bash', 'python')
-FILES = ('yaml', 'csv', 'javascript', 'python')
+FILES = ('yaml', 'javascript', 'python')
 SHOWN = ('text', 'math')
 MARKS = (
     'file', 'part of', 'output', 'exit', 'terminals', 'interrupted after', 'needs', 'blocks',

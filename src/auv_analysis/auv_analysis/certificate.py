@@ -1,6 +1,6 @@
 """The Lyapunov certificate (23) to (28), evaluated on a run.
 
-Both laws have one form, with s = U^-1 (nu_err + Lambda z) and w = U^T (f - F):
+Both laws have one form, with s = U^-1 (nu_err + Lambda z) and w = U^T (f - F)::
 
     law   U        A   B      G        H
     gvc   Upsilon  N   N k_D  Gamma N  N Gamma

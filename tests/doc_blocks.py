@@ -21,7 +21,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 ROOT = Path(__file__).resolve().parents[1]
-NEEDS = ('ubuntu', 'docker', 'ros2', 'vehicle', 'hours')
+NEEDS = ('ubuntu', 'docker', 'ros2', 'vehicle', 'rerun', 'hours')
 RUN = ('bash', 'python')
 FILES = ('yaml', 'javascript', 'python')
 SHOWN = ('text', 'math')

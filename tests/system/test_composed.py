@@ -73,6 +73,7 @@ def test_all_nodes_are_one_process_under_a_name_of_its_own(tmp_path: Path) -> No
     assert 'not finished' not in ' '.join(run.notes), 'the recorder has closed its bag'
 
 
+@pytest.mark.long
 def test_it_does_not_outlive_auv(tmp_path: Path) -> None:
     out = tmp_path / 'out'
     process = start(write(tmp_path, duration=600.0), out, '--composed')

@@ -117,7 +117,8 @@ def remove_results(out: Path) -> None:
     shutil.rmtree(out)
 
 
-@pytest.mark.parametrize('harm', [pytest.param(remove_bag, marks=pytest.mark.long), remove_results])
+@pytest.mark.long
+@pytest.mark.parametrize('harm', [remove_bag, remove_results])
 def test_a_bag_that_is_removed_under_the_recorder(
     tmp_path: Path, harm: Callable[[Path], None]
 ) -> None:

@@ -147,6 +147,7 @@ def held_up_run(folder: Path, steps: int, begin: Callable = start) -> list[dict]
     return sizes
 
 
+@pytest.mark.long
 def test_a_recorder_stopped_and_slowed_at_random_loses_and_doubles_nothing(tmp_path: Path) -> None:
     held_up_run(tmp_path, 10_000, record)
     assert_same(*both(tmp_path / 'out', tmp_path / 'long.yaml'))

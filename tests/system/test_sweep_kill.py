@@ -75,6 +75,7 @@ def test_killed_sweep_goes_on_without_losing_or_repeating(files: Path) -> None:
     assert not list(out.rglob('.*'))  # nothing unfinished is left
 
 
+@pytest.mark.long
 def test_interrupt_ends_in_one_line_that_says_how_to_go_on(files: Path) -> None:
     process = start(files, 'out')
     wait_for_parts(process, files / 'out', 3)

@@ -66,7 +66,15 @@ def test_an_earlier_file_is_not_replaced_unasked(monkeypatch, capsys, tmp_path) 
 
 
 def test_every_sample_is_in_the_file(monkeypatch, tmp_path: Path) -> None:
-    pytest.importorskip('rerun', reason='rerun-sdk is not installed')
+    chunk = pytest.importorskip('rerun.chunk', reason='rerun-sdk is not installed')
     monkeypatch.setattr(Run, 'blocks', lambda run: (run.part(slice(i, i + 3)) for i in (0, 3, 6)))
-    assert rerun_export.export(made_run(), tmp_path / 'made.rrd') == SAMPLES
-    assert [path.name for path in tmp_path.iterdir()] == ['made.rrd']
+    run, path = made_run(), tmp_path / 'made.rrd'
+    assert rerun_export.export(run, path) == SAMPLES
+    assert list(tmp_path.iterdir()) == [path]
+    batches = [
+        part.to_record_batch()
+        for part in chunk.RrdReader(path).stream().to_chunks()
+        if not part.is_static and part.entity_path == '/wrench/yaw/my\\ own'
+    ]
+    found = [value for batch in batches for (value,) in batch['Scalars:scalars'].to_pylist()]
+    assert sorted(found) == run.tau[:, 5].tolist()

@@ -89,6 +89,11 @@ def _path(*parts: str) -> str:
     return str(library().new_entity_path(list(parts)))
 
 
+def _numbers(colour: str) -> list[int]:
+    """Red, green and blue of #rrggbb."""
+    return list(bytes.fromhex(colour[1:]))
+
+
 def _name(recording: 'rerun.RecordingStream', run: AnyRun) -> None:
     """What does not change with time: axes, colours, names and widths of lines."""
     rr = library()
@@ -124,7 +129,10 @@ def _send(recording: 'rerun.RecordingStream', run: AnyRun) -> int:
         recording.send_columns(_path(TRAJECTORY, run.controller, 'vehicle'), times, moved)
         line.append(position[-count % every :: every])
         count += len(block.t)
-    path = rr.LineStrips3D([np.concatenate(line)], labels=[run.controller])
+    colour = COLOURS[0] if run.law == 'gvc' else COLOURS[4]
+    path = rr.LineStrips3D(
+        [np.concatenate(line)], labels=[run.controller], colors=[_numbers(colour)]
+    )
     recording.log(_path(TRAJECTORY, run.controller, 'path'), path, static=True)
     return count
 

@@ -27,8 +27,8 @@ DAY ?= 86400
 EXAMPLES ?= 500
 MUTANTS ?= 500
 
-.PHONY: help setup case1 case2 test soak fuzz properties mutation audit bench bench-growth build wheels \
-  lint format hooks interop docs docs-links docs-test docs-tools clean
+.PHONY: help setup case1 case2 test soak fuzz properties mutation audit bench bench-growth build wheels
+.PHONY: lint format hooks interop docs docs-links docs-test docs-tools clean
 
 help:  ## this list
 	@sed -nE 's/^([a-z0-9 -]+):[^#]*## *(.*)/\1\t\2/p' $(MAKEFILE_LIST) | column -t -s $$'\t'
@@ -110,7 +110,7 @@ hooks: setup  ## the same and some hygiene before every commit of this clone
 interop: setup  ## read a bag with npm's @mcap/core as well
 	$(BIN)/python -m pytest tests/system/test_interop.py
 
-docs-tools: setup
+docs-tools: setup  ## what builds the documentation, into .venv
 	$(BIN)/python -m pip install --quiet -r requirements-docs.txt
 
 # every warning, also a dead reference, is an error; what was executed is kept below build/docs

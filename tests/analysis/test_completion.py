@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from auv_analysis import cli
-from auv_analysis.command_line import LAWS
+from auv_analysis.tuning.options import LAWS
 from auv_gvc_controller.laws import SHIPPED
 
 AUV = Path(sys.executable).with_name('auv')

@@ -16,6 +16,7 @@ KEYS = {  # of rosdep, for imports of another name
         name: f'python3-{name}'
         for name in (
             'argcomplete',
+            'defusedxml',
             'jsonschema',
             'matplotlib',
             'numpy',

@@ -294,7 +294,7 @@ def test_late_comers_get_what_was_kept_for_them(tmp_path: Path) -> None:
         ({'start': 9.0}, 'start: expected at most 0.49 s'),
         ({'namespace': 'a b'}, 'namespace: expected a namespace'),
         ({'speed': 2.0}, 'speed: expected one of'),
-        ({'topics': ['sonar']}, 'topics: expected topics of /cmd_vel.*found sonar'),
+        ({'topics': ['sonar']}, 'topics: expected one of /cmd_vel.*found sonar'),
         ({'expected_subscribers': ['sonar=1']}, 'expected_subscribers: expected topic=count'),
         ({'original_names': True, 'topics': ['wrench']}, 'expected a topic .* --commands'),
     ],

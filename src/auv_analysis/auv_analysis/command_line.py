@@ -10,10 +10,10 @@ from auv_analysis.foreign.options import add_options as add_foreign
 from auv_analysis.formats.options import add_export, add_import
 from auv_analysis.linearization.options import add_options as add_linearize
 from auv_analysis.replay.options import add_options as add_replay
+from auv_analysis.tuning.options import add_options as add_tune
 
 SCENARIO = 'a scenario file, or the bare name of a shipped one'
 VEHICLE = 'a vehicle file, or the bare name of a shipped one'
-LAWS = ('gvc', 'cl', 'pid', 'smc')
 RESULT = 'a bag, a folder of results or of a sweep, or a scenario, which is simulated'
 
 
@@ -127,26 +127,8 @@ def _sweep(command: argparse.ArgumentParser) -> None:
 
 def _tune(command: argparse.ArgumentParser) -> None:
     command.add_argument('scenario', help=SCENARIO)
-    text = 'controller to equal; default: the first under gvc'
-    command.add_argument('--reference', metavar='NAME', help=text)
-    text = "only this one beside the reference's own; may be repeated; default: all shipped"
-    command.add_argument('--law', action='append', choices=LAWS, help=text)
-    text = 'what the laws are given alike; default: effort'
-    command.add_argument('--equal', choices=('effort', 'error'), default='effort', help=text)
-    text = 'of the error: weighted by time, or the plain mean; default: time'
-    command.add_argument('--index', choices=('time', 'mean'), default='time', help=text)
-    structures = ('best', 'scalar', 'mass', 'diagonal', 'inertia')
-    text = 'of gains: times I, M_ii, six numbers, times M; default: the better of the first two'
-    command.add_argument('--structure', choices=structures, default='best', help=text)
-    text = 'relative, of the equality; default: 0.001'
-    command.add_argument('--tolerance', type=float, default=0.001, help=text)
-    text = 'draws of the Monte Carlo; 0: none; default: 256'
-    command.add_argument('--samples', type=int, metavar='N', default=256, help=text)
-    text = 'how far draws go, such as damping=0.3 or current=0.1; may be repeated'
-    command.add_argument('--spread', action='append', metavar='NAME=VALUE', help=text)
+    add_tune(command)
     _hold(command)
-    text = 'of search and draws; default: 0'
-    command.add_argument('--seed', type=int, default=0, help=text)
 
 
 def _watch(command: argparse.ArgumentParser) -> None:

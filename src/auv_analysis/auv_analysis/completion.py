@@ -6,8 +6,8 @@ from typing import Any
 import argcomplete
 from argcomplete.completers import BaseCompleter, FilesCompleter
 
-from auv_analysis.command_line import LAWS
 from auv_analysis.command_parser import Parser
+from auv_analysis.tuning.options import LAWS
 from auv_dynamics.config import shipped, shipped_names
 from auv_dynamics.yaml_text import parse_any_yaml
 

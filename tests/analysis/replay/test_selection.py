@@ -116,7 +116,7 @@ def test_what_a_command_is(topic: str, kind: str, expected: bool) -> None:
 @pytest.mark.parametrize(
     ('wish', 'bag', 'words'),
     [
-        (Wish(topics=('sonar',)), index(), 'topics: expected topics of .* found sonar'),
+        (Wish(topics=('sonar',)), index(), 'topics: expected one of .* found sonar'),
         (Wish(topics=('clock',), original_names=True), index(), 'the time of the replay'),
         (Wish(original_names=True), index({'/wrench': WRENCH}), '--commands publishes it'),
         (Wish(), index({}), 'expected a topic that can be played'),

@@ -92,7 +92,7 @@ def test_spread_of_the_command_line() -> None:
     assert 'inertia' not in applied(Spread(), REXROV.vehicle)
     assert applied(Spread(), HERMAN.vehicle).keys() >= {'inertia', 'damping'}
     for text, match in (
-        ('size=1', 'with a name of mass, added_mass'), ('mass', 'from 0 up below 1, found'),
+        ('size=1', 'with NAME one of mass, added_mass'), ('mass', 'from 0 up below 1, found'),
         ('mass=1', 'below 1, found 1'), ('current=-1', 'from 0 up, found -1'),
         ('waves=nan', 'found nan'), ('current=inf', 'found inf'),
     ):  # fmt: skip

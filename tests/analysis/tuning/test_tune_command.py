@@ -173,8 +173,8 @@ def test_effort_out_of_reach_is_said_plainly(command: Callable, tmp_path: Path) 
         (('--tolerance', 'nan'), '--tolerance: expected a number above 0'),
         (('--seed', '-1'), '--seed: expected a whole number from 0'),
         (('--spread', 'mass=2'), '--spread: mass: expected a number from 0 up below 1, found 2'),
-        (('--equal', 'cost'), "invalid choice: 'cost'"),
-        (('--law', 'lqr'), "invalid choice: 'lqr'"),
+        (('--equal', 'cost'), '--equal: expected one of effort, error, found cost'),
+        (('--law', 'lqr'), '--law: expected one of gvc, cl, pid, smc, found lqr'),
     ],
 )
 def test_wrong_options_are_one_line(command, arguments, match, tmp_path: Path) -> None:

@@ -14,9 +14,8 @@ import matplotlib as mpl
 from doc_blocks import ROOT, Block, Page
 from harness import environment, fresh_domain
 
-PATIENCE = (
-    1800.0  # s, after which a block has failed: a busy machine is slow, a page is no benchmark
-)
+# s, after which a block has failed: a busy machine is slow, a page is no benchmark
+PATIENCE = 1800.0
 MADE = {'runs', 'build', 'install', 'log', '.git', '.venv', 'docs', '.pytest_cache'}
 ENDED = (0, -signal.SIGTERM)  # of what runs in a terminal until the page ends
 

@@ -25,6 +25,9 @@ X = np.array([0, 0, 0, 1, 0, 0, 0, 0.1, 0, 0, 0, 0, 0], float)
 REAL = [*CONTROLLER, *parameters(odometry_timeout=0.3, setpoint_timeout=0.3, ramp=0.2)]
 
 
+SLOW = 3.0  # s, of a ramp
+
+
 class Driver:
     """Odometry and set-points at 50 Hz, stamped by the clock on the wall unless it is set wrong."""
 
@@ -65,11 +68,10 @@ class Driver:
         )
 
     def rises(self) -> None:
-        """Drive until the wrench does not grow any more: the ramp is over."""
+        """Drive until the law is in charge and its slow ramp over."""
         self.works()
-        self.until(
-            lambda: np.ptp(self.surge[-25:]) < 0.02 * abs(self.surge[-1]), 'the end of the ramp'
-        )
+        over = time.monotonic() + SLOW
+        self.until(lambda: time.monotonic() > over, 'the end of the ramp')
 
     def lets_go(self) -> list[float]:
         """Drive until the wrench is zero; the forces on the way."""
@@ -108,7 +110,7 @@ def recovering():
 @pytest.fixture
 def slow():
     """One whose ramp is long beside any pause of a busy machine that no watchdog sees."""
-    yield from driven(*parameters(ramp=3.0))
+    yield from driven(*parameters(ramp=SLOW))
 
 
 def driven(*more: str) -> Iterator[Driver]:

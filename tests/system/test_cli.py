@@ -99,9 +99,11 @@ WRONG_LINES = {  # what is typed -> what the one line names
     'analyze taken/notes.md': 'taken/notes.md',
 }
 INSTALLED = [  # of these, the ones that are also tried as the user runs them
-    'fly', 'simulate case1 --hold foh', 'simulate case9', 'simulate case1 --out taken',
-    'run case1 --controller gvc --controller pid', 'run case1 --domain-id 102',
-    'run case1 --out taken', 'sweep case1_gains --out taken', 'info taken/notes.md',
+    'fly', 'simulate case9', 'run case1 --domain-id 102', 'run case1 --out taken',
+    *(pytest.param(line, marks=pytest.mark.long) for line in (
+        'simulate case1 --hold foh', 'simulate case1 --out taken', 'info taken/notes.md',
+        'run case1 --controller gvc --controller pid', 'sweep case1_gains --out taken',
+    )),
 ]  # fmt: skip
 
 

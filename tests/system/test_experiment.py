@@ -57,7 +57,9 @@ def done(tmp_path_factory) -> Path:
     assert ended.returncode == 0, ended.stderr
     assert json.loads(ended.stdout).keys() == {'gvc', 'cl'}
     assert 'export ROS_DOMAIN_ID=' in ended.stderr
-    recorded(scenario, root / 'two')
+    options = '--out', str(root / 'two'), '--composed', '--no-report'
+    ended = auv('run', str(scenario), *options)
+    assert ended.returncode == 0, ended.stderr
     assert not nodes(root)
     return root
 

@@ -89,6 +89,7 @@ def killing(worker: subprocess.Popen, after: int) -> Callable[[int], None]:
     return progress
 
 
+@pytest.mark.long
 def test_rows_are_the_same_when_a_worker_is_killed_half_way(cluster, files: Path) -> None:
     run(files, out='threads')
     address, workers = cluster

@@ -47,7 +47,7 @@ def _timing(result: Result) -> Drawn:
     figure = plotting.new_figure(2.4)
     left, right = figure.subplots(1, 2)
     apart = np.diff(np.sort(t)) * MS
-    left.hist(apart, bins=BINS, range=(0.0, WIDER * apart.max()), color=COLOURS[0])
+    left.hist(apart, bins=BINS, range=(0.0, WIDER * float(np.max(apart))), color=COLOURS[0])
     left.set(xlabel='between two messages (ms)', ylabel='messages', yscale='log')
     right.plot(t, ages * MS, '.', markersize=2, color=COLOURS[0])
     right.set(xlabel='$t$ (s)', ylabel='older than the freshest (ms)')

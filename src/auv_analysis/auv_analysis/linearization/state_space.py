@@ -22,7 +22,7 @@ def state_names(m: int) -> tuple[str, ...]:
 def relative(error: np.ndarray, values: np.ndarray) -> float:
     """Largest error relative to the largest entry of its row."""
     largest = np.abs(values).max(axis=1, keepdims=True)
-    return float((error / np.where(largest > 0, largest, 1.0)).max(initial=0.0))
+    return float(np.max(error / np.where(largest > 0, largest, 1.0), initial=0.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from io import StringIO
 
 import pytest
 
-from auv_analysis import progress
+from auv_analysis import counting, progress
 from auv_analysis.console import TextConsole
 
 
@@ -19,15 +19,15 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> StringIO:
 def _totals(steps: int) -> list[float | None]:
     """Total of the line that is around, before, during and after `steps` entries."""
     with progress.waiting('works'):
-        around = progress._counting.get()
+        around = counting.counting.get()
         assert around is not None
         shown, task = around
         found = [shown.tasks[task].total]
-        for _ in progress.each(range(steps), steps):
+        for _ in counting.each(range(steps), steps):
             found.append(shown.tasks[task].total)
-            assert list(progress.each('ab', 99)) == ['a', 'b']  # is no part of what is counted
+            assert list(counting.each('ab', 99)) == ['a', 'b']  # is no part of what is counted
         found.append(shown.tasks[task].total)
-    assert progress._counting.get() is None
+    assert counting.counting.get() is None
     return found
 
 
@@ -37,7 +37,7 @@ def test_entries_are_counted_by_what_is_around(terminal):
 
 
 def test_without_something_around_entries_just_pass(terminal):
-    assert list(progress.each(iter('abc'), 3)) == ['a', 'b', 'c']
+    assert list(counting.each(iter('abc'), 3)) == ['a', 'b', 'c']
     assert terminal.getvalue() == ''
 
 
@@ -46,8 +46,8 @@ def test_what_fails_leaves_nothing_behind(terminal):
         raise ValueError('stop')
 
     with pytest.raises(ValueError, match='stop'), progress.waiting('works'):
-        list(map(fails, progress.each(range(3), 3)))
-    assert progress._counting.get() is None
+        list(map(fails, counting.each(range(3), 3)))
+    assert counting.counting.get() is None
 
 
 def test_bar_says_what_is_done_how_far_and_how_fast(terminal):

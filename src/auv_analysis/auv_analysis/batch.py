@@ -19,8 +19,8 @@ from auv_analysis.closed_loop import (
     Tables,
     Workspace,
 )
+from auv_analysis.counting import each
 from auv_analysis.kernels import Kernel, kernels
-from auv_analysis.progress import each
 from auv_analysis.reduction import Figures
 from auv_analysis.trees import kept, mapped
 from auv_dynamics.actuators import memory

@@ -1,9 +1,7 @@
 """How far work is and how long it will take: on a terminal, and nowhere else."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
-from typing import TypeVar
 
 from rich.progress import (
     BarColumn,
@@ -11,17 +9,15 @@ from rich.progress import (
     ProgressColumn,
     SpinnerColumn,
     Task,
-    TaskID,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
 
 from auv_analysis.console import TextConsole
+from auv_analysis.counting import counting
 
-T = TypeVar('T')
 console = TextConsole(stderr=True)
-_counting: ContextVar[tuple[Progress, TaskID] | None] = ContextVar('_counting', default=None)
 
 
 class Speed(ProgressColumn):
@@ -72,34 +68,8 @@ def waiting(text: str) -> Iterator[None]:
     with Progress(
         *columns, TimeRemainingColumn(), console=console, transient=True, disable=quiet
     ) as shown:
-        token = _counting.set((shown, shown.add_task(text, total=None)))
+        token = counting.set((shown, shown.add_task(text, total=None)))
         try:
             yield
         finally:
-            _counting.reset(token)
-
-
-def each(entries: Iterable[T], total: int) -> Iterator[T]:
-    """Go through entries, counted by the `waiting` that is around; without one, just through them.
-
-    Parameters
-    ----------
-    entries : of similar length in time
-    total : how many
-
-    """
-    around = _counting.get()
-    if around is None:
-        yield from entries
-        return
-    shown, task = around
-    _counting.set(None)  # what is counted inside of an entry is no part of this
-    shown.update(task, total=total, completed=0)
-    try:
-        for entry in entries:
-            yield entry
-            shown.advance(task)
-    finally:
-        _counting.set(around)
-        # how long the rest takes is not known; `update` takes None for no change
-        next(one for one in shown.tasks if one.id == task).total = None
+            counting.reset(token)

@@ -14,7 +14,7 @@ from auv_analysis.closed_loop import (
     run_continuous,
     run_held,
 )
-from auv_analysis.progress import each
+from auv_analysis.counting import each
 from auv_analysis.records import Log
 from auv_analysis.run import Run
 from auv_analysis.scenario import Scenario

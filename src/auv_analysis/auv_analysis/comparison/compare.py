@@ -12,9 +12,10 @@ from auv_analysis.comparison.opening import named, open_source
 from auv_analysis.comparison.ranking import Ranking, rank
 from auv_analysis.comparison.sources import Source
 from auv_analysis.console import say
+from auv_analysis.counting import each
 from auv_analysis.failure import FailedError
 from auv_analysis.folder import write_json
-from auv_analysis.progress import each, waiting
+from auv_analysis.progress import waiting
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.summary import summarize
 from auv_dynamics.files import first_line

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.counting import each
 from auv_analysis.exploration import best, dependence
 from auv_analysis.exploration.indices import designed, indices
 from auv_analysis.exploration.influence import influence, ranks_of
@@ -14,7 +15,6 @@ from auv_analysis.exploration.paired import paired
 from auv_analysis.exploration.quantiles import distribution, figures_spread, varying
 from auv_analysis.exploration.varied import Varied, varied_paths
 from auv_analysis.measures import BY_NAME, MEASURES, Measure
-from auv_analysis.progress import each
 from auv_analysis.report.text import join
 from auv_analysis.sweep.groups import kind_of
 

@@ -19,17 +19,14 @@ from importlib import import_module
 from typing import IO, Any
 
 from auv_analysis import load_scenario
+from auv_analysis.experiment import COMPOSED, PACKAGES
 from auv_analysis.warm_up import warm_up
 
-NODES = {
-    'plant_node': 'auv_dynamics',
+NODES = {  # and the package of each
+    **PACKAGES,
     'frame_converter_node': 'auv_dynamics',
-    'setpoint_node': 'auv_gvc_controller',
-    'controller_node': 'auv_gvc_controller',
-    'recorder_node': 'auv_analysis',
-    'analysis_node': 'auv_analysis',
     'replay_node': 'auv_analysis',
-    'composed_graph': 'auv_analysis',
+    COMPOSED: 'auv_analysis',
 }
 SIZE = 1 << 20  # bytes of a request, at most
 

@@ -23,8 +23,6 @@ FRAMES = Frames()
 PERIOD = 0.02
 X = np.array([0, 0, 0, 1, 0, 0, 0, 0.1, 0, 0, 0, 0, 0], float)
 REAL = [*CONTROLLER, *parameters(odometry_timeout=0.3, setpoint_timeout=0.3, ramp=0.2)]
-
-
 SLOW = 3.0  # s, of a ramp
 
 

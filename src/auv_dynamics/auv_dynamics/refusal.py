@@ -34,6 +34,11 @@ def first_line(error: BaseException) -> str:
     return (str(error) or type(error).__name__).splitlines()[0]
 
 
+def named_line(error: BaseException) -> str:
+    """Type of an error and the first line of what it says."""
+    return f'{type(error).__name__}: {error}'.splitlines()[0]
+
+
 def shorten(value: object) -> str:
     """One short line that shows a value."""
     if isinstance(value, str) and PLAIN.fullmatch(value):

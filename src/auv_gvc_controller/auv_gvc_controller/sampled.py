@@ -9,6 +9,7 @@ import numpy as np
 from auv_dynamics.actuators import Reach, demanded, make_reach, reachable
 from auv_dynamics.jit import JITTED, compiled, jitable, specialised
 from auv_dynamics.lanes import anywhere, select
+from auv_dynamics.refusal import named_line
 from auv_dynamics.six import Numbers, Vector
 from auv_gvc_controller.laws import SHIPPED
 from auv_gvc_controller.model import ControlModel
@@ -18,15 +19,9 @@ ROUNDING = 1e-9
 
 @specialised('gains')
 def wrench(
-    t: float,
-    nu: Vector,
-    attitude: Vector,
-    nu_d: Vector,
-    nu_d_dot: Vector,
-    state: Vector,
-    gains: Any,
-    model: ControlModel,
-) -> tuple[Numbers, Numbers]:
+    t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
+    gains: Any, model: ControlModel,
+) -> tuple[Numbers, Numbers]:  # fmt: skip
     """(tau, f) of the law to which `gains` belongs."""
     tau, f = type(gains).wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
     return tuple(map(number, tau)), tuple(map(number, f))
@@ -39,15 +34,9 @@ def number(value: Any) -> Any:
 
 @specialised('gains')
 def state_rate(
-    t: float,
-    nu: Vector,
-    attitude: Vector,
-    nu_d: Vector,
-    nu_d_dot: Vector,
-    state: Vector,
-    gains: Any,
-    model: ControlModel,
-) -> Vector:
+    t: float, nu: Vector, attitude: Vector, nu_d: Vector, nu_d_dot: Vector, state: Vector,
+    gains: Any, model: ControlModel,
+) -> Vector:  # fmt: skip
     """Rate of the state of the law to which `gains` belongs."""
     return type(gains).state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
 
@@ -156,8 +145,8 @@ def user_law(gains: Any) -> Iterator[None]:
     except Exception as error:
         if type(gains) in SHIPPED.values():
             raise
-        text = f'{type(error).__name__}: {error}'.splitlines()[0]
-        raise ArithmeticError(f'the law {type(gains).__name__} failed: {text}') from error
+        said = named_line(error)
+        raise ArithmeticError(f'the law {type(gains).__name__} failed: {said}') from error
 
 
 ZERO = (0.0,) * 6

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Iterable, Iterator
 from typing import Literal, NamedTuple
 
+from auv_dynamics.refusal import named_line
+
 Verdict = Literal['ok', 'note', 'warning', 'broken']
 
 
@@ -40,5 +42,5 @@ def findings_of(checks: Iterable[Check]) -> Iterator[Finding]:
             yield from check()
         except Exception as error:  # whatever a broken set-up does: the other checks go on
             name = getattr(check, '__name__', 'check').replace('_', ' ')
-            found = f'could not be looked at: {type(error).__name__}: {error}'.splitlines()[0]
+            found = f'could not be looked at: {named_line(error)}'
             yield Finding(name, 'broken', found, 'make clean, then make setup')

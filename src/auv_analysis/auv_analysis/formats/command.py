@@ -13,7 +13,6 @@ from auv_dynamics.config import shipped
 from auv_dynamics.files import parse_yaml, read_yaml
 from auv_dynamics.vehicle_file import vehicle_from_dict
 
-TITLES = {'handled': 'traps', 'assumed': 'assumed', 'left out': 'left_out'}
 NAMES = {'uuv': 'uuv_simulator', 'gazebo': 'Gazebo', 'mss': 'a list of derivatives'}
 
 
@@ -32,13 +31,15 @@ def import_vehicle(options: argparse.Namespace) -> dict[str, Any]:
     elif not options.json:
         print(text, end='')
     _report(draft, list(vehicle.warnings))
-    lists = {key: getattr(draft, key) for key in TITLES.values()}
-    return {'format': kind, 'vehicle': data, **lists, 'warnings': list(vehicle.warnings)}
+    return {
+        'format': kind, 'vehicle': data, 'traps': draft.traps, 'assumed': draft.assumed,
+        'left_out': draft.left_out, 'warnings': list(vehicle.warnings),
+    }  # fmt: skip
 
 
 def _report(draft: Draft, warnings: list[str]) -> None:
-    for title, key in TITLES.items():
-        for sentence in getattr(draft, key):
+    for title, sentences in draft.report.items():
+        for sentence in sentences:
             say(f'{title}: {sentence}')
     for warning in warnings:
         say(f'warning: {warning}')

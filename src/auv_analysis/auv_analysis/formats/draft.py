@@ -65,6 +65,11 @@ class Draft:
     assumed: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
 
+    @property
+    def report(self) -> dict[str, list[str]]:
+        """The sentences of the report under their titles."""
+        return {'handled': self.traps, 'assumed': self.assumed, 'left out': self.left_out}
+
     def put(self, key: str, value: Any, comment: str) -> None:
         """Set a value, with the text of its comment; a zero has no sign."""
         self.values[key] = np.asarray(value, float) + 0.0 if np.ndim(value) else value

@@ -11,7 +11,6 @@ from auv_analysis.formats.uuv_urdf import uuv_entries
 from auv_analysis.formats.xml_text import parse_xml
 from auv_dynamics.files import InputError, parse_yaml, read_text
 
-FORMATS = ('auto', 'uuv', 'gazebo', 'mss')
 UUV = re.compile(r'hydrodynamic_model|quad_damping|quadratic_damping|^Ma\s*:', re.M)
 
 

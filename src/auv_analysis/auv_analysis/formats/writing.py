@@ -30,7 +30,7 @@ def vehicle_text(draft: Draft, name: str, source: str) -> str:
     lines = [
         '# Comments say where numbers stand in the file that they were imported from. Body axes',
         '# are forward-starboard-down, units SI, matrices positive.',
-        *(f'# {kind}: {_line(text)}' for kind, texts in _report(draft) for text in texts),
+        *(f'# {title}: {_line(text)}' for title, texts in draft.report.items() for text in texts),
         'format: 1',
         f'name: {_scalar(UNFIT.sub("_", name) or "imported")}',
         f'source: {_scalar(source)}',
@@ -47,14 +47,6 @@ def vehicle_text(draft: Draft, name: str, source: str) -> str:
 def _line(text: str) -> str:
     """A comment is one line, whatever names a file has."""
     return ' '.join(printable(text).split())
-
-
-def _report(draft: Draft) -> list[tuple[str, list[str]]]:
-    return [
-        ('handled', draft.traps),
-        ('assumed', draft.assumed),
-        ('left out', draft.left_out),
-    ]
 
 
 def _entry(draft: Draft, place: str, key: str, indent: str) -> list[str]:

@@ -15,6 +15,7 @@ from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError, read_yaml
 from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import load_vehicle
+from auv_gvc_controller.laws import refusal
 
 LONGEST = 90  # of the name in that of the folder
 
@@ -28,9 +29,7 @@ def linearize(options: argparse.Namespace) -> dict[str, Any]:
         with waiting('linearising'):
             models = linear_models(subject, names, options.nu0, eta0)
     except ValueError as error:
-        key, _, rest = str(error).partition(': expected ')
-        expected, _, found = rest.partition(', found ')
-        raise InputError(paths[0], key, expected, found) from None
+        raise InputError(paths[0], *refusal(error)) from None
     folder = f'linearize_{UNFIT.sub("_", subject.name)[:LONGEST]}'
     out = prepare(options.out or Path('runs') / folder, overwrite=options.overwrite, inputs=paths)
     left_out = subject.sampled if isinstance(subject, Scenario) else ()

@@ -10,6 +10,7 @@ import numpy as np
 
 from auv_dynamics.files import matrix6
 from auv_dynamics.nearest import meant, one_of
+from auv_dynamics.refusal import named_line
 from auv_gvc_controller.laws.cl import CL
 from auv_gvc_controller.laws.gvc import GVC
 from auv_gvc_controller.laws.pid import PID
@@ -52,7 +53,7 @@ def law_class(name: str) -> Any:
         likely = meant(attribute, dir(sys.modules.get(module)))
         raise ValueError(f'expected {expected}{likely}, found no {attribute} in {module}') from None
     except (Exception, SystemExit) as error:  # whatever a user's module does when it is imported
-        raise ValueError(f'expected {expected}, found {name!r} ({_short(error)})') from None
+        raise ValueError(f'expected {expected}, found {name!r} ({named_line(error)})') from None
     missing = [
         part for part in ('wrench', 'state_rate', 'STATES', '_fields') if not hasattr(law, part)
     ]
@@ -112,7 +113,7 @@ def try_law(gains: Any, model: Any) -> None:
             with np.errstate(all='ignore'):
                 return function()
         except Exception as error:  # whatever a user's law does
-            text = f'expected {part} of {law.__name__} to answer at rest, found {_short(error)}'
+            text = f'expected {part} of {law.__name__} to answer at rest, found {named_line(error)}'
             raise ValueError(text) from None
 
     answer = call('wrench', lambda: [np.asarray(a, float).size for a in law.wrench(*arguments)])
@@ -144,10 +145,6 @@ def refusal(error: ValueError) -> tuple[str, str, str]:
         key, rest = '', str(error).removeprefix('expected ')
     expected, _, found = rest.partition(', found ')
     return key, expected, found
-
-
-def _short(error: BaseException) -> str:
-    return f'{type(error).__name__}: {error}'.splitlines()[0]
 
 
 def make_gains(name: str, values: Mapping[str, Any]) -> Any:
@@ -192,7 +189,7 @@ def make_gains(name: str, values: Mapping[str, Any]) -> Any:
         gains = law(**flat)
     except TypeError as error:
         text = 'a named tuple of gains'
-        raise ValueError(f'expected {text}, found {name!r} ({_short(error)})') from None
+        raise ValueError(f'expected {text}, found {name!r} ({named_line(error)})') from None
     if hasattr(law, 'check'):
         try:
             law.check(gains)
@@ -202,5 +199,5 @@ def make_gains(name: str, values: Mapping[str, Any]) -> Any:
             raise ValueError(f'expected gains that {name} accepts, found {error}') from None
         except Exception as error:  # whatever a user's law does
             text = f'expected check of {name} to judge the gains'
-            raise ValueError(f'{text}, found {_short(error)}') from None
+            raise ValueError(f'{text}, found {named_line(error)}') from None
     return gains

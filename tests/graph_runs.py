@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import psutil
 import yaml
-from harness import environment, fresh_domain
+from harness import environment, fresh_domain, nursery, start_auv, start_installed_auv
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from nursery import NODES
+from nursery import NODES, Process
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run
@@ -25,20 +25,20 @@ SIGNALS = ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_e
            'nu_measured', 'tau_applied')  # fmt: skip
 
 
-def start(scenario: Path, out: Path, *options: str) -> subprocess.Popen:
+def start(scenario: Path, out: Path, *options: str) -> Process:
     """Start `auv run`."""
-    command = [str(Path(sys.executable).with_name('auv')), 'run', str(scenario), '--out', str(out)]
-    environ = {**os.environ, 'ROS_DOMAIN_ID': str(fresh_domain())}
-    return subprocess.Popen([*command, *options], env=environ, stderr=subprocess.PIPE, text=True)
+    return start_auv('run', str(scenario), '--out', str(out), *options)
 
 
-def record(
-    scenario: Path, out: Path, *controllers: str, domain: int | None = None
-) -> subprocess.Popen:
+def start_installed(scenario: Path, out: Path, *options: str) -> subprocess.Popen:
+    """Start the `auv run` of a user, whose nodes are its children."""
+    return start_installed_auv('run', str(scenario), '--out', str(out), *options)
+
+
+def record(scenario: Path, out: Path, *controllers: str, domain: int | None = None) -> Process:
     """Start the nodes of `auv run` and record, without the analysis and the report behind it."""
     environ = environment(fresh_domain() if domain is None else domain)
-    command = [sys.executable, __file__, str(scenario), str(out), *controllers]
-    return subprocess.Popen(command, env=environ, stderr=subprocess.PIPE, text=True)
+    return nursery().start(['record', str(scenario), str(out), *controllers], environ)
 
 
 def recorded(scenario: Path, out: Path, *controllers: str) -> Path:
@@ -120,23 +120,20 @@ def plain(value: object) -> object:
     return tuple(map(plain, value)) if isinstance(value, list | tuple) else value
 
 
-def main(path: str, out: str, *controllers: str) -> None:
+def main() -> None:
     """Record controllers of a scenario, all where none is named."""
     from auv_analysis.experiment import run_controller
     from auv_analysis.warm_up import warm_up
     from auv_dynamics.ros.watcher import Watcher
 
+    path, out, *controllers = sys.argv[1:]
     scenario, domain = load_scenario(path), int(os.environ['ROS_DOMAIN_ID'])
     Path(out).mkdir()
-    names = controllers or tuple(scenario.controllers)
-    warm_up(scenario, list(names))
+    names = controllers or list(scenario.controllers)
+    warm_up(scenario, names)
     graph = Watcher(domain)
     try:
         for name in names:
             run_controller(scenario, name, Path(out), domain, graph, lambda _: None)
     finally:
         graph.close()
-
-
-if __name__ == '__main__':
-    main(*sys.argv[1:])

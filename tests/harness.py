@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
-from nursery import Node, Nursery
+from nursery import Nursery, Process
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
@@ -43,14 +43,14 @@ def environment(domain: int) -> dict[str, str]:
 
 @cache
 def nursery() -> Nursery:
-    """The process that forks the nodes of this worker."""
+    """The process that forks the programs of this worker."""
     return Nursery()
 
 
-def start_node(name: str, domain: int, *arguments: str) -> Node:
+def start_node(name: str, domain: int, *arguments: str) -> Process:
     """Start one of our nodes; its output is captured."""
     given = ['--ros-args', *arguments] if arguments else []
-    return nursery().start(name, given, environment(domain))
+    return nursery().start([name, *given], environment(domain))
 
 
 def run_node(name: str, *arguments: str) -> subprocess.CompletedProcess:
@@ -187,12 +187,43 @@ def graph(
                 print(f'--- {name}, exit code {died}\n{output}')  # shown when the test fails
 
 
-def auv(*arguments: str, cwd: Path | None = None, **extra: str) -> subprocess.CompletedProcess:
-    """Run the installed `auv` command, in a domain of the test's."""
+def start_auv(
+    *arguments: str, cwd: Path | None = None, domain: int | None = None, **extra: str
+) -> Process:
+    """Start `auv`, in a domain of the test's."""
+    return nursery().start(['auv', *arguments], _of_auv(domain, extra), str(cwd or ''))
+
+
+def start_installed_auv(
+    *arguments: str,
+    cwd: Path | None = None,
+    domain: int | None = None,
+    stdin: int = subprocess.DEVNULL,
+    stdout: int = subprocess.PIPE,
+    **extra: str,
+) -> subprocess.Popen:
+    """Start the installed command, which starts the installed nodes and ends them if it dies."""
     command = [str(Path(sys.executable).with_name('auv')), *arguments]
+    streams = {'stdin': stdin, 'stdout': stdout, 'stderr': subprocess.PIPE}
+    return subprocess.Popen(command, cwd=cwd, env=_of_auv(domain, extra), text=True, **streams)
+
+
+def _of_auv(domain: int | None, extra: dict[str, str]) -> dict[str, str]:
     # not a domain of its own choice: a parallel test may be about to use the same
-    environ = {**os.environ, 'ROS_DOMAIN_ID': str(fresh_domain())}
-    return subprocess.run(
-        command, cwd=cwd, env={**environ, **extra}, capture_output=True, text=True, timeout=600,
-        check=False,
-    )  # fmt: skip
+    number = fresh_domain() if domain is None else domain
+    return {**os.environ, 'ROS_DOMAIN_ID': str(number), **extra}
+
+
+def auv(*arguments: str, **options: Any) -> subprocess.CompletedProcess:
+    """Run `auv` to its end."""
+    return _to_its_end(start_auv(*arguments, **options))
+
+
+def installed_auv(*arguments: str, **options: Any) -> subprocess.CompletedProcess:
+    """Run the installed command to its end."""
+    return _to_its_end(start_installed_auv(*arguments, **options))
+
+
+def _to_its_end(process: Process | subprocess.Popen) -> subprocess.CompletedProcess:
+    said = process.communicate(timeout=600)
+    return subprocess.CompletedProcess(process.args, process.returncode, *said)

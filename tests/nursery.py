@@ -1,10 +1,12 @@
-"""Nodes as processes of their own, forked from one that has imported them all.
+"""Our programs as processes of their own, forked from one that has imported them all.
 
-To import what a node needs takes longer than most tests of nodes. What the executables themselves
-do before that is seen by the tests of `auv run`, which start them.
+To import what a node needs takes longer than most tests of nodes, and `auv run` starts five of
+them for each controller. What the executables themselves do before that is seen by the tests that
+start the installed ones.
 """
 
 import contextlib
+import ctypes
 import json
 import os
 import selectors
@@ -16,11 +18,15 @@ import threading
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import IO, Any
 
-from auv_analysis import load_scenario
+from setproctitle import setproctitle
+
+from auv_analysis import load_scenario, supervisor
 from auv_analysis.experiment import COMPOSED, PACKAGES
 from auv_analysis.warm_up import warm_up
+from auv_dynamics.interface import PARENT
 
 NODES = {  # and the package of each
     **PACKAGES,
@@ -28,22 +34,39 @@ NODES = {  # and the package of each
     'replay_node': 'auv_analysis',
     COMPOSED: 'auv_analysis',
 }
+STARTERS = {'auv': 'auv_analysis.cli', 'record': 'graph_runs'}  # of nodes, and their modules
+LOADED = (  # what `auv` imports once it knows what it has to do
+    *('auv_analysis.commands.run', 'auv_analysis.commands.analyze', 'auv_analysis.commands.replay'),
+    *('auv_analysis.report.document', 'auv_analysis.report.figure_files'),
+)
+INTERPRETER = Path(sys.executable).name.encode()
 SIZE = 1 << 20  # bytes of a request, at most
+ROOM = 4096  # bytes of a command line in the list of processes, which lie in the environment
 
 
-class Node:
-    """A node that was forked: what `subprocess.Popen` tells and does of a process."""
+class Process:
+    """A program that was forked: what `subprocess.Popen` tells and does of a process."""
 
-    def __init__(self, args: Sequence[str], pid: int, output: int, ended: int):
+    def __init__(self, args: Sequence[str], pid: int, outputs: Sequence[int], ended: int):
         self.args, self.pid = args, pid
         self.returncode: int | None = None
-        self.stdout: IO[str] = os.fdopen(output, errors='replace')
+        self.streams: list[IO[str]] = [os.fdopen(output, errors='replace') for output in outputs]
         self._ended = ended
-        self._said: list[str] = []
-        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._said = [''] * len(outputs)
+        self._readers: list[threading.Thread] = []
 
-    def _read(self) -> None:
-        self._said.append(self.stdout.read())
+    @property
+    def stdout(self) -> IO[str]:
+        """Its output, with its errors where these have no pipe of their own."""
+        return self.streams[0]
+
+    @property
+    def stderr(self) -> IO[str]:
+        """Its errors."""
+        return self.streams[1]
+
+    def _read(self, i: int) -> None:
+        self._said[i] = self.streams[i].read()
 
     def poll(self) -> int | None:
         """Exit code, negative for a signal; None while it runs."""
@@ -63,15 +86,22 @@ class Node:
         return self.returncode
 
     def communicate(self, timeout: float | None = None) -> tuple[str, str]:
-        """What it has said and not been read yet, once it has ended; nothing goes to stderr."""
-        if not self._reader.ident:
-            self._reader.start()
-        self._reader.join(timeout)
-        if self._reader.is_alive():
-            raise subprocess.TimeoutExpired(list(self.args), timeout or 0.0)
+        """Output and errors that have not been read yet, once it has ended."""
+        if not self._readers:
+            count = range(len(self.streams))
+            self._readers = [threading.Thread(target=self._read, args=[i]) for i in count]
+            for reader in self._readers:
+                reader.daemon = True
+                reader.start()
+        for reader in self._readers:
+            reader.join(timeout)
+            if reader.is_alive():
+                raise subprocess.TimeoutExpired(list(self.args), timeout or 0.0)
         self.wait(timeout)
-        self.stdout.close()
-        return self._said[0], ''
+        for stream in self.streams:
+            stream.close()
+        output, errors = [*self._said, ''][:2]
+        return output, errors
 
     def send_signal(self, number: int) -> None:
         """Send a signal, where it still runs."""
@@ -87,26 +117,55 @@ class Node:
         self.send_signal(signal.SIGKILL)
 
 
-class Nursery:
-    """The process that forks them."""
+class Line:
+    """The way to the process that forks."""
+
+    def __init__(self, end: socket.socket):
+        self._end = end
+
+    def start(
+        self,
+        arguments: Sequence[str],
+        environ: Mapping[str, str],
+        folder: str = '',
+        files: tuple[int, int] | None = None,
+    ) -> Process:
+        """Start a program.
+
+        Parameters
+        ----------
+        arguments : command line; the first is the program, by its name or as an executable
+        environ : of the process
+        folder : that it works in, by default that of this process
+        files : that take its output and its errors, by default pipes: one of a node, two of others
+
+        """
+        name = Path(arguments[0]).name
+        pipes = [] if files else [os.pipe() for _ in range(1 + (name in STARTERS))]
+        ended, code = os.pipe()
+        ends = [end for _, end in pipes]
+        request = [list(arguments), dict(environ), folder or os.getcwd()]
+        said = files or (ends[0], ends[-1])
+        try:
+            socket.send_fds(self._end, [json.dumps(request).encode()], [*said, code])
+        finally:
+            for number in (*ends, code):
+                os.close(number)
+        return Process(arguments, int(self._end.recv(16)), [pipe for pipe, _ in pipes], ended)
+
+
+class Nursery(Line):
+    """A process that forks, started."""
 
     def __init__(self) -> None:
-        self._line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        end, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        super().__init__(end)
         with theirs:
             command = [sys.executable, __file__, str(theirs.fileno())]
-            self._process = subprocess.Popen(command, pass_fds=[theirs.fileno()])
-
-    def start(self, name: str, arguments: Sequence[str], environ: Mapping[str, str]) -> Node:
-        """Start a node; its output is captured."""
-        output, said = os.pipe()
-        ended, code = os.pipe()
-        request = [name, *arguments], dict(environ), os.getcwd()
-        try:
-            socket.send_fds(self._line, [json.dumps(request).encode()], [said, code])
-        finally:
-            os.close(said)
-            os.close(code)
-        return Node(request[0], int(self._line.recv(16)), output, ended)
+            environ = {**os.environ, 'AUV_GVC_ROOM': ' ' * ROOM}
+            self._process = subprocess.Popen(
+                command, env=environ, stdin=subprocess.DEVNULL, pass_fds=[theirs.fileno()]
+            )
 
 
 def grow(main: Callable[[], Any], arguments: list[str]) -> int:
@@ -122,20 +181,54 @@ def grow(main: Callable[[], Any], arguments: list[str]) -> int:
     return 0
 
 
-def fork(main: Callable[[], Any], request: Any, said: int, inherited: Sequence[int]) -> int:
-    """Process id of a new node."""
+def entitle(command: Sequence[str]) -> None:
+    """Be found by a command line in the list of processes, under the interpreter's name for ROS."""
+    setproctitle(' '.join(command))
+    libc = ctypes.CDLL(None)
+    for name in ('program_invocation_name', 'program_invocation_short_name'):
+        ctypes.c_char_p.in_dll(libc, name).value = INTERPRETER
+
+
+def of_a_run(line: Line) -> Callable[..., Process]:
+    """What the supervisor of a run starts its nodes by, in place of a new interpreter."""
+
+    def begin(command: Sequence[str], env: Mapping[str, str], stdout: IO[bytes], **_: Any) -> Any:
+        # it is not `auv` that has forked it
+        environ = {**env, PARENT: str(os.getppid())}
+        return line.start(command, environ, files=(stdout.fileno(), stdout.fileno()))
+
+    return begin
+
+
+def fork(
+    main: Callable[[], Any], request: Any, said: Sequence[int], inherited: Sequence[int]
+) -> tuple[int, socket.socket | None]:
+    """Process id of a new program, and the way on which it asks for nodes."""
+    arguments, environ, folder = request
+    is_starter = Path(arguments[0]).name in STARTERS
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     if pid := os.fork():
-        return pid
+        theirs.close()
+        if not is_starter:
+            ours.close()
+        return pid, ours if is_starter else None
     code = 1
     try:
-        arguments, environ, folder = request
-        for number in inherited:
+        for number in (*inherited, ours.detach()):
             os.close(number)
         os.environ.clear()
         os.environ.update(environ)
         os.chdir(folder)
-        os.dup2(said, 1)
-        os.dup2(said, 2)
+        os.dup2(said[0], 1)
+        os.dup2(said[1], 2)
+        sys.stdout = os.fdopen(1, 'w', 1, closefd=False)
+        sys.stderr = os.fdopen(2, 'w', 1, errors='backslashreplace', closefd=False)
+        entitle([sys.executable, *arguments])
+        if is_starter:
+            supervisor.begin = of_a_run(Line(theirs))
+        else:
+            theirs.close()
+            os.setsid()
         code = grow(main, arguments)
         sys.stdout.flush()
         sys.stderr.flush()
@@ -146,8 +239,9 @@ def fork(main: Callable[[], Any], request: Any, said: int, inherited: Sequence[i
 def serve(line: socket.socket, mains: Mapping[str, Callable[[], Any]]) -> None:
     """Fork what is asked for and tell how it ended, until nobody asks any more."""
     selector, ends = selectors.DefaultSelector(), dict[int, tuple[int, int]]()
+    lines = {line.fileno(): line}
     selector.register(line, selectors.EVENT_READ)
-    while True:
+    while lines:
         for key, _ in selector.select():
             if key.fd in ends:
                 pid, code = ends.pop(key.fd)
@@ -158,24 +252,35 @@ def serve(line: socket.socket, mains: Mapping[str, Callable[[], Any]]) -> None:
                     os.write(code, str(how).encode())
                 os.close(code)
                 continue
-            data, handed, *_ = socket.recv_fds(line, SIZE, 2)
+            asking = lines[key.fd]
+            data, handed, *_ = socket.recv_fds(asking, SIZE, 3)
             if not data:
-                return
-            request, (said, code) = json.loads(data), handed
-            inherited = [line.fileno(), code, *ends, *(one[1] for one in ends.values())]
-            pid = fork(mains[request[0][0]], request, said, inherited)
-            os.close(said)
+                selector.unregister(asking)
+                del lines[key.fd]
+                asking.close()
+                continue
+            request, (*said, code) = json.loads(data), handed
+            inherited = [*lines, code, *ends, *(one[1] for one in ends.values())]
+            pid, more = fork(mains[Path(request[0][0]).name], request, said, inherited)
+            for number in said:
+                os.close(number)
+            if more:
+                lines[more.fileno()] = more
+                selector.register(more, selectors.EVENT_READ)
             watched = os.pidfd_open(pid)
             ends[watched] = pid, code
             selector.register(watched, selectors.EVENT_READ)
-            line.send(str(pid).encode())
+            asking.send(str(pid).encode())
 
 
 def main() -> None:
-    """Import the nodes and load what they call most, then serve."""
-    mains = {name: import_module(f'{package}.{name}').main for name, package in NODES.items()}
+    """Import the programs and load what they call most, then serve."""
+    setproctitle('nursery')  # before the environment is changed, in which it finds its room
+    modules = {**{name: f'{package}.{name}' for name, package in NODES.items()}, **STARTERS}
+    mains = {name: import_module(module).main for name, module in modules.items()}
+    for module in LOADED:
+        import_module(module)
     warm_up(load_scenario('case1'), ['gvc'])
-    sys.stdout, sys.stderr = (os.fdopen(number, 'w', 1, closefd=False) for number in (1, 2))
     with socket.socket(fileno=int(sys.argv[1])) as line:
         serve(line, mains)
 

@@ -73,7 +73,7 @@ def run(*, mirrored: bool) -> dict[str, np.ndarray]:
         kinds = (topics.ODOM, topics.WRENCH)
         heard = [Topic(n, k.type) for n, k in zip(names, kinds, strict=True)]
         peer.listen(*{topic.name: topic for topic in (*heard, *kinds)}.values())
-        peer.until(lambda: len(peer.heard[names[1]]) == STEPS + 1, 'the last wrench')
+        peer.until(lambda: all(len(m) == STEPS + 1 for m in peer.heard.values()), 'all steps')
         peer.until(lambda: processes['plant_node'].poll() is not None, 'the end of the plant')
         assert processes['plant_node'].returncode == 0
         plant_frames = Frames('inertial', 'body') if mirrored else NED

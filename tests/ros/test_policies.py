@@ -2,7 +2,6 @@
 
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -11,7 +10,7 @@ import graph_runs
 import policies
 import pytest
 import yaml
-from harness import PATIENCE, Peer, environment, fresh_domain, parameters, start_node
+from harness import PATIENCE, Peer, fresh_domain, parameters, start_auv, start_node
 from made_messages import Bag
 from rclpy.serialization import serialize_message
 
@@ -131,9 +130,7 @@ def long(tmp_path: Path) -> Path:
 def test_policy_is_that_of_a_run_in_lock_step_and_of_those_who_look_on(tmp_path, long) -> None:
     domain = fresh_domain()
     run = graph_runs.record(long, tmp_path / 'out', domain=domain)
-    watch = [str(Path(sys.executable).with_name('auv')), 'watch', '--for', '120']
-    watched = subprocess.Popen(watch, env=environment(domain), stdout=subprocess.DEVNULL)
-    with ended(run, watched):
+    with ended(run, start_auv('watch', '--for', '120', domain=domain)):
         assert_exact(domain, expected(SEPARATE, LOCK_STEP_LACKS))
 
 
@@ -168,9 +165,7 @@ def test_policy_is_that_of_a_replay_and_its_live_analysis(tmp_path) -> None:
         bag.add(f'/{name}', kind, 0, serialize_message(message_class(kind)()))
     bag.close()
     domain = fresh_domain()
-    auv = str(Path(sys.executable).with_name('auv'))
-    command = [auv, 'replay', str(tmp_path), '--paused', '--loop']
-    replay = subprocess.Popen(command, env=environment(domain), stdin=subprocess.DEVNULL)
+    replay = start_auv('replay', str(tmp_path), '--paused', '--loop', domain=domain)
     below = ('-r', '__ns:=/replay', *parameters(vehicle='herman2018'))
     with ended(start_node('analysis_node', domain, *below), replay):
         assert_exact(domain, expected(only('replay_node'), {}))

@@ -3,7 +3,6 @@
 import json
 import signal
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from harness import Peer, environment, fresh_domain, parameters, start_node, stop
+from harness import Peer, fresh_domain, parameters, start_auv, start_node, stop
+from nursery import Process
 
 from auv_analysis.driver_check.catalogue import CHECKS
 from auv_analysis.driver_check.finding import FAIL, PASS
@@ -19,7 +19,6 @@ from auv_analysis.driver_check.procedure import GOODBYE, PERIOD
 from auv_dynamics.interface import Frames, wrench_of
 from auv_dynamics.ros import convert, topics
 
-AUV = str(Path(sys.executable).with_name('auv'))
 VEHICLE = parameters(vehicle='bluerov2_heavy', step=0.02, initial__eta='[0.0,0.0,5.0,0.0,0.0,0.8]')
 LIMIT = 180.0  # s
 RATE = 50.0  # Hz
@@ -27,12 +26,9 @@ ZERO = (0.0,) * 6
 AT_REST = np.eye(13)[3]
 
 
-def start_check(domain: int, *options: str) -> subprocess.Popen:
-    command = [AUV, 'check-driver', '--domain-id', str(domain), '--vehicle', 'bluerov2_heavy',
-               '--actuate', '--seconds', '1.5', '--json', *options]  # fmt: skip
-    return subprocess.Popen(
-        command, env=environment(domain), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+def start_check(domain: int, *options: str) -> Process:
+    given = '--vehicle', 'bluerov2_heavy', '--actuate', '--seconds', '1.5', '--json'
+    return start_auv('check-driver', *given, *options, domain=domain)
 
 
 def await_odometry(domain: int) -> None:
@@ -88,7 +84,7 @@ class Interrupted:
 class Ended:
     """A check that has come to its end."""
 
-    def __init__(self, process: subprocess.Popen):
+    def __init__(self, process: Process):
         self.output, self.errors = process.communicate(timeout=LIMIT)
         self.code = process.returncode
 

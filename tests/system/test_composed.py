@@ -2,14 +2,15 @@
 
 import signal
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
 import yaml
-from graph_runs import every_message, node_of, nodes, recorded, start
-from harness import auv, graph, parameters, stop
+from graph_runs import every_message, node_of, nodes, recorded, start, start_installed
+from harness import auv, graph, installed_auv, parameters, stop
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from std_srvs.srv import SetBool, Trigger
@@ -45,8 +46,9 @@ def write(folder: Path, **changes) -> Path:
 def test_the_bag_is_that_of_five_processes(tmp_path: Path, executor: str) -> None:
     """Message for message, analysis and clock included."""
     scenario, out = write(tmp_path), tmp_path / 'one'
-    ended = auv('run', str(scenario), '--out', str(out), '--composed', '--no-report',
-                AUV_GVC_EXECUTOR=executor)  # fmt: skip
+    # it is read where rclpy is loaded
+    run = partial(installed_auv, AUV_GVC_EXECUTOR=executor) if executor else auv
+    ended = run('run', str(scenario), '--out', str(out), '--composed', '--no-report')
     assert ended.returncode == 0, ended.stderr
     assert not nodes(out)
     one = every_message(out / 'gvc', *PACED)
@@ -76,7 +78,7 @@ def test_all_nodes_are_one_process_under_a_name_of_its_own(tmp_path: Path) -> No
 @pytest.mark.long
 def test_it_does_not_outlive_auv(tmp_path: Path) -> None:
     out = tmp_path / 'out'
-    process = start(write(tmp_path, duration=600.0), out, '--composed')
+    process = start_installed(write(tmp_path, duration=600.0), out, '--composed')
     composed = node_of(out, ALONE)
     process.kill()
     process.communicate(timeout=60)

@@ -1,32 +1,27 @@
 """`auv design` as a user runs it: its claim is what `auv simulate` gives for that vehicle."""
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
+from harness import auv
 
 from auv_analysis import cli
 
-AUV = Path(sys.executable).with_name('auv')
 FILES = {
     'design.json', 'summary.json', 'summary_before.json', 'vehicle.yaml', 'vehicle_before.yaml',
     'scenario.yaml', 'report.html', 'numbers.parquet', 'figures',
 }  # fmt: skip
 
 
-def auv(*arguments, folder):
-    done = subprocess.run(
-        [AUV, *arguments], cwd=folder, capture_output=True, text=True, check=False
-    )
+def designed(*arguments, folder):
+    done = auv(*arguments, cwd=folder)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 @pytest.mark.long
 def test_the_claim_is_what_a_simulation_of_the_changed_vehicle_gives(tmp_path):
-    document = json.loads(auv('design', 'rexrov', '--json', folder=tmp_path))
+    document = json.loads(designed('design', 'rexrov', '--json', folder=tmp_path))
     out = tmp_path / 'runs' / 'design_rexrov'
     assert {path.name for path in out.iterdir()} == FILES
     assert json.loads((out / 'design.json').read_text()) == document
@@ -37,7 +32,7 @@ def test_the_claim_is_what_a_simulation_of_the_changed_vehicle_gives(tmp_path):
 
     scenario = str(out / 'scenario.yaml')
     summaries = json.loads(
-        auv('simulate', scenario, '--json', '--no-report', '--out', 'after', folder=tmp_path)
+        designed('simulate', scenario, '--json', '--no-report', '--out', 'after', folder=tmp_path)
     )
     assert summaries == json.loads((out / 'summary.json').read_text())
     for i, dof in enumerate(('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw')):

@@ -9,8 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from graph_runs import assert_same, both, every_message, node_of, nodes, recorded, start
-from harness import auv, fresh_domain
+from graph_runs import (
+    assert_same,
+    both,
+    every_message,
+    node_of,
+    nodes,
+    recorded,
+    start_installed,
+)
+from harness import auv, fresh_domain, installed_auv
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
@@ -53,7 +61,7 @@ def done(tmp_path_factory) -> Path:
     """Two recorded runs of the same scenario: folders one and two."""
     root = tmp_path_factory.mktemp('run')
     scenario = write(root / 'six_dofs.yaml')
-    ended = auv('run', str(scenario), '--out', str(root / 'one'), '--json')
+    ended = installed_auv('run', str(scenario), '--out', str(root / 'one'), '--json')
     assert ended.returncode == 0, ended.stderr
     assert json.loads(ended.stdout).keys() == {'gvc', 'cl'}
     assert 'export ROS_DOMAIN_ID=' in ended.stderr
@@ -162,7 +170,7 @@ def test_a_run_can_be_repeated_from_what_it_left(done: Path, tmp_path: Path) -> 
 )
 def test_ending_auv_ends_its_nodes(tmp_path: Path, how: int) -> None:
     out = tmp_path / 'out'
-    process = start(write(tmp_path / 's.yaml', duration=600.0), out)
+    process = start_installed(write(tmp_path / 's.yaml', duration=600.0), out)
     node_of(out, 'plant_node')
     policies = {name: os.sched_getscheduler(node.pid) for name, node in nodes(out).items()}
     process.send_signal(how)

@@ -1,18 +1,16 @@
 """`auv analyze` and `auv info` of bags of other systems, as the user runs them."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 from foreign_bags import Maker, motion, nanoseconds, simple, simulated, write
+from harness import auv
 
 from auv_analysis import cli
 
-AUV = Path(sys.executable).with_name('auv')
 TOPICS = '/rexrov/pose_gt', '/rexrov/thruster_manager/input'
 
 
@@ -80,10 +78,8 @@ def test_installed_command_analyses_it(bag, tmp_path) -> None:
         'frames': 'enu_flu', 'vehicle': 'rexrov', 'step': 0.02,
     }  # fmt: skip
     (tmp_path / 'map.yaml').write_text(yaml.safe_dump(mapping))
-    done = subprocess.run(
-        [AUV, 'analyze', bag, '--map', 'map.yaml', '--out', 'out', '--json'],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    options = '--map', 'map.yaml', '--out', 'out', '--json'
+    done = auv('analyze', str(bag), *options, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)['dive']
     assert json.loads((tmp_path / 'out' / 'summary.json').read_text())['dive'] == summary

@@ -6,8 +6,6 @@ always that of the same node at the same time.
 
 import os
 import random
-import subprocess
-import sys
 import time
 from bisect import bisect_right
 from pathlib import Path
@@ -16,7 +14,8 @@ from typing import NamedTuple
 import psutil
 import pytest
 from graph_runs import long_run, nodes
-from harness import Peer, auv, environment, fresh_domain
+from harness import Peer, auv, fresh_domain, start_auv
+from nursery import Process
 
 from auv_analysis.bag import load_run
 from auv_analysis.experiment import COMPOSED, PACKAGES
@@ -66,16 +65,14 @@ class Progress:
         return self.steps[i - 1] if i else -1
 
 
-def killed(folder: Path, kill: Kill) -> tuple[float, subprocess.Popen, Progress]:
+def killed(folder: Path, kill: Kill) -> tuple[float, Process, Progress]:
     """Start a run and kill one of its nodes: when that was."""
     domain, out = fresh_domain(), folder / 'out'
     progress = Progress(domain)
-    command = [str(Path(sys.executable).with_name('auv')), 'run', str(long_run(folder, STEPS))]
     options = ['--composed'] if kill.name == COMPOSED else []
-    process = subprocess.Popen(
-        [*command, '--out', str(out), *options],
-        env=environment(domain), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+    process = start_auv(
+        'run', str(long_run(folder, STEPS)), '--out', str(out), *options, domain=domain
+    )
     limit = time.monotonic() + 60
     victim: psutil.Process | None = None
     while victim is None or not (kill.starting or progress.steps):

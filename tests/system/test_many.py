@@ -1,11 +1,10 @@
 """Comparisons, the atlas and sweeps as a user runs them, with their figures drawn."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from harness import auv
 from PIL import Image
 from sweeps import run as run_sweep
 from sweeps import write_files
@@ -13,15 +12,6 @@ from sweeps import write_files
 from auv_analysis import load_scenario, simulate
 from auv_analysis.experiment import write_inputs
 from auv_analysis.samples import write_samples
-
-AUV = [sys.executable, '-m', 'auv_analysis.cli']
-
-
-def auv(folder: Path, *arguments: str) -> subprocess.CompletedProcess:
-    command = [*AUV, *arguments]
-    return subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, timeout=300, check=False
-    )
 
 
 def drawn(out: Path) -> set[str]:
@@ -37,7 +27,7 @@ def drawn(out: Path) -> set[str]:
 @pytest.mark.long
 def test_a_sweep_is_explored(tmp_path: Path) -> None:
     run_sweep(write_files(tmp_path), out='runs/small')
-    ended = auv(tmp_path, 'analyze', 'runs/small', '--json')
+    ended = auv('analyze', 'runs/small', '--json', cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     document = json.loads(ended.stdout)
     assert (document['rows'], document['planned_rows']) == (32, 32)
@@ -51,7 +41,7 @@ def test_a_sweep_is_explored(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_the_atlas_is_drawn(tmp_path: Path) -> None:
-    ended = auv(tmp_path, 'atlas', 'bluerov2', '--only', '--json')
+    ended = auv('atlas', 'bluerov2', '--only', '--json', cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     assert list(json.loads(ended.stdout)['vehicles']) == ['bluerov2']
     figures = {'strength', 'correlation', 'shares', 'case1_delta_xi', 'case1_delta_pi'}
@@ -67,7 +57,7 @@ def test_results_and_scenarios_are_compared(tmp_path: Path) -> None:
     write_inputs(scenario, out)
     for name in scenario.controllers:
         write_samples(simulate(scenario, name), out / f'{name}.npz')
-    ended = auv(tmp_path, 'analyze', 'runs/a', 'scenario.yaml', '--out', 'both', '--json')
+    ended = auv('analyze', 'runs/a', 'scenario.yaml', '--out', 'both', '--json', cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     summaries = json.loads(ended.stdout)
     places = 'a', 'simulated/scenario'

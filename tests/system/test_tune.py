@@ -1,22 +1,15 @@
 """`auv tune` as a program: `auv simulate` repeats what it left."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from harness import auv
 from tunings import GVC, SAME_CL, write
 
-AUV = Path(sys.executable).with_name('auv')
 
-
-def auv(folder: Path, *arguments: str) -> dict:
-    done = subprocess.run(
-        [AUV, *arguments, '--json'], cwd=folder, env=os.environ, capture_output=True, text=True,
-        check=False,
-    )  # fmt: skip
+def tuned(folder: Path, *arguments: str) -> dict:
+    done = auv(*arguments, '--json', cwd=folder)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -25,10 +18,10 @@ def auv(folder: Path, *arguments: str) -> dict:
 def test_simulate_repeats_what_was_tuned(tmp_path: Path) -> None:
     write(tmp_path, {'gvc': GVC, 'cl': SAME_CL | {'k_D': 300.0}}, duration=0.2)
     arguments = ('tune', 's.yaml', '--law', 'cl', '--structure', 'mass', '--samples', '10')
-    document = auv(tmp_path, *arguments, '--out', 'a')
+    document = tuned(tmp_path, *arguments, '--out', 'a')
     effort = {n: e['measures']['effort'] for n, e in document['controllers'].items()}
     assert effort['cl_tuned'] == pytest.approx(effort['gvc'], rel=1e-3)
-    summary = auv(tmp_path, 'simulate', 'a/scenario.yaml', '--out', 'c', '--no-report')
+    summary = tuned(tmp_path, 'simulate', 'a/scenario.yaml', '--out', 'c', '--no-report')
     M = [120.0, 160.0, 180.0, 13.0, 17.0, 18.0]  # diagonal: the forms are sums of rms values
     for name, entry in document['controllers'].items():
         rms = summary[name]['velocity_error']['rms'], summary[name]['effort']['rms']

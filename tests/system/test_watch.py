@@ -5,19 +5,17 @@ import os
 import pty
 import re
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
 import yaml
 from graph_runs import every_message, record
-from harness import PATIENCE, auv, environment, fresh_domain
+from harness import PATIENCE, auv, fresh_domain, start_auv, start_installed_auv
+from nursery import Process
 
 from auv_dynamics import interface
 
-AUV = str(Path(sys.executable).with_name('auv'))
 PACED = ('/diagnostics', '/recorder/progress', '/controller_node/transition_event')  # by the wall
 SCENARIO = {
     'name': 'watched',
@@ -30,13 +28,7 @@ SCENARIO = {
 }
 
 
-def start_watch(domain: int, *options: str, **kinds) -> subprocess.Popen:
-    command = [AUV, 'watch', '--domain-id', str(domain), *options]
-    kinds = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, **kinds}
-    return subprocess.Popen(command, env=environment(domain), text=True, **kinds)
-
-
-def first_look(watch: subprocess.Popen, run: subprocess.Popen) -> str:
+def first_look(watch: Process, run: Process) -> str:
     """Line in which a watch says how fast the run is that it sees."""
     for line in watch.stderr:
         if ' x real time' in line:
@@ -55,7 +47,7 @@ def scenario(tmp_path_factory) -> Path:
 @pytest.mark.long
 def test_a_run_is_the_same_beside_a_watch_that_is_even_stopped(scenario, tmp_path) -> None:
     domain = fresh_domain()
-    beside = start_watch(domain, '--json', '--rate', '20')
+    beside = start_auv('watch', '--json', '--rate', '20', domain=domain)
     try:
         assert f'ROS_DOMAIN_ID={domain}' in beside.stderr.readline()
         run = record(scenario, tmp_path / 'watched', domain=domain)
@@ -97,7 +89,7 @@ def test_without_a_graph_it_says_where_it_waits_and_ends_with_1() -> None:
 
 def test_on_a_terminal_q_ends_it_and_the_terminal_is_given_back() -> None:
     ours, its = pty.openpty()
-    process = start_watch(fresh_domain(), stdin=its, stdout=its, stderr=subprocess.PIPE)
+    process = start_installed_auv('watch', stdin=its, stdout=its)
     os.close(its)
     shown = b''
     limit = time.monotonic() + PATIENCE

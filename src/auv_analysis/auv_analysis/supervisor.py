@@ -13,6 +13,7 @@ from auv_analysis.failure import FailedError
 from auv_dynamics.interface import PARENT
 
 GRACE = 5.0  # s between SIGTERM and SIGKILL
+begin = psutil.Popen  # what starts a process: tests put a faster one in its place
 
 
 class NodeDiedError(FailedError):
@@ -60,7 +61,7 @@ class Supervisor:
         log = (self._logs / f'{name}.log').open('w+b')
         self._outputs[name] = log
         # a session of its own: Ctrl-C reaches `auv`, which ends the nodes in order
-        self._processes[name] = psutil.Popen(
+        self._processes[name] = begin(
             command,
             env=self._environment,
             stdin=-3,  # subprocess.DEVNULL

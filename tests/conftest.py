@@ -1,11 +1,22 @@
-"""The order of the tests: what waits for nodes first, so that parallel workers end together."""
+"""The order of the tests: what waits for nodes first, so that parallel workers end together.
 
+Examples of property tests are the same in every run, and nobody judges how long one takes;
+`make properties` asks for more of them, drawn by a seed.
+"""
+
+import os
 import signal
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 FIRST = ('system', 'ros')
+
+settings.register_profile(
+    'tests', derandomize='AUV_GVC_EXAMPLES' not in os.environ, deadline=None, database=None
+)
+settings.load_profile('tests')
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # in the background of a shell
     signal.signal(signal.SIGINT, signal.default_int_handler)  # what tests interrupt inherits it

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 from auv_dynamics import six
 
-JIT = ('helper', 'compiled', 'jitable', 'specialised')
+JIT = ('helper', 'compiled', 'specialised')
 OPPOSITE = {ast.Add: ast.Sub, ast.Sub: ast.Add}
 SWAPPED = {'add': 'sub', 'sub': 'add'}
 

@@ -38,9 +38,7 @@ ODD = (  # what a message may be in place of a usable one of constant length
     'big endian', 'trailing bytes', 'other frame', 'longer frame', 'no frame', 'NaN', 'infinite',
     'long quaternion', 'cut', 'late', 'negative', 'not text',
 )  # fmt: skip
-quick = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+quick = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def row(k: int, width: int) -> np.ndarray:

@@ -20,7 +20,7 @@ from auv_analysis.lyapunov import certificate_of
 from auv_analysis.run import LongRun, Run, joined, widened
 from auv_gvc_controller.model import control_model
 
-quick = settings(max_examples=20, deadline=None)
+quick = settings(max_examples=20)
 ROWS = st.integers(1, 40) | st.integers(100, 450)
 
 

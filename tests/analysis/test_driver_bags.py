@@ -21,7 +21,7 @@ from auv_dynamics.files import InputError
 MS = 1_000_000
 VEHICLE = load_scenario('case1').attachments['vehicle.yaml']
 GRID = 20  # ms between set-points
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 EXACT = '/**/controller_node:\n  ros__parameters: {setpoint_pairing: exact}\n'
 
 

@@ -24,7 +24,7 @@ ROLES = {
     'disturbance': 'Wrench', 'wrench_applied': 'Wrench', 'ground_truth/odom': '',
 }  # fmt: skip
 VEHICLE = load_scenario('case1').attachments['vehicle.yaml']
-quick = settings(max_examples=60, deadline=None)
+quick = settings(max_examples=60)
 
 
 def turning(k: int) -> np.ndarray:

@@ -141,7 +141,7 @@ if JITTED:
 
 
 @pytest.mark.skipif(not JITTED, reason='lanes are as wide as the batch')
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.lists(st.integers(0, 36), min_size=1, max_size=40), st.integers(1, 3))
 def test_no_rollout_depends_on_those_beside_it(rows, threads):
     """Bit for bit, whatever their number, order and lane, and the number of threads."""

@@ -18,7 +18,7 @@ from auv_analysis.report.statistics import Statistics, followed, part_of
 from auv_analysis.report.traces import COLUMNS, FEW, Trace, decimate, thinned
 from auv_analysis.run import LongRun, Run
 
-quick = settings(max_examples=40, deadline=None)
+quick = settings(max_examples=40)
 
 
 def signal(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from strategies import QUICK, vectors
 from auv_dynamics import load_vehicle
 from auv_dynamics.actuators import (
     IDEAL,
-    applied_wrench,
+    fill_applied,
     make_actuators,
     make_reach,
     memory,
@@ -31,7 +31,7 @@ def chain(spec: dict, commands: np.ndarray = COMMANDS) -> np.ndarray:
     """Applied wrenches of a series of commands."""
     actuators = make_actuators(spec, VEHICLE, STEP, 'case.yaml')
     state = memory(actuators)
-    rows = [applied_wrench(actuators, k, tuple(c), state) for k, c in enumerate(commands)]
+    rows = [fill_applied(actuators, k, tuple(c), state) for k, c in enumerate(commands)]
     return np.array(rows)
 
 
@@ -76,7 +76,7 @@ def test_limits_and_slew_hold_whatever_comes(limit, rate, lag, delay):
 def test_no_entry_changes_nothing():
     assert make_actuators(None, VEHICLE, STEP, 'f') is IDEAL
     state = memory(IDEAL)
-    assert applied_wrench(IDEAL, 0, tuple(COMMANDS[0]), state) == tuple(COMMANDS[0])
+    assert fill_applied(IDEAL, 0, tuple(COMMANDS[0]), state) == tuple(COMMANDS[0])
     assert_array_equal(chain({'lag': 0.0, 'delay': 0.0}), COMMANDS)
 
 

@@ -5,10 +5,10 @@ from numpy.testing import assert_array_equal
 from plants import plant_of
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.actuators import applied_wrench, make_actuators, memory
+from auv_dynamics.actuators import fill_applied, make_actuators, memory
 from auv_dynamics.integrator import TABLEAUS, stage_times
 from auv_dynamics.plant import BLOCK, SIZE, fill_plant_step, initial_state, lumped_uncertainty
-from auv_dynamics.sensors import LOST, SensorNoise, fill_measurement
+from auv_dynamics.sensors import LOST, SensorNoise, fill_measured
 from auv_dynamics.uncertainty import make_uncertainty
 
 VEHICLE = load_vehicle('rexrov')
@@ -39,12 +39,12 @@ def test_a_plant_goes_through_its_blocks_as_through_one_table():
     stages, trial = np.zeros((4, SIZE)), np.zeros(SIZE)
     truth = uncertainty.truth
     for k in range(STEPS + 1):
-        fill_measurement(rows[k], x, measured)
+        fill_measured(rows[k], x, measured)
         assert plant.k == k
         assert plant.lost == (rows[k, LOST] == 1.0)
         assert_array_equal(plant.x, x)
         assert_array_equal(plant.measured, measured)
-        applied = applied_wrench(chain, k, command(k), state)
+        applied = fill_applied(chain, k, command(k), state)
         lump = lumped_uncertainty(truth, x, applied, F[k], current[k])
         assert_array_equal(plant.answer(command(k)), [applied, lump])
         fill_plant_step(truth, x, applied, F[k], current[k], STEP, tableau, stages, trial)

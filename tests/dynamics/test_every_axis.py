@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.actuators import (
-    applied_wrench,
     demanded,
+    fill_applied,
     make_actuators,
     make_reach,
     memory,
@@ -28,7 +28,7 @@ def after(spec: dict, *commands: np.ndarray) -> np.ndarray:
     """Wrench applied in answer to the last of some commands."""
     actuators = make_actuators(spec, VEHICLE, STEP, 'case.yaml')
     state = memory(actuators)
-    rows = [applied_wrench(actuators, k, tuple(c), state) for k, c in enumerate(commands)]
+    rows = [fill_applied(actuators, k, tuple(c), state) for k, c in enumerate(commands)]
     return np.array(rows[-1])
 
 

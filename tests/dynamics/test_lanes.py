@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
@@ -100,7 +100,6 @@ def fill_blocks(both, table, x, out):
 
 
 @pytest.mark.skipif(not JITTED, reason='needs numba')
-@settings(deadline=None)  # the first example compiles
 @given(count=SIZES, seed=st.integers(0, 2**32 - 1))
 def test_compiled_lanes_do_what_numpy_does_for_each_vehicle(count, seed):
     generator = np.random.default_rng(seed)

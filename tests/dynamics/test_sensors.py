@@ -8,7 +8,7 @@ from plants import plant_of, push
 from auv_dynamics import load_vehicle
 from auv_dynamics.kinematics import rotation
 from auv_dynamics.plant import initial_state
-from auv_dynamics.sensors import LOST, SensorNoise, fill_measurement
+from auv_dynamics.sensors import LOST, SensorNoise, fill_measured
 
 SPEC = {
     'velocity_noise': [0.1, 0.2, 0.3, 0.01, 0.02, 0.03],
@@ -55,7 +55,7 @@ def test_what_is_measured():
     q = [np.cos(angle / 2), *(np.sin(angle / 2) * turned / angle)]
     noise = np.array([0.1, 0.2, 0.3, 0.01, 0.02, 0.03, *q, 0.0])
     measured = np.zeros(13)
-    fill_measurement(noise, X, measured)
+    fill_measured(noise, X, measured)
     assert_array_equal(measured[:3], X[:3])
     assert_allclose(measured[7:], X[7:] + noise[:6], rtol=1e-15)
     turn = rotation(X[3:7]).T @ rotation(measured[3:7])
@@ -67,16 +67,16 @@ def test_what_is_measured():
 
 def test_without_noise_the_truth_is_measured():
     measured = np.zeros(13)
-    fill_measurement(SensorNoise({}, 1).rows(1)[0], X, measured)
+    fill_measured(SensorNoise({}, 1).rows(1)[0], X, measured)
     assert_array_equal(measured, X)
 
 
 def test_a_lost_sample_repeats_the_last_and_the_first_is_never_lost():
     first, second = SensorNoise({'drop_out': 1.0}, 3).rows(2)
     measured = np.full(13, 5.0)
-    fill_measurement(second, X, measured)
+    fill_measured(second, X, measured)
     assert_array_equal(measured, np.full(13, 5.0))
-    fill_measurement(first, X, measured)
+    fill_measured(first, X, measured)
     assert_array_equal(measured, X)
 
 

@@ -48,9 +48,13 @@ class Recording:
             self.steps += 1
 
     def acknowledged(self) -> None:
-        """Wait until all that was given has been taken."""
+        """Wait until all that was given has been taken, or the recorder has ended."""
         heard, last = self.peer.heard['recorder/progress'], (self.steps - 1) * STEP
-        self.peer.until(lambda: heard and nanoseconds(heard[-1].stamp) >= last, 'progress')
+
+        def taken() -> bool:
+            return bool(heard) and nanoseconds(heard[-1].stamp) >= last
+
+        self.peer.until(lambda: taken() or self.process.poll() is not None, 'progress')
 
     def on_disk(self, file: Path) -> None:
         """Wait until steps have reached a file."""
@@ -95,6 +99,7 @@ def test_a_full_disk(tmp_path: Path) -> None:
                 resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, limits)
             while recorder.process.poll() is None and recorder.steps < MOST:
                 recorder.give(100)
+                recorder.acknowledged()
             text = 'file too large' if disk is None else 'no space left on device'
             recorder.ends(f'{bag}/bag_0.mcap: {text}')
         kept = assert_steps_from_the_first(bag)
@@ -115,6 +120,7 @@ def test_a_quota(tmp_path: Path) -> None:
         resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, limits)
         while recorder.process.poll() is None and recorder.steps < MOST:
             recorder.give(100)
+            recorder.acknowledged()
         recorder.ends(f'{bag}/bag_0.mcap: file too large')
     assert assert_steps_from_the_first(bag) > 100
     assert (bag / 'bag_0.mcap').stat().st_size <= limits[0]
@@ -127,6 +133,7 @@ def test_too_little_space_ends_the_recording_in_good_order(tmp_path: Path) -> No
         with recording(bag, storage__free_space=least) as recorder:
             while recorder.process.poll() is None and recorder.steps < MOST:
                 recorder.give(100)
+                recorder.acknowledged()
             recorder.ends(f'{bag}/bag_0.mcap', 'bytes free', f'storage.free_space asks for {least}')
         contents = read_bag(bag)
         assert contents.notes == [], 'the bag is finished'

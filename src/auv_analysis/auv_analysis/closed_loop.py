@@ -12,7 +12,7 @@ from auv_dynamics.actuators import Actuators, fill_applied
 from auv_dynamics.faults import FaultShape
 from auv_dynamics.faulty_devices import fill_arrived, fill_faulty
 from auv_dynamics.integrator import Tableau, fill_step
-from auv_dynamics.jit import compiled, jitable
+from auv_dynamics.jit import compiled, helper
 from auv_dynamics.lanes import uncounted
 from auv_dynamics.plant import SIZE, HeldWrench, attitude_of, fill_plant_rate, fill_unit_attitude
 from auv_dynamics.sensors import fill_measured
@@ -69,7 +69,7 @@ class LawInside(NamedTuple):
         fill_answered(system, stage, x, tau, change, rate)
 
 
-@jitable
+@helper
 def answer(system: LawInside, stage: int, x: np.ndarray) -> tuple[Numbers, Numbers, Vector]:
     """(tau, f, state rate) of the law at a stage of the step."""
     t, nu, attitude, state = system.t[stage], vector(x, 7), attitude_of(x), x[SIZE:]
@@ -80,7 +80,7 @@ def answer(system: LawInside, stage: int, x: np.ndarray) -> tuple[Numbers, Numbe
     return tau, f, change
 
 
-@jitable
+@helper
 def fill_answered(
     system: LawInside, stage: int, x: np.ndarray, tau: Vector, change: Vector, rate: np.ndarray
 ) -> None:
@@ -161,7 +161,7 @@ class Workspace(NamedTuple):
     trial: np.ndarray
 
 
-@jitable
+@helper
 def fill_continuous(
     loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
     record: Any,
@@ -183,7 +183,7 @@ def fill_continuous(
             fill_unit_attitude(x)
 
 
-@jitable
+@helper
 def fill_held(
     loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
     record: Any,

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from auv_dynamics.jit import jitable
+from auv_dynamics.jit import helper
 from auv_dynamics.lanes import Number
 
 
-@jitable
+@helper
 def component(N: Number, xi: Number) -> Number:
     """1/2 N_i xi_i^2 of one number or of arrays: kg, kg m2 and m/s, rad/s to J; equation (30)."""
     return 0.5 * N * xi * xi

@@ -16,7 +16,7 @@ from auv_analysis.coupling import input_deformation, velocity_deformation
 from auv_analysis.energy import component
 from auv_analysis.run import Run
 from auv_analysis.windows import Windows
-from auv_dynamics.jit import JITTED, compiled, jitable
+from auv_dynamics.jit import JITTED, compiled, helper
 from auv_dynamics.lanes import LANES, of_block, uncounted
 from auv_dynamics.six import (
     Vector,
@@ -51,7 +51,7 @@ def maps_of(model: ControlModel) -> Maps:
     return Maps(model.Upsilon_inv, model.N, *(np.ravel(matrix) for matrix in deformations))
 
 
-@jitable
+@helper
 def signals(
     nu: Vector, nu_d: Vector, tau: Vector, f: Vector, F: Vector, maps: Maps
 ) -> tuple[Vector, ...]:
@@ -72,7 +72,7 @@ def signals(
     )
 
 
-@jitable
+@helper
 def add_sample(
     nu: Vector, nu_d: Vector, tau: Vector, f: Vector, F: Vector, maps: Maps, sums: np.ndarray,
     squares: np.ndarray, peaks: np.ndarray,
@@ -95,7 +95,7 @@ def add_sample(
     keep_largest(peaks[SETPOINT], setpoint)
 
 
-@jitable
+@helper
 def fill_beside(beside: np.ndarray, first: int, flat: np.ndarray, k: int, lanes: int) -> None:
     """Put six numbers each of the samples from index `k` side by side, from row `first`."""
     for i in range(6):
@@ -103,7 +103,7 @@ def fill_beside(beside: np.ndarray, first: int, flat: np.ndarray, k: int, lanes:
             beside[0, first + i, w] = flat[k + 6 * w + i]
 
 
-@jitable
+@helper
 def fill_signals(
     beside: np.ndarray, nu: np.ndarray, nu_d: np.ndarray, tau: np.ndarray, f: np.ndarray,
     F: np.ndarray, k: int, lanes: int,

@@ -7,7 +7,7 @@ import numpy as np
 from auv_analysis.records import Sample
 from auv_analysis.summary import TRANSIENT
 from auv_dynamics.files import LARGEST
-from auv_dynamics.jit import helper, jitable
+from auv_dynamics.jit import helper
 from auv_dynamics.lanes import Number, select
 from auv_dynamics.signals import DOFS
 from auv_dynamics.six import (
@@ -114,7 +114,7 @@ def at_start(model: ControlModel, band: np.ndarray, step: float, like: Any) -> d
     }
 
 
-@jitable
+@helper
 def keep_divergence(diverged: np.ndarray, k: int, sample: Sample) -> None:
     """Index k where sample k is the first that is not finite, in place."""
     good = size_of(sample) < LARGEST
@@ -139,7 +139,7 @@ def sizes(a: Vector) -> Six:
     return (abs(a[0]), abs(a[1]), abs(a[2]), abs(a[3]), abs(a[4]), abs(a[5]))
 
 
-@jitable
+@helper
 def size_of(sample: Sample) -> Number:
     """Sum of the absolute values of a sample; NaN or inf where one is not finite."""
     x, state = sample.x, sample.state

@@ -213,16 +213,10 @@ def reachable(reach: Reach, tau: Numbers) -> Six:
     return clipped(allocated(reach, tau), reach.limit)
 
 
-@helper
+@compiled
 def fill_applied(actuators: Actuators, k: int, tau: Numbers, state: np.ndarray) -> Numbers:
     """Wrench applied from sample k on for the command tau; `state` of `memory` in place."""
     if actuators.ideal:
         return tau
     c = reachable(actuators.reach, waited(actuators, k, tau, state))
     return fill_slowed(actuators, c, state[0])
-
-
-@compiled
-def applied_wrench(actuators: Actuators, k: int, tau: Numbers, state: np.ndarray) -> Numbers:
-    """`fill_applied` to be called from Python: one call is one step of the actuators."""
-    return fill_applied(actuators, k, tau, state)

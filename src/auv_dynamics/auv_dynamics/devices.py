@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from auv_dynamics.actuators import Actuators, applied_wrench, memory
+from auv_dynamics.actuators import Actuators, fill_applied, memory
 from auv_dynamics.faults import Faults
 from auv_dynamics.faulty_devices import (
     AGE,
     SIZE,
     WRENCH,
-    faulty_wrench,
-    fill_arrival,
+    fill_arrived,
+    fill_faulty,
     history_shape,
 )
-from auv_dynamics.sensors import LOST, SensorNoise, fill_measurement
+from auv_dynamics.sensors import LOST, SensorNoise, fill_measured
 
 
 class Sensing:
@@ -55,11 +55,11 @@ class Sensing:
             return
         lost = bool(noise[LOST])
         if fault is None or len(self._history) == 0:
-            fill_measurement(noise, x, self.measured)
+            fill_measured(noise, x, self.measured)
             self.lost = lost
             return
-        fill_measurement(noise, x, self._history[-1])
-        fill_arrival(fault, k, self._history, self.measured)
+        fill_measured(noise, x, self._history[-1])
+        fill_arrived(fault, k, self._history, self.measured)
         before, self.age = self.age, int(fault[AGE])
         self._losses[k % len(self._losses)] = lost
         nothing_new = k > 0 and self.age == before + 1
@@ -93,8 +93,8 @@ class Acting:
         """
         if fault is None:
             ideal = self._actuators.ideal
-            return tau if ideal else applied_wrench(self._actuators, k, tau, self._memory)
+            return tau if ideal else fill_applied(self._actuators, k, tau, self._memory)
         if heard:
             fault = fault.copy()
             fault[WRENCH] = 0.0
-        return faulty_wrench(self._actuators, fault, k, tau, self._memory)
+        return fill_faulty(self._actuators, fault, k, tau, self._memory)

@@ -24,7 +24,7 @@ def history_shape(faults: FaultShape) -> tuple[int, int]:
     return (faults.delay + 2 if faults.delay else 0, SIZE)
 
 
-@helper
+@compiled
 def fill_arrived(fault: np.ndarray, k: int, history: np.ndarray, measured: np.ndarray) -> None:
     """Write the newest measurement that has arrived at step k into `measured` (13,).
 
@@ -39,12 +39,6 @@ def fill_arrived(fault: np.ndarray, k: int, history: np.ndarray, measured: np.nd
             old = history[(k - age) % size]
             for n in range(history.shape[1]):
                 measured[n] = select(wanted, old[n], measured[n])
-
-
-@compiled
-def fill_arrival(fault: np.ndarray, k: int, history: np.ndarray, measured: np.ndarray) -> None:
-    """`fill_arrived` to be called from Python."""
-    fill_arrived(fault, k, history, measured)
 
 
 @helper
@@ -108,7 +102,7 @@ def left_of_axes(fault: np.ndarray, c: Vector) -> Six:
     )
 
 
-@helper
+@compiled
 def fill_faulty(
     actuators: Actuators, fault: np.ndarray, k: int, tau: Vector, state: np.ndarray
 ) -> Numbers:
@@ -118,11 +112,3 @@ def fill_faulty(
     reach = actuators.reach
     c = clipped(left_of_thrusters(reach, fault, command), reach.limit)
     return fill_slowed(actuators, left_of_axes(fault, c), state[0])
-
-
-@compiled
-def faulty_wrench(
-    actuators: Actuators, fault: np.ndarray, k: int, tau: Vector, state: np.ndarray
-) -> Numbers:
-    """`fill_faulty` to be called from Python: one call is one step of the actuators."""
-    return fill_faulty(actuators, fault, k, tau, state)

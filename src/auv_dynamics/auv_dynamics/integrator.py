@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.jit import jitable, specialised
+from auv_dynamics.jit import helper, specialised
 
 
 class Tableau(NamedTuple):
@@ -45,7 +45,7 @@ def fill_rate(system: Any, stage: int, x: np.ndarray, rate: np.ndarray) -> None:
     type(system).fill_rate(system, stage, x, rate)
 
 
-@jitable
+@helper
 def fill_step(
     system: Any,
     x: np.ndarray,
@@ -68,7 +68,7 @@ def fill_step(
     fill_sum(x, x, step, tableau.b, stages, count)
 
 
-@jitable
+@helper
 def fill_sum(
     total: np.ndarray,
     x: np.ndarray,

@@ -1,10 +1,9 @@
 """Compile the kernel with numba where it is installed; the same source runs without it.
 
-Four decorators are all that the mathematics knows of numba: `helper` for small functions that
-are always inlined, `compiled` for those that are called from Python, and `jitable` for those that
-are compiled as part of another one but stay plain Python by themselves: they may meet a user's own
-law, which need not be compilable and must not enter the cache that other processes load: `uncached`
-is for that.
+Three decorators are all that the mathematics knows of numba: `helper` for functions that are
+inlined wherever a compiled one calls them and stay plain Python by themselves: they may meet a
+user's own law, which need not be compilable; `compiled` for those that are called from Python as
+well, whose code other processes load; `uncached` where a user's law must not enter that cache.
 
 Compiled code is kept in one explicit folder whose name changes with every source file that the
 kernels can depend on, so that a stale binary cannot be loaded: numba itself only looks at the file
@@ -22,7 +21,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
-COMPILES = re.compile(rb'^@(?:helper|compiled|uncached|jitable|specialised)\b', re.M)
+COMPILES = re.compile(rb'^@(?:helper|compiled|uncached|specialised)\b', re.M)
 IMPORT = re.compile(rb'^\s*(?:from|import)\s+(auv_[\w.]+)(?:\s+import\s+(\([^)]*\)|.*))?', re.M)
 Function = TypeVar('Function', bound=Callable[..., Any])
 
@@ -117,17 +116,16 @@ if JITTED:
         )
         print(text, file=sys.stderr, flush=True)
     OPTIONS: Any = {'fastmath': {'contract'}, 'error_model': 'numpy'}
-    helper: Decorator = numba.njit(forceinline=True, **OPTIONS)
-    compiled: Decorator = numba.njit(cache=KEPT, nogil=True, **OPTIONS)
+    helper: Decorator = register_jitable(forceinline=True, **OPTIONS)
+    compiled: Decorator = numba.njit(cache=KEPT, nogil=True, forceinline=True, **OPTIONS)
     uncached: Decorator = numba.njit(nogil=True, **OPTIONS)
-    jitable: Decorator = register_jitable(forceinline=True, **OPTIONS)
 else:
 
     def helper(function: Function, /) -> Function:
         """Return the function as it is: numba is absent or switched off."""
         return function
 
-    compiled = uncached = jitable = helper
+    compiled = uncached = helper
 
 
 def plain(function: Function) -> Function:

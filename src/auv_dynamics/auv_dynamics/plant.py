@@ -28,7 +28,7 @@ def attitude_of(x: np.ndarray) -> tuple[Number, Number, Number, Number]:
     return (x[3], x[4], x[5], x[6])
 
 
-@helper
+@compiled
 def fill_plant_rate(
     truth: Truth, x: np.ndarray, tau: Vector, F: Vector, current: np.ndarray, stage: int,
     rate: np.ndarray,

@@ -7,7 +7,7 @@ import numpy as np
 
 from auv_dynamics.fault_rows import MeasurementFaults
 from auv_dynamics.faults import NONE, Faults
-from auv_dynamics.jit import compiled, helper
+from auv_dynamics.jit import compiled
 from auv_dynamics.lanes import select
 
 WIDTH = 11  # columns of a row: velocity noise (6), rotation quaternion (4), whether it is lost
@@ -57,7 +57,7 @@ class SensorNoise:
         return np.column_stack([noise[:, :6], np.cos(angle), half * scale[:, None], lost])
 
 
-@helper
+@compiled
 def fill_measured(noise: np.ndarray, x: np.ndarray, measured: np.ndarray) -> None:
     """Write what is measured of the state x (13,); a lost sample changes nothing.
 
@@ -74,9 +74,3 @@ def fill_measured(noise: np.ndarray, x: np.ndarray, measured: np.ndarray) -> Non
     measured[6] = select(lost, measured[6], w * e3 + i * e2 - j * e1 + l * e0)
     for n in range(6):
         measured[7 + n] = select(lost, measured[7 + n], x[7 + n] + noise[n])
-
-
-@compiled
-def fill_measurement(noise: np.ndarray, x: np.ndarray, measured: np.ndarray) -> None:
-    """`fill_measured` to be called from Python."""
-    fill_measured(noise, x, measured)

@@ -9,7 +9,7 @@ import numpy as np
 from auv_dynamics.current import Current, acceleration_in_current, make_current, varies
 from auv_dynamics.disturbance import Disturbance, make_disturbance
 from auv_dynamics.files import InputError, matrix6
-from auv_dynamics.jit import helper
+from auv_dynamics.jit import compiled, helper
 from auv_dynamics.model import Model, acceleration, coriolis, damping, restoring
 from auv_dynamics.six import Numbers, Six, Vector, add, mul, sub, vector
 from auv_dynamics.vehicle import Vehicle, row_major
@@ -181,7 +181,7 @@ def true_acceleration(
     return acceleration_in_current(truth.model, truth.M_RB, attitude, nu, tau, F, flow)
 
 
-@helper
+@compiled
 def lumped(
     truth: Truth, attitude: Vector, nu: Vector, tau: Vector, F: Numbers, current: np.ndarray
 ) -> Numbers:

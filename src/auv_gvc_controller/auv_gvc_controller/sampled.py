@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_dynamics.actuators import Reach, demanded, make_reach, reachable
-from auv_dynamics.jit import JITTED, compiled, jitable, specialised
+from auv_dynamics.jit import JITTED, compiled, helper, specialised
 from auv_dynamics.lanes import anywhere, select
 from auv_dynamics.refusal import named_line
 from auv_dynamics.six import Numbers, Vector
@@ -69,7 +69,7 @@ def anti_windup(gains: Any, reach: Reach | None) -> AntiWindup:
     return AntiWindup(integrals, reach)
 
 
-@jitable
+@helper
 def fill_sample(
     t: float,
     dt: float,
@@ -109,7 +109,7 @@ def fill_sample(
     return tau, f
 
 
-@jitable
+@helper
 def cut(wanted: Vector, had: Vector, i: int) -> Any:
     """Whether the actuators keep axis i from what is wanted, by more than rounding.
 

@@ -13,9 +13,7 @@ from auv_analysis.replay.stream import messages
 from auv_dynamics.files import InputError
 
 TOPICS = ('/a', '/b', '/c')
-quick = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+quick = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 TIMES = st.lists(st.tuples(st.integers(0, 30), st.integers(0, 2)), max_size=40)
 
 

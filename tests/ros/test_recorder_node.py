@@ -220,7 +220,7 @@ def test_a_driver_with_best_effort_is_heard_where_that_is_asked_for(tmp_path: Pa
             return peer.heard['recorder/progress']
 
         peer.until(progress, 'a recorded step')
-    with graph(('recorder_node', deaf)) as (peer, _):
+    with graph(('recorder_node', deaf)) as (peer, processes):
         output = peer.node.create_publisher(topics.ODOM.type, 'odom', qos)
         peer.listen(topics.DIAGNOSTICS)
 
@@ -229,3 +229,5 @@ def test_a_driver_with_best_effort_is_heard_where_that_is_asked_for(tmp_path: Pa
             return any('odom: incompatible QoS' in m and 'reliability' in m for m in found)
 
         peer.until(said, 'the report of the deaf one')
+        assert stop(processes['recorder_node'])[0] == 0
+    assert read_bag(tmp_path / 'deaf').counts['/diagnostics'] > 0, 'its report is in its bag'

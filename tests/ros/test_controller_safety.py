@@ -101,8 +101,8 @@ def driver():
 
 @pytest.fixture(scope='module')
 def recovering():
-    """One driver, which is broken and mended again and again."""
-    yield from driven()
+    """One driver, which is broken and mended again and again, its ramp longer than most pauses."""
+    yield from driven(*parameters(ramp=1.0))
 
 
 @pytest.fixture

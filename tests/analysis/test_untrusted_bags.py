@@ -4,6 +4,7 @@ import os
 import resource
 import struct
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 import lz4.frame
@@ -52,6 +53,7 @@ def write_chunk(path: Path, chunk: Chunk) -> Path:
     return old(path)
 
 
+@cache
 def zstd_bomb(size: int, *, says: bool) -> bytes:
     """Zeros, with or without their number."""
     options = {'size': size} if says else {}
@@ -62,6 +64,7 @@ def zstd_bomb(size: int, *, says: bool) -> bytes:
     )
 
 
+@cache
 def lz4_bomb(size: int, *, says: bool) -> bytes:
     compressor = lz4.frame.LZ4FrameCompressor(compression_level=3)
     zeros = bytes(16 * MIB)

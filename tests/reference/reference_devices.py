@@ -55,6 +55,9 @@ class Actuators:
                 raise ValueError('thrusters: true needs a vehicle file with thrusters')
             self.T, self.lowest, self.highest = thruster_matrix(vehicle['thrusters'])
             self.T_plus = np.linalg.pinv(self.T)
+            # a row that the rows before it span has no wrench of its own
+            ranks = [np.linalg.matrix_rank(self.T[:i], tol=1e-9) for i in range(1, 7)]
+            self.spanned = np.diff(ranks, prepend=0) == 0
         self.cuts = self.T is not None or bool(np.isfinite(self.limit).any())
         self.faults, self.k, self.heard_at, self.h = faults, -1, -1, h
         self.names = [one['name'] for one in vehicle.get('thrusters', [])]
@@ -106,13 +109,7 @@ class Actuators:
         """What tau asks of the actuators: the part that the thrusters span."""
         if self.T is None:
             return tau
-        asked = self.T @ (self.T_plus @ tau)
-        for i in range(6):  # a row that the rows before it span has no wrench of its own
-            if np.linalg.matrix_rank(self.T[: i + 1], tol=1e-9) == np.linalg.matrix_rank(
-                self.T[:i], tol=1e-9
-            ):
-                asked[i] = tau[i]
-        return asked
+        return np.where(self.spanned, tau, self.T @ (self.T_plus @ tau))
 
     def __call__(self, tau: Array) -> Array:
         """a_k of tau_k, N and N m."""

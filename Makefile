@@ -27,7 +27,7 @@ DAY ?= 86400
 EXAMPLES ?= 500
 MUTANTS ?= 500
 
-.PHONY: help setup case1 case2 test soak fuzz properties mutation audit bench bench-growth build wheels
+.PHONY: help setup case1 case2 test quick coverage soak fuzz properties mutation audit bench bench-growth build wheels
 .PHONY: lint format hooks interop docs docs-links docs-test docs-tools clean
 
 help:  ## this list
@@ -52,6 +52,14 @@ case1 case2: setup  ## the paper's experiment: GVC against CL on real nodes, wit
 test: setup  ## the tests
 	$(BIN)/python tests/compile_kernels.py
 	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
+
+quick: setup  ## the tests that start no nodes: what to run after every change
+	$(BIN)/python tests/compile_kernels.py
+	$(BIN)/python -m pytest -n 3 --dist loadfile --ignore tests/system --ignore tests/ros
+
+coverage: setup  ## lines and branches that the tests see: all of the mathematics, nine tenths of the rest
+	$(BIN)/python tests/compile_kernels.py
+	$(BIN)/python tests/coverage/run.py
 
 soak: setup docs-tools  ## COUNT random runs by SEED, KILLS of nodes, a run of STEPS, one of DAY s, what else takes long
 	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) AUV_GVC_STEPS=$(STEPS) AUV_GVC_KILLS=$(KILLS) \

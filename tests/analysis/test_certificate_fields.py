@@ -1,10 +1,14 @@
 """Every field of the certificate sample by sample, written out with matrices; singular gains."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from auv_analysis import load_scenario, simulate
 from auv_analysis.certificate import certificate, sampled_integral
+from auv_analysis.certificate_figures import integral_of
 from auv_analysis.differences import derivative
 from auv_dynamics import load_vehicle
 from auv_gvc_controller.laws import make_gains
@@ -80,3 +84,16 @@ def test_sampled_integral():
     assert_allclose(z[0], np.zeros(6))
     for k in range(1, len(T)):
         assert_allclose(z[k], z[k - 1] + (T[k] - T[k - 1]) * NU[k - 1], rtol=1e-12, atol=1e-14)
+
+
+def test_the_integral_is_the_laws_own_or_that_of_what_it_saw_or_unknown():
+    scenario = load_scenario('case1')
+    short = replace(scenario, data={**scenario.data, 'duration': 0.1})
+    run = simulate(short, 'gvc', 'zoh')
+    assert_allclose(integral_of(run), run.law_state[:, :6])
+    recorded = replace(run, law_state=None)  # as a bag has it
+    assert_allclose(integral_of(recorded), run.law_state[:, :6], atol=1e-15)
+    assert integral_of(replace(recorded, applied=run.tau)) is None, (
+        'anti-windup may have stopped it'
+    )
+    assert integral_of(replace(recorded, hold='continuous')) is None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.summary import settling_time
+from auv_analysis.summary import lumped_error, settling_time
 
 
 @pytest.fixture(scope='module')
@@ -62,3 +62,11 @@ def test_a_run_without_gains_has_none(run):
     found = summarize(replace(run, gains={}))['gains']
     assert found == {'K_D': None, 'K_f': None}
     assert summarize(run)['gains']['K_D'] is not None
+
+
+def test_without_set_points_or_a_disturbance_there_is_no_error_to_tell(run):
+    blind = replace(run, disturbance=None, nu_d=np.full_like(run.nu_d, np.nan))
+    assert lumped_error(blind) is None
+    summary = summarize(blind)
+    assert set(summary['velocity_error'].values()) == {None}
+    assert summary['velocity']['rms'] == summarize(run)['velocity']['rms']

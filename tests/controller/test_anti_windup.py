@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 
 from auv_analysis import load_scenario, simulate
 from auv_dynamics import load_vehicle
-from auv_dynamics.actuators import make_reach
+from auv_dynamics.allocation import make_reach
 from auv_dynamics.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.model import control_model

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.actuators import make_reach
+from auv_dynamics.allocation import make_reach
 from auv_dynamics.jit import plain
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.laws.pid import PID

@@ -1,5 +1,8 @@
 """The zero-order hold: z += dt e_{k-1}, S += dt s_{k-1}, nothing at k = 0, then tau_k."""
 
+import re
+from typing import NamedTuple
+
 import herman_reference as reference
 import numpy as np
 import pytest
@@ -11,7 +14,7 @@ from auv_dynamics.config import shipped
 from auv_dynamics.kinematics import quaternion
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.model import control_model
-from auv_gvc_controller.sampled import SampledLaw
+from auv_gvc_controller.sampled import SampledLaw, user_law
 
 PAPER = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 LAWS = ['cl', 'gvc']  # those of the paper
@@ -122,3 +125,23 @@ def test_answers_are_plain_floats():
     tau, f = make('cl').sample(0.0, 0.0, (0.0,) * 6, ATTITUDE, (1.0,) * 6, (0.0,) * 6)
     assert len(tau) == len(f) == 6
     assert {type(value) for value in (*tau, *f)} == {float}
+
+
+class Own(NamedTuple):
+    """Gains of a law of one's own."""
+
+    k: float
+
+
+@pytest.mark.parametrize(
+    ('raised', 'error', 'text'),
+    [
+        (KeyError('k_Q'), ArithmeticError, "the law Own failed: KeyError: 'k_Q'"),
+        (OverflowError('too large'), OverflowError, 'too large'),
+    ],
+)
+def test_what_a_law_of_ones_own_raises_names_it(raised, error, text):
+    with pytest.raises(error, match=re.escape(text)), user_law(Own(1.0)):
+        raise raised
+    with pytest.raises(KeyError), user_law(make_gains('cl', PAPER)):
+        raise KeyError('a defect of ours stays what it is')

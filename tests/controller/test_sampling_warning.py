@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from auv_gvc_controller.gains import body_gains, sampled_rate, sampling_warning
+from auv_gvc_controller.gains import body_gains, sampled_rate, sampling_warning, state_warning
+from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.laws.cl import CL
 
 M = np.diag([2.0, 4.0, 5.0, 1.0, 10.0, 8.0])
@@ -71,3 +72,21 @@ def test_a_law_without_gains_of_these_names_has_none():
     K_D, K_f = body_gains(CL(full, full, full, 2 * full), None)
     assert np.array_equal(K_D.ravel(), full)
     assert np.array_equal(K_f.ravel(), 2 * full)
+
+
+def test_a_complex_pair_that_grows_is_told_before_the_rate_says_so():
+    K_D = np.diag([4.0, 4.0, 0.0, 0.0, 0.0, 0.0])
+    K_D[0, 1], K_D[1, 0] = 30.0, -30.0  # eigenvalues 4 +- 30i
+    growth = np.hypot(1 - 0.04 * 4.0, 0.04 * 30.0)
+    text = sampling_warning(K_D, np.eye(6), 0.04)
+    assert f'its complex pair grows by {growth:.3g} a sample' in text
+    assert sampling_warning(K_D, np.eye(6), 0.001) is None
+    assert sampling_warning(-np.eye(6), np.eye(6), 1.0) is None, 'it grows at any step'
+
+
+def test_the_states_of_a_law_have_a_rate_of_their_own():
+    fast = make_gains('pid', {'k_P': 5.0, 'k_I': 1.0, 'k_D': 0.1, 'omega_f': 30.0})
+    assert state_warning(fast, 0.01) is None
+    assert "the law's own states: rate * step = 3" in state_warning(fast, 0.1)
+    assert 'is unstable' in state_warning(fast, 0.1)
+    assert state_warning(CL(M, M, M, M), 10.0) is None, 'it has no such states'

@@ -104,6 +104,8 @@ def test_the_columns_are_those_of_the_contract():
         (rows().replace('-0.1', 'inf', 1), 'line 3: expected 7 finite numbers'),
         (rows().replace(',0.2\n', '\n', 1), 'line 3: expected 7 finite numbers'),
         (rows().replace(',0.2\n', ',0.2,9\n', 1), 'line 3: expected 7 finite numbers'),
+        (HEADER + '\n' + 'x' * 200_000,
+         'line 2: expected 7 finite numbers, found a cell of more than'),
         (rows(T + 0.01), 't: expected 0 to 2 s covered, found 0.01 to 2.01 s'),
         (rows(T * 0.9), 't: expected 0 to 2 s covered, found 0 to 1.8 s'),
     ],

@@ -10,14 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from strategies import QUICK, vectors
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.actuators import (
-    IDEAL,
-    fill_applied,
-    make_actuators,
-    make_reach,
-    memory,
-    reachable,
-)
+from auv_dynamics.actuators import IDEAL, fill_applied, make_actuators, memory
+from auv_dynamics.allocation import make_reach, reachable
 from auv_dynamics.files import InputError
 from auv_dynamics.jit import plain
 from auv_dynamics.thrusters import Thrusters
@@ -138,3 +132,14 @@ def test_the_kernel_allocates_as_the_vehicle_says(name, size):
     _, delivered = vehicle.thrusters.allocate(tau)
     found = plain(reachable)(make_reach(None, vehicle), tuple(tau))
     assert_allclose(found, delivered, rtol=0, atol=1e-9 * size)
+
+
+def test_a_delay_that_would_not_fit_into_memory_is_refused():
+    with pytest.raises(InputError, match=r'actuators\.delay: expected at most 1000000 steps'):
+        make_actuators({'delay': 1e5}, VEHICLE, STEP, 'case.yaml')
+
+
+def test_thrusters_that_a_vehicle_lacks_are_refused():
+    expected = 'actuators.thrusters: expected a vehicle with thrusters, herman2018 has none'
+    with pytest.raises(InputError, match=expected):
+        make_actuators({'thrusters': True}, load_vehicle('herman2018'), STEP, 'case.yaml')

@@ -5,15 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.actuators import (
-    demanded,
-    fill_applied,
-    make_actuators,
-    make_reach,
-    memory,
-    reachable,
-    share_within,
-)
+from auv_dynamics.actuators import fill_applied, make_actuators, memory
+from auv_dynamics.allocation import demanded, make_reach, reachable, share_within
 from auv_dynamics.files import InputError
 from auv_dynamics.jit import plain
 

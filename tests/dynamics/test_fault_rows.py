@@ -176,3 +176,18 @@ def test_a_dead_thruster_takes_its_column_out_of_the_wrench():
     u = HEAVY.thrusters.inverse @ tau
     u[2] = 0.0
     assert_allclose(plant.answer(tuple(tau))[0], HEAVY.thrusters.matrix @ u, atol=1e-12)
+
+
+def test_a_plant_says_what_of_it_fails():
+    """Its wrench is lost in steps 3 to 5; its sensors are two steps late from step 4 on."""
+    lost = {'kind': 'wrench_loss', 'from': 0.03, 'to': 0.06}
+    late = {'kind': 'sensor_delay', 'from': 0.04, 'delay': 0.02}
+    still = initial_state(np.zeros(6), np.zeros(6))
+    plant = plant_of(HEAVY, [], H, 'rk4', still, faults=faults(lost, late))
+    found = []
+    for _ in range(300):  # beyond a block of steps that is tabulated at once
+        found.append((plant.deaf, plant.measured_at, plant.lost))
+        push(plant, (20.0, 0, 0, 0, 0, 0))
+    assert [k for k, (deaf, _, _) in enumerate(found) if deaf] == [3, 4, 5]
+    assert [at for _, at, _ in found[:8]] == [0, 1, 2, 3, 3, 3, 4, 5]
+    assert [at for _, at, _ in found[295:]] == [293, 294, 295, 296, 297]

@@ -200,3 +200,25 @@ def test_a_run_of_which_one_part_is_not_converted_is_another(left_out):
     wrong[part] = start[part]
     there = drive(forward_left_up(vehicle_of(data)), wrong, steps=50)
     assert np.abs(frames.swap_state(there) - here).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ('frame', 'axes'),
+    [
+        ('odom_ned', frames.NED_FSD), ('frd', frames.NED_FSD),
+        ('world_NED/vehicle', frames.NED_FSD),
+        ('map_enu', frames.ENU_FLU), ('base_link_flu', frames.ENU_FLU),
+        ('odom', None), ('undefined', None), ('enu_to_ned', None),
+    ],
+)  # fmt: skip
+def test_axes_that_a_frame_id_names(frame, axes):
+    assert frames.named_axes(frame) == axes
+
+
+def test_the_covariance_of_a_pose_turns_with_its_axes():
+    """cov(T x) = T cov(x) T^T of samples in NED, and the same written in ENU."""
+    samples = np.random.default_rng(3).normal(size=(40, 6)) * np.arange(1.0, 7.0)
+    swapped = np.hstack([samples[:, :3] @ E.T, samples[:, 3:] @ E.T])
+    found = frames.swap_earth_matrix(np.cov(samples.T))
+    assert_allclose(found, np.cov(swapped.T), rtol=1e-12, atol=1e-12)
+    assert_allclose(frames.swap_earth_matrix(found), np.cov(samples.T), atol=1e-12)

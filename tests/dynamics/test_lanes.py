@@ -164,3 +164,9 @@ def test_compiled_functions_keep_nothing_alive():
         assert first(table) == 1.0
         counts.append(sys.getrefcount(table.t))
     assert len(set(counts)) == 1
+
+
+def test_what_is_shared_is_given_to_every_block_as_it_is():
+    shared, own = SharedTable(np.arange(12.0)), Table(np.arange(12.0).reshape(2, 6))
+    assert of_block(shared, 1) is shared
+    assert_array_equal(of_block(own, 1).t, np.arange(6.0, 12.0))

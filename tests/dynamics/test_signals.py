@@ -91,3 +91,9 @@ def test_phase_may_be_absent_and_lengths_must_agree():
     ):
         with pytest.raises(ValueError, match='sway: amplitude, omega and phase of equal length'):
             harmonic_spec(columns)
+
+
+def test_a_part_of_many_is_what_they_are():
+    many = Harmonics(np.arange(18.0).reshape(3, 6), tuple(np.full((3, 1, 3), i) for i in range(6)))
+    t = np.linspace(0.0, 1.0, 5)
+    assert_array_equal(many.part([2, 0]).value(t), many.value(t)[[2, 0]])

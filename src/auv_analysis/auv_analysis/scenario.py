@@ -16,7 +16,7 @@ from auv_analysis.scenario_values import (
     resolved,
     vehicle_path_of,
 )
-from auv_dynamics.actuators import Reach, make_reach
+from auv_dynamics.allocation import Reach, make_reach
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError, check, read_text, read_yaml
 from auv_dynamics.nearest import one_of

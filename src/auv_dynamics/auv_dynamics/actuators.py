@@ -5,38 +5,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from auv_dynamics.allocation import Reach, make_reach, reachable, six_numbers
 from auv_dynamics.files import InputError
 from auv_dynamics.jit import compiled, helper
-from auv_dynamics.lanes import Number, select
-from auv_dynamics.servo import fill_slowed, waited
-from auv_dynamics.signals import DOFS
-from auv_dynamics.six import Numbers, Six, Vector, clipped
+from auv_dynamics.lanes import Number, clip, select
+from auv_dynamics.six import Numbers, Six, Vector, copied, fill_vector, vector
 from auv_dynamics.vehicle import Vehicle
 
 MOST_STEPS = 1_000_000  # of a delay
 WHOLE = 1e-6  # of a step: how far a delay may be from a whole number of steps
-
-
-class Reach(NamedTuple):
-    """The wrenches that can be had: what a law may know of its actuators.
-
-    Attributes
-    ----------
-    bounded : whether there is any bound
-    limit : (6,) largest absolute wrench per axis, N and N m; inf where there is none
-    T_inv, T : (n, 6) pseudo-inverse and (6, n) configuration of the thrusters, n = 0 for none
-    reverse, forward : (n,) largest thrust each way, N
-    own : (6,) 1 for a degree of freedom that the thrusters give a wrench of its own, else 0
-
-    """
-
-    bounded: bool
-    limit: np.ndarray
-    T_inv: np.ndarray
-    T: np.ndarray
-    reverse: np.ndarray
-    forward: np.ndarray
-    own: np.ndarray
 
 
 class Actuators(NamedTuple):
@@ -57,24 +34,6 @@ class Actuators(NamedTuple):
     slew: np.ndarray
     follow: np.ndarray
     delay: int
-
-
-def make_reach(limit: Any, vehicle: Vehicle | None) -> Reach:
-    """Reach of axis limits (1 or 6 numbers, N and N m) and of a vehicle's thrusters, or None."""
-    bounds = np.full(6, np.inf) if limit is None else _six(limit)
-    thrusters = vehicle.thrusters if vehicle is not None else None
-    if thrusters is None:
-        no, every = np.zeros(0), np.ones(6)
-        return Reach(limit is not None, bounds, np.zeros((0, 6)), np.zeros((6, 0)), no, no, every)
-    return Reach(
-        True,
-        bounds,
-        np.ascontiguousarray(thrusters.inverse),
-        np.ascontiguousarray(thrusters.matrix),
-        thrusters.reverse.astype(float),
-        thrusters.forward.astype(float),
-        np.array([float(dof not in thrusters.unactuated()) for dof in DOFS]),
-    )
 
 
 def make_actuators(
@@ -111,15 +70,10 @@ def make_actuators(
     return Actuators(
         False,
         make_reach(spec.get('limit'), vehicle if use_thrusters else None),
-        np.full(6, np.inf) if spec.get('rate') is None else _six(spec['rate']) * step,
+        np.full(6, np.inf) if spec.get('rate') is None else six_numbers(spec['rate']) * step,
         np.full(6, 1.0 if lag == 0 else -np.expm1(-step / lag)),
         round(delay),
     )
-
-
-def _six(value: Any) -> np.ndarray:
-    """(6,) of one number or six."""
-    return np.broadcast_to(np.asarray(value, float), 6).copy()
 
 
 IDEAL = Actuators(True, make_reach(None, None), np.full(6, np.inf), np.ones(6), 0)
@@ -134,83 +88,38 @@ def memory(actuators: Actuators, *, faults: bool = False) -> np.ndarray:
 
 
 @helper
-def thrust(reach: Reach, i: int, tau: Vector) -> Number:
-    """u_i of u = T^+ tau in N, without limits."""
-    T_inv = reach.T_inv
-    return (
-        T_inv[i, 0] * tau[0]
-        + T_inv[i, 1] * tau[1]
-        + T_inv[i, 2] * tau[2]
-        + T_inv[i, 3] * tau[3]
-        + T_inv[i, 4] * tau[4]
-        + T_inv[i, 5] * tau[5]
-    )
+def _servo(applied: Number, command: Number, follow: Number, slew: Number) -> Number:
+    """First-order servo with a slew limit, Fossen 2021, section 9.5, over one step."""
+    move = follow * (command - applied)
+    near = select(follow == 1.0, command, applied + move)
+    return select(abs(move) > slew, applied + clip(move, -slew, slew), near)
 
 
 @helper
-def share_within(reach: Reach, tau: Vector) -> Number:
-    """Largest share of the thrusts T^+ tau, at most 1, that is within every thruster's limits."""
-    share = 1.0
-    for i in range(reach.T.shape[1]):
-        u = thrust(reach, i, tau)
-        most = select(u > 0.0, reach.forward[i], reach.reverse[i])
-        over = abs(u) * share > most
-        share = select(over, most / select(over, abs(u), 1.0), share)
-    return share
-
-
-@helper
-def _delivered_in(reach: Reach, j: int, tau: Vector, share: Number) -> Number:
-    total = 0.0 * tau[j]
-    for i in range(reach.T.shape[1]):
-        total = total + reach.T[j, i] * thrust(reach, i, tau) * share
-    return total
-
-
-@helper
-def delivered(reach: Reach, tau: Vector, share: Number) -> Six:
-    """T u with u a share of T^+ tau: six floats, N and N m."""
-    return (
-        _delivered_in(reach, 0, tau, share),
-        _delivered_in(reach, 1, tau, share),
-        _delivered_in(reach, 2, tau, share),
-        _delivered_in(reach, 3, tau, share),
-        _delivered_in(reach, 4, tau, share),
-        _delivered_in(reach, 5, tau, share),
-    )
-
-
-@helper
-def demanded(reach: Reach, tau: Numbers) -> Numbers:
-    """What the command asks of the actuators: T T^+ tau, had the thrusters no limits.
-
-    A degree of freedom without a wrench of its own keeps its command: it is never delivered.
-    """
-    if reach.T.shape[1] == 0:
+def waited(actuators: Actuators, k: int, tau: Numbers, state: np.ndarray) -> Numbers:
+    """The command that the delay lets through at step k; `state` of `memory` in place."""
+    if actuators.delay == 0:
         return tau
-    spanned, own = delivered(reach, tau, 1.0), reach.own
-    return (
-        select(own[0] > 0.0, spanned[0], tau[0]),
-        select(own[1] > 0.0, spanned[1], tau[1]),
-        select(own[2] > 0.0, spanned[2], tau[2]),
-        select(own[3] > 0.0, spanned[3], tau[3]),
-        select(own[4] > 0.0, spanned[4], tau[4]),
-        select(own[5] > 0.0, spanned[5], tau[5]),
+    slot = 1 + k % actuators.delay
+    command = copied(vector(state[slot], 0))
+    fill_vector(state[slot], 0, tau)
+    return command
+
+
+@helper
+def fill_slowed(actuators: Actuators, c: Vector, a: np.ndarray) -> Six:
+    """The wrench c behind lag and slew limit; the applied wrench `a` (6,) in place."""
+    follow, slew = actuators.follow, actuators.slew
+    applied = (
+        _servo(a[0], c[0], follow[0], slew[0]),
+        _servo(a[1], c[1], follow[1], slew[1]),
+        _servo(a[2], c[2], follow[2], slew[2]),
+        _servo(a[3], c[3], follow[3], slew[3]),
+        _servo(a[4], c[4], follow[4], slew[4]),
+        _servo(a[5], c[5], follow[5], slew[5]),
     )
-
-
-@helper
-def allocated(reach: Reach, tau: Numbers) -> Numbers:
-    """T u with u = T^+ tau, scaled down together until every thrust is within its limits."""
-    if reach.T.shape[1] == 0:
-        return tau
-    return delivered(reach, tau, share_within(reach, tau))
-
-
-@helper
-def reachable(reach: Reach, tau: Numbers) -> Six:
-    """The wrench that is had for the command tau: thruster allocation, then the axis limits."""
-    return clipped(allocated(reach, tau), reach.limit)
+    fill_vector(a, 0, applied)
+    return applied
 
 
 @compiled

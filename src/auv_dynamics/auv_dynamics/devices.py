@@ -32,7 +32,8 @@ class Sensing:
     """
 
     def __init__(self, noise: SensorNoise | None, faults: Faults):
-        self._noise = noise
+        # sensors that are late but perfect still have a past
+        self._noise = SensorNoise({}, 0) if noise is None and faults.shape.delay else noise
         self._history = np.zeros(history_shape(faults.shape))
         # of the last measurements, as in the ring of the history
         self._losses = np.zeros(faults.shape.delay + 1, bool)

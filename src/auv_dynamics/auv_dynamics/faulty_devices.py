@@ -7,11 +7,11 @@ arrived in steps, a factor per axis (6), an offset per axis (6), a factor and an
 
 import numpy as np
 
-from auv_dynamics.actuators import Actuators, Reach, share_within, thrust
+from auv_dynamics.actuators import Actuators, fill_slowed, waited
+from auv_dynamics.allocation import Reach, share_within, thrust
 from auv_dynamics.faults import FaultShape
 from auv_dynamics.jit import compiled, helper
 from auv_dynamics.lanes import Number, anywhere, select
-from auv_dynamics.servo import fill_slowed, waited
 from auv_dynamics.six import Numbers, Six, Vector, clipped, fill_vector
 
 SIZE = 13  # of a state

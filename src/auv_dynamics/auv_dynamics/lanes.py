@@ -20,11 +20,11 @@ ALIGNMENT = 64  # bytes of a cache line
 
 def _register() -> int:
     """How many float64 a vector register of this machine holds, at least four."""
-    if not JITTED:
-        return 4
-    from llvmlite.binding import get_host_cpu_features
+    if JITTED:
+        from llvmlite.binding import get_host_cpu_features
 
-    return 8 if get_host_cpu_features().get('avx512f') else 4
+        return 8 if get_host_cpu_features().get('avx512f') else 4
+    return 4
 
 
 LANES = _register()

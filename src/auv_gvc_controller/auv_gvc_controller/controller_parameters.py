@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.actuators import Reach, make_reach
+from auv_dynamics.allocation import Reach, make_reach
 from auv_dynamics.files import InputError
 from auv_dynamics.ros.parameters import declare, given
 from auv_dynamics.vehicle import Vehicle

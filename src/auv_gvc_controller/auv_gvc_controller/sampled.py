@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.actuators import Reach, demanded, make_reach, reachable
+from auv_dynamics.allocation import Reach, demanded, make_reach, reachable
 from auv_dynamics.jit import JITTED, compiled, helper, specialised
 from auv_dynamics.lanes import anywhere, select
 from auv_dynamics.refusal import named_line

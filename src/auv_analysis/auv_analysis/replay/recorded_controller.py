@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.bag import attached
-from auv_dynamics.actuators import Reach, make_reach
+from auv_dynamics.allocation import Reach, make_reach
 from auv_dynamics.files import InputError
 from auv_dynamics.vehicle import Vehicle
 from auv_gvc_controller.controller import VelocityController

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from foreign_vehicles import BLUEROV2, REXROV, URDF, sdf
 from made_messages import ODOMETRY, Bag, odometry, serialized, stamped
 from watchman import playground, watched
 
@@ -149,6 +150,27 @@ def try_replay(bag: Path) -> None:
     answers = open_loop(recorded_loop(bag), 'cl', {'k_D': 12.0, 'k_I': 1.0})
     if not np.all(np.isfinite(answers.tau)):
         raise CrashError('a wrench that is not finite')
+
+
+IMPORTED = {'.yaml': REXROV, '.urdf': URDF, '.sdf': sdf(), '.m': BLUEROV2}
+SAID = '--inertia-reference', 'co', '--gravity', '9.81', '--products', 'integral'
+
+
+def try_import(data: bytes, suffix: str, *, told: bool) -> str:
+    """A vehicle of another system; what comes of it is a vehicle file that can be used."""
+    with playground() as folder:
+        path, out = folder / f'theirs{suffix}', folder / 'vehicle.yaml'
+        path.write_bytes(data)
+        with watched(folder):
+            code = command('import-vehicle', str(path), '--out', str(out), *(SAID if told else ()))
+            if code:
+                if out.exists():
+                    raise CrashError('refused, and yet a file was written')
+                return 'refused'
+            rate = load_vehicle(out).forward_dynamics(np.zeros(6), np.ones(6), np.ones(6))
+            if not np.all(np.isfinite(rate)):
+                raise CrashError(f'an imported vehicle accelerates by {rate}')
+            return 'accepted'
 
 
 def try_text(data: bytes) -> str:

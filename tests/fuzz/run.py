@@ -18,8 +18,8 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 SHARES = {  # of all inputs
-    'vehicles': 0.22, 'scenarios': 0.16, 'parameters': 0.04, 'text': 0.08, 'messages': 0.25,
-    'decoding': 0.15, 'bags': 0.08, 'guided_bags': 0.02,
+    'vehicles': 0.20, 'imports': 0.06, 'scenarios': 0.16, 'parameters': 0.04, 'text': 0.08,
+    'messages': 0.23, 'decoding': 0.13, 'bags': 0.08, 'guided_bags': 0.02,
 }  # fmt: skip
 GUIDED = {'text': 'text', 'decoding': 'decoding', 'guided_bags': 'bags'}
 
@@ -79,6 +79,26 @@ def messages(count: int, seed: int) -> Any:
     return told
 
 
+def imports(count: int, seed: int) -> Any:
+    """Vehicles of other systems with letters and numbers changed."""
+    from files import IMPORTED, try_import
+    from scramble import renumbered, scrambled
+
+    rng, verdicts = random.Random(seed), Counter[str]()
+    for _ in range(count):
+        suffix, text = rng.choice([*IMPORTED.items()])
+        data = renumbered(text, rng).encode()
+        if rng.random() < 0.5:
+            data = scrambled(data, rng, [other.encode() for other in IMPORTED.values()])
+        told = rng.random() < 0.8
+        try:
+            verdicts[f'{suffix} {try_import(data, suffix, told=told)}'] += 1
+        except Exception as error:
+            error.add_note(f'{suffix}, told {told}: {data!r}')
+            raise
+    return verdicts
+
+
 def bags(count: int, seed: int) -> Any:
     """Bags with bytes changed."""
     import files
@@ -112,7 +132,7 @@ def guided(target: str, count: int, seed: int) -> Any:
 
 
 OWN: dict[str, Callable[[int, int], Any]] = {
-    'vehicles': vehicles, 'scenarios': scenarios, 'parameters': parameters,
+    'vehicles': vehicles, 'imports': imports, 'scenarios': scenarios, 'parameters': parameters,
     'messages': messages, 'bags': bags,
 }  # fmt: skip
 

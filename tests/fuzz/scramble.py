@@ -1,6 +1,7 @@
 """Seeded mutations: of bytes, and of the numbers inside of them."""
 
 import random
+import re
 import struct
 from collections.abc import Sequence
 
@@ -25,6 +26,32 @@ def scrambled(data: bytes, rng: random.Random, others: Sequence[bytes] = ()) -> 
     for _ in range(rng.randint(1, 5)):
         rng.choice(CHANGES)(changed, rng, others)
     return bytes(changed)
+
+
+NUMBER = re.compile(r'(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?')
+WORDS = (
+    'nan',
+    '-inf',
+    '1e400',
+    '-1e308',
+    '1e-320',
+    '0',
+    '-0.0',
+    '1e9',
+    '',
+    '1_0',
+    '0x10',
+    '9' * 400,
+)
+
+
+def renumbered(text: str, rng: random.Random) -> str:
+    """A copy with up to three of its numbers written as what nobody expects, or negated."""
+    for _ in range(rng.randint(0, 3)):
+        found = rng.choice([*NUMBER.finditer(text)])
+        word = rng.choice((*WORDS, f'-{found[0]}', f'{found[0]}0'))
+        text = text[: found.start()] + word + text[found.end() :]
+    return text
 
 
 def _place(data: bytearray, rng: random.Random, size: int = 1) -> int:

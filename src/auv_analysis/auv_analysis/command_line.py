@@ -31,7 +31,7 @@ def parser() -> Parser:
         command = commands.add_parser(name, help=text, description=text)
         main.children[name] = command
         if writes:
-            command.add_argument('--out', type=Path, help='folder of the results')
+            command.add_argument('--out', type=Path, help=writes)
             command.add_argument('--overwrite', action='store_true', help='replace earlier results')
         command.add_argument('--json', action='store_true', help='one JSON document on stdout')
         add_options(command)
@@ -182,34 +182,37 @@ def _nothing(_: argparse.ArgumentParser) -> None:
     """No option of its own."""
 
 
+TO_FILE = 'file to write; default: printed'
+
+
 class Command(NamedTuple):
-    """A subcommand: its line of help, what adds its options, whether it writes a folder."""
+    """A subcommand: its line of help, what adds its options, what it writes if anything."""
 
     text: str
     add_options: Callable[[argparse.ArgumentParser], None]
-    writes: bool = True
+    writes: str = 'folder of the results'
 
 
 GROUPS = {
     'To begin with': {
-        'new': Command('a vehicle, a scenario or a law of your own to start from', _new, False),
-        'doctor': Command('what is wrong with the set-up, and what to do', _nothing, False),
-        'completion': Command('names of commands and files by the TAB key', _shell, False),
+        'new': Command('a vehicle, a scenario or a law of your own to start from', _new, ''),
+        'doctor': Command('what is wrong with the set-up, and what to do', _nothing, ''),
+        'completion': Command('names of commands and files by the TAB key', _shell, ''),
     },
     'Experiments': {
         'simulate': Command('simulate a scenario in this process, analyse and report', _simulate),
         'run': Command('run a scenario on real nodes, record, analyse and report', _run),
         'study': Command('the procedure of the paper, steps 1 to 6, as one report', _study),
-        'watch': Command('live dashboard in the terminal', _watch, False),
+        'watch': Command('live dashboard in the terminal', _watch, ''),
         'params': Command('the ROS parameter file of a scenario', _params),
     },
     'Results and bags': {
         'analyze': Command('summary and report of bags, folders of results, or a sweep', _analyze),
-        'info': Command('what lies in a bag', _info, False),
+        'info': Command('what lies in a bag', _info, ''),
         'replay': Command(
             'a bag as live topics again, or what another law makes of it', add_replay
         ),
-        'recover': Command('repair a bag that was cut or damaged, in place', _info, False),
+        'recover': Command('repair a bag that was cut or damaged, in place', _info, ''),
         'export-rerun': Command('a bag as a file for the rerun viewer', _info),
     },
     'Vehicles and laws compared': {
@@ -220,8 +223,10 @@ GROUPS = {
         'linearize': Command(
             'poles and matrices of a vehicle or of its closed loops', add_linearize
         ),
-        'import-vehicle': Command('a vehicle file from that of another system', add_import),
-        'export-vehicle': Command('a vehicle as an SDF model for Gazebo', add_export),
+        'import-vehicle': Command(
+            'a vehicle file from that of another system', add_import, TO_FILE
+        ),
+        'export-vehicle': Command('a vehicle as an SDF model for Gazebo', add_export, TO_FILE),
         'atlas': Command('couplings by inertia of the shipped vehicles, side by side', _atlas),
         'tune': Command('laws tuned to equal effort or error, and compared over draws', _tune),
         'sweep': Command('many rollouts of a scenario, with values that vary, to Parquet', _sweep),

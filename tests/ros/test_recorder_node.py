@@ -148,7 +148,9 @@ def test_a_gap_on_a_topic_without_steps_is_seen(tmp_path: Path, strict: bool, co
         publish_step(peer, 1)
         if not strict:
             acknowledged(peer, 1)
-            peer.spin(1.0)
+            peer.until(
+                lambda: read_bag(tmp_path / 'bag').counts['/clock'] > 1, 'the first one after'
+            )
             process.terminate()
         peer.until(lambda: process.poll() is not None, 'the end')
         ended, output = stop(process)

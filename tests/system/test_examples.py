@@ -68,6 +68,25 @@ def test_own_law_runs_in_process_and_on_the_nodes(tmp_path: Path) -> None:
     assert max(reached['run']['max_after_2s']) < 0.2
 
 
+def test_a_law_that_fails_on_the_nodes_is_told_and_is_no_success(tmp_path: Path) -> None:
+    text = (EXAMPLES / 'own_law.py').read_text()
+    ahead, behind = text.split('    def wrench(', 1)
+    body = behind.index('"""', behind.index('"""') + 3) + 3
+    failing = f'{behind[:body]}\n        if t > 0.5:\n            raise RuntimeError("boom")\n'
+    (tmp_path / 'own_law.py').write_text(f'{ahead}    def wrench({failing}{behind[body:]}')
+    scenario = (EXAMPLES / 'own_law.yaml').read_text().replace('duration: 10.0', 'duration: 1.0')
+    (tmp_path / 'own_law.yaml').write_text(scenario)
+    options = '--composed', '--no-report', '--out', 'out'
+    ended = auv('run', 'own_law.yaml', *options, cwd=tmp_path)
+    assert ended.returncode == 1
+    assert (
+        'mine: controller_node: the law ComputedTorque failed: RuntimeError: boom' in ended.stderr
+    )
+    summaries = json.loads((tmp_path / 'out/summary.json').read_text())
+    assert len(summaries) == 2, 'both runs are whole and summed up'
+    assert 'boom' in summaries['mine']['notes'][0]
+
+
 @pytest.mark.skipif(shutil.which('ros2') is None, reason='no ros2 command: it has no wheel')
 def test_ros2_run_finds_the_nodes() -> None:
     ended = subprocess.run(

@@ -204,7 +204,7 @@ GROUPS = {
         'run': Command('run a scenario on real nodes, record, analyse and report', _run),
         'study': Command('the procedure of the paper, steps 1 to 6, as one report', _study),
         'watch': Command('live dashboard in the terminal', _watch, ''),
-        'params': Command('the ROS parameter file of a scenario', _params),
+        'params': Command('the ROS parameter file of a scenario', _params, TO_FILE),
     },
     'Results and bags': {
         'analyze': Command('summary and report of bags, folders of results, or a sweep', _analyze),
@@ -216,9 +216,7 @@ GROUPS = {
         'export-rerun': Command('a bag as a file for the rerun viewer', _info),
     },
     'Vehicles and laws compared': {
-        'check-vehicle': Command(
-            'inertia, couplings and limits of a vehicle', _check_vehicle, False
-        ),
+        'check-vehicle': Command('inertia, couplings and limits of a vehicle', _check_vehicle, ''),
         'design': Command('which change of a vehicle removes which coupling, simulated', _design),
         'linearize': Command(
             'poles and matrices of a vehicle or of its closed loops', add_linearize

@@ -18,7 +18,7 @@ from auv_analysis.node_parameters import (
     parameter_file,
 )
 from auv_analysis.scenario import Scenario
-from auv_analysis.supervisor import NodeDiedError, Supervisor, executable
+from auv_analysis.supervisor import NodeDiedError, Supervisor, TroubleError, executable
 from auv_dynamics.ros.reach import loopback
 from auv_dynamics.ros.security import enclave
 
@@ -105,6 +105,7 @@ def run_controller(
     Raises
     ------
     NodeDiedError : a node ended, did not start or fell silent; nothing is left running
+    TroubleError : the run came to its end, its bag is whole, but the controller met an error
 
     """
     bag = out / controller
@@ -126,8 +127,13 @@ def run_controller(
             supervisor.start(name, [str(executable(package, name)), *arguments])
         _start(supervisor, graph)
         _follow(supervisor, COMPOSED if composed else RECORDER, graph, scenario, progress)
+        said = supervisor.complaints(COMPOSED if composed else CONTROLLER, CONTROLLER)
     finally:
         supervisor.stop()
+    if said:
+        raise TroubleError(
+            f'{controller}: {CONTROLLER}: {said[0]}; see {out / "logs" / controller}'
+        )
     return bag
 
 

@@ -56,7 +56,7 @@ class RecorderNode(BulkNode):
 
         def callback(message: bytes, info: dict[str, Any]) -> None:
             ns = first_stamp(message) if stamped else self._latest
-            self._take(resolved, kind, message, ns)
+            self._take(resolved, kind, message, ns or self._beginning())
             if numbered:
                 self._count(name, step_topic, ns, info.get('publication_sequence_number'))
             if name in self._newest:
@@ -64,6 +64,10 @@ class RecorderNode(BulkNode):
 
         self._known.add(resolved)
         self.graph.subscribe(topic or topics.Topic(resolved, kind), callback, topics.every_step())
+
+    def _beginning(self) -> int:
+        """Log time of what has no stamp: zero where time is simulated, else that of the clock."""
+        return 0 if self._settings.strict else int(self.get_clock().now().nanoseconds)
 
     def _take(self, topic: str, kind: type, message: bytes, ns: int) -> None:
         if self._writer.broken:

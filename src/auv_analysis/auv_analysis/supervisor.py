@@ -20,6 +20,10 @@ class NodeDiedError(FailedError):
     """A node ended before its time; the text names it and shows its last lines."""
 
 
+class TroubleError(FailedError):
+    """A run came to its end, but one of its nodes had something to complain about on the way."""
+
+
 def executable(package: str, name: str) -> Path:
     """Executable of a node: of the colcon install tree or of the environment.
 
@@ -95,6 +99,12 @@ class Supervisor:
         log = self._outputs[name]
         size = os.fstat(log.fileno()).st_size
         return os.pread(log.fileno(), size, 0).decode(errors='replace').splitlines()
+
+    def complaints(self, process: str, node: str) -> list[str]:
+        """Errors that a node in a process has logged, each without time and name."""
+        mark = f'[{node}]: '
+        lines = [line for line in self._lines(process) if '[ERROR]' in line and mark in line]
+        return [line.split(mark, 1)[1] for line in lines]
 
     def _complaints(self, besides: str) -> str:
         """Last error of each other process: often the cause."""

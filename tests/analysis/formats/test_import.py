@@ -143,6 +143,10 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'which point': ('a.m', BLUEROV2, [], '--inertia-reference'),
     'products': ('a.m', BLUEROV2 + 'Ixz = 0.01', ['--inertia-reference', 'co'], '--products'),
     'nondimensional': ('a.m', BLUEROV2 + "Xvv' = 0.01", [], 'a prime'),
+    'a letter for a digit': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6O'), LIST, 'Mq'),
+    'a product': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6*10'), LIST, 'Mq'),
+    'a decimal comma': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -60,5'), LIST, 'Mq'),
+    'pounds': ('a.m', BLUEROV2.replace('m = 11.5', 'm = 25 lb'), LIST, 'm: expected a number'),
     'a formula': ('a.m', BLUEROV2 + 'V = m/rho', [], 'V: expected a number'),
     'no gravity': ('a.m', BLUEROV2, [*LIST, '--gravity', '0'], 'environment.gravity'),
     'no weight': ('a.m', BLUEROV2.replace('m = 11.5', 'm = 0'), LIST, 'm: expected a positive'),
@@ -165,3 +169,9 @@ def test_refusals_are_one_line(what, tmp_path, monkeypatch, capsys):
     assert word in captured.err
     assert 'expected' in captured.err
     assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize('unit', ['N m s', '[N m s/rad]', 'kg m^2/s', '(Nms)', 'kg·m²/s'])
+def test_a_number_may_have_its_unit(imported, unit):
+    vehicle, _ = imported('list.m', BLUEROV2.replace('Mq = -0.07', f'Mq = -0.07 {unit}'), *LIST)
+    assert vehicle.D_linear[4, 4] == 0.07

@@ -12,6 +12,7 @@ from auv_analysis.progress import console, waiting
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
 from auv_analysis.summary import Window, summarize
+from auv_analysis.supervisor import TroubleError
 from auv_dynamics.files import first_line
 
 
@@ -48,7 +49,9 @@ def finish(
     """Summary and report of the runs that came to their end; then the failure of another one."""
     texts, document = scenario.attachments, {}
     if failure is not None:
-        note = f'another controller did not come to its end: {first_line(failure)}'
+        note = first_line(failure)
+        if not isinstance(failure, TroubleError):
+            note = f'another controller did not come to its end: {note}'
         runs = {name: replace(run, notes=(*run.notes, note)) for name, run in runs.items()}
     if runs:
         document = conclude(

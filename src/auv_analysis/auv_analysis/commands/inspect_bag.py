@@ -9,6 +9,8 @@ from auv_analysis.bag.files import files_of
 from auv_analysis.console import TextConsole
 from auv_analysis.foreign.candidates import candidates, survey
 
+PARAMETERS = 'params.yaml'
+
 
 def info(options: argparse.Namespace) -> dict[str, Any]:
     """What lies in a bag."""
@@ -25,7 +27,8 @@ def info(options: argparse.Namespace) -> dict[str, Any]:
             for topic, kind in sorted(contents.types.items())
         },
         'attachments': sorted(contents.attachments),
-        'candidates': candidates(contents),
+        # what our recorder has attached says of the topics what they are
+        'candidates': {} if PARAMETERS in contents.attachments else candidates(contents),
         'notes': contents.notes,
     }
     if not options.json:

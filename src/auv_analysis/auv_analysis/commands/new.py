@@ -31,7 +31,7 @@ def new(options: argparse.Namespace) -> dict[str, Any]:
             f'auv new scenario {name}_case1 --vehicle {name}.yaml',
         ],
         'scenario': [f'auv simulate {name}.yaml', f'auv run {name}.yaml'],
-        'law': [f'auv simulate {name}.yaml', f'auv tune {name}.yaml'],
+        'law': [f'auv simulate {name}.yaml', f'auv run {name}.yaml'],
     }[kind]
     if not options.json:
         print(f'made {" and ".join(files)}')

@@ -14,9 +14,10 @@ from auv_analysis.commands.scenarios import open_scenario, prepare_out
 from auv_analysis.console import say
 from auv_analysis.domain import VARIABLE, chosen_domain
 from auv_analysis.experiment import environment, run_controller
+from auv_analysis.failure import FailedError
 from auv_analysis.progress import Speed, bar, count, waiting
 from auv_analysis.scenario import Scenario
-from auv_analysis.supervisor import NodeDiedError
+from auv_analysis.supervisor import NodeDiedError, TroubleError
 from auv_analysis.warm_up import warm_up
 from auv_dynamics.files import InputError
 
@@ -44,7 +45,8 @@ def recorded(options: argparse.Namespace, scenario: Scenario, names: list[str]) 
         with waiting('loading or compiling the kernel'):
             warm_up(scenario, names)
         say(f'export {VARIABLE}={domain}')
-        failure, done = None, []
+        failure: FailedError | None = None
+        done = []
         for name in names:
             with bar(count('steps'), Speed('steps'), keep=True) as shown:
                 task = shown.add_task(f'{scenario.name} {name}', total=scenario.steps)
@@ -56,6 +58,8 @@ def recorded(options: argparse.Namespace, scenario: Scenario, names: list[str]) 
                 except NodeDiedError as error:
                     failure = error
                     break  # the graph is broken; what was recorded is still worth a report
+                except TroubleError as error:
+                    failure = failure or error  # the others may fare better
             done.append(name)
     finally:
         graph.close()

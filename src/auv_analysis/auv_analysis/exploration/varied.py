@@ -78,7 +78,7 @@ def _varied(sweep: Sweep, path: str) -> Varied:
     if pa.types.is_integer(kind) or pa.types.is_floating(kind):
         numbers = column.to_numpy().astype(float)
         codes, edges, binned = _groups(numbers)
-        labels = [_label(*pair) for pair in edges]
+        labels = _labels(edges)
         codes = codes.astype(np.int32)
         return Varied(path, unit, meaning, numbers, codes, labels, edges, binned)
     codes, labels = _categories(column)
@@ -107,8 +107,19 @@ def _groups(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
     return codes, np.stack([low, high], axis=1), True
 
 
-def _label(low: float, high: float) -> str:
-    return plain(low, 6) if low == high else f'{plain(low, 3)}–{plain(high, 3)}'
+def _labels(edges: np.ndarray) -> list[str]:
+    """Names of groups, with as many digits as tell them apart."""
+    for digits in range(3, 18):
+        labels = [_label(low, high, digits) for low, high in edges]
+        if len({*labels}) == len(labels):
+            break
+    return labels
+
+
+def _label(low: float, high: float, digits: int) -> str:
+    if low == high:
+        return plain(low, max(6, digits))
+    return f'{plain(low, digits)}–{plain(high, digits)}'
 
 
 def _categories(column: pa.ChunkedArray) -> tuple[np.ndarray, list[str]]:

@@ -13,6 +13,9 @@ from auv_analysis.formats.draft import SNAME, Choices, Draft
 
 NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 ASSIGNED = re.compile(rf'([A-Za-z][\w{{}}|\\\']*)\s*[=:]\s*({NUMBER})?')
+# what may follow a number: its SI unit, then the end, a separator or the next name
+UNIT = r'(?:\[[^\]]*\]|\([^)]*\)|(?:kg|N|m|s|rad)(?:[ ./*^·\-\d²³]*(?:kg|N|m|s|rad))*[\^\-\d²³]*)'
+FOLLOWS = re.compile(rf"\s*{UNIT}?\s*(?:$|[;,&|\\](?!\d)|(?=[A-Za-z][\w{{}}|\\']*\s*[=:]))")
 BRACED = re.compile(r'\{[^=]*\}')  # X_{\dot u}
 COMMENT = re.compile(r'(%|#|//).*')
 ADDED = re.compile(r'([XYZKMN])(?:([uvwpqr])dot|dot([uvwpqr]))')
@@ -57,8 +60,9 @@ def _assignments(text: str, draft: Draft) -> list[tuple[str, float]]:
         bare = BRACED.sub(lambda braced: braced[0].replace(' ', ''), COMMENT.sub('', line))
         for match in ASSIGNED.finditer(bare):
             name = match[1]
-            if match[2] is None:
-                raise draft.refuse(name, 'a number', line.strip())
+            if match[2] is None or not FOLLOWS.match(bare, match.end()):
+                expected = 'a number, and nothing behind it but its SI unit'
+                raise draft.refuse(name, expected, line.strip())
             if name in seen:
                 raise draft.refuse(name, 'each name once', 'again')
             seen.add(name)

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import signal
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +16,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 from auv_dynamics import interface
+from auv_dynamics.ending import ENDING
 from auv_dynamics.interface import Frames
 from auv_dynamics.ros import convert, topics
 
@@ -121,14 +121,14 @@ def test_refuses_broken_odometry_and_goes_on(lockstep) -> None:
     assert 'expected' in output
 
 
-@pytest.mark.parametrize('how', [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize('how', ENDING)
 def test_ends_on_a_signal(lockstep, how: int) -> None:
     peer, process = lockstep
     peer.publish(topics.CMD_VEL, setpoint(0))
     peer.publish(topics.ODOM, odometry(0))
     answered(peer, 1)  # so that both ends have matched
     peer.publish(topics.ODOM, odometry(1))
-    peer.spin(1.0)
+    peer.spin(0.5)
     code, _ = stop(process, how)
     assert code == 0
     last = answered(peer, 2)[-1]

@@ -101,7 +101,7 @@ class Runs:
         healthy, other, third = fresh_domain(), fresh_domain(), fresh_domain()
         peers = [Peer(other), Peer(third)]
         self.relay = Relay(peers[0])
-        self.vehicle = Interrupted(peers[1], 'auv1', signal.SIGTERM)
+        self.vehicle = Interrupted(peers[1], 'auv1', signal.SIGHUP)
         over = threading.Event()
         threads = [threading.Thread(target=self._spin, args=(peer, over)) for peer in peers]
         plants = [

@@ -23,6 +23,7 @@ from harness import auv, fresh_domain, installed_auv
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
 from auv_dynamics import interface
+from auv_dynamics.ending import ENDING
 from auv_dynamics.kinematics import quaternion
 
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
@@ -166,7 +167,12 @@ def test_a_run_can_be_repeated_from_what_it_left(done: Path, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    'how', [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGKILL]
+    'how',
+    [
+        *(pytest.param(how, marks=pytest.mark.long) for how in ENDING if how != signal.SIGHUP),
+        signal.SIGHUP,
+        signal.SIGKILL,
+    ],
 )
 def test_ending_auv_ends_its_nodes(tmp_path: Path, how: int) -> None:
     out = tmp_path / 'out'
@@ -174,7 +180,8 @@ def test_ending_auv_ends_its_nodes(tmp_path: Path, how: int) -> None:
     node_of(out, 'plant_node')
     policies = {name: os.sched_getscheduler(node.pid) for name, node in nodes(out).items()}
     process.send_signal(how)
-    process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=60)
+    assert how == signal.SIGKILL or errors.splitlines()[-1] == 'interrupted'
     prompt = {name for name, policy in policies.items() if policy != os.SCHED_BATCH}
     assert len(policies) == 5
     assert prompt == {'plant_node', 'controller_node'}, 'observers give way to them'

@@ -3,8 +3,9 @@
 import json
 import os
 import pty
-import signal
+import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from graph_runs import every_message, recorded
 from harness import (
     PATIENCE,
     Peer,
+    environment,
     fresh_domain,
     graph,
     parameters,
@@ -29,6 +31,7 @@ from played_bags import ended, made, there
 from auv_analysis.bag import load_run
 from auv_analysis.replay.open_loop import open_loop, recorded_loop
 from auv_dynamics import interface
+from auv_dynamics.ending import ENDING
 from auv_dynamics.interface import nanoseconds
 from auv_dynamics.ros import topics
 
@@ -44,6 +47,7 @@ SCENARIO = {
     'disturbance': {'kind': 'herman2018'},
     'actuators': {'limit': 900.0},
 }
+FORCED = ('--original-names', '--force-commands', '--topics', 'wrench')
 PACED = ('/diagnostics', '/recorder/progress', '/controller_node/transition_event')  # by the wall
 
 
@@ -178,24 +182,54 @@ def vector(message: Any) -> tuple:
     return message.x, message.y, message.z
 
 
-def test_a_signal_ends_it_well(tmp_path: Path) -> None:
+@pytest.mark.parametrize('how', ENDING)
+def test_a_signal_ends_it_well(how: int, tmp_path: Path) -> None:
+    """What it said to a vehicle last is a zero wrench."""
     domain = fresh_domain()
     peer = Peer(domain)
     try:
-        odom = there(topics.ODOM)
-        peer.listen(odom)
-        options = (str(made(tmp_path / 'bag', 500)), '--rate', '0.1', '--json', '--topics', 'odom')
+        peer.listen(topics.WRENCH)
+        options = (str(made(tmp_path / 'bag', 500)), '--rate', '0.2', '--json', *FORCED)
         process = start_replay(domain, *options)
-        peer.until(lambda: peer.heard[odom.name], 'odometry')
-        process.send_signal(signal.SIGINT)
+        forces = forces_once_moving(peer)
+        process.send_signal(how)
         output, errors = process.communicate(timeout=PATIENCE)
+        peer.until(lambda: forces()[-1] == 0.0, 'the zero wrench')
     finally:
         peer.close()
     assert process.returncode == 0, errors
     document = json.loads(output)
     assert document['interrupted']
     assert 0 < document['messages'] < 500
-    assert document['topics'].keys() == {'/odom'}
+    assert document['topics'].keys() == {'/wrench'}
+
+
+def forces_once_moving(peer: Peer) -> Callable[[], list[float]]:
+    """Forces heard so far, once one of them is not zero."""
+
+    def forces() -> list[float]:
+        return [message.wrench.force.x for message in peer.heard['wrench']]
+
+    peer.until(lambda: any(forces()), 'a wrench')
+    return forces
+
+
+def test_a_terminal_that_is_closed_leaves_a_zero_wrench(tmp_path: Path) -> None:
+    domain = fresh_domain()
+    peer = Peer(domain)
+    peer.listen(topics.WRENCH)
+    options = (str(made(tmp_path / 'bag', 500)), '--rate', '0.2', *FORCED)
+    pid, terminal = pty.fork()
+    if not pid:
+        command = str(Path(sys.executable).with_name('auv'))
+        os.execve(command, [command, 'replay', *options], environment(domain))
+    try:
+        forces = forces_once_moving(peer)
+        os.close(terminal)
+        peer.until(lambda: forces()[-1] == 0.0, 'the zero wrench')
+        peer.until(lambda: os.waitpid(pid, os.WNOHANG)[0], 'the end')
+    finally:
+        peer.close()
 
 
 def test_keys_step_and_go_on(tmp_path: Path) -> None:

@@ -2,8 +2,10 @@
 
 import json
 import os
+import signal
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +29,12 @@ def main(arguments: list[str] | None = None) -> None:
         return print_guide(Path())
     from auv_analysis.commands import function
     from auv_analysis.failure import FailedError
+    from auv_dynamics.ending import ENDING
     from auv_dynamics.refusal import InputError
 
+    for number in ENDING:  # end in good order, as with Ctrl-C
+        if signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
     try:
         _work(function(options.command), options)
     except InputError as error:
@@ -69,7 +75,8 @@ def _print(options: Any, document: dict[str, Any]) -> None:
 def _say(text: str) -> None:
     from auv_dynamics.printable import printable
 
-    print(printable(text), file=sys.stderr, flush=True)
+    with suppress(OSError):  # the terminal was closed
+        print(printable(text), file=sys.stderr, flush=True)
 
 
 if __name__ == '__main__':

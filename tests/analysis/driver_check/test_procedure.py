@@ -1,14 +1,15 @@
 """Wrenches are sent at a steady rate, and the last ones are zero whatever happens."""
 
 import signal
+import threading
 
 import numpy as np
 import pytest
 from simulated_driver import SimulatedDriver
 
-from auv_analysis.commands.actuating import Stop
 from auv_analysis.driver_check.plan import plan_of
 from auv_analysis.driver_check.procedure import GOODBYE, PERIOD, StoppedError, carry_out
+from auv_dynamics.ending import ENDING, on_signals
 
 ZERO = (0.0,) * 6
 LAST = round(GOODBYE / PERIOD)
@@ -67,17 +68,17 @@ def test_a_user_who_wants_an_end_gets_it_and_the_vehicle_gets_zero() -> None:
     assert driver.sent[-LAST:] == [ZERO] * LAST
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('number', ENDING)
 def test_a_signal_is_no_exception_but_a_wish_while_wrenches_are_sent(number: int) -> None:
-    driver, stop = SimulatedDriver(), Stop()
+    driver, stop = SimulatedDriver(), threading.Event()
     before = signal.getsignal(number)
 
     def stopped() -> bool:
         if len(driver.sent) == 40:
             signal.raise_signal(number)
-        return stop()
+        return stop.is_set()
 
-    with pytest.raises(StoppedError), stop.on_signals():
+    with pytest.raises(StoppedError), on_signals(stop.set):
         sent_by(driver, stopped)
     assert len(driver.sent) == 40 + LAST
     assert driver.sent[-LAST:] == [ZERO] * LAST

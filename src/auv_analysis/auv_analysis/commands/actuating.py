@@ -1,9 +1,8 @@
 """What `auv check-driver --actuate` does to a vehicle: announced, bounded, to be stopped."""
 
-import signal
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from threading import Event
 from typing import Any
 
 from auv_analysis.console import say
@@ -11,6 +10,7 @@ from auv_analysis.driver_check.finding import PASS, Finding
 from auv_analysis.driver_check.plan import Plan
 from auv_analysis.driver_check.procedure import Actuation, StoppedError, carry_out
 from auv_analysis.report.text import join
+from auv_dynamics.ending import on_signals
 
 COUNTDOWN = 3  # s
 MATCHES = 5.0  # s for the driver to be seen by a new publisher
@@ -19,31 +19,6 @@ NEEDED = (
     *('odom_publisher', 'wrench_subscriber', 'wrench_publishers', 'qos_wrench', 'frames'),
     *('finite', 'quaternion_norm', 'rate', 'gaps', 'stamps'),
 )
-
-
-class Stop:
-    """Whether the user wants an end; a signal only says so, and zero is sent before it is one."""
-
-    def __init__(self) -> None:
-        self.asked = False
-
-    def __call__(self) -> bool:
-        """Whether a signal has come."""
-        return self.asked
-
-    @contextmanager
-    def on_signals(self) -> Iterator['Stop']:
-        """Take SIGINT and SIGTERM while this lasts."""
-
-        def take(*_: Any) -> None:
-            self.asked = True
-
-        before = {number: signal.signal(number, take) for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            yield self
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
 
 
 def refusal(findings: Sequence[Finding]) -> str:
@@ -66,16 +41,17 @@ def actuate(ear: Any, plan: Plan, timeout: float) -> Actuation:
     KeyboardInterrupt : the user wanted an end; zero was sent
 
     """
-    with Stop().on_signals() as stop:
+    stop = Event()  # a signal only asks for an end: zero is sent before it is one
+    with on_signals(stop.set):
         try:
-            return _announced(ear, plan, timeout, stop)
+            return _announced(ear, plan, timeout, stop.is_set)
         except StoppedError:
             raise KeyboardInterrupt from None
         finally:
             ear.hush()
 
 
-def _announced(ear: Any, plan: Plan, timeout: float, stop: Stop) -> Actuation:
+def _announced(ear: Any, plan: Plan, timeout: float, stop: Callable[[], bool]) -> Actuation:
     for line in plan.lines():
         say(line)
     for left in range(COUNTDOWN, 0, -1):
@@ -89,7 +65,7 @@ def _announced(ear: Any, plan: Plan, timeout: float, stop: Stop) -> Actuation:
     return carry_out(ear, plan, timeout, stop, lambda trial: say(f'{trial.dof} ...'))
 
 
-def _wait(ear: Any, seconds: float, stop: Stop) -> None:
+def _wait(ear: Any, seconds: float, stop: Callable[[], bool]) -> None:
     until = time.monotonic() + seconds
     while (left := until - time.monotonic()) > 0:
         ear.listen(min(LOOK, left))

@@ -2,14 +2,13 @@
 
 import os
 import select
-import signal
 import sys
 import termios
 import time
 import tty
-from types import FrameType
+from contextlib import ExitStack, suppress
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+from auv_dynamics.ending import on_signals
 
 
 class Keyboard:
@@ -26,13 +25,14 @@ class Keyboard:
         self._file = sys.stdin.fileno() if _has_keys() else None
 
     def __enter__(self) -> 'Keyboard':
-        self._signals = {number: signal.signal(number, self._end) for number in SIGNALS}
+        self._signals = ExitStack()
+        self._signals.enter_context(on_signals(self._end))
         if self._file is not None:
             self._terminal = termios.tcgetattr(self._file)
             tty.setcbreak(self._file)
         return self
 
-    def _end(self, number: int, frame: FrameType | None) -> None:
+    def _end(self) -> None:
         self.ended = True
 
     @property
@@ -45,16 +45,18 @@ class Keyboard:
         if self._file is None:
             time.sleep(seconds)
         elif select.select([self._file], [], [], seconds)[0]:
-            keys = os.read(self._file, 64)
+            keys = b''
+            with suppress(OSError):  # the terminal was closed
+                keys = os.read(self._file, 64)
             self.ended = self.ended or not keys or b'q' in keys.lower()
             return keys
         return b''
 
     def __exit__(self, *_: object) -> None:
         if self._file is not None:
-            termios.tcsetattr(self._file, termios.TCSADRAIN, self._terminal)
-        for number, handler in self._signals.items():
-            signal.signal(number, handler)
+            with suppress(termios.error):  # the terminal was closed
+                termios.tcsetattr(self._file, termios.TCSADRAIN, self._terminal)
+        self._signals.close()
 
 
 def _has_keys() -> bool:

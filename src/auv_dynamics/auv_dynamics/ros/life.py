@@ -15,6 +15,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, T
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
+from auv_dynamics.ending import take_signals
 from auv_dynamics.files import InputError, first_line
 from auv_dynamics.interface import PARENT
 from auv_dynamics.ros.bulk import DataPath
@@ -23,7 +24,6 @@ from auv_dynamics.ros.reach import say_local, stay_local
 from auv_dynamics.ros.security import asked
 
 POLL = 0.1  # s, longest wait before a signal is noticed
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
 TEARDOWN = 4.0  # s to leave the graph, after the last words; then the process ends anyway
 SERVE = 0.02  # s of data between two looks at parameters, services and timers
 CALLBACKS = 50  # that are served at each look, at most
@@ -44,8 +44,7 @@ def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> i
 
     """
     stop = threading.Event()
-    for number in SIGNALS:
-        signal.signal(number, lambda *_: stop.set())
+    take_signals(lambda *_: stop.set())
     if not any(getattr(make, 'prompt', False) for make in makes):
         give_way()
     nodes: list[Any] = []
@@ -74,8 +73,8 @@ def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> i
         closed = _close(nodes)
         code = code or closed
         _tear_down(nodes)
-        for number in SIGNALS:  # one that comes while Python tears down does not change the code
-            signal.signal(number, signal.SIG_IGN)
+        # one that comes while Python tears down does not change the code
+        take_signals(signal.SIG_IGN)
     return code
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from auv_analysis import cli
 from auv_analysis.commands import run, simulate
-from auv_analysis.folder import prepare
+from auv_analysis.folder import prepare, write_text
+from auv_analysis.new_files import replacing, unfinished_name
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError
 
@@ -89,6 +90,20 @@ def test_overwrite_follows_no_link_out_of_the_folder(tmp_path: Path) -> None:
         (tmp_path / 'out' / name).symlink_to(tmp_path / 'elsewhere')
     prepare(tmp_path / 'out', overwrite=True)
     assert tree(tmp_path / 'elsewhere') == {'params.yaml', 'x_0.mcap', 'nu.png'}
+
+
+def test_no_file_is_written_through_a_link(tmp_path: Path) -> None:
+    target, victim = tmp_path / 'sweep.json', tmp_path / 'elsewhere'
+    target.symlink_to(victim)
+    with pytest.raises(InputError, match='an existing file'):
+        write_text(target, 'new', overwrite=False)
+    assert not victim.exists()
+    unfinished_name(target).symlink_to(victim)
+    with replacing(target) as file:
+        file.write(b'new')
+    assert not victim.exists()
+    assert {path.name for path in tmp_path.iterdir()} == {target.name}
+    assert target.read_text() == 'new'
 
 
 @pytest.mark.parametrize('overwrite', [False, True])

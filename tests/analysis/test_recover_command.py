@@ -316,6 +316,35 @@ def test_a_repair_that_is_ended_is_finished_by_the_next(
     assert recover(bag).changed is False
 
 
+@pytest.mark.parametrize('kind', ['symlink', 'hard link'])
+def test_planted_links_are_not_written_through(tmp_path: Path, kind: str) -> None:
+    bag, victim = write_bag(tmp_path / 'bag'), tmp_path / 'victim'
+    left = cut(bag / 'bag_0.mcap')
+    (bag / 'metadata.yaml').unlink()
+    victim.write_text('precious')
+    for name in ('bag_0.mcap.unfinished', 'metadata.yaml.unfinished'):
+        if kind == 'symlink':
+            (bag / name).symlink_to(victim)
+        else:
+            (bag / name).hardlink_to(victim)
+    (bag / 'metadata.yaml').symlink_to(victim)
+    report = recover(bag)
+    assert victim.read_text() == 'precious'
+    assert (bag / 'bag_0.mcap.damaged').read_bytes() == left
+    assert report.metadata == 'written'
+    assert not (bag / 'metadata.yaml').is_symlink()
+    assert sum(seen_by_rosbags(bag).values()) == report.document()['messages']
+
+
+@pytest.mark.parametrize('target', ['bag_0.mcap', 'nowhere'])
+def test_a_planted_link_does_not_pass_for_the_damaged_file(tmp_path: Path, target: str) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    left = cut(bag / 'bag_0.mcap')
+    (bag / 'bag_0.mcap.damaged').symlink_to(target)
+    file = recover(bag / 'bag_0.mcap').files[0]
+    assert (bag / str(file.kept_as)).read_bytes() == left
+
+
 def no_links(*_: Any) -> None:
     raise PermissionError(1, 'operation not permitted')
 

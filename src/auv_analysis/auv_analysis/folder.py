@@ -72,10 +72,11 @@ def check_free(out: Path, *, overwrite: bool) -> bool:
 def write_text(path: Path, text: str, *, overwrite: bool) -> None:
     """Write a file that was asked for; InputError where it exists or cannot be written."""
     try:
-        if path.exists() and not overwrite:
+        if os.path.lexists(path) and not overwrite:
             raise InputError(path, '--out', 'a new file, or --overwrite', 'an existing file')
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding='utf-8')
+        with path.open('w' if overwrite else 'x', encoding='utf-8') as file:
+            file.write(text)
     except OSError as error:
         found = reason(error)
         raise InputError(path, '--out', 'a file that can be written', found) from None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from auv_analysis.energy import kinetic_energy, shares
-from auv_analysis.folder import UNFINISHED
+from auv_analysis.new_files import created, unfinished_name
 from auv_analysis.report.plotting import COLOURS, GREY
 from auv_analysis.run import AnyRun, Run
 from auv_dynamics.files import InputError, reason
@@ -53,10 +53,10 @@ def export(run: AnyRun, path: Path) -> int:
 
     """
     rr = library()
-    unfinished = path.with_name(path.name + UNFINISHED)
+    unfinished = unfinished_name(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished.touch()
+        created(unfinished).close()  # rerun writes to a name
     except OSError as error:
         expected = 'a file that can be written'
         raise InputError(path, '--out', expected, reason(error)) from None

@@ -1,6 +1,5 @@
 """The metadata.yaml of a bag: rosbag2's version 9."""
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,8 +7,7 @@ from typing import Any
 
 import yaml
 
-from auv_analysis.folder import UNFINISHED
-from auv_analysis.recording.output import sync_folder
+from auv_analysis.new_files import replacing
 
 DISTRO = 'jazzy'
 NAME = 'metadata.yaml'
@@ -129,10 +127,5 @@ def qos_text(qos: list[Any]) -> str:
 
 def write_metadata(folder: Path, text: str) -> None:
     """Write metadata.yaml: it is there as a whole, or as it was before."""
-    unfinished = folder / f'{NAME}{UNFINISHED}'
-    with unfinished.open('w', encoding='utf-8') as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(unfinished, folder / NAME)
-    sync_folder(folder)
+    with replacing(folder / NAME) as file:
+        file.write(text.encode())

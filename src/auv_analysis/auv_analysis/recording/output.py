@@ -5,6 +5,8 @@ import fcntl
 import os
 from pathlib import Path
 
+from auv_analysis.new_files import NEW
+
 
 class Output:
     """A new file that is written record by record; each write reaches the system at once.
@@ -24,8 +26,7 @@ class Output:
 
     def __init__(self, path: Path):
         self.path, self.position, self._synced = path, 0, 0
-        how = os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC
-        self._fd = os.open(path, how, 0o644)
+        self._fd = os.open(path, NEW | os.O_APPEND, 0o644)
         with contextlib.suppress(OSError):  # a file system without locks
             fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         # some network file systems give an open file another number than its name
@@ -89,13 +90,3 @@ class Output:
     def _identity_of_path(self) -> tuple[int, int]:
         status = os.lstat(self.path)
         return status.st_dev, status.st_ino
-
-
-def sync_folder(folder: Path) -> None:
-    """Wait until the names in a folder are on the disk, where the system can do that."""
-    with contextlib.suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from auv_analysis.new_files import sync_folder
 from auv_analysis.recording.bag_file import BagFile
 from auv_analysis.recording.guard import Guard
 from auv_analysis.recording.keeper import Keeper
@@ -19,7 +20,6 @@ from auv_analysis.recording.metadata import (
     metadata,
     write_metadata,
 )
-from auv_analysis.recording.output import sync_folder
 from auv_analysis.recording.storage import Storage
 from auv_dynamics.files import reason
 

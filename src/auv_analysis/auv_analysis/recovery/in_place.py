@@ -4,14 +4,12 @@ import contextlib
 import errno
 import fcntl
 import os
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from auv_analysis.failure import FailedError
-from auv_analysis.folder import UNFINISHED
-from auv_analysis.recording.output import sync_folder
+from auv_analysis.new_files import sync_folder, unfinished_name
 from auv_analysis.recovery.audit import Audit
 from auv_analysis.recovery.rewrite import Rewriter
 from auv_dynamics.files import InputError, reason
@@ -75,14 +73,14 @@ def repair(audit: Audit, target: Path, before: tuple[int, int, int], progress: P
     kept_as : name of the damaged file
 
     """
-    unfinished = target.with_name(f'{target.name}{UNFINISHED}')
+    unfinished = unfinished_name(target)
     Rewriter(audit, target.name).write(
         unfinished, lambda place: progress(f'repairing {target.name}', place, audit.size)
     )
     if state(audit.path) != before:
         unfinished.unlink()
         raise InputError(audit.path, '', EXPECTED, 'a file that is being written')
-    shutil.copymode(audit.path, unfinished)
+    os.chmod(unfinished, audit.path.stat().st_mode & 0o777)
     kept = audit.path if audit.path != target else keep(target)
     os.replace(unfinished, target)
     sync_folder(target.parent)
@@ -93,8 +91,10 @@ def keep(path: Path) -> Path:
     """Give a file a second name that says that it is damaged; an earlier one is not replaced."""
     kept = path.with_name(f'{path.name}{DAMAGED}')
     number = 2
-    while kept.exists():
-        if kept.samefile(path):  # of a repair that was ended after this
+    while os.path.lexists(kept):
+        if os.path.samestat(
+            os.lstat(kept), os.lstat(path)
+        ):  # of a repair that was ended after this
             return kept
         kept = path.with_name(f'{path.name}{DAMAGED}.{number}')
         number += 1

@@ -1,12 +1,12 @@
 """A file written anew from what could be kept of it: complete indices, summary and statistics."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
 from mcap.records import Attachment, Chunk, Metadata
 from mcap.writer import Writer
 
+from auv_analysis.new_files import created, synced
 from auv_analysis.recording.metadata import Extent, as_text, metadata
 from auv_analysis.recording.storage import COMPRESSIONS
 from auv_analysis.recovery.audit import PROFILE, ROSBAG2, Audit
@@ -46,7 +46,7 @@ class Rewriter:
         """
         audit = self._audit
         keeps_chunks = audit.compression is not None
-        with path.open('wb') as file, audit.path.open('rb') as stream:
+        with created(path) as file, audit.path.open('rb') as stream:
             self._writer = Writer(
                 file,
                 chunk_size=NEVER if keeps_chunks else CHUNK_SIZE,
@@ -60,8 +60,7 @@ class Rewriter:
             for channel in audit.definitions.channels():
                 self._channel(channel.id)
             self._finish()
-            file.flush()
-            os.fsync(file.fileno())
+            synced(file)
 
     def _beginning(self) -> tuple[str, str]:
         header = self._audit.header

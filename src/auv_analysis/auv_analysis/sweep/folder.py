@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from auv_analysis.folder import CAMPAIGN, MANIFEST, PART, ROLLOUTS, UNFINISHED, prepare
+from auv_analysis.new_files import replacing
 from auv_analysis.sweep.block import laws_of, versions
 from auv_analysis.sweep.campaign import Campaign
 from auv_dynamics.files import InputError, dotted
@@ -102,17 +103,8 @@ class SweepFolder:
 
 def write(path: Path, contents: Any) -> None:
     """Write a file so that it is there as a whole or not at all, whatever ends the process."""
-    unfinished = path.with_name(f'.{path.name}{UNFINISHED}')
-    with unfinished.open('wb') as file:
+    with replacing(path, path.with_name(f'.{path.name}{UNFINISHED}')) as file:
         file.write(contents)
-        file.flush()
-        os.fsync(file.fileno())
-    unfinished.replace(path)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)  # the name is on the disk as well
-    finally:
-        os.close(folder)
 
 
 def _lock(out: Path) -> int | None:

@@ -1,10 +1,12 @@
 """What a law would have commanded: the order of its messages, its limits, its gains, refusals."""
 
 import json
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
+import rclpy
 import yaml
 from made_messages import Bag, odometry, serialized, stamped
 
@@ -18,9 +20,13 @@ from auv_dynamics.files import InputError
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.sampled import SampledLaw
+from auv_gvc_controller.settings import ControllerSettings
 
 STEP = 10_000_000
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
+SETTINGS = {  # as `auv run` writes them
+    'law': 'gvc', 'lockstep': True, 'setpoint_pairing': 'exact', 'setpoint_acceleration': 'topic'
+}  # fmt: skip
 COUNT = 40
 VEHICLE = 'bluerov2_heavy'
 
@@ -38,7 +44,7 @@ def write(
     """Bag of a controller's messages; set-points are logged `late` steps behind their stamps."""
     bag = Bag(path)
     bag.attach('vehicle.yaml', shipped('vehicles', VEHICLE).read_text())
-    own = {'law': 'gvc', 'lockstep': True, **{f'gains.{k}': [v] for k, v in GAINS.items()}}
+    own = {**SETTINGS, **{f'gains.{k}': [v] for k, v in GAINS.items()}}
     nodes = {'controller_node': {**own, **(params or {})}}
     bag.attach('params.yaml', yaml.safe_dump({n: {'ros__parameters': v} for n, v in nodes.items()}))
     x, nu_d, slope = rows(COUNT, 13), rows(COUNT, 6), rows(COUNT, 6)
@@ -123,6 +129,26 @@ def test_unusable_messages_are_counted(tmp_path: Path) -> None:
     assert found.refused > 0
     assert 'twist.linear: expected at most 0.2 m/s' in found.trouble
     assert len(found.ns) < COUNT
+
+
+@pytest.mark.parametrize('lockstep', [True, False])
+def test_what_is_not_written_is_what_the_node_takes(tmp_path, lockstep, monkeypatch) -> None:
+    from auv_gvc_controller.controller_parameters import ControllerParameters
+
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
+    context = rclpy.Context()
+    rclpy.init(context=context, args=['--ros-args', '-p', f'lockstep:={str(lockstep).lower()}'])
+    try:
+        node = rclpy.create_node('controller_node', context=context)
+        taken = ControllerParameters(node).settings
+        node.destroy_node()
+    finally:
+        rclpy.shutdown(context=context)
+    replayed = ControllerSettings.recorded({'lockstep': lockstep}, 'controller_node')
+    assert replayed == taken
+    assert {entry.metadata['name'] for entry in fields(taken)[1:]} | {
+        'law', 'vehicle', 'autostart', 'use_sim_time', 'start_type_description_service',
+    } == {name for name in node._parameters if not name.startswith('gains.')}  # fmt: skip
 
 
 def test_gains_as_recorded_but_for_those_that_are_given(tmp_path: Path) -> None:

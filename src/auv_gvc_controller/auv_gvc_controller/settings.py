@@ -1,0 +1,214 @@
+"""Everything that makes a controller but law, gains and vehicle: defaults, ranges, construction."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from auv_dynamics.allocation import Reach, make_reach
+from auv_dynamics.files import InputError
+from auv_dynamics.vehicle import Vehicle
+from auv_gvc_controller.controller import Timeouts, VelocityController
+from auv_gvc_controller.hand_over import HandOver
+from auv_gvc_controller.limits import Limits
+from auv_gvc_controller.model import control_model
+from auv_gvc_controller.odometry_guard import OdometryGuard
+from auv_gvc_controller.pairing import DIFFERENCE, SAME, Pairing
+from auv_gvc_controller.sampled import SampledLaw
+from auv_gvc_controller.stamp_age import AUTO, CLOCKS, StampAge
+
+LATEST, EXACT = 'latest', 'exact'
+Six = tuple[float, ...]  # six numbers, one per axis, or none
+Reader = Callable[..., Any]  # name, type, default, description, range -> value
+
+
+def _setting(default: Any, name: str, description: str, **accepted: Any) -> Any:
+    told = {'name': name, 'description': description, 'accepted': accepted}
+    return field(default=default, metadata=told)
+
+
+_number = partial(_setting, at_least=0.0)
+_six = partial(_setting, ())
+
+
+@dataclass(frozen=True)
+class ControllerSettings:
+    """Settings of a controller, by the names of its parameters with `_` for a dot.
+
+    Times in s; `()` stands for six numbers that are not given.
+
+    Attributes
+    ----------
+    source : node or file that they come from, for refusals
+
+    """
+
+    source: str
+    lockstep: bool = _setting(False, 'lockstep', 'answer every odometry, in its time')
+    setpoint_pairing: str = _setting(
+        LATEST, 'setpoint_pairing', 'which set-point', one_of=(EXACT, LATEST)
+    )
+    setpoint_acceleration: str = _setting(
+        DIFFERENCE, 'setpoint_acceleration', 'where nu_d_dot comes from', one_of=(SAME, DIFFERENCE)
+    )
+    odometry_timeout: float = _number(
+        0.5, 'odometry_timeout', 's, silence or age of the stamp: zero wrench'
+    )
+    setpoint_timeout: float = _number(
+        0.5, 'setpoint_timeout', 's, silence or age of the stamp: zero wrench'
+    )
+    limits_gap: float = _number(1.0, 'limits.gap', 's, longest step of time that is integrated')
+    limits_speed: float = _number(20.0, 'limits.speed', 'm/s; more is refused')
+    limits_rate: float = _number(20.0, 'limits.rate', 'rad/s; more is refused')
+    limits_acceleration: float = _number(
+        100.0, 'limits.acceleration', 'm/s2, rad/s2; more is refused'
+    )
+    limits_wrench: Six = _six('limits.wrench', 'clips the wrench')
+    limits_wrench_rate: Six = _six('limits.wrench_rate', 'per s, limits its change')
+    ramp: float = _number(0.2, 'ramp', 's, real time: from no wrench to all of it, and back')
+    stamp_clock: str = _setting(
+        AUTO,
+        'stamp_clock',
+        "that odometry is stamped with: the node's own (ros), a free-running one (own), "
+        'or auto: ros if they count from the same beginning, else its age is not judged',
+        one_of=CLOCKS,
+    )
+    actuators_limit: Six = _six('actuators.limit', 'of the actuators, for anti-windup')
+    actuators_thrusters: bool = _setting(
+        False, 'actuators.thrusters', "anti-windup knows the vehicle's thrusters"
+    )
+    anti_windup: bool = _setting(
+        True, 'anti_windup', 'stop integrating what pushes beyond these limits'
+    )
+
+    @classmethod
+    def read(cls, reader: Reader, source: str) -> 'ControllerSettings':
+        """Settings from whatever knows parameters.
+
+        Parameters
+        ----------
+        reader : `(name, type, default, description, *, at_least, one_of)` -> value in its range
+        source : node or file, for refusals
+
+        Raises
+        ------
+        InputError : what the reader refuses, or six numbers that are none
+
+        """
+        values: dict[str, Any] = {}
+        for entry in fields(cls)[1:]:
+            name, text = entry.metadata['name'], entry.metadata['description']
+            if entry.type is Six:
+                text = f'1 or 6 numbers, N, N m, {text}; none: off'
+                found = reader(name, list[float], None, text)
+                values[entry.name] = _positive(found or [], source, name)
+            else:
+                kind: Any = entry.type
+                values[entry.name] = reader(
+                    name, kind, entry.default, text, **entry.metadata['accepted']
+                )
+        return cls(source, **values)
+
+    @classmethod
+    def recorded(cls, values: Mapping[str, Any], source: str) -> 'ControllerSettings':
+        """Settings from parameters by name, as a bag carries them; InputError for a wrong one."""
+
+        def reader(
+            name: str, kind: Any, default: Any, _: str, *, at_least: float = -math.inf,
+            one_of: tuple[str, ...] = (),
+        ) -> Any:  # fmt: skip
+            value = values.get(name, default)
+            if kind is float and isinstance(value, int) and not isinstance(value, bool):
+                value = float(value)
+            good = {
+                float: lambda: isinstance(value, float) and at_least <= value < math.inf,
+                list[float]: lambda: value is None or isinstance(value, list),
+                str: lambda: value in one_of,
+                bool: lambda: isinstance(value, bool),
+            }
+            if not good[kind]():
+                expected = {
+                    float: f'a number of at least {at_least:g}', str: f'one of {", ".join(one_of)}',
+                    list[float]: 'a list of numbers', bool: 'true or false',
+                }  # fmt: skip
+                raise InputError(source, name, expected[kind], value)
+            return value
+
+        return cls.read(reader, source)
+
+    def pairing(self) -> Pairing:
+        """What keeps set-points until their odometry comes."""
+        return Pairing(self.exact, self.setpoint_acceleration, self.limits)
+
+    @property
+    def exact(self) -> bool:
+        """Whether only the set-point of the odometry's own stamp is taken."""
+        return self.setpoint_pairing == EXACT
+
+    @property
+    def limits(self) -> Limits:
+        """Velocities and accelerations that are believed."""
+        return Limits(self.limits_speed, self.limits_rate, self.limits_acceleration)
+
+    def build(
+        self, gains: Any, vehicle: Vehicle, pairing: Pairing, *, clocks: bool = True
+    ) -> VelocityController:
+        """Controller with a law.
+
+        Parameters
+        ----------
+        gains : of the law, which they name (`make_gains`)
+        vehicle : what the law knows
+        pairing : with the set-points that have come
+        clocks : whether the controller has a clock, for its watchdogs; else stamps are all it has
+
+        """
+        law = SampledLaw(gains, control_model(vehicle), self._reach(vehicle))
+        timeouts = Timeouts(self.odometry_timeout, self.setpoint_timeout)
+        live = clocks and not self.lockstep
+        guard = OdometryGuard(
+            round(self.limits_gap * 1e9),
+            self.limits,
+            self.lockstep,
+            patience=timeouts.odometry if live else 0.0,
+            age=StampAge(self.stamp_clock, round(timeouts.odometry * 1e9)) if live else None,
+        )
+        ramp = 0.0 if self.lockstep else self.ramp
+        return VelocityController(
+            law,
+            pairing,
+            guard,
+            HandOver(self._wrench_limit(vehicle), self.limits_wrench_rate, ramp),
+            exact=self.exact,
+            timeouts=timeouts if live else None,
+        )
+
+    def _wrench_limit(self, vehicle: Vehicle) -> Six:
+        """Largest wrench; without limits what accelerations beyond belief take."""
+        believable = np.abs(vehicle.M).sum(axis=1) * self.limits_acceleration
+        return self.limits_wrench or tuple(believable.tolist())
+
+    def _reach(self, vehicle: Vehicle) -> Reach:
+        """What anti-windup knows of the wrenches that can be had."""
+        if self.actuators_thrusters and vehicle.thrusters is None:
+            expected = f'a vehicle with thrusters, not {vehicle.name}'
+            raise InputError(self.source, 'actuators.thrusters', expected, 'true')
+        if not self.anti_windup:
+            return make_reach(None, None)
+        limits = [limit for limit in (self.limits_wrench, self.actuators_limit) if limit]
+        smallest = [min(axis) for axis in zip(*limits, strict=True)]
+        return make_reach(smallest or None, vehicle if self.actuators_thrusters else None)
+
+
+def _positive(values: list[Any], source: str, name: str) -> Six:
+    """Six positive numbers of one or six; none of none."""
+    listed = values * 6 if len(values) == 1 else values
+    good = all(
+        isinstance(v, int | float) and not isinstance(v, bool) and 0 < v < math.inf for v in listed
+    )
+    if len(listed) not in (0, 6) or not good:
+        raise InputError(source, name, '1 or 6 positive numbers', values)
+    return tuple(map(float, listed))

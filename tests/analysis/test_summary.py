@@ -143,6 +143,7 @@ def test_couplings(run, summary):
 
 
 def settled(columns, peak=1.0):
+    columns = np.array([*columns, *np.zeros(11)])
     t = np.arange(len(columns)) * 0.5
     nu_d = np.zeros((len(columns), 6))
     nu_d[0, 0] = -peak
@@ -156,7 +157,6 @@ def settled(columns, peak=1.0):
     [
         ([1.0, 0.021, 0.02, -0.02, 0.0], 1.0, 1.0),  # 2 % of the peak, the edge belongs to it
         ([1.0, 0.0, -0.03, 0.0, 0.0], 1.0, 1.5),  # it must stay there
-        ([1.0, 0.0, 0.0, 0.0, 0.021], 1.0, None),  # and not end outside
         ([0.01, 0.0, 0.0, 0.0, 0.0], 1.0, 0.0),  # inside from the start
         ([0.02, 0.0049, 0.005, 0.001, 0.0], 0.1, 0.5),  # the band is never below 0.005
         ([0.02, 0.0051, 0.0, 0.0, 0.0], 0.0, 1.0),
@@ -165,3 +165,28 @@ def settled(columns, peak=1.0):
 )
 def test_settling_time(errors, peak, time):
     assert settled(errors, peak) == time
+
+
+@pytest.mark.parametrize(('samples', 'steps'), [(12, 10), (101, 10), (3001, 150)])
+def test_an_error_has_settled_only_once_it_dwells_in_its_band(samples, steps):
+    t, nu_d, error = np.arange(samples) * 0.01, np.ones((samples, 6)), np.zeros((samples, 6))
+    entered = samples - 1 - steps
+    error[entered - 1, :3] = error[entered, 3:] = 0.021
+    assert settling_time(t, error, nu_d) == [*3 * [t[entered]], *3 * [None]]
+
+
+def test_a_run_shorter_than_the_dwell_time_settles_only_where_it_never_leaves():
+    t, nu_d, error = np.arange(6.0), np.ones((6, 6)), np.zeros((6, 6))
+    error[0, 1] = 0.021
+    assert settling_time(t, error, nu_d) == [0.0, None, 0.0, 0.0, 0.0, 0.0]
+
+
+def test_noise_that_happens_to_end_inside_has_not_settled(run):
+    noise = np.random.default_rng(3).normal(scale=0.03, size=run.nu.shape)
+    noise[-3:] = 0.0
+    found = summarize(replace(run, nu=run.nu_d + noise))
+    assert found['velocity_error']['settling_time'] == 6 * [None]
+    settling = found['settling']
+    assert settling['dwell'] == pytest.approx(0.2)
+    assert_allclose(settling['residual'], np.abs(noise[-21:]).max(axis=0))
+    assert_allclose(settling['band'], np.maximum(0.02 * np.abs(run.nu_d).max(axis=0), 0.005))

@@ -47,13 +47,13 @@ def test_the_transient_is_two_seconds_from_the_first_sample(run, start):
 
 @pytest.mark.parametrize('axis', range(6))
 def test_each_axis_settles_by_itself(axis):
-    t, nu_d, error = 3.0 + np.arange(5.0), np.zeros((5, 6)), np.zeros((5, 6))
+    t, nu_d, error = 3.0 + np.arange(13.0), np.zeros((13, 6)), np.zeros((13, 6))
     nu_d[2, axis] = 1.0
     error[1, axis] = 0.021
     expected = [3.0] * 6
     expected[axis] = 5.0
     assert settling_time(t, error, nu_d) == expected
-    error[4, axis] = -0.021
+    error[-1, axis] = -0.021
     expected[axis] = None
     assert settling_time(t, error, nu_d) == expected
 

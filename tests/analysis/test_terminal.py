@@ -27,6 +27,7 @@ def summary(*, zeros: dict[str, list[str]] = NO_ZEROS, **changes: Any) -> dict[s
     found: dict[str, Any] = {
         'law': 'gvc', 'source': 'bag', 'duration': 30.0, 'step': 0.01, 'notes': [],
         'velocity_error': {}, 'lumped_error': {}, 'effort': {},
+        'settling': {'residual': [0.011, 0.021, 0.031, 0.041, 0.051, 0.061], 'dwell': 1.5},
         'coupling': {'structural_zeros': zeros},
         'kinetic_energy': {
             'mean': 402.45, 'mean_by_component': [next(numbers) / 10 for _ in DOFS],
@@ -108,7 +109,7 @@ def test_what_is_not_known_is_a_dash() -> None:
         assert row[1] == row[3] == row[4] == '–'
         assert (row[2] == '–') == (i in (1, 3))
         assert couplings[i][2:] == ['–', '–']
-    assert 'not settled at the end: sway and roll' in text
+    assert 'sway (0.021 m/s) and roll (0.041 rad/s)' in ' '.join(text.split())
     assert 'None' not in text
     assert 'nan' not in text
     assert text.count('kinetic energy') == 1, 'of the other run only'

@@ -11,7 +11,7 @@ import numpy as np
 from auv_analysis.fault_words import Mark
 from auv_analysis.run import AnyRun, Facts
 from auv_analysis.study.parquet import write_table
-from auv_analysis.summary import TRANSIENT, band_of
+from auv_analysis.summary import TRANSIENT, band_of, has_settled
 from auv_dynamics.signals import DOFS
 
 FILE = 'faults.parquet'
@@ -32,8 +32,8 @@ class Response:
     rms : of nu_d - nu before, during and after, m/s or rad/s
     peak : largest absolute error before, during and after
     band : of a settled error
-    recovery : s from the end of the fault until the error stays inside the band, up to the next
-        begin or end of a fault or the end of the run
+    recovery : s from the end of the fault until the error has settled in the band, dwell time
+        included, up to the next begin or end of a fault or the end of the run
     until : s, when the time that `recovery` looks at ends; None where the fault has no end
     effort : RMS of the commanded wrench of this axis before, during and after, N or N m
 
@@ -103,7 +103,7 @@ class _Tally:
         self._peak = np.zeros((3, 6))
         self._until = next_change(mark, run)
         self._outside = np.full(6, -math.inf)  # time of the last sample outside the band
-        self._last = -math.inf  # time of the last sample that recovery looks at
+        self._seen, self._left = 0, np.full(6, -1)  # samples of recovery, and the last one outside
 
     def add(self, t: np.ndarray, error: np.ndarray, tau: np.ndarray, band: np.ndarray) -> None:
         """Take in consecutive samples."""
@@ -117,10 +117,12 @@ class _Tally:
                 self._peak[i] = np.maximum(self._peak[i], error[inside].max(axis=0))
         behind = np.flatnonzero((t >= self._mark.end - tiny) & (t < self._until - tiny))
         if len(behind):
-            self._last = float(t[behind[-1]])
             for i in range(6):
-                outside = behind[error[behind, i] > band[i]]
-                self._outside[i] = t[outside[-1]] if len(outside) else self._outside[i]
+                outside = np.flatnonzero(error[behind, i] > band[i])
+                if len(outside):
+                    self._left[i] = self._seen + outside[-1]
+                    self._outside[i] = t[behind[outside[-1]]]
+            self._seen += len(behind)
 
     def responses(self, band: np.ndarray) -> list[Response]:
         """Of every degree of freedom."""
@@ -136,7 +138,7 @@ class _Tally:
                 self._of_parts(self._peak[:, i]),
                 float(band[i]),
                 self._recovery(i),
-                None if self._last == -math.inf else min(self._until, run.start + run.duration),
+                min(self._until, run.start + run.duration) if self._seen else None,
                 self._roots(self._effort, i),
             )
             for i, dof in enumerate(DOFS)
@@ -150,9 +152,9 @@ class _Tally:
         return tuple(float(value) if count else None for value, count in pairs)
 
     def _recovery(self, i: int) -> float | None:
-        if self._last == -math.inf or self._outside[i] == self._last:
+        if not self._seen or not has_settled(self._left[i], self._seen):
             return None
-        if self._outside[i] == -math.inf:
+        if self._left[i] < 0:
             return 0.0
         return round(float(self._outside[i] + self._run.step - self._mark.end), 9)
 

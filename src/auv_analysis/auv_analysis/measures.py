@@ -10,11 +10,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from auv_analysis.summary import BAND, SMALLEST_BAND
+from auv_analysis.summary import SETTLED
 from auv_dynamics.signals import DOFS
 
 VELOCITY, WRENCH, SECONDS = ('m/s', 'rad/s'), ('N', 'N m'), ('s', 's')
-SETTLED = f'{100 * BAND:g} % of the peak of its set-point, at least {SMALLEST_BAND:g}'
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.records import Sample
-from auv_analysis.summary import TRANSIENT
+from auv_analysis.summary import TRANSIENT, has_settled
 from auv_dynamics.files import LARGEST
 from auv_dynamics.jit import helper
 from auv_dynamics.lanes import Number, select
@@ -185,7 +185,8 @@ def columns(found: Figures, samples: int, step: float) -> dict[str, np.ndarray]:
     total = energy.sum(axis=1, keepdims=True)
     shares = 100.0 * np.divide(energy, total, out=np.zeros_like(energy), where=total > 0)
     late = samples > found.late
-    settled = np.where(found.outside == samples - 1, np.nan, (found.outside + 1) * step)
+    inside = has_settled(found.outside, samples)
+    settled = np.where(inside, (found.outside + 1) * step, np.nan)
     six = (
         energy,
         shares,

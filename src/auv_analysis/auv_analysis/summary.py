@@ -28,6 +28,10 @@ ENERGY_WINDOW = 10.0  # s: the paper prints no window; over this one its energy 
 Window = tuple[float, float]
 BAND = 0.02  # of the peak of nu_d: settled
 SMALLEST_BAND = 0.005  # m/s, rad/s
+DWELL = 5  # % of the run at its end that a settled error stays in its band
+SHORTEST_DWELL = 10  # steps
+BAND_TEXT = f'{100 * BAND:g} % of the peak of the set-point, at least {SMALLEST_BAND:g}'
+SETTLED = f'{BAND_TEXT}, and dwells there for the last {DWELL} % of the run or longer'
 
 
 def summarize(
@@ -81,7 +85,7 @@ def summarize(
         'kinetic_energy': energies[chosen],
         'kinetic_energy_windows': [energies[entry] for entry in listed],
         'velocity': {'rms': velocities.rms, 'max': velocities.peaks.tolist()},
-        'velocity_error': _errors(run, whole, after),
+        **_errors(run, whole, after),
         'lumped_error': {
             'rms': whole.rms(moments.LUMPED) if run.knows_disturbance else None,
             'max_after_2s': _peak(after, moments.LUMPED) if run.knows_disturbance else None,
@@ -117,9 +121,11 @@ def band_of(peak: np.ndarray) -> np.ndarray:
 
 
 def settling_time(t: np.ndarray, error: np.ndarray, nu_d: np.ndarray) -> list[float | None]:
-    """Time from which each error stays within its band; None when it ends outside.
+    """Time from which each error stays within its band; None where it has not settled.
 
-    The band is 2 % of the peak of nu_d of that degree of freedom, at least 0.005 m/s or rad/s.
+    The band is 2 % of the peak of nu_d of that degree of freedom, at least 0.005 m/s or rad/s. An
+    error has settled when it is inside at the end and has been for the dwell time (IEEE Std 181:
+    settling needs a specified duration inside): one that only happens to end inside has not.
 
     Parameters
     ----------
@@ -127,29 +133,47 @@ def settling_time(t: np.ndarray, error: np.ndarray, nu_d: np.ndarray) -> list[fl
     error, nu_d : (n, 6) m/s, rad/s
 
     """
-    return _last_entry([(t, error)], np.abs(nu_d).max(axis=0))
+    return _settling([(t, error)], len(t), band_of(np.abs(nu_d).max(axis=0)))[0]
 
 
-def _settling(run: AnyRun, peaks: np.ndarray) -> list[float | None]:
-    return _last_entry(((block.t, block.nu_d - block.nu) for block in run.blocks()), peaks)
+def dwell(samples: int) -> int:
+    """Steps that a settled error stays in its band: 5 % of a run, 10 at least, no more than all."""
+    return min(max(-(-DWELL * (samples - 1) // 100), SHORTEST_DWELL), samples - 1)
 
 
-def _last_entry(
-    blocks: Iterable[tuple[np.ndarray, np.ndarray]], peaks: np.ndarray
-) -> list[float | None]:
-    """Settling times from consecutive blocks of times and errors."""
-    band = band_of(peaks)
-    times: list[float | None] = [None] * 6  # None: outside at the last sample so far
+def has_settled(outside: np.ndarray, samples: int) -> np.ndarray:
+    """Whether errors dwell in their bands at the end of a run.
+
+    Parameters
+    ----------
+    outside : index of the last sample outside the band, -1 where there is none
+    samples : of the run
+
+    """
+    return samples - 2 - outside >= dwell(samples)
+
+
+def _settling(
+    blocks: Iterable[tuple[np.ndarray, np.ndarray]], samples: int, band: np.ndarray
+) -> tuple[list[float | None], list[float]]:
+    """Settling times and largest errors of the final dwell time, of consecutive blocks."""
+    entered, outside, residual = np.full(6, np.nan), np.full(6, -1), np.zeros(6)
+    seen, last = 0, samples - 1 - dwell(samples)
     for t, error in blocks:
-        outside = np.abs(error) > band
+        size = np.abs(error)
+        far = size > band
         for i in range(6):
-            where = np.flatnonzero(outside[:, i])
-            inside_from = where[-1] + 1 if len(where) else 0
-            if inside_from == len(t):
-                times[i] = None
-            elif len(where) or times[i] is None:
-                times[i] = float(t[inside_from])
-    return times
+            where = np.flatnonzero(far[:, i])
+            begin = where[-1] + 1 if len(where) else 0
+            if len(where):
+                outside[i], entered[i] = seen + where[-1], np.nan
+            if np.isnan(entered[i]) and begin < len(t):
+                entered[i] = t[begin]
+        residual = np.maximum(residual, size[max(last - seen, 0) :].max(axis=0, initial=0.0))
+        seen += len(t)
+    settled = has_settled(outside, samples)
+    times = [float(t) if inside else None for t, inside in zip(entered, settled, strict=True)]
+    return times, residual.tolist()
 
 
 def _usual_windows(run: AnyRun) -> list[Window]:
@@ -166,11 +190,22 @@ def _cuts(run: AnyRun, window: Window) -> Window:
 
 def _errors(run: AnyRun, whole: Moments, after: Moments) -> dict[str, Any]:
     if not run.knows_setpoint:
-        return dict.fromkeys(('rms', 'max_after_2s', 'settling_time'))
+        none = dict.fromkeys(('rms', 'max_after_2s', 'settling_time'))
+        return {'velocity_error': none, 'settling': None}
+    band = band_of(whole.peaks[moments.SETPOINT])
+    blocks = ((block.t, block.nu_d - block.nu) for block in run.blocks())
+    times, residual = _settling(blocks, run.samples, band)
     return {
-        'rms': whole.rms(moments.ERROR),
-        'max_after_2s': _peak(after, moments.ERROR),
-        'settling_time': _settling(run, whole.peaks[moments.SETPOINT]),
+        'velocity_error': {
+            'rms': whole.rms(moments.ERROR),
+            'max_after_2s': _peak(after, moments.ERROR),
+            'settling_time': times,
+        },
+        'settling': {
+            'band': band.tolist(),
+            'dwell': dwell(run.samples) * run.step,
+            'residual': residual,
+        },
     }
 
 

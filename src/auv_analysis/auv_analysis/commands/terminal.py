@@ -8,7 +8,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from auv_analysis.report.text import MISSING, join, number, plain
+from auv_analysis.report.text import MISSING, join, number, plain, residuals
 from auv_analysis.share_bar import share_bar
 from auv_dynamics.signals import DOFS
 
@@ -94,9 +94,11 @@ def _remarks(summary: Mapping[str, Any]) -> Iterable[str]:
     if named:
         yield f'{ZERO} in every motion: {"; ".join(named)}'
     times = summary['velocity_error']['settling_time']
-    late = [dof for dof, time in zip(DOFS, times or (), strict=bool(times)) if time is None]
+    late = [i for i, time in enumerate(times or ()) if time is None]
     if late:
-        yield f'not settled at the end: {join(late)}'
+        reached, last = residuals(summary), plain(summary['settling']['dwell'])
+        listed = join([f'{DOFS[i]} ({reached[i]})' for i in late])
+        yield f'not settled: {listed}; in brackets the largest error of the last {last} s'
 
 
 def comparison_table(summaries: Mapping[str, Mapping[str, Any]]) -> Table:

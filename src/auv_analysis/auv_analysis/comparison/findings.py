@@ -8,6 +8,7 @@ from auv_analysis.comparison.entries import Entry
 from auv_analysis.comparison.ranking import Ranking
 from auv_analysis.measures import BY_NAME
 from auv_analysis.report.document import Sentence
+from auv_analysis.report.findings import namesakes
 from auv_analysis.report.text import join, number
 
 SETTLED = 'overall.velocity_error.settling_time'
@@ -33,6 +34,7 @@ def findings(entries: Sequence[Entry], rows: Rows, ranking: Ranking) -> list[Sen
     known = [row for row in rows if not row['failure']]
     found = [_settled(known), *(_extremes(known, *which) for which in EXTREMES)]
     found += [_uncoupled(entries), _differing(known), _diverged(rows)]
+    found += namesakes([entry.sketch for entry in entries if entry.sketch])
     return [Sentence(text, RUNS) for text in found if text]
 
 

@@ -13,7 +13,7 @@ from auv_analysis.report.grids import MARGIN, ROW, TALLEST, name_rows
 from auv_analysis.report.overview import RUNS
 from auv_analysis.report.plotting import COLOURS, DASHES, GREY
 from auv_analysis.report.sketch import Sketch
-from auv_analysis.summary import BAND, SMALLEST_BAND, band_of
+from auv_analysis.summary import BAND_TEXT, DWELL, band_of
 
 MANY = (*RUNS, COLOURS[-1], '#8c8c8c')
 MOST_LINES = len(MANY)  # that can be told apart in a panel
@@ -21,6 +21,7 @@ MOST_PANELS = 12
 ACROSS = 4  # panels in a row
 SMALLEST, LARGEST = 1e-3, 1e4  # of the axis, multiples of the band
 TIMES = 240  # columns of the rows of colours
+ENDS = f', unless that is in the last {DWELL} % of the time'
 Drawn = tuple[Figure | None, str, str]
 
 
@@ -52,15 +53,15 @@ def errors(entries: Sequence[Entry]) -> Drawn:
     caption = (
         f'{title}: the largest velocity error between t and the end of the run, of all six '
         'degrees of freedom, divided by the band in which it counts as settled '
-        f'({100 * BAND:g} % of the peak of its set-point, at least {SMALLEST_BAND:g}). '
+        f'({BAND_TEXT}). '
     )
     if not groups:
         return None, title, f'{title}: without set-points there is none.'
     if len(groups) <= MOST_PANELS and len(labels) <= MOST_LINES:
-        caption += 'A run has settled where its line falls below the dotted 1. '
+        caption += f'A run has settled where its line falls below the dotted 1{ENDS}. '
         figure = _panels(groups, labels)
     else:
-        caption += 'Each row is a run; it has settled where its colours end. '
+        caption += f'Each row is a run; it has settled where its colours end{ENDS}. '
         figure = _rows([e for e in entries if e.sketch and e.sketch.knows_setpoint])
     return figure, title, caption + 'Time is logarithmic.'
 

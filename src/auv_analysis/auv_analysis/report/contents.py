@@ -14,7 +14,7 @@ from auv_analysis.report.figures import reference
 from auv_analysis.report.panel import PanelSet
 from auv_analysis.report.rendering import prose
 from auv_analysis.report.set_up import SetUp
-from auv_analysis.report.sketch import Sketch
+from auv_analysis.report.sketch import TINY, Sketch, alike
 from auv_analysis.report.tables.controllers import notes
 from auv_analysis.run import FOREIGN
 
@@ -84,7 +84,8 @@ class Contents:
         scenarios = list(dict.fromkeys(run.scenario for run in self.runs.values()))
         commanded = any(run.acting for run in self.runs.values())
         foreign = any(run.source == FOREIGN for run in self.runs.values())
-        yield prose('experiment', scenarios=scenarios, commanded=commanded, foreign=foreign)
+        same, other = self._shared()
+        yield prose('experiment', same=same, other=other, commanded=commanded, foreign=foreign)
         yield tables.controllers_table(self.runs)
         several = len(self.scenes) > 1
         for number, (names, scene) in enumerate(self.scenes.items(), start=1):
@@ -94,6 +95,26 @@ class Contents:
             yield 'The other scenarios’ files are not shown.'
         ends = {name: run.end[:3] for name, run in self.runs.items()}
         yield prose('position', ends=ends, ends_apart=_apart(self.runs))
+
+    def _shared(self) -> tuple[list[str], list[str]]:
+        """What all runs have in common, and in what they are known to differ."""
+        runs = list(self.runs.values())
+        if len(runs) < 2:
+            return [], []
+        alike_in = {
+            'start': bool(np.ptp([run.begin for run in runs], axis=0).max() <= TINY),
+            'set-point': alike(runs, 'nu_d'),
+            'disturbance': True if self._share_disturbances(runs) else alike(runs, 'F'),
+        }
+        return [[word for word, is_same in alike_in.items() if is_same is v] for v in (True, False)]
+
+    def _share_disturbances(self, runs: Sequence[Sketch]) -> bool:
+        """Whether the scenarios describe the same disturbances and faults of the same vehicle."""
+        wanted = [(s.data.get('disturbance'), s.data.get('faults')) for s in self.scenes.values()]
+        known = all(scene.data for scene in self.scenes.values())
+        M = runs[0].vehicle.M
+        same = all(np.array_equal(run.vehicle.M, M) for run in runs)
+        return known and same and all(one == wanted[0] for one in wanted)
 
     def _gains(self) -> Iterator[Block]:
         laws = {run.law for run in self.runs.values()}
@@ -155,8 +176,13 @@ def _sampled(summaries: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 
 def _apart(runs: Mapping[str, Sketch]) -> float | None:
-    """Largest distance of the final positions of runs of equal length, m; None for one run."""
+    """Largest distance of the final positions of runs alike, m; None for one run and for others.
+
+    Alike are runs of equal length with the same start and the same set-point.
+    """
     ends = [run.end[:3] for run in runs.values()]
-    if len(ends) < 2 or len({run.samples for run in runs.values()}) > 1:
+    lengths = [run.duration for run in runs.values()]
+    moved = np.ptp([run.begin for run in runs.values()], axis=0).max() > TINY
+    if len(ends) < 2 or np.ptp(lengths) > TINY or moved or not alike([*runs.values()], 'nu_d'):
         return None
     return max(float(np.linalg.norm(a - b)) for a in ends for b in ends)

@@ -12,11 +12,11 @@ from matplotlib.patches import Patch
 
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import Drawn, FigureRecord, save_figures
-from auv_analysis.report.overview import RUNS
+from auv_analysis.report.overview import RUNS, common_bands, left_out
 from auv_analysis.report.plotting import DASHES, GREY
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.text import join
-from auv_analysis.summary import BAND, SMALLEST_BAND, TRANSIENT
+from auv_analysis.summary import TRANSIENT
 from auv_dynamics.signals import DOFS
 
 ROOM = 1.3  # of the axis above what it shows, for the numbers of the faults
@@ -38,8 +38,9 @@ def _drawn(runs: Mapping[str, Sketch]) -> Drawn:
     figure: Figure = plotting.new_figure(7.2)
     panels = figure.subplots(6, 1, sharex=True)
     first = next(iter(runs.values()))
+    bands = common_bands(runs)
     for i, axes in enumerate(panels):
-        _panel(axes, runs, i)
+        _panel(axes, runs, i, bands[i])
         axes.set_ylabel(f'{plotting.ERROR.symbols[i]} ({plotting.ERROR.unit(i)})')
         plotting.letter(axes, i, DOFS[i])
     panels[-1].set_xlabel('$t$ (s)')
@@ -50,14 +51,14 @@ def _drawn(runs: Mapping[str, Sketch]) -> Drawn:
     figure.legend(patches, named, loc='outside lower left', ncols=2)
     title = 'Velocity errors under faults'
     caption = (
-        f'{title}, of {join(list(runs))}. Dotted: settling band. The axes are those of the '
-        f'errors after {TRANSIENT:g} s.{plotting.shade_sentence(first)}'
+        f'{title}, of {join(list(runs))}. Dotted: settling band{left_out(bands)}. '
+        f'The axes are those of the errors after {TRANSIENT:g} s.{plotting.shade_sentence(first)}'
     )
     return figure, title, caption
 
 
-def _panel(axes: Axes, runs: Mapping[str, Sketch], i: int) -> None:
-    low, high, band = 0.0, 0.0, 0.0
+def _panel(axes: Axes, runs: Mapping[str, Sketch], i: int, band: float | None) -> None:
+    low, high = 0.0, 0.0
     for n, run in enumerate(runs.values()):
         split = ('error', 'early') in run.traces
         for part in ('early', 'late') if split else ('whole',):
@@ -65,11 +66,10 @@ def _panel(axes: Axes, runs: Mapping[str, Sketch], i: int) -> None:
             axes.plot(t, error, **_look(n))
             if part != 'early':
                 low, high = min(low, np.nanmin(error)), max(high, np.nanmax(error))
-        band = max(SMALLEST_BAND, BAND * run.part('nu_d').peak[i])
         axes.set_xlim(run.start, run.start + run.duration)
-    for level in (-band, band):
+    for level in () if band is None else (-band, band):
         axes.axhline(level, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)), zorder=1.5)
-    low, high = min(low, -1.2 * band), max(high, 1.2 * band)
+        low, high = min(low, 1.2 * level), max(high, 1.2 * level)
     axes.set_ylim(1.1 * low, ROOM * high)
     plotting.shade(axes, next(iter(runs.values())))
 

@@ -9,13 +9,16 @@ from auv_analysis.report import paper
 from auv_analysis.report.claim import Claim
 from auv_analysis.report.document import Sentence
 from auv_analysis.report.figures import reference
-from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.text import fixed, join, number
+from auv_analysis.report.sketch import Sketch, alike, last_third
+from auv_analysis.report.text import fixed, join, number, plain, residuals
 from auv_analysis.report.unexplained import unexplained_finding
+from auv_analysis.summary import band_of
 from auv_dynamics.signals import DOFS
 
 Summaries = Mapping[str, Mapping[str, Any]]
 DECIDED = ('reproduced', 'partly', 'not reproduced')
+RESTLESS = 10.0  # times that an error of noise crosses its own range in the last third of a run
+_SEVERAL = 'do', 'their errors reach'
 
 
 def findings(
@@ -37,6 +40,7 @@ def findings(
     mine = summaries[leading.controller]
     figures = 'table-key_figures'
     found = [Sentence(_settling(n, run, summaries[n]), figures) for n, run in runs.items()]
+    found += [Sentence(text, 'experiment') for text in namesakes([*runs.values()])]
     found += [Sentence(_late_errors(summaries), figures), Sentence(_inputs(summaries), figures)]
     found += [Sentence(_applied(runs), 'inputs_compared')]
     found += [
@@ -48,15 +52,48 @@ def findings(
     return [sentence for sentence in found if sentence.text]
 
 
+def namesakes(runs: Sequence[Sketch]) -> list[str]:
+    """What has to be said of runs whose scenarios have one name and other set-points."""
+    groups: dict[str, list[Sketch]] = {}
+    for run in runs:
+        groups.setdefault(run.scenario, []).append(run)
+    return [
+        f'Not all {len(group)} runs of {name} have the same set-point: only the name is the same.'
+        for name, group in groups.items()
+        if alike(group, 'nu_d') is False
+    ]
+
+
 def _settling(name: str, run: Sketch, summary: Mapping[str, Any]) -> str:
     times = summary['velocity_error']['settling_time']
     if times is None:
         return f'Of {name} no set-point is known, and so no error.'
-    missing = [dof for dof, time in zip(DOFS, times, strict=True) if time is None]
+    missing = [i for i, time in enumerate(times) if time is None]
     if not missing:
         return f'Under {name} every velocity error has settled after {max(times):.2f} s.'
-    verb = 'does' if len(missing) == 1 else 'do'
-    return f'Under {name}, {join(missing)} {verb} not settle within {run.duration:g} s.'
+    noisy = [i for i in missing if _is_noise(run, i)]
+    reached = residuals(summary)
+    parts = []
+    if still := [i for i in missing if i not in noisy]:
+        verb, whose = ('does', 'its error reaches') if len(still) == 1 else _SEVERAL
+        last = plain(summary['settling']['dwell'])
+        parts.append(
+            f'{join([DOFS[i] for i in still])} {verb} not settle within {run.duration:g} s: '
+            f'in the last {last} s {whose} {join([reached[i] for i in still])}'
+        )
+    if noisy:
+        floors = join([f'{reached[i]} in {DOFS[i]}' for i in noisy])
+        parts.append(
+            f'the error is within its noise floor of {floors}, wider than the settling band'
+        )
+    return f'Under {name}, {"; ".join(parts)}.'
+
+
+def _is_noise(run: Sketch, i: int) -> bool:
+    """Whether a measured error fluctuates about a mean that lies in the band."""
+    late, band = run.part('error', last_third(run)), band_of(run.part('nu_d').peak)
+    measured = run.sensing or run.acceleration is not None
+    return measured and abs(late.mean[i]) <= band[i] and late.path[i] >= RESTLESS * late.span[i]
 
 
 def _late_errors(summaries: Summaries) -> str:
@@ -120,7 +157,7 @@ def _couplings(summary: Mapping[str, Any], leading: Sketch) -> str:
         f'{symbol} of {DOFS[i]} by up to {number(values[i], 2)} {unit}'
         for symbol, values, unit, members in (
             ('the velocity component', xi, 'm/s', range(3)),
-            ('that', xi, 'rad/s', range(3, 6)),
+            ('the velocity component', xi, 'rad/s', range(3, 6)),
             ('the input', pi, 'N', range(3)),
             ('the input', pi, 'N m', range(3, 6)),
         )

@@ -1,6 +1,6 @@
 """Figures that put the controllers of a scenario side by side: errors, inputs, energy."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,13 @@ from matplotlib.lines import Line2D
 from auv_analysis.energy import shares
 from auv_analysis.report import paper, plotting
 from auv_analysis.report.plotting import COLOURS, DASHES, GREY
-from auv_analysis.report.sketch import FOREVER, Sketch
+from auv_analysis.report.sketch import FOREVER, Sketch, alike
 from auv_analysis.report.sketching import common_window
 from auv_analysis.report.text import join
-from auv_analysis.summary import BAND, SMALLEST_BAND
+from auv_analysis.summary import BAND_TEXT, DWELL, band_of
 from auv_dynamics.signals import DOFS
 
-GREY_LINE = ', and in grey that of a vehicle that moves exactly as the set-point asks'
+GREY_LINE = ', and in grey that of a vehicle that moves exactly as the set-point{} asks'
 MARKERS = 'os^vPX'
 SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
 RUNS = ('#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00')  # of three runs and more
@@ -38,24 +38,38 @@ def settling(runs: Mapping[str, Sketch]) -> tuple[Figure | None, str, str]:
     if not runs:
         return None, title, f'{title}: without a set-point there is none.'
     figure, panels = _six_panels(runs)
+    bands = common_bands(runs)
     for i, axes in enumerate(panels):
-        band = 0.0
         for look, run in zip(_looks(runs, COLOURS[i]), runs.values(), strict=True):
             t, error = run.line('error', i, 'log')
             rest = np.maximum.accumulate(error[::-1])[::-1]
             axes.plot(t[rest > 0], rest[rest > 0], **look)
-            band = max(SMALLEST_BAND, BAND * run.part('nu_d').peak[i])
-        axes.axhline(band, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
+        if bands[i] is not None:
+            axes.axhline(bands[i], color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
         plotting.logarithmic(axes, 'x', 'y')
     for row, unit in zip((0, 3), plotting.VELOCITY, strict=True):
         panels[row].set_ylabel(rf'$\max_{{s\,\geq\,t}}|\Delta\nu(s)|$ ({unit})')
     caption = (
         f'{title}: the largest velocity error between t and the end of the run, '
         f'{_named_dashes(runs)}. An error has settled where its line falls below the dotted band '
-        f'({100 * BAND:g} % of the peak of the set-point, at least {SMALLEST_BAND:g}). '
+        f'({BAND_TEXT}{left_out(bands)}), unless that is in the last {DWELL} % of the run. '
         'Both axes are logarithmic; at the end of the run little is to come and every line drops.'
     )
     return figure, title, caption
+
+
+def common_bands(runs: Mapping[str, Sketch]) -> list[float | None]:
+    """Band of a settled error per degree of freedom; None where the runs do not share it."""
+    bands = np.array([band_of(run.part('nu_d').peak) for run in runs.values()])
+    return [
+        float(band[0]) if np.allclose(band, band[0], rtol=1e-6, atol=0.0) else None
+        for band in bands.T
+    ]
+
+
+def left_out(bands: Sequence[float | None]) -> str:
+    """What a caption says of bands that are not drawn."""
+    return '; not drawn where the set-points of the runs differ' if None in bands else ''
 
 
 def inputs(runs: Mapping[str, Sketch]) -> tuple[Figure, str, str]:
@@ -92,8 +106,9 @@ def energy(runs: Mapping[str, Sketch], leading: Sketch) -> tuple[Figure, str, st
     figure = plotting.new_figure(2.7)
     left, right = figure.subplots(1, 2)
     handles, wanted = [], []
+    whose = '' if alike([*runs.values()], 'nu_d') else f' of {leading.controller}'
     if leading.knows_setpoint:
-        wanted = ['set-point']
+        wanted = [f'set-point{whose}']
         handles = left.plot(*leading.drawn('wanted'), color='#b5b5b5', linewidth=3.2)
     for look, run in zip(_looks(runs), runs.values(), strict=True):
         handles += left.plot(*run.drawn('kinetic'), **look)
@@ -115,7 +130,7 @@ def energy(runs: Mapping[str, Sketch], leading: Sketch) -> tuple[Figure, str, st
         plotting.letter(axes, index)
     title = 'Kinetic energy'
     caption = (
-        f'{title}: (a) of each controller{GREY_LINE if wanted else ""}; '
+        f'{title}: (a) of each controller{GREY_LINE.format(whose) if wanted else ""}; '
         f'(b) shares of the components of {leading.controller}, equation (30).'
         f'{plotting.shade_sentence(leading)}'
     )

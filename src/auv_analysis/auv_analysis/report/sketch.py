@@ -1,5 +1,6 @@
 """What the report needs of a run, taken in one pass over its blocks: lines, extremes, sums."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ from auv_analysis.report.traces import Line, Trace, broken
 from auv_analysis.run import Extent, Facts
 
 FOREVER = float('inf')
+FEWEST_SHARED = 10  # samples at equal times, from which on courses are compared
+ROUNDING, TINY = 1e-6, 1e-9  # of the peak, and in the unit of a signal: apart by no more is alike
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -30,8 +33,10 @@ class Sketch(Facts):
         transient) and 'log' (over the time since the start)
     stack : times (c,) and shares (c, 6) in %, means over columns of samples
     settled : time, s from the start, of the last sample with an error above 0.005; 0: of none,
-        inf: of the very last
-    end : (6,) eta at the last sample
+        inf: one of the final dwell time
+    begin, end : eta and nu (12,) at the first sample, eta (6,) at the last
+    course : times `t` since the start of some samples, s, and (m, 6) `nu_d` and `F` there where
+        they are known: what `alike` looks at
     estimates : whether the adaptive term is ever other than zero
     missed : (6,) whether the applied wrench ever differs from the command
     F_digest : tells disturbances of different runs apart
@@ -44,7 +49,9 @@ class Sketch(Facts):
     traces: dict[tuple[str, str], list[Trace]]
     stack: Line
     settled: float
+    begin: np.ndarray
     end: np.ndarray
+    course: dict[str, np.ndarray]
     estimates: bool
     missed: np.ndarray
     F_digest: bytes
@@ -88,6 +95,32 @@ class Sketch(Facts):
         if found is None:
             raise ValueError(f'expected samples in {first:g} to {last:g} s, found none')
         return found.of(self.columns[name])
+
+
+def alike(runs: Sequence[Sketch], signal: str) -> bool | None:
+    """Whether a signal has the same course in all runs, over the time that they share.
+
+    Parameters
+    ----------
+    runs : one at least
+    signal : 'nu_d' or 'F'
+
+    Returns
+    -------
+    alike : None where a run does not know it, or where they share too few times to tell
+
+    """
+    first = runs[0].course
+    if any(signal not in run.course for run in runs):
+        return None
+    for other in (run.course for run in runs[1:]):
+        _, mine, theirs = np.intersect1d(first['t'], other['t'], return_indices=True)
+        if len(mine) < min(FEWEST_SHARED, len(first['t']), len(other['t'])):
+            return None
+        a, b = first[signal][mine], other[signal][theirs]
+        if np.any(np.abs(a - b) > ROUNDING * np.abs(a).max(axis=0) + TINY):
+            return False
+    return True
 
 
 def cut_before(run: Facts, time: float) -> float:

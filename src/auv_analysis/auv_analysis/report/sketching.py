@@ -14,7 +14,7 @@ from auv_analysis.report.sketch import FOREVER, Sketch, cut_before, cut_behind, 
 from auv_analysis.report.statistics import Statistics
 from auv_analysis.report.traces import Line, Trace
 from auv_analysis.run import AnyRun, Facts, Run
-from auv_analysis.summary import TRANSIENT
+from auv_analysis.summary import TRANSIENT, has_settled
 from auv_gvc_controller.model import ControlModel, control_model
 
 SPLIT = ('error', 'lumped_error', 'tau', 'delta_pi')  # begin with a peak that dwarfs the rest
@@ -23,6 +23,7 @@ WHOLE = (
 )  # fmt: skip
 NEAR_ZERO = 0.005  # m/s, rad/s: what counts as a settled error
 SHARE_COLUMNS = 600  # of the stacked shares
+COURSE = 1000  # samples, at most, by which runs are compared
 
 
 def sketches(runs: Mapping[str, AnyRun | Sketch]) -> dict[str, Sketch]:
@@ -102,9 +103,11 @@ class _Builder:
         self._edges = np.unique(edges)[:-1]  # numbers of the samples that begin a column
         self._sums = np.zeros((len(self._edges), 8))  # of 1, t and the energies, by column
         self._seen = 0
-        self._outside: float | None = None
+        self._outside, self._left = 0.0, -1  # time and number of the last sample far from zero
         self._estimates, self._missed = False, np.zeros(6, bool)
-        self._end = np.zeros(6)
+        self._begin, self._end = np.zeros(12), np.zeros(6)
+        self._every = 1 << ((run.samples - 1) // COURSE).bit_length()  # runs share the times of it
+        self._course: dict[str, list[np.ndarray]] = {}
 
     def add(self, block: Run) -> None:
         """Take in the next block."""
@@ -116,11 +119,18 @@ class _Builder:
         self._statistics.add(block.t, np.concatenate([*found.values()], axis=1))
         for name, values in found.items() if self._lines else ():
             self._draw(name, block.t, values)
+        if not self._seen:
+            self._begin = np.concatenate([block.eta[0], block.nu[0]])
+        kept = slice(-self._seen % self._every, None, self._every)
+        since = {'t': np.round(block.t - self._run.start, 9)}
+        for name, values in (since | {n: found[n] for n in ('nu_d', 'F') if n in found}).items():
+            self._course.setdefault(name, []).append(values[kept])
         self._add_shares(block.t, found['energy'])
         error = found.get('error', np.zeros((1, 6)))
         far = np.flatnonzero(np.abs(error).max(axis=1) > NEAR_ZERO)
         if len(far):
             self._outside = float(block.t[far[-1]] - self._run.start)
+            self._left = self._seen - len(error) + int(far[-1])
         self._estimates |= bool(np.any(block.disturbance_estimate != 0.0))
         self._missed |= np.any(block.tau != block.tau_applied, axis=0)
         if block.disturbance is not None:
@@ -203,8 +213,10 @@ class _Builder:
             statistics=self._statistics,
             traces=self._traces,
             stack=self._shares(),
-            settled=FOREVER if self._outside == run.duration else self._outside or 0.0,
+            settled=self._outside if has_settled(self._left, run.samples) else FOREVER,
+            begin=self._begin,
             end=self._end,
+            course={name: np.concatenate(parts) for name, parts in self._course.items()},
             estimates=self._estimates,
             missed=self._missed,
             F_digest=self._digest.digest(),

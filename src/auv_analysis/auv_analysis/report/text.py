@@ -1,7 +1,7 @@
 """Numbers and lists as a reader wants them: rounded, grouped, with a true minus."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 MISSING = '–'
@@ -62,3 +62,12 @@ def tied(text: str) -> str:
 def join(words: Sequence[str]) -> str:
     """One, two and three as 'one, two and three'."""
     return ' and '.join(filter(None, [', '.join(words[:-1]), *words[-1:]]))
+
+
+def residuals(summary: Mapping[str, Any]) -> list[str]:
+    """Largest error of the final dwell time per degree of freedom of a summary, with its unit."""
+    units = 3 * ['m/s'] + 3 * ['rad/s']
+    return [
+        f'{number(value, 2)} {unit}'
+        for value, unit in zip(summary['settling']['residual'], units, strict=True)
+    ]

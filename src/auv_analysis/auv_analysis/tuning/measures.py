@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from auv_analysis.run import Run
-from auv_analysis.summary import TRANSIENT, settling_time
+from auv_analysis.summary import SETTLED, TRANSIENT, has_settled, settling_time
 from auv_analysis.tuning.record import Cost
 
 
@@ -25,7 +25,7 @@ class Measures(NamedTuple):
     effort : mean of 1/2 tau^T M^-1 tau over the run, tau the wrench applied, J/s2
     late_error : largest of the error's energy 2 s after the start, J
     peak_effort : largest of the effort's form, J/s2
-    settling : from when on all errors stay in their bands, s; infinite where one ends outside
+    settling : from when on all errors stay in their bands, s; infinite where one has not settled
 
     """
 
@@ -55,7 +55,8 @@ def measures_of(cost: Cost, samples: int, step: float) -> Measures:
     measures : Measures of (B,) arrays
 
     """
-    settled = np.where(cost.outside == samples - 1, np.inf, (cost.outside + 1) * step)
+    inside = has_settled(cost.outside, samples)
+    settled = np.where(inside, (cost.outside + 1) * step, np.inf)
     late = cost.late_error if samples > cost.late else np.nan * cost.late_error
     values = (
         cost.error[:, 0] / samples,
@@ -94,11 +95,7 @@ MEANINGS = {
     ),
     'late_error': Meaning(f'error after {TRANSIENT:g} s', 'J', 'largest ½ Δν^T M Δν from then on'),
     'peak_effort': Meaning('peak effort', 'J/s²', 'largest ½ τ^T M^-1 τ'),
-    'settling': Meaning(
-        'settled',
-        's',
-        'from when on all errors are within 2 % of the peak of ν_d, at least 0.005 m/s or rad/s',
-    ),
+    'settling': Meaning('settled', 's', f'time from which every error stays within {SETTLED}'),
 }
 
 

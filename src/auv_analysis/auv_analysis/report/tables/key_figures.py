@@ -5,10 +5,9 @@ from typing import Any
 from auv_analysis.report.document import Cell, Column, Table, cell
 from auv_analysis.report.tables.sources import Summaries, summary_source
 from auv_analysis.report.text import MISSING, fixed, join
-from auv_analysis.summary import BAND, SMALLEST_BAND, TRANSIENT
+from auv_analysis.summary import SETTLED, TRANSIENT
 from auv_dynamics.signals import DOFS
 
-BAND_TEXT = f'{100 * BAND:g} % of the peak of the set-point, at least {SMALLEST_BAND:g}'
 ERROR, ESTIMATE, INPUT = 'velocity error', 'estimation error w', 'input τ'
 LATE = f'max after {TRANSIENT:g} s'
 COLUMNS = (
@@ -16,7 +15,7 @@ COLUMNS = (
     Column('', meaning='degree of freedom', numeric=False),
     Column('RMS', '', 'root mean square of ν_d − ν over the run; m/s, rad/s', group=ERROR),
     Column(LATE, '', 'largest |ν_d − ν| behind the transient; m/s, rad/s', group=ERROR),
-    Column('settled', 's', f'time from which the error stays within {BAND_TEXT}', group=ERROR),
+    Column('settled', 's', f'time from which the error stays within {SETTLED}', group=ERROR),
     Column('RMS', '', 'root mean square of w = f − F over the run; N, N m', group=ESTIMATE),
     Column(LATE, '', 'largest |w| behind the transient; N, N m', group=ESTIMATE),
     Column('RMS', '', 'root mean square of the command over the run; N, N m', group=INPUT),

@@ -1,0 +1,87 @@
+"""What runs have in common is told from their samples, and never from names."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.report.contents import Contents
+from auv_analysis.report.findings import findings
+from auv_analysis.report.overview import common_bands
+from auv_analysis.report.set_up import set_up
+from auv_analysis.report.sketch import alike
+from auv_analysis.report.sketching import sketches
+from auv_analysis.run import Run
+
+
+@pytest.fixture(scope='module')
+def run() -> Run:
+    scenario = load_scenario('case1')
+    return simulate(replace(scenario, data=scenario.data | {'duration': 4.0}), 'gvc')
+
+
+@pytest.fixture
+def other(run) -> Run:
+    """The same scenario's name, another set-point and disturbance."""
+    return replace(run, nu_d=1.5 * run.nu_d, disturbance=run.disturbance + 1.0)
+
+
+def said(runs: dict[str, Run]) -> str:
+    runs = {name: replace(one, controller=name) for name, one in runs.items()}
+    drawn = sketches(runs)
+    summaries = {name: summarize(one) for name, one in runs.items()}
+    scenes = {tuple(runs): set_up(drawn, summaries, '')}
+    sections = Contents(drawn, summaries, scenes, [], [], {}).sections()
+    experiment = ' '.join(str(block) for block in sections[0].blocks)
+    return ' '.join([experiment, *(s.text for s in findings(drawn, summaries, []))])
+
+
+def test_runs_of_one_name_are_told_apart_by_their_samples(run, other) -> None:
+    text = said({'a': run, 'b': other})
+    assert 'with the same start, but not with the same set-point and disturbance' in text
+    assert 'Not all 2 runs of case1 have the same set-point' in text
+    assert 'm apart' not in text
+
+
+def test_runs_of_other_names_may_have_the_same_set_point(run) -> None:
+    text = said({'a': run, 'b': replace(run, scenario='renamed', eta=1.1 * run.eta)})
+    assert 'with the same start, set-point and disturbance.' in text
+    assert 'for the same set-point these places are up to' in text
+    assert 'only the name' not in text
+
+
+def test_another_start_is_not_laid_to_the_laws(run) -> None:
+    assert 'm apart' not in said({'a': run, 'b': replace(run, eta=run.eta + 1.0)})
+
+
+@pytest.mark.parametrize('every', [1, 2, 7])
+def test_set_points_are_held_against_each_other_over_the_time_that_runs_share(run, every) -> None:
+    shorter = run.part(slice(0, 300, every))
+    a, b = sketches({'a': run, 'b': shorter}).values()
+    assert alike([a, b], 'nu_d') is True
+    late = replace(shorter, nu_d=shorter.nu_d + 0.1 * (shorter.t > 1.5)[:, None])
+    assert alike([a, *sketches({'b': late}).values()], 'nu_d') is False
+
+
+def test_what_is_not_known_is_neither_the_same_nor_another(run) -> None:
+    blind = replace(run, disturbance=None)
+    shifted = replace(run, t=run.t * 1.000123)
+    a, b, c = sketches({'a': run, 'b': blind, 'c': shifted}).values()
+    assert alike([a, b], 'F') is None
+    assert alike([a, c], 'nu_d') is None
+
+
+def test_a_band_is_drawn_only_where_the_runs_share_it(run, other) -> None:
+    changed = replace(run, nu_d=run.nu_d * [1.5, 1, 1, 1, 1, 1])
+    bands = common_bands(sketches({'a': run, 'b': changed}))
+    assert [band is None for band in bands] == [True, *5 * [False]]
+
+
+@pytest.mark.parametrize('measured', [True, False])
+def test_noise_above_the_band_is_called_so_where_the_velocity_was_measured(run, measured) -> None:
+    noise = np.random.default_rng(1).normal(scale=0.05, size=run.nu.shape)
+    noisy = replace(run, nu=run.nu_d + noise, measured=run.nu if measured else None)
+    text = said({'a': noisy})
+    assert ('within its noise floor of' in text) == measured
+    assert ('do not settle within 4 s: in the last 0.2 s' in text) != measured

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from auv_analysis import linearize
 from auv_analysis.cli import main
+from auv_analysis.linearization.modes import stability
 
 
 @pytest.mark.usefixtures('unrendered')
@@ -35,6 +36,17 @@ def test_the_loops_of_a_scenario_as_a_table(tmp_path, capsys):
     for word in ('open loop: 8 states', 'cl: 20 states', 'damping', 'frequency, rad/s', '±'):
         assert word in text
     assert 'gvc' not in text
+    model = json.loads((tmp_path / 'out' / 'linearization.json').read_text())['models']['cl']
+    zeros = sum(mode['pole'] == [0.0, 0.0] for mode in model['modes'])
+    assert zeros == 2, 'roll and pitch: their restoring moments are compensated'
+    assert (model['stable'], model['stability']) == (False, 'marginal')
+    assert f'cl: 20 states, marginal, 2 of its {len(model["modes"])} modes neither grow' in text
+
+
+@pytest.mark.parametrize(('rate', 'verdict'), [(-1, 'asymptotically stable'), (1e-3, 'unstable')])
+def test_one_growing_pole_is_enough(rate, verdict):
+    poles = [{'pole': [-2.0, 1.0]}, {'pole': [rate, 0.0]}]
+    assert stability(poles) == verdict
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from auv_analysis.linearization.loop import linearize
-from auv_analysis.linearization.modes import modes
+from auv_analysis.linearization.modes import STABLE, modes, stability
 from auv_analysis.linearization.state_space import Linearization
 from auv_analysis.scenario import Scenario
 from auv_dynamics.vehicle import Vehicle
@@ -52,5 +52,6 @@ def _model(model: Linearization) -> dict[str, Any]:
         **{key: getattr(model, key).tolist() for key in ('x0', 'u0', 'y0', 'drift')},
         'error': model.error,
         'modes': found,
-        'stable': all(mode['pole'][0] <= 0 for mode in found),
+        'stable': stability(found) == STABLE,
+        'stability': stability(found),
     }

@@ -1,5 +1,6 @@
 """The poles of a linear model: damping, frequency, time constant, and where each one lives."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ import scipy.linalg
 
 from auv_analysis.linearization.state_space import Linearization
 
+STABLE, MARGINAL, UNSTABLE = 'asymptotically stable', 'marginal', 'unstable'
 NEGLIGIBLE = 1e-8  # of the fastest pole, below which one is zero
 
 
@@ -35,6 +37,17 @@ def modes(model: Linearization) -> list[dict[str, Any]]:
     return [_mode(complex(values[i]), weights[:, i], model.states, smallest) for i in kept]
 
 
+def stability(found: Sequence[Mapping[str, Any]]) -> str:
+    """Stability of a linear model from its modes.
+
+    Asymptotically stable where every pole lies in the open left half plane, unstable where one lies
+    in the right one. Else poles on the imaginary axis, such as at zero, make it marginal: what they
+    belong to neither decays nor grows exponentially, and the linear model does not decide.
+    """
+    largest = max(mode['pole'][0] for mode in found)
+    return STABLE if largest < 0 else UNSTABLE if largest > 0 else MARGINAL
+
+
 def _mode(
     value: complex, weights: np.ndarray, states: tuple[str, ...], smallest: float
 ) -> dict[str, Any]:
@@ -42,9 +55,7 @@ def _mode(
     size = abs(complex(real, imaginary))
     parts: dict[str, float] = {}
     for name, weight in zip(states, weights, strict=True):
-        place = name.rstrip(']').rpartition('[')[
-            2
-        ]  # the law's states are of a degree of freedom as well
+        place = name.rstrip(']').rpartition('[')[2]  # states of a law are of a degree of freedom
         parts[place] = parts.get(place, 0.0) + float(weight)
     mostly = max(parts, key=lambda place: parts[place])
     return {

@@ -26,9 +26,13 @@ def print_poles(document: dict[str, Any], out: Console | None = None) -> None:
 
 
 def _verdict(model: dict[str, Any]) -> str:
-    growing = sum(mode['pole'][0] > 0 for mode in model['modes'])
-    text = f'{len(model["states"])} states, '
-    text += 'no pole grows' if model['stable'] else f'{growing} of its modes grow'
+    rates = [mode['pole'][0] for mode in model['modes']]
+    text = f'{len(model["states"])} states, {model["stability"]}'
+    for count, what in (
+        (sum(rate > 0 for rate in rates), 'grow'),
+        (sum(rate == 0 for rate in rates), 'neither grow nor decay'),
+    ):
+        text += f', {count} of its {len(rates)} modes {what}' if count else ''
     if any(abs(rate) > 1e-9 for rate in model['drift']):
         text += '; the point moves: it turns while it is inclined'
     return text

@@ -9,6 +9,7 @@ from made_sweeps import make_sweep
 from auv_analysis.exploration.indices import designed
 from auv_analysis.exploration.opening import open_sweep
 from auv_analysis.exploration.results import analysed
+from auv_dynamics.signals import DOFS
 
 pytest.importorskip('SALib')
 ENERGY = 'kinetic_energy.mean'
@@ -67,10 +68,25 @@ def test_a_base_point_with_a_failed_row_is_left_out_whole(tmp_path: Path) -> Non
 
     found = [row for row in indices(make_sweep(tmp_path, SALTELLI, failing))
              if row['with'] is None and row['case'] == 'integrator = ode5']  # fmt: skip
+    assert 'no row failed' in ' '.join(analysed(open_sweep(tmp_path / 'out')).notes)
     lost = len({index // 8 for index in range(5, 2048, 80)})
     assert {row['points'] for row in found} == {256 - lost}
     for row in found:
         assert row['S1'] == pytest.approx({A: 0.9, B: 0.1, C: 0.0}[row['path']], abs=0.06)
+
+
+def test_rows_that_settle_are_no_sample_of_the_design(tmp_path: Path) -> None:
+    """Their indices would be those of rows that were chosen by the figure itself."""
+
+    def settling(controller, values, index):
+        heave = np.where(values[A] > 1.2, 3.0 - values[A], np.nan)
+        return linear(controller, values, index) | {
+            f'velocity_error.settling_time.{dof}': heave for dof in DOFS
+        }
+
+    results = analysed(open_sweep(make_sweep(tmp_path, SALTELLI, settling)))
+    assert {row['figure'] for row in results.tables['indices']} == {ENERGY}
+    assert len([note for note in results.notes if 'no indices of settled under gvc' in note]) == 1
 
 
 def test_an_unfinished_design_uses_its_whole_base_points(tmp_path: Path) -> None:

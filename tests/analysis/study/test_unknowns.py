@@ -185,6 +185,11 @@ def made(verdicts):
         ('partly', 'partly in all', 'partly in all'),
         ([['reproduced'], ['partly']], 'varies', 'holds over all'),
         ([['reproduced', 'partly'], ['partly', 'partly']], 'varies', 'varies'),
+        ('not evaluated', 'not evaluated', 'not evaluated'),
+        (
+            [['reproduced', 'not evaluated'], ['not evaluated', 'reproduced']],
+            *2 * ['holds over all, of those evaluated'],
+        ),
     ],
 )
 def test_outcomes_follow_the_verdicts(verdicts, every, as_read):

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from auv_analysis.comparison.entries import Entry
-from auv_analysis.comparison.ranking import Ranking
+from auv_analysis.comparison.ranking import ERRORS, Ranking
 from auv_analysis.measures import BY_NAME
 from auv_analysis.report.document import Sentence
 from auv_analysis.report.findings import namesakes
@@ -39,7 +39,9 @@ def findings(entries: Sequence[Entry], rows: Rows, ranking: Ranking) -> list[Sen
 
 
 def _settled(rows: Rows) -> str:
-    times = {row['run']: row[SETTLED] for row in rows}
+    times = {row['run']: row[SETTLED] for row in rows if row[ERRORS] is not None}
+    if not times:
+        return ''
     settled = {name: time for name, time in times.items() if time is not None}
     if not settled:
         return f'In none of {len(times)} runs do all six velocity errors settle.'
@@ -96,4 +98,4 @@ def _diverged(rows: Rows) -> str:
     if not failed:
         return ''
     shown = [*failed[:MOST_NAMES], *(['others'] if len(failed) > MOST_NAMES else [])]
-    return f'{len(failed)} of {len(rows)} runs diverged and have no figures: {join(shown)}.'
+    return f'{len(failed)} of {len(rows)} runs failed and have no figures: {join(shown)}.'

@@ -88,7 +88,7 @@ def overview(rows: Sequence[Mapping[str, Any]]) -> Table:
         body.append([_head(row), *words, *(_cell(row, name, i) for name in numbers)])
     caption = 'All runs. Click on a head to sort by it.'
     failed = [row['run'] for row in rows if row['failure']]
-    note = f'Diverged, without figures: {join(failed)}.' if failed else ''
+    note = f'Failed, without figures: {join(failed)}.' if failed else ''
     return Table('runs', caption, columns, body, note=note)
 
 
@@ -104,7 +104,7 @@ def _six_table(rows: Sequence[Mapping[str, Any]], family: str) -> Table:
 
 
 def _head(row: Mapping[str, Any]) -> Cell:
-    return Cell(row['run'], remark='diverged' if row['failure'] else '')
+    return Cell(row['run'], remark='failed' if row['failure'] else '')
 
 
 def _column(name: str, label: str, group: str = '') -> Column:

@@ -42,7 +42,7 @@ def total_indices(results: Results) -> Drawn:
     caption = (
         f'{title} of Sobol: the share of the variance of a figure that would be left if all but '
         'this path were known, its interactions included; an estimate may leave 0 to 1. Crossed '
-        'out: the figure does not vary, or does not exist in whole rows of the design. '
+        'out: the figure does not vary, or does not exist in all rows. '
         f'{"; ".join(said)}.'
     )
     if len(cases) > len(LETTERS):

@@ -47,9 +47,10 @@ def _settled(results: Results) -> Iterator[Sentence]:
     for row in results.tables['quantiles']:
         if row['figure'] == SETTLED and row['rows']:
             share = 100 * row['known'] / row['rows']
-            text = f'Under {row["controller"]} all errors settle in {number(share)} % of the rows'
+            text = f'Under {row["controller"]} all errors settle in {number(share)} % of the '
+            text += f'{row["rows"]} rows that came to their end'
             if row['median'] is not None:
-                text += f', half of the rows within {number(row["median"])} s'
+                text += f', in half of them within {number(row["median"])} s'
             yield Sentence(f'{text}.', 'table-quantiles')
 
 
@@ -60,9 +61,11 @@ def _against(results: Results) -> Iterator[Sentence]:
             what = 'time to settle' if row['figure'] == SETTLED else label
             text = (
                 f'The {what} of {row["controller"]} is smaller than that of {row["other"]} in '
-                f'{number(row["smaller_percent"])} % of {row["rollouts"]} rollouts.'
+                f'{number(row["smaller_percent"])} % of {row["rollouts"]} rollouts'
             )
-            yield Sentence(text, 'table-paired')
+            if row['equal_percent']:
+                text += f', and in {number(row["equal_percent"])} % there is no difference'
+            yield Sentence(f'{text}.', 'table-paired')
 
 
 def _matters(results: Results) -> Iterator[Sentence]:
@@ -78,7 +81,8 @@ def _matters(results: Results) -> Iterator[Sentence]:
                     share = number(row['explained_percent'])
                     parts.append(f'{names[row["path"]]} under {controller} ({share} %)')
         if parts:
-            text = f'What explains most of {BY_NAME[name].label}: {join(parts)}.'
+            text = f'The largest part of the order of {BY_NAME[name].label} is explained by '
+            text += f'{join(parts)}.'
             yield Sentence(text, 'table-influence')
 
 

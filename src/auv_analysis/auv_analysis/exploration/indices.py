@@ -120,8 +120,9 @@ def _is_the_same(sweep: Sweep, group: Group, entry: Designed) -> bool:
 def indices(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure) -> Iterator[Row]:
     """Indices of a measure: of each controller and each combination of the other groups.
 
-    A base point or trajectory with a row that is missing, failed or has no such figure is left
-    out, as a whole.
+    A base point or trajectory with a row that is missing or failed is left out, as a whole. There
+    are no indices of a figure that some rows do not have, such as a time to settle: they would be
+    those of the rows that were chosen by the figure itself.
 
     Parameters
     ----------
@@ -135,7 +136,9 @@ def indices(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure)
     size = int(entry.spec['count']) * entry.step
     for i, controller in enumerate(sweep.controllers):
         for other, case in enumerate(entry.cases):
-            rows = (sweep.controller == i) & (sweep.status == 0) & (entry.others == other)
+            rows = _rows(sweep, entry, i, other)
+            if np.isnan(values[rows]).any():
+                continue
             Y = np.full(size, np.nan)
             Y[entry.positions[rows]] = values[rows]
             blocks = Y.reshape(-1, entry.step)
@@ -147,6 +150,35 @@ def indices(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure)
             names |= {'controller': controller, 'figure': measure.name, 'unit': measure.unit}
             names |= {'case': case, 'points': len(used), 'of': int(entry.spec['count'])}
             yield from (names | row for row in _quiet(analyze, entry, used, whole))
+
+
+def _rows(sweep: Sweep, entry: Designed, controller: int, other: int) -> np.ndarray:
+    """Mask of the rows of a controller and combination that came to their end."""
+    return (sweep.controller == controller) & (sweep.status == 0) & (entry.others == other)
+
+
+def omitted(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure) -> Iterator[str]:
+    """What has to be said of a measure that has no indices since some rows have no such figure."""
+    for i, controller in enumerate(sweep.controllers):
+        lacks = [np.isnan(values[_rows(sweep, entry, i, k)]) for k in range(len(entry.cases))]
+        some = [mask for mask in lacks if mask.any() and not mask.all()]
+        if some:
+            count, of = (int(sum(n)) for n in zip(*((m.sum(), m.size) for m in some), strict=True))
+            yield (
+                f'no indices of {measure.label} under {controller}: {count} of {of} rows have '
+                'none, and the rest is no sample of the design'
+            )
+
+
+def failing(sweep: Sweep, entry: Designed) -> Iterator[str]:
+    """What has to be said of indices of a design in which rows failed."""
+    for i, controller in enumerate(sweep.controllers):
+        failed = int(((sweep.controller == i) & (sweep.status != 0)).sum())
+        if failed:
+            yield (
+                f'indices of {", ".join(entry.paths)} under {controller} are of the part of the '
+                f'design where no row failed: {failed} did'
+            )
 
 
 def _quiet(analyze: Callable[..., Iterator[Row]], *arguments: Any) -> list[Row]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from auv_analysis.counting import each
 from auv_analysis.exploration import best, dependence
-from auv_analysis.exploration.indices import designed, indices
+from auv_analysis.exploration.indices import designed, failing, indices, omitted
 from auv_analysis.exploration.influence import influence, ranks_of
 from auv_analysis.exploration.opening import STATUSES, Sweep
 from auv_analysis.exploration.paired import paired
@@ -102,7 +102,7 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Results:
     """
     results = Results(sweep, varied_paths(sweep), {name: [] for name in TABLES})
     groups, notes = designed(sweep)
-    results.notes = [*notes, *_tied(sweep)]
+    results.notes = [*notes, *_tied(sweep), *(n for group in groups for n in failing(sweep, group))]
     for measure in each(MEASURES, len(MEASURES)):
         _one_measure(results, measure, groups)
     results.pair = results.most_influential()[:2]
@@ -146,6 +146,7 @@ def _one_measure(results: Results, measure: Measure, groups: Sequence[Any]) -> N
                 tables['influence'].append(names | {'path': varied.path} | found)
     for group in groups:
         tables['indices'] += indices(sweep, group, values, measure)
+        results.notes += omitted(sweep, group, values, measure)
 
 
 def _pairs(results: Results) -> None:

@@ -164,7 +164,7 @@ def _couplings(summary: Mapping[str, Any], leading: Sketch) -> str:
         for i in [max(members, key=values.__getitem__)]
         if values[i] > 0
     ]
-    return f'Inertial coupling deforms, under {leading.controller}, {join(parts)}.'
+    return f'Inertial coupling deforms, under {leading.controller}, {join(parts)}.' if parts else ''
 
 
 def _claims(claims: Sequence[Claim]) -> str:

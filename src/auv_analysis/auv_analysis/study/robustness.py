@@ -16,6 +16,8 @@ HOLDS = 'holds over all'
 FAILS = 'fails over all'
 PARTLY = 'partly in all'
 VARIES = 'varies'
+OPEN = 'not evaluated'
+PART = ', of those evaluated'  # behind an outcome where some are not
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,8 @@ class Held:
     ----------
     percent : verdict -> share, %
     outcome : 'holds over all': reproduced in all; 'fails over all': not reproduced in any; 'partly
-        in all'; else 'varies'
+        in all'; 'not evaluated' in any; else 'varies'; what is only true of those that could be
+        evaluated says so
     split : what decides it, with the shares of the best verdict that occurs; None where the verdict
         never changes
 
@@ -77,10 +80,14 @@ def held(unknowns: Mapping[str, np.ndarray], verdicts: np.ndarray) -> Held:
     total = max(len(verdicts), 1)
     percent = {str(v): 100.0 * int(np.sum(verdicts == v)) / total for v in DECIDED}
     best = next((verdict for verdict, part in percent.items() if part > 0), DECIDED[0])
-    whole = dict(zip(DECIDED, (HOLDS, PARTLY, FAILS), strict=True))
-    # a verdict is a word
-    outcome = whole[best] if percent[best] == 100.0 else VARIES  # type: ignore[index]
-    return Held(percent, outcome, best_split(unknowns, verdicts, best))
+    known = np.isin(verdicts.astype(str), DECIDED)
+    whole = dict(zip(map(str, DECIDED), (HOLDS, PARTLY, FAILS), strict=True))
+    outcome = OPEN
+    if known.any():
+        outcome = whole[best] if np.all(verdicts[known] == best) else VARIES
+        outcome += '' if known.all() else PART
+    of_known = {name: values[known] for name, values in unknowns.items()}
+    return Held(percent, outcome, best_split(of_known, verdicts[known], best))
 
 
 def columns_of(found: Unknowns) -> dict[str, np.ndarray]:

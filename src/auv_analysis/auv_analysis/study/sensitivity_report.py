@@ -126,7 +126,7 @@ def _sentences(of: Sensitivity) -> Iterator[tuple[str, str]]:
         if first is not None:
             yield _headline(of, first), table
     idle = [gain for gain in of.gains if _share(of, gain) < NOTHING]
-    if idle and of.method == 'sobol':
+    if idle and of.variables and of.method == 'sobol':
         most = max(_share(of, gain) for gain in idle)
         yield (
             f'Under {of.controller}, {join(idle)} {"decides" if len(idle) == 1 else "decide"} '

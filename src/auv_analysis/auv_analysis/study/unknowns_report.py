@@ -85,9 +85,9 @@ def _outcome(held: Held) -> Cell:
     if split is None:
         return Cell(held.outcome, source=source, kind=KINDS.get(held.outcome, ''))
     if split.explained < LITTLE:
-        return Cell(f'{held.outcome}, by no single unknown', source=source)
+        return Cell(f'{held.outcome}, parted by no single unknown', source=source)
     figures = {name: getattr(split, name) for name in ('threshold', 'below', 'above')}
-    text = f'{held.outcome}, most by {WORDS[split.unknown][0]}'
+    text = f'{held.outcome}, parted best by {WORDS[split.unknown][0]}'
     return Cell(text, source=f'{CLAIMS}:threshold', figures=figures, remark=_question(split))
 
 
@@ -156,7 +156,10 @@ def _sentences(found: Unknowns, rows: Sequence[Robustness]) -> Iterator[tuple[st
     )
     for of, where in (('every', ''), ('as_read', ' where the exponents are read with −')):
         for name, numbers in _deciding([(row.number, getattr(row, of)) for row in rows]):
-            yield f'{name[0].upper()}{name[1:]} decides most of no. {numbers}{where}.', tables[of]
+            yield (
+                f'{name[0].upper()}{name[1:]} parts the verdicts of no. {numbers} best{where}.',
+                tables[of],
+            )
     if found.failed:
         yield f'{len(found.failed)} variants diverge and are left out.', table
     for entry in energy_ranges(found):
@@ -177,7 +180,7 @@ def _sentences(found: Unknowns, rows: Sequence[Robustness]) -> Iterator[tuple[st
 
 
 def _deciding(rows: Sequence[tuple[int, Held]]) -> list[tuple[str, str]]:
-    """Unknowns that decide claims, the one with most of them first, and the claims' numbers."""
+    """Unknowns that part verdicts best, the one with most claims first, and their numbers."""
     found: dict[str, list[str]] = {}
     for number_, held in rows:
         if held.split and held.split.explained >= LITTLE:

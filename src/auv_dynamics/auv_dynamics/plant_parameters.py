@@ -8,7 +8,7 @@ from rclpy.node import Node
 from auv_dynamics.current import AXES
 from auv_dynamics.disturbance import KINDS
 from auv_dynamics.files import InputError
-from auv_dynamics.ros.parameters import declare, given
+from auv_dynamics.ros.parameters import declare
 from auv_dynamics.signals import DOFS, harmonic_spec
 
 NAMES = 'disturbance.names'
@@ -119,5 +119,4 @@ def harmonic_parameters(
         spec = harmonic_spec(columns, axes)
     except ValueError as error:
         raise InputError(node.get_name(), prefix.rstrip('.'), str(error), 'other lengths') from None
-    used = {axis for axis in axes if given(node, f'{prefix}{axis}.')}
-    return {axis: entry for axis, entry in spec.items() if axis in used}
+    return {axis: entry for axis, entry in spec.items() if entry['offset'] or entry['terms']}

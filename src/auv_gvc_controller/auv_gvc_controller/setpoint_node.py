@@ -12,8 +12,7 @@ from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
-from auv_dynamics.ros.parameters import declare, declare_grid, given, refuse_unknown
-from auv_dynamics.signals import DOFS
+from auv_dynamics.ros.parameters import declare, declare_grid, refuse_unknown
 from auv_gvc_controller.limits import Limits
 from auv_gvc_controller.odometry_guard import OdometryGuard
 from auv_gvc_controller.setpoint import Setpoint, make_setpoint
@@ -51,11 +50,9 @@ class SetpointNode(BulkNode):
         file = declare(self, 'setpoint.file', str, '', 'CSV file with t, surge, ..., yaw')
         spec = harmonic_parameters(self, 'setpoint.', 'm/s, rad/s')
         if file:
-            both = [dof for dof in DOFS if given(self, f'setpoint.{dof}.')]
-            if both:
-                raise InputError(
-                    self.get_name(), f'setpoint.{both[0]}', 'setpoint.file alone', 'both'
-                )
+            if spec:
+                key = f'setpoint.{next(iter(spec))}'
+                raise InputError(self.get_name(), key, 'setpoint.file alone', 'both')
             return make_setpoint({'file': Path(file)}, duration)
         return make_setpoint(spec, duration)
 

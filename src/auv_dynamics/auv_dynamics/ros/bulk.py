@@ -11,7 +11,9 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import Any
 
+from rclpy.exceptions import ParameterUninitializedException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
 
 from auv_dynamics.ros.private import PLAIN, DataWait, taken
@@ -36,6 +38,16 @@ class BulkMixin:
         hidden = self.data_subscriptions()
         mine = super().subscriptions  # type: ignore[misc]  # of the Node behind the mixin
         return (s for s in mine if PLAIN or not (s in hidden or _is_clock(s)))
+
+    def get_parameter(self, name: str) -> Parameter:
+        """A parameter, also one that is not set.
+
+        rclpy raises for it, and its service then answers nothing about all the others either.
+        """
+        try:
+            return super().get_parameter(name)  # type: ignore[misc]  # as above
+        except ParameterUninitializedException:
+            return Parameter(name)
 
     def close(self) -> None:
         """Last words while the context is still valid: zero wrench, closed bag."""

@@ -70,6 +70,8 @@ def declare(
 
     """
     _coerce(node, name, kind)
+    if default is None:
+        _leave_unset(node, name)
     descriptor = ParameterDescriptor(description=description, read_only=not writable)
     if one_of:
         descriptor.additional_constraints = f'one of {", ".join(one_of)}'
@@ -148,6 +150,13 @@ def _coerce(node: Node, name: str, kind: Any) -> None:
     else:
         return
     overrides(node)[name] = Parameter(name, value=value)
+
+
+def _leave_unset(node: Node, name: str) -> None:
+    """Take `null`, as `ros2 param dump` writes what is not set, and `[]` for no value."""
+    override = overrides(node).get(name)
+    if override is not None and override.value in (None, 'null'):
+        del overrides(node)[name]
 
 
 def _set_range(

@@ -1,10 +1,21 @@
 """The plant node: lock-step on the wrench's stamp, start barrier, watchdog, reset, real time."""
 
 import itertools
+import signal
+from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
-from harness import assert_one_line, graph, parameters, run_node, stop
+from harness import (
+    PATIENCE,
+    assert_one_line,
+    fresh_domain,
+    graph,
+    parameters,
+    run_node,
+    start_node,
+    stop,
+)
 from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics import interface
@@ -177,6 +188,28 @@ def test_reset_restores_the_state_and_not_the_time() -> None:
         assert message.pose.pose.position.x == pytest.approx(1.0, abs=1e-3)
 
 
+def test_the_answer_to_a_step_is_an_answer_to_its_state_also_after_a_reset() -> None:
+    """F of a step belongs to the state that was published; the state of the start comes next."""
+    error = ['-p', 'disturbance.names:=["a"]', *parameters(disturbance__a__kind='model_error')]
+    extra = [*error, '-p', 'disturbance.a.dD:=[9.0]', '-p', 'initial.nu:=[1,0,0,0,0,0]']
+    heard = []
+    for resets in (False, True):
+        with graph(('plant_node', barrier(*extra))) as (peer, _):
+            listening(peer)
+            for k in range(5):
+                odometry(peer, k + 1)
+                peer.publish(topics.WRENCH, wrench(k))
+            odometry(peer, 6)
+            if resets:
+                assert 'from step 6' in peer.call(Trigger, 'plant_node/reset').message
+            peer.publish(topics.WRENCH, wrench(5))
+            peer.until(lambda: len(peer.heard['disturbance']) == 6, 'F of step 5')
+            heard.append(peer.heard['disturbance'][5].wrench)
+            surge = odometry(peer, 7)[6].twist.twist.linear.x
+            assert (surge == 1.0) == resets
+    assert heard[0] == heard[1]
+
+
 def test_twist_is_in_the_child_frame() -> None:
     """Rivals publish it in the odom frame (Plankton#52, uuv_simulator#165)."""
     extra = [
@@ -219,6 +252,73 @@ def test_real_time_holds_the_last_wrench_then_lets_go() -> None:
         peer.until(slowing, 'the wrench to end')
         stamps = [step_of(m) for m in peer.heard['odom']]
         assert stamps == list(range(len(stamps)))
+
+
+REAL = [*parameters(vehicle='herman2018_neutral'), '-p', 'expected_subscribers:=["odom=1"]']
+
+
+def test_a_wrench_that_is_stamped_ahead_locks_out_none_of_those_that_follow() -> None:
+    with graph(('plant_node', REAL)) as (peer, _):
+        listening(peer)
+
+        def pushed() -> float:
+            newest = step_of(odometry(peer, 1)[-1])
+            peer.publish(topics.WRENCH, wrench(newest + 50, (0.0,) * 6))
+            peer.publish(topics.WRENCH, wrench(10**9, (-1e3, 0, 0, 0, 0, 0)))
+            peer.spin(0.02)
+            peer.publish(topics.WRENCH, wrench(newest + 10, (300.0, 0, 0, 0, 0, 0)))
+            peer.spin(0.05)
+            return peer.heard['odom'][-1].twist.twist.linear.x
+
+        peer.until(lambda: pushed() > 0.05, 'motion forward')
+
+
+def test_a_pause_in_real_time_is_bounded_and_said() -> None:
+    with graph(('plant_node', REAL)) as (peer, processes):
+        listening(peer)
+        before = step_of(odometry(peer, 3)[-1])
+        process = processes['plant_node']
+        process.send_signal(signal.SIGSTOP)
+        peer.spin(3.0)
+        process.send_signal(signal.SIGCONT)
+        count = len(peer.heard['odom'])
+        after = step_of(odometry(peer, count + 3)[count + 2])
+        code, output = stop(process)
+    assert after - before < 250, 'three seconds are not made up for'
+    assert 'late: time goes on from step' in output
+    assert code == 0
+
+
+def test_real_time_ends_where_the_loop_diverges() -> None:
+    with graph(('plant_node', REAL)) as (peer, processes):
+        listening(peer)
+        newest = step_of(odometry(peer, 1)[-1])
+        peer.publish(topics.WRENCH, wrench(newest, (1e7, 0, 0, 0, 0, 0)))
+        peer.until(lambda: processes['plant_node'].poll() is not None, 'the end')
+        code, output = stop(processes['plant_node'])
+    assert code == 1
+    assert 'diverges' in output
+
+
+def test_a_second_clock_is_refused_by_who_comes_later() -> None:
+    domain = fresh_domain()
+    with graph(('plant_node', REAL), domain=domain) as (peer, processes):
+        peer.listen(topics.ODOM, topics.DIAGNOSTICS)
+        odometry(peer, 350)  # it is no newcomer any more
+        second = [*parameters(vehicle='herman2018_neutral'), '-r', '__ns:=/two']
+        late = start_node('plant_node', domain, *second)
+        ended = CompletedProcess([], late.wait(PATIENCE), late.communicate()[0])
+        assert_one_line(ended, 'publish_clock', '/plant_node')
+        beside = start_node('plant_node', domain, *second, *parameters(publish_clock=False))
+        said = peer.heard[topics.DIAGNOSTICS.name]
+        two = topics.Topic('two/odom', topics.ODOM.type)
+        peer.listen(two)
+        peer.until(lambda: len(peer.heard[two.name]) > 20, 'odometry of the second')
+        peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 1)
+        crowd = '/clock: expected one publisher, found /plant_node, /test_peer'
+        peer.until(lambda: crowd in said[-1].status[0].message, 'an error')
+        assert processes['plant_node'].poll() is None
+        assert stop(beside)[0] == 0
 
 
 @pytest.mark.parametrize(

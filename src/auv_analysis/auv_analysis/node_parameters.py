@@ -147,6 +147,7 @@ def _plant(scenario: Scenario, vehicle: str, nodes: list[str], lockstep: bool) -
         'duration': scenario.duration,
         'lockstep': lockstep,
         'start_paused': False,
+        'publish_clock': True,
         'recorder_window': WINDOW if RECORDER in nodes and lockstep else 0,
         'integrator': scenario.data['integrator'],
         'seed': scenario.data['seed'],

@@ -6,10 +6,13 @@ from typing import Any
 from auv_dynamics import interface
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.codec import first_stamp
-from auv_dynamics.ros.graph import steady_timer
+from auv_dynamics.ros.endpoints import UNNAMED
+from auv_dynamics.ros.graph import OK, STALE, Health, steady_timer
 
-UNNAMED = '_NODE_NAME_UNKNOWN_'  # what the middleware calls an endpoint without a known node
 WATCH = 0.2  # s between two looks at the silence
+CATCH_UP = 0.5  # s that a plant in real time may be late: beyond, its time goes on from there
+AHEAD = 1.0  # s that the stamp of a wrench may be ahead: it answers an odometry
+DIVERGES = 'beyond every speed after step {}: the closed loop diverges'
 
 
 class LockStep:
@@ -23,7 +26,7 @@ class LockStep:
 
     def __init__(self, node: Any):
         self._node = node
-        self._started = self._published = False
+        self._started = self._published = self._reset = False
         self._ack = -1
         self._since: float | None = None  # when the present wait began; None: nothing is awaited
         self._publishers: dict[str, str] = {}  # topic -> nodes last seen to publish it
@@ -53,6 +56,14 @@ class LockStep:
     def pause(self) -> None:
         """Hold the next step."""
 
+    def reset(self) -> int:
+        """Put the vehicle back, at the next step where this one is known; which step that is."""
+        # the answer to a published step is an answer to its state, and so is its F
+        self._reset = self._published
+        if not self._reset:
+            self._node.plant.reset()
+        return self._node.plant.k + self._reset
+
     def wrench(self, ns: int, tau: tuple[float, ...]) -> None:
         """Take the answer to the step that was published last."""
         node, plant = self._node, self._node.plant
@@ -70,9 +81,12 @@ class LockStep:
             return
         plant.advance()
         self._published = False
+        if self._reset:
+            self._reset = False
+            plant.reset()
         if plant.diverged:
             node.publish_forces(k, applied, F)
-            node.end(1, f'beyond every speed after step {k}: the closed loop diverges')
+            node.end(1, DIVERGES.format(k))
             return
         self._go_on()
         node.publish_forces(k, applied, F)
@@ -126,6 +140,7 @@ class RealTime:
         self._heard = -float('inf')
         self._answered = -1
         self._ended: float | None = None
+        node.graph.in_trouble_while(self._silence)
 
     def start(self) -> None:
         """Start the clock; later calls do nothing."""
@@ -144,21 +159,36 @@ class RealTime:
 
     def wrench(self, ns: int, tau: tuple[float, ...]) -> None:
         """Hold this wrench from now on."""
-        if ns // self._node.step_ns < self._answered:
+        step, k = ns // self._node.step_ns, self._node.plant.k
+        if step < self._answered:
             raise interface.BadMessageError(
                 f'wrench: stamp: expected newer than the last, found {ns} ns'
             )
-        self._answered = ns // self._node.step_ns
+        if (step - k) * self._node.step_ns > AHEAD * interface.NANOSECONDS:
+            raise interface.BadMessageError(
+                f'wrench: stamp: expected that of an odometry, found {ns} ns, ahead of all'
+            )
+        self._answered = min(step, k)  # one that is ahead locks out none of those that follow
         if not self._node.plant.deaf:
             self._tau, self._heard = tau, time.monotonic()
+
+    def reset(self) -> int:
+        """Put the vehicle back; the step from which this is seen."""
+        self._node.plant.reset()
+        return int(self._node.plant.k)
+
+    def _silence(self) -> Health:
+        timeout = self._node.wrench_timeout
+        runs = self._began is not None and self._ended is None
+        if not runs or time.monotonic() - self._heard <= timeout:
+            return OK, ''
+        return STALE, f'no wrench for {timeout:g} s: zero wrench'
 
     def _held(self) -> tuple[float, ...]:
         node = self._node
         if time.monotonic() - self._heard <= node.wrench_timeout:
             return self._tau
-        if self._tau != self.ZERO:
-            node.graph.complain(f'no wrench for {node.wrench_timeout:g} s: zero wrench')
-            self._tau = self.ZERO
+        self._tau = self.ZERO
         return self.ZERO
 
     def _tick(self) -> None:
@@ -167,18 +197,25 @@ class RealTime:
         if self._began is None:
             return
         due = self._first + int((time.monotonic() - self._began) * 1e9) // node.step_ns
+        late = (due - plant.k) * node.step_ns / interface.NANOSECONDS
+        if late > max(CATCH_UP, node.step_ns / interface.NANOSECONDS):
+            node.graph.complain(f'{late:.3g} s late: time goes on from step {plant.k}')
+            self._began, self._first, due = time.monotonic(), plant.k, plant.k
         while plant.k <= due and self._ended is None:
             node.publish_state(None if plant.lost else plant.measured_at)
             node.publish_forces(plant.k, *plant.answer(self._held(), heard=True))
             if plant.k == node.last:
                 self._ended = time.monotonic()
-            else:
-                plant.advance()
+                continue
+            plant.advance()
+            if plant.diverged:
+                self._ended = time.monotonic()
+                node.end(1, DIVERGES.format(plant.k - 1))
 
     def _end(self) -> None:
         """With no recorder to wait for, exit once the last wrench is here or overdue."""
         node = self._node
-        if self._ended is None or node.window:
+        if self._ended is None or node.window or node.exit_code is not None:
             return
         overdue = time.monotonic() - self._ended > node.wrench_timeout
         if self._answered >= node.last or overdue:

@@ -1,5 +1,8 @@
 """The plant as a node: odometry out, wrench in, in lock-step or in real time."""
 
+import sys
+import time
+
 import numpy as np
 from rclpy.duration import Duration
 from std_srvs.srv import SetBool, Trigger
@@ -20,12 +23,16 @@ from auv_dynamics.plant_parameters import (
 )
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.endpoints import full_name, other_publishers
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import declare, declare_grid, refuse_unknown
 from auv_dynamics.ros.peers import Peers
 from auv_dynamics.sensors import SensorNoise
 from auv_dynamics.uncertainty import make_uncertainty
+
+MET = 0.5  # s after its birth in which those who are there already are met, before it starts
+NEW = 3.0  # s after its start in which it is the newcomer where there is another clock
 
 
 class PlantNode(BulkNode):
@@ -35,12 +42,13 @@ class PlantNode(BulkNode):
 
     def __init__(self) -> None:
         super().__init__('plant_node')
+        self._born = time.monotonic()
         self.graph = Graph(self)
         self._declare()
         refuse_unknown(self)
         self.graph.must_hold = self.window
         self._say_odometry = self.graph.output(topics.ODOM)
-        self._say_clock = self.graph.output(topics.CLOCK)
+        self._say_clock = self.graph.output(topics.CLOCK) if self._publish_clock else None
         self._say_twist = self.graph.output(topics.TWIST)
         self._say_disturbance = self.graph.output(topics.DISTURBANCE)
         self._say_applied = self.graph.output(topics.WRENCH_APPLIED) if self._acts else None
@@ -53,6 +61,7 @@ class PlantNode(BulkNode):
         self.create_service(SetBool, '~/run', self._on_run)
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.paused = self._start_paused
+        self._started: float | None = None
         steady_timer(self, 0.05, self._start)
 
     def _declare(self) -> None:
@@ -63,6 +72,9 @@ class PlantNode(BulkNode):
         self.step_ns, self.last = grid.step_ns, grid.last
         self.lockstep = declare(self, 'lockstep', bool, False, 'advance on the wrench, not on time')
         self._start_paused = declare(self, 'start_paused', bool, False, 'wait for ~/run')
+        self._publish_clock = declare(
+            self, 'publish_clock', bool, True, 'publish /clock; false beside another that does'
+        )
         self.window = declare(
             self, 'recorder_window', int, 0, 'steps ahead of recorder/progress, 0: off',
             at_least=0, at_most=topics.DEPTH - 1,
@@ -82,6 +94,7 @@ class PlantNode(BulkNode):
         )  # fmt: skip
         specs, actuators, sensors = disturbance_specs(self), actuator_spec(self), sensor_spec(self)
         name, vehicle = self.get_name(), load_vehicle(path)
+        self.graph.hardware_id = vehicle.name
         allocated = bool((actuators or {}).get('thrusters', False))
         faults = make_faults(
             *fault_specs(self),
@@ -109,8 +122,23 @@ class PlantNode(BulkNode):
         return np.array(values)
 
     def _start(self) -> None:
-        if self.graph.ready() and not self.peers.not_ready() and not self.paused:
+        now = time.monotonic()
+        if self._started is None or now - self._started < NEW:
+            self._refuse_second_clock()
+        met = now - self._born >= MET and self.exit_code is None
+        if met and self.graph.ready() and not self.peers.not_ready() and not self.paused:
+            self._started = self._started or now
             self.pace.start()
+
+    def _refuse_second_clock(self) -> None:
+        """End with one line where somebody publishes `/clock`; who came later has to give way."""
+        if self._say_clock is None or self.exit_code is not None:
+            return
+        if others := other_publishers(self, topics.CLOCK.name):
+            expected = f'nobody else who publishes {topics.CLOCK.name}, or false'
+            found = ', '.join(sorted(map(full_name, others)))
+            print(InputError(self.get_name(), 'publish_clock', expected, found), file=sys.stderr)
+            self.exit_code = 2
 
     def publish_state(self, measured: int | None) -> None:
         """Publish step k; odometry first, since the controller waits for it.
@@ -120,7 +148,8 @@ class PlantNode(BulkNode):
         plant, ns = self.plant, self.plant.k * self.step_ns
         if measured is not None:
             self._say_odometry(measured * self.step_ns, plant.measured)
-        self._say_clock(ns, ())
+        if self._say_clock is not None:
+            self._say_clock(ns, ())
         if measured is not None:
             self._say_twist(measured * self.step_ns, plant.measured[7:])
         if self._say_truth is not None:
@@ -155,8 +184,8 @@ class PlantNode(BulkNode):
         return response
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self.plant.reset()
-        response.success, response.message = True, f'state of the start from step {self.plant.k}'
+        step = self.pace.reset()
+        response.success, response.message = True, f'state of the start from step {step}'
         return response
 
 

@@ -7,7 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from harness import CONTROLLER, GAINS, assert_one_line, graph, parameters, run_node, stop
+from harness import (
+    CONTROLLER,
+    GAINS,
+    assert_one_line,
+    fresh_domain,
+    graph,
+    parameters,
+    run_node,
+    start_node,
+    stop,
+)
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterValue
@@ -147,6 +157,30 @@ def test_an_incompatible_publisher_is_heard(lockstep) -> None:
     assert 'reliability' in said[-1].status[0].message
     _, output = stop(process)
     assert 'odom: incompatible QoS' in output
+
+
+def test_a_second_odometry_and_a_second_controller_are_named_while_they_last() -> None:
+    domain = fresh_domain()
+    with graph(('controller_node', CONTROLLER), domain=domain) as (peer, _):
+        peer.listen(topics.DIAGNOSTICS)
+        said = peer.heard[topics.DIAGNOSTICS.name]
+
+        def errors() -> str:
+            heard = [s for m in said[-4:] for s in m.status if s.level == b'\x02']
+            return '; '.join(status.message for status in heard)
+
+        first, second = (peer.node.create_publisher(topics.ODOM.type, 'odom', 10) for _ in '12')
+        other = start_node('controller_node', domain, *CONTROLLER)  # of the same name
+        peer.until(
+            lambda: '/odom: expected one publisher, found /test_peer, /test_peer' in errors()
+        )
+        crowd = '/wrench: expected one publisher, found /controller_node, /controller_node'
+        peer.until(lambda: crowd in errors(), 'both controllers')
+        stop(other)
+        peer.node.destroy_publisher(second)
+        said.clear()
+        peer.until(lambda: len(said) > 4 and not errors(), 'the end of it')
+        peer.node.destroy_publisher(first)
 
 
 def change(peer, transition: int) -> bool:

@@ -162,6 +162,25 @@ def test_nothing_is_published_until_it_speaks(commands: bool) -> None:
         peer.close()
 
 
+def test_two_that_command_see_each_other_although_they_have_one_name() -> None:
+    domain = fresh_domain()
+    ears = [Ear(domain, '/', TOPICS, Frames(), commands=True) for _ in '12']
+    try:
+        assert [ear.speak() for ear in ears] == [False, False]
+        limit = time.monotonic() + PATIENCE
+        while not all(ear.others() == [f'/{COMMANDER}'] for ear in ears):
+            assert time.monotonic() < limit
+            for ear in ears:
+                ear.listen(0.05)
+        ears[0].hush()
+        while ears[1].others():
+            assert time.monotonic() < limit
+            ears[1].listen(0.05)
+    finally:
+        for ear in ears:
+            ear.close()
+
+
 def test_with_another_commander_nothing_is_sent(domain: int) -> None:
     peer = Peer(domain)
     peer.node.create_publisher(WrenchStamped, '/healthy/wrench', topics.every_step())

@@ -18,12 +18,13 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from auv_analysis.driver_check.recording import Recording, Tape
 from auv_analysis.driver_check.scene import Scene
-from auv_analysis.driver_check.scene_of_node import commanders, full_name, scene_of
+from auv_analysis.driver_check.scene_of_node import scene_of
 from auv_dynamics import interface
 from auv_dynamics.interface import Frames
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode, DataPath
 from auv_dynamics.ros.codec import Codec, first_stamp, message_of
+from auv_dynamics.ros.endpoints import full_name, other_publishers
 from auv_dynamics.ros.participant import Participant
 from auv_dynamics.ros.private import PLAIN
 
@@ -160,7 +161,7 @@ class Ear(Participant):
 
     def others(self) -> list[str]:
         """Who else publishes the wrench."""
-        return [full_name(one) for one in commanders(self._node, self._node.wrench)]
+        return [full_name(one) for one in other_publishers(self._node, self._node.wrench)]
 
     def speak(self) -> bool:
         """Begin to publish wrenches, of which none is sent yet; whether somebody hears them."""

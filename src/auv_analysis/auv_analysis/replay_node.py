@@ -11,12 +11,12 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
-from auv_analysis.replay.neighbours import NAMED, NAMELESS, rivals
 from auv_analysis.replay.player import Player
 from auv_analysis.replay_parameters import replay_parameters
 from auv_dynamics import interface
 from auv_dynamics.files import InputError
 from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.endpoints import NAMED, NAMELESS, full_name, other_publishers
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.participant import Participant
@@ -100,7 +100,7 @@ class ReplayNode(BulkNode):
     def _rival(self, now: float) -> InputError | None:
         """Who else publishes what only one may publish, once it has a name."""
         for topic, remedy in self.player.alone.items():
-            others = rivals(self, topic)
+            others = sorted(map(full_name, other_publishers(self, topic)))
             if not others:
                 self._rivals_since.pop(topic, None)
                 continue

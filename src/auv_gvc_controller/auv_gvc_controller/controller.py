@@ -146,6 +146,11 @@ class VelocityController:
         return answer
 
     @property
+    def newest(self) -> int | None:
+        """Stamp of the last odometry, ns; None before the first."""
+        return self._guard.last
+
+    @property
     def unanswered(self) -> int | None:
         """Stamp of the odometry that still waits for its answer."""
         return self._waiting[0] if self._waiting else None

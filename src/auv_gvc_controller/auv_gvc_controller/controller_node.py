@@ -11,11 +11,12 @@ from std_srvs.srv import Trigger
 
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkMixin
-from auv_dynamics.ros.graph import Graph, steady_timer
+from auv_dynamics.ros.graph import OK, Graph, Health, steady_timer
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import refuse_unknown
 from auv_gvc_controller.controller import Answer, VelocityController
 from auv_gvc_controller.controller_parameters import ControllerParameters
+from auv_gvc_controller.idle import Idle
 from auv_gvc_controller.odometry_guard import UNTIMED
 from auv_gvc_controller.pairing import SAME
 from auv_gvc_controller.stamp_age import Now
@@ -40,10 +41,12 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self._controller: VelocityController  # exists once configured
         self._active = False
         self._held: Answer | None = None
+        self._follows = False
         self._say_wrench = self.graph.output(topics.WRENCH)
         self._say_estimate = self.graph.output(topics.DISTURBANCE_ESTIMATE)
         self.graph.also_ready_when(lambda: '' if self._active else 'inactive')
-        self.graph.in_trouble_while(lambda: self._controller.watchdog if self._active else '')
+        self._idle = Idle(self, self._settings.acceleration == SAME)
+        self.graph.in_trouble_while(self._trouble)
         self._subscribe()
         self.create_service(Trigger, '~/reset', self._on_reset)
         steady_timer(self, WATCH, self._watch)
@@ -118,6 +121,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         """Subscribe to set-points; one may be what an odometry has been waiting for."""
 
         def take(ns: int, values: tuple[float, ...]) -> None:
+            self._idle.hear(topic, ns)
             try:
                 keep(ns, values)
             except ValueError as error:
@@ -134,11 +138,24 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self._held = None if self.graph.ready() else answer
         if self._held is not None:
             return  # until the expected subscribers have matched; see _watch
-        if answer.trouble:
-            self.graph.complain(answer.trouble)
+        self._tell(answer.trouble)
         self._say_wrench(answer.ns, answer.tau)
         self._say_estimate(answer.ns, answer.f)
         self.graph.latest_ns = answer.ns
+
+    def _tell(self, trouble: str) -> None:
+        """Log when the law takes over, and when it lets go."""
+        if trouble and self._settings.lockstep:  # there nothing is late: something has failed
+            self.graph.complain(trouble)
+        elif self._follows == bool(trouble):
+            self._follows = not trouble
+            self.get_logger().info(f'lets go: {trouble}' if trouble else 'takes over')
+
+    def _trouble(self) -> Health:
+        """What is wrong for as long as it lasts."""
+        if not self._active:
+            return OK, ''
+        return self._idle.health(self._controller.watchdog, self._controller.newest)
 
     def _watch(self) -> None:
         """Say what is held back; in real time, let go when odometry or set-points stay away."""

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from simulated_driver import SimulatedDriver
 
+from auv_analysis.commands import actuating
 from auv_analysis.driver_check.plan import plan_of
 from auv_analysis.driver_check.procedure import GOODBYE, PERIOD, StoppedError, carry_out
 from auv_dynamics.ending import ENDING, on_signals
@@ -83,6 +84,16 @@ def test_a_signal_is_no_exception_but_a_wish_while_wrenches_are_sent(number: int
     assert len(driver.sent) == 40 + LAST
     assert driver.sent[-LAST:] == [ZERO] * LAST
     assert signal.getsignal(number) == before
+
+
+def test_nothing_is_sent_where_another_begins_to_command_in_the_countdown(monkeypatch) -> None:
+    driver = SimulatedDriver(joined_after=0.0)
+    driver.speak = driver.hush = lambda: True
+    monkeypatch.setattr(actuating, 'COUNTDOWN', 0)
+    plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
+    actuation = actuating.actuate(driver, plan, 0.5)
+    assert actuation.aborted == '/somebody publishes the wrench as well'
+    assert driver.sent == []
 
 
 def test_any_other_error_ends_it_with_zero_as_well() -> None:

@@ -54,9 +54,12 @@ def actuate(ear: Any, plan: Plan, timeout: float) -> Actuation:
 def _announced(ear: Any, plan: Plan, timeout: float, stop: Callable[[], bool]) -> Actuation:
     for line in plan.lines():
         say(line)
+    ear.speak()  # silent so far, but to be seen by whoever else is about to command
     for left in range(COUNTDOWN, 0, -1):
         say(f'begins in {left} s')
         _wait(ear, 1.0, stop)
+    if others := ear.others():
+        return Actuation((), f'{join(others)} publishes the wrench as well')
     until = time.monotonic() + MATCHES
     while not ear.speak():
         if time.monotonic() > until:

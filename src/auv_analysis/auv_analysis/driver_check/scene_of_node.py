@@ -6,7 +6,6 @@ from typing import Any
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Infinite
-from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
     LivelinessPolicy,
@@ -17,14 +16,13 @@ from rclpy.qos import (
 
 from auv_analysis.driver_check.scene import Endpoint, Scene
 from auv_dynamics.ros import topics
-from auv_dynamics.ros.endpoints import UNNAMED, observes
+from auv_dynamics.ros.endpoints import acts, full_name, other_publishers, other_subscribers
 from auv_dynamics.ros.kinds import type_name
 
-LISTENERS = ('recorder_node', 'analysis_node')  # ours, which hear the wrench and obey nothing
 ODOMETRY, WRENCH = type_name(Odometry), type_name(WrenchStamped)
 
 
-def scene_of(node: Node, odom: str, wrench: str, place: str) -> Scene:
+def scene_of(node: Any, odom: str, wrench: str, place: str) -> Scene:
     """Who is there beside a node.
 
     Parameters
@@ -35,7 +33,7 @@ def scene_of(node: Node, odom: str, wrench: str, place: str) -> Scene:
 
     """
     odometry = node.get_publishers_info_by_topic(odom)
-    takers = [one for one in node.get_subscriptions_info_by_topic(wrench) if _obeys(node, one)]
+    takers = list(filter(acts, other_subscribers(node, wrench)))
     clocks = node.get_publishers_info_by_topic(topics.CLOCK.name)
     names = [name for name, _ in node.get_topic_names_and_types()]
     rest = [name for name in names if name not in (odom, wrench)]
@@ -46,7 +44,7 @@ def scene_of(node: Node, odom: str, wrench: str, place: str) -> Scene:
         ODOMETRY,
         WRENCH,
         odom_publishers=tuple(map(_endpoint, odometry)),
-        wrench_publishers=tuple(map(_endpoint, commanders(node, wrench))),
+        wrench_publishers=tuple(map(_endpoint, other_publishers(node, wrench))),
         wrench_subscribers=tuple(map(_endpoint, takers)),
         clock_publishers=tuple(map(_endpoint, clocks)),
         conflicts={
@@ -67,33 +65,11 @@ def scene_of(node: Node, odom: str, wrench: str, place: str) -> Scene:
         listeners=_nodes(
             (name, one)
             for name in rest
-            for one in node.get_subscriptions_info_by_topic(name)
-            if one.topic_type == WRENCH and _obeys(node, one)
+            for one in other_subscribers(node, name)
+            if one.topic_type == WRENCH and acts(one)
         ),
         topics=tuple(names),
     )
-
-
-def commanders(node: Node, wrench: str) -> list[Any]:
-    """Publishers of the wrench that are not of the node itself."""
-    found = node.get_publishers_info_by_topic(wrench)
-    return [one for one in found if not _own(node, one)]
-
-
-def full_name(info: Any) -> str:
-    """Namespace and name of the node of an endpoint."""
-    if info.node_name == UNNAMED:
-        return 'a node without a name'
-    return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-
-
-def _own(node: Node, info: Any) -> bool:
-    return (info.node_name, info.node_namespace) == (node.get_name(), node.get_namespace())
-
-
-def _obeys(node: Node, info: Any) -> bool:
-    """Whether a subscription may be that of a vehicle."""
-    return not (observes(info) or _own(node, info) or info.node_name in LISTENERS)
 
 
 def _endpoint(info: Any) -> Endpoint:

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from auv_analysis.replay.neighbours import NAMED, NAMELESS, actors
 from auv_dynamics.files import InputError
+from auv_dynamics.ros.endpoints import NAMED, NAMELESS, acts, full_name, other_subscribers
 
 
 class Guard:
@@ -41,13 +41,18 @@ class Guard:
         if self._foreign:
             return None
         for topic, publisher in self._publishers.items():
-            found = actors(self._node, publisher.topic_name)
+            found = self._actors(publisher)
             if found and (final or found != [NAMELESS]):
                 key, expected = publisher.topic_name, 'nobody who acts on recorded commands'
                 names = f'{", ".join(found)} (allowed by --force-commands)'
                 return InputError(self._node.get_name(), key, expected, names)
             self._judged.pop(topic, None)
         return None
+
+    def _actors(self, publisher: Any) -> list[str]:
+        """Who may act on what is published, full names."""
+        found = other_subscribers(self._node, publisher.topic_name)
+        return sorted({full_name(one) for one in found if acts(one)})
 
     def look(self, now: float) -> None:
         """Judge all subscribers anew."""
@@ -66,7 +71,7 @@ class Guard:
         count = self._node.count_subscribers(publisher.topic_name)
         if count == self._judged.get(topic):
             return True
-        found = actors(self._node, publisher.topic_name)
+        found = self._actors(publisher)
         if found == [NAMELESS] and now - self._strange.setdefault(topic, now) < NAMED:
             return None
         self._strange.pop(topic, None)

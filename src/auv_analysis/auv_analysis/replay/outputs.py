@@ -6,6 +6,7 @@ from typing import Any
 from auv_analysis.replay.index import PlayedTopic
 from auv_analysis.replay.selection import Selection
 from auv_analysis.schemas import definition
+from auv_dynamics.ros.endpoints import full_name
 from auv_dynamics.ros.graph import Graph
 from auv_dynamics.ros.kinds import message_class
 from auv_dynamics.ros.offered import offered_again
@@ -58,9 +59,8 @@ def _installed(name: str) -> type | None:
 
 def _means_the_same(node: Any, publisher: Any, digest: str) -> bool:
     """Whether the installed type is the recorded one, as far as the bag says which it was."""
-    own = node.get_fully_qualified_name().rpartition('/')
     for one in node.get_publishers_info_by_topic(publisher.topic_name):
-        ours = (one.node_namespace.rstrip('/'), one.node_name) == (own[0], own[2])
+        ours = full_name(one) == node.get_fully_qualified_name()
         if ours and digest.startswith('RIHS01_') and str(one.topic_type_hash) != digest:
             return False
     return True

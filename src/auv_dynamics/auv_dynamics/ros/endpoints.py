@@ -11,6 +11,9 @@ from auv_dynamics.ros.kinds import type_name
 from auv_dynamics.ros.topics import Topic
 
 UNNAMED = '_NODE_NAME_UNKNOWN_'  # the names of nodes arrive behind their endpoints
+NAMELESS = 'a node without a name yet'
+NAMED = 1.0  # s after which a name does not come any more
+ONLOOKERS = ('analysis_node', 'recorder_node')  # our nodes that act on nothing they hear
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,57 @@ class Endpoints:
     subscribers: int = 0
     foreign: str = ''
     conflicts: tuple[str, ...] = ()
+
+
+def full_name(endpoint: Any) -> str:
+    """Namespace and name of the node of an endpoint."""
+    if endpoint.node_name == UNNAMED:
+        return NAMELESS
+    return f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}'
+
+
+def other_publishers(node: Any, topic: str) -> list[Any]:
+    """Publishers of a topic, by its full name, beside the node's own."""
+    own = sum(one.topic_name == topic for one in node.publishers)
+    return _others(node, node.get_publishers_info_by_topic(topic), own)
+
+
+def other_subscribers(node: Any, topic: str) -> list[Any]:
+    """Subscriptions of a topic, by its full name, beside the node's own."""
+    mine = {id(one): one for one in (*node.subscriptions, *node.data_subscriptions())}
+    own = sum(one.topic_name == topic for one in mine.values())
+    return _others(node, node.get_subscriptions_info_by_topic(topic), own)
+
+
+def _others(node: Any, found: list[Any], own: int) -> list[Any]:
+    """Endpoints without so many of the node's own: another node may have its very name."""
+    others, name = [], node.get_fully_qualified_name()
+    for endpoint in found:
+        if own and full_name(endpoint) == name:
+            own -= 1
+        else:
+            others.append(endpoint)
+    return others
+
+
+def acts(endpoint: Any) -> bool:
+    """Whether a subscription may be of somebody who acts on what he hears."""
+    if endpoint.node_name == UNNAMED:
+        return True
+    return not (endpoint.node_name in ONLOOKERS or observes(endpoint))
+
+
+def why_silent(node: Node, topic: Topic) -> str:
+    """Why nothing can be heard on a topic, with what to do; empty: somebody publishes its type."""
+    name, expected = node.resolve_topic_name(topic.name), type_name(topic.type)
+    found = node.get_publishers_info_by_topic(name)
+    if not found:
+        return f'nobody publishes {name}'
+    if any(one.topic_type == expected for one in found):
+        return ''
+    other = found[0].topic_type
+    remedy = 'publish it with a header' if f'{other}Stamped' == expected else 'publish that type'
+    return f'{name}: expected {expected}, found {other} of {full_name(found[0])}; {remedy}'
 
 
 def onlookers(node: Node, topic: str) -> int:

@@ -1,5 +1,6 @@
 """A node's part of the graph: publishers, subscriptions, the start barrier, diagnostics."""
 
+import math
 import re
 import time
 from collections import Counter
@@ -23,12 +24,16 @@ from auv_dynamics.interface import BadMessageError, Frames
 from auv_dynamics.nearest import meant
 from auv_dynamics.ros.codec import Codec
 from auv_dynamics.ros.convert import stamp
-from auv_dynamics.ros.endpoints import onlookers
+from auv_dynamics.ros.endpoints import full_name, onlookers
+from auv_dynamics.ros.kinds import type_name
 from auv_dynamics.ros.parameters import declare
 from auv_dynamics.ros.topics import (
     ANALYSIS_TOPICS,
+    CLOCK,
     DIAGNOSTICS,
+    ODOM,
     STEP_TOPICS,
+    WRENCH,
     Topic,
     every_step,
     one_at_a_time,
@@ -36,12 +41,49 @@ from auv_dynamics.ros.topics import (
 
 STEP_TOPICS_BY_NAME = [topic.name for topic in STEP_TOPICS]
 LOUD = 1.0  # s between two reports of the same kind
+LASTING = 1.0  # s, after which what is wrong is logged: names and matches may come late
+REPEATED = 10.0  # s between two logs of what is wrong and lasts
+OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
+STALE, ERROR = DiagnosticStatus.STALE, DiagnosticStatus.ERROR
+WORSE = (OK, WARN, STALE, ERROR)
+SINGLE = {topic.name: topic for topic in (ODOM, WRENCH, CLOCK)}  # with one publisher each
+Health = tuple[bytes, str]  # level of a DiagnosticStatus, and why it is not OK
 NUMBER = re.compile(r'[-+]?\d')  # with the first one reports of the same kind may begin to differ
 
 
 def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Timer:
     """Timer on the steady clock, whatever `use_sim_time` says."""
     return node.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+
+class Lasting:
+    """Logs what is wrong once it lasts, then now and then, and that it is over.
+
+    Parameters
+    ----------
+    logger : of the node
+
+    """
+
+    def __init__(self, logger: Any):
+        self._logger = logger
+        self._kind, self._text = '', ''
+        self._since = self._said = -math.inf
+
+    def see(self, level: bytes, text: str) -> None:
+        """Take the present state; an empty text: nothing is wrong."""
+        now, kind = time.monotonic(), NUMBER.split(text, maxsplit=1)[0]
+        if kind != self._kind:
+            if self._said > self._since and not text:
+                self._logger.info(f'over: {self._text}')
+            self._kind, self._since, self._said = kind, now, -math.inf
+        self._text = text
+        if text and now - self._since >= LASTING and now - self._said >= REPEATED:
+            self._said = now
+            if level == ERROR:
+                self._logger.error(text)
+            else:
+                self._logger.warning(text)
 
 
 class Graph:
@@ -58,10 +100,13 @@ class Graph:
         self.refused: Counter[str] = Counter()  # how often, by what was wrong
         self.latest_ns = 0
         self.facts: dict[str, Any] = {}
+        self.hardware_id = node.get_namespace().strip('/')  # the vehicle, by its name if known
         self._said: dict[str, float] = {}
         self._ready = False
         self._not_ready: Callable[[], str] = str
-        self._lasting: Callable[[], str] = str
+        self._reasons: list[Callable[[], Health]] = [self._crowd]
+        self._lasting = Lasting(node.get_logger())
+        self._single: set[str] = set()  # topics of a single publisher that concern this node
         self._expected: dict[str, int] = {}
         self.frames = Frames()
         self.must_hold = 0  # messages: a publisher of step topics needs a greater depth
@@ -97,6 +142,7 @@ class Graph:
             ),
         )
         self.publishers[topic.name] = publisher
+        self._single |= {topic.name} & SINGLE.keys()
         return publisher
 
     def output(self, topic: Topic) -> Callable[[int, Any], None]:
@@ -143,6 +189,7 @@ class Graph:
             raw=True,
         )
         self.node.add_data(subscription)
+        self._single |= {topic.name} & SINGLE.keys()
 
     def ready(self) -> bool:
         """Whether every expected subscriber has matched; once true it stays true."""
@@ -153,9 +200,9 @@ class Graph:
         """Add a condition to `~/ready`: `reason` says why not, or gives an empty text."""
         self._not_ready = reason
 
-    def in_trouble_while(self, reason: Callable[[], str]) -> None:
-        """Let the diagnostics say what is wrong for as long as `reason` gives a text."""
-        self._lasting = reason
+    def in_trouble_while(self, reason: Callable[[], Health]) -> None:
+        """Let diagnostics and log say what is wrong for as long as `reason` gives a text."""
+        self._reasons.append(reason)
 
     def refuse(self, text: str) -> None:
         """Say loudly that a message was refused."""
@@ -175,9 +222,12 @@ class Graph:
     def publish_diagnostics(self) -> None:
         """Publish this node's health, stamped with the latest step."""
         status = DiagnosticStatus(name=self.node.get_fully_qualified_name())
-        trouble = self._lasting() or self.trouble
-        status.level = DiagnosticStatus.ERROR if trouble else DiagnosticStatus.OK
-        status.message = trouble or 'ok'
+        status.hardware_id = self.hardware_id
+        found = [(level, text) for level, text in (ask() for ask in self._reasons) if text]
+        level, text = max(found, key=lambda one: WORSE.index(one[0]), default=(OK, ''))
+        self._lasting.see(level, text)
+        status.level = ERROR if self.trouble else level
+        status.message = '; '.join(filter(None, (text, self.trouble))) or 'ok'
         refused = {f'refused {kind}': count for kind, count in sorted(self.refused.items())}
         facts = {
             'ready': self._ready, 'refused': self.refused.total(), **self.facts, **refused
@@ -187,6 +237,18 @@ class Graph:
         message.header.stamp, message.header.frame_id = stamp(self.latest_ns), self.frames.base
         self._diagnostics.publish(message)
         self.trouble = ''
+
+    def _crowd(self) -> Health:
+        """Which of the topics with a single publisher has more of them, and whose they are."""
+        clock = {CLOCK.name} if self.node.get_parameter('use_sim_time').value else set()
+        crowds = []
+        for name in sorted(self._single | clock):
+            full, kind = self.node.resolve_topic_name(name), type_name(SINGLE[name].type)
+            listed = self.node.get_publishers_info_by_topic(full)
+            found = sorted(full_name(one) for one in listed if one.topic_type == kind)
+            if len(found) > 1:
+                crowds.append(f'{full}: expected one publisher, found {", ".join(found)}')
+        return ERROR, '; '.join(crowds)
 
     def _deep_enough(self, topic: Topic, qos: QoSProfile) -> SetParametersResult:
         name = f'qos_overrides.{self.node.resolve_topic_name(topic.name)}.publisher.depth'

@@ -11,6 +11,7 @@ from rclpy.publisher import Publisher
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+from auv_dynamics.ros.endpoints import full_name
 from auv_dynamics.ros.peers import ASK_AGAIN
 
 WINDOW = 1000  # messages of a topic that may be under way: far fewer than subscribers keep
@@ -66,7 +67,7 @@ class Receivers:
         services = {name for name, _ in self._node.get_service_names_and_types()}
         for publisher in self._publishers.values():
             for one in self._node.get_subscriptions_info_by_topic(publisher.topic_name):
-                name = f'{one.node_namespace.rstrip("/")}/{one.node_name}'
+                name = full_name(one)
                 if name not in self._clients and f'{name}/{READY}' in services:
                     self._clients[name] = self._node.create_client(Trigger, f'{name}/{READY}')
 

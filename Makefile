@@ -27,7 +27,7 @@ DAY ?= 86400
 EXAMPLES ?= 500
 MUTANTS ?= 500
 
-.PHONY: help setup case1 case2 test quick coverage soak fuzz properties mutation audit bench bench-growth build wheels
+.PHONY: help setup case1 case2 test quick coverage soak fuzz properties mutation audit bench bench-growth build colcon-test wheels
 .PHONY: lint format hooks interop docs docs-links docs-test docs-tools clean
 
 help:  ## this list
@@ -96,6 +96,10 @@ bench-growth: setup  ## how cost grows with batch, horizon, threads, topics and 
 build: setup  ## colcon build of the workspace
 	AMENT_PREFIX_PATH="$(abspath $(VENV))$${AMENT_PREFIX_PATH:+:$$AMENT_PREFIX_PATH}" \
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m colcon build --symlink-install
+
+colcon-test: build  ## the tests of the packages as colcon runs them
+	. install/local_setup.bash && PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m colcon test \
+	  --executor sequential --return-code-on-test-failure --event-handlers console_direct+
 
 # each wheel from its sdist, so that nothing is in it that the sdist lacks
 wheels: setup  ## sdist and wheel of the three packages, in dist/

@@ -49,6 +49,12 @@ def test_it_runs_from_there_alone(install: Path) -> None:
         assert found.startswith(str(install)), found
 
 
+def test_colcon_test_finds_the_tests_of_every_package(install: Path) -> None:
+    bases = f'--base-paths {ROOT}/src --build-base build --install-base install'
+    options = f'{bases} --return-code-on-test-failure --pytest-args --collect-only -q'
+    sourced(install, f'{sys.executable} -m colcon --log-base log test {options}')
+
+
 def test_case1_is_that_of_the_checkout_to_the_last_bit(install: Path, tmp_path: Path) -> None:
     executable = install / 'auv_analysis/lib/auv_analysis/auv'
     options = 'run case1 --no-report --out'

@@ -1,8 +1,11 @@
 """What the packages say of themselves: dependencies, metadata, files."""
 
 import ast
+import configparser
 import re
+import shlex
 import sys
+import tomllib
 from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
@@ -55,6 +58,21 @@ def imported(package: str) -> set[str]:
 
 def setup_text(package: str) -> str:
     return (ROOT / 'src' / package / 'setup.py').read_text()
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_colcon_test_finds_its_tests_as_make_test_does(package: str) -> None:
+    """colcon runs pytest in the package's folder, which then is the root of all paths."""
+    folder = ROOT / 'src' / package
+    parsed = configparser.ConfigParser()
+    parsed.read(folder / 'pytest.ini')
+    own = parsed['pytest']
+    ours = tomllib.loads((ROOT / 'pyproject.toml').read_text())['tool']['pytest']['ini_options']
+    paths = [(folder / path).resolve() for path in own['pythonpath'].split()]
+    assert paths == [ROOT / path for path in ours['pythonpath']]
+    assert (folder / own['testpaths']).resolve().parent == ROOT / ours['testpaths'][0]
+    assert shlex.split(own['addopts']) == shlex.split(ours['addopts'])
+    assert own['markers'].split('\n')[1].partition(':')[0] == ours['markers'][0].partition(':')[0]
 
 
 @pytest.mark.parametrize('package', PACKAGES)

@@ -1,6 +1,7 @@
 """Bags of a driver: stamps of its own, set-points on another grid, topics under other names."""
 
 import tempfile
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -184,3 +185,33 @@ def test_messages_that_nobody_could_use_are_left_out_and_counted(tmp_path: Path)
 def test_in_lock_step_they_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match='/odom: expected messages of its type, found'):
         load_run(with_unusable_messages(tmp_path / 'bag.mcap', strict=True))
+
+
+def test_the_namespace_of_the_recorder_is_the_one_that_is_read(tmp_path: Path) -> None:
+    """Two vehicles in a bag; without a word of the recorder nobody chooses one."""
+
+    def bag(namespace: str | None) -> Path:
+        path = tmp_path / f'{namespace}'.replace('/', '_')
+        path.mkdir()
+        made = Bag(path / 'bag.mcap')
+        made.attach('vehicle.yaml', VEHICLE)
+        if namespace is not None:
+            made.attach(NAME, recording_text(False, {}, namespace))
+        for ms, (k, space) in product(range(0, 50, 10), enumerate(('/auv1', '/auv2', '/auv3'))):
+            odom = serialized(odometry(ms * MS, state(k)))
+            made.add(f'{space}/odom', ODOMETRY, ms * MS, odom)
+            if k < 2:
+                wrench = stamped('Wrench', ms * MS, [float(k)] * 6)
+                made.add(f'{space}/wrench', wrench.__msgtype__, ms * MS, serialized(wrench))
+        return made.close()
+
+    told, untold = bag('/auv2'), bag(None)
+    assert load_run(told).tau[0, 0] == 1.0
+    assert joined(list(open_bag(told, whole=2).run.blocks())).tau[0, 0] == 1.0
+    assert load_run(told, namespace='auv1').tau[0, 0] == 0.0
+    assert load_run(untold, namespace='/auv2').tau[0, 0] == 1.0
+    with pytest.raises(InputError, match=r'/auv1, /auv2$'):
+        load_run(untold)
+    for path, space in ((bag('/'), None), (told, '/auv4')):
+        with pytest.raises(InputError, match=r'namespace /.*--namespace.*/auv1, /auv2, /auv3'):
+            open_bag(path, namespace=space)

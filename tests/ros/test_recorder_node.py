@@ -3,17 +3,34 @@
 import itertools
 import signal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from harness import PATIENCE, assert_one_line, graph, parameters, run_node, stop
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+import yaml
+from builtin_interfaces.msg import Time
+from harness import (
+    PATIENCE,
+    Peer,
+    assert_one_line,
+    fresh_domain,
+    graph,
+    parameters,
+    run_node,
+    stop,
+)
+from mcap.reader import make_reader
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import String
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Header, String
 
 from auv_analysis.bag import read_bag
-from auv_dynamics.interface import Frames, nanoseconds
+from auv_analysis.bag.records import records
+from auv_analysis.bag.tables import Table
+from auv_dynamics.interface import NANOSECONDS, Frames, nanoseconds
 from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.raw_types import raw_class
 
 FRAMES = Frames()
 STEP = 10_000_000
@@ -48,7 +65,7 @@ def test_records_every_step_and_leaves_when_it_has_all(tmp_path: Path) -> None:
         acknowledged(peer, 20)
     contents = read_bag(tmp_path / 'bag')
     assert contents.counts['/odom'] == contents.counts['/wrench'] == 21
-    assert contents.attachments == {'scenario.yaml': 'name: by_hand\n'}
+    assert contents.attachments['scenario.yaml'] == 'name: by_hand\n'
     assert contents.notes == []
     assert (contents.first, contents.last) == (0, 20 * STEP), 'log time is the header stamp'
 
@@ -166,22 +183,154 @@ def test_a_gap_on_a_topic_without_steps_is_seen(tmp_path: Path, strict: bool, co
     assert clocks() < 30_000
 
 
-def test_records_what_is_not_ours_as_well(tmp_path: Path) -> None:
-    with graph(('recorder_node', [*TOPICS, *parameters(bag=tmp_path / 'bag')])) as (
-        peer,
-        processes,
-    ):
+KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+BEST_EFFORT = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def logged(bag: Path) -> dict[str, list]:
+    """Messages of each topic with their times."""
+    with (bag / f'{bag.name}_0.mcap').open('rb') as file:
+        found: dict[str, list] = {}
+        for _, channel, message in make_reader(file).iter_messages():
+            found.setdefault(channel.topic, []).append(message)
+    return found
+
+
+def published(peer: Any, topic: str, kind: type, qos: QoSProfile | int, *messages: Any) -> Any:
+    """Publisher of messages that somebody hears."""
+    output = peer.node.create_publisher(kind, topic, qos)
+    peer.until(output.get_subscription_count, f'the recorder on {topic}')
+    for message in messages:
+        output.publish(message)
+    return output
+
+
+def test_records_what_others_publish_as_they_offer_it(tmp_path: Path, monkeypatch: Any) -> None:
+    """Best effort, latched, of a type that is not installed, and of one that is not defined."""
+    folder = tmp_path / 'share' / 'sonar_msgs' / 'msg'
+    folder.mkdir(parents=True)
+    (folder / 'Ping.msg').write_text('float64 range\n')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
+    domain = fresh_domain()
+    early = Peer(domain)
+    description = early.node.create_publisher(String, '/robot_description', KEPT)
+    description.publish(String(data='<robot/>'))
+    arguments = [*TOPICS, *parameters(bag=tmp_path / 'bag', exclude='secret|private')]
+    with graph(('recorder_node', arguments), domain=domain) as (peer, processes):
         peer.listen(topics.PROGRESS)
-        foreign = peer.node.create_publisher(String, 'sonar/remark', 10)
         publish_step(peer, 0)
-        peer.until(foreign.get_subscription_count, 'the recorder to discover it')
-        foreign.publish(String(data='a foreign word'))
-        acknowledged(peer, 0)
-        peer.spin(0.5)
-        stop(processes['recorder_node'])
+        secret = peer.node.create_publisher(String, 'camera/secret', 1)
+        peer.node.create_publisher(raw_class('sonar_msgs/msg/Secret'), 'sonar/new', 1)
+        ping = b'\0\1\0\0' + bytes(8)
+        published(peer, 'sonar/ping', raw_class('sonar_msgs/msg/Ping'), BEST_EFFORT, ping)
+        published(peer, 'imu', Imu, BEST_EFFORT, Imu())
+        published(peer, 'remark', String, 10, String(data='reliable'))
+        later = published(peer, 'remark', String, BEST_EFFORT)
+
+        def both() -> bool:
+            later.publish(String(data='with best effort'))
+            process = processes['recorder_node']
+            return process.poll() is None and b'with best effort' in whole(tmp_path / 'bag')
+
+        peer.until(both, 'the later publisher to be recorded')
+        assert not secret.get_subscription_count()
+        code, output = stop(processes['recorder_node'])
+    early.close()
+    assert code == 0, output
+    last = output.strip().splitlines()[-1]
+    assert '/sonar/new (no definition of sonar_msgs/msg/Secret)' in last
+    counts = read_bag(tmp_path / 'bag').counts
+    assert counts['/imu'] == counts['/sonar/ping'] == counts['/robot_description'] == 1
+    assert counts['/remark'] > 1
+    assert '/camera/secret' not in counts
+    assert logged(tmp_path / 'bag')['/sonar/ping'][0].data == ping
+    told = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())
+    offered = {
+        entry['topic_metadata']['name']: entry['topic_metadata']['offered_qos_profiles'][0]
+        for entry in told['rosbag2_bagfile_information']['topics_with_message_count']
+    }
+    assert offered['/imu']['reliability'] == 'best_effort'
+    assert offered['/robot_description']['durability'] == 'transient_local'
+
+
+def whole(bag: Path) -> bytes:
+    """What is on the disk, without compression."""
+    return b''.join(
+        bytes(item.data)
+        for path in bag.glob('*.mcap')
+        for item in records(path, [])
+        if isinstance(item, Table)
+    )
+
+
+@pytest.mark.parametrize(
+    ('strict', 'simulated', 'origin'),
+    [
+        (True, False, 5 * STEP),  # lock-step: the time of the steps
+        (False, True, 5 * STEP),  # a simulated clock
+        (False, False, None),  # the system's
+        (False, False, 5 * STEP),  # a driver whose clock began with it
+    ],
+)
+def test_a_bag_spans_what_was_recorded(
+    tmp_path: Path, strict: bool, simulated: bool, origin: int | None
+) -> None:
+    """Whatever others stamp, and before the first step too: the time when a message came."""
+    bag = tmp_path / 'bag'
+    arguments = [*TOPICS, *parameters(bag=bag, strict=strict, use_sim_time=simulated)]
+    with graph(('recorder_node', arguments)) as (peer, processes):
+        peer.listen(topics.PROGRESS)
+        begin = peer.node.get_clock().now().nanoseconds if origin is None else origin
+        remark = published(peer, 'remark', String, 10, String(data='without a stamp'))
+        strange = [Header(stamp=Time(sec=sec, nanosec=ns)) for sec, ns in ((2**31 - 1, 0), (-1, 0))]
+        published(peer, 'epoch', Header, 10, *strange, Header(stamp=Time(nanosec=2**32 - 1)))
+        if simulated:
+            clock = Clock(clock=convert.stamp(begin))
+            peer.publish(topics.CLOCK, clock, subscribers=2)
+        for k in range(3):
+            stamp = begin + k * STEP
+            peer.publish(topics.ODOM, convert.odometry(stamp, UPRIGHT, FRAMES))
+            peer.publish(topics.WRENCH, convert.wrench(stamp, (0.0,) * 6, FRAMES))
+        broken = convert.wrench(0, (0.0,) * 6, FRAMES)
+        broken.header.stamp = Time(sec=-1)
+        peer.until(lambda: peer.heard['recorder/progress'], 'the steps')
+        peer.publish(topics.WRENCH, broken)
+        remark.publish(String(data='at the end'))
+        peer.until(lambda: whole(bag).count(b'at the end'), 'the last word')
+        assert stop(processes['recorder_node'])[0] == 0
+    found = logged(bag)
+    assert len(found['/epoch']) == 3
+    assert len(found['/wrench']) == 4
+    assert [m.log_time for m in found['/odom']] == [begin + k * STEP for k in range(3)]
+    times = [message.log_time for messages in found.values() for message in messages]
+    assert max(times) - min(times) < 2 * PATIENCE * NANOSECONDS
+    source = found['/remark'][0].publish_time
+    assert abs(source - peer.node.get_clock().now().nanoseconds) < 10 * PATIENCE * NANOSECONDS
+
+
+def test_a_recorder_takes_its_own_vehicle_and_what_it_is_told(tmp_path: Path) -> None:
+    """Two vehicles in one domain; each bag says whose it is."""
+    own = ['-r', '__ns:=/auv1', '-p', 'extra_topics:=["/auv2/ping"]']
+    arguments = [*TOPICS, *own, *parameters(bag=tmp_path / 'bag')]
+    with graph(('recorder_node', arguments)) as (peer, processes):
+        for k, space in itertools.product(range(3), ('/auv1', '/auv2')):
+            output, wrench = f'{space}/odom', f'{space}/wrench'
+            for name, message in (
+                (output, convert.odometry(k * STEP, UPRIGHT, FRAMES)),
+                (wrench, convert.wrench(k * STEP, (0.0,) * 6, FRAMES)),
+            ):
+                topic = topics.Topic(name, type(message))
+                peer.publish(topic, message, subscribers=space == '/auv1')
+        published(peer, '/auv2/ping', String, 10, String(data='asked for'))
+        published(peer, '/auv1/sonar', String, 10, String(data='inside'))
+        published(peer, '/tf', String, 10, String(data='global'))
+        peer.until(lambda: b'global' in whole(tmp_path / 'bag'), 'the last message')
+        assert stop(processes['recorder_node'])[0] == 0
     contents = read_bag(tmp_path / 'bag')
-    assert contents.types['/sonar/remark'] == 'std_msgs/msg/String'
-    assert contents.counts['/sonar/remark'] == 1
+    strangers = {topic for topic in contents.counts if topic.startswith('/auv2')}
+    assert strangers == {'/auv2/ping'}
+    assert {'/auv1/odom', '/auv1/sonar', '/tf'} <= set(contents.counts)
+    assert contents.namespace == '/auv1'
 
 
 def test_refuses_a_folder_that_holds_a_bag(tmp_path: Path) -> None:
@@ -204,6 +353,8 @@ def test_refuses_a_folder_that_holds_a_bag(tmp_path: Path) -> None:
         (parameters(bag='x', storage__compression='gzip'), 'storage.compression'),
         (parameters(bag='/dev/null/x'), '/dev/null/x'),
         (parameters(bag='x', lockstep=True), 'lockstep'),
+        (parameters(bag='x', exclude='(imu'), 'exclude'),
+        (['-p', 'extra_topics:=["a b"]', '-p', 'bag:=x'], 'extra_topics'),
     ],
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str) -> None:
@@ -218,8 +369,7 @@ def test_a_driver_with_best_effort_is_heard_where_that_is_asked_for(tmp_path: Pa
     deaf = [*one, *parameters(bag=tmp_path / 'deaf', strict=False), '-r', '__node:=deaf']
     with graph(('recorder_node', [*one, *wanted])) as (peer, _):
         peer.listen(topics.PROGRESS)
-        qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-        output = peer.node.create_publisher(topics.ODOM.type, 'odom', qos)
+        output = peer.node.create_publisher(topics.ODOM.type, 'odom', BEST_EFFORT)
         k = itertools.count()
 
         def progress() -> list:
@@ -228,13 +378,15 @@ def test_a_driver_with_best_effort_is_heard_where_that_is_asked_for(tmp_path: Pa
 
         peer.until(progress, 'a recorded step')
     with graph(('recorder_node', deaf)) as (peer, processes):
-        output = peer.node.create_publisher(topics.ODOM.type, 'odom', qos)
+        output = peer.node.create_publisher(topics.ODOM.type, 'odom', BEST_EFFORT)
         peer.listen(topics.DIAGNOSTICS)
 
         def said() -> bool:
             found = [status.message for a in peer.heard['/diagnostics'] for status in a.status]
-            return any('odom: incompatible QoS' in m and 'reliability' in m for m in found)
+            return sum('odom: incompatible QoS' in m and 'reliability' in m for m in found) > 3
 
-        peer.until(said, 'the report of the deaf one')
-        assert stop(processes['recorder_node'])[0] == 0
+        peer.until(said, 'the report of the deaf one, as long as it lasts')
+        code, output = stop(processes['recorder_node'])
+    assert code == 1
+    assert 'expected topics without any message: odom' in output
     assert read_bag(tmp_path / 'deaf').counts['/diagnostics'] > 0, 'its report is in its bag'

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from harness import PATIENCE, Peer, fresh_domain, graph, parameters
+from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
@@ -155,13 +156,17 @@ def test_it_is_no_stranger_on_a_domain(ears: Ears) -> None:
 
 
 def test_nobody_waits_for_it_and_it_does_not_start_a_run() -> None:
-    """The start barrier counts subscribers: an onlooker is not the recorder that is expected."""
+    """The start barrier counts subscribers, but no onlooker, foreign recorder or tool."""
     expected = ['-p', 'expected_subscribers:=["odom=1"]']
     plant = ('plant_node', [*parameters(vehicle='herman2018', lockstep=True), *expected])
     with graph(plant) as (peer, _):
         beside = Ears(peer, peer.context.get_domain_id())
+        others = [('recorder_node', '/auv2'), ('rosbag2_recorder', '/')]
+        strangers = [Node(name, namespace=at, context=peer.context) for name, at in others]
         try:
-            beside.until(lambda: peer.node.count_subscribers('odom') == 1)
+            for stranger in strangers:
+                stranger.create_subscription(topics.ODOM.type, '/odom', print, 10)
+            beside.until(lambda: peer.node.count_subscribers('odom') == 3)
             answer = peer.call(Trigger, 'plant_node/ready')
             assert not answer.success
             assert answer.message == 'odom: expected 1 subscribers, found 0'
@@ -169,4 +174,6 @@ def test_nobody_waits_for_it_and_it_does_not_start_a_run() -> None:
             beside.until(lambda: peer.heard['odom'])
             assert peer.call(Trigger, 'plant_node/ready').success
         finally:
+            for stranger in strangers:
+                stranger.destroy_node()
             beside.listener.close()

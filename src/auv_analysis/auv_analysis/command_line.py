@@ -95,6 +95,8 @@ def _analyze(command: argparse.ArgumentParser) -> None:
     command.add_argument('results', nargs='+', metavar='BAG', help=RESULT)
     command.add_argument('--by', metavar='MEASURE', help='of a sweep: what sorts the best rows')
     command.add_argument('--vehicle', help='for bags that do not carry their own')
+    text = 'of the vehicle in a bag of several; default: that of the recorder'
+    command.add_argument('--namespace', metavar='NS', help=text)
     _no_report(command)
     text = 'own law that results may name, as its code may run; may be repeated'
     command.add_argument('--law', metavar='MODULE:CLASS', action='append', help=text)

@@ -12,7 +12,7 @@ from auv_dynamics import interface
 from auv_dynamics.signals import harmonic_columns
 
 PLANT, SETPOINT, CONTROLLER = 'plant_node', 'setpoint_node', 'controller_node'
-ANALYSIS, RECORDER = 'analysis_node', 'recorder_node'
+ANALYSIS, RECORDER = 'analysis_node', interface.RECORDER
 EVERY = 10  # steps between live analysis samples
 WINDOW = 2000  # steps that the plant may be ahead of the recorder
 HORIZON = 200  # steps that set-points are published ahead

@@ -1,4 +1,4 @@
-"""The recorder as a node: every topic of the graph into an MCAP bag, every step checked."""
+"""The recorder as a node: the topics of a vehicle into an MCAP bag, every step checked."""
 
 import time
 from typing import Any
@@ -8,25 +8,68 @@ from std_msgs.msg import Header
 
 from auv_analysis.ledger import LostStepError, PublicationLedger, StepLedger
 from auv_analysis.recorder_parameters import recorder_parameters
+from auv_analysis.recorder_topics import OtherTopics
 from auv_analysis.recording import RecordingError
 from auv_analysis.schemas import schema_text
+from auv_dynamics.interface import NANOSECONDS, RECORDER, BadMessageError
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.graph import Graph, steady_timer
-from auv_dynamics.ros.kinds import begins_with_stamp, message_class, qos_entry, type_name
+from auv_dynamics.ros.kinds import qos_entry, type_name
 from auv_dynamics.ros.life import main_of
 
-UNRECORDED = ('/rosout', '/parameter_events')
 PATIENCE = 2.0  # s for the clock of the last steps, which nothing else waits for
 NUMBERED = (*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK)  # with one publisher each
+TIMED = (*topics.STEP_TOPICS, topics.CLOCK)  # whose stamp is the log time
+EPOCH = 86_400 * NANOSECONDS  # ns between two clocks, from which they have different epochs
+EARLY_TIME = 60.0  # s that messages wait for the first step, which tells the time of the graph
+EARLY_COUNT, EARLY_SIZE = 10_000, 1 << 24  # messages and bytes that wait at most
+
+
+class GraphClock:
+    """Time of the graph: that of the steps in lock-step, else of the node's clock.
+
+    Where a driver stamps by a clock of another epoch, the node's clock is moved there by the first
+    step, so that all of a bag lies together.
+
+    Attributes
+    ----------
+    latest : newest stamp of a step, ns; -1 before the first
+
+    """
+
+    def __init__(self, node: BulkNode, strict: bool):
+        self._node, self._strict, self.latest = node, strict, -1
+        self.simulated = strict or bool(node.get_parameter('use_sim_time').value)
+        self._offset: int | None = None
+
+    def follow(self, ns: int) -> None:
+        """Note the stamp of a step."""
+        self.latest = max(self.latest, ns)
+        if self._offset is None:
+            apart = ns - self._node.get_clock().now().nanoseconds
+            self._offset = apart if abs(apart) > EPOCH else 0
+
+    def now(self, received: int) -> int | None:
+        """Time in ns of a message that came at `received` of the system's; None: not known yet."""
+        if not self.simulated:
+            wall = received or int(self._node.get_clock().now().nanoseconds)
+            return None if self._offset is None else max(0, wall + self._offset)
+        told = 0 if self._strict else int(self._node.get_clock().now().nanoseconds)
+        return told or (self.latest if self.latest >= 0 else None)
+
+    def begin(self) -> None:
+        """Do without a step: the time is the node's, zero where it is simulated."""
+        self.latest = max(self.latest, 0)
+        self._offset = self._offset or 0
 
 
 class RecorderNode(BulkNode):
-    """Records raw messages; log time is the header stamp, so a bag is in simulated time."""
+    """Records raw messages; log time is the stamp of steps, of others the time when they came."""
 
     def __init__(self) -> None:
-        super().__init__('recorder_node')
+        super().__init__(RECORDER)
         self._settings = p = recorder_parameters(self)
         self._writer = p.writer
         # in real time set-points lie on a grid of their own, ahead of the odometry
@@ -34,48 +77,81 @@ class RecorderNode(BulkNode):
         self._counted = [topic for topic in p.topics if topic not in ahead] or list(p.topics)
         self._ledger = StepLedger(self._counted, p.step_ns, p.strict)
         self._publications = PublicationLedger(p.strict)
-        self._latest = 0  # stamp of the newest step message, for messages without one
+        self._time = GraphClock(self, p.strict)
+        self._early: list[tuple[str, str, bytes, dict[str, Any]]] = []
+        self._early_since = 0.0  # steady s
         self._newest = {topics.LUMPED_ERROR.name: -1, topics.CLOCK.name: -1}  # stamps, ns
         self._whole_since: float | None = None  # steady s
         self._reported = -1
         self._complaints: set[str] = set()
-        self._known: set[str] = set()
         self.graph = Graph(self, barrier=False)
         self._progress = self.graph.publisher(topics.PROGRESS, topics.one_at_a_time())
-        for topic in topics.TOPICS:
-            self._record(topic.name, topic.type, topic)
+        self._ours = {self._record(topic) for topic in topics.TOPICS}
+        self._others = OtherTopics(self, p.others, self._take)
         steady_timer(self, 0.02, self._report)
         steady_timer(self, 0.2, self._keep)
-        steady_timer(self, 0.5, self._discover)
+        steady_timer(self, 0.5, lambda: self._others.look(self._ours))
+        expected = ', '.join(p.topics)
+        self.get_logger().info(f'records {p.others.namespace} into {p.bag}, expects {expected}')
 
-    def _record(self, name: str, kind: type, topic: topics.Topic | None = None) -> None:
+    def _record(self, topic: topics.Topic) -> str:
+        """Subscribe to a topic of the graph; its full name."""
+        name, kind = topic.name, type_name(topic.type)
         resolved = self.resolve_topic_name(name)
-        step_topic = topic.name if topic and topic.name in self._counted else ''
-        numbered = topic in NUMBERED
-        stamped = begins_with_stamp(kind)
+        step_topic = name if name in self._counted else ''
+        numbered, timed, awaited = topic in NUMBERED, topic in TIMED, name in self._newest
+        zero_is_a_time = self._time.simulated or topic is topics.CLOCK
 
-        def callback(message: bytes, info: dict[str, Any]) -> None:
-            ns = first_stamp(message) if stamped else self._latest
-            self._take(resolved, kind, message, ns or self._beginning())
+        def callback(message: bytes, way: dict[str, Any]) -> None:
+            ns = 0
+            try:
+                if timed or awaited:
+                    ns = first_stamp(message)
+            except BadMessageError:
+                self._take(resolved, kind, message, way)
+                raise
+            if timed and (ns or zero_is_a_time):
+                if step_topic:
+                    self._time.follow(ns)
+                self._write(resolved, kind, message, ns, ns)
+            else:
+                self._take(resolved, kind, message, way)
             if numbered:
-                self._count(name, step_topic, ns, info.get('publication_sequence_number'))
-            if name in self._newest:
+                self._count(name, step_topic, ns, way.get('publication_sequence_number'))
+            if awaited:
                 self._newest[name] = max(self._newest[name], ns)
 
-        self._known.add(resolved)
-        self.graph.subscribe(topic or topics.Topic(resolved, kind), callback, topics.every_step())
+        self.graph.subscribe(topic, callback, topics.every_step())
+        return resolved
 
-    def _beginning(self) -> int:
-        """Log time of what has no stamp: zero where time is simulated, else that of the clock."""
-        return 0 if self._settings.strict else int(self.get_clock().now().nanoseconds)
+    def _take(self, topic: str, kind: str, message: bytes, way: dict[str, Any]) -> None:
+        """Write a message at the time when it came; before that is known, it waits."""
+        ns = self._time.now(way.get('received_timestamp') or 0)
+        if ns is None:
+            self._early_since = self._early_since or time.monotonic()
+            self._early.append((topic, kind, message, way))
+        else:
+            self._write(topic, kind, message, ns, max(0, way.get('source_timestamp') or ns))
 
-    def _take(self, topic: str, kind: type, message: bytes, ns: int) -> None:
+    def _release(self, *, ends: bool = False) -> None:
+        """Write what has waited, once the time of the graph is known or not waited for."""
+        if not self._early:
+            return
+        late = time.monotonic() - self._early_since > EARLY_TIME
+        size = sum(len(message) for _, _, message, _ in self._early)
+        if ends or late or len(self._early) > EARLY_COUNT or size > EARLY_SIZE:
+            self._time.begin()
+        waiting, self._early = self._early, []
+        for entry in waiting:
+            self._take(*entry)
+
+    def _write(self, topic: str, kind: str, message: bytes, ns: int, published: int) -> None:
         if self._writer.broken:
             return
         try:
             if not self._writer.has_channel(topic):
-                self._add_channel(topic, type_name(kind))
-            self._writer.write(topic, ns, message)
+                self._add_channel(topic, kind)
+            self._writer.write(topic, ns, message, published)
         except RecordingError as error:
             self._end(1, str(error))
         if self._writer.trouble:
@@ -91,7 +167,6 @@ class RecorderNode(BulkNode):
     def _count(self, name: str, step_topic: str, ns: int, number: int | None) -> None:
         try:
             if step_topic:
-                self._latest = max(self._latest, ns)
                 self._ledger.add(step_topic, ns)
             self._publications.add(name, number)
         except LostStepError as error:
@@ -125,23 +200,10 @@ class RecorderNode(BulkNode):
 
     def _keep(self) -> None:
         """Repeat the progress for whoever has joined since."""
+        self._release()
         self._say_progress()
-        self.graph.latest_ns = self._latest
+        self.graph.latest_ns = max(0, self._time.latest)
         self.graph.facts.update(complete=self._ledger.complete, behind=self._ledger.behind())
-
-    def _discover(self) -> None:
-        """Record topics that are not ours as well."""
-        for topic, kinds in self.get_topic_names_and_types():
-            if topic in self._known or topic in UNRECORDED:
-                continue
-            try:
-                kind = message_class(kinds[0])
-                schema_text(kinds[0])
-            except (ImportError, AttributeError, FileNotFoundError):
-                self.get_logger().warning(f'{topic}: not recorded, no definition of {kinds[0]}')
-                self._known.add(topic)
-                continue
-            self._record(topic, kind)
 
     def _end(self, code: int, text: str = '') -> None:
         if self.exit_code is not None:
@@ -157,8 +219,9 @@ class RecorderNode(BulkNode):
         self._complaints.add(text)
 
     def close(self) -> None:
-        """Finish the bag with everything that has arrived."""
+        """Finish the bag with everything that has arrived, and say what has not."""
         self.take_data()
+        self._release(ends=True)
         try:
             self._writer.close()
         except RecordingError as error:
@@ -168,6 +231,18 @@ class RecorderNode(BulkNode):
         if lost or self._publications.gaps:
             lost.update(self._publications.gaps)
             self.get_logger().warning(f'steps or messages that did not arrive: {lost}')
+        if not self._complaints:
+            self._conclude()
+
+    def _conclude(self) -> None:
+        p, has = self._settings, self._writer.has_channel
+        silent = [topic for topic in p.topics if not has(self.resolve_topic_name(topic))]
+        if silent:
+            self._complain(f'{p.bag}: expected topics without any message: {", ".join(silent)}')
+            self.exit_code = 1
+        left = [f'{topic} ({why})' for topic, why in sorted(self._others.left.items())]
+        text = f'{p.bag}: {self._writer.count} messages'
+        self.get_logger().info(f'{text}, not recorded: {", ".join(left)}' if left else text)
 
 
 def main() -> None:

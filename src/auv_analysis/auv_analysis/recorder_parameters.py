@@ -1,5 +1,6 @@
 """The recorder's ROS parameters."""
 
+import re
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 from rclpy.node import Node
 
 from auv_analysis.bag import recording as described
+from auv_analysis.recorder_topics import ALL, Wanted
 from auv_analysis.recording import COMPRESSIONS, BagWriter, Storage
 from auv_analysis.recording.storage import FREE_SPACE, LARGEST_CHUNK, LEAST_DURATION, LEAST_SIZE
 from auv_dynamics import interface
@@ -14,6 +16,7 @@ from auv_dynamics.files import InputError, read_text, reason
 from auv_dynamics.nearest import meant
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.parameters import declare, refuse_unknown
+from auv_dynamics.ros.private import RCLError
 
 
 @dataclass(frozen=True)
@@ -22,8 +25,10 @@ class RecorderParameters:
 
     Attributes
     ----------
+    bag : its folder
     writer : of the bag, open
     topics : step topics that are expected, each step of each
+    others : which other topics are recorded
     step_ns : ns between steps
     last : index of the last step, None: until SIGTERM
     last_due : stamp in ns of analysis' last sample, None: not waited for
@@ -31,8 +36,10 @@ class RecorderParameters:
 
     """
 
+    bag: Path
     writer: BagWriter
     topics: tuple[str, ...]
+    others: Wanted
     step_ns: int
     last: int | None
     last_due: int | None
@@ -46,6 +53,7 @@ def recorder_parameters(node: Node) -> RecorderParameters:
     bag = declare(node, 'bag', str, '', 'folder of the bag')
     usual = list(interface.STEP_TOPICS)
     expected = declare(node, 'topics', list[str], usual, 'step topics that are expected')
+    others = _others(node)
     duration = declare(node, 'duration', float, 0.0, 's, 0: until SIGTERM', at_least=0.0)
     step = declare(node, 'step', float, 0.01, 's between steps', at_least=1e-9)
     every = declare(
@@ -68,14 +76,37 @@ def recorder_parameters(node: Node) -> RecorderParameters:
         label, equals, path = entry.partition('=')
         source = Path(path if equals else label)
         attachments[label if equals else source.name] = read_text(source, 'attachment')
-    names = remapped(node)
-    if names or not strict:
-        attachments[described.NAME] = described.recording_text(strict, names)
+    attachments[described.NAME] = described.recording_text(
+        strict, remapped(node), node.get_namespace()
+    )
     writer = _writer(name, Path(bag), attachments, storage)
     last = round(duration / step) if duration else None
     step_ns = round(step * interface.NANOSECONDS)
     due = last // every * every * step_ns if last is not None and every else None
-    return RecorderParameters(writer, tuple(expected), step_ns, last, due, strict)
+    return RecorderParameters(
+        Path(bag), writer, tuple(expected), others, step_ns, last, due, strict
+    )
+
+
+def _others(node: Node) -> Wanted:
+    """Topics beside those of the graph."""
+    name = node.get_name()
+    text = f'topics outside of the namespace that are recorded as well, or {ALL}'
+    listed = declare(node, 'extra_topics', list[str], None, text) or []
+    text = 'regular expression: topics in whose names it is found are not recorded, but for ours'
+    exclude = declare(node, 'exclude', str, '', text)
+    extra = []
+    for topic in listed:
+        try:
+            extra.append(topic if topic == ALL else node.resolve_topic_name(topic))
+        except (RCLError, ValueError):
+            expected = f'names of topics, or {ALL}'
+            raise InputError(name, 'extra_topics', expected, topic) from None
+    try:
+        pattern = re.compile(exclude) if exclude else None
+    except (re.error, RecursionError, OverflowError) as error:
+        raise InputError(name, 'exclude', f'a regular expression ({error})', exclude) from None
+    return Wanted(node.get_namespace(), tuple(extra), pattern)
 
 
 def remapped(node: Node) -> dict[str, str]:

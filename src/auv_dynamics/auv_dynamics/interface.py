@@ -13,6 +13,7 @@ from auv_dynamics.dofs import DOFS
 NANOSECONDS = 10**9
 UNIT = 1e-3  # deviation of a quaternion's norm from 1 that is accepted
 PARENT = 'AUV_GVC_PARENT'  # variable with the process id of `auv run`: nodes do not outlive it
+RECORDER = 'recorder_node'  # name of the recorder, in whatever namespace
 OBSERVER = 'auv_watch'  # name of a node that only looks on: nobody waits for it
 
 ODOM = 'odom'

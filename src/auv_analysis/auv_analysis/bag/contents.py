@@ -29,6 +29,8 @@ class Contents:
     notes : what is odd, one line each
     frames : namespace -> frames of its first odometry
     names : recorded topic -> our name of it, where the recorder's topics were remapped
+    namespace : that is read: the one asked for, else that of the recorder; None: any
+    asked : whether it was asked for
     lenient : whether a driver was free to say anything: what cannot be used is left out
 
     """
@@ -43,6 +45,8 @@ class Contents:
     notes: list[str] = field(default_factory=list)
     frames: dict[str, Frames] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
+    namespace: str | None = None
+    asked: bool = False
     lenient: bool = False
 
     def span(self, first: int, last: int) -> None:

@@ -34,13 +34,16 @@ class Recording(NamedTuple):
     attachments: dict[str, str]
 
 
-def load_run(bag: str | Path, vehicle: str | Path | None = None) -> Run:
+def load_run(
+    bag: str | Path, vehicle: str | Path | None = None, namespace: str | None = None
+) -> Run:
     """Run of a recorded bag.
 
     Parameters
     ----------
     bag : folder or .mcap file
     vehicle : vehicle file for a bag that does not carry its own
+    namespace : of the vehicle; None: that of the recorder, or the only one in the bag
 
     Returns
     -------
@@ -52,10 +55,15 @@ def load_run(bag: str | Path, vehicle: str | Path | None = None) -> Run:
     InputError : no bag, no vehicle, or topics missing
 
     """
-    return _whole(read_bag(bag), Path(bag), vehicle)
+    return _whole(read_bag(bag, namespace), Path(bag), vehicle)
 
 
-def open_bag(bag: str | Path, vehicle: str | Path | None = None, whole: int = WHOLE) -> Recording:
+def open_bag(
+    bag: str | Path,
+    vehicle: str | Path | None = None,
+    whole: int = WHOLE,
+    namespace: str | None = None,
+) -> Recording:
     """The same run, in memory that hardly grows with its length.
 
     A long bag is read once now, which finds and checks all that is in it, and once more for every
@@ -63,7 +71,7 @@ def open_bag(bag: str | Path, vehicle: str | Path | None = None, whole: int = WH
 
     Parameters
     ----------
-    bag, vehicle : as for `load_run`
+    bag, vehicle, namespace : as for `load_run`
     whole : number of messages per topic up to which the run is kept in memory
 
     Raises
@@ -71,7 +79,8 @@ def open_bag(bag: str | Path, vehicle: str | Path | None = None, whole: int = WH
     InputError : as for `load_run`
 
     """
-    bag, contents, survey = Path(bag), Contents(), Survey(whole)
+    bag, survey = Path(bag), Survey(whole)
+    contents = Contents(namespace=namespace, asked=namespace is not None)
     for batch in batches(bag, contents):
         survey.add(batch)
     run: AnyRun
@@ -81,7 +90,7 @@ def open_bag(bag: str | Path, vehicle: str | Path | None = None, whole: int = WH
     elif survey.rising:
         run = _long(contents, survey, bag, vehicle)
     else:
-        run = load_run(bag, vehicle)  # its steps have to be sorted
+        run = load_run(bag, vehicle, namespace)  # its steps have to be sorted
     return Recording(run, contents.attachments)
 
 
@@ -110,7 +119,7 @@ def _long(contents: Contents, survey: Survey, bag: Path, vehicle: str | Path | N
     roles = {topic: role for role, topic in topics.items()}
 
     def blocks(rows: int) -> Iterator[Run]:
-        found = batches(bag, Contents())
+        found = batches(bag, Contents(namespace=contents.namespace, asked=True))
         parts = ((roles.get(b.topic, ''), (b.stamps, b.rows)) for b in found)
         steps = complete_blocks(held_parts(parts) if held else parts, ends, rows)
         return _blocks(steps, first, facts)

@@ -87,11 +87,17 @@ class FileReader:
         if item.name == recording.NAME:
             self._contents.names = recording.names_of(text, self._path)
             self._contents.lenient = not recording.was_strict(text, self._path)
+            if not self._contents.asked:
+                self._contents.namespace = recording.namespace_in(text, self._path)
 
     def _topic(self, channel: int) -> str:
         """Our name of a channel's topic."""
         topic = self._channels[channel].topic
         return self._contents.names.get(topic, topic)
+
+    def _is_read(self, topic: str) -> bool:
+        space = self._contents.namespace
+        return space is None or namespace_of(topic).strip('/') == space.strip('/')
 
     def _channel(self, channel: Channel) -> None:
         if channel.id in self._channels:
@@ -100,8 +106,9 @@ class FileReader:
         schema = self._schemas.get(channel.schema_id)
         kind = schema.name if schema else ''
         self._contents.types[channel.topic] = kind
-        if self._decode and role_of(self._topic(channel.id)) in READERS:
-            check_type(self._path, self._topic(channel.id), kind)
+        topic = self._topic(channel.id)
+        if self._decode and role_of(topic) in READERS and self._is_read(topic):
+            check_type(self._path, topic, kind)
             self._decoders.add(channel, schema)
 
     def _table(self, table: Table) -> Iterator[Batch]:

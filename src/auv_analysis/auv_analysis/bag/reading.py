@@ -33,12 +33,13 @@ def batches(bag: str | Path, contents: Contents, *, decode: bool = True) -> Iter
         reader.finish()
 
 
-def read_bag(bag: str | Path, *, decode: bool = True) -> Contents:
+def read_bag(bag: str | Path, namespace: str | None = None, *, decode: bool = True) -> Contents:
     """Read a bag.
 
     Parameters
     ----------
     bag : folder or .mcap file
+    namespace : whose topics are ours; None: what the bag says, else any
     decode : read the messages of our topics; else only count
 
     Raises
@@ -46,7 +47,7 @@ def read_bag(bag: str | Path, *, decode: bool = True) -> Contents:
     InputError : not a bag, or a message that must not be used
 
     """
-    contents = Contents()
+    contents = Contents(namespace=namespace, asked=namespace is not None)
     found: dict[str, list[Series]] = {}
     small: dict[str, list[Series]] = {}
     for topic, stamps, rows in batches(bag, contents, decode=decode):

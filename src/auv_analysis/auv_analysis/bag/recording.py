@@ -1,4 +1,4 @@
-"""What the recorder notes of its recording, as an attachment: names of topics, and how strict."""
+"""What the recorder notes of its recording, as an attachment: namespace, names, how strict."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,16 +10,26 @@ from auv_dynamics.files import InputError, parse_yaml
 NAME = 'recording.yaml'
 
 
-def recording_text(strict: bool, names: Mapping[str, str]) -> str:
+def recording_text(strict: bool, names: Mapping[str, str], namespace: str = '/') -> str:
     """Text of the attachment.
 
     Parameters
     ----------
     strict : whether every step had to come once and in order
     names : recorded topic -> the name that it has where nothing is remapped, of those that differ
+    namespace : of the recorder
 
     """
-    return yaml.safe_dump({'strict': strict, 'topics': dict(names)}, sort_keys=False)
+    noted = {'strict': strict, 'namespace': namespace, 'topics': dict(names)}
+    return yaml.safe_dump(noted, sort_keys=False)
+
+
+def namespace_in(text: str, bag: object) -> str | None:
+    """Namespace of the recorder; None where it is not noted."""
+    found = parse_yaml(text, f'{bag}: {NAME}', 'recording').get('namespace')
+    if not (found is None or isinstance(found, str)):
+        raise InputError(f'{bag}: {NAME}', 'namespace', 'the name of a namespace', found)
+    return found
 
 
 def names_of(text: str, bag: object) -> dict[str, str]:

@@ -8,6 +8,7 @@ import numpy as np
 from auv_analysis.bag.contents import Contents, NotOursError, Series
 from auv_analysis.bag.roles import READERS, namespace_of, role_of
 from auv_dynamics import interface
+from auv_dynamics.files import InputError
 from auv_dynamics.frames import NED_FSD, named_axes
 
 REQUIRED = (interface.ODOM, interface.WRENCH)
@@ -15,37 +16,55 @@ Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> v
 
 
 def topics_of_one_graph(topics: Iterable[str], contents: Contents, bag: Path) -> dict[str, str]:
-    """Role -> topic, of the first namespace that has an odometry.
+    """Role -> topic, of the namespace that is read, or of the only one that is complete.
 
     Parameters
     ----------
     topics : those of ours that have messages
-    contents : of the bag; gets a note when there are several vehicles
+    contents : of the bag
     bag : for the refusal
 
     Raises
     ------
-    InputError : a topic without which there is no run has no messages
+    InputError : a topic without which there is no run has no messages, or there are several runs
 
     """
     topics = set(topics)
-    spaces = sorted(namespace_of(t) for t in topics if role_of(t) == interface.ODOM)
+    space = _namespace(topics, contents, bag)
     found = ', '.join(sorted(contents.types)) or 'no topics'
-    if not spaces:
-        raise NotOursError(bag, interface.ODOM, 'messages', found)
-    if len(spaces) > 1:
-        contents.notes.append(f'several vehicles in the bag: read {spaces[0]}, left {spaces[1:]}')
-    frames = contents.frames[spaces[0]]
+    frames = contents.frames[space]
     named = all(named_axes(name) == NED_FSD for name in (frames.odom, frames.base))
     if 'params.yaml' not in contents.attachments and not named:
         expected = 'frames whose names say that they are NED and FSD'
         found = f'{frames.odom}, {frames.base}'
-        raise NotOursError(bag, f'{spaces[0]}{interface.ODOM}: frame_id', expected, found)
-    ours = {role: f'{spaces[0]}{role}' for role in READERS if f'{spaces[0]}{role}' in topics}
+        raise NotOursError(bag, f'{space}{interface.ODOM}: frame_id', expected, found)
+    ours = {role: f'{space}{role}' for role in READERS if f'{space}{role}' in topics}
     for role in REQUIRED:
         if role not in ours:
             raise NotOursError(bag, role, 'messages', found)
     return ours
+
+
+def _namespace(topics: set[str], contents: Contents, bag: Path) -> str:
+    """Namespace that is read, as it stands before our names."""
+    found = ', '.join(sorted(contents.types)) or 'no topics'
+    spaces = sorted(namespace_of(t) for t in topics if role_of(t) == interface.ODOM)
+    whole = [space for space in spaces if all(f'{space}{role}' in topics for role in REQUIRED)]
+    if not spaces and contents.namespace is not None:
+        others = {namespace_of(t) for t in contents.counts if role_of(t) == interface.ODOM}
+        listed = ', '.join(sorted(space.rstrip('/') or '/' for space in others))
+        key = f'namespace {contents.namespace}'
+        if others:
+            expected = f'{interface.ODOM} in it, or --namespace with one that has it'
+            raise InputError(bag, key, expected, listed)
+        if contents.asked:
+            raise InputError(bag, key, interface.ODOM, found)
+    if not spaces:
+        raise NotOursError(bag, interface.ODOM, 'messages', found)
+    if len(whole) > 1:
+        listed = ', '.join(space.rstrip('/') or '/' for space in whole)
+        raise InputError(bag, '', 'one vehicle, or --namespace with that of one', listed)
+    return whole[0] if whole else spaces[0]
 
 
 def complete(series: Mapping[str, Series]) -> Steps:

@@ -32,7 +32,7 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
         return explore(Path(sweeps[0]), options)
     _import_laws(options.law or ())
     mapping = _mapping(options)
-    sources = sources_of(options.results, mapping)
+    sources = sources_of(options.results, mapping, options.namespace)
     if options.out:
         check_free(options.out, overwrite=options.overwrite)
     return _few(sources, options) if len(sources) <= FEW else _many(sources, options)

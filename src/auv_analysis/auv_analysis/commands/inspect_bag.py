@@ -26,6 +26,7 @@ def info(options: argparse.Namespace) -> dict[str, Any]:
             topic: {'type': kind, 'messages': contents.counts.get(topic, 0)}
             for topic, kind in sorted(contents.types.items())
         },
+        'namespace': contents.namespace,
         'attachments': sorted(contents.attachments),
         # what our recorder has attached says of the topics what they are
         'candidates': {} if PARAMETERS in contents.attachments else candidates(contents),
@@ -46,6 +47,8 @@ def _print_info(document: dict[str, Any]) -> None:
     for topic, entry in document['topics'].items():
         table.add_row(topic, entry['type'], str(entry['messages']))
     out.print(table)
+    if document['namespace'] is not None:
+        out.print(f'namespace: {document["namespace"]}')
     out.print(f'attachments: {", ".join(document["attachments"]) or "none"}')
     for role, topics in document['candidates'].items():
         if topics:

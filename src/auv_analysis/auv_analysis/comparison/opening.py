@@ -74,7 +74,7 @@ def _open_bag(source: Source, vehicle: str | None) -> Recording:
     try:
         if not is_mcap(bag):
             raise NotOursError(bag, '', 'an MCAP bag of our nodes', 'a bag of another kind')
-        return open_bag(bag, vehicle)
+        return open_bag(bag, vehicle, namespace=source.namespace)
     except NotOursError as error:
         raise with_candidates(error) from None
 

@@ -30,6 +30,7 @@ class Source:
     controller : its name; '' of a bag, which says so itself
     scenario : of samples and scenarios, loaded
     mapping : of a bag of another system, what its topics hold; None: nothing was told
+    namespace : of the vehicle in a bag; None: what the bag says
 
     """
 
@@ -38,6 +39,7 @@ class Source:
     controller: str = ''
     scenario: Scenario | None = None
     mapping: TopicMap | None = None
+    namespace: str | None = None
 
     @property
     def files(self) -> list[Path]:
@@ -56,7 +58,9 @@ def is_sweep(argument: str) -> bool:
     return os.path.isfile(os.path.join(argument, MANIFEST))
 
 
-def sources_of(arguments: Sequence[str], mapping: TopicMap | None = None) -> list[Source]:
+def sources_of(
+    arguments: Sequence[str], mapping: TopicMap | None = None, namespace: str | None = None
+) -> list[Source]:
     """The runs that arguments stand for, in their order.
 
     Parameters
@@ -65,6 +69,7 @@ def sources_of(arguments: Sequence[str], mapping: TopicMap | None = None) -> lis
         `auv simulate`, `auv run` or `auv study` is all runs in it; an .npz file is one simulated
         run; a .yaml file or the bare name of a shipped scenario is simulated, all its controllers
     mapping : of all bags; None: they are those of our nodes
+    namespace : of the vehicle in all bags; None: what each says
 
     Raises
     ------
@@ -72,7 +77,8 @@ def sources_of(arguments: Sequence[str], mapping: TopicMap | None = None) -> lis
 
     """
     found = [source for argument in arguments for source in _sources(argument)]
-    return [replace(one, mapping=mapping) if one.kind == 'bag' else one for one in found]
+    told = {'mapping': mapping, 'namespace': namespace}
+    return [replace(one, **told) if one.kind == 'bag' else one for one in found]
 
 
 def _sources(argument: str) -> list[Source]:

@@ -118,10 +118,13 @@ class BagFile:
         pending += pending // 64  # what does not compress becomes longer
         return self.output.position + pending + self._ending + self._per_chunk()
 
-    def write(self, topic: str, log_time: int, data: bytes) -> bool:
-        """Write one serialized message, stamped in ns; whether that has closed the chunk."""
+    def write(
+        self, topic: str, log_time: int, data: bytes, publish_time: int | None = None
+    ) -> bool:
+        """Write one serialized message, times in ns; whether that has closed the chunk."""
         before = self.output.position
-        self._writer.add_message(self._channels[topic], log_time, data, log_time)
+        published = log_time if publish_time is None else publish_time
+        self._writer.add_message(self._channels[topic], log_time, data, published)
         self.extent.add(topic, log_time)
         if topic == self._pace:
             self._heard = time.monotonic()

@@ -80,6 +80,11 @@ class BagWriter:
         """File that is being written."""
         return self._file.output.path
 
+    @property
+    def count(self) -> int:
+        """Number of messages that were written."""
+        return sum(sum(extent.counts.values()) for extent in self._extents)
+
     def _next_file(self) -> BagFile:
         path = self._folder / f'{self._name}_{len(self._extents)}.mcap'
         file = BagFile(path, self._attachments, self._storage)
@@ -117,14 +122,24 @@ class BagWriter:
         """Whether a topic is registered."""
         return topic in self._definitions
 
-    def write(self, topic: str, log_time: int, data: bytes) -> None:
-        """Write one serialized message, stamped in ns; RecordingError when no more is taken."""
+    def write(
+        self, topic: str, log_time: int, data: bytes, publish_time: int | None = None
+    ) -> None:
+        """Write one serialized message; RecordingError when no more is taken.
+
+        Parameters
+        ----------
+        topic : registered
+        log_time, publish_time : ns; without a publish time that is the log time
+        data : the message
+
+        """
         with self._lock:
             self._guard.refuse_broken()
             try:
                 if self._file.is_full(topic, log_time, len(data)):
                     self._split()
-                closed = self._file.write(topic, log_time, data)
+                closed = self._file.write(topic, log_time, data, publish_time)
                 if closed:
                     self._waits_since = None
                     self._guard.follow(self._file)

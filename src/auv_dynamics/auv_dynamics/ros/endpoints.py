@@ -10,6 +10,7 @@ from auv_dynamics import interface
 from auv_dynamics.ros.kinds import type_name
 from auv_dynamics.ros.topics import Topic
 
+TOOLS = ('rosbag2_recorder', '_ros2cli')  # how the names of their nodes begin
 UNNAMED = '_NODE_NAME_UNKNOWN_'  # the names of nodes arrive behind their endpoints
 NAMELESS = 'a node without a name yet'
 NAMED = 1.0  # s after which a name does not come any more
@@ -86,12 +87,18 @@ def why_silent(node: Node, topic: Topic) -> str:
 
 
 def onlookers(node: Node, topic: str) -> int:
-    """How many subscriptions of a topic are of observers, or may turn out to be.
+    """How many subscriptions of a topic are not of its graph, or may turn out not to be.
 
-    Observers subscribe with best effort: a reliable subscription without a name is none of them.
+    These are observers, the recorder of another namespace, and tools: `ros2 bag`, `ros2 topic`.
     """
     found = node.get_subscriptions_info_by_topic(node.resolve_topic_name(topic))
-    return sum(map(observes, found))
+    return sum(_looks_on(node, one) for one in found)
+
+
+def _looks_on(node: Node, endpoint: Any) -> bool:
+    name = endpoint.node_name
+    foreign = name == interface.RECORDER and endpoint.node_namespace != node.get_namespace()
+    return foreign or name == UNNAMED or observes(endpoint) or name.startswith(TOOLS)
 
 
 def observes(endpoint: Any) -> bool:
@@ -114,6 +121,23 @@ def endpoints(node: Node, topic: Topic) -> Endpoints:
     return Endpoints(
         len(ours), len(subscribers), others[0] if others else '', tuple(filter(None, conflicts))
     )
+
+
+def has_conflict(node: Node, topic: Topic) -> bool:
+    """Whether there is an endpoint of a topic that a node cannot hear, or is not heard by."""
+    name = node.resolve_topic_name(topic.name)
+    subscribers = node.get_subscriptions_info_by_topic(name)
+    return any(
+        _conflict(topic, publisher, subscriber)
+        for publisher in node.get_publishers_info_by_topic(name)
+        for subscriber in subscribers
+        if _is_of(node, publisher) or _is_of(node, subscriber)
+    )
+
+
+def _is_of(node: Node, endpoint: Any) -> bool:
+    own = node.get_name(), node.get_namespace()
+    return (endpoint.node_name, endpoint.node_namespace) == own
 
 
 def _conflict(topic: Topic, publisher: Any, subscriber: Any) -> str:

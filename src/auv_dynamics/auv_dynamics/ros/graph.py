@@ -24,7 +24,7 @@ from auv_dynamics.interface import BadMessageError, Frames
 from auv_dynamics.nearest import meant
 from auv_dynamics.ros.codec import Codec
 from auv_dynamics.ros.convert import stamp
-from auv_dynamics.ros.endpoints import full_name, onlookers
+from auv_dynamics.ros.endpoints import full_name, has_conflict, onlookers
 from auv_dynamics.ros.kinds import type_name
 from auv_dynamics.ros.parameters import declare
 from auv_dynamics.ros.topics import (
@@ -104,9 +104,10 @@ class Graph:
         self._said: dict[str, float] = {}
         self._ready = False
         self._not_ready: Callable[[], str] = str
-        self._reasons: list[Callable[[], Health]] = [self._crowd]
+        self._reasons: list[Callable[[], Health]] = [self._crowd, self._conflict]
         self._lasting = Lasting(node.get_logger())
         self._single: set[str] = set()  # topics of a single publisher that concern this node
+        self._conflicts: dict[str, Topic] = {}  # by what was said of them
         self._expected: dict[str, int] = {}
         self.frames = Frames()
         self.must_hold = 0  # messages: a publisher of step topics needs a greater depth
@@ -283,6 +284,13 @@ class Graph:
         response.success, response.message = not reason, reason or 'ready'
         return response
 
+    def _conflict(self) -> Health:
+        """Whom this node does not hear, or who does not hear it, for as long as that lasts."""
+        told = self._conflicts.items()
+        return ERROR, next((text for text, topic in told if has_conflict(self.node, topic)), '')
+
     def _incompatible(self, topic: Topic, event: Any) -> None:
         policy = QoSPolicyKind(event.last_policy_kind).name.lower()
-        self.complain(f'{topic.name}: incompatible QoS with another endpoint: {policy}')
+        text = f'{topic.name}: incompatible QoS with another endpoint: {policy}'
+        self._conflicts[text] = topic
+        self.complain(text)

@@ -109,6 +109,32 @@ def test_no_file_is_larger_than_it_may_be(
     assert recover(tmp_path / 'bag').changed is False
 
 
+@pytest.mark.parametrize('where', ['loss', 'free_space', 'sync', 'flush'])
+def test_any_exception_of_the_thread_ends_the_recording_in_good_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    writer = writer_of(tmp_path / 'bag', free_space=1)
+    writer.write('/a', 0, said('a message'))
+
+    def strange(*_: object) -> None:
+        raise ValueError('nobody has thought of this')
+
+    with monkeypatch.context() as patched:
+        kind = writer_module.BagFile if where == 'flush' else output.Output
+        patched.setattr(kind, where, strange)
+        limit = time.monotonic() + PATIENCE
+        while not writer.trouble:
+            assert time.monotonic() < limit
+            time.sleep(0.01)
+    assert writer.trouble.endswith('bag_0.mcap: ValueError: nobody has thought of this')
+    writer.write('/a', 1, said('another one'))
+    writer.close()
+    contents = read_bag(tmp_path / 'bag')
+    assert contents.counts == {'/a': 2}
+    assert contents.notes == []
+    assert not recover(tmp_path / 'bag').changed
+
+
 def test_the_thread_does_not_stumble_over_files_that_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,5 +1,6 @@
 """`auv recover` as a user meets it: files, names, exit codes, and repairs that are ended midway."""
 
+import errno
 import fcntl
 import json
 import os
@@ -235,6 +236,24 @@ def test_a_bag_that_is_being_recorded_is_refused(
     assert len(err.splitlines()) == 1
     writer.close()
     assert command(capsys, tmp_path / 'bag')[0] == 0
+
+
+@pytest.mark.parametrize('has_locks', [True, False])
+def test_a_network_file_system(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_locks: bool
+) -> None:
+    """There an exclusive lock asks for a file that may be written, or there is none at all."""
+
+    def flock(descriptor: int, _: int) -> None:
+        if not has_locks:
+            raise OSError(errno.ENOLCK, 'No locks available')
+        if fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE != os.O_RDWR:
+            raise OSError(errno.EBADF, 'Bad file descriptor')
+
+    bag = write_bag(tmp_path / 'bag')
+    monkeypatch.setattr(fcntl, 'flock', flock)
+    notes = recover(bag).document()['notes']
+    assert notes == ([] if has_locks else ['bag_0.mcap: not locked: no locks available'])
 
 
 def test_two_repairs_at_once(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -111,14 +112,10 @@ class OtherTopics:
         kind = self._kinds[topic]
         # what comes late is seen at the next look
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        callback: Any = partial(self._take, topic, kind)
         try:
             subscription = self._node.create_subscription(
-                _class(kind),
-                topic,
-                lambda message, way: self._take(topic, kind, message, way),
-                qos,
-                event_callbacks=events,
-                raw=True,
+                _class(kind), topic, callback, qos, event_callbacks=events, raw=True
             )
         except (ImportError, RCLError) as error:
             self._leave(topic, first_line(error))
@@ -128,7 +125,8 @@ class OtherTopics:
 
     def _leave(self, topic: str, why: str) -> None:
         self.left[topic] = why
-        self._node.get_logger().warning(f'{topic}: not recorded, {why}')
+        node: Any = self._node
+        node.get_logger().warning(f'{topic}: not recorded, {why}')
 
 
 def _class(kind: str) -> type:

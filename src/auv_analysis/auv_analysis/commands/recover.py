@@ -49,6 +49,8 @@ def _print(document: dict[str, Any]) -> None:
     out.print(f'{document["messages"]} messages, {words}')
     attachments = ', '.join(document['attachments']) or 'none'
     out.print(f'attachments: {attachments}')
+    for note in document['notes']:
+        out.print(f'note: {note}')
     if not document['changed']:
         out.print('nothing was changed')
 

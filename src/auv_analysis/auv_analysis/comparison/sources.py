@@ -77,8 +77,10 @@ def sources_of(
 
     """
     found = [source for argument in arguments for source in _sources(argument)]
-    told = {'mapping': mapping, 'namespace': namespace}
-    return [replace(one, **told) if one.kind == 'bag' else one for one in found]
+    return [
+        replace(one, mapping=mapping, namespace=namespace) if one.kind == 'bag' else one
+        for one in found
+    ]
 
 
 def _sources(argument: str) -> list[Source]:

@@ -2,7 +2,7 @@
 
 from auv_analysis.failure import FailedError
 from auv_analysis.recording.bag_file import BagFile
-from auv_dynamics.files import reason
+from auv_dynamics.files import first_line, reason
 
 
 class RecordingError(FailedError):
@@ -34,7 +34,7 @@ class Guard:
         try:
             loss = file.output.loss()
             self._check_space(file)
-        except OSError as error:
+        except Exception as error:
             self.fail(file, error)
             return
         if loss:
@@ -54,9 +54,19 @@ class Guard:
             text = f'{free} bytes free on its file system, storage.free_space asks for {asked}'
             self.trouble = f'{file.output.path}: {text}'
 
-    def fail(self, file: BagFile, error: OSError) -> None:
-        """The system has refused something."""
-        self.give_up(f'{error.filename or file.output.path}: {reason(error)}')
+    def fail(self, file: BagFile, error: Exception, *, final: bool = False) -> None:
+        """Take an error as the end: of all where the system has refused something.
+
+        After any other error the recording ends as well, but what has been recorded is finished,
+        unless that is what has failed, `final`.
+        """
+        if isinstance(error, OSError):
+            self.give_up(f'{error.filename or file.output.path}: {reason(error)}')
+            return
+        text = f'{file.output.path}: {type(error).__name__}: {first_line(error)}'
+        if final:
+            self.give_up(text)
+        self.trouble = self.trouble or text
 
     def give_up(self, trouble: str) -> None:
         """Nothing more is written."""

@@ -113,7 +113,7 @@ class BagWriter:
             self._guard.refuse_broken()
             try:
                 self._file.define(definition, schema)
-            except OSError as error:
+            except Exception as error:
                 self._guard.fail(self._file, error)
                 self._guard.refuse_broken()
             self._definitions[topic] = definition, schema
@@ -147,7 +147,7 @@ class BagWriter:
                     self._waits_since = time.monotonic()
                 else:
                     self._flush_due()
-            except OSError as error:
+            except Exception as error:
                 self._guard.fail(self._file, error)
                 self._guard.refuse_broken()
 
@@ -166,13 +166,13 @@ class BagWriter:
             self._waits_since = None
 
     def _look(self) -> None:
-        """What the thread does every tenth of a second."""
+        """What the thread does every tenth of a second; whatever it raises ends the recording."""
         if self.broken:
             return
         with self._lock:
             try:
                 self._flush_due()
-            except OSError as error:
+            except Exception as error:
                 self._guard.fail(self._file, error)
         self._finish_full()
         file = self._file  # open until the next look, even if it is full by now
@@ -183,7 +183,7 @@ class BagWriter:
         if now - self._synced >= SYNC_PERIOD and not self.broken:
             try:
                 file.output.sync()
-            except OSError as error:
+            except Exception as error:
                 self._guard.fail(file, error)
             self._synced = time.monotonic()
 
@@ -192,8 +192,8 @@ class BagWriter:
             file = self._full[0]
             try:
                 file.finish()
-            except OSError as error:
-                self._guard.fail(file, error)
+            except Exception as error:
+                self._guard.fail(file, error, final=True)
             else:
                 self._full.pop(0)
 
@@ -217,7 +217,7 @@ class BagWriter:
         self._finish_full()
         for file in self._full:
             if self._guard.displaced:
-                with contextlib.suppress(OSError):
+                with contextlib.suppress(Exception):
                     file.finish()
             file.output.close()
         self._guard.refuse_broken()
@@ -226,4 +226,6 @@ class BagWriter:
             write_metadata(self._folder, as_text(metadata(definitions, self._extents)))
         except OSError as error:
             self._guard.give_up(f'{self._folder / NAME}: {reason(error)}')
+        except Exception as error:
+            self._guard.fail(self._file, error, final=True)
         self._guard.refuse_broken()

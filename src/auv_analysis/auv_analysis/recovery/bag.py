@@ -52,8 +52,10 @@ def recover(bag: Path, progress: Progress = lambda *_: None) -> Report:
     """
     sources = _sources(bag)
     try:
-        with taken([*sources.values()]):
-            return _recover(bag, sources, progress)
+        with taken([*sources.values()]) as notes:
+            report = _recover(bag, sources, progress)
+            report.notes += notes
+            return report
     except OSError as error:
         raise failed(bag, error) from None
 

@@ -21,20 +21,34 @@ Progress = Callable[[str, int, int], None]  # what is done, bytes that are done,
 
 
 @contextlib.contextmanager
-def taken(paths: list[Path]) -> Iterator[None]:
-    """Hold the locks of files; InputError where a recorder or another repair has one."""
+def taken(paths: list[Path]) -> Iterator[list[str]]:
+    """Hold the locks of files; InputError where a recorder or another repair has one.
+
+    Gives a note for each file that could not be locked: one that somebody else repairs at the same
+    time is not noticed.
+    """
     with contextlib.ExitStack() as stack:
+        notes = []
         for path in paths:
-            descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+            descriptor = _opened(path)
             stack.callback(os.close, descriptor)
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise InputError(path, '', EXPECTED, 'a file that is being written') from None
             except OSError as error:
-                if error.errno not in (errno.ENOTSUP, errno.ENOLCK, errno.ENOSYS):
-                    raise
-        yield
+                notes.append(f'{path.name}: not locked: {reason(error)}')
+        yield notes
+
+
+def _opened(path: Path) -> int:
+    """Descriptor of a file, for writing where that is allowed: network file systems want that."""
+    try:
+        return os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError as error:
+        if error.errno not in (errno.EACCES, errno.EPERM, errno.EROFS):
+            raise
+        return os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
 
 
 def watch(path: Path, before: tuple[int, int, int]) -> None:

@@ -43,12 +43,14 @@ class Report:
     bag : as it was named
     files : in their order
     metadata : 'unchanged', 'written' or 'none': a bag that rosbag2 has nothing to say of
+    notes : what could not be done, one line each
 
     """
 
     bag: str
     files: list[FileReport] = field(default_factory=list)
     metadata: str = 'unchanged'
+    notes: list[str] = field(default_factory=list)
 
     @property
     def changed(self) -> bool:
@@ -77,6 +79,7 @@ class Report:
             'attachments': sorted(
                 {name for file in self.files for name, _ in file.audit.attachments}
             ),
+            'notes': self.notes,
         }
 
 

@@ -25,6 +25,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag import read_bag
+from auv_analysis.bag.roles import ODOMETRY
 from auv_analysis.replay_node import ReplayNode
 from auv_dynamics.files import InputError
 from auv_dynamics.interface import nanoseconds
@@ -119,6 +120,19 @@ def test_keeps_the_time_of_the_bag(tmp_path: Path) -> None:
         assert ended(peer, replay) == 0
         all_heard(peer, 50, ODOM)
     assert steps_of(peer, ODOM) == list(range(50))
+
+
+def test_names_gaps_and_jumps_over_them(tmp_path: Path) -> None:
+    """A bag with an odometry of two epochs; nobody waits for decades."""
+    bag = Bag(tmp_path / 'bag.mcap')
+    for k in (0, 1, 10**11, 10**11 + 1):
+        bag.add('/odom', ODOMETRY, k * STEP, serialized(odometry(k * STEP, STATE)))
+    values = {'expected_subscribers': ['odom=1'], 'skip_gaps': True}
+    with playing(bag.close(), **values) as (peer, replay):
+        peer.listen(ODOM, topics.CLOCK)
+        assert ended(peer, replay) == 0
+        all_heard(peer, 4, ODOM)
+        assert 'nothing from 0.01 to 1e+09 s of the bag' in ' '.join(replay.remarks())
 
 
 def test_plays_a_part_again_and_again(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ NAME = 'replay_node'
 DISCOVERY = 1.0  # s in which those who are there already are met
 CAREFUL = 3.0  # s, the same where a vehicle may be among them
 LOOK = 0.1  # s between two looks at the others
+SHOWN = 5  # gaps that are named, the longest ones
 
 
 class ReplayNode(BulkNode):
@@ -49,7 +50,11 @@ class ReplayNode(BulkNode):
 
     def remarks(self) -> list[str]:
         """What is odd about the bag, and what of it is not played."""
-        return [*self.settings.index.notes, *self.settings.selection.remarks()]
+        p = self.settings
+        longest = sorted(p.gaps, key=lambda gap: gap[0] - gap[1])[:SHOWN]
+        then = 'jumped over' if p.skip_gaps else '--skip-gaps jumps over it'
+        gaps = [f'nothing from {a:g} to {b:g} s of the bag: {then}' for a, b in sorted(longest)]
+        return [*p.index.notes, *p.selection.remarks(), *gaps]
 
     @property
     def playing(self) -> bool:

@@ -25,6 +25,7 @@ class ReplayParameters:
     begin, end : first and last log time, ns
     rate : seconds of the bag per second, 0: as fast as possible
     loop, start_paused : begin again at the end; wait for `~/run` at the beginning
+    skip_gaps : do not wait where nothing was recorded for more than a minute
     clock : publish the time of the bag
     foreign : publish commands also where a foreign node acts on them
     expected : recorded topic -> subscribers that are waited for
@@ -39,10 +40,18 @@ class ReplayParameters:
     rate: float
     loop: bool
     start_paused: bool
+    skip_gaps: bool
     clock: bool
     foreign: bool
     expected: dict[str, int]
     answers: str
+
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """Where nothing is played for more than a minute: s of the bag before and behind it."""
+        found = self.index.gaps(self.selection.names, self.begin, self.end)
+        first = self.index.first
+        return [((a - first) / NANOSECONDS, (b - first) / NANOSECONDS) for a, b in found]
 
 
 def replay_parameters(node: Node) -> ReplayParameters:
@@ -57,6 +66,7 @@ def replay_parameters(node: Node) -> ReplayParameters:
     )  # fmt: skip
     loop = declare(node, 'loop', bool, False, 'begin again at the end')
     paused = declare(node, 'start_paused', bool, False, 'wait for ~/run')
+    skips = declare(node, 'skip_gaps', bool, False, 'jump where nothing was recorded for a minute')
     clock = declare(node, 'clock', bool, True, 'publish /clock')
     foreign = declare(
         node, 'allow_commands_to_foreign', bool, False,
@@ -79,7 +89,7 @@ def replay_parameters(node: Node) -> ReplayParameters:
     end = begin + round(duration * NANOSECONDS) if duration else index.last
     expected = _counts(name, listed, selection)
     return ReplayParameters(
-        index, selection, begin, end, rate, loop, paused, clock, foreign, expected, answers
+        index, selection, begin, end, rate, loop, paused, skips, clock, foreign, expected, answers
     )  # fmt: skip
 
 

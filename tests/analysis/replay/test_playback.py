@@ -16,6 +16,16 @@ def test_due_times_do_not_drift() -> None:
         assert playback.wait(NOW + 0.25 * k / 100 - 1.0, ns) == pytest.approx(1.0, abs=1e-9)
 
 
+def test_a_gap_is_jumped_over_and_the_time_goes_on_behind_it() -> None:
+    playback = Playback(rate=2.0, skips_gaps=True)
+    playback.wait(NOW, 0)
+    playback.played(0)
+    assert playback.wait(NOW + 1.0, 60 * SECOND) == 29.0, 'a minute is none'
+    assert playback.wait(NOW + 1.0, 10**9 * SECOND) == 0.0
+    playback.played(10**9 * SECOND)
+    assert playback.wait(NOW + 1.5, (10**9 + 3) * SECOND) == 1.0
+
+
 @pytest.mark.parametrize('ns', [0, SECOND, 10**6 * SECOND])
 def test_as_fast_as_possible_never_waits(ns: int) -> None:
     playback = Playback(rate=0.0)

@@ -1,6 +1,7 @@
 """The order of what is played: by log time whatever the bag, in little memory."""
 
 import tracemalloc
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,28 @@ def test_memory_does_not_grow_with_the_bag(tmp_path: Path, beside: bool) -> None
         most[count] = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
     assert most[4000] - most[500] < 0.05 * 3500 * len(text)  # the index of a chunk, no message
+
+
+@quick
+@given(
+    st.lists(TIMES, min_size=1, max_size=4).filter(any),
+    st.sets(st.sampled_from(TOPICS)),
+    st.sampled_from([{'chunk_size': 200}, {'chunk_size': 1}]),
+)
+def test_gaps_of_what_is_played_are_those_between_its_log_times(
+    tmp_path, files, topics, options
+) -> None:
+    apart = 50 * 10**9
+    listed = [[(k * apart, topic) for k, topic in entries] for entries in files]
+    everything = write(tmp_path, listed, **options)
+    times = sorted({ns for ns, topic, _ in everything if topic in topics})
+    gaps = [(a, b) for a, b in pairwise(times) if b - a > apart]
+    index = index_bag(tmp_path)
+    assert index.gaps(topics, 0, 2**63) == gaps
+    for begin, end in gaps[:1]:
+        assert index.gaps(topics, begin, end) == [(begin, end)]
+        assert index.gaps(topics, begin + 1, 2**63) == gaps[1:]
+        assert index.gaps(topics, 0, end - 1) == []
 
 
 def test_a_file_is_opened_when_its_time_has_come(tmp_path: Path, monkeypatch) -> None:

@@ -63,6 +63,7 @@ def _parameters(options: argparse.Namespace) -> dict[str, Any]:
         'duration': positive(options.duration, '--duration'),
         'loop': options.loop,
         'start_paused': options.paused,
+        'skip_gaps': options.skip_gaps,
         'topics': options.topics,
         'namespace': options.namespace,
         'original_names': options.original_names,
@@ -136,6 +137,7 @@ def _document(node: Any, keyboard: Keyboard, elapsed: float) -> dict[str, Any]:
         'interrupted': keyboard.ended,
         'commands_stopped': player.guard.stopped or None,
         'silent': player.silent,
+        'gaps': [{'from': before, 'to': behind} for before, behind in p.gaps],
         'notes': p.index.notes,
     }
 

@@ -1,5 +1,6 @@
 """What lies in a bag that is to be played: channels, span, and in which order its tables come."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,11 +10,14 @@ from mcap.records import Channel, McapRecord, Schema
 from auv_analysis.bag.files import bag_files
 from auv_analysis.bag.records import records
 from auv_analysis.bag.tables import Table
+from auv_analysis.replay.playback import GAP
 from auv_dynamics.files import InputError
 from auv_dynamics.interface import NANOSECONDS
 
 NEVER = 1 << 64  # ns, later than every log time
 LATEST = (1 << 31) * NANOSECONDS  # of a ROS time
+MOST_SPANS = 1000  # of a topic that are told apart
+Span = tuple[int, int]  # ns, first and last log time
 
 
 @dataclass
@@ -61,6 +65,7 @@ class BagIndex:
     topics : recorded name -> how it was recorded
     counts : recorded name -> number of messages
     first, last : log times in ns
+    spans : recorded name -> log times of it without a gap in between, in the order of the bag
     clashes : topics that were recorded in more than one way
     notes : what is odd, one line each
 
@@ -70,10 +75,21 @@ class BagIndex:
     files: list[PlayedFile] = field(default_factory=list)
     topics: dict[str, PlayedTopic] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
+    spans: dict[str, list[Span]] = field(default_factory=dict)
     first: int = NEVER
     last: int = -1
     clashes: set[str] = field(default_factory=set)
     notes: list[str] = field(default_factory=list)
+
+    def gaps(self, topics: Collection[str], begin: int, end: int) -> list[Span]:
+        """Last log time before and first one behind each gap of some topics, from begin to end."""
+        found = sorted(span for topic in topics for span in self.spans.get(topic, ()))
+        gaps, reached = [], found[0][1] if found else 0
+        for first, last in found:
+            if first - reached > GAP and begin <= reached and first <= end:
+                gaps.append((reached, first))
+            reached = max(reached, last)
+        return gaps
 
 
 def index_bag(bag: str | Path) -> BagIndex:
@@ -139,5 +155,21 @@ def _count(table: Table, names: dict[int, str], path: Path, index: BagIndex) -> 
             raise InputError(path, f'channel {channel}', 'a channel before its messages', None)
         topic = names[channel]
         index.counts[topic] = index.counts.get(topic, 0) + int(counts[channel])
+        _span(index.spans.setdefault(topic, []), table.log_times[table.channels == channel])
     index.first = min(index.first, int(table.log_times.min()))
     index.last = max(index.last, int(table.log_times.max()))
+
+
+def _span(spans: list[Span], times: np.ndarray) -> None:
+    """Add the log times of a topic in a table; further gaps than can be told apart are none."""
+    ordered = np.sort(times)
+    inner = np.flatnonzero(np.diff(ordered) > GAP)
+    firsts = ordered[np.concatenate([[0], inner + 1])].tolist()
+    lasts = ordered[np.concatenate([inner, [-1]])].tolist()
+    for first, last in zip(firsts, lasts, strict=True):
+        before = spans[-1] if spans else (first, last)
+        near = first - before[1] <= GAP and before[0] - last <= GAP
+        if spans and (near or len(spans) >= MOST_SPANS):
+            spans[-1] = min(before[0], first), max(before[1], last)
+        else:
+            spans.append((first, last))

@@ -13,6 +13,8 @@ def add_options(command: argparse.ArgumentParser) -> None:
     command.add_argument('--duration', metavar='S', help='play so many s of it')
     command.add_argument('--loop', action='store_true', help='begin again at its end')
     command.add_argument('--paused', action='store_true', help='begin paused')
+    text = 'jump where nothing was recorded for more than a minute'
+    command.add_argument('--skip-gaps', action='store_true', help=text)
     text = 'recorded names or patterns; default: all'
     command.add_argument('--topics', nargs='+', metavar='TOPIC', help=text)
     names = command.add_mutually_exclusive_group()

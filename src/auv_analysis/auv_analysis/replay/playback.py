@@ -5,6 +5,7 @@ import math
 from auv_dynamics.interface import NANOSECONDS
 
 HELD = math.inf
+GAP = 60 * NANOSECONDS  # ns without a message, from which it is a gap
 
 
 class Playback:
@@ -17,6 +18,7 @@ class Playback:
     ----------
     rate : seconds of the bag per second; 0: as fast as possible
     paused : whether it begins paused
+    skips_gaps : whether a message behind a gap is due at once
 
     Attributes
     ----------
@@ -24,8 +26,8 @@ class Playback:
 
     """
 
-    def __init__(self, rate: float, paused: bool = False):
-        self.rate, self.paused = rate, paused
+    def __init__(self, rate: float, paused: bool = False, *, skips_gaps: bool = False):
+        self.rate, self.paused, self._skips_gaps = rate, paused, skips_gaps
         self._place: tuple[float, int] | None = None  # a time of the clock, and of the bag then
         self._reached = 0
         self._until = -1  # ns up to which is played although it is paused
@@ -42,6 +44,8 @@ class Playback:
             return 0.0 if ns <= self._until else HELD
         if self.rate == 0.0:
             return 0.0
+        if self._skips_gaps and ns - self._reached > GAP:
+            self._place = now, ns
         clock, place = self._place
         return clock + (ns - place) / (self.rate * NANOSECONDS) - now
 

@@ -57,7 +57,9 @@ class Player:
         self._receivers = Receivers(node, self._publishers)
         self._answers = Answers(node.graph, settings.answers) if settings.answers else None
         self._say_clock = node.graph.output(topics.CLOCK) if settings.clock else None
-        self.playback = Playback(settings.rate, settings.start_paused)
+        self.playback = Playback(
+            settings.rate, settings.start_paused, skips_gaps=settings.skip_gaps
+        )
         self.published: Counter[str] = Counter()
         self.loops, self.now_ns, self._clock_ns = 0, settings.begin, -1
         self.ended, self.failure = False, ''

@@ -12,6 +12,7 @@ from pages import Page, at, tokens
 from auv_analysis import cli
 from auv_analysis.report import document, rendering
 from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.text import MISSING
 
 
@@ -72,7 +73,7 @@ def test_a_report_says_what_made_it(folder):
 def made(tmp_path: Path, **changes) -> str:
     columns = Column('what', numeric=False), Column('x', 'm', 'how far <it> is', group='far')
     rows = [[Cell('<a>'), cell(0.0)], [Cell('b'), cell(None)], [Cell('c'), cell(1234.5, 'here')]]
-    table = Table('t', 'A table of x_d.', columns, rows)
+    table = Table('t', Maths('A table of x_d.'), columns, rows)
     blocks = ['A paragraph.', Sentence('It is 1.', 'table-t'), table]
     sections = [Section('s', 'First', blocks), Section('empty', 'Second', [])]
     arguments = {'title': 'T', 'about': 'a', 'findings': [Sentence('Found.', 's')]} | changes

@@ -17,7 +17,6 @@ from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.page import write_report
-from auv_analysis.report.rendering import maths
 from auv_analysis.report.text import fixed, join, number, plain, tied
 from auv_analysis.report.traces import decimate
 from auv_analysis.run import Run
@@ -329,4 +328,3 @@ def test_numbers_as_text():
         '', 'a', 'a and b', 'a, b and c',
     ]  # fmt: skip
     assert tied('840 N m in 2 s') == '840\u00a0N\u00a0m in 2\u00a0s'
-    assert str(maths('w_X < ξ3, Lambda')) == 'w<sub>X</sub> &lt; ξ<sub>3</sub>, Λ'

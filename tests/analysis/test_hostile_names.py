@@ -6,13 +6,18 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+import tunings
 import yaml
 from rich.table import Table
 from rich.text import Text
 from stranger_bags import SCENARIO, write
 
-from auv_analysis import cli, load_run
+from auv_analysis import cli, load_run, load_scenario, simulate
 from auv_analysis.console import TextConsole
+from auv_analysis.report.overview import settling
+from auv_analysis.report.quantities import Maths, symbol
+from auv_analysis.report.rendering import maths
+from auv_analysis.report.sketching import sketches
 from auv_dynamics import load_vehicle
 from auv_dynamics.files import InputError
 from auv_dynamics.printable import MARK, printable
@@ -108,3 +113,34 @@ def test_a_console_shows_texts_and_keeps_its_own_colours() -> None:
 def test_lines_of_an_error_stay_lines() -> None:
     assert printable('a\nb\x1bc\td') == f'a\nb{MARK}c{MARK}d'
     assert printable('Δξ – ½ · 漢\u00a0字') == 'Δξ – ½ · 漢\u00a0字'
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_names_that_look_like_symbols_stay_as_they_are(tmp_path: Path, capsys) -> None:
+    names = ('dolphin', 'alphabet', 'psi_delta', 'nu-shell', 'omega3', 'tau', 'k_D', 'Lambda')
+    gvc = {'law': 'gvc', 'k_D': 6.0, 'k_I': 2.0, 'Lambda': 0.5, 'Gamma': 20.0}
+    path = tunings.write(
+        tmp_path, dict.fromkeys(names, gvc), name='w_X.phi', duration=0.1,
+        vehicle={**tunings.DIAGONAL, 'name': 'seagull omega^2 ξ3'},
+    )  # fmt: skip
+    cli.main(['simulate', str(path), '--out', str(tmp_path / 'out')])
+    page, shown = (tmp_path / 'out' / 'report.html').read_text(), capsys.readouterr().err
+    for name in (*names, 'w_X.phi', 'seagull omega^2 ξ3'):
+        assert f'>{name}<' in page or f': {name}<' in page or f' {name};' in page, name
+        assert name in shown or name.startswith(('w_X', 'seagull')), name
+    assert '<sub>X</sub>.φ' not in page
+    assert 'K<sub>D</sub>' in page  # ours is set
+    figure, _, caption = settling(sketches({n: simulate(load_scenario(path), n) for n in names}))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == list(names)
+    assert all(f'{name} ' in caption for name in names)
+
+
+def test_symbols_are_set_in_words_of_ours_alone() -> None:
+    text = Maths('w_X < ξ3, K_D of {} and M^-1 of {}', 'omega_f & Gamma', symbol('Lambda'))
+    assert str(text) == 'w_X < ξ3, K_D of omega_f & Gamma and M^-1 of Lambda'
+    assert str(maths(text)) == (
+        'w<sub>X</sub> &lt; ξ<sub>3</sub>, K<sub>D</sub> of omega_f &amp; Gamma '
+        'and M<sup>−1</sup> of Λ'
+    )
+    assert str(maths('dolphin w_X')) == 'dolphin w_X'
+    assert type(symbol('k_Dolphin')) is str

@@ -114,7 +114,7 @@ MEASURES = (
         'kinetic_energy.mean',
         'kinetic energy',
         'J',
-        'mean kinetic energy 1/2 nu^T M nu over its window',
+        'mean kinetic energy ½ νᵀ M ν over its window',
         ('kinetic_energy.mean',),
         'only',
     ),

@@ -13,6 +13,7 @@ from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.grids import ALWAYS, Grid, draw_grid, grid_figure, scale_bar
 from auv_analysis.report.plotting import COLOURS
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.text import join
 from auv_dynamics.signals import DOFS
 
@@ -79,12 +80,13 @@ def _correlation(charts: Sequence[Chart]) -> Drawn:
         for name, chart in coupled(charts)
     }
     title = 'Inertial correlation'
-    caption = (
+    caption = Maths(
         f'{title} M_ij / sqrt(M_ii M_jj) of the vehicles that are coupled: where i and j move with '
         'equal kinetic energies, their cross term is this part of the sum of the two. All panels '
-        'have one scale; 0: not coupled; the diagonal is left out. '
+        'have one scale; 0: not coupled; the diagonal is left out. {}',
+        uncoupled(charts),
     )
-    return _panels(grids), title, caption + uncoupled(charts)
+    return _panels(grids), title, caption
 
 
 def _shares(charts: Sequence[Chart]) -> Drawn:

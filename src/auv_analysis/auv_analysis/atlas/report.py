@@ -8,6 +8,7 @@ from auv_analysis.atlas.figures import uncoupled
 from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.grids import ALWAYS
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.rendering import write_document
 from auv_analysis.report.tables.sources import VELOCITY, WRENCH, count, pointer
 from auv_analysis.report.text import join, number
@@ -15,7 +16,7 @@ from auv_dynamics.signals import DOFS
 
 PERCENT = 100.0
 KINDS = {'delta_xi': ('Δξ', VELOCITY), 'delta_pi': ('Δπ', WRENCH)}
-MEASURE = (
+MEASURE = Maths(
     'With D = diag(M), the kinetic energy is 1/2 ν^T M ν = 1/2 y^T R y with y = D^1/2 ν and the '
     'inertial correlation R = D^-1/2 M D^-1/2. R is 1 on its diagonal; what is beside it are cross '
     'terms. R_ij is the largest part that the cross term of i and j can have of their energies '
@@ -23,7 +24,7 @@ MEASURE = (
     'cross terms together. Units of length, mass or angle change neither. Both are those of the '
     'origin and the axes of the vehicle file: another origin couples otherwise.'
 )
-SHARES = (
+SHARES = Maths(
     'The decomposition M = Upsilon^-T N Upsilon^-1 spreads the energy 1/2 M_jj ν_j^2 of a motion '
     'in j alone over its components: 1/2 N_i ξ_i^2 is the share N_i (Upsilon^-1)_ij^2 / M_jj of '
     'it. An impulse in j alone leaves the share Upsilon_ji^2 / (N_i (M^-1)_jj) in component i. '
@@ -128,9 +129,11 @@ def pairs(charts: Sequence[Chart]) -> Table:
         Column('vehicle', numeric=False),
         Column('deformed', '', 'the one whose velocity component is deformed', numeric=False),
         Column('by', '', 'the one that deforms it', numeric=False),
-        Column('correlation', '', 'inertial correlation M_ij / sqrt(M_ii M_jj)'),
+        Column('correlation', '', Maths('inertial correlation M_ij / sqrt(M_ii M_jj)')),
         Column(
-            'Δξ per velocity', '', 'entry of Upsilon^-1: Δξ of the one per velocity of the other'
+            'Δξ per velocity',
+            '',
+            Maths('entry of Υ^-1: Δξ of the one per velocity of the other'),
         ),
         Column('its unit', '', numeric=False),
         Column('Δξ share', '%', 'of the energy of a motion of "by" alone, found in "deformed"'),
@@ -163,7 +166,7 @@ def reached(charts: Sequence[Chart], kind: str) -> Table:
     columns += [Column(dof, units[i // 3], group=symbol) for i, dof in enumerate(DOFS)]
     if kind == 'delta_xi':
         meaning = 'largest 1/2 N_i Δξ_i^2 of the six at its peak, of the mean kinetic energy'
-        columns.append(Column('energy', '%', meaning))
+        columns.append(Column('energy', '%', Maths(meaning)))
     rows = [_peaks(chart, kind) for chart in charts if not chart.reached['failure']]
     caption = f'Largest {symbol} in case 1 scaled to each vehicle, under GVC.'
     note = f'{ALWAYS}: zero for every motion, by the structure of M.'

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from auv_analysis.design.result import Result
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import Drawn, FigureRecord, save_figures
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.sketching import sketches
 from auv_analysis.summary import TRANSIENT
 from auv_dynamics.signals import DOFS
@@ -146,7 +147,7 @@ def _upsilon(result: Result) -> Picture:
         figure.colorbar(grid[0].images[0], ax=grid, label=label, shrink=0.8)
         return figure
 
-    caption = (
+    caption = Maths(
         'Entries of Υ − I before and after the change, from ξ (columns) to ν (rows). The numbers '
         'are the entries in SI units; the colour is their size times the root of M_ii / M_jj, '
         'which is free of units. Below the diagonal everything is zero.'

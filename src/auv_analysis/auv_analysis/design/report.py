@@ -11,26 +11,33 @@ from auv_analysis.design.objective import OTHERS, PART, SIZE, UNREST
 from auv_analysis.design.result import Result
 from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.figure_files import FigureRecord
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.rendering import write_document
 from auv_analysis.report.text import join, number
 
-METHOD = (
-    'Every coupling is judged by its share in the motion. A deformed velocity counts by the '
-    'kinetic energy, Σ N_i ξ_i^2 = ν^T M ν, a deformed input by the dual of it, Σ π_i^2 / N_i = '
-    'τ^T M^-1 τ; both are free of units. Unless a coupling is asked for, the one with the largest '
-    'share is reduced.',
-    'A change adds to M, to the restoring moment and to the damping; Υ follows from M. The search '
-    'takes the motion of the simulated vehicle as it was and computes by (1) what input the '
-    'changed vehicle would need for it. It makes small r² + '
-    f'{OTHERS:g} (o² + e²) + {UNREST:g} b + {SIZE:g} s, where r is the largest magnitude of the '
-    'coupling (in place of it the mean of eighth powers, which is smooth), o the root sum square '
-    'of the shares of the other couplings, e the root of the mean of τ^T M^-1 τ, each after by '
-    'before, b what turns the vehicle from level at rest or rights it less, in proportion to what '
-    'rights it, and s the size of the change. Gradients are by the complex step, the search is '
-    'SLSQP within the bounds from several starts.',
-    'Every change in the tables was then simulated with its own vehicle. Of those that halve the '
-    'coupling the one with the lowest score is proposed, where every part that is changed costs '
-    f'{PART:g}; where none does, the one that lowers it most.',
+METHOD = tuple(
+    map(
+        Maths,
+        (
+            'Every coupling is judged by its share in the motion. A deformed velocity counts by '
+            'the kinetic energy, Σ N_i ξ_i^2 = ν^T M ν, a deformed input by the dual of it, '
+            'Σ π_i^2 / N_i = τ^T M^-1 τ; both are free of units. Unless a coupling is asked for, '
+            'the one with the largest share is reduced.',
+            'A change adds to M, to the restoring moment and to the damping; Υ follows from M. The '
+            'search takes the motion of the simulated vehicle as it was and computes by (1) what '
+            'input the changed vehicle would need for it. It makes small r² + '
+            f'{OTHERS:g} (o² + e²) + {UNREST:g} b + {SIZE:g} s, where r is the largest magnitude '
+            'of the coupling (in place of it the mean of eighth powers, which is smooth), o the '
+            'root sum square of the shares of the other couplings, e the root of the mean of '
+            'τ^T M^-1 τ, each after by before, b what turns the vehicle from level at rest or '
+            'rights it less, in proportion to what rights it, and s the size of the change. '
+            'Gradients are by the complex step, the search is SLSQP within the bounds from several '
+            'starts.',
+            'Every change in the tables was then simulated with its own vehicle. Of those that '
+            'halve the coupling the one with the lowest score is proposed, where every part that '
+            f'is changed costs {PART:g}; where none does, the one that lowers it most.',
+        ),
+    )
 )
 
 

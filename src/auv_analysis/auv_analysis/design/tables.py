@@ -6,6 +6,7 @@ from typing import Any
 from auv_analysis.design.printed import change
 from auv_analysis.design.words import part_words
 from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.text import MISSING, fixed, plain
 
 FILE = 'design.json:'
@@ -41,7 +42,7 @@ def ranking_table(document: Document) -> Table:
         shares = [cell(row['share'][key], f'{where}/share/{key}') for key in PHASES]
         peaks = [cell(row['largest'][key], f'{where}/largest/{key}') for key in PHASES]
         rows.append([Cell(row['coupling']), *shares, *peaks, Cell(row['unit'])])
-    meaning = (
+    meaning = Maths(
         'root of mean(N_i Δξ_i^2) / mean(ν^T M ν), or of mean(Δπ_i^2 / N_i) / mean(τ^T M^-1 τ)'
     )
     columns = (
@@ -139,8 +140,8 @@ REST = (
     ('weight', 'weight W', 'N'),
     ('buoyancy', 'buoyancy B', 'N'),
     ('weight_minus_buoyancy', 'W − B', 'N'),
-    ('metacentric_height', 'z_G − z_B', 'm'),
-    ('stability', 'static stability W z_G − B z_B', 'N m'),
+    ('metacentric_height', Maths('z_G − z_B'), 'm'),
+    ('stability', Maths('static stability W z_G − B z_B'), 'N m'),
     ('tilt_at_rest_deg', 'tilt at rest', 'deg'),
 )
 

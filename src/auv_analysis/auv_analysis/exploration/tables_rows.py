@@ -7,6 +7,7 @@ from auv_analysis.exploration.names import short_names
 from auv_analysis.exploration.results import DOCUMENT, Results, Row
 from auv_analysis.measures import BY_NAME
 from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import count, pointer
 
 MOST_FAILURES = 20
@@ -18,12 +19,12 @@ def indices(results: Results) -> Iterator[Table]:
     """Sensitivity indices, a table per method and one of interactions."""
     rows = list(enumerate(results.tables['indices']))
     sobol = {
-        'S1': ('S_1', 'share of the variance by this path alone'),
-        'S1_conf': ('±', 'half of the 95 % interval of S_1, by bootstrap'),
-        'ST': ('S_T', 'share of the variance by this path with all its interactions'),
-        'ST_conf': ('±', 'half of the 95 % interval of S_T'),
+        'S1': (Maths('S_1'), 'share of the variance by this path alone'),
+        'S1_conf': ('±', Maths('half of the 95 % interval of S_1, by bootstrap')),
+        'ST': (Maths('S_T'), 'share of the variance by this path with all its interactions'),
+        'ST_conf': ('±', Maths('half of the 95 % interval of S_T')),
     }
-    second = {'S2': ('S_2', 'share of the variance by both together alone'),
+    second = {'S2': (Maths('S_2'), 'share of the variance by both together alone'),
               'S2_conf': ('±', 'half of the 95 % interval')}  # fmt: skip
     morris = {
         'mu_star': ('μ*', 'mean size of the effect of going through the whole range'),

@@ -86,7 +86,9 @@ def _varied(sweep: Sweep, path: str) -> Varied:
 
 
 def _said(sweep: Sweep, path: str) -> tuple[str, str]:
-    named = path.replace('controllers.*.', f"controllers.'{sweep.controllers[0]}'.")
+    named, every = path, 'controllers.*.'
+    if path.startswith(every):
+        named = f"controllers.'{sweep.controllers[0]}'.{path.removeprefix(every)}"
     vehicles = list(sweep.manifest.get('vehicles', {}).values())
     return said_of(sweep.manifest.get('scenario', {}), (vehicles or [{}])[0], named)
 

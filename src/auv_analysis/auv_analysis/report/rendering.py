@@ -1,7 +1,6 @@
 """A document as one HTML file that needs nothing but itself."""
 
 import base64
-import re
 from collections.abc import Sequence
 from functools import cache
 from itertools import groupby
@@ -24,7 +23,7 @@ from auv_analysis.report.document import (
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.interactive import Interactive
 from auv_analysis.report.provenance import provenance
-from auv_analysis.report.quantities import QUANTITIES
+from auv_analysis.report.quantities import QUANTITIES, Maths
 from auv_analysis.report.text import fixed, join, number, plain, tied
 
 HERE = Path(__file__).parent
@@ -35,6 +34,7 @@ KINDS = {
     Gallery: 'gallery',
     Sentence: 'sentence',
     str: 'text',
+    Maths: 'text',
 }
 
 
@@ -110,7 +110,8 @@ def environment() -> jinja2.Environment:
     )
     found.filters |= {
         'num': number, 'plain': plain, 'fixed': fixed, 'tied': tied, 'join_words': join,
-        'maths': maths, 'by_kind': by_kind, 'data': data_of,
+        'maths': maths, 'symbols': lambda text: maths(Maths(text)),
+        'by_kind': by_kind, 'data': data_of,
     }  # fmt: skip
     return found
 
@@ -132,10 +133,6 @@ def data_of(path: Path) -> str:
 
 
 def maths(text: str) -> markupsafe.Markup:
-    """Text with its indices lowered: w_X, K_D, ξ3; Lambda and Gamma become letters."""
-    safe = str(markupsafe.escape(tied(text))).replace('Lambda', 'Λ').replace('Gamma', 'Γ')
-    safe = safe.replace('omega', 'ω').replace('phi', 'φ')
-    safe = re.sub(r'\b(Δ?[A-Za-zτξπωνΓΛΥ])_([A-Za-z0-9]{1,2})\b', r'\1<sub>\2</sub>', safe)
-    safe = re.sub(r'\^([-−]?[A-Za-z0-9]+(?:/\d)?)', r'<sup>\1</sup>', safe)
-    safe = safe.replace('<sup>-', '<sup>−')
-    return markupsafe.Markup(re.sub(r'(?<=[ξπ])([1-6])\b', r'<sub>\1</sub>', safe))
+    """Our own words with their symbols set, every other text as it stands; see `Maths`."""
+    set_text = text.html() if isinstance(text, Maths) else markupsafe.escape(text)
+    return markupsafe.Markup(tied(str(set_text)))

@@ -56,7 +56,7 @@ def typeset(text: str) -> str:
 def tied(text: str) -> str:
     """The same text, whose numbers do not part from their units at the end of a line."""
     text = re.sub(r'(?<=\d) (?=(J|N|N m|m|s|%|m/s|rad/s|kg)\b|%)', '\u00a0', text)
-    return text.replace('N m', 'N\u00a0m')
+    return re.sub(r'\bN m\b', 'N\u00a0m', text)
 
 
 def join(words: Sequence[str]) -> str:

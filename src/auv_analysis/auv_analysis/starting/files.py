@@ -71,7 +71,7 @@ def law_files(name: str, vehicle: str | None) -> dict[str, str]:
     module = read_text(path.with_suffix('.py'), 'law')
     found = CLASS.search(module)
     own = ''.join(word.capitalize() for word in name.split('_')) or name
-    shown = module.replace(found[1], own) if found else module
+    shown = re.sub(rf'\b{found[1]}\b', own, module) if found else module
     data: dict[str, Any] = copy.deepcopy(read_yaml(path, 'scenario'))
     data |= {'name': name} | ({'vehicle': vehicle} if vehicle else {})
     load_vehicle(data['vehicle'])

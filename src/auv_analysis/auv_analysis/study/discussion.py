@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.report.document import Sentence
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.text import fixed, join, number
 from auv_analysis.summary import TRANSIENT
 from auv_dynamics.signals import DOFS
@@ -86,10 +87,10 @@ def _energy(name: str, summary: Summary) -> Iterator[Sentence]:
     order = np.argsort(shares)[::-1]
     count = 1 + int(np.argmax(np.cumsum(np.array(shares)[order]) >= MOST))
     parts = [f'ξ{i + 1} ({DOFS[i]}) has {fixed(shares[i], 2)} %' for i in order[:count]]
-    text = f'Of the kinetic energy of {name} over the whole run, {join(parts)}'
+    text = f'Of the kinetic energy of {{}} over the whole run, {join(parts)}'
     rest = float(np.array(shares)[order[count:]].sum())
     text += f'; the other {len(order) - count} have {fixed(rest, 2)} % together' if rest else ''
-    yield Sentence(f'{text}.', 'table-energy')
+    yield Sentence(Maths(f'{text}.', name), 'table-energy')
 
 
 def _deformed(kind: str, name: str, summary: Summary) -> Iterator[Sentence]:

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord
+from auv_analysis.report.quantities import mathtext
 from auv_analysis.report.text import plain
 from auv_analysis.study.effects import Sensitivity, Variable
 
@@ -75,7 +76,7 @@ def _map(axes: Axes, shown: list[Variable], found: Sensitivity) -> None:
         colour = 'white' if value > 0.55 * top else '#222222'
         text = f'{value:.2f}'.replace('-0.00', '0.00')
         axes.text(column, row, text, ha='center', va='center', fontsize=7.5, color=colour)
-    axes.set_xticks(range(len(found.gains)), [_symbol(gain) for gain in found.gains])
+    axes.set_xticks(range(len(found.gains)), [mathtext(gain) for gain in found.gains])
     axes.tick_params(axis='both', length=0, labelleft=False)
     axes.grid(visible=False)
     for spine in axes.spines.values():
@@ -89,9 +90,3 @@ def _part(left: Axes, right: Axes, shown: list[Variable]) -> None:
         if names[i] != names[i - 1]:
             left.axhline(i - 0.5, color=plotting.GREY, linewidth=0.6)
             right.axhline(i - 0.5, color='white', linewidth=2.5)
-
-
-def _symbol(gain: str) -> str:
-    greek = {'Lambda': r'$\Lambda$', 'Gamma': r'$\Gamma$', 'phi': r'$\phi$'}
-    head, mark, tail = gain.partition('_')
-    return greek.get(gain, f'${head}_{{{tail}}}$' if mark and tail else gain)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from auv_analysis.report.document import Cell, Column, Sentence, Table
+from auv_analysis.report.quantities import Maths, symbol
 from auv_analysis.report.text import fixed, join, number, plain
 from auv_analysis.study.effects import Index, Sensitivity, Variable
 from auv_analysis.study.sensitivity_file import FILE
@@ -32,7 +33,10 @@ def sensitivity_table(found: Sensitivity) -> Table:
         ),
         Column('place', meaning='by spread among the degrees of freedom, its 95 % interval'),
         Column('main gain × 2', meaning='the gain that does most, and what twice of it does'),
-        *(Column(gain, meaning=MEANINGS[weight], group=GROUPS[weight]) for gain in found.gains),
+        *(
+            Column(symbol(gain), meaning=MEANINGS[weight], group=GROUPS[weight])
+            for gain in found.gains
+        ),
     )
     text = (
         f'How the figures of {found.controller} change when every gain is multiplied by a number '
@@ -67,7 +71,7 @@ def _row(variable: Variable, weight: str, found: Sensitivity) -> list[Cell]:
         ),
         of('rank', f'{ends} of {count}', rank_low=low, rank_high=high, alike=count),
         Cell(
-            f'{main.gain} {sign}{number(abs(main.doubled), 2)} %',
+            Maths(f'{{}} {sign}{number(abs(main.doubled), 2)} %', symbol(main.gain)),
             main.doubled,
             f'{FILE}:doubled',
         ),

@@ -7,6 +7,7 @@ import numpy as np
 from auv_analysis.energy import shares
 from auv_analysis.report import paper
 from auv_analysis.report.document import Cell, Column, Sentence, Table, cell
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.text import fixed, join, number
 from auv_analysis.study.attribution import Split
 from auv_analysis.study.robustness import FAILS, HOLDS, Held, Robustness, energy_ranges, met
@@ -73,7 +74,7 @@ def _row(row: Robustness, of: str) -> list[Cell]:
     )
     return [
         Cell(str(row.number), row.number, f'{CLAIMS}:number'),
-        Cell(row.claim),
+        Cell(Maths(row.claim)),
         Cell(', then '.join(shipped), kind='badge' if len(shipped) == 1 else ''),
         *shares,
         _outcome(held),
@@ -108,7 +109,7 @@ def energy_table(found: Unknowns) -> Table:
         Column('from', 'J', 'smallest of all variants'),
         Column('to', 'J', 'largest of all variants'),
         Column('to the paper', '%', 'shipped relative to the paper’s 519.47 J'),
-        *(Column(f'ξ{i + 1}', '%', group='shares') for i in range(6)),
+        *(Column(Maths(f'ξ{i + 1}'), '%', group='shares') for i in range(6)),
     )
     rows = []
     for end in ENDS:

@@ -83,18 +83,18 @@ MEANINGS = {
     'weighted_error': Meaning(
         'time-weighted error',
         'J',
-        'mean of ½ Δν^T M Δν, the kinetic energy of the velocity error, weighted by the time since '
+        'mean of ½ Δνᵀ M Δν, the kinetic energy of the velocity error, weighted by the time since '
         'the start (ITSE)',
     ),
     'error': Meaning('error', 'J', 'the same without the weight (ISE)'),
     'effort': Meaning(
         'effort',
         'J/s²',
-        'mean of ½ τ^T M^-1 τ: the kinetic energy that the wrench alone would give the vehicle '
+        'mean of ½ τᵀ M⁻¹ τ: the kinetic energy that the wrench alone would give the vehicle '
         'from rest in a second',
     ),
-    'late_error': Meaning(f'error after {TRANSIENT:g} s', 'J', 'largest ½ Δν^T M Δν from then on'),
-    'peak_effort': Meaning('peak effort', 'J/s²', 'largest ½ τ^T M^-1 τ'),
+    'late_error': Meaning(f'error after {TRANSIENT:g} s', 'J', 'largest ½ Δνᵀ M Δν from then on'),
+    'peak_effort': Meaning('peak effort', 'J/s²', 'largest ½ τᵀ M⁻¹ τ'),
     'settling': Meaning('settled', 's', f'time from which every error stays within {SETTLED}'),
 }
 

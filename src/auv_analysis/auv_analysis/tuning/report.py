@@ -6,6 +6,7 @@ from typing import Any
 
 from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.figure_files import FigureRecord
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.rendering import write_document
 from auv_analysis.tuning import tables
 
@@ -20,7 +21,7 @@ FAIR = (
     'quadratic programming with the equality as a constraint. The reference’s own law takes part, '
     'since its gains in the scenario were not searched: against it, what is left is the law’s.'
 )
-PERIOD = (
+PERIOD = Maths(
     'No velocity loop may be faster than the control period carries: lambda_max(M^-1 K_D) times '
     'the step stays at or below 1, or at the reference’s own value where that is above.'
 )

@@ -4,19 +4,20 @@ from collections.abc import Mapping
 from typing import Any
 
 from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.quantities import Maths, symbol
 from auv_analysis.report.text import MISSING, number
 from auv_analysis.report.words import gain_text
 from auv_analysis.tuning.measures import MEANINGS, Measures
 from auv_analysis.tuning.verdict import p_text
 
 SPREADS = {
-    'mass': ('relative error of M_RB and of the weight', ''),
-    'added_mass': ('relative error of M_A', ''),
-    'damping': ('relative error of D; where M_RB and M_A are not apart, of its linear part', ''),
+    'mass': (Maths('relative error of M_RB and of the weight'), ''),
+    'added_mass': (Maths('relative error of M_A'), ''),
+    'damping': (Maths('relative error of D; without M_RB and M_A apart, of its linear part'), ''),
     'buoyancy': ('relative error of the buoyancy', ''),
     'inertia': ('relative error of M along each of its directions, drawn as well', ''),
     'disturbance': ('relative change of the scenario’s own disturbance', ''),
-    'waves': ('amplitude of an added harmonic force on each axis, per M_ii', 'm/s², rad/s²'),
+    'waves': (Maths('amplitude of an added harmonic force on each axis, per M_ii'), 'm/s², rad/s²'),
     'current': ('speed of an added constant horizontal current of any heading', 'm/s'),
 }  # fmt: skip
 CONTROLLER = Column('controller', meaning='as in scenario.yaml of this folder', numeric=False)
@@ -64,7 +65,11 @@ def gains_table(document: Mapping[str, Any]) -> Table:
     """Gains of every controller."""
     entries = document['controllers']
     gains = list(dict.fromkeys(gain for entry in entries.values() for gain in entry['gains']))
-    columns = [CONTROLLER, Column('law', numeric=False), *(Column(g, numeric=False) for g in gains)]
+    columns = [
+        CONTROLLER,
+        Column('law', numeric=False),
+        *(Column(symbol(g), numeric=False) for g in gains),
+    ]
     rows = [
         [
             Cell(name),
@@ -106,7 +111,7 @@ def allowed_table(document: Mapping[str, Any]) -> Table:
                 here = *at, 'searched', gain
                 times = _times(search['structure']) if about['times_inertia'] else 'itself'
                 rows.append([
-                    Cell(name), Cell(search['structure']), Cell(gain),
+                    Cell(name), Cell(search['structure']), Cell(symbol(gain)),
                     cell(about['low'], source(*here, 'low')),
                     cell(about['high'], source(*here, 'high')),
                     Cell(times),
@@ -124,25 +129,24 @@ def _small(document: Mapping[str, Any]) -> str:
 
 
 def _times(structure: str) -> str:
-    return {
+    words = {
         'scalar': 'times the smallest to the largest M_ii: one number',
         'mass': 'times M_ii of each axis',
         'diagonal': 'times M_ii of each axis, six numbers',
         'inertia': 'times M',
-    }[structure]
+    }
+    return Maths(words[structure])
 
 
 def draws_table(document: Mapping[str, Any]) -> Table:
     """Quantiles of the measures over the draws."""
-    shown = 'q05', 'median', 'q95'
+    shown = {'q05': '5 %', 'median': 'median', 'q95': '95 %'}
     columns = [
         CONTROLLER,
         *(
-            Column(
-                q.replace('q', '').replace('05', '5 %').replace('95', '95 %'), m.unit, group=m.label
-            )
+            Column(label, m.unit, group=m.label)
             for m in MEANINGS.values()
-            for q in shown
+            for label in shown.values()
         ),
         Column('settled', '%', 'share of the draws in which all errors end inside their bands'),
         Column('diverged', '%', 'share of the draws'),

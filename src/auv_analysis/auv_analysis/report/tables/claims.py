@@ -9,6 +9,7 @@ from pyarrow import parquet
 
 from auv_analysis.report.claim import Claim
 from auv_analysis.report.document import Cell, Column, Table
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.quotes import Value
 
 FILE = 'claims.parquet'  # every number of the table: a row each, and one at least of every claim
@@ -45,10 +46,13 @@ def _row(claim: Claim) -> list[Cell]:
         Cell(
             str(claim.number), claim.number, f'{FILE}:number', off, anchor=f'claim-{claim.number}'
         ),
-        Cell(claim.claim, remark=f'Criterion: {claim.criterion}.'),
-        Cell(claim.paper, source=f'{FILE}:value', figures=_figures(claim.printed)),
+        Cell(Maths(claim.claim), remark=Maths(f'Criterion: {claim.criterion}.')),
+        Cell(Maths(claim.paper), source=f'{FILE}:value', figures=_figures(claim.printed)),
         Cell(
-            claim.ours, source=f'{FILE}:value', figures=_figures(claim.values), remark=claim.remark
+            Maths(claim.ours),
+            source=f'{FILE}:value',
+            figures=_figures(claim.values),
+            remark=Maths(claim.remark),
         ),
         Cell(claim.window, remark=claim.case),
         Cell(claim.verdict, kind='badge'),

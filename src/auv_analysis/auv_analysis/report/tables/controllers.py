@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from auv_analysis.report.document import Cell, Column, Table
+from auv_analysis.report.quantities import Maths, symbol
 from auv_analysis.report.set_up import SetUp
 from auv_analysis.report.tables.sources import numbers_in, summary_source
 from auv_analysis.report.text import fixed, join, plain
@@ -41,14 +42,15 @@ def controllers_table(runs: Mapping[str, Facts]) -> Table:
 def _controller(name: str, run: Facts) -> list[Cell]:
     defaults = getattr(SHIPPED.get(run.law), '_field_defaults', {}) if run.gains else {}
     left = {gain: value for gain, value in defaults.items() if gain not in run.gains}
-    texts = [f'{gain} = {gain_text(value)}' for gain, value in run.gains.items()]
-    texts += [f'{gain} = {gain_text(value)} (default)' for gain, value in left.items()]
+    texts = [f'{{}} = {gain_text(value)}' for value in run.gains.values()]
+    texts += [f'{{}} = {gain_text(value)} (default)' for value in left.values()]
+    said = Maths(', '.join(texts), *map(symbol, (*run.gains, *left)))
     gains = dict(numbers_in({**run.gains, **left}))
     facts = {key: summary_source(name, key) for key in ('duration', 'step', 'samples')}
     return [
         Cell(name),
         Cell(run.law),
-        Cell(', '.join(texts), figures=gains, source=SCENARIO),
+        Cell(said, figures=gains, source=SCENARIO),
         Cell(plain(run.duration, 9), run.duration, facts['duration']),
         Cell(f'{run.step:g}', run.step, facts['step']),
         Cell(fixed(run.samples, 0), run.samples, facts['samples']),

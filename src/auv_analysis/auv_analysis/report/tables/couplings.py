@@ -7,6 +7,7 @@ import numpy as np
 
 from auv_analysis.coupling import input_deformation, velocity_deformation
 from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import (
     VELOCITIES,
     VELOCITY,
@@ -37,7 +38,9 @@ def couplings_table(summaries: Summaries, vehicle: str) -> Table:
     caption = 'Couplings: the rule, and the largest magnitude over the run'
     caption += f'; the rule is that of {vehicle}.' if vehicle else '.'
     columns = [
-        Column('', meaning='Δξ_i = ξ_i − ν_i of (33), Δπ_i = π_i − τ_i of (34)', numeric=False),
+        Column(
+            '', meaning=Maths('Δξ_i = ξ_i − ν_i of (33), Δπ_i = π_i − τ_i of (34)'), numeric=False
+        ),
         Column('', meaning='degree of freedom that is deformed', numeric=False),
         Column('rule', meaning='what adds to it, by (31) and (32)', numeric=False),
         *(Column(name, meaning=f'largest magnitude in the run {name}') for name in summaries),
@@ -59,7 +62,7 @@ def _rows(kind: str, summaries: Summaries) -> Iterator[list[Cell]]:
     for i, dof in enumerate(DOFS):
         structural = dof in zeros
         figures = {f'of {DOFS[j]}': abs(float(x)) for j, x in enumerate(weights[i]) if x}
-        rule = Cell('structural zero') if structural else Cell(_linear(weights[i], signals))
+        rule = Cell('structural zero') if structural else Cell(Maths(_linear(weights[i], signals)))
         values = [
             cell(
                 summary['coupling'][f'{kind}_max'][i],
@@ -70,7 +73,7 @@ def _rows(kind: str, summaries: Summaries) -> Iterator[list[Cell]]:
         ]
         named = Cell(rule.text, figures=figures, source=summary_source(first, 'coupling_terms'))
         shown = rule if structural else named
-        yield [Cell(f'{symbol}_{i + 1}'), Cell(dof), shown, *values, Cell(units[i // 3])]
+        yield [Cell(Maths(f'{symbol}_{i + 1}')), Cell(dof), shown, *values, Cell(units[i // 3])]
 
 
 def terms_table(name: str, summary: Mapping[str, Any]) -> Table | None:
@@ -93,9 +96,9 @@ def terms_table(name: str, summary: Mapping[str, Any]) -> Table | None:
             share = term['share_percent']
             part = Cell(MISSING) if share is None else Cell(_percent(share), share, where(SHARE))
             rows.append([
-                Cell(f'{symbol}_{i + 1}'), Cell(term['to']), Cell(term['from']),
+                Cell(Maths(f'{symbol}_{i + 1}')), Cell(term['to']), Cell(term['from']),
                 cell(term['coefficient'], where('coefficient')),
-                Cell(signals[j]),
+                Cell(Maths(signals[j])),
                 cell(term['rms'], where('rms')), cell(term['max'], where('max')),
                 Cell(units[i // 3]), part,
             ])  # fmt: skip

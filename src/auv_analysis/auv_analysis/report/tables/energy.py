@@ -4,11 +4,13 @@ from typing import Any
 
 from auv_analysis.report import paper
 from auv_analysis.report.document import Cell, Column, Table
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import Summaries, summary_source
 from auv_analysis.report.text import MISSING, fixed, number
 
 SHARES = tuple(
-    Column(f'ξ{i}', '%', f'share of ½ N_{i} ξ{i}² in the kinetic energy, (30)') for i in range(1, 7)
+    Column(Maths(f'ξ{i}'), '%', Maths(f'share of ½ N_{i} ξ{i}² in the kinetic energy, (30)'))
+    for i in range(1, 7)
 )
 COLUMNS = (
     Column('controller', meaning='name of the run', numeric=False),

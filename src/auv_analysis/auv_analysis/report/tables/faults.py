@@ -4,19 +4,20 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from auv_analysis.fault_response import FILE, PARTS, SHORTEST, Response
 from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import WRENCH
 from auv_analysis.report.text import MISSING, fixed
 from auv_analysis.summary import BAND_TEXT
 from auv_dynamics.signals import DOFS
 
-ERROR, EFFORT = 'RMS of ν_d − ν', 'RMS of τ'
+ERROR, EFFORT = Maths('RMS of ν_d − ν'), 'RMS of τ'
 COLUMNS = (
     Column('', meaning='degree of freedom', numeric=False),
     Column('controller', meaning='name of the run', numeric=False),
     Column('before', '', 'RMS of the velocity error before the fault; m/s, rad/s', group=ERROR),
     Column('during', '', 'the same while it is there', group=ERROR),
     Column('after', '', 'the same behind it', group=ERROR),
-    Column('max', '', 'largest |ν_d − ν| during the fault; m/s, rad/s'),
+    Column('max', '', Maths('largest |ν_d − ν| during the fault; m/s, rad/s')),
     Column('band', '', f'of a settled error: {BAND_TEXT}; m/s, rad/s'),
     Column('recovery', 's', 'time behind the end of the fault from which the error stays within'),
     Column('before', '', 'RMS of the command before the fault; N, N m', group=EFFORT),

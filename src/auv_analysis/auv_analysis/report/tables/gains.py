@@ -7,6 +7,7 @@ import numpy as np
 
 from auv_analysis.report import paper
 from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import Summaries, summary_source
 from auv_analysis.report.text import join, plain
 from auv_analysis.run import Facts
@@ -28,7 +29,8 @@ def gains_tables(runs: Mapping[str, Facts], summaries: Summaries) -> Iterator[Ta
         if entry['text'] is None:
             count += 1
             owner, symbol = entry['controllers'][0], entry['symbol']
-            caption = f'The {SYMBOLS[symbol]} of {join(entry["controllers"])} in the body frame.'
+            words = f'The {SYMBOLS[symbol]} of {{}} in the body frame.'
+            caption = Maths(words, join(entry['controllers']))
             where = owner, 'gains', symbol
             name = f'gain_{symbol}_{count}'
             yield _matrix(name, caption, entry['gain'], where)

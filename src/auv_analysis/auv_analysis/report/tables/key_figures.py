@@ -3,6 +3,7 @@
 from typing import Any
 
 from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import Summaries, summary_source
 from auv_analysis.report.text import MISSING, fixed, join
 from auv_analysis.summary import SETTLED, TRANSIENT
@@ -13,8 +14,8 @@ LATE = f'max after {TRANSIENT:g} s'
 COLUMNS = (
     Column('controller', meaning='name of the run', numeric=False),
     Column('', meaning='degree of freedom', numeric=False),
-    Column('RMS', '', 'root mean square of ν_d − ν over the run; m/s, rad/s', group=ERROR),
-    Column(LATE, '', 'largest |ν_d − ν| behind the transient; m/s, rad/s', group=ERROR),
+    Column('RMS', '', Maths('root mean square of ν_d − ν over the run; m/s, rad/s'), group=ERROR),
+    Column(LATE, '', Maths('largest |ν_d − ν| behind the transient; m/s, rad/s'), group=ERROR),
     Column('settled', 's', f'time from which the error stays within {SETTLED}', group=ERROR),
     Column('RMS', '', 'root mean square of w = f − F over the run; N, N m', group=ESTIMATE),
     Column(LATE, '', 'largest |w| behind the transient; N, N m', group=ESTIMATE),
@@ -32,13 +33,14 @@ def key_figures_table(summaries: Summaries, without_estimate: list[str]) -> Tabl
     without_estimate : names of runs whose law has no adaptive term
 
     """
-    caption = (
+    words = (
         'Key figures: velocity error ν_d − ν, lumped estimation error w = f − F, '
         'commanded input τ. Linear rows in m/s and N, angular rows in rad/s and N m; an en dash '
         '(–) stands for what is missing: not known, or not settled within the run.'
     )
     if without_estimate:
-        caption += f' Under {join(without_estimate)} nothing is estimated: there w is −F.'
+        words += ' Under {} nothing is estimated: there w is −F.'
+    caption = Maths(words, *([join(without_estimate)] if without_estimate else []))
     rows = [_row(name, summary, i) for name, summary in summaries.items() for i in range(len(DOFS))]
     return Table('key_figures', caption, COLUMNS, rows, stub=2)
 

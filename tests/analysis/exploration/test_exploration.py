@@ -66,7 +66,7 @@ def test_controllers_in_the_same_rollouts(results: Results) -> None:
     (row,) = rows(results, 'paired', figure=ENERGY)
     assert (row['controller'], row['other'], row['rollouts']) == ('gvc', 'cl', 800)
     assert (row['smaller_percent'], row['equal_percent']) == (100.0, 0.0)
-    assert row['median_ratio'] == pytest.approx(1 / 1.5)
+    assert (row['ratio'], row['effect']) == (pytest.approx(1 / 1.5), -1.0)
     (same,) = rows(results, 'paired', figure='overall.effort.max.angular')
     assert same['equal_percent'] == 100.0
 

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import tunings
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import QUICK
 
+from auv_analysis.tuning.rivals import starts_of
 from auv_analysis.tuning.space import LAWS, STRUCTURES, Space, make_space
 from auv_dynamics.vehicle_file import load_vehicle
 from auv_gvc_controller.gains import sampling_warning
@@ -53,10 +55,25 @@ def test_room_ends_where_the_sampled_loop_begins_to_ring() -> None:
     assert [w is None for w in warned] == [True, False]
 
 
-def test_gains_outside_come_to_the_border_and_negative_ones_to_none() -> None:
+def test_gains_outside_come_to_the_border_and_those_that_are_not_positive_to_the_middle() -> None:
     space = space_of('gvc', 'mass')
     far = {'k_D': 1e9, 'k_I': 1.0, 'Lambda': 1e-9, 'Gamma': 1.0}
     x = space.nearest(far)
-    assert x is not None
     assert (x[0], x[2]) == (space.high[0], space.low[2])
-    assert space.nearest(far | {'k_I': 0.0}) is None
+    assert space.nearest(far | {'k_I': 0.0})[1] == (space.low[1] + space.high[1]) / 2
+
+
+@pytest.mark.parametrize('reference', ['gvc', 'cl', 'smc'])
+def test_every_law_starts_from_the_same_two_points(tmp_path, reference: str) -> None:
+    """The reference's gains in the units of the law, whatever else the scenario has."""
+    smc = {'law': 'smc', 'k_D': 300.0, 'Lambda': 0.5, 'Gamma': 0.0, 'k_S': 3.0, 'phi': 0.1}
+    entries = {'gvc': tunings.GVC, 'cl': tunings.SAME_CL, 'other': tunings.SAME_CL, 'smc': smc}
+    scenario = tunings.scenario(tmp_path, entries)
+    model = control_model(scenario.vehicle)
+    for law in LAWS:
+        space = make_space(law, 'mass', model, STEP, 1 / STEP)
+        near, middle = starts_of(space, scenario, reference, model)
+        np.testing.assert_array_equal(middle, (space.low + space.high) / 2)
+        if {law, reference} <= {'gvc', 'cl'}:  # one and the same law where M is diagonal
+            own = space.nearest(entries[law])
+            np.testing.assert_allclose(near, own)

@@ -136,6 +136,6 @@ def _show(document: dict[str, Any]) -> None:
             number(measures['effort'], 4),
             '–' if equality is None else f'{100 * equality:+.3f} %',
             'not all' if settled is None else f'{settled:.2f} s',
-            '' if compared is None else number(compared['median']),
+            '' if compared is None else number(compared['ratio']),
         )
     console.print(table)

@@ -6,14 +6,15 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.exploration.opening import Sweep
-from auv_analysis.exploration.quantiles import finite, ordered
+from auv_analysis.exploration.quantiles import ordered
 from auv_analysis.measures import Measure
+from auv_analysis.pairs import log_ratios, paired
 
 Row = dict[str, Any]
 
 
-def paired(sweep: Sweep, values: np.ndarray, measure: Measure) -> Iterator[Row]:
-    """For each two controllers, in how many rollouts the one's figure is the smaller one.
+def pairs(sweep: Sweep, values: np.ndarray, measure: Measure) -> Iterator[Row]:
+    """For each two controllers, the ratio of their figures in the same rollouts, as `Pairs`.
 
     Only rollouts that both finished count; a time that does not exist is later than any other.
 
@@ -28,19 +29,22 @@ def paired(sweep: Sweep, values: np.ndarray, measure: Measure) -> Iterator[Row]:
     usable = (sweep.status == 0) & ~np.isnan(at)
     for first, second, mine, other in sweep.pairs:
         both = usable[mine] & usable[other]
-        a, b = at[mine[both]], at[other[both]]
-        if len(a) == 0:
+        d = log_ratios(at[mine[both]], at[other[both]])
+        if len(d) == 0:
             continue
-        comparable = np.isfinite(a) & np.isfinite(b) & (b > 0)
-        ratios = a[comparable] / b[comparable]
+        found = paired(d)
+        low, high = found.interval or (None, None)
         yield {
             'figure': measure.name,
             'label': measure.label,
             'controller': sweep.controllers[first],
             'other': sweep.controllers[second],
-            'rollouts': len(a),
-            'smaller_percent': float(100 * np.mean(a < b)),
-            'equal_percent': float(100 * np.mean(a == b)),
-            'larger_percent': float(100 * np.mean(a > b)),
-            'median_ratio': finite(np.median(ratios)) if len(ratios) else None,
+            'rollouts': len(d),
+            'smaller_percent': 100 * found.smaller,
+            'equal_percent': float(100 * np.mean(d == 0)),
+            'larger_percent': 100 * found.larger,
+            'effect': found.effect,
+            'ratio': found.ratio,
+            'ratio_low': low,
+            'ratio_high': high,
         }

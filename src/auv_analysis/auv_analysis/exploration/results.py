@@ -11,7 +11,7 @@ from auv_analysis.exploration import best, dependence
 from auv_analysis.exploration.indices import designed, failing, indices, omitted
 from auv_analysis.exploration.influence import influence, ranks_of
 from auv_analysis.exploration.opening import STATUSES, Sweep
-from auv_analysis.exploration.paired import paired
+from auv_analysis.exploration.paired import pairs
 from auv_analysis.exploration.quantiles import distribution, figures_spread, varying
 from auv_analysis.exploration.varied import Varied, varied_paths
 from auv_analysis.measures import BY_NAME, MEASURES, Measure
@@ -132,7 +132,7 @@ def _one_measure(results: Results, measure: Measure, groups: Sequence[Any]) -> N
         results.fixed[measure.name] = float(known[0]) if len(known) else None
         return
     results.measures.append(measure)
-    tables['paired'] += paired(sweep, values, measure)
+    tables['paired'] += pairs(sweep, values, measure)
     for controller, rows in zip(sweep.controllers, ok, strict=True):
         results.lines[measure.name, controller] = distribution(values[rows], measure)
         ranks, there = ranks_of(values[rows], measure)

@@ -96,9 +96,12 @@ def against(results: Results) -> Table:
         Column('rollouts', '', 'that both came to the end of'),
         Column('smaller in', '%', 'rollouts where the first one’s value is smaller'),
         Column('equal in', '%', 'rollouts where both are equal'),
-        Column('median ratio', '', 'of the first to the second, where both values exist'),
+        Column('effect', '', 'rank-biserial correlation: below 0 where the first one’s is smaller'),
+        Column('ratio', '', 'of the first to the second, after Hodges and Lehmann'),
+        Column('from', '', '95 % interval of that ratio, by the signed-rank test'),
+        Column('to'),
     ]
-    keys = ('smaller_percent', 'equal_percent', 'median_ratio')
+    keys = ('smaller_percent', 'equal_percent', 'effect', 'ratio', 'ratio_low', 'ratio_high')
     rows = [
         [Cell(row['label']), Cell(row['controller']), Cell(row['other']),
          count(row['rollouts'], f'paired.parquet:rollouts[{i}]'),

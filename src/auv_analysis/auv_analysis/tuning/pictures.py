@@ -10,10 +10,10 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
+from auv_analysis.pairs import KNOWN, log_ratios
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.plotting import COLOURS, DASHES, GREY
-from auv_analysis.tuning.comparison import DIVERGED, log_ratios
 from auv_analysis.tuning.measures import MEANINGS, Measures
 from auv_analysis.tuning.outcome import Outcome
 
@@ -165,8 +165,8 @@ def paired(outcome: Outcome) -> Drawn:
 
 def _ratios(draws: Mapping[str, Measures], name: str, reference: str, measure: str) -> np.ndarray:
     """Ratios of the draws in which neither loop diverged."""
-    d = log_ratios(draws[name], draws[reference], measure)
-    return np.exp(d[np.abs(d) < DIVERGED])
+    d = log_ratios(getattr(draws[name], measure), getattr(draws[reference], measure))
+    return np.exp(d[np.abs(d) < KNOWN])
 
 
 def _look(outcome: Outcome, name: str) -> tuple[str, object]:

@@ -9,6 +9,8 @@ from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.rendering import write_document
 from auv_analysis.tuning import tables
+from auv_analysis.tuning.rivals import POINTS
+from auv_analysis.tuning.search import FINALISTS, LONG, SHORT, STARTS
 
 MEASURES = (
     'Error and effort are weighted by the inertia, so that metres and radians, newtons and newton '
@@ -17,8 +19,13 @@ MEASURES = (
     'mean is decided by the first moments, in which a law has its gain and nothing else.'
 )
 FAIR = (
-    'Every law was given the same search: a Sobol sequence over all its gains, then sequential '
-    'quadratic programming with the equality as a constraint. The reference’s own law takes part, '
+    'Every law was given the same search: the reference’s gains in the units of the law, the '
+    f'middle of the bounds and {POINTS} Sobol points over all its gains (of six numbers per gain, '
+    'the best multiple of the inertia instead), then sequential quadratic programming with the '
+    'equality as a constraint, '
+    f'{SHORT} gradients from each of the best {STARTS} points and {LONG} from the best {FINALISTS} '
+    'of these at most; a gradient of a law with more gains takes more loops. '
+    'The reference’s own law takes part, '
     'since its gains in the scenario were not searched: against it, what is left is the law’s.'
 )
 PERIOD = Maths(

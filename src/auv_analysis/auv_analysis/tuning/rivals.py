@@ -13,7 +13,6 @@ from auv_analysis.tuning.loops import measured
 from auv_analysis.tuning.measures import Measures
 from auv_analysis.tuning.search import Found, Goal, search
 from auv_analysis.tuning.space import BEST, Space, make_space
-from auv_dynamics.files import matrix6
 from auv_gvc_controller.gains import body_gains, sampled_rate
 from auv_gvc_controller.laws import SHIPPED
 from auv_gvc_controller.model import ControlModel, control_model
@@ -115,7 +114,7 @@ def tuned(
     searches: list[Found] = []
     for structure in structures_of(request.structure):
         space = make_space(law, structure, model, scenario.step, fastest)
-        starts = [*starts_of(space, scenario, request.reference, model)]
+        starts = starts_of(space, scenario, request.reference, model)
         points = POINTS
         if structure == 'diagonal':
             starts.append(space.nearest(searches[0].space.entry(searches[0].x)))
@@ -123,7 +122,7 @@ def tuned(
         searches.append(
             search(
                 space, evaluator(request, space), goal, points=points, seed=request.seed,
-                starts=[start for start in starts if start is not None],
+                starts=starts,
             )
         )  # fmt: skip
         progress()
@@ -140,23 +139,17 @@ def evaluator(request: Request, space: Space) -> Callable[[Mapping[str, np.ndarr
 
 def starts_of(
     space: Space, scenario: Scenario, reference: str, model: ControlModel
-) -> list[np.ndarray | None]:
-    """Points next to gains at hand: the scenario's own of this law, and the reference's."""
-    own = [
-        space.nearest(scenario.gain_values(name))
-        for name, entry in scenario.controllers.items()
-        if entry['law'] == space.law
-    ]
-    K_D, K_f = (np.diagonal(K).tolist() for K in body_gains(scenario.gains(reference), model))
-    shared = {
-        gain: value
-        for gain, value in scenario.gain_values(reference).items()
-        if gain in ('k_I', 'Lambda')
-    }
-    meant = {'k_P' if space.law == 'pid' else 'k_D': K_D, 'Gamma': K_f, **shared}
-    positive = {k: v for k, v in meant.items() if np.all(np.diagonal(matrix6(v)) > 0)}
-    middle = space.low + (space.high - space.low) / 2
-    return [*own, middle] if space.law == 'gvc' else [*own, space.nearest(positive), middle]
+) -> list[np.ndarray]:
+    """Two points, whatever the law: next to the reference's gains, and the middle of the space."""
+    meant = scenario.gain_values(reference)
+    if scenario.controller(reference)['law'] != space.law:
+        K_D, K_f = (np.diagonal(K) for K in body_gains(scenario.gains(reference), model))
+        inertia = np.diagonal(np.reshape(model.dynamics.M, (6, 6)))
+        unit = inertia if space.law == 'gvc' else 1.0  # GVC multiplies its gains by M itself
+        shared = {gain: meant[gain] for gain in ('k_I', 'Lambda') if gain in meant}
+        fast = 'k_P' if space.law == 'pid' else 'k_D'
+        meant = {fast: (K_D / unit).tolist(), 'Gamma': (K_f / unit).tolist(), **shared}
+    return [space.nearest(meant), (space.low + space.high) / 2]
 
 
 def _fastest(request: Request) -> float:

@@ -117,21 +117,20 @@ class Space:
         """Law and gains of one point (n,) as a scenario file gives them."""
         return {'law': self.law, **{k: v[0].tolist() for k, v in self.gains(x[None]).items()}}
 
-    def nearest(self, gains: Mapping[str, Any]) -> np.ndarray | None:
-        """(n,) point next to gains as a scenario file gives them; None where one is not positive.
+    def nearest(self, gains: Mapping[str, Any]) -> np.ndarray:
+        """(n,) point next to gains as a scenario file gives them.
 
-        The diagonals are what is compared; a gain that is absent stands in the middle.
+        The diagonals are what is compared; a gain that is absent, or not positive, stands in the
+        middle.
         """
         parts: list[float] = []
         for gain, basis in self.basis.items():
             at = slice(len(parts), len(parts) + (6 if self.structure == 'diagonal' else 1))
             middle = (self.low[at] + self.high[at]) / 2
-            if gain not in gains:
+            diagonal = np.diagonal(matrix6(gains.get(gain, 0.0)))
+            if not np.all(diagonal > 0):
                 parts += middle.tolist()
                 continue
-            diagonal = np.diagonal(matrix6(gains[gain]))
-            if not np.all(diagonal > 0):
-                return None
             per_axis = np.log(diagonal / np.diagonal(matrix6(basis)))
             parts += per_axis.tolist() if len(middle) == 6 else [per_axis.mean()]
         return np.clip(parts, self.low, self.high)

@@ -170,9 +170,10 @@ def paired_table(document: Mapping[str, Any]) -> Table:
         CONTROLLER,
         Column('against', numeric=False),
         Column('measure', numeric=False),
-        Column('ratio', '', 'median over the draws of controller to against'),
-        Column('from', '', '95 % bootstrap interval of that median'),
+        Column('ratio', '', 'of controller to against over the draws, after Hodges and Lehmann'),
+        Column('from', '', '95 % interval of that ratio, by the test'),
         Column('to'),
+        Column('effect', '', 'rank-biserial correlation, −1 to 1; its sign says who is smaller'),
         Column('smaller', '%', 'share of the draws in which the controller’s is smaller'),
         Column('larger', '%'),
         Column(
@@ -185,9 +186,10 @@ def paired_table(document: Mapping[str, Any]) -> Table:
         low, high = c['interval'] or (None, None)
         rows.append([
             Cell(c['controller']), Cell(c['against']), Cell(MEANINGS[c['measure']].label),
-            cell(c['median'], source(*at, 'median')),
+            cell(c['ratio'], source(*at, 'ratio')),
             cell(low, source(*at, 'interval', 0)),
             cell(high, source(*at, 'interval', 1)),
+            cell(c['effect'], source(*at, 'effect')),
             *(Cell(number(100 * c[k]), c[k], source(*at, k)) for k in ('smaller', 'larger')),
             Cell(p_text(c['p_holm']), c['p_holm'], source(*at, 'p_holm'),
                  kind={-1: 'good', 1: 'bad', 0: ''}[c['verdict']]),

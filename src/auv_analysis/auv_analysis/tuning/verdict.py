@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from auv_analysis.report.document import Sentence
-from auv_analysis.report.text import join, number
+from auv_analysis.report.text import fixed, join, number
 from auv_analysis.tuning.comparison import LEVEL, Comparison
 from auv_analysis.tuning.measures import MEANINGS
 from auv_analysis.tuning.outcome import Outcome
@@ -105,8 +105,8 @@ def _ranked(outcome: Outcome) -> Iterator[Sentence]:
         if rows:
             yield Sentence(
                 f'Over {draws} draws of model error and disturbance, the same for all, in '
-                f'{label}: {_places(rows, against)} (median ratios; Wilcoxon signed-rank test, '
-                f'Holm’s correction, level {LEVEL:g}).',
+                f'{label}: {_places(rows, against)} (ratios after Hodges and Lehmann; Wilcoxon '
+                f'signed-rank test, Holm’s correction, level {LEVEL:g}).',
                 PAIRED,
             )
 
@@ -115,19 +115,20 @@ def _places(rows: list[Comparison], against: str) -> str:
     words = {-1: f'ahead of {against}', 1: f'behind {against}', 0: f'not told apart from {against}'}
     parts = []
     for sign, place in words.items():
-        names = [f'{c.controller} ({number(c.median)})' for c in rows if c.verdict == sign]
+        names = [f'{c.controller} ({_ratio(c)})' for c in rows if c.verdict == sign]
         if names:
             parts.append(f'{join(names)} {"are" if len(names) > 1 else "is"} {place}')
     return '; '.join(parts)
 
 
 def _distribution(c: Comparison) -> str:
-    if c.median is None or c.interval is None:
-        ratio = 'no ratio in the median, since loops diverged'
-    else:
-        low, high = (number(x) for x in c.interval)
-        ratio = f'{number(c.median)} times in the median (95 % interval {low} to {high})'
+    low, high = map(number, c.interval or (None, None))
+    ratio = f'{_ratio(c)} (95 % interval {low} to {high}), rank-biserial {fixed(c.effect, 2)}'
     return f'{ratio}, smaller in {number(100 * c.smaller)} % of the draws, {p_text(c.p_holm)}'
+
+
+def _ratio(c: Comparison) -> str:
+    return 'no ratio, too many are missing' if c.ratio is None else f'{number(c.ratio)} times'
 
 
 def p_text(p: float) -> str:

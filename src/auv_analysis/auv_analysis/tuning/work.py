@@ -58,7 +58,7 @@ def work(request: Request, draws: Draws, out: Path, progress: Progress) -> Outco
             scenario, draws.spread, draws.samples, draws.seed, request.hold, request.threads,
             advance,
         )  # fmt: skip
-        compared = _compared(request, scenario, rivals, found, draws.seed)
+        compared = _compared(request, scenario, rivals, found)
     return Outcome(
         request, goal, scenario, rivals, nominal, deviation, draws.spread, found, compared
     )
@@ -109,7 +109,7 @@ def _deviation(a: float, b: float) -> float:
 
 def _compared(
     request: Request, scenario: Scenario, rivals: Mapping[str, Rival],
-    found: Mapping[str, Measures], seed: int,
+    found: Mapping[str, Measures],
 ) -> list[Comparison]:  # fmt: skip
     """Each controller against the reference, each tuned law against the reference's own, tuned."""
     reference = request.reference
@@ -118,4 +118,4 @@ def _compared(
     pairs = [(name, reference) for name in scenario.controllers if name != reference]
     if own is not None:
         pairs += [(name, own) for name in rivals if name != own]
-    return compare(found, pairs, seed)
+    return compare(found, pairs)

@@ -1,7 +1,13 @@
 """What a report shows, read back from its page."""
 
+import json
 import re
 from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pyarrow import parquet
 
 TOKEN = re.compile(r'−?\d(?:[\d\u202f]*)(?:\.\d+)?(?:·10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?')
 POWERS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
@@ -63,3 +69,34 @@ def at(document, pointer: str):
         key = part.replace('~1', '/').replace('~0', '~')
         document = document[int(key)] if isinstance(document, list) else document[key]
     return document
+
+
+def check_numbers(folder: Path) -> int:
+    """Hold every number of a report's tables against its text, its unit and its source.
+
+    Returns how many have their source in a JSON file of the folder, or in a row of a Parquet file.
+    """
+    kept: dict[str, Any] = {}
+    checked = 0
+    for row in parquet.read_table(folder / 'numbers.parquet').to_pylist():
+        shown = tokens(row['text'])
+        if not row['name'] and shown and not re.search('[<–]', row['text']):  # a bound, a range
+            assert abs(shown[0][0] - row['value']) <= shown[0][1] + 1e-12 * abs(shown[0][0]), row
+        file, _, place = row['source'].partition(':')
+        place, _, factor = place.partition('*')
+        if file.endswith('.json'):
+            kept[file] = kept.get(file) or json.loads((folder / file).read_text(encoding='utf-8'))
+            assert row['unit'] != '%' or factor == '100' or 'percent' in place, row
+            value = at(kept[file], place)
+            value = value.get(row['name']) if isinstance(value, dict) else value
+        elif place.endswith(']'):
+            kept[file] = kept.get(file) or parquet.read_table(folder / file).to_pylist()
+            name, _, index = place.removesuffix(']').rpartition('[')
+            value = kept[file][int(index)][name]
+        else:
+            continue
+        if not isinstance(value, int | float):
+            continue  # a cell with figures of its own names
+        assert value * float(factor or 1) == pytest.approx(row['value'], rel=1e-12), row
+        checked += 1
+    return checked

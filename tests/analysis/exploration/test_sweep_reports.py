@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_sweeps import ENERGY, K_D, MIXED, SIMPLE, change_manifest, make_sweep, mixed, rows, simple
+from pages import check_numbers
 from pyarrow import parquet
 
 from auv_analysis import cli
@@ -89,7 +90,6 @@ def _damage(path: Path) -> None:
 
 
 def _without(path: Path) -> None:
-    from pyarrow import parquet
 
     parquet.write_table(parquet.read_table(path).drop_columns([K_D]), path)
 
@@ -105,21 +105,7 @@ def test_the_document_has_no_nan(results: Results) -> None:
 def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known) -> None:
     out = tmp_path / 'report'
     cli.main(['analyze', str(make_sweep(tmp_path, campaign, known)), '--out', str(out)])
-    document = json.loads((out / 'analysis.json').read_text())
-    numbers = parquet.read_table(out / 'numbers.parquet').to_pylist()
-    assert len(numbers) > 100
-    tables: dict[str, list[dict]] = {}
-    for number in numbers:
-        file, _, place = number['source'].partition(':')
-        if file == 'analysis.json':
-            value = document
-            for key in place.removeprefix('/').split('/'):
-                value = value[int(key)] if isinstance(value, list) else value[key]
-        else:
-            rows_ = tables.setdefault(file, parquet.read_table(out / file).to_pylist())
-            name, _, row = place.removesuffix(']').rpartition('[')
-            value = rows_[int(row)][name]
-        assert value == number['value'], number['source']
+    assert check_numbers(out) > 100
 
 
 @pytest.mark.usefixtures('unrendered')

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as parquet
 import pytest
 import yaml
-from pages import Page, at, tokens
+from pages import Page, at, check_numbers, tokens
 
 from auv_analysis import cli, load_scenario, simulate, summarize
 from auv_analysis.report import paper
@@ -39,6 +39,7 @@ def names_of(path: Path) -> set[str]:
 
 
 def test_every_number_of_every_table_is_found_where_its_source_says(folder, rows):
+    assert check_numbers(folder) > 100
     summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
     scenario = yaml.safe_load((folder / 'scenario.yaml').read_text(encoding='utf-8'))
     given = {value for _, value in numbers_in(scenario)}

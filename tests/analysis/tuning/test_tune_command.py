@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import yaml
+from pages import check_numbers
 from tunings import GVC, SAME_CL, write
 
 from auv_analysis import load_scenario, simulate
@@ -54,6 +55,8 @@ def test_folder_document_and_files_agree(command: Callable, tmp_path: Path) -> N
     _repeated(document, folder)
     _searched(document, folder)
     _drawn(document, folder)
+    assert all(sentence['source'] for sentence in document['verdict'])
+    assert check_numbers(folder) > 100
     assert all(sentence['source'] for sentence in document['verdict'])
 
 

@@ -5,9 +5,9 @@ from typing import Any
 
 from auv_analysis.design.printed import change
 from auv_analysis.design.words import part_words
-from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.document import Cell, Column, Table, cell, percent
 from auv_analysis.report.quantities import Maths
-from auv_analysis.report.text import MISSING, fixed, plain
+from auv_analysis.report.text import MISSING, plain
 
 FILE = 'design.json:'
 Document = Mapping[str, Any]
@@ -72,9 +72,8 @@ def matrix_table(document: Document) -> Table:
             ratio, i = row.get(part, (None, 0))
             where = f'{FILE}/alternatives/{i}/ratio'
             good = 'good' if ratio is not None and ratio <= 0.5 else ''
-            value = None if ratio is None else 100 * ratio
-            text = 'cannot be run' if value is None else fixed(value, 1)
-            cells.append(Cell(text, value, where, good))
+            shown = percent(ratio, where, kind=good)
+            cells.append(Cell('cannot be run') if ratio is None else shown)
         rows.append([Cell(coupling), *cells])
     columns = [
         Column('', meaning='coupling that the change was made for', numeric=False),

@@ -164,6 +164,12 @@ def cell(value: float | None, source: str = '', *, digits: int = 3, kind: str = 
     return Cell(number(value, digits), float(value), source, kind or ('zero' if value == 0 else ''))
 
 
+def percent(share: float | None, source: str, *, digits: int = 3, kind: str = '') -> Cell:
+    """Cell of a share, 0 to 1 where `source` has it, in a column whose unit is %."""
+    value = None if share is None else 100 * share
+    return cell(value, f'{source}*100', digits=digits, kind=kind)
+
+
 def write_numbers(path: Path, tables: Sequence[Table]) -> None:
     """Write a row for every number that some tables show.
 

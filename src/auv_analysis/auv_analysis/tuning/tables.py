@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from auv_analysis.report.document import Cell, Column, Table, cell
+from auv_analysis.report.document import Cell, Column, Table, cell, percent
 from auv_analysis.report.quantities import Maths, symbol
-from auv_analysis.report.text import MISSING, number
+from auv_analysis.report.text import MISSING
 from auv_analysis.report.words import gain_text
 from auv_analysis.tuning.measures import MEANINGS, Measures
 from auv_analysis.tuning.verdict import p_text
@@ -47,14 +47,12 @@ def tuned_table(document: Mapping[str, Any]) -> Table:
             for m in Measures._fields
         ]
         ordered = dict(zip(Measures._fields, measures, strict=True))
-        equality = entry['equality']
         rows.append([
             Cell(name),
             Cell(entry['law']),
             Cell(entry.get('structure', 'as given')),
             *(ordered[m] for m in MEANINGS),
-            Cell(MISSING) if equality is None
-            else Cell(number(100 * equality, 2), equality, source(*at, 'equality')),
+            percent(entry['equality'], source(*at, 'equality'), digits=2),
             cell(entry.get('price'), source(*at, 'price')),
         ])  # fmt: skip
     caption = 'The scenario itself: what each controller costs and what it achieves.'
@@ -155,10 +153,7 @@ def draws_table(document: Mapping[str, Any]) -> Table:
     for name, entry in document['monte_carlo']['controllers'].items():
         at = 'monte_carlo', 'controllers', name
         quantiles = [cell(entry[m][q], source(*at, m, q)) for m in MEANINGS for q in shown]
-        shares = [
-            Cell(number(100 * entry[key]), entry[key], source(*at, key))
-            for key in ('settled', 'diverged')
-        ]
+        shares = [percent(entry[key], source(*at, key)) for key in ('settled', 'diverged')]
         rows.append([Cell(name), *quantiles, *shares])
     count = document['monte_carlo']['samples']
     return Table('draws', f'Over {count} draws, the same for all.', columns, rows)
@@ -190,7 +185,7 @@ def paired_table(document: Mapping[str, Any]) -> Table:
             cell(low, source(*at, 'interval', 0)),
             cell(high, source(*at, 'interval', 1)),
             cell(c['effect'], source(*at, 'effect')),
-            *(Cell(number(100 * c[k]), c[k], source(*at, k)) for k in ('smaller', 'larger')),
+            *(percent(c[k], source(*at, k)) for k in ('smaller', 'larger')),
             Cell(p_text(c['p_holm']), c['p_holm'], source(*at, 'p_holm'),
                  kind={-1: 'good', 1: 'bad', 0: ''}[c['verdict']]),
         ])  # fmt: skip

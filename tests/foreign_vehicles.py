@@ -41,6 +41,18 @@ X_u = -4.03; Yv = -6.22; Zw = -5.18; Kp = -0.07; Mq = -0.07; Nr = -0.07
 Xuu = -18.18; Y_{v|v|} = -21.66; Z_{w|w|} = -36.99;  # quadratic
 Kp|p| = -1.55; Mq|q| = -1.55; Nr|r| = -1.55
 """
+# Prestero 2001, appendix C: derivatives by u are combined, with what the added mass adds to them
+REMUS_LIFT = """
+Yuv = -28.6; Yur = 5.22; Zuw = -28.6; Zuq = -5.22; Muw = 24; Muq = -2; Nuv = -24; Nur = -2
+Yuudr = 9.64; Nuudr = -6.15; Zuuds = -9.64; Muuds = -6.15
+"""
+REMUS = """
+W = 299; B = 306; rho = 1030; g = 9.81; Ix = 0.177; Iy = 3.45; Iz = 3.45; zG = 0.0196
+Xudot = -0.93; Yvdot = -35.5; Yrdot = 1.93; Zwdot = -35.5; Zqdot = -1.93; Kpdot = -0.0704
+Mwdot = -1.93; Mqdot = -4.88; Nvdot = 1.93; Nrdot = -4.88
+Xu|u| = -1.62; Yv|v| = -1310; Yr|r| = 0.632; Zw|w| = -131; Zq|q| = -0.632; Kp|p| = -0.13
+Mw|w| = 3.18; Mq|q| = -188; Nv|v| = -3.18; Nr|r| = -94
+"""
 # a link in FLU: nose heavy, below its buoyancy, with a product of inertia
 SDF = """<sdf version="1.9"><world name="w"><gravity>0 0 -9.81</gravity>
   <plugin filename="gz-sim-buoyancy-system" name="gz::sim::systems::Buoyancy">

@@ -50,7 +50,7 @@ def symmetric(size: float) -> np.ndarray:
 
 DENSE = symmetric(50.0)  # every entry couples
 X, NU, NU_DOT, TAU, F = (drawn(6) for _ in range(5))
-D_LINEAR, D_QUADRATIC, FULL = drawn(6, 6), drawn(6, 6), drawn(6, 6)
+D_LINEAR, D_QUADRATIC, FULL, LIFT = (drawn(6, 6) for _ in range(4))
 ATTITUDES = [G_ETA, np.array([0, 0, 0, 0.7, 0.4, -2.0]), np.array([0, 0, 0, -2.5, -1.1, 0.9])]
 
 
@@ -59,13 +59,17 @@ def model_of(M: np.ndarray, data: dict | None = None) -> Model:
     m = reference.vehicle_matrices(data or with_inertia(M))
     couple = m['W'] * m['r_G'] - m['B'] * m['r_B']
     heavy = np.array([m['W'] - m['B'], *couple])
-    return Model(M.ravel(), np.linalg.inv(M).ravel(), D_LINEAR.ravel(), D_QUADRATIC.ravel(), heavy)
+    drag = D_LINEAR.ravel(), D_QUADRATIC.ravel()
+    return Model(M.ravel(), np.linalg.inv(M).ravel(), *drag, heavy, LIFT.ravel())
 
 
 def right_side(M: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """C nu + D nu + g (6,) with the coefficients of `model_of`."""
-    drag = (D_LINEAR + D_QUADRATIC * np.abs(nu)) @ nu
-    return reference.kirchhoff(M, nu) + drag + gradient(with_inertia(M), eta)
+    return reference.kirchhoff(M, nu) + D(nu) @ nu + gradient(with_inertia(M), eta)
+
+
+def D(nu: np.ndarray) -> np.ndarray:
+    return D_LINEAR + D_QUADRATIC * np.abs(nu) + LIFT * abs(nu[0])
 
 
 def gradient(data: dict, eta: np.ndarray) -> np.ndarray:
@@ -85,9 +89,10 @@ def check_C(coriolis: Callable) -> None:
 
 
 def check_D(damping: Callable) -> None:
-    """Written out as matrices; and a diagonal one only takes energy."""
-    found = damping(model_of(DENSE), tuple(NU), tuple(X))
-    assert_allclose(found, (D_LINEAR + D_QUADRATIC * np.abs(NU)) @ X, rtol=1e-12)
+    """Written out as matrices, ahead and astern; and a diagonal one only takes energy."""
+    for nu in (NU, -NU):
+        found = damping(model_of(DENSE), tuple(nu), tuple(X))
+        assert_allclose(found, D(nu) @ X, rtol=1e-12)
     takes = Model(*model_of(DENSE)[:2], np.eye(6).ravel(), 3.0 * np.eye(6).ravel(), np.zeros(4))
     for x in np.vstack([np.eye(6), [X]]):
         assert x @ damping(takes, tuple(NU), tuple(x)) >= x @ x

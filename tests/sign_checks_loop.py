@@ -11,16 +11,17 @@ import herman_reference as reference
 import numpy as np
 import yaml
 from numpy.testing import assert_allclose
-from physics import attitude_of, turned
-from sign_checks import ATTITUDES, NU, TAU, F, drawn, gradient, symmetric
+from physics import attitude_of, turned, vehicle_of
+from sign_checks import ATTITUDES, LIFT, NU, TAU, F, drawn, gradient, symmetric
 
-from auv_dynamics import load_vehicle
 from auv_dynamics.config import shipped
 from auv_dynamics.jit import plain
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.model import control_model
 
 REXROV = yaml.safe_load(shipped('vehicles', 'rexrov').read_text(encoding='utf-8'))
+REXROV['lift'] = (500.0 * LIFT).tolist()
+VEHICLE = vehicle_of(REXROV)
 NU_D, NU_D_DOT, ETA = drawn(6), drawn(6), ATTITUDES[1]
 GAINS = {
     'k_D': symmetric(3.0),
@@ -50,7 +51,7 @@ FLOW = {
 def answer(law: Any, gains: Any, state: np.ndarray) -> tuple[np.ndarray, ...]:
     """(tau, f, rate) of a law at the state of these checks."""
     arguments = (0.0, tuple(NU), tuple(attitude_of(ETA[3:])), tuple(NU_D), tuple(NU_D_DOT),
-                 state, gains, control_model(load_vehicle('rexrov')))  # fmt: skip
+                 state, gains, control_model(VEHICLE))  # fmt: skip
     tau, f = law.wrench(*arguments)
     return np.array(tau), np.array(f), np.array(law.state_rate(*arguments))
 
@@ -99,7 +100,7 @@ def check_other_law(name: str, law: Any) -> None:
 
 def check_current(module: Any) -> None:
     """Acceleration in a current that varies, by Newton for the body and Kirchhoff for the water."""
-    t, vehicle = 0.7, load_vehicle('rexrov')
+    t, vehicle = 0.7, VEHICLE
     flow = module.make_current([FLOW])(np.array([t]))[0]
     assert_allclose(flow, np.concatenate(reference.current([FLOW], t)), rtol=1e-12)
     steady = reference.Plant(REXROV, [FLOW])
@@ -115,10 +116,10 @@ def check_current(module: Any) -> None:
 
 def check_uncertainty(module: Any) -> None:
     """The plant's coefficients, and F as what is left of (1) with the vehicle file's."""
-    vehicle, places = load_vehicle('rexrov'), [str(i) for i in range(len(SPECS))]
+    vehicle, places = VEHICLE, [str(i) for i in range(len(SPECS))]
     made = module.make_uncertainty(vehicle, SPECS, 'scenario.yaml', places)
     true, known = reference.plant_matrices(REXROV, SPECS[:2]), reference.vehicle_matrices(REXROV)
-    for key in ('M', 'D_linear', 'D_quadratic'):
+    for key in ('M', 'D_linear', 'D_quadratic', 'lift'):
         assert_allclose(np.reshape(getattr(made.truth.model, key), (6, 6)), true[key], rtol=1e-12)
     couple = true['W'] * true['r_G'] - true['B'] * true['r_B']
     assert_allclose(made.truth.model.hydrostatics, [true['W'] - true['B'], *couple], rtol=1e-9)

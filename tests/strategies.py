@@ -55,6 +55,8 @@ def inertias(draw: st.DrawFn, mass: float) -> np.ndarray:
 def vehicles(draw: st.DrawFn, heavy_water: bool | None = None) -> dict[str, Any]:
     """Contents of a vehicle file: dense M_A, often far above M_RB, and CG off in all axes.
 
+    Damping and lift, where there is any, may be asymmetric and only take energy.
+
     Parameters
     ----------
     draw : given by Hypothesis
@@ -71,6 +73,10 @@ def vehicles(draw: st.DrawFn, heavy_water: bool | None = None) -> dict[str, Any]
     quadratic = mass * np.diag(np.abs(draw(vectors())))
     sign = draw(st.sampled_from(('positive', 'sname')))
     factor = {'positive': 1.0, 'sname': -1.0}[sign]
+    lift = {}
+    if (seed := int(1e6 * mass)) % 2:  # half of them, without a draw: the rest stays as hard
+        arms = 0.3 * mass * np.random.default_rng(seed).uniform(-1, 1, (6, 6))
+        lift['lift'] = (factor * (arms - arms.T + np.diag(np.abs(np.diagonal(arms))))).tolist()
     return {
         'format': 1,
         'name': 'random',
@@ -90,6 +96,7 @@ def vehicles(draw: st.DrawFn, heavy_water: bool | None = None) -> dict[str, Any]
             'linear': (factor * linear).tolist(),
             'quadratic': (factor * quadratic).tolist(),
         },
+        **lift,
         'environment': {'water_density': 1025.0, 'gravity': 9.81},
         'sign': sign,
     }

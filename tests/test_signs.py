@@ -43,7 +43,10 @@ class Formula:
 
 FORMULAS = [
     Formula('C', 'auv_dynamics.model', ['coriolis'], lambda m: check_C(plain(m.coriolis)), 12),
-    Formula('D', 'auv_dynamics.model', ['damping'], lambda m: check_D(plain(m.damping)), 6),
+    Formula(
+        'D', 'auv_dynamics.model', ['damping', '_with_lift'],
+        lambda m: check_D(plain(m.damping)), 2,
+    ),
     Formula(
         'g', 'auv_dynamics.model', ['down', 'restoring'], lambda m: check_g(plain(m.restoring)), 10
     ),

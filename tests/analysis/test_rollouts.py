@@ -106,6 +106,19 @@ def test_columns_give_what_single_runs_give(law, hold):
     same_as_alone(scenario, law, changes, hold, columns, (0, 6, 10))
 
 
+def test_columns_of_lift_give_what_single_runs_give():
+    changes = {
+        'vehicle.lift[1][1]': np.array([0.0, 20.6, 300.0]),
+        'vehicle.lift[5][1]': np.array([-6.0, 6.0, -40.0]),
+        'disturbance[0].damping': np.array([0.0, 0.5, -0.5]),
+    }
+    scenario = scenario_of('gvc', 'lauv', disturbance=[{'kind': 'model_error', 'damping': 0.1}])
+    columns = rollouts(scenario, 'gvc', changes)
+    assert set(columns['status']) == {'ok'}
+    assert len(set(columns['effort.rms.sway'])) == 3
+    same_as_alone(scenario, 'gvc', changes, 'continuous', columns, range(3))
+
+
 SMC = pytest.param('smc', marks=pytest.mark.long)
 
 

@@ -84,6 +84,7 @@ class Engine:
 def without_water(data: dict) -> dict:
     return data | {
         'added_mass': [0.0] * 6,
+        'lift': [[0.0] * 6] * 6,
         'damping': {'linear': [0.0] * 6, 'quadratic': [0.0] * 6},
         'environment': {'water_density': 1025.0, 'gravity': GRAVITY},
     }

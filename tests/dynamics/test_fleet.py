@@ -26,7 +26,8 @@ PLACES = {
         ('environment', 'water_density'),
     ],
     'herman2018': [('rigid_body', 'mass'), ('inertia_matrix', 0, 0), ('inertia_matrix', 5, 5)],
-    'lauv': [('rigid_body', 'mass'), ('added_mass', 1, 1), ('damping', 'linear', 1, 1)],
+    'lauv': [('rigid_body', 'mass'), ('added_mass', 1, 1), ('damping', 'linear', 1, 1),
+             ('lift', 1, 5)],
     'lrauv_tethys': [('added_mass', 2), ('damping', 'quadratic', 4), ('rigid_body', 'mass')],
 }  # fmt: skip
 
@@ -82,7 +83,8 @@ def test_a_fleet_is_the_vehicles_of_as_many_files(name, data):
             assert not good[i] or 'a positive number' in refusal
             continue
         assert good[i]
-        for part in ('M', 'D_linear', 'D_quadratic', 'weight', 'buoyancy', 'r_G', 'r_B'):
+        parts = ('M', 'D_linear', 'D_quadratic', 'weight', 'buoyancy', 'r_G', 'r_B')
+        for part in (*parts, 'lift') if 'lift' in file else parts:
             assert_array_equal(getattr(found, part)[i], getattr(expected, part), err_msg=part)
         model, alone = control_model(found.changed(M=found.M[i : i + 1])), control_model(expected)
         for part in ('Upsilon', 'Upsilon_inv', 'N'):

@@ -150,6 +150,7 @@ def forward_left_up(vehicle: Vehicle) -> Vehicle:
         M=frames.swap_body_matrix(vehicle.M),
         D_linear=frames.swap_body_matrix(vehicle.D_linear),
         D_quadratic=frames.swap_body_matrix(vehicle.D_quadratic),
+        lift=None if vehicle.lift is None else frames.swap_body_matrix(vehicle.lift),
         weight=-vehicle.weight,
         buoyancy=-vehicle.buoyancy,
         r_G=S @ vehicle.r_G,

@@ -187,8 +187,8 @@ def agree(ours, theirs, scale=None) -> None:
 
 def check_against_reference(data: dict, eta: np.ndarray, nu: np.ndarray) -> None:
     vehicle, other = vehicle_of(data), reference.vehicle_matrices(data)
-    for ours in ('M', 'M_RB', 'M_A', 'D_linear', 'D_quadratic', 'r_G', 'r_B'):
-        if other[ours] is not None:
+    for ours in ('M', 'M_RB', 'M_A', 'D_linear', 'D_quadratic', 'lift', 'r_G', 'r_B'):
+        if getattr(vehicle, ours) is not None:
             agree(getattr(vehicle, ours), other[ours])
     assert vehicle.weight == pytest.approx(other['W'], rel=1e-12)
     assert vehicle.buoyancy == pytest.approx(other['B'], rel=1e-12)
@@ -203,7 +203,7 @@ def test_random_vehicles_agree_with_the_reference(data, eta, nu):
     check_against_reference(data, eta, nu)
 
 
-@pytest.mark.parametrize('name', ['herman2018', 'herman2018_neutral', 'rexrov'])
+@pytest.mark.parametrize('name', ['herman2018', 'herman2018_neutral', 'rexrov', 'lauv'])
 def test_shipped_vehicles_agree_with_the_reference(name):
     data = yaml.safe_load(shipped('vehicles', name).read_text(encoding='utf-8'))
     eta, nu = np.array([1, 2, 3, 0.4, -0.5, 2.6]), np.array([1.1, -0.5, 0.3, 0.2, -0.7, 0.4])

@@ -49,8 +49,9 @@ def momentum_balance(
     c = np.concatenate([R.T @ v_c, np.zeros(3)])
     nu_r = nu - c
     c_dot = np.concatenate([-np.cross(nu[3:], c[:3]), np.zeros(3)])
-    D = (vehicle.D_linear + vehicle.D_quadratic * np.abs(nu_r)) * (1 + error['damping'])
-    D = D + error['dD']
+    lift = np.zeros((6, 6)) if vehicle.lift is None else abs(nu_r[0]) * vehicle.lift
+    D = vehicle.D_linear + vehicle.D_quadratic * np.abs(nu_r) + lift
+    D = D * (1 + error['damping']) + error['dD']
     W, B = vehicle.weight * (1 + error['mass']), vehicle.buoyancy * (1 + error['buoyancy'])
     down = R[2]
     force, moment = (W - B) * down, np.cross(W * vehicle.r_G - B * vehicle.r_B, down)

@@ -114,7 +114,7 @@ def test_the_two_inertia_references_give_the_same_vehicle(data):
 
 @QUICK
 @given(vehicles())
-def test_sname_negates_added_mass_and_damping_and_nothing_else(data):
+def test_sname_negates_added_mass_damping_and_lift_and_nothing_else(data):
     def negated(value):
         return (-np.array(value)).tolist()
 
@@ -122,9 +122,10 @@ def test_sname_negates_added_mass_and_damping_and_nothing_else(data):
         'sign': 'positive' if data['sign'] == 'sname' else 'sname',
         'added_mass': negated(data['added_mass']),
         'damping': {key: negated(value) for key, value in data['damping'].items()},
+        **({'lift': negated(data['lift'])} if 'lift' in data else {}),
     }
     one, two = vehicle_from_dict(data, 'f'), vehicle_from_dict(other, 'f')
-    for key in ('M', 'M_RB', 'M_A', 'D_linear', 'D_quadratic', 'r_G', 'r_B'):
+    for key in ('M', 'M_RB', 'M_A', 'D_linear', 'D_quadratic', 'lift', 'r_G', 'r_B'):
         assert_array_equal(getattr(one, key), getattr(two, key))
     assert (one.weight, one.buoyancy) == (two.weight, two.buoyancy)
 

@@ -15,6 +15,7 @@ FOLDER = shipped('vehicles', 'herman2018').parent
 OURS = ('herman2018', 'herman2018_neutral')
 CITED = ('bluerov2', 'bluerov2_heavy', 'girona500', 'lauv', 'lrauv_tethys', 'rexrov')
 LAUV_LINEAR = {(1, 5): 11.5, (2, 4): -11.5, (4, 2): 3.1, (5, 1): -3.1}  # SNAME: Y_r Z_q M_w N_v
+LAUV_LIFT = {(1, 5): 3.84, (2, 4): -3.84, (4, 2): -6.0, (5, 1): 6.0}  # of dune
 LAUV_QUADRATIC = {(1, 5): 0.3, (2, 4): -0.3, (4, 2): 1.5, (5, 1): -1.5}
 
 # mass, weight and buoyancy in N, z_G - z_B, diagonals of M_A, D_linear, D_quadratic
@@ -128,6 +129,7 @@ def test_damping_of_the_lauv_is_minus_the_sname_derivatives():
     for D, derivatives in (
         (vehicle.D_linear, LAUV_LINEAR),
         (vehicle.D_quadratic, LAUV_QUADRATIC),
+        (vehicle.lift, LAUV_LIFT),
     ):
         coupled = D - np.diag(np.diag(D))
         assert {(i, j): -coupled[i, j] for i, j in zip(*np.nonzero(coupled), strict=True)} == (
@@ -144,10 +146,11 @@ def test_the_same_lauv_written_with_sname_signs(tmp_path):
         for place, value in derivatives.items():
             D[place] = value
         data['damping'][key] = D.tolist()
+    data['lift'] = (-np.array(data['lift'])).tolist()
     path = tmp_path / 'lauv.yaml'
     path.write_text(yaml.safe_dump(data), encoding='utf-8')
     one, other = load_vehicle('lauv'), load_vehicle(Path(path))
-    for key in ('M', 'D_linear', 'D_quadratic'):
+    for key in ('M', 'D_linear', 'D_quadratic', 'lift'):
         assert_array_equal(getattr(one, key), getattr(other, key))
 
 
@@ -171,10 +174,10 @@ def test_the_sway_force_of_the_lauv_acts_behind_its_origin():
     assert force[2] == pytest.approx(0.0, abs=1e-12)
 
 
-def sway_yaw_poles(vehicle, u, sign=1.0):
+def sway_yaw_poles(vehicle, u, sign=1.0, lift=0.0):
     """Poles of (v, r) about straight motion at u with linear damping; sign of its couplings."""
     D = np.diag(np.diag(vehicle.D_linear))
-    D += sign * (vehicle.D_linear - D)
+    D += sign * (vehicle.D_linear - D) + lift * u * vehicle.lift
     small = 1e-6
 
     def rate(v, r):
@@ -188,3 +191,20 @@ def test_the_lauv_keeps_its_course_at_1_m_s_and_with_the_other_signs_would_not()
     vehicle = load_vehicle('lauv')
     assert sway_yaw_poles(vehicle, 1.0).real.max() < 0
     assert sway_yaw_poles(vehicle, 1.0, sign=-1.0).real.max() > 0
+
+
+def test_lift_keeps_the_lauv_on_its_course_up_to_its_top_speed():
+    vehicle = load_vehicle('lauv')
+    assert sway_yaw_poles(vehicle, 2.0).real.max() > 1.0
+    assert sway_yaw_poles(vehicle, 2.0, lift=1.0).real.max() < -0.5
+
+
+def test_the_fins_of_the_lrauv_act_behind_its_origin():
+    """A fin at x = -1.05 m sees v + x r and w - x q: no force where these vanish."""
+    vehicle, k = load_vehicle('lrauv_tethys'), 1025 / 2 * 4.13 * 0.0244
+    for sideways in ([0, 1.05, 0, 0, 0, 1.0], [0, 0, 1.05, 0, -1.0, 0]):
+        assert_allclose(vehicle.lift @ sideways, 0.0, atol=0.01)
+    assert_allclose(vehicle.lift[1, 1], k, rtol=1e-3)
+    assert sway_yaw_poles(vehicle, 1.0, lift=1.0).real.max() < (
+        0.2 * sway_yaw_poles(vehicle, 1.0).real.max()
+    )

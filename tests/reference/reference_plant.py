@@ -59,6 +59,7 @@ def plant_matrices(vehicle: dict[str, Any], items: list[dict[str, Any]]) -> dict
     mats['B'] *= 1.0 + relative['buoyancy']
     mats['D_linear'] = (1.0 + relative['damping']) * mats['D_linear'] + d_d
     mats['D_quadratic'] = (1.0 + relative['damping']) * mats['D_quadratic']
+    mats['lift'] = (1.0 + relative['damping']) * mats['lift']
     if mats['M_RB'] is None:
         mats['M'] = mats['M'] + d_m
     else:

@@ -75,6 +75,7 @@ def vehicle_matrices(spec: dict[str, Any]) -> dict[str, Any]:
         'M_A': m_a,
         'D_linear': sign * square(drag.get('linear', 0.0)),
         'D_quadratic': sign * square(drag.get('quadratic', 0.0)),
+        'lift': sign * square(spec.get('lift', 0.0)),
         'W': mass * gravity,
         'B': density * gravity * float(hydro['volume']),
         'r_G': r_g,
@@ -94,8 +95,9 @@ def coriolis(M: Array, nu: Array) -> Array:
 
 
 def damping(spec_matrices: dict[str, Any], nu: Array) -> Array:
-    """D(nu) = D_linear + D_quadratic diag(|nu|): column j is multiplied by |nu_j|."""
-    return spec_matrices['D_linear'] + spec_matrices['D_quadratic'] * np.abs(nu)[np.newaxis, :]
+    """D(nu) = D_linear + D_quadratic diag(|nu|) + |u| lift: |nu_j| multiplies column j."""
+    drag = spec_matrices['D_linear'] + spec_matrices['D_quadratic'] * np.abs(nu)[np.newaxis, :]
+    return drag + abs(nu[0]) * spec_matrices['lift']
 
 
 def restoring(mats: dict[str, Any], eta: Array) -> Array:

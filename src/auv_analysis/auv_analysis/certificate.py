@@ -142,7 +142,9 @@ def certificate(
     w = (disturbance_estimate - disturbance) @ form.U  # U^T (f - F)
     G_inv, norm = _inverse(form.G)
     drag = x @ dynamics.D_linear.reshape(6, 6).T
-    drag += (np.abs(nu) * x) @ dynamics.D_quadratic.reshape(6, 6).T  # D(nu) x
+    drag += (np.abs(nu) * x) @ dynamics.D_quadratic.reshape(6, 6).T
+    if dynamics.lift is not None:
+        drag += (np.abs(nu[:, :1]) * x) @ dynamics.lift.reshape(6, 6).T  # D(nu) x
     L = 0.5 * (_quadratic(s, form.A, s) + _quadratic(z, form.k_I, z) + _quadratic(w, G_inv, w))
     rates = derivative(t, np.column_stack([disturbance, L]))
     F_dot = rates[:, :6] @ form.U  # U^T F_dot

@@ -19,7 +19,7 @@ from auv_gvc_controller.laws import SHIPPED
 
 RELATIVE = ('mass', 'added_mass', 'damping', 'buoyancy')  # errors of a plant
 NUMERIC = (
-    'rigid_body', 'inertia_matrix', 'hydrostatics', 'added_mass', 'damping', 'environment',
+    'rigid_body', 'inertia_matrix', 'hydrostatics', 'added_mass', 'damping', 'lift', 'environment',
 )  # fmt: skip
 TERM = ('amplitude', 'omega', 'phase')
 SHAPES = ((6,), (6, 6))  # of what stands for a matrix, beside a number where that may stand

@@ -103,6 +103,7 @@ def fleet(
         M=M,
         D_linear=linear,
         D_quadratic=sign * matrices(of('damping', 'quadratic')),
+        lift=sign * matrices(of('lift')) if 'lift' in data else None,
         weight=mass * gravity,
         buoyancy=of('environment', 'water_density') * gravity * of('hydrostatics', 'volume'),
         r_G=r_G,

@@ -10,7 +10,7 @@ import numpy as np
 
 from auv_dynamics.jit import helper
 from auv_dynamics.lanes import Number
-from auv_dynamics.six import Six, Vector, mul
+from auv_dynamics.six import Six, Vector, add, mul
 
 
 class Model(NamedTuple):
@@ -21,6 +21,7 @@ class Model(NamedTuple):
     M, M_inv : (36,) inertia with added mass and its inverse, row-major; kg, kg m, kg m2
     D_linear, D_quadratic : (36,) positive damping, row-major; column j multiplies 1, abs(nu_j)
     hydrostatics : (4,) W - B in N, then W r_G - B r_B in N m
+    lift : (36,) positive lift of body and fins, row-major, which multiplies abs(u); None: none
 
     """
 
@@ -29,6 +30,7 @@ class Model(NamedTuple):
     D_linear: np.ndarray
     D_quadratic: np.ndarray
     hydrostatics: np.ndarray
+    lift: np.ndarray | None = None
 
 
 @helper
@@ -47,7 +49,7 @@ def coriolis(M: np.ndarray, nu: Vector, x: Vector) -> Six:
 
 @helper
 def damping(model: Model, nu: Vector, x: Vector) -> Six:
-    """D(nu) x, D = D_linear + D_quadratic diag(abs(nu)); positive D opposes motion, (1)."""
+    """D(nu) x, D = D_linear + D_quadratic diag(abs(nu)) + abs(u) lift; positive D opposes, (1)."""
     drag = (
         abs(nu[0]) * x[0],
         abs(nu[1]) * x[1],
@@ -57,15 +59,16 @@ def damping(model: Model, nu: Vector, x: Vector) -> Six:
         abs(nu[5]) * x[5],
     )
     linear = mul(model.D_linear, x)
-    quadratic = mul(model.D_quadratic, drag)
-    return (
-        linear[0] + quadratic[0],
-        linear[1] + quadratic[1],
-        linear[2] + quadratic[2],
-        linear[3] + quadratic[3],
-        linear[4] + quadratic[4],
-        linear[5] + quadratic[5],
-    )
+    return _with_lift(model.lift, nu, x, add(linear, mul(model.D_quadratic, drag)))
+
+
+@helper
+def _with_lift(lift: np.ndarray | None, nu: Vector, x: Vector, rest: Six) -> Six:
+    """The branch is none when compiled: a model without lift is of another type."""
+    if lift is None:
+        return rest
+    u = abs(nu[0])
+    return add(rest, mul(lift, (u * x[0], u * x[1], u * x[2], u * x[3], u * x[4], u * x[5])))
 
 
 @helper

@@ -154,6 +154,7 @@ def with_errors(
         M=M + (dM + dM.T) / 2,
         D_linear=vehicle.D_linear * drag + sum(matrix6(error.get('dD', 0.0)) for error in errors),
         D_quadratic=vehicle.D_quadratic * drag,
+        lift=None if vehicle.lift is None else vehicle.lift * drag,
         weight=weight,
         buoyancy=buoyancy,
     )

@@ -43,6 +43,21 @@ def rigid_body_matrix(
     return np.block([[m * np.eye(3), -m * S], [m * S, about_origin]])
 
 
+def munk_terms(M: np.ndarray) -> np.ndarray:
+    """What inertia adds to SNAME's derivatives by u: coefficient (i, j) of u nu_j in -C(nu) nu.
+
+    With the added mass of a torpedo alone, [5][1] is the Munk moment X_udot - Y_vdot, a part of a
+    combined N_uv; column 0 is zero. (6, 6) of a symmetric M (6, 6).
+    """
+    flat, ahead, product = row_major(M), tuple(np.eye(6)[0]), plain(coriolis)
+    columns = [
+        -np.add(product(flat, ahead, tuple(unit)), product(flat, tuple(unit), ahead))
+        for unit in np.eye(6)
+    ]
+    columns[0] = columns[0] / 2
+    return np.stack(columns, axis=1)
+
+
 def row_major(A: np.ndarray) -> np.ndarray:
     """Matrices (..., 6, 6) as the kernel takes them: (..., 36), copied."""
     return np.array(A, float).reshape(*np.shape(A)[:-2], 36)
@@ -59,6 +74,7 @@ class Vehicle:
     name, source : from the file
     M : (6, 6) inertia with added mass, symmetric positive definite
     D_linear, D_quadratic : (6, 6) positive damping; column j of D_quadratic multiplies abs(nu_j)
+    lift : (6, 6) positive lift of body and fins, which multiplies abs(u); None: none
     weight, buoyancy : N
     r_G, r_B : (3,) centres of gravity and buoyancy, m
     M_RB, M_A : (6, 6) rigid-body and added part of M, None where a file gives M itself
@@ -78,6 +94,7 @@ class Vehicle:
     r_B: np.ndarray
     M_RB: np.ndarray | None = None
     M_A: np.ndarray | None = None
+    lift: np.ndarray | None = None
     warnings: tuple[str, ...] = field(default=())
     thrusters: Thrusters | None = None
 
@@ -93,6 +110,7 @@ class Vehicle:
             D_linear=row_major(self.D_linear),
             D_quadratic=row_major(self.D_quadratic),
             hydrostatics=np.concatenate([heavy, couple], axis=-1),
+            lift=None if self.lift is None else row_major(self.lift),
         )
 
     def changed(self, **values: Any) -> 'Vehicle':

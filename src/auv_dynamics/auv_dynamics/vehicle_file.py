@@ -52,6 +52,7 @@ def vehicle_from_dict(data: dict[str, Any], file: object) -> Vehicle:
     weight = mass * environment['gravity']
     buoyancy = environment['water_density'] * environment['gravity'] * water['volume']
     D_linear, D_quadratic = source.damping()
+    lift = source.lift()
     source.warn_buoyancy(weight, buoyancy)
     thrusters = source.thrusters()
     return Vehicle(
@@ -66,6 +67,7 @@ def vehicle_from_dict(data: dict[str, Any], file: object) -> Vehicle:
         r_B=np.array(water['center_of_buoyancy'], float),
         M_RB=M_RB,
         M_A=M_A,
+        lift=lift,
         warnings=tuple(source.warnings),
         thrusters=thrusters,
     )
@@ -171,6 +173,15 @@ class _Source:
         self._check_semidefinite('damping.linear', (linear + linear.T) / 2)
         self._warn_quadratic(quadratic)
         return linear, quadratic
+
+    def lift(self) -> np.ndarray | None:
+        if 'lift' not in self._data:
+            return None
+        lift = self._sign * matrix6(self._data['lift'])
+        for i in np.flatnonzero(np.diagonal(lift) < 0):
+            found = f'[{i}][{i}] = {lift[i, i]:g}'
+            self._warn('lift', f'{found} drives its own motion: is it of the other sign?')
+        return lift
 
     def thrusters(self) -> Thrusters | None:
         if 'thrusters' not in self._data:

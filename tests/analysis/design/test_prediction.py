@@ -1,5 +1,7 @@
 """What a run foretells of a changed vehicle: inverse dynamics, shares, scores and gradients."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -63,8 +65,10 @@ def test_the_input_is_that_of_inverse_dynamics(prediction, unit):
     assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
-def test_the_acceleration_is_that_of_the_plant(prediction):
+@pytest.mark.parametrize('lift', [None, 40.0 * np.arange(36.0).reshape(6, 6)])
+def test_the_acceleration_is_that_of_the_plant(prediction, lift):
     _, run = prediction
+    run = replace(run, vehicle=replace(run.vehicle, lift=lift))
     part = run.part(slice(0, None, 50))
     down = rotation(quaternion(part.eta[:, 3:]))[:, 2]
     samples = zip(part.eta, part.nu, part.tau, part.disturbance, strict=True)

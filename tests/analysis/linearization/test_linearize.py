@@ -33,7 +33,7 @@ def test_derivatives_of_what_has_a_corner_in_its_slope():
     assert error[0, 0] > 1e-9  # what is not quadratic shows in the error
 
 
-@pytest.mark.parametrize('name', ['rexrov', 'bluerov2'])
+@pytest.mark.parametrize('name', ['rexrov', 'bluerov2', 'lauv'])
 def test_vehicle_alone_against_differences_of_its_dynamics(name):
     vehicle = load_vehicle(name)
     model = linearize(vehicle, NU, eta0=ETA)

@@ -33,7 +33,7 @@ class Couplings:
     velocity_shares, input_shares : (6, 6), in 0..1
     strength : of `coupling_strength`
     zeros : 'delta_xi' and 'delta_pi' -> degrees of freedom that vanish for every motion
-    damped : pairs that linear or quadratic damping couples
+    damped : pairs that damping or lift couples
 
     """
 
@@ -116,5 +116,7 @@ def _without_rounding(A: np.ndarray, below: float = NEGLIGIBLE) -> np.ndarray:
 
 def _damped(vehicle: Vehicle) -> list[Pair]:
     size = np.abs(vehicle.D_linear) + np.abs(vehicle.D_quadratic)
+    if vehicle.lift is not None:
+        size += np.abs(vehicle.lift)
     both = size + size.T
     return [(DOFS[i], DOFS[j]) for i, j in combinations(range(6), 2) if both[i, j] > 0.0]

@@ -91,6 +91,8 @@ def acceleration(run: Run, down: np.ndarray) -> np.ndarray:
     whole = Difference(vehicle.M, couple, np.zeros(6))
     rest = run.tau_applied - added_wrench(whole, nu, np.zeros_like(nu), down)
     rest -= nu @ vehicle.D_linear.T + (np.abs(nu) * nu) @ vehicle.D_quadratic.T
+    if vehicle.lift is not None:
+        rest -= (np.abs(nu[:, :1]) * nu) @ vehicle.lift.T
     rest[:, :3] += (vehicle.weight - vehicle.buoyancy) * down
     if run.disturbance is not None:
         rest -= run.disturbance

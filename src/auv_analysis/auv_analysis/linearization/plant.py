@@ -14,9 +14,10 @@ def plant_jacobian(
 ) -> tuple[np.ndarray, np.ndarray]:
     """A and B of x_dot = A x + B (tau - F), x = (phi, theta, nu), exact but for rounding.
 
-    C(nu) nu is homogeneous of degree 2, D(nu) nu = D_l nu + D_q abs(nu) nu has the derivative
-    D_l + 2 D_q diag(abs(nu)), also at zero, and g is a sinusoid in phi as in theta, whose
-    derivative is half its difference over a quarter turn to either side.
+    C(nu) nu is homogeneous of degree 2, D(nu) nu = D_l nu + D_q abs(nu) nu + abs(u) lift nu has
+    the derivative D_l + 2 D_q diag(abs(nu)) + abs(u) lift + sign(u) lift nu e_u^T, also at zero
+    (at u = 0 with sideways velocity: the mean of either side), and g is a sinusoid in phi as in
+    theta, whose derivative is half its difference over a quarter turn to either side.
 
     Parameters
     ----------
@@ -33,6 +34,9 @@ def plant_jacobian(
     C = vehicle.C(nu)
     turning = C + np.stack([vehicle.C(unit) @ nu for unit in np.eye(6)], axis=1)
     dragging = 2 * vehicle.D(nu) - vehicle.D_linear
+    if vehicle.lift is not None:
+        dragging -= abs(nu[0]) * vehicle.lift
+        dragging[:, 0] += np.sign(nu[0]) * vehicle.lift @ nu
     restoring = np.stack([_quarter_turns(vehicle, eta, axis) for axis in (3, 4)], axis=1)
     A = np.zeros((8, 8))
     A[ATTITUDE, ATTITUDE] = _attitude_slope(eta, kinematics(eta) @ nu)

@@ -27,6 +27,8 @@ def test_there_and_back(name, place, tmp_path, monkeypatch, capsys):
     for key in ('M_RB', 'M_A', 'D_linear', 'D_quadratic', 'r_G', 'r_B', 'weight', 'buoyancy'):
         there = np.asarray(getattr(vehicle, key))
         assert_allclose(getattr(back, key), there, atol=1e-12 * np.abs(there).max(), rtol=1e-9)
+    nu = np.array([-0.7, -0.2, 0.3, 0.1, -0.3, 0.2])
+    assert_allclose(back.D(nu), vehicle.D(nu), rtol=1e-12)
 
 
 def test_damping_acts_in_gazebo_as_here(capsys):
@@ -43,8 +45,8 @@ def test_damping_acts_in_gazebo_as_here(capsys):
                 float(entry.text) * state[columns.index(entry.tag[1])]
             )
         elif 'abs' in entry.tag:
-            u = state[columns.index(entry.tag[1])]
-            force[rows.index(entry.tag[0])] += float(entry.text) * abs(u) * u
+            one, other = (state[columns.index(entry.tag[k])] for k in (1, 5))
+            force[rows.index(entry.tag[0])] += float(entry.text) * abs(other) * one
     assert_allclose(swap_body(force), -load_vehicle('lauv').D(nu) @ nu, atol=1e-12)
 
 

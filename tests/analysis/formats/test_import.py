@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from foreign_vehicles import BLUEROV2, REXROV, URDF, sdf
+from foreign_vehicles import BLUEROV2, REMUS, REMUS_LIFT, REXROV, URDF, sdf
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.cli import main
@@ -105,13 +105,52 @@ def test_products_of_inertia_by_either_convention(imported):
 
 def test_what_a_file_cannot_hold_is_left_out_when_asked(imported):
     for name, text, word in (
-        ('list.m', BLUEROV2.replace('zG = 0.02', 'Yuv = -3; L = 2'), 'Yuv'),
+        ('list.m', BLUEROV2.replace('zG = 0.02', 'Yvr = -3; L = 2'), 'Yvr'),
         ('made.sdf', sdf(more='<yVabsR>-3</yVabsR>'), 'yVabsR'),
         ('rexrov.yaml', f'{REXROV}colour: red\n"a\\nname: b": 1\n', 'colour'),
     ):
         _, document = imported(name, text, '--leave-out')
         assert any(word in text for text in document['left_out'])
         assert document['vehicle']['name'] == 'made'
+
+
+def forces(vehicle, u):
+    """Slopes of Y, Z, M, N by v, w, q, r in motion ahead."""
+    h, columns = 1e-7, []
+    for j in (1, 2, 4, 5):
+        nu, other = (u * np.eye(6)[0] + sign * h * np.eye(6)[j] for sign in (1, -1))
+        pull = [-(vehicle.C(x) + vehicle.D(x)) @ x for x in (nu, other)]
+        columns.append((pull[0] - pull[1])[[1, 2, 4, 5]] / (2 * h))
+    return np.transpose(columns)
+
+
+def test_combined_derivatives_of_a_list_come_out_as_published(imported):
+    options = [*LIST, '--lift', 'combined']
+    vehicle, document = imported('remus.m', REMUS + REMUS_LIFT, *options)
+    m, u = 299 / 9.81, 1.5
+    published = [[-28.6, 0, 0, 5.22 - m], [0, -28.6, -5.22 + m, 0], [0, 24, -2, 0], [-24, 0, 0, -2]]
+    assert_allclose(forces(vehicle, u), u * np.array(published), atol=1e-3)
+    assert_allclose(vehicle.lift[5], [0, -10.57, 0, 0, 0, 3.93], atol=1e-9)
+    assert ['Yuudr' in text for text in document['left_out']].count(True) == 1
+    alone, _ = imported('remus.m', REMUS + REMUS_LIFT, *LIST, '--lift', 'alone')
+    assert_array_equal(alone.lift[5], [0, 24, 0, 0, 0, 2])
+
+
+def test_damping_by_forward_speed_of_uuv_simulator_is_lift(imported):
+    row = ' '.join(str(-value) for value in (0, 0, 0, 0, 0, 9))
+    matrix = f'{"0 0 0 0 0 0 " * 5}{row}'
+    vehicle, document = imported('a.yaml', f'{REXROV}  linear_damping_forward_speed: {matrix}\n')
+    assert_array_equal(vehicle.lift, np.diag([0, 0, 0, 0, 0, 9]))
+    assert any('linear_damping_forward_speed' in text for text in document['traps'])
+
+
+def test_products_with_u_of_gazebo_are_lift(imported):
+    more = '<yVabsU>-3</yVabsU><nRU>-4</nRU><mUW>-2</mUW><zWabsU>-1</zWabsU><xWabsU>2</xWabsU>'
+    vehicle, document = imported('a.sdf', sdf(more=more))
+    found = {(i, j): vehicle.lift[i, j] for i, j in np.argwhere(vehicle.lift)}
+    # x stays and z turns from FLU; y with y, and pitch with heave, turn both
+    assert found == {(1, 1): 3.0, (5, 5): 4.0, (4, 2): 2.0, (2, 2): 1.0, (0, 2): 2.0}
+    assert any('nRU, mUW' in text for text in document['traps'])
 
 
 BOMB = '<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><sdf>&b;</sdf>'
@@ -127,6 +166,8 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
         'a.sdf', re.sub('<uniform.*density>', '', sdf()), [], '--water-density'),
     'xUU': ('a.sdf', sdf(more='<zWW>-3</zWW>'), [], '--quadratic-abs'),
     'two velocities': ('a.sdf', sdf(more='<yVabsR>-3</yVabsR>'), [], '--leave-out'),
+    'u times another abs': ('a.sdf', sdf(more='<yUabsV>-3</yUabsV>'), [], '--leave-out'),
+    'which lift': ('a.m', REMUS + REMUS_LIFT, LIST, '--lift alone'),
     'damping that feeds': ('a.sdf', sdf().replace('-18', '18'), [], '--sign positive'),
     'added mass twice': (
         'a.sdf', sdf(fluid='<fluid_added_mass><xx>1</xx></fluid_added_mass>'), [], 'it twice'),

@@ -1,7 +1,7 @@
 """Lists of derivatives as papers and MATLAB files give them: Xudot = -5.5, X_{u|u|} = -18.2, ...
 
 Fossen's conventions: FSD, derivatives of SNAME. What a list cannot say for itself (the sign of
-products of inertia, the point of the tensor) is asked for.
+products of inertia, the point of the tensor, whether Nuv has the Munk moment in it) is asked for.
 """
 
 import re
@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from auv_analysis.formats.draft import SNAME, Choices, Draft
+from auv_dynamics.vehicle import munk_terms
 
 NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 ASSIGNED = re.compile(rf'([A-Za-z][\w{{}}|\\\']*)\s*[=:]\s*({NUMBER})?')
@@ -20,6 +21,8 @@ BRACED = re.compile(r'\{[^=]*\}')  # X_{\dot u}
 COMMENT = re.compile(r'(%|#|//).*')
 ADDED = re.compile(r'([XYZKMN])(?:([uvwpqr])dot|dot([uvwpqr]))')
 DAMPING = re.compile(r'([XYZKMN])([uvwpqr])([uvwpqr])?')
+SURFACE = re.compile(r'[XYZKMN]uu(?:d|delta)[a-z]*')  # Yuudr: an input
+ABSOLUTE = re.compile(r'abs([uvwpqr])')
 ROWS, COLUMNS = 'XYZKMN', 'uvwpqr'
 SCALARS = {
     'mass': 'm', 'Ixx': 'Ix', 'Iyy': 'Iy', 'Izz': 'Iz', 'volume': 'V', 'nabla': 'V', 'Vol': 'V',
@@ -34,7 +37,8 @@ def read_derivatives(text: str, path: Path, choices: Choices) -> Draft:
     """Draft of a list; InputError names file, key, expected and found."""
     draft = Draft(path, choices, path.stem)
     scalars: dict[str, float] = {}
-    matrices = np.zeros((3, 6, 6))
+    matrices = np.zeros((4, 6, 6))
+    lifting: list[str] = []
     for name, value in _assignments(text, draft):
         plain = re.sub(r"[_{}|\\']|abs", '', name)
         scalar = re.sub(r'^([xyz])([gb])$', lambda m: m[1] + m[2].upper(), plain)
@@ -43,15 +47,44 @@ def read_derivatives(text: str, path: Path, choices: Choices) -> Draft:
             raise draft.refuse(name, 'a coefficient with a dimension', 'a prime')
         if scalar in KNOWN:
             scalars[scalar] = value
+        elif SURFACE.fullmatch(plain):
+            draft.left_out.append(f'{name}: of a control surface, which is an input')
         elif not _placed(draft, matrices, name, plain, value):
             draft.cannot_hold(name, 'no name of a coefficient')
+        elif value and _is_by_u(plain):
+            lifting.append(name)
     draft.assumed.append('all numbers are in SI units and FSD axes, coefficients with dimensions')
     _body(draft, scalars)
     names = ('added_mass', 'damping.linear', 'damping.quadratic')
     said = ('Xudot ... Nrdot', 'Xu ... Nr', 'Xuu ... Nrr')
-    for key, A, where in zip(names, matrices, said, strict=True):
+    for key, A, where in zip(names, matrices[:3], said, strict=True):
         draft.put(key, draft.positive(key, A, SNAME, where), where)
+    if lifting:
+        _lift(draft, matrices[3], lifting)
     return draft
+
+
+def _is_by_u(plain: str) -> bool:
+    """Whether a name is that of a product of u and another velocity."""
+    match = DAMPING.fullmatch(plain)
+    return bool(match and match[3] and match[2] != match[3] and 'u' in (match[2], match[3]))
+
+
+def _lift(draft: Draft, derivatives: np.ndarray, names: list[str]) -> None:
+    """Put the lift; combined derivatives without what C has of the added mass."""
+    lift = draft.positive('lift', derivatives, SNAME, 'Yuv ... Nur')
+    water = munk_terms(draft.values['added_mass']) * (derivatives != 0)
+    if np.any(water) and draft.choices.lift is None:
+        expected = (
+            '--lift alone (of body and fins) or combined (with the terms of added mass, such '
+        )
+        expected += 'as the Munk moment in Nuv): the list cannot say'
+        raise draft.refuse(', '.join(names), expected, 'added mass that adds to them')
+    if draft.choices.lift == 'combined':
+        draft.traps.append(f'{", ".join(names)}: the terms of added mass are taken out, C has them')
+        lift = lift + water
+    draft.put('lift', lift, 'Yuv ... Nur')
+    draft.lift_by_abs_u([name for name in names if '|' not in name and 'abs' not in name])
 
 
 def _assignments(text: str, draft: Draft) -> list[tuple[str, float]]:
@@ -72,7 +105,7 @@ def _assignments(text: str, draft: Draft) -> list[tuple[str, float]]:
 
 def _placed(draft: Draft, matrices: np.ndarray, name: str, plain: str, value: float) -> bool:
     """Put a coefficient in its matrix; False where its name is none."""
-    added, linear, quadratic = matrices
+    added, linear, quadratic, lift = matrices
     if match := ADDED.fullmatch(plain):
         added[ROWS.index(match[1]), COLUMNS.index(match[2] or match[3])] = value
         return True
@@ -82,6 +115,12 @@ def _placed(draft: Draft, matrices: np.ndarray, name: str, plain: str, value: fl
     i, j = ROWS.index(match[1]), COLUMNS.index(match[2])
     if match[3] is None:
         linear[i, j] = value
+    elif _is_by_u(plain):
+        other = match[3] if match[2] == 'u' else match[2]
+        if value and f'|{other}|' in ABSOLUTE.sub(r'|\1|', name):
+            draft.cannot_hold(name, 'u times the absolute value of another velocity')
+        else:
+            lift[i, COLUMNS.index(other)] = value
     elif match[3] != match[2]:
         if value:
             draft.cannot_hold(name, 'a product of two different velocities')

@@ -18,9 +18,10 @@ class Choices:
 
     Attributes
     ----------
-    sign : 'sname' (damping and added mass are negative derivatives) or 'positive'
+    sign : 'sname' (damping, lift, added mass are negative derivatives) or 'positive'
     products : 'integral' (Ixy is the integral of x y dm) or 'tensor' (the tensor's entry)
     inertia_reference : 'cg' or 'co'
+    lift : 'alone' (of body and fins) or 'combined' (with the terms of the added mass)
     quadratic_abs : xUU is meant as xUabsU
     swap_weight_buoyancy : W and B stand for each other
     leave_out : what a vehicle file cannot hold is left out and reported, not refused
@@ -32,6 +33,7 @@ class Choices:
     sign: str | None = None
     products: str | None = None
     inertia_reference: str | None = None
+    lift: str | None = None
     quadratic_abs: bool = False
     swap_weight_buoyancy: bool = False
     leave_out: bool = False
@@ -115,6 +117,13 @@ class Draft:
         elif used == SNAME:
             self.traps.append(f'{key}: SNAME derivatives, sign turned: positive matrices here')
         return turned
+
+    def lift_by_abs_u(self, names: Sequence[str]) -> None:
+        """Say that products with u become products with abs(u)."""
+        if names:
+            self.traps.append(
+                f'{", ".join(names)}: u nu_j there, abs(u) nu_j here, which is the same ahead'
+            )
 
     def from_flu(self, key: str, A: np.ndarray) -> np.ndarray:
         """The matrix in FSD of one in FLU, (6, 6) or the tensor (3, 3)."""

@@ -1,8 +1,8 @@
 """Gazebo: the hydrodynamics plugin of an SDF model, with the link that it acts on.
 
 In Gazebo everything is in the link's frame, forward-left-up; xDotU and xU, xUabsU are derivatives
-of SNAME, negative where they oppose (gz-sim, systems/hydrodynamics); <fluid_added_mass> of the
-link is a positive matrix. The plugin's C_A has the diagonal of the added mass alone.
+of SNAME, negative where they oppose (gz-sim, systems/hydrodynamics), yVabsU is lift; a positive
+matrix is <fluid_added_mass> of the link. The plugin's C_A has the diagonal of the added mass alone.
 """
 
 import re
@@ -91,7 +91,8 @@ def _gravity(root: Element, draft: Draft) -> tuple[float, str]:
 
 
 def _coefficients(draft: Draft, plugin: Element, link: Element) -> None:
-    added, linear, quadratic = np.zeros((3, 6, 6))
+    added, linear, quadratic, lift = np.zeros((4, 6, 6))
+    by_u: list[str] = []
     for child in plugin:
         tag = str(child.tag)
         match = COEFFICIENT.fullmatch(tag)
@@ -105,6 +106,12 @@ def _coefficients(draft: Draft, plugin: Element, link: Element) -> None:
             added[i, j] = value
         elif not match[5]:
             linear[i, j] = value
+        elif value and 'U' in (match[3], match[5]) and match[3] != match[5]:
+            if match[4] and match[5] != 'U':
+                draft.cannot_hold(tag, 'u times the absolute value of another velocity')
+                continue
+            lift[i, COLUMNS.index(match[5]) if match[3] == 'U' else j] += value
+            by_u += [] if match[4] else [tag]
         elif value:
             _quadratic(draft, quadratic, tag, (i, j, match[5], bool(match[4])), value)
     M_A, convention, said = _added_mass(draft, plugin, link, added)
@@ -114,6 +121,10 @@ def _coefficients(draft: Draft, plugin: Element, link: Element) -> None:
         name = f'damping.{key}'
         D = draft.positive(name, A, SNAME, said)
         draft.put(name, draft.from_flu(name, D), f'{said} of the plugin')
+    if np.any(lift):
+        said = 'yVabsU ... of the plugin'
+        draft.put('lift', draft.from_flu('lift', draft.positive('lift', lift, SNAME, said)), said)
+        draft.lift_by_abs_u(by_u)
     draft.traps.append(
         'C_A: Gazebo takes it from the diagonal of xDotU ... alone (before 2026 with two wrong '
         'elements); here C follows from the whole of M'

@@ -13,12 +13,16 @@ def add_import(command: argparse.ArgumentParser) -> None:
     text = 'uuv_simulator, Gazebo, a list of derivatives; default: by its contents'
     command.add_argument('--format', choices=formats, default='auto', help=text)
     command.add_argument('--source', help='citation for the vehicle file')
-    text = 'of damping and added mass in the file, where it is not the usual one of its format'
+    text = (
+        'of damping, lift and added mass in the file, where it is not the usual one of its format'
+    )
     command.add_argument('--sign', choices=('sname', 'positive'), help=text)
     text = 'what Ixy, Ixz, Iyz of a list are: of x y dm, or entries of the tensor'
     command.add_argument('--products', choices=('integral', 'tensor'), help=text)
     text = 'point that the tensor of a list is about'
     command.add_argument('--inertia-reference', choices=('cg', 'co'), help=text)
+    text = 'what Yuv, Nuv, Muw ... of a list are: of body and fins, or with the terms of added mass'
+    command.add_argument('--lift', choices=('alone', 'combined'), help=text)
     text = 'xUU is meant as xUabsU (Gazebo)'
     command.add_argument('--quadratic-abs', action='store_true', help=text)
     text = 'W and B stand for each other'

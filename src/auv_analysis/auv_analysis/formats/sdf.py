@@ -133,19 +133,23 @@ def _collision(vehicle: Vehicle, volume: float) -> list[str]:
 
 
 def _plugin(vehicle: Vehicle, added_mass: str) -> list[str]:
-    """Derivatives of SNAME: the signs of M_A and D turned; zeros off the diagonal are left out."""
+    """Derivatives of SNAME: the signs of M_A and D turned; zeros off the diagonal are left out.
+
+    Lift is yVabsU ...; its column of u is the same as that of the quadratic damping.
+    """
     lines = []
     M_A = vehicle.M_A if added_mass == IN_PLUGIN and vehicle.M_A is not None else np.zeros((6, 6))
-    for A, between, is_abs in (
-        (M_A, 'Dot', False),
-        (vehicle.D_linear, '', False),
-        (vehicle.D_quadratic, '', True),
+    lift = np.zeros((6, 6)) if vehicle.lift is None else vehicle.lift
+    by_u = lift * (np.arange(6) == 0)
+    for A, name in (
+        (M_A, '{}Dot{}'),
+        (vehicle.D_linear, '{}{}'),
+        (vehicle.D_quadratic + by_u, '{0}{1}abs{1}'),
+        (lift - by_u, '{}{}absU'),
     ):
         given = -swap_body_matrix(A)
         for i, j in np.argwhere(given):
-            velocity = COLUMNS[j]
-            tag = f'{ROWS[i]}{between}{velocity}{f"abs{velocity}" if is_abs else ""}'
-            lines.append(f'      {_tag(tag, given[i, j])}')
+            lines.append(f'      {_tag(name.format(ROWS[i], COLUMNS[j]), given[i, j])}')
     return lines
 
 

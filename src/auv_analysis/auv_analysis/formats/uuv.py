@@ -122,8 +122,9 @@ def _volume(draft: Draft, given: Mapping[str, Any], mass: float) -> tuple[float,
 
 def _matrices(draft: Draft, given: Mapping[str, Any]) -> None:
     forward = 'linear_damping_forward_speed'
-    if forward in given and np.any(_matrix(draft, given, forward)):
-        draft.cannot_hold(forward, 'damping that grows with u')
+    if forward in given and np.any(A := _matrix(draft, given, forward)):
+        draft.put('lift', draft.positive('lift', A, SNAME, forward), forward)
+        draft.lift_by_abs_u([forward])
     for key, name, convention in (
         ('added_mass', 'added_mass', POSITIVE),
         ('damping.linear', 'linear_damping', SNAME),

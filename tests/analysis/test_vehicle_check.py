@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 import yaml
+from foreign_vehicles import REMUS, REMUS_LIFT
 from hypothesis import given
 from numpy.testing import assert_allclose
 from rich.console import Console
@@ -19,11 +20,13 @@ from auv_dynamics import load_vehicle
 from auv_dynamics.config import shipped
 from auv_dynamics.kinematics import jacobian
 from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import munk_terms
 from auv_gvc_controller import decompose
 
 NAMES = sorted(path.stem for path in shipped('vehicles', 'herman2018').parent.glob('*.yaml'))
 KEYS = {'name', 'source', 'M', 'N', 'Upsilon', 'inertia', 'couplings', 'structural_zeros',
-        'statement', 'hydrostatics', 'damping', 'thrusters', 'sampling', 'warnings'}  # fmt: skip
+        'statement', 'hydrostatics', 'damping', 'cruise', 'thrusters', 'sampling',
+        'warnings'}  # fmt: skip
 
 
 @pytest.fixture
@@ -264,3 +267,48 @@ def test_command_refuses_a_bad_file_in_one_line(options, written, capsys):
     assert captured.out == ''
     assert captured.err.startswith(f'{path}: added_mass: expected a positive semidefinite matrix')
     assert captured.err.count('\n') == 1
+
+
+def cruise(vehicle_file, *options):
+    return check_vehicle(vehicle_file, *options)['cruise']
+
+
+def test_poles_of_a_torpedo_without_and_with_lift(tmp_path, monkeypatch, capsys):
+    """REMUS of Prestero 2001: its published lift halves the growth, and leaves it unstable."""
+    monkeypatch.chdir(tmp_path)
+    growth = {}
+    for name, text in (('bare', REMUS), ('with_lift', REMUS + REMUS_LIFT)):
+        (tmp_path / f'{name}.m').write_text(text)
+        options = ['--inertia-reference', 'co', '--lift', 'combined', '--json']
+        main(['import-vehicle', f'{name}.m', *options, '--out', f'{name}.yaml'])
+        capsys.readouterr()
+        main(['check-vehicle', f'{name}.yaml', '--speed', '1.5', '--json'])
+        found = json.loads(capsys.readouterr().out)['cruise']
+        assert (found['verdict'], found['speed']) == ('unstable', 1.5)
+        assert ('no lift' in found['hint']) == (name == 'bare')
+        growth[name] = max(mode['pole'][0] for mode in found['modes'])
+    assert 1.8 < growth['bare'] < 2.2
+    assert 0.9 < growth['with_lift'] < 1.1
+
+
+def test_poles_ahead_say_whether_a_vehicle_keeps_its_course(written):
+    assert cruise('lauv')['verdict'] == 'stable'
+    assert cruise('lauv')['speed'] == 2.0
+    data = file_of('lauv')
+    del data['lift']
+    bare = cruise(written(data), 2.0)
+    assert (bare['verdict'], bare['speed_source']) == ('unstable', 'given')
+    assert 'key lift' in bare['hint']
+    assert cruise(written(data | {'name': 'other'}))['speed_source'] == 'assumed'
+    data['damping'] = {'linear': [0.0] * 6, 'quadratic': [0.0] * 6}
+    at_rest = cruise(written(data), 0.0)
+    assert (at_rest['verdict'], at_rest['hint']) == ('marginal', None)
+
+
+def test_munk_terms_are_the_slopes_of_the_coriolis_wrench():
+    M = load_vehicle('rexrov').M
+    vehicle, h = load_vehicle('rexrov'), 1e-6
+    for j in range(1, 6):
+        ahead, slip = np.eye(6)[0], h * np.eye(6)[j]
+        slope = [-vehicle.C(ahead + s * slip) @ (ahead + s * slip) for s in (1, -1)]
+        assert_allclose(munk_terms(M)[:, j], (slope[0] - slope[1]) / (2 * h), rtol=1e-7, atol=1e-4)

@@ -161,6 +161,8 @@ def _params(command: argparse.ArgumentParser) -> None:
 
 def _check_vehicle(command: argparse.ArgumentParser) -> None:
     command.add_argument('vehicle', metavar='FILE', help=VEHICLE)
+    text = 'ahead, at which the poles are, m/s; default: the top speed of a shipped one, else 1'
+    command.add_argument('--speed', type=float, metavar='U', help=text)
 
 
 def _check_driver(command: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""What a vehicle file says: inertia, couplings, hydrostatics, damping, thrusters, largest step."""
+"""What a vehicle file says: inertia, couplings, hydrostatics, poles, thrusters, largest step."""
 
 from pathlib import Path
 from typing import Any
@@ -6,30 +6,35 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.coupling import NEGLIGIBLE, structural_zeros
+from auv_analysis.linearization.loop import linearize
+from auv_analysis.linearization.modes import modes
+from auv_analysis.scaling import TOP_SPEED
 from auv_dynamics.signals import DOFS
 from auv_dynamics.thrusters import Thrusters
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.vehicle import Vehicle, munk_terms
 from auv_dynamics.vehicle_file import load_vehicle
 from auv_gvc_controller.decomposition import decompose, inverse_upper
 from auv_gvc_controller.gains import RINGS, UNSTABLE, sampled_rate
 
 K_D = 12.0  # k_D of the paper, (36)
+CRUISE = 1.0  # m/s, where the top speed of a vehicle is not known
 VELOCITY = ('m/s',) * 3 + ('rad/s',) * 3
 WRENCH = ('N',) * 3 + ('N m',) * 3
 
 
-def check_vehicle(name_or_path: str | Path) -> dict[str, Any]:
+def check_vehicle(name_or_path: str | Path, speed: float | None = None) -> dict[str, Any]:
     """Properties of a vehicle file that decide how it can be controlled, ready for JSON.
 
     Parameters
     ----------
     name_or_path : a vehicle file, or the bare name of a shipped one
+    speed : m/s, ahead, at which the poles are; None: the top speed of a shipped vehicle, else 1
 
     Returns
     -------
     document : name, source, M, N, Upsilon, inertia, couplings, structural_zeros, statement,
-        hydrostatics, damping, thrusters (None without), sampling, warnings; SI units, None for
-        what does not exist (a time constant without damping, a frequency without restoring)
+        hydrostatics, damping, cruise, thrusters (None without), sampling, warnings; SI units, None
+        for what does not exist (a time constant without damping, a frequency without restoring)
 
     Raises
     ------
@@ -56,6 +61,7 @@ def check_vehicle(name_or_path: str | Path) -> dict[str, Any]:
         'statement': _statement(couplings),
         'hydrostatics': _hydrostatics(vehicle),
         'damping': _damping(vehicle),
+        'cruise': _cruise(vehicle, speed),
         'thrusters': None if vehicle.thrusters is None else _thrusters(vehicle.thrusters),
         'sampling': _sampling(vehicle.M),
         'warnings': list(vehicle.warnings),
@@ -160,6 +166,39 @@ def _damping(vehicle: Vehicle) -> dict[str, Any]:
         'linear_symmetric_eigenvalues': np.linalg.eigvalsh(symmetric).tolist(),
         'time_constants': constants,
     }
+
+
+def _cruise(vehicle: Vehicle, speed: float | None) -> dict[str, Any]:
+    """Poles of straight and level motion ahead, held by a constant wrench, and what they mean."""
+    known = TOP_SPEED.get(vehicle.name)
+    source = 'given' if speed is not None else 'top speed' if known else 'assumed'
+    if speed is None:
+        speed = float(known.split()[0]) if known else CRUISE
+    found = modes(linearize(vehicle, [speed, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    fastest = max(found, key=lambda mode: mode['pole'][0])
+    growth = fastest['pole'][0]
+    return {
+        'speed': speed,
+        'speed_source': source,
+        'modes': found,
+        'verdict': 'unstable' if growth > 0 else 'marginal' if growth == 0 else 'stable',
+        'mostly': fastest['mostly'],
+        'hint': _munk(vehicle) if growth > 0 else None,
+    }
+
+
+def _munk(vehicle: Vehicle) -> str | None:
+    """Why a vehicle turns across the flow; None where the added mass does not turn it."""
+    yaw, pitch = (munk_terms(vehicle.M)[place] for place in ((5, 1), (4, 2)))
+    if yaw >= 0 and pitch <= 0:
+        return None
+    because = 'the Munk moment of the added mass turns it across the flow'
+    if vehicle.lift is None:
+        return (
+            f'{because}, and the file has no lift of body and fins (key lift), without which a '
+            'torpedo vehicle is unstable'
+        )
+    return f'{because}; lift and damping are too small against it'
 
 
 def _thrusters(thrusters: Thrusters) -> dict[str, Any]:

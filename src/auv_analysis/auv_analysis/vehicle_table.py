@@ -25,6 +25,7 @@ def print_check(document: dict[str, Any], out: Console | None = None) -> None:
     _couplings(document, out)
     _hydrostatics(document['hydrostatics'], out)
     _damping(document['damping'], out)
+    _cruise(document['cruise'], out)
     if document['thrusters'] is not None:
         _thrusters(document['thrusters'], out)
     _sampling(document['sampling'], out)
@@ -115,6 +116,27 @@ def _damping(found: dict[str, Any], out: Console) -> None:
     _print(out, 'open loop with linear damping alone', columns, rows)
     values = ', '.join(_number(value) for value in found['linear_symmetric_eigenvalues'])
     _say(out, f'eigenvalues of the symmetric part of linear D: {values}')
+
+
+def _cruise(found: dict[str, Any], out: Console) -> None:
+    why = {'given': '--speed', 'top speed': 'its top speed', 'assumed': 'assumed, see --speed'}
+    rows = []
+    for mode in found['modes']:
+        real, imaginary = mode['pole']
+        pole = f'{real:.4g} ± {imaginary:.4g}i' if imaginary else _number(real)
+        rows.append((mode['mostly'], pole, _number(mode['time_constant'])))
+    title = f'poles straight ahead at {found["speed"]:g} m/s ({why[found["speed_source"]]})'
+    _print(out, title, ('mostly', 'pole, 1/s', 'time constant, s'), rows)
+    said = {
+        'unstable': 'it leaves straight motion',
+        'marginal': 'no pole grows, one does not decay',
+    }
+    text = f'{found["verdict"]} at {found["speed"]:g} m/s without control'
+    if found['verdict'] in said:
+        text += f': {said[found["verdict"]]}, in {found["mostly"]} first'
+    _say(out, text)
+    if found['hint']:
+        _say(out, f'hint: {found["hint"]}')
 
 
 def _thrusters(found: dict[str, Any], out: Console) -> None:

@@ -9,7 +9,7 @@ from auv_analysis.vehicle_table import print_check
 
 def check_vehicle(options: argparse.Namespace) -> dict[str, Any]:
     """What a vehicle file says about how it can be controlled."""
-    document = vehicle_check.check_vehicle(options.vehicle)
+    document = vehicle_check.check_vehicle(options.vehicle, options.speed)
     if not options.json:
         print_check(document)
     return document

@@ -1,6 +1,7 @@
 """A parser of command lines whose complaint is one line with the nearest word, and grouped help."""
 
 import argparse
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,6 +23,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(**options)
         self.children: dict[str, Parser] = {}
         self.groups: Mapping[str, Mapping[str, str]] = {}
+        self.register('type', float, _finite)
 
     @property
     def arguments(self) -> list[argparse.Action]:
@@ -86,3 +88,17 @@ class Parser(argparse.ArgumentParser):
 
             expected = one_of(value, map(str, action.choices))
             raise argparse.ArgumentError(action, f'expected {expected}, found {value}')
+
+
+def _finite(text: str) -> float:
+    """What stands for `type=float`: inf and nan are no numbers that a command can work with."""
+    from auv_dynamics.files import LARGEST
+
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= LARGEST:
+        expected = f'a finite number, at most {LARGEST:g}'
+        raise argparse.ArgumentTypeError(f'expected {expected}, found {text}')
+    return value

@@ -114,7 +114,7 @@ def _counts(node: str, listed: list[str], selection: Selection) -> dict[str, int
     for entry in listed:
         topic, _, count = entry.partition('=')
         named = [name for name in (topic, f'/{topic}') if name in selection.names]
-        if not (named and count.isdigit()):
+        if not (named and count.isdecimal()):
             expected = f'topic=count with a topic of {", ".join(selection.names)}'
             raise InputError(node, 'expected_subscribers', expected, entry)
         counts[named[0]] = int(count)

@@ -21,6 +21,26 @@ def listed(run: Run, maker: Maker) -> list:
     return simple(motion(run, enu=True), maker, '/o', '/w', UNNAMED)
 
 
+@pytest.mark.parametrize('count', [1, 2])
+def test_a_motion_of_one_or_two_messages_is_refused(count, run, tmp_path) -> None:
+    maker, few = Maker(), motion(run, enu=True, keep=slice(count))
+    path = write(tmp_path / 'dive', simple(few, maker, '/o', '/w', UNNAMED), maker)
+    with pytest.raises(InputError) as refusal:
+        loaded(path, **KEYS)
+    assert '/o' in str(refusal.value)
+
+
+def test_files_whose_names_end_in_what_is_no_number(run, tmp_path) -> None:
+    """The superscript is a digit of Unicode, and none of a number."""
+    path = write(tmp_path / 'dive', listed(run, Maker()), Maker())
+    [file] = files_of(path)
+    copies = [path / f'{file.stem}_{end}.mcap' for end in ('²', '1')]
+    for copy in copies:
+        copy.write_bytes(file.read_bytes())
+    (path / 'metadata.yaml').unlink()
+    assert files_of(path) == [*sorted([file, copies[0]]), copies[1]]
+
+
 @pytest.mark.parametrize('name', ['x.db3', 'x.bag', 'x.mcap'])
 @pytest.mark.parametrize('data', [b'', b'no bag at all', b'SQLite format 3\0', b'#ROSBAG V2.0\n'])
 def test_what_is_no_bag_is_refused(name, data, tmp_path) -> None:

@@ -124,6 +124,35 @@ def forces(vehicle, u):
     return np.transpose(columns)
 
 
+FRAMES = """<frame name="aft" attached_to="mount"><pose>-1 0 0 0 0 0</pose></frame>
+  <link name="fin"><pose relative_to="aft">0 0.5 0 0 0 0</pose></link>
+  <joint name="hinge" type="fixed"><pose degrees="true">0 0 1 0 0 90</pose><child>fin</child>
+    <parent>base_link</parent></joint>
+  <frame name="mount"><pose relative_to="base_link">0 0 0 0 0 0</pose></frame>"""
+
+
+@pytest.mark.parametrize(
+    ('frame', 'pose', 'r_B'),
+    [
+        ('base_link', '1 2 3 0 0 0', (1, -2, -3)),
+        ('__model__', '1 2 3 0 0 0', (-3, -3, 4)),  # the link is at (4, 5, 7), its x along y
+        ('aft', '0 0 0 0 0 0', (-1, 0, 0)),
+        ('fin', '1 2 3 0 0 0', (0, -2.5, -3)),
+        ('hinge', '1 2 3 0 0 0', (-3, -1.5, -4)),
+    ],
+)
+def test_poses_are_in_the_frame_that_they_name(imported, frame, pose, r_B):
+    text = sdf().replace(
+        '<pose>0 0 0.05 0 0 0</pose>', f'<pose relative_to="{frame}">{pose}</pose>'
+    )
+    text = text.replace(
+        '<link name="base_link">',
+        '<link name="base_link"><pose>4 5 7 0 0 1.5707963267948966</pose>',
+    )
+    vehicle, _ = imported('a.sdf', text.replace('</link>', f'</link>{FRAMES}', 1))
+    assert_allclose(vehicle.r_B, r_B, atol=1e-12)
+
+
 def test_combined_derivatives_of_a_list_come_out_as_published(imported):
     options = [*LIST, '--lift', 'combined']
     vehicle, document = imported('remus.m', REMUS + REMUS_LIFT, *options)
@@ -173,6 +202,14 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
         'a.sdf', sdf(fluid='<fluid_added_mass><xx>1</xx></fluid_added_mass>'), [], 'it twice'),
     'a word for a number': ('a.sdf', sdf().replace('-18', 'much'), [], 'xUabsU: expected'),
     'not finite': ('a.sdf', sdf().replace('-18', 'nan'), [], 'xUabsU'),
+    'xacro in an angle': (
+        'a.urdf', URDF.replace('xyz="0 0 0"', 'rpy="0 0 ${pi}"'), [], 'expand xacro first'),
+    'an angle': ('a.urdf', URDF.replace('xyz="0 0 0"', 'rpy="0 0 1"'), [], 'rpy="0 0 0"'),
+    'a frame of another model': ('a.sdf', sdf().replace(
+        '<pose>0 0 0.05', '<pose relative_to="other::mount">0 0 0.05'), [], 'other::mount'),
+    'frames in a circle': ('a.sdf', sdf(more='</plugin><frame name="a" attached_to="b"/>'
+        '<frame name="b" attached_to="a"/><plugin>').replace(
+        '<pose>0 0 0.05', '<pose relative_to="a">0 0 0.05'), [], 'in a circle'),
     'xacro': ('a.urdf', URDF.replace('1.83826', '${volume}'), [], 'expand xacro first'),
     'positive damping': ('a.yaml', REXROV.replace('[-74.82', '[74.82'), [], 'damping.linear'),
     'unknown entry': ('a.yaml', f'{REXROV}colour: red\n', [], 'colour'),

@@ -54,4 +54,4 @@ def check_regular(path: Path, folder: Path) -> None:
 def split_order(path: Path) -> tuple[int, str]:
     """Place of a file in its bag: by the number at the end of its name."""
     number = path.stem.rpartition('_')[2]
-    return (int(number) if number.isdigit() else 0, path.name)
+    return (int(number) if number.isdecimal() else 0, path.name)

@@ -95,8 +95,10 @@ def _said(axes: Mapping[str, str], found: Mapping[str, Recorded]) -> str:
 
 def _track(role: str, one: Recorded, axes: str, rows: np.ndarray | None = None) -> Track:
     rows = in_our_axes(one.rows, role, axes) if rows is None else rows
-    if not len(one.stamps):
-        raise InputError(one.bag, one.source.topic, 'messages on the clock of the velocity', 'none')
+    least = 2 if role in ('pose', 'twist') else 1  # a motion has a rate
+    if len(one.stamps) < least:
+        expected = f'at least {least} messages on the clock of the velocity'
+        raise InputError(one.bag, one.source.topic, expected, len(one.stamps) or 'none')
     return Track(role, one.source.topic, one.stamps, rows, _limit(one), _is_held(one.source))
 
 

@@ -33,7 +33,7 @@ def read_gazebo(root: Element, path: Path, choices: Choices) -> Draft:
     name = (plugin.findtext('link_name') or '').strip()
     model, link = _link(root, name, draft)
     draft.name = model.get('name') or path.stem
-    link_inertia(draft, link)
+    link_inertia(draft, link, model)
     others = [other for other in model.iter('link') if other is not link]
     masses = [other.findtext('inertial/mass') for other in others]
     total = sum(numbers(text, 1, path, 'link.mass')[0] for text in masses if text)
@@ -41,7 +41,7 @@ def read_gazebo(root: Element, path: Path, choices: Choices) -> Draft:
         draft.assumed.append(
             f'{len(others)} other links of the model are no part of the vehicle: {total:g} kg'
         )
-    found = displaced(link, path)
+    found = displaced(link, model, path)
     said = 'collision shapes of the link, which Gazebo computes buoyancy from'
     draft.buoyancy(
         None if found is None else (found[0], said), None if found is None else (found[1], said)

@@ -5,9 +5,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from auv_analysis.formats.draft import Draft
-from auv_analysis.formats.solids import pose_of
+from auv_analysis.formats.solids import pose_in_link
 from auv_analysis.formats.xml_text import numbers
-from auv_dynamics.kinematics import quaternion, rotation
 
 ENTRIES = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
@@ -30,25 +29,21 @@ def put_rigid_body(
     draft.values['rigid_body.inertia_reference'] = 'cg'
 
 
-def link_inertia(draft: Draft, link: Element) -> None:
-    """Put mass, centre of gravity and tensor of an SDF link."""
+def link_inertia(draft: Draft, link: Element, model: Element) -> None:
+    """Put mass, centre of gravity and tensor of a link of an SDF model."""
     inertial = link.find('inertial')
     if inertial is None or inertial.find('mass') is None:
         raise draft.refuse('link.inertial.mass', 'a number (kg)', None)
     path, key = draft.file, 'link.inertial'
     mass = numbers(inertial.findtext('mass'), 1, path, f'{key}.mass')[0]
-    pose = inertial.find('pose')
-    if pose is not None and pose.get('relative_to'):
-        raise draft.refuse(f'{key}.pose', "a pose in the link's frame", pose.get('relative_to'))
-    r_G, angles = pose_of(inertial, path, key)
+    r_G, R = pose_in_link(inertial, link, model, path, key)
     entries = [
         numbers(inertial.findtext(f'inertia/{name}', '0'), 1, path, f'{key}.{name}')[0]
         for name in ENTRIES
     ]
-    if np.any(angles):
+    if np.any(np.eye(3) != R):
         draft.traps.append('link.inertial.pose: the tensor is turned into the axes of the link')
         xx, xy, xz, yy, yz, zz = entries
-        R = rotation(quaternion(angles))
         turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
         entries = [float(turned[i, j]) for i in range(3) for j in range(i, 3)]
     put_rigid_body(draft, mass, r_G, entries, '<inertial> of the link')

@@ -1,4 +1,4 @@
-"""Volumes and centres of the collision shapes of SDF, which Gazebo's buoyancy is computed from."""
+"""Poses of SDF, and its collision shapes, which Gazebo's buoyancy is computed from."""
 
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -6,24 +6,72 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from auv_analysis.formats.xml_text import numbers
+from auv_dynamics.files import InputError
+from auv_dynamics.kinematics import quaternion, rotation
+
+Pose = tuple[np.ndarray, np.ndarray]  # position (3,) in m, rotation (3, 3) to the outer frame
+SAME: Pose = (np.zeros(3), np.eye(3))
+MODEL = '__model__'
 
 
-def pose_of(element: Element, path: object, key: str) -> tuple[np.ndarray, np.ndarray]:
-    """Position (3,) in m and roll, pitch, yaw (3,) in rad of <pose>; zero where there is none."""
+def pose_in_link(element: Element, link: Element, model: Element, path: object, key: str) -> Pose:
+    """Pose of a part of a link in the frame of the link, whatever frame it is given in.
+
+    Parameters
+    ----------
+    element : has a <pose>, or none: that of the link
+    link, model : the link, and the model whose links, joints and frames poses may be relative to
+    path, key : named in errors
+
+    Raises
+    ------
+    InputError : a frame that the model does not have, or frames that go in a circle
+
+    """
+    frame, inner = _pose_of(element, path, key)
+    if frame in ('', link.get('name')):
+        return inner
+    p, R = _chained(_in_model(frame, model, path, key, ()), inner)
+    origin, axes = _in_model(link.get('name', ''), model, path, key, ())
+    return axes.T @ (p - origin), axes.T @ R
+
+
+def _pose_of(element: Element, path: object, key: str) -> tuple[str, Pose]:
+    """Name of the frame that <pose> is relative to, empty for the usual one, and the pose."""
     pose = element.find('pose')
     if pose is None:
-        return np.zeros(3), np.zeros(3)
-    values = np.array(numbers(pose.text, 6, path, f'{key}.pose'))
+        return '', SAME
+    values = np.array(numbers(pose.text or '0 0 0 0 0 0', 6, path, f'{key}.pose'))
     angles = np.radians(values[3:]) if pose.get('degrees') in ('true', '1') else values[3:]
-    return values[:3], angles
+    return pose.get('relative_to', ''), (values[:3], rotation(quaternion(angles)))
 
 
-def displaced(link: Element, path: Path) -> tuple[float, np.ndarray] | None:
+def _chained(outer: Pose, inner: Pose) -> Pose:
+    return outer[0] + outer[1] @ inner[0], outer[1] @ inner[1]
+
+
+def _in_model(name: str, model: Element, path: object, key: str, seen: tuple[str, ...]) -> Pose:
+    """Pose of a link, joint or frame of a model in the frame of the model."""
+    if name == MODEL:
+        return SAME
+    named = [e for tag in ('link', 'joint', 'frame') for e in model.findall(tag)]
+    found = [e for e in named if e.get('name') == name]
+    if len(found) != 1 or name in seen:
+        why = 'in a circle' if name in seen else 'not one of them'
+        expected = 'a pose relative to a link, joint or frame of this model'
+        raise InputError(path, f'{key}.pose', expected, f'{name}, {why}')
+    usual = {'joint': found[0].findtext('child', '').strip(), 'frame': found[0].get('attached_to')}
+    frame, inner = _pose_of(found[0], path, f'{found[0].tag} {name}')
+    outer = frame or usual.get(str(found[0].tag)) or MODEL
+    return _chained(_in_model(outer, model, path, key, (*seen, name)), inner)
+
+
+def displaced(link: Element, model: Element, path: Path) -> tuple[float, np.ndarray] | None:
     """Volume in m3 and its centre (3,) in the link's frame; None where a shape has none of its own.
 
     Parameters
     ----------
-    link : of an SDF model
+    link, model : of SDF
     path : named in errors
 
     """
@@ -35,7 +83,7 @@ def displaced(link: Element, path: Path) -> tuple[float, np.ndarray] | None:
         if volume is None:
             return None
         total += volume
-        moment += volume * pose_of(collision, path, key)[0]
+        moment += volume * pose_in_link(collision, link, model, path, key)[0]
     return (total, moment / total) if total > 0 else None
 
 

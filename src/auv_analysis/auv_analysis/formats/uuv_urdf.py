@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
+from auv_analysis.formats.xml_text import numbers
 from auv_dynamics.files import InputError
 
 
@@ -40,7 +41,7 @@ def _inertial(root: Element, name: str, path: Path) -> dict[str, Any]:
         expected = f'<inertial> of the link {name or "without name"}, with xacro expanded'
         raise InputError(path, 'inertial', expected, None)
     mass, origin, inertia = (found.find(tag) for tag in ('mass', 'origin', 'inertia'))
-    if origin is not None and any(float(word) for word in origin.get('rpy', '0 0 0').split()):
+    if origin is not None and any(numbers(origin.get('rpy', '0 0 0'), 3, path, 'inertial.origin')):
         raise InputError(path, 'inertial.origin', 'rpy="0 0 0"', origin.get('rpy'))
     return {
         'mass': '' if mass is None else mass.get('value', ''),

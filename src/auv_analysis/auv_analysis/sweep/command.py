@@ -51,7 +51,7 @@ def _announce(campaign: Campaign) -> None:
 def _workers(text: str | None) -> int | None:
     if text is None:
         return None
-    if not text.isdecimal() or not 1 <= int(text) <= 1024:
+    if not (text.isdecimal() and len(text) < 9 and 1 <= int(text) <= 1024):
         raise InputError('--workers', '', 'a whole number from 1 to 1024', text)
     return int(text)
 

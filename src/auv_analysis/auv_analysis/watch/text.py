@@ -52,7 +52,7 @@ def stamp(value: float) -> str:
 def fact(value: str) -> str:
     """What a node says of itself; a number with three digits."""
     try:
-        return value if value.lstrip('-').isdigit() else f'{float(value):.3g}'
+        return value if value.lstrip('-').isdecimal() else f'{float(value):.3g}'
     except ValueError:
         return value
 

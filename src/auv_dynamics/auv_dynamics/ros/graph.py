@@ -263,7 +263,7 @@ class Graph:
         counts = {}
         for entry in listed:
             topic, _, count = entry.partition('=')
-            if topic not in known or not count.isdigit():
+            if topic not in known or not count.isdecimal():
                 expected = f'topic=count with a topic of {", ".join(known)}{meant(topic, known)}'
                 raise InputError(self.node.get_name(), 'expected_subscribers', expected, entry)
             counts[topic] = int(count)

@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -53,6 +55,14 @@ def test_mathematics_never_imports_ros() -> None:
         allowed = path.stem.endswith('_node') or path.parent.name == 'ros'
         if not allowed and path.stem not in wiring:
             assert not [m for m in imported(path) if is_ros(m)], path
+
+
+@pytest.mark.parametrize(
+    'module', ['auv_gvc_controller.setpoint_node', 'auv_dynamics.frame_converter_node']
+)
+def test_a_node_that_compiles_nothing_does_not_load_numba(module: str) -> None:
+    script = f'import sys, {module}; sys.exit("numba" in sys.modules)'
+    assert subprocess.run([sys.executable, '-c', script], check=False).returncode == 0
 
 
 def test_layers_never_import_upward() -> None:

@@ -17,7 +17,7 @@ from rcl_interfaces.srv import SetParameters
 from auv_dynamics import interface
 from auv_dynamics.interface import Frames
 from auv_dynamics.ros import convert, topics
-from auv_dynamics.ros.graph import ERROR, STALE, WARN
+from auv_dynamics.ros.health import ERROR, STALE, WARN
 from auv_dynamics.ros.topics import DIAGNOSTICS
 
 FRAMES = Frames()

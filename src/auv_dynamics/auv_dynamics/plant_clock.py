@@ -7,7 +7,8 @@ from auv_dynamics import interface
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.endpoints import UNNAMED
-from auv_dynamics.ros.graph import OK, STALE, Health, steady_timer
+from auv_dynamics.ros.graph import steady_timer
+from auv_dynamics.ros.health import OK, STALE, Health
 
 WATCH = 0.2  # s between two looks at the silence
 CATCH_UP = 0.5  # s that a plant in real time may be late: beyond, its time goes on from there

@@ -8,8 +8,7 @@ from rclpy.node import Node
 from auv_dynamics.current import AXES
 from auv_dynamics.disturbance import KINDS
 from auv_dynamics.files import InputError
-from auv_dynamics.ros.parameters import declare
-from auv_dynamics.signals import DOFS, harmonic_spec
+from auv_dynamics.ros.parameters import declare, harmonic_parameters
 
 NAMES = 'disturbance.names'
 ALL_KINDS = (*KINDS, 'model_error', 'current')
@@ -101,22 +100,3 @@ def numbers(node: Node, name: str, text: str, lengths: tuple[int, ...]) -> list[
 def _matrices(node: Node, prefix: str, keys: tuple[str, ...]) -> dict[str, list[float]]:
     found = {key: numbers(node, f'{prefix}{key}', '6x6', (1, 6, 36)) for key in keys}
     return {key: value for key, value in found.items() if value}
-
-
-def harmonic_parameters(
-    node: Node, prefix: str, unit: str, axes: tuple[str, ...] = DOFS
-) -> dict[str, Any]:
-    """Declare `<prefix><axis>.{offset, amplitude, omega, phase}` and return them as a mapping."""
-    columns: dict[str, Any] = {}
-    for axis in axes:
-        columns[f'{axis}.offset'] = declare(
-            node, f'{prefix}{axis}.offset', float, 0.0, f'constant part, {unit}'
-        )
-        for key, what in (('amplitude', unit), ('omega', 'rad/s'), ('phase', 'rad')):
-            values = declare(node, f'{prefix}{axis}.{key}', list[float], None, f'{what}, per term')
-            columns[f'{axis}.{key}'] = values or []
-    try:
-        spec = harmonic_spec(columns, axes)
-    except ValueError as error:
-        raise InputError(node.get_name(), prefix.rstrip('.'), str(error), 'other lengths') from None
-    return {axis: entry for axis, entry in spec.items() if entry['offset'] or entry['terms']}

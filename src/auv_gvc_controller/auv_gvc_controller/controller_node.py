@@ -11,7 +11,8 @@ from std_srvs.srv import Trigger
 
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkMixin
-from auv_dynamics.ros.graph import OK, Graph, Health, steady_timer
+from auv_dynamics.ros.graph import Graph, steady_timer
+from auv_dynamics.ros.health import OK, Health
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import refuse_unknown
 from auv_gvc_controller.controller import Answer, VelocityController

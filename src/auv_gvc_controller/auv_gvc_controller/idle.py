@@ -6,7 +6,7 @@ from typing import Any
 from auv_dynamics.interface import NANOSECONDS
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.endpoints import why_silent
-from auv_dynamics.ros.graph import ERROR, OK, STALE, WARN, Health
+from auv_dynamics.ros.health import ERROR, OK, STALE, WARN, Health
 
 LATE = 1.0  # s without a message, after which nobody is said to publish
 NO_ODOMETRY, NO_SETPOINT = 'no odometry', 'no set-point'  # what the watchdog's texts begin with

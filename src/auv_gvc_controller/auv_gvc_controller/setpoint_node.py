@@ -7,12 +7,16 @@ import numpy as np
 
 from auv_dynamics import interface
 from auv_dynamics.files import InputError
-from auv_dynamics.plant_parameters import harmonic_parameters
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
-from auv_dynamics.ros.parameters import declare, declare_grid, refuse_unknown
+from auv_dynamics.ros.parameters import (
+    declare,
+    declare_grid,
+    harmonic_parameters,
+    refuse_unknown,
+)
 from auv_gvc_controller.limits import Limits
 from auv_gvc_controller.odometry_guard import OdometryGuard
 from auv_gvc_controller.setpoint import Setpoint, make_setpoint

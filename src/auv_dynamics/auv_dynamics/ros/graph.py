@@ -1,7 +1,5 @@
 """A node's part of the graph: publishers, subscriptions, the start barrier, diagnostics."""
 
-import math
-import re
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -25,6 +23,7 @@ from auv_dynamics.nearest import meant
 from auv_dynamics.ros.codec import Codec
 from auv_dynamics.ros.convert import stamp
 from auv_dynamics.ros.endpoints import full_name, has_conflict, onlookers
+from auv_dynamics.ros.health import ERROR, Health, Lasting, kind_of, worst
 from auv_dynamics.ros.kinds import type_name
 from auv_dynamics.ros.parameters import declare
 from auv_dynamics.ros.topics import (
@@ -41,49 +40,12 @@ from auv_dynamics.ros.topics import (
 
 STEP_TOPICS_BY_NAME = [topic.name for topic in STEP_TOPICS]
 LOUD = 1.0  # s between two reports of the same kind
-LASTING = 1.0  # s, after which what is wrong is logged: names and matches may come late
-REPEATED = 10.0  # s between two logs of what is wrong and lasts
-OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
-STALE, ERROR = DiagnosticStatus.STALE, DiagnosticStatus.ERROR
-WORSE = (OK, WARN, STALE, ERROR)
 SINGLE = {topic.name: topic for topic in (ODOM, WRENCH, CLOCK)}  # with one publisher each
-Health = tuple[bytes, str]  # level of a DiagnosticStatus, and why it is not OK
-NUMBER = re.compile(r'[-+]?\d')  # with the first one reports of the same kind may begin to differ
 
 
 def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Timer:
     """Timer on the steady clock, whatever `use_sim_time` says."""
     return node.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
-
-
-class Lasting:
-    """Logs what is wrong once it lasts, then now and then, and that it is over.
-
-    Parameters
-    ----------
-    logger : of the node
-
-    """
-
-    def __init__(self, logger: Any):
-        self._logger = logger
-        self._kind, self._text = '', ''
-        self._since = self._said = -math.inf
-
-    def see(self, level: bytes, text: str) -> None:
-        """Take the present state; an empty text: nothing is wrong."""
-        now, kind = time.monotonic(), NUMBER.split(text, maxsplit=1)[0]
-        if kind != self._kind:
-            if self._said > self._since and not text:
-                self._logger.info(f'over: {self._text}')
-            self._kind, self._since, self._said = kind, now, -math.inf
-        self._text = text
-        if text and now - self._since >= LASTING and now - self._said >= REPEATED:
-            self._said = now
-            if level == ERROR:
-                self._logger.error(text)
-            else:
-                self._logger.warning(text)
 
 
 class Graph:
@@ -213,7 +175,7 @@ class Graph:
     def complain(self, text: str) -> None:
         """Log an error and keep it for the diagnostics; the like of it at most once a second."""
         # rclpy's own throttling looks at the simulated clock, which may stand still
-        now, kind = time.monotonic(), NUMBER.split(text, maxsplit=1)[0]
+        now, kind = time.monotonic(), kind_of(text)
         if now - self._said.get(kind, -LOUD) >= LOUD:
             self._said = {k: at for k, at in self._said.items() if now - at < LOUD}
             self._said[kind] = now
@@ -224,8 +186,7 @@ class Graph:
         """Publish this node's health, stamped with the latest step."""
         status = DiagnosticStatus(name=self.node.get_fully_qualified_name())
         status.hardware_id = self.hardware_id
-        found = [(level, text) for level, text in (ask() for ask in self._reasons) if text]
-        level, text = max(found, key=lambda one: WORSE.index(one[0]), default=(OK, ''))
+        level, text = worst([ask() for ask in self._reasons])
         self._lasting.see(level, text)
         status.level = ERROR if self.trouble else level
         status.message = '; '.join(filter(None, (text, self.trouble))) or 'ok'

@@ -20,7 +20,6 @@ from auv_dynamics.frames import (
     swap_state,
 )
 from auv_dynamics.interface import BadMessageError, Frames
-from auv_dynamics.kinematics import rotation
 from auv_dynamics.ros import convert
 
 CHILD, WORLD = 'child', 'world'  # frame in which an odometry's twist is written
@@ -86,6 +85,8 @@ def mirrored_odometry(
     poses = _covariance(message.pose.covariance, f'{topic}: pose.covariance')
     twists = _covariance(message.twist.covariance, f'{topic}: twist.covariance')
     if twist_frame == WORLD:
+        from auv_dynamics.kinematics import rotation  # which loads numba, needed here alone
+
         to_child = np.kron(np.eye(2), rotation(x[3:7]).T)
         x[7:] = to_child @ x[7:]
         twists = to_child @ twists @ to_child.T

@@ -13,6 +13,7 @@ from auv_dynamics import nearest
 from auv_dynamics.files import InputError
 from auv_dynamics.interface import NANOSECONDS
 from auv_dynamics.ros.private import declared, overrides
+from auv_dynamics.signals import DOFS, harmonic_spec
 
 LONGEST = 1e9  # s of a step or a run: stamps end in 2038
 KNOWN_TO_ALL = ('use_sim_time', 'start_type_description_service')
@@ -132,6 +133,25 @@ def declare_grid(node: Node) -> Grid:
     if last is not None and abs(duration / step - last) > 1e-9 * last:
         raise InputError(node.get_name(), 'duration', f'a multiple of step ({step} s)', duration)
     return Grid(step, step_ns, duration, last)
+
+
+def harmonic_parameters(
+    node: Node, prefix: str, unit: str, axes: tuple[str, ...] = DOFS
+) -> dict[str, Any]:
+    """Declare `<prefix><axis>.{offset, amplitude, omega, phase}` and return them as a mapping."""
+    columns: dict[str, Any] = {}
+    for axis in axes:
+        columns[f'{axis}.offset'] = declare(
+            node, f'{prefix}{axis}.offset', float, 0.0, f'constant part, {unit}'
+        )
+        for key, what in (('amplitude', unit), ('omega', 'rad/s'), ('phase', 'rad')):
+            values = declare(node, f'{prefix}{axis}.{key}', list[float], None, f'{what}, per term')
+            columns[f'{axis}.{key}'] = values or []
+    try:
+        spec = harmonic_spec(columns, axes)
+    except ValueError as error:
+        raise InputError(node.get_name(), prefix.rstrip('.'), str(error), 'other lengths') from None
+    return {axis: entry for axis, entry in spec.items() if entry['offset'] or entry['terms']}
 
 
 def _coerce(node: Node, name: str, kind: Any) -> None:

@@ -2,11 +2,13 @@
 
 import itertools
 import math
+import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import Twist
 from harness import (
     CONTROLLER,
     GAINS,
@@ -29,6 +31,7 @@ from auv_dynamics import interface
 from auv_dynamics.ending import ENDING
 from auv_dynamics.interface import Frames
 from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.health import ERROR, WARN
 
 FRAMES = Frames()
 STEP = 10_000_000
@@ -181,6 +184,58 @@ def test_a_second_odometry_and_a_second_controller_are_named_while_they_last() -
         said.clear()
         peer.until(lambda: len(said) > 4 and not errors(), 'the end of it')
         peer.node.destroy_publisher(first)
+
+
+def explained(peer, said: str, *published: tuple[topics.Topic, Any]) -> bytes:
+    """Offer odometry and more until the diagnostics say something; the level they say it with."""
+    heard = peer.heard[topics.DIAGNOSTICS.name]
+    outputs = [(peer.node.create_publisher(t.type, t.name, 10), made) for t, made in published]
+    odom = peer.node.create_publisher(topics.ODOM.type, 'odom', 10)
+    begun = len(heard)
+
+    def told() -> list:
+        ns = time.time_ns()
+        for output, make in outputs:
+            output.publish(make(ns))
+        odom.publish(convert.odometry(ns, X, FRAMES))
+        peer.spin(0.02)
+        return [s for m in heard[begun:] for s in m.status if said in s.message]
+
+    found = peer.until(told, said)[-1]
+    for output, _ in [*outputs, (odom, None)]:
+        peer.node.destroy_publisher(output)
+    assert found.hardware_id == 'herman2018'
+    return found.level
+
+
+def test_mistakes_with_set_points_are_explained() -> None:
+    plain = topics.Topic('cmd_vel', Twist)
+    with graph(('controller_node', CONTROLLER)) as (peer, processes):
+        peer.listen(topics.DIAGNOSTICS)
+        assert explained(peer, 'nobody publishes /cmd_vel') == WARN
+        named = 'expected geometry_msgs/msg/TwistStamped, found geometry_msgs/msg/Twist of /test_'
+        assert explained(peer, named, (plain, lambda _: Twist())) == WARN
+        code, output = stop(processes['controller_node'])
+    assert code == 0
+    assert 'begins: tracks cmd_vel with gvc in real time' in output
+    assert 'ends with exit code 0: tracks cmd_vel' in output
+    assert 'ERROR' not in output, 'a normal start and end'
+
+
+def test_stamps_of_set_points_without_a_time_are_explained() -> None:
+    unstamped = topics.CMD_VEL, lambda _: convert.twist(0, (0.1, 0, 0, 0, 0, 0), FRAMES)
+    with graph(('controller_node', CONTROLLER)) as (peer, _):
+        peer.listen(topics.DIAGNOSTICS)
+        assert explained(peer, 'found stamp 0', unstamped) == ERROR, 'they are refused as well'
+
+
+def test_a_set_point_that_waits_for_its_acceleration_is_explained() -> None:
+    waits = [*CONTROLLER, *parameters(setpoint_acceleration='topic')]
+    with graph(('controller_node', waits)) as (peer, _):
+        peer.listen(topics.DIAGNOSTICS)
+        moving = topics.CMD_VEL, lambda ns: convert.twist(ns, (0.1, 0, 0, 0, 0, 0), FRAMES)
+        said = 'nobody publishes /cmd_accel; setpoint_acceleration: topic waits for it'
+        assert explained(peer, said, moving) == WARN
 
 
 def change(peer, transition: int) -> bool:

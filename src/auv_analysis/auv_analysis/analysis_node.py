@@ -11,7 +11,9 @@ from auv_dynamics.files import InputError
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.codec import Codec, first_stamp
+from auv_dynamics.ros.endpoints import why_silent
 from auv_dynamics.ros.graph import Graph
+from auv_dynamics.ros.health import OK, STALE, Health
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import declare, refuse_unknown
 
@@ -36,7 +38,9 @@ class AnalysisNode(BulkNode):
         self._odometry = topics.GROUND_TRUTH if truth else topics.ODOM
         if not vehicle:
             raise InputError(self.get_name(), 'vehicle', 'a vehicle file', None)
-        self._live = LiveAnalysis(load_vehicle(vehicle))
+        known = load_vehicle(vehicle)
+        self.graph.hardware_id = known.name
+        self._live = LiveAnalysis(known)
         self._k = 0  # odometry messages so far
         self._due: OrderedDict[int, set[topics.Topic]] = OrderedDict()
         self._waiting: dict[topics.Topic, OrderedDict[int, bytes]] = {
@@ -47,6 +51,13 @@ class AnalysisNode(BulkNode):
         self._codecs = {t: Codec(t.type, self.graph.frames, t.name) for t in HEARD}
         for topic in HEARD:
             self._watch(topic)
+        self.graph.in_trouble_while(self._trouble)
+        self.begin(f'analyses every {self._every}. step with {self.graph.hardware_id}')
+
+    def _trouble(self) -> Health:
+        if self._k:
+            return OK, ''
+        return STALE, why_silent(self, self._odometry) or 'no odometry yet'
 
     def _watch(self, topic: topics.Topic) -> None:
         def callback(message: bytes, _: dict[str, Any]) -> None:

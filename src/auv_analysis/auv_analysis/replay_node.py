@@ -43,7 +43,7 @@ class ReplayNode(BulkNode):
         self.create_service(SetBool, '~/run', self._on_run)
         self.create_service(Trigger, '~/step', self._on_step)
         self.add_on_set_parameters_callback(self._on_parameters)
-        self.failure = ''
+        self.failure, self.aloud = '', False
         self._rivals_since: dict[str, float] = {}
         self._timer = steady_timer(self, LOOK, self._tick)
         steady_timer(self, LOOK, self._look)
@@ -79,6 +79,8 @@ class ReplayNode(BulkNode):
             self.player.meet()
             if met and not self.player.waits_for():
                 self._phase = self._play
+                if self.aloud:
+                    self.begin(f'plays {self.settings.index.bag}')
         return LOOK
 
     def _play(self, now: float) -> float:
@@ -196,6 +198,7 @@ class Replay(Participant):
 def outspoken() -> ReplayNode:
     """A replay that says what is odd about its bag."""
     node = ReplayNode()
+    node.aloud = True
     for remark in node.remarks():
         node.get_logger().warning(remark)
     return node

@@ -57,6 +57,7 @@ class FrameConverterNode(BulkNode):
         self._commanded = self._pass(topics.WRENCH, _theirs(topics.WRENCH), outward, command)
         self.graph.also_ready_when(self._untaken)
         steady_timer(self, 0.05, self._say_held)
+        self.begin(f'converts {ENU_FLU}/* of a driver to {ours.odom} and {ours.base}, and back')
 
     def _check_axes(self, ours: Frames, theirs: Frames) -> None:
         """Refuse frame ids that name the axes of the other side."""

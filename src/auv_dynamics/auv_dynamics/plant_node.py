@@ -13,6 +13,7 @@ from auv_dynamics.fault_checks import FaultSetting, make_faults
 from auv_dynamics.fault_parameters import fault_specs
 from auv_dynamics.files import InputError
 from auv_dynamics.integrator import TABLEAUS
+from auv_dynamics.interface import NANOSECONDS
 from auv_dynamics.plant import Plant, initial_state
 from auv_dynamics.plant_clock import LockStep, RealTime
 from auv_dynamics.plant_parameters import (
@@ -127,7 +128,11 @@ class PlantNode(BulkNode):
             self._refuse_second_clock()
         met = now - self._born >= MET and self.exit_code is None
         if met and self.graph.ready() and not self.peers.not_ready() and not self.paused:
-            self._started = self._started or now
+            if self._started is None:
+                self._started = now
+                pace = 'lock-step' if self.lockstep else 'real time'
+                step = f'{self.step_ns / NANOSECONDS:g} s'
+                self.begin(f'simulates {self.graph.hardware_id} in {pace}, {step} per step')
             self.pace.start()
 
     def _refuse_second_clock(self) -> None:

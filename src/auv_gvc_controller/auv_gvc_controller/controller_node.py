@@ -53,6 +53,10 @@ class ControllerNode(BulkMixin, LifecycleNode):
         steady_timer(self, WATCH, self._watch)
         if self._settings.autostart:
             self._autostart()
+        if self.exit_code is None:
+            law = self.get_parameter('law').value or 'a law'
+            pace = 'lock-step' if self._settings.lockstep else 'real time'
+            self.begin(f'tracks {topics.CMD_VEL.name} with {law} in {pace}')
 
     def _subscribe(self) -> None:
         p = self._settings
@@ -99,6 +103,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
     def _build(self) -> bool:
         try:
             self._controller = self._settings.build()
+            self.graph.hardware_id = self._settings.vehicle_name
         except (ValueError, ArithmeticError) as error:  # InputError among them
             print(error, file=sys.stderr, flush=True)
             self.graph.trouble = str(error)

@@ -48,6 +48,7 @@ class ControllerParameters:
         if not self._vehicle:
             raise InputError(name, 'vehicle', 'a vehicle file', None)
         vehicle = load_vehicle(self._vehicle)
+        self.vehicle_name = vehicle.name
         try:
             gains = make_gains(law, self._gains(law))
             try_law(gains, control_model(vehicle))

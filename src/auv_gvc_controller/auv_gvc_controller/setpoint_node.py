@@ -9,7 +9,9 @@ from auv_dynamics import interface
 from auv_dynamics.files import InputError
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.endpoints import why_silent
 from auv_dynamics.ros.graph import Graph, steady_timer
+from auv_dynamics.ros.health import OK, STALE, Health
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import (
     declare,
@@ -49,6 +51,13 @@ class SetpointNode(BulkNode):
         self._next = 0
         self._first, self._rows = 0, np.zeros((0, 12))
         steady_timer(self, 0.02, self._publish)
+        self.graph.in_trouble_while(self._trouble)
+        self.begin(f'publishes set-points every {grid.step:g} s, once there is odometry')
+
+    def _trouble(self) -> Health:
+        if self._guard.last is not None:
+            return OK, ''
+        return STALE, why_silent(self, topics.ODOM) or 'no odometry yet'
 
     def _declare_setpoint(self, duration: float) -> Setpoint:
         file = declare(self, 'setpoint.file', str, '', 'CSV file with t, surge, ..., yaw')

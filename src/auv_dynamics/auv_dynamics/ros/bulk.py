@@ -31,6 +31,7 @@ class BulkMixin:
 
     prompt = False
     exit_code: int | None = None  # set when the node ends by itself
+    task = ''  # what it does, once it has begun
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
@@ -48,6 +49,17 @@ class BulkMixin:
             return super().get_parameter(name)  # type: ignore[misc]  # as above
         except ParameterUninitializedException:
             return Parameter(name)
+
+    def begin(self, task: str) -> None:
+        """Say in a line what the node does from now on."""
+        self.task = task
+        self.get_logger().info(f'begins: {task}')  # type: ignore[attr-defined]  # as above
+
+    def finish(self) -> None:
+        """Say that it is over, and how it went."""
+        if self.task:
+            text = f'ends with exit code {self.exit_code or 0}: {self.task}'
+            self.get_logger().info(text)  # type: ignore[attr-defined]  # as above
 
     def close(self) -> None:
         """Last words while the context is still valid: zero wrench, closed bag."""

@@ -1,13 +1,13 @@
 """A node's life as a process: start, spin, end on a signal or by itself, exit code."""
 
 import contextlib
-import faulthandler
+import ctypes
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import rclpy
@@ -17,7 +17,7 @@ from rclpy.utilities import try_shutdown
 
 from auv_dynamics.ending import take_signals
 from auv_dynamics.files import InputError, first_line
-from auv_dynamics.interface import PARENT
+from auv_dynamics.interface import NANOSECONDS, PARENT
 from auv_dynamics.ros.bulk import DataPath
 from auv_dynamics.ros.private import PLAIN, RCLError, RMWError
 from auv_dynamics.ros.reach import say_local, stay_local
@@ -25,6 +25,7 @@ from auv_dynamics.ros.security import asked
 
 POLL = 0.1  # s, longest wait before a signal is noticed
 TEARDOWN = 4.0  # s to leave the graph, after the last words; then the process ends anyway
+MONOTONIC, IN_A_THREAD = 1, 2  # CLOCK_MONOTONIC, SIGEV_THREAD
 SERVE = 0.02  # s of data between two looks at parameters, services and timers
 CALLBACKS = 50  # that are served at each look, at most
 
@@ -72,7 +73,7 @@ def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> i
     finally:
         closed = _close(nodes)
         code = code or closed
-        _tear_down(nodes)
+        _tear_down(nodes, code)
         # one that comes while Python tears down does not change the code
         take_signals(signal.SIG_IGN)
     return code
@@ -129,6 +130,8 @@ def _close(nodes: list[Any]) -> int:
     with contextlib.ExitStack() as stack:
         for node in nodes:
             stack.callback(node.close)
+    for node in nodes:
+        node.finish()
     codes = [node.exit_code for node in nodes if node.exit_code]
     if len(nodes) > 1:
         for name, code in failed.items():
@@ -136,14 +139,42 @@ def _close(nodes: list[Any]) -> int:
     return codes[0] if codes else 0
 
 
-def _tear_down(nodes: list[Any]) -> None:
-    """Leave the graph; the middleware has been seen to turn in circles there, with the GIL held."""
-    faulthandler.dump_traceback_later(TEARDOWN, exit=True)
-    for node in reversed(nodes):
-        with contextlib.suppress(Exception):
-            node.destroy_node()
-    try_shutdown()
-    faulthandler.cancel_dump_traceback_later()
+def _tear_down(nodes: list[Any], code: int) -> None:
+    """Leave the graph; what was done before counts, however long that takes."""
+    with _ending(code, TEARDOWN):
+        for node in reversed(nodes):
+            with contextlib.suppress(Exception):
+                node.destroy_node()
+        try_shutdown()
+
+
+class _Event(ctypes.Structure):
+    """What a timer of POSIX does: `struct sigevent`."""
+
+    _fields_ = (
+        *(('value', ctypes.c_void_p), ('signal', ctypes.c_int), ('how', ctypes.c_int)),
+        *(('function', ctypes.c_void_p), ('rest', ctypes.c_char * 40)),
+    )
+
+
+@contextlib.contextmanager
+def _ending(code: int, seconds: float) -> Iterator[None]:
+    """End the process with an exit code if this lasts longer.
+
+    The middleware has been seen to turn in circles with the GIL held: Python cannot end it then.
+    """
+    sys.stdout.flush()
+    libc, timer = ctypes.CDLL(None), ctypes.c_void_p()
+    call = ctypes.cast(libc['_exit'], ctypes.c_void_p).value
+    event = _Event(code, 0, IN_A_THREAD, call)
+    libc.timer_create(MONOTONIC, ctypes.byref(event), ctypes.byref(timer))
+    whole, rest = divmod(seconds, 1.0)
+    once = (ctypes.c_long * 4)(0, 0, int(whole), int(rest * NANOSECONDS))
+    libc.timer_settime(timer, 0, once, None)
+    try:
+        yield
+    finally:
+        libc.timer_delete(timer)
 
 
 def _orphaned() -> bool:

@@ -39,7 +39,7 @@ def test_commands_stop_when_a_foreign_listener_comes(tmp_path: Path) -> None:
 
 
 def test_our_own_observers_are_no_strangers(tmp_path: Path) -> None:
-    recorder = parameters(bag=tmp_path / 'again', strict=False)
+    recorder = parameters(bag=tmp_path / 'again', strict=False, topics='[odom, wrench, cmd_vel]')
     waits = ('-p', 'expected_subscribers:=["wrench=1", "odom=1"]')
     played = [*parameters(bag=made(tmp_path / 'bag'), **AS_RECORDED, rate=0.0), *waits]
     with graph(('recorder_node', recorder), ('replay_node', played)) as (peer, processes):

@@ -54,8 +54,15 @@ def recorder_parameters(node: Node) -> RecorderParameters:
     usual = list(interface.STEP_TOPICS)
     expected = declare(node, 'topics', list[str], usual, 'step topics that are expected')
     others = _others(node)
-    duration = declare(node, 'duration', float, 0.0, 's, 0: until SIGTERM', at_least=0.0)
-    step = declare(node, 'step', float, 0.01, 's between steps', at_least=1e-9)
+    duration = declare(
+        node,
+        'duration',
+        float,
+        0.0,
+        'length of the recording, s; 0: until a signal ends it',
+        at_least=0.0,
+    )
+    step = declare(node, 'step', float, 0.01, 'time step, s', at_least=1e-9)
     every = declare(
         node, 'analysis_every', int, 0, 'steps between analysis samples, 0: not waited for',
         at_least=0,
@@ -122,14 +129,20 @@ def remapped(node: Node) -> dict[str, str]:
 
 def _storage(node: Node, pace: str) -> Storage:
     compression = declare(
-        node, 'storage.compression', str, 'zstd', 'of chunks', one_of=list(COMPRESSIONS)
+        node, 'storage.compression', str, 'zstd', 'compression of chunks', one_of=list(COMPRESSIONS)
     )
     chunk_size = declare(
-        node, 'storage.chunk_size', int, 1 << 20, 'bytes', at_least=1024, at_most=LARGEST_CHUNK
+        node,
+        'storage.chunk_size',
+        int,
+        1 << 20,
+        'bytes of a chunk',
+        at_least=1024,
+        at_most=LARGEST_CHUNK,
     )
-    text = 'bytes of a file at most, 0: one file'
+    text = 'most bytes of a file; 0: one file'
     max_size = declare(node, 'storage.max_size', int, 0, text, at_least=0)
-    text = 's of log time in a file at most, 0: one file'
+    text = 'most log time in a file, s; 0: one file'
     max_duration = declare(
         node, 'storage.max_duration', float, 0.0, text, at_least=0.0, at_most=1e9
     )

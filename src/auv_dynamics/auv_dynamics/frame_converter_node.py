@@ -34,14 +34,28 @@ class FrameConverterNode(BulkNode):
         self.graph = Graph(self)
         ours = self.graph.frames
         theirs = Frames(
-            declare(self, 'enu_frame', str, ROS_FRAMES.odom, "frame of the driver's poses, ENU"),
-            declare(self, 'flu_frame', str, ROS_FRAMES.base, "the driver's body frame, FLU"),
+            declare(
+                self,
+                'enu_frame',
+                str,
+                ROS_FRAMES.odom,
+                "frame id of the driver's poses: east-north-up",
+            ),
+            declare(
+                self,
+                'flu_frame',
+                str,
+                ROS_FRAMES.base,
+                "frame id of the driver's body: forward-left-up",
+            ),
         )
         self._twist_frame = declare(
             self, 'twist_frame', str, CHILD, "frame of the twist in the driver's odometry",
             one_of=(CHILD, WORLD),
         )  # fmt: skip
-        self.lockstep = declare(self, 'lockstep', bool, False, 'the plant waits for each wrench')
+        self.lockstep = declare(
+            self, 'lockstep', bool, False, 'each step waits for its wrench; else real time'
+        )
         refuse_unknown(self)
         self._check_axes(ours, theirs)
         self._held: deque[tuple[Publisher, Any]] = deque(maxlen=topics.DEPTH)

@@ -71,27 +71,35 @@ class PlantNode(BulkNode):
             raise InputError(self.get_name(), 'vehicle', 'a vehicle file', None)
         grid = declare_grid(self)
         self.step_ns, self.last = grid.step_ns, grid.last
-        self.lockstep = declare(self, 'lockstep', bool, False, 'advance on the wrench, not on time')
-        self._start_paused = declare(self, 'start_paused', bool, False, 'wait for ~/run')
+        self.lockstep = declare(
+            self, 'lockstep', bool, False, 'each step waits for its wrench; else real time'
+        )
+        self._start_paused = declare(
+            self, 'start_paused', bool, False, 'wait for ~/run before step 0'
+        )
         self._publish_clock = declare(
             self, 'publish_clock', bool, True, 'publish /clock; false beside another that does'
         )
         self.window = declare(
-            self, 'recorder_window', int, 0, 'steps ahead of recorder/progress, 0: off',
+            self, 'recorder_window', int, 0, 'most steps ahead of recorder/progress; 0: any',
             at_least=0, at_most=topics.DEPTH - 1,
         )  # fmt: skip
         integrator = declare(
-            self, 'integrator', str, 'ode5', 'fixed-step method', one_of=list(TABLEAUS)
+            self, 'integrator', str, 'ode5', 'integration method', one_of=list(TABLEAUS)
         )
-        seed = declare(self, 'seed', int, 0, 'of everything random', at_least=0)
-        eta, nu = (self._six(f'initial.{name}') for name in ('eta', 'nu'))
+        seed = declare(
+            self, 'seed', int, 0, 'seed of the random numbers of sensors and faults', at_least=0
+        )
+        eta = self._six('initial.eta', 'position, m, and Euler angles, rad, NED')
+        nu = self._six('initial.nu', 'velocity, m/s and rad/s, body frame')
         self._start_after = (
-            declare(self, 'start_after', list[str], None, 'nodes whose ~/ready is waited for') or []
+            declare(self, 'start_after', list[str], None, 'nodes whose ~/ready is awaited') or []
         )
         default = 30.0 if self.lockstep else 0.5
         self.wrench_timeout = declare(
             self, 'wrench_timeout', float, default,
-            's: real time: then zero wrench; lock-step: then the run ends', at_least=0.0,
+            's without a wrench: then zero wrench in real time; in lock-step the run fails',
+            at_least=0.0,
         )  # fmt: skip
         specs, actuators, sensors = disturbance_specs(self), actuator_spec(self), sensor_spec(self)
         name, vehicle = self.get_name(), load_vehicle(path)
@@ -116,8 +124,8 @@ class PlantNode(BulkNode):
             seed,
         )
 
-    def _six(self, name: str) -> np.ndarray:
-        values = declare(self, name, list[float], [0.0] * 6, '6 numbers, SI, NED and body frame')
+    def _six(self, name: str, text: str) -> np.ndarray:
+        values = declare(self, name, list[float], [0.0] * 6, f'initial {text}')
         if len(values) != 6 or not np.all(np.isfinite(values)):
             raise InputError(self.get_name(), name, '6 finite numbers', values)
         return np.array(values)

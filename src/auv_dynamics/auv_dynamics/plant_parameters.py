@@ -17,7 +17,7 @@ RELATIVE = ('mass', 'added_mass', 'damping', 'buoyancy')
 
 def disturbance_specs(node: Node) -> list[dict[str, Any]]:
     """Declare the disturbances of a node and return them as a scenario writes them."""
-    declare(node, NAMES, list[str], None, 'disturbances, added up')
+    declare(node, NAMES, list[str], None, 'names of the disturbances; their sum acts')
     return [_spec(node, f'{prefix}.') for prefix in disturbance_prefixes(node)]
 
 
@@ -30,19 +30,25 @@ def disturbance_prefixes(node: Node) -> list[str]:
 def _spec(node: Node, prefix: str) -> dict[str, Any]:
     kind = declare(node, f'{prefix}kind', str, '', 'kind of disturbance', one_of=ALL_KINDS)
     if kind == 'herman2018':
-        sign = declare(node, f'{prefix}exponent_sign', float, -1.0, 'sign of the exponents of (39)')
+        sign = declare(
+            node, f'{prefix}exponent_sign', float, -1.0, '-1 or 1, sign of the exponents of (39)'
+        )
         if sign not in (-1.0, 1.0):
             raise InputError(node.get_name(), f'{prefix}exponent_sign', '-1 or 1', sign)
         return {'kind': kind, 'exponent_sign': sign, **_matrices(node, prefix, ('scale',))}
     if kind == 'model_error':
         spec: dict[str, Any] = {'kind': kind, **_matrices(node, prefix, ('dM', 'dD'))}
         for key in RELATIVE:
-            value = declare(node, f'{prefix}{key}', float, None, 'relative error', at_least=-1.0)
+            value = declare(
+                node, f'{prefix}{key}', float, None, f'relative error of {key}', at_least=-1.0
+            )
             if value is not None:
                 spec[key] = value
         return spec
     if kind == 'current':
-        velocity = numbers(node, f'{prefix}velocity', 'm/s, NED', (3,))
+        velocity = numbers(
+            node, f'{prefix}velocity', 'constant velocity of the water, m/s, NED', (3,)
+        )
         waves = harmonic_parameters(node, prefix, 'm/s', tuple(AXES))
         return {'kind': kind, **({'velocity': velocity} if velocity else {}), **waves}
     return {'kind': kind, **harmonic_parameters(node, prefix, 'N, N m')}
@@ -51,14 +57,14 @@ def _spec(node: Node, prefix: str) -> dict[str, Any]:
 def actuator_spec(node: Node) -> dict[str, Any] | None:
     """Declare `actuators.*` and return them as a scenario writes them; None when there are none."""
     spec: dict[str, Any] = {}
-    for key, unit in (('limit', 'N, N m'), ('rate', 'N/s, N m/s')):
+    for key, unit in (('limit', 'saturation, N, N m'), ('rate', 'rate limit, N/s, N m/s')):
         values = numbers(node, f'actuators.{key}', unit, (1, 6))
         if values and min(values) <= 0:
             raise InputError(node.get_name(), f'actuators.{key}', 'positive numbers', values)
         spec[key] = (values[0] if len(values) == 1 else values) if values else None
-    for key in ('lag', 'delay'):
-        spec[key] = declare(node, f'actuators.{key}', float, None, 's', at_least=0.0)
-    text = 'allocate to the thrusters of the vehicle file'
+    for key, text in (('lag', 'time constant of a first-order lag, s'), ('delay', 'dead time, s')):
+        spec[key] = declare(node, f'actuators.{key}', float, None, text, at_least=0.0)
+    text = 'allocate the wrench to the thrusters of the vehicle file'
     spec['thrusters'] = declare(node, 'actuators.thrusters', bool, None, text)
     return what_is_given(spec)
 
@@ -98,5 +104,8 @@ def numbers(node: Node, name: str, text: str, lengths: tuple[int, ...]) -> list[
 
 
 def _matrices(node: Node, prefix: str, keys: tuple[str, ...]) -> dict[str, list[float]]:
-    found = {key: numbers(node, f'{prefix}{key}', '6x6', (1, 6, 36)) for key in keys}
+    found = {
+        key: numbers(node, f'{prefix}{key}', '6x6: 1, 6 (diagonal) or 36 numbers', (1, 6, 36))
+        for key in keys
+    }
     return {key: value for key, value in found.items() if value}

@@ -60,7 +60,13 @@ class SetpointNode(BulkNode):
         return STALE, why_silent(self, topics.ODOM) or 'no odometry yet'
 
     def _declare_setpoint(self, duration: float) -> Setpoint:
-        file = declare(self, 'setpoint.file', str, '', 'CSV file with t, surge, ..., yaw')
+        file = declare(
+            self,
+            'setpoint.file',
+            str,
+            '',
+            'CSV file of set-points with the columns t, surge, ..., yaw',
+        )
         spec = harmonic_parameters(self, 'setpoint.', 'm/s, rad/s')
         if file:
             if spec:

@@ -1,5 +1,6 @@
 """Who publishes and subscribes a topic, as the middleware's discovery tells it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,6 +72,18 @@ def acts(endpoint: Any) -> bool:
     if endpoint.node_name == UNNAMED:
         return True
     return not (endpoint.node_name in ONLOOKERS or observes(endpoint))
+
+
+def crowds(node: Node, topics: Iterable[Topic]) -> list[str]:
+    """Which of some topics that are for one publisher have more of them, and whose they are."""
+    found = []
+    for topic in sorted(topics, key=lambda one: one.name):
+        name, kind = node.resolve_topic_name(topic.name), type_name(topic.type)
+        listed = node.get_publishers_info_by_topic(name)
+        names = sorted(full_name(one) for one in listed if one.topic_type == kind)
+        if len(names) > 1:
+            found.append(f'{name}: expected one publisher, found {", ".join(names)}')
+    return found
 
 
 def why_silent(node: Node, topic: Topic) -> str:

@@ -22,25 +22,21 @@ from auv_dynamics.interface import BadMessageError, Frames
 from auv_dynamics.nearest import meant
 from auv_dynamics.ros.codec import Codec
 from auv_dynamics.ros.convert import stamp
-from auv_dynamics.ros.endpoints import full_name, has_conflict, onlookers
+from auv_dynamics.ros.endpoints import crowds, has_conflict, onlookers
 from auv_dynamics.ros.health import ERROR, Health, Lasting, kind_of, worst
-from auv_dynamics.ros.kinds import type_name
 from auv_dynamics.ros.parameters import declare
 from auv_dynamics.ros.topics import (
     ANALYSIS_TOPICS,
     CLOCK,
     DIAGNOSTICS,
-    ODOM,
+    SINGLE,
     STEP_TOPICS,
-    WRENCH,
     Topic,
     every_step,
     one_at_a_time,
 )
 
-STEP_TOPICS_BY_NAME = [topic.name for topic in STEP_TOPICS]
 LOUD = 1.0  # s between two reports of the same kind
-SINGLE = {topic.name: topic for topic in (ODOM, WRENCH, CLOCK)}  # with one publisher each
 
 
 def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Timer:
@@ -68,19 +64,25 @@ class Graph:
         self._not_ready: Callable[[], str] = str
         self._reasons: list[Callable[[], Health]] = [self._crowd, self._conflict]
         self._lasting = Lasting(node.get_logger())
-        self._single: set[str] = set()  # topics of a single publisher that concern this node
+        self._single: set[Topic] = set()  # that are for one publisher and concern this node
         self._conflicts: dict[str, Topic] = {}  # by what was said of them
         self._expected: dict[str, int] = {}
         self.frames = Frames()
         self.must_hold = 0  # messages: a publisher of step topics needs a greater depth
         if barrier:
             self.frames = Frames(
-                declare(node, 'odom_frame', str, 'odom_ned', 'frame of poses, NED'),
-                declare(node, 'base_frame', str, 'base_link_fsd', 'body frame, FSD'),
+                declare(node, 'odom_frame', str, 'odom_ned', 'frame id of poses: north-east-down'),
+                declare(
+                    node,
+                    'base_frame',
+                    str,
+                    'base_link_fsd',
+                    'frame id of the body: forward-starboard-down',
+                ),
             )
             listed = declare(
                 node, 'expected_subscribers', list[str], None,
-                'topic=count: nothing is published on step topics until so many have matched',
+                'topic=count: subscriptions that must match before step topics are published',
             )  # fmt: skip
             self._expected = self._counts(listed or [])
         self._diagnostics = node.create_publisher(
@@ -105,7 +107,7 @@ class Graph:
             ),
         )
         self.publishers[topic.name] = publisher
-        self._single |= {topic.name} & SINGLE.keys()
+        self._single |= {topic} & {*SINGLE}
         return publisher
 
     def output(self, topic: Topic) -> Callable[[int, Any], None]:
@@ -119,7 +121,6 @@ class Graph:
     ) -> None:
         """Subscription to the stamps in ns and the numbers of a topic; broken ones are refused."""
         codec = Codec(topic.type, self.frames, topic.name)
-
         self.subscribe(topic, lambda data, _: callback(*codec.decode(data)), qos)
 
     def subscribe(
@@ -152,7 +153,7 @@ class Graph:
             raw=True,
         )
         self.node.add_data(subscription)
-        self._single |= {topic.name} & SINGLE.keys()
+        self._single |= {topic} & {*SINGLE}
 
     def ready(self) -> bool:
         """Whether every expected subscriber has matched; once true it stays true."""
@@ -191,9 +192,8 @@ class Graph:
         status.level = ERROR if self.trouble else level
         status.message = '; '.join(filter(None, (text, self.trouble))) or 'ok'
         refused = {f'refused {kind}': count for kind, count in sorted(self.refused.items())}
-        facts = {
-            'ready': self._ready, 'refused': self.refused.total(), **self.facts, **refused
-        }  # fmt: skip
+        count = self.refused.total()
+        facts = {'ready': self._ready, 'refused': count, **self.facts, **refused}
         status.values = [KeyValue(key=key, value=str(value)) for key, value in facts.items()]
         message = DiagnosticArray(status=[status])
         message.header.stamp, message.header.frame_id = stamp(self.latest_ns), self.frames.base
@@ -202,19 +202,12 @@ class Graph:
 
     def _crowd(self) -> Health:
         """Which of the topics with a single publisher has more of them, and whose they are."""
-        clock = {CLOCK.name} if self.node.get_parameter('use_sim_time').value else set()
-        crowds = []
-        for name in sorted(self._single | clock):
-            full, kind = self.node.resolve_topic_name(name), type_name(SINGLE[name].type)
-            listed = self.node.get_publishers_info_by_topic(full)
-            found = sorted(full_name(one) for one in listed if one.topic_type == kind)
-            if len(found) > 1:
-                crowds.append(f'{full}: expected one publisher, found {", ".join(found)}')
-        return ERROR, '; '.join(crowds)
+        clock = {CLOCK} if self.node.get_parameter('use_sim_time').value else set()
+        return ERROR, '; '.join(crowds(self.node, self._single | clock))
 
     def _deep_enough(self, topic: Topic, qos: QoSProfile) -> SetParametersResult:
         name = f'qos_overrides.{self.node.resolve_topic_name(topic.name)}.publisher.depth'
-        if topic.name in STEP_TOPICS_BY_NAME and qos.depth <= self.must_hold:
+        if topic.step and qos.depth <= self.must_hold:
             expected = f'more than {self.must_hold}, the steps that may be under way'
             raise InputError(self.node.get_name(), name, expected, qos.depth)
         return SetParametersResult(successful=True)

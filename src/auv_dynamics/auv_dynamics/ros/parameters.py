@@ -124,8 +124,16 @@ class Grid(NamedTuple):
 
 def declare_grid(node: Node) -> Grid:
     """Declare `step` and `duration`; InputError where they make no grid of whole nanoseconds."""
-    step = declare(node, 'step', float, 0.01, 's between steps', at_least=1e-9, at_most=LONGEST)
-    duration = declare(node, 'duration', float, 0.0, 's, 0: no end', at_least=0.0, at_most=LONGEST)
+    step = declare(node, 'step', float, 0.01, 'time step, s', at_least=1e-9, at_most=LONGEST)
+    duration = declare(
+        node,
+        'duration',
+        float,
+        0.0,
+        'length of the run, s; 0: no end',
+        at_least=0.0,
+        at_most=LONGEST,
+    )
     step_ns = round(step * NANOSECONDS)
     if abs(step_ns - step * NANOSECONDS) > 1e-6 * max(1.0, step):
         raise InputError(node.get_name(), 'step', 'a whole number of nanoseconds', step)
@@ -142,10 +150,15 @@ def harmonic_parameters(
     columns: dict[str, Any] = {}
     for axis in axes:
         columns[f'{axis}.offset'] = declare(
-            node, f'{prefix}{axis}.offset', float, 0.0, f'constant part, {unit}'
+            node, f'{prefix}{axis}.offset', float, 0.0, f'constant part of {axis}, {unit}'
         )
-        for key, what in (('amplitude', unit), ('omega', 'rad/s'), ('phase', 'rad')):
-            values = declare(node, f'{prefix}{axis}.{key}', list[float], None, f'{what}, per term')
+        for key, what in (
+            ('amplitude', f'amplitude, {unit}'),
+            ('omega', 'angular frequency, rad/s'),
+            ('phase', 'phase, rad'),
+        ):
+            text = f'{what}, of each sinusoid of {axis}'
+            values = declare(node, f'{prefix}{axis}.{key}', list[float], None, text)
             columns[f'{axis}.{key}'] = values or []
     try:
         spec = harmonic_spec(columns, axes)

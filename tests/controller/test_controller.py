@@ -15,6 +15,7 @@ from auv_gvc_controller.limits import ZERO, Limits
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.odometry_guard import OdometryGuard
 from auv_gvc_controller.pairing import DIFFERENCE, SAME, Pairing
+from auv_gvc_controller.reference_filter import FilterSettings, ReferenceFilter
 from auv_gvc_controller.sampled import SampledLaw
 from auv_gvc_controller.stamp_age import Now
 
@@ -23,6 +24,7 @@ PAPER = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 MODEL = control_model(load_vehicle('rexrov'))
 GAINS = make_gains('gvc', PAPER)
 NU_D = (0.5, 0.0, -0.2, 0.0, 0.0, 0.1)
+UP = (1.0, 0.0, 0.0, 0.0)
 NU_D_DOT = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -46,8 +48,10 @@ class Bench:
         ramp=0.0,
         odometry=0.2,
         setpoint=0.05,
+        steepest=None,
+        reference=None,
     ):
-        self.pairing = Pairing(exact, acceleration)
+        self.pairing = Pairing(exact, acceleration, steepest=steepest)
         self.controller = VelocityController(
             SampledLaw(gains, MODEL),
             self.pairing,
@@ -55,6 +59,7 @@ class Bench:
             HandOver(limit, ramp=ramp),
             exact=exact,
             timeouts=None if lockstep else Timeouts(odometry, setpoint),
+            reference=reference,
         )
         self.law = SampledLaw(gains, MODEL)
 
@@ -134,7 +139,7 @@ def test_a_stale_set_point_is_a_zero_wrench_until_the_next():
     assert stale.tau == stale.f == ZERO
     assert stale.trouble == 'no set-point for 0.06 s: zero wrench'
     bench.setpoint(65)
-    bench.law.forget_rate()  # the time without the law is not integrated
+    bench.law.reset()  # its integrals are of before
     recovered = bench.odometry(70)
     assert recovered.trouble == ''
     assert recovered.tau == bench.alone(0.07, 0.01)
@@ -318,7 +323,7 @@ def test_it_recovers_when_odometry_returns_and_comes_in_over_the_ramp():
         bench.setpoint(ms)
         answers.append(bench.odometry(ms))
     sizes = [abs(answer.tau[0]) for answer in answers]
-    assert 0 < sizes[0] < 0.2 * abs(held.tau[0])
+    assert 0 == sizes[0] < sizes[1] < 0.2 * abs(held.tau[0])
     assert sizes[:15] == sorted(sizes[:15])
     assert sizes[-1] > 0.9 * abs(held.tau[0])
     assert answers[-1].trouble == bench.controller.watchdog == ''
@@ -337,13 +342,81 @@ def test_silence_of_set_points_counts_by_the_clock_on_the_wall_as_well():
     assert bench.odometry(5, at=0.53).trouble == ''
 
 
-def test_set_points_that_were_published_ahead_are_followed_to_their_end():
+def test_a_publisher_that_falls_silent_is_missed_however_far_ahead_it_was():
     bench = Bench(setpoint=0.5)
     for ms in range(0, 2000, 10):
         bench.setpoint(ms, at=0.0)
-    found = [bench.odometry(ms).trouble for ms in range(0, 3000, 10)]
-    assert not any(found[:199])
-    assert all(found[-40:])
+    found = [bench.odometry(ms).trouble for ms in range(0, 1000, 10)]
+    assert not any(found[:51])
+    assert all(found[51:])
+
+
+def test_integrals_do_not_outlive_a_watchdog():
+    bench = Bench(odometry=0.5, setpoint=10.0)
+    for ms in range(0, 300, 10):
+        bench.setpoint(ms)
+        assert bench.odometry(ms).trouble == ''
+    assert bench.watch(0.9).tau == ZERO
+    with pytest.raises(ValueError, match='stamp jumped'):
+        bench.odometry(990)
+    assert bench.odometry(1000).tau == bench.alone(1.0, 0.0)
+
+
+def test_a_reset_while_the_law_is_in_charge_is_no_jump():
+    bench = Bench(ramp=0.2)
+    for ms in range(0, 500, 10):
+        bench.setpoint(ms)
+        before = bench.odometry(ms).tau
+    bench.controller.reset()
+    bench.setpoint(500)
+    assert bench.odometry(500).tau == before
+    bench.setpoint(510)
+    assert bench.odometry(510).tau[0] == pytest.approx(before[0], rel=0.1)
+    for ms in range(520, 800, 10):
+        bench.setpoint(ms)
+        after = bench.odometry(ms).tau
+    assert after[0] < 0.9 * before[0]
+
+
+FILTER = FilterSettings(1.0, 1.0, 3.0, 1.0, 0.2, 0.2)
+BY_HAND = {  # stamp in ms -> surge, m/s
+    'a step': {0: 0.0, 100: 0.5},
+    'steps at 10 Hz': {0: 0.0, 100: 0.25, 200: 0.5, 300: 0.25, 400: 0.5},
+    'back to back': {0: 0.5, 1000: 0.5, 1000.1: 0.505},
+}
+
+
+@pytest.mark.parametrize('how', BY_HAND)
+@pytest.mark.parametrize('acceleration', ['filter', 'none', 'difference'])
+def test_set_points_by_hand_take_little_more_than_holds_the_speed(how, acceleration):
+    """The vehicle follows exactly: what is asked is the feed-forward of the set-point alone."""
+    bench = Bench(
+        acceleration=acceleration, setpoint=60.0, steepest=FILTER.steepest,
+        reference=ReferenceFilter(FILTER) if acceleration == 'filter' else None,
+        gains=make_gains('gvc', {'k_D': 1e-6, 'k_I': 0.0, 'Lambda': 1e-6, 'Gamma': 0.0}),
+    )  # fmt: skip
+    still = (0.0, 0.0, 3.0, 1.0, *[0.0] * 9)
+    left, found = dict(BY_HAND[how]), []
+    for ms in range(0, 15000, 10):
+        for at in [at for at in left if at <= ms]:
+            bench.setpoint(at, (left.pop(at), *[0.0] * 5))
+        now = Now(ms / 1000)
+        found.append(abs(bench.controller.odometry(ms * MS, still, now).tau[0]))
+    held = bench.law.sample(0.0, 0.0, ZERO, UP, (0.5, *ZERO[1:]), ZERO)[0][0]
+    assert found[-1] == pytest.approx(held, rel=0.02)
+    assert max(found) <= found[-1] + load_vehicle('rexrov').M[0, 0] * FILTER.acceleration
+
+
+def test_the_reference_begins_at_the_velocity_of_the_vehicle():
+    reference = ReferenceFilter(FILTER)
+    bench = Bench(reference=reference, setpoint=0.05)
+    bench.setpoint(0, (2.0, *[0.0] * 5))
+    at_rest = bench.law.sample(0.0, 0.0, odometry(0.7)[7:], UP, odometry(0.7)[7:], ZERO)[0]
+    assert bench.odometry(0, 0.7).tau == at_rest
+    bench.odometry(60, 0.7)  # the watchdog
+    bench.setpoint(65, (2.0, *[0.0] * 5))
+    bench.odometry(70, 0.4)
+    assert reference.advance(0.0, ZERO)[0][0] == 0.4
 
 
 def test_exact_pairing_in_real_time_lets_go_when_set_points_stay_away():

@@ -3,7 +3,15 @@
 import pytest
 
 from auv_gvc_controller.limits import Limits
-from auv_gvc_controller.pairing import CAPACITY, DIFFERENCE, SAME, Pairing, Reference
+from auv_gvc_controller.pairing import (
+    CAPACITY,
+    DIFFERENCE,
+    FILTER,
+    NONE,
+    SAME,
+    Pairing,
+    Reference,
+)
 
 MS = 1_000_000
 
@@ -139,6 +147,27 @@ def test_what_is_not_believed_is_refused() -> None:
     with pytest.raises(ValueError, match=r'accel\.angular: expected at most 5 rad/s2, found 6'):
         pairing.derivative(0, (0.0, 0.0, 0.0, 0.0, 0.0, 6.0))
     assert pairing.find(0) is None
+
+
+def test_a_bounded_difference_ends_with_the_interval_that_it_was_taken_over() -> None:
+    pairing = Pairing(exact=False, acceleration=DIFFERENCE, steepest=(0.2,) * 6)
+    for ms, value in ((0, 0.0), (100, 0.01), (200, 0.5), (200.1, 0.505)):
+        pairing.setpoint(round(ms * MS), six(value))
+        slope = pairing.find(round(ms * MS)).nu_d_dot
+    assert slope == six(0.2), 'two that come back to back'
+    assert pairing.find(205 * MS).nu_d_dot == six(0.2)
+    assert pairing.find(206 * MS) == Reference(200_100_000, six(0.505), ZERO)
+    pairing.setpoint(300 * MS, six(0.515))
+    assert pairing.find(400 * MS - 100_000).nu_d_dot == pytest.approx(six(0.01 / 0.0999))
+    assert pairing.find(400 * MS).nu_d_dot == ZERO
+
+
+@pytest.mark.parametrize('acceleration', [NONE, FILTER])
+def test_without_a_difference_the_derivative_is_zero(acceleration) -> None:
+    pairing = Pairing(exact=False, acceleration=acceleration)
+    for k in range(2):
+        pairing.setpoint(k * MS, six(k))
+        assert pairing.find(k * MS) == Reference(k * MS, six(k), (0.0,) * 6)
 
 
 def test_a_jump_of_the_set_point_has_no_derivative() -> None:

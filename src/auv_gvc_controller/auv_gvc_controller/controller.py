@@ -6,6 +6,7 @@ from auv_gvc_controller.hand_over import HandOver
 from auv_gvc_controller.limits import ZERO
 from auv_gvc_controller.odometry_guard import UNTIMED, OdometryGuard
 from auv_gvc_controller.pairing import Pairing, Reference
+from auv_gvc_controller.reference_filter import ReferenceFilter
 from auv_gvc_controller.sampled import SampledLaw
 from auv_gvc_controller.stamp_age import Now
 
@@ -27,7 +28,8 @@ class Timeouts:
     Attributes
     ----------
     odometry : silence on `odom`
-    setpoint : silence on `cmd_vel`, or age of the newest set-point by its stamp
+    setpoint : silence on `cmd_vel`, however far ahead its stamps are, or age of the set-point in
+        use by its stamp
 
     """
 
@@ -44,6 +46,7 @@ class VelocityController:
     pairing : which set-point belongs to an odometry
     guard : which odometry may be used
     output : what the wrench passes before it is published
+    reference : smooths the set-points; None: they are followed as they come
     timeouts : of the watchdogs; None in lock-step: it waits for the set-point, whatever the time
 
     Attributes
@@ -62,7 +65,9 @@ class VelocityController:
         *,
         exact: bool,
         timeouts: Timeouts | None,
+        reference: ReferenceFilter | None = None,
     ):
+        self._reference = reference
         self._law, self._pairing, self._guard, self._output = law, pairing, guard, output
         self._exact, self._timeouts = exact, timeouts
         self._waiting: tuple[int, tuple[float, ...], float] | None = None
@@ -73,8 +78,9 @@ class VelocityController:
         self.watchdog, self.trips = '', 0
 
     def reset(self) -> None:
-        """Forget the integrals."""
+        """Forget the integrals; the law comes in anew over the ramp."""
         self._law.reset()
+        self._output.restart()
 
     def odometry(self, ns: int, x: tuple[float, ...], now: Now = UNTIMED) -> Answer | None:
         """Take an odometry.
@@ -114,17 +120,22 @@ class VelocityController:
         ns, x, dt = self._waiting
         reference = self._pairing.find(ns)
         if reference is None:
-            return None if self._exact else self._let_go(ns, 'no set-point yet', now)
+            return None if self._exact else self._trip(ns, 'no set-point yet', now)
         stale = self._stale(ns, reference, now)
         if stale:
-            return self._let_go(ns, stale, now)
+            return self._trip(ns, stale, now)
         self._waiting = None
         if self._bridge:
             self._law.forget_rate()
             self._bridge = False
         t = (ns - self._guard.origin) / 1e9
+        nu_d, nu_d_dot = reference.nu_d, reference.nu_d_dot
+        if self._reference is not None:
+            if not self._in_charge:
+                self._reference.start(x[7:])
+            nu_d, nu_d_dot = self._reference.advance(dt if self._in_charge else 0.0, nu_d)
         try:
-            tau, f = self._law.sample(t, dt, x[7:], x[3:7], reference.nu_d, reference.nu_d_dot)
+            tau, f = self._law.sample(t, dt, x[7:], x[3:7], nu_d, nu_d_dot)
         except ArithmeticError as error:
             return self._let_go(ns, str(error), now)
         self.watchdog, self._in_charge = '', True
@@ -137,10 +148,10 @@ class VelocityController:
             return None
         waits = self._waiting is not None and now.steady - self._unanswered_since > late.setpoint
         if self._waiting is not None and (waits or self.watchdog):
-            return self._let_go(self._waiting[0], 'no set-point of its stamp', now)
+            return self._trip(self._waiting[0], 'no set-point of its stamp', now)
         if now.steady - self._heard <= late.odometry:
             return None
-        answer = self._let_go(self._guard.last or 0, f'no odometry for {late.odometry:g} s', now)
+        answer = self._trip(self._guard.last or 0, f'no odometry for {late.odometry:g} s', now)
         if self._output.idle:
             self._heard = None  # said
         return answer
@@ -167,10 +178,15 @@ class VelocityController:
         most, age = self._timeouts.setpoint, (ns - reference.ns) / 1e9
         if age > most:
             return f'no set-point for {age:.3g} s'
-        # one who publishes ahead may be silent until his set-points are used up
-        if now.steady - self._pairing.heard > most and not self._pairing.is_ahead(ns):
+        if now.steady - self._pairing.heard > most:
             return f'no set-point heard for {most:g} s'
         return ''
+
+    def _trip(self, ns: int, trouble: str, now: Now) -> Answer:
+        """Let go because of a watchdog: in real time the integrals do not outlive it."""
+        if self._timeouts is not None:
+            self._law.reset()
+        return self._let_go(ns, trouble, now)
 
     def _let_go(self, ns: int, trouble: str, now: Now) -> Answer:
         self._waiting = None

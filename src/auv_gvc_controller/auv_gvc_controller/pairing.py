@@ -3,11 +3,12 @@
 from collections import OrderedDict
 from typing import NamedTuple
 
-from auv_gvc_controller.limits import Limits
+from auv_gvc_controller.limits import ZERO, Limits
+from auv_gvc_controller.reference_filter import clamped
 
 UNLIMITED = Limits()
-SAME = 'topic'
-DIFFERENCE = 'difference'
+SAME, FILTER, NONE, DIFFERENCE = 'topic', 'filter', 'none', 'difference'
+LEAST = 5_000_000  # ns that two set-points are taken to be apart at least
 CAPACITY = 4096  # set-points kept; more than any horizon that is accepted
 
 
@@ -25,9 +26,13 @@ class Pairing:
     Parameters
     ----------
     exact : take the set-point of the odometry's own stamp; else the newest at or before it
-    acceleration : 'topic' waits for the derivative of the same stamp, 'difference' takes the
-        backward difference of the set-points, zero at the first and over a jump
+    acceleration : 'topic' waits for the derivative of the same stamp; 'difference' takes the
+        backward difference of the set-points, zero at the first and over a jump; with 'none' and
+        'filter' it is zero here
     limits : velocities and accelerations that are believed
+    steepest : (6,) bounds of the difference, m/s2 and rad/s2; set-points are then taken to be
+        `LEAST` apart at least, and the difference is zero once a set-point has been held for
+        longer than it took to come; None: none of this
 
     Attributes
     ----------
@@ -35,11 +40,19 @@ class Pairing:
 
     """
 
-    def __init__(self, exact: bool, acceleration: str, limits: Limits = UNLIMITED):
+    def __init__(
+        self,
+        exact: bool,
+        acceleration: str,
+        limits: Limits = UNLIMITED,
+        steepest: tuple[float, ...] | None = None,
+    ):
         self._exact, self._acceleration, self._limits = exact, acceleration, limits
+        self._steepest = steepest
         self._nu_d: OrderedDict[int, tuple[float, ...]] = OrderedDict()
         self._nu_d_dot: OrderedDict[int, tuple[float, ...]] = OrderedDict()
         self._used: Reference | None = None
+        self._slope_until = 0  # ns
         self.heard = 0.0
 
     def reset(self) -> None:
@@ -64,10 +77,6 @@ class Pairing:
         self._keep(self._nu_d, ns, nu_d)
         self.heard = steady
 
-    def is_ahead(self, ns: int) -> bool:
-        """Whether there is a set-point for a time after `ns`: its publisher is not behind."""
-        return any(stamp > ns for stamp in reversed(self._nu_d))
-
     def derivative(self, ns: int, nu_d_dot: tuple[float, ...]) -> None:
         """Keep a derivative; ValueError when it is not believed or not newer than that in use."""
         self._limits.check_acceleration(nu_d_dot)
@@ -90,11 +99,13 @@ class Pairing:
         if chosen is None:
             return None
         if self._used is not None and chosen == self._used.ns:
+            if self._steepest is not None and ns > self._slope_until:
+                self._used = self._used._replace(nu_d_dot=ZERO)
             return self._used
         if self._acceleration == SAME:
             nu_d_dot = self._nu_d_dot[chosen]
         else:
-            nu_d_dot = self._difference(chosen)
+            nu_d_dot = self._difference(chosen) if self._acceleration == DIFFERENCE else ZERO
         self._used = Reference(chosen, self._nu_d[chosen], nu_d_dot)
         for buffer in (self._nu_d, self._nu_d_dot):
             while buffer and next(iter(buffer)) <= chosen:
@@ -116,12 +127,16 @@ class Pairing:
         if self._used is not None:
             before.append((self._used.ns, self._used.nu_d))
         if not before:
-            return (0.0,) * 6
+            return ZERO
         ns, last = max(before)
-        dt = (chosen - ns) / 1e9
+        apart = chosen - ns if self._steepest is None else max(chosen - ns, LEAST)
+        self._slope_until = chosen + apart
+        dt = apart / 1e9
         slope = tuple((new - old) / dt for new, old in zip(self._nu_d[chosen], last, strict=True))
         try:
             self._limits.check_acceleration(slope)
         except ValueError:
-            return (0.0,) * 6  # a jump has no derivative
-        return slope
+            return ZERO  # a jump has no derivative
+        if self._steepest is None:
+            return slope
+        return tuple(clamped(*entry) for entry in zip(slope, self._steepest, strict=True))

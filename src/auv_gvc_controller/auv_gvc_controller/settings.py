@@ -16,12 +16,12 @@ from auv_gvc_controller.hand_over import HandOver
 from auv_gvc_controller.limits import Limits
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.odometry_guard import OdometryGuard
-from auv_gvc_controller.pairing import DIFFERENCE, SAME, Pairing
+from auv_gvc_controller.pairing import DIFFERENCE, FILTER, NONE, SAME, Pairing
+from auv_gvc_controller.reference_filter import FilterSettings, ReferenceFilter
 from auv_gvc_controller.sampled import SampledLaw
 from auv_gvc_controller.stamp_age import AUTO, CLOCKS, StampAge
 
 LATEST, EXACT = 'latest', 'exact'
-Six = tuple[float, ...]  # six numbers, one per axis, or none
 Reader = Callable[..., Any]  # name, type, default, description, range -> value
 
 
@@ -52,7 +52,26 @@ class ControllerSettings:
         LATEST, 'setpoint_pairing', 'which set-point', one_of=(EXACT, LATEST)
     )
     setpoint_acceleration: str = _setting(
-        DIFFERENCE, 'setpoint_acceleration', 'where nu_d_dot comes from', one_of=(SAME, DIFFERENCE)
+        FILTER,
+        'setpoint_acceleration',
+        'where nu_d_dot comes from: cmd_accel of the same stamp (topic), a reference filter that '
+        'smooths nu_d as well (filter; usual in real time), nowhere, zero (none), or the '
+        'difference of two set-points (difference; usual in lock-step)',
+        one_of=(SAME, FILTER, NONE, DIFFERENCE),
+    )
+    filter_omega: float = _setting(
+        1.0, 'setpoint_filter.omega', 'rad/s, natural frequency', at_least=0.01, at_most=20.0
+    )
+    filter_zeta: float = _setting(
+        1.0, 'setpoint_filter.zeta', 'damping ratio', at_least=0.5, at_most=5.0
+    )
+    filter_speed: float = _number(3.0, 'setpoint_filter.speed', 'm/s, largest nu_d of an axis')
+    filter_rate: float = _number(1.0, 'setpoint_filter.rate', 'rad/s, largest nu_d of an axis')
+    filter_acceleration: float = _number(
+        0.2, 'setpoint_filter.acceleration', 'm/s2, largest of an axis; of the difference as well'
+    )
+    filter_angular_acceleration: float = _number(
+        0.2, 'setpoint_filter.angular_acceleration', 'rad/s2, the same of roll, pitch and yaw'
     )
     odometry_timeout: float = _number(
         0.5, 'odometry_timeout', 's, silence or age of the stamp: zero wrench'
@@ -66,8 +85,8 @@ class ControllerSettings:
     limits_acceleration: float = _number(
         100.0, 'limits.acceleration', 'm/s2, rad/s2; more is refused'
     )
-    limits_wrench: Six = _six('limits.wrench', 'clips the wrench')
-    limits_wrench_rate: Six = _six('limits.wrench_rate', 'per s, limits its change')
+    limits_wrench: tuple[float, ...] = _six('limits.wrench', 'clips the wrench')
+    limits_wrench_rate: tuple[float, ...] = _six('limits.wrench_rate', 'per s, limits its change')
     ramp: float = _number(0.2, 'ramp', 's, real time: from no wrench to all of it, and back')
     stamp_clock: str = _setting(
         AUTO,
@@ -76,7 +95,9 @@ class ControllerSettings:
         'or auto: ros if they count from the same beginning, else its age is not judged',
         one_of=CLOCKS,
     )
-    actuators_limit: Six = _six('actuators.limit', 'of the actuators, for anti-windup')
+    actuators_limit: tuple[float, ...] = _six(
+        'actuators.limit', 'of the actuators, for anti-windup'
+    )
     actuators_thrusters: bool = _setting(
         False, 'actuators.thrusters', "anti-windup knows the vehicle's thrusters"
     )
@@ -90,7 +111,7 @@ class ControllerSettings:
 
         Parameters
         ----------
-        reader : `(name, type, default, description, *, at_least, one_of)` -> value in its range
+        reader : `(name, type, default, description, *, at_least, at_most, one_of)` -> value
         source : node or file, for refusals
 
         Raises
@@ -101,14 +122,15 @@ class ControllerSettings:
         values: dict[str, Any] = {}
         for entry in fields(cls)[1:]:
             name, text = entry.metadata['name'], entry.metadata['description']
-            if entry.type is Six:
+            if entry.type == tuple[float, ...]:
                 text = f'1 or 6 numbers, N, N m, {text}; none: off'
                 found = reader(name, list[float], None, text)
                 values[entry.name] = _positive(found or [], source, name)
             else:
-                kind: Any = entry.type
+                own = name == 'setpoint_acceleration'
+                default = usual_acceleration(values['lockstep']) if own else entry.default
                 values[entry.name] = reader(
-                    name, kind, entry.default, text, **entry.metadata['accepted']
+                    name, entry.type, default, text, **entry.metadata['accepted']
                 )
         return cls(source, **values)
 
@@ -117,21 +139,24 @@ class ControllerSettings:
         """Settings from parameters by name, as a bag carries them; InputError for a wrong one."""
 
         def reader(
-            name: str, kind: Any, default: Any, _: str, *, at_least: float = -math.inf,
-            one_of: tuple[str, ...] = (),
+            name: str, kind: Any, default: Any, _: str, *, at_least: float = 0.0,
+            at_most: float = math.inf, one_of: tuple[str, ...] = (),
         ) -> Any:  # fmt: skip
             value = values.get(name, default)
             if kind is float and isinstance(value, int) and not isinstance(value, bool):
                 value = float(value)
             good = {
-                float: lambda: isinstance(value, float) and at_least <= value < math.inf,
+                float: lambda: (
+                    isinstance(value, float) and at_least <= value <= at_most and value < math.inf
+                ),
                 list[float]: lambda: value is None or isinstance(value, list),
                 str: lambda: value in one_of,
                 bool: lambda: isinstance(value, bool),
             }
             if not good[kind]():
                 expected = {
-                    float: f'a number of at least {at_least:g}', str: f'one of {", ".join(one_of)}',
+                    float: f'a number from {at_least:g} to {at_most:g}',
+                    str: f'one of {", ".join(one_of)}',
                     list[float]: 'a list of numbers', bool: 'true or false',
                 }  # fmt: skip
                 raise InputError(source, name, expected[kind], value)
@@ -141,7 +166,8 @@ class ControllerSettings:
 
     def pairing(self) -> Pairing:
         """What keeps set-points until their odometry comes."""
-        return Pairing(self.exact, self.setpoint_acceleration, self.limits)
+        steepest = None if self.lockstep else self.reference_filter.steepest
+        return Pairing(self.exact, self.setpoint_acceleration, self.limits, steepest)
 
     @property
     def exact(self) -> bool:
@@ -152,6 +178,14 @@ class ControllerSettings:
     def limits(self) -> Limits:
         """Velocities and accelerations that are believed."""
         return Limits(self.limits_speed, self.limits_rate, self.limits_acceleration)
+
+    @property
+    def reference_filter(self) -> FilterSettings:
+        """Settings of the reference filter, whether it is used or not."""
+        return FilterSettings(
+            *(self.filter_omega, self.filter_zeta, self.filter_speed, self.filter_rate),
+            *(self.filter_acceleration, self.filter_angular_acceleration),
+        )
 
     def build(
         self, gains: Any, vehicle: Vehicle, pairing: Pairing, *, clocks: bool = True
@@ -177,6 +211,7 @@ class ControllerSettings:
             age=StampAge(self.stamp_clock, round(timeouts.odometry * 1e9)) if live else None,
         )
         ramp = 0.0 if self.lockstep else self.ramp
+        filtered = self.setpoint_acceleration == FILTER
         return VelocityController(
             law,
             pairing,
@@ -184,9 +219,10 @@ class ControllerSettings:
             HandOver(self._wrench_limit(vehicle), self.limits_wrench_rate, ramp),
             exact=self.exact,
             timeouts=timeouts if live else None,
+            reference=ReferenceFilter(self.reference_filter) if filtered else None,
         )
 
-    def _wrench_limit(self, vehicle: Vehicle) -> Six:
+    def _wrench_limit(self, vehicle: Vehicle) -> tuple[float, ...]:
         """Largest wrench; without limits what accelerations beyond belief take."""
         believable = np.abs(vehicle.M).sum(axis=1) * self.limits_acceleration
         return self.limits_wrench or tuple(believable.tolist())
@@ -203,7 +239,12 @@ class ControllerSettings:
         return make_reach(smallest or None, vehicle if self.actuators_thrusters else None)
 
 
-def _positive(values: list[Any], source: str, name: str) -> Six:
+def usual_acceleration(lockstep: bool) -> str:
+    """Where nu_d_dot comes from when nobody says it."""
+    return DIFFERENCE if lockstep else FILTER
+
+
+def _positive(values: list[Any], source: str, name: str) -> tuple[float, ...]:
     """Six positive numbers of one or six; none of none."""
     listed = values * 6 if len(values) == 1 else values
     good = all(

@@ -11,8 +11,8 @@ from auv_dynamics.vehicle import Vehicle
 from auv_gvc_controller.controller import VelocityController
 from auv_gvc_controller.laws import law_class, make_gains, refusal, try_law
 from auv_gvc_controller.model import control_model
-from auv_gvc_controller.pairing import DIFFERENCE, SAME, Pairing
-from auv_gvc_controller.settings import ControllerSettings
+from auv_gvc_controller.pairing import SAME, Pairing
+from auv_gvc_controller.settings import ControllerSettings, usual_acceleration
 
 
 class RecordedController:
@@ -44,7 +44,8 @@ class RecordedController:
         source = f'{bag}: params.yaml: controller_node'
         self.settings = ControllerSettings.recorded(parameters, source)
         if self.settings.setpoint_acceleration == SAME and not derivatives:
-            self.settings = replace(self.settings, setpoint_acceleration=DIFFERENCE)
+            usual = usual_acceleration(self.settings.lockstep)
+            self.settings = replace(self.settings, setpoint_acceleration=usual)
 
     def build(self, law: str, gains: Mapping[str, Any]) -> tuple[VelocityController, Pairing]:
         """Controller with a law, and what it keeps set-points in; InputError: no such law."""

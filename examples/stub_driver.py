@@ -32,7 +32,8 @@ NODES = {
     'controller_node': (
         'auv_gvc_controller',
         ['law:=gvc', 'vehicle:=herman2018_neutral', 'gains.k_D:=[4.0]', 'gains.k_I:=[1.0]',
-         'gains.Lambda:=[0.8]', 'gains.Gamma:=[2.0]', 'setpoint_acceleration:=topic'],
+         'gains.Lambda:=[0.8]', 'gains.Gamma:=[2.0]', 'setpoint_acceleration:=topic',
+         'limits.wrench:=[300.0]'],
     ),
 }  # fmt: skip
 

@@ -89,7 +89,7 @@ def parameters(**values: Any) -> list[str]:
 GAINS = parameters(
     gains__k_D='[12.0]', gains__k_I='[1.0]', gains__Lambda='[0.8]', gains__Gamma='[60.0]'
 )
-CONTROLLER = [*parameters(law='gvc', vehicle='herman2018'), *GAINS]
+CONTROLLER = [*parameters(law='gvc', vehicle='herman2018', limits__wrench='[1e5]'), *GAINS]
 
 
 class Peer:

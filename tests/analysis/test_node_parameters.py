@@ -1,15 +1,19 @@
 """A scenario as ROS parameters: what the contract names, in ROS' types, and back from the file."""
 
+import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
 from auv_analysis import load_scenario
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.scenario import Scenario
+from auv_dynamics import load_vehicle
 from auv_dynamics.interface import ANALYSIS_TOPICS, OPTIONAL_STEP_TOPICS, STEP_TOPICS
 
 FRAMES = {'odom_frame', 'base_frame', 'expected_subscribers'}
@@ -55,6 +59,7 @@ LISTS_OF_WORDS = {
 LISTS = {
     'initial.eta', 'initial.nu', 'amplitude', 'omega', 'phase', 'scale', 'dM', 'dD', 'velocity',
     'actuators.limit', 'actuators.rate', 'sensors.velocity_noise', 'sensors.attitude_noise',
+    'limits.wrench',
 }  # fmt: skip
 WHOLE_NUMBERS = """
 name: whole
@@ -114,6 +119,20 @@ def test_case1_has_every_parameter_of_the_contract() -> None:
     assert parameters['recorder_node']['topics'] == list(STEP_TOPICS)
     assert parameters['controller_node']['setpoint_pairing'] == 'exact'
     assert parameters['controller_node']['setpoint_acceleration'] == 'topic'
+
+
+def test_beside_a_vehicle_the_wrench_is_that_of_its_thrusters() -> None:
+    made = load_scenario('case1')
+    heavy = replace(made, vehicle=load_vehicle('bluerov2_heavy'))
+    lockstep, paced = (_parameters(heavy, 'gvc', lockstep=on) for on in (True, False))
+    assert 'limits.wrench' not in lockstep['controller_node'], '`simulate` would not equal it'
+    most = paced['controller_node']['limits.wrench']
+    thrusters = heavy.vehicle.thrusters
+    T, forward, reverse = thrusters.matrix, thrusters.forward, thrusters.reverse
+    corners = np.array(list(itertools.product(*zip(-reverse, forward, strict=True)))) @ T.T
+    assert most == pytest.approx(np.abs(corners).max(axis=0))
+    assert (lockstep['setpoint_node']['horizon'], paced['setpoint_node']['horizon']) == (200, 0)
+    assert 'limits.wrench' not in _parameters(made, 'gvc', lockstep=False)['controller_node']
 
 
 def test_case1_has_its_setpoint_and_disturbance() -> None:

@@ -65,6 +65,18 @@ def test_past_the_end_the_last_value_is_held():
     assert TABLE.derivative(np.zeros((3, 6))).shape == (3, 6, 6)
 
 
+def test_without_a_duration_it_goes_to_zero_over_a_ramp_after_its_file(tmp_path):
+    table = load_table(written(tmp_path, rows()), 0.0)
+    t = np.arange(0.0, 60.0, 0.01)
+    nu_d, slope = table.value(t), table.derivative(t)
+    assert_array_equal(table.value(2.0), NU_D[-1])
+    after = t[:-1] >= 2.0
+    assert 0.0 < np.abs(np.diff(nu_d, axis=0)[after]).max() < 0.0021, '0.2 m/s2'
+    assert_allclose(np.diff(nu_d, axis=0)[after] / 0.01, slope[:-1][after], atol=1e-9)
+    assert not nu_d[-1].any()
+    assert not slope[-1].any()
+
+
 def test_a_file_gives_the_same_as_its_numbers(tmp_path):
     path = written(tmp_path, rows())
     t = np.linspace(0.0, 2.0, 81)

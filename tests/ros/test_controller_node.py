@@ -1,6 +1,5 @@
 """The controller node: what it answers, what it refuses, how it lets go."""
 
-import itertools
 import math
 import time
 from collections.abc import Callable
@@ -36,6 +35,7 @@ from auv_dynamics.ros.health import ERROR, WARN
 FRAMES = Frames()
 STEP = 10_000_000
 X = np.array([0, 0, 0, 1, 0, 0, 0, 0.1, 0, 0, 0, 0, 0], float)
+UNLIMITED = parameters(law='gvc', vehicle='herman2018')
 LOCKSTEP = [*CONTROLLER, *parameters(lockstep=True, setpoint_pairing='exact')]
 
 
@@ -51,17 +51,21 @@ def stamps(messages: list) -> list[int]:
     return [interface.nanoseconds(m.header.stamp) // STEP for m in messages]
 
 
-def offer(peer, k: int):
-    """Answer to odometry k in real time; best effort may lose one, so a few follow each other."""
-    microseconds = itertools.count()
+def offer(peer):
+    """Answer to an odometry of now; best effort may lose one, so a few follow each other."""
 
     def answers() -> list:
-        ns = k * STEP + 1000 * next(microseconds)
+        ns = time.time_ns()
         peer.publish(topics.ODOM, convert.odometry(ns, X, FRAMES))
         peer.spin(0.1)
-        return [message for message in peer.heard['wrench'] if stamps([message]) == [k]]
+        heard = peer.heard['wrench']
+        return [m for m in heard if interface.nanoseconds(m.header.stamp) == ns]
 
-    return peer.until(answers, f'an answer to odometry {k}')[-1]
+    return peer.until(answers, 'an answer')[-1]
+
+
+def setpoint_of_now(surge: float = 0.2):
+    return convert.twist(time.time_ns(), (surge, 0, 0, 0, 0, 0), FRAMES)
 
 
 @pytest.fixture
@@ -319,7 +323,7 @@ def test_real_time_answers_zero_before_the_first_setpoint() -> None:
     with graph(('controller_node', CONTROLLER)) as (peer, _):
         peer.listen(topics.WRENCH)
         peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
-        assert offer(peer, 0).wrench.force.x == 0, 'no set-point yet'
+        assert offer(peer).wrench.force.x == 0, 'no set-point yet'
 
 
 def test_real_time_lets_go_when_odometry_falls_silent() -> None:
@@ -327,10 +331,9 @@ def test_real_time_lets_go_when_odometry_falls_silent() -> None:
     with graph(('controller_node', arguments)) as (peer, _):
         peer.listen(topics.WRENCH)
         peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
-        peer.publish(topics.CMD_VEL, setpoint(0))
+        peer.publish(topics.CMD_VEL, setpoint_of_now())
         peer.spin(0.1)
-        numbers = itertools.count(1)
-        peer.until(lambda: offer(peer, next(numbers)).wrench.force.x > 0, 'a wrench')
+        peer.until(lambda: offer(peer).wrench.force.x > 0, 'a wrench')
         peer.until(lambda: peer.heard['wrench'][-1].wrench.force.x == 0, 'a zero wrench')
 
 
@@ -340,6 +343,9 @@ def test_real_time_lets_go_when_odometry_falls_silent() -> None:
         ([*parameters(vehicle='herman2018'), *GAINS], 'law', 'gvc, cl, pid, smc or module:Class'),
         ([*parameters(law='gvc'), *GAINS], 'vehicle', 'a vehicle file'),
         (parameters(law='gvc', vehicle='herman2018'), 'gains.k_D', 'a number'),
+        ([*UNLIMITED, *GAINS], 'limits.wrench', 'the largest wrench'),
+        ([*CONTROLLER, *parameters(limits__wrench='[0.0]')], 'limits.wrench', 'one above'),
+        ([*CONTROLLER, *parameters(setpoint_filter__zeta=0.1)], 'setpoint_filter.zeta', '0.5'),
         ([*CONTROLLER, *parameters(gains__k_D='[1.0, 2.0]')], 'gains.k_D', '1, 6 or 36'),
         ([*CONTROLLER, *parameters(gains__k_P='[1.0]')], 'gains.k_P', 'k_D, k_I, Lambda, Gamma'),
         ([*CONTROLLER, *parameters(lockstop=True)], 'lockstop', 'one of'),
@@ -390,3 +396,15 @@ def test_without_anti_windup_they_do_not_stop() -> None:
 def test_thrusters_that_the_vehicle_has_not_are_refused() -> None:
     extra = parameters(actuators__thrusters=True)
     assert_one_line(run_node('controller_node', *CONTROLLER, *extra), 'actuators.thrusters')
+
+
+@pytest.mark.parametrize('limit', ['limits__wrench', 'actuators__limit'])
+def test_in_real_time_nothing_beyond_the_limit_is_published(limit: str) -> None:
+    told = parameters(**{limit: '[5.0]'}, ramp=0.0, setpoint_timeout=60.0)
+    with graph(('controller_node', [*UNLIMITED, *GAINS, *told])) as (peer, _):
+        peer.listen(topics.WRENCH)
+        peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
+        peer.publish(topics.CMD_VEL, setpoint_of_now(2.0))
+        peer.spin(0.1)
+        peer.until(lambda: offer(peer).wrench.force.x == 5.0, 'the limit')
+        assert max(abs(m.wrench.force.x) for m in peer.heard['wrench']) == 5.0

@@ -130,9 +130,19 @@ def freeze(driver: Driver) -> None:
     driver.clock = lambda: now
 
 
+def silent_ahead(driver: Driver) -> None:
+    """Two seconds of set-points at once, and no more."""
+    now = time.time_ns()
+    for k in range(200):
+        ahead = convert.twist(now + k * 10_000_000, (0.5, 0, 0, 0, 0, 0), FRAMES)
+        driver.peer.publish(topics.CMD_VEL, ahead)
+    driver.setpoints = False
+
+
 FAULTS: dict[str, tuple[Callable[[Driver], None], str]] = {
     'odometry falls silent': (lambda d: setattr(d, 'odometry', False), 'no odometry for 0.3 s'),
     'set-points fall silent': (lambda d: setattr(d, 'setpoints', False), 'no set-point for'),
+    'set-points ahead, then none': (silent_ahead, 'no set-point heard for'),
     'old set-points': (lambda d: setattr(d, 'setpoint_age', 10**9), 'no set-point for'),
     'odometry is late': (
         lambda d: setattr(d, 'clock', lambda: time.time_ns() - 10**9), 'no odometry for 0.3 s',
@@ -374,6 +384,41 @@ def test_an_error_inside_a_transition_leaves_no_wrench_and_can_be_mended() -> No
         peer.close()
         process.terminate()
         assert process.wait(timeout=30) == 0
+
+
+STEPS = {  # s -> surge, m/s
+    'a step': {0.0: 0.5},
+    'steps at 10 Hz': {0.0: 0.75, 0.1: 1.0, 0.2: 0.75, 0.3: 0.5},
+    'back to back': {1.0: 0.5, 1.0001: 0.505},
+}
+
+
+def test_set_points_by_hand_take_little_more_than_holds_the_speed() -> None:
+    """Ten a second, and jumps: with differences a step takes 1500 N, two at once thousands."""
+    law = [word.replace('herman2018', 'herman2018_neutral') for word in CONTROLLER]
+    law += parameters(use_sim_time=True)
+    with graph(
+        ('plant_node', parameters(vehicle='herman2018_neutral')), ('controller_node', law)
+    ) as (peer, _):
+        peer.listen(topics.ODOM, topics.WRENCH)
+        odometry, wrenches = peer.heard['odom'], peer.heard['wrench']
+        peer.until(lambda: odometry, 'odometry')
+
+        def now() -> float:
+            return interface.nanoseconds(odometry[-1].header.stamp) / 1e9
+
+        for steps in STEPS.values():
+            begin, left, surge, sent = now(), dict(steps), 0.5, 0.0
+            while now() < begin + 4.0:
+                due = [left.pop(at) for at in [*left] if begin + at <= now()]
+                surge = due[-1] if due else surge
+                for value in due or [surge] * (now() >= sent + 0.1):
+                    sent = max(now(), sent + 1e-4)
+                    command = convert.twist(round(sent * 1e9), (value, 0, 0, 0, 0, 0), FRAMES)
+                    peer.publish(topics.CMD_VEL, command)
+                peer.spin(0.01)
+        peer.until(lambda: abs(odometry[-1].twist.twist.linear.x - 0.5) < 0.1, 'the speed')
+    assert max(abs(message.wrench.force.x) for message in wrenches) < 200.0  # 60 N hold 0.5 m/s
 
 
 def test_the_wrench_changes_no_faster_than_its_limit() -> None:

@@ -140,6 +140,7 @@ def test_policy_is_that_of_a_run_in_real_time_in_one_process_in_a_namespace(tmp_
     nodes = node_parameters(
         scenario, 'gvc', bag=tmp_path / 'bag', lockstep=False, use_sim_time=False
     )
+    nodes['controller_node']['limits.wrench'] = [1e4]
     path.write_text(parameter_file(nodes, 'real time'))
     domain = fresh_domain()
     enclave = ('--enclave', '/auv_gvc/composed_graph')

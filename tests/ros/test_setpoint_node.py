@@ -46,6 +46,30 @@ def test_runs_ahead_of_the_odometry_on_its_grid() -> None:
     assert peer.heard['cmd_vel'][0].header.frame_id == 'base_link_fsd'
 
 
+def test_without_a_horizon_the_next_odometry_finds_its_set_point() -> None:
+    with graph(('setpoint_node', parameters(setpoint__surge__offset=0.2))) as (peer, _):
+        peer.listen(topics.CMD_VEL)
+        for at, last in ((0, 1), (1, 2), (6, 11), (7, 11), (11, 15)):  # steps
+            peer.publish(topics.ODOM, odometry(10**9 + at * STEP))
+            newest = 10**9 + last * STEP
+            peer.until(lambda newest=newest: newest in stamps(peer, 'cmd_vel'), 'the next')
+            assert stamps(peer, 'cmd_vel')[-1] == newest
+
+
+def test_a_jump_of_the_clock_is_no_burst() -> None:
+    with graph(('setpoint_node', [*SURGE, *parameters(duration=3600.0)])) as (peer, _):
+        peer.listen(topics.CMD_VEL)
+        peer.publish(topics.ODOM, odometry(0))
+        for k in range(3):
+            peer.publish(topics.ODOM, odometry(1800 * 10**9 + k * STEP))
+        last = 1800 * 10**9 + 7 * STEP
+        peer.until(lambda: last in stamps(peer, 'cmd_vel'), 'those after the jump')
+        first = 1800 * 10**9 + STEP  # the first odometry after it is not believed yet
+        assert stamps(peer, 'cmd_vel') == [
+            *(k * STEP for k in range(6)), *(first + k * STEP for k in range(7))
+        ]  # fmt: skip
+
+
 def test_ends_with_its_duration() -> None:
     with graph(('setpoint_node', [*SURGE, *parameters(duration=0.03)])) as (peer, _):
         peer.listen(topics.CMD_VEL)

@@ -190,7 +190,7 @@ def test_params_prints_the_parameter_file(options, folder, capsys) -> None:
 
 def test_params_for_a_driver_know_neither_plant_nor_simulated_time(folder, capsys) -> None:
     cli.main(['params', 'case1', '--controller', 'gvc', '--no-plant', '--out', 'driver.yaml'])
-    capsys.readouterr()
+    assert 'controller_node: limits.wrench: expected' in capsys.readouterr().err
     data = yaml.safe_load((folder / 'driver.yaml').read_text())
     nodes = {name.rpartition('/')[2]: entry['ros__parameters'] for name, entry in data.items()}
     assert set(nodes) == {'setpoint_node', 'controller_node', 'analysis_node', 'recorder_node'}

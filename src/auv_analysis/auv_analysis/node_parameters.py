@@ -10,15 +10,15 @@ from auv_analysis.node_values import disturbance_values, fault_values, flat
 from auv_analysis.scenario import Scenario
 from auv_dynamics import interface
 from auv_dynamics.signals import harmonic_columns
+from auv_gvc_controller.settings import ControllerSettings
 
 PLANT, SETPOINT, CONTROLLER = 'plant_node', 'setpoint_node', 'controller_node'
 ANALYSIS, RECORDER = 'analysis_node', interface.RECORDER
 EVERY = 10  # steps between live analysis samples
 WINDOW = 2000  # steps that the plant may be ahead of the recorder
-HORIZON = 200  # steps that set-points are published ahead
+HORIZON = 200  # steps that set-points are published ahead in lock-step
 WRENCH_TIMEOUT = 30.0  # s of silence that end a lock-step run
 TIMEOUT = 0.5  # s, the real-time watchdogs
-RAMP = 0.2  # s, in real time, from no wrench to all of the law's and back
 OF_PLANT_ALONE = (  # no driver has to offer them
     *(interface.TWIST, interface.DISTURBANCE),
     *(interface.WRENCH_APPLIED, interface.GROUND_TRUTH),
@@ -81,7 +81,12 @@ def node_parameters(
     grid = {'step': scenario.step, 'duration': scenario.duration}
     parameters: dict[str, dict[str, Any]] = {
         PLANT: {'use_sim_time': False, **_plant(scenario, vehicle, nodes, lockstep)},
-        SETPOINT: {**clock, **grid, 'horizon': HORIZON, **_setpoint(scenario)},
+        SETPOINT: {
+            **clock,
+            **grid,
+            'horizon': HORIZON if lockstep else 0,
+            **_setpoint(scenario),
+        },
         CONTROLLER: {**clock, **_controller(scenario, controller, vehicle, lockstep)},
     }
     sensing = plant and scenario.senses
@@ -190,10 +195,10 @@ def _controller(
         'setpoint_acceleration': 'topic',
         'setpoint_timeout': TIMEOUT,
         'odometry_timeout': TIMEOUT,
-        'ramp': RAMP,
-        'stamp_clock': 'auto',
-        'limits.gap': max(1.0, 10 * scenario.step),
-        **{f'limits.{name}': value for name, value in _limits(lockstep).items()},
+        'ramp': ControllerSettings.ramp,
+        'stamp_clock': ControllerSettings.stamp_clock,
+        'limits.gap': max(ControllerSettings.limits_gap, 10 * scenario.step),
+        **{f'limits.{name}': value for name, value in _limits(scenario, lockstep).items()},
         'autostart': True,
     }
     gains = scenario.gain_values(controller)
@@ -211,11 +216,21 @@ def _anti_windup(scenario: Scenario, controller: str) -> dict[str, Any]:
     return told
 
 
-def _limits(lockstep: bool) -> dict[str, float]:
-    """What the controller believes; in lock-step more than the plant, which ends at 100 m/s."""
+def _limits(scenario: Scenario, lockstep: bool) -> dict[str, Any]:
+    """What the controller believes; in lock-step more than the plant, which ends at 100 m/s.
+
+    Beside a vehicle, also the largest wrench of its thrusters, where they are known.
+    """
     if lockstep:
         return {'speed': 120.0, 'rate': 120.0, 'acceleration': 1e5}
-    return {'speed': 20.0, 'rate': 20.0, 'acceleration': 100.0}
+    usual = ControllerSettings
+    believed = {
+        'speed': usual.limits_speed,
+        'rate': usual.limits_rate,
+        'acceleration': usual.limits_acceleration,
+    }
+    thrusters = scenario.vehicle.thrusters
+    return believed if thrusters is None else {**believed, 'wrench': thrusters.largest().tolist()}
 
 
 def _without_empty_lists(parameters: dict[str, Any]) -> dict[str, Any]:

@@ -67,6 +67,12 @@ class Thrusters:
         u = u / max(1.0, most)
         return u, self.matrix @ u
 
+    def largest(self) -> np.ndarray:
+        """(6,) largest wrench along each axis, N and N m, whichever way it is larger."""
+        ahead = np.where(self.matrix > 0, self.matrix * self.forward, -self.matrix * self.reverse)
+        astern = np.where(self.matrix > 0, self.matrix * self.reverse, -self.matrix * self.forward)
+        return np.maximum(ahead.sum(axis=1), astern.sum(axis=1))
+
     def unactuated(self) -> dict[str, tuple[str, ...]]:
         """Degrees of freedom without a wrench of their own, and what each comes along with.
 

@@ -56,6 +56,7 @@ class ControllerParameters:
             gain, expected, found = refusal(error)
             key = f'{WRITABLE}{gain}' if gain else 'law'
             raise InputError(name, key, expected, found) from None
+        self.settings.check_bounded()
         self.pairing.reset()
         return self.settings.build(gains, vehicle, self.pairing)
 

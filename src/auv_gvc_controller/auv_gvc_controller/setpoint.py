@@ -13,6 +13,7 @@ from auv_dynamics.signals import DOFS, Harmonics
 
 COLUMNS = ('t', *DOFS)
 ROUNDING = 1e-10  # s
+STOPPING = 0.2  # m/s2, rad/s2: how a set-point without a duration goes to zero after its file
 
 
 class Setpoint(Protocol):
@@ -62,7 +63,8 @@ def load_table(path: Path, duration: float, text: str | None = None) -> Table:
     Parameters
     ----------
     path : CSV file, first line the column names
-    duration : s that the file must cover from 0
+    duration : s that the file must cover from 0; 0: the set-point has no end, and goes to zero
+        over a ramp once the file is over
     text : its contents where they have been read already; `path` is then only named in errors
 
     Returns
@@ -91,7 +93,12 @@ def load_table(path: Path, duration: float, text: str | None = None) -> Table:
         raise InputError(path, f'line {lines[k + 1]}', expected, f'{t[k]:g}')
     if t[0] > 0 or t[-1] < duration - 1e-9:
         raise InputError(path, 't', f'0 to {duration:g} s covered', f'{t[0]:g} to {t[-1]:g} s')
-    return Table(t, values[:, 1:])
+    nu_d = values[:, 1:]
+    stopping = np.abs(nu_d[-1]).max() / STOPPING
+    if not duration and stopping > 0.0:
+        t = np.append(t, t[-1] + stopping + np.array([0.0, 1.0]))
+        nu_d = np.vstack([nu_d, np.zeros((2, 6))])
+    return Table(t, nu_d)
 
 
 def _rows(path: Path, text: str | None) -> tuple[list[int], list[list[str]]]:
@@ -127,7 +134,7 @@ def make_setpoint(spec: Mapping[str, Any], duration: float, text: str | None = N
     Parameters
     ----------
     spec : {file: path} or {surge: {offset, terms}, ...}
-    duration : s that a file must cover
+    duration : s that a file must cover, 0: see `load_table`
     text : the file's contents where they have been read already
 
     """

@@ -29,15 +29,19 @@ PATIENCE = 0.3  # s without odometry after which stamps that have gone back are 
 
 
 class SetpointNode(BulkNode):
-    """Publishes nu_d and nu_d_dot for every step up to `horizon` steps ahead."""
+    """Publishes nu_d and nu_d_dot for every step up to `horizon` steps ahead.
+
+    At least those until the next odometry are: it must find its set-point when it comes.
+    """
 
     def __init__(self) -> None:
         super().__init__('setpoint_node')
         self.graph = Graph(self)
         grid = declare_grid(self)
         self._horizon = declare(
-            self, 'horizon', int, 200, 'steps ahead of odom', at_least=0, at_most=topics.DEPTH - 1
-        )
+            self, 'horizon', int, 0, 'steps ahead of odom, those until the next one at least',
+            at_least=0, at_most=topics.DEPTH - 1,
+        )  # fmt: skip
         self._step_ns, self._last = grid.step_ns, grid.last
         self._setpoint = self._declare_setpoint(grid.duration)
         refuse_unknown(self)
@@ -48,6 +52,7 @@ class SetpointNode(BulkNode):
         gap = max(interface.NANOSECONDS, 10 * self._step_ns)
         self._guard = OdometryGuard(gap, Limits(), lockstep=False, patience=PATIENCE)
         self._newest = -1
+        self._stride = 1  # steps from one odometry to the next
         self._next = 0
         self._first, self._rows = 0, np.zeros((0, 12))
         steady_timer(self, 0.02, self._publish)
@@ -76,21 +81,23 @@ class SetpointNode(BulkNode):
         return make_setpoint(spec, duration)
 
     def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
-        restarts = self._guard.restarts
         try:
-            self._guard.elapsed(ns, x[7:], Now(time.monotonic()))
+            elapsed = self._guard.elapsed(ns, x[7:], Now(time.monotonic()))
         except ValueError as error:
             self.graph.refuse(f'{topics.ODOM.name}: {error}')
             return
-        if self._guard.restarts > restarts:  # the driver was started again: go on from here
-            self._next = self._newest
-        self._newest = max(self._newest, (ns - self._guard.origin) // self._step_ns)
+        newest = (ns - self._guard.origin) // self._step_ns
+        if elapsed:
+            self._stride = max(1, newest - self._newest)
+        else:  # the first one, or the clock has jumped: go on from here
+            self._next = newest
+        self._newest = newest
         self._publish()
 
     def _publish(self) -> None:
         if self._guard.last is None or not self.graph.ready():
             return
-        until = self._newest + self._horizon
+        until = self._newest + max(self._horizon, self._stride)
         until = until if self._last is None else min(until, self._last)
         # after a jump of the odometry's clock what lies behind it is of no use to anybody
         if self._last is None:

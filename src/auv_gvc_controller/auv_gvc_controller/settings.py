@@ -92,7 +92,7 @@ class ControllerSettings:
         AUTO,
         'stamp_clock',
         "that odometry is stamped with: the node's own (ros), a free-running one (own), "
-        'or auto: ros if they count from the same beginning, else its age is not judged',
+        'or auto: ros if they count from the same beginning, else own',
         one_of=CLOCKS,
     )
     actuators_limit: tuple[float, ...] = _six(
@@ -125,7 +125,7 @@ class ControllerSettings:
             if entry.type == tuple[float, ...]:
                 text = f'1 or 6 numbers, N, N m, {text}; none: off'
                 found = reader(name, list[float], None, text)
-                values[entry.name] = _positive(found or [], source, name)
+                values[entry.name] = _six_numbers(found or [], source, name)
             else:
                 own = name == 'setpoint_acceleration'
                 default = usual_acceleration(values['lockstep']) if own else entry.default
@@ -222,8 +222,20 @@ class ControllerSettings:
             reference=ReferenceFilter(self.reference_filter) if filtered else None,
         )
 
+    def check_bounded(self) -> None:
+        """Raise InputError for a controller beside a vehicle whose wrench nothing limits."""
+        if self.lockstep or self.limits_wrench or self.actuators_limit or self.actuators_thrusters:
+            return
+        expected = 'in real time the largest wrench of the vehicle, 1 or 6 numbers in N, N m'
+        raise InputError(self.source, 'limits.wrench', expected, None)
+
     def _wrench_limit(self, vehicle: Vehicle) -> tuple[float, ...]:
         """Largest wrench; without limits what accelerations beyond belief take."""
+        if not self.lockstep and not self.limits_wrench:
+            if self.actuators_limit:
+                return self.actuators_limit
+            if self.actuators_thrusters and vehicle.thrusters is not None:
+                return tuple(vehicle.thrusters.largest().tolist())
         believable = np.abs(vehicle.M).sum(axis=1) * self.limits_acceleration
         return self.limits_wrench or tuple(believable.tolist())
 
@@ -244,12 +256,12 @@ def usual_acceleration(lockstep: bool) -> str:
     return DIFFERENCE if lockstep else FILTER
 
 
-def _positive(values: list[Any], source: str, name: str) -> tuple[float, ...]:
-    """Six positive numbers of one or six; none of none."""
+def _six_numbers(values: list[Any], source: str, name: str) -> tuple[float, ...]:
+    """Six numbers of one or six, zero for an axis without actuators; none of none."""
     listed = values * 6 if len(values) == 1 else values
     good = all(
-        isinstance(v, int | float) and not isinstance(v, bool) and 0 < v < math.inf for v in listed
+        isinstance(v, int | float) and not isinstance(v, bool) and 0 <= v < math.inf for v in listed
     )
-    if len(listed) not in (0, 6) or not good:
-        raise InputError(source, name, '1 or 6 positive numbers', values)
+    if len(listed) not in (0, 6) or not good or (listed and not any(listed)):
+        raise InputError(source, name, '1 or 6 numbers of at least 0, one above it', values)
     return tuple(map(float, listed))

@@ -29,7 +29,7 @@ class StampAge:
     ----------
     clock : that wrote the stamps. 'ros': the node's own, so that the age is their difference;
         'own': a free-running one, so that the age counts from the freshest stamp seen; 'auto': as
-        'ros' where both count from the same beginning, else ages are not judged
+        'ros' where both count from the same beginning, else as 'own'
     most_ns : largest age, ns
 
     """
@@ -42,26 +42,29 @@ class StampAge:
         """Forget the freshest stamp, as when their clock has jumped."""
         self._freshest: tuple[float, float] | None = None  # steady s minus stamp s, and when
 
-    def known(self, ns: int, now: Now) -> float | None:
-        """Age in s of a stamp, negative ahead of the clock; None where it cannot be told."""
-        if self._clock == OWN:
+    def of(self, ns: int, now: Now) -> float:
+        """Age in s of a stamp, negative ahead of the clock."""
+        if self._runs_free(ns, now):
             return self._relative(ns, now.steady)
-        age = now.ros_ns - ns
-        apart = now.ros_ns == 0 or abs(age) > SAME_EPOCH
-        return None if self._clock == AUTO and apart else age / 1e9
+        return (now.ros_ns - ns) / 1e9
+
+    def _runs_free(self, ns: int, now: Now) -> bool:
+        """Whether the stamp's clock cannot be compared with the node's."""
+        apart = now.ros_ns == 0 or abs(now.ros_ns - ns) > SAME_EPOCH
+        return self._clock == OWN or (self._clock == AUTO and apart)
 
     def check(self, ns: int, now: Now) -> None:
         """Raise ValueError for a stamp that is too old or ahead of the clock."""
-        age, most = self.known(ns, now), self._most / 1e9
-        if age is not None and age > most:
+        age, most = self.of(ns, now), self._most / 1e9
+        if age > most:
             raise ValueError(f'stamp old: expected at most {most:g} s, found {age:.3g} s')
-        if age is not None and -age > most:
+        if -age > most:
             text = f'expected at most {most:g} s ahead of the clock, found {-age:.3g} s'
             raise ValueError(f'stamp ahead of the clock: {text}')
 
     def accept(self, ns: int, now: Now) -> None:
         """Remember a stamp that is used."""
-        if self._clock == OWN:
+        if self._runs_free(ns, now):
             self._freshest = (now.steady - ns / 1e9 - self._relative(ns, now.steady), now.steady)
 
     def _relative(self, ns: int, steady: float) -> float:

@@ -4,9 +4,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from auv_analysis.console import say
 from auv_analysis.folder import write_text
-from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis.node_parameters import CONTROLLER, node_parameters, parameter_file
 from auv_analysis.scenario import load_scenario
+from auv_dynamics.files import InputError
+from auv_gvc_controller.settings import ControllerSettings
 
 
 def params(options: argparse.Namespace) -> dict[str, Any]:
@@ -27,6 +30,8 @@ def params(options: argparse.Namespace) -> dict[str, Any]:
         vehicle=scenario.shipped_vehicle,
         attachments={name: path.resolve() for name, path in attachments.items()},
     )
+    if note := _missing(parameters[CONTROLLER]):
+        say(note)
     text = parameter_file(
         parameters, f'auv params {scenario.name} --controller {options.controller}'
     )
@@ -35,3 +40,12 @@ def params(options: argparse.Namespace) -> dict[str, Any]:
     elif not options.json:
         print(text, end='')
     return parameters
+
+
+def _missing(controller: dict[str, Any]) -> str:
+    """What the controller will not be configured without, where the scenario does not say it."""
+    try:
+        ControllerSettings.recorded(controller, CONTROLLER).check_bounded()
+    except InputError as error:
+        return f'{error}; give it, or the scenario `actuators: {{limit: ...}}`'
+    return ''

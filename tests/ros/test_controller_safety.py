@@ -241,11 +241,11 @@ BROKEN: dict[str, Callable[[int], object]] = {
 
 
 def test_broken_messages_among_good_ones_are_refused_counted_and_never_forwarded() -> None:
-    still = parameters(  # without integrals, the wrench stays what it is
+    still = parameters(  # without integrals and filter, the wrench stays what it is
         law='gvc', vehicle='herman2018', gains__k_D='[12.0]', gains__k_I='[0.0]',
         # no pause of a busy machine is as long as these
         gains__Lambda='[1e-9]', gains__Gamma='[0.0]', odometry_timeout=3.0, setpoint_timeout=3.0,
-        limits__gap=10.0,
+        limits__gap=10.0, limits__wrench='[1e5]', setpoint_acceleration='none',
     )  # fmt: skip
     with graph(('controller_node', still)) as (peer, processes):
         driver = Driver(peer)

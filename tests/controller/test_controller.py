@@ -59,7 +59,7 @@ class Bench:
             HandOver(limit, ramp=ramp),
             exact=exact,
             timeouts=None if lockstep else Timeouts(odometry, setpoint),
-            reference=reference,
+            reference_filter=reference,
         )
         self.law = SampledLaw(gains, MODEL)
 

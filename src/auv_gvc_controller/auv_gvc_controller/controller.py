@@ -46,7 +46,7 @@ class VelocityController:
     pairing : which set-point belongs to an odometry
     guard : which odometry may be used
     output : what the wrench passes before it is published
-    reference : smooths the set-points; None: they are followed as they come
+    reference_filter : smooths the set-points; None: they are followed as they come
     timeouts : of the watchdogs; None in lock-step: it waits for the set-point, whatever the time
 
     Attributes
@@ -65,9 +65,9 @@ class VelocityController:
         *,
         exact: bool,
         timeouts: Timeouts | None,
-        reference: ReferenceFilter | None = None,
+        reference_filter: ReferenceFilter | None = None,
     ):
-        self._reference = reference
+        self._filter = reference_filter
         self._law, self._pairing, self._guard, self._output = law, pairing, guard, output
         self._exact, self._timeouts = exact, timeouts
         self._waiting: tuple[int, tuple[float, ...], float] | None = None
@@ -130,10 +130,10 @@ class VelocityController:
             self._bridge = False
         t = (ns - self._guard.origin) / 1e9
         nu_d, nu_d_dot = reference.nu_d, reference.nu_d_dot
-        if self._reference is not None:
+        if self._filter is not None:
             if not self._in_charge:
-                self._reference.start(x[7:])
-            nu_d, nu_d_dot = self._reference.advance(dt if self._in_charge else 0.0, nu_d)
+                self._filter.start(x[7:])
+            nu_d, nu_d_dot = self._filter.advance(dt if self._in_charge else 0.0, nu_d)
         try:
             tau, f = self._law.sample(t, dt, x[7:], x[3:7], nu_d, nu_d_dot)
         except ArithmeticError as error:

@@ -31,7 +31,7 @@ PATIENCE = 0.3  # s without odometry after which stamps that have gone back are 
 class SetpointNode(BulkNode):
     """Publishes nu_d and nu_d_dot for every step up to `horizon` steps ahead.
 
-    At least those until the next odometry are: it must find its set-point when it comes.
+    At least up to the next odometry, which must find its set-point when it comes.
     """
 
     def __init__(self) -> None:

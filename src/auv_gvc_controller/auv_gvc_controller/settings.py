@@ -49,7 +49,10 @@ class ControllerSettings:
     source: str
     lockstep: bool = _setting(False, 'lockstep', 'answer every odometry, in its time')
     setpoint_pairing: str = _setting(
-        LATEST, 'setpoint_pairing', 'which set-point', one_of=(EXACT, LATEST)
+        LATEST,
+        'setpoint_pairing',
+        'set-point of the same stamp as odom (exact), or the newest at or before it (latest)',
+        one_of=(EXACT, LATEST),
     )
     setpoint_acceleration: str = _setting(
         FILTER,
@@ -85,9 +88,11 @@ class ControllerSettings:
     limits_acceleration: float = _number(
         100.0, 'limits.acceleration', 'm/s2, rad/s2; more is refused'
     )
-    limits_wrench: tuple[float, ...] = _six('limits.wrench', 'clips the wrench')
-    limits_wrench_rate: tuple[float, ...] = _six('limits.wrench_rate', 'per s, limits its change')
-    ramp: float = _number(0.2, 'ramp', 's, real time: from no wrench to all of it, and back')
+    limits_wrench: tuple[float, ...] = _six(
+        'limits.wrench', 'largest wrench; must be known in real time'
+    )
+    limits_wrench_rate: tuple[float, ...] = _six('limits.wrench_rate', 'per s, its fastest change')
+    ramp: float = _number(0.2, 'ramp', 's, real time: over which a law takes over and lets go')
     stamp_clock: str = _setting(
         AUTO,
         'stamp_clock',
@@ -96,7 +101,7 @@ class ControllerSettings:
         one_of=CLOCKS,
     )
     actuators_limit: tuple[float, ...] = _six(
-        'actuators.limit', 'of the actuators, for anti-windup'
+        'actuators.limit', 'largest wrench of the actuators, for anti-windup'
     )
     actuators_thrusters: bool = _setting(
         False, 'actuators.thrusters', "anti-windup knows the vehicle's thrusters"
@@ -219,7 +224,7 @@ class ControllerSettings:
             HandOver(self._wrench_limit(vehicle), self.limits_wrench_rate, ramp),
             exact=self.exact,
             timeouts=timeouts if live else None,
-            reference=ReferenceFilter(self.reference_filter) if filtered else None,
+            reference_filter=ReferenceFilter(self.reference_filter) if filtered else None,
         )
 
     def check_bounded(self) -> None:

@@ -1,7 +1,7 @@
 """Everything that makes a controller but law, gains and vehicle: defaults, ranges, construction."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Any
@@ -138,36 +138,6 @@ class ControllerSettings:
                     name, entry.type, default, text, **entry.metadata['accepted']
                 )
         return cls(source, **values)
-
-    @classmethod
-    def recorded(cls, values: Mapping[str, Any], source: str) -> 'ControllerSettings':
-        """Settings from parameters by name, as a bag carries them; InputError for a wrong one."""
-
-        def reader(
-            name: str, kind: Any, default: Any, _: str, *, at_least: float = 0.0,
-            at_most: float = math.inf, one_of: tuple[str, ...] = (),
-        ) -> Any:  # fmt: skip
-            value = values.get(name, default)
-            if kind is float and isinstance(value, int) and not isinstance(value, bool):
-                value = float(value)
-            good = {
-                float: lambda: (
-                    isinstance(value, float) and at_least <= value <= at_most and value < math.inf
-                ),
-                list[float]: lambda: value is None or isinstance(value, list),
-                str: lambda: value in one_of,
-                bool: lambda: isinstance(value, bool),
-            }
-            if not good[kind]():
-                expected = {
-                    float: f'a number from {at_least:g} to {at_most:g}',
-                    str: f'one of {", ".join(one_of)}',
-                    list[float]: 'a list of numbers', bool: 'true or false',
-                }  # fmt: skip
-                raise InputError(source, name, expected[kind], value)
-            return value
-
-        return cls.read(reader, source)
 
     def pairing(self) -> Pairing:
         """What keeps set-points until their odometry comes."""

@@ -14,13 +14,13 @@ from auv_analysis import cli
 from auv_analysis.bag.roles import ACCEL, ODOMETRY, TWIST, WRENCH
 from auv_analysis.replay.compared import compared, figures_of
 from auv_analysis.replay.open_loop import OpenLoop, open_loop, recorded_loop
+from auv_analysis.replay.recorded_controller import recorded_settings
 from auv_dynamics import load_vehicle
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError
 from auv_gvc_controller.laws import make_gains
 from auv_gvc_controller.model import control_model
 from auv_gvc_controller.sampled import SampledLaw
-from auv_gvc_controller.settings import ControllerSettings
 
 STEP = 10_000_000
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
@@ -144,7 +144,7 @@ def test_what_is_not_written_is_what_the_node_takes(tmp_path, lockstep, monkeypa
         node.destroy_node()
     finally:
         rclpy.shutdown(context=context)
-    replayed = ControllerSettings.recorded({'lockstep': lockstep}, 'controller_node')
+    replayed = recorded_settings({'lockstep': lockstep}, 'controller_node')
     assert replayed == taken
     assert {entry.metadata['name'] for entry in fields(taken)[1:]} | {
         'law', 'vehicle', 'autostart', 'use_sim_time', 'start_type_description_service',

@@ -7,9 +7,9 @@ from typing import Any
 from auv_analysis.console import say
 from auv_analysis.folder import write_text
 from auv_analysis.node_parameters import CONTROLLER, node_parameters, parameter_file
+from auv_analysis.replay.recorded_controller import recorded_settings
 from auv_analysis.scenario import load_scenario
 from auv_dynamics.files import InputError
-from auv_gvc_controller.settings import ControllerSettings
 
 
 def params(options: argparse.Namespace) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def params(options: argparse.Namespace) -> dict[str, Any]:
 def _missing(controller: dict[str, Any]) -> str:
     """What the controller will not be configured without, where the scenario does not say it."""
     try:
-        ControllerSettings.recorded(controller, CONTROLLER).check_bounded()
+        recorded_settings(controller, CONTROLLER).check_bounded()
     except InputError as error:
         return f'{error}; give it, or the scenario `actuators: {{limit: ...}}`'
     return ''

@@ -1,5 +1,6 @@
 """The controller of a bag as its attached parameters describe it, to be given any law."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +43,7 @@ class RecordedController:
         self._vehicle = vehicle
         self.law, self.gains = attached.law_and_gains(dict(parameters), bag)
         source = f'{bag}: params.yaml: controller_node'
-        self.settings = ControllerSettings.recorded(parameters, source)
+        self.settings = recorded_settings(parameters, source)
         if self.settings.setpoint_acceleration == SAME and not derivatives:
             usual = usual_acceleration(self.settings.lockstep)
             self.settings = replace(self.settings, setpoint_acceleration=usual)
@@ -65,3 +66,33 @@ class RecordedController:
         except ValueError as error:
             raise InputError('--law', '', *refusal(error)[1:]) from None
         return {**{name: v for name, v in self.gains.items() if name in names}, **given}
+
+
+def recorded_settings(values: Mapping[str, Any], source: str) -> ControllerSettings:
+    """Settings of parameters by name, as a bag carries them; InputError for a wrong one."""
+
+    def reader(
+        name: str, kind: Any, default: Any, _: str, *, at_least: float = 0.0,
+        at_most: float = math.inf, one_of: tuple[str, ...] = (),
+    ) -> Any:  # fmt: skip
+        value = values.get(name, default)
+        if kind is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        good = {
+            float: lambda: (
+                isinstance(value, float) and at_least <= value <= at_most and value < math.inf
+            ),
+            list[float]: lambda: value is None or isinstance(value, list),
+            str: lambda: value in one_of,
+            bool: lambda: isinstance(value, bool),
+        }
+        if not good[kind]():
+            expected = {
+                float: f'a number from {at_least:g} to {at_most:g}',
+                str: f'one of {", ".join(one_of)}',
+                list[float]: 'a list of numbers', bool: 'true or false',
+            }  # fmt: skip
+            raise InputError(source, name, expected[kind], value)
+        return value
+
+    return ControllerSettings.read(reader, source)

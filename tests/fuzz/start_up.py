@@ -43,7 +43,7 @@ BESIDE: dict[str, dict[str, Any]] = {  # nodes that are in no run
         'bag': 'bag', 'namespace': 'replay', 'start': 0.01, 'duration': 0.1, 'rate': 2.0,
         'loop': True, 'start_paused': False, 'clock': True, 'topics': ['/odom', '/w*'],
         'command_topics': ['/remark'], 'expected_subscribers': ['/odom=1'], 'answers': '/wrench',
-        'original_names': False, 'commands': False, 'all': True,
+        'original_names': False, 'commands': False, 'all': True, 'skip_gaps': True,
     },
 }  # fmt: skip
 
@@ -52,6 +52,7 @@ def originals() -> list[dict[str, Any]]:
     """Node name and parameters of each."""
     scenario = load_scenario('case1')
     found = node_parameters(scenario, 'gvc', bag=Path('bag'), vehicle='herman2018')
+    found['recorder_node'] |= {'extra_topics': ['/imu', 'all'], 'exclude': '(a+)+b'}
     found = {**found, **BESIDE}
     return [{'node': name, 'parameters': dict(found[name])} for name in NODES]
 
@@ -105,6 +106,8 @@ def try_parameters(data: Any) -> str:
         with watched(folder):
             code, said = started(node, ['--params-file', str(path)])
     lines = [line for line in said.splitlines() if line.strip()]
+    if code == 1 and 'expected topics without any message' in said:
+        code = 0  # a recorder that has heard nobody
     if code not in (0, 2) or 'Traceback' in said or (code == 2 and not lines):
         raise CrashError(f'{node.__name__}: exit code {code}, said {said[-2000:]}')
     return 'started' if code == 0 else 'refused'

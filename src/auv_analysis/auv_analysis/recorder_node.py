@@ -113,6 +113,8 @@ class RecorderNode(BulkNode):
             if timed and (ns or zero_is_a_time):
                 if step_topic:
                     self._time.follow(ns)
+                    if self._early:
+                        self._release()
                 self._write(resolved, kind, message, ns, ns)
             else:
                 self._take(resolved, kind, message, way)

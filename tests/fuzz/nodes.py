@@ -53,7 +53,7 @@ NODES = {
         topics.KINETIC_ENERGY,
     ),
     'recorder_node': Fuzzed(
-        parameters(strict=False),
+        [*parameters(strict=False), '-p', 'topics:=["odom", "cmd_vel", "wrench"]'],
         (topics.ODOM, topics.CMD_VEL, topics.WRENCH, topics.PROGRESS),
         topics.DIAGNOSTICS,
     ),

@@ -16,10 +16,11 @@ from auv_analysis.node_parameters import node_parameters
 from auv_analysis.recorder_node import RecorderNode
 from auv_analysis.replay_node import ReplayNode
 from auv_analysis.scenario import load_scenario
+from auv_dynamics.ending import ENDING
 from auv_dynamics.frame_converter_node import FrameConverterNode
 from auv_dynamics.plant_node import PlantNode
 from auv_dynamics.ros import life
-from auv_dynamics.ros.life import SIGNALS, live
+from auv_dynamics.ros.life import live
 from auv_gvc_controller.controller_node import ControllerNode
 from auv_gvc_controller.setpoint_node import SetpointNode
 
@@ -73,7 +74,7 @@ def started(make: Callable[[], Any], arguments: Sequence[str]) -> tuple[int, str
         return node
 
     life.TEARDOWN = PATIENCE  # a node that is torn down too slowly ends its process
-    kept = {number: signal.getsignal(number) for number in SIGNALS}
+    kept = {number: signal.getsignal(number) for number in ENDING}
     with tempfile.TemporaryFile(dir='.') as said:  # where the fuzzing lets files be written
         screens = os.dup(1), os.dup(2)
         try:

@@ -224,6 +224,7 @@ def test_records_what_others_publish_as_they_offer_it(tmp_path: Path, monkeypatc
         ping = b'\0\1\0\0' + bytes(8)
         published(peer, 'sonar/ping', raw_class('sonar_msgs/msg/Ping'), BEST_EFFORT, ping)
         published(peer, 'imu', Imu, BEST_EFFORT, Imu())
+        early.node.create_publisher(Header, 'imu', 1)  # of another type than the recorded one
         published(peer, 'remark', String, 10, String(data='reliable'))
         later = published(peer, 'remark', String, BEST_EFFORT)
 
@@ -239,6 +240,7 @@ def test_records_what_others_publish_as_they_offer_it(tmp_path: Path, monkeypatc
     assert code == 0, output
     last = output.strip().splitlines()[-1]
     assert '/sonar/new (no definition of sonar_msgs/msg/Secret)' in last
+    assert '/imu of std_msgs/msg/Header' in last
     counts = read_bag(tmp_path / 'bag').counts
     assert counts['/imu'] == counts['/sonar/ping'] == counts['/robot_description'] == 1
     assert counts['/remark'] > 1

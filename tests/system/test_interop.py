@@ -75,14 +75,12 @@ def test_mcap_ros2_support(bag: Path) -> None:
     assert np.array_equal(rows, run.tau)
     assert stamped >= {f'/{topic}' for topic in interface.STEP_TOPICS}
     assert {'/clock', '/recorder/progress'} <= stamped  # too short for diagnostics
+    ours = (*interface.STEP_TOPICS, *interface.ANALYSIS_TOPICS, interface.CLOCK)
+    names = {f'/{topic.lstrip("/")}' for topic in ours}
     for _, channel, message, decoded in found:
-        header = getattr(decoded, 'header', None)
-        time = header.stamp if header is not None else getattr(decoded, 'clock', None)
-        if time is None:
-            time = getattr(decoded, 'stamp', None)
-        if time is None:  # a lifecycle event has no stamp: it is filed at the latest step
-            continue
-        assert message.log_time == interface.nanoseconds(time), channel.topic
+        if channel.topic in names:  # others are logged when they came
+            time = decoded.clock if channel.topic == interface.CLOCK else decoded.header.stamp
+            assert message.log_time == interface.nanoseconds(time), channel.topic
 
 
 def test_schemas_hashes_and_attachments(bag: Path) -> None:

@@ -21,7 +21,7 @@ from auv_dynamics.ros.life import main_of
 
 PATIENCE = 2.0  # s for the clock of the last steps, which nothing else waits for
 NUMBERED = (*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK)  # with one publisher each
-TIMED = (*topics.STEP_TOPICS, topics.CLOCK)  # whose stamp is the log time
+TIMED = (*topics.STEP_TOPICS, topics.CLOCK)  # whose stamp is the log time, and the publish time
 EPOCH = 86_400 * NANOSECONDS  # ns between two clocks, from which they have different epochs
 EARLY_TIME = 60.0  # s that messages wait for the first step, which tells the time of the graph
 EARLY_COUNT, EARLY_SIZE = 10_000, 1 << 24  # messages and bytes that wait at most
@@ -99,7 +99,10 @@ class RecorderNode(BulkNode):
         name, kind = topic.name, type_name(topic.type)
         resolved = self.resolve_topic_name(name)
         step_topic = name if name in self._counted else ''
-        numbered, timed, awaited = topic in NUMBERED, topic in TIMED, name in self._newest
+        numbered, awaited = topic in NUMBERED, name in self._newest
+        # what is said of a step in lock-step belongs to it, however late it comes
+        of_a_step = self._settings.strict and topic in topics.ANALYSIS_TOPICS
+        timed = topic in TIMED or of_a_step
         zero_is_a_time = self._time.simulated or topic is topics.CLOCK
 
         def callback(message: bytes, way: dict[str, Any]) -> None:
@@ -115,7 +118,8 @@ class RecorderNode(BulkNode):
                     self._time.follow(ns)
                     if self._early:
                         self._release()
-                self._write(resolved, kind, message, ns, ns)
+                published = (of_a_step and way.get('source_timestamp')) or ns
+                self._write(resolved, kind, message, ns, published)
             else:
                 self._take(resolved, kind, message, way)
             if numbered:
@@ -130,6 +134,7 @@ class RecorderNode(BulkNode):
         """Write a message at the time when it came; before that is known, it waits."""
         ns = self._time.now(way.get('received_timestamp') or 0)
         if ns is None:
+            self._meet(topic, kind)  # its publisher may be gone by then
             self._early_since = self._early_since or time.monotonic()
             self._early.append((topic, kind, message, way))
         else:
@@ -148,23 +153,29 @@ class RecorderNode(BulkNode):
             self._take(*entry)
 
     def _write(self, topic: str, kind: str, message: bytes, ns: int, published: int) -> None:
+        self._meet(topic, kind)
         if self._writer.broken:
             return
         try:
-            if not self._writer.has_channel(topic):
-                self._add_channel(topic, kind)
             self._writer.write(topic, ns, message, published)
         except RecordingError as error:
             self._end(1, str(error))
         if self._writer.trouble:
             self._end(1, self._writer.trouble)
 
-    def _add_channel(self, topic: str, kind: str) -> None:
-        endpoints = self.get_publishers_info_by_topic(topic)
-        qos = [qos_entry(endpoint.qos_profile) for endpoint in endpoints]
-        endpoints = endpoints or self.get_subscriptions_info_by_topic(topic)
-        digest = str(endpoints[0].topic_type_hash) if endpoints else ''
-        self._writer.add_channel(topic, kind, schema_text(kind), qos, digest)
+    def _meet(self, topic: str, kind: str) -> None:
+        """Define a topic in the bag, with what its publishers offer."""
+        if self._writer.broken or self._writer.has_channel(topic):
+            return
+        found = self.get_publishers_info_by_topic(topic)
+        offered = [one for one in found if one.topic_type == kind]
+        qos = [qos_entry(one.qos_profile) for one in offered]
+        known = offered or self.get_subscriptions_info_by_topic(topic)
+        digest = str(known[0].topic_type_hash) if known else ''
+        try:
+            self._writer.add_channel(topic, kind, schema_text(kind), qos, digest)
+        except RecordingError as error:
+            self._end(1, str(error))
 
     def _count(self, name: str, step_topic: str, ns: int, number: int | None) -> None:
         try:

@@ -84,14 +84,16 @@ class OtherTopics:
         for topic, _ in self._node.get_topic_names_and_types():
             if topic in ours or topic in self.left or topic not in self._wanted:
                 continue
-            publishers = self._node.get_publishers_info_by_topic(topic)
-            if topic in self._heard:
-                self._adapt(topic, publishers)
-            elif publishers:
-                self._begin(topic, publishers)
+            found = self._node.get_publishers_info_by_topic(topic)
+            if found:
+                kind = self._kinds.setdefault(topic, found[0].topic_type)
+                follow = self._adapt if topic in self._heard else self._begin
+                follow(topic, [one for one in found if one.topic_type == kind])
+                for other in {one.topic_type for one in found} - {kind}:
+                    self._leave(f'{topic} of {other}', f'it is recorded as {kind}')
 
     def _begin(self, topic: str, publishers: list[Any]) -> None:
-        kind = self._kinds[topic] = publishers[0].topic_type
+        kind = self._kinds[topic]
         try:
             schema_text(kind)
         except (OSError, ValueError):
@@ -124,9 +126,10 @@ class OtherTopics:
         self._node.add_data(subscription)
 
     def _leave(self, topic: str, why: str) -> None:
+        if topic not in self.left:
+            node: Any = self._node
+            node.get_logger().warning(f'{topic}: not recorded, {why}')
         self.left[topic] = why
-        node: Any = self._node
-        node.get_logger().warning(f'{topic}: not recorded, {why}')
 
 
 def _class(kind: str) -> type:

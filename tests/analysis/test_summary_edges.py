@@ -1,5 +1,6 @@
 """Edges of the windows of a summary: which sample still counts."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -70,3 +71,9 @@ def test_without_set_points_or_a_disturbance_there_is_no_error_to_tell(run):
     summary = summarize(blind)
     assert set(summary['velocity_error'].values()) == {None}
     assert summary['velocity']['rms'] == summarize(run)['velocity']['rms']
+
+
+def test_what_overflows_is_null(run):
+    found = summarize(replace(run, tau=np.full_like(run.tau, 1e200)))
+    assert found['effort']['rms'] == [None] * 6
+    json.dumps(found, allow_nan=False)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
+import costly_bags
 import lz4.frame
 import pytest
 import yaml
@@ -146,6 +147,48 @@ def test_records_that_are_too_long_are_refused(
     text = f'byte {len(head)}: expected a record of at most 1000 bytes, found 1001'
     with pytest.raises(InputError, match=text):
         read_bag(path)
+
+
+@pytest.mark.parametrize('kind', costly_bags.KINDS)
+@pytest.mark.usefixtures('little_memory')
+def test_small_files_of_very_many_records_cost_little(
+    tmp_path: Path, kind: str, capsys: pytest.CaptureFixture
+) -> None:
+    path = tmp_path / 'bag_0.mcap'
+    path.write_bytes(costly_bags.KINDS[kind](1_000_000))
+    for command in ('info', 'recover'):
+        old(path)
+        ended = 0
+        try:
+            main([command, str(path)])
+        except SystemExit as error:
+            ended = int(error.code or 0)
+        said = capsys.readouterr().err.splitlines()
+        assert ended in (0, 1, 2)
+        assert ended == 0 or len(said) == 1
+        if ended == 2:
+            assert ': expected at most' in said[0]
+
+
+@pytest.mark.parametrize('indexed', [True, False])
+def test_a_long_recording_of_small_messages_is_no_hostile_one(indexed: bool) -> None:
+    messages = 36_000_000  # ten topics at 1 kHz for an hour
+    counts = limits.Counts(messages * (16 + 4 if indexed else 4))  # bytes of index and payload
+    for _ in range(messages // 1_500_000):  # chunks of 64 MiB
+        counts.take(1_500_000, 100_000)
+
+
+def test_a_schema_that_cannot_be_parsed_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    parts = costly_bags.schema(1, remark='\n=====5====='), costly_bags.channel(1, '/odom')
+    data = costly_bags.file_of(*parts, costly_bags.message(1))
+    (tmp_path / 'bag.mcap').write_bytes(data)
+    with pytest.raises(SystemExit) as ended:
+        main(['analyze', str(tmp_path / 'bag.mcap')])
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert '/odom: expected a schema of its type' in line
 
 
 def test_strings_that_reach_beyond_their_record(tmp_path: Path) -> None:

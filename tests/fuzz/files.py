@@ -3,6 +3,7 @@
 import contextlib
 import io
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -132,12 +133,27 @@ def try_bag(data: bytes) -> str:
             understood(lambda: summarize(open_bag(bag, whole=64).run))
             codes = [command('info', str(bag), '--json')]
             understood(try_replay, bag)
+            codes.append(command('analyze', str(bag), '--json', '--no-report', '--out', 'results'))
             codes.append(command('recover', str(bag), '--json'))
             understood(load_run, bag)
+            shutil.rmtree('results', ignore_errors=True)
             left = {entry.name for entry in folder.iterdir()}
             if left != {'bag'}:
                 raise CrashError(f'files beside the bag: {left}')
             return 'refused' if run is None else 'read' if max(codes) == 0 else 'partly'
+
+
+def try_costly_bag(data: bytes) -> str:
+    """A small bag that declares very much; each command has the limits of an input."""
+    with playground() as folder:
+        file = folder / 'bag_0.mcap'
+        file.write_bytes(data)
+        os.utime(file, (0, 0))
+        codes = []
+        for name in ('info', 'analyze', 'recover'):
+            with watched(folder):
+                codes.append(command(name, str(file), '--json'))
+        return ' '.join(map(str, codes))
 
 
 def try_replay(bag: Path) -> None:

@@ -1,6 +1,7 @@
 """Fuzzing of everything that comes from outside: `make fuzz`, see README.md beside this file."""
 
 import argparse
+import itertools
 import json
 import os
 import random
@@ -19,7 +20,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 SHARES = {  # of all inputs
     'vehicles': 0.20, 'imports': 0.06, 'scenarios': 0.16, 'parameters': 0.04, 'text': 0.08,
-    'messages': 0.23, 'decoding': 0.13, 'bags': 0.08, 'guided_bags': 0.02,
+    'messages': 0.23, 'decoding': 0.13, 'bags': 0.078, 'guided_bags': 0.02, 'costs': 0.002,
 }  # fmt: skip
 GUIDED = {'text': 'text', 'decoding': 'decoding', 'guided_bags': 'bags'}
 
@@ -117,6 +118,21 @@ def bags(count: int, seed: int) -> Any:
     return verdicts
 
 
+def costs(count: int, seed: int) -> Any:
+    """Small bags that declare very many records."""
+    from costly_bags import drawn
+    from files import try_costly_bag
+
+    verdicts: Counter[str] = Counter()
+    for name, data in itertools.islice(drawn(random.Random(seed)), count):
+        try:
+            verdicts[f'{name} {try_costly_bag(data)}'] += 1
+        except Exception as error:
+            error.add_note(f'{name}: {len(data)} bytes')
+            raise
+    return verdicts
+
+
 def guided(target: str, count: int, seed: int) -> Any:
     """Let atheris look for inputs; it ends its process itself."""
     command = [sys.executable, str(HERE / 'guided.py'), GUIDED[target], str(count), str(seed)]
@@ -133,7 +149,7 @@ def guided(target: str, count: int, seed: int) -> Any:
 
 OWN: dict[str, Callable[[int, int], Any]] = {
     'vehicles': vehicles, 'imports': imports, 'scenarios': scenarios, 'parameters': parameters,
-    'messages': messages, 'bags': bags,
+    'messages': messages, 'bags': bags, 'costs': costs,
 }  # fmt: skip
 
 

@@ -1,6 +1,7 @@
-"""Watches an input while it is tried: how long it takes, and which files are written."""
+"""Watches an input while it is tried: time, memory, and which files are written."""
 
 import os
+import re
 import signal
 import sys
 import tempfile
@@ -9,13 +10,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-PATIENCE = 20  # s for an input; 0: another watches
+PATIENCE = 20  # s of CPU for an input, six times that by the clock; 0: another watches
+CLOCKS = {signal.ITIMER_PROF: signal.SIGPROF, signal.ITIMER_REAL: signal.SIGALRM}
+MEMORY = 1 << 29  # bytes that an input may need beside what there was before
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 CHANGES = {'os.mkdir', 'os.rename', 'os.remove', 'os.rmdir', 'os.link', 'os.symlink', 'os.truncate'}
 
 
 class HangError(AssertionError):
     """An input takes too long."""
+
+
+class GreedError(AssertionError):
+    """An input takes too much memory."""
 
 
 class StrayFileError(AssertionError):
@@ -53,13 +60,20 @@ def _late(*_: Any) -> None:
     raise HangError(f'more than {PATIENCE} s')
 
 
+def _peak() -> int:
+    """Most memory that this process has held, bytes."""
+    found = re.search(r'VmHWM:\s+(\d+) kB', Path('/proc/self/status').read_text())
+    assert found
+    return 1024 * int(found[1])
+
+
 @contextmanager
 def watched(*folders: Path) -> Iterator[None]:
     """Try an input; files may be written in these folders alone.
 
     Raises
     ------
-    HangError, StrayFileError : what must not happen
+    HangError, GreedError, StrayFileError : what must not happen
 
     """
     global _allowed  # noqa: PLW0603  # an audit hook cannot be taken away again
@@ -68,15 +82,21 @@ def watched(*folders: Path) -> Iterator[None]:
     _allowed = [Path(os.path.realpath(folder)) for folder in (*folders, *system)]
     _stray.clear()
     if PATIENCE:
-        before = signal.signal(signal.SIGALRM, _late)
-        signal.alarm(PATIENCE)
+        before = [(number, signal.signal(number, _late)) for number in CLOCKS.values()]
+        signal.setitimer(signal.ITIMER_PROF, PATIENCE)
+        signal.setitimer(signal.ITIMER_REAL, 6 * PATIENCE)
+    Path('/proc/self/clear_refs').write_text('5')  # the peak is from now on
+    begin = _peak()
     try:
         yield
     finally:
         _allowed = None
         if PATIENCE:
-            signal.alarm(0)
-            signal.signal(signal.SIGALRM, before)
+            for clock, (number, handler) in zip(CLOCKS, before, strict=True):
+                signal.setitimer(clock, 0)
+                signal.signal(number, handler)
+    if (more := _peak() - begin) > MEMORY:
+        raise GreedError(f'{more >> 20} MiB')
     if _stray:
         raise StrayFileError(', '.join(_stray))
 

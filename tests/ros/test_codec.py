@@ -22,7 +22,7 @@ from auv_dynamics.signals import DOFS
 FRAMES = Frames()
 STAMPS = st.integers(0, (2**31 - 1) * 10**9 + 10**9 - 1)
 READ = (Odometry, TwistStamped, AccelStamped, WrenchStamped, JointState)
-ANY = st.floats(allow_nan=False, allow_infinity=False)
+ANY = st.floats(-2e29, 2e29)  # together below what is absurd
 UNIT = (0.5, -0.5, 0.5, 0.5)
 
 
@@ -84,7 +84,7 @@ def test_without_a_layout_messages_are_sent_and_read_all_the_same(kind: type) ->
 
 @pytest.mark.parametrize('kind', READ)
 @pytest.mark.parametrize('place', range(13))
-@pytest.mark.parametrize('bad', [float('nan'), float('inf'), float('-inf')])
+@pytest.mark.parametrize('bad', [float('nan'), float('inf'), float('-inf'), 1e31])
 def test_a_number_that_is_not_finite_is_refused_alike(kind: type, place: int, bad: float) -> None:
     values = list(numbers(kind, [1.0] * 13))
     values[place % len(values)] = bad
@@ -92,7 +92,7 @@ def test_a_number_that_is_not_finite_is_refused_alike(kind: type, place: int, ba
     texts = []
     for codec in (Codec(kind, FRAMES, 'topic'), long_way(kind)):
         with pytest.raises(
-            BadMessageError, match='topic: not finite: expected finite numbers'
+            BadMessageError, match=r'topic: (not finite: expected finite numbers|absurd)'
         ) as refusal:
             codec.decode(data)
         texts.append(str(refusal.value))

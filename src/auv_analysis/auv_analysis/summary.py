@@ -1,5 +1,6 @@
 """The figures of a run, as written to summary.json."""
 
+import math
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from typing import Any
@@ -75,7 +76,7 @@ def summarize(
     whole, after = tally.between(), tally.between(late)
     energies = {w: _energy(tallies[w].between(*cuts[w]), w) for w in cuts}
     listed = dict.fromkeys([*usual, *windows])
-    return {
+    figures = {
         'scenario': run.scenario,
         'law': run.law,
         'source': run.source,
@@ -108,6 +109,7 @@ def summarize(
         'gaps': gap_figures(run),
         'notes': list(run.notes),
     }
+    return _known(figures)
 
 
 def lumped_error(run: Run) -> np.ndarray | None:

@@ -12,6 +12,8 @@ from auv_dynamics.dofs import DOFS
 
 NANOSECONDS = 10**9
 UNIT = 1e-3  # deviation of a quaternion's norm from 1 that is accepted
+LARGEST = 1e30  # of numbers in a message: energies and their squares are still finite
+NOT_FINITE = 'not finite: expected finite numbers'
 PARENT = 'AUV_GVC_PARENT'  # variable with the process id of `auv run`: nodes do not outlive it
 RECORDER = 'recorder_node'  # name of the recorder, in whatever namespace
 OBSERVER = 'auv_watch'  # name of a node that only looks on: nobody waits for it
@@ -72,9 +74,11 @@ def _six(linear: Any, angular: Any) -> tuple[float, ...]:
 
 
 def check_finite(topic: str, values: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the numbers of a message; BadMessageError when one is not finite."""
-    if not all(map(math.isfinite, values)):
-        raise BadMessageError(f'{topic}: not finite: expected finite numbers, found {values}')
+    """Return the numbers of a message; BadMessageError when one is not finite, or absurd."""
+    if not math.hypot(*values) <= LARGEST:  # NaN: false
+        absurd = all(map(math.isfinite, values))
+        expected = f'absurd: expected at most {LARGEST:g}' if absurd else NOT_FINITE
+        raise BadMessageError(f'{topic}: {expected}, found {values}')
     return values
 
 

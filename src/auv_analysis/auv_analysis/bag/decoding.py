@@ -1,5 +1,7 @@
 """One message at a time, by its schema: decoded, checked, or refused in one line."""
 
+import contextlib
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -7,6 +9,7 @@ from typing import Any
 from mcap.records import Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
+from auv_analysis.bag.limits import LARGEST_PARSED
 from auv_analysis.bag.roles import READERS, role_of
 from auv_analysis.bag.tables import Table
 from auv_dynamics import interface
@@ -27,17 +30,34 @@ class Decoding:
     def __init__(self, path: Path):
         self._path = path
         self._decoders: dict[int, Decoder] = {}
+        self._known: dict[tuple[str, str, str, bytes], Decoder | None] = {}
+        self._parsed = 0  # bytes of definitions
         self._topics: dict[int, str] = {}
 
     def add(self, channel: Channel, schema: Schema | None) -> None:
         """Learn to decode a channel, where its encoding is known."""
-        try:  # a factory of its own per file: schema ids are only unique within one
-            decoder = DecoderFactory().decoder_for(channel.message_encoding, schema)
-        except Exception as error:  # whatever its parser stumbles over
-            raise refusal(self._path, channel.topic, 'a schema of its type', error) from None
+        decoder = self._decoder(channel, schema)
         if decoder is not None:
             self._decoders[channel.id] = decoder
             self._topics[channel.id] = channel.topic
+
+    def _decoder(self, channel: Channel, schema: Schema | None) -> Decoder | None:
+        """Decoder of a channel; channels of one definition share it."""
+        if schema is None:
+            return None
+        key = channel.message_encoding, schema.name, schema.encoding, schema.data
+        if key not in self._known:
+            self._parsed += len(schema.data)
+            if self._parsed > LARGEST_PARSED:
+                expected = f'at most {LARGEST_PARSED} bytes of different definitions'
+                raise InputError(self._path, channel.topic, expected, f'{self._parsed}')
+            try:  # a factory of its own each: it goes by the ids of schemas
+                with contextlib.redirect_stderr(io.StringIO()):  # its parser prints and raises
+                    decoder = DecoderFactory().decoder_for(channel.message_encoding, schema)
+            except Exception as error:  # whatever its parser stumbles over
+                raise refusal(self._path, channel.topic, 'a schema of its type', error) from None
+            self._known[key] = decoder
+        return self._known[key]
 
     def __contains__(self, channel: int) -> bool:
         return channel in self._decoders

@@ -75,7 +75,7 @@ class Layout:
             return None
         parts = [gather(data, starts + at, 8 * count).view('<f8') for at, count in self.runs]
         rows = np.concatenate(parts, axis=1)[:, self.order] if self.is_state else parts[0]
-        usable = np.isfinite(rows).all()
+        usable = np.all(np.abs(rows) < interface.LARGEST / 4.0)  # NaN: false
         if self.is_state and usable:
             q = rows[:, 3:7]
             usable = np.all(np.abs(np.sqrt(np.einsum('ij,ij->i', q, q)) - 1.0) < NEARLY)

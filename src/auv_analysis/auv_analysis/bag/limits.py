@@ -1,4 +1,4 @@
-"""How much a bag may make us hold: sizes are checked before anything is read or decompressed."""
+"""How much a bag may make us hold: sizes and counts are checked before anything is made of them."""
 
 import zlib
 from typing import Any
@@ -7,7 +7,7 @@ import lz4.frame
 import zstandard
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk
+from mcap.records import Attachment, Channel, Chunk, Metadata, Schema
 
 MIB = 1 << 20
 LARGEST_CHUNK = 512 * MIB  # bytes, decompressed; recorders close theirs at 1 to 64 MiB
@@ -20,10 +20,76 @@ LARGEST_RECORD: dict[int, int] = {
     Opcode.CHUNK_INDEX: 2 * MIB,
 }
 LARGEST_OTHER = 64 * MIB  # bytes of a schema, of metadata and of what is not known
+LARGEST_PARSED = MIB // 4  # bytes of the definitions of types that are parsed, of a file
+MOST_RECORDS = 1 << 21  # in a chunk; a chunk of 64 MiB holds so many of the smallest messages
+FREE_RECORDS = 1 << 17  # in all chunks of a file, beside one per byte of it
+FREE_DEFINITIONS = 16 * MIB  # bytes of definitions in all chunks of a file, beside RATIO per byte
+RATIO = 8
+MOST_NAMED = 10_000  # channels of a file; as many schemas, attachments and metadata
 
 
 class TooLargeError(McapError):
     """More than we are willing to hold; the text says what and how much."""
+
+
+class TooManyError(TooLargeError):
+    """More records than we are willing to look at; the text says of what and how many."""
+
+
+class Counts:
+    """What a file may still hold; a hostile one of some kilobytes declares millions of records.
+
+    Parameters
+    ----------
+    size : bytes of the file
+
+    """
+
+    def __init__(self, size: int):
+        self._records = self._most_records = FREE_RECORDS + size
+        self._definitions = self._most_definitions = FREE_DEFINITIONS + RATIO * size
+        self._names: dict[type, int] = {}
+        self._known: set[tuple[type, int]] = set()
+
+    @property
+    def most(self) -> int:
+        """Number of records that the next chunk may hold."""
+        return min(self._records, MOST_RECORDS)
+
+    def check(self, records: int, definitions: int) -> None:
+        """Raise TooManyError where a chunk holds too many records, or bytes of definitions."""
+        if records > MOST_RECORDS:
+            raise TooManyError(f'a chunk of at most {MOST_RECORDS} records', 'more')
+        if records > self._records:
+            raise TooManyError(
+                f'at most {self._most_records} records in a file of its size', 'more'
+            )
+        if definitions > self._definitions:
+            expected = (
+                f'at most {self._most_definitions} bytes of definitions in a file of its size'
+            )
+            raise TooManyError(expected, 'more')
+
+    def take(self, records: int, definitions: int) -> None:
+        """The same, and note that the chunk holds them."""
+        self.check(records, definitions)
+        self._records -= records
+        self._definitions -= definitions
+
+    def note(self, record: object) -> None:
+        """Count what has a name or an id of its own."""
+        if isinstance(record, Schema | Channel):
+            key = type(record), record.id
+            if key in self._known:
+                return
+            self._known.add(key)
+        elif not isinstance(record, Attachment | Metadata):
+            return
+        kind = type(record)
+        self._names[kind] = self._names.get(kind, 0) + 1
+        if self._names[kind] > MOST_NAMED:
+            expected = f'at most {MOST_NAMED} records of the kind {kind.__name__}'
+            raise TooManyError(expected, 'more')
 
 
 def check_length(opcode: int, length: int) -> None:

@@ -22,7 +22,7 @@ from auv_analysis.bag.decoding import Decoding
 from auv_analysis.bag.layouts import Layout, learned
 from auv_analysis.bag.limits import LARGEST_ATTACHMENT
 from auv_analysis.bag.roles import ODOMETRIES, READERS, check_type, namespace_of, role_of
-from auv_analysis.bag.tables import Table
+from auv_analysis.bag.tables import Table, by_channel
 from auv_dynamics import interface
 from auv_dynamics.files import InputError
 
@@ -53,6 +53,8 @@ class FileReader:
         self._channels: dict[int, Channel] = {}
         self._decoders = Decoding(path)
         self._layouts: dict[int, Layout] = {}
+        self._sizes = {name: len(text) for name, text in contents.attachments.items()}
+        self._attached = sum(self._sizes.values())
         self._left_out: Counter[str] = Counter()
         self._reasons: dict[str, str] = {}  # topic -> why its first message was left out
 
@@ -77,11 +79,13 @@ class FileReader:
 
     def _attachment(self, item: Attachment) -> None:
         kept = self._contents.attachments
-        held = sum(len(text) for name, text in kept.items() if name != item.name)
-        if held + len(item.data) > LARGEST_ATTACHMENT:
+        more = len(item.data) - self._sizes.get(item.name, 0)
+        if self._attached + more > LARGEST_ATTACHMENT:
             note = f'{self._path.name}: attachment {item.name!r} not read, they are too many'
             self._contents.notes.append(note)
             return
+        self._attached += more
+        self._sizes[item.name] = len(item.data)
         text = item.data.decode('utf-8', 'replace')
         kept[item.name] = text
         if item.name == recording.NAME:
@@ -112,18 +116,15 @@ class FileReader:
             self._decoders.add(channel, schema)
 
     def _table(self, table: Table) -> Iterator[Batch]:
-        counts = np.bincount(table.channels)
         members = {}
-        for channel in np.flatnonzero(counts).tolist():
+        for channel, index in by_channel(table.channels):
             if channel not in self._channels:
                 expected = 'a channel before its messages'
                 raise InputError(self._path, f'channel {channel}', expected, None)
             topic = self._channels[channel].topic
-            self._contents.counts[topic] = self._contents.counts.get(topic, 0) + int(
-                counts[channel]
-            )
+            self._contents.counts[topic] = self._contents.counts.get(topic, 0) + len(index)
             if channel in self._decoders:
-                members[channel] = np.flatnonzero(table.channels == channel)
+                members[channel] = index
         self._contents.span(int(table.log_times.min()), int(table.log_times.max()))
         known = dict(self._frames)
         try:

@@ -1,5 +1,6 @@
 """The records of an MCAP file in order, finished or not, damaged or not."""
 
+import os
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,7 +9,6 @@ from typing import IO, Any
 import numpy as np
 from mcap.exceptions import McapError
 from mcap.records import Chunk, DataEnd, Footer, McapRecord, Message
-from mcap.stream_reader import breakup_chunk
 
 from auv_analysis.bag.framing import (
     DAMAGES,
@@ -21,8 +21,8 @@ from auv_analysis.bag.framing import (
     frame_at,
     record_of,
 )
-from auv_analysis.bag.limits import TooLargeError, decompressed
-from auv_analysis.bag.tables import Table, parts_of_chunk, table_of_messages
+from auv_analysis.bag.limits import Counts, TooLargeError, TooManyError, decompressed
+from auv_analysis.bag.tables import Table, parts_of_chunk, parts_one_by_one, table_of_messages
 from auv_dynamics.files import InputError, first_line
 
 TOGETHER = 4096  # messages outside chunks that are read together
@@ -35,16 +35,12 @@ class _Pending:
         self.chunk, self.position = chunk, position
         self.places: list[np.ndarray] = []
 
-    def parts(self) -> list[Table | McapRecord]:
+    def parts(self, counts: Counts) -> list[Table | McapRecord]:
         """What lies in the chunk, in order."""
         data = decompressed(self.chunk)
-        found = parts_of_chunk(data, np.concatenate(self.places) if self.places else None)
-        return records_of(data) if found is None else found
-
-
-def records_of(data: bytes) -> list[Table | McapRecord]:
-    """Records of a decompressed chunk, one by one."""
-    return [*breakup_chunk(Chunk('', data, 0, 0, 0, len(data)))]
+        places = np.concatenate(self.places) if self.places else None
+        found = parts_of_chunk(data, places, counts)
+        return parts_one_by_one(data, counts) if found is None else found
 
 
 def records(path: Path, notes: list[str]) -> Iterator[Table | McapRecord]:
@@ -97,6 +93,7 @@ def _ended(path: Path, error: Exception, position: int, notes: list[str], finish
 
 def _opened(stream: IO[bytes]) -> Iterator[tuple[Any, int]]:
     """Records and the places where they begin, chunks opened; an exception may be the last one."""
+    counts = Counts(os.fstat(stream.fileno()).st_size)
     pending: _Pending | None = None
     for item, position in _closed(stream):
         if pending is not None and isinstance(item, MessageIndex):
@@ -104,7 +101,9 @@ def _opened(stream: IO[bytes]) -> Iterator[tuple[Any, int]]:
             continue
         if pending is not None:
             try:
-                parts = pending.parts()
+                parts = pending.parts(counts)
+                for part in parts:
+                    counts.note(part)
             except DAMAGES as error:
                 yield error, pending.position
                 return
@@ -114,6 +113,11 @@ def _opened(stream: IO[bytes]) -> Iterator[tuple[Any, int]]:
         if isinstance(item, Chunk):
             pending = _Pending(item, position)
         elif item is not None:
+            try:
+                counts.note(item)
+            except TooManyError as error:
+                yield error, position
+                return
             yield item, position
 
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from auv_analysis.bag.decoding import refusal
+from auv_analysis.bag.limits import LARGEST_PARSED
 
 Result = TypeVar('Result')
 Decoder = Callable[[bytes], Any]
@@ -26,12 +27,14 @@ def decoder(name: str, definition: str, language: str, encoding: str) -> Decoder
 
     Raises
     ------
-    ValueError : another language or encoding
+    ValueError : another language or encoding, or a definition that is too long
     Exception : whatever the parser of the definition stumbles over
 
     """
     if encoding not in ('cdr', 'ros1') or language not in ('msg', 'idl'):
         raise ValueError(f'messages in {encoding or "no encoding"}, described in {language}')
+    if len(definition) > LARGEST_PARSED:
+        raise ValueError(f'a definition of {len(definition)} bytes, above {LARGEST_PARSED}')
     store = get_typestore(Stores.EMPTY if definition else Stores.ROS2_HUMBLE)
     if definition and language == 'msg':
         store.register(get_types_from_msg(definition, name))

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.interface import nanoseconds
+from auv_dynamics.interface import LARGEST, nanoseconds
 
 UNIT = 1e-2  # of the norm of a quaternion: what rounding to single precision leaves, and more
 Numbers = tuple[float, ...]
@@ -99,8 +99,8 @@ READERS['setpoint'] = READERS['twist']
 
 
 def are_usable(rows: np.ndarray, role: str) -> np.ndarray:
-    """Whether each row (n, k) is finite and, of a pose, its quaternion near a unit one: (n,)."""
-    finite = np.isfinite(rows).all(axis=1)
+    """Whether each row (n, k) can be used: finite, not absurd, and poses with unit quaternions."""
+    finite = np.all(np.abs(rows) < LARGEST, axis=1)  # NaN: false
     if role not in ('odometry', 'pose'):
         return finite
     return finite & (np.abs(np.linalg.norm(rows[:, 3:7], axis=1) - 1.0) < UNIT)

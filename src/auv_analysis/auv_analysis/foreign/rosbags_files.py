@@ -15,6 +15,7 @@ from rosbags.rosbag2 import Reader as Rosbag2
 from auv_analysis.bag.contents import Contents
 from auv_analysis.bag.decoding import refusal
 from auv_analysis.bag.files import check_regular
+from auv_analysis.bag.limits import MOST_NAMED
 from auv_analysis.foreign.decoders import Decoder, Logged, decoded, decoder_of
 from auv_dynamics.files import InputError, read_yaml
 
@@ -125,6 +126,8 @@ def _opened(bag: Path) -> Iterator[Any]:
     except Exception as error:  # of SQLite, of YAML, of the library: by what the file is
         raise refusal(bag, '', 'a bag that rosbags can open', error) from None
     try:
+        if len(reader.connections) > MOST_NAMED:
+            raise InputError(bag, '', f'at most {MOST_NAMED} topics', f'{len(reader.connections)}')
         yield reader
     finally:
         reader.close()

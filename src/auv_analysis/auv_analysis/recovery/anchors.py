@@ -9,7 +9,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Schema
 
 from auv_analysis.bag.framing import DAMAGES, PREFIX, CutError, Frame, frame_at, record_of
-from auv_analysis.bag.limits import LARGEST_CHUNK, decompressed
+from auv_analysis.bag.limits import LARGEST_CHUNK, Counts, decompressed
 from auv_analysis.bag.tables import parts_of_chunk
 
 PROVEN = re.compile(rb'(?s)(?=[\x06\x09].{4}\x00{4})')  # chunk or attachment, below 4 GiB
@@ -82,7 +82,10 @@ class Anchors:
             self._patience -= record.uncompressed_size
             try:
                 content = decompressed(record)  # by checksum, else by what is in it
-                return record.uncompressed_crc != 0 or parts_of_chunk(content, None) is not None
+                return (
+                    record.uncompressed_crc != 0
+                    or parts_of_chunk(content, None, Counts(self._size)) is not None
+                )
             except DAMAGES:
                 return False
         return isinstance(record, Attachment) and frame.body[-4:] != bytes(4)

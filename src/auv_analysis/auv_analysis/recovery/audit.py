@@ -16,6 +16,7 @@ from mcap.records import (
     Schema,
 )
 
+from auv_analysis.bag.tables import by_channel
 from auv_analysis.recovery.definitions import BETWEEN, CHUNK, SUMMARY, Definitions
 from auv_analysis.recovery.indices import Indices, checksum_of, summary_fits
 from auv_analysis.recovery.parts import Messages, parts_of
@@ -115,9 +116,9 @@ class Audit:
             self._indices.record(record)
 
     def _space(self, messages: Messages) -> None:
-        for channel in np.unique(messages.channels).tolist():
+        for channel, index in by_channel(messages.channels):
             spacing = self.spacings.setdefault(channel, Spacing())
-            spacing.add(messages.log_times[messages.channels == channel].astype(np.int64))
+            spacing.add(messages.log_times[index].astype(np.int64))
 
     def _faults(self, ends_well: bool) -> list[str]:
         found = [f'damaged: {lost.why}' for lost in self.lost]

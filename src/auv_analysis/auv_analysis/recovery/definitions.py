@@ -8,6 +8,7 @@ from mcap.records import Channel, Schema
 from auv_analysis.recording.metadata import Definition
 from auv_dynamics.files import InputError, parse_any_yaml
 
+LARGEST_POLICIES = 1 << 21  # characters of the offered profiles of all topics; more are left out
 BETWEEN, SUMMARY, CHUNK = range(3)  # where a definition stands: the better its checksum, the higher
 
 
@@ -58,19 +59,27 @@ class Definitions:
     def of_rosbag2(self) -> list[Definition] | None:
         """The topics for a metadata.yaml; None where not all are as rosbag2 writes them."""
         found: dict[str, Definition] = {}
+        known: dict[str, list[Any]] = {}
+        left = LARGEST_POLICIES
         for channel in self.channels():
             schema = self.schema_of(channel)
             if channel.message_encoding != 'cdr' or schema is None:
                 return None
             digest = channel.metadata.get('topic_type_hash', '')
-            qos = _qos(channel.metadata.get('offered_qos_profiles', ''))
+            text = channel.metadata.get('offered_qos_profiles', '')
+            left -= len(text)
+            if text not in known and left >= 0:
+                known[text] = _qos(text)
+            qos = known[text] if left >= 0 else []
             definition = Definition(channel.topic, schema.name, qos=qos, digest=digest)
             found.setdefault(channel.topic, definition)
         return [*found.values()]
 
 
 def _qos(text: str) -> list[Any]:
-    """Offered profiles, none where the text is no list of them."""
+    """Offered profiles, none where the text is no list of them, or one that refers to itself."""
+    if '*' in text:
+        return []
     try:
         found = parse_any_yaml(text, 'offered_qos_profiles')
     except InputError:

@@ -33,7 +33,7 @@ class Rewriter:
         self._channels: dict[int, int] = {}
         self._topics: dict[int, str] = {}
         self._schemas: dict[int, int] = {}
-        self._metadata: list[Metadata] = []
+        self._metadata: set[tuple[str, frozenset[tuple[str, str]]]] = set()
 
     def write(self, path: Path, progress: Callable[[int], None] = lambda _: None) -> None:
         """Write the file and wait until it is on the disk; an older one is replaced.
@@ -74,11 +74,17 @@ class Rewriter:
             elif isinstance(part, Attachment):
                 a = part
                 self._writer.add_attachment(a.create_time, a.log_time, a.name, a.media_type, a.data)
-            elif isinstance(part, Metadata) and part.name != ROSBAG2 and part not in self._metadata:
-                self._metadata.append(part)
-                self._writer.add_metadata(part.name, part.metadata)
+            elif isinstance(part, Metadata) and part.name != ROSBAG2:
+                self._keep(part)
         if isinstance(found.record, Chunk):
             self._writer.flush()
+
+    def _keep(self, record: Metadata) -> None:
+        """Write metadata, once."""
+        key = record.name, frozenset(record.metadata.items())
+        if key not in self._metadata:
+            self._metadata.add(key)
+            self._writer.add_metadata(record.name, record.metadata)
 
     def _messages(self, messages: Messages) -> None:
         columns = (c.tolist() for c in messages[:4])

@@ -19,11 +19,10 @@ from auv_analysis.bag.framing import (
     frame_at,
     record_of,
 )
-from auv_analysis.bag.limits import LARGEST_CHUNK, check_length, decompressed
-from auv_analysis.bag.records import records_of
-from auv_analysis.bag.tables import Table, parts_of_chunk
+from auv_analysis.bag.limits import LARGEST_CHUNK, Counts, TooManyError, check_length, decompressed
+from auv_analysis.bag.tables import Table, parts_of_chunk, parts_one_by_one
 from auv_analysis.recovery.anchors import CHUNK_HEAD, Anchors
-from auv_dynamics.files import first_line
+from auv_dynamics.files import InputError, first_line
 
 COMPRESSIONS = (b'', b'lz4', b'zstd')
 
@@ -73,13 +72,14 @@ class Scan:
     def __init__(self, path: Path, stream: IO[bytes]):
         self._stream = stream
         self.size = path.stat().st_size
+        self._path, self._counts = path, Counts(self.size)
         self._anchors = Anchors(stream, self.size)
         self._has_chunks, self._has_plain, self.ends_well = False, False, False
         stream.seek(0)
         self.starts_well = stream.read(len(MAGIC)) == MAGIC[: self.size]
 
     def items(self) -> Iterator[Found | Lost]:
-        """Records in their order, and what is lost between them."""
+        """Records in their order, and what is lost between them; InputError: they are too many."""
         if not self.size:
             return
         place = proven = len(MAGIC)
@@ -113,7 +113,12 @@ class Scan:
         except McapError as error:
             return 0, first_line(error)
         try:
-            return frame.end, self._found(frame)
+            found = self._found(frame)
+            for part in (found.record, *found.parts):
+                self._counts.note(part)
+            return frame.end, found
+        except TooManyError as error:
+            raise InputError(self._path, f'byte {place}', *error.args) from None
         except DAMAGES as error:
             return frame.end, first_line(error)
 
@@ -122,9 +127,9 @@ class Scan:
         if isinstance(record, Chunk):
             self._has_chunks = True
             content = decompressed(record)
-            tiles = parts_of_chunk(content, None)
+            tiles = parts_of_chunk(content, None, self._counts)
             proven = record.uncompressed_crc != 0 or tiles is not None
-            parts = records_of(content) if tiles is None else tiles
+            parts = parts_one_by_one(content, self._counts) if tiles is None else tiles
             return Found(record, frame.start, frame.end, parts, proven)
         if isinstance(record, MessageIndex) and len(frame.body) != 6 + record.entries.nbytes:
             raise McapError('a message index that is longer than its fields')

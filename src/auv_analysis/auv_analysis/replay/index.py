@@ -9,7 +9,7 @@ from mcap.records import Channel, McapRecord, Schema
 
 from auv_analysis.bag.files import bag_files
 from auv_analysis.bag.records import records
-from auv_analysis.bag.tables import Table
+from auv_analysis.bag.tables import Table, by_channel
 from auv_analysis.replay.playback import GAP
 from auv_dynamics.files import InputError
 from auv_dynamics.interface import NANOSECONDS
@@ -149,13 +149,12 @@ def _meet(
 
 
 def _count(table: Table, names: dict[int, str], path: Path, index: BagIndex) -> None:
-    counts = np.bincount(table.channels)
-    for channel in np.flatnonzero(counts).tolist():
+    for channel, messages in by_channel(table.channels):
         if channel not in names:
             raise InputError(path, f'channel {channel}', 'a channel before its messages', None)
         topic = names[channel]
-        index.counts[topic] = index.counts.get(topic, 0) + int(counts[channel])
-        _span(index.spans.setdefault(topic, []), table.log_times[table.channels == channel])
+        index.counts[topic] = index.counts.get(topic, 0) + len(messages)
+        _span(index.spans.setdefault(topic, []), table.log_times[messages])
     index.first = min(index.first, int(table.log_times.min()))
     index.last = max(index.last, int(table.log_times.max()))
 

@@ -112,6 +112,15 @@ def summarize(
     return _known(figures)
 
 
+def _known(value: Any) -> Any:
+    """The same with null in place of every number that is not finite, such as an overflow."""
+    if isinstance(value, dict):
+        return {key: _known(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_known(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def lumped_error(run: Run) -> np.ndarray | None:
     """W = f - F in the body frame, (n + 1, 6) in N, N m; None where F is not known."""
     return None if run.disturbance is None else run.disturbance_estimate - run.disturbance

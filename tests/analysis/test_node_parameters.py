@@ -21,7 +21,7 @@ CONTRACT = {  # every name of the contract's table that is not optional
     'plant_node': {
         *FRAMES, 'vehicle', 'step', 'duration', 'lockstep', 'start_paused', 'recorder_window',
         'integrator', 'seed', 'initial.eta', 'initial.nu', 'start_after', 'disturbance.names',
-        'wrench_timeout',
+        'wrench_timeout', 'publish_clock',
     },
     'setpoint_node': {*FRAMES, 'step', 'duration', 'horizon'},
     'controller_node': {
@@ -51,7 +51,7 @@ WHOLE = {
 }
 SWITCHES = {
     'lockstep', 'start_paused', 'autostart', 'use_sim_time', 'strict', 'ground_truth', 'thrusters',
-    'anti_windup',
+    'anti_windup', 'publish_clock',
 }  # fmt: skip
 LISTS_OF_WORDS = {
     'expected_subscribers', 'start_after', 'disturbance.names', 'topics', 'attachments',

@@ -117,6 +117,9 @@ def test_columns_of_lift_give_what_single_runs_give():
     assert set(columns['status']) == {'ok'}
     assert len(set(columns['effort.rms.sway'])) == 3
     same_as_alone(scenario, 'gvc', changes, 'continuous', columns, range(3))
+    mixed = {'vehicle': ['lauv', 'rexrov', 'lauv']}  # with and without
+    columns = rollouts(scenario, 'gvc', mixed)
+    same_as_alone(scenario, 'gvc', mixed, 'continuous', columns, range(2))
 
 
 SMC = pytest.param('smc', marks=pytest.mark.long)

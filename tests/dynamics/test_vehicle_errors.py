@@ -79,6 +79,7 @@ ERRORS = {
     'inertia_matrix asymmetric': (
         without_inertia(matrix(1, 3, -3.0)), 'inertia_matrix',
         'a symmetric matrix', '[1][3] = -3 against [3][1] = 0'),
+    'lift of five': (BASE | {'lift': [1.0] * 5}, 'lift', '6 numbers or a 6x6 matrix', '5 numbers'),
     'unknown key': (
         BASE | {'drag': 1}, 'drag', 'one of format, name, source,', 'an unknown key'),
     'unknown nested key': (
@@ -187,6 +188,7 @@ def test_damping_may_be_asymmetric_and_is_kept(tmp_path):
     [
         (changed('hydrostatics.volume', 1.75), 'hydrostatics.volume', 'more than 2 % apart'),
         (changed('damping.quadratic', matrix(0, 1, 900.0)), 'damping.quadratic', 'gains energy'),
+        (BASE | {'lift': matrix(1, 5, -3.0, -1.0)}, 'lift', '[5][5] = -1: feeds'),
         (changed('source', ''), 'source', 'no source is given'),
     ],
 )

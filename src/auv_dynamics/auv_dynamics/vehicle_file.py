@@ -178,9 +178,9 @@ class _Source:
         if 'lift' not in self._data:
             return None
         lift = self._sign * matrix6(self._data['lift'])
-        for i in np.flatnonzero(np.diagonal(lift) < 0):
-            found = f'[{i}][{i}] = {lift[i, i]:g}'
-            self._warn('lift', f'{found} drives its own motion: is it of the other sign?')
+        driving = [f'[{i}][{i}] = {lift[i, i]:g}' for i in range(6) if lift[i, i] < 0]
+        if driving:
+            self._warn('lift', f'{", ".join(driving)}: feeds its own motion, see sign')
         return lift
 
     def thrusters(self) -> Thrusters | None:

@@ -75,10 +75,8 @@ def _lift(draft: Draft, derivatives: np.ndarray, names: list[str]) -> None:
     lift = draft.positive('lift', derivatives, SNAME, 'Yuv ... Nur')
     water = munk_terms(draft.values['added_mass']) * (derivatives != 0)
     if np.any(water) and draft.choices.lift is None:
-        expected = (
-            '--lift alone (of body and fins) or combined (with the terms of added mass, such '
-        )
-        expected += 'as the Munk moment in Nuv): the list cannot say'
+        expected = '--lift alone (of body and fins) or combined (with the terms of added mass, as '
+        expected += 'the Munk moment in Nuv): the list cannot say'
         raise draft.refuse(', '.join(names), expected, 'added mass that adds to them')
     if draft.choices.lift == 'combined':
         draft.traps.append(f'{", ".join(names)}: the terms of added mass are taken out, C has them')

@@ -42,7 +42,7 @@ def vehicle_text(draft: Draft, name: str, source: str) -> str:
         for key in keys:
             lines += _entry(draft, f'{section}.{key}', key, '  ')
         if section == 'damping' and 'lift' in draft.values:
-            lines += _entry(draft, 'lift', 'lift', '', whole=True)
+            lines += _entry(draft, 'lift', 'lift', '')
     return '\n'.join(lines) + '\n'
 
 
@@ -51,13 +51,13 @@ def _line(text: str) -> str:
     return ' '.join(printable(text).split())
 
 
-def _entry(draft: Draft, place: str, key: str, indent: str, *, whole: bool = False) -> list[str]:
+def _entry(draft: Draft, place: str, key: str, indent: str) -> list[str]:
     value, comment = draft.values[place], draft.comments.get(place, '')
     said = f'  # {comment}' if comment else ''
     if isinstance(value, str):
         return [f'{indent}{key}: {value}{said}']
     array = np.asarray(value, float)
-    if array.shape == (6, 6) and not (whole or np.any(array - np.diag(np.diagonal(array)))):
+    if array.shape == (6, 6) and not np.any(array - np.diag(np.diagonal(array))):
         array = np.diagonal(array)
     if array.ndim < 2:
         return [f'{indent}{key}: {_numbers(array)}{said}']

@@ -29,7 +29,7 @@ class UdpPort:
     def __init__(self, connection: str, system: int, component: int):
         kind, _, address = connection.partition(':')
         host, _, port = address.rpartition(':')
-        if kind not in ('udpin', 'udpout') or not host or not port.isdigit():
+        if kind not in ('udpin', 'udpout') or not host or not port.isdecimal():
             raise ValueError(f'expected udpin:HOST:PORT or udpout:HOST:PORT, found {connection!r}')
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from auv_analysis.formats.draft import SNAME, Choices, Draft
+from auv_dynamics.files import LARGEST
 from auv_dynamics.vehicle import munk_terms
 
 NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
@@ -91,7 +92,8 @@ def _assignments(text: str, draft: Draft) -> list[tuple[str, float]]:
         bare = BRACED.sub(lambda braced: braced[0].replace(' ', ''), COMMENT.sub('', line))
         for match in ASSIGNED.finditer(bare):
             name = match[1]
-            if match[2] is None or not FOLLOWS.match(bare, match.end()):
+            told = match[2] is not None and abs(float(match[2])) <= LARGEST
+            if not told or not FOLLOWS.match(bare, match.end()):
                 expected = 'a number, and nothing behind it but its SI unit'
                 raise draft.refuse(name, expected, line.strip())
             if name in seen:

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, ParseError
 import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
-from auv_dynamics.files import InputError, first_line
+from auv_dynamics.files import LARGEST, InputError, first_line
 from auv_dynamics.yaml_text import LONGEST_TEXT, MOST_ENTRIES
 
 # SDF has prefixes that nobody declares, such as <experimental:params> or gz:expressed_in="..."
@@ -52,7 +52,7 @@ def numbers(text: str | None, count: int, path: object, key: str) -> list[float]
         found = [float(word) for word in words]
     except ValueError:
         found = []
-    if len(found) != count or not all(abs(value) < float('inf') for value in found):
+    if len(found) != count or not all(abs(value) <= LARGEST for value in found):
         expected = 'a number' if count == 1 else f'{count} numbers'
         hint = ' (expand xacro first)' if '${' in (text or '') else ''
         raise InputError(path, key, expected + hint, text or None)

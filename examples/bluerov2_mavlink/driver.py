@@ -21,7 +21,7 @@ from auv_dynamics.files import InputError
 from auv_dynamics.interface import BadMessageError
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
-from auv_dynamics.ros.graph import Graph, steady_timer
+from auv_dynamics.ros.graph import ERROR, Graph, steady_timer
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import declare, refuse_unknown
 
@@ -62,7 +62,7 @@ class Driver(BulkNode):
         self._say_odometry = self.graph.output(topics.ODOM)
         self.graph.listen(topics.WRENCH, self._on_wrench, topics.newest_command())
         self.create_service(SetBool, '~/arm', self._on_arm)
-        self.graph.in_trouble_while(self._not_commanded)
+        self.graph.in_trouble_while(lambda: (ERROR, self._not_commanded()))
         if autoarm:
             self._link.pilot.want(True, time.monotonic_ns())
         steady_timer(self, POLL, self._poll)

@@ -92,7 +92,7 @@ class RecorderNode(BulkNode):
         steady_timer(self, 0.2, self._keep)
         steady_timer(self, 0.5, lambda: self._others.look(self._ours))
         expected = ', '.join(p.topics)
-        self.get_logger().info(f'records {p.others.namespace} into {p.bag}, expects {expected}')
+        self.begin(f'records {p.others.namespace} into {p.bag}, expects {expected}')
 
     def _record(self, topic: topics.Topic) -> str:
         """Subscribe to a topic of the graph; its full name."""
@@ -245,17 +245,18 @@ class RecorderNode(BulkNode):
             lost.update(self._publications.gaps)
             self.get_logger().warning(f'steps or messages that did not arrive: {lost}')
         if not self._complaints:
-            self._conclude()
+            self._name_silent()
+        left = [f'{topic} ({why})' for topic, why in sorted(self._others.left.items())]
+        self.task = f'recorded {self._writer.count} messages into {self._settings.bag}'
+        self.task += f', not {", ".join(left)}' if left else ''
 
-    def _conclude(self) -> None:
+    def _name_silent(self) -> None:
+        """Fail where a topic that is expected has had no message."""
         p, has = self._settings, self._writer.has_channel
         silent = [topic for topic in p.topics if not has(self.resolve_topic_name(topic))]
         if silent:
             self._complain(f'{p.bag}: expected topics without any message: {", ".join(silent)}')
             self.exit_code = 1
-        left = [f'{topic} ({why})' for topic, why in sorted(self._others.left.items())]
-        text = f'{p.bag}: {self._writer.count} messages'
-        self.get_logger().info(f'{text}, not recorded: {", ".join(left)}' if left else text)
 
 
 def main() -> None:

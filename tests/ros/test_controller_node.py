@@ -273,6 +273,29 @@ def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
         assert set_parameter(peer, 'gains.k_D', doubles).successful
 
 
+def test_limits_and_timeouts_are_taken_while_inactive_only() -> None:
+    with graph(('controller_node', [*LOCKSTEP, *parameters(autostart=False)])) as (peer, _):
+        peer.listen(topics.WRENCH)
+        assert change(peer, Transition.TRANSITION_CONFIGURE)
+        five = ParameterValue(type=8, double_array_value=[5.0])
+        assert set_parameter(peer, 'limits.wrench', five).successful
+        two = ParameterValue(type=8, double_array_value=[5.0, 1.0])
+        assert 'limits.wrench: expected 1 or 6' in set_parameter(peer, 'limits.wrench', two).reason
+        second = ParameterValue(type=3, double_value=1.0)
+        for name in ('odometry_timeout', 'setpoint_timeout', 'ramp', 'limits.speed'):
+            assert set_parameter(peer, name, second).successful
+        decides = set_parameter(peer, 'lockstep', ParameterValue(type=1, bool_value=False))
+        assert not decides.successful, 'it decides what is subscribed'
+        assert change(peer, Transition.TRANSITION_ACTIVATE)
+        refused = set_parameter(peer, 'limits.wrench', five)
+        assert 'inactive' in refused.reason
+        fast = convert.twist(STEP, (1.5, 0, 0, 0, 0, 0), FRAMES)
+        peer.publish(topics.CMD_VEL, fast)  # refused: 1 m/s at most
+        peer.publish(topics.CMD_VEL, setpoint(0))
+        peer.publish(topics.ODOM, odometry(0))
+        assert answered(peer, 1)[0].wrench.force.x == 5.0
+
+
 def test_a_transition_that_does_not_exist_is_survived() -> None:
     with graph(('controller_node', CONTROLLER)) as (peer, processes):
         peer.until(lambda: state(peer) == 'active', 'activation')

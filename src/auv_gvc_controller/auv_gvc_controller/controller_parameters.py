@@ -1,7 +1,8 @@
 """The controller's ROS parameters, and the controller that they describe."""
 
 import math
-from functools import partial
+from array import array
+from collections.abc import Mapping
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -18,6 +19,7 @@ from auv_gvc_controller.settings import ControllerSettings
 
 GAINS = {gain for law in SHIPPED.values() for gain in law._fields}
 WRITABLE = 'gains.'
+FIXED = ('lockstep', 'setpoint_pairing', 'setpoint_acceleration')  # which decide what is heard
 LAWS = f'{", ".join(SHIPPED)} or module:Class of your own'
 
 
@@ -32,11 +34,25 @@ class ControllerParameters:
             text = '1 number (times identity), 6 (diagonal) or 36 (row-major)'
             declare(node, name, list[float], None, text, writable=True)
         self._vehicle = declare(node, 'vehicle', str, '', 'vehicle file, or shipped bare name')
-        self.settings = ControllerSettings.read(partial(declare, node), node.get_name())
+        self.settings = ControllerSettings.read(self._declare, node.get_name())
         self.lockstep = self.settings.lockstep
         self.acceleration = self.settings.setpoint_acceleration
         self.pairing = self.settings.pairing()
         self.autostart = declare(node, 'autostart', bool, True, 'configure and activate at once')
+
+    def _declare(self, name: str, *about: Any, **accepted: Any) -> Any:
+        return declare(self._node, name, *about, writable=name not in FIXED, **accepted)
+
+    def _present(self, changed: Mapping[str, Any]) -> ControllerSettings:
+        """Settings of this moment, with what is about to change; InputError for a wrong value."""
+
+        def value(name: str, *_: Any, **__: Any) -> Any:
+            found = changed[name] if name in changed else self._node.get_parameter(name).value
+            if isinstance(found, float) and not math.isfinite(found):
+                raise InputError(self._node.get_name(), name, 'a finite number', found)
+            return list(found) if isinstance(found, array) else found
+
+        return ControllerSettings.read(value, self._node.get_name())
 
     def build(self) -> VelocityController:
         """Controller of the present values; InputError when law, vehicle or a gain is missing."""
@@ -56,7 +72,9 @@ class ControllerParameters:
             gain, expected, found = refusal(error)
             key = f'{WRITABLE}{gain}' if gain else 'law'
             raise InputError(name, key, expected, found) from None
+        self.settings = self._present({})
         self.settings.check_bounded()
+        self.pairing.believe(*self.settings.believed)
         self.pairing.reset()
         return self.settings.build(gains, vehicle, self.pairing)
 
@@ -70,15 +88,20 @@ class ControllerParameters:
         return values
 
     def refuse_while(self, active: bool, parameters: list[Parameter]) -> SetParametersResult:
-        """Answer a change of parameters: laws and gains are taken while inactive only."""
+        """Answer a change of parameters: all but those of rclpy are taken while inactive only."""
+        names = ControllerSettings.names()
+        changed = {one.name: one.value for one in parameters if one.name in names}
         for parameter in parameters:
-            if parameter.name != 'law' and not parameter.name.startswith(WRITABLE):
+            of_law = parameter.name == 'law' or parameter.name.startswith(WRITABLE)
+            if not of_law and parameter.name not in changed:
                 continue
             if active:
                 reason = f'{parameter.name}: expected an inactive controller, found an active one'
                 return SetParametersResult(successful=False, reason=reason)
             try:
-                if parameter.name == 'law':
+                if not of_law:
+                    self._present(changed)
+                elif parameter.name == 'law':
                     self._check_law(parameter.value)
                 elif len(parameter.value) not in (1, 6, 36) or not all(
                     map(math.isfinite, parameter.value)
@@ -86,7 +109,8 @@ class ControllerParameters:
                     found = f'{len(parameter.value)} numbers'
                     raise ValueError(f'expected 1, 6 or 36 finite numbers, found {found}')
             except (ValueError, TypeError) as error:
-                reason = f'{parameter.name}: {error}'
+                text = str(error).removeprefix(f'{self._node.get_name()}: ')
+                reason = text if not of_law else f'{parameter.name}: {text}'
                 return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 

@@ -47,13 +47,17 @@ class Pairing:
         limits: Limits = UNLIMITED,
         steepest: tuple[float, ...] | None = None,
     ):
-        self._exact, self._acceleration, self._limits = exact, acceleration, limits
-        self._steepest = steepest
+        self._exact, self._acceleration = exact, acceleration
+        self.believe(limits, steepest)
         self._nu_d: OrderedDict[int, tuple[float, ...]] = OrderedDict()
         self._nu_d_dot: OrderedDict[int, tuple[float, ...]] = OrderedDict()
         self._used: Reference | None = None
         self._slope_until = 0  # ns
         self.heard = 0.0
+
+    def believe(self, limits: Limits, steepest: tuple[float, ...] | None) -> None:
+        """Set the limits of what comes from now on."""
+        self._limits, self._steepest = limits, steepest
 
     def reset(self) -> None:
         """Forget which set-point was used last, as at activation; the buffers stay."""

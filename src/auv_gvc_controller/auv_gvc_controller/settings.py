@@ -139,10 +139,19 @@ class ControllerSettings:
                 )
         return cls(source, **values)
 
+    @classmethod
+    def names(cls) -> list[str]:
+        """Names of the parameters."""
+        return [entry.metadata['name'] for entry in fields(cls)[1:]]
+
     def pairing(self) -> Pairing:
         """What keeps set-points until their odometry comes."""
-        steepest = None if self.lockstep else self.reference_filter.steepest
-        return Pairing(self.exact, self.setpoint_acceleration, self.limits, steepest)
+        return Pairing(self.exact, self.setpoint_acceleration, *self.believed)
+
+    @property
+    def believed(self) -> tuple[Limits, tuple[float, ...] | None]:
+        """Limits of set-points, and those of the difference of two."""
+        return self.limits, None if self.lockstep else self.reference_filter.steepest
 
     @property
     def exact(self) -> bool:

@@ -36,10 +36,22 @@ COMMENT = """\
 # {yaw:g} rad/s in yaw, for every shipped vehicle. Top speed of this one: {speed}.
 # All six degrees of freedom count as actuated, as in the paper. A torpedo-shaped vehicle has
 # nothing to heave with: there it is an experiment on paper.
-# Disturbance (39): the same acceleration a(t) for every vehicle, F = M a(t), by scale = M M_ref^-1
-# with M_ref of {reference}.
+# Disturbance (39): the same acceleration a(t) for every vehicle, F = M a(t).
+{scale}
 # Written by write_scaled_scenarios in auv_analysis/scaling.py; a test holds the two together.
 """
+
+
+SCALE = (
+    'scale, 6x6: F = scale F_39, where F_39 is (39) as printed, in N and N m. It is M M_ref^-1',
+    'with M of this vehicle and M_ref of {reference}, and no coupling of the water: row i says how',
+    'much of each entry of F_39, surge to yaw, acts in degree of freedom i.',
+)
+
+
+def scale_lines(reference: str = REFERENCE) -> list[str]:
+    """What the `scale` of a scaled disturbance is, for a comment."""
+    return [line.format(reference=reference) for line in SCALE]
 
 
 def scaled_case1(vehicle: str | Path, reference: str = REFERENCE) -> dict[str, Any]:
@@ -102,6 +114,7 @@ def scenario_text(scenario: dict[str, Any], reference: str = REFERENCE) -> str:
         name=name,
         reference=reference,
         factor=SLOWER,
+        scale='\n'.join(f'# {line}' for line in scale_lines(reference)),
         speed=TOP_SPEED.get(name, 'not found in its sources'),
         **{dof: round(_peak(harmonics), 6) for dof, harmonics in scenario['setpoint'].items()},
     )

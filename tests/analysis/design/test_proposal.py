@@ -11,13 +11,19 @@ from pages import check_numbers
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.design import comparison, proposal
 from auv_analysis.design.couplings import COUPLINGS, coupling_named
-from auv_analysis.design.parameters import NAMES, bounds
+from auv_analysis.design.parameters import NAMES, bounds, semi_axes
 from auv_analysis.design.printed import change, print_design
 from auv_analysis.design.proposal import propose
 from auv_analysis.design.report import write_design_report
 from auv_analysis.design.result import concluded
 from auv_analysis.design.setting import open_setting
-from auv_analysis.design.statements import warnings_of
+from auv_analysis.design.statements import (
+    bound_warnings,
+    place_warnings,
+    side_effect_warnings,
+    side_effects,
+    warnings_of,
+)
 from auv_analysis.design.words import change_words
 from auv_dynamics import InputError, load_vehicle
 from auv_dynamics.config import shipped
@@ -265,6 +271,41 @@ def test_a_vehicle_that_rights_itself_less_is_warned_of():
     assert warnings_of(vehicle, upside) == ['the changed vehicle is statically unstable']
 
 
+def test_what_lies_on_a_bound_or_outside_the_hull_is_warned_of():
+    space = open_setting('rexrov', None).space
+    axes, _ = semi_axes(space.vehicle, space.data)
+    inside = space.unchanged.copy()
+    inside[7:11] = (0.2, *space.vehicle.r_B)
+    corner = inside.copy()
+    corner[8:11] += 0.9 * axes
+    assert place_warnings(space, inside) == []
+    (text,) = place_warnings(space, corner)
+    assert text.startswith('the disc is placed outside the hull')
+    rows = [{'name': 'disc.x', 'value': -1.135, 'unit': 'm', 'at_bound': 'lower'},
+            {'name': 'disc.y', 'value': 0.1, 'unit': 'm', 'at_bound': None}]  # fmt: skip
+    assert 'disc.x = −1.135 m (lower)' in bound_warnings(rows)[0]
+    assert bound_warnings(rows[1:]) == []
+
+
+def test_what_grows_beside_the_target_is_named_however_small_its_share():
+    def row(name, before, after, unit='N m'):
+        return {'name': name, 'unit': unit, 'before': before, 'after': after}
+
+    rows = [
+        row('delta_pi_max.pitch', 4000.0, 4800.0),
+        row('delta_pi_max.yaw', 10.0, 38.4),
+        row('delta_pi_max.roll', 50.0, 54.0),
+        row('delta_pi_max.sway', 1e-12, 1e-9, 'N'),
+        row('delta_pi_max.heave', 0.0, 3.0, 'N'),
+        row('kinetic_energy.shares_percent.roll', 1.0, 5.0, '%'),
+        row('velocity_error.max_after_2s.roll', None, None, 'rad/s'),
+    ]
+    found = {one['name']: one['percent'] for one in side_effects(rows, 'delta_pi.pitch')}
+    assert found == {'delta_pi_max.heave': None, 'delta_pi_max.yaw': pytest.approx(284.0)}
+    (text,) = side_effect_warnings(side_effects(rows, 'delta_pi.pitch'))
+    assert '10.0 to 38.4 N m (+284 %)' in text
+
+
 def test_a_change_in_words():
     space = open_setting('rexrov', None).space
     x = space.unchanged.copy()
@@ -274,8 +315,20 @@ def test_a_change_in_words():
     ]
     x[3], x[7], x[12] = 10.0, 0.2, -90.0
     _, ballast, disc = change_words(space, x)
-    assert ballast.startswith('add 10.0 kg of ballast at (0, 0, 0) m, trimmed by foam')
-    assert disc.endswith('its normal along (0, 0, 1) (21.9 kg of added mass)')
+    assert (
+        ballast
+        == 'add 10.0 kg of ballast at the reference point, trimmed by foam at the same place'
+    )
+    assert disc == (
+        'fit a thin circular plate of 0.400 m diameter, at the reference point, facing down '
+        '(21.9 kg of added mass)'
+    )
+    x[8:13] = (-1.135, 0.2, -0.1, 0.0, 69.0)
+    plate = change_words(space, x)[2]
+    assert (
+        ' 1.135 m aft, 0.2 m to starboard and 0.1 m above, seen from the reference point' in plate
+    )
+    assert 'facing down, turned 21.0° forward, its normal (0.358, 0, 0.934)' in plate
 
 
 @pytest.mark.parametrize(

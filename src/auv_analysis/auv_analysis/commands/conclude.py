@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from auv_analysis.authority import beyond_authority
 from auv_analysis.commands.terminal import comparison_table, summary_tables
 from auv_analysis.console import say
 from auv_analysis.folder import write_json
@@ -88,6 +89,9 @@ def conclude(
     write_json(out / 'summary.json', summaries)
     page = _report(out, runs, summaries, scenario_text, vehicle_text, study) if report else None
     console.print(summary_tables(summaries))
+    for name, run in runs.items():
+        for remark in beyond_authority(run.vehicle, summaries[name]['effort']['max']):
+            say(f'note: {name}: {remark}')
     say_where(out, page)
     return summaries
 

@@ -39,10 +39,12 @@ def _measures(document: Mapping[str, Any]) -> Table:
     for i, head in enumerate(('', 'before', 'after', '', 'change')):
         table.add_column(head, justify='left' if i in (0, 3) else 'right', no_wrap=True)
     target = f'{document["reduce"].replace(".", "_max.")}'
+    worse = {row['name'] for row in document['side_effects']}
     for row in document['measures']:
         before, after = row['before'], row['after']
         cells = (row['name'], number(before), number(after), row['unit'], change(before, after))
-        table.add_row(*cells, style='bold' if row['name'] == target else None)
+        style = 'bold' if row['name'] == target else 'yellow' if row['name'] in worse else None
+        table.add_row(*cells, style=style)
     return table
 
 

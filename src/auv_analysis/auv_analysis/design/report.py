@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.design import tables
-from auv_analysis.design.couplings import UNITS
 from auv_analysis.design.figures import draw_design
 from auv_analysis.design.objective import OTHERS, PART, SIZE, UNREST
 from auv_analysis.design.result import Result
@@ -13,7 +12,7 @@ from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.rendering import write_document
-from auv_analysis.report.text import join, number
+from auv_analysis.report.text import number
 
 METHOD = tuple(
     map(
@@ -74,12 +73,8 @@ def _findings(result: Result) -> Iterator[Sentence]:
         return
     first, *rest = document['ranking']
     yield Sentence(_largest(first, rest), 'table-ranking')
-    worse = [row for row in document['ranking'] if _grows(row, document)]
-    if worse:
-        names = join([f'{row["coupling"]} ({_way(row)})' for row in worse])
-        yield Sentence(f'In exchange other couplings grow: {names}.', 'table-ranking')
     for warning in document['warnings']:
-        yield Sentence(f'{warning[:1].upper()}{warning[1:]}.', 'table-at_rest')
+        yield Sentence(f'{warning[:1].upper()}{warning[1:]}.', 'proposal')
 
 
 def _largest(first: dict[str, Any], rest: Sequence[dict[str, Any]]) -> str:
@@ -90,21 +85,6 @@ def _largest(first: dict[str, Any], rest: Sequence[dict[str, Any]]) -> str:
         other = number(100 * rest[0]['share']['before'], 2)
         text += f'; the next, {rest[0]["coupling"]}, {other} %'
     return f'{text}.'
-
-
-def _grows(row: dict[str, Any], document: dict[str, Any]) -> bool:
-    """Whether another coupling that counts gets larger by more than a tenth."""
-    top = document['ranking'][0]['share']['before']
-    share = row['share']
-    counts = share['after'] > 0.01 * top
-    return (
-        row['coupling'] != document['reduce'] and counts and share['after'] > 1.1 * share['before']
-    )
-
-
-def _way(row: dict[str, Any]) -> str:
-    unit = UNITS[row['coupling']]
-    return f'{number(row["largest"]["before"])} to {number(row["largest"]["after"])} {unit}'
 
 
 def _sections(result: Result, figures: Sequence[FigureRecord]) -> list[Section]:

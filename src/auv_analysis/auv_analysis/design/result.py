@@ -7,17 +7,23 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.authority import beyond_authority
 from auv_analysis.design.comparison import HALF, Candidate
 from auv_analysis.design.couplings import COUPLINGS, UNITS, present
 from auv_analysis.design.inputs import write_inputs
 from auv_analysis.design.outcome import Outcome, coupled_in, measures
+from auv_analysis.design.parameters import Parameter
 from auv_analysis.design.proposal import Proposal
 from auv_analysis.design.search import parts_of
 from auv_analysis.design.statements import (
     ASSUMPTIONS,
+    bound_warnings,
     nothing_statement,
+    place_warnings,
     rest_of,
     result_statement,
+    side_effect_warnings,
+    side_effects,
     warnings_of,
 )
 from auv_analysis.design.words import change_words, values_of
@@ -25,6 +31,7 @@ from auv_analysis.folder import write_json
 from auv_dynamics.vehicle import Vehicle
 from auv_gvc_controller.decomposition import decompose
 
+AT_BOUND = 2e-3  # of a range: a value that is nearer to its end lies on it
 DESIGN, BEFORE, AFTER = 'design.json', 'summary_before.json', 'summary.json'
 
 
@@ -101,9 +108,13 @@ def _body(found: Proposal, changed: Vehicle, before: Outcome, after: Outcome) ->
     words = change_words(setting.space, x)
     vehicle, main = setting.space.vehicle, setting.controller
     coupled = coupled_in(vehicle, changed)
+    rows = measures(before.summaries[main], after.summaries[main], coupled)
+    parameters = _parameters(found, x)
+    effects = side_effects(rows, COUPLINGS[target])
+    largest = after.summaries[main]['effort']['max']
     by = f'simulated with {main} ({setting.hold})'
     return {
-        'measures': measures(before.summaries[main], after.summaries[main], coupled),
+        'measures': rows,
         'statement': result_statement(target, float(found.before.peaks[target]), best, words, by),
         'halved': best is not None and best.ratio is not None and best.ratio <= HALF,
         'proposal': {
@@ -113,13 +124,20 @@ def _body(found: Proposal, changed: Vehicle, before: Outcome, after: Outcome) ->
             'Upsilon_before': decompose(vehicle.M)[0].tolist(),
             'Upsilon_after': decompose(changed.M)[0].tolist(),
         },
-        'parameters': _parameters(found, x),
+        'parameters': parameters,
         'ranking': _ranking(found, changed),
         'alternatives': [_candidate(one, one is best) for one in found.candidates],
         'at_rest': {'before': rest_of(vehicle), 'after': rest_of(changed)},
         'controllers': _controllers(before, after, coupled),
         'assumptions': list(ASSUMPTIONS),
-        'warnings': warnings_of(vehicle, changed),
+        'side_effects': effects,
+        'warnings': [
+            *side_effect_warnings(effects),
+            *warnings_of(vehicle, changed),
+            *bound_warnings(parameters),
+            *place_warnings(setting.space, x),
+            *beyond_authority(changed, largest),
+        ],
     }
 
 
@@ -133,9 +151,18 @@ def _parameters(found: Proposal, x: np.ndarray) -> list[dict[str, Any]]:
             'lower': one.lower,
             'upper': one.upper,
             'reason': one.reason,
+            'at_bound': _at_bound(one, float(value)) if one.part in parts else None,
         }
         for one, value in zip(found.setting.space.parameters, x, strict=True)
     ]
+
+
+def _at_bound(one: Parameter, value: float) -> str | None:
+    """Which bound of the search a value lies on; an angle comes round again."""
+    if one.unit == 'deg' or one.lower == one.upper:
+        return None
+    near = AT_BOUND * (one.upper - one.lower)
+    return 'upper' if value > one.upper - near else 'lower' if value < one.lower + near else None
 
 
 def _ranking(found: Proposal, changed: Vehicle) -> list[dict[str, Any]]:

@@ -1,13 +1,16 @@
 """What a design comes to, in sentences that are computed from its numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from auv_analysis.design.comparison import HALF, Candidate
 from auv_analysis.design.couplings import COUPLINGS, UNITS
-from auv_analysis.report.text import join, number
+from auv_analysis.design.parameters import BALLAST, DISC_PART, NAMES, semi_axes
+from auv_analysis.design.search import parts_of
+from auv_analysis.design.space import Space
+from auv_analysis.report.text import join, number, plain
 from auv_dynamics.vehicle import Vehicle
 
 ASSUMPTIONS = (
@@ -19,6 +22,13 @@ ASSUMPTIONS = (
     'The damping is otherwise that of the file, and the controllers keep their gains.',
 )
 TILT = np.radians(1.0)  # more of it at rest is worth a warning
+WORSE = 1.1  # times: from which on a side effect is named
+NEGLIGIBLE = 1e-3  # of the largest of its kind and unit: not worth a word
+MOST = 6  # side effects that are named
+COSTS = (
+    'delta_xi_max', 'delta_pi_max', 'effort.rms', 'effort.max', 'velocity_error.rms',
+    'velocity_error.max_after_2s',
+)  # fmt: skip
 
 
 def nothing_statement(vehicle: str, target: str | None, there: Sequence[str]) -> str:
@@ -80,6 +90,77 @@ def warnings_of(before: Vehicle, after: Vehicle) -> list[str]:
         angles = (np.degrees(angle) for angle in (tilted, level))
         found.append('at rest it tilts by {:.1f} deg, before {:.1f}'.format(*angles))
     return found
+
+
+def bound_warnings(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What lies on a bound of the search; `parameters` as in design.json."""
+    on = [
+        f'{one["name"]} = {plain(one["value"], 4)} {one["unit"]} ({one["at_bound"]})'
+        for one in parameters
+        if one['at_bound']
+    ]
+    if not on:
+        return []
+    return [f'at a bound of the search, so that more might do more: {join(on)}']
+
+
+def place_warnings(space: Space, x: np.ndarray) -> list[str]:
+    """Which parts are placed outside of the hull, as far as a vehicle file tells of it."""
+    axes, which = semi_axes(space.vehicle, space.data)
+    found = []
+    for part in (BALLAST, DISC_PART):
+        r = x[[NAMES.index(f'{part}.{axis}') for axis in 'xyz']]
+        if part in parts_of(x) and np.linalg.norm((r - space.vehicle.r_B) / axes) > 1:
+            found.append(
+                f'the {part} is placed outside the hull, as far as the file tells of one: about '
+                f'the centre of buoyancy, {join([plain(a, 3) for a in axes])} m, {which}'
+            )
+    return found
+
+
+def side_effects(rows: Sequence[Mapping[str, Any]], target: str) -> list[dict[str, Any]]:
+    """Measures beside the target that a change makes larger by more than a tenth.
+
+    Parameters
+    ----------
+    rows : `measures` of design.json
+    target : name of the coupling that is reduced, as in `COUPLINGS`
+
+    Returns
+    -------
+    effects : the same rows with `percent`, None where there was none before; those that are
+        nothing beside the largest of their kind are left out
+
+    """
+    found = []
+    kinds: dict[tuple[str, str], float] = {}
+    for row in rows:
+        kind = row['name'].rpartition('.')[0], row['unit']
+        kinds[kind] = max(kinds.get(kind, 0.0), row['before'] or 0.0, row['after'] or 0.0)
+    for row in rows:
+        kind = row['name'].rpartition('.')[0], row['unit']
+        before, after = row['before'], row['after']
+        if before is None or after is None or kind[0] not in COSTS:
+            continue
+        asked = row['name'] == target.replace('.', '_max.')
+        if not asked and after > WORSE * before and after > NEGLIGIBLE * kinds[kind]:
+            percent = 100 * (after / before - 1) if before else None
+            found.append({**row, 'percent': percent})
+    return sorted(found, key=lambda row: -(row['percent'] or np.inf))
+
+
+def side_effect_warnings(effects: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The same in words, the largest first."""
+    if not effects:
+        return []
+    named = [
+        f'{row["name"]} from {number(row["before"])} to {number(row["after"])} {row["unit"]}'
+        + (' (new)' if row['percent'] is None else f' (+{number(row["percent"])} %)')
+        for row in effects[:MOST]
+    ]
+    if len(effects) > MOST:
+        named.append(f'{len(effects) - MOST} others')
+    return [f'side effects above {100 * (WORSE - 1):.0f} %: {join(named)}']
 
 
 def stability(vehicle: Vehicle) -> float:

@@ -17,11 +17,13 @@ PHASES = ('before', 'after')
 def measures_table(document: Document) -> Table:
     """Couplings, energy, effort and errors before and after, of the controller that decides."""
     target = document['reduce'].replace('.', '_max.')
+    worse = {row['name'] for row in document['side_effects']}
     rows = []
     for i, row in enumerate(document['measures']):
         cells = [cell(row[key], f'{FILE}/measures/{i}/{key}') for key in PHASES]
         kind = 'paper' if row['name'] == target else ''
-        changed = Cell(change(row['before'], row['after']) or MISSING)
+        bad = 'bad' if row['name'] in worse else ''
+        changed = Cell(change(row['before'], row['after']) or MISSING, kind=bad)
         rows.append([Cell(row['name'], kind=kind), *cells, changed, Cell(row['unit'])])
     caption = f'Figures of the run under {document["controller"]} before and after the change.'
     columns = (
@@ -123,13 +125,15 @@ def parameters_table(document: Document) -> Table:
     for i, one in enumerate(document['parameters']):
         where = f'{FILE}/parameters/{i}'
         cells = [cell(one[key], f'{where}/{key}', digits=4) for key in ('value', 'lower', 'upper')]
-        rows.append([Cell(one['name']), *cells, Cell(one['unit']), Cell(one['reason'])])
+        at = Cell(one['at_bound'] or '', kind='bad' if one['at_bound'] else '')
+        rows.append([Cell(one['name']), *cells, Cell(one['unit']), at, Cell(one['reason'])])
     columns = (
         Column('', meaning='parameter', numeric=False),
         Column('value', meaning='– where that part of the vehicle is not changed'),
         Column('lower'),
         Column('upper'),
         Column('unit', numeric=False),
+        Column('at bound', meaning='the bound that the value lies on', numeric=False),
         Column('bounds', meaning='where they come from', numeric=False),
     )
     return Table('parameters', 'The change and the bounds that it was kept within.', columns, rows)

@@ -9,6 +9,9 @@ from auv_analysis.design.space import Space
 from auv_analysis.report.text import join, number, plain
 
 WAYS = (('forward', 'aft'), ('to starboard', 'to port'), ('down', 'up'))
+PLACES = (('forward', 'aft'), ('to starboard', 'to port'), ('below', 'above'))
+ORIGIN = 'the reference point'  # origin of the body frame
+ALIGNED = np.radians(0.5)  # less than this from an axis is along it
 NEAR = 5e-4  # of a unit vector: not worth a word
 
 
@@ -44,22 +47,40 @@ def _shift(_: Space, x: np.ndarray) -> str:
 
 
 def _ballast(_: Space, x: np.ndarray) -> str:
-    return (
-        f'add {number(x[3])} kg of ballast at {_place(x[4:7])}, trimmed by foam of the same place'
-    )
+    return f'add {number(x[3])} kg of ballast {_place(x[4:7])}, trimmed by foam at the same place'
 
 
 def _disc(space: Space, x: np.ndarray) -> str:
     mass = float(disc_mass(x[7], space.density))
     normal = normal_of(x[11], x[12])
     normal = normal * np.sign(normal[int(np.argmax(np.abs(normal)))])  # a disc has two of them
-    facing = _place(normal, '')
     return (
-        f'fit a thin flat disc of {number(x[7])} m radius at {_place(x[8:11])}, its normal along '
-        f'{facing} ({number(mass)} kg of added mass)'
+        f'fit a thin circular plate of {number(2 * x[7])} m diameter, {_place(x[8:11])}, '
+        f'{_facing(normal)} ({number(mass)} kg of added mass)'
     )
 
 
-def _place(r: np.ndarray, unit: str = ' m') -> str:
-    numbers = ', '.join('0' if abs(v) < NEAR else plain(round(float(v), 3), 4) for v in r)
-    return f'({numbers}){unit}'
+def _place(r: np.ndarray) -> str:
+    """Where a part goes, seen from the reference point."""
+    ways = [
+        f'{plain(round(abs(float(v)), 3), 4)} m {names[int(v < 0)]}'
+        for v, names in zip(r, PLACES, strict=True)
+        if abs(v) >= NEAR
+    ]
+    return f'{join(ways)}, seen from {ORIGIN}' if ways else f'at {ORIGIN}'
+
+
+def _facing(normal: np.ndarray) -> str:
+    """Which way a plate faces: along the nearest axis, and how far it is turned from there."""
+    main = int(np.argmax(np.abs(normal)))
+    text = f'facing {WAYS[main][int(normal[main] < 0)]}'
+    angle = float(np.arccos(min(abs(normal[main]), 1.0)))
+    if angle < ALIGNED:
+        return text
+    ways = [
+        WAYS[i][int(normal[i] < 0)]
+        for i in range(3)
+        if i != main and abs(normal[i]) >= np.sin(ALIGNED)
+    ]
+    numbers = ', '.join('0' if abs(v) < NEAR else plain(round(float(v), 3), 3) for v in normal)
+    return f'{text}, turned {np.degrees(angle):.1f}° {join(ways)}, its normal ({numbers})'

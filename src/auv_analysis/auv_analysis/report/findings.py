@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.authority import beyond_authority
 from auv_analysis.report import paper
 from auv_analysis.report.claim import Claim
 from auv_analysis.report.document import Sentence
@@ -42,6 +43,11 @@ def findings(
     found = [Sentence(_settling(n, run, summaries[n]), figures) for n, run in runs.items()]
     found += [Sentence(text, 'experiment') for text in namesakes([*runs.values()])]
     found += [Sentence(_late_errors(summaries), figures), Sentence(_inputs(summaries), figures)]
+    found += [
+        Sentence(f'Under {name} {"; ".join(remarks)}.', figures)
+        for name, run in runs.items()
+        if (remarks := beyond_authority(run.vehicle, summaries[name]['effort']['max']))
+    ]
     found += [Sentence(_applied(runs), 'inputs_compared')]
     found += [
         Sentence(unexplained_finding(n, s), f'table-unexplained_{n}') for n, s in summaries.items()

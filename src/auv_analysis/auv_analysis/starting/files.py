@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.scaling import scaled_case1
+from auv_analysis.scaling import scale_lines, scaled_case1
 from auv_analysis.scenario import SCHEMA
 from auv_analysis.starting.annotated import annotated
 from auv_dynamics.config import shipped
@@ -61,7 +61,8 @@ def scenario_files(name: str, vehicle: str | None) -> dict[str, str]:
     vehicle = vehicle or STARTING
     data = scaled_case1(vehicle) | {'name': name, 'vehicle': vehicle}
     data['disturbance'] = [data['disturbance']]
-    about = ("A scenario of your own: the paper's case 1, scaled to the vehicle; SI units.",)
+    first = "A scenario of your own: the paper's case 1, scaled to the vehicle; SI units."
+    about = (first, 'Of the disturbance:', *scale_lines())
     return {f'{name}.yaml': _text(data, SCHEMA, about)}
 
 

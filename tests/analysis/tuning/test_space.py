@@ -7,8 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import QUICK
 
-from auv_analysis.tuning.rivals import starts_of
+from auv_analysis.tuning.measures import Measures
+from auv_analysis.tuning.rivals import Rival, starts_of
+from auv_analysis.tuning.search import Found
 from auv_analysis.tuning.space import LAWS, STRUCTURES, Space, make_space
+from auv_analysis.tuning.tried import Tried
 from auv_dynamics.vehicle_file import load_vehicle
 from auv_gvc_controller.gains import sampling_warning
 from auv_gvc_controller.laws import make_gains
@@ -77,3 +80,22 @@ def test_every_law_starts_from_the_same_two_points(tmp_path, reference: str) -> 
         if {law, reference} <= {'gvc', 'cl'}:  # one and the same law where M is diagonal
             own = space.nearest(entries[law])
             np.testing.assert_allclose(near, own)
+
+
+@pytest.mark.parametrize(
+    ('Gamma', 'k_D', 'words'),
+    [
+        (5.0, 12.0, []),
+        (0.1, 12.0, ['its adaptation is switched off']),  # 0.1 / 12 1/s in a run of 30 s
+        (1e-3, 12.0, ['at a bound of the search: Gamma (lower)', 'its adaptation is switched off']),
+        (60.0, 100.0, ['at a bound of the search: k_D (upper)', 'as fast as the control period']),
+    ],
+)
+@pytest.mark.parametrize('law', ['gvc', 'cl'])
+def test_a_bound_and_an_adaptation_without_effect_are_remarked_on(law, Gamma, k_D, words) -> None:
+    space = space_of(law, 'inertia')
+    x = np.log([k_D, 1.0, 1.0, Gamma])
+    nothing = Measures(*np.zeros((len(Measures._fields), 1)))
+    found = Rival(law, Found(space, x, nothing, True, None, Tried()), ()).remarks(30.0)
+    assert len(found) == len(words)
+    assert all(word in text for word, text in zip(words, found, strict=True))

@@ -57,7 +57,9 @@ def test_folder_document_and_files_agree(command: Callable, tmp_path: Path) -> N
     _drawn(document, folder)
     assert all(sentence['source'] for sentence in document['verdict'])
     assert check_numbers(folder) > 100
-    assert all(sentence['source'] for sentence in document['verdict'])
+    said = {sentence['text'] for sentence in document['verdict']}
+    entries = document['controllers'].items()
+    assert {f'{name}: {text}.' for name, entry in entries for text in entry['remarks']} <= said
 
 
 def _equal(document: dict, measure: str, tolerance: float) -> None:

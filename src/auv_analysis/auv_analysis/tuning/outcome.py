@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.authority import beyond_authority
 from auv_analysis.scenario import Scenario
 from auv_analysis.tuning.comparison import Comparison
 from auv_analysis.tuning.draws import Spread, applied
@@ -28,6 +29,7 @@ class Outcome:
     rivals : name in that scenario -> tuned law
     nominal : controller -> measures (1,) in the scenario itself
     deviation : largest relative difference of these to the same from `simulate`
+    commands : controller -> largest magnitudes (6,) of its command, N and N m; not of diverged ones
     spread : of the draws
     draws : controller -> measures (n,), row i of the same draw; empty without Monte Carlo
     comparisons : paired, over the draws
@@ -40,6 +42,7 @@ class Outcome:
     rivals: Mapping[str, Rival]
     nominal: Mapping[str, Measures]
     deviation: float
+    commands: Mapping[str, np.ndarray]
     spread: Spread
     draws: Mapping[str, Measures]
     comparisons: Sequence[Comparison]
@@ -54,6 +57,15 @@ class Outcome:
         """A measure of a controller in the scenario itself, to the reference's."""
         value, base = (getattr(self.nominal[n], measure)[0] for n in (name, self.request.reference))
         return float(value / base)
+
+    def remarks(self, name: str) -> list[str]:
+        """What a reader of a controller's numbers must know, a phrase each."""
+        found = []
+        if name in self.rivals:
+            found += self.rivals[name].remarks(self.scenario.duration)
+        if name in self.commands:
+            found += beyond_authority(self.scenario.vehicle, self.commands[name].tolist())
+        return found
 
     def document(self) -> dict[str, Any]:
         """Contents of `tune.json`."""
@@ -93,6 +105,7 @@ class Outcome:
             'gains': self.scenario.gain_values(name),
             'measures': plain(self.nominal[name]),
             'equality': self._equality(name),
+            'remarks': self.remarks(name),
         }
         if name not in self.rivals:
             return found
@@ -100,6 +113,7 @@ class Outcome:
         return found | {
             'structure': rival.best.space.structure,
             'structure_means': STRUCTURES[rival.best.space.structure],
+            'at_bound': rival.best.space.at_bound(rival.best.x),
             'reached': rival.best.reached,
             'price': rival.best.price,
             'evaluations': sum(len(s.tried) for s in rival.searches),

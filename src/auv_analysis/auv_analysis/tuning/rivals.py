@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.changes import changed_scenario
+from auv_analysis.report.text import join, number
 from auv_analysis.scenario import Scenario
 from auv_analysis.simulation import DivergedError, Hold
 from auv_analysis.tuning.loops import measured
 from auv_analysis.tuning.measures import Measures
 from auv_analysis.tuning.search import Found, Goal, search
-from auv_analysis.tuning.space import BEST, Space, make_space
+from auv_analysis.tuning.space import BEST, EDGE, Space, make_space
 from auv_gvc_controller.gains import body_gains, sampled_rate
-from auv_gvc_controller.laws import SHIPPED
+from auv_gvc_controller.laws import SHIPPED, make_gains
 from auv_gvc_controller.model import ControlModel, control_model
 
 POINTS = 1024  # of a Sobol sequence
@@ -69,6 +70,27 @@ class Rival:
     def entry(self) -> dict[str, Any]:
         """Law and gains as a scenario file gives them."""
         return self.best.space.entry(self.best.x)
+
+    def remarks(self, duration: float) -> list[str]:
+        """What a reader of the gains must know: bounds of the search, an adaptation without effect.
+
+        An adaptation whose slowest and fastest rates, the eigenvalues of K_D^-1 K_f, are below the
+        inverse of the run's length does not act in it.
+        """
+        space, x = self.best.space, self.best.x
+        on = [f'{name} ({side})' for name, side in space.at_bound(x).items()]
+        found = [f'at a bound of the search: {join(on)}'] if on else []
+        if space.room(x[None])[0] < EDGE:
+            found.append('its velocity loop is as fast as the control period allows')
+        gains = {name: value for name, value in self.entry.items() if name != 'law'}
+        K_D, K_f = body_gains(make_gains(self.law, gains), space.model)
+        fastest = float(np.abs(np.linalg.eigvals(np.linalg.solve(K_D, K_f))).max())
+        if 0 < fastest * duration < 1:
+            found.append(
+                'its adaptation is switched off: K_f / K_D is at most '
+                f'{number(fastest, 2)} 1/s, slower than the run of {duration:g} s'
+            )
+        return found
 
 
 def goal_of(request: Request) -> Goal:

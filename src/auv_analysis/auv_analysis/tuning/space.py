@@ -23,6 +23,7 @@ STRUCTURES = {
     'diagonal': 'six numbers',
     'inertia': 'a number times M',
 }
+EDGE = 1e-3  # of the distance of two bounds: a value that is nearer to one lies on it
 BEST = 'best'  # the better of `scalar` and `mass`
 
 
@@ -112,6 +113,14 @@ class Space:
             made = make_gains(self.law, {gain: values[i] for gain, values in gains.items()})
             rates[i] = sampled_rate(body_gains(made, self.model)[0], M)[0]
         return np.log(self.fastest / rates)
+
+    def at_bound(self, x: np.ndarray) -> dict[str, str]:
+        """Coordinates of a point (n,) that lie on a bound of the search: 'lower' or 'upper'."""
+        near = EDGE * (self.high - self.low)
+        sides = np.where(
+            x <= self.low + near, 'lower', np.where(x >= self.high - near, 'upper', '')
+        )
+        return {name: str(side) for name, side in zip(self.names, sides, strict=True) if side}
 
     def entry(self, x: np.ndarray) -> dict[str, Any]:
         """Law and gains of one point (n,) as a scenario file gives them."""

@@ -67,6 +67,7 @@ def gains_table(document: Mapping[str, Any]) -> Table:
         CONTROLLER,
         Column('law', numeric=False),
         *(Column(symbol(g), numeric=False) for g in gains),
+        Column('remarks', meaning='bounds, adaptation, commands', numeric=False),
     ]
     rows = [
         [
@@ -81,6 +82,7 @@ def gains_table(document: Mapping[str, Any]) -> Table:
                 else Cell(MISSING)
                 for gain in gains
             ),
+            Cell('\n'.join(entry['remarks']), kind='bad' if entry['remarks'] else ''),
         ]
         for name, entry in entries.items()
     ]

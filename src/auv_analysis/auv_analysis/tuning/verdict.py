@@ -11,6 +11,7 @@ from auv_analysis.tuning.measures import MEANINGS
 from auv_analysis.tuning.outcome import Outcome
 
 TUNED, PAIRED, DRAWS = 'table-tuned', 'table-paired', 'table-draws'
+GAINS = 'table-gains'
 SMALLEST_P = 1e-6
 SMALLEST_SHARE = 1e-6  # of an equality: below it, it is met
 WORSE = 1.05  # ratio of a measure that was not tuned for, from which it is worth a sentence
@@ -20,7 +21,8 @@ def verdict(outcome: Outcome) -> list[Sentence]:
     """Sentences of an outcome, the most important ones first."""
     drawn = [*_ranked(outcome), *_diverged(outcome)] if outcome.draws else []
     whole = [_nominal(outcome), _left(outcome), _unreached(outcome), drawn, _paid(outcome)]
-    return [sentence for part in (*whole, _price(outcome)) for sentence in part]
+    last = _price(outcome), _remarks(outcome)
+    return [sentence for part in (*whole, *last) for sentence in part]
 
 
 def paired_sentences(outcome: Outcome) -> list[Sentence]:
@@ -155,6 +157,13 @@ def _paid(outcome: Outcome) -> Iterator[Sentence]:
                 f'{MEANINGS[measure].label}, by a factor of {join(worse)}.',
                 TUNED,
             )
+
+
+def _remarks(outcome: Outcome) -> Iterator[Sentence]:
+    """What is odd about the gains and the commands of each controller."""
+    for name in outcome.scenario.controllers:
+        for remark in outcome.remarks(name):
+            yield Sentence(f'{name}: {remark}.', GAINS)
 
 
 def _price(outcome: Outcome) -> Iterator[Sentence]:

@@ -50,7 +50,7 @@ def work(request: Request, draws: Draws, out: Path, progress: Progress) -> Outco
     written = write_inputs(_with(request.scenario, rivals), out)
     scenario = load_scenario(written['scenario.yaml'])
     nominal = of_each(scenario, request.hold)
-    deviation = _checked(scenario, request, nominal, progress)
+    deviation, largest = _checked(scenario, request, nominal, progress)
     found, compared = {}, []
     if draws.samples:
         advance = progress(f'{draws.samples} draws of model error and disturbance', draws.samples)
@@ -60,7 +60,7 @@ def work(request: Request, draws: Draws, out: Path, progress: Progress) -> Outco
         )  # fmt: skip
         compared = _compared(request, scenario, rivals, found)
     return Outcome(
-        request, goal, scenario, rivals, nominal, deviation, draws.spread, found, compared
+        request, goal, scenario, rivals, nominal, deviation, largest, draws.spread, found, compared
     )
 
 
@@ -82,15 +82,17 @@ def _with(scenario: Scenario, rivals: Mapping[str, Rival]) -> Scenario:
 
 def _checked(
     scenario: Scenario, request: Request, nominal: Mapping[str, Measures], progress: Progress
-) -> float:
-    """Largest relative deviation of single runs from the batch that the search used."""
+) -> tuple[float, dict[str, np.ndarray]]:
+    """Largest relative deviation of single runs from the batch, and their largest commands (6,)."""
     advance = progress('checking against single runs', len(nominal))
-    largest = 0.0
+    largest, commands = 0.0, {}
     for name, expected in nominal.items():
         try:
-            found = measures_of_run(simulate(scenario, name, request.hold))
+            run = simulate(scenario, name, request.hold)
         except DivergedError:
             found = Measures(*(np.full(1, np.nan) for _ in Measures._fields))
+        else:
+            found, commands[name] = measures_of_run(run), np.abs(run.tau).max(axis=0)
         deviations = [_deviation(a[0], b[0]) for a, b in zip(found, expected, strict=True)]
         largest = max(largest, *deviations)
         if largest > SAME:
@@ -98,7 +100,7 @@ def _checked(
             text = f'expected what the batch gave, found {worst} apart by {largest:.2g}'
             raise FailedError(f'{scenario.name}, {name}: {text} (relative)')
         advance()
-    return largest
+    return largest, commands
 
 
 def _deviation(a: float, b: float) -> float:

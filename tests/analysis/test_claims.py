@@ -50,6 +50,15 @@ def test_verdicts_of_case_1(case1):
     assert all(claim.criterion for claim in table.values())
 
 
+def test_another_experiment_of_the_same_name_is_not_the_papers(case1):
+    run = case1['gvc']
+    heavier = run.vehicle.changed(M=1.1 * run.vehicle.M)
+    for changes in (
+        {'nu_d': 1.1 * run.nu_d}, {'disturbance': run.disturbance + 5.0}, {'vehicle': heavier},
+    ):  # fmt: skip
+        assert _table({'gvc': replace(run, **changes)}) == {}
+
+
 def test_verdicts_of_case_2(case2):
     table = _table(case2)
     decided = CASE2_ONLY | {21}

@@ -3,15 +3,20 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from auv_analysis.report.claim import BOTH, Claim, Row
 from auv_analysis.report.claims_rows import ROWS
 from auv_analysis.report.evidence import Evidence, Signals, Verdict
 from auv_analysis.report.paper import CASES, is_plain, paper_run
-from auv_analysis.report.sketch import Sketch
+from auv_analysis.report.sketch import TINY, Sketch
 from auv_analysis.report.sketching import sketches
 from auv_analysis.report.text import MISSING
 from auv_analysis.run import AnyRun
+from auv_analysis.scenario import load_scenario
+from auv_dynamics.disturbance import make_disturbance
 
+SAME = 1e-3  # of the peak: set-points and disturbances that are nearer are the paper's
 GAINS = {
     ('case1', 'gvc'): '(36), (37)',
     ('case1', 'cl'): '(36), (37)',
@@ -33,7 +38,8 @@ def claims_table(
     Returns
     -------
     claims : 21 rows where all runs are of case1 or all of case2, else none; none either where
-        all of them have what the paper's have not, such as limits of actuators
+        all of them have what the paper's have not, such as limits of actuators, or one has another
+        inertia, set-point or disturbance than the scenario whose name it bears
 
     """
     scenarios = {run.scenario for run in runs.values()}
@@ -43,9 +49,26 @@ def claims_table(
     (scenario,) = scenarios
     found = {law: paper_run(runs, law) for law in BOTH}
     known = sketches({law: run for law, run in found.items() if run is not None})
+    if not all(_is_case(run) for run in known.values()):
+        return []
     signals = {law: Signals(run) for law, run in known.items()}
     N = next(iter(summaries.values()))['decomposition']['N']
     return judged({scenario: Evidence(signals, tuple(N))})
+
+
+def _is_case(run: Sketch) -> bool:
+    """Whether a run has the inertia, the set-point and the disturbance of the case it is named."""
+    case, t = load_scenario(run.scenario), run.course['t']
+    wanted = {'nu_d': case.setpoint.value(t)}
+    if run.knows_disturbance:
+        wanted['F'] = make_disturbance(case.data['disturbance'])(t)
+    return np.allclose(run.vehicle.M, case.vehicle.M) and all(
+        name in run.course
+        and bool(
+            np.all(np.abs(run.course[name] - values) <= SAME * np.abs(values).max(axis=0) + TINY)
+        )
+        for name, values in wanted.items()
+    )
 
 
 def judged(cases: Mapping[str, Evidence]) -> list[Claim]:

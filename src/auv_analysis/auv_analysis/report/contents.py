@@ -106,7 +106,8 @@ class Contents:
             'set-point': alike(runs, 'nu_d'),
             'disturbance': True if self._share_disturbances(runs) else alike(runs, 'F'),
         }
-        return [[word for word, is_same in alike_in.items() if is_same is v] for v in (True, False)]
+        same = [word for word, is_same in alike_in.items() if is_same]
+        return same, [word for word, is_same in alike_in.items() if is_same is False]
 
     def _share_disturbances(self, runs: Sequence[Sketch]) -> bool:
         """Whether the scenarios describe the same disturbances and faults of the same vehicle."""

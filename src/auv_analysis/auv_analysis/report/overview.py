@@ -44,8 +44,8 @@ def settling(runs: Mapping[str, Sketch]) -> tuple[Figure | None, str, str]:
             t, error = run.line('error', i, 'log')
             rest = np.maximum.accumulate(error[::-1])[::-1]
             axes.plot(t[rest > 0], rest[rest > 0], **look)
-        if bands[i] is not None:
-            axes.axhline(bands[i], color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
+        if (band := bands[i]) is not None:
+            axes.axhline(band, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
         plotting.logarithmic(axes, 'x', 'y')
     for row, unit in zip((0, 3), plotting.VELOCITY, strict=True):
         panels[row].set_ylabel(rf'$\max_{{s\,\geq\,t}}|\Delta\nu(s)|$ ({unit})')

@@ -213,7 +213,7 @@ class _Builder:
             statistics=self._statistics,
             traces=self._traces,
             stack=self._shares(),
-            settled=self._outside if has_settled(self._left, run.samples) else FOREVER,
+            settled=self._outside if has_settled(np.array(self._left), run.samples) else FOREVER,
             begin=self._begin,
             end=self._end,
             course={name: np.concatenate(parts) for name, parts in self._course.items()},

@@ -82,7 +82,7 @@ def gains_table(document: Mapping[str, Any]) -> Table:
                 else Cell(MISSING)
                 for gain in gains
             ),
-            Cell('\n'.join(entry['remarks']), kind='bad' if entry['remarks'] else ''),
+            Cell('; '.join(entry['remarks']), kind='bad' if entry['remarks'] else ''),
         ]
         for name, entry in entries.items()
     ]

@@ -112,8 +112,8 @@ def place_warnings(space: Space, x: np.ndarray) -> list[str]:
         r = x[[NAMES.index(f'{part}.{axis}') for axis in 'xyz']]
         if part in parts_of(x) and np.linalg.norm((r - space.vehicle.r_B) / axes) > 1:
             found.append(
-                f'the {part} is placed outside the hull, as far as the file tells of one: about '
-                f'the centre of buoyancy, {join([plain(a, 3) for a in axes])} m, {which}'
+                f'the {part} is placed outside the hull, as far as the file tells of one: {which}, '
+                f'{join([plain(a, 3) for a in axes])} m, about the centre of buoyancy'
             )
     return found
 

@@ -124,7 +124,7 @@ class _Builder:
         kept = slice(-self._seen % self._every, None, self._every)
         since = {'t': np.round(block.t - self._run.start, 9)}
         for name, values in (since | {n: found[n] for n in ('nu_d', 'F') if n in found}).items():
-            self._course.setdefault(name, []).append(values[kept])
+            self._course.setdefault(name, []).append(values[kept].copy())
         self._add_shares(block.t, found['energy'])
         error = found.get('error', np.zeros((1, 6)))
         far = np.flatnonzero(np.abs(error).max(axis=1) > NEAR_ZERO)

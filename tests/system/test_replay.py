@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import signal
 import sys
 import time
 from collections.abc import Callable
@@ -25,10 +26,15 @@ from harness import (
     start_node,
     stop,
 )
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from nursery import Process
 from played_bags import ended, made, there
 
+from auv_analysis import load_scenario
 from auv_analysis.bag import load_run
+from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis.replay.compared import reproduction
 from auv_analysis.replay.open_loop import open_loop, recorded_loop
 from auv_dynamics import interface
 from auv_dynamics.ending import ENDING
@@ -280,3 +286,55 @@ def test_a_foreign_listener_is_named_by_the_command(tmp_path: Path) -> None:
     refusal = errors.strip().splitlines()[-1]
     assert '/wrench: expected nobody who acts on recorded commands, found /test_peer' in refusal
     assert peer.heard == {'wrench': [], 'odom': []}
+
+
+def in_real_time(folder: Path) -> Path:
+    """A run that is not in lock-step: activated late, and without set-points for a while."""
+    path, text = folder / 'played.yaml', yaml.safe_dump({**SCENARIO, 'duration': 600.0})
+    path.write_text(text)
+    scenario, bag = load_scenario(path), folder / 'bag'
+    nodes = node_parameters(
+        scenario,
+        'gvc',
+        bag=bag,
+        vehicle='rexrov',
+        analysis=False,
+        lockstep=False,
+        use_sim_time=False,
+    )
+    nodes['plant_node']['start_after'] = []  # an inactive controller is not ready
+    nodes['controller_node'] |= {'autostart': False, 'limits.wrench': [3000.0] * 6}
+    told, attached = folder / 'params.yaml', folder / 'vehicle.yaml'
+    attached.write_text(scenario.attachments['vehicle.yaml'])
+    nodes['recorder_node']['attachments'] = [f'{file.name}={file}' for file in (told, attached)]
+    told.write_text(parameter_file(nodes, 'real time'))
+    names = ('plant_node', 'setpoint_node', 'controller_node', 'recorder_node')
+    with graph(*((name, ['--ros-args', '--params-file', str(told)]) for name in names)) as found:
+        peer, processes = found
+        peer.listen(topics.ODOM, topics.WRENCH)
+        odometry, wrenches = peer.heard[topics.ODOM.name], peer.heard[topics.WRENCH.name]
+        peer.until(lambda: len(odometry) > 100, 'odometry')
+        for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+            request = ChangeState.Request(transition=Transition(id=transition))
+            assert peer.call(ChangeState, 'controller_node/change_state', request).success
+
+        def acts(number: int) -> bool:
+            return sum(message.wrench.force.x != 0.0 for message in wrenches) > number
+
+        peer.until(lambda: acts(200), 'wrenches')
+        processes['setpoint_node'].send_signal(signal.SIGSTOP)
+        peer.until(lambda: wrenches[-1].wrench.force.x == 0.0, 'watchdog')
+        processes['setpoint_node'].send_signal(signal.SIGCONT)
+        peer.until(lambda: acts(500), 'wrenches again')
+        code, _ = stop(processes['recorder_node'], signal.SIGINT)
+        assert code == 0
+    return bag
+
+
+def test_the_law_of_a_bag_in_real_time_is_reproduced(tmp_path: Path) -> None:
+    loop = recorded_loop(in_real_time(tmp_path))
+    answers = open_loop(loop, loop.controller.law, loop.controller.gains)
+    found = reproduction(loop, answers)
+    assert found.holds, found.sentence()
+    assert answers.ns[0] > loop.series[interface.ODOM][0][50], 'not before its activation'
+    assert any('was not in charge' in note for note in answers.notes)

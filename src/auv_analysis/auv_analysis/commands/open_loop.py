@@ -9,9 +9,17 @@ from rich.table import Table
 
 from auv_analysis.bag.attached import UNKNOWN
 from auv_analysis.console import say
+from auv_analysis.failure import FailedError
 from auv_analysis.folder import check_free, prepare, write_json
 from auv_analysis.progress import bar, console, count, waiting
-from auv_analysis.replay.compared import Compared, compared, figures_of, listed
+from auv_analysis.replay.compared import (
+    Compared,
+    Reproduction,
+    compared,
+    figures_of,
+    listed,
+    reproduction,
+)
 from auv_analysis.replay.open_loop import OpenLoop, RecordedLoop, open_loop, recorded_loop
 from auv_analysis.report.text import number
 from auv_dynamics.files import InputError
@@ -20,6 +28,7 @@ from auv_gvc_controller.laws import is_unasked, law_class, refusal
 
 DOCUMENT = 'open_loop.json'
 UNITS = ('N', 'N m')
+UNCHECKED = 'reproduction not checked: the bag does not name its law, or it is not imported'
 
 
 def answered(options: argparse.Namespace) -> dict[str, Any]:
@@ -33,14 +42,19 @@ def answered(options: argparse.Namespace) -> dict[str, Any]:
     gains = own.gains_of(options.law, _gains(options.gain))
     answers = _answers(recorded, options.law, gains)
     known = own.law != UNKNOWN
-    again = _answers(recorded, own.law, own.gains) if known and not is_unasked(own.law) else None
+    verdict = _verdict(recorded, known)
     both = compared(recorded, answers)
     out = prepare(
         options.out or _folder(recorded, options.law),
         overwrite=options.overwrite,
         inputs=[options.bag],
     )
+    sentence = verdict.sentence() if verdict else UNCHECKED
     document = {
+        'reproduced': verdict.holds if verdict else None,
+        'reproduction': sentence,
+        'reproduced_relative': verdict.relative if verdict else None,
+        'reproduced_within': verdict.within if verdict else None,
         'bag': str(options.bag),
         'scenario': recorded.scenario,
         'controller': recorded.name,
@@ -49,11 +63,12 @@ def answered(options: argparse.Namespace) -> dict[str, Any]:
         'samples': len(both.t),
         'wrench': figures_of(both),
         'not_used': answers.refused,
-        'reproduced_within': _reproduced(recorded, again),
-        'notes': [*recorded.notes, *_remarks(answers)],
+        'notes': [*recorded.notes, *answers.notes, *_remarks(answers)],
     }
     write_json(out / DOCUMENT, document)
     _conclude(document, both, out)
+    if verdict and not verdict.holds:
+        raise FailedError(f'{options.bag}: {sentence}', document)
     return document
 
 
@@ -91,12 +106,12 @@ def _folder(recorded: RecordedLoop, law: str) -> Path:
     return Path('runs') / f'replay_{recorded.scenario}_{recorded.name}_{plain}'
 
 
-def _reproduced(recorded: RecordedLoop, again: OpenLoop | None) -> float | None:
-    """Largest difference of the recorded wrench to the recorded law's own answers, N and N m."""
-    both = compared(recorded, again) if again is not None else None
-    if both is None or not len(both.t):
+def _verdict(recorded: RecordedLoop, known: bool) -> Reproduction | None:
+    """Whether the recorded law gives the recorded wrench; None where it cannot be asked."""
+    own = recorded.controller
+    if not known or is_unasked(own.law):
         return None
-    return float(np.abs(both.answered - both.recorded).max())
+    return reproduction(recorded, _answers(recorded, own.law, own.gains))
 
 
 def _remarks(answers: OpenLoop) -> list[str]:
@@ -106,13 +121,14 @@ def _remarks(answers: OpenLoop) -> list[str]:
 
 
 def _conclude(document: dict[str, Any], both: Compared, out: Path) -> None:
-    """Draw, and show the figures."""
+    """Say whether the recorded law is reproduced, draw, and show the figures."""
     from auv_analysis.replay.pictures import draw  # with matplotlib, which loads slowly
 
+    say(document['reproduction'])
     law, wrench = document['answered']['law'], document['wrench']
     names = f'recorded ({document["recorded"]["law"] or "unknown law"})', f'{law}, open loop'
     with waiting('drawing the figure'):
-        figure = draw(both, names, out / 'figures')
+        figure = draw(both, names, document['reproduction'], out / 'figures')
     table = Table(box=None, header_style='bold')
     table.add_column('')
     for head in ('recorded\nrms', 'max', f'{law}\nrms', 'max', 'difference\nrms', 'max'):
@@ -127,6 +143,4 @@ def _conclude(document: dict[str, Any], both: Compared, out: Path) -> None:
     console.print(table)
     for note in document['notes']:
         say(f'note: {note}')
-    if (within := document['reproduced_within']) is not None:
-        say(f'the recorded law itself gives the recorded wrench within {number(within)}')
     say(f'figure: {figure}')

@@ -2,6 +2,7 @@
 
 The loop is open: the vehicle moved as the recorded wrench made it move, whatever this law says.
 Messages go through the very controller that the node runs, in the order in which a node needs them.
+In real time it is told what the recorded controller has answered, and begins anew where that did.
 """
 
 import heapq
@@ -20,7 +21,9 @@ from auv_analysis.node_parameters import CONTROLLER
 from auv_analysis.replay.recorded_controller import RecordedController
 from auv_dynamics import interface
 from auv_gvc_controller.controller import Answer, VelocityController
+from auv_gvc_controller.hand_over import FEWEST
 from auv_gvc_controller.pairing import Pairing
+from auv_gvc_controller.stamp_age import Now
 
 Progress = Callable[[int], None]
 
@@ -60,6 +63,8 @@ class OpenLoop:
     tau, f : (n, 6) wrench and estimate, N and N m, body frame
     refused : odometry and set-points that were not used, and wrenches that the law had not
     trouble : why, of the first one
+    ramps : (n,) whether an answer may be on the ramp of a law that takes over; None: none is
+    notes : what of the recording was left out or is missing
 
     """
 
@@ -68,6 +73,8 @@ class OpenLoop:
     f: np.ndarray
     refused: int = 0
     trouble: str = ''
+    ramps: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
 
 
 def recorded_loop(bag: str | Path, vehicle: str | Path | None = None) -> RecordedLoop:
@@ -123,23 +130,35 @@ def open_loop(
     Returns
     -------
     answers : sampled and held as the nodes do: the law of the bag with its gains gives the
-        recorded wrench to the last bit, where it was recorded in lock-step
+        recorded wrench to the last bit, where it was recorded in lock-step; in real time nearly,
+        since the bag does not say when each message arrived
 
     Raises
     ------
     InputError : no such law, a gain is missing or wrong
 
     """
-    controller, pairing = recorded.controller.build(law, gains)
+    own = recorded.controller
+    pairing, course = own.settings.pairing(), _Course(recorded)
+    controller, stretch, begin = own.build(law, gains, pairing), 0, (0, 0)
+    ramps: list[bool] = []
     answers: list[Answer] = []
     troubles: list[str] = []
     for k, (ns, role, values) in enumerate(_in_order(recorded.series)):
+        if role == interface.ODOM:
+            now_in = course.stretch(ns)
+            if not now_in:
+                continue
+            if now_in != stretch:
+                controller = own.build(law, gains, pairing) if stretch else controller
+                stretch, begin = now_in, (ns, len(answers))
         try:
             answer = _tell(controller, pairing, role, ns, values)
         except ValueError as error:
             troubles.append(f'{role}: {error}')
             continue
         if answer is not None:
+            ramps.append(course.is_ramp(answer.ns - begin[0], len(answers) - begin[1]))
             answers.append(answer)
             troubles += [answer.trouble] if answer.trouble else []
         if k % 1024 == 0:
@@ -151,17 +170,75 @@ def open_loop(
         np.array([answer.f for answer in answers], float).reshape(-1, 6),
         len(troubles),
         troubles[0] if troubles else '',
+        np.array(ramps, bool),
+        course.notes,
     )
+
+
+class _Course:
+    """When the recorded law was in charge, by its own wrenches and estimates.
+
+    In real time odometry may come while nobody answers, before activation or lost on the way to
+    the controller alone, and while a watchdog has let go: the law's integrals do not know it.
+
+    Parameters
+    ----------
+    recorded : odometry, wrenches and estimates
+
+    """
+
+    def __init__(self, recorded: RecordedLoop):
+        ns, tau = recorded.series[interface.WRENCH]
+        odometry = recorded.series[interface.ODOM][0]
+        settings = recorded.controller.settings
+        answered, first = np.unique(ns, return_index=True)
+        self._free = settings.lockstep or not np.isin(odometry, answered).any()
+        self._ramp = 0.0 if self._free else 1.5 * settings.ramp * interface.NANOSECONDS
+        if self._free:
+            self.notes: tuple[str, ...] = ()
+            return
+        again = np.ones(len(ns), bool)
+        again[first] = False  # said later of the same odometry: a watchdog, or deactivation
+        silenced = np.isin(answered, ns[again & ~tau.any(axis=1)])
+        active = tau[first].any(axis=1)
+        if interface.DISTURBANCE_ESTIMATE in recorded.series:
+            stamps, f = recorded.series[interface.DISTURBANCE_ESTIMATE]
+            if f.any():  # zero while the law is not in charge, and in its first answer
+                adapts = np.isin(answered, stamps[f.any(axis=1)])
+                active &= adapts | np.append(adapts[1:], False)
+        silence = round(settings.odometry_timeout * interface.NANOSECONDS)
+        anew = np.ones(len(answered), bool)
+        anew[1:] = ~active[:-1] | silenced[:-1] | (np.diff(answered) > silence)
+        number = np.cumsum(anew & active)
+        self._stretches = dict(zip(answered[active].tolist(), number[active].tolist(), strict=True))
+        left = np.count_nonzero(~np.isin(odometry, answered[active]))
+        lost = np.count_nonzero(~np.isin(answered[active], odometry))
+        told = (
+            (left, 'odometry messages left out, since the recorded law was not in charge'),
+            (lost, 'odometry messages that it answered are not in the bag: integrated over'),
+        )
+        self.notes = tuple(f'{count} {text}' for count, text in told if count)
+
+    def stretch(self, ns: int) -> int:
+        """Number of the time in charge that the odometry of a stamp belongs to; 0: to none."""
+        return 1 if self._free else self._stretches.get(ns, 0)
+
+    def is_ramp(self, since: int, count: int) -> bool:
+        """Whether an answer, so many ns and answers behind the first one, may be on the ramp."""
+        return self._ramp > 0.0 and (since < self._ramp or count < 1.5 * FEWEST)
 
 
 def _tell(
     controller: VelocityController, pairing: Pairing, role: str, ns: int, values: tuple[float, ...]
 ) -> Answer | None:
+    now = Now(ns / interface.NANOSECONDS, ns)  # of what arrives when it is stamped
     if role == interface.ODOM:
-        return controller.odometry(ns, values)
-    keep = pairing.setpoint if role == interface.CMD_VEL else pairing.derivative
-    keep(ns, values)
-    return controller.answer()
+        return controller.odometry(ns, values, now)
+    if role == interface.CMD_VEL:
+        pairing.setpoint(ns, values, now.steady)
+    else:
+        pairing.derivative(ns, values)
+    return controller.answer(now)
 
 
 def _in_order(series: Mapping[str, Series]) -> Iterator[tuple[int, str, tuple[float, ...]]]:

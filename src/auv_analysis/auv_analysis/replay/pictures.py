@@ -16,21 +16,22 @@ NAME = 'open_loop_wrench'
 ORDER = (0, 3, 1, 4, 2, 5)  # forces left, moments right
 
 
-def draw(both: Compared, names: tuple[str, str], folder: Path) -> Path:
+def draw(both: Compared, names: tuple[str, str], verdict: str, folder: Path) -> Path:
     """Draw both wrenches, a panel per degree of freedom, as PNG and PDF; the path of the PNG.
 
     Parameters
     ----------
     both : wrenches
     names : of the recorded law and of the other one
+    verdict : whether the recorded law reproduces the recorded wrench
     folder : of the figures, made when it is not there
 
     """
-    save_figures(folder, {NAME: partial(_figure, both, names)})
+    save_figures(folder, {NAME: partial(_figure, both, names, verdict)})
     return folder / f'{NAME}.png'
 
 
-def _figure(both: Compared, names: tuple[str, str]) -> tuple[Figure, str, str]:
+def _figure(both: Compared, names: tuple[str, str], verdict: str) -> tuple[Figure, str, str]:
     figure = plotting.new_figure(5.2)
     panels = figure.subplots(3, 2, sharex=True)
     for axes, i in zip(panels.flat, ORDER, strict=True):
@@ -44,6 +45,9 @@ def _figure(both: Compared, names: tuple[str, str]) -> tuple[Figure, str, str]:
     for axes in panels[-1]:
         axes.set_xlabel('$t$ (s)')
     panels[0, 1].legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
+    said = f'{verdict[0].upper()}{verdict[1:]}'
+    figure.suptitle(said, fontsize='small')
     title = f'What {names[1]} would have commanded'
-    caption = f'{title} at the recorded velocity and set-point, beside the recorded wrench.'
+    recorded = 'at the recorded velocity and set-point, beside the recorded wrench'
+    caption = f'{title} {recorded}. {said}.'
     return figure, title, caption

@@ -17,7 +17,7 @@ from auv_gvc_controller.settings import ControllerSettings, usual_acceleration
 
 
 class RecordedController:
-    """Everything of a controller but its law, without the clock: that of the stamps is enough.
+    """Everything of a controller but its law; its clock is that of the stamps.
 
     Parameters
     ----------
@@ -48,16 +48,15 @@ class RecordedController:
             usual = usual_acceleration(self.settings.lockstep)
             self.settings = replace(self.settings, setpoint_acceleration=usual)
 
-    def build(self, law: str, gains: Mapping[str, Any]) -> tuple[VelocityController, Pairing]:
-        """Controller with a law, and what it keeps set-points in; InputError: no such law."""
+    def build(self, law: str, gains: Mapping[str, Any], pairing: Pairing) -> VelocityController:
+        """Controller with a law, and the set-points that have come; InputError: no such law."""
         try:
             made = make_gains(law, gains)
             try_law(made, control_model(self._vehicle))
         except ValueError as error:
             gain, expected, found = refusal(error)
             raise InputError('--gain' if gain else '--law', gain, expected, found) from None
-        pairing = self.settings.pairing()
-        return self.settings.build(made, self._vehicle, pairing, clocks=False), pairing
+        return self.settings.build(made, self._vehicle, pairing)
 
     def gains_of(self, law: str, given: Mapping[str, Any]) -> dict[str, Any]:
         """Gains for a law: those that are given, the others as they were recorded."""

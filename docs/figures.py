@@ -26,7 +26,7 @@ BASIS = (HERE / 'figures.py', HERE.parent / 'src', HERE.parent / 'config')
 
 
 def settling() -> plt.Figure:
-    """Errors of GVC and CL with the same gains, Case 1."""
+    """Errors of GVC and CL with the paper's gains, Case 1."""
     scenario = load_scenario('case1')
     figure, rows = plt.subplots(2, 1, sharex=True, figsize=(6.4, 4.2), layout='constrained')
     for name, dash in (('gvc', '-'), ('cl', '--')):

@@ -10,6 +10,9 @@ from auv_analysis.commands.terminal import comparison_table, summary_tables
 from auv_analysis.console import say
 from auv_analysis.folder import write_json
 from auv_analysis.progress import console, waiting
+from auv_analysis.report.sketch import Sketch
+from auv_analysis.report.sketching import sketches
+from auv_analysis.report.verdict import FAILED, verdict
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario
 from auv_analysis.summary import Window, summarize
@@ -52,7 +55,7 @@ def finish(
     if failure is not None:
         note = first_line(failure)
         if not isinstance(failure, TroubleError):
-            note = f'another controller did not come to its end: {note}'
+            note = f'{FAILED}: {note}'
         runs = {name: replace(run, notes=(*run.notes, note)) for name, run in runs.items()}
     if runs:
         document = conclude(
@@ -86,8 +89,13 @@ def conclude(
     windows = study.windows if study else ()
     with waiting('computing the figures of summary.json'):
         summaries = {name: summarize(run, windows=windows) for name, run in runs.items()}
+        shown = sketches(runs) if report or len(runs) > 1 else {}
     write_json(out / 'summary.json', summaries)
-    page = _report(out, runs, summaries, scenario_text, vehicle_text, study) if report else None
+    page = None
+    if report:
+        page = _report(out, runs, shown, summaries, scenario_text, vehicle_text, study)
+    for sentence in verdict(shown, summaries):
+        say(sentence)
     console.print(summary_tables(summaries))
     for name, run in runs.items():
         for remark in beyond_authority(run.vehicle, summaries[name]['effort']['max']):
@@ -104,6 +112,7 @@ def say_where(out: Path, page: Path | None) -> None:
 def _report(
     out: Path,
     runs: Mapping[str, AnyRun],
+    shown: Mapping[str, Sketch],
     summaries: dict[str, Any],
     scenario_text: str | dict[str, str],
     vehicle_text: str | dict[str, str],
@@ -121,7 +130,7 @@ def _report(
         more['more'] = {**behind, 'tracking': [section, *behind.get('tracking', ())]}
         more['sentences'] = [*sentences, *more.get('sentences', ())]
     with waiting('drawing figures, writing the report'):
-        return write_report(out, runs, summaries, scenario_text, vehicle_text, **more)
+        return write_report(out, shown, summaries, scenario_text, vehicle_text, **more)
 
 
 def show(summaries: Mapping[str, Mapping[str, Any]]) -> None:

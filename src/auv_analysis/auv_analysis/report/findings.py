@@ -13,6 +13,7 @@ from auv_analysis.report.figures import reference
 from auv_analysis.report.sketch import Sketch, alike, last_third
 from auv_analysis.report.text import fixed, join, number, plain, residuals
 from auv_analysis.report.unexplained import unexplained_finding
+from auv_analysis.report.verdict import verdict
 from auv_analysis.summary import band_of
 from auv_dynamics.signals import DOFS
 
@@ -34,13 +35,15 @@ def findings(
 
     Returns
     -------
-    sentences : settling, errors, inputs, energy, couplings, claims; what is not known is left out
+    sentences : verdict, settling, errors, inputs, energy, couplings, claims; what is not known is
+        left out
 
     """
     leading = reference(runs)
     mine = summaries[leading.controller]
     figures = 'table-key_figures'
-    found = [Sentence(_settling(n, run, summaries[n]), figures) for n, run in runs.items()]
+    found = [Sentence(text, figures) for text in verdict(runs, summaries)]
+    found += [Sentence(_settling(n, run, summaries[n]), figures) for n, run in runs.items()]
     found += [Sentence(text, 'experiment') for text in namesakes([*runs.values()])]
     found += [Sentence(_late_errors(summaries), figures), Sentence(_inputs(summaries), figures)]
     found += [
@@ -176,12 +179,12 @@ def _couplings(summary: Mapping[str, Any], leading: Sketch) -> str:
 def _claims(claims: Sequence[Claim]) -> str:
     if not claims:
         return ''
-    counts = {verdict: [c for c in claims if c.verdict == verdict] for verdict in DECIDED}
-    counts = {verdict: rows for verdict, rows in counts.items() if rows}
+    counts = {word: [c for c in claims if c.verdict == word] for word in DECIDED}
+    counts = {word: rows for word, rows in counts.items() if rows}
     decided = sum(len(rows) for rows in counts.values())
     parts = []
-    for verdict, rows in counts.items():
+    for word, rows in counts.items():
         numbers = f' (no. {join([str(row.number) for row in rows])})'
-        parts.append(f'{len(rows)} {verdict}{"" if verdict == "reproduced" else numbers}')
+        parts.append(f'{len(rows)} {word}{"" if word == "reproduced" else numbers}')
     outcome = f': {join(parts)}' if parts else ''
     return f'Of the paper’s {len(claims)} claims these runs decide {decided}{outcome}.'

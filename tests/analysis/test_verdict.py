@@ -114,6 +114,9 @@ def test_of_several_the_best_is_held_against_the_next(tmp_path: Path) -> None:
     runs, summaries = made(tmp_path, {'weak': weak, 'gvc': tunings.GVC, 'cl': CL})
     (text, _) = verdict(runs, summaries)
     assert text.startswith('Of 3 controllers, gvc tracks best, cl next: against cl, gvc has ')
+    left = {name: (runs[name], summaries[name]) for name in ('weak', 'cl')}
+    (_, without) = verdict(*({n: pair[i] for n, pair in left.items()} for i in (0, 1)))
+    assert 'auv tune SCENARIO --reference cl compares' in without
     one = {'gvc': runs['gvc']}, {'gvc': summaries['gvc']}
     assert verdict(*one) == []
 

@@ -7,8 +7,9 @@ import numpy as np
 
 from auv_analysis.lyapunov import OF_THE_MOTION
 from auv_analysis.report.quantities import Maths
-from auv_analysis.report.sketch import TINY, Sketch, alike
+from auv_analysis.report.sketch import Sketch, alike
 from auv_analysis.report.text import join, number
+from auv_analysis.summary import SMALLEST_BAND
 from auv_dynamics.config import shipped_names
 from auv_dynamics.signals import DOFS
 from auv_gvc_controller.laws import SHIPPED
@@ -51,13 +52,20 @@ def verdict(runs: Mapping[str, Sketch], summaries: Mapping[str, Summary]) -> lis
     sentences: list[str] = [*failed, Maths(f'{{}}{gains}{{}}', before, after)]
     unlike = any(not 1 - SIMILAR <= r <= 1 + SIMILAR for r in (*factors, ratio))
     if unlike and {mine['law'], theirs['law']} <= set(SHIPPED):
-        scenario = next(iter(runs.values())).scenario
-        file = scenario if scenario in shipped_names('scenarios') else 'SCENARIO'
         sentences.append(
-            f'That compares gains as they were chosen; auv tune {file} compares the laws, each '
-            'tuned to the same effort.'
+            f'That compares gains as they were chosen; {_tune(best, [*runs.values()])} compares '
+            'the laws, each tuned to the same effort.'
         )
     return sentences
+
+
+def _tune(best: str, runs: Sequence[Sketch]) -> str:
+    """Command that tunes the laws of some runs."""
+    scenario = runs[0].scenario
+    words = ['auv tune', scenario if scenario in shipped_names('scenarios') else 'SCENARIO']
+    words += [] if any(run.law == 'gvc' for run in runs) else [f'--reference {best}']
+    words += ['--hold zoh'] if any(run.acting or run.sensing for run in runs) else []
+    return ' '.join(words)
 
 
 def _errors(summary: Summary) -> np.ndarray | None:
@@ -67,13 +75,13 @@ def _errors(summary: Summary) -> np.ndarray | None:
 
 
 def _differing(runs: Sequence[Sketch]) -> list[str]:
-    """What the runs would need in common and do not have."""
+    """What the runs would need in common and do not have; where they start counts for nothing."""
     M, begin, length = runs[0].vehicle.M, runs[0].begin, runs[0].duration
     depends = any(kind in OF_THE_MOTION for run in runs for kind in run.kinds or ())
     same = {
         'vehicle': all(np.array_equal(run.vehicle.M, M) for run in runs),
-        'length': all(abs(run.duration - length) <= TINY for run in runs),
-        'start': all(np.abs(run.begin - begin).max() <= TINY for run in runs),
+        'length': all(abs(run.duration - length) <= EQUAL * length for run in runs),
+        'start': all(np.all(np.abs(run.begin - begin)[3:] <= SMALLEST_BAND) for run in runs),
         'set-point': alike(runs, 'nu_d'),
         'disturbance': depends or alike(runs, 'F'),
     }

@@ -168,7 +168,7 @@ def starts_of(
         K_D, K_f = (np.diagonal(K) for K in body_gains(scenario.gains(reference), model))
         inertia = np.diagonal(np.reshape(model.dynamics.M, (6, 6)))
         unit = inertia if space.law == 'gvc' else 1.0  # GVC multiplies its gains by M itself
-        shared = {gain: meant[gain] for gain in ('k_I', 'Lambda') if gain in meant}
+        shared = {k: v for k, v in meant.items() if k in ('k_I', 'Lambda')}
         fast = 'k_P' if space.law == 'pid' else 'k_D'
         meant = {fast: (K_D / unit).tolist(), 'Gamma': (K_f / unit).tolist(), **shared}
     return [space.nearest(meant), (space.low + space.high) / 2]

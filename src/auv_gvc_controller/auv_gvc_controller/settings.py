@@ -171,9 +171,7 @@ class ControllerSettings:
             *(self.filter_acceleration, self.filter_angular_acceleration),
         )
 
-    def build(
-        self, gains: Any, vehicle: Vehicle, pairing: Pairing, *, clocks: bool = True
-    ) -> VelocityController:
+    def build(self, gains: Any, vehicle: Vehicle, pairing: Pairing) -> VelocityController:
         """Controller with a law.
 
         Parameters
@@ -181,12 +179,11 @@ class ControllerSettings:
         gains : of the law, which they name (`make_gains`)
         vehicle : what the law knows
         pairing : with the set-points that have come
-        clocks : whether the controller has a clock, for its watchdogs; else stamps are all it has
 
         """
         law = SampledLaw(gains, control_model(vehicle), self._reach(vehicle))
         timeouts = Timeouts(self.odometry_timeout, self.setpoint_timeout)
-        live = clocks and not self.lockstep
+        live = not self.lockstep
         guard = OdometryGuard(
             round(self.limits_gap * 1e9),
             self.limits,

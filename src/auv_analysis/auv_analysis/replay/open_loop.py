@@ -200,7 +200,7 @@ class _Course:
         again = np.ones(len(ns), bool)
         again[first] = False  # said later of the same odometry: a watchdog, or deactivation
         silenced = np.isin(answered, ns[again & ~tau.any(axis=1)])
-        active = tau[first].any(axis=1)
+        active = np.asarray(tau[first].any(axis=1))
         if interface.DISTURBANCE_ESTIMATE in recorded.series:
             stamps, f = recorded.series[interface.DISTURBANCE_ESTIMATE]
             if f.any():  # zero while the law is not in charge, and in its first answer

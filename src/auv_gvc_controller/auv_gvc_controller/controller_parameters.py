@@ -3,6 +3,7 @@
 import math
 from array import array
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -19,6 +20,7 @@ from auv_gvc_controller.settings import ControllerSettings
 
 GAINS = {gain for law in SHIPPED.values() for gain in law._fields}
 WRITABLE = 'gains.'
+SETTINGS = {entry.metadata['name'] for entry in fields(ControllerSettings)[1:]}
 FIXED = ('lockstep', 'setpoint_pairing', 'setpoint_acceleration')  # which decide what is heard
 LAWS = f'{", ".join(SHIPPED)} or module:Class of your own'
 
@@ -88,9 +90,8 @@ class ControllerParameters:
         return values
 
     def refuse_while(self, active: bool, parameters: list[Parameter]) -> SetParametersResult:
-        """Answer a change of parameters: all but those of rclpy are taken while inactive only."""
-        names = ControllerSettings.names()
-        changed = {one.name: one.value for one in parameters if one.name in names}
+        """Answer a change of parameters: law, gains and settings are taken while inactive only."""
+        changed = {one.name: one.value for one in parameters if one.name in SETTINGS}
         for parameter in parameters:
             of_law = parameter.name == 'law' or parameter.name.startswith(WRITABLE)
             if not of_law and parameter.name not in changed:

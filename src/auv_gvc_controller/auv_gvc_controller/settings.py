@@ -139,11 +139,6 @@ class ControllerSettings:
                 )
         return cls(source, **values)
 
-    @classmethod
-    def names(cls) -> list[str]:
-        """Names of the parameters."""
-        return [entry.metadata['name'] for entry in fields(cls)[1:]]
-
     def pairing(self) -> Pairing:
         """What keeps set-points until their odometry comes."""
         return Pairing(self.exact, self.setpoint_acceleration, *self.believed)

@@ -52,7 +52,7 @@ class AnalysisNode(BulkNode):
         for topic in HEARD:
             self._watch(topic)
         self.graph.in_trouble_while(self._trouble)
-        self.begin(f'analyses every {self._every}. step with {self.graph.hardware_id}')
+        self.begin(f'analyses one step in {self._every} of {self.graph.hardware_id}')
 
     def _trouble(self) -> Health:
         if self._k:

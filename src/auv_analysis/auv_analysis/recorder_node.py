@@ -7,11 +7,12 @@ from rclpy.duration import Duration
 from std_msgs.msg import Header
 
 from auv_analysis.ledger import LostStepError, PublicationLedger, StepLedger
+from auv_analysis.recorder_clock import GraphClock
 from auv_analysis.recorder_parameters import recorder_parameters
 from auv_analysis.recorder_topics import OtherTopics
 from auv_analysis.recording import RecordingError
 from auv_analysis.schemas import schema_text
-from auv_dynamics.interface import NANOSECONDS, RECORDER, BadMessageError
+from auv_dynamics.interface import RECORDER, BadMessageError
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.codec import first_stamp
@@ -22,47 +23,6 @@ from auv_dynamics.ros.life import main_of
 PATIENCE = 2.0  # s for the clock of the last steps, which nothing else waits for
 NUMBERED = (*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK)  # with one publisher each
 TIMED = (*topics.STEP_TOPICS, topics.CLOCK)  # whose stamp is the log time, and the publish time
-EPOCH = 86_400 * NANOSECONDS  # ns between two clocks, from which they have different epochs
-EARLY_TIME = 60.0  # s that messages wait for the first step, which tells the time of the graph
-EARLY_COUNT, EARLY_SIZE = 10_000, 1 << 24  # messages and bytes that wait at most
-
-
-class GraphClock:
-    """Time of the graph: that of the steps in lock-step, else of the node's clock.
-
-    Where a driver stamps by a clock of another epoch, the node's clock is moved there by the first
-    step, so that all of a bag lies together.
-
-    Attributes
-    ----------
-    latest : newest stamp of a step, ns; -1 before the first
-
-    """
-
-    def __init__(self, node: BulkNode, strict: bool):
-        self._node, self._strict, self.latest = node, strict, -1
-        self.simulated = strict or bool(node.get_parameter('use_sim_time').value)
-        self._offset: int | None = None
-
-    def follow(self, ns: int) -> None:
-        """Note the stamp of a step."""
-        self.latest = max(self.latest, ns)
-        if self._offset is None:
-            apart = ns - self._node.get_clock().now().nanoseconds
-            self._offset = apart if abs(apart) > EPOCH else 0
-
-    def now(self, received: int) -> int | None:
-        """Time in ns of a message that came at `received` of the system's; None: not known yet."""
-        if not self.simulated:
-            wall = received or int(self._node.get_clock().now().nanoseconds)
-            return None if self._offset is None else max(0, wall + self._offset)
-        told = 0 if self._strict else int(self._node.get_clock().now().nanoseconds)
-        return told or (self.latest if self.latest >= 0 else None)
-
-    def begin(self) -> None:
-        """Do without a step: the time is the node's, zero where it is simulated."""
-        self.latest = max(self.latest, 0)
-        self._offset = self._offset or 0
 
 
 class RecorderNode(BulkNode):
@@ -78,8 +38,6 @@ class RecorderNode(BulkNode):
         self._ledger = StepLedger(self._counted, p.step_ns, p.strict)
         self._publications = PublicationLedger(p.strict)
         self._time = GraphClock(self, p.strict)
-        self._early: list[tuple[str, str, bytes, dict[str, Any]]] = []
-        self._early_since = 0.0  # steady s
         self._newest = {topics.LUMPED_ERROR.name: -1, topics.CLOCK.name: -1}  # stamps, ns
         self._whole_since: float | None = None  # steady s
         self._reported = -1
@@ -116,7 +74,7 @@ class RecorderNode(BulkNode):
             if timed and (ns or zero_is_a_time):
                 if step_topic:
                     self._time.follow(ns)
-                    if self._early:
+                    if self._time.early:
                         self._release()
                 published = (of_a_step and way.get('source_timestamp')) or ns
                 self._write(resolved, kind, message, ns, published)
@@ -135,21 +93,13 @@ class RecorderNode(BulkNode):
         ns = self._time.now(way.get('received_timestamp') or 0)
         if ns is None:
             self._meet(topic, kind)  # its publisher may be gone by then
-            self._early_since = self._early_since or time.monotonic()
-            self._early.append((topic, kind, message, way))
+            self._time.hold((topic, kind, message, way))
         else:
             self._write(topic, kind, message, ns, max(0, way.get('source_timestamp') or ns))
 
     def _release(self, *, ends: bool = False) -> None:
         """Write what has waited, once the time of the graph is known or not waited for."""
-        if not self._early:
-            return
-        late = time.monotonic() - self._early_since > EARLY_TIME
-        size = sum(len(message) for _, _, message, _ in self._early)
-        if ends or late or len(self._early) > EARLY_COUNT or size > EARLY_SIZE:
-            self._time.begin()
-        waiting, self._early = self._early, []
-        for entry in waiting:
+        for entry in self._time.released(ends=ends) if self._time.early else ():
             self._take(*entry)
 
     def _write(self, topic: str, kind: str, message: bytes, ns: int, published: int) -> None:

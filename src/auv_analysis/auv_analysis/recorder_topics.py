@@ -19,6 +19,7 @@ from rclpy.subscription import Subscription
 
 from auv_analysis.schemas import schema_text
 from auv_dynamics.files import first_line
+from auv_dynamics.interface import GLOBALS
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.kinds import message_class
 from auv_dynamics.ros.private import RCLError
@@ -26,7 +27,6 @@ from auv_dynamics.ros.raw_types import raw_class
 from auv_dynamics.ros.topics import DEPTH
 
 ALL = 'all'
-GLOBALS = ('/clock', '/diagnostics', '/tf', '/tf_static', '/robot_description')
 UNRECORDED = ('/rosout', '/parameter_events')  # unless they are asked for by name
 Take = Callable[[str, str, bytes, dict[str, Any]], None]  # topic, type, message, what is known
 

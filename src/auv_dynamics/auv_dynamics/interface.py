@@ -35,6 +35,7 @@ LUMPED_ERROR = 'analysis/lumped_error'
 PROGRESS = 'recorder/progress'
 DIAGNOSTICS = '/diagnostics'
 CLOCK = '/clock'
+GLOBALS = (CLOCK, DIAGNOSTICS, '/tf', '/tf_static', '/robot_description')  # of all vehicles
 
 ANALYSIS_TOPICS = (KINETIC_ENERGY, KINETIC_ENERGY_SHARES, DELTA_XI, DELTA_PI, LUMPED_ERROR)
 STEP_TOPICS = (ODOM, TWIST, CMD_VEL, CMD_ACCEL, WRENCH, DISTURBANCE, DISTURBANCE_ESTIMATE)

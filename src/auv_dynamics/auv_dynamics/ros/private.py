@@ -62,3 +62,18 @@ def overrides(node: Node) -> dict[str, Parameter]:
 def declared(node: Node) -> list[str]:
     """Names of the parameters that the node has declared."""
     return sorted(node._parameters)  # noqa: SLF001
+
+
+def type_support(kind: type) -> Any:
+    """Capsule with the type support of a message class."""
+    of_class: Any = type(kind)
+    if of_class._TYPE_SUPPORT is None:  # noqa: SLF001
+        of_class.__import_type_support__()
+    return of_class._TYPE_SUPPORT  # noqa: SLF001
+
+
+def class_of(name: str, support: Any, keeps: Any) -> type:
+    """Stand-in for a message class that has a type support, which lives as long as `keeps`."""
+    verbs = ('CREATE_ROS_MESSAGE', 'CONVERT_FROM_PY', 'CONVERT_TO_PY', 'DESTROY_ROS_MESSAGE')
+    entries = {'_TYPE_SUPPORT': support, 'keeps': keeps} | {f'_{verb}': support for verb in verbs}
+    return type('RawType', (type,), entries)(name, (), {})

@@ -13,6 +13,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import String
 
 from auv_dynamics.ros.kinds import NAME
+from auv_dynamics.ros.private import class_of, type_support
 
 MIDDLEWARE = 'rmw_fastrtps_cpp'  # whose type supports are laid out as below
 IDENTIFIER = b'rosidl_typesupport_fastrtps_c'
@@ -77,22 +78,11 @@ def raw_class(name: str) -> type:
         [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p],
     )
     support = new(ctypes.addressof(handle), None, None)
-    functions = (
-        '_CREATE_ROS_MESSAGE',
-        '_CONVERT_FROM_PY',
-        '_CONVERT_TO_PY',
-        '_DESTROY_ROS_MESSAGE',
-    )
-    # what the capsule points to lives as long as the class
-    entries = {'_TYPE_SUPPORT': support, 'keeps': (handle, callbacks)}
-    return type('RawType', (type,), entries | dict.fromkeys(functions, support))(match[2], (), {})
+    return class_of(match[2], support, (handle, callbacks))
 
 
 def _installed() -> _Handle:
     """Type support of an installed type, which finds that of the middleware."""
-    kind: Any = type(String)
-    if kind._TYPE_SUPPORT is None:  # noqa: SLF001  # what rclpy looks at in every message class
-        kind.__import_type_support__()
     pointer = ctypes.pythonapi.PyCapsule_GetPointer
     pointer.restype, pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
-    return _Handle.from_address(pointer(kind._TYPE_SUPPORT, None))  # noqa: SLF001  # as above
+    return _Handle.from_address(pointer(type_support(String), None))

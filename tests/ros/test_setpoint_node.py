@@ -56,6 +56,20 @@ def test_without_a_horizon_the_next_odometry_finds_its_set_point() -> None:
             assert stamps(peer, 'cmd_vel')[-1] == newest
 
 
+def test_odometry_within_the_horizon_is_no_jump_however_late_it_is_looked_at() -> None:
+    far = 140  # steps, of more than a second
+    with graph(('setpoint_node', parameters(setpoint__surge__offset=0.2, horizon=150))) as (
+        peer,
+        _,
+    ):
+        peer.listen(topics.CMD_VEL)
+        for at in (0, far, 2 * far):
+            peer.publish(topics.ODOM, odometry(at * STEP))
+            newest = (at + 150) * STEP
+            peer.until(lambda newest=newest: newest in stamps(peer, 'cmd_vel'), 'the horizon')
+        assert stamps(peer, 'cmd_vel') == [k * STEP for k in range(2 * far + 151)]
+
+
 def test_a_jump_of_the_clock_is_no_burst() -> None:
     with graph(('setpoint_node', [*SURGE, *parameters(duration=3600.0)])) as (peer, _):
         peer.listen(topics.CMD_VEL)

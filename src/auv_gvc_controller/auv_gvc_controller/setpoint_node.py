@@ -49,7 +49,8 @@ class SetpointNode(BulkNode):
         self._say_velocity = self.graph.output(topics.CMD_VEL)
         self._say_acceleration = self.graph.output(topics.CMD_ACCEL)
         self.graph.listen(topics.ODOM, self._on_odometry, topics.one_at_a_time())
-        gap = max(interface.NANOSECONDS, 10 * self._step_ns)
+        # in lock-step the odometry may go on for `horizon` steps while this node does not look
+        gap = max(interface.NANOSECONDS, (10 + self._horizon) * self._step_ns)
         self._guard = OdometryGuard(gap, Limits(), lockstep=False, patience=PATIENCE)
         self._newest = -1
         self._stride = 1  # steps from one odometry to the next
@@ -81,6 +82,7 @@ class SetpointNode(BulkNode):
         return make_setpoint(spec, duration)
 
     def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
+        restarts = self._guard.restarts
         try:
             elapsed = self._guard.elapsed(ns, x[7:], Now(time.monotonic()))
         except ValueError as error:
@@ -89,8 +91,10 @@ class SetpointNode(BulkNode):
         newest = (ns - self._guard.origin) // self._step_ns
         if elapsed:
             self._stride = max(1, newest - self._newest)
-        else:  # the first one, or the clock has jumped: go on from here
+        elif self._guard.restarts > restarts:  # what was published has stamps of the old time
             self._next = newest
+        else:  # the first one, or the clock has jumped forward: no step is published twice
+            self._next = max(self._next, newest)
         self._newest = newest
         self._publish()
 

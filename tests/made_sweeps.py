@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from auv_analysis.exploration.results import Results
 from auv_analysis.reduction import COLUMNS
 from auv_analysis.sweep.campaign import Campaign, load_campaign
-from auv_analysis.sweep.folder import SweepFolder
+from auv_analysis.sweep.folder import sweep_folder
 from auv_analysis.sweep.table import table_of
 
 Values = dict[str, np.ndarray]
@@ -77,7 +76,7 @@ def make_sweep(folder: Path, campaign: str, known: Known, blocks: range | None =
     """
     (folder / 'campaign.yaml').write_text(campaign)
     loaded = load_campaign(folder / 'campaign.yaml')
-    with closing(SweepFolder(folder / 'out', loaded, overwrite=False)) as sweep:
+    with sweep_folder(folder / 'out', loaded, overwrite=False) as sweep:
         count = -(-loaded.rollouts // sweep.block)
         for block in blocks if blocks is not None else range(count):
             first = block * sweep.block

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import closing
 from pathlib import Path
 from threading import Lock
 
@@ -11,7 +10,7 @@ import pyarrow.dataset
 
 from auv_analysis.sweep.campaign import load_campaign
 from auv_analysis.sweep.engine import Outcome, sweep
-from auv_analysis.sweep.folder import SweepFolder
+from auv_analysis.sweep.folder import sweep_folder
 
 ROOT = Path(__file__).parents[1]
 SCENARIO = (ROOT / 'config/scenarios/case1.yaml').read_text().replace('30.0', '0.3')
@@ -39,9 +38,16 @@ def write_files(folder: Path) -> Path:
     return folder
 
 
-def run(files: Path, executor: Executor | None = None, out: str = 'out', ahead: int = 4) -> Outcome:
+def run(
+    files: Path,
+    executor: Executor | None = None,
+    out: str = 'out',
+    ahead: int = 4,
+    *,
+    overwrite: bool = False,
+) -> Outcome:
     campaign = load_campaign(files / 'campaign.yaml')
-    with closing(SweepFolder(files / out, campaign, overwrite=False)) as folder:
+    with sweep_folder(files / out, campaign, overwrite=overwrite) as folder:
         return sweep(campaign, folder, executor or ThreadPoolExecutor(2), lambda: ahead)
 
 

@@ -188,7 +188,7 @@ TABLES = {  # what is wrong with the CSV file -> text, key, expected, found
 @pytest.fixture(autouse=True)
 def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fail where the results' folder would be made, which comes before all work."""
-    monkeypatch.setattr(scenarios, 'prepare', lambda *_, **__: pytest.fail('work has begun'))
+    monkeypatch.setattr(scenarios, 'results_folder', lambda *_, **__: pytest.fail('work has begun'))
 
 
 def _cases(table: str) -> list[tuple[str, str, str, str, str]]:

@@ -64,7 +64,7 @@ def test_wrong_environment_is_refused(value: str, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize('where', ['--domain-id', VARIABLE])
 @pytest.mark.parametrize('value', WRONG)
 def test_run_refuses_a_wrong_domain_in_one_line(where, value, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(scenarios, 'prepare', lambda *_, **__: pytest.fail('work has begun'))
+    monkeypatch.setattr(scenarios, 'results_folder', lambda *_, **__: pytest.fail('work has begun'))
     arguments = ['run', 'case1']
     if where == VARIABLE:
         monkeypatch.setenv(VARIABLE, value)

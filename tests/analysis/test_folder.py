@@ -1,53 +1,78 @@
-"""The results' folder: made, refused, and with --overwrite cleared of what is ours and only that.
+"""The results' folder: made, refused, and with --overwrite replaced, as a whole and nothing else.
 
 Whatever a user keeps in or beside it, the recordings and files that a command was given included,
 outlives the command.
 """
 
 import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from auv_analysis import cli
 from auv_analysis.commands import run, simulate
-from auv_analysis.folder import prepare, write_text
-from auv_analysis.new_files import replacing, unfinished_name
+from auv_analysis.failure import FailedError
+from auv_analysis.folder import results_folder
+from auv_analysis.new_files import replacing, unfinished_name, write_text
 from auv_dynamics.config import shipped
 from auv_dynamics.files import InputError
 
-OURS = [
-    'summary.json', 'report.html', 'figures/nu.png', 'scenario.yaml', 'vehicle.yaml', 'gvc.npz',
-    'logs/gvc/plant_node.log', 'gvc/params.yaml', 'gvc/metadata.yaml', 'gvc/gvc_0.mcap',
-    'cl/params.yaml', 'design.json', 'summary_before.json', 'vehicle_before.yaml',
-]  # fmt: skip
+EARLIER = {
+    'summary.json': 'old', 'report.html': 'old', 'figures/nu.png': 'old', 'scenario.yaml': 'old',
+    'logs/gvc/plant_node.log': 'old', 'gvc/params.yaml': 'old', 'gvc/gvc_0.mcap': 'old',
+}  # fmt: skip
+LATER = {'summary.json': 'new', 'figures/tau.png': 'new', 'gvc/gvc_0.mcap': 'new'}
 THEIRS = [
-    'notes.md', 'thesis/chapter.npz', 'thesis/chapter2.npz', 'sea_trial/sea_trial_0.mcap',
-    'sea_trial/metadata.yaml', 'sea_trial.mcap', 'measured.npz', 'params.yaml', '.hidden',
-    '.writable', 'my_vehicle.yaml', 'cl.txt',
+    'notes.md', 'thesis/chapter.npz', 'figures/my_photo.png', 'logs/my.log', 'rawdata/field_0.mcap',
+    'metadata.yaml', 'measured.npz', 'params.yaml', '.hidden', 'my_vehicle.yaml', 'cl.txt',
+    'rollouts/mine.txt', 'unfinished_ideas.txt',
 ]  # fmt: skip
-TEXTS = {  # by which our own samples are known
-    'summary.json': '{"gvc": {}, "cl": {}}\n',
-    'scenario.yaml': 'name: case1\ncontrollers: {gvc: {law: gvc}, cl: {law: cl}}\n',
-}
+OWN = ['gvc/*', 'cl.npz']
 
 
-def fill(folder: Path, names: list[str]) -> None:
-    for name in names:
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(TEXTS.get(name, 'x'))
+def fill(folder: Path, texts: Mapping[str, str]) -> None:
+    for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
 
 
-def tree(folder: Path) -> set[str]:
-    return {str(path.relative_to(folder)) for path in folder.rglob('*') if not path.is_dir()}
+def write(
+    out: Path,
+    texts: Mapping[str, str],
+    *,
+    overwrite: bool = False,
+    end: BaseException | None = None,
+) -> None:
+    """What a command does, which may not come to its end."""
+    with results_folder(out, overwrite=overwrite, own=OWN) as results:
+        fill(results.folder, texts)
+        if end is not None:
+            raise end
 
 
-def refused(out: Path, *, overwrite: bool) -> str:
-    with pytest.raises(InputError) as caught:
-        prepare(out, overwrite=overwrite)
+def tree(folder: Path) -> dict[str, str]:
+    """Text of every file; of the manifest, and of a link, none."""
+    files = {str(path.relative_to(folder)): path for path in folder.rglob('*')}
+    return {
+        name: '' if path.is_symlink() or name == 'manifest.json' else path.read_text()
+        for name, path in files.items()
+        if path.is_symlink() or not path.is_dir()
+    }
+
+
+def refused(out: Path, *, overwrite: bool, **options: Any) -> str:
+    with (
+        pytest.raises(InputError) as caught,
+        results_folder(out, overwrite=overwrite, own=OWN, **options),
+    ):
+        pytest.fail('work has begun')
     line = str(caught.value)
-    assert line.startswith(f'{out}: --out: expected ')
+    assert line.startswith(str(out))
     assert ', found ' in line
     assert len(line.splitlines()) == 1
     return line
@@ -55,41 +80,204 @@ def refused(out: Path, *, overwrite: bool) -> str:
 
 @pytest.mark.parametrize('overwrite', [False, True])
 @pytest.mark.parametrize('there', [False, True])
-def test_new_or_empty_folder_is_made_and_left_empty(overwrite, there, tmp_path) -> None:
+def test_results_of_a_new_or_empty_folder_are_written_in_place(overwrite, there, tmp_path) -> None:
     out = tmp_path / 'runs' / 'case1'
     if there:
         out.mkdir(parents=True)
-    assert prepare(out, overwrite=overwrite) == out
-    assert list(out.iterdir()) == []
+    with results_folder(out, overwrite=overwrite, own=OWN) as results:
+        assert results == (out, out)
+        fill(out, EARLIER)
+    assert tree(out) == {**EARLIER, 'manifest.json': ''}
 
 
 @pytest.mark.parametrize('name', ['summary.json', 'notes.md', '.hidden'])
-def test_folder_with_anything_in_it_is_refused(name: str, tmp_path: Path) -> None:
-    fill(tmp_path, [name])
-    assert '--overwrite' in refused(tmp_path, overwrite=False)
-    assert tree(tmp_path) == {name}
+@pytest.mark.parametrize('overwrite', [False, True])
+def test_folder_that_no_manifest_lists_is_refused(name, overwrite, tmp_path: Path) -> None:
+    fill(tmp_path, {name: 'mine'})
+    assert ('manifest.json' if overwrite else '--overwrite') in refused(
+        tmp_path, overwrite=overwrite
+    )
+    assert tree(tmp_path) == {name: 'mine'}
 
 
-def test_overwrite_clears_our_results(tmp_path: Path) -> None:
-    fill(tmp_path, OURS)
-    prepare(tmp_path, overwrite=True)
-    assert tree(tmp_path) == set()
+FOREIGN = [
+    '{}',
+    '[]',
+    '{"name": "My app"}',
+    'x',
+    '{"files": {"../x": "1"}}',
+    '{"files": {"/x": "1"}}',
+]
 
 
-@pytest.mark.parametrize('name', THEIRS)
-def test_overwrite_keeps_what_is_not_ours(name: str, tmp_path: Path) -> None:
-    fill(tmp_path, [*OURS, name])
-    prepare(tmp_path, overwrite=True)
-    assert name in tree(tmp_path)
+@pytest.mark.parametrize('text', FOREIGN)
+def test_manifest_of_somebody_else_lists_nothing(text: str, tmp_path: Path) -> None:
+    fill(tmp_path, {'out/manifest.json': text, 'x': 'mine'})
+    refused(tmp_path / 'out', overwrite=True)
+    assert (tmp_path / 'x').read_text() == 'mine'
+
+
+def test_overwrite_replaces_what_the_manifest_lists(tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    write(tmp_path, LATER, overwrite=True)
+    assert tree(tmp_path) == {**LATER, 'manifest.json': ''}
+    assert not (tmp_path / 'logs').exists()  # nothing of ours is left in it
+    write(tmp_path, EARLIER, overwrite=True)
+    assert tree(tmp_path) == {**EARLIER, 'manifest.json': ''}
+
+
+def test_overwrite_keeps_what_is_not_ours(tmp_path: Path) -> None:
+    theirs = dict.fromkeys(THEIRS, 'mine')
+    write(tmp_path, EARLIER)
+    fill(tmp_path, theirs)
+    write(tmp_path, LATER, overwrite=True)
+    assert tree(tmp_path) == {**LATER, **theirs, 'manifest.json': ''}
+
+
+def test_file_that_comes_while_a_command_writes_is_not_ours(tmp_path: Path) -> None:
+    write(tmp_path, {**EARLIER, 'notes.md': 'mine'})  # in place: the user writes there as well
+    write(tmp_path, LATER, overwrite=True)
+    assert tree(tmp_path) == {**LATER, 'notes.md': 'mine', 'manifest.json': ''}
+
+
+@pytest.mark.parametrize('name', ['summary.json', 'figures/nu.png', 'gvc/gvc_0.mcap'])
+def test_result_that_has_been_edited_is_kept(name: str, tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    fill(tmp_path, {name: 'edited'})
+    assert name in refused(tmp_path, overwrite=True)
+    assert tree(tmp_path) == {**EARLIER, name: 'edited', 'manifest.json': ''}
+
+
+@pytest.mark.parametrize(
+    'name', ['gvc/notes.md', 'cl.npz', 'tune.json', 'tune.json/x', 'setpoint.csv']
+)
+def test_what_stands_where_a_result_must_go_is_refused(name: str, tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    fill(tmp_path, {name: 'mine'})
+    assert name in refused(tmp_path, overwrite=True)
+    assert tree(tmp_path) == {**EARLIER, name: 'mine', 'manifest.json': ''}
+
+
+def test_figure_of_the_users_in_the_way_of_a_new_one_is_kept_beside_it(tmp_path, capsys) -> None:
+    write(tmp_path, EARLIER)
+    fill(tmp_path, {'figures/tau.png': 'mine'})  # only drawing shows that it is in the way
+    with pytest.raises(FailedError, match=r'tau\.png: expected no such file'):
+        write(tmp_path, LATER, overwrite=True)
+    assert EARLIER.items() <= tree(tmp_path).items()
+    assert (tmp_path / 'figures/tau.png').read_text() == 'mine'
+    left = tmp_path / 'unfinished'
+    assert tree(left) == {**LATER, 'manifest.json': ''}
+    assert str(left) in capsys.readouterr().err
+
+
+def test_folder_with_what_is_read_is_refused(tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    for given in ('gvc', 'gvc/gvc_0.mcap', 'scenario.yaml'):
+        assert given in refused(tmp_path, overwrite=True, inputs=[tmp_path / given])
+    assert tree(tmp_path) == {**EARLIER, 'manifest.json': ''}
 
 
 def test_overwrite_follows_no_link_out_of_the_folder(tmp_path: Path) -> None:
-    fill(tmp_path / 'elsewhere', ['params.yaml', 'x_0.mcap', 'nu.png'])
-    (tmp_path / 'out').mkdir()
-    for name in ('figures', 'gvc'):
-        (tmp_path / 'out' / name).symlink_to(tmp_path / 'elsewhere')
-    prepare(tmp_path / 'out', overwrite=True)
-    assert tree(tmp_path / 'elsewhere') == {'params.yaml', 'x_0.mcap', 'nu.png'}
+    elsewhere, out = tmp_path / 'elsewhere', tmp_path / 'out'
+    write(out, EARLIER)
+    (out / 'figures').rename(elsewhere)
+    (out / 'figures').symlink_to(elsewhere)
+    refused(out, overwrite=True)
+    (out / 'figures').unlink()
+    (out / 'summary.json').rename(elsewhere / 'summary.json')
+    (out / 'summary.json').symlink_to(elsewhere / 'summary.json')
+    refused(out, overwrite=True)
+    assert tree(elsewhere) == {'nu.png': 'old', 'summary.json': 'old'}
+
+
+ENDS = [KeyboardInterrupt(), OSError(28, 'No space left'), InputError('x', '', 'y', 'z')]
+
+
+@pytest.mark.parametrize('end', ENDS)
+def test_command_that_does_not_come_to_its_end_leaves_the_results(end, tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    before = tree(tmp_path)
+    with pytest.raises(type(end)):
+        write(tmp_path, {'summary.json': 'half'}, overwrite=True, end=end)
+    assert tree(tmp_path) == before
+    write(tmp_path, LATER, overwrite=True)
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from auv_analysis.folder import results_folder
+
+with results_folder(Path(sys.argv[1]), overwrite=True) as results:
+    (results.folder / 'summary.json').write_text('half')
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_command_that_is_killed_leaves_the_results(tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    before = tree(tmp_path)
+    subprocess.run([sys.executable, '-c', KILLED, str(tmp_path)], check=False)
+    left = {'unfinished/summary.json': 'half'}
+    assert tree(tmp_path) == {**before, **left}
+    write(tmp_path, LATER, overwrite=True)
+    assert tree(tmp_path) == {**LATER, **left, 'manifest.json': ''}  # no manifest lists it
+
+
+@pytest.mark.parametrize('end', [FailedError('a node ended'), KeyboardInterrupt()])
+def test_recording_is_kept_until_the_next_command_succeeds(end, tmp_path: Path, capsys) -> None:
+    write(tmp_path, EARLIER)
+    for name in ('unfinished', 'unfinished_1'):
+        with pytest.raises(type(end)):
+            write(tmp_path, {'gvc/gvc_0.mcap': 'half'}, overwrite=True, end=end)
+        assert str(tmp_path / name) in capsys.readouterr().err
+        assert tree(tmp_path / name) == {'gvc/gvc_0.mcap': 'half', 'manifest.json': ''}
+        assert EARLIER.items() <= tree(tmp_path).items()
+    fill(tmp_path / 'unfinished_1', {'gvc/gvc_0.mcap': 'recovered'})
+    write(tmp_path, LATER, overwrite=True)
+    assert not (tmp_path / 'unfinished').exists()
+    assert (tmp_path / 'unfinished_1/gvc/gvc_0.mcap').read_text() == 'recovered'
+
+
+def test_new_results_that_are_not_whole_can_be_overwritten(tmp_path: Path) -> None:
+    half = {'gvc/gvc_0.mcap': 'half', 'notes.md': 'mine'}
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path, half, end=KeyboardInterrupt())
+    write(tmp_path, LATER, overwrite=True)
+    assert tree(tmp_path) == {**LATER, 'notes.md': 'mine', 'manifest.json': ''}
+
+
+def test_folder_that_nothing_was_written_into_is_not_left(tmp_path: Path) -> None:
+    with pytest.raises(FailedError), results_folder(tmp_path / 'runs/x', overwrite=False):
+        raise FailedError('no')
+    assert tree(tmp_path) == {}
+    assert not (tmp_path / 'runs').exists()
+
+
+def test_interrupt_of_the_exchange_waits_for_its_end(tmp_path: Path, monkeypatch) -> None:
+    write(tmp_path, EARLIER)
+    replace, calls = Path.replace, []
+
+    def interrupted(path: Path, target: Path) -> Path:
+        calls.append(path)
+        signal.raise_signal(signal.SIGINT)
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, 'replace', interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path, LATER, overwrite=True)
+    assert len(calls) == len(LATER) + 1  # and the manifest
+    assert tree(tmp_path) == {**LATER, 'manifest.json': ''}
+
+
+@pytest.mark.parametrize('overwrite', [False, True])
+def test_folder_that_another_command_writes_into_is_refused(overwrite: bool, tmp_path) -> None:
+    out = tmp_path / 'out'
+    with results_folder(out, overwrite=False, own=OWN):
+        assert 'no other command' in refused(out, overwrite=overwrite)
+        fill(out, EARLIER)
+        assert 'no other command' in refused(out, overwrite=overwrite)
+    write(out, LATER, overwrite=True)
 
 
 def test_no_file_is_written_through_a_link(tmp_path: Path) -> None:
@@ -154,20 +342,7 @@ def test_folder_that_holds_the_inputs_is_refused(command, project, capsys) -> No
     assert '--out: expected ' in lines[0]
 
 
-@pytest.mark.parametrize('left', ['gvc/notes.md', 'gvc'])
-def test_run_refuses_a_folder_in_which_its_bag_has_no_place(left, project, capsys) -> None:
-    # what is not ours stays, so a controller's folder may still be there: said before any work
-    out = project / 'out'
-    fill(out, [left])
-    with pytest.raises(SystemExit) as end:
-        cli.main(['run', str(project / 'scenario.yaml'), '--out', str(out), '--overwrite'])
-    lines = capsys.readouterr().err.splitlines()
-    assert (end.value.code, len(lines)) == (2, 1)
-    assert str(out / 'gvc') in lines[0]
-    assert tree(out) == {left}
-
-
-@pytest.mark.parametrize('name', ['figures', 'logs', 'summary.json', 'report.html', 'vehicle.yaml'])
+@pytest.mark.parametrize('name', ['figures', 'summary.json', 'manifest.json', 'unfinished'])
 def test_controller_may_not_be_named_like_our_files(name, project, capsys) -> None:
     path = project / 'scenario.yaml'
     path.write_text(path.read_text().replace('  gvc: {', f'  {name}: {{'))

@@ -27,7 +27,6 @@ from mcap.stream_reader import breakup_chunk
 
 from auv_analysis.bag import read_bag
 from auv_analysis.cli import main
-from auv_analysis.folder import prepare
 from auv_analysis.recording import BagWriter, Storage
 from auv_analysis.recovery import in_place
 from auv_analysis.recovery.bag import recover
@@ -411,18 +410,6 @@ def test_attachments_are_never_used_as_paths(tmp_path: Path) -> None:
     recover(bag)
     assert '../escape.yaml' in dict(attachments_of(bag / 'bag_0.mcap'))
     assert sorted(p.name for p in tmp_path.rglob('*escape*')) == []
-
-
-def test_overwrite_knows_what_a_repair_leaves(tmp_path: Path) -> None:
-    out = tmp_path / 'out'
-    bag = write_bag(out / 'gvc')
-    (bag / 'params.yaml').write_text('{}')
-    for _ in range(2):
-        cut(bag / 'gvc_0.mcap')
-        recover(bag)
-    (bag / 'gvc_0.mcap.unfinished').write_text('')
-    prepare(out, overwrite=True)
-    assert not bag.exists()
 
 
 def test_memory_does_not_grow_with_the_bag(tmp_path: Path) -> None:

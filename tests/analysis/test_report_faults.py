@@ -12,7 +12,6 @@ from pages import Page
 
 from auv_analysis import cli, simulate, summarize
 from auv_analysis.fault_words import Mark
-from auv_analysis.folder import prepare
 from auv_analysis.report import plotting
 from auv_analysis.report.document import NUMBERS
 from auv_analysis.report.faults import fault_part
@@ -134,14 +133,6 @@ def test_the_section_and_its_sentences_are_on_the_page(folder):
     for words in ('Fault 1 (thruster T3 at 50 %', 'The fault that disturbs gvc most', 'Shaded: '):
         assert words in text.replace('\u00a0', ' '), words
     assert (folder / 'figures' / 'faults.pdf').is_file()
-
-
-def test_a_second_run_clears_what_the_first_left(folder, tmp_path):
-    out = tmp_path / 'out'
-    out.mkdir()
-    (out / 'faults.parquet').write_bytes((folder / 'faults.parquet').read_bytes())
-    prepare(out, overwrite=True)
-    assert not list(out.iterdir())
 
 
 def test_runs_with_other_faults_share_no_section(runs, tmp_path):

@@ -1,7 +1,6 @@
 """The folder of a sweep: gone on with after a stop, refused where something has changed."""
 
 import json
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -9,7 +8,7 @@ from sweeps import CAMPAIGN, ROLLOUTS, ROOT, Counting, Interrupted, parts, run, 
 
 from auv_analysis.sweep.campaign import load_campaign
 from auv_analysis.sweep.engine import SweepStoppedError
-from auv_analysis.sweep.folder import SweepFolder
+from auv_analysis.sweep.folder import sweep_folder
 from auv_dynamics.files import InputError
 
 
@@ -95,12 +94,12 @@ def test_folder_is_refused_when_the_versions_differ(files: Path) -> None:
 
 
 def test_folder_that_another_process_sweeps_into_is_refused(files: Path) -> None:
+    run(files)
     campaign = load_campaign(files / 'campaign.yaml')
-    with closing(SweepFolder(files / 'out', campaign, overwrite=False)):
+    with sweep_folder(files / 'out', campaign, overwrite=False):
         for overwrite in (False, True):
-            with pytest.raises(InputError, match='no other process is sweeping into'):
-                SweepFolder(files / 'out', campaign, overwrite=overwrite)
-    SweepFolder(files / 'out', campaign, overwrite=False).close()
+            with pytest.raises(InputError, match='no other command is writing into'):
+                run(files, overwrite=overwrite)
 
 
 @pytest.mark.parametrize('name', ['notes.md', 'rollouts/part-00000000.parquet', 'rollouts/x'])
@@ -108,12 +107,25 @@ def test_folder_that_is_no_sweep_is_left_alone(name: str, files: Path) -> None:
     theirs = files / 'out' / name
     theirs.parent.mkdir(parents=True)
     theirs.write_text('mine')
-    with pytest.raises(InputError, match='a new folder, or --overwrite'):
-        run(files)
-    campaign = load_campaign(files / 'campaign.yaml')
-    if name.startswith('rollouts'):  # a part without its manifest is not known to be ours
-        with pytest.raises(InputError, match='expected no such file or folder'):
-            SweepFolder(files / 'out', campaign, overwrite=True)
-    else:
-        SweepFolder(files / 'out', campaign, overwrite=True).close()
+    for overwrite, line in ((False, 'a new folder, or --overwrite'), (True, 'manifest.json')):
+        with pytest.raises(InputError, match=line):
+            run(files, overwrite=overwrite)
     assert theirs.read_text() == 'mine'
+
+
+def test_sweep_is_replaced_by_a_whole_one_alone(files: Path) -> None:
+    run(files)
+    before = parts(files / 'out')
+    (files / 'out/rollouts/mine.txt').write_text('mine')
+    text = (files / 'campaign.yaml').read_text()
+    (files / 'campaign.yaml').write_text(text.replace('seed: 11', 'seed: 12'))
+    with pytest.raises(SweepStoppedError):
+        run(files, Interrupted(after=3), overwrite=True, ahead=1)
+    kept = parts(files / 'out/unfinished')
+    assert kept
+    assert parts(files / 'out') == {**before, 'mine.txt': b'mine'}
+    assert run(files, out='out/unfinished').before == 5 * len(kept)  # it goes on by itself
+    whole = parts(files / 'out/unfinished')
+    run(files, overwrite=True)
+    assert parts(files / 'out') == {**whole, 'mine.txt': b'mine'}
+    assert not (files / 'out/unfinished').exists()

@@ -19,7 +19,8 @@ from rclpy.serialization import serialize_message
 
 from auv_analysis import cli, load_scenario
 from auv_analysis.command_line import COMMANDS
-from auv_analysis.folder import MANIFEST
+from auv_analysis.folder import SWEEP
+from auv_analysis.manifest import digest, write_manifest
 from auv_analysis.node_parameters import node_parameters, parameter_file
 from auv_analysis.recording import BagWriter, Storage
 from auv_analysis.schemas import schema_text
@@ -228,13 +229,13 @@ def test_simulate_prints_one_document_and_leaves_its_files(offset, options, fold
     assert summaries['gvc']['samples'] == 6
     results = folder / 'runs' / 'short'
     assert json.loads((results / 'summary.json').read_text()) == summaries
-    left = {'scenario.yaml', 'vehicle.yaml', 'gvc.npz', 'summary.json'}
+    left = {'scenario.yaml', 'vehicle.yaml', 'gvc.npz', 'summary.json', 'manifest.json'}
     report = {'report.html', 'figures', 'numbers.parquet'}
     assert {path.name for path in results.iterdir()} == (left if options else left | report)
 
 
 def test_a_report_of_a_sweep_cannot_be_left_out(folder, capsys) -> None:
-    Path('taken', MANIFEST).write_text('{}')
+    Path('taken', SWEEP).write_text('{}')
     code = _exit_code('analyze', 'taken', '--no-report')
     captured = capsys.readouterr()
     _is_refusal(code, captured.out, captured.err, '--no-report', folder)
@@ -369,9 +370,9 @@ def stopped(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     from auv_analysis.commands import analyze, conclude
 
     asked: list[Path] = []
-    prepare = analyze.prepare
+    made = analyze.results_folder
     monkeypatch.setattr(
-        analyze, 'prepare', lambda out, **options: asked.append(out) or prepare(out, **options)
+        analyze, 'results_folder', lambda out, **options: asked.append(out) or made(out, **options)
     )
     monkeypatch.setattr(conclude, 'summarize', lambda *_, **__: sys.exit(0))
     return asked
@@ -392,6 +393,8 @@ def test_analyze_writes_below_runs_whatever_a_bag_says(text, recording, folder, 
 def test_analyze_keeps_the_bags_that_it_reads(given, out, recording, folder) -> None:
     bag = shutil.copytree(recording(), folder / 'result' / 'gvc')
     (bag / 'params.yaml').write_text(_parameters())
+    files = {str(path.relative_to(folder / 'result')): digest(path) for path in bag.iterdir()}
+    write_manifest(folder / 'result', files)
     before = {path.name: path.read_bytes() for path in bag.iterdir()}
     assert _exit_code('analyze', given, '--out', out, '--overwrite') in (0, 2)
     assert {path.name: path.read_bytes() for path in bag.iterdir()} == before

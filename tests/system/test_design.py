@@ -10,6 +10,7 @@ from auv_analysis import cli
 FILES = {
     'design.json', 'summary.json', 'summary_before.json', 'vehicle.yaml', 'vehicle_before.yaml',
     'scenario.yaml', 'report.html', 'numbers.parquet', 'figures',
+    'manifest.json',
 }  # fmt: skip
 
 

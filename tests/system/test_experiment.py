@@ -22,6 +22,7 @@ from harness import auv, fresh_domain, installed_auv
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
+from auv_analysis.folder import results_folder
 from auv_dynamics import interface
 from auv_dynamics.ending import ENDING
 from auv_dynamics.kinematics import quaternion
@@ -66,7 +67,9 @@ def done(tmp_path_factory) -> Path:
     assert ended.returncode == 0, ended.stderr
     assert json.loads(ended.stdout).keys() == {'gvc', 'cl'}
     assert 'export ROS_DOMAIN_ID=' in ended.stderr
-    options = '--out', str(root / 'two'), '--composed', '--no-report'
+    with results_folder(root / 'two', overwrite=False) as results:
+        (results.folder / 'setpoint.csv').write_text('of an earlier result')
+    options = '--out', str(root / 'two'), '--composed', '--no-report', '--overwrite'
     ended = auv('run', str(scenario), *options)
     assert ended.returncode == 0, ended.stderr
     assert not nodes(root)
@@ -146,6 +149,13 @@ def test_what_a_run_leaves(done: Path) -> None:
     assert parameters['/**/plant_node']['ros__parameters']['lockstep'] is True
 
 
+def test_a_run_that_replaces_another_result_lies_in_its_place(done: Path) -> None:
+    out = done / 'two'
+    left = {'summary.json', 'scenario.yaml', 'vehicle.yaml', 'logs', 'gvc', 'cl', 'manifest.json'}
+    assert {path.name for path in out.iterdir()} == left
+    assert str(out / 'vehicle.yaml') in (out / 'cl' / 'params.yaml').read_text()
+
+
 def test_analyze_and_info_read_what_run_recorded(done: Path, tmp_path: Path) -> None:
     bags = [str(done / name / 'gvc') for name in ('one', 'two')]
     ended = auv('analyze', *bags, '--out', str(tmp_path / 'both'), '--json', '--no-report')
@@ -174,9 +184,12 @@ def test_a_run_can_be_repeated_from_what_it_left(done: Path, tmp_path: Path) -> 
         signal.SIGKILL,
     ],
 )
-def test_ending_auv_ends_its_nodes(tmp_path: Path, how: int) -> None:
-    out = tmp_path / 'out'
-    process = start_installed(write(tmp_path / 's.yaml', duration=600.0), out)
+def test_ending_auv_ends_its_nodes_and_keeps_earlier_results(tmp_path: Path, how: int) -> None:
+    with results_folder(tmp_path / 'out', overwrite=False) as results:
+        (results.folder / 'summary.json').write_text('earlier')
+    out = tmp_path / 'out' / 'unfinished'
+    scenario = write(tmp_path / 's.yaml', duration=600.0)
+    process = start_installed(scenario, results.out, '--overwrite')
     node_of(out, 'plant_node')
     policies = {name: os.sched_getscheduler(node.pid) for name, node in nodes(out).items()}
     process.send_signal(how)
@@ -191,6 +204,7 @@ def test_ending_auv_ends_its_nodes(tmp_path: Path, how: int) -> None:
         time.sleep(0.05)
     notes = ' '.join(load_run(out / 'gvc').notes)
     assert 'not finished' not in notes, 'the recorder has closed its bag'
+    assert (results.out / 'summary.json').read_text() == 'earlier'
 
 
 @pytest.mark.long

@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -15,7 +15,7 @@ from auv_analysis.cli import main
 from auv_analysis.sweep.campaign import load_campaign
 from auv_analysis.sweep.engine import sweep
 from auv_analysis.sweep.executors import opened
-from auv_analysis.sweep.folder import SweepFolder
+from auv_analysis.sweep.folder import sweep_folder
 from auv_dynamics.files import InputError
 
 pytest.importorskip('distributed')
@@ -97,7 +97,7 @@ def test_rows_are_the_same_when_a_worker_is_killed_half_way(cluster, files: Path
     progress = killing(workers[0], after=ROLLOUTS // 2)
     with (
         opened('dask', address, None) as (executor, in_flight),
-        closing(SweepFolder(files / 'dask', campaign, overwrite=False)) as folder,
+        sweep_folder(files / 'dask', campaign, overwrite=False) as folder,
     ):
         assert in_flight() == 4
         outcome = sweep(campaign, folder, executor, in_flight, progress)
@@ -120,7 +120,7 @@ def test_sweep_is_stopped_on_dask_and_finished_with_threads(cluster, files, monk
 
     with (
         opened(None, address, None) as (executor, in_flight),
-        closing(SweepFolder(files / 'out', campaign, overwrite=False)) as folder,
+        sweep_folder(files / 'out', campaign, overwrite=False) as folder,
         pytest.raises(RuntimeError, match='interrupted'),
     ):
         sweep(campaign, folder, executor, in_flight, interrupt)

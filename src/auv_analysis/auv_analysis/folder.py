@@ -1,18 +1,43 @@
-"""The folder of a run's results: made, checked and, when asked, cleared of what we left there."""
+"""The folder of a command's results: locked, listed in a manifest, replaced only as a whole."""
 
-import json
+import fcntl
 import os
 import re
 import shutil
+import signal
 import tempfile
-from collections.abc import Iterable
-from pathlib import Path
-from typing import Any
+import threading
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from fnmatch import fnmatchcase
+from itertools import count
+from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
-from auv_dynamics.files import InputError, read_yaml, reason
+from auv_analysis.console import say
+from auv_analysis.failure import FailedError
+from auv_analysis.manifest import (
+    MANIFEST,
+    Signature,
+    digest,
+    discard,
+    has_links,
+    listed_in,
+    paths_in,
+    remove,
+    remove_empty,
+    signature,
+    write_manifest,
+)
+from auv_dynamics.files import InputError, reason
 
-OURS = (
-    'summary.json', 'report.html', 'numbers.parquet', 'figures', 'logs', 'scenario.yaml',
+STAGING = 'unfinished'  # folder of a result that is to replace another one
+SWEEP, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep
+PART = re.compile(r'part-(\d{8})\.parquet')
+REPORT, SUMMARY = 'report.html', 'summary.json'
+SHARED = ('figures', 'logs')  # folders of ours in which a user's files may lie as well
+NAMES = (
+    MANIFEST, SUMMARY, REPORT, *SHARED, 'numbers.parquet', 'scenario.yaml',
     'vehicle.yaml', 'setpoint.csv', 'claims.parquet', 'sensitivity.parquet', 'unknowns.parquet',
     'unknowns_claims.parquet', 'energy_window.parquet', 'comparison.parquet', 'comparison.csv',
     'atlas.json', 'atlas.parquet', 'analysis.json', 'quantiles.parquet', 'influence.parquet',
@@ -21,131 +46,224 @@ OURS = (
     'vehicle_before.yaml',
     'tune.json', 'search.parquet', 'monte_carlo.parquet', 'open_loop.json', 'check.json',
     'samples.parquet', 'wrenches.parquet', 'faults.parquet', 'linearization.json',
+    SWEEP, CAMPAIGN,
 )  # fmt: skip
-OURS_IN_RUN = ('params.yaml', 'metadata.yaml')
-OF_A_BAG = re.compile(r'.*\.mcap(\.damaged(\.\d+)?)?')
-MANIFEST, CAMPAIGN, ROLLOUTS = 'sweep.json', 'campaign.yaml', 'rollouts'  # of a sweep
-PART = re.compile(r'part-(\d{8})\.parquet')
-UNFINISHED = '.unfinished'  # ends the name of a file that is being written
 
 
-def prepare(
-    out: Path, *, overwrite: bool, inputs: Iterable[Path] = (), new: Iterable[str] = ()
-) -> Path:
-    """Make an empty folder for results.
+class Results(NamedTuple):
+    """Where results go.
+
+    Attributes
+    ----------
+    folder : to write into
+    out : where they lie in the end: the same folder where it was new
+
+    """
+
+    folder: Path
+    out: Path
+
+
+@contextmanager
+def results_folder(
+    out: Path,
+    *,
+    overwrite: bool,
+    own: Sequence[str] = (),
+    inputs: Iterable[Path] = (),
+    begun: bool = False,
+) -> Iterator[Results]:
+    """Folder for results, locked, with a manifest at the end.
+
+    New results are written in place. Those that replace others are written into a folder beside
+    them, and take their place when they are whole: a command that fails, is interrupted or killed
+    leaves the earlier ones as they were. Only files that the manifest lists are ever removed.
 
     Parameters
     ----------
     out : the folder
-    overwrite : clear it of earlier results; anything else in it stays where it is
-    inputs : files that the command reads, which must not be cleared away
-    new : names in the folder that must be free afterwards
+    overwrite : replace the results in it
+    own : patterns of paths in it, beside `NAMES`, that the command writes
+    inputs : files and folders that the command reads, which must not be replaced
+    begun : go on with what is there
 
     Raises
     ------
-    InputError : it exists, is no folder, cannot be written or holds an input
+    InputError : it exists, is in use, is no folder, cannot be written, holds an input, or
+        something that the manifest does not list, or that has changed, is in the way
 
     """
+    made = _make(out)
+    with _locked(out):
+        try:
+            old = {} if begun else _replaceable(out, own, inputs, overwrite=overwrite)
+        except InputError:
+            remove_empty(made)
+            raise
+        folder = _staging(out) if old else out
+        try:
+            yield Results(folder, out)
+            files = {path: digest(folder / path) for path in _written(folder, out, own)}
+            if folder != out:
+                _swap(folder, out, old, files)
+            else:
+                write_manifest(out, files)
+        except BaseException as error:
+            with suppress(OSError):
+                _give_up(folder, out, own, error)
+                remove_empty(made)
+            raise
+        _say_where(out)
+
+
+def check_free(out: Path, *, overwrite: bool) -> None:
+    """Refuse, before any work, a folder of results that must not be replaced."""
+    if out.is_dir():
+        _replaceable(out, (), (), overwrite=overwrite)
+
+
+def _make(out: Path) -> list[Path]:
+    """Make a folder and see that it can be written; those that were not there, innermost first."""
     try:
-        if check_free(out, overwrite=overwrite):
-            _clear(out, [path.resolve() for path in inputs], new)
+        missing = [path for path in (out, *out.parents) if not path.exists()]
         out.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=out).close()
     except OSError as error:
         found = reason(error)
         raise InputError(out, '--out', 'a folder that can be written', found) from None
-    return out
+    return missing
 
 
-def check_free(out: Path, *, overwrite: bool) -> bool:
-    """Whether a folder has something in it; InputError where that must not be overwritten."""
+@contextmanager
+def _locked(out: Path) -> Iterator[None]:
+    """Lock a folder as long as this lasts or the process lives, where the file system can."""
+    handle = os.open(out, os.O_RDONLY)
     try:
-        taken = out.is_dir() and any(out.iterdir())
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            expected = 'a folder that no other command is writing into'
+            raise InputError(out, '--out', expected, 'one in use') from None
+        except OSError:
+            pass
+        yield
+    finally:
+        os.close(handle)
+
+
+def _replaceable(
+    out: Path, own: Sequence[str], inputs: Iterable[Path], *, overwrite: bool
+) -> dict[str, Signature]:
+    """Files of the results that may be replaced; none where the folder is empty."""
+    try:
+        if not any(out.iterdir()):
+            return {}
     except OSError as error:
         found = reason(error)
         raise InputError(out, '--out', 'a folder that can be written', found) from None
-    if taken and not overwrite:
+    if not overwrite:
         raise InputError(out, '--out', 'a new folder, or --overwrite', 'an existing folder')
-    return taken
-
-
-def write_text(path: Path, text: str, *, overwrite: bool) -> None:
-    """Write a file that was asked for; InputError where it exists or cannot be written."""
-    try:
-        if os.path.lexists(path) and not overwrite:
-            raise InputError(path, '--out', 'a new file, or --overwrite', 'an existing file')
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open('w' if overwrite else 'x', encoding='utf-8') as file:
-            file.write(text)
-    except OSError as error:
-        found = reason(error)
-        raise InputError(path, '--out', 'a file that can be written', found) from None
-
-
-def write_json(path: Path, document: Any) -> None:
-    """Write a document as `--json` prints it, for people: indented; NaN is a ValueError."""
-    text = json.dumps(document, indent=2, allow_nan=False)
-    path.write_text(text + '\n', encoding='utf-8')
-
-
-def _clear(out: Path, inputs: list[Path], new: Iterable[str]) -> None:
-    samples = _samples(out)
-    ours = [
-        entry
-        for entry in out.iterdir()
-        if entry.name in OURS
-        or entry.name in samples
-        or (entry.is_dir() and _is_run(entry))
-        or _is_of_sweep(entry)
-    ]
-    for entry in ours:
-        for path in inputs:
-            if path.is_relative_to(entry.resolve()):
-                expected = 'a folder that does not hold what is read'
-                raise InputError(out, '--out', expected, str(path))
-    left = {entry.name for entry in out.iterdir()} - {entry.name for entry in ours}
-    for name in new:
-        if name in left:
-            raise InputError(out / name, '--out', 'no such file or folder', 'what is not ours')
-    # a sweep's manifest goes last: without it, its parts would be taken for somebody else's
-    for entry in sorted(ours, key=lambda entry: entry.name == MANIFEST):
-        _remove(entry)
-
-
-def _samples(out: Path) -> set[str]:
-    """Names of the sample files of `auv simulate`: its summary and scenario list the runs."""
-    names: set[str] = set()
-    for file, key in (('summary.json', None), ('scenario.yaml', 'controllers')):
-        try:
-            data = read_yaml(out / file, 'results')
-            names.update(data[key] if key else data)
-        except (OSError, ValueError, TypeError, KeyError):
+    listed = listed_in(out)
+    if listed is None:
+        expected = f'a new folder, or results whose {MANIFEST} says what may be replaced'
+        raise InputError(out, '--out', expected, 'files that none lists')
+    read = [path.resolve() for path in inputs]
+    old = {}
+    for name, known in listed.items():
+        path = out / name
+        if not os.path.lexists(path):
             continue
-    return {f'{name}{ending}' for name in names for ending in ('.npz', '.parquet')}
+        if has_links(out, name) or not path.is_file() or digest(path) != known:
+            raise InputError(path, '--out', 'the file as it was written', 'one that has changed')
+        for given in read:
+            if path.resolve().is_relative_to(given):
+                expected = 'a folder that does not hold what is read'
+                raise InputError(out, '--out', expected, str(given))
+        old[name] = signature(path)
+    for name in paths_in(out):
+        top, inside, _ = name.partition('/')
+        if name not in listed and _is_own(name, own) and not (top in SHARED and inside):
+            raise InputError(out / name, '--out', 'no such file or folder', 'what is not ours')
+    return old
 
 
-def _is_run(folder: Path) -> bool:
-    names = [entry.name for entry in folder.iterdir()]
-    # params.yaml is written before anything else: without it the bag is somebody else's
-    return 'params.yaml' in names and all(_is_ours_in_run(name) for name in names)
+def _is_own(name: str, own: Sequence[str]) -> bool:
+    first = [pattern.partition('/')[0] for pattern in own]
+    return (
+        name.partition('/')[0] in NAMES
+        or any(fnmatchcase(name, pattern) for pattern in own)
+        or any('/' not in name and fnmatchcase(name, top) for top in first)
+    )
 
 
-def _is_ours_in_run(name: str) -> bool:
-    name = name.removesuffix(UNFINISHED)
-    return name in OURS_IN_RUN or OF_A_BAG.fullmatch(name) is not None
+def _written(folder: Path, out: Path, own: Sequence[str]) -> list[str]:
+    """Files that a command has written: in a new folder beside the results all that is there."""
+    mine = [name for name in paths_in(folder) if folder != out or _is_own(name, own)]
+    return [name for name in sorted(mine) if name != MANIFEST and not has_links(folder, name)]
 
 
-def _is_of_sweep(entry: Path) -> bool:
-    if not (entry.parent / MANIFEST).is_file():
-        return False
-    if entry.name == ROLLOUTS and entry.is_dir():
-        names = [part.name for part in entry.iterdir()]
-        return all(PART.fullmatch(name) or name.endswith(UNFINISHED) for name in names)
-    return entry.name in (MANIFEST, CAMPAIGN)
+def _staging(out: Path) -> Path:
+    """A new folder beside the results that are to be replaced."""
+    for i in count():
+        folder = out / (f'{STAGING}_{i}' if i else STAGING)
+        with suppress(FileExistsError):
+            folder.mkdir()
+            break
+    return folder
 
 
-def _remove(entry: Path) -> None:
-    if entry.is_dir() and not entry.is_symlink():
-        shutil.rmtree(entry)
-    else:
-        os.unlink(entry)
+def _swap(staging: Path, out: Path, old: dict[str, Signature], files: Mapping[str, str]) -> None:
+    """Put whole results in the place of others, which have not changed since they were checked."""
+    for name in files:
+        way = [out / parent for parent in PurePosixPath(name).parents]
+        there = os.path.lexists(out / name)
+        mine = name in old and there and signature(out / name) == old[name]
+        if has_links(out, name) or (there and not mine) or any(p.is_file() for p in way):
+            raise FailedError(f'{out / name}: expected no such file, found what is not ours')
+    with _undisturbed():
+        for name in files:
+            (out / name).parent.mkdir(parents=True, exist_ok=True)
+            (staging / name).replace(out / name)
+        remove(out, [name for name in old if name not in files and name != MANIFEST])
+        write_manifest(out, files)
+        shutil.rmtree(staging)
+        for left in out.glob(f'{STAGING}*'):
+            discard(left)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Let Ctrl-C wait for the end of this."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    asked: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if asked:
+        raise KeyboardInterrupt
+
+
+def _give_up(folder: Path, out: Path, own: Sequence[str], error: BaseException) -> None:
+    """List what a command that failed has left; drop of a replacement what is no use."""
+    failed = isinstance(error, FailedError | ArithmeticError)
+    recorded = any(any(folder.rglob(kind)) for kind in ('*.mcap*', 'part-*.parquet'))
+    if folder != out and not recorded and not (failed and (folder / SUMMARY).is_file()):
+        shutil.rmtree(folder)
+        return
+    if files := _written(folder, out, own):
+        write_manifest(folder, {name: digest(folder / name) for name in files})
+        _say_where(folder)
+    if folder != out:
+        say(f'{out}: the earlier results stay; what there is of the new ones: {folder}')
+
+
+def _say_where(folder: Path) -> None:
+    """Say where results lie: the page, or the summary alone where there is none."""
+    for kind, name in (('report', REPORT), ('summary', SUMMARY)):
+        if (folder / name).is_file():
+            say(f'{kind}: {folder / name}')
+            return

@@ -1,13 +1,15 @@
 """Files that are made anew: no link is followed, and a file is there as a whole or as it was."""
 
 import contextlib
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
-from auv_analysis.folder import UNFINISHED
+from auv_dynamics.files import InputError, reason
 
+UNFINISHED = '.unfinished'  # ends the name of a file that is being written
 NEW = os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_WRONLY | os.O_CLOEXEC
 
 
@@ -58,3 +60,45 @@ def sync_folder(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+
+
+def write_text(path: Path, text: str, *, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
+    """Write a file that was asked for, as a whole or not at all; a link is replaced itself.
+
+    Raises
+    ------
+    InputError : it exists, is no file, is one of the inputs or cannot be written
+
+    """
+    check_file(path, overwrite=overwrite, inputs=inputs)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write(path, text.encode())
+    except OSError as error:
+        found = reason(error)
+        raise InputError(path, '--out', 'a file that can be written', found) from None
+
+
+def check_file(path: Path, *, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
+    """Refuse a file that must not be written, before any work."""
+    if not os.path.lexists(path):
+        return
+    if not overwrite:
+        raise InputError(path, '--out', 'a new file, or --overwrite', 'an existing file')
+    if not path.is_symlink() and not path.is_file():
+        raise InputError(path, '--out', 'a file that can be replaced', 'what is no file')
+    for given in inputs:
+        if given.resolve() == path.resolve():
+            raise InputError(path, '--out', 'another file than the one that is read', str(given))
+
+
+def write_json(path: Path, document: Any) -> None:
+    """Write a document as `--json` prints it, for people: indented; NaN is a ValueError."""
+    text = json.dumps(document, indent=2, allow_nan=False)
+    path.write_text(text + '\n', encoding='utf-8')
+
+
+def write(path: Path, contents: Any) -> None:
+    """Write a file so that it is there as a whole or not at all, whatever ends the process."""
+    with replacing(path, path.with_name(f'.{path.name}{UNFINISHED}')) as file:
+        file.write(contents)

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.folder import OURS
+from auv_analysis.folder import NAMES, ROLLOUTS, STAGING
 from auv_dynamics.config import shipped_by_name
 from auv_dynamics.files import InputError
 
@@ -32,7 +32,7 @@ def resolved(data: dict[str, Any]) -> dict[str, Any]:
 def check_names(data: dict[str, Any], path: Path) -> None:
     """Refuse a controller whose results would take the place of our own files."""
     for name in data['controllers']:
-        if name in OURS:
+        if name in (*NAMES, STAGING, ROLLOUTS):
             expected = 'names that are not those of our own files'
             raise InputError(path, 'controllers', expected, name)
 

@@ -25,6 +25,7 @@ from auv_analysis.design.statements import (
     warnings_of,
 )
 from auv_analysis.design.words import change_words
+from auv_analysis.folder import Results
 from auv_dynamics import InputError, load_vehicle
 from auv_dynamics.config import shipped
 
@@ -61,7 +62,8 @@ def short(tmp_path):
 def designed(vehicle, tmp_path, scenario=None, reduce=None, own=()):
     out = tmp_path / 'out'
     out.mkdir()
-    return concluded(propose(open_setting(vehicle, scenario, own), reduce), out), out
+    found = propose(open_setting(vehicle, scenario, own), reduce)
+    return concluded(found, Results(out, out)), out
 
 
 def by_name(document):

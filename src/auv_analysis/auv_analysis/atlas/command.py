@@ -6,7 +6,7 @@ from typing import Any
 
 from auv_analysis.atlas.collect import charts, write_atlas
 from auv_analysis.console import say
-from auv_analysis.folder import check_free, prepare
+from auv_analysis.folder import results_folder
 from auv_analysis.progress import waiting
 from auv_dynamics.config import shipped, shipped_names
 from auv_dynamics.files import InputError
@@ -22,18 +22,16 @@ def atlas(options: argparse.Namespace) -> dict[str, Any]:
     known = [] if options.only else shipped_names('vehicles')
     vehicles = [*known, *(vehicle for vehicle in given if vehicle not in known)]
     out = options.out or FOLDER
-    check_free(out, overwrite=options.overwrite)
-    with waiting(f'case 1 on {len(vehicles)} vehicles'):
-        found = charts(vehicles)
     files = [shipped('vehicles', vehicle) for vehicle in vehicles]
-    prepare(out, overwrite=options.overwrite, inputs=files)
-    document = write_atlas(found, out)
-    from auv_analysis.atlas.figures import draw  # with matplotlib, which loads slowly
-    from auv_analysis.atlas.report import findings, write_report
+    with results_folder(out, overwrite=options.overwrite, inputs=files) as results:
+        with waiting(f'case 1 on {len(vehicles)} vehicles'):
+            found = charts(vehicles)
+        document = write_atlas(found, results.folder)
+        from auv_analysis.atlas.figures import draw  # with matplotlib, which loads slowly
+        from auv_analysis.atlas.report import findings, write_report
 
-    with waiting('drawing figures, writing the report'):
-        report = write_report(out, found, draw(found, out / 'figures'))
-    for sentence in findings(found):
-        say(sentence.text)
-    say(f'report: {report}')
+        with waiting('drawing figures, writing the report'):
+            write_report(results.folder, found, draw(found, results.folder / 'figures'))
+        for sentence in findings(found):
+            say(sentence.text)
     return document

@@ -2,13 +2,14 @@
 
 import argparse
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 from auv_analysis.commands.conclude import conclude
 from auv_analysis.comparison.opening import named, open_source
 from auv_analysis.comparison.sources import Source, is_sweep, sources_of
-from auv_analysis.folder import check_free, prepare
+from auv_analysis.folder import Results, check_free, results_folder
 from auv_analysis.foreign.mapping import OPTIONS, TopicMap, read_mapping
 from auv_analysis.progress import waiting
 from auv_dynamics.files import InputError
@@ -63,11 +64,12 @@ def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, An
             opened.append(open_source(source, options.vehicle))
     pairs = [(source, entry.run) for source, entry in zip(sources, opened, strict=True)]
     names = named(pairs, join='_')
-    out = _prepared([entry.run.scenario for entry in opened], sources, options)
     runs = dict(zip(names, (entry.run for entry in opened), strict=True))
     scenario_texts = dict(zip(names, (entry.scenario_text for entry in opened), strict=True))
     vehicle_texts = dict(zip(names, (entry.vehicle_text for entry in opened), strict=True))
-    return conclude(out, runs, scenario_texts, vehicle_texts, report=not options.no_report)
+    report = not options.no_report
+    with _folder([entry.run.scenario for entry in opened], sources, options) as results:
+        return conclude(results.folder, runs, scenario_texts, vehicle_texts, report=report)
 
 
 def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
@@ -75,13 +77,13 @@ def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, A
 
     with waiting(f'reading {len(sources)} runs'):
         entries = entries_of(sources, options.vehicle)
-    out = _prepared([entry.scenario for entry in entries], sources, options)
-    return conclude_comparison(out, entries, report=not options.no_report)
+    with _folder([entry.scenario for entry in entries], sources, options) as results:
+        return conclude_comparison(results.folder, entries, report=not options.no_report)
 
 
-def _prepared(
+def _folder(
     scenarios: Sequence[str], sources: Sequence[Source], options: argparse.Namespace
-) -> Path:
+) -> AbstractContextManager[Results]:
     """Folder of the results, only now that all has been read."""
     names = list(dict.fromkeys(scenarios))
     name = '_'.join(names)
@@ -90,4 +92,4 @@ def _prepared(
     files = [file for source in sources for file in source.files]
     files += [Path(options.map)] if options.map else []
     out = options.out or Path('runs') / f'analyze_{name}'
-    return prepare(out, overwrite=options.overwrite, inputs=files)
+    return results_folder(out, overwrite=options.overwrite, inputs=files)

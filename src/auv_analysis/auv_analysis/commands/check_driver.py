@@ -22,7 +22,7 @@ from auv_analysis.driver_check.plan import SPEED, plan_of
 from auv_analysis.driver_check.settings import Settings
 from auv_analysis.driver_check.terminal import findings_table
 from auv_analysis.failure import FailedError
-from auv_analysis.folder import check_free, prepare
+from auv_analysis.folder import check_free, results_folder
 from auv_analysis.progress import bar, waiting
 from auv_dynamics import interface, load_vehicle
 from auv_dynamics.config import shipped
@@ -121,10 +121,11 @@ def _conclude(options: argparse.Namespace, result: Result) -> dict[str, Any]:
         from auv_analysis.driver_check.report import write_results  # matplotlib loads slowly
 
         inputs = [shipped('vehicles', options.vehicle)] if options.vehicle else []
-        prepare(options.out, overwrite=options.overwrite, inputs=inputs)
-        with waiting('drawing figures, writing the report'):
-            report = write_results(options.out, result, document)
-        say(f'report: {report}')
+        with (
+            results_folder(options.out, overwrite=options.overwrite, inputs=inputs) as results,
+            waiting('drawing figures, writing the report'),
+        ):
+            write_results(results.folder, result, document)
     failure = failure_of(result.findings)
     if failure:
         raise FailedError(failure, document)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 from auv_analysis.authority import beyond_authority
 from auv_analysis.commands.terminal import comparison_table, summary_tables
 from auv_analysis.console import say
-from auv_analysis.folder import write_json
+from auv_analysis.new_files import write_json
 from auv_analysis.progress import console, waiting
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
@@ -34,9 +34,8 @@ class Study(Protocol):
 
 
 class Outcome(NamedTuple):
-    """Runs that came to their end, the folder that they lie in, and the failure of another one."""
+    """Runs that came to their end, and the failure of another one."""
 
-    out: Path
     runs: Mapping[str, AnyRun]
     failure: Exception | None
 
@@ -75,7 +74,7 @@ def conclude(
     *,
     report: bool = True,
 ) -> dict[str, Any]:
-    """Write summary and report, show the tables; returns the summaries.
+    """Write summary and report, show the tables.
 
     Parameters
     ----------
@@ -85,28 +84,25 @@ def conclude(
     study : what the report has beside the runs, made from their summaries
     report : whether there is a report, with its figures
 
+    Returns
+    -------
+    summaries : name -> summary
+
     """
     windows = study.windows if study else ()
     with waiting('computing the figures of summary.json'):
         summaries = {name: summarize(run, windows=windows) for name, run in runs.items()}
         shown = sketches(runs) if report or len(runs) > 1 else {}
     write_json(out / 'summary.json', summaries)
-    page = None
     if report:
-        page = _report(out, runs, shown, summaries, scenario_text, vehicle_text, study)
+        _report(out, runs, shown, summaries, scenario_text, vehicle_text, study)
     for sentence in verdict(shown, summaries):
         say(sentence)
     console.print(summary_tables(summaries))
     for name, run in runs.items():
         for remark in beyond_authority(run.vehicle, summaries[name]['effort']['max']):
             say(f'note: {name}: {remark}')
-    say_where(out, page)
     return summaries
-
-
-def say_where(out: Path, page: Path | None) -> None:
-    """Say where the results lie: the page, or the summary alone where there is none."""
-    say(f'report: {page}' if page else f'summary: {out / "summary.json"}')
 
 
 def _report(
@@ -117,7 +113,7 @@ def _report(
     scenario_text: str | dict[str, str],
     vehicle_text: str | dict[str, str],
     study: Study | None,
-) -> Path:
+) -> None:
     # with matplotlib, which loads slowly
     from auv_analysis.report.faults import fault_part
     from auv_analysis.report.page import write_report
@@ -130,7 +126,7 @@ def _report(
         more['more'] = {**behind, 'tracking': [section, *behind.get('tracking', ())]}
         more['sentences'] = [*sentences, *more.get('sentences', ())]
     with waiting('drawing figures, writing the report'):
-        return write_report(out, shown, summaries, scenario_text, vehicle_text, **more)
+        write_report(out, shown, summaries, scenario_text, vehicle_text, **more)
 
 
 def show(summaries: Mapping[str, Mapping[str, Any]]) -> None:

@@ -12,7 +12,7 @@ from auv_analysis.design.printed import print_design
 from auv_analysis.design.proposal import Proposal, propose
 from auv_analysis.design.result import concluded
 from auv_analysis.design.setting import Setting, open_setting
-from auv_analysis.folder import prepare
+from auv_analysis.folder import results_folder
 from auv_analysis.progress import bar, count, waiting
 from auv_analysis.scaling import UNFIT
 from auv_analysis.warm_up import announce
@@ -29,24 +29,20 @@ def design(options: argparse.Namespace) -> dict[str, Any]:
     if options.reduce is not None:
         coupling_named(options.reduce, present(setting.space.vehicle))
     name = UNFIT.sub('_', setting.space.vehicle.name)[:LONGEST]
-    out = prepare(
-        options.out or Path('runs') / f'design_{name}',
-        overwrite=options.overwrite,
-        inputs=setting.inputs,
-    )
-    for warning in setting.scenario.warnings:
-        say(f'warning: {warning}')
-    announce(setting.scenario, [setting.controller])
-    found = _found(setting, options.reduce)
-    with waiting('simulating the vehicle before and after'):
-        result = concluded(found, out)
-    from auv_analysis.design.report import write_design_report  # with matplotlib, which is slow
+    out = options.out or Path('runs') / f'design_{name}'
+    with results_folder(out, overwrite=options.overwrite, inputs=setting.inputs) as results:
+        for warning in setting.scenario.warnings:
+            say(f'warning: {warning}')
+        announce(setting.scenario, [setting.controller])
+        found = _found(setting, options.reduce)
+        with waiting('simulating the vehicle before and after'):
+            result = concluded(found, results)
+        from auv_analysis.design.report import write_design_report  # with matplotlib, which is slow
 
-    with waiting('drawing figures, writing the report'):
-        report = write_design_report(result, out)
-    if not options.json:
-        print_design(result.document)
-    say(f'report: {report}')
+        with waiting('drawing figures, writing the report'):
+            write_design_report(result, results.folder)
+        if not options.json:
+            print_design(result.document)
     return result.document
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.bag import open_bag
+from auv_analysis.new_files import check_file
 from auv_analysis.rerun_export import export, library
-from auv_dynamics.files import InputError
 from auv_dynamics.printable import printable
 
 
@@ -15,8 +15,7 @@ def export_rerun(options: argparse.Namespace) -> dict[str, Any]:
     library()  # before anything is read
     bag = Path(options.bag)
     out = options.out or bag.with_suffix('.rrd')
-    if out.exists() and not options.overwrite:
-        raise InputError(out, '--out', 'a new file, or --overwrite', 'an existing file')
+    check_file(out, overwrite=options.overwrite, inputs=[bag])
     run = open_bag(bag).run
     samples = export(run, out)
     if not options.json:

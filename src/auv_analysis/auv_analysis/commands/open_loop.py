@@ -10,7 +10,8 @@ from rich.table import Table
 from auv_analysis.bag.attached import UNKNOWN
 from auv_analysis.console import say
 from auv_analysis.failure import FailedError
-from auv_analysis.folder import check_free, prepare, write_json
+from auv_analysis.folder import check_free, results_folder
+from auv_analysis.new_files import write_json
 from auv_analysis.progress import bar, console, count, waiting
 from auv_analysis.replay.compared import (
     Compared,
@@ -44,11 +45,7 @@ def answered(options: argparse.Namespace) -> dict[str, Any]:
     known = own.law != UNKNOWN
     verdict = _verdict(recorded, known)
     both = compared(recorded, answers)
-    out = prepare(
-        options.out or _folder(recorded, options.law),
-        overwrite=options.overwrite,
-        inputs=[options.bag],
-    )
+    out = options.out or _folder(recorded, options.law)
     sentence = verdict.sentence() if verdict else UNCHECKED
     document = {
         'reproduced': verdict.holds if verdict else None,
@@ -65,8 +62,11 @@ def answered(options: argparse.Namespace) -> dict[str, Any]:
         'not_used': answers.refused,
         'notes': [*recorded.notes, *answers.notes, *_remarks(answers)],
     }
-    write_json(out / DOCUMENT, document)
-    _conclude(document, both, out)
+    with results_folder(out, overwrite=options.overwrite, inputs=[options.bag]) as results:
+        write_json(results.folder / DOCUMENT, document)
+        figure = _draw(document, both, results.folder)
+    _show(document)
+    say(f'figure: {out / figure.relative_to(results.folder)}')
     if verdict and not verdict.holds:
         raise FailedError(f'{options.bag}: {sentence}', document)
     return document
@@ -120,15 +120,19 @@ def _remarks(answers: OpenLoop) -> list[str]:
     return [f'{answers.refused} messages without an answer of the law; first: {answers.trouble}']
 
 
-def _conclude(document: dict[str, Any], both: Compared, out: Path) -> None:
-    """Say whether the recorded law is reproduced, draw, and show the figures."""
+def _draw(document: dict[str, Any], both: Compared, out: Path) -> Path:
     from auv_analysis.replay.pictures import draw  # with matplotlib, which loads slowly
 
-    say(document['reproduction'])
-    law, wrench = document['answered']['law'], document['wrench']
+    law = document['answered']['law']
     names = f'recorded ({document["recorded"]["law"] or "unknown law"})', f'{law}, open loop'
     with waiting('drawing the figure'):
-        figure = draw(both, names, document['reproduction'], out / 'figures')
+        return draw(both, names, document['reproduction'], out / 'figures')
+
+
+def _show(document: dict[str, Any]) -> None:
+    """Say whether the recorded law is reproduced, and show the figures."""
+    say(document['reproduction'])
+    law, wrench = document['answered']['law'], document['wrench']
     table = Table(box=None, header_style='bold')
     table.add_column('')
     for head in ('recorded\nrms', 'max', f'{law}\nrms', 'max', 'difference\nrms', 'max'):
@@ -143,4 +147,3 @@ def _conclude(document: dict[str, Any], both: Compared, out: Path) -> None:
     console.print(table)
     for note in document['notes']:
         say(f'note: {note}')
-    say(f'figure: {figure}')

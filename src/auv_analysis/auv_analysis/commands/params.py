@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.console import say
-from auv_analysis.folder import write_text
+from auv_analysis.new_files import write_text
 from auv_analysis.node_parameters import CONTROLLER, node_parameters, parameter_file
 from auv_analysis.replay.recorded_controller import recorded_settings
 from auv_analysis.scenario import load_scenario
@@ -36,7 +36,7 @@ def params(options: argparse.Namespace) -> dict[str, Any]:
         parameters, f'auv params {scenario.name} --controller {options.controller}'
     )
     if options.out is not None:
-        write_text(options.out, text, overwrite=options.overwrite)
+        write_text(options.out, text, overwrite=options.overwrite, inputs=scenario.inputs)
     elif not options.json:
         print(text, end='')
     return parameters

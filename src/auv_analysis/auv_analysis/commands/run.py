@@ -3,18 +3,22 @@
 import argparse
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from rich.progress import Progress, TaskID
 
 from auv_analysis.bag import open_bag
 from auv_analysis.commands.conclude import Outcome, finish
-from auv_analysis.commands.scenarios import open_scenario, prepare_out
+from auv_analysis.commands.scenarios import open_scenario, scenario_folder
 from auv_analysis.console import say
 from auv_analysis.domain import VARIABLE, chosen_domain
 from auv_analysis.experiment import environment, run_controller
 from auv_analysis.failure import FailedError
+from auv_analysis.folder import Results
 from auv_analysis.progress import Speed, bar, count, waiting
 from auv_analysis.scenario import Scenario
 from auv_analysis.supervisor import NodeDiedError, TroubleError
@@ -24,14 +28,30 @@ from auv_dynamics.files import InputError
 DISCOVERY = 3.0  # s: discovery may take so long
 
 
+class FreeGraph(NamedTuple):
+    """A domain that nobody else drives a vehicle on, and what is seen of it."""
+
+    domain: int
+    watcher: Any
+
+
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Real nodes, in lock-step, recorded."""
     scenario, names = open_scenario(options)
-    return finish(*recorded(options, scenario, names), scenario, report=not options.no_report)
+    with free_graph(options) as graph, scenario_folder(options, scenario, names, '/*') as results:
+        outcome = recorded(options, scenario, names, results, graph)
+        return finish(results.folder, *outcome, scenario, report=not options.no_report)
 
 
-def recorded(options: argparse.Namespace, scenario: Scenario, names: list[str]) -> Outcome:
-    """Runs of the node graph: the folder, the runs from their bags, what went wrong."""
+@contextmanager
+def free_graph(options: argparse.Namespace) -> Iterator[FreeGraph]:
+    """Join the domain of the command line, or a free one.
+
+    Raises
+    ------
+    InputError : no such domain, or somebody's vehicle is on it
+
+    """
     domain, picked = chosen_domain(options.domain_id)
     os.environ.update(environment(domain))
     # the middleware reads its environment when it is loaded
@@ -41,31 +61,50 @@ def recorded(options: argparse.Namespace, scenario: Scenario, names: list[str]) 
     try:
         if not picked:
             _refuse_strangers(graph, domain)
-        out = prepare_out(options, scenario, names)
-        with waiting('loading or compiling the kernel'):
-            warm_up(scenario, names)
-        say(f'export {VARIABLE}={domain}')
-        failure: FailedError | None = None
-        done = []
-        for name in names:
-            with bar(count('steps'), Speed('steps'), keep=True) as shown:
-                task = shown.add_task(f'{scenario.name} {name}', total=scenario.steps)
-                show = partial(_show_step, shown, task)
-                try:
-                    run_controller(
-                        scenario, name, out, domain, graph, show, composed=options.composed
-                    )
-                except NodeDiedError as error:
-                    failure = error
-                    break  # the graph is broken; what was recorded is still worth a report
-                except TroubleError as error:
-                    failure = failure or error  # the others may fare better
-            done.append(name)
+        yield FreeGraph(domain, graph)
     finally:
         graph.close()
+
+
+def recorded(
+    options: argparse.Namespace,
+    scenario: Scenario,
+    names: list[str],
+    results: Results,
+    graph: FreeGraph,
+) -> Outcome:
+    """Runs of the node graph from their bags, and what went wrong."""
+    out = results.folder
+    with waiting('loading or compiling the kernel'):
+        warm_up(scenario, names)
+    say(f'export {VARIABLE}={graph.domain}')
+    failure: FailedError | None = None
+    done = []
+    for name in names:
+        with bar(count('steps'), Speed('steps'), keep=True) as shown:
+            task = shown.add_task(f'{scenario.name} {name}', total=scenario.steps)
+            show = partial(_show_step, shown, task)
+            try:
+                run_controller(scenario, name, out, *graph, show, composed=options.composed)
+            except NodeDiedError as error:
+                failure = error
+                break  # the graph is broken; what was recorded is still worth a report
+            except TroubleError as error:
+                failure = failure or error  # the others may fare better
+        done.append(name)
     if failure is not None and not out.is_dir():
         raise failure  # the results were removed under us: there is nothing to report
-    return Outcome(out, {name: open_bag(out / name).run for name in done}, failure)
+    if failure is None:
+        for name in names:
+            _move_paths(out / name / 'params.yaml', results)
+    return Outcome({name: open_bag(out / name).run for name in done}, failure)
+
+
+def _move_paths(parameters: Path, results: Results) -> None:
+    """Let a parameter file name the files of the run where they lie in the end."""
+    text = parameters.read_text(encoding='utf-8')
+    before, then = (str(path.resolve()) for path in results)
+    parameters.write_text(text.replace(before, then), encoding='utf-8')
 
 
 def _refuse_strangers(graph: Any, domain: int) -> None:

@@ -1,10 +1,13 @@
 """What commands on scenarios begin with: the scenario, its controllers, the results' folder."""
 
 import argparse
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 
 from auv_analysis.console import say
-from auv_analysis.folder import prepare
+from auv_analysis.folder import Results, results_folder
 from auv_analysis.scenario import Scenario, load_scenario
 
 
@@ -17,14 +20,26 @@ def open_scenario(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
     return scenario, names
 
 
-def prepare_out(options: argparse.Namespace, scenario: Scenario, names: list[str]) -> Path:
-    """Folder of the results; warnings only now, so that a refusal is one line."""
-    out = prepare(
+@contextmanager
+def scenario_folder(
+    options: argparse.Namespace, scenario: Scenario, names: Sequence[str], *own: str
+) -> Iterator[Results]:
+    """Folder of the results; warnings only now, so that a refusal is one line.
+
+    Parameters
+    ----------
+    options : out and overwrite of the command line
+    scenario : whose files must not be replaced
+    names : of the controllers
+    own : endings of what is written of each controller, such as '.npz' or '/*'
+
+    """
+    with results_folder(
         options.out or Path('runs') / scenario.name,
         overwrite=options.overwrite,
+        own=[f'{escape(name)}{ending}' for name in names for ending in own],
         inputs=scenario.inputs,
-        new=names,
-    )
-    for warning in scenario.warnings:
-        say(f'warning: {warning}')
-    return out
+    ) as results:
+        for warning in scenario.warnings:
+            say(f'warning: {warning}')
+        yield results

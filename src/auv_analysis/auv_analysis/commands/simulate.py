@@ -4,8 +4,9 @@ import argparse
 from typing import Any
 
 from auv_analysis.commands.conclude import Outcome, finish
-from auv_analysis.commands.scenarios import open_scenario, prepare_out
+from auv_analysis.commands.scenarios import open_scenario, scenario_folder
 from auv_analysis.experiment import write_inputs
+from auv_analysis.folder import Results
 from auv_analysis.progress import waiting
 from auv_analysis.run import AnyRun
 from auv_analysis.samples import ENDING, write_samples
@@ -18,13 +19,17 @@ from auv_analysis.warm_up import announce
 def simulate(options: argparse.Namespace) -> dict[str, Any]:
     """In this process, by the same kernel."""
     scenario, names = open_scenario(options)
-    return finish(*simulated(options, scenario, names), scenario, report=not options.no_report)
-
-
-def simulated(options: argparse.Namespace, scenario: Scenario, names: list[str]) -> Outcome:
-    """Runs of this process: the folder, the runs, the first failure."""
     check_hold(scenario, options.hold)
-    out = prepare_out(options, scenario, names)
+    with scenario_folder(options, scenario, names, ENDING) as results:
+        outcome = simulated(options, scenario, names, results)
+        return finish(results.folder, *outcome, scenario, report=not options.no_report)
+
+
+def simulated(
+    options: argparse.Namespace, scenario: Scenario, names: list[str], results: Results
+) -> Outcome:
+    """Runs of this process, and the first failure."""
+    out = results.folder
     write_inputs(scenario, out)
     announce(scenario, names)
     runs: dict[str, AnyRun] = {}
@@ -38,4 +43,4 @@ def simulated(options: argparse.Namespace, scenario: Scenario, names: list[str])
             continue
         runs[name] = run
         write_samples(run, out / f'{name}{ENDING}')
-    return Outcome(out, runs, failure)
+    return Outcome(runs, failure)

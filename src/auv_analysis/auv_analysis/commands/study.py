@@ -3,20 +3,23 @@
 import argparse
 import os
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from auv_analysis.commands.conclude import finish
-from auv_analysis.commands.run import recorded
-from auv_analysis.commands.scenarios import open_scenario
+from auv_analysis.commands.run import free_graph, recorded
+from auv_analysis.commands.scenarios import open_scenario, scenario_folder
 from auv_analysis.commands.simulate import simulated
 from auv_analysis.console import say
 from auv_analysis.progress import bar, waiting
 from auv_analysis.report.document import Section, Sentence
 from auv_analysis.report.paper import CASES
 from auv_analysis.run import AnyRun
+from auv_analysis.samples import ENDING
 from auv_analysis.scenario import Scenario
+from auv_analysis.simulation import check_hold
 from auv_analysis.study.discussion import discussion
 from auv_analysis.study.effects import Sensitivity
 from auv_analysis.study.indices import Design, Method
@@ -38,8 +41,19 @@ def study(options: argparse.Namespace) -> dict[str, Any]:
     _check(options)
     if options.run:
         options.hold = 'zoh'  # as the nodes do
-    outcome = (recorded if options.run else simulated)(options, scenario, names)
-    return finish(*outcome, scenario, Procedure(scenario, outcome.out, windows, options))
+    check_hold(scenario, options.hold)
+    of_a_run = '/*' if options.run else ENDING
+    with ExitStack() as stack:
+        graph = stack.enter_context(free_graph(options)) if options.run else None
+        folder = scenario_folder(options, scenario, names, '.parquet', of_a_run)
+        results = stack.enter_context(folder)
+        outcome = (
+            recorded(options, scenario, names, results, graph)
+            if graph
+            else simulated(options, scenario, names, results)
+        )
+        procedure = Procedure(scenario, results.folder, windows, options)
+        return finish(results.folder, *outcome, scenario, procedure)
 
 
 def _window(scenario: Scenario, first: float, last: float) -> Window:

@@ -10,7 +10,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from auv_analysis.console import say
-from auv_analysis.folder import prepare, write_json
+from auv_analysis.folder import results_folder
+from auv_analysis.new_files import write_json
 from auv_analysis.progress import bar, console, count, waiting
 from auv_analysis.report.text import number
 from auv_analysis.scenario import Scenario, load_scenario
@@ -36,13 +37,13 @@ def tune(options: argparse.Namespace) -> dict[str, Any]:
     request = _request(options, scenario)
     draws = Draws(_samples(options.samples), spread_of(options.spread or ()), request.seed)
     out = options.out or Path('runs') / f'tune_{scenario.name}'
-    prepare(out, overwrite=options.overwrite, inputs=scenario.inputs)
-    for warning in scenario.warnings:
-        say(f'warning: {warning}')
-    announce(scenario, [request.reference])
-    with bar(count(), keep=True) as shown:
-        outcome = work(request, draws, out, _stages(shown))
-    return _conclude(outcome, out)
+    with results_folder(out, overwrite=options.overwrite, inputs=scenario.inputs) as results:
+        for warning in scenario.warnings:
+            say(f'warning: {warning}')
+        announce(scenario, [request.reference])
+        with bar(count(), keep=True) as shown:
+            outcome = work(request, draws, results.folder, _stages(shown))
+        return _conclude(outcome, results.folder)
 
 
 def _request(options: argparse.Namespace, scenario: Scenario) -> Request:
@@ -106,11 +107,10 @@ def _conclude(outcome: Outcome, out: Path) -> dict[str, Any]:
         listing = (out / 'scenario.yaml').read_text(encoding='utf-8')
         listings = [('scenario.yaml', listing)]
         pairs = paired_sentences(outcome)
-        report = write_report(out, document, sentences, pairs, figures, listings)
+        write_report(out, document, sentences, pairs, figures, listings)
     _show(document)
     for sentence in sentences:
         say(sentence.text)
-    say(f'report: {report}')
     return document
 
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from auv_analysis.commands.conclude import say_where, show
+from auv_analysis.commands.conclude import show
 from auv_analysis.comparison.entries import Entry, comparison_table, write_table
 from auv_analysis.comparison.opening import named, open_source
 from auv_analysis.comparison.ranking import Ranking, rank
@@ -14,7 +14,7 @@ from auv_analysis.comparison.sources import Source
 from auv_analysis.console import say
 from auv_analysis.counting import each
 from auv_analysis.failure import FailedError
-from auv_analysis.folder import write_json
+from auv_analysis.new_files import write_json
 from auv_analysis.progress import waiting
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.summary import summarize
@@ -115,20 +115,20 @@ def conclude_comparison(
     table = comparison_table(entries)
     ranking = rank(table)
     write_table(table, ranking, out)
-    page = _report(out, entries, table, ranking) if report else None
+    if report:
+        _report(out, entries, table, ranking)
     for entry in entries:
         for note in [entry.failure] if entry.failure else entry.summary['notes']:
             say(f'note: {entry.name}: {note}')
     show({entry.name: entry.summary for entry in entries if entry.summary})
-    say_where(out, page)
     return summaries
 
 
-def _report(out: Path, entries: Sequence[Entry], table: pa.Table, ranking: Ranking) -> Path:
+def _report(out: Path, entries: Sequence[Entry], table: pa.Table, ranking: Ranking) -> None:
     # with matplotlib, which loads slowly
     from auv_analysis.comparison.figures import draw
     from auv_analysis.comparison.report import write_comparison
 
     with waiting('drawing figures, writing the report'):
         figures = draw(entries, table, ranking, out / 'figures')
-        return write_comparison(out, entries, table, ranking, figures)
+        write_comparison(out, entries, table, ranking, figures)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from auv_analysis.bag.files import OTHERS, files_of
-from auv_analysis.folder import MANIFEST
+from auv_analysis.folder import SWEEP
 from auv_analysis.foreign.mapping import TopicMap
 from auv_analysis.samples import ENDING
 from auv_analysis.scenario import Scenario, load_scenario
@@ -55,7 +55,7 @@ class Source:
 
 def is_sweep(argument: str) -> bool:
     """Whether an argument is a folder of `auv sweep`."""
-    return os.path.isfile(os.path.join(argument, MANIFEST))
+    return os.path.isfile(os.path.join(argument, SWEEP))
 
 
 def sources_of(

@@ -27,7 +27,8 @@ from auv_analysis.design.statements import (
     warnings_of,
 )
 from auv_analysis.design.words import change_words, values_of
-from auv_analysis.folder import write_json
+from auv_analysis.folder import Results
+from auv_analysis.new_files import write_json
 from auv_dynamics.vehicle import Vehicle
 from auv_gvc_controller.decomposition import decompose
 
@@ -53,13 +54,13 @@ class Result:
     after: Outcome | None = None
 
 
-def concluded(found: Proposal, out: Path) -> Result:
+def concluded(found: Proposal, results: Results) -> Result:
     """Write the changed vehicle and its scenario, run both vehicles, write the figures.
 
     Parameters
     ----------
     found : of `propose`
-    out : folder, which exists
+    results : where to write, and the folder that the document names
 
     Returns
     -------
@@ -67,9 +68,9 @@ def concluded(found: Proposal, out: Path) -> Result:
         scenario and the vehicle as they were read back from the folder
 
     """
-    setting = found.setting
+    setting, out = found.setting, results.folder
     scenario = write_inputs(found, out)
-    document = _head(found, out)
+    document = _head(found, results.out)
     if found.target is None or found.before is None:
         name = setting.space.vehicle.name
         document['statement'] = nothing_statement(name, found.asked, found.there)

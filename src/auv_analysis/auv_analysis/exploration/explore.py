@@ -11,7 +11,7 @@ from auv_analysis.exploration.files import write_results
 from auv_analysis.exploration.opening import open_sweep
 from auv_analysis.exploration.results import BEST_BY, Results, analysed
 from auv_analysis.failure import FailedError
-from auv_analysis.folder import check_free, prepare
+from auv_analysis.folder import SWEEP, results_folder
 from auv_analysis.measures import BY_NAME
 from auv_analysis.progress import console, waiting
 from auv_analysis.report.text import number
@@ -41,20 +41,19 @@ def explore(folder: Path, options: argparse.Namespace) -> dict[str, Any]:
         raise InputError('--by', '', one_of(by, BY_NAME), by)
     sweep = open_sweep(folder)
     out = options.out or Path('runs') / f'analyze_{sweep.name}'
-    check_free(out, overwrite=options.overwrite)
-    if not (sweep.status == 0).any():
-        raise FailedError(f'{folder}: none of {sweep.rows} rows has figures')
-    with waiting(f'{sweep.rows} rows'):
-        results = analysed(sweep, by)
-    prepare(out, overwrite=options.overwrite, inputs=[folder / 'sweep.json', *sweep.parts])
-    document = write_results(results, out)
-    from auv_analysis.exploration.figures import draw  # with matplotlib, which loads slowly
-    from auv_analysis.exploration.report import write_report
+    inputs = [folder / SWEEP, *sweep.parts]
+    with results_folder(out, overwrite=options.overwrite, inputs=inputs) as place:
+        if not (sweep.status == 0).any():
+            raise FailedError(f'{folder}: none of {sweep.rows} rows has figures')
+        with waiting(f'{sweep.rows} rows'):
+            results = analysed(sweep, by)
+        document = write_results(results, place.folder)
+        from auv_analysis.exploration.figures import draw  # with matplotlib, which loads slowly
+        from auv_analysis.exploration.report import write_report
 
-    with waiting('drawing figures, writing the report'):
-        report = write_report(out, results, draw(results, out / 'figures'))
-    _show(results)
-    say(f'report: {report}')
+        with waiting('drawing figures, writing the report'):
+            write_report(place.folder, results, draw(results, place.folder / 'figures'))
+        _show(results)
     return document
 
 

@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 import pyarrow.dataset as ds
 from pyarrow import parquet
 
-from auv_analysis.folder import MANIFEST, PART, ROLLOUTS
+from auv_analysis.folder import PART, ROLLOUTS, SWEEP
 from auv_analysis.measures import Measure
 from auv_analysis.sweep.groups import kind_of
 from auv_dynamics.files import InputError, first_line, reason
@@ -152,7 +152,7 @@ def open_sweep(folder: Path) -> Sweep:
     InputError : a part or the manifest cannot be read, or there is no row
 
     """
-    manifest = _manifest(folder / MANIFEST)
+    manifest = _manifest(folder / SWEEP)
     parts = sorted(_parts(folder / ROLLOUTS))
     if not parts:
         expected = 'finished blocks of a sweep'

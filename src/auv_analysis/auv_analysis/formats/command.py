@@ -4,11 +4,11 @@ import argparse
 from typing import Any
 
 from auv_analysis.console import say
-from auv_analysis.folder import write_text
 from auv_analysis.formats.draft import Choices, Draft
 from auv_analysis.formats.reading import read_vehicle
 from auv_analysis.formats.sdf import notes, sdf_text
 from auv_analysis.formats.writing import vehicle_text
+from auv_analysis.new_files import write_text
 from auv_dynamics.config import shipped
 from auv_dynamics.files import parse_yaml, read_yaml
 from auv_dynamics.vehicle_file import vehicle_from_dict
@@ -27,7 +27,7 @@ def import_vehicle(options: argparse.Namespace) -> dict[str, Any]:
     data = parse_yaml(text, place, 'vehicle')
     vehicle = vehicle_from_dict(data, place)
     if options.out is not None:
-        write_text(options.out, text, overwrite=options.overwrite)
+        write_text(options.out, text, overwrite=options.overwrite, inputs=[options.file])
     elif not options.json:
         print(text, end='')
     _report(draft, list(vehicle.warnings))
@@ -52,7 +52,7 @@ def export_vehicle(options: argparse.Namespace) -> dict[str, Any]:
     vehicle = vehicle_from_dict(data, path)
     text = sdf_text(vehicle, data['environment'], path, options.added_mass)
     if options.out is not None:
-        write_text(options.out, text, overwrite=options.overwrite)
+        write_text(options.out, text, overwrite=options.overwrite, inputs=[path])
     elif not options.json:
         print(text, end='')
     said = notes(vehicle, options.added_mass)

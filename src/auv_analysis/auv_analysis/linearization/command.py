@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.console import say
-from auv_analysis.folder import prepare, write_json
+from auv_analysis.folder import results_folder
 from auv_analysis.linearization.document import document_of, linear_models
 from auv_analysis.linearization.printed import print_poles
+from auv_analysis.new_files import write_json
 from auv_analysis.progress import waiting
 from auv_analysis.scaling import UNFIT
 from auv_analysis.scenario import Scenario, load_scenario
@@ -17,6 +18,7 @@ from auv_dynamics.vehicle import Vehicle
 from auv_dynamics.vehicle_file import load_vehicle
 from auv_gvc_controller.laws import refusal
 
+DOCUMENT = 'linearization.json'
 LONGEST = 90  # of the name in that of the folder
 
 
@@ -31,17 +33,18 @@ def linearize(options: argparse.Namespace) -> dict[str, Any]:
     except ValueError as error:
         raise InputError(paths[0], *refusal(error)) from None
     folder = f'linearize_{UNFIT.sub("_", subject.name)[:LONGEST]}'
-    out = prepare(options.out or Path('runs') / folder, overwrite=options.overwrite, inputs=paths)
+    out = options.out or Path('runs') / folder
     left_out = subject.sampled if isinstance(subject, Scenario) else ()
     document = document_of(subject.name, models, left_out)
-    write_json(out / 'linearization.json', document)
-    from auv_analysis.linearization.figures import draw  # with matplotlib, which loads slowly
+    with results_folder(out, overwrite=options.overwrite, inputs=paths) as results:
+        write_json(results.folder / DOCUMENT, document)
+        from auv_analysis.linearization.figures import draw  # with matplotlib, which loads slowly
 
-    with waiting('drawing the pole map'):
-        figures = draw(models, out / 'figures')
+        with waiting('drawing the pole map'):
+            draw(models, results.folder / 'figures')
     if not options.json:
         print_poles(document)
-    say(f'matrices: {out / "linearization.json"}, pole map: {figures["poles"].png}')
+    say(f'matrices: {out / DOCUMENT}, pole map: {out / "figures" / "poles.png"}')
     return document
 
 

@@ -11,12 +11,13 @@ from rich.table import Table
 
 from auv_analysis.console import say
 from auv_analysis.failure import FailedError
+from auv_analysis.folder import ROLLOUTS
 from auv_analysis.progress import Speed, bar, console, count
 from auv_analysis.sweep.campaign import Campaign, load_campaign
 from auv_analysis.sweep.engine import REFUSED, Outcome, SweepStoppedError
 from auv_analysis.sweep.engine import sweep as run_sweep
 from auv_analysis.sweep.executors import opened
-from auv_analysis.sweep.folder import SweepFolder
+from auv_analysis.sweep.folder import SweepFolder, sweep_folder
 from auv_analysis.warm_up import announce
 from auv_dynamics.files import InputError
 
@@ -27,17 +28,16 @@ def sweep(options: argparse.Namespace) -> dict[str, Any]:
     """Run a campaign, or what is left of it."""
     campaign = load_campaign(options.campaign)
     out = options.out or Path('runs') / campaign.name
-    with opened(options.executor, options.scheduler, _workers(options.workers)) as executor:
-        folder = SweepFolder(out, campaign, overwrite=options.overwrite)
-        try:
-            for warning in campaign.scenario.warnings:
-                say(f'warning: {warning}')
-            if folder.new:
-                _announce(campaign)
-            outcome = _run(campaign, folder, *executor, overwrite=options.overwrite)
-        finally:
-            folder.close()
-    return _conclude(campaign, folder, outcome)
+    with (
+        opened(options.executor, options.scheduler, _workers(options.workers)) as executor,
+        sweep_folder(out, campaign, overwrite=options.overwrite) as folder,
+    ):
+        for warning in campaign.scenario.warnings:
+            say(f'warning: {warning}')
+        if folder.new:
+            _announce(campaign)
+        outcome = _run(campaign, folder, *executor)
+    return _conclude(campaign, out, outcome)
 
 
 def _announce(campaign: Campaign) -> None:
@@ -61,8 +61,6 @@ def _run(
     folder: SweepFolder,
     executor: Executor,
     in_flight: Callable[[], int],
-    *,
-    overwrite: bool,
 ) -> Outcome:
     try:
         with bar(count('rollouts'), Speed('rollouts'), keep=True) as shown:
@@ -77,15 +75,20 @@ def _run(
     except SweepStoppedError as stopped:
         stored = folder.stored(campaign.rollouts)  # the interrupt may come when one is just stored
         done = f'{stored} of {campaign.rollouts} rollouts'
-        how = 'the same command without --overwrite' if overwrite else 'the same command'
-        line = f'{folder.out}: {stopped}; {done} are finished, {how} goes on from there'
+        line = f'{folder.folder}: {stopped}; {done} are finished, {_how(folder)}'
         raise FailedError(line) from None
     except KeyboardInterrupt:  # the second one: running blocks are not waited for
-        say(f'{folder.out}: interrupted; the same command goes on from there')
+        say(f'{folder.folder}: interrupted; {_how(folder)}')
         os._exit(1)
 
 
-def _conclude(campaign: Campaign, folder: SweepFolder, outcome: Outcome) -> dict[str, Any]:
+def _how(folder: SweepFolder) -> str:
+    """In words, how a sweep that was stopped goes on."""
+    other = f' with --out {folder.folder}, without --overwrite,'
+    return f'the same command{"" if folder.folder == folder.out else other} goes on from there'
+
+
+def _conclude(campaign: Campaign, out: Path, outcome: Outcome) -> dict[str, Any]:
     counts = {
         name: {status: outcome.counts[name, status] for status in STATUSES}
         for name in campaign.controllers
@@ -100,13 +103,13 @@ def _conclude(campaign: Campaign, folder: SweepFolder, outcome: Outcome) -> dict
     rows = sum(outcome.counts.values())
     if refused:
         say(f'warning: {refused} of {rows} rows refused, the first: {outcome.reason}')
-    say(f"rollouts: {rows} rows, pandas.read_parquet('{folder.data}')")
+    say(f"rollouts: {rows} rows, pandas.read_parquet('{out / ROLLOUTS}')")
     if refused == rows:
         raise FailedError('every rollout was refused: its values make no scenario')
     return {
         'campaign': campaign.name,
-        'folder': str(folder.out),
-        'dataset': str(folder.data),
+        'folder': str(out),
+        'dataset': str(out / ROLLOUTS),
         'rollouts': outcome.rollouts,
         'rollouts_before': outcome.before,
         'rows': rows,

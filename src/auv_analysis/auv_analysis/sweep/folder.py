@@ -4,19 +4,17 @@ Whatever is in it under its final name is complete: everything is written under 
 flushed to the disk and then renamed. A process may therefore be killed at any time.
 """
 
-import fcntl
 import json
-import os
 import platform
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from auv_analysis.folder import CAMPAIGN, MANIFEST, PART, ROLLOUTS, UNFINISHED, prepare
-from auv_analysis.new_files import replacing
+from auv_analysis.folder import CAMPAIGN, PART, ROLLOUTS, SWEEP, Results, results_folder
+from auv_analysis.new_files import UNFINISHED, write
 from auv_analysis.sweep.block import laws_of, versions
 from auv_analysis.sweep.campaign import Campaign
 from auv_dynamics.files import InputError, dotted
@@ -25,51 +23,58 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-class SweepFolder:
-    """Folder of a sweep, new or gone on with; locked as long as this process holds it.
+@contextmanager
+def sweep_folder(out: Path, campaign: Campaign, *, overwrite: bool) -> Iterator['SweepFolder']:
+    """Folder of a sweep, new or gone on with; locked as long as this lasts.
 
     Parameters
     ----------
     out : the folder
     campaign : what is swept
-    overwrite : clear it of earlier results
+    overwrite : replace an earlier sweep, once this one has come to its end
 
     Raises
     ------
     InputError : it holds another sweep or something else, is in use or cannot be written
 
     """
+    begun = not overwrite and _stored(out) is not None
+    with results_folder(
+        out,
+        overwrite=overwrite,
+        own=[f'{ROLLOUTS}/part-*.parquet'],
+        inputs=campaign.inputs,
+        begun=begun,
+    ) as results:
+        yield SweepFolder(results, campaign)
 
-    def __init__(self, out: Path, campaign: Campaign, *, overwrite: bool):
-        self.out, self.data = out, out / ROLLOUTS
-        self._lock = _lock(out) if out.is_dir() else None
-        try:
-            self._open(campaign, overwrite=overwrite)
-        except BaseException:
-            self.close()
-            raise
 
-    def _open(self, campaign: Campaign, *, overwrite: bool) -> None:
-        out, manifest = self.out, _manifest(campaign)
-        stored = None if overwrite else _stored(out)
+class SweepFolder:
+    """What a sweep was made of, and the blocks that are finished.
+
+    Attributes
+    ----------
+    folder : where they are written
+    out : where they lie in the end
+    data : folder of the finished blocks
+    new : whether nothing was there before
+
+    """
+
+    def __init__(self, results: Results, campaign: Campaign):
+        self.folder, self.out = results
+        self.data = self.folder / ROLLOUTS
+        manifest, stored = _manifest(campaign), _stored(self.folder)
         self.new = stored is None
         if stored is None:
-            _clear_unfinished(out)
-            prepare(out, overwrite=overwrite, inputs=campaign.inputs, new=[MANIFEST, ROLLOUTS])
-            self._lock = self._lock or _lock(out)
             stored = {**manifest, 'block': campaign.block}
-            write(out / MANIFEST, json.dumps(stored, indent=1).encode())
+            write(self.folder / SWEEP, json.dumps(stored, indent=1).encode())
         self.block = stored.pop('block')
-        _refuse_other(out, stored, manifest)
-        _write_inputs(out, campaign)
+        _refuse_other(self.folder, stored, manifest)
+        _clear_unfinished(self.folder)
+        _write_inputs(self.folder, campaign)
         self.data.mkdir(exist_ok=True)
         _clear_unfinished(self.data)
-
-    def close(self) -> None:
-        """Let another process use it."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
 
     def finished(self, columns: list[str]) -> Iterator[tuple[int, 'pa.Table']]:
         """Number and some columns of each finished block; what cannot be read is not finished."""
@@ -99,30 +104,6 @@ class SweepFolder:
         words = [field.name for field in table.schema if pa.types.is_string(field.type)]
         pq.write_table(table, sink, compression='zstd', use_dictionary=words)
         write(self.data / f'part-{block:08d}.parquet', sink.getvalue())
-
-
-def write(path: Path, contents: Any) -> None:
-    """Write a file so that it is there as a whole or not at all, whatever ends the process."""
-    with replacing(path, path.with_name(f'.{path.name}{UNFINISHED}')) as file:
-        file.write(contents)
-
-
-def _lock(out: Path) -> int | None:
-    """Lock of a folder, which ends with the process; None where the file system has none."""
-    try:
-        handle = os.open(out, os.O_RDONLY)
-    except OSError:
-        return None  # `prepare` says why
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(handle)
-        expected = 'a folder that no other process is sweeping into'
-        raise InputError(out, '--out', expected, 'one in use') from None
-    except OSError:
-        os.close(handle)
-        return None
-    return handle
 
 
 def _clear_unfinished(folder: Path) -> None:
@@ -175,13 +156,13 @@ def _write_inputs(out: Path, campaign: Campaign) -> None:
 def _stored(out: Path) -> dict[str, Any] | None:
     """Manifest of the folder, None where there is none."""
     try:
-        stored = json.loads((out / MANIFEST).read_text(encoding='utf-8'))
+        stored = json.loads((out / SWEEP).read_text(encoding='utf-8'))
     except (FileNotFoundError, NotADirectoryError):
         return None
     except (OSError, ValueError):
         stored = None
     if not isinstance(stored, dict) or not isinstance(stored.get('block'), int):
-        found = f'a {MANIFEST} that is not ours'
+        found = f'a {SWEEP} that is not ours'
         raise InputError(out, '--out', 'a folder of `auv sweep`, or --overwrite', found)
     return stored
 

@@ -128,7 +128,7 @@ def test_same_seed_same_document_another_seed_another(command: Callable) -> None
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_equal_error_and_no_draws(command: Callable) -> None:
+def test_equal_error_and_no_draws(command: Callable, tmp_path: Path) -> None:
     arguments = ('--equal', 'error', '--index', 'mean', '--samples', '0', *QUICK[:2])
     code, out, _ = command(*arguments, '--json')
     document = json.loads(out)

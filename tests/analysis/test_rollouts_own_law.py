@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from auv_analysis import batch, load_scenario, simulate, summarize
+from auv_analysis import batch, cli, load_scenario, simulate, summarize
 from auv_analysis.changes import changed_scenario
+from auv_analysis.kernels import Kernel, kernels
 from auv_analysis.rollouts import rollouts
 from auv_dynamics.jit import JITTED
 
@@ -83,3 +84,34 @@ def test_a_law_runs_as_compiled_as_can_be(scenario, name, before, how):
 def test_a_law_that_fails_is_named(scenario):
     with pytest.raises(ArithmeticError, match="the law PI failed: KeyError: 'lost'"):
         rollouts(scenario('own_failing', FAILS), 'own', {})
+
+
+@pytest.mark.parametrize('error', [AssertionError('register'), KeyError('x'), RuntimeError('a\nb')])
+def test_law_that_numba_fails_on_in_any_way_runs_as_plain_python(
+    scenario, error, monkeypatch, capsys
+):
+    def fails(*_):
+        raise error
+
+    tried = [Kernel(fails, False, 'in vector registers'), Kernel(fails, True, 'compiled')]
+    monkeypatch.setattr(batch, 'kernels', lambda *given: [*tried, kernels(*given)[-1]])
+    monkeypatch.setattr(batch, '_CHOSEN', {})
+    base = scenario(f'own_{type(error).__name__}', '')
+    columns = rollouts(base, 'own', {'controllers.own.k_P': GAINS}, threads=2)
+    assert set(columns['status']) == {'ok'}
+    (line,) = capsys.readouterr().err.splitlines()  # once, whatever the number of threads
+    assert 'the law PI runs as plain Python' in line
+    assert type(error).__name__ in line
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not JITTED, reason='nothing is compiled')
+def test_the_template_of_a_law_is_compiled(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    cli.main(['new', 'law', 'template_of_a_law'])
+    base = load_scenario('template_of_a_law.yaml')
+    columns = rollouts(base, 'mine', {'controllers.mine.k_P': [3.0, 4.0]})
+    assert set(columns['status']) == {'ok'}
+    chosen = {law.__module__: k.how for (law, _), k in batch._CHOSEN.items()}
+    assert chosen['template_of_a_law'] == 'compiled'
+    assert 'plain Python' not in capsys.readouterr().err

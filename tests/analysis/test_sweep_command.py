@@ -112,7 +112,9 @@ class Proportional(NamedTuple):
 
 
 @pytest.mark.long
-def test_own_law_runs_as_plain_python_and_says_so(command, files: Path, monkeypatch) -> None:
+def test_own_law_is_swept_and_an_edited_one_is_refused_in_words(
+    command, files: Path, monkeypatch
+) -> None:
     (files / 'my_sweep_law.py').write_text(OWN_LAW)
     monkeypatch.syspath_prepend(str(files))
     text = SCENARIO.replace('0.3', '0.02')
@@ -121,12 +123,12 @@ def test_own_law_runs_as_plain_python_and_says_so(command, files: Path, monkeypa
     text = ('name: small\nscenario: scenario.yaml\ncontrollers: [mine]\n'
             "vary: [{grid: {'controllers.mine.k_P': [50, 100.0]}}]")  # fmt: skip
     (files / 'campaign.yaml').write_text(text)
-    code, out, lines = command('--json')
+    code, out, _ = command('--json')
     assert (code, json.loads(out)['controllers']['mine']['ok']) == (0, 2)
-    assert any('the law Proportional runs as plain Python, slower' in line for line in lines)
     errors = rows(files / 'runs/small')['velocity_error.rms.surge'].to_pylist()
     assert errors[0] > errors[1]
     (files / 'my_sweep_law.py').write_text(OWN_LAW + '# changed\n')
     code, _, lines = command()
     assert (code, len(lines)) == (2, 1)
-    assert 'laws.mine: expected' in lines[0]
+    assert 'laws.mine: expected the module of the law as when it was begun' in lines[0]
+    assert lines[0].endswith('found an edited one')

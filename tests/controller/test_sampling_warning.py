@@ -1,5 +1,7 @@
 """When a velocity gain is too fast for the control period, against one axis worked out by hand."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
@@ -60,18 +62,37 @@ def test_what_the_warning_says():
     assert 'a step of at most 0.25 s' in text
 
 
-def test_a_law_without_gains_of_these_names_has_none():
-    class Own(tuple):
-        pass
+class Own(NamedTuple):
+    """A law whose gains have names of its own."""
 
-    K_D, K_f = body_gains(Own(), None)
-    assert K_D.shape == K_f.shape == (6, 6)
-    assert not K_D.any()
+    zeta: np.ndarray
+    STATES = 6
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        error = np.subtract(nu_d, nu)
+        drag = np.abs(nu) * nu  # quadratic: nothing at rest
+        return gains.zeta.reshape(6, 6) @ (error + state) + drag, np.zeros(6)
+
+
+def test_velocity_gain_of_a_users_law_is_measured_at_rest():
+    zeta = np.arange(36.0)
+    K_D, K_f = body_gains(Own(zeta), None)
+    assert np.allclose(K_D.ravel(), zeta, atol=2e-3)  # the step of the differences, by the drag
     assert not K_f.any()
+    K_D, _ = body_gains(Own(300 * M.ravel()), None)
+    assert 'is unstable' in sampling_warning(K_D, M, 0.01)
+
+
+def test_velocity_gain_of_a_shipped_law_is_what_it_says():
     full = np.arange(36.0)
     K_D, K_f = body_gains(CL(full, full, full, 2 * full), None)
     assert np.array_equal(K_D.ravel(), full)
     assert np.array_equal(K_f.ravel(), 2 * full)
+
+
+def test_users_law_that_gives_nothing_finite_at_rest_has_no_velocity_gain():
+    assert not body_gains(Own(np.full(36, np.nan)), None)[0].any()
 
 
 def test_a_complex_pair_that_grows_is_told_before_the_rate_says_so():

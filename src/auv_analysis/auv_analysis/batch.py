@@ -1,5 +1,7 @@
 """Many closed loops at once: vehicles in lanes, blocks of lanes over threads, figures reduced."""
 
+import re
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -19,6 +21,7 @@ from auv_analysis.closed_loop import (
     Tables,
     Workspace,
 )
+from auv_analysis.console import say
 from auv_analysis.counting import each
 from auv_analysis.kernels import Kernel, kernels
 from auv_analysis.reduction import Figures
@@ -34,6 +37,8 @@ Known = Callable[[np.ndarray], Tables]  # stage times t (T, s) of the next block
 SHARED_STEPS = 1024  # steps that are tabulated at once where all vehicles share the tables
 OWN_STEPS = 256  # the same where each has its own
 PARTS = 4  # of a batch per thread, so that a slow one is made up for
+NESTED = re.compile(r'\w+Error: ')
+LONGEST = 160  # of what is said of it
 OWN_VEHICLES = 16  # of a part where each has its own tables
 
 
@@ -110,28 +115,41 @@ class _Job(NamedTuple):
 def kernel_of(batch: Batch) -> Kernel:
     """Fastest kernel that takes the batch's law; compiles a user's law to find out, once."""
     law = type(batch.loop.gains)
-    candidates = kernels(law, batch.hold)
-    if (law, batch.hold) not in _CHOSEN:
-        _CHOSEN[law, batch.hold] = next(k for k in candidates if _works(batch, k, candidates[-1]))
+    with _CHOOSING:  # the others wait: numba compiles one at a time anyway
+        if (law, batch.hold) not in _CHOSEN:
+            _CHOSEN[law, batch.hold] = _chosen(batch, kernels(law, batch.hold))
     return _CHOSEN[law, batch.hold]
 
 
 _CHOSEN: dict[tuple[Any, str], Kernel] = {}
+_CHOOSING = threading.Lock()
 
 
-def _works(batch: Batch, kernel: Kernel, last: Kernel) -> bool:
-    """Whether numba compiles a kernel, tried on no steps; the last one needs no trial."""
-    if kernel is last:
-        return True
-    from numba.core.errors import NumbaError
+def _chosen(batch: Batch, candidates: Sequence[Kernel]) -> Kernel:
+    """First kernel that numba compiles, tried on no steps; the last one is plain Python."""
+    *compiled, in_python = candidates
+    for kernel in compiled:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter('ignore')  # what numba thinks of a user's code
+                _run_part(_job(batch, kernel), range(1), trial=True)
+        except Exception as error:  # numba fails in many ways on what it does not know
+            why = _why(error)
+        else:
+            return kernel
+    if compiled:
+        law = type(batch.loop.gains).__name__
+        say(f'note: the law {law} runs as plain Python, slower: numba cannot compile it: {why}')
+    return in_python
 
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter('ignore')  # what numba thinks of a user's code
-            _run_part(_job(batch, kernel), range(1), trial=True)
-    except NumbaError:
-        return False
-    return True
+
+def _why(error: Exception) -> str:
+    """What the innermost error of numba says, and where it met it, in one line."""
+    lines = [line.strip() for line in f'{type(error).__name__}: {error}'.splitlines()]
+    last = max((i for i, line in enumerate(lines) if NESTED.match(line)), default=0)
+    said = lines[last : last + 2] if 'Failed in' in lines[last] else lines[last : last + 1]
+    where = next((line.rstrip(':') for line in lines[last:] if line.startswith('File "')), '')
+    return ', '.join(filter(None, (said[-1][:LONGEST], where)))
 
 
 def _job(batch: Batch, kernel: Kernel) -> _Job:

@@ -5,17 +5,20 @@ from typing import Any
 import numpy as np
 
 from auv_dynamics.signals import DOFS
+from auv_gvc_controller.laws import SHIPPED
 from auv_gvc_controller.model import ControlModel
+from auv_gvc_controller.sampled import user_law
 
 ROUNDING = 1e-9
+DIFFERENCE = 1e-3  # m/s, rad/s
 RINGS, UNSTABLE = 1.0, 2.0  # of lambda step, for a velocity loop that is sampled and held
 
 
 def body_gains(gains: Any, model: ControlModel) -> tuple[np.ndarray, np.ndarray]:
     """K_D and K_f of tau = ... + K_D s + K_f integral(s), step 1 of section 4.2.
 
-    A law says it in a static method `body_gains(gains, model)`; one without it is taken by its own
-    k_D and Gamma, zero where it has none.
+    A law says it in a static method `body_gains(gains, model)`. Of a user's law without one, K_D
+    is what it does at rest, -d tau / d nu, and K_f its gain Gamma, zero where it has none.
 
     Parameters
     ----------
@@ -31,8 +34,24 @@ def body_gains(gains: Any, model: ControlModel) -> tuple[np.ndarray, np.ndarray]
     if hasattr(law, 'body_gains'):
         K_D, K_f = law.body_gains(gains, model)
     else:
-        K_D, K_f = (getattr(gains, name, np.zeros(36)) for name in ('k_D', 'Gamma'))
+        K_D = gains.k_D if law in SHIPPED.values() else velocity_gain(gains, model)
+        K_f = getattr(gains, 'Gamma', np.zeros(36))
     return np.reshape(K_D, (6, 6)), np.reshape(K_f, (6, 6))
+
+
+def velocity_gain(gains: Any, model: ControlModel) -> np.ndarray:
+    """-d tau / d nu (6, 6) of a law at rest at t = 0, by differences; zero if it is not finite."""
+    zero, state = (0.0,) * 6, np.zeros(type(gains).STATES)
+
+    def tau(nu: np.ndarray) -> np.ndarray:
+        arguments = 0.0, tuple(nu.tolist()), (1.0, 0.0, 0.0, 0.0), zero, zero, state.copy()
+        answer, _ = type(gains).wrench(*arguments, gains, model)
+        return np.asarray(answer, float)
+
+    with np.errstate(all='ignore'), user_law(gains):
+        columns = [(tau(-h) - tau(h)) / (2 * DIFFERENCE) for h in DIFFERENCE * np.eye(6)]
+    gain = np.stack(columns, axis=1)
+    return gain if np.isfinite(gain).all() else np.zeros((6, 6))
 
 
 def sampled_rate(K_D: np.ndarray, M: np.ndarray) -> tuple[float, str]:

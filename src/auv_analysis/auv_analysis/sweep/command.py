@@ -43,9 +43,6 @@ def sweep(options: argparse.Namespace) -> dict[str, Any]:
 def _announce(campaign: Campaign) -> None:
     own = campaign.own_laws
     announce(campaign.scenario, [name for name in campaign.controllers if name not in own])
-    for name, law in own.items():
-        how = 'as plain Python, slower, where numba cannot compile it'
-        say(f'{name}: the law {law.__name__} runs {how}')
 
 
 def _workers(text: str | None) -> int | None:

@@ -183,3 +183,22 @@ def test_without_a_compiler_columns_give_what_samples_give(run) -> None:
         for kind, values in zip(kept, document[name], strict=True):
             expected = getattr(compiled, kind)[kept[kind]]
             assert_allclose(np.array(values)[kept[kind]], expected, rtol=1e-12, atol=1e-12)
+
+
+def test_a_run_is_printed_in_a_line(run: Run) -> None:
+    for one in (run, in_blocks(run, 100)):
+        text = repr(one)
+        assert len(text.splitlines()) == 1
+        assert all(word in text for word in ('case1', 'gvc', 'herman2018', '401 samples', '4 s'))
+
+
+def test_a_run_is_a_data_frame(run: Run) -> None:
+    pytest.importorskip('pandas')
+    frame = run.to_pandas()
+    assert frame.index.name == 't'
+    assert_array_equal(frame.index, run.t)
+    assert_array_equal(frame['nu_d_dot.yaw'], run.nu_d_dot[:, 5])
+    assert_array_equal(frame['F.heave'], run.disturbance[:, 2])
+    assert 'applied.surge' not in frame, 'no actuators'
+    acting = replace(run, applied=2 * run.tau).to_pandas()
+    assert_array_equal(acting['applied.roll'], 2 * run.tau[:, 3])

@@ -1,6 +1,8 @@
 """What the workspace promises of itself: layers, one place per fact, shipped files that load."""
 
 import ast
+import importlib
+import pydoc
 import re
 import subprocess
 import sys
@@ -128,3 +130,13 @@ def test_public_functions_say_what_they_take_and_give() -> None:
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name[0] != '_':
                 text = ast.get_docstring(node)
                 assert text, f'{path.name}: {node.name}'
+
+
+@pytest.mark.parametrize('package', ORDER)
+def test_help_of_a_package_lists_its_public_names(package: str) -> None:
+    text = pydoc.plain(pydoc.render_doc(importlib.import_module(package)))
+    names = importlib.import_module(package).__all__
+    assert names
+    for name in names:
+        assert f'`{name}' in text.partition('PACKAGE CONTENTS')[0], name
+        assert re.search(rf'^    (class )?{name}\(', text, re.M), name

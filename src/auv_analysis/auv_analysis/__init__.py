@@ -1,4 +1,14 @@
-"""Scenarios, simulation, experiments on the node graph, bags, energy and coupling analysis."""
+"""Scenarios, simulation, experiments on the node graph, bags, energy and coupling analysis.
+
+- `load_scenario(path or name)`: a scenario, checked with its vehicle, gains and set-point
+- `simulate(scenario, controller)`: a `Run` by the kernel that the nodes use
+- `load_run(bag)`, `open_bag(bag)`: the same `Run` of a recorded bag; with its attachments
+- `Run`: the samples of a closed loop, as arrays or, by `to_pandas()`, as a data frame
+- `summarize(run)`: its figures as plain data, as in summary.json
+- `linearize(vehicle or scenario)`: the linear model of a vehicle or of a closed loop
+
+Many runs at once: `auv_analysis.rollouts`. On the command line: `auv --help`.
+"""
 
 import importlib
 from typing import TYPE_CHECKING, Any
@@ -6,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from auv_analysis.bag import load_run, open_bag
     from auv_analysis.linearization.loop import linearize
+    from auv_analysis.run import Run
     from auv_analysis.scenario import load_scenario
     from auv_analysis.simulation import simulate
     from auv_analysis.summary import summarize
@@ -14,11 +25,12 @@ _HOME = {
     'linearize': 'auv_analysis.linearization.loop',
     'load_run': 'auv_analysis.bag',
     'open_bag': 'auv_analysis.bag',
+    'Run': 'auv_analysis.run',
     'load_scenario': 'auv_analysis.scenario',
     'simulate': 'auv_analysis.simulation',
     'summarize': 'auv_analysis.summary',
 }
-__all__ = ['linearize', 'load_run', 'load_scenario', 'open_bag', 'simulate', 'summarize']
+__all__ = ['Run', 'linearize', 'load_run', 'load_scenario', 'open_bag', 'simulate', 'summarize']
 
 
 def __getattr__(name: str) -> Any:
@@ -26,3 +38,8 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(importlib.import_module(_HOME[name]), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+
+
+def __dir__() -> list[str]:
+    """Public names as well, for `help` and the TAB key."""
+    return sorted({*globals(), *__all__})

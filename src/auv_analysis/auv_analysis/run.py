@@ -3,18 +3,22 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from auv_analysis.fault_words import Mark
+from auv_dynamics.signals import DOFS
 from auv_dynamics.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FOREIGN = 'foreign_bag'  # source of a run that another system recorded
 BLOCK = 8192  # samples that are worked on together: their arrays fit into a processor's cache
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Facts(ABC):
     """What is known of a run beside its samples.
 
@@ -53,6 +57,15 @@ class Facts(ABC):
     @abstractmethod
     def extent(self) -> 'Extent':
         """How long the run is, and which of the signals are there that not every run has."""
+
+    def __repr__(self) -> str:
+        """What it is a run of, in a line."""
+        known = self.extent
+        return (
+            f'<{type(self).__name__} {self.scenario}, {self.controller}: law {self.law}, vehicle '
+            f'{self.vehicle.name}, by {self.source} ({self.hold}), {known.samples} samples from '
+            f'{known.start:g} to {known.end:g} s>'
+        )
 
     @property
     def samples(self) -> int:
@@ -112,7 +125,7 @@ class Extent(NamedTuple):
     knows_setpoint: bool = True
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Run(Facts):
     """One closed loop from start to end, n + 1 samples.
 
@@ -169,6 +182,35 @@ class Run(Facts):
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
+    def columns(self) -> dict[str, np.ndarray]:
+        """Name -> samples (n + 1,): `t` in s, then `eta.surge` to `f.yaw`, those that are there.
+
+        By group: eta in m and rad; nu, nu_d, measured in m/s and rad/s; nu_d_dot in m/s2 and
+        rad/s2; tau, applied, F (`disturbance`), f (`disturbance_estimate`) in N and N m.
+        """
+        groups = {
+            'eta': self.eta,
+            'nu': self.nu,
+            'measured': self.measured,
+            'nu_d': self.nu_d,
+            'nu_d_dot': self.nu_d_dot,
+            'tau': self.tau,
+            'applied': self.applied,
+            'F': self.disturbance,
+            'f': self.disturbance_estimate,
+        }
+        found = {'t': self.t}
+        for name, values in groups.items():
+            if values is not None:
+                found |= {f'{name}.{dof}': values[:, i] for i, dof in enumerate(DOFS)}
+        return found
+
+    def to_pandas(self) -> 'pd.DataFrame':
+        """The `columns` as a data frame, with `t` as its index; needs pandas."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns()).set_index('t')
+
     @property
     def extent(self) -> Extent:
         """Length and optional signals, from the arrays."""
@@ -188,7 +230,7 @@ class Run(Facts):
         return self.tau if self.applied is None else self.applied
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class LongRun(Facts):
     """A run whose samples are read in blocks, whenever they are asked for.
 

@@ -31,7 +31,7 @@ from auv_gvc_controller.setpoint import Setpoint, make_setpoint
 SCHEMA = Path(__file__).with_name('scenario.schema.json')
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scenario(Devices):
     """A checked scenario.
 
@@ -52,6 +52,11 @@ class Scenario(Devices):
     vehicle_data: dict[str, Any]
     data: dict[str, Any]
     attachments: dict[str, str]
+
+    def __repr__(self) -> str:
+        """Name, vehicle, controllers and length, in a line."""
+        loops = ', '.join(self.controllers)
+        return f'<Scenario {self.name}: vehicle {self.vehicle.name}, {loops}, {self.duration:g} s>'
 
     @property
     def name(self) -> str:

@@ -1,4 +1,8 @@
-"""Vehicle model, kinematics, integrator, disturbances and the plant."""
+"""Vehicle model, kinematics, integrator, disturbances and the plant.
+
+- `load_vehicle(path or name)`: a `Vehicle` with M, C(nu), D(nu), g(eta) and both dynamics
+- `InputError`: what is wrong with a file or an option: file, key, expected, found
+"""
 
 import importlib
 from typing import TYPE_CHECKING, Any
@@ -21,3 +25,8 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(importlib.import_module(_HOME[name]), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+
+
+def __dir__() -> list[str]:
+    """Public names as well, for `help` and the TAB key."""
+    return sorted({*globals(), *__all__})

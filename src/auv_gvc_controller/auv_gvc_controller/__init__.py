@@ -1,4 +1,7 @@
-"""Decomposition into generalised velocity components, control laws and set-points."""
+"""Decomposition into generalised velocity components, control laws and set-points.
+
+- `decompose(M)`: Upsilon (6, 6) and N (6,) of an inertia matrix
+"""
 
 import importlib
 from typing import TYPE_CHECKING, Any
@@ -17,3 +20,8 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(importlib.import_module(_HOME[name]), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+
+
+def __dir__() -> list[str]:
+    """Public names as well, for `help` and the TAB key."""
+    return sorted({*globals(), *__all__})

@@ -178,3 +178,10 @@ def test_current_is_refused(small_step):
     flowing = replace(scenario, data=scenario.data | {'disturbance': [spec]})
     with pytest.raises(ValueError, match='a scenario in still water, found a current'):
         linearize(flowing, controller='gvc')
+
+
+def test_printed_result_is_a_few_lines_with_the_poles():
+    text = repr(linearize('rexrov', law='gvc', gains=PAPER))
+    assert len(text.splitlines()) <= 3
+    assert 'law2' in text
+    assert '-0.8' in text

@@ -25,7 +25,7 @@ def relative(error: np.ndarray, values: np.ndarray) -> float:
     return float(np.max(error / np.where(largest > 0, largest, 1.0), initial=0.0))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Linearization:
     """x_dot = A x + B u, y = C x + D u about a point; unpacks as A, B, C, D.
 
@@ -57,6 +57,21 @@ class Linearization:
         """A, B, C, D, so that `control.ss(*linearize(...))` works."""
         return iter((self.A, self.B, self.C, self.D))
 
+    def __repr__(self) -> str:
+        """Sizes, names and poles, in a few lines; the matrices are A, B, C and D."""
+        groups = (
+            ', '.join(dict.fromkeys(name.partition('[')[0] for name in named))
+            for named in (self.states, self.inputs, self.outputs)
+        )
+        states, inputs, outputs = groups
+        poles = np.sort_complex(np.linalg.eigvals(self.A))[::-1]
+        shown = ', '.join(_number(pole) for pole in poles if pole.imag >= 0)
+        return (
+            f'<Linearization: A {self.A.shape}, B {self.B.shape}, C {self.C.shape}'
+            f'\n states: {states}; inputs: {inputs}; outputs: {outputs}'
+            f'\n poles, 1/s: {shown}>'
+        )
+
     def __len__(self) -> int:
         """Four."""
         return 4
@@ -75,6 +90,11 @@ class Linearization:
             u0=self.u0[columns],
             y0=self.y0[rows],
         )
+
+
+def _number(pole: complex) -> str:
+    real = f'{round(pole.real, 9) + 0.0:.4g}'
+    return f'{real} ± {pole.imag:.4g}i' if pole.imag > 1e-9 else real
 
 
 def _places(named: Sequence[str], groups: Sequence[str], what: str) -> list[int]:

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
@@ -19,9 +18,8 @@ def write_samples(run: AnyRun, path: Path) -> Path:
     Parameters
     ----------
     run : of `simulate` or of a bag, of any length
-    path : of the Parquet file; columns `t` in s, `nu.surge` and so on for nu, nu_d, eta, tau,
-        applied (where there are actuators), F (where it is known), f, xi, kinetic_energy
-        (½ N_i xi_i² of (30), J), delta_xi (33), delta_pi (34)
+    path : of the Parquet file; the columns of the run, and `xi.surge` and so on for xi,
+        kinetic_energy (½ N_i xi_i² of (30), J), delta_xi (33), delta_pi (34)
 
     Returns
     -------
@@ -44,21 +42,13 @@ def write_samples(run: AnyRun, path: Path) -> Path:
 
 def _table(run: Run, model: ControlModel) -> pa.Table:
     Upsilon, inverse = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
-    signals: dict[str, np.ndarray | None] = {
-        'eta': run.eta,
-        'nu': run.nu,
-        'nu_d': run.nu_d,
-        'tau': run.tau,
-        'applied': run.applied,
-        'F': run.disturbance,
-        'f': run.disturbance_estimate,
+    signals = {
         'kinetic_energy': kinetic_energy(inverse, model.N, run.nu),
         'xi': run.nu @ inverse.T,
         'delta_xi': delta_xi(inverse, run.nu),
         'delta_pi': delta_pi(Upsilon, run.tau),
     }
-    columns = {'t': run.t}
+    columns = run.columns()
     for name, values in signals.items():
-        if values is not None:
-            columns |= {f'{name}.{dof}': values[:, i] for i, dof in enumerate(DOFS)}
+        columns |= {f'{name}.{dof}': values[:, i] for i, dof in enumerate(DOFS)}
     return pa.table(columns)

@@ -7,7 +7,7 @@ import pytest
 
 from auv_analysis import cli
 from auv_analysis.commands import scenarios
-from auv_analysis.domain import LARGEST, VARIABLE, chosen_domain
+from auv_analysis.domain import LARGEST, VARIABLE, chosen_domain, own_domain
 from auv_dynamics.files import InputError
 
 WRONG = ['-1', '102', '99999999999999999999', 'abc', '1.5', '0x1', ' ', '1e1']
@@ -75,3 +75,20 @@ def test_run_refuses_a_wrong_domain_in_one_line(where, value, monkeypatch, capsy
     lines = capsys.readouterr().err.splitlines()
     assert (end.value.code, len(lines)) == (2, 1), lines
     assert f'{where}: expected a whole number from 0 to 101, found ' in lines[0]
+
+
+def test_domain_of_another_run_is_refused_and_never_picked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
+    with own_domain(None) as (domain, picked):
+        assert picked
+        with (
+            pytest.raises(
+                InputError, match=f'{VARIABLE}={domain}: expected a domain that no other'
+            ),
+            own_domain(domain),
+        ):
+            pass
+        with own_domain(None) as (another, _):
+            assert another != domain
+    with own_domain(domain) as again:
+        assert again == (domain, False)

@@ -1,10 +1,13 @@
 """The installed `auv`: help, refusals in one line, and exactly one JSON document."""
 
+import ctypes
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
 import uuid
 from collections.abc import Callable
 from pathlib import Path
@@ -429,3 +432,53 @@ def test_a_controller_that_diverges_leaves_the_others_their_report(folder, capsy
     assert errors[-1] == 'case1_lauv, cl: the closed loop diverges, not finite from t = 0.27 s'
     assert json.loads(Path('lauv/summary.json').read_text()).keys() == {'gvc'}
     assert Path('lauv/report.html').exists()
+
+
+CALLBACK = ctypes.CFUNCTYPE(None)
+
+
+def _dropped() -> None:
+    signal.raise_signal(signal.SIGINT)  # raised in a callback of C, where Python drops it
+
+
+def test_interrupt_that_python_drops_ends_the_command(monkeypatch, capsys) -> None:
+    def command(_: object) -> dict:
+        CALLBACK(_dropped)()
+        limit = time.monotonic() + 30
+        while time.monotonic() < limit:
+            time.sleep(0.01)
+        return {}
+
+    monkeypatch.setattr('auv_analysis.commands.function', lambda _: command)
+    assert _exit_code('doctor') == 1
+    assert capsys.readouterr().err == 'interrupted\n'
+
+
+@pytest.mark.parametrize('error', [OSError(28, 'No space left on device', 'x/y'), OSError('odd')])
+def test_full_disk_ends_in_one_line(error, monkeypatch, capsys) -> None:
+    def command(_: object) -> dict:
+        raise error
+
+    monkeypatch.setattr('auv_analysis.commands.function', lambda _: command)
+    assert _exit_code('simulate', 'case1') == 1
+    text = error.strerror or str(error)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert text in line
+
+
+@pytest.mark.long
+def test_interrupt_ends_simulate_whenever_it_comes(folder) -> None:
+    command = [sys.executable, '-m', 'auv_analysis.cli', 'simulate', 'case1', '--overwrite']
+    begun = time.monotonic()
+    subprocess.run(command, check=True, capture_output=True)
+    whole = time.monotonic() - begun
+    for i in range(1, 40):
+        process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        try:
+            process.wait(0.3 + i / 40 * whole)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=60)
+            assert process.returncode == 1 or i > 34, errors  # it may have come to its end
+            assert 'Traceback' not in errors
+            assert json.loads((folder / 'runs/case1/summary.json').read_text())

@@ -1,9 +1,11 @@
 """The `auv` command: one function per subcommand, imports only when they are needed."""
 
+import _thread
 import json
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -12,11 +14,36 @@ from typing import Any
 from auv_analysis.command_line import parser
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command; exit code 0 fine, 1 the work failed, 2 wrong input.
+AGAIN = 0.05  # s after which a Ctrl-C that was dropped is repeated
 
-    It must start where packages are broken, for `auv doctor`: nothing here imports any.
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command; exit code 0 fine, 1 the work failed, 2 wrong input."""
+    before, sys.unraisablehook = sys.unraisablehook, _repeat_interrupt
+    try:
+        _main(arguments)
+    except KeyboardInterrupt:
+        print('interrupted', file=sys.stderr, flush=True)
+        sys.exit(1)
+    finally:
+        sys.unraisablehook = before
+
+
+def _repeat_interrupt(dropped: Any) -> None:
+    """Repeat a Ctrl-C that Python drops, since it came inside a callback of C.
+
+    Loading or compiling kernels, LLVM calls back while it works; whatever is raised there is lost.
     """
+    if dropped.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(dropped)
+        return
+    timer = threading.Timer(AGAIN, _thread.interrupt_main)
+    timer.daemon = True
+    timer.start()
+
+
+def _main(arguments: list[str] | None) -> None:
+    # it must start where packages are broken, for `auv doctor`: nothing here imports any
     grammar = parser()
     if '_ARGCOMPLETE' in os.environ:  # the shell asks what could follow
         from auv_analysis.completion import complete
@@ -51,8 +78,8 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing left to flush
         sys.exit(1)
-    except KeyboardInterrupt:
-        _say('interrupted')
+    except OSError as error:  # a full disk, a quota, a folder that has gone
+        _say(f'{error.filename or "auv"}: {error.strerror or error}')
         sys.exit(1)
 
 

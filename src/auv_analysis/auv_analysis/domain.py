@@ -1,8 +1,13 @@
 """Which ROS domain a run uses, and that nobody else's vehicle is on it."""
 
+import fcntl
 import os
 import random
 import socket
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 from auv_dynamics.refusal import InputError, shorten
 
@@ -29,6 +34,35 @@ def chosen_domain(option: int | str | None) -> tuple[int, bool]:
     candidates = list(range(1, LARGEST + 1))
     random.shuffle(candidates)
     return next((domain for domain in candidates if is_free(domain)), 1), True
+
+
+@contextmanager
+def own_domain(option: int | str | None) -> Iterator[tuple[int, bool]]:
+    """`chosen_domain`, kept from other runs of this user as long as this lasts.
+
+    Raises
+    ------
+    InputError : no such domain, or another run is on the one that was asked for
+
+    """
+    for _ in range(LARGEST):
+        domain, picked = chosen_domain(option)
+        path = Path(tempfile.gettempdir()) / f'auv_gvc_{os.getuid()}_domain_{domain}.lock'
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            break
+        except BlockingIOError:
+            os.close(handle)
+            if not picked:
+                expected = 'a domain that no other auv run is on'
+                raise InputError(f'{VARIABLE}={domain}', '', expected, 'one in use') from None
+    else:
+        raise InputError(VARIABLE, '', 'a free domain', 'none')
+    try:
+        yield domain, picked
+    finally:
+        os.close(handle)
 
 
 def joined_domain(option: int | str | None) -> int:

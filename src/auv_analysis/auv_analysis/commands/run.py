@@ -15,7 +15,7 @@ from auv_analysis.bag import open_bag
 from auv_analysis.commands.conclude import Outcome, finish
 from auv_analysis.commands.scenarios import open_scenario, scenario_folder
 from auv_analysis.console import say
-from auv_analysis.domain import VARIABLE, chosen_domain
+from auv_analysis.domain import VARIABLE, own_domain
 from auv_analysis.experiment import environment, run_controller
 from auv_analysis.failure import FailedError
 from auv_analysis.folder import Results
@@ -52,18 +52,18 @@ def free_graph(options: argparse.Namespace) -> Iterator[FreeGraph]:
     InputError : no such domain, or somebody's vehicle is on it
 
     """
-    domain, picked = chosen_domain(options.domain_id)
-    os.environ.update(environment(domain))
-    # the middleware reads its environment when it is loaded
-    from auv_dynamics.ros.watcher import Watcher
+    with own_domain(options.domain_id) as (domain, picked):
+        os.environ.update(environment(domain))
+        # the middleware reads its environment when it is loaded
+        from auv_dynamics.ros.watcher import Watcher
 
-    graph = Watcher(domain)
-    try:
-        if not picked:
-            _refuse_strangers(graph, domain)
-        yield FreeGraph(domain, graph)
-    finally:
-        graph.close()
+        graph = Watcher(domain)
+        try:
+            if not picked:
+                _refuse_strangers(graph, domain)
+            yield FreeGraph(domain, graph)
+        finally:
+            graph.close()
 
 
 def recorded(

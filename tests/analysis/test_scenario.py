@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -198,3 +199,12 @@ def test_schema_is_one_and_says_what_is_expected_everywhere(kind: str) -> None:
     jsonschema.Draft202012Validator.check_schema(schema)
     for name, entry in schema['properties'].items():
         assert entry.get('title'), name
+
+
+def test_initial_angles_in_degrees_are_warned_of() -> None:
+    scenario = load_scenario('case1')
+    before = scenario.warnings
+    data = scenario.data | {'initial': {'eta': [0, 0, 0, 0, 10.0, 400.0], 'nu': [0.0] * 6}}
+    (warning,) = [w for w in replace(scenario, data=data).warnings if w not in before]
+    assert 'initial.eta' in warning
+    assert 'degrees?' in warning

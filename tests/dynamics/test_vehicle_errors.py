@@ -64,6 +64,15 @@ ERRORS = {
     'D indefinite': (
         changed('damping.linear', matrix(0, 1, 300.0)), 'damping.linear',
         'a positive semidefinite matrix', 'smallest eigenvalue -50'),
+    'volume in litres': (
+        changed('hydrostatics.volume', 1838.26), 'hydrostatics.volume',
+        'm3 that displace about the mass, 1862.87 kg', '1838.26: litres, or the mass in t?'),
+    'mass in g': (
+        changed('rigid_body.mass', 1862870.0), 'rigid_body.mass',
+        'kg, about the 1889.73 kg of water displaced', '1.86287e+06: g?'),
+    'density in g/cm3': (
+        changed('environment.water_density', 1.025), 'environment.water_density',
+        'kg/m3, such as 1025', '1.025: g/cm3?'),
     'triangle inequality': (
         changed('rigid_body.inertia', np.diag([1.0, 2.0, 3.5]).tolist()), 'rigid_body.inertia',
         'principal moments that satisfy the triangle inequality', 'principal moments 1, 2, 3.5'),
@@ -190,6 +199,16 @@ def test_damping_may_be_asymmetric_and_is_kept(tmp_path):
         (changed('damping.quadratic', matrix(0, 1, 900.0)), 'damping.quadratic', 'gains energy'),
         (BASE | {'lift': matrix(1, 5, -3.0, -1.0)}, 'lift', '[5][5] = -1: feeds'),
         (changed('source', ''), 'source', 'no source is given'),
+        (
+            changed('rigid_body.inertia', np.diag([525390.0, 794200.0, 691230.0]).tolist()),
+            'rigid_body.inertia',
+            'g m2 or kg mm2?',
+        ),
+        (
+            changed('hydrostatics.center_of_buoyancy', [0.0, 0.0, -506.0]),
+            'hydrostatics.center_of_buoyancy',
+            'mm?',
+        ),
     ],
 )
 def test_what_is_odd_but_usable_is_a_warning(tmp_path, data, key, text):

@@ -137,10 +137,10 @@ def test_sname_negates_added_mass_damping_and_lift_and_nothing_else(data):
 )  # fmt: skip
 def test_numbers_as_people_write_them(tmp_path, written, value):
     text = text_of('herman2018')
-    assert 'volume: 0.36' in text
+    assert 'gravity: 9.81' in text
     path = tmp_path / 'vehicle.yaml'
-    path.write_text(text.replace('volume: 0.36', f'volume: {written}'), encoding='utf-8')
-    assert load_vehicle(path).buoyancy == pytest.approx(1000.0 * 9.81 * value, rel=1e-14)
+    path.write_text(text.replace('gravity: 9.81', f'gravity: {written}'), encoding='utf-8')
+    assert load_vehicle(path).weight == pytest.approx(250.0 * value, rel=1e-14)
 
 
 def test_six_numbers_are_a_diagonal(tmp_path):

@@ -13,7 +13,6 @@ from typing import Any
 
 from auv_analysis.command_line import parser
 
-
 AGAIN = 0.05  # s after which a Ctrl-C that was dropped is repeated
 
 

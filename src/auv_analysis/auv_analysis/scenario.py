@@ -1,6 +1,7 @@
 """Scenario file, format 1: one experiment, resolved so that nothing is left to look up."""
 
 import json
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -143,6 +144,9 @@ class Scenario(Devices):
     def warnings(self) -> list[str]:
         """What is odd but usable, of the vehicle and of gains for this step, one line each."""
         found = list(self.vehicle.warnings)
+        angles = self.data['initial']['eta'][3:5]
+        if max(map(abs, angles)) > 2 * math.pi:
+            found.append(f'{self.path}: initial.eta: roll and pitch of {angles} rad: degrees?')
         for name in self.controllers:
             gains = self.gains(name)
             K_D, _ = body_gains(gains, control_model(self.vehicle))

@@ -12,6 +12,9 @@ from auv_dynamics.vehicle import Vehicle, rigid_body_matrix, skew
 
 SCHEMA = Path(__file__).with_name('vehicle.schema.json')
 ASYMMETRY = 1e-3  # largest tolerated, relative to the matrix's largest entry
+ABSURD = 300.0  # times: weight and buoyancy of no vehicle are so far apart, a wrong unit is 1000
+LIGHTEST = 10.0  # kg/m3 of water
+LONGEST = 8.0  # of lengths, in edges of a cube of the vehicle's volume: a slender hull has 2
 ROUNDING = 1e-9  # relative, below which a negative eigenvalue counts as zero
 
 
@@ -49,6 +52,7 @@ def vehicle_from_dict(data: dict[str, Any], file: object) -> Vehicle:
         M = M_RB + M_A
     source.check_positive_definite(M)
     environment, water = data['environment'], data['hydrostatics']
+    source.check_units(mass, water['volume'], environment['water_density'])
     weight = mass * environment['gravity']
     buoyancy = environment['water_density'] * environment['gravity'] * water['volume']
     D_linear, D_quadratic = source.damping()
@@ -211,6 +215,35 @@ class _Source:
                 text = f'nu = {_numbers(nu)} gains energy from it ({power:.3g} W)'
                 self._warn('damping.quadratic', text)
                 return
+
+    def check_units(self, mass: float, volume: float, density: float) -> None:
+        """Refuse what is wrong by a factor of a thousand, warn of what probably is."""
+        displaced = density * volume
+        if displaced > ABSURD * mass:
+            expected = f'm3 that displace about the mass, {mass:g} kg'
+            found = f'{volume:g}: litres, or the mass in t?'
+            raise InputError(self._file, 'hydrostatics.volume', expected, found)
+        if mass > ABSURD * displaced:
+            if density < LIGHTEST:
+                found = f'{density:g}: g/cm3?'
+                raise InputError(
+                    self._file, 'environment.water_density', 'kg/m3, such as 1025', found
+                )
+            expected, found = f'kg, about the {displaced:g} kg of water displaced', f'{mass:g}: g?'
+            raise InputError(self._file, 'rigid_body.mass', expected, found)
+        body, most = self._data['rigid_body'], LONGEST * volume ** (1 / 3)
+        if 'inertia' in body:
+            radius = float(np.sqrt(np.abs(body['inertia']).max() / mass))
+            if radius > most:
+                text = f'a radius of gyration of {radius:.3g} m for {volume:g} m3: g m2 or kg mm2?'
+                self._warn('rigid_body.inertia', text)
+        for part, key in (
+            ('rigid_body', 'center_of_gravity'),
+            ('hydrostatics', 'center_of_buoyancy'),
+        ):
+            distance = float(np.linalg.norm(self._data[part][key]))
+            if distance > most:
+                self._warn(f'{part}.{key}', f'{distance:.3g} m away for {volume:g} m3: mm?')
 
     def warn_buoyancy(self, weight: float, buoyancy: float) -> None:
         if abs(weight - buoyancy) > 0.02 * weight:

@@ -29,6 +29,7 @@ from auv_analysis.manifest import (
     signature,
     write_manifest,
 )
+from auv_dynamics.ending import ENDING
 from auv_dynamics.files import InputError, reason
 
 STAGING = 'unfinished'  # folder of a result that is to replace another one
@@ -233,16 +234,20 @@ def _swap(staging: Path, out: Path, old: dict[str, Signature], files: Mapping[st
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Let Ctrl-C wait for the end of this."""
+    """Let Ctrl-C and the other signals that end a command wait for the end of this."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     asked: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
+    before = {
+        number: signal.signal(number, lambda number, _: asked.append(number))
+        for number in {signal.SIGINT, *ENDING}
+    }
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     if asked:
         raise KeyboardInterrupt
 

@@ -4,7 +4,6 @@ import fcntl
 import os
 import re
 import shutil
-import signal
 import tempfile
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -29,7 +28,7 @@ from auv_analysis.manifest import (
     signature,
     write_manifest,
 )
-from auv_dynamics.ending import ENDING
+from auv_dynamics.ending import on_signals
 from auv_dynamics.files import InputError, reason
 
 STAGING = 'unfinished'  # folder of a result that is to replace another one
@@ -238,16 +237,9 @@ def _undisturbed() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    asked: list[int] = []
-    before = {
-        number: signal.signal(number, lambda number, _: asked.append(number))
-        for number in {signal.SIGINT, *ENDING}
-    }
-    try:
+    asked: list[None] = []
+    with on_signals(lambda: asked.append(None)):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
     if asked:
         raise KeyboardInterrupt
 

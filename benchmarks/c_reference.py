@@ -76,9 +76,11 @@ def loops(scenarios: Sequence[Scenario], controller: str) -> Loops:
 
 def _parameters(scenario: Scenario, controller: str) -> np.ndarray:
     known = control_model(scenario.vehicle)
-    plant, gains = scenario.uncertainty.truth.model, scenario.gains(controller)
-    parts = (*plant, *known.dynamics, known.Upsilon, known.Upsilon_inv, known.N, *gains)
-    return np.concatenate(parts)
+    models, gains = (scenario.uncertainty.truth.model, known.dynamics), scenario.gains(controller)
+    if any(model.lift is not None for model in models):
+        raise ValueError(f'{scenario.vehicle.name}: reference.c knows no lift')
+    dynamics = [part for model in models for part in model if part is not None]
+    return np.concatenate([*dynamics, known.Upsilon, known.Upsilon_inv, known.N, *gains])
 
 
 def rollouts(library: Any, loops: Loops) -> tuple[np.ndarray, np.ndarray]:

@@ -30,7 +30,7 @@ class Theirs(NamedTuple):
 
     @staticmethod
     def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
-        return np.zeros(6), np.zeros(6)
+        return gains.k_D.reshape(6, 6) @ np.subtract(nu_d, nu), np.zeros(6)
 
     @staticmethod
     def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):

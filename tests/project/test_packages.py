@@ -39,7 +39,7 @@ NAMES = {  # on PyPI
 }  # fmt: skip
 FROM_PYPI = {'SALib', 'bokeh', 'lz4', 'mcap', 'mcap_ros2', 'pyarrow', 'rosbags', 'scipy',
              'zstandard'}  # fmt: skip
-OPTIONAL = {'numba', 'llvmlite', 'distributed', 'rerun'}
+OPTIONAL = {'numba', 'llvmlite', 'distributed', 'pandas', 'rerun'}
 
 
 @cache

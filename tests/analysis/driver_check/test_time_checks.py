@@ -1,8 +1,6 @@
 """Rate, gaps, order, age and drift of stamps."""
 
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +12,6 @@ from auv_analysis.driver_check.settings import Settings
 from auv_analysis.driver_check.time_checks import time_findings
 
 SECOND = 10**9
-PARAMETERS = 'src/auv_gvc_controller/auv_gvc_controller/controller_parameters.py'
-ROOT = Path(__file__).parents[3]
 
 
 def found_in(heard: Recording, **settings: object) -> dict[str, Finding]:
@@ -36,18 +32,6 @@ def test_a_healthy_recording_passes() -> None:
     assert found['rate'].numbers['rate_hz'] == pytest.approx(50.0)
     assert found['age'].numbers['age_median_s'] == pytest.approx(0.004)
     assert found['drift'].numbers['drift'] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_the_limits_are_the_defaults_of_the_controller() -> None:
-    text = (ROOT / PARAMETERS).read_text()
-    ours = Settings()
-    for name, value in {
-        'odometry_timeout': ours.timeout, 'limits.gap': ours.gap, 'limits.speed': ours.speed,
-        'limits.rate': ours.turning, 'limits.acceleration': ours.acceleration,
-    }.items():  # fmt: skip
-        found = re.search(rf"'{name}',\s*([\d.]+)", text)
-        assert found, name
-        assert float(found[1]) == value, name
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from auv_analysis.folder import check_free, results_folder
 from auv_analysis.new_files import write_json
 from auv_analysis.progress import bar, console, count, waiting
 from auv_analysis.replay.compared import (
+    UNCHECKED,
     Compared,
     Reproduction,
     compared,
@@ -29,7 +30,7 @@ from auv_gvc_controller.laws import is_unasked, law_class, refusal
 
 DOCUMENT = 'open_loop.json'
 UNITS = ('N', 'N m')
-UNCHECKED = 'reproduction not checked: the bag does not name its law, or it is not imported'
+UNNAMED = f'{UNCHECKED}: the bag does not name its law, or it is not imported'
 
 
 def answered(options: argparse.Namespace) -> dict[str, Any]:
@@ -46,7 +47,7 @@ def answered(options: argparse.Namespace) -> dict[str, Any]:
     verdict = _verdict(recorded, known)
     both = compared(recorded, answers)
     out = options.out or _folder(recorded, options.law)
-    sentence = verdict.sentence() if verdict else UNCHECKED
+    sentence = verdict.sentence() if verdict else UNNAMED
     document = {
         'reproduced': verdict.holds if verdict else None,
         'reproduction': sentence,
@@ -67,7 +68,7 @@ def answered(options: argparse.Namespace) -> dict[str, Any]:
         figure = _draw(document, both, results.folder)
     _show(document)
     say(f'figure: {out / figure.relative_to(results.folder)}')
-    if verdict and not verdict.holds:
+    if verdict and verdict.holds is False:
         raise FailedError(f'{options.bag}: {sentence}', document)
     return document
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from auv_dynamics.interface import Frames
+from auv_gvc_controller.settings import ControllerSettings
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,8 @@ class Settings:
     rate: float | None = None
     sim_time: bool = False
     actuates: bool = False
-    timeout: float = 0.5
-    gap: float = 1.0
-    speed: float = 20.0
-    turning: float = 20.0
-    acceleration: float = 100.0
+    timeout: float = ControllerSettings.odometry_timeout
+    gap: float = ControllerSettings.limits_gap
+    speed: float = ControllerSettings.limits_speed
+    turning: float = ControllerSettings.limits_rate
+    acceleration: float = ControllerSettings.limits_acceleration

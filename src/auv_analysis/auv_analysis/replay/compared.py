@@ -12,6 +12,7 @@ from auv_dynamics.interface import NANOSECONDS
 
 LOCKSTEP = 1e-9  # of the rms: rounding of another machine; on the same one nothing differs
 REAL_TIME = 0.05  # the bag does not say when each message arrived
+UNCHECKED = 'reproduction not checked'
 
 
 class Compared(NamedTuple):
@@ -73,17 +74,17 @@ class Reproduction(NamedTuple):
     limit: float
 
     @property
-    def holds(self) -> bool:
-        """Whether it does."""
+    def holds(self) -> bool | None:
+        """Whether it does; None: there is nothing to compare."""
         if self.relative is None:
-            return self.within == 0.0
+            return None if self.within is None else self.within == 0.0
         return self.relative <= self.limit
 
     def sentence(self) -> str:
         """What is said first of the results."""
         limit = f'(limit {100.0 * self.limit:g} %)'
         if self.within is None:
-            return 'NOT reproduced: no recorded wrench answers a recorded odometry, but on a ramp'
+            return f'{UNCHECKED}: no recorded wrench answers a recorded odometry, but on a ramp'
         if self.relative is None:
             return f'{"" if self.holds else "NOT "}reproduced: the recorded wrench is zero'
         text = f'by {100.0 * self.relative:.3g} % rms {limit}'

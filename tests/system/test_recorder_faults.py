@@ -1,10 +1,14 @@
 """`auv run` when its recorder or its disk gives way: the cause is named, the rest is kept."""
 
 import json
+import os
 import shutil
 import signal
 import subprocess
+import sys
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +21,7 @@ from graph_runs import node_of, nodes, start
 from harness import auv
 
 from auv_analysis.bag import load_run, read_bag
+from auv_analysis.supervisor import NodeDiedError, Supervisor
 from auv_dynamics import interface
 
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
@@ -150,6 +155,22 @@ def test_a_disk_that_fills_up(tmp_path: Path) -> None:
         assert read_bag(last).notes == [], 'finished in good order'
         assert steps_of(last) > 0
         assert not nodes(out)
+
+
+def test_a_node_that_cannot_even_say_so(tmp_path: Path) -> None:
+    with small_disk(tmp_path / 'disk', 64) as disk:
+        if disk is None:
+            pytest.skip('mounting is not permitted')
+        with (disk / 'full').open('wb', buffering=0) as file, suppress(OSError):
+            while True:
+                file.write(bytes(4096))
+        supervisor = Supervisor(disk / 'logs', dict(os.environ))
+        supervisor.start('node', [sys.executable, '-c', 'print("why", flush=True)'])
+        while not supervisor.ended():
+            time.sleep(0.01)
+        with pytest.raises(NodeDiedError, match=r'exit code 1\n.*: no space left'):
+            supervisor.check('')
+        supervisor.stop()
 
 
 @pytest.mark.long

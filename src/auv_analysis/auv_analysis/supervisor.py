@@ -92,8 +92,12 @@ class Supervisor:
         return may_end in ended
 
     def last_lines(self, name: str, count: int = 8) -> str:
-        """End of a process' output, indented, for a message."""
-        return ''.join(f'\n    {line}' for line in self._lines(name)[-count:])
+        """End of a process' output, indented, for a message; on a full disk it has none."""
+        lines = self._lines(name)[-count:]
+        free = os.statvfs(self._logs).f_bavail if self._logs.is_dir() else None
+        if free == 0:
+            lines.append(f'{self._logs}: no space left on the file system')
+        return ''.join(f'\n    {line}' for line in lines)
 
     def _lines(self, name: str) -> list[str]:
         log = self._outputs[name]

@@ -41,10 +41,13 @@ def test_empty_environment_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 1 <= domain <= LARGEST
 
 
-def test_picked_domain_is_one_whose_port_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize('participant', [0, 1, 4])
+def test_picked_domain_is_one_whose_ports_are_free(participant, monkeypatch) -> None:
     monkeypatch.setattr('random.shuffle', lambda candidates: None)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken, suppress(OSError):
-        taken.bind(('127.0.0.1', 7400 + 250 + 10))  # of domain 1, DDSI-RTPS 9.6.1.1
+        taken.bind(
+            ('127.0.0.1', 7400 + 250 + 10 + 2 * participant)
+        )  # of domain 1, DDSI-RTPS 9.6.1.1
         assert chosen_domain(None)[0] > 1
 
 

@@ -13,6 +13,7 @@ from auv_dynamics.refusal import InputError, shorten
 
 LARGEST = 101  # above it, DDS ports fall into the range that the system hands out
 VARIABLE = 'ROS_DOMAIN_ID'
+PARTICIPANTS = 10  # of a graph that is looked for
 
 
 def chosen_domain(option: int | str | None) -> tuple[int, bool]:
@@ -92,10 +93,17 @@ def _checked(value: object, name: str) -> int:
 
 
 def is_free(domain: int) -> bool:
-    """Whether the first participant's port of a domain is unused (DDSI-RTPS 9.6.1.1)."""
+    """Whether the ports of a domain's first participants are unused (DDSI-RTPS 9.6.1.1).
+
+    The very first one may have left before the others.
+    """
+    return all(_is_unused(7400 + 250 * domain + 10 + 2 * i) for i in range(PARTICIPANTS))
+
+
+def _is_unused(port: int) -> bool:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.bind(('127.0.0.1', 7400 + 250 * domain + 10))
+            probe.bind(('127.0.0.1', port))
         except OSError:
             return False
     return True

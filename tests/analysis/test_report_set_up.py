@@ -112,6 +112,7 @@ def test_set_up_says_every_number_of_the_scenario(rough):
     ]
     assert words['seed'] == ['3']
     assert any('symmetrised' in line for line in words['warnings'])
+    assert not any('/' in line.partition(': ')[0] for line in words['warnings']), 'no folders'
     assert list(set_up(*rough).limit) == DATA['actuators']['limit']
 
 

@@ -1,5 +1,6 @@
 """The set-up of a study in words: what acts on the plant, and what lies between it and the law."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -27,6 +28,7 @@ from auv_gvc_controller.gains import sampling_warning
 
 VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
 KEYS = {'set-point': 'setpoint', 'start': 'initial', 'disturbances': 'disturbance'}
+FOLDERS = re.compile(r'^.*?(?=[^/\s]+\.ya?ml: )')  # before a file's name: a report is passed on
 ELSEWHERE = 'not known: another system ran the law; the notes say how its bag was read'
 KINDS = {
     'herman2018': herman2018,
@@ -148,7 +150,8 @@ def _shared(
     if integrator:
         lines[0] = f'{integrator}; {lines[0]}'
     odd = sampling_warnings(runs, summaries)
-    odd += dict.fromkeys(warning for run in runs.values() for warning in run.vehicle.warnings)
+    told = (warning for run in runs.values() for warning in run.vehicle.warnings)
+    odd += dict.fromkeys(FOLDERS.sub('', warning) for warning in told)
     return [('integration', lines), *([('warnings', odd)] if odd else [])]
 
 

@@ -97,9 +97,10 @@ build: setup  ## colcon build of the workspace
 	AMENT_PREFIX_PATH="$(abspath $(VENV))$${AMENT_PREFIX_PATH:+:$$AMENT_PREFIX_PATH}" \
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m colcon build --symlink-install
 
+# TESTS="--pytest-args -k ..." takes some of them
 colcon-test: build  ## the tests of the packages as colcon runs them
 	. install/local_setup.bash && PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m colcon test \
-	  --executor sequential --return-code-on-test-failure --event-handlers console_direct+
+	  --executor sequential --return-code-on-test-failure --event-handlers console_direct+ $(TESTS)
 
 # each wheel from its sdist, so that nothing is in it that the sdist lacks
 wheels: setup  ## sdist and wheel of the three packages, in dist/

@@ -138,13 +138,17 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
         self.graph.listen(topic, take, topics.every_step())
 
-    def _say(self, answer: Answer | None) -> None:
+    def _say(self, answer: Answer | None, *, leaves: bool = False) -> None:
         if answer is None:
             return
         self._held = None if self.graph.ready() else answer
         if self._held is not None:
             return  # until the expected subscribers have matched; see _watch
-        self._tell(answer.trouble)
+        if not leaves:
+            self._tell(answer.trouble)
+        elif self._follows:
+            self._follows = False
+            self.get_logger().info('lets go: zero wrench')
         self._say_wrench(answer.ns, answer.tau)
         self._say_estimate(answer.ns, answer.f)
         self.graph.latest_ns = answer.ns
@@ -182,7 +186,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         if not self._active:
             return
         if not self._settings.lockstep or self._controller.unanswered is not None:
-            self._say(self._controller.silence())
+            self._say(self._controller.silence(), leaves=True)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._active:

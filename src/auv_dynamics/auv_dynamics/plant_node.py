@@ -24,7 +24,7 @@ from auv_dynamics.plant_parameters import (
 )
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
-from auv_dynamics.ros.endpoints import full_name, other_publishers
+from auv_dynamics.ros.endpoints import NAMED, NAMELESS, full_name, other_publishers
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import declare, declare_grid, refuse_unknown
@@ -43,7 +43,7 @@ class PlantNode(BulkNode):
 
     def __init__(self) -> None:
         super().__init__('plant_node')
-        self._born = time.monotonic()
+        self._born, self._rivals_since = time.monotonic(), 0.0
         self.graph = Graph(self)
         self._declare()
         refuse_unknown(self)
@@ -132,8 +132,9 @@ class PlantNode(BulkNode):
 
     def _start(self) -> None:
         now = time.monotonic()
-        if self._started is None or now - self._started < NEW:
-            self._refuse_second_clock()
+        newcomer = self._started is None or now - self._started < NEW
+        if newcomer and self._say_clock is not None and not self._is_only_clock(now):
+            return
         met = now - self._born >= MET and self.exit_code is None
         if met and self.graph.ready() and not self.peers.not_ready() and not self.paused:
             if self._started is None:
@@ -143,15 +144,18 @@ class PlantNode(BulkNode):
                 self.begin(f'simulates {self.graph.hardware_id} in {pace}, {step} per step')
             self.pace.start()
 
-    def _refuse_second_clock(self) -> None:
-        """End with one line where somebody publishes `/clock`; who came later has to give way."""
-        if self._say_clock is None or self.exit_code is not None:
-            return
-        if others := other_publishers(self, topics.CLOCK.name):
+    def _is_only_clock(self, now: float) -> bool:
+        """Whether nobody else publishes `/clock`; who came later ends with one line."""
+        names = sorted(map(full_name, other_publishers(self, topics.CLOCK.name)))
+        self._rivals_since = (self._rivals_since or now) if names else 0.0
+        if not names or (NAMELESS in names and now - self._rivals_since < NAMED):
+            return not names
+        if self.exit_code is None:
             expected = f'nobody else who publishes {topics.CLOCK.name}, or false'
-            found = ', '.join(sorted(map(full_name, others)))
+            found = ', '.join(names)
             print(InputError(self.get_name(), 'publish_clock', expected, found), file=sys.stderr)
             self.exit_code = 2
+        return False
 
     def publish_state(self, measured: int | None) -> None:
         """Publish step k; odometry first, since the controller waits for it.

@@ -308,7 +308,7 @@ def test_a_second_clock_is_refused_by_who_comes_later() -> None:
         second = [*parameters(vehicle='herman2018_neutral'), '-r', '__ns:=/two']
         late = start_node('plant_node', domain, *second)
         ended = CompletedProcess([], late.wait(PATIENCE), late.communicate()[0])
-        assert_one_line(ended, 'publish_clock', '/clock')
+        assert_one_line(ended, 'publish_clock', '/plant_node')
         beside = start_node('plant_node', domain, *second, *parameters(publish_clock=False))
         said = peer.heard[topics.DIAGNOSTICS.name]
         two = topics.Topic('two/odom', topics.ODOM.type)

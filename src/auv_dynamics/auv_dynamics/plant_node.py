@@ -24,7 +24,7 @@ from auv_dynamics.plant_parameters import (
 )
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
-from auv_dynamics.ros.endpoints import NAMED, NAMELESS, full_name, other_publishers
+from auv_dynamics.ros.endpoints import NAMELESS, full_name, other_publishers
 from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import declare, declare_grid, refuse_unknown
@@ -33,7 +33,7 @@ from auv_dynamics.sensors import SensorNoise
 from auv_dynamics.uncertainty import make_uncertainty
 
 MET = 0.5  # s after its birth in which those who are there already are met, before it starts
-NEW = 3.0  # s after its start in which it is the newcomer where there is another clock
+NEW = 3.0  # s after its start in which it gives way to another clock, and may wait for its name
 
 
 class PlantNode(BulkNode):
@@ -148,7 +148,7 @@ class PlantNode(BulkNode):
         """Whether nobody else publishes `/clock`; who came later ends with one line."""
         names = sorted(map(full_name, other_publishers(self, topics.CLOCK.name)))
         self._rivals_since = (self._rivals_since or now) if names else 0.0
-        if not names or (NAMELESS in names and now - self._rivals_since < NAMED):
+        if not names or (NAMELESS in names and now - self._rivals_since < NEW):
             return not names
         if self.exit_code is None:
             expected = f'nobody else who publishes {topics.CLOCK.name}, or false'

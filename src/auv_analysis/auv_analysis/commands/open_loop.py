@@ -44,7 +44,8 @@ def answered(options: argparse.Namespace) -> dict[str, Any]:
     gains = own.gains_of(options.law, _gains(options.gain))
     answers = _answers(recorded, options.law, gains)
     known = own.law != UNKNOWN
-    verdict = _verdict(recorded, known)
+    same = options.law == own.law and not options.gain  # as recorded: asked once
+    verdict = _verdict(recorded, known, answers if same else None)
     both = compared(recorded, answers)
     out = options.out or _folder(recorded, options.law)
     sentence = verdict.sentence() if verdict else UNNAMED
@@ -107,12 +108,15 @@ def _folder(recorded: RecordedLoop, law: str) -> Path:
     return Path('runs') / f'replay_{recorded.scenario}_{recorded.name}_{plain}'
 
 
-def _verdict(recorded: RecordedLoop, known: bool) -> Reproduction | None:
-    """Whether the recorded law gives the recorded wrench; None where it cannot be asked."""
+def _verdict(recorded: RecordedLoop, known: bool, again: OpenLoop | None) -> Reproduction | None:
+    """Whether the recorded law gives the recorded wrench; None where it cannot be asked.
+
+    `again` are its answers where there are some already.
+    """
     own = recorded.controller
     if not known or is_unasked(own.law):
         return None
-    return reproduction(recorded, _answers(recorded, own.law, own.gains))
+    return reproduction(recorded, again or _answers(recorded, own.law, own.gains))
 
 
 def _remarks(answers: OpenLoop) -> list[str]:

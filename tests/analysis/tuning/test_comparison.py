@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import binomtest, rankdata
 from tunings import GVC, SAME_CL, scenario
 
-from auv_analysis.pairs import NEVER, log_ratios, paired
-from auv_analysis.tuning.comparison import COMPARED, compare, holm
+from auv_analysis.studies.pairs import NEVER, holm, log_ratios, paired
+from auv_analysis.tuning.comparison import COMPARED, compare
 from auv_analysis.tuning.draws import Spread
 from auv_analysis.tuning.measures import Measures
 from auv_analysis.tuning.monte_carlo import monte_carlo

@@ -8,7 +8,7 @@ import numpy as np
 from auv_analysis.exploration.opening import Sweep
 from auv_analysis.exploration.quantiles import ordered
 from auv_analysis.measures import Measure
-from auv_analysis.pairs import log_ratios, paired
+from auv_analysis.studies.pairs import log_ratios, paired
 
 Row = dict[str, Any]
 

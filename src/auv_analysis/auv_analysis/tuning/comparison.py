@@ -1,11 +1,11 @@
 """Controllers compared draw by draw, with Holm's correction for the number of comparisons."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from auv_analysis.pairs import Pairs, log_ratios, paired
+from auv_analysis.studies.pairs import Pairs, holm, log_ratios, paired
 from auv_analysis.tuning.measures import Measures
 
 COMPARED = ('weighted_error', 'error', 'effort', 'late_error', 'settling')
@@ -63,12 +63,3 @@ def compare(found: Mapping[str, Measures], pairs: Iterable[tuple[str, str]]) -> 
         Comparison(**asdict(row), controller=a, against=b, measure=m, draws=len(d), p_holm=p)
         for row, (a, b, m), d, p in zip(rows, names, ratios, adjusted, strict=True)
     ]
-
-
-def holm(p: Sequence[float]) -> list[float]:
-    """Holm's step-down correction: the k-th smallest of m times m - k + 1, never decreasing."""
-    order = np.argsort(p, kind='stable')
-    scaled = np.asarray(p)[order] * np.arange(len(p), 0, -1)
-    adjusted = np.empty(len(p))
-    adjusted[order] = np.minimum(np.maximum.accumulate(scaled), 1.0)
-    return adjusted.tolist()

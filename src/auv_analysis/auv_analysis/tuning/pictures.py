@@ -10,10 +10,10 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from auv_analysis.pairs import KNOWN, log_ratios
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.plotting import COLOURS, DASHES, GREY
+from auv_analysis.studies.pairs import KNOWN, log_ratios
 from auv_analysis.tuning.measures import MEANINGS, Measures
 from auv_analysis.tuning.outcome import Outcome
 

@@ -1,6 +1,7 @@
-"""Two samples of the same draws: Wilcoxon's signed-rank test, and the ratio that goes with it."""
+"""Paired comparison: Wilcoxon's signed-rank test, effect size and ratio, Holm's correction."""
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,3 +105,12 @@ def _p(d: np.ndarray) -> float:
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')  # of few draws
         return float(wilcoxon(d, zero_method='zsplit').pvalue)
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Holm's step-down correction: the k-th smallest of m times m - k + 1, never decreasing."""
+    order = np.argsort(p, kind='stable')
+    scaled = np.asarray(p)[order] * np.arange(len(p), 0, -1)
+    adjusted = np.empty(len(p))
+    adjusted[order] = np.minimum(np.maximum.accumulate(scaled), 1.0)
+    return adjusted.tolist()

@@ -1,0 +1,1 @@
+"""Studies of a vehicle and its controllers: functions of scenario and settings."""

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from auv_analysis.exploration.results import Results
 from auv_analysis.reduction import COLUMNS
-from auv_analysis.sweep.campaign import Campaign, load_campaign
-from auv_analysis.sweep.folder import sweep_folder
-from auv_analysis.sweep.table import table_of
+from auv_analysis.studies.sweep.analysis import Results
+from auv_analysis.studies.sweep.blocks import table_of
+from auv_analysis.studies.sweep.campaign import Campaign, load_campaign
+from auv_analysis.studies.sweep.folder import sweep_folder
 
 Values = dict[str, np.ndarray]
 Known = Callable[[str, Values, np.ndarray], dict[str, np.ndarray]]

@@ -8,9 +8,9 @@ from threading import Lock
 import pyarrow as pa
 import pyarrow.dataset
 
-from auv_analysis.sweep.campaign import load_campaign
-from auv_analysis.sweep.engine import Outcome, sweep
-from auv_analysis.sweep.folder import sweep_folder
+from auv_analysis.studies.sweep.campaign import load_campaign
+from auv_analysis.studies.sweep.engine import Outcome, sweep
+from auv_analysis.studies.sweep.folder import sweep_folder
 
 ROOT = Path(__file__).parents[1]
 SCENARIO = (ROOT / 'config/scenarios/case1.yaml').read_text().replace('30.0', '0.3')

@@ -33,7 +33,7 @@ setup(
             'report/*.j2',
             'report/*.css',
             'report/*.js',
-            'sweep/*.json',
+            'studies/sweep/*.json',
             'foreign/*.json',
         ]
     },

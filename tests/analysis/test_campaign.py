@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import QUICK
 
-from auv_analysis.sweep.campaign import Campaign, load_campaign
+from auv_analysis.studies.sweep.campaign import Campaign, load_campaign
 from auv_dynamics.files import InputError
 
 SOURCE = """

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_analysis import load_scenario
-from auv_analysis.changes import changed, changed_scenario, split
-from auv_analysis.schema_paths import check_paths
+from auv_analysis.changes import changed, changed_scenario, check_paths, split
 from auv_dynamics.files import InputError, dotted
 
 KEYS = st.from_regex(r'[A-Za-z_][A-Za-z0-9_+-]*', fullmatch=True)

@@ -13,7 +13,7 @@ import yaml
 
 from auv_analysis import load_scenario
 from auv_analysis.cli import main
-from auv_analysis.sweep.campaign import load_campaign
+from auv_analysis.studies.sweep.campaign import load_campaign
 from auv_dynamics import interface, load_vehicle
 
 ROOT = Path(__file__).resolve().parents[2]

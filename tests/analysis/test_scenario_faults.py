@@ -6,10 +6,10 @@ import pytest
 import yaml
 
 from auv_analysis import load_scenario, simulate
+from auv_analysis.changes import check_paths
 from auv_analysis.node_parameters import node_parameters
-from auv_analysis.schema_paths import check_paths
 from auv_analysis.simulation import check_hold
-from auv_analysis.sweep.campaign import load_campaign
+from auv_analysis.studies.sweep.campaign import load_campaign
 from auv_dynamics.files import InputError
 
 BASE = {

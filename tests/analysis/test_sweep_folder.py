@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from sweeps import CAMPAIGN, ROLLOUTS, ROOT, Counting, Interrupted, parts, run, write_files
 
-from auv_analysis.sweep.campaign import load_campaign
-from auv_analysis.sweep.engine import SweepStoppedError
-from auv_analysis.sweep.folder import sweep_folder
+from auv_analysis.studies.sweep.campaign import load_campaign
+from auv_analysis.studies.sweep.engine import SweepStoppedError
+from auv_analysis.studies.sweep.folder import sweep_folder
 from auv_dynamics.files import InputError
 
 

@@ -11,10 +11,8 @@ from scipy import stats
 from scipy.stats import qmc
 from strategies import QUICK
 
-from auv_analysis.sweep.designs import MOST_AT_ONCE, make_design
-from auv_analysis.sweep.distributions import make_distribution
-from auv_analysis.sweep.groups import make_group
-from auv_analysis.sweep.values import axis_values
+from auv_analysis.studies.distributions import axis_values, make_distribution
+from auv_analysis.studies.sweep.variation import MOST_AT_ONCE, make_design, make_group
 from auv_dynamics.files import InputError
 
 SEED = 7

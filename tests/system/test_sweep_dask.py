@@ -12,10 +12,9 @@ import pytest
 from sweeps import CAMPAIGN, ROLLOUTS, parts, rows, run, write_files
 
 from auv_analysis.cli import main
-from auv_analysis.sweep.campaign import load_campaign
-from auv_analysis.sweep.engine import sweep
-from auv_analysis.sweep.executors import opened
-from auv_analysis.sweep.folder import sweep_folder
+from auv_analysis.studies.sweep.campaign import load_campaign
+from auv_analysis.studies.sweep.engine import opened, sweep
+from auv_analysis.studies.sweep.folder import sweep_folder
 from auv_dynamics.files import InputError
 
 pytest.importorskip('distributed')
@@ -138,7 +137,7 @@ def test_command_starts_dask_on_this_machine(files: Path, monkeypatch, capsys) -
 
 
 def test_scheduler_that_does_not_answer_is_refused(monkeypatch) -> None:
-    from auv_analysis.sweep import executors
+    from auv_analysis.studies.sweep import engine as executors
 
     monkeypatch.setattr(executors, 'PATIENCE', 0.5)
     with (

@@ -1,18 +1,22 @@
-"""Values of a scenario and its vehicle addressed by dotted paths, and scenarios changed by them."""
+"""Dotted paths into a scenario and its vehicle: grammar, changes, what the schemas say."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+import jsonschema
 import numpy as np
 
-from auv_analysis.scenario import Scenario, scenario_from
+from auv_analysis.scenario import SCHEMA, Scenario, scenario_from
 from auv_analysis.scenario_values import vehicle_path_of
-from auv_dynamics.files import InputError, dotted, read_text, read_yaml
+from auv_dynamics.files import InputError, dotted, read_text, read_yaml, schema
+from auv_dynamics.nearest import one_of
+from auv_dynamics.vehicle_file import SCHEMA as VEHICLE_SCHEMA
 
 VEHICLE = 'vehicle'
 KEY = r"(?:^|(?<=.)\.)(?:([^.\[\]'\s]+)|'([^']+)')"
 PART = re.compile(rf'{KEY}|\[(0|[1-9]\d{{0,8}})\]')
+UNIT = re.compile(r'\(([^()]+)\)$')  # ends a title: 'a positive number (kg)'
 GRAMMAR = 'keys and [indices], such as disturbance[0].sway.terms[1].amplitude'
 
 Parts = tuple[str | int, ...]
@@ -155,3 +159,117 @@ def of_vehicle(path: str) -> bool:
 def below_vehicle(path: str) -> str:
     """Path within the vehicle file."""
     return path.removeprefix(f'{VEHICLE}.')
+
+
+def check_paths(scenario: Scenario, paths: Iterable[str]) -> None:
+    """Refuse paths at which nothing can stand, before any value is known.
+
+    Parameters
+    ----------
+    scenario : of `load_scenario`
+    paths : see `changed_scenario`
+
+    Raises
+    ------
+    InputError : naming the file, the path, and the known keys with the nearest one
+
+    """
+    for path in paths:
+        if path != VEHICLE:
+            _nodes_in(scenario, path)
+
+
+def bounds(scenario: Scenario, path: str) -> tuple[float, float] | None:
+    """Open interval of the finite numbers that the schema lets stand at a path.
+
+    Parameters
+    ----------
+    scenario : of `load_scenario`
+    path : see `changed_scenario`
+
+    Returns
+    -------
+    bounds : below and above every such number; None where the schema asks for more than bounds
+
+    """
+    low, high = -np.inf, np.inf
+    for node in _nodes_in(scenario, path):
+        if node.keys() & {'enum', 'const', 'multipleOf'} or node.get('type') == 'integer':
+            return None
+        if node.get('type') == 'number':
+            least, most = node.get('minimum', -np.inf), node.get('maximum', np.inf)
+            low = max(low, node.get('exclusiveMinimum', -np.inf), np.nextafter(least, -np.inf))
+            high = min(high, node.get('exclusiveMaximum', np.inf), np.nextafter(most, np.inf))
+    return float(low), float(high)
+
+
+def _nodes_of(
+    data: Any, vehicle: Any, path: str, file: object = 'scenario', vehicle_file: object = 'vehicle'
+) -> list[dict[str, Any]]:
+    """What the schemas say of the entry at a path; InputError where nothing can stand there."""
+    if of_vehicle(path):
+        return _nodes_at(schema(VEHICLE_SCHEMA), vehicle, split(below_vehicle(path)), vehicle_file)
+    return _nodes_at(schema(SCHEMA), data, split(path), file)
+
+
+def _nodes_in(scenario: Scenario, path: str) -> list[dict[str, Any]]:
+    files = scenario.path, scenario.vehicle_path
+    return _nodes_of(scenario.data, scenario.vehicle_data, path, *files)
+
+
+def _nodes_at(root: dict[str, Any], data: Any, parts: Parts, file: object) -> list[dict[str, Any]]:
+    nodes = list(_applicable(root, root, data))
+    for depth, part in enumerate(parts):
+        if isinstance(part, int):
+            check_container(data, parts, depth, file)
+            below = [node['items'] for node in nodes if 'items' in node]
+            data = data[part]
+        else:
+            data = {} if data is None else data  # absent, and the schema knows it
+            check_container(data, parts, depth, file)
+            known = dict.fromkeys(k for node in nodes for k in node.get('properties', ()))
+            known |= dict.fromkeys(data)
+            if part not in known:
+                expected = one_of(part, known) if known else 'a single value'
+                raise InputError(file, dotted(parts[: depth + 1]), expected, part)
+            below = [_property(node, part) for node in nodes]
+            data = data.get(part)
+        nodes = [node for inner in below for node in _applicable(inner, root, data)]
+    return nodes
+
+
+def _property(node: Mapping[str, Any], key: str) -> Any:
+    return node.get('properties', {}).get(key, node.get('additionalProperties'))
+
+
+def _applicable(node: Any, root: dict[str, Any], data: Any) -> Iterator[dict[str, Any]]:
+    """Nodes of a schema that say something about `data`, references and conditions followed."""
+    if not isinstance(node, dict):
+        return
+    yield node
+    if '$ref' in node:
+        yield from _applicable(root['$defs'][node['$ref'].rsplit('/', 1)[-1]], root, data)
+    for inner in (*node.get('allOf', ()), *node.get('anyOf', ())):
+        yield from _applicable(inner, root, data)
+    if 'if' in node:
+        holds = jsonschema.Draft202012Validator(node['if']).is_valid(data)
+        yield from _applicable(node.get('then' if holds else 'else'), root, data)
+
+
+def said_of(data: Any, vehicle: Any, path: str) -> tuple[str, str]:
+    """Unit and description of the value at a path; '' what the schemas do not say.
+
+    Parameters
+    ----------
+    data, vehicle : contents of a scenario file and of its vehicle file
+    path : see `changed_scenario`
+
+    """
+    try:
+        nodes = _nodes_of(data, vehicle, path)
+    except (InputError, IndexError, KeyError, TypeError):
+        return '', ''
+    titles = [node['title'] for node in nodes if 'title' in node]
+    units = [found[1] for found in map(UNIT.search, titles) if found]
+    descriptions = [node['description'] for node in nodes if 'description' in node]
+    return (units or [''])[0], (descriptions or [''])[0]

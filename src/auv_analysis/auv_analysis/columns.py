@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.changes import split
+from auv_analysis.changes import bounds, split
 from auv_analysis.scenario import Scenario
-from auv_analysis.schema_paths import bounds
 from auv_dynamics.files import LARGEST
 from auv_dynamics.fleet import Keys
 from auv_gvc_controller.laws import SHIPPED

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.fault_words import Mark
+from auv_analysis.new_files import write_table
 from auv_analysis.run import AnyRun, Facts
-from auv_analysis.study.parquet import write_table
 from auv_analysis.summary import TRANSIENT, band_of, has_settled
 from auv_dynamics.signals import DOFS
 

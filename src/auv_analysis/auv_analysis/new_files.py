@@ -3,11 +3,14 @@
 import contextlib
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from auv_dynamics.files import InputError, reason
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 UNFINISHED = '.unfinished'  # ends the name of a file that is being written
 NEW = os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_WRONLY | os.O_CLOEXEC
@@ -96,6 +99,27 @@ def write_json(path: Path, document: Any) -> None:
     """Write a document as `--json` prints it, for people: indented; NaN is a ValueError."""
     text = json.dumps(document, indent=2, allow_nan=False)
     path.write_text(text + '\n', encoding='utf-8')
+
+
+def write_table(path: Path, columns: Mapping[str, Sequence[Any]]) -> Path:
+    """Write columns of words, whole numbers or numbers as Parquet; None and NaN become null."""
+    from pyarrow import parquet
+
+    parquet.write_table(arrow_table(columns), path)
+    return path
+
+
+def arrow_table(columns: Mapping[str, Sequence[Any]]) -> 'pa.Table':
+    """Columns of words, truths or numbers; a column of nothing but null is one of numbers."""
+    import pyarrow as pa
+
+    def array(values: Sequence[Any]) -> pa.Array:
+        numbers = all(type(value) in (int, float) or value is None for value in values)
+        whole = numbers and all(type(value) is int for value in values)
+        kind = pa.float64() if numbers and not whole else None
+        return pa.array(values, kind, from_pandas=True)
+
+    return pa.table({name: array(values) for name, values in columns.items()})
 
 
 def write(path: Path, contents: Any) -> None:

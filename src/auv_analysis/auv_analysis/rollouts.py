@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.batch import Batch, Known, run_batch
-from auv_analysis.changes import changed_scenario
+from auv_analysis.changes import changed_scenario, check_paths
 from auv_analysis.closed_loop import Tables
 from auv_analysis.columns import in_columns
 from auv_analysis.reduction import COLUMNS, columns
 from auv_analysis.scenario import Scenario
-from auv_analysis.schema_paths import check_paths
 from auv_analysis.simulation import Hold, check_hold, reference, tables
 from auv_analysis.summary import band_of
 from auv_analysis.variants import Variants, merged, packed_variants

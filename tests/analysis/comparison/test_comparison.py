@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.comparison import figures, lines
-from auv_analysis.comparison.entries import Entry, comparison_table
-from auv_analysis.comparison.ranking import rank
 from auv_analysis.report.sketching import sketch
+from auv_analysis.studies.compare import plots
+from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank
 from auv_analysis.summary import band_of
 
 SETTLED = 'overall.velocity_error.settling_time'
@@ -86,7 +85,7 @@ def test_error_still_to_come_is_the_largest_ratio_from_then_on(entries) -> None:
     band = band_of(np.abs(run.nu_d).max(axis=0))
     ratio = (np.abs(run.nu_d - run.nu) / band).max(axis=1)
     rest = np.maximum.accumulate(ratio[::-1])[::-1]
-    t, drawn = lines.still_to_come(entries[1].sketch)
+    t, drawn = plots.still_to_come(entries[1].sketch)
     assert np.all(np.diff(drawn) <= 0)
     inside = t > 0
     exact = rest[np.searchsorted(run.t, t[inside] - 1e-9)]
@@ -95,15 +94,15 @@ def test_error_still_to_come_is_the_largest_ratio_from_then_on(entries) -> None:
 
 def test_it_falls_below_one_where_the_run_settles(entries) -> None:
     for known in (entries[0], entries[2]):
-        t, ratio = lines.still_to_come(known.sketch)
+        t, ratio = plots.still_to_come(known.sketch)
         settled = max(known.summary['velocity_error']['settling_time'])
         first = t[np.argmax(ratio <= 1.0)]
         assert first == pytest.approx(settled, abs=0.05)
 
 
 def test_lines_are_told_apart() -> None:
-    looks = [(look['color'], str(look['linestyle'])) for look in map(lines.look, range(8))]
-    assert len({colour for colour, _ in looks}) == lines.MOST_LINES == 8
+    looks = [(look['color'], str(look['linestyle'])) for look in map(plots.look, range(8))]
+    assert len({colour for colour, _ in looks}) == plots.MOST_LINES == 8
 
 
 @pytest.mark.usefixtures('unrendered')
@@ -112,8 +111,8 @@ def test_figures_scale_with_the_number_of_runs(entries, copies: int, tmp_path: P
     many = [replace(e, name=f'{e.name}_{i}', controller=f'{e.controller}_{i}')
             for i in range(copies) for e in entries]  # fmt: skip
     table = comparison_table(many)
-    drawn = figures.draw(many, table, rank(table), tmp_path / 'figures')
-    assert set(drawn) == {'ranking', 'errors', 'kinetic_energy', *figures.SIX}
+    drawn = plots.draw(many, table, rank(table), tmp_path / 'figures')
+    assert set(drawn) == {'ranking', 'errors', 'kinetic_energy', *plots.SIX}
     few = copies == 1
     assert ('falls below the dotted 1' in drawn['errors'].caption) is few
     assert ('Equal values share a rank' in drawn['ranking'].caption) is few
@@ -121,8 +120,8 @@ def test_figures_scale_with_the_number_of_runs(entries, copies: int, tmp_path: P
 
 
 def test_structural_zeros_are_told_from_what_is_zero(entries, table) -> None:
-    always = figures.structural(table, 'coupling.delta_xi_max')
+    always = plots.structural(table, 'coupling.delta_xi_max')
     assert always[0].tolist() == [False] * 4 + [True] * 2
     assert always[2].all()
     assert not always[4].any()
-    assert not figures.structural(table, 'effort.rms').any()
+    assert not plots.structural(table, 'effort.rms').any()

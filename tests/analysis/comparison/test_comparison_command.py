@@ -60,8 +60,8 @@ def test_every_number_of_the_report_is_in_the_table(scenarios) -> None:
 
 
 def test_all_diverged_is_a_failure(scenarios, capsys, monkeypatch) -> None:
-    from auv_analysis.comparison import compare
     from auv_analysis.simulation import DivergedError
+    from auv_analysis.studies.compare import report as compare
 
     def diverge(*_):
         raise DivergedError('it diverges')

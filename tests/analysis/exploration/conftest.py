@@ -3,8 +3,8 @@
 import pytest
 from made_sweeps import SIMPLE, make_sweep, simple
 
-from auv_analysis.exploration.opening import open_sweep
-from auv_analysis.exploration.results import Results, analysed
+from auv_analysis.studies.sweep.analysis import Results, analysed
+from auv_analysis.studies.sweep.dataset import open_sweep
 
 
 @pytest.fixture(scope='session')

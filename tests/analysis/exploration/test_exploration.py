@@ -9,10 +9,15 @@ from made_sweeps import DAMPING, ENERGY, K_D, SETTLED, rows
 from scipy.stats import f_oneway, spearmanr
 from strategies import QUICK
 
-from auv_analysis.exploration.influence import explained
-from auv_analysis.exploration.quantiles import by_group, distribution, quantiles, spread
-from auv_analysis.exploration.results import Results, analysed
 from auv_analysis.measures import BY_NAME
+from auv_analysis.studies.sweep.analysis import Results, analysed
+from auv_analysis.studies.sweep.statistics import (
+    by_group,
+    distribution,
+    explained,
+    quantiles,
+    spread,
+)
 
 
 def test_figures_that_never_differ_are_named_not_analysed(results: Results) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from made_sweeps import make_sweep
 
-from auv_analysis.exploration.indices import designed
-from auv_analysis.exploration.opening import open_sweep
-from auv_analysis.exploration.results import analysed
+from auv_analysis.studies.sweep.analysis import analysed
+from auv_analysis.studies.sweep.dataset import open_sweep
+from auv_analysis.studies.sweep.indices import designed
 from auv_dynamics.signals import DOFS
 
 pytest.importorskip('SALib')

@@ -10,11 +10,11 @@ from pages import check_numbers
 from pyarrow import parquet
 
 from auv_analysis import cli
-from auv_analysis.exploration.dependence import merged
-from auv_analysis.exploration.figures import draw
-from auv_analysis.exploration.opening import open_sweep
-from auv_analysis.exploration.results import Results, analysed
-from auv_analysis.exploration.varied import varied_paths
+from auv_analysis.studies.sweep.analysis import Results, analysed
+from auv_analysis.studies.sweep.dataset import open_sweep
+from auv_analysis.studies.sweep.factors import varied_paths
+from auv_analysis.studies.sweep.plots import draw
+from auv_analysis.studies.sweep.statistics import merged
 from auv_dynamics import InputError
 
 
@@ -95,7 +95,7 @@ def _without(path: Path) -> None:
 
 
 def test_the_document_has_no_nan(results: Results) -> None:
-    from auv_analysis.exploration.files import document
+    from auv_analysis.studies.sweep.analysis import document
 
     assert json.loads(json.dumps(document(results), allow_nan=False))['rows'] == 1600
 

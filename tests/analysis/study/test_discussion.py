@@ -9,8 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.study.discussion import discussion
-from auv_analysis.study.samples import write_samples
+from auv_analysis.studies.study.discussion import discussion
+from auv_analysis.studies.study.procedure import write_samples
 from auv_dynamics.signals import DOFS
 
 

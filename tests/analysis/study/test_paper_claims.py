@@ -16,9 +16,9 @@ from auv_analysis.report.evidence import Response
 from auv_analysis.report.quotes import Quotes
 from auv_analysis.report.tables.claims import claims_table, write_claims
 from auv_analysis.report.text import MISSING
+from auv_analysis.studies.study.procedure import claims_sentences
+from auv_analysis.studies.study.sensitivity import sensitivity
 from auv_analysis.study.paper_claims import case_evidence, case_of, paper_claims
-from auv_analysis.study.sections import claims_sentences
-from auv_analysis.study.sensitivity import sensitivity
 
 NUMBER = re.compile(r'([+−]?)(\d[\d\u202f]*)(?:\.(\d+))?(?:·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?')
 POWERS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')

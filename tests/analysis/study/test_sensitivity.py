@@ -13,14 +13,13 @@ from auv_analysis import batch, load_scenario, simulate, summarize
 from auv_analysis.changes import changed_scenario
 from auv_analysis.kernels import kernels
 from auv_analysis.reduction import COLUMNS
-from auv_analysis.study import sensitivity as module
-from auv_analysis.study.gains import gain_factors
-from auv_analysis.study.sensitivity import sensitivity
-from auv_analysis.study.sensitivity_file import write_sensitivities
-from auv_analysis.study.sensitivity_report import (
+from auv_analysis.studies.study import sensitivity as module
+from auv_analysis.studies.study.sensitivity import gain_factors, sensitivity
+from auv_analysis.studies.study.sensitivity_report import (
     left_out_table,
     sensitivity_sentences,
     sensitivity_table,
+    write_sensitivities,
 )
 from auv_dynamics.files import InputError
 

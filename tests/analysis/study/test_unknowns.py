@@ -14,11 +14,11 @@ from strategies import QUICK
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.changes import changed_scenario
 from auv_analysis.report import paper
+from auv_analysis.studies.study.responses import ERROR, response
+from auv_analysis.studies.study.sensitivity import sensitivity
 from auv_analysis.study.attribution import best_split
 from auv_analysis.study.paper_claims import case_of, paper_claims
-from auv_analysis.study.responses import ERROR, response
 from auv_analysis.study.robustness import crossings, energy_ranges, met, robustness
-from auv_analysis.study.sensitivity import sensitivity
 from auv_analysis.study.unknowns import (
     DAMPING,
     M46,

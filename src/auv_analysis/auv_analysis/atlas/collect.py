@@ -11,8 +11,8 @@ from pyarrow import parquet
 
 from auv_analysis.atlas.couplings import Couplings, couplings_of
 from auv_analysis.atlas.reached import reached
-from auv_analysis.comparison.opening import numbered
 from auv_analysis.counting import each
+from auv_analysis.studies.compare.sources import numbered
 from auv_dynamics.signals import DOFS
 from auv_dynamics.vehicle_file import load_vehicle
 

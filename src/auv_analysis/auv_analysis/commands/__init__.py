@@ -23,7 +23,7 @@ _HOME = {
     'import-vehicle': 'auv_analysis.formats.command',
     'export-vehicle': 'auv_analysis.formats.command',
     'linearize': 'auv_analysis.linearization.command',
-    'sweep': 'auv_analysis.sweep.command',
+    'sweep': 'auv_analysis.commands.sweep',
     'new': 'new',
     'completion': 'completion',
     'doctor': 'auv_analysis.doctor.command',

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.commands.conclude import conclude
-from auv_analysis.comparison.opening import named, open_source
-from auv_analysis.comparison.sources import Source, is_sweep, sources_of
 from auv_analysis.folder import Results, check_free, results_folder
 from auv_analysis.foreign.mapping import OPTIONS, TopicMap, read_mapping
 from auv_analysis.progress import waiting
+from auv_analysis.studies.compare.sources import Source, is_sweep, named, open_source, sources_of
 from auv_dynamics.files import InputError
 from auv_gvc_controller.laws import law_class, refusal
 
@@ -28,7 +27,7 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
             raise InputError(sweeps[0], '', 'a sweep alone, without other results', found)
         if options.no_report:
             raise InputError('--no-report', '', 'runs', f'{sweeps[0]}, a sweep')
-        from auv_analysis.exploration.explore import explore
+        from auv_analysis.studies.sweep.report import explore
 
         return explore(Path(sweeps[0]), options)
     _import_laws(options.law or ())
@@ -73,7 +72,7 @@ def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, An
 
 
 def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
-    from auv_analysis.comparison.compare import conclude_comparison, entries_of
+    from auv_analysis.studies.compare.report import conclude_comparison, entries_of
 
     with waiting(f'reading {len(sources)} runs'):
         entries = entries_of(sources, options.vehicle)

@@ -20,13 +20,16 @@ from auv_analysis.run import AnyRun
 from auv_analysis.samples import ENDING
 from auv_analysis.scenario import Scenario
 from auv_analysis.simulation import check_hold
-from auv_analysis.study.discussion import discussion
-from auv_analysis.study.effects import Sensitivity
-from auv_analysis.study.indices import Design, Method
+from auv_analysis.studies.study.discussion import discussion
+from auv_analysis.studies.study.indices import Design, Method
+from auv_analysis.studies.study.procedure import (
+    claims_sentences,
+    sensitivity_section,
+    unknowns_section,
+    write_samples,
+)
+from auv_analysis.studies.study.sensitivity import Sensitivity, sensitivity
 from auv_analysis.study.paper_claims import PaperClaims, paper_claims
-from auv_analysis.study.samples import write_samples
-from auv_analysis.study.sections import claims_sentences, sensitivity_section, unknowns_section
-from auv_analysis.study.sensitivity import sensitivity
 from auv_analysis.study.unknowns_run import unknowns
 from auv_analysis.summary import Window
 from auv_dynamics.files import InputError

@@ -14,9 +14,8 @@ from auv_analysis.report.sketching import sketches
 from auv_analysis.run import AnyRun
 from auv_analysis.scenario import Scenario, load_scenario
 from auv_analysis.simulation import Hold, simulate
-from auv_analysis.study.effects import Sensitivity
-from auv_analysis.study.responses import response
-from auv_analysis.study.sensitivity import sensitivity
+from auv_analysis.studies.study.responses import response
+from auv_analysis.studies.study.sensitivity import Sensitivity, sensitivity
 from auv_gvc_controller.model import control_model
 
 COMPARED = ('duration', 'step', 'integrator', 'initial', 'setpoint', 'disturbance')

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.energy import shares
+from auv_analysis.new_files import write_table
 from auv_analysis.report.claims_rows import ROWS
 from auv_analysis.report.evidence import DECIDED
 from auv_analysis.report.paper import KINETIC_ENERGY
-from auv_analysis.study.parquet import write_table
 from auv_analysis.study.robustness import Held, Robustness
 from auv_analysis.study.unknowns import NAMES
 from auv_analysis.study.unknowns_run import Unknowns

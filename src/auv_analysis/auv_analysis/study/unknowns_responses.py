@@ -9,13 +9,13 @@ from auv_analysis.report.claim import BOTH
 from auv_analysis.report.evidence import Response
 from auv_analysis.rollouts import rollouts
 from auv_analysis.scenario import Scenario
-from auv_analysis.study.gains import gain_factors
-from auv_analysis.study.responses import (
+from auv_analysis.studies.study.responses import (
     error_columns,
     followed,
     moved_setpoints,
     setpoint_changes,
 )
+from auv_analysis.studies.study.sensitivity import gain_factors
 from auv_analysis.study.unknowns import Variant, changes_of
 
 COUNT = 32  # points of a Sobol' sequence in the gains: enough to order six spreads

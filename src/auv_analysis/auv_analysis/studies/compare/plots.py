@@ -1,0 +1,274 @@
+"""Figures of a comparison, whatever the number of its runs."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from auv_analysis.measures import FAMILIES
+from auv_analysis.report import plotting
+from auv_analysis.report.figure_files import FigureRecord, save_figures
+from auv_analysis.report.grids import ALWAYS, MARGIN, ROW, TALLEST, Grid, grid_figure, name_rows
+from auv_analysis.report.overview import RUNS, XI
+from auv_analysis.report.plotting import COLOURS, DASHES, GREY
+from auv_analysis.report.sketch import Sketch
+from auv_analysis.studies.compare.ranking import Entry, Ranking
+from auv_analysis.summary import BAND_TEXT, DWELL, band_of
+from auv_dynamics.signals import DOFS
+
+MANY = (*RUNS, COLOURS[-1], '#8c8c8c')
+MOST_LINES = len(MANY)  # that can be told apart in a panel
+MOST_PANELS = 12
+ACROSS = 4  # panels in a row
+SMALLEST, LARGEST = 1e-3, 1e4  # of the axis, multiples of the band
+TIMES = 240  # columns of the rows of colours
+ENDS = f', unless that is in the last {DWELL} % of the time'
+Drawn = tuple[Figure | None, str, str]
+SIX = {  # name of the figure -> family, title
+    'rms_errors': ('velocity_error.rms', 'Root mean square velocity errors'),
+    'late_errors': ('velocity_error.max_after_2s', 'Largest velocity errors after 2 s'),
+    'settling_times': ('velocity_error.settling_time', 'Settling times'),
+    'delta_xi': ('coupling.delta_xi_max', 'What inertial coupling adds to velocities, Δξ'),
+    'delta_pi': ('coupling.delta_pi_max', 'What inertial coupling adds to inputs, Δπ'),
+    'rms_inputs': ('effort.rms', 'Root mean square inputs'),
+    'peak_inputs': ('effort.max', 'Largest inputs'),
+}
+MARKS = 'pale 0: exactly zero; crossed out: there is none'
+
+
+def draw(
+    entries: Sequence[Entry], table: pa.Table, ranking: Ranking, folder: Path
+) -> dict[str, FigureRecord]:
+    """Draw the figures of a comparison as PNG and PDF: name -> figure.
+
+    Parameters
+    ----------
+    entries : its runs, of which one at least did not diverge
+    table : of `comparison_table`
+    ranking : of `rank`
+    folder : where the files go; made when it is not there
+
+    """
+    drawn: dict[str, Callable[[], Drawn]] = {
+        'ranking': partial(_ranking, ranking),
+        'errors': partial(errors, entries),
+        'kinetic_energy': partial(_energy, table),
+        **{name: partial(_six, name, table) for name in SIX},
+    }
+    return save_figures(folder, drawn)
+
+
+def column(table: pa.Table, name: str) -> np.ndarray:
+    """Column of numbers (n,), NaN where there is none."""
+    values = table[name].to_pylist()
+    return np.array([np.nan if value is None else value for value in values], float)
+
+
+def six(table: pa.Table, family: str) -> np.ndarray:
+    """Columns of a family (n, 6), NaN where there is none."""
+    return np.stack([column(table, f'{family}.{dof}') for dof in DOFS], axis=1)
+
+
+def _six(name: str, table: pa.Table) -> Drawn:
+    family, title = SIX[name]
+    values, entry = six(table, family), FAMILIES[family]
+    halves = [slice(0, 6)] if entry.units[0] == entry.units[1] else [slice(0, 3), slice(3, 6)]
+    zeros = structural(table, family)
+    grids = [
+        Grid(values[:, half], DOFS[half], f'{entry.label} ({unit})', structural=zeros[:, half])
+        for half, unit in zip(halves, entry.units, strict=False)
+    ]
+    always = f', {ALWAYS}: for every motion by the structure of M' if zeros.any() else ''
+    caption = f'{title}, a row per run ({entry.meaning}); {MARKS}{always}.'
+    return grid_figure(table['run'].to_pylist(), grids), title, caption
+
+
+def structural(table: pa.Table, family: str) -> np.ndarray:
+    """(n, 6) whether a figure of a family is zero for every motion, by the structure of M."""
+    kind = family.removeprefix('coupling.').removesuffix('_max')
+    if kind not in ('delta_xi', 'delta_pi'):
+        return np.zeros((len(table), 6), bool)
+    words = table[f'coupling.structural_zeros.{kind}'].to_pylist()
+    return np.array([[dof in (word or '').split('; ') for dof in DOFS] for word in words])
+
+
+def _energy(table: pa.Table) -> Drawn:
+    """Shares of the mean kinetic energy as bars, and the energy beside them."""
+    names, shares = table['run'].to_pylist(), six(table, 'kinetic_energy.shares_percent')
+    figure = plotting.new_figure(min(MARGIN + ROW * len(names), TALLEST))
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
+    places = np.arange(len(names))
+    known = np.nan_to_num(shares)
+    starts = np.cumsum(known, axis=1) - known
+    for i in range(6):
+        left.barh(places, known[:, i], left=starts[:, i], color=COLOURS[i], height=0.78)
+    handles = [Line2D([], [], color=COLOURS[i], linewidth=6) for i in range(6)]
+    labels = [f'{XI[i]} {DOFS[i]}' for i in range(6)]
+    figure.legend(handles, labels, loc='outside upper right', ncols=6, handlelength=0.9)
+    name_rows(left, names, len(names))
+    left.set(xlim=(0.0, 100.0), ylim=(len(names) - 0.5, -0.5), xlabel='share (%)')
+    mean = column(table, 'kinetic_energy.mean')
+    right.plot(mean, places, 'o', color='#1a1a1a', markersize=4)
+    right.set_xlabel('mean kinetic energy (J)')
+    plotting.logarithmic(right, 'x')
+    right.margins(x=0.08)
+    for axes in (left, right):
+        axes.grid(axis='y', visible=False)
+    title = 'Kinetic energy'
+    caption = (
+        f'{title}: shares of the components of the decomposition in its mean, equation (30), '
+        'and the mean of the whole run.'
+    )
+    return figure, title, caption
+
+
+def _ranking(ranking: Ranking) -> Drawn:
+    title = 'Ranking'
+    labels = [measure.label for measure in ranking.measures]
+    caption = f'{title} by the measures that sum up a run, rank 1 is the smallest value. '
+    if len(ranking.runs) <= MOST_LINES:
+        return _parallel(ranking, labels), title, caption + 'Equal values share a rank.'
+    widest = float(np.nanmax(np.abs(ranking.ratios), initial=1.0))
+    end = min(np.ceil(widest), 4.0)
+    grid = Grid(
+        np.where(np.isfinite(ranking.ratios), ranking.ratios + 0.0, np.nan),
+        labels,
+        'log2 of value / median of the runs',
+        'PuOr_r',
+        Normalize(-end, end),
+        decimals=1,
+    )
+    figure = grid_figure(ranking.runs, [grid])
+    axes = figure.axes[0]
+    axes.tick_params(axis='x', labelrotation=90, labelsize='small')
+    text = (
+        f'{title}: each measure as a multiple of its median over the runs where it is not zero, in '
+        'powers of two: 1 is twice the median, −1 half of it; crossed out: none, or zero. '
+        'Sorted by the mean rank.'
+    )
+    return figure, title, text
+
+
+def _parallel(ranking: Ranking, labels: Sequence[str]) -> Figure:
+    """Ranks of each run along the measures."""
+    figure = plotting.new_figure(1.6 + 0.24 * len(ranking.runs))
+    axes = figure.subplots()
+    places = np.arange(len(labels))
+    for i, run in enumerate(ranking.runs):
+        style = look(i)
+        axes.plot(places, ranking.ranks[i], marker='o', markersize=4, label=run, **style)
+    axes.set(ylim=(len(ranking.runs) + 0.4, 0.6), xlim=(-0.3, len(labels) - 0.7), ylabel='rank')
+    axes.set_xticks(places, labels, rotation=90, fontsize='small')
+    axes.set_yticks(range(1, len(ranking.runs) + 1))
+    figure.legend(loc='outside right upper', handlelength=2.6)
+    return figure
+
+
+def still_to_come(run: Sketch) -> tuple[np.ndarray, np.ndarray]:
+    """Largest error from each time on, as a multiple of the band in which it counts as settled.
+
+    Returns
+    -------
+    t : (n,) s
+    ratio : (n,) the largest of the six degrees of freedom; below 1 from where all have settled
+
+    """
+    lines = [run.line('error', i, 'log') for i in range(6)]
+    band = band_of(run.part('nu_d').peak)
+    t = np.unique(np.concatenate([times for times, _ in lines]))
+    ratio = np.zeros(len(t))
+    for (times, error), width in zip(lines, band, strict=True):
+        rest = np.maximum.accumulate(np.abs(error)[::-1])[::-1] / width
+        behind = np.searchsorted(times, t)  # the first sample at or after t has what is to come
+        ratio = np.maximum(ratio, np.append(rest, 0.0)[behind])
+    return t, ratio
+
+
+def errors(entries: Sequence[Entry]) -> Drawn:
+    """The error still to come of every run. Returns figure, title and caption."""
+    groups = _groups(entries)
+    labels = list(dict.fromkeys(label for group in groups.values() for label in group))
+    title = 'Error still to come, in multiples of its band'
+    caption = (
+        f'{title}: the largest velocity error between t and the end of the run, of all six '
+        'degrees of freedom, divided by the band in which it counts as settled '
+        f'({BAND_TEXT}). '
+    )
+    if not groups:
+        return None, title, f'{title}: without set-points there is none.'
+    if len(groups) <= MOST_PANELS and len(labels) <= MOST_LINES:
+        caption += f'A run has settled where its line falls below the dotted 1{ENDS}. '
+        figure = _panels(groups, labels)
+    else:
+        caption += f'Each row is a run; it has settled where its colours end{ENDS}. '
+        figure = _rows([e for e in entries if e.sketch and e.sketch.knows_setpoint])
+    return figure, title, caption + 'Time is logarithmic.'
+
+
+def _groups(entries: Sequence[Entry]) -> dict[str, dict[str, Sketch]]:
+    """Scenario -> label in its panel -> run."""
+    groups: dict[str, dict[str, Sketch]] = {}
+    for entry in entries:
+        if entry.sketch is not None and entry.sketch.knows_setpoint:
+            label = entry.name.removeprefix(f'{entry.scenario}/')
+            groups.setdefault(entry.scenario, {})[label] = entry.sketch
+    return groups
+
+
+def _panels(groups: Mapping[str, Mapping[str, Sketch]], labels: Sequence[str]) -> Figure:
+    down = -(-len(groups) // ACROSS)
+    across = -(-len(groups) // down)
+    figure = plotting.new_figure(0.5 + 1.75 * down)
+    panels = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True).ravel()
+    looks = {label: look(i) for i, label in enumerate(labels)}
+    for axes, (scenario, runs) in zip(panels, groups.items(), strict=False):
+        for label, run in runs.items():
+            t, ratio = still_to_come(run)
+            axes.plot(t[ratio > 0], ratio[ratio > 0], **looks[label])
+        axes.axhline(1.0, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
+        axes.set_title(scenario, loc='left')
+        plotting.logarithmic(axes, 'x', 'y')
+    low, high = panels[0].get_ylim()
+    panels[0].set_ylim(max(low, SMALLEST), min(high, LARGEST))
+    for axes in panels[len(groups) :]:
+        axes.set_axis_off()
+    for axes in panels[max(len(groups) - across, 0) : len(groups)]:
+        axes.tick_params(labelbottom=True)  # nothing is below it
+    handles = [Line2D([], [], **looks[label]) for label in labels]
+    figure.legend(handles, labels, loc='outside upper right', ncols=4, handlelength=2.6)
+    figure.supxlabel('$t$ (s)', fontsize='medium')
+    figure.supylabel('error still to come / band', fontsize='medium')
+    return figure
+
+
+def look(index: int) -> dict[str, Any]:
+    """Colour and dashes of one of `MOST_LINES` lines."""
+    return {'color': MANY[index % len(MANY)], 'linestyle': DASHES[index % len(DASHES)]}
+
+
+def _rows(entries: Sequence[Entry]) -> Figure:
+    lines = [still_to_come(entry.sketch) for entry in entries if entry.sketch]
+    first = min(t[t > 0].min() for t, _ in lines)
+    times = np.geomspace(first, max(t[-1] for t, _ in lines), TIMES)
+    values = np.full((len(lines), TIMES), np.nan)
+    for row, (t, ratio) in zip(values, lines, strict=True):
+        inside = times <= t[-1]
+        row[inside] = ratio[np.searchsorted(t, times[inside])]
+    shown = np.ma.masked_where(~(values >= 1.0), values)
+    figure = plotting.new_figure(min(MARGIN + ROW * len(lines), TALLEST))
+    axes = figure.subplots()
+    edges = np.geomspace(first, times[-1], TIMES + 1)
+    mesh = axes.pcolormesh(
+        edges, np.arange(len(lines) + 1) - 0.5, np.log10(shown), cmap='cividis_r', vmin=0.0
+    )
+    axes.set(xscale='log', ylim=(len(lines) - 0.5, -0.5), xlabel='$t$ (s)')
+    axes.grid(False)
+    name_rows(axes, [entry.name for entry in entries], len(entries))
+    figure.colorbar(mesh, ax=axes, label='log10 of the error still to come / band', fraction=0.04)
+    return figure

@@ -1,0 +1,224 @@
+"""Campaign file, format 1: which rollouts of which scenario, resolved and checked."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.changes import VEHICLE, Parts, changed_scenario, check_paths, split
+from auv_analysis.scenario import Scenario, load_scenario
+from auv_analysis.scenario_devices import SAMPLED
+from auv_analysis.simulation import Hold, check_hold
+from auv_analysis.studies.distributions import Values
+from auv_analysis.studies.sweep.variation import Group, kind_of, make_group
+from auv_dynamics.config import shipped
+from auv_dynamics.files import InputError, check, dotted, read_yaml
+from auv_dynamics.nearest import meant, one_of
+from auv_gvc_controller.laws import SHIPPED
+
+SCHEMA = Path(__file__).with_name('campaign.schema.json')
+EVERY = 'controllers.*.'  # begins a path into each controller of the sweep
+NOT_VARIED = {
+    'seed': "nothing: a rollout's seed follows from the campaign's",
+    'name': 'nothing: a sweep has one name',
+    'format': 'nothing: there is one format',
+    'setpoint.file': 'nothing: one file, or a set-point of offsets and terms',
+}
+MOST_ROLLOUTS = 2**53
+STEPS_AT_ONCE = 500_000  # of a block, about: a fraction of a second, compiled
+PLAIN_BLOCK = 8  # rollouts of a user's own law: as plain Python a second or more each
+SMALLEST_BLOCK, LARGEST_BLOCK = 16, 1024
+BLOCKS_AT_LEAST = 8  # so that every core has something to do
+MOST_PARTS = 10_000  # files of a result, about
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """A checked campaign.
+
+    Attributes
+    ----------
+    path : of the campaign file
+    data : its contents with every default filled in
+    scenario : as it is in its file
+    scenarios : name of a vehicle -> the scenario with it; '' -> the scenario as it is, where the
+        vehicle does not vary
+    groups : what varies together, the last one fastest
+
+    """
+
+    path: Path
+    data: dict[str, Any]
+    scenario: Scenario
+    scenarios: dict[str, Scenario]
+    groups: list[Group]
+
+    @property
+    def name(self) -> str:
+        """Name, which is also that of the results' folder."""
+        return self.data['name']
+
+    @property
+    def controllers(self) -> list[str]:
+        """Names of the controllers that are swept."""
+        return self.data['controllers']
+
+    @property
+    def hold(self) -> Hold:
+        """Whether the law is inside every stage, or sampled and held."""
+        return self.data['hold']
+
+    @property
+    def own_laws(self) -> dict[str, type]:
+        """Controller -> its law, where that is a user's own."""
+        laws = {name: type(self.scenario.gains(name)) for name in self.controllers}
+        return {name: law for name, law in laws.items() if law not in SHIPPED.values()}
+
+    @property
+    def inputs(self) -> list[Path]:
+        """Files that the campaign was read from."""
+        scenarios = (self.scenario, *self.scenarios.values())
+        files = [file for scenario in scenarios for file in scenario.inputs]
+        return list(dict.fromkeys([self.path, *files]))
+
+    @cached_property
+    def rollouts(self) -> int:
+        """Number of rollouts, of every controller the same."""
+        return int(np.prod([group.size for group in self.groups], dtype=object))
+
+    @property
+    def block(self) -> int:
+        """Rollouts that are simulated and stored at once."""
+        if 'block' in self.data:
+            return self.data['block']
+        by_length = STEPS_AT_ONCE // self.scenario.steps
+        shared = min(by_length, -(-self.rollouts // BLOCKS_AT_LEAST))
+        size = min(max(shared, SMALLEST_BLOCK), LARGEST_BLOCK)
+        if self.own_laws:
+            size = min(size, PLAIN_BLOCK)
+        return max(size, -(-self.rollouts // MOST_PARTS))
+
+    def values(self, first: int, last: int) -> dict[str, Values]:
+        """Path -> values of the rollouts from `first` up to, not including, `last`."""
+        found: dict[str, Values] = {}
+        index, inner = np.arange(first, last), self.rollouts
+        for group in self.groups:
+            inner //= group.size
+            found |= group.at(index // inner % group.size)
+        return found
+
+    def seeds(self, first: int, last: int) -> np.ndarray:
+        """Seeds (n,) of these rollouts, each a function of the root seed and its index alone."""
+        root = self.data['seed']
+        words = [
+            np.random.SeedSequence(root, spawn_key=(i,)).generate_state(1, np.uint64)[0]
+            for i in range(first, last)
+        ]
+        return (np.array(words, np.uint64) >> np.uint64(1)).astype(np.int64)
+
+
+def load_campaign(campaign: str | Path) -> Campaign:
+    """Campaign of a file or of a shipped bare name.
+
+    Parameters
+    ----------
+    campaign : path of a campaign file, or a bare name such as 'case1_gains'
+
+    Returns
+    -------
+    campaign : Campaign, checked with its scenario and vehicles
+
+    Raises
+    ------
+    InputError : naming file, key, expected and found
+
+    """
+    path = shipped('campaigns', campaign)
+    data = read_yaml(path, 'campaign')
+    check(data, SCHEMA, path)
+    scenario = _scenario(data['scenario'], path)
+    data = {
+        'format': 1,
+        'controllers': list(scenario.controllers),
+        'hold': 'continuous',
+        'seed': 0,
+        **data,
+    }
+    data['seed'] = int(data['seed'])
+    for i, name in enumerate(data['controllers']):
+        if name not in scenario.controllers:
+            expected = one_of(name, scenario.controllers)
+            raise InputError(path, f'controllers[{i}]', expected, name)
+    check_hold(scenario, data['hold'])
+    groups = [make_group(spec, data['seed'], i, path) for i, spec in enumerate(data['vary'])]
+    result = Campaign(path, data, scenario, _scenarios(scenario, data, path), groups)
+    if result.rollouts > MOST_ROLLOUTS:
+        raise InputError(path, 'vary', f'at most {MOST_ROLLOUTS} rollouts', f'{result.rollouts}')
+    _check_varied(result)
+    return result
+
+
+def _scenario(named: str, campaign: Path) -> Scenario:
+    beside = campaign.parent / named
+    if beside.is_file():
+        return load_scenario(beside)
+    try:
+        path = shipped('scenarios', named)
+    except InputError as error:
+        raise InputError(campaign, 'scenario', error.expected, named) from None
+    return load_scenario(path if path != Path(named) else beside)
+
+
+def _scenarios(scenario: Scenario, data: dict[str, Any], path: Path) -> dict[str, Scenario]:
+    """The scenario with each vehicle that is named."""
+    for number, spec in enumerate(data['vary']):
+        kind = kind_of(spec)
+        if VEHICLE in spec[kind]:
+            named = spec[kind][VEHICLE]
+            names = named.get('choice') if isinstance(named, dict) else named
+            if not names or not all(isinstance(name, str) for name in names):
+                expected = 'a list of names or paths of vehicles'
+                raise InputError(path, f'vary[{number}].{kind}.{VEHICLE}', expected, named)
+            return {name: changed_scenario(scenario, {VEHICLE: name}) for name in names}
+    return {'': scenario}
+
+
+def _check_varied(campaign: Campaign) -> None:
+    """Refuse paths that lead nowhere, that must not vary or that stand twice."""
+    seen: dict[Parts, str] = {}
+    for number, spec in enumerate(campaign.data['vary']):
+        for path in spec[kind_of(spec)]:
+            place = f'vary[{number}].{kind_of(spec)}.{path}'
+            try:
+                _check_path(campaign, path)
+            except InputError as error:
+                raise InputError(campaign.path, place, error.expected, error.found) from None
+            for parts in {split(of_controller(path, name)) for name in campaign.controllers}:
+                if parts in seen:
+                    found = f'{dotted(parts)} in {seen[parts]} as well'
+                    raise InputError(campaign.path, place, 'each value varied once', found)
+                seen[parts] = f'vary[{number}]'
+
+
+def _check_path(campaign: Campaign, path: str) -> None:
+    parts, names = split(path), campaign.controllers
+    if path in NOT_VARIED:
+        raise InputError(path, '', NOT_VARIED[path], path)
+    if campaign.hold == 'continuous' and parts[0] in SAMPLED:
+        expected = 'hold: zoh in the campaign: they act on samples'
+        raise InputError(path, '', expected, 'hold: continuous')
+    for scenario in campaign.scenarios.values():
+        check_paths(scenario, [of_controller(path, name) for name in names])
+    if parts[0] == 'controllers' and len(parts) > 1 and parts[1] not in ('*', *names):
+        expected = f'a controller that is swept: {", ".join(names)}{meant(parts[1], names)}'
+        raise InputError(path, '', expected, str(parts[1]))
+
+
+def of_controller(path: str, controller: str) -> str:
+    """Path of a campaign as it reads for one controller: `controllers.*` is each of them."""
+    if not path.startswith(EVERY):
+        return path
+    key = f"'{controller}'" if '.' in controller else controller
+    return f'controllers.{key}.{path.removeprefix(EVERY)}'

@@ -1,0 +1,196 @@
+"""The folder of a sweep: what it was made of, and the parts that are finished.
+
+Whatever is in it under its final name is complete: everything is written under another name,
+flushed to the disk and then renamed. A process may therefore be killed at any time.
+"""
+
+import json
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from auv_analysis.folder import CAMPAIGN, PART, ROLLOUTS, SWEEP, Results, results_folder
+from auv_analysis.new_files import UNFINISHED, write
+from auv_analysis.studies.sweep.blocks import laws_of, versions
+from auv_analysis.studies.sweep.campaign import Campaign
+from auv_dynamics.files import InputError, dotted
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+@contextmanager
+def sweep_folder(out: Path, campaign: Campaign, *, overwrite: bool) -> Iterator['SweepFolder']:
+    """Folder of a sweep, new or gone on with; locked as long as this lasts.
+
+    Parameters
+    ----------
+    out : the folder
+    campaign : what is swept
+    overwrite : replace an earlier sweep, once this one has come to its end
+
+    Raises
+    ------
+    InputError : it holds another sweep or something else, is in use or cannot be written
+
+    """
+    begun = not overwrite and _stored(out) is not None
+    with results_folder(
+        out,
+        overwrite=overwrite,
+        own=[f'{ROLLOUTS}/part-*.parquet'],
+        inputs=campaign.inputs,
+        begun=begun,
+    ) as results:
+        yield SweepFolder(results, campaign)
+
+
+class SweepFolder:
+    """What a sweep was made of, and the blocks that are finished.
+
+    Attributes
+    ----------
+    folder : where they are written
+    out : where they lie in the end
+    data : folder of the finished blocks
+    new : whether nothing was there before
+
+    """
+
+    def __init__(self, results: Results, campaign: Campaign):
+        self.folder, self.out = results
+        self.data = self.folder / ROLLOUTS
+        manifest, stored = _manifest(campaign), _stored(self.folder)
+        self.new = stored is None
+        if stored is None:
+            stored = {**manifest, 'block': campaign.block}
+            write(self.folder / SWEEP, json.dumps(stored, indent=1).encode())
+        self.block = stored.pop('block')
+        _refuse_other(self.folder, stored, manifest)
+        _clear_unfinished(self.folder)
+        _write_inputs(self.folder, campaign)
+        self.data.mkdir(exist_ok=True)
+        _clear_unfinished(self.data)
+
+    def finished(self, columns: list[str]) -> Iterator[tuple[int, 'pa.Table']]:
+        """Number and some columns of each finished block; what cannot be read is not finished."""
+        for number, path in sorted(self._parts()):
+            import pyarrow as pa
+            import pyarrow.parquet as pq
+
+            with suppress(pa.ArrowInvalid, OSError):
+                yield number, pq.ParquetFile(path).read(columns)
+
+    def stored(self, rollouts: int) -> int:
+        """How many of so many rollouts lie in the folder."""
+        blocks = (block for block, _ in self._parts())
+        return sum(min(self.block, rollouts - block * self.block) for block in blocks)
+
+    def _parts(self) -> Iterator[tuple[int, Path]]:
+        for entry in self.data.iterdir():
+            if match := PART.fullmatch(entry.name):
+                yield int(match[1]), entry
+
+    def store(self, block: int, table: 'pa.Table') -> None:
+        """Write a finished block."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        sink = pa.BufferOutputStream()
+        words = [field.name for field in table.schema if pa.types.is_string(field.type)]
+        pq.write_table(table, sink, compression='zstd', use_dictionary=words)
+        write(self.data / f'part-{block:08d}.parquet', sink.getvalue())
+
+
+def _clear_unfinished(folder: Path) -> None:
+    if folder.is_dir():
+        for entry in folder.glob(f'.*{UNFINISHED}'):
+            entry.unlink()
+
+
+def _manifest(campaign: Campaign) -> dict[str, Any]:
+    """What the rows depend on."""
+    scenario = campaign.scenario
+    data = dict(scenario.data)
+    if table := scenario.attachments.get('setpoint.csv'):
+        data['setpoint'] = {'file': 'setpoint.csv'}
+    return json.loads(json.dumps({
+        'format': 1,
+        'campaign': campaign.data,
+        'scenario': data,
+        'vehicles': {entry.data['vehicle']: entry.vehicle_data
+                     for entry in campaign.scenarios.values()},
+        'setpoint.csv': table,
+        'laws': laws_of(campaign),
+        'versions': {**versions(), **_sampling_versions(campaign), 'machine': platform.machine()},
+        'rollouts': campaign.rollouts,
+    }))  # fmt: skip
+
+
+def _sampling_versions(campaign: Campaign) -> dict[str, str]:
+    """Versions of the libraries that drew the samples."""
+    from importlib import metadata
+
+    from auv_analysis.studies.sweep.variation import kind_of
+
+    kinds = {kind_of(spec) for spec in campaign.data['vary']} - {'grid', 'zip'}
+    packages = (['scipy'] if kinds else []) + (['SALib'] if 'morris' in kinds else [])
+    return {package: metadata.version(package) for package in packages}
+
+
+def _write_inputs(out: Path, campaign: Campaign) -> None:
+    """Texts for people: the manifest alone is read again."""
+    from auv_analysis.experiment import write_inputs
+
+    write_inputs(campaign.scenario, out)
+    header = f'# {campaign.path.name} with every default filled in\n'
+    resolved = {**campaign.data, 'scenario': 'scenario.yaml'}
+    text = yaml.safe_dump(resolved, sort_keys=False, default_flow_style=None, width=100)
+    write(out / CAMPAIGN, (header + text).encode())
+
+
+def _stored(out: Path) -> dict[str, Any] | None:
+    """Manifest of the folder, None where there is none."""
+    try:
+        stored = json.loads((out / SWEEP).read_text(encoding='utf-8'))
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except (OSError, ValueError):
+        stored = None
+    if not isinstance(stored, dict) or not isinstance(stored.get('block'), int):
+        found = f'a {SWEEP} that is not ours'
+        raise InputError(out, '--out', 'a folder of `auv sweep`, or --overwrite', found)
+    return stored
+
+
+def _refuse_other(out: Path, stored: dict[str, Any], manifest: dict[str, Any]) -> None:
+    difference = _difference(stored, manifest)
+    if difference is not None:
+        path, before, now = difference
+        if path[0] == 'laws':  # digests say nothing to people
+            expected = 'the module of the law as when it was begun, or --overwrite'
+            raise InputError(out, dotted(path), expected, 'an edited one')
+        with suppress(TypeError):
+            before, now = (json.dumps(x)[:40] for x in (before, now))
+        expected = f'{before} as when it was begun, or --overwrite'
+        raise InputError(out, dotted(path), expected, f'{now}')
+
+
+def _difference(
+    a: Any, b: Any, path: tuple[Any, ...] = ()
+) -> tuple[tuple[Any, ...], Any, Any] | None:
+    """Where two JSON documents differ first."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        pairs = [(key, a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b])]
+    elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+        pairs = [(i, x, y) for i, (x, y) in enumerate(zip(a, b, strict=True))]
+    else:
+        return None if a == b else (path, a, b)
+    for key, x, y in pairs:
+        if found := _difference(x, y, (*path, key)):
+            return found
+    return None

@@ -1,0 +1,253 @@
+"""Sensitivity indices of a campaign whose design was made for them: Sobol's and Morris's."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from auv_analysis.measures import Measure
+from auv_analysis.studies.sweep.dataset import Sweep
+from auv_analysis.studies.sweep.variation import (
+    LEVELS,
+    Group,
+    cube,
+    kind_of,
+    make_design,
+    make_group,
+)
+
+Row = dict[str, Any]
+METHODS = ('saltelli', 'morris')
+FIRST_AND_TOTAL, SECOND = ('S1', 'S1_conf', 'ST', 'ST_conf'), ('S2', 'S2_conf')
+EFFECTS = ('mu', 'mu_star', 'mu_star_conf', 'sigma')
+MOST_OTHERS = 8  # combinations of the other groups of which each has indices of its own
+FEWEST = 8  # base points or trajectories
+SEED = 0  # of the bootstrap of the confidence intervals
+MISSING = 'sensitivity indices need SALib: pip install SALib'
+
+
+class Designed(NamedTuple):
+    """A group of a campaign whose design allows indices.
+
+    Attributes
+    ----------
+    kind : 'saltelli' or 'morris'
+    paths : names of its coordinates
+    spec : the group in the campaign file
+    step : rows of one base point or trajectory
+    positions : (n,) place of each row of the sweep in the design
+    others : (n,) which combination of the other groups it has
+    cases : what each of these is, '' where it is the only one
+    points : (size, k) of the unit cube; None of saltelli, which needs none
+
+    """
+
+    kind: str
+    paths: list[str]
+    spec: dict[str, Any]
+    step: int
+    positions: np.ndarray
+    others: np.ndarray
+    cases: list[str]
+    points: np.ndarray | None
+
+
+def designed(sweep: Sweep) -> tuple[list[Designed], list[str]]:
+    """Groups of a sweep that allow indices, and what has to be said of those that do not."""
+    specs, seed = sweep.campaign['vary'], sweep.campaign['seed']
+    if not any(kind_of(spec) in METHODS for spec in specs):
+        return [], []
+    try:
+        import SALib  # noqa: F401  its parts are imported where they are used
+    except ImportError:
+        return [], [MISSING]
+    groups = [make_group(spec, seed, i, sweep.folder) for i, spec in enumerate(specs)]
+    found, notes = [], []
+    for i, spec in enumerate(specs):
+        if kind_of(spec) not in METHODS:
+            continue
+        entry = _designed(sweep, groups, i, spec)
+        if len(entry.cases) > MOST_OTHERS:
+            notes.append(
+                f'no indices of {", ".join(entry.paths)}: {len(entry.cases)} combinations of '
+                f'the other groups, of at most {MOST_OTHERS}'
+            )
+        elif not _is_the_same(sweep, groups[i], entry):
+            notes.append(f'no indices of {", ".join(entry.paths)}: the design drawn now is another')
+        else:
+            found.append(entry)
+    return found, notes
+
+
+def _designed(sweep: Sweep, groups: list[Group], number: int, spec: dict[str, Any]) -> Designed:
+    sizes = [group.size for group in groups]
+    inner = int(np.prod(sizes[number + 1 :], dtype=np.int64))
+    positions = sweep.index // inner % sizes[number]
+    outer = sweep.index // (inner * sizes[number])
+    kind = kind_of(spec)
+    paths = list(spec[kind])
+    points = None
+    if kind == 'morris':
+        options = {key: int(value) for key, value in spec.items() if key != kind}
+        design = make_design(kind, paths, options, sweep.campaign['seed'], number)
+        points = design.at(np.arange(design.size))
+    step = sizes[number] // int(spec['count'])
+    others = outer * inner + sweep.index % inner
+    cases = _cases(sweep, others, paths, sweep.manifest['rollouts'] // sizes[number])
+    return Designed(kind, paths, spec, step, positions, others, cases, points)
+
+
+def _cases(sweep: Sweep, others: np.ndarray, paths: list[str], count: int) -> list[str]:
+    """What else varies, in each combination that has rows."""
+    beside = [path for path in sweep.paths if path not in paths]
+    if not beside or count > MOST_OTHERS:
+        return [''] * count
+    table, cases = sweep.table(beside), []
+    for case in range(count):
+        rows = np.flatnonzero(others == case)
+        values = table.slice(rows[0], 1).to_pylist()[0] if len(rows) else {}
+        cases.append(', '.join(f'{path} = {value}' for path, value in values.items()))
+    return cases
+
+
+def _is_the_same(sweep: Sweep, group: Group, entry: Designed) -> bool:
+    """Whether the design that is drawn now gives the values that the rows have."""
+    drawn = group.at(entry.positions)
+    for path in entry.paths:
+        there, here = sweep.table([path])[path].to_pylist(), drawn[path]
+        if isinstance(here, np.ndarray) and here.dtype.kind == 'f':
+            if not np.allclose(here, there, rtol=1e-12, atol=0.0):
+                return False
+        elif list(here) != there:
+            return False
+    return True
+
+
+def indices(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure) -> Iterator[Row]:
+    """Indices of a measure: of each controller and each combination of the other groups.
+
+    A base point or trajectory with a row that is missing or failed is left out, as a whole. There
+    are no indices of a figure that some rows do not have, such as a time to settle: they would be
+    those of the rows that were chosen by the figure itself.
+
+    Parameters
+    ----------
+    sweep : whose rows they are
+    entry : of `designed`
+    values : (n,) of the measure in all rows
+    measure : what it is
+
+    """
+    analyze = _sobol if entry.kind == 'saltelli' else _morris
+    size = int(entry.spec['count']) * entry.step
+    for i, controller in enumerate(sweep.controllers):
+        for other, case in enumerate(entry.cases):
+            rows = _rows(sweep, entry, i, other)
+            if np.isnan(values[rows]).any():
+                continue
+            Y = np.full(size, np.nan)
+            Y[entry.positions[rows]] = values[rows]
+            blocks = Y.reshape(-1, entry.step)
+            whole = np.isfinite(blocks).all(axis=1)
+            used = blocks[whole]
+            if len(used) < FEWEST or np.ptp(used) <= 1e-12 * np.abs(used).max():
+                continue
+            names: Row = {'method': 'sobol' if entry.kind == 'saltelli' else 'morris'}
+            names |= {'controller': controller, 'figure': measure.name, 'unit': measure.unit}
+            names |= {'case': case, 'points': len(used), 'of': int(entry.spec['count'])}
+            yield from (names | row for row in _quiet(analyze, entry, used, whole))
+
+
+def _rows(sweep: Sweep, entry: Designed, controller: int, other: int) -> np.ndarray:
+    """Mask of the rows of a controller and combination that came to their end."""
+    return (sweep.controller == controller) & (sweep.status == 0) & (entry.others == other)
+
+
+def omitted(sweep: Sweep, entry: Designed, values: np.ndarray, measure: Measure) -> Iterator[str]:
+    """What has to be said of a measure that has no indices since some rows have no such figure."""
+    for i, controller in enumerate(sweep.controllers):
+        lacks = [np.isnan(values[_rows(sweep, entry, i, k)]) for k in range(len(entry.cases))]
+        some = [mask for mask in lacks if mask.any() and not mask.all()]
+        if some:
+            count, of = (int(sum(n)) for n in zip(*((m.sum(), m.size) for m in some), strict=True))
+            yield (
+                f'no indices of {measure.label} under {controller}: {count} of {of} rows have '
+                'none, and the rest is no sample of the design'
+            )
+
+
+def failing(sweep: Sweep, entry: Designed) -> Iterator[str]:
+    """What has to be said of indices of a design in which rows failed."""
+    for i, controller in enumerate(sweep.controllers):
+        failed = int(((sweep.controller == i) & (sweep.status != 0)).sum())
+        if failed:
+            yield (
+                f'indices of {", ".join(entry.paths)} under {controller} are of the part of the '
+                f'design where no row failed: {failed} did'
+            )
+
+
+def _quiet(analyze: Callable[..., Iterator[Row]], *arguments: Any) -> list[Row]:
+    with np.errstate(all='ignore'):
+        return list(analyze(*arguments))
+
+
+def _sobol(entry: Designed, Y: np.ndarray, whole: np.ndarray) -> Iterator[Row]:
+    second = bool(entry.spec.get('second_order'))
+    found = sobol_indices(entry.paths, Y.ravel(), SEED, second_order=second)
+    for i, path in enumerate(entry.paths):
+        yield {'path': path, 'with': None} | {key: _known(found[key][i]) for key in FIRST_AND_TOTAL}
+    if second:
+        for i, path in enumerate(entry.paths):
+            for j in range(i + 1, len(entry.paths)):
+                row = {key: _known(found[key][i, j]) for key in SECOND}
+                yield {'path': path, 'with': entry.paths[j]} | row
+
+
+def _morris(entry: Designed, Y: np.ndarray, whole: np.ndarray) -> Iterator[Row]:
+    assert entry.points is not None
+    X = entry.points.reshape(len(whole), entry.step, -1)[whole].reshape(Y.size, -1)
+    found = morris_indices(entry.paths, X, Y.ravel(), SEED, int(entry.spec.get('levels', LEVELS)))
+    for i, path in enumerate(entry.paths):
+        yield {'path': path, 'with': None} | {key: _known(found[key][i]) for key in EFFECTS}
+
+
+def sobol_indices(
+    names: Sequence[str], y: np.ndarray, seed: int, *, second_order: bool = False
+) -> dict[str, np.ndarray]:
+    """Sobol' indices S1 (k,), ST (k,) and S2 (k, k) by SALib; '_conf' is half of the 95 % interval.
+
+    Parameters
+    ----------
+    names : of the k factors
+    y : (n,) answers at the points of a Saltelli design, base point after base point
+    seed : of the bootstrap
+    second_order : whether the design has the rows for S2
+
+    """
+    from SALib.analyze import sobol
+
+    return sobol.analyze(cube(names), y, calc_second_order=second_order, seed=seed)
+
+
+def morris_indices(
+    names: Sequence[str], points: np.ndarray, y: np.ndarray, seed: int, levels: int
+) -> dict[str, np.ndarray]:
+    """Elementary effects of Morris over the whole range by SALib: mu, mu_star and sigma, each (k,).
+
+    Parameters
+    ----------
+    names : of the k factors
+    points : (n, k) of the unit cube, trajectory after trajectory
+    y : (n,) answers at the points
+    seed : of the bootstrap behind mu_star_conf, half of the 95 % interval
+    levels : of the grid of the design
+
+    """
+    from SALib.analyze import morris
+
+    return morris.analyze(cube(names), points, y, num_levels=levels, seed=seed)
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,309 @@
+"""Quantiles of figures: of all rows of a controller, and of groups of them."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import rankdata
+
+from auv_analysis.measures import FAMILIES, MEASURES, Measure, described
+from auv_analysis.studies.pairs import log_ratios, paired
+from auv_analysis.studies.sweep.dataset import STATUSES, Sweep
+from auv_analysis.studies.sweep.factors import Varied, by_group
+from auv_dynamics.signals import DOFS
+
+LEVELS = {'low': 0.05, 'quarter': 0.25, 'median': 0.5, 'three_quarters': 0.75, 'high': 0.95}
+Row = dict[str, Any]
+POINTS = 201  # of a distribution function as it is drawn
+
+
+def ordered(values: np.ndarray, unit: str) -> np.ndarray:
+    """The same values; a time that does not exist is later than any other."""
+    return np.where(np.isnan(values), np.inf, values) if unit == 's' else values
+
+
+def quantiles(values: np.ndarray, levels: Iterable[float]) -> np.ndarray:
+    """Quantiles that are values themselves, so that one of them may be infinite."""
+    known = values[~np.isnan(values)]
+    levels = np.asarray(list(levels))
+    if len(known) == 0:
+        return np.full(len(levels), np.nan)
+    return np.quantile(known, levels, method='inverted_cdf')
+
+
+def finite(value: float) -> float | None:
+    """A number, None where it is not finite."""
+    return float(value) if np.isfinite(value) else None
+
+
+def spread(values: np.ndarray, unit: str) -> Row:
+    """Quantiles of a figure as columns; None: it does not exist there, such as a settling time.
+
+    `known` counts the values that exist; of a time, the quantiles count one that does not as late.
+    """
+    known = values[np.isfinite(values)]
+    at = quantiles(ordered(values, unit), LEVELS.values())
+    row: Row = {'rows': len(values), 'known': len(known)}
+    row |= {'smallest': finite(known.min()) if len(known) else None}
+    row |= {name: finite(value) for name, value in zip(LEVELS, at, strict=True)}
+    row |= {'largest': finite(known.max()) if len(known) else None}
+    return row | {'mean': finite(known.mean()) if len(known) else None}
+
+
+def figures_spread(sweep: Sweep) -> Iterator[Row]:
+    """Rows of `quantiles.parquet`: controller, figure, its unit and meaning, its quantiles."""
+    for measure in MEASURES:
+        yield from _of_column(sweep, measure.name, sweep.measure(measure))
+    for family in FAMILIES:
+        table = sweep.table([f'{family}.{dof}' for dof in DOFS])
+        for name in table.column_names:
+            yield from _of_column(sweep, name, table[name].to_numpy().astype(float))
+
+
+def _of_column(sweep: Sweep, name: str, values: np.ndarray) -> Iterator[Row]:
+    label, unit, meaning = described(name)
+    for i, controller in enumerate(sweep.controllers):
+        rows = (sweep.controller == i) & (sweep.status == 0)
+        names = {'controller': controller, 'figure': name, 'label': label}
+        yield names | {'unit': unit, 'meaning': meaning} | spread(values[rows], unit)
+
+
+def distribution(values: np.ndarray, measure: Measure) -> tuple[np.ndarray, np.ndarray]:
+    """Distribution function as a line: values and the share of rows at or below each, in %.
+
+    Rows without the figure count as rows above every value where it is a time.
+    """
+    at = ordered(values, measure.unit)
+    at = at[~np.isnan(at)]
+    levels = np.linspace(0.0, 1.0, POINTS)
+    if len(at) == 0:
+        return np.empty(0), np.empty(0)
+    lines = np.quantile(at, levels, method='inverted_cdf')
+    below = np.searchsorted(np.sort(at), lines, side='right') / len(at)
+    inside = np.isfinite(lines)
+    return lines[inside], 100 * below[inside]
+
+
+def varying(values: Sequence[np.ndarray], unit: str) -> bool:
+    """Whether there is more than one value; of a time, one that does not exist is one as well."""
+    whole = np.concatenate(values)
+    known = whole[np.isfinite(whole)]
+    if len(known) == 0:
+        return False
+    late = unit == 's' and len(known) < len(whole)
+    return late or bool(np.ptp(known) > 1e-12 * np.abs(known).max())
+
+
+FEWEST = 8  # rows that a correlation is worth computing of
+
+
+def influence(ranks: np.ndarray, varied: Varied, rows: np.ndarray) -> Row | None:
+    """How much of the order of a figure a path explains.
+
+    Parameters
+    ----------
+    ranks : (m,) of the figure
+    varied : the path
+    rows : (m,) indices of these rows
+
+    Returns
+    -------
+    row : None where there is nothing to compare
+        spearman : rank correlation, None of words and lists
+        explained_percent : share of the variance of the ranks that lies between the groups of the
+            path (bins of numbers, or its values), corrected for their number; it also sees what
+            rises and falls again
+
+    """
+    codes = varied.codes[rows]
+    groups = len(np.unique(codes))
+    if len(ranks) < FEWEST or groups < 2 or np.ptp(ranks) == 0 or len(ranks) <= groups:
+        return None
+    spearman = None
+    if varied.numbers is not None:
+        others = rankdata(varied.numbers[rows])
+        spearman = float(np.corrcoef(ranks, others)[0, 1])
+    return {'spearman': spearman, 'explained_percent': 100 * explained(ranks, codes)}
+
+
+def explained(ranks: np.ndarray, codes: np.ndarray) -> float:
+    """Share of the variance between groups, less what chance alone would put there; not below 0."""
+    counts = np.bincount(codes)
+    sums = np.bincount(codes, ranks)
+    used = counts > 0
+    total = np.sum((ranks - ranks.mean()) ** 2)
+    between = np.sum(sums[used] ** 2 / counts[used]) - len(ranks) * ranks.mean() ** 2
+    n, k = len(ranks), int(used.sum())
+    within = (total - between) / (n - k) * (n - 1) / total
+    return float(np.clip(1.0 - within, 0.0, 1.0))
+
+
+def ranks_of(values: np.ndarray, measure: Measure) -> tuple[np.ndarray, np.ndarray]:
+    """Ranks of the values that exist, and which rows these are; a time that does not is late."""
+    at = ordered(values, measure.unit)
+    there = np.flatnonzero(~np.isnan(at))
+    return rankdata(at[there]), there
+
+
+MOST_CELLS = 10  # groups of a path that a table of two has room for
+
+
+def along(values: np.ndarray, rows: np.ndarray, varied: Varied, measure: Measure) -> Iterator[Row]:
+    """Quantiles of a figure in each group of a path.
+
+    Parameters
+    ----------
+    values : (n,) of all rows
+    rows : (m,) indices of the rows that count
+    varied : the path
+    measure : whose values they are
+
+    """
+    groups = by_group(values[rows], varied.codes[rows], len(varied.labels))
+    for i, (label, group) in enumerate(zip(varied.labels, groups, strict=True)):
+        row: Row = {'path': varied.path, 'figure': measure.name, 'unit': measure.unit}
+        row |= {'group': i, 'value': label, 'middle': finite(varied.middles[i])}
+        ends = (None, None) if varied.edges is None else map(float, varied.edges[i])
+        yield row | dict(zip(('from', 'to'), ends, strict=True)) | spread(group, measure.unit)
+
+
+def together(
+    values: np.ndarray, rows: np.ndarray, pair: Sequence[Varied], measure: Measure
+) -> Iterator[Row]:
+    """Median of a figure for each combination of the groups of two paths.
+
+    Parameters
+    ----------
+    values, rows, measure : as of `along`
+    pair : two paths; bins are merged until they are few
+
+    """
+    first, second = (merged(varied) for varied in pair)
+    width = len(second[1])
+    codes = first[0][rows] * width + second[0][rows]
+    groups = by_group(values[rows], codes, len(first[1]) * width)
+    for i, group in enumerate(groups):
+        at = quantiles(ordered(group, measure.unit), [0.5])[0]
+        names = {'figure': measure.name, 'unit': measure.unit}
+        names |= {'path': pair[0].path, 'value': first[1][i // width]}
+        names |= {'other_path': pair[1].path, 'other_value': second[1][i % width]}
+        known = int(np.isfinite(group).sum())
+        yield names | {'rows': len(group), 'known': known, 'median': finite(at)}
+
+
+def merged(varied: Varied) -> tuple[np.ndarray, list[str]]:
+    """Codes and labels of a path with neighbouring bins joined until they are few."""
+    labels = list(varied.labels)
+    if not varied.binned or len(labels) <= MOST_CELLS:
+        return varied.codes, labels
+    step = -(-len(labels) // MOST_CELLS)
+    starts = [label.split('–')[0] for label in labels[::step]]
+    ends = [labels[min(i + step, len(labels)) - 1] for i in range(0, len(labels), step)]
+    joined = [f'{a}–{b.split("–")[-1]}' for a, b in zip(starts, ends, strict=True)]
+    return varied.codes // step, joined
+
+
+def failures(varied: Varied, status: np.ndarray, rows: np.ndarray) -> Iterator[Row]:
+    """Shares of diverged and refused rows in each group of a path.
+
+    Parameters
+    ----------
+    varied : the path
+    status : (n,) places in `STATUSES`
+    rows : (m,) indices of the rows that count
+
+    """
+    groups = by_group(status[rows], varied.codes[rows], len(varied.labels))
+    for label, group in zip(varied.labels, groups, strict=True):
+        row: Row = {'path': varied.path, 'value': label, 'rows': len(group)}
+        for place, word in enumerate(STATUSES[1:], start=1):
+            count = int((group == place).sum())
+            share = 100.0 * count / len(group) if len(group) else None
+            row |= {word: count, f'{word}_percent': share}
+        yield row
+
+
+def pairs(sweep: Sweep, values: np.ndarray, measure: Measure) -> Iterator[Row]:
+    """For each two controllers, the ratio of their figures in the same rollouts, as `Pairs`.
+
+    Only rollouts that both finished count; a time that does not exist is later than any other.
+
+    Parameters
+    ----------
+    sweep : whose rows they are
+    values : (n,) of the measure in all rows
+    measure : what is compared
+
+    """
+    at = ordered(values, measure.unit)
+    usable = (sweep.status == 0) & ~np.isnan(at)
+    for first, second, mine, other in sweep.pairs:
+        both = usable[mine] & usable[other]
+        d = log_ratios(at[mine[both]], at[other[both]])
+        if len(d) == 0:
+            continue
+        found = paired(d)
+        low, high = found.interval or (None, None)
+        yield {
+            'figure': measure.name,
+            'label': measure.label,
+            'controller': sweep.controllers[first],
+            'other': sweep.controllers[second],
+            'rollouts': len(d),
+            'smaller_percent': 100 * found.smaller,
+            'equal_percent': float(100 * np.mean(d == 0)),
+            'larger_percent': 100 * found.larger,
+            'effect': found.effect,
+            'ratio': found.ratio,
+            'ratio_low': low,
+            'ratio_high': high,
+        }
+
+
+COUNT = 10  # rows of each controller
+
+
+def smallest(
+    sweep: Sweep, values: np.ndarray, measure: Measure, count: int = COUNT
+) -> list[tuple[int, Row]]:
+    """Rows of each controller with the smallest values of a measure: place in the sweep, names.
+
+    Parameters
+    ----------
+    sweep : whose rows they are
+    values : (n,) of the measure in all rows
+    measure : by which they are sorted
+    count : at most so many of a controller
+
+    """
+    found = []
+    for i, controller in enumerate(sweep.controllers):
+        rows = np.flatnonzero((sweep.controller == i) & (sweep.status == 0) & np.isfinite(values))
+        order = rows[np.argsort(values[rows], kind='stable')[:count]]
+        for rank, row in enumerate(order, start=1):
+            found.append((int(row), {'by': measure.name, 'controller': controller, 'rank': rank}))
+    return found
+
+
+def with_values(
+    sweep: Sweep, found: Sequence[tuple[int, Row]], figures: Mapping[str, np.ndarray]
+) -> list[Row]:
+    """The same rows with rollout, seed, varied values and all measures.
+
+    Parameters
+    ----------
+    sweep : whose rows they are
+    found : of `smallest`
+    figures : measure -> (n,)
+
+    """
+    places = [row for row, _ in found]
+    table = sweep.table(['index', 'seed', *sweep.paths]).take(places)
+    rows = []
+    for (place, names), given in zip(found, table.to_pylist(), strict=True):
+        row = {**names, 'rollout': given.pop('index'), **given}
+        for measure in MEASURES:
+            value = figures[measure.name][place]
+            row[measure.name] = float(value) if np.isfinite(value) else None
+        rows.append(row)
+    return rows

@@ -16,12 +16,21 @@ from made_bags import make_bag
 from measure import RUNS, Measured, interleaved, speed
 
 from auv_analysis import simulate
-from auv_analysis.coupling import delta_pi, delta_xi
-from auv_analysis.energy import kinetic_energy
-from auv_analysis.moments import DELTA_PI, DELTA_XI, ENERGY, ERROR, LUMPED, TAU, Tally, maps_of
-from auv_analysis.run import Run
-from auv_analysis.summary import TRANSIENT
-from auv_gvc_controller.model import ControlModel, control_model
+from auv_analysis.metrics.coupling import delta_pi, delta_xi
+from auv_analysis.metrics.energy import kinetic_energy
+from auv_analysis.metrics.moments import (
+    DELTA_PI,
+    DELTA_XI,
+    ENERGY,
+    ERROR,
+    LUMPED,
+    TAU,
+    Tally,
+    maps_of,
+)
+from auv_analysis.metrics.summary import TRANSIENT
+from auv_analysis.runs.run import Run
+from auv_gvc_controller.laws.model import ControlModel, control_model
 
 SAMPLES = 1_000_000
 SIGNALS = ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate')

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from measure import RUNS, Measured, interleaved
 
-from auv_analysis.domain import VARIABLE, chosen_domain
-from auv_analysis.experiment import environment
+from auv_analysis.graph.domain import VARIABLE, chosen_domain
+from auv_analysis.graph.experiment import environment
 from auv_dynamics.ros.topics import TOPICS
 
 ECHO = Path(__file__).with_name('echo.py')

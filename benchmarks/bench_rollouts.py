@@ -13,10 +13,10 @@ from loops import CONTROLLER, case1, in_c, prepared, varied
 from measure import Measured, cost, interleaved, speed
 
 from auv_analysis import simulate
-from auv_analysis.batch import run_batch
-from auv_analysis.rollouts import rollouts
-from auv_analysis.scenario import Scenario
-from auv_dynamics.signals import DOFS
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.batch import run_batch
+from auv_analysis.simulation.rollouts import rollouts
+from auv_dynamics.vehicle import DOFS
 
 DURATION = 10.0  # s
 BATCH = 96

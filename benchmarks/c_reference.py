@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.scenario import Scenario
-from auv_analysis.summary import BAND, SMALLEST_BAND, TRANSIENT
-from auv_dynamics.integrator import TABLEAUS, stage_times
-from auv_dynamics.plant import initial_state
-from auv_gvc_controller.model import control_model
+from auv_analysis.metrics.summary import BAND, SMALLEST_BAND, TRANSIENT
+from auv_analysis.scenario.scenario import Scenario
+from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
+from auv_dynamics.plant.plant import initial_state
+from auv_gvc_controller.laws.model import control_model
 
 SOURCE = Path(__file__).with_name('reference.c')
 # no fast-math: every result is one that C defines, but for the fused multiply-add that gcc takes

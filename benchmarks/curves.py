@@ -15,7 +15,7 @@ from measure import seconds
 from table import quantity
 
 from auv_analysis import load_run
-from auv_analysis.rollouts import rollouts
+from auv_analysis.simulation.rollouts import rollouts
 
 BRIEF = 1.0  # s below which a measurement is repeated and its median taken
 REPEATS = 5

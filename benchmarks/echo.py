@@ -7,7 +7,7 @@ from nav_msgs.msg import Odometry
 from rclpy.executors import ExternalShutdownException
 from rclpy.utilities import try_shutdown
 
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 from auv_dynamics.ros.topics import every_step
 
 

@@ -18,10 +18,10 @@ from pathlib import Path
 import yaml
 from loops import CONTROLLER
 
-from auv_analysis.domain import chosen_domain
-from auv_analysis.experiment import environment, run_controller
-from auv_analysis.scenario import load_scenario
-from auv_analysis.warm_up import warm_up
+from auv_analysis.graph.domain import chosen_domain
+from auv_analysis.graph.experiment import environment, run_controller
+from auv_analysis.scenario.scenario import load_scenario
+from auv_analysis.simulation.warm_up import warm_up
 from auv_dynamics.ros.reach import loopback
 
 SETTLE = 1.0  # s of ping-pong before it is counted

@@ -8,16 +8,21 @@ import numpy as np
 from c_reference import Loops, loops
 
 from auv_analysis import load_scenario
-from auv_analysis.batch import Batch
-from auv_analysis.changes import changed_scenario, split
-from auv_analysis.closed_loop import run_continuous
-from auv_analysis.reduction import Figures
-from auv_analysis.rollouts import batch_of
-from auv_analysis.scenario import Scenario
-from auv_analysis.simulation import at_start, blocks, one_loop, tables
-from auv_analysis.summary import band_of
-from auv_analysis.variants import packed_variants
-from auv_dynamics.integrator import TABLEAUS
+from auv_analysis.metrics.summary import band_of
+from auv_analysis.scenario.changes import changed_scenario, split
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.batch import Batch
+from auv_analysis.simulation.closed_loop import run_continuous
+from auv_analysis.simulation.reduction import Figures
+from auv_analysis.simulation.rollouts import batch_of
+from auv_analysis.simulation.simulate import (
+    at_start,
+    blocks,
+    one_loop,
+    tables,
+)
+from auv_analysis.simulation.variants import packed_variants
+from auv_dynamics.kernel.integrator import TABLEAUS
 
 CONTROLLER = 'gvc'
 VARIED = (

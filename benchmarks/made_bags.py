@@ -11,12 +11,12 @@ import yaml
 from rosbags.typesys import Stores, get_typestore
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.recording import BagWriter, Storage
-from auv_analysis.run import Run
-from auv_analysis.scenario import Scenario
-from auv_dynamics.interface import NANOSECONDS, Frames
-from auv_dynamics.kinematics import quaternion
+from auv_analysis.runs.run import Run
+from auv_analysis.scenario.scenario import Scenario
+from auv_dynamics.ros.interface import NANOSECONDS, Frames
+from auv_dynamics.vehicle.kinematics import quaternion
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 FRAMES = Frames()

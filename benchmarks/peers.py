@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.scenario import Scenario
-from auv_dynamics.plant import initial_state
-from auv_gvc_controller.model import control_model
+from auv_analysis.scenario.scenario import Scenario
+from auv_dynamics.plant.plant import initial_state
+from auv_gvc_controller.laws.model import control_model
 
 ACCURACY = {'rtol': 1e-8, 'atol': 1e-10}
 

@@ -11,12 +11,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.coupling import delta_pi, delta_xi
-from auv_analysis.energy import kinetic_energy
+from auv_analysis.metrics.coupling import delta_pi, delta_xi
+from auv_analysis.metrics.energy import kinetic_energy
 from auv_analysis.report.plotting import COLOURS, STYLE
-from auv_analysis.run import Run
+from auv_analysis.runs.run import Run
 from auv_dynamics import load_vehicle
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller import decompose
 
 HERE = Path(__file__).resolve().parent

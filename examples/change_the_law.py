@@ -13,12 +13,17 @@ import subprocess
 from pathlib import Path
 
 from auv_analysis.bag import load_run
-from auv_analysis.experiment import PACKAGES, environment, write_inputs
-from auv_analysis.node_parameters import CONTROLLER, RECORDER, node_parameters, parameter_file
-from auv_analysis.scenario import Scenario, load_scenario
-from auv_analysis.summary import summarize
-from auv_analysis.supervisor import executable
-from auv_dynamics.signals import DOFS
+from auv_analysis.graph.experiment import PACKAGES, environment, write_inputs
+from auv_analysis.graph.node_parameters import (
+    CONTROLLER,
+    RECORDER,
+    node_parameters,
+    parameter_file,
+)
+from auv_analysis.graph.supervisor import executable
+from auv_analysis.metrics.summary import summarize
+from auv_analysis.scenario.scenario import Scenario, load_scenario
+from auv_dynamics.vehicle import DOFS
 
 LAWS = ('gvc', 'cl')
 

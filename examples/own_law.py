@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_dynamics.model import coriolis, damping, restoring
+from auv_dynamics.vehicle.model import coriolis, damping, restoring
 
 
 class ComputedTorque(NamedTuple):

@@ -17,13 +17,13 @@ from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 
-from auv_analysis.experiment import environment
-from auv_analysis.supervisor import executable
+from auv_analysis.graph.experiment import environment
+from auv_analysis.graph.supervisor import executable
 from auv_dynamics import load_vehicle
-from auv_dynamics.interface import Frames
-from auv_dynamics.plant import Plant, initial_state
+from auv_dynamics.plant.plant import Plant, initial_state
+from auv_dynamics.plant.uncertainty import make_uncertainty
 from auv_dynamics.ros import convert
-from auv_dynamics.uncertainty import make_uncertainty
+from auv_dynamics.ros.interface import Frames
 
 PERIOD = 0.02  # s: 50 Hz, as a navigation filter may give
 SURGE = 0.4  # m/s, the set-point

@@ -7,8 +7,8 @@ import numpy as np
 import yaml
 
 from auv_analysis import load_scenario, simulate
-from auv_dynamics.config import shipped
-from auv_dynamics.vehicle_file import vehicle_from_dict
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 
 PAPER = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 

@@ -15,11 +15,11 @@ import numpy as np
 import yaml
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.rollouts import rollouts
-from auv_analysis.scenario import Scenario
-from auv_analysis.simulation import Hold
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.rollouts import rollouts
+from auv_analysis.simulation.simulate import Hold
+from auv_analysis.simulation.warm_up import warm_up
 from auv_analysis.tuning.loops import measured
-from auv_analysis.warm_up import warm_up
 
 STEPS = 20
 SHARED, OWN = 'controllers.{}.k_D', 'setpoint.surge.offset'  # set-points that are shared, or not

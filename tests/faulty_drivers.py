@@ -16,9 +16,9 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 
-from auv_dynamics.interface import NANOSECONDS, Frames
-from auv_dynamics.kinematics import rotation
 from auv_dynamics.ros import convert
+from auv_dynamics.ros.interface import NANOSECONDS, Frames
+from auv_dynamics.vehicle.kinematics import rotation
 
 RATE, SLOW = 50.0, 2.0  # Hz
 SECONDS = 120.0  # of motion, more than any test takes

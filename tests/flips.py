@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
-from auv_dynamics import six
+from auv_dynamics.kernel import six
 
 JIT = ('helper', 'compiled', 'specialised')
 OPPOSITE = {ast.Add: ast.Sub, ast.Sub: ast.Add}

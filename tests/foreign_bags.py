@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from auv_analysis import load_scenario, simulate
 from auv_analysis.foreign.load import load_foreign
 from auv_analysis.foreign.mapping import read_mapping
-from auv_analysis.run import Run
+from auv_analysis.runs.run import Run
 
 SECOND = 10**9
 ROS2, ROS1 = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS1_NOETIC)

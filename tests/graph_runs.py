@@ -18,7 +18,7 @@ from nursery import NODES, Process
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run
-from auv_analysis.run import Run
+from auv_analysis.runs.run import Run
 
 ENOUGH = 150_000  # bytes of a bag in which there are steps
 SIGNALS = ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate',
@@ -122,8 +122,8 @@ def plain(value: object) -> object:
 
 def main() -> None:
     """Record controllers of a scenario, all where none is named."""
-    from auv_analysis.experiment import run_controller
-    from auv_analysis.warm_up import warm_up
+    from auv_analysis.graph.experiment import run_controller
+    from auv_analysis.simulation.warm_up import warm_up
     from auv_dynamics.ros.watcher import Watcher
 
     path, out, *controllers = sys.argv[1:]

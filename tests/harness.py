@@ -18,7 +18,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from auv_analysis.domain import is_free
+from auv_analysis.graph.domain import is_free
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.reach import loopback
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from auv_analysis.driver_check.recording import Recording
 from auv_analysis.driver_check.scene import Endpoint, Scene
-from auv_dynamics.frames import swap_state
-from auv_dynamics.interface import Frames
-from auv_dynamics.kinematics import euler, quaternion, rotation
+from auv_dynamics.ros.interface import Frames
+from auv_dynamics.vehicle.frames import swap_state
+from auv_dynamics.vehicle.kinematics import euler, quaternion, rotation
 
 BEGAN = 1_700_000_000 * 10**9
 ODOMETRY, WRENCH = 'nav_msgs/msg/Odometry', 'geometry_msgs/msg/WrenchStamped'

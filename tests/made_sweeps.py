@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from auv_analysis.reduction import COLUMNS
+from auv_analysis.simulation.reduction import COLUMNS
 from auv_analysis.studies.sweep.analysis import Results
 from auv_analysis.studies.sweep.blocks import table_of
 from auv_analysis.studies.sweep.campaign import Campaign, load_campaign

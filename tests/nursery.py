@@ -23,10 +23,11 @@ from typing import IO, Any
 
 from setproctitle import setproctitle
 
-from auv_analysis import load_scenario, supervisor
-from auv_analysis.experiment import COMPOSED, PACKAGES
-from auv_analysis.warm_up import warm_up
-from auv_dynamics.interface import PARENT
+from auv_analysis import load_scenario
+from auv_analysis.graph import supervisor
+from auv_analysis.graph.experiment import COMPOSED, PACKAGES
+from auv_analysis.simulation.warm_up import warm_up
+from auv_dynamics.ros.interface import PARENT
 
 NODES = {  # and the package of each
     **PACKAGES,
@@ -34,9 +35,9 @@ NODES = {  # and the package of each
     'replay_node': 'auv_analysis',
     COMPOSED: 'auv_analysis',
 }
-STARTERS = {'auv': 'auv_analysis.cli', 'record': 'graph_runs'}  # of nodes, and their modules
+STARTERS = {'auv': 'auv_analysis.cli.main', 'record': 'graph_runs'}  # of nodes, and their modules
 LOADED = (  # what `auv` imports once it knows what it has to do
-    *('auv_analysis.commands.run', 'auv_analysis.commands.analyze', 'auv_analysis.commands.replay'),
+    *('auv_analysis.cli.run', 'auv_analysis.cli.analyze', 'auv_analysis.cli.replay'),
     *('auv_analysis.report.document', 'auv_analysis.report.figure_files'),
 )
 INTERPRETER = Path(sys.executable).name.encode()

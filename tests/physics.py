@@ -10,8 +10,8 @@ import herman_reference as reference
 import numpy as np
 from plants import plant_of, push
 
-from auv_dynamics.vehicle import Vehicle
-from auv_dynamics.vehicle_file import vehicle_from_dict
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 
 # M and what C, g and R are with it, as published; see the tests that use them
 DENSE_M_A = np.array(

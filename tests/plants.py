@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from auv_dynamics.plant import Plant
-from auv_dynamics.uncertainty import make_uncertainty
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.plant.plant import Plant
+from auv_dynamics.plant.uncertainty import make_uncertainty
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 
 def plant_of(

@@ -11,9 +11,9 @@ from made_messages import STRING, Bag, new, odometry, serialized, stamped
 from rclpy.parameter import Parameter
 
 from auv_analysis.bag.roles import ODOMETRY
-from auv_analysis.replay_node import ReplayNode
-from auv_dynamics.interface import nanoseconds
+from auv_analysis.nodes.replay_node import ReplayNode
 from auv_dynamics.ros import topics
+from auv_dynamics.ros.interface import nanoseconds
 
 STEP = 10_000_000
 STATE = (0.0, 0.0, 0.0, 1.0, *(0.0,) * 9)

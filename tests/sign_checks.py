@@ -31,8 +31,8 @@ from physics import (
 )
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.jit import plain
-from auv_dynamics.model import Model
+from auv_dynamics.kernel.compile import plain
+from auv_dynamics.vehicle.model import Model
 
 DRAWN = np.random.default_rng(6)
 

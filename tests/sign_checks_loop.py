@@ -14,10 +14,10 @@ from numpy.testing import assert_allclose
 from physics import attitude_of, turned, vehicle_of
 from sign_checks import ATTITUDES, LIFT, NU, TAU, F, drawn, gradient, symmetric
 
-from auv_dynamics.config import shipped
-from auv_dynamics.jit import plain
-from auv_gvc_controller.laws import make_gains
-from auv_gvc_controller.model import control_model
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.kernel.compile import plain
+from auv_gvc_controller.laws.law import make_gains
+from auv_gvc_controller.laws.model import control_model
 
 REXROV = yaml.safe_load(shipped('vehicles', 'rexrov').read_text(encoding='utf-8'))
 REXROV['lift'] = (500.0 * LIFT).tolist()

@@ -8,9 +8,9 @@ from made_odometry import BEGAN
 
 from auv_analysis.driver_check.recording import Recording, Tape
 from auv_dynamics import load_vehicle
-from auv_dynamics.interface import NANOSECONDS, Frames
-from auv_dynamics.kinematics import jacobian
-from auv_dynamics.plant import initial_state
+from auv_dynamics.plant.plant import initial_state
+from auv_dynamics.ros.interface import NANOSECONDS, Frames
+from auv_dynamics.vehicle.kinematics import jacobian
 
 STEP = 0.01  # s
 ZERO = (0.0,) * 6

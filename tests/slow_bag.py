@@ -15,8 +15,8 @@ from zstandard import ZstdError
 
 from auv_analysis.bag.contents import Contents
 from auv_analysis.bag.files import bag_files
-from auv_dynamics import interface
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros import interface
 
 MAGIC = b'\x89MCAP0\r\n'
 STAMPED = 'geometry_msgs/msg/{}Stamped'.format

@@ -8,7 +8,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from auv_dynamics.files import matrix6
+from auv_dynamics.files.yaml_files import matrix6
 
 QUICK = settings(max_examples=int(os.environ.get('AUV_GVC_EXAMPLES', '25')))  # `make properties`
 

@@ -26,8 +26,8 @@ from sign_checks import (
 )
 from sign_checks_loop import check_current, check_law, check_other_law, check_uncertainty
 
-from auv_dynamics.jit import plain
-from auv_gvc_controller.laws import SHIPPED
+from auv_dynamics.kernel.compile import plain
+from auv_gvc_controller.laws.law import SHIPPED
 
 
 @dataclass(frozen=True)
@@ -41,35 +41,38 @@ class Formula:
     least: int  # signs in it today: a formula that moves must take its check along
 
 
+MODEL = 'auv_dynamics.vehicle.model'
 FORMULAS = [
-    Formula('C', 'auv_dynamics.model', ['coriolis'], lambda m: check_C(plain(m.coriolis)), 12),
+    Formula('C', MODEL, ['coriolis'], lambda m: check_C(plain(m.coriolis)), 12),
     Formula(
-        'D', 'auv_dynamics.model', ['damping', '_with_lift'],
+        'D', MODEL, ['damping', '_with_lift'],
         lambda m: check_D(plain(m.damping)), 2,
     ),
     Formula(
-        'g', 'auv_dynamics.model', ['down', 'restoring'], lambda m: check_g(plain(m.restoring)), 10
+        'g', MODEL, ['down', 'restoring'], lambda m: check_g(plain(m.restoring)), 10
     ),
     Formula(
-        'W - B', 'auv_dynamics.vehicle', ['Vehicle.model'],
+        'W - B', 'auv_dynamics.vehicle.vehicle', ['Vehicle.model'],
         lambda m: check_couple(published_vehicle(m.Vehicle)), 2,
     ),
-    Formula('M', 'auv_dynamics.vehicle', ['skew', 'rigid_body_matrix'], check_M, 5),
+    Formula('M', 'auv_dynamics.vehicle.vehicle', ['skew', 'rigid_body_matrix'], check_M, 5),
     Formula(
-        'J', 'auv_dynamics.kinematics',
+        'J', 'auv_dynamics.vehicle.kinematics',
         ['quaternion', 'rotation', 'euler', 'jacobian', 'position_rate', 'attitude_rate'],
         check_J, 52,
     ),
-    Formula('U', 'auv_gvc_controller.decomposition', ['decompose', 'inverse_upper'], check_U, 7),
     Formula(
-        'U x', 'auv_dynamics.six',
+        'U', 'auv_gvc_controller.laws.decomposition', ['decompose', 'inverse_upper'], check_U, 7
+    ),
+    Formula(
+        'U x', 'auv_dynamics.kernel.six',
         ['vector', 'fill_vector', 'add', 'sub', '_row', 'upper', 'upper_T'], check_algebra, 62,
     ),
     Formula(
-        'F', 'auv_dynamics.model', ['acceleration'], lambda m: check_F(plain(m.acceleration)), 24
+        'F', MODEL, ['acceleration'], lambda m: check_F(plain(m.acceleration)), 24
     ),
     Formula(
-        'F inverse', 'auv_dynamics.vehicle', ['Vehicle.inverse_dynamics'],
+        'F inverse', 'auv_dynamics.vehicle.vehicle', ['Vehicle.inverse_dynamics'],
         lambda m: check_inverse(published_vehicle(m.Vehicle)), 4,
     ),
     Formula(
@@ -90,18 +93,19 @@ FORMULAS = [
         lambda m: check_other_law('smc', m.SMC), 23,
     ),
     Formula(
-        'F current', 'auv_dynamics.current',
+        'F current', 'auv_dynamics.plant.current',
         ['make_current', 'to_body', 'acceleration_in_current'], check_current, 33,
     ),
     Formula(
-        'F lumped', 'auv_dynamics.uncertainty', ['with_errors', 'lumped'], check_uncertainty, 11
+        'F lumped', 'auv_dynamics.plant.uncertainty', ['with_errors', 'lumped'],
+        check_uncertainty, 11
     ),
     Formula(
-        'step', 'auv_dynamics.integrator',
+        'step', 'auv_dynamics.kernel.integrator',
         ['TABLEAUS', 'fill_step', 'fill_sum', 'stage_times'], check_step, 10,
     ),
     Formula(
-        'frames', 'auv_dynamics.frames',
+        'frames', 'auv_dynamics.vehicle.frames',
         ['_S', '_checked', 'swap_position', 'swap_attitude', 'swap_state', 'swap_body',
          'swap_body_matrix', 'swap_inertia'],
         check_frames, 12,
@@ -152,5 +156,5 @@ def test_a_check_that_looks_at_less_lets_signs_through() -> None:
     assert len(survivors(formula, lambda m: None)) == formula.least
     through = survivors(formula, one_entry)
     assert len(through) == formula.least
-    assert all(place.startswith('auv_dynamics.model:') for place in through)
+    assert all(place.startswith('auv_dynamics.vehicle.model:') for place in through)
     assert any(place.endswith('a0 * x[5] - a2 * x[3]') for place in through)

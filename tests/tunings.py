@@ -5,7 +5,7 @@ from typing import Any
 
 import yaml
 
-from auv_analysis.scenario import Scenario, load_scenario
+from auv_analysis.scenario.scenario import Scenario, load_scenario
 
 MASS, VOLUME = 100.0, 0.1  # neutral in water of 1000 kg/m3
 DIAGONAL = {

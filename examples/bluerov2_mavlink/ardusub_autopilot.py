@@ -14,9 +14,9 @@ from ardusub_mixer import MIDDLE, motor_pulses, thrust
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.kinematics import rotation
-from auv_dynamics.plant import Plant, initial_state
-from auv_dynamics.uncertainty import make_uncertainty
+from auv_dynamics.plant.plant import Plant, initial_state
+from auv_dynamics.plant.uncertainty import make_uncertainty
+from auv_dynamics.vehicle.kinematics import rotation
 
 STEP = 5_000_000  # ns of the simulation
 SECOND = 1_000_000_000

@@ -17,11 +17,11 @@ from vehicle_link import LinkSettings, VehicleLink
 from wrench_mapping import WrenchMapping
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.files import InputError
-from auv_dynamics.interface import BadMessageError
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.graph import ERROR, Graph, steady_timer
+from auv_dynamics.ros.interface import BadMessageError
 from auv_dynamics.ros.life import main_of
 from auv_dynamics.ros.parameters import declare, refuse_unknown
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from boot_clock import BootClock
 
-from auv_dynamics.kinematics import attitude_rate, rotation
+from auv_dynamics.vehicle.kinematics import attitude_rate, rotation
 
 MILLISECOND = 1_000_000  # ns
 APART = 100  # ms that the attitude may be older or newer than the position

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from t200 import command_of, supply_factors, thrust_of
 
-from auv_dynamics.files import InputError
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 BISECTIONS = 60
 ALIKE = 1e-9

@@ -29,7 +29,8 @@ setup(
     package_data={
         NAME: [
             'py.typed',
-            '*.json',
+            '*/*.json',
+            '*/*/*.json',
             'report/*.j2',
             'report/*.css',
             'report/*.js',
@@ -84,11 +85,11 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'auv = auv_analysis.cli:main',
-            'recorder_node = auv_analysis.recorder_node:main',
-            'analysis_node = auv_analysis.analysis_node:main',
-            'replay_node = auv_analysis.replay_node:main',
-            'composed_graph = auv_analysis.composed_graph:main',
+            'auv = auv_analysis.cli.main:main',
+            'recorder_node = auv_analysis.nodes.recorder_node:main',
+            'analysis_node = auv_analysis.nodes.analysis_node:main',
+            'replay_node = auv_analysis.nodes.replay_node:main',
+            'composed_graph = auv_analysis.nodes.composed_graph:main',
         ]
     },
 )

@@ -26,7 +26,7 @@ setup(
     maintainer='auv_gvc developers',
     maintainer_email='auv-gvc@users.noreply.github.com',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', '*.json', 'ros/*.xml']},
+    package_data={NAME: ['py.typed', '*/*.json', '*/*/*.json', 'ros/*.xml']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -38,8 +38,8 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'frame_converter_node = auv_dynamics.frame_converter_node:main',
-            'plant_node = auv_dynamics.plant_node:main',
+            'frame_converter_node = auv_dynamics.nodes.frame_converter_node:main',
+            'plant_node = auv_dynamics.nodes.plant_node:main',
         ]
     },
 )

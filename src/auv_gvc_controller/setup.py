@@ -35,8 +35,8 @@ setup(
     zip_safe=False,
     entry_points={
         'console_scripts': [
-            'setpoint_node = auv_gvc_controller.setpoint_node:main',
-            'controller_node = auv_gvc_controller.controller_node:main',
+            'setpoint_node = auv_gvc_controller.nodes.setpoint_node:main',
+            'controller_node = auv_gvc_controller.nodes.controller_node:main',
         ]
     },
 )

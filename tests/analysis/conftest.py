@@ -13,7 +13,7 @@ from PIL import Image
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.report import plotting
 from auv_analysis.report.page import write_report
-from auv_analysis.run import Run
+from auv_analysis.runs.run import Run
 
 
 @pytest.fixture(scope='session')

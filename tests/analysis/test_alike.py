@@ -12,7 +12,7 @@ from auv_analysis.report.overview import common_bands
 from auv_analysis.report.set_up import set_up
 from auv_analysis.report.sketch import alike
 from auv_analysis.report.sketching import sketches
-from auv_analysis.run import Run
+from auv_analysis.runs.run import Run
 
 
 @pytest.fixture(scope='module')

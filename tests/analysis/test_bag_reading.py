@@ -22,7 +22,7 @@ from made_messages import (
 from slow_bag import slow_read_bag
 
 from auv_analysis.bag import Contents, decoding, read_bag
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 STEP = 10_000_000
 TWISTS = {'cmd_vel': 'Twist', 'cmd_accel': 'Accel', 'wrench': 'Wrench', 'disturbance': 'Wrench'}

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from strategies import QUICK
 
 from auv_analysis.studies.sweep.campaign import Campaign, load_campaign
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 SOURCE = """
 name: mixed

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from pages import Page, check_numbers, tokens
 
-from auv_analysis import cli
+from auv_analysis.cli import main
 from auv_analysis.report import document, rendering
 from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
 from auv_analysis.report.quantities import Maths
@@ -19,7 +19,7 @@ from auv_analysis.report.text import MISSING
 def folder(tmp_path_factory, composing) -> Path:
     out = tmp_path_factory.mktemp('document') / 'out'
     with composing():
-        cli.main(['simulate', 'case1', '--out', str(out)])
+        main.main(['simulate', 'case1', '--out', str(out)])
     return out
 
 

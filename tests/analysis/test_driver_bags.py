@@ -15,9 +15,9 @@ from numpy.testing import assert_array_equal
 from auv_analysis import load_scenario
 from auv_analysis.bag import load_run, open_bag, read_bag
 from auv_analysis.bag.recording import NAME, recording_text
-from auv_analysis.ledger import StepLedger
-from auv_analysis.run import Run, joined
-from auv_dynamics.files import InputError
+from auv_analysis.nodes.ledger import StepLedger
+from auv_analysis.runs.run import Run, joined
+from auv_dynamics.files.errors import InputError
 
 MS = 1_000_000
 VEHICLE = load_scenario('case1').attachments['vehicle.yaml']

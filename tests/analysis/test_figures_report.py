@@ -19,7 +19,7 @@ from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.page import write_report
 from auv_analysis.report.text import fixed, join, number, plain, tied
 from auv_analysis.report.traces import decimate
-from auv_analysis.run import Run
+from auv_analysis.runs.run import Run
 
 EMPTY_TAGS = {'meta', 'img', 'br', 'input'}
 SCRIPTS = re.compile(r'<script.*?</script>', re.DOTALL)

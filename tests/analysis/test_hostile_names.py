@@ -12,15 +12,15 @@ from rich.table import Table
 from rich.text import Text
 from stranger_bags import SCENARIO, write
 
-from auv_analysis import cli, load_run, load_scenario, simulate
-from auv_analysis.console import TextConsole
+from auv_analysis import load_run, load_scenario, simulate
+from auv_analysis.cli import main
+from auv_analysis.output.progress import TextConsole
 from auv_analysis.report.overview import settling
 from auv_analysis.report.quantities import Maths, symbol
 from auv_analysis.report.rendering import maths
 from auv_analysis.report.sketching import sketches
 from auv_dynamics import load_vehicle
-from auv_dynamics.files import InputError
-from auv_dynamics.printable import MARK, printable
+from auv_dynamics.files.errors import MARK, InputError, printable
 
 HTML = '<xss onload="x()">&amp;</script></style></title></textarea><xss>\'"{{7*7}}'
 ESCAPES = '\x1b[2J\x1b]0;mine\x07\r\x9b31m\u202e[red]x[/red]'
@@ -46,7 +46,7 @@ def test_a_report_shows_what_a_bag_says_as_text(tmp_path: Path) -> None:
     plain = write(tmp_path / 'plain.mcap')
     bag = write(tmp_path / 'bag.mcap', controller=HTML.replace('/', '_'), vehicle=HTML, remark=HTML)
     for name in ('plain', 'bag'):
-        cli.main(['analyze', str(tmp_path / f'{name}.mcap'), '--out', str(tmp_path / name)])
+        main.main(['analyze', str(tmp_path / f'{name}.mcap'), '--out', str(tmp_path / name)])
     pages = [(tmp_path / name / 'report.html').read_text() for name in ('plain', 'bag')]
     usual, found = map(Found, pages)
     assert plain != bag
@@ -84,13 +84,13 @@ def test_a_vehicle_may_have_any_other_name(tmp_path: Path) -> None:
 def test_a_terminal_obeys_no_bag(tmp_path: Path, capsys, command: str) -> None:
     bag = write(tmp_path / 'bag.mcap', topic=f'/{ESCAPES}', remark=ESCAPES, samples=2)
     with pytest.raises(SystemExit) if command == 'analyze' else nullcontext():
-        cli.main([command, str(bag), *(['--vehicle', ESCAPES] if command == 'analyze' else [])])
+        main.main([command, str(bag), *(['--vehicle', ESCAPES] if command == 'analyze' else [])])
     out, err = capsys.readouterr()
     assert printable(out + err) == out + err
     assert MARK in out + err
     if command == 'info':  # a name that is short enough for its column
         short = write(tmp_path / 'short.mcap', topic='/[red]x[/red]', samples=2)
-        cli.main([command, str(short)])
+        main.main([command, str(short)])
         assert '[red]x[/red]' in capsys.readouterr().out
 
 
@@ -123,7 +123,7 @@ def test_names_that_look_like_symbols_stay_as_they_are(tmp_path: Path, capsys) -
         tmp_path, dict.fromkeys(names, gvc), name='w_X.phi', duration=0.1,
         vehicle={**tunings.DIAGONAL, 'name': 'seagull omega^2 ξ3'},
     )  # fmt: skip
-    cli.main(['simulate', str(path), '--out', str(tmp_path / 'out')])
+    main.main(['simulate', str(path), '--out', str(tmp_path / 'out')])
     page, shown = (tmp_path / 'out' / 'report.html').read_text(), capsys.readouterr().err
     for name in (*names, 'w_X.phi', 'seagull omega^2 ξ3'):
         assert f'>{name}<' in page or f': {name}<' in page or f' {name};' in page, name

@@ -15,8 +15,8 @@ from made_messages import ODOMETRY, Bag, odometry, serialized, stamped
 from auv_analysis import load_scenario, summarize
 from auv_analysis.bag import load_run, open_bag
 from auv_analysis.report.sketching import sketch
-from auv_analysis.run import LongRun, Run, joined
-from auv_dynamics.files import InputError
+from auv_analysis.runs.run import LongRun, Run, joined
+from auv_dynamics.files.errors import InputError
 
 STEP = 10_000_000
 ROLES = {

@@ -18,7 +18,7 @@ from auv_analysis.report.packing import Packer, packed
 from auv_analysis.report.panels import different_disturbances, panel_sets
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 
 @pytest.fixture(scope='module')

@@ -26,7 +26,7 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk
 
 from auv_analysis.bag import read_bag
-from auv_analysis.cli import main
+from auv_analysis.cli.main import main
 from auv_analysis.recording import BagWriter, Storage
 from auv_analysis.recovery import in_place
 from auv_analysis.recovery.bag import recover

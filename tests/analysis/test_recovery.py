@@ -23,9 +23,8 @@ from hypothesis import strategies as st
 from made_messages import COMPRESSIONS, STRING, TYPES, Bag, serialized
 
 from auv_analysis.bag import read_bag
-from auv_analysis.failure import FailedError
 from auv_analysis.recovery.bag import recover
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import FailedError, InputError
 
 STEP = 10_000_000
 OPTIONS = st.fixed_dictionaries({

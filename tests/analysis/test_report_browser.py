@@ -5,7 +5,7 @@ import pytest
 from browser import coloured, pixels
 
 from auv_analysis.report.plotting import COLOURS
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 SUPERSCRIPTS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
 PANELS = ('error-linear', 'error-angular', 'tau-linear')

@@ -10,8 +10,8 @@ import pytest
 import yaml
 from pages import Page
 
-from auv_analysis import cli, simulate, summarize
-from auv_analysis.fault_words import Mark
+from auv_analysis import simulate, summarize
+from auv_analysis.cli import main
 from auv_analysis.report import plotting
 from auv_analysis.report.document import NUMBERS
 from auv_analysis.report.faults import fault_part
@@ -19,8 +19,9 @@ from auv_analysis.report.interactive import interactive
 from auv_analysis.report.panel_models import model
 from auv_analysis.report.set_up import set_up
 from auv_analysis.report.sketching import sketches
-from auv_analysis.run import Run
-from auv_analysis.scenario import load_scenario
+from auv_analysis.runs.run import Run
+from auv_analysis.scenario.fault_words import Mark
+from auv_analysis.scenario.scenario import load_scenario
 
 FAULTS = [
     {'kind': 'thruster', 'thruster': 2, 'efficiency': 0.5, 'from': 1.0, 'to': 2.0},
@@ -57,7 +58,7 @@ def folder(tmp_path_factory, composing) -> Path:
     (root / 'failing.yaml').write_text(TEXT, encoding='utf-8')
     arguments = ['simulate', str(root / 'failing.yaml'), '--hold', 'zoh', '--out']
     with composing():
-        cli.main([*arguments, str(root / 'out')])
+        main.main([*arguments, str(root / 'out')])
     return root / 'out'
 
 

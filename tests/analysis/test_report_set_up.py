@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.lyapunov import certificate_of
+from auv_analysis.metrics.lyapunov import certificate_of
 from auv_analysis.report import certificates, overview, plotting
 from auv_analysis.report.applied import applied_figure
 from auv_analysis.report.certificates import certificate_figure
@@ -21,8 +21,8 @@ from auv_analysis.report.paper import paper_figure
 from auv_analysis.report.set_up import set_up
 from auv_analysis.report.sketching import sketch, sketches
 from auv_analysis.report.tables import certificate_table, reasons
-from auv_analysis.run import Run
-from auv_gvc_controller.model import control_model
+from auv_analysis.runs.run import Run
+from auv_gvc_controller.laws.model import control_model
 
 DATA = {
     'name': 'rough',

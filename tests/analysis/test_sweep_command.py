@@ -8,7 +8,7 @@ import pyarrow.parquet
 import pytest
 from sweeps import CAMPAIGN, ROLLOUTS, SCENARIO, parts, rows, write_files
 
-from auv_analysis.cli import main
+from auv_analysis.cli.main import main
 
 
 @pytest.fixture

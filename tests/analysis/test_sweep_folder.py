@@ -9,7 +9,7 @@ from sweeps import CAMPAIGN, ROLLOUTS, ROOT, Counting, Interrupted, parts, run, 
 from auv_analysis.studies.sweep.campaign import load_campaign
 from auv_analysis.studies.sweep.engine import SweepStoppedError
 from auv_analysis.studies.sweep.folder import sweep_folder
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from strategies import QUICK
 
 from auv_analysis.studies.distributions import axis_values, make_distribution
 from auv_analysis.studies.sweep.variation import MOST_AT_ONCE, make_design, make_group
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 SEED = 7
 PATHS = ['a', 'b', 'c']

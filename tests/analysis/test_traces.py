@@ -16,7 +16,7 @@ from auv_analysis.report.page import write_report
 from auv_analysis.report.sketching import sketch
 from auv_analysis.report.statistics import Statistics, followed, part_of
 from auv_analysis.report.traces import COLUMNS, FEW, Trace, decimate, thinned
-from auv_analysis.run import LongRun, Run
+from auv_analysis.runs.run import LongRun, Run
 
 quick = settings(max_examples=40)
 

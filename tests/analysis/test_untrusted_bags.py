@@ -19,10 +19,10 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Me
 
 from auv_analysis import load_scenario
 from auv_analysis.bag import files, framing, limits, load_run, messages, read_bag
-from auv_analysis.cli import main
-from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis.cli.main import main
+from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.recording import BagWriter
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 MIB = 1 << 20
 HUGE = 3 << 30  # bytes that a bomb holds

@@ -10,7 +10,8 @@ import pytest
 import tunings
 from pages import tokens
 
-from auv_analysis import cli, simulate, summarize
+from auv_analysis import simulate, summarize
+from auv_analysis.cli import main
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
 from auv_analysis.report.verdict import FAILED, verdict
@@ -71,7 +72,7 @@ def test_the_verdict_stands_above_the_tables_and_first_in_the_report(
     monkeypatch.setattr(page, 'draw_figures', lambda *_: [])
     monkeypatch.setattr(page, 'write_document', lambda out, *rest: found.append(rest[2]) or out)
     path = tunings.write(tmp_path, {'cl': CL, 'gvc': tunings.GVC}, duration=0.5)
-    cli.main(['simulate', str(path), '--out', str(tmp_path / 'out')])
+    main.main(['simulate', str(path), '--out', str(tmp_path / 'out')])
     shown = capsys.readouterr().err
     first = found[0][0].text
     assert first.startswith('gvc tracks better than cl')

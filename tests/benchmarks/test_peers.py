@@ -7,7 +7,7 @@ from closed_loops import TURNED
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
-from auv_dynamics.integrator import TABLEAUS
+from auv_dynamics.kernel.integrator import TABLEAUS
 
 DURATION = 0.5
 

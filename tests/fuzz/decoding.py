@@ -6,18 +6,18 @@ import numpy as np
 from rclpy.serialization import serialize_message
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.interface import BadMessageError, Frames
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.codec import Codec, first_stamp
-from auv_gvc_controller.controller import Timeouts, VelocityController
-from auv_gvc_controller.hand_over import HandOver
-from auv_gvc_controller.laws import make_gains
-from auv_gvc_controller.limits import Limits
-from auv_gvc_controller.model import control_model
-from auv_gvc_controller.odometry_guard import OdometryGuard
-from auv_gvc_controller.pairing import DIFFERENCE, Pairing
-from auv_gvc_controller.sampled import SampledLaw
-from auv_gvc_controller.stamp_age import Now, StampAge
+from auv_dynamics.ros.interface import BadMessageError, Frames
+from auv_gvc_controller.control.controller import Timeouts, VelocityController
+from auv_gvc_controller.control.odometry_guard import OdometryGuard
+from auv_gvc_controller.control.output_stage import HandOver
+from auv_gvc_controller.control.plausibility import Limits
+from auv_gvc_controller.control.sampled import SampledLaw
+from auv_gvc_controller.control.setpoint_buffer import DIFFERENCE, Pairing
+from auv_gvc_controller.control.stamp_age import Now, StampAge
+from auv_gvc_controller.laws.law import make_gains
+from auv_gvc_controller.laws.model import control_model
 
 X = np.array([0, 0, 0, 1, 0, 0, 0, 0.1, 0, 0, 0, 0, 0], float)
 LIMIT = (500.0,) * 6

@@ -13,15 +13,15 @@ from foreign_vehicles import BLUEROV2, REXROV, URDF, sdf
 from made_messages import ODOMETRY, Bag, odometry, serialized, stamped
 from watchman import playground, watched
 
-from auv_analysis import cli, load_scenario, simulate, summarize
-from auv_analysis.failure import FailedError
-from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.cli import main
+from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.replay.index import LATEST, index_bag
 from auv_analysis.replay.open_loop import open_loop, recorded_loop
 from auv_analysis.replay.selection import Wish, select
 from auv_analysis.replay.stream import messages
-from auv_dynamics.files import InputError
-from auv_dynamics.vehicle_file import load_vehicle
+from auv_dynamics.files.errors import FailedError, InputError
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 ROOT = Path(__file__).resolve().parents[2]
 TOPICS = {
@@ -57,7 +57,7 @@ def command(*arguments: str) -> int:
     said, printed = io.StringIO(), io.StringIO()
     try:
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(printed):
-            cli.main(list(arguments))
+            main.main(list(arguments))
         return 0
     except SystemExit as error:
         code = error.code

@@ -18,9 +18,9 @@ from harness import GAINS, Peer, fresh_domain, parameters, start_node
 from scramble import SPECIAL, scrambled
 
 from auv_analysis.bag import read_bag
-from auv_dynamics.frame_converter_node import ENU_FLU
-from auv_dynamics.interface import ROS_FRAMES, Frames, wrench_of
+from auv_dynamics.nodes.frame_converter_node import ENU_FLU
 from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.interface import ROS_FRAMES, Frames, wrench_of
 
 X = np.array([0, 0, 0, 1, 0, 0, 0, 0.1, 0, 0, 0, 0, 0], float)
 TWIST = (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)

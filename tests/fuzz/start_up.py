@@ -11,18 +11,18 @@ from typing import Any
 from files import CrashError, bags, dumped
 from watchman import playground, watched
 
-from auv_analysis.analysis_node import AnalysisNode
-from auv_analysis.node_parameters import node_parameters
-from auv_analysis.recorder_node import RecorderNode
-from auv_analysis.replay_node import ReplayNode
-from auv_analysis.scenario import load_scenario
-from auv_dynamics.ending import ENDING
-from auv_dynamics.frame_converter_node import FrameConverterNode
-from auv_dynamics.plant_node import PlantNode
+from auv_analysis.graph.node_parameters import node_parameters
+from auv_analysis.nodes.analysis_node import AnalysisNode
+from auv_analysis.nodes.recorder_node import RecorderNode
+from auv_analysis.nodes.replay_node import ReplayNode
+from auv_analysis.scenario.scenario import load_scenario
+from auv_dynamics.files.ending import ENDING
+from auv_dynamics.nodes.frame_converter_node import FrameConverterNode
+from auv_dynamics.nodes.plant_node import PlantNode
 from auv_dynamics.ros import life
 from auv_dynamics.ros.life import live
-from auv_gvc_controller.controller_node import ControllerNode
-from auv_gvc_controller.setpoint_node import SetpointNode
+from auv_gvc_controller.nodes.controller_node import ControllerNode
+from auv_gvc_controller.nodes.setpoint_node import SetpointNode
 
 NODES: dict[str, Callable[[], Any]] = {
     'plant_node': PlantNode,

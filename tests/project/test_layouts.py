@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from auv_analysis.report.overview import RUNS
 from auv_analysis.report.plotting import COLOURS, GREY
 from auv_dynamics.ros import topics
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / 'config' / 'layouts'

@@ -14,10 +14,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from strategies import QUICK
 
-from auv_dynamics import interface
-from auv_dynamics.interface import BadMessageError, Frames
+from auv_dynamics.ros import interface
 from auv_dynamics.ros.codec import KINDS, Codec, Layout, first_stamp, verified_layout
-from auv_dynamics.signals import DOFS
+from auv_dynamics.ros.interface import BadMessageError, Frames
+from auv_dynamics.vehicle import DOFS
 
 FRAMES = Frames()
 STAMPS = st.integers(0, (2**31 - 1) * 10**9 + 10**9 - 1)

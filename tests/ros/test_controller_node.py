@@ -26,11 +26,10 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
-from auv_dynamics import interface
-from auv_dynamics.ending import ENDING
-from auv_dynamics.interface import Frames
-from auv_dynamics.ros import convert, topics
+from auv_dynamics.files.ending import ENDING
+from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.health import ERROR, WARN
+from auv_dynamics.ros.interface import Frames
 
 FRAMES = Frames()
 STEP = 10_000_000

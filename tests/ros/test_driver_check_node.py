@@ -11,14 +11,13 @@ from faulty_drivers import NAMES
 from geometry_msgs.msg import WrenchStamped
 from harness import PATIENCE, Peer, environment, fresh_domain
 
-from auv_analysis.commands.actuating import refusal
+from auv_analysis.cli.check_driver import refusal
 from auv_analysis.driver_check.checks import findings_of
 from auv_analysis.driver_check.finding import FAIL, NOT_CHECKED, PASS, Finding
 from auv_analysis.driver_check.settings import Settings
-from auv_analysis.driver_check_node import COMMANDER, Ear
-from auv_dynamics import interface
-from auv_dynamics.interface import Frames
-from auv_dynamics.ros import topics
+from auv_analysis.nodes.driver_check_node import COMMANDER, Ear
+from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.interface import Frames
 
 SECONDS = 3.0  # of listening
 TOPICS = {interface.ODOM: interface.ODOM, interface.WRENCH: interface.WRENCH}

@@ -10,9 +10,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from std_srvs.srv import Trigger
 
-from auv_dynamics import interface
-from auv_dynamics.interface import Frames
-from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros import convert, interface, topics
+from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.topics import Topic
 
 ENU, NED = Frames('odom', 'base_link'), Frames()

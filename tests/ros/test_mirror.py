@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from strategies import QUICK, vectors
 
-from auv_dynamics import interface
-from auv_dynamics.interface import BadMessageError, Frames
-from auv_dynamics.kinematics import quaternion, rotation
-from auv_dynamics.ros import convert
+from auv_dynamics.ros import convert, interface
+from auv_dynamics.ros.interface import BadMessageError, Frames
 from auv_dynamics.ros.mirror import WORLD, mirrored, mirrored_odometry
+from auv_dynamics.vehicle.kinematics import quaternion, rotation
 
 NED, ENU = Frames(), Frames('odom', 'base_link')
 E = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]])

@@ -7,9 +7,8 @@ import pytest
 from harness import Peer, assert_one_line, graph, parameters, run_node
 from numpy.testing import assert_allclose, assert_array_equal
 
-from auv_dynamics import interface
-from auv_dynamics.interface import Frames
-from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros import convert, interface, topics
+from auv_dynamics.ros.interface import Frames
 
 STEP = 10_000_000
 HEARD = (topics.ODOM, topics.GROUND_TRUTH, topics.WRENCH_APPLIED)

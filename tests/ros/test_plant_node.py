@@ -18,10 +18,9 @@ from harness import (
 )
 from std_srvs.srv import SetBool, Trigger
 
-from auv_dynamics import interface
-from auv_dynamics.interface import Frames
-from auv_dynamics.kinematics import rotation
-from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros import convert, interface, topics
+from auv_dynamics.ros.interface import Frames
+from auv_dynamics.vehicle.kinematics import rotation
 
 FRAMES = Frames()
 STEP = 10_000_000

@@ -15,12 +15,11 @@ from made_messages import Bag
 from rclpy.serialization import serialize_message
 
 from auv_analysis import load_scenario
-from auv_analysis.driver_check_node import Ear
-from auv_analysis.experiment import PACKAGES
-from auv_analysis.node_parameters import node_parameters, parameter_file
-from auv_dynamics import interface
-from auv_dynamics.interface import Frames
-from auv_dynamics.ros import topics
+from auv_analysis.graph.experiment import PACKAGES
+from auv_analysis.graph.node_parameters import node_parameters, parameter_file
+from auv_analysis.nodes.driver_check_node import Ear
+from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.kinds import message_class, type_name
 
 LOOKS = {

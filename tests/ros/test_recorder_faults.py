@@ -18,8 +18,8 @@ from harness import assert_one_line, graph, parameters, run_node, stop
 
 from auv_analysis.bag import read_bag
 from auv_analysis.recovery.bag import recover
-from auv_dynamics.interface import Frames, nanoseconds
 from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.interface import Frames, nanoseconds
 
 FRAMES = Frames()
 STEP = 10_000_000

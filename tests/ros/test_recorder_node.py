@@ -28,8 +28,8 @@ from std_msgs.msg import Header, String
 from auv_analysis.bag import read_bag
 from auv_analysis.bag.records import records
 from auv_analysis.bag.tables import Table
-from auv_dynamics.interface import NANOSECONDS, Frames, nanoseconds
 from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.interface import NANOSECONDS, Frames, nanoseconds
 from auv_dynamics.ros.raw_types import raw_class
 
 FRAMES = Frames()

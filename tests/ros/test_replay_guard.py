@@ -8,8 +8,8 @@ from made_messages import Bag, serialized, stamped
 from played_bags import STEP, ended, made, playing, process, steps_of, there
 
 from auv_analysis.bag import read_bag
-from auv_dynamics.interface import nanoseconds
 from auv_dynamics.ros import topics
+from auv_dynamics.ros.interface import nanoseconds
 
 ODOM = there(topics.ODOM)
 AS_RECORDED = {'original_names': True, 'commands': True}

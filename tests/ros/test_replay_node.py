@@ -26,10 +26,10 @@ from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag import read_bag
 from auv_analysis.bag.roles import ODOMETRY
-from auv_analysis.replay_node import ReplayNode
-from auv_dynamics.files import InputError
-from auv_dynamics.interface import nanoseconds
+from auv_analysis.nodes.replay_node import ReplayNode
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import topics
+from auv_dynamics.ros.interface import nanoseconds
 from auv_dynamics.ros.receivers import WINDOW
 
 ODOM, WRENCH, CMD_VEL = there(topics.ODOM), there(topics.WRENCH), there(topics.CMD_VEL)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from harness import assert_one_line, graph, parameters, run_node
 
-from auv_dynamics import interface
-from auv_dynamics.interface import Frames
-from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros import convert, interface, topics
+from auv_dynamics.ros.interface import Frames
 
 STEP = 10_000_000
 UPRIGHT = np.array([0, 0, 0, 1, *[0] * 9], float)

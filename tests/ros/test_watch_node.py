@@ -12,12 +12,11 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from auv_analysis.nodes.watch_node import Listener
 from auv_analysis.watch.gauge import Gauge
 from auv_analysis.watch.snapshot import Snapshot, TopicState
-from auv_analysis.watch_node import Listener
-from auv_dynamics import interface
-from auv_dynamics.interface import Frames
-from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros import convert, interface, topics
+from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.watcher import Watcher
 
 FRAMES = Frames()

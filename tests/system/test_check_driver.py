@@ -16,8 +16,8 @@ from nursery import Process
 from auv_analysis.driver_check.catalogue import CHECKS
 from auv_analysis.driver_check.finding import FAIL, PASS
 from auv_analysis.driver_check.procedure import GOODBYE, PERIOD
-from auv_dynamics.interface import Frames, wrench_of
 from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.interface import Frames, wrench_of
 
 VEHICLE = parameters(vehicle='bluerov2_heavy', step=0.02, initial__eta='[0.0,0.0,5.0,0.0,0.0,0.8]')
 LIMIT = 180.0  # s

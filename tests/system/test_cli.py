@@ -20,14 +20,14 @@ from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 
-from auv_analysis import cli, load_scenario
-from auv_analysis.command_line import COMMANDS
-from auv_analysis.folder import SWEEP
-from auv_analysis.manifest import digest, write_manifest
-from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis import load_scenario
+from auv_analysis.bag.schemas import schema_text
+from auv_analysis.cli import main
+from auv_analysis.cli.command_line import COMMANDS
+from auv_analysis.graph.node_parameters import node_parameters, parameter_file
+from auv_analysis.output.folder import SWEEP, digest, write_manifest
 from auv_analysis.recording import BagWriter, Storage
-from auv_analysis.schemas import schema_text
-from auv_dynamics.config import shipped
+from auv_dynamics.files.shipped import shipped
 
 AUV = Path(sys.executable).with_name('auv')
 REXROV = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
@@ -126,7 +126,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def _exit_code(*arguments: str) -> Any:
     try:
-        cli.main(list(arguments))
+        main.main(list(arguments))
     except SystemExit as end:
         return end.code
     return 0
@@ -179,21 +179,21 @@ def test_help(arguments: list[str], capsys: pytest.CaptureFixture) -> None:
 
 @pytest.mark.parametrize('options', [[], ['--real-time']])
 def test_params_prints_the_parameter_file(options, folder, capsys) -> None:
-    cli.main(['params', 'case1', '--controller', 'gvc', *options])
+    main.main(['params', 'case1', '--controller', 'gvc', *options])
     data = yaml.safe_load(capsys.readouterr().out)
     assert all(set(entry) == {'ros__parameters'} for entry in data.values())
     assert data['/**/controller_node']['ros__parameters']['law'] == 'gvc'
     for node in ('plant_node', 'controller_node'):
         assert data[f'/**/{node}']['ros__parameters']['lockstep'] is not bool(options)
-    cli.main(['params', 'case1', '--controller', 'gvc', *options, '--out', 'new/gvc.yaml'])
+    main.main(['params', 'case1', '--controller', 'gvc', *options, '--out', 'new/gvc.yaml'])
     assert yaml.safe_load((folder / 'new' / 'gvc.yaml').read_text()) == data
-    cli.main(['params', 'case1', '--controller', 'gvc', *options, '--json'])
+    main.main(['params', 'case1', '--controller', 'gvc', *options, '--json'])
     nodes = {name.rpartition('/')[2]: entry['ros__parameters'] for name, entry in data.items()}
     assert json.loads(capsys.readouterr().out) == nodes
 
 
 def test_params_for_a_driver_know_neither_plant_nor_simulated_time(folder, capsys) -> None:
-    cli.main(['params', 'case1', '--controller', 'gvc', '--no-plant', '--out', 'driver.yaml'])
+    main.main(['params', 'case1', '--controller', 'gvc', '--no-plant', '--out', 'driver.yaml'])
     assert 'controller_node: limits.wrench: expected' in capsys.readouterr().err
     data = yaml.safe_load((folder / 'driver.yaml').read_text())
     nodes = {name.rpartition('/')[2]: entry['ros__parameters'] for name, entry in data.items()}
@@ -285,11 +285,11 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
 
 def test_info(recording, capsys) -> None:
     bag = recording()
-    cli.main(['info', str(bag)])
+    main.main(['info', str(bag)])
     text = capsys.readouterr().out
     for word in ('10 messages', '0.04 s', '/odom', 'nav_msgs/msg/Odometry', 'params.yaml'):
         assert word in text
-    cli.main(['info', str(bag), '--json'])
+    main.main(['info', str(bag), '--json'])
     document = json.loads(capsys.readouterr().out)
     assert document['topics']['/wrench'] == {
         'type': 'geometry_msgs/msg/WrenchStamped',
@@ -321,7 +321,7 @@ def test_info_of_a_damaged_bag_says_so(recording, capsys, tmp_path) -> None:
     data[data.rindex(b'odom_ned') + 200] ^= 1  # in a covariance: only the chunk's CRC can tell
     path = tmp_path / 'bent.mcap'
     path.write_bytes(data)
-    cli.main(['info', str(path), '--json'])
+    main.main(['info', str(path), '--json'])
     assert 'damaged' in ' '.join(json.loads(capsys.readouterr().out)['notes'])
 
 
@@ -370,7 +370,7 @@ def test_analyze_refuses_a_bag_with_a_bad_attachment(what, recording, folder, ca
 @pytest.fixture
 def stopped(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """Folders that a command asked for; it ends, all well, where the summaries would begin."""
-    from auv_analysis.commands import analyze, conclude
+    from auv_analysis.cli import analyze, conclude
 
     asked: list[Path] = []
     made = analyze.results_folder
@@ -449,7 +449,7 @@ def test_interrupt_that_python_drops_ends_the_command(monkeypatch, capsys) -> No
             time.sleep(0.01)
         return {}
 
-    monkeypatch.setattr('auv_analysis.commands.function', lambda _: command)
+    monkeypatch.setattr('auv_analysis.cli.main._function', lambda _: command)
     assert _exit_code('doctor') == 1
     assert capsys.readouterr().err == 'interrupted\n'
 
@@ -459,7 +459,7 @@ def test_full_disk_ends_in_one_line(error, monkeypatch, capsys) -> None:
     def command(_: object) -> dict:
         raise error
 
-    monkeypatch.setattr('auv_analysis.commands.function', lambda _: command)
+    monkeypatch.setattr('auv_analysis.cli.main._function', lambda _: command)
     assert _exit_code('simulate', 'case1') == 1
     text = error.strerror or str(error)
     (line,) = capsys.readouterr().err.splitlines()
@@ -468,7 +468,7 @@ def test_full_disk_ends_in_one_line(error, monkeypatch, capsys) -> None:
 
 @pytest.mark.long
 def test_interrupt_ends_simulate_whenever_it_comes(folder) -> None:
-    command = [sys.executable, '-m', 'auv_analysis.cli', 'simulate', 'case1', '--overwrite']
+    command = [sys.executable, '-m', 'auv_analysis.cli.main', 'simulate', 'case1', '--overwrite']
     begun = time.monotonic()
     subprocess.run(command, check=True, capture_output=True)
     whole = time.monotonic() - begun

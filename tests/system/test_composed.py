@@ -16,8 +16,8 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag import load_run, read_bag
-from auv_analysis.node_parameters import node_parameters, parameter_file
-from auv_analysis.scenario import load_scenario
+from auv_analysis.graph.node_parameters import node_parameters, parameter_file
+from auv_analysis.scenario.scenario import load_scenario
 from auv_dynamics.ros import topics
 
 SCENARIO = """

@@ -5,7 +5,7 @@ import json
 import pytest
 from harness import auv
 
-from auv_analysis import cli
+from auv_analysis.cli import main
 
 FILES = {
     'design.json', 'summary.json', 'summary_before.json', 'vehicle.yaml', 'vehicle_before.yaml',
@@ -48,7 +48,7 @@ def test_the_claim_is_what_a_simulation_of_the_changed_vehicle_gives(tmp_path):
 @pytest.mark.parametrize('options', [[], ['--json'], ['--reduce', 'delta_xi.surge']])
 def test_a_vehicle_without_couplings_is_told_so(options, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    cli.main(['design', 'lauv', *options])
+    main.main(['design', 'lauv', *options])
     text = capsys.readouterr().out
     assert 'M is diagonal' in text
     if '--json' in options:

@@ -22,10 +22,10 @@ from harness import auv, fresh_domain, installed_auv
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
-from auv_analysis.folder import results_folder
-from auv_dynamics import interface
-from auv_dynamics.ending import ENDING
-from auv_dynamics.kinematics import quaternion
+from auv_analysis.output.folder import results_folder
+from auv_dynamics.files.ending import ENDING
+from auv_dynamics.ros import interface
+from auv_dynamics.vehicle.kinematics import quaternion
 
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 SCENARIO = {
@@ -128,7 +128,7 @@ def test_the_bag_alone_closes_the_equation_of_motion(done: Path) -> None:
 def test_twist_is_in_the_child_frame(done: Path) -> None:
     run = load_run(done / 'one' / 'gvc')
     assert np.abs(run.eta[:, 5]).min() > 0.5, 'yaw is not zero'
-    from auv_dynamics.kinematics import rotation
+    from auv_dynamics.vehicle.kinematics import rotation
 
     for k in range(0, 300, 20):
         moved = (run.eta[k + 1, :3] - run.eta[k, :3]) / run.step

@@ -12,9 +12,9 @@ from harness import auv
 from pages import Page
 
 from auv_analysis.bag import load_run, read_bag
-from auv_analysis.fault_response import FILE, responses
-from auv_analysis.run import Run
-from auv_dynamics import interface
+from auv_analysis.metrics.fault_response import FILE, responses
+from auv_analysis.runs.run import Run
+from auv_dynamics.ros import interface
 
 SCENARIO = """
 name: failing

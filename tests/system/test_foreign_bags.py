@@ -9,7 +9,7 @@ import yaml
 from foreign_bags import Maker, motion, nanoseconds, simple, simulated, write
 from harness import auv
 
-from auv_analysis import cli
+from auv_analysis.cli import main
 
 TOPICS = '/rexrov/pose_gt', '/rexrov/thruster_manager/input'
 
@@ -30,7 +30,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def refused(arguments: list[str], capsys: pytest.CaptureFixture) -> str:
     with pytest.raises(SystemExit) as end:
-        cli.main(arguments)
+        main.main(arguments)
     captured = capsys.readouterr()
     assert (end.value.code, captured.out) == (2, '')
     (line,) = captured.err.splitlines()
@@ -38,7 +38,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture) -> str:
 
 
 def test_info_names_what_could_be_mapped(bag, capsys) -> None:
-    cli.main(['info', str(bag), '--json'])
+    main.main(['info', str(bag), '--json'])
     document = json.loads(capsys.readouterr().out)
     assert document['candidates'] == {
         'odometry': [TOPICS[0]], 'pose': [], 'twist': [], 'wrench': [TOPICS[1]],
@@ -48,7 +48,7 @@ def test_info_names_what_could_be_mapped(bag, capsys) -> None:
         'type': 'geometry_msgs/msg/WrenchStamped', 'messages': 301,
     }  # fmt: skip
     assert document['duration'] == pytest.approx(3.002, abs=1e-3)
-    cli.main(['info', str(bag)])
+    main.main(['info', str(bag)])
     assert f'could be mapped as odometry: {TOPICS[0]}' in capsys.readouterr().out
 
 

@@ -19,7 +19,7 @@ from rosbags.highlevel import AnyReader
 
 from auv_analysis.bag import bag_files, load_run, read_bag
 from auv_analysis.recording import BagWriter, Storage
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 HERE = Path(__file__).parent
 CHECK = HERE / 'interop'

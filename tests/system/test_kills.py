@@ -18,9 +18,8 @@ from harness import Peer, auv, fresh_domain, start_auv
 from nursery import Process
 
 from auv_analysis.bag import load_run
-from auv_analysis.experiment import COMPOSED, PACKAGES
-from auv_dynamics import interface
-from auv_dynamics.ros import topics
+from auv_analysis.graph.experiment import COMPOSED, PACKAGES
+from auv_dynamics.ros import interface, topics
 
 KILLS = int(os.environ.get('AUV_GVC_KILLS', '200'))
 SEED = int(os.environ.get('AUV_GVC_SEED', '0'))

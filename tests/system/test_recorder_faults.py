@@ -21,8 +21,8 @@ from graph_runs import node_of, nodes, start
 from harness import auv
 
 from auv_analysis.bag import load_run, read_bag
-from auv_analysis.supervisor import NodeDiedError, Supervisor
-from auv_dynamics import interface
+from auv_analysis.graph.supervisor import NodeDiedError, Supervisor
+from auv_dynamics.ros import interface
 
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 SCENARIO = {

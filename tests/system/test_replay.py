@@ -33,13 +33,12 @@ from played_bags import ended, made, there
 
 from auv_analysis import load_scenario
 from auv_analysis.bag import load_run
-from auv_analysis.node_parameters import node_parameters, parameter_file
+from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.replay.compared import reproduction
 from auv_analysis.replay.open_loop import open_loop, recorded_loop
-from auv_dynamics import interface
-from auv_dynamics.ending import ENDING
-from auv_dynamics.interface import nanoseconds
-from auv_dynamics.ros import topics
+from auv_dynamics.files.ending import ENDING
+from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.interface import nanoseconds
 
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 SCENARIO = {

@@ -18,8 +18,8 @@ from harness import PATIENCE, auv, environment, fresh_domain, stop
 from nursery import NODES
 
 from auv_analysis import load_scenario
-from auv_analysis.supervisor import executable
-from auv_dynamics.files import InputError
+from auv_analysis.graph.supervisor import executable
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.reach import PROFILE, RANGE, loopback, stay_local
 from auv_dynamics.ros.security import asked, require
 

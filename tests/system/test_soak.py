@@ -22,9 +22,9 @@ from harness import auv
 
 from auv_analysis import load_scenario
 from auv_analysis.bag import read_bag
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 from auv_dynamics.ros.codec import first_stamp
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 COUNT = int(os.environ.get('AUV_GVC_COUNT', '10'))
 SEED = int(os.environ.get('AUV_GVC_SEED', '0'))

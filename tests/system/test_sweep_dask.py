@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from sweeps import CAMPAIGN, ROLLOUTS, parts, rows, run, write_files
 
-from auv_analysis.cli import main
+from auv_analysis.cli.main import main
 from auv_analysis.studies.sweep.campaign import load_campaign
 from auv_analysis.studies.sweep.engine import opened, sweep
 from auv_analysis.studies.sweep.folder import sweep_folder
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 pytest.importorskip('distributed')
 ADDRESS = re.compile(r'tcp://127\.0\.0\.1:\d+')

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from sweeps import CAMPAIGN, parts, write_files
 
-AUV = [sys.executable, '-m', 'auv_analysis.cli', 'sweep', 'campaign.yaml', '--workers', '2']
+AUV = [sys.executable, '-m', 'auv_analysis.cli.main', 'sweep', 'campaign.yaml', '--workers', '2']
 BLOCKS = 48
 PATIENCE = 600.0  # s, after which a test that waits has failed: the first process compiles
 

@@ -13,8 +13,8 @@ from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
-from auv_analysis.run import Run
-from auv_dynamics import interface
+from auv_analysis.runs.run import Run
+from auv_dynamics.ros import interface
 
 SCENARIO = """
 name: uncertain

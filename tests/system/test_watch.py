@@ -14,7 +14,7 @@ from graph_runs import every_message, record
 from harness import PATIENCE, auv, fresh_domain, start_auv, start_installed_auv
 from nursery import Process
 
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 PACED = ('/diagnostics', '/recorder/progress', '/controller_node/transition_event')  # by the wall
 SCENARIO = {

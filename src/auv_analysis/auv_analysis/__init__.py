@@ -7,7 +7,7 @@
 - `summarize(run)`: its figures as plain data, as in summary.json
 - `linearize(vehicle or scenario)`: the linear model of a vehicle or of a closed loop
 
-Many runs at once: `auv_analysis.rollouts`. On the command line: `auv --help`.
+Many runs at once: `auv_analysis.simulation.rollouts`. On the command line: `auv --help`.
 """
 
 import importlib
@@ -15,20 +15,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from auv_analysis.bag import load_run, open_bag
-    from auv_analysis.linearization.loop import linearize
-    from auv_analysis.run import Run
-    from auv_analysis.scenario import load_scenario
-    from auv_analysis.simulation import simulate
-    from auv_analysis.summary import summarize
+    from auv_analysis.metrics.summary import summarize
+    from auv_analysis.runs.run import Run
+    from auv_analysis.scenario.scenario import load_scenario
+    from auv_analysis.simulation.simulate import simulate
+    from auv_analysis.studies.linearize.linearize import linearize
 
 _HOME = {
-    'linearize': 'auv_analysis.linearization.loop',
+    'linearize': 'auv_analysis.studies.linearize.linearize',
     'load_run': 'auv_analysis.bag',
     'open_bag': 'auv_analysis.bag',
-    'Run': 'auv_analysis.run',
-    'load_scenario': 'auv_analysis.scenario',
-    'simulate': 'auv_analysis.simulation',
-    'summarize': 'auv_analysis.summary',
+    'Run': 'auv_analysis.runs.run',
+    'load_scenario': 'auv_analysis.scenario.scenario',
+    'simulate': 'auv_analysis.simulation.simulate',
+    'summarize': 'auv_analysis.metrics.summary',
 }
 __all__ = ['Run', 'linearize', 'load_run', 'load_scenario', 'open_bag', 'simulate', 'summarize']
 

@@ -25,9 +25,14 @@ from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from auv_analysis.experiment import PACKAGES, write_inputs
-from auv_analysis.node_parameters import PLANT, RECORDER, node_parameters, parameter_file
-from auv_analysis.scenario import load_scenario
+from auv_analysis.graph.experiment import PACKAGES, write_inputs
+from auv_analysis.graph.node_parameters import (
+    PLANT,
+    RECORDER,
+    node_parameters,
+    parameter_file,
+)
+from auv_analysis.scenario.scenario import load_scenario
 from auv_dynamics.ros.reach import loopback
 from auv_dynamics.ros.security import enclave
 

@@ -8,14 +8,14 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from auv_dynamics.files import InputError
-    from auv_dynamics.vehicle import Vehicle
-    from auv_dynamics.vehicle_file import load_vehicle
+    from auv_dynamics.files.errors import InputError
+    from auv_dynamics.vehicle.vehicle import Vehicle
+    from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 _HOME = {
-    'InputError': 'auv_dynamics.files',
-    'Vehicle': 'auv_dynamics.vehicle',
-    'load_vehicle': 'auv_dynamics.vehicle_file',
+    'InputError': 'auv_dynamics.files.yaml_files',
+    'Vehicle': 'auv_dynamics.vehicle.vehicle',
+    'load_vehicle': 'auv_dynamics.vehicle.vehicle_file',
 }
 __all__ = ['InputError', 'Vehicle', 'load_vehicle']
 

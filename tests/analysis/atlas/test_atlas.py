@@ -10,11 +10,12 @@ import yaml
 from pages import check_numbers
 from pyarrow import parquet
 
-from auv_analysis import cli, load_scenario, simulate, summarize
-from auv_analysis.atlas.collect import charts, document
-from auv_analysis.atlas.figures import coupled, uncoupled
-from auv_dynamics.config import shipped, shipped_names
-from auv_dynamics.signals import DOFS
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.cli import main
+from auv_analysis.studies.atlas.atlas import charts, document
+from auv_analysis.studies.atlas.plots import coupled, uncoupled
+from auv_dynamics.files.shipped import shipped, shipped_names
+from auv_dynamics.vehicle import DOFS
 
 
 @pytest.fixture(scope='module')
@@ -53,7 +54,7 @@ def test_command_writes_table_and_report(tmp_path: Path, capsys) -> None:
     mine = tmp_path / 'mine.yaml'
     mine.write_text(yaml.safe_dump(data))  # its name is that of the shipped one
     out = tmp_path / 'out'
-    cli.main(['atlas', 'rexrov', str(mine), 'lauv', '--only', '--out', str(out), '--json'])
+    main.main(['atlas', 'rexrov', str(mine), 'lauv', '--only', '--out', str(out), '--json'])
     whole = json.loads(capsys.readouterr().out)
     assert whole == json.loads((out / 'atlas.json').read_text())
     assert set(whole['vehicles']) == {'rexrov', 'rexrov_2', 'lauv'}
@@ -70,13 +71,13 @@ def test_command_writes_table_and_report(tmp_path: Path, capsys) -> None:
 
 @pytest.mark.usefixtures('unrendered')
 def test_every_number_of_the_report_is_in_the_document(tmp_path: Path) -> None:
-    cli.main(['atlas', 'bluerov2', '--only', '--out', str(tmp_path / 'out')])
+    main.main(['atlas', 'bluerov2', '--only', '--out', str(tmp_path / 'out')])
     assert check_numbers(tmp_path / 'out') > 20
 
 
 @pytest.mark.usefixtures('unrendered')
 def test_vehicles_without_coupling_alone_are_said_not_drawn(tmp_path: Path, capsys) -> None:
-    cli.main(['atlas', 'lauv', '--only', '--out', str(tmp_path / 'out')])
+    main.main(['atlas', 'lauv', '--only', '--out', str(tmp_path / 'out')])
     assert 'nothing is coupled by inertia' in capsys.readouterr().err
     assert list((tmp_path / 'out' / 'figures').iterdir()) == []
 
@@ -88,7 +89,7 @@ def test_all_shipped_vehicles_are_taken() -> None:
 
 def test_an_unknown_vehicle_is_refused_in_one_line(tmp_path: Path, capsys) -> None:
     with pytest.raises(SystemExit) as end:
-        cli.main(['atlas', 'nautilus', '--out', str(tmp_path / 'out')])
+        main.main(['atlas', 'nautilus', '--out', str(tmp_path / 'out')])
     lines = capsys.readouterr().err.splitlines()
     assert end.value.code == 2
     assert len(lines) == 1

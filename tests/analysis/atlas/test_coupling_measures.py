@@ -8,16 +8,16 @@ from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 from strategies import QUICK, positive_definite, vectors
 
-from auv_analysis.atlas.couplings import couplings_of
-from auv_analysis.atlas.measures import (
+from auv_analysis.metrics.energy import kinetic_energy
+from auv_analysis.studies.atlas.atlas import (
     coupling_strength,
+    couplings_of,
     inertial_correlation,
     input_shares,
     velocity_shares,
 )
-from auv_analysis.energy import kinetic_energy
 from auv_dynamics import load_vehicle
-from auv_gvc_controller.decomposition import decompose, inverse_upper
+from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
 
 MEASURES = (inertial_correlation, velocity_shares, input_shares, coupling_strength)
 SCALES = arrays(float, 6, elements=st.floats(-3, 3)).map(lambda powers: 10.0**powers)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.metrics.summary import band_of
 from auv_analysis.report.sketching import sketch
 from auv_analysis.studies.compare import plots
 from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank
-from auv_analysis.summary import band_of
 
 SETTLED = 'overall.velocity_error.settling_time'
 SCENARIO = load_scenario('case1')

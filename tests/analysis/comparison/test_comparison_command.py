@@ -10,8 +10,9 @@ import yaml
 from pages import check_numbers
 from pyarrow import parquet
 
-from auv_analysis import cli, load_scenario, simulate, summarize
-from auv_analysis.measures import BY_NAME
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.cli import main
+from auv_analysis.metrics.measures import BY_NAME
 
 SCENARIO = load_scenario('case1')
 
@@ -32,7 +33,7 @@ def scenarios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 @pytest.mark.usefixtures('unrendered')
 def test_command_compares_scenarios_by_name(scenarios, capsys) -> None:
-    cli.main(['analyze', *scenarios, '--json'])
+    main.main(['analyze', *scenarios, '--json'])
     captured = capsys.readouterr()
     summaries = json.loads(captured.out)
     assert list(summaries) == ['one/gvc', 'one/cl', 'two/gvc', 'two/cl', 'wild/gvc', 'wild/cl']
@@ -52,7 +53,7 @@ def test_command_compares_scenarios_by_name(scenarios, capsys) -> None:
 
 @pytest.mark.usefixtures('unrendered')
 def test_every_number_of_the_report_is_in_the_table(scenarios) -> None:
-    cli.main(['analyze', *scenarios])
+    main.main(['analyze', *scenarios])
     out = Path('runs/analyze_one_two_wild')
     table = parquet.read_table(out / 'comparison.parquet').to_pylist()
     assert check_numbers(out) > 200
@@ -60,7 +61,7 @@ def test_every_number_of_the_report_is_in_the_table(scenarios) -> None:
 
 
 def test_all_diverged_is_a_failure(scenarios, capsys, monkeypatch) -> None:
-    from auv_analysis.simulation import DivergedError
+    from auv_analysis.simulation.simulate import DivergedError
     from auv_analysis.studies.compare import report as compare
 
     def diverge(*_):
@@ -68,7 +69,7 @@ def test_all_diverged_is_a_failure(scenarios, capsys, monkeypatch) -> None:
 
     monkeypatch.setattr(compare, 'open_source', diverge)
     with pytest.raises(SystemExit) as end:
-        cli.main(['analyze', *scenarios])
+        main.main(['analyze', *scenarios])
     assert end.value.code == 1
     assert (
         capsys.readouterr().err.splitlines()[-1] == 'all of 6 runs failed, the first: it diverges'
@@ -90,7 +91,7 @@ def test_wrong_arguments_are_refused_in_one_line(scenarios, line: str, words: st
         Path(name).mkdir()
         (Path(name) / 'sweep.json').write_text('{}')
     with pytest.raises(SystemExit) as end:
-        cli.main(['analyze', *line.split()])
+        main.main(['analyze', *line.split()])
     lines_ = capsys.readouterr().err.splitlines()
     assert (end.value.code, len(lines_)) == (2, 1), lines_
     assert words in lines_[0]

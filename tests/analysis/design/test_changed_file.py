@@ -11,9 +11,9 @@ from strategies import QUICK, vectors, vehicles
 from auv_analysis.design.changed_file import changed_data, changed_text
 from auv_analysis.design.parameters import NAMES, rounded
 from auv_analysis.design.space import Space
-from auv_dynamics.config import shipped
-from auv_dynamics.files import parse_yaml, read_yaml
-from auv_dynamics.vehicle_file import load_vehicle, vehicle_from_dict
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import parse_yaml, read_yaml
+from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
 
 FORMS = ('cg', 'co', 'M')
 SHIPPED = sorted(path.stem for path in shipped('vehicles', 'rexrov').parent.glob('*.yaml'))

@@ -10,8 +10,6 @@ from numpy.testing import assert_allclose
 from strategies import QUICK, positive_definite, vectors
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.changes import changed_scenario
-from auv_analysis.coupling import delta_pi, delta_xi
 from auv_analysis.design.changed_file import changed_data
 from auv_analysis.design.couplings import COUPLINGS, effort_of, shares_of, sizes_of
 from auv_analysis.design.motion import Motion, acceleration
@@ -19,9 +17,11 @@ from auv_analysis.design.objective import Objective, score
 from auv_analysis.design.parameters import NAMES, rounded
 from auv_analysis.design.prediction import Figures, Prediction, smooth_peak
 from auv_analysis.design.space import Space
-from auv_dynamics.kinematics import quaternion, rotation
-from auv_dynamics.vehicle_file import vehicle_from_dict
-from auv_gvc_controller.decomposition import decompose, inverse_upper
+from auv_analysis.metrics.coupling import delta_pi, delta_xi
+from auv_analysis.scenario.changes import changed_scenario
+from auv_dynamics.vehicle.kinematics import quaternion, rotation
+from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
+from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
 
 
 @pytest.fixture(scope='module', params=['rexrov', 'herman2018'])

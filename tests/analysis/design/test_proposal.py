@@ -25,9 +25,9 @@ from auv_analysis.design.statements import (
     warnings_of,
 )
 from auv_analysis.design.words import change_words
-from auv_analysis.folder import Results
+from auv_analysis.output.folder import Results
 from auv_dynamics import InputError, load_vehicle
-from auv_dynamics.config import shipped
+from auv_dynamics.files.shipped import shipped
 
 SHORT = """
 name: short

@@ -12,8 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from auv_analysis import cli
-from auv_analysis.doctor import command, graph_checks, machine_checks, python_checks, ros_checks
+from auv_analysis.cli import doctor, main
+from auv_analysis.doctor import (
+    graph_checks,
+    machine_checks,
+    python_checks,
+    ros_checks,
+)
 from auv_analysis.doctor.finding import Finding, findings_of
 
 RANGE = ros_checks.RANGE
@@ -173,10 +178,10 @@ def test_a_check_that_fails_is_a_finding_and_the_others_go_on():
 
 @pytest.mark.parametrize(('verdict', 'code'), [('ok', 0), ('warning', 0), ('broken', 1)])
 def test_exit_code_and_document(verdict, code, monkeypatch, capsys):
-    monkeypatch.setattr(command, 'CHECKS', (lambda: [Finding('x', verdict, 'y', 'z')],))
+    monkeypatch.setattr(doctor, 'CHECKS', (lambda: [Finding('x', verdict, 'y', 'z')],))
     for options in ([], ['--json']):
         with pytest.raises(SystemExit) if code else nullcontext(None) as end:
-            cli.main(['doctor', *options])
+            main.main(['doctor', *options])
         assert end is None or end.value.code == 1
         out = capsys.readouterr().out
         if not options:
@@ -201,8 +206,8 @@ def test_it_runs_where_everything_is_broken(tmp_path):
 
 
 def _auv(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, '-m', 'auv_analysis.cli', *arguments]
+    doctor = [sys.executable, '-m', 'auv_analysis.cli.main', *arguments]
     environ = {**os.environ, 'PYTHONPATH': str(folder)}
     return subprocess.run(
-        command, cwd=folder, env=environ, capture_output=True, text=True, check=False
+        doctor, cwd=folder, env=environ, capture_output=True, text=True, check=False
     )

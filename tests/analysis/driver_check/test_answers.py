@@ -10,7 +10,7 @@ from auv_analysis.driver_check.plan import PULSE, Plan, plan_of
 from auv_analysis.driver_check.prediction import predicted
 from auv_analysis.driver_check.procedure import carry_out
 from auv_dynamics import load_vehicle
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 AXES = ('surge', 'sway', 'yaw')
 

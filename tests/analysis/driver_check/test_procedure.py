@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from simulated_driver import SimulatedDriver
 
-from auv_analysis.commands import actuating
+from auv_analysis.cli import check_driver
 from auv_analysis.driver_check.plan import plan_of
 from auv_analysis.driver_check.procedure import GOODBYE, PERIOD, StoppedError, carry_out
-from auv_dynamics.ending import ENDING, on_signals
+from auv_dynamics.files.ending import ENDING, on_signals
 
 ZERO = (0.0,) * 6
 LAST = round(GOODBYE / PERIOD)
@@ -89,9 +89,9 @@ def test_a_signal_is_no_exception_but_a_wish_while_wrenches_are_sent(number: int
 def test_nothing_is_sent_where_another_begins_to_command_in_the_countdown(monkeypatch) -> None:
     driver = SimulatedDriver(joined_after=0.0)
     driver.speak = driver.hush = lambda: True
-    monkeypatch.setattr(actuating, 'COUNTDOWN', 0)
+    monkeypatch.setattr(check_driver, 'COUNTDOWN', 0)
     plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
-    actuation = actuating.actuate(driver, plan, 0.5)
+    actuation = check_driver.actuate(driver, plan, 0.5)
     assert actuation.aborted == '/somebody publishes the wrench as well'
     assert driver.sent == []
 

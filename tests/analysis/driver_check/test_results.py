@@ -12,7 +12,7 @@ from pyarrow import parquet
 from rich.console import Console
 from simulated_driver import SimulatedDriver
 
-from auv_analysis.cli import main
+from auv_analysis.cli.main import main
 from auv_analysis.driver_check.catalogue import CHECKS, GROUPS
 from auv_analysis.driver_check.finding import NOT_CHECKED, PASS, VERDICTS
 from auv_analysis.driver_check.outcome import Commands, Result, document_of, failure_of, judged

@@ -11,9 +11,14 @@ from auv_analysis.driver_check.fits import fits_of
 from auv_analysis.driver_check.hypotheses import ANGULAR, CHILD, LINEAR
 from auv_analysis.driver_check.motion import motion_of
 from auv_analysis.driver_check.twist_checks import motion_findings
-from auv_dynamics.frames import swap_attitude, swap_body, swap_position, swap_state
-from auv_dynamics.kinematics import euler, rotation
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.frames import (
+    swap_attitude,
+    swap_body,
+    swap_position,
+    swap_state,
+)
+from auv_dynamics.vehicle.kinematics import euler, rotation
 
 NOISES = (0.0, 0.01)  # m, rad, m/s, rad/s
 

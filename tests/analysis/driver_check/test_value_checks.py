@@ -10,8 +10,8 @@ from auv_analysis.driver_check.recording import Recording
 from auv_analysis.driver_check.settings import Settings
 from auv_analysis.driver_check.speed_checks import speed_findings
 from auv_analysis.driver_check.value_checks import value_findings
-from auv_dynamics.frames import swap_state
-from auv_dynamics.interface import Frames
+from auv_dynamics.ros.interface import Frames
+from auv_dynamics.vehicle.frames import swap_state
 
 
 def found_in(heard: Recording, settings: Settings | None = None) -> dict[str, Finding]:

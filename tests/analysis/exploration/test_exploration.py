@@ -9,7 +9,7 @@ from made_sweeps import DAMPING, ENERGY, K_D, SETTLED, rows
 from scipy.stats import f_oneway, spearmanr
 from strategies import QUICK
 
-from auv_analysis.measures import BY_NAME
+from auv_analysis.metrics.measures import BY_NAME
 from auv_analysis.studies.sweep.analysis import Results, analysed
 from auv_analysis.studies.sweep.statistics import (
     by_group,

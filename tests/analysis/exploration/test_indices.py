@@ -9,7 +9,7 @@ from made_sweeps import make_sweep
 from auv_analysis.studies.sweep.analysis import analysed
 from auv_analysis.studies.sweep.dataset import open_sweep
 from auv_analysis.studies.sweep.indices import designed
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 pytest.importorskip('SALib')
 ENERGY = 'kinetic_energy.mean'

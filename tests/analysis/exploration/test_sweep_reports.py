@@ -9,7 +9,7 @@ from made_sweeps import ENERGY, K_D, MIXED, SIMPLE, change_manifest, make_sweep,
 from pages import check_numbers
 from pyarrow import parquet
 
-from auv_analysis import cli
+from auv_analysis.cli import main
 from auv_analysis.studies.sweep.analysis import Results, analysed
 from auv_analysis.studies.sweep.dataset import open_sweep
 from auv_analysis.studies.sweep.factors import varied_paths
@@ -104,14 +104,14 @@ def test_the_document_has_no_nan(results: Results) -> None:
 @pytest.mark.parametrize(('campaign', 'known'), [(SIMPLE, simple), (MIXED, mixed)])
 def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known) -> None:
     out = tmp_path / 'report'
-    cli.main(['analyze', str(make_sweep(tmp_path, campaign, known)), '--out', str(out)])
+    main.main(['analyze', str(make_sweep(tmp_path, campaign, known)), '--out', str(out)])
     assert check_numbers(out) > 100
 
 
 @pytest.mark.usefixtures('unrendered')
 def test_an_unfinished_sweep_says_so(tmp_path: Path, capsys) -> None:
     out = make_sweep(tmp_path, SIMPLE, simple, range(0, 16, 3))
-    cli.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
+    main.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
     assert 'note: not finished, 600 of 1600 rows are there' in capsys.readouterr().err
     report = (tmp_path / 'report/report.html').read_text(encoding='utf-8')
     assert 'The sweep is not finished: 600 of 1600 rows are there.' in report
@@ -123,7 +123,7 @@ def test_a_sweep_without_figures_is_a_failure(tmp_path: Path, capsys) -> None:
 
     out = make_sweep(tmp_path, SIMPLE, refused, range(2))
     with pytest.raises(SystemExit) as end:
-        cli.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
+        main.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
     assert end.value.code == 1
     assert capsys.readouterr().err.splitlines()[-1] == f'{out}: none of 200 rows has figures'
     assert not (tmp_path / 'report').exists()
@@ -133,19 +133,19 @@ def test_a_sweep_without_figures_is_a_failure(tmp_path: Path, capsys) -> None:
 def test_results_are_replaced_only_when_asked_and_the_rest_stays(tmp_path: Path, capsys) -> None:
     sweep, out = make_sweep(tmp_path, MIXED, mixed), tmp_path / 'report'
     command = ['analyze', str(sweep), '--out', str(out)]
-    cli.main(command)
+    main.main(command)
     (out / 'notes.md').write_text('mine')
     capsys.readouterr()
     with pytest.raises(SystemExit) as end:
-        cli.main(command)
+        main.main(command)
     assert (end.value.code, len(capsys.readouterr().err.splitlines())) == (2, 1)
-    cli.main([*command, '--overwrite', '--by', ENERGY, '--json'])
+    main.main([*command, '--overwrite', '--by', ENERGY, '--json'])
     document = json.loads(capsys.readouterr().out)
     assert document == json.loads((out / 'analysis.json').read_text())
     assert {row['by'] for row in document['best']} == {ENERGY}
     assert (out / 'notes.md').read_text() == 'mine'
     with pytest.raises(SystemExit):
-        cli.main(['analyze', str(sweep), '--out', str(sweep), '--overwrite'])
+        main.main(['analyze', str(sweep), '--out', str(sweep), '--overwrite'])
     assert (sweep / 'sweep.json').exists()
 
 

@@ -6,8 +6,8 @@ from foreign_bags import UNNAMED, Maker, loaded, motion, simple, simulated, writ
 from auv_analysis.bag.files import files_of, is_mcap
 from auv_analysis.foreign.candidates import survey
 from auv_analysis.recording import BagWriter, Storage
-from auv_analysis.run import Run
-from auv_dynamics.files import InputError
+from auv_analysis.runs.run import Run
+from auv_dynamics.files.errors import InputError
 
 KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
 

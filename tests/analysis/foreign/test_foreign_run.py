@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from auv_analysis import summarize
-from auv_analysis.run import Run
-from auv_dynamics.frames import ENU_FLU, NED_FSD
+from auv_analysis.runs.run import Run
+from auv_dynamics.vehicle.frames import ENU_FLU, NED_FSD
 
 TOPICS = {'odometry': '/auv/state', 'wrench': '/auv/force'}
 AXES = {'enu': ENU_FLU, 'ned': NED_FSD}

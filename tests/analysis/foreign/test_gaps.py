@@ -11,18 +11,18 @@ from rich.console import Console
 from scipy.integrate import trapezoid
 
 from auv_analysis import summarize
-from auv_analysis.commands.terminal import summary_tables
+from auv_analysis.cli.terminal import summary_tables
 from auv_analysis.foreign.time_base import sensible_step, time_base
 from auv_analysis.foreign.tracks import Track, at_times, integral, means_over, usual_limit
-from auv_analysis.lyapunov import lyapunov
+from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.report import plotting
 from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.sketching import sketch
 from auv_analysis.report.text import number
-from auv_analysis.run import Run
-from auv_dynamics.interface import NANOSECONDS
-from auv_dynamics.signals import DOFS
-from auv_gvc_controller.model import control_model
+from auv_analysis.runs.run import Run
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle import DOFS
+from auv_gvc_controller.laws.model import control_model
 
 KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu', 'step': 0.01}
 

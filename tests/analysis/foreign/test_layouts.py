@@ -21,8 +21,8 @@ from foreign_bags import (
 )
 from numpy.testing import assert_allclose
 
-from auv_analysis.run import Run
-from auv_dynamics.files import InputError
+from auv_analysis.runs.run import Run
+from auv_dynamics.files.errors import InputError
 
 Layout = tuple[list[Message], dict[str, Any]]
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from auv_analysis.foreign.mapping import read_mapping
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 GOOD = 'odometry: /o\nwrench: /w\n'
 WRONG = {  # what is in the file -> what the one line says

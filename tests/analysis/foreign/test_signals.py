@@ -18,8 +18,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.foreign.mapping import Source
 from auv_analysis.foreign.signals import Recorded, longest_stretch, on_the_clock, ordered
-from auv_analysis.run import Run
-from auv_dynamics.files import InputError
+from auv_analysis.runs.run import Run
+from auv_dynamics.files.errors import InputError
 
 KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu', 'step': 0.01}
 

@@ -8,7 +8,7 @@ import pytest
 from foreign_bags import UNNAMED, Maker, loaded, motion, simple, simulated, write
 from numpy.testing import assert_allclose
 
-from auv_analysis.run import Run
+from auv_analysis.runs.run import Run
 
 KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
 NOISE = np.array([3e-3, 3e-3, 3e-3, 2e-3, 2e-3, 2e-3])  # m/s, rad/s

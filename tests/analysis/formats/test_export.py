@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from auv_analysis.cli import main
+from auv_analysis.cli.main import main
 from auv_dynamics import load_vehicle
-from auv_dynamics.frames import swap_body
+from auv_dynamics.vehicle.frames import swap_body
 
 NAMES = ('rexrov', 'bluerov2', 'bluerov2_heavy', 'lauv', 'lrauv_tethys', 'girona500')
 

@@ -8,7 +8,7 @@ import pytest
 from foreign_vehicles import BLUEROV2, REMUS, REMUS_LIFT, REXROV, URDF, sdf
 from numpy.testing import assert_allclose, assert_array_equal
 
-from auv_analysis.cli import main
+from auv_analysis.cli.main import main
 from auv_dynamics import load_vehicle
 
 LIST = ['--inertia-reference', 'co', '--gravity', '9.81']

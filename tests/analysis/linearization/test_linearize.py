@@ -10,10 +10,10 @@ from closed_loops import PAPER
 from numpy.testing import assert_allclose
 
 from auv_analysis import linearize, load_scenario, simulate
-from auv_analysis.linearization.derivatives import jacobian
-from auv_analysis.linearization.modes import modes
+from auv_analysis.studies.linearize.linearize import jacobian
+from auv_analysis.studies.linearize.modes import modes
 from auv_dynamics import load_vehicle
-from auv_dynamics.kinematics import jacobian as kinematics
+from auv_dynamics.vehicle.kinematics import jacobian as kinematics
 
 NU = np.array([0.8, -0.2, 0.3, 0.05, -0.1, 0.2])
 ETA = np.array([1.0, 2.0, 3.0, 0.3, -0.4, 2.0])

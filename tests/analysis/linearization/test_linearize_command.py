@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from auv_analysis import linearize
-from auv_analysis.cli import main
-from auv_analysis.linearization.modes import stability
+from auv_analysis.cli.main import main
+from auv_analysis.studies.linearize.modes import stability
 
 
 @pytest.mark.usefixtures('unrendered')

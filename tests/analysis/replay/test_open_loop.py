@@ -10,17 +10,17 @@ import rclpy
 import yaml
 from made_messages import Bag, odometry, serialized, stamped
 
-from auv_analysis import cli
 from auv_analysis.bag.roles import ACCEL, ODOMETRY, TWIST, WRENCH
+from auv_analysis.cli import main
 from auv_analysis.replay.compared import compared, figures_of, reproduction
 from auv_analysis.replay.open_loop import OpenLoop, open_loop, recorded_loop
 from auv_analysis.replay.recorded_controller import recorded_settings
 from auv_dynamics import load_vehicle
-from auv_dynamics.config import shipped
-from auv_dynamics.files import InputError
-from auv_gvc_controller.laws import make_gains
-from auv_gvc_controller.model import control_model
-from auv_gvc_controller.sampled import SampledLaw
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.shipped import shipped
+from auv_gvc_controller.control.sampled import SampledLaw
+from auv_gvc_controller.laws.law import make_gains
+from auv_gvc_controller.laws.model import control_model
 
 STEP = 10_000_000
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
@@ -179,7 +179,7 @@ def test_unusable_messages_are_counted(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('lockstep', [True, False])
 def test_what_is_not_written_is_what_the_node_takes(tmp_path, lockstep, monkeypatch) -> None:
-    from auv_gvc_controller.controller_parameters import ControllerParameters
+    from auv_gvc_controller.nodes.controller_parameters import ControllerParameters
 
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
     context = rclpy.Context()
@@ -245,7 +245,7 @@ def test_the_command_leaves_figures_and_refuses_a_taken_folder(tmp_path, capsys)
     bag, out = write(tmp_path / 'bag.mcap'), tmp_path / 'out'
     command = ['replay', str(bag), '--law', 'cl', '--gain', 'k_D=1,2,3,4,5,6', '--out', str(out)]
     with pytest.raises(SystemExit) as ended:
-        cli.main([*command, '--json'])
+        main.main([*command, '--json'])
     assert ended.value.code == 1
     document = json.loads(capsys.readouterr().out)
     assert document['answered']['gains']['k_D'] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
@@ -255,7 +255,7 @@ def test_the_command_leaves_figures_and_refuses_a_taken_folder(tmp_path, capsys)
     assert document['reproduced_within'] > 1.0
     assert document['reproduction'].startswith('NOT reproduced')
     with pytest.raises(SystemExit) as ended:
-        cli.main(command)
+        main.main(command)
     assert ended.value.code == 2
     assert 'a new folder, or --overwrite' in capsys.readouterr().err
 
@@ -274,6 +274,6 @@ def test_the_command_leaves_figures_and_refuses_a_taken_folder(tmp_path, capsys)
 )
 def test_wrong_options_are_named(tmp_path: Path, options: list[str], words: str, capsys) -> None:
     with pytest.raises(SystemExit) as ended:
-        cli.main(['replay', str(write(tmp_path / 'bag.mcap')), *options])
+        main.main(['replay', str(write(tmp_path / 'bag.mcap')), *options])
     assert ended.value.code == 2
     assert words in capsys.readouterr().err

@@ -7,8 +7,8 @@ import pytest
 from auv_analysis.bag.roles import ODOMETRY, TWIST, WRENCH
 from auv_analysis.replay.index import BagIndex, PlayedTopic
 from auv_analysis.replay.selection import Wish, is_command, select
-from auv_dynamics import interface
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros import interface
 
 STRING = 'std_msgs/msg/String'
 KINDS = {

@@ -11,7 +11,7 @@ from made_messages import STRING, Bag, new, serialized
 
 from auv_analysis.replay.index import index_bag
 from auv_analysis.replay.stream import messages
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 TOPICS = ('/a', '/b', '/c')
 quick = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 import yaml
 
-from auv_analysis import cli, load_scenario
-from auv_analysis.scenario import SCHEMA
-from auv_analysis.starting.annotated import annotated
-from auv_analysis.starting.files import STARTING
+from auv_analysis import load_scenario
+from auv_analysis.cli import main
+from auv_analysis.scenario.scenario import SCHEMA
+from auv_analysis.scenario.templates import STARTING, annotated
 from auv_dynamics import load_vehicle
-from auv_dynamics.files import schema
-from auv_dynamics.vehicle_file import SCHEMA as VEHICLE_SCHEMA
+from auv_dynamics.files.yaml_files import schema
+from auv_dynamics.vehicle.vehicle_file import SCHEMA as VEHICLE_SCHEMA
 
 OPTION = re.compile(r'^( *)#(?! \S|$)', re.M)
 HINT = re.compile(r'\$schema=file://(\S+)')
@@ -31,7 +31,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def _new(*arguments: str) -> int:
     try:
-        cli.main(['new', *arguments])
+        main.main(['new', *arguments])
     except SystemExit as end:
         return int(end.code or 0)
     return 0
@@ -45,7 +45,7 @@ def test_vehicle_loads_and_explains_every_key(folder, capsys):
     assert _new('vehicle', 'mine') == 0
     assert 'auv check-vehicle mine.yaml' in capsys.readouterr().out
     assert load_vehicle('mine.yaml').M.tolist() == load_vehicle(STARTING).M.tolist()
-    cli.main(['check-vehicle', 'mine.yaml', '--json'])
+    main.main(['check-vehicle', 'mine.yaml', '--json'])
     assert json.loads(capsys.readouterr().out)
     text = Path('mine.yaml').read_text()
     assert Path(HINT.search(text)[1]) == VEHICLE_SCHEMA
@@ -82,7 +82,8 @@ def test_law_and_its_scenario_run_as_they_are(folder):
     Path('my_own_law.yaml').write_text(text.replace('duration: 10.0', 'duration: 0.05'))
     # as plain Python: what is asked is whether it runs, not how fast
     ended = subprocess.run(
-        [sys.executable, '-m', 'auv_analysis.cli', 'simulate', 'my_own_law.yaml', '--no-report'],
+        [sys.executable, '-m', 'auv_analysis.cli.main', 'simulate', 'my_own_law.yaml',
+         '--no-report'],
         env={**os.environ, 'NUMBA_DISABLE_JIT': '1'}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert ended.returncode == 0, ended.stderr

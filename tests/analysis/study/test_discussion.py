@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.studies.study.discussion import discussion
 from auv_analysis.studies.study.procedure import write_samples
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 
 @cache

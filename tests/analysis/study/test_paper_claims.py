@@ -9,13 +9,13 @@ import pyarrow.parquet as parquet
 import pytest
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.changes import changed_scenario
 from auv_analysis.report import paper
 from auv_analysis.report.claims import judged
 from auv_analysis.report.evidence import Response
 from auv_analysis.report.quotes import Quotes
 from auv_analysis.report.tables.claims import claims_table, write_claims
 from auv_analysis.report.text import MISSING
+from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.studies.study.procedure import claims_sentences
 from auv_analysis.studies.study.sensitivity import sensitivity
 from auv_analysis.study.paper_claims import case_evidence, case_of, paper_claims

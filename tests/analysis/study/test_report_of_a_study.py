@@ -11,7 +11,8 @@ import pytest
 import yaml
 from pages import Page, at, check_numbers, tokens
 
-from auv_analysis import cli, load_scenario, simulate, summarize
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.cli import main
 from auv_analysis.report import paper
 from auv_analysis.report.document import NUMBERS
 from auv_analysis.report.tables.sources import numbers_in
@@ -24,7 +25,7 @@ PRINTED = {*paper.N, *paper.SHARES, paper.KINETIC_ENERGY}
 def folder(tmp_path_factory, composing) -> Path:
     out = tmp_path_factory.mktemp('study') / 'case1'
     with composing():
-        cli.main(['study', 'case1', '--samples', '4', '--window', '0', '10.28', '--out', str(out)])
+        main.main(['study', 'case1', '--samples', '4', '--window', '0', '10.28', '--out', str(out)])
     return out
 
 
@@ -132,7 +133,7 @@ def test_pieces_and_shares_of_the_files_add_up(folder):
 )
 def test_wrong_options_end_in_one_line(tmp_path, capsys, options, line):
     with pytest.raises(SystemExit) as end:
-        cli.main(['study', 'case1', *options, '--out', str(tmp_path / 'out')])
+        main.main(['study', 'case1', *options, '--out', str(tmp_path / 'out')])
     assert end.value.code == 2
     error = capsys.readouterr().err
     assert line in error
@@ -143,7 +144,7 @@ def test_wrong_options_end_in_one_line(tmp_path, capsys, options, line):
 @pytest.mark.usefixtures('unrendered')
 def test_a_study_of_another_vehicle_has_no_claims(tmp_path):
     out = tmp_path / 'out'
-    cli.main(['study', 'case1_bluerov2_heavy', '--sensitivity', 'none', '--out', str(out)])
+    main.main(['study', 'case1_bluerov2_heavy', '--sensitivity', 'none', '--out', str(out)])
     page = Page((out / 'report.html').read_text(encoding='utf-8'))
     assert 'claims' not in page.tables
     assert 'sensitivity' not in page.ids

@@ -9,10 +9,11 @@ import pytest
 from closed_loops import PER_AXIS
 from numpy.testing import assert_allclose
 
-from auv_analysis import batch, load_scenario, simulate, summarize
-from auv_analysis.changes import changed_scenario
-from auv_analysis.kernels import kernels
-from auv_analysis.reduction import COLUMNS
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.simulation import batch
+from auv_analysis.simulation.kernels import kernels
+from auv_analysis.simulation.reduction import COLUMNS
 from auv_analysis.studies.study import sensitivity as module
 from auv_analysis.studies.study.sensitivity import gain_factors, sensitivity
 from auv_analysis.studies.study.sensitivity_report import (
@@ -21,7 +22,7 @@ from auv_analysis.studies.study.sensitivity_report import (
     sensitivity_table,
     write_sensitivities,
 )
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 SPREAD = math.log(2.0) / math.sqrt(3.0)  # of one log-uniform factor up to 2
 

@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from strategies import QUICK
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.changes import changed_scenario
 from auv_analysis.report import paper
+from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.studies.study.responses import ERROR, response
 from auv_analysis.studies.study.sensitivity import sensitivity
 from auv_analysis.study.attribution import best_split
@@ -33,8 +33,8 @@ from auv_analysis.study.unknowns_file import write_unknowns
 from auv_analysis.study.unknowns_report import energy_table, unknowns_sentences, unknowns_tables
 from auv_analysis.study.unknowns_responses import responses_of
 from auv_analysis.study.unknowns_run import unknowns
-from auv_dynamics.files import InputError
-from auv_gvc_controller.decomposition import decompose
+from auv_dynamics.files.errors import InputError
+from auv_gvc_controller.laws.decomposition import decompose
 
 OTHER = Variant('corner', 300.0, -32.0, 20.0, 0.0, 1)
 

@@ -8,10 +8,11 @@ from strategies import QUICK
 from tunings import GVC, SAME_CL, scenario
 
 from auv_analysis import load_scenario
-from auv_analysis.changes import changed_scenario
+from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.tuning.draws import Spread, applied, drawn, spread_of
 from auv_analysis.tuning.monte_carlo import monte_carlo
-from auv_dynamics.files import InputError, matrix6
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import matrix6
 
 HERMAN = load_scenario('case1')
 REXROV = load_scenario('case1_rexrov')

@@ -6,14 +6,14 @@ import numpy as np
 from tunings import GVC, scenario
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.changes import changed_scenario
-from auv_analysis.records import Sample
-from auv_analysis.summary import band_of
+from auv_analysis.metrics.summary import band_of
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.simulation.records import Sample
 from auv_analysis.tuning.loops import measured
 from auv_analysis.tuning.measures import MEANINGS, Measures, measures_of, measures_of_run
 from auv_analysis.tuning.monte_carlo import of_each
 from auv_analysis.tuning.record import Cost
-from auv_gvc_controller.model import control_model
+from auv_gvc_controller.laws.model import control_model
 
 ROUGH = [{'kind': 'model_error', 'mass': 0.1, 'added_mass': -0.2, 'damping': 0.3},
          {'kind': 'current', 'velocity': [0.2, -0.1, 0.0]}]  # fmt: skip

@@ -9,9 +9,9 @@ from auv_analysis.tuning.measures import Measures
 from auv_analysis.tuning.rivals import Request, goal_of, tuned
 from auv_analysis.tuning.search import Goal, search
 from auv_analysis.tuning.space import make_space
-from auv_dynamics.vehicle_file import load_vehicle
-from auv_gvc_controller.gains import sampled_rate
-from auv_gvc_controller.model import control_model
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
+from auv_gvc_controller.control.gains import sampled_rate
+from auv_gvc_controller.laws.model import control_model
 
 VEHICLE = load_vehicle('girona500')
 SPACE = make_space('gvc', 'scalar', control_model(VEHICLE), 0.01, 100.0)

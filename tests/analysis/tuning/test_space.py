@@ -12,10 +12,10 @@ from auv_analysis.tuning.rivals import Rival, starts_of
 from auv_analysis.tuning.search import Found
 from auv_analysis.tuning.space import LAWS, STRUCTURES, Space, make_space
 from auv_analysis.tuning.tried import Tried
-from auv_dynamics.vehicle_file import load_vehicle
-from auv_gvc_controller.gains import sampling_warning
-from auv_gvc_controller.laws import make_gains
-from auv_gvc_controller.model import control_model
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
+from auv_gvc_controller.control.gains import sampling_warning
+from auv_gvc_controller.laws.law import make_gains
+from auv_gvc_controller.laws.model import control_model
 
 VEHICLE = load_vehicle('rexrov')
 STEP = 0.01

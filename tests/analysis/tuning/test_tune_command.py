@@ -12,7 +12,7 @@ from pages import check_numbers
 from tunings import GVC, SAME_CL, write
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.cli import main
+from auv_analysis.cli.main import main
 from auv_analysis.tuning import rivals
 from auv_analysis.tuning.measures import measures_of_run
 

@@ -8,7 +8,8 @@ import pytest
 from auv_analysis.watch.gauge import HEARD, Gauge
 from auv_analysis.watch.health import KEPT, SILENT
 from auv_analysis.watch.snapshot import NodeState
-from auv_dynamics import interface, load_vehicle
+from auv_dynamics import load_vehicle
+from auv_dynamics.ros import interface
 
 STEP = 10_000_000
 STATE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, *[0.1] * 6)

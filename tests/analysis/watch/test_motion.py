@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from strategies import QUICK
 
-from auv_analysis.live_analysis import LiveAnalysis
+from auv_analysis.metrics.live_analysis import LiveAnalysis
 from auv_analysis.watch.motion import FRESH, HELD_NS, Motion
-from auv_dynamics import interface, load_vehicle
+from auv_dynamics import load_vehicle
+from auv_dynamics.ros import interface
 
 STEP = 10_000_000
 LIVE = LiveAnalysis(load_vehicle('herman2018'))

@@ -16,8 +16,8 @@ from auv_analysis.watch.snapshot import (
     Trouble,
 )  # fmt: skip
 from auv_analysis.watch.text import fact, fixed, seconds, short, spark, stamp
-from auv_dynamics import interface
-from auv_dynamics.signals import DOFS
+from auv_dynamics.ros import interface
+from auv_dynamics.vehicle import DOFS
 
 FULL = Snapshot(
     domain=42,

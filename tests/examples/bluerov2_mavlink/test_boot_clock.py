@@ -6,7 +6,7 @@ from boot_clock import ENOUGH, BootClock, Exchange
 from navigation import turned
 from numpy.testing import assert_allclose
 
-from auv_dynamics.kinematics import attitude_rate, quaternion
+from auv_dynamics.vehicle.kinematics import attitude_rate, quaternion
 
 MS = 1_000_000
 OFFSET = 12_345 * MS

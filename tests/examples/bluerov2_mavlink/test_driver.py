@@ -11,9 +11,8 @@ from mavlink_relay import Relay, free_port, start_program
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from std_srvs.srv import SetBool
 
-from auv_dynamics import interface
-from auv_dynamics.interface import NANOSECONDS, Frames
-from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros import convert, interface, topics
+from auv_dynamics.ros.interface import NANOSECONDS, Frames
 
 FRAMES = Frames()
 PUSH = (12.0, 0.0, 0.0, 0.0, 0.0, 0.0)

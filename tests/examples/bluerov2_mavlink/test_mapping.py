@@ -12,7 +12,7 @@ from strategies import QUICK, vectors
 from wrench_mapping import SIGNS, PilotAxes, WrenchMapping
 
 from auv_dynamics import load_vehicle
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 VEHICLES = {name: load_vehicle(name) for name in ('bluerov2_heavy', 'bluerov2')}
 ALL = tuple(range(6))

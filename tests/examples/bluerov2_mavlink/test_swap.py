@@ -12,11 +12,10 @@ from mavlink_relay import EXAMPLE, free_port, start_program
 from numpy.testing import assert_array_equal
 
 from auv_analysis.bag import load_run, open_bag
-from auv_analysis.cli import main
-from auv_analysis.run import LongRun, joined
-from auv_dynamics import interface
-from auv_dynamics.interface import Frames
-from auv_dynamics.ros import topics
+from auv_analysis.cli.main import main
+from auv_analysis.runs.run import LongRun, joined
+from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.topics import Topic
 
 FRAMES = Frames('map_ned', 'rov_frd')

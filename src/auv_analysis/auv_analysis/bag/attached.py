@@ -5,12 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.bag.contents import Contents
-from auv_analysis.fault_words import Mark, marks_of
-from auv_analysis.scenario import SCHEMA
-from auv_dynamics.files import InputError, check, parse_yaml
-from auv_dynamics.vehicle import Vehicle
-from auv_dynamics.vehicle_file import load_vehicle, vehicle_from_dict
-from auv_gvc_controller.laws import is_unasked, make_gains
+from auv_analysis.scenario.fault_words import Mark, marks_of
+from auv_analysis.scenario.scenario import SCHEMA
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import check, parse_yaml
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
+from auv_gvc_controller.laws.law import is_unasked, make_gains
 
 NAME = re.compile('[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}')
 LAW = re.compile(r'[A-Za-z_][\w.]*:[A-Za-z_]\w*', re.ASCII)  # module:Class

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from auv_dynamics.files import InputError
-from auv_dynamics.interface import Frames
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros.interface import Frames
 
 Series = tuple[np.ndarray, np.ndarray]  # stamps (n,) in ns, values (n, 6) or (n, 13)
 

@@ -12,8 +12,8 @@ from mcap_ros2.decoder import DecoderFactory
 from auv_analysis.bag.limits import LARGEST_PARSED
 from auv_analysis.bag.roles import READERS, role_of
 from auv_analysis.bag.tables import Table
-from auv_dynamics import interface
-from auv_dynamics.files import InputError, first_line
+from auv_dynamics.files.errors import InputError, first_line
+from auv_dynamics.ros import interface
 
 Decoder = Callable[[bytes], Any]
 

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file'
 OTHERS = ('.db3', '.bag')  # endings of files that rosbags reads

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 
 from auv_analysis.bag.contents import Contents, Series
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 SETPOINTS = (interface.CMD_VEL, interface.CMD_ACCEL)
 LATEST = 'latest'

@@ -9,7 +9,7 @@ import numpy as np
 
 from auv_analysis.bag.roles import KINDS, ODOMETRY, READERS
 from auv_analysis.bag.tables import gather
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 CDR = 4  # bytes of the encapsulation, from which alignment counts
 STAMP = slice(CDR, CDR + 8)  # sec and nanosec

@@ -20,9 +20,15 @@ from auv_analysis.bag.steps import (
     topics_of_one_graph,
 )
 from auv_analysis.bag.survey import Survey
-from auv_analysis.run import AnyRun, Extent, LongRun, Run, widened
-from auv_analysis.simulation import unwrapped_eta
-from auv_dynamics import interface
+from auv_analysis.runs.run import (
+    AnyRun,
+    Extent,
+    LongRun,
+    Run,
+    widened,
+)
+from auv_analysis.simulation.simulate import unwrapped_eta
+from auv_dynamics.ros import interface
 
 WHOLE = 1 << 16  # steps up to which a recording is kept in memory
 

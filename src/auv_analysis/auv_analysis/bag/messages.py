@@ -23,8 +23,8 @@ from auv_analysis.bag.layouts import Layout, learned
 from auv_analysis.bag.limits import LARGEST_ATTACHMENT
 from auv_analysis.bag.roles import ODOMETRIES, READERS, check_type, namespace_of, role_of
 from auv_analysis.bag.tables import Table, by_channel
-from auv_dynamics import interface
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros import interface
 
 
 class Batch(NamedTuple):

@@ -5,7 +5,8 @@ from typing import Any
 
 import yaml
 
-from auv_dynamics.files import InputError, parse_yaml
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import parse_yaml
 
 NAME = 'recording.yaml'
 

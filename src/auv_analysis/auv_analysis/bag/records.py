@@ -23,7 +23,7 @@ from auv_analysis.bag.framing import (
 )
 from auv_analysis.bag.limits import Counts, TooLargeError, TooManyError, decompressed
 from auv_analysis.bag.tables import Table, parts_of_chunk, parts_one_by_one, table_of_messages
-from auv_dynamics.files import InputError, first_line
+from auv_dynamics.files.errors import InputError, first_line
 
 TOGETHER = 4096  # messages outside chunks that are read together
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.bag.contents import NotOursError
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 ODOMETRIES = (interface.ODOM, interface.GROUND_TRUTH)
 ODOMETRY = 'nav_msgs/msg/Odometry'

@@ -7,9 +7,9 @@ import numpy as np
 
 from auv_analysis.bag.contents import Contents, NotOursError, Series
 from auv_analysis.bag.roles import READERS, namespace_of, role_of
-from auv_dynamics import interface
-from auv_dynamics.files import InputError
-from auv_dynamics.frames import NED_FSD, named_axes
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros import interface
+from auv_dynamics.vehicle.frames import NED_FSD, named_axes
 
 REQUIRED = (interface.ODOM, interface.WRENCH)
 Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> values

@@ -9,8 +9,8 @@ from auv_analysis.bag.contents import Series
 from auv_analysis.bag.held import SETPOINTS, held_parts
 from auv_analysis.bag.messages import Batch
 from auv_analysis.bag.steps import complete_blocks
-from auv_analysis.run import BLOCK
-from auv_dynamics import interface
+from auv_analysis.runs.run import BLOCK
+from auv_dynamics.ros import interface
 
 
 class Survey:

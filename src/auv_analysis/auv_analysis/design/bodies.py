@@ -7,8 +7,8 @@ decomposition is written here a second time, for complex symmetric matrices.
 
 import numpy as np
 
-from auv_dynamics.vehicle import rigid_body_matrix
-from auv_gvc_controller.decomposition import inverse_upper
+from auv_dynamics.vehicle.vehicle import rigid_body_matrix
+from auv_gvc_controller.laws.decomposition import inverse_upper
 
 DISC = 8 / 3  # added mass of a thin disc that moves broadside, in rho a^3: Lamb 1932
 DISC_TURNED = 16 / 45  # its added moment of inertia about a diameter, in rho a^5: Lamb 1932

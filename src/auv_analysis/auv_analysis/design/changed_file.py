@@ -7,7 +7,7 @@ import numpy as np
 import yaml
 
 from auv_analysis.design.space import Space
-from auv_dynamics.files import matrix6
+from auv_dynamics.files.yaml_files import matrix6
 
 PREFIX = 'design_'  # of its name: nobody shall take it for the vehicle that it came from
 

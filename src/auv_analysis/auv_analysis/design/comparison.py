@@ -12,8 +12,8 @@ from auv_analysis.design.parameters import ALL, PARTS
 from auv_analysis.design.prediction import Figures, Prediction
 from auv_analysis.design.search import Spread, parts_of, search
 from auv_analysis.design.setting import Setting
-from auv_analysis.run import Run
-from auv_dynamics.files import InputError, first_line
+from auv_analysis.runs.run import Run
+from auv_dynamics.files.errors import InputError, first_line
 
 HALF = 0.5
 AGREES = 0.02  # of the magnitude before: a prediction that is as near is not made again

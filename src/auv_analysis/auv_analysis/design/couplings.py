@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_analysis.coupling import delta_pi, delta_xi, structural_zeros
-from auv_analysis.run import Run
-from auv_dynamics.files import InputError
-from auv_dynamics.nearest import one_of
-from auv_dynamics.signals import DOFS
-from auv_dynamics.vehicle import Vehicle
-from auv_gvc_controller.decomposition import decompose, inverse_upper
-from auv_gvc_controller.model import control_model
+from auv_analysis.metrics.coupling import delta_pi, delta_xi, structural_zeros
+from auv_analysis.runs.run import Run
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import one_of
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
+from auv_gvc_controller.laws.model import control_model
 
 KINDS = ('delta_xi', 'delta_pi')
 COUPLINGS = tuple(f'{kind}.{dof}' for kind in KINDS for dof in DOFS)

@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from auv_analysis.design.result import Result
+from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import Drawn, FigureRecord, save_figures
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.sketching import sketches
-from auv_analysis.summary import TRANSIENT
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 WAS, IS = plotting.GREY, plotting.COLOURS[0]
 FAINT = 1e-4  # of the largest share: smaller couplings are not drawn

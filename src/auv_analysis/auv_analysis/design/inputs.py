@@ -8,7 +8,7 @@ from auv_analysis.design.changed_file import changed_data, changed_text
 from auv_analysis.design.couplings import COUPLINGS
 from auv_analysis.design.proposal import Proposal
 from auv_analysis.design.words import change_words
-from auv_analysis.scenario import Scenario, load_scenario
+from auv_analysis.scenario.scenario import Scenario, load_scenario
 
 LONGEST = 92  # of a scenario's name, with room for the word behind it
 

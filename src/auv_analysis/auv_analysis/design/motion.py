@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from auv_analysis.coupling import delta_pi, delta_xi
 from auv_analysis.design.space import UPPER, WIDTH, Difference
-from auv_analysis.run import Run
-from auv_dynamics.kinematics import quaternion, rotation
-from auv_gvc_controller.model import control_model
+from auv_analysis.metrics.coupling import delta_pi, delta_xi
+from auv_analysis.runs.run import Run
+from auv_dynamics.vehicle.kinematics import quaternion, rotation
+from auv_gvc_controller.laws.model import control_model
 
 SPREAD = 120  # samples that are spread over a run, denser where much happens
 PEAKS = 3  # samples that are added for every signal, at its largest values

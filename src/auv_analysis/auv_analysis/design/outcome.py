@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from auv_analysis.design.couplings import KINDS, present
-from auv_analysis.run import Run
-from auv_analysis.scenario import Scenario
-from auv_analysis.simulation import Hold, simulate
-from auv_analysis.summary import summarize
-from auv_dynamics.files import first_line
-from auv_dynamics.signals import DOFS
-from auv_dynamics.vehicle import Vehicle
+from auv_analysis.metrics.summary import summarize
+from auv_analysis.runs.run import Run
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.simulate import Hold, simulate
+from auv_dynamics.files.errors import first_line
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 VELOCITY = ('m/s',) * 3 + ('rad/s',) * 3
 WRENCH = ('N',) * 3 + ('N m',) * 3

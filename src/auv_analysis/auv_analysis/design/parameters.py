@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.design.bodies import DISC
-from auv_dynamics.files import InputError
-from auv_dynamics.nearest import one_of
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import one_of
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 SHIFT, BALLAST, DISC_PART = 'shift', 'ballast', 'disc'
 PARTS = (SHIFT, BALLAST, DISC_PART)

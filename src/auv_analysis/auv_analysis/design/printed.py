@@ -6,8 +6,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from auv_analysis.console import TextConsole
 from auv_analysis.design.words import part_words
+from auv_analysis.output.progress import TextConsole
 from auv_analysis.report.text import number
 
 NEAR = 1e-9  # relative: no change

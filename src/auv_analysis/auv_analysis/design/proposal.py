@@ -9,7 +9,7 @@ from auv_analysis.design.comparison import HALF, Candidate, Comparison
 from auv_analysis.design.couplings import COUPLINGS, REST, Sizes, coupling_named, present
 from auv_analysis.design.search import parts_of
 from auv_analysis.design.setting import Setting
-from auv_analysis.run import Run
+from auv_analysis.runs.run import Run
 
 STARTS = 4  # of a search for the proposal
 FEW = 1  # of one for the table of what helps against the other couplings

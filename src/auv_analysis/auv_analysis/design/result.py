@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.authority import beyond_authority
 from auv_analysis.design.comparison import HALF, Candidate
 from auv_analysis.design.couplings import COUPLINGS, UNITS, present
 from auv_analysis.design.inputs import write_inputs
@@ -27,10 +26,11 @@ from auv_analysis.design.statements import (
     warnings_of,
 )
 from auv_analysis.design.words import change_words, values_of
-from auv_analysis.folder import Results
-from auv_analysis.new_files import write_json
-from auv_dynamics.vehicle import Vehicle
-from auv_gvc_controller.decomposition import decompose
+from auv_analysis.metrics.authority import beyond_authority
+from auv_analysis.output.folder import Results
+from auv_analysis.output.new_files import write_json
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_gvc_controller.laws.decomposition import decompose
 
 AT_BOUND = 2e-3  # of a range: a value that is nearer to its end lies on it
 DESIGN, BEFORE, AFTER = 'design.json', 'summary_before.json', 'summary.json'

@@ -10,13 +10,13 @@ import numpy as np
 from auv_analysis.design.changed_file import changed_data
 from auv_analysis.design.couplings import Sizes, sizes_of
 from auv_analysis.design.space import Space
-from auv_analysis.run import Run
-from auv_analysis.scaling import REFERENCE, scaled_case1
-from auv_analysis.scenario import SCHEMA, Scenario, scenario_from
-from auv_analysis.simulation import Hold, simulate
-from auv_dynamics.config import shipped
-from auv_dynamics.files import check, read_text, read_yaml
-from auv_gvc_controller.sampled import is_compiled
+from auv_analysis.runs.run import Run
+from auv_analysis.scenario.scaling import REFERENCE, scaled_case1
+from auv_analysis.scenario.scenario import SCHEMA, Scenario, scenario_from
+from auv_analysis.simulation.simulate import Hold, simulate
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import check, read_text, read_yaml
+from auv_gvc_controller.control.sampled import is_compiled
 
 MANY_STEPS = 30_000
 LAW = 'gvc'  # the first controller of this law is the one that a design is judged by

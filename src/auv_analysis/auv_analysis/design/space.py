@@ -15,8 +15,8 @@ from auv_analysis.design.bodies import (
     point_mass,
 )
 from auv_analysis.design.parameters import NAMES, Parameter, bounds, parameters_of, semi_axes
-from auv_dynamics.vehicle import Vehicle
-from auv_dynamics.vehicle_file import vehicle_from_dict
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 
 UPPER = np.triu_indices(6)
 WIDTH = len(UPPER[0]) + 3 + 6  # numbers of a `Difference` as one row

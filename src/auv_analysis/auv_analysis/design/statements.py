@@ -11,7 +11,7 @@ from auv_analysis.design.parameters import BALLAST, DISC_PART, NAMES, semi_axes
 from auv_analysis.design.search import parts_of
 from auv_analysis.design.space import Space
 from auv_analysis.report.text import join, number, plain
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 ASSUMPTIONS = (
     'The inertia about the centre of gravity stays as it is when the centre of gravity is moved.',

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from typing import Literal, NamedTuple
 
-from auv_dynamics.refusal import named_line
+from auv_dynamics.files.errors import named_line
 
 Verdict = Literal['ok', 'note', 'warning', 'broken']
 

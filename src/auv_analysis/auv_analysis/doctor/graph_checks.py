@@ -21,7 +21,7 @@ MULTICAST = 0x1000  # IFF_MULTICAST
 
 def discovery() -> Iterator[Finding]:
     """Let two participants look for each other on the loopback, in a domain of their own."""
-    from auv_analysis.domain import LARGEST, is_free
+    from auv_analysis.graph.domain import LARGEST, is_free
     from auv_dynamics.ros.reach import loopback
 
     domains = [domain for domain in range(1, LARGEST + 1) if is_free(domain)]
@@ -61,8 +61,8 @@ def _what_to_do(why: str) -> str:
 
 def neighbours() -> Iterator[Finding]:
     """Who is in the domain that commands join here."""
-    from auv_analysis.domain import VARIABLE, joined_domain
-    from auv_dynamics.refusal import InputError
+    from auv_analysis.graph.domain import VARIABLE, joined_domain
+    from auv_dynamics.files.errors import InputError
     from auv_dynamics.ros.reach import RANGE, loopback
 
     try:

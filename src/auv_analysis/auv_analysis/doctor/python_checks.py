@@ -129,7 +129,7 @@ def _kept() -> Finding:
     from io import StringIO
 
     with redirect_stderr(StringIO()):  # it warns of what is said below
-        from auv_dynamics.jit import cache_folder, is_private
+        from auv_dynamics.kernel.compile import cache_folder, is_private
     folder = cache_folder()
     try:
         if not is_private(folder):
@@ -147,7 +147,7 @@ def executables() -> Iterator[Finding]:
     """Whether the nodes are installed beside this `auv`, and `auv` on the path is this one."""
     import shutil
 
-    from auv_analysis.supervisor import NodeDiedError, executable
+    from auv_analysis.graph.supervisor import NodeDiedError, executable
 
     missing = []
     for name, package in NODES.items():

@@ -62,7 +62,7 @@ def reach() -> Iterator[Finding]:
         found = f'{RANGE}={value}: everybody on the network hears the nodes and may command them'
         yield Finding('reach', 'warning', found, f'unset {RANGE} where no other machine takes part')
     else:
-        from auv_dynamics.nearest import one_of
+        from auv_dynamics.files.nearest import one_of
 
         found = f'{RANGE}={value}: expected {one_of(value, REACHES)}'
         yield Finding('reach', 'broken', found, f'unset {RANGE}')
@@ -70,8 +70,8 @@ def reach() -> Iterator[Finding]:
 
 def domain() -> Iterator[Finding]:
     """Whether ROS_DOMAIN_ID is one."""
-    from auv_analysis.domain import VARIABLE, joined_domain
-    from auv_dynamics.refusal import InputError
+    from auv_analysis.graph.domain import VARIABLE, joined_domain
+    from auv_dynamics.files.errors import InputError
 
     try:
         number = joined_domain(None)

@@ -9,7 +9,7 @@ from auv_analysis.driver_check.recording import Recording
 from auv_analysis.driver_check.response_checks import response_findings
 from auv_analysis.driver_check.silence import silence_finding
 from auv_analysis.driver_check.trials import Answered, answered, heard_of
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 
 def answers_of(

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from auv_dynamics.kinematics import rotation
+from auv_dynamics.vehicle.kinematics import rotation
 
 
 def tilt(q: np.ndarray) -> np.ndarray:

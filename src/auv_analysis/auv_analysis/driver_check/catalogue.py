@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 
 class Check(NamedTuple):

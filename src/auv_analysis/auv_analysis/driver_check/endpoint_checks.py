@@ -6,8 +6,8 @@ from auv_analysis.driver_check.finding import Finding, judged
 from auv_analysis.driver_check.scene import Endpoint, Scene
 from auv_analysis.driver_check.settings import Settings
 from auv_analysis.report.text import join
-from auv_dynamics import interface
-from auv_dynamics.nearest import nearest
+from auv_dynamics.files.nearest import nearest
+from auv_dynamics.ros import interface
 
 NAMED = 3  # topics of a like name
 

@@ -14,8 +14,8 @@ from auv_analysis.driver_check.trials import Answered
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.plotting import COLOURS, GREY
-from auv_dynamics.interface import NANOSECONDS
-from auv_dynamics.signals import DOFS
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle import DOFS
 
 MS = 1e3
 BINS = 60

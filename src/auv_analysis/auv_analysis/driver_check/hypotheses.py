@@ -1,7 +1,7 @@
 """What a driver may have meant by its pose and twist: the right reading and the usual mistakes.
 
 Each reading gives a path and the velocity that would be its rate. Earth axes are E times those of
-the other convention, body axes S times (`auv_dynamics.frames`).
+the other convention, body axes S times (`auv_dynamics.vehicle.frames`).
 """
 
 from collections.abc import Callable
@@ -11,8 +11,8 @@ import numpy as np
 
 from auv_analysis.driver_check.attitude import inverted, reordered, turned
 from auv_analysis.driver_check.motion import Motion
-from auv_dynamics.frames import swap_body, swap_position
-from auv_dynamics.kinematics import euler, rotation
+from auv_dynamics.vehicle.frames import swap_body, swap_position
+from auv_dynamics.vehicle.kinematics import euler, rotation
 
 Reading = Callable[[Motion], tuple[np.ndarray, np.ndarray]]
 CHILD = 'child'

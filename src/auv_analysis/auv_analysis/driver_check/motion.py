@@ -10,7 +10,7 @@ from scipy.integrate import cumulative_trapezoid
 from auv_analysis.driver_check.attitude import travelled, turned
 from auv_analysis.driver_check.recording import Recording
 from auv_analysis.foreign.local_polynomials import SMALLEST, rates, residuals
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.ros.interface import NANOSECONDS
 
 WINDOW = 1.0  # s over which rates are fitted
 PROBES = 400  # times at which they are, at most

@@ -2,7 +2,7 @@
 
 import argparse
 
-from auv_dynamics.dofs import DOFS
+from auv_dynamics.vehicle import DOFS
 
 
 def add_options(command: argparse.ArgumentParser) -> None:

@@ -14,8 +14,8 @@ from auv_analysis.driver_check.scene import Scene
 from auv_analysis.driver_check.settings import Settings
 from auv_analysis.driver_check.trials import Answered
 from auv_analysis.report.text import join
-from auv_dynamics.interface import ODOM, WRENCH
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.ros.interface import ODOM, WRENCH
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 DOCUMENT = 'check.json'
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from auv_analysis.driver_check.prediction import predicted
 from auv_analysis.report.text import join
-from auv_dynamics.signals import DOFS
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 PULSE = 1.0  # s that a wrench acts one way, then the other
 REST = 0.5  # s of zero before and after

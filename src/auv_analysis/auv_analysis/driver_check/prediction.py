@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from auv_dynamics.kinematics import jacobian
-from auv_dynamics.plant import eta_of
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.plant.plant import eta_of
+from auv_dynamics.vehicle.kinematics import jacobian
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 ACCURATE = 1e-6  # m/s, rad/s, and relative
 STEPS = 0.02  # s between two values of a prediction

@@ -8,7 +8,7 @@ import numpy as np
 
 from auv_analysis.driver_check.plan import HELD, PULSE, REST, UNHEARD, Plan, Trial
 from auv_analysis.driver_check.recording import Tape
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.ros.interface import NANOSECONDS
 
 PERIOD = 0.02  # s between two wrenches
 GOODBYE = 0.3  # s of zero at the end

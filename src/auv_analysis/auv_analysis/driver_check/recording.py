@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.ros.interface import NANOSECONDS
 
 NONE = np.zeros(0, np.int64)
 

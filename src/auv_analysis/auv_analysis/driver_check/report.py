@@ -12,7 +12,7 @@ from auv_analysis.driver_check.catalogue import CHECKS, GROUPS
 from auv_analysis.driver_check.figures import draw
 from auv_analysis.driver_check.finding import FAIL, NOT_CHECKED, PASS, Finding
 from auv_analysis.driver_check.outcome import DOCUMENT, Result
-from auv_analysis.new_files import write_json
+from auv_analysis.output.new_files import write_json
 from auv_analysis.report.document import Block, Cell, Column, Section, Sentence, Table
 from auv_analysis.report.rendering import write_document
 from auv_analysis.report.text import join

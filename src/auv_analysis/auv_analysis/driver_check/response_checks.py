@@ -9,7 +9,7 @@ from auv_analysis.driver_check.plan import Plan
 from auv_analysis.driver_check.procedure import Actuation
 from auv_analysis.driver_check.trials import Answered
 from auv_analysis.report.text import join, number
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 GAINS = (0.5, 2.0)  # of the measured over the predicted answer
 NOTHING = 0.2  # of it: no answer

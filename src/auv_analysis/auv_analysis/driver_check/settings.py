@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from auv_dynamics.interface import Frames
-from auv_gvc_controller.settings import ControllerSettings
+from auv_dynamics.ros.interface import Frames
+from auv_gvc_controller.control.settings import ControllerSettings
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from auv_analysis.driver_check.finding import Finding, judged, unchecked
 from auv_analysis.driver_check.prediction import predicted
 from auv_analysis.driver_check.response import LATEST, response_of
 from auv_analysis.driver_check.trials import Heard
-from auv_dynamics.interface import WRENCH_APPLIED
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.ros.interface import WRENCH_APPLIED
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 LONGEST = 1.0  # s of silence after which a driver must have let go
 PART = 0.05  # of the wrench: less is none

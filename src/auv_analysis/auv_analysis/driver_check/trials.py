@@ -11,8 +11,8 @@ from auv_analysis.driver_check.prediction import Predicted, pieces, predicted
 from auv_analysis.driver_check.procedure import Sent
 from auv_analysis.driver_check.recording import Recording
 from auv_analysis.driver_check.response import Response, response_of
-from auv_dynamics.interface import NANOSECONDS
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 LEAST = 20  # messages of a trial
 

@@ -7,8 +7,8 @@ from auv_analysis.driver_check.finding import Finding, judged, unchecked
 from auv_analysis.driver_check.recording import Recording
 from auv_analysis.driver_check.settings import Settings
 from auv_analysis.report.text import join, number
-from auv_dynamics.frames import ENU_FLU, named_axes
-from auv_dynamics.interface import ODOM, UNIT
+from auv_dynamics.ros.interface import ODOM, UNIT
+from auv_dynamics.vehicle.frames import ENU_FLU, named_axes
 
 USUAL = {ODOM, 'map', 'world', 'earth', 'base_link', 'base_footprint'}  # in ROS: ENU and FLU
 CONVERTER = (

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from auv_analysis.foreign.signals import Recorded
-from auv_dynamics.files import InputError
-from auv_dynamics.frames import (
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.frames import (
     ENU_FLU,
     NED_FSD,
     named_axes,
@@ -14,7 +14,7 @@ from auv_dynamics.frames import (
     swap_body,
     swap_position,
 )
-from auv_dynamics.kinematics import rotation
+from auv_dynamics.vehicle.kinematics import rotation
 
 _SWAPS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     'pose': lambda x: np.concatenate([swap_position(x[:, :3]), swap_attitude(x[:, 3:])], axis=1),

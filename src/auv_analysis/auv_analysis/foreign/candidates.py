@@ -7,7 +7,7 @@ from auv_analysis.bag.contents import Contents, NotOursError
 from auv_analysis.bag.files import is_mcap
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.foreign.kinds import READERS, type_name
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 ROLES = ('odometry', 'pose', 'twist', 'wrench', 'setpoint', 'thrusters')
 ASKED = ('cmd', 'command', 'desired', 'goal', 'ref', 'reference', 'setpoint', 'target')

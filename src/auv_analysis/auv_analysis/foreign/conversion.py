@@ -15,10 +15,10 @@ from auv_analysis.foreign.signals import (
     ordered,
 )
 from auv_analysis.foreign.tracks import Track, at_times, usual_limit
-from auv_dynamics.files import InputError
-from auv_dynamics.frames import ENU_FLU
-from auv_dynamics.interface import NANOSECONDS
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle.frames import ENU_FLU
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 FRAMES = ('child', 'world')  # in which a velocity may be written
 POSE, TWIST = slice(0, 7), slice(7, 13)  # of an odometry's row

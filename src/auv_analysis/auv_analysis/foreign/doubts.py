@@ -3,8 +3,8 @@
 import numpy as np
 
 from auv_analysis.foreign.tracks import Track, at_times
-from auv_dynamics.interface import NANOSECONDS
-from auv_dynamics.kinematics import rotation
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle.kinematics import rotation
 
 STILL = 0.02  # m/s: motion below this says nothing about axes
 WORSE = 2.0  # times: from here on the other reading fits clearly better

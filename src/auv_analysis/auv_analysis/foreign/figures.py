@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.run import AnyRun, Facts, LongRun
+from auv_analysis.runs.run import AnyRun, Facts, LongRun
 
 
 def gap_figures(run: Facts) -> dict[str, Any]:

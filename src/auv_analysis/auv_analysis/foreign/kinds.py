@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.interface import LARGEST, nanoseconds
+from auv_dynamics.ros.interface import LARGEST, nanoseconds
 
 UNIT = 1e-2  # of the norm of a quaternion: what rounding to single precision leaves, and more
 Numbers = tuple[float, ...]

@@ -14,13 +14,14 @@ from auv_analysis.foreign.reading import read_sources
 from auv_analysis.foreign.time_base import TimeBase, sensible_step, time_base
 from auv_analysis.foreign.tracks import Track, at_times, means_over
 from auv_analysis.foreign.unexplained import unexplained
-from auv_analysis.run import FOREIGN, Run
-from auv_analysis.simulation import unwrapped_eta
-from auv_dynamics.config import shipped
-from auv_dynamics.files import InputError, read_text
-from auv_dynamics.interface import NANOSECONDS
-from auv_dynamics.vehicle import Vehicle
-from auv_dynamics.vehicle_file import load_vehicle
+from auv_analysis.runs.run import FOREIGN, Run
+from auv_analysis.simulation.simulate import unwrapped_eta
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import read_text
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 
 def load_foreign(bag: str | Path, mapping: TopicMap) -> Recording:

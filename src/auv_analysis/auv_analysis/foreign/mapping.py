@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from auv_dynamics.files import InputError, check, read_yaml
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import check, read_yaml
 
 SCHEMA = Path(__file__).with_name('mapping.schema.json')
 MEASURED = ('odometry', 'pose', 'twist')

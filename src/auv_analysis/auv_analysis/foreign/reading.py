@@ -11,8 +11,8 @@ from auv_analysis.foreign.containers import messages
 from auv_analysis.foreign.kinds import READERS, Reading, are_usable
 from auv_analysis.foreign.mapping import Source, TopicMap
 from auv_analysis.foreign.signals import Recorded
-from auv_dynamics.files import InputError
-from auv_dynamics.nearest import meant
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import meant
 
 TOGETHER = 4096  # messages that wait as objects before they become rows of arrays
 

@@ -17,7 +17,8 @@ from auv_analysis.bag.decoding import refusal
 from auv_analysis.bag.files import check_regular
 from auv_analysis.bag.limits import MOST_NAMED
 from auv_analysis.foreign.decoders import Decoder, Logged, decoded, decoder_of
-from auv_dynamics.files import InputError, read_yaml
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import read_yaml
 
 
 def survey_of_rosbags(bag: Path) -> Contents:

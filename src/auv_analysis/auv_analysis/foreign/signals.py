@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.foreign.mapping import HELD, Source
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.ros.interface import NANOSECONDS
 
 BACK = NANOSECONDS  # ns: stamps that fall by more have begun anew, less is a message that came late
 APART = NANOSECONDS  # ns between logged and stamped time from which they are two clocks

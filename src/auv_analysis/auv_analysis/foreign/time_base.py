@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from auv_analysis.foreign.tracks import Track
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.ros.interface import NANOSECONDS
 
 ENOUGH = 12  # velocity samples of a stretch, fewer are left out: no rate could be estimated
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.ros.interface import NANOSECONDS
 
 GAP_PERIODS = 5.0  # median periods, at least, that make a pause a gap
 GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in bursts

@@ -18,10 +18,10 @@ from auv_analysis.foreign.filtering import Stretch, filtered, given_window, narr
 from auv_analysis.foreign.local_polynomials import ORDER
 from auv_analysis.foreign.time_base import TimeBase
 from auv_analysis.foreign.tracks import Track, at_times, integral
-from auv_dynamics.interface import NANOSECONDS
-from auv_dynamics.jit import plain
-from auv_dynamics.model import coriolis, damping, restoring
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.kernel.compile import plain
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle.model import coriolis, damping, restoring
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 FILTER = 'local polynomials of order 3 (Savitzky-Golay for uneven stamps)'
 SMALL = 1e-6  # m/s, rad/s: step of the differences that tell how resistance depends on nu

@@ -6,8 +6,8 @@ from auv_analysis.foreign.time_base import TimeBase
 from auv_analysis.foreign.tracks import Track
 from auv_analysis.foreign.unexplained import FILTER, Unexplained
 from auv_analysis.report.text import join
-from auv_dynamics.interface import NANOSECONDS
-from auv_dynamics.signals import DOFS
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle import DOFS
 
 HOW = {
     'pose': 'position by straight lines, attitude by slerp',

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from auv_analysis.formats.draft import SNAME, Choices, Draft
-from auv_dynamics.files import LARGEST
-from auv_dynamics.vehicle import munk_terms
+from auv_analysis.formats.imported import SNAME, Choices, Draft
+from auv_dynamics.files.yaml_files import LARGEST
+from auv_dynamics.vehicle.vehicle import munk_terms
 
 NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 ASSIGNED = re.compile(rf'([A-Za-z][\w{{}}|\\\']*)\s*[=:]\s*({NUMBER})?')

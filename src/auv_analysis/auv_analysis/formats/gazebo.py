@@ -11,10 +11,13 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from auv_analysis.formats.draft import POSITIVE, SNAME, Choices, Draft
-from auv_analysis.formats.rigid_bodies import link_inertia
-from auv_analysis.formats.solids import displaced
-from auv_analysis.formats.xml_text import numbers
+from auv_analysis.formats.imported import (
+    POSITIVE,
+    SNAME,
+    Choices,
+    Draft,
+)
+from auv_analysis.formats.xml_parts import displaced, link_inertia, numbers
 
 ROWS, COLUMNS = 'xyzkmn', 'UVWPQR'
 COEFFICIENT = re.compile(r'([xyzkmn])(Dot)?([UVWPQR])(abs)?([UVWPQR])?')

@@ -6,9 +6,9 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from auv_analysis.formats.gazebo import COLUMNS, FLUID, ROWS
-from auv_dynamics.files import InputError
-from auv_dynamics.frames import swap_body_matrix, swap_inertia
-from auv_dynamics.vehicle import Vehicle, skew
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.frames import swap_body_matrix, swap_inertia
+from auv_dynamics.vehicle.vehicle import Vehicle, skew
 
 IN_PLUGIN, IN_LINK = 'plugin', 'link'
 HYDRODYNAMICS = 'filename="gz-sim-hydrodynamics-system" name="gz::sim::systems::Hydrodynamics"'

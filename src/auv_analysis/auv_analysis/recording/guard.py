@@ -1,8 +1,7 @@
 """What can go wrong with a file under a recorder, and what has."""
 
-from auv_analysis.failure import FailedError
 from auv_analysis.recording.bag_file import BagFile
-from auv_dynamics.files import first_line, reason
+from auv_dynamics.files.errors import FailedError, first_line, reason
 
 
 class RecordingError(FailedError):

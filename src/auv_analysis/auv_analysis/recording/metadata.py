@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from auv_analysis.new_files import replacing
+from auv_analysis.output.new_files import replacing
 
 DISTRO = 'jazzy'
 NAME = 'metadata.yaml'

@@ -5,7 +5,7 @@ import fcntl
 import os
 from pathlib import Path
 
-from auv_analysis.new_files import NEW
+from auv_analysis.output.new_files import NEW
 
 
 class Output:

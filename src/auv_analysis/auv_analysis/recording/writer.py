@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.new_files import sync_folder
+from auv_analysis.output.new_files import sync_folder
 from auv_analysis.recording.bag_file import BagFile
 from auv_analysis.recording.guard import Guard
 from auv_analysis.recording.keeper import Keeper
@@ -21,7 +21,7 @@ from auv_analysis.recording.metadata import (
     write_metadata,
 )
 from auv_analysis.recording.storage import Storage
-from auv_dynamics.files import reason
+from auv_dynamics.files.errors import reason
 
 CHUNK_PERIOD = 0.7  # s, after which a chunk is closed and handed to the system
 SYNC_PERIOD = 0.7  # s between two waits for the disk

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.bag.files import check_regular, split_order
-from auv_analysis.failure import FailedError
 from auv_analysis.recording.metadata import (
     NAME,
     ROOT,
@@ -27,7 +26,8 @@ from auv_analysis.recovery.in_place import (
     watch,
 )
 from auv_analysis.recovery.report import FileReport, Report
-from auv_dynamics.files import InputError, read_yaml
+from auv_dynamics.files.errors import FailedError, InputError
+from auv_dynamics.files.yaml_files import read_yaml
 
 KEPT = re.compile(r'(?P<target>.*\.mcap)\.damaged(\.(?P<number>\d+))?')
 EXPECTED = 'a bag: a folder with .mcap files, or an .mcap file'

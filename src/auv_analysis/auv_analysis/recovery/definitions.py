@@ -6,7 +6,8 @@ from typing import Any
 from mcap.records import Channel, Schema
 
 from auv_analysis.recording.metadata import Definition
-from auv_dynamics.files import InputError, parse_any_yaml
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import parse_any_yaml
 
 LARGEST_POLICIES = 1 << 21  # characters of the offered profiles of all topics; more are left out
 BETWEEN, SUMMARY, CHUNK = range(3)  # where a definition stands: the better its checksum, the higher

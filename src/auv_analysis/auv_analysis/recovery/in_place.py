@@ -8,11 +8,10 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from auv_analysis.failure import FailedError
-from auv_analysis.new_files import sync_folder, unfinished_name
+from auv_analysis.output.new_files import sync_folder, unfinished_name
 from auv_analysis.recovery.audit import Audit
 from auv_analysis.recovery.rewrite import Rewriter
-from auv_dynamics.files import InputError, reason
+from auv_dynamics.files.errors import FailedError, InputError, reason
 
 DAMAGED = '.damaged'  # ends the name under which a damaged file is kept
 QUIET = 2.0  # s: a file that was written more recently is watched for so long

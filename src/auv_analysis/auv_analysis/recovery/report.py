@@ -7,7 +7,7 @@ from typing import Any
 from auv_analysis.bag.roles import role_of
 from auv_analysis.recovery.audit import Audit
 from auv_analysis.recovery.spacing import Spacing
-from auv_dynamics.interface import NANOSECONDS, OPTIONAL_STEP_TOPICS, STEP_TOPICS
+from auv_dynamics.ros.interface import NANOSECONDS, OPTIONAL_STEP_TOPICS, STEP_TOPICS
 
 
 @dataclass

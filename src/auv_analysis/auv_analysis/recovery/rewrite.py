@@ -6,7 +6,7 @@ from pathlib import Path
 from mcap.records import Attachment, Chunk, Metadata
 from mcap.writer import Writer
 
-from auv_analysis.new_files import created, synced
+from auv_analysis.output.new_files import created, synced
 from auv_analysis.recording.metadata import Extent, as_text, metadata
 from auv_analysis.recording.storage import COMPRESSIONS
 from auv_analysis.recovery.audit import PROFILE, ROSBAG2, Audit

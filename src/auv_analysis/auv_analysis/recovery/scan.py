@@ -22,7 +22,7 @@ from auv_analysis.bag.framing import (
 from auv_analysis.bag.limits import LARGEST_CHUNK, Counts, TooManyError, check_length, decompressed
 from auv_analysis.bag.tables import Table, parts_of_chunk, parts_one_by_one
 from auv_analysis.recovery.anchors import CHUNK_HEAD, Anchors
-from auv_dynamics.files import InputError, first_line
+from auv_dynamics.files.errors import InputError, first_line
 
 COMPRESSIONS = (b'', b'lz4', b'zstd')
 

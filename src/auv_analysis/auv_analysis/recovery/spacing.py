@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.ros.interface import NANOSECONDS
 
 MOST = 4096  # different intervals that are told apart
 SHOWN = 10  # longest intervals whose place is remembered

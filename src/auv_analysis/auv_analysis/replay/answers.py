@@ -4,11 +4,10 @@ import time
 from typing import Any
 
 from auv_analysis.bag.roles import ODOMETRY, role_of
-from auv_dynamics import interface
-from auv_dynamics.interface import NANOSECONDS
-from auv_dynamics.ros import topics
+from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.graph import Graph
+from auv_dynamics.ros.interface import NANOSECONDS
 
 PATIENCE = 10.0  # s
 

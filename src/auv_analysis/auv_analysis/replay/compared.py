@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.replay.open_loop import OpenLoop, RecordedLoop
-from auv_dynamics import interface
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.ros import interface
+from auv_dynamics.ros.interface import NANOSECONDS
 
 LOCKSTEP = 1e-9  # of the rms: rounding of another machine; on the same one nothing differs
 REAL_TIME = 0.05  # the bag does not say when each message arrived

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.endpoints import NAMED, NAMELESS, acts, full_name, other_subscribers
 
 

@@ -11,8 +11,8 @@ from auv_analysis.bag.files import bag_files
 from auv_analysis.bag.records import records
 from auv_analysis.bag.tables import Table, by_channel
 from auv_analysis.replay.playback import GAP
-from auv_dynamics.files import InputError
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros.interface import NANOSECONDS
 
 NEVER = 1 << 64  # ns, later than every log time
 LATEST = (1 << 31) * NANOSECONDS  # of a ROS time

@@ -17,13 +17,13 @@ from auv_analysis.bag import attached
 from auv_analysis.bag.contents import Contents, NotOursError, Series
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.steps import topics_of_one_graph
-from auv_analysis.node_parameters import CONTROLLER
+from auv_analysis.graph.node_parameters import CONTROLLER
 from auv_analysis.replay.recorded_controller import RecordedController
-from auv_dynamics import interface
-from auv_gvc_controller.controller import Answer, VelocityController
-from auv_gvc_controller.hand_over import FEWEST
-from auv_gvc_controller.pairing import Pairing
-from auv_gvc_controller.stamp_age import Now
+from auv_dynamics.ros import interface
+from auv_gvc_controller.control.controller import Answer, VelocityController
+from auv_gvc_controller.control.output_stage import FEWEST
+from auv_gvc_controller.control.setpoint_buffer import Pairing
+from auv_gvc_controller.control.stamp_age import Now
 
 Progress = Callable[[int], None]
 

@@ -3,9 +3,9 @@
 import re
 from typing import Any
 
+from auv_analysis.bag.schemas import definition
 from auv_analysis.replay.index import PlayedTopic
 from auv_analysis.replay.selection import Selection
-from auv_analysis.schemas import definition
 from auv_dynamics.ros.endpoints import full_name
 from auv_dynamics.ros.graph import Graph
 from auv_dynamics.ros.kinds import message_class

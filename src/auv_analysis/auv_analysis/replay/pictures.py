@@ -10,7 +10,7 @@ from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import save_figures
 from auv_analysis.report.plotting import COLOURS, DASHES, INPUT
 from auv_analysis.report.traces import FEW, thinned
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 NAME = 'open_loop_wrench'
 ORDER = (0, 3, 1, 4, 2, 5)  # forces left, moments right

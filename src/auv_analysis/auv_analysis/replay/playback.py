@@ -2,7 +2,7 @@
 
 import math
 
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.ros.interface import NANOSECONDS
 
 HELD = math.inf
 GAP = 60 * NANOSECONDS  # ns without a message, from which it is a gap

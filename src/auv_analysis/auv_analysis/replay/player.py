@@ -6,18 +6,17 @@ from collections.abc import Iterator
 from typing import Any
 
 from auv_analysis.bag.roles import ODOMETRY
+from auv_analysis.nodes.replay_parameters import ReplayParameters
 from auv_analysis.replay.answers import Answers, is_odometry
 from auv_analysis.replay.guard import Guard
 from auv_analysis.replay.outputs import make_publishers
 from auv_analysis.replay.playback import Playback
 from auv_analysis.replay.selection import REPLAY, nothing_left
 from auv_analysis.replay.stream import Logged, messages
-from auv_analysis.replay_parameters import ReplayParameters
-from auv_dynamics import interface
-from auv_dynamics.interface import BadMessageError
-from auv_dynamics.ros import topics
+from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.commands import Commands
 from auv_dynamics.ros.endpoints import onlookers
+from auv_dynamics.ros.interface import BadMessageError
 from auv_dynamics.ros.receivers import Receivers
 
 BATCH = 0.01  # s of messages between two looks at services and signals

@@ -7,13 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.bag import attached
-from auv_dynamics.files import InputError
-from auv_dynamics.vehicle import Vehicle
-from auv_gvc_controller.controller import VelocityController
-from auv_gvc_controller.laws import law_class, make_gains, refusal, try_law
-from auv_gvc_controller.model import control_model
-from auv_gvc_controller.pairing import SAME, Pairing
-from auv_gvc_controller.settings import ControllerSettings, usual_acceleration
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_gvc_controller.control.controller import VelocityController
+from auv_gvc_controller.control.setpoint_buffer import SAME, Pairing
+from auv_gvc_controller.control.settings import ControllerSettings, usual_acceleration
+from auv_gvc_controller.laws.law import (
+    law_class,
+    make_gains,
+    refusal,
+    try_law,
+)
+from auv_gvc_controller.laws.model import control_model
 
 
 class RecordedController:

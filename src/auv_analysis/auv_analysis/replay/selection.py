@@ -7,9 +7,9 @@ from fnmatch import fnmatchcase
 
 from auv_analysis.bag.roles import WRENCH
 from auv_analysis.replay.index import BagIndex
-from auv_dynamics import interface
-from auv_dynamics.files import InputError
-from auv_dynamics.nearest import one_of
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import one_of
+from auv_dynamics.ros import interface
 
 REPLAY = 'replay'  # namespace in which nothing of a vehicle listens
 DERIVED = (

@@ -11,7 +11,7 @@ from auv_analysis.report import plotting
 from auv_analysis.report.plotting import COLOURS
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.text import join, number
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 BEYOND = 3.0  # times what else is to be seen: a command that is cut off and told in the panel
 ROOM = 1.25  # of the axis above what it shows

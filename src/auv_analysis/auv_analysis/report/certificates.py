@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report import plotting
 from auv_analysis.report.sketch import Sketch
-from auv_analysis.summary import TRANSIENT
 
 IDENTITY, BOUND, MEASURED = '#56B4E9', '#D55E00', '#1a1a1a'
 APART = 10.0  # ratio of a largest value to what else is to be seen, from which it is logarithmic

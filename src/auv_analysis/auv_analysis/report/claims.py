@@ -12,9 +12,9 @@ from auv_analysis.report.paper import CASES, is_plain, paper_run
 from auv_analysis.report.sketch import TINY, Sketch
 from auv_analysis.report.sketching import sketches
 from auv_analysis.report.text import MISSING
-from auv_analysis.run import AnyRun
-from auv_analysis.scenario import load_scenario
-from auv_dynamics.disturbance import make_disturbance
+from auv_analysis.runs.run import AnyRun
+from auv_analysis.scenario.scenario import load_scenario
+from auv_dynamics.plant.disturbance import make_disturbance
 
 SAME = 1e-3  # of the peak: set-points and disturbances that are nearer are the paper's
 GAINS = {

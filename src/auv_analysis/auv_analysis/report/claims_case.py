@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report.claims_motion import ERRORS, U, W
 from auv_analysis.report.evidence import Evidence, Finding, Verdict, grade, settled, spell
 from auv_analysis.report.quotes import Quotes, percent, short
 from auv_analysis.report.sketching import NEAR_ZERO
-from auv_analysis.summary import TRANSIENT
 
 SLIGHTLY = 0.10  # relative difference of inputs that differ 'only slightly'
 COMPARABLE = 0.05  # of efforts that are 'comparable'

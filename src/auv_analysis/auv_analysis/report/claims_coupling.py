@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from auv_analysis.energy import shares
+from auv_analysis.metrics.energy import shares
+from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report import paper
 from auv_analysis.report.claims_motion import ERRORS, FAR, P, Q, V
 from auv_analysis.report.evidence import Evidence, Finding, Signals, grade, spell
 from auv_analysis.report.quotes import Quotes, decimals, short
-from auv_analysis.summary import TRANSIENT
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 WITHIN = 0.02  # of the paper's kinetic energy
 POINTS = 1.0  # percentage points of a share

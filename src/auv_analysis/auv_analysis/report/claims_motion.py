@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report.evidence import Evidence, Finding, grade, settled, spell
 from auv_analysis.report.quotes import Quotes, decimals, short
 from auv_analysis.report.sketch import last_third
 from auv_analysis.report.sketching import NEAR_ZERO
-from auv_analysis.summary import TRANSIENT
 
 U, V, W, P, Q, R = range(6)
 FAR = 10.0  # times: what counts as much larger

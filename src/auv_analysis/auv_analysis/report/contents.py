@@ -16,7 +16,7 @@ from auv_analysis.report.rendering import prose
 from auv_analysis.report.set_up import SetUp
 from auv_analysis.report.sketch import TINY, Sketch, alike
 from auv_analysis.report.tables.controllers import notes
-from auv_analysis.run import FOREIGN
+from auv_analysis.runs.run import FOREIGN
 
 FIGURES = {  # part of the report -> beginnings of the names of its figures
     'errors': ('errors_', 'settling'),

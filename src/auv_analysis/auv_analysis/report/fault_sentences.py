@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from auv_analysis.fault_response import Response
+from auv_analysis.metrics.fault_response import Response
 from auv_analysis.report.document import Sentence
 from auv_analysis.report.text import fixed, number, plain
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 Found = Mapping[str, Sequence[Response]]
 SAME = 0.1  # of the error before: a smaller change is none

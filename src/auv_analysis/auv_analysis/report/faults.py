@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from auv_analysis.fault_response import Response, responses, write_responses
+from auv_analysis.metrics.fault_response import Response, responses, write_responses
 from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.fault_figure import fault_figure
 from auv_analysis.report.fault_sentences import fault_overview, fault_sentences
 from auv_analysis.report.sketching import sketches
 from auv_analysis.report.tables.faults import fault_tables
-from auv_analysis.run import AnyRun
+from auv_analysis.runs.run import AnyRun
 
 ABOUT = (
     'The simulated vehicle has faults that the controllers do not know of. Each is held against '

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from auv_analysis.counting import each
+from auv_analysis.output.progress import each
 from auv_analysis.report import plotting
 
 Drawn = tuple[Figure | None, str, str]  # with title and caption

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from auv_analysis.coupling import structural_zeros
-from auv_analysis.lyapunov import OF_THE_MOTION
+from auv_analysis.metrics.coupling import structural_zeros
+from auv_analysis.metrics.lyapunov import OF_THE_MOTION
+from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report import overview, plotting
 from auv_analysis.report.applied import applied_figure
 from auv_analysis.report.certificates import certificate_figure, is_drawn
@@ -23,10 +24,9 @@ from auv_analysis.report.sketching import sketches
 from auv_analysis.report.statistics import Part
 from auv_analysis.report.text import join, number
 from auv_analysis.report.unexplained import unexplained_figure
-from auv_analysis.run import AnyRun
-from auv_analysis.summary import TRANSIENT
-from auv_dynamics.signals import DOFS
-from auv_gvc_controller.model import control_model
+from auv_analysis.runs.run import AnyRun
+from auv_dynamics.vehicle import DOFS
+from auv_gvc_controller.laws.model import control_model
 
 SIGNALS = {  # kind of figure -> signal of `Sketch`
     'errors': 'error',

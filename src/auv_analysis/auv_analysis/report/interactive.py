@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from auv_analysis.fault_words import Mark
+from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report.packing import Packer, packed
 from auv_analysis.report.panel import Panel, PanelLine, PanelSet
 from auv_analysis.report.panel_models import DASHES, model
@@ -14,8 +14,8 @@ from auv_analysis.report.panels import panel_sets
 from auv_analysis.report.plotting import COLOURS
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.traces import COLUMNS, Line, broken, thinned
-from auv_analysis.summary import TRANSIENT
-from auv_dynamics.signals import DOFS
+from auv_analysis.scenario.fault_words import Mark
+from auv_dynamics.vehicle import DOFS
 
 POINTS = 300_000  # of all panels together, at most 1.3 MB of the page
 FEWEST = 200  # columns of pixels that a line keeps however many lines there are

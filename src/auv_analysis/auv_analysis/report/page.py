@@ -19,7 +19,7 @@ from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
 from auv_analysis.report.tables.claims import write_claims
 from auv_analysis.report.text import join
-from auv_analysis.run import AnyRun
+from auv_analysis.runs.run import AnyRun
 
 Texts = str | Mapping[str, str]
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from auv_analysis.fault_words import Mark
+from auv_analysis.scenario.fault_words import Mark
 
 HEIGHT = 230  # px
 NUMBERS_AT, NUMBERS_APART = 170, 13  # px above the time axis, of the faults

@@ -11,7 +11,7 @@ from auv_analysis.report.plotting import COLOURS, GREY, Quantity
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.text import join
 from auv_analysis.report.traces import Line
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 THIN, THICK = 1.0, 3.0  # of lines, px; the thick ones lie under others
 INK = 'ink'  # the colour of the text, light or dark

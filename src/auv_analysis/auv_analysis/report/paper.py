@@ -5,9 +5,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from auv_analysis import summary
-from auv_analysis.run import Facts
-from auv_dynamics.files import matrix6
+from auv_analysis.metrics import summary
+from auv_analysis.runs.run import Facts
+from auv_dynamics.files.yaml_files import matrix6
 
 AnyFacts = TypeVar('AnyFacts', bound=Facts)
 CITATION = (

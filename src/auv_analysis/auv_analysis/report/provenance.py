@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 
-from auv_dynamics.jit import sources_digest
+from auv_dynamics.kernel.compile import sources_digest
 
 PACKAGES = ('auv_analysis', 'auv_gvc_controller', 'auv_dynamics', 'numpy', 'numba', 'scipy')
 
@@ -35,7 +35,7 @@ class Provenance:
 def provenance() -> Provenance:
     """What made a report that is written now."""
     program = Path(sys.argv[0])
-    ours = program.stem == 'auv' or program.match('auv_analysis/cli.py')
+    ours = program.stem == 'auv' or program.match('auv_analysis/cli/main.py')
     versions = {'Python': platform.python_version()}
     for package in PACKAGES:
         try:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.fault_words import Mark, marks_of
 from auv_analysis.report.tables.sources import numbers_in
 from auv_analysis.report.text import join, number, plain
 from auv_analysis.report.words import (
@@ -19,12 +18,14 @@ from auv_analysis.report.words import (
     per_axis,
     rotations,
 )
-from auv_analysis.run import FOREIGN, Facts
-from auv_analysis.scenario import SCHEMA
-from auv_dynamics.faults import ACTING, SENSING
-from auv_dynamics.files import InputError, check, parse_yaml
-from auv_dynamics.signals import DOFS
-from auv_gvc_controller.gains import sampling_warning
+from auv_analysis.runs.run import FOREIGN, Facts
+from auv_analysis.scenario.fault_words import Mark, marks_of
+from auv_analysis.scenario.scenario import SCHEMA
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import check, parse_yaml
+from auv_dynamics.plant.faults import ACTING, SENSING
+from auv_dynamics.vehicle import DOFS
+from auv_gvc_controller.control.gains import sampling_warning
 
 VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
 KEYS = {'set-point': 'setpoint', 'start': 'initial', 'disturbances': 'disturbance'}

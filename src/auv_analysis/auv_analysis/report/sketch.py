@@ -7,7 +7,7 @@ import numpy as np
 
 from auv_analysis.report.statistics import Part, Statistics
 from auv_analysis.report.traces import Line, Trace, broken
-from auv_analysis.run import Extent, Facts
+from auv_analysis.runs.run import Extent, Facts
 
 FOREVER = float('inf')
 FEWEST_SHARED = 10  # samples at equal times, from which on courses are compared

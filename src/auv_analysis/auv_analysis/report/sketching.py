@@ -5,17 +5,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from auv_analysis.certificate import LAWS
-from auv_analysis.certificate_figures import certificate_blocks
-from auv_analysis.coupling import delta_pi, delta_xi
-from auv_analysis.energy import kinetic_energy, shares
+from auv_analysis.metrics.certificate import LAWS, certificate_blocks
+from auv_analysis.metrics.coupling import delta_pi, delta_xi
+from auv_analysis.metrics.energy import kinetic_energy, shares
+from auv_analysis.metrics.summary import TRANSIENT, has_settled
 from auv_analysis.report import paper
 from auv_analysis.report.sketch import FOREVER, Sketch, cut_before, cut_behind, last_third
 from auv_analysis.report.statistics import Statistics
 from auv_analysis.report.traces import Line, Trace
-from auv_analysis.run import AnyRun, Facts, Run
-from auv_analysis.summary import TRANSIENT, has_settled
-from auv_gvc_controller.model import ControlModel, control_model
+from auv_analysis.runs.run import AnyRun, Facts, Run
+from auv_gvc_controller.laws.model import ControlModel, control_model
 
 SPLIT = ('error', 'lumped_error', 'tau', 'delta_pi')  # begin with a peak that dwarfs the rest
 WHOLE = (

@@ -6,7 +6,7 @@ from functools import reduce
 
 import numpy as np
 
-from auv_analysis.windows import Windows
+from auv_analysis.runs.run import Windows
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from auv_analysis.report import plotting
 from auv_analysis.report.plotting import COLOURS, GREY
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.text import number
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 BEYOND = 3.0  # times F: a wrench that is cut off, its extremes told above the panel
 BAND = 0.3  # opacity

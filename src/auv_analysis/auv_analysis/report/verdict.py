@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.lyapunov import OF_THE_MOTION
+from auv_analysis.metrics.lyapunov import OF_THE_MOTION
+from auv_analysis.metrics.summary import SMALLEST_BAND
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.sketch import Sketch, alike
 from auv_analysis.report.text import join, number
-from auv_analysis.summary import SMALLEST_BAND
-from auv_dynamics.config import shipped_names
-from auv_dynamics.signals import DOFS
-from auv_gvc_controller.laws import SHIPPED
+from auv_dynamics.files.shipped import shipped_names
+from auv_dynamics.vehicle import DOFS
+from auv_gvc_controller.laws.law import SHIPPED
 
 Summary = Mapping[str, Any]
 FAILED = 'another controller did not come to its end'  # begins the note of it

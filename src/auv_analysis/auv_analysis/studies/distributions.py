@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.files import shorten
+from auv_dynamics.files.errors import shorten
 
 Values = np.ndarray | list[Any]  # numbers and true/false as an array, words and lists as they are
 LARGEST_INTEGER = 2**63 - 1

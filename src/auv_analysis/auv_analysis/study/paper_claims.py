@@ -4,19 +4,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from auv_analysis.changes import changed_scenario
 from auv_analysis.report import paper
 from auv_analysis.report.claim import BOTH, Claim
 from auv_analysis.report.claims import judged
 from auv_analysis.report.evidence import Evidence, Response, Signals
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
-from auv_analysis.run import AnyRun
-from auv_analysis.scenario import Scenario, load_scenario
-from auv_analysis.simulation import Hold, simulate
+from auv_analysis.runs.run import AnyRun
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.scenario.scenario import Scenario, load_scenario
+from auv_analysis.simulation.simulate import Hold, simulate
 from auv_analysis.studies.study.responses import response
 from auv_analysis.studies.study.sensitivity import Sensitivity, sensitivity
-from auv_gvc_controller.model import control_model
+from auv_gvc_controller.laws.model import control_model
 
 COMPARED = ('duration', 'step', 'integrator', 'initial', 'setpoint', 'disturbance')
 SENSITIVE_CASE = 'case1'  # whose gains the claim on sensitivity is of

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.changes import changed_scenario
 from auv_analysis.report import paper
-from auv_analysis.scenario import Scenario
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.scenario.scenario import Scenario
 
 R_G = (0.15, 0.0, 0.03)  # m; section 5
 MASS = (185.0, 300.0)  # kg: what Δξ of sway leaves, and X_udot <= 0

@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.energy import shares
-from auv_analysis.new_files import write_table
+from auv_analysis.metrics.energy import shares
+from auv_analysis.output.new_files import write_table
 from auv_analysis.report.claims_rows import ROWS
 from auv_analysis.report.evidence import DECIDED
 from auv_analysis.report.paper import KINETIC_ENERGY
 from auv_analysis.study.robustness import Held, Robustness
 from auv_analysis.study.unknowns import NAMES
 from auv_analysis.study.unknowns_run import Unknowns
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 VERDICTS, CLAIMS, ENERGY = 'unknowns.parquet', 'unknowns_claims.parquet', 'energy_window.parquet'
 SPLIT = ('threshold', 'below', 'above', 'explained')

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from auv_analysis.energy import shares
+from auv_analysis.metrics.energy import shares
 from auv_analysis.report import paper
 from auv_analysis.report.document import Cell, Column, Sentence, Table, cell
 from auv_analysis.report.quantities import Maths
@@ -14,7 +14,7 @@ from auv_analysis.study.robustness import FAILS, HOLDS, Held, Robustness, energy
 from auv_analysis.study.unknowns import DAMPING, M46, MASS
 from auv_analysis.study.unknowns_file import CLAIMS, ENERGY, to_paper
 from auv_analysis.study.unknowns_run import Unknowns
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 WORDS = {  # unknown -> how it is called, and its unit
     'mass': ('the mass', ' kg'),

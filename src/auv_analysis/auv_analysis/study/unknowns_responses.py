@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from auv_analysis.changes import changed_scenario
 from auv_analysis.report.claim import BOTH
 from auv_analysis.report.evidence import Response
-from auv_analysis.rollouts import rollouts
-from auv_analysis.scenario import Scenario
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.rollouts import rollouts
 from auv_analysis.studies.study.responses import (
     error_columns,
     followed,

@@ -5,21 +5,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from auv_analysis.changes import changed_scenario
-from auv_analysis.energy import kinetic_energy
+from auv_analysis.metrics.energy import kinetic_energy
 from auv_analysis.report.claim import BOTH
 from auv_analysis.report.claims import judged
 from auv_analysis.report.evidence import Evidence, Response, Signals, Verdict
 from auv_analysis.report.paper import CASES, CL_GAINS, GVC_GAINS
 from auv_analysis.report.sketching import sketch
-from auv_analysis.run import Run
-from auv_analysis.scenario import Scenario
-from auv_analysis.simulation import DivergedError, simulate
+from auv_analysis.runs.run import Run
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.study.paper_claims import SENSITIVE_CASE, case_of, departures_of
 from auv_analysis.study.unknowns import Variant, scenario_of, variants
 from auv_analysis.study.unknowns_responses import responses_of
-from auv_dynamics.files import InputError
-from auv_gvc_controller.model import control_model
+from auv_dynamics.files.errors import InputError
+from auv_gvc_controller.laws.model import control_model
 
 WINDOWS = (10.0, 30.0)  # s: how long the runs may have been
 ENDS = np.arange(50, 301) / 10  # s: of the windows of the mean kinetic energy

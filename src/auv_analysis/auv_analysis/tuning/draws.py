@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.changes import changed_scenario
-from auv_analysis.scenario import Scenario
-from auv_dynamics.files import InputError
-from auv_dynamics.nearest import one_of
-from auv_dynamics.signals import DOFS
-from auv_dynamics.vehicle import Vehicle
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.scenario.scenario import Scenario
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import one_of
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 FREQUENCIES = 0.3, 1.5  # rad/s, of the waves' forces
 BELOW_ONE = ('mass', 'added_mass', 'damping', 'buoyancy', 'inertia')  # no plant without any

@@ -10,8 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_analysis.run import Run
-from auv_analysis.summary import SETTLED, TRANSIENT, has_settled, settling_time
+from auv_analysis.metrics.summary import (
+    SETTLED,
+    TRANSIENT,
+    has_settled,
+    settling_time,
+)
+from auv_analysis.runs.run import Run
 from auv_analysis.tuning.record import Cost
 
 

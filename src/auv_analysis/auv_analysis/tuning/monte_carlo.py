@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.batch import Batch, run_batch
-from auv_analysis.closed_loop import Tables
-from auv_analysis.rollouts import batch_of
-from auv_analysis.scenario import Scenario
-from auv_analysis.simulation import Hold
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.batch import Batch, run_batch
+from auv_analysis.simulation.closed_loop import Tables
+from auv_analysis.simulation.rollouts import batch_of
+from auv_analysis.simulation.simulate import Hold
+from auv_analysis.simulation.variants import Variants, merged, packed_variants
 from auv_analysis.tuning.draws import Spread, drawn
 from auv_analysis.tuning.measures import Measures, measures_of
 from auv_analysis.tuning.record import Cost
-from auv_analysis.variants import Variants, merged, packed_variants
 
 
 def monte_carlo(

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.authority import beyond_authority
-from auv_analysis.scenario import Scenario
+from auv_analysis.metrics.authority import beyond_authority
+from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.tuning.comparison import Comparison
 from auv_analysis.tuning.draws import Spread, applied
 from auv_analysis.tuning.measures import MEANINGS, Measures

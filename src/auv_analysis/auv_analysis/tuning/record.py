@@ -4,12 +4,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_analysis.records import Sample
-from auv_analysis.reduction import at_start, keep_divergence, keep_last
-from auv_dynamics.jit import helper
-from auv_dynamics.lanes import Number, select
-from auv_dynamics.six import Six, Vector, diag, sub, upper, upper_T, vector
-from auv_gvc_controller.model import ControlModel
+from auv_analysis.simulation.records import Sample
+from auv_analysis.simulation.reduction import at_start, keep_divergence, keep_last
+from auv_dynamics.kernel.compile import helper
+from auv_dynamics.kernel.lanes import Number, select
+from auv_dynamics.kernel.six import (
+    Six,
+    Vector,
+    diag,
+    sub,
+    upper,
+    upper_T,
+    vector,
+)
+from auv_gvc_controller.laws.model import ControlModel
 
 
 class Cost(NamedTuple):

@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.changes import changed_scenario
 from auv_analysis.report.text import join, number
-from auv_analysis.scenario import Scenario
-from auv_analysis.simulation import DivergedError, Hold
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.simulate import DivergedError, Hold
 from auv_analysis.tuning.loops import measured
 from auv_analysis.tuning.measures import Measures
 from auv_analysis.tuning.search import Found, Goal, search
 from auv_analysis.tuning.space import BEST, EDGE, Space, make_space
-from auv_gvc_controller.gains import body_gains, sampled_rate
-from auv_gvc_controller.laws import SHIPPED, make_gains
-from auv_gvc_controller.model import ControlModel, control_model
+from auv_gvc_controller.control.gains import body_gains, sampled_rate
+from auv_gvc_controller.laws.law import SHIPPED, make_gains
+from auv_gvc_controller.laws.model import ControlModel, control_model
 
 POINTS = 1024  # of a Sobol sequence
 

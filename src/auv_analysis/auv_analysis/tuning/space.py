@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.files import matrix6
-from auv_dynamics.signals import DOFS
-from auv_gvc_controller.gains import body_gains, sampled_rate
-from auv_gvc_controller.laws import make_gains
-from auv_gvc_controller.model import ControlModel
+from auv_dynamics.files.yaml_files import matrix6
+from auv_dynamics.vehicle import DOFS
+from auv_gvc_controller.control.gains import body_gains, sampled_rate
+from auv_gvc_controller.laws.law import make_gains
+from auv_gvc_controller.laws.model import ControlModel
 
 STRUCTURES = {
     'scalar': 'a number times the identity',

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.changes import changed_scenario
-from auv_analysis.experiment import write_inputs
-from auv_analysis.failure import FailedError
-from auv_analysis.scenario import Scenario, load_scenario
-from auv_analysis.simulation import DivergedError, simulate
+from auv_analysis.graph.experiment import write_inputs
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.scenario.scenario import Scenario, load_scenario
+from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.tuning.comparison import Comparison, compare
 from auv_analysis.tuning.draws import Spread
 from auv_analysis.tuning.measures import Measures, measures_of_run
 from auv_analysis.tuning.monte_carlo import monte_carlo, of_each
 from auv_analysis.tuning.outcome import Outcome
 from auv_analysis.tuning.rivals import Request, Rival, goal_of, structures_of, tuned
+from auv_dynamics.files.errors import FailedError
 
 SAME = 1e-6  # relative: a batch and a single run differ by rounding alone
 LONGEST = 100  # characters of a scenario's name

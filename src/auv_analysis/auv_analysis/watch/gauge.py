@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from auv_analysis.live_analysis import LiveAnalysis
+from auv_analysis.metrics.live_analysis import LiveAnalysis
 from auv_analysis.watch.health import STEP_TOPICS, Health
 from auv_analysis.watch.motion import Motion
 from auv_analysis.watch.snapshot import NodeState, Six, Snapshot, TopicState, Trouble
 from auv_analysis.watch.stream import Stream
-from auv_dynamics import interface
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.ros import interface
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from auv_dynamics.ros.endpoints import Endpoints

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from auv_analysis.watch.snapshot import NodeState, TopicState, Trouble
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 if TYPE_CHECKING:
     from auv_dynamics.ros.endpoints import Endpoints

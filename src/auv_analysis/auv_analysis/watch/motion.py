@@ -6,10 +6,10 @@ from collections import OrderedDict
 
 import numpy as np
 
-from auv_analysis.live_analysis import LiveAnalysis
+from auv_analysis.metrics.live_analysis import LiveAnalysis
 from auv_analysis.watch.snapshot import Energy, Errors, Six
 from auv_analysis.watch.trend import BUCKET, BUCKETS, Trend
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 CAPACITY = 4096  # set-points that are kept; more than any horizon that is accepted
 PENDING = 512  # messages that wait for the one of the same stamp

@@ -5,10 +5,10 @@ from collections.abc import Callable
 from rich.console import RenderableType
 from rich.table import Table
 
-from auv_analysis.share_bar import share_bar
+from auv_analysis.output.progress import share_bar
 from auv_analysis.watch.snapshot import Six, Snapshot
 from auv_analysis.watch.text import MISSING, fixed, short, spark
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 WIDE = 116  # columns from which set-points, rms and history are shown as well
 HISTORY = 20  # half seconds

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from auv_analysis.watch.snapshot import NodeState, Snapshot, TopicState, Trouble
 from auv_analysis.watch.text import count, fact, rate, seconds
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 ANALYSIS = f'{posixpath.commonpath(interface.ANALYSIS_TOPICS)}/*'
 BASIC = (interface.ODOM, interface.CMD_VEL, interface.WRENCH)  # shown though nobody publishes them

@@ -9,7 +9,7 @@ from auv_analysis.watch.panels import nodes_table, topics_table, troubles_lines
 from auv_analysis.watch.sampling import LISTEN, PERIOD
 from auv_analysis.watch.snapshot import Snapshot
 from auv_analysis.watch.text import short, stamp
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 ABOVE = 11  # lines of heading, motion, footnote and the head of the lists
 

@@ -17,12 +17,11 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from auv_dynamics import interface
-from auv_dynamics.files import first_line
-from auv_dynamics.interface import NANOSECONDS, BadMessageError, Frames
-from auv_dynamics.ros import convert
+from auv_dynamics.files.errors import first_line
+from auv_dynamics.ros import convert, interface
+from auv_dynamics.ros.interface import NANOSECONDS, BadMessageError, Frames
 from auv_dynamics.ros.private import PLAIN
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 STAMP = 'iI'  # Time: seconds and nanoseconds
 FIRST_FIELD = 4  # bytes of the CDR encapsulation come before it

@@ -6,8 +6,8 @@ from geometry_msgs.msg import WrenchStamped
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 
-from auv_dynamics.interface import Frames
 from auv_dynamics.ros.codec import KINDS, message_of
+from auv_dynamics.ros.interface import Frames
 
 ACKNOWLEDGED = Duration(seconds=0.5)
 

@@ -7,8 +7,8 @@ from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 
-from auv_dynamics.interface import NANOSECONDS, Frames
-from auv_dynamics.signals import DOFS
+from auv_dynamics.ros.interface import NANOSECONDS, Frames
+from auv_dynamics.vehicle import DOFS
 
 
 def stamp(ns: int) -> Time:

@@ -7,7 +7,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, ReliabilityPolicy, qos_check_compatible
 
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 from auv_dynamics.ros.kinds import type_name
 from auv_dynamics.ros.topics import Topic
 

@@ -17,13 +17,13 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-from auv_dynamics.files import InputError
-from auv_dynamics.interface import BadMessageError, Frames
-from auv_dynamics.nearest import meant
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.codec import Codec
 from auv_dynamics.ros.convert import stamp
 from auv_dynamics.ros.endpoints import crowds, has_conflict, onlookers
 from auv_dynamics.ros.health import ERROR, Health, Lasting, kind_of, worst
+from auv_dynamics.ros.interface import BadMessageError, Frames
 from auv_dynamics.ros.parameters import declare
 from auv_dynamics.ros.topics import (
     ANALYSIS_TOPICS,

@@ -8,7 +8,7 @@ from typing import Any
 
 from rclpy.qos import QoSProfile
 
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 NAME = re.compile(r'([a-z]\w*)/msg/([A-Z]\w*)', re.ASCII)
 STAMPED_TYPES = ('std_msgs/msg/Header', 'rosgraph_msgs/msg/Clock')

@@ -15,10 +15,10 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, T
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
-from auv_dynamics.ending import take_signals
-from auv_dynamics.files import InputError, first_line
-from auv_dynamics.interface import NANOSECONDS, PARENT
+from auv_dynamics.files.ending import take_signals
+from auv_dynamics.files.errors import InputError, first_line
 from auv_dynamics.ros.bulk import DataPath
+from auv_dynamics.ros.interface import NANOSECONDS, PARENT
 from auv_dynamics.ros.private import PLAIN, RCLError, RMWError
 from auv_dynamics.ros.reach import say_local, stay_local
 from auv_dynamics.ros.security import asked

@@ -12,15 +12,14 @@ import numpy as np
 from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 
-from auv_dynamics import interface
-from auv_dynamics.frames import (
+from auv_dynamics.ros import convert, interface
+from auv_dynamics.ros.interface import BadMessageError, Frames
+from auv_dynamics.vehicle.frames import (
     swap_body,
     swap_body_matrix,
     swap_earth_matrix,
     swap_state,
 )
-from auv_dynamics.interface import BadMessageError, Frames
-from auv_dynamics.ros import convert
 
 CHILD, WORLD = 'child', 'world'  # frame in which an odometry's twist is written
 _MAKERS: dict[type, Callable[..., Any]] = {
@@ -85,7 +84,7 @@ def mirrored_odometry(
     poses = _covariance(message.pose.covariance, f'{topic}: pose.covariance')
     twists = _covariance(message.twist.covariance, f'{topic}: twist.covariance')
     if twist_frame == WORLD:
-        from auv_dynamics.kinematics import rotation  # which loads numba, needed here alone
+        from auv_dynamics.vehicle.kinematics import rotation  # which loads numba, needed here alone
 
         to_child = np.kron(np.eye(2), rotation(x[3:7]).T)
         x[7:] = to_child @ x[7:]

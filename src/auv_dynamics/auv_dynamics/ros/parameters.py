@@ -9,11 +9,12 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from auv_dynamics import nearest
-from auv_dynamics.files import InputError
-from auv_dynamics.interface import NANOSECONDS
+from auv_dynamics.files import nearest
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.plant.signals import harmonic_spec
+from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.ros.private import declared, overrides
-from auv_dynamics.signals import DOFS, harmonic_spec
+from auv_dynamics.vehicle import DOFS
 
 LONGEST = 1e9  # s of a step or a run: stamps end in 2038
 KNOWN_TO_ALL = ('use_sim_time', 'start_type_description_service')

@@ -7,7 +7,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.graph import steady_timer
 
 ASK_AGAIN = 1.0  # s: an answer is lost when it comes before both ends have matched

@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 ENABLE, STRATEGY = 'ROS_SECURITY_ENABLE', 'ROS_SECURITY_STRATEGY'
 KEYSTORE = 'ROS_SECURITY_KEYSTORE'

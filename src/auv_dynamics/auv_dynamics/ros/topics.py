@@ -10,7 +10,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 
 DEPTH = 3000  # of step topics: above every recorder_window and horizon that is accepted
 

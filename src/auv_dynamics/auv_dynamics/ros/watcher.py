@@ -9,7 +9,7 @@ from rclpy.task import Future
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
-from auv_dynamics import interface
+from auv_dynamics.ros import interface
 from auv_dynamics.ros.endpoints import observes
 from auv_dynamics.ros.participant import Participant
 from auv_dynamics.ros.peers import ASK_AGAIN

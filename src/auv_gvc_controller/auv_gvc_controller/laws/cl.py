@@ -4,9 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_dynamics.model import coriolis, damping, restoring
-from auv_dynamics.six import Numbers, Vector, add, mul, sub, vector
-from auv_gvc_controller.model import ControlModel
+from auv_dynamics.kernel.six import (
+    Numbers,
+    Vector,
+    add,
+    mul,
+    sub,
+    vector,
+)
+from auv_dynamics.vehicle.model import coriolis, damping, restoring
+from auv_gvc_controller.laws.model import ControlModel
 
 
 class CL(NamedTuple):

@@ -4,11 +4,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.jit import helper
-from auv_dynamics.lanes import clip
-from auv_dynamics.model import coriolis, damping, restoring
-from auv_dynamics.six import Numbers, Six, Vector, add, mul, sub, vector
-from auv_gvc_controller.model import ControlModel
+from auv_dynamics.kernel.compile import helper
+from auv_dynamics.kernel.lanes import clip
+from auv_dynamics.kernel.six import (
+    Numbers,
+    Six,
+    Vector,
+    add,
+    mul,
+    sub,
+    vector,
+)
+from auv_dynamics.vehicle.model import coriolis, damping, restoring
+from auv_gvc_controller.laws.model import ControlModel
 
 
 class SMC(NamedTuple):

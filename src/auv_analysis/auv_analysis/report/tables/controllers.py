@@ -9,8 +9,8 @@ from auv_analysis.report.set_up import SetUp
 from auv_analysis.report.tables.sources import numbers_in, summary_source
 from auv_analysis.report.text import fixed, join, plain
 from auv_analysis.report.words import gain_text
-from auv_analysis.run import FOREIGN, Facts
-from auv_gvc_controller.laws import SHIPPED
+from auv_analysis.runs.run import FOREIGN, Facts
+from auv_gvc_controller.laws.law import SHIPPED
 
 SCENARIO = 'scenario.yaml'
 ORIGIN = {

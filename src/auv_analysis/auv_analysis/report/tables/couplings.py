@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.coupling import input_deformation, velocity_deformation
+from auv_analysis.metrics.coupling import input_deformation, velocity_deformation
 from auv_analysis.report.document import Cell, Column, Table, cell
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import (
@@ -17,8 +17,8 @@ from auv_analysis.report.tables.sources import (
     summary_source,
 )
 from auv_analysis.report.text import MISSING, plain
-from auv_dynamics.signals import DOFS
-from auv_gvc_controller.decomposition import inverse_upper
+from auv_dynamics.vehicle import DOFS
+from auv_gvc_controller.laws.decomposition import inverse_upper
 
 KINDS = {  # symbol, units, signals that it is a linear form of
     'delta_xi': ('Δξ', VELOCITY, list(VELOCITIES)),

@@ -10,8 +10,8 @@ from auv_analysis.report.document import Cell, Column, Table, cell
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import Summaries, summary_source
 from auv_analysis.report.text import join, plain
-from auv_analysis.run import Facts
-from auv_dynamics.signals import DOFS
+from auv_analysis.runs.run import Facts
+from auv_dynamics.vehicle import DOFS
 
 ZERO = 'zero (no adaptive term)'
 SYMBOLS = {'K_D': 'velocity gain K_D', 'K_f': 'adaptation gain K_f'}

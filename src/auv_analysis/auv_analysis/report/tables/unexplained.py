@@ -6,7 +6,7 @@ from typing import Any
 from auv_analysis.report.document import Cell, Column, Table, cell
 from auv_analysis.report.tables.sources import WRENCH, Summaries, summary_source
 from auv_analysis.report.text import number
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 COLUMNS = (
     Column('', meaning='degree of freedom', numeric=False),

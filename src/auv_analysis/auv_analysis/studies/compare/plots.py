@@ -11,7 +11,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from auv_analysis.measures import FAMILIES
+from auv_analysis.metrics.measures import FAMILIES
+from auv_analysis.metrics.summary import BAND_TEXT, DWELL, band_of
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.grids import ALWAYS, MARGIN, ROW, TALLEST, Grid, grid_figure, name_rows
@@ -19,8 +20,7 @@ from auv_analysis.report.overview import RUNS, XI
 from auv_analysis.report.plotting import COLOURS, DASHES, GREY
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.studies.compare.ranking import Entry, Ranking
-from auv_analysis.summary import BAND_TEXT, DWELL, band_of
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 MANY = (*RUNS, COLOURS[-1], '#8c8c8c')
 MOST_LINES = len(MANY)  # that can be told apart in a panel

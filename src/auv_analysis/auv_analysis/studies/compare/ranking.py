@@ -10,7 +10,7 @@ import pyarrow as pa
 from pyarrow import csv, parquet
 from scipy.stats import rankdata
 
-from auv_analysis.measures import MEASURES, Measure, flat
+from auv_analysis.metrics.measures import MEASURES, Measure, flat
 from auv_analysis.report.sketch import Sketch
 
 ERRORS = 'overall.velocity_error.rms.linear'

@@ -7,13 +7,16 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from auv_analysis.commands.conclude import show
-from auv_analysis.console import say
-from auv_analysis.counting import each
-from auv_analysis.failure import FailedError
-from auv_analysis.measures import BY_NAME, FAMILIES, MEASURES, described
-from auv_analysis.new_files import write_json
-from auv_analysis.progress import waiting
+from auv_analysis.cli.conclude import show
+from auv_analysis.metrics.measures import (
+    BY_NAME,
+    FAMILIES,
+    MEASURES,
+    described,
+)
+from auv_analysis.metrics.summary import summarize
+from auv_analysis.output.new_files import write_json
+from auv_analysis.output.progress import each, say, waiting
 from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.findings import namesakes
@@ -33,10 +36,9 @@ from auv_analysis.studies.compare.ranking import (
     write_table,
 )
 from auv_analysis.studies.compare.sources import Source, named, open_source
-from auv_analysis.summary import summarize
-from auv_dynamics.files import first_line
-from auv_dynamics.signals import DOFS
-from auv_dynamics.vehicle import Vehicle
+from auv_dynamics.files.errors import FailedError, first_line
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 NAMED = {  # column of words -> head, meaning
     'scenario': 'what is asked of the vehicle, and what disturbs it',

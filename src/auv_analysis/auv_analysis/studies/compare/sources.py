@@ -10,17 +10,18 @@ from auv_analysis.bag import open_bag
 from auv_analysis.bag.contents import NotOursError
 from auv_analysis.bag.files import OTHERS, files_of, is_mcap
 from auv_analysis.bag.load import Recording
-from auv_analysis.folder import SWEEP
 from auv_analysis.foreign.candidates import with_candidates
 from auv_analysis.foreign.mapping import TopicMap
-from auv_analysis.run import AnyRun
-from auv_analysis.samples import ENDING, load_samples
-from auv_analysis.scenario import Scenario, load_scenario
-from auv_analysis.simulation import Hold, simulate
-from auv_analysis.warm_up import announce
-from auv_dynamics.config import shipped_by_name
-from auv_dynamics.files import InputError, read_yaml, reason
-from auv_gvc_controller.laws import is_unasked
+from auv_analysis.output.folder import SWEEP
+from auv_analysis.runs.run import AnyRun
+from auv_analysis.runs.samples import ENDING, load_samples
+from auv_analysis.scenario.scenario import Scenario, load_scenario
+from auv_analysis.simulation.simulate import Hold, simulate
+from auv_analysis.simulation.warm_up import announce
+from auv_dynamics.files.errors import InputError, reason
+from auv_dynamics.files.shipped import shipped_by_name
+from auv_dynamics.files.yaml_files import read_yaml
+from auv_gvc_controller.laws.law import is_unasked
 
 EXPECTED = 'a bag, a folder of results or of a sweep, or a scenario'
 YAML = ('.yaml', '.yml')

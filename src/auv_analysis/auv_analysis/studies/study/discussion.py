@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report.document import Sentence
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.text import fixed, join, number
-from auv_analysis.summary import TRANSIENT
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 Summary = Mapping[str, Any]
 MUCH = 2.0  # times: from which ratio on a difference is worth a sentence

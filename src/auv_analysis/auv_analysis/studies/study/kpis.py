@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from auv_analysis.coupling import structural_zeros
-from auv_dynamics.signals import DOFS
-from auv_dynamics.vehicle import Vehicle
-from auv_gvc_controller.model import control_model
+from auv_analysis.metrics.coupling import structural_zeros
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_gvc_controller.laws.model import control_model
 
 Group = Literal['velocity error', 'input', 'estimation error', 'coupling', 'kinetic energy']
 VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')

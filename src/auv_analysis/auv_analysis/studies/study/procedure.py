@@ -6,10 +6,10 @@ from pathlib import Path
 import pyarrow as pa
 from pyarrow import parquet
 
-from auv_analysis.coupling import delta_pi, delta_xi
-from auv_analysis.energy import kinetic_energy
+from auv_analysis.metrics.coupling import delta_pi, delta_xi
+from auv_analysis.metrics.energy import kinetic_energy
 from auv_analysis.report.document import Block, Section, Sentence
-from auv_analysis.run import AnyRun, Run
+from auv_analysis.runs.run import AnyRun, Run
 from auv_analysis.studies.study.sensitivity import Sensitivity
 from auv_analysis.studies.study.sensitivity_report import (
     left_out_table,
@@ -28,8 +28,8 @@ from auv_analysis.study.unknowns_report import (
     unknowns_tables,
 )
 from auv_analysis.study.unknowns_run import Unknowns
-from auv_dynamics.signals import DOFS
-from auv_gvc_controller.model import ControlModel, control_model
+from auv_dynamics.vehicle import DOFS
+from auv_gvc_controller.laws.model import ControlModel, control_model
 
 Part = tuple[Section, list[Sentence]]
 GAINS = (

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from auv_analysis.changes import changed_scenario
 from auv_analysis.report.evidence import Response
-from auv_analysis.run import Run
-from auv_analysis.scenario import Scenario
-from auv_analysis.simulation import DivergedError, Hold, simulate
+from auv_analysis.runs.run import Run
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.simulate import DivergedError, Hold, simulate
 from auv_analysis.studies.study.sensitivity import Sensitivity
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 STEP = 1.1  # factor by which a set-point is changed
 ERROR = 'velocity_error.rms'

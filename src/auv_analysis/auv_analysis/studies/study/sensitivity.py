@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.batch import kernel_of
-from auv_analysis.changes import changed_scenario
-from auv_analysis.kernels import IN_PYTHON
-from auv_analysis.rollouts import batch_of, rollouts
-from auv_analysis.scenario import Scenario
-from auv_analysis.simulation import Hold
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.batch import kernel_of
+from auv_analysis.simulation.kernels import IN_PYTHON
+from auv_analysis.simulation.rollouts import batch_of, rollouts
+from auv_analysis.simulation.simulate import Hold
+from auv_analysis.simulation.variants import packed_variants
 from auv_analysis.studies.study.indices import Design, Method, spreads
 from auv_analysis.studies.study.kpis import Excluded, Figure, sort_out
-from auv_analysis.variants import packed_variants
-from auv_dynamics.signals import DOFS
-from auv_gvc_controller.laws import SHIPPED
+from auv_dynamics.vehicle import DOFS
+from auv_gvc_controller.laws.law import SHIPPED
 
 COUNTS = {'sobol': 256, 'morris': 32}  # default base points, trajectories
 OWN_COUNTS = {'sobol': 64, 'morris': 16}  # of a user's law, whose every loop is packed on its own

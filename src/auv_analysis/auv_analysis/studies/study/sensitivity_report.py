@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from auv_analysis.new_files import write_table
+from auv_analysis.output.new_files import write_table
 from auv_analysis.report import plotting
 from auv_analysis.report.document import Cell, Column, Sentence, Table
 from auv_analysis.report.figure_files import FigureRecord

@@ -10,8 +10,8 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
-from auv_analysis.counting import each
-from auv_analysis.measures import BY_NAME, MEASURES, Measure
+from auv_analysis.metrics.measures import BY_NAME, MEASURES, Measure
+from auv_analysis.output.progress import each
 from auv_analysis.report.text import join
 from auv_analysis.studies.sweep import statistics
 from auv_analysis.studies.sweep.dataset import STATUSES, Sweep

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from auv_analysis.changes import VEHICLE, split
-from auv_analysis.scenario import Scenario, scenario_from
+from auv_analysis.scenario.changes import VEHICLE, split
+from auv_analysis.scenario.scenario import Scenario, scenario_from
 from auv_analysis.studies.distributions import Values, take
 from auv_analysis.studies.sweep.campaign import Campaign, of_controller
-from auv_dynamics.files import InputError
-from auv_dynamics.jit import JITTED, sources_digest
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.kernel.compile import JITTED, sources_digest
 
 Figures = dict[str, np.ndarray]  # column -> (n,)
 
@@ -102,7 +102,7 @@ def block_figures(
 def _figures(
     contents: str, controller: str, hold: Any, changes: dict[str, Values], seeds: np.ndarray
 ) -> Figures:
-    from auv_analysis.rollouts import rollouts
+    from auv_analysis.simulation.rollouts import rollouts
 
     varied = {
         of_controller(path, controller): values

@@ -7,16 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.changes import VEHICLE, Parts, changed_scenario, check_paths, split
-from auv_analysis.scenario import Scenario, load_scenario
-from auv_analysis.scenario_devices import SAMPLED
-from auv_analysis.simulation import Hold, check_hold
+from auv_analysis.scenario.changes import (
+    VEHICLE,
+    Parts,
+    changed_scenario,
+    check_paths,
+    split,
+)
+from auv_analysis.scenario.scenario import SAMPLED, Scenario, load_scenario
+from auv_analysis.simulation.simulate import Hold, check_hold
 from auv_analysis.studies.distributions import Values
 from auv_analysis.studies.sweep.variation import Group, kind_of, make_group
-from auv_dynamics.config import shipped
-from auv_dynamics.files import InputError, check, dotted, read_yaml
-from auv_dynamics.nearest import meant, one_of
-from auv_gvc_controller.laws import SHIPPED
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import meant, one_of
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import check, dotted, read_yaml
+from auv_gvc_controller.laws.law import SHIPPED
 
 SCHEMA = Path(__file__).with_name('campaign.schema.json')
 EVERY = 'controllers.*.'  # begins a path into each controller of the sweep

@@ -14,10 +14,10 @@ import pyarrow.compute as pc
 import pyarrow.dataset as ds
 from pyarrow import parquet
 
-from auv_analysis.folder import PART, ROLLOUTS, SWEEP
-from auv_analysis.measures import Measure
+from auv_analysis.metrics.measures import Measure
+from auv_analysis.output.folder import PART, ROLLOUTS, SWEEP
 from auv_analysis.studies.sweep.variation import kind_of
-from auv_dynamics.files import InputError, first_line, reason
+from auv_dynamics.files.errors import InputError, first_line, reason
 
 STATUSES = ('ok', 'diverged', 'refused')
 OWN = ('index', 'controller', 'seed', 'status', 'reason')

@@ -18,12 +18,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from auv_analysis.failure import FailedError
 from auv_analysis.studies.distributions import Values
 from auv_analysis.studies.sweep.blocks import BlockError, block_figures, contents_of
 from auv_analysis.studies.sweep.campaign import Campaign
 from auv_analysis.studies.sweep.folder import SweepFolder
-from auv_dynamics.files import InputError, first_line
+from auv_dynamics.files.errors import FailedError, InputError, first_line
 
 if TYPE_CHECKING:
     import pyarrow as pa

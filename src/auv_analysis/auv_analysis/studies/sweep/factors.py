@@ -10,10 +10,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from auv_analysis.changes import said_of, split
 from auv_analysis.report.text import plain
+from auv_analysis.scenario.changes import said_of, split
 from auv_analysis.studies.sweep.dataset import Sweep
-from auv_dynamics.files import shorten
+from auv_dynamics.files.errors import shorten
 
 MOST_VALUES = 12  # different numbers up to which each is a group of its own
 BINS = 16

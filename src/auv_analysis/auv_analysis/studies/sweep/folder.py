@@ -13,11 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from auv_analysis.folder import CAMPAIGN, PART, ROLLOUTS, SWEEP, Results, results_folder
-from auv_analysis.new_files import UNFINISHED, write
+from auv_analysis.output.folder import (
+    CAMPAIGN,
+    PART,
+    ROLLOUTS,
+    SWEEP,
+    Results,
+    results_folder,
+)
+from auv_analysis.output.new_files import UNFINISHED, write
 from auv_analysis.studies.sweep.blocks import laws_of, versions
 from auv_analysis.studies.sweep.campaign import Campaign
-from auv_dynamics.files import InputError, dotted
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import dotted
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -144,7 +152,7 @@ def _sampling_versions(campaign: Campaign) -> dict[str, str]:
 
 def _write_inputs(out: Path, campaign: Campaign) -> None:
     """Texts for people: the manifest alone is read again."""
-    from auv_analysis.experiment import write_inputs
+    from auv_analysis.graph.experiment import write_inputs
 
     write_inputs(campaign.scenario, out)
     header = f'# {campaign.path.name} with every default filled in\n'

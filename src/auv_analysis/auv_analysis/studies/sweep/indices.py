@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_analysis.measures import Measure
+from auv_analysis.metrics.measures import Measure
 from auv_analysis.studies.sweep.dataset import Sweep
 from auv_analysis.studies.sweep.variation import (
     LEVELS,

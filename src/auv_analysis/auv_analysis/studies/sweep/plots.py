@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from auv_analysis.measures import BY_NAME, Measure
+from auv_analysis.metrics.measures import BY_NAME, Measure
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.grids import Grid, draw_grid, grid_figure, scale_bar, small_heads
@@ -114,7 +114,7 @@ def _distributions(results: Results) -> Drawn:
 
 def fixed_sentence(results: Results) -> str:
     """Which measures are the same in every row, or have no value."""
-    from auv_analysis.measures import BY_NAME
+    from auv_analysis.metrics.measures import BY_NAME
 
     zero = [BY_NAME[name].label for name, value in results.fixed.items() if value == 0.0]
     same = [BY_NAME[name].label for name, value in results.fixed.items() if value]

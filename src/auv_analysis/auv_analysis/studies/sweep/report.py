@@ -5,11 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.console import say
-from auv_analysis.failure import FailedError
-from auv_analysis.folder import SWEEP, results_folder
-from auv_analysis.measures import BY_NAME
-from auv_analysis.progress import console, waiting
+from auv_analysis.metrics.measures import BY_NAME
+from auv_analysis.output.folder import SWEEP, results_folder
+from auv_analysis.output.progress import console, say, waiting
 from auv_analysis.report.document import Block, Cell, Column, Section, Sentence, Table, cell
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.quantities import Maths
@@ -26,8 +24,8 @@ from auv_analysis.studies.sweep.analysis import (
 )
 from auv_analysis.studies.sweep.dataset import STATUSES, open_sweep
 from auv_analysis.studies.sweep.factors import short_names
-from auv_dynamics.files import InputError
-from auv_dynamics.nearest import one_of
+from auv_dynamics.files.errors import FailedError, InputError
+from auv_dynamics.files.nearest import one_of
 
 LISTING = 'campaign.yaml'
 

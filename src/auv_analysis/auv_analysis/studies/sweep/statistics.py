@@ -6,11 +6,16 @@ from typing import Any
 import numpy as np
 from scipy.stats import rankdata
 
-from auv_analysis.measures import FAMILIES, MEASURES, Measure, described
+from auv_analysis.metrics.measures import (
+    FAMILIES,
+    MEASURES,
+    Measure,
+    described,
+)
 from auv_analysis.studies.pairs import log_ratios, paired
 from auv_analysis.studies.sweep.dataset import STATUSES, Sweep
 from auv_analysis.studies.sweep.factors import Varied, by_group
-from auv_dynamics.signals import DOFS
+from auv_dynamics.vehicle import DOFS
 
 LEVELS = {'low': 0.05, 'quarter': 0.25, 'median': 0.5, 'three_quarters': 0.75, 'high': 0.95}
 Row = dict[str, Any]

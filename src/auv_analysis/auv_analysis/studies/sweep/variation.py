@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from auv_analysis.studies.distributions import Values, axis_values, make_distribution, take
-from auv_dynamics.files import InputError
+from auv_dynamics.files.errors import InputError
 
 SAMPLES = 0  # first of the two spawn keys of a group; a rollout's seed has one key
 LEVELS = 4  # of the grid that Morris walks on

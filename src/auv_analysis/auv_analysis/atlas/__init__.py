@@ -1,1 +1,0 @@
-"""How strongly the inertia of vehicles couples their degrees of freedom, without units."""

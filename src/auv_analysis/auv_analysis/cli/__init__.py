@@ -1,0 +1,1 @@
+"""The `auv` command: one module a command, and what commands share."""

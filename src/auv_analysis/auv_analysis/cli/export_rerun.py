@@ -1,0 +1,24 @@
+"""`auv export-rerun`: a bag as a file for the rerun viewer."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from auv_analysis.bag import open_bag
+from auv_analysis.output.new_files import check_file
+from auv_analysis.report.rerun_export import export, library
+from auv_dynamics.files.errors import printable
+
+
+def export_rerun(options: argparse.Namespace) -> dict[str, Any]:
+    """Write a bag as a file for the rerun viewer."""
+    library()  # before anything is read
+    bag = Path(options.bag)
+    out = options.out or bag.with_suffix('.rrd')
+    check_file(out, overwrite=options.overwrite, inputs=[bag])
+    run = open_bag(bag).run
+    samples = export(run, out)
+    if not options.json:
+        print(printable(f'{out}: {samples} samples, trajectory, velocity, wrench, energy shares'))
+        print(printable(f'rerun {out}'))
+    return {'file': str(out), 'controller': run.controller, 'samples': samples}

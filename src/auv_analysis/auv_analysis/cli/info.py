@@ -1,0 +1,57 @@
+"""`auv info`: what lies in a bag."""
+
+import argparse
+from typing import Any
+
+from rich.table import Table
+
+from auv_analysis.bag.files import files_of
+from auv_analysis.foreign.candidates import candidates, survey
+from auv_analysis.output.progress import TextConsole
+
+PARAMETERS = 'params.yaml'
+
+
+def info(options: argparse.Namespace) -> dict[str, Any]:
+    """What lies in a bag."""
+    contents = survey(options.bag)
+    first, last = contents.first, contents.last
+    span = None if first is None or last is None else (last - first) / 1e9
+    document = {
+        'bag': str(options.bag),
+        'files': [path.name for path in files_of(options.bag)],
+        'duration': span,
+        'messages': sum(contents.counts.values()),
+        'topics': {
+            topic: {'type': kind, 'messages': contents.counts.get(topic, 0)}
+            for topic, kind in sorted(contents.types.items())
+        },
+        'namespace': contents.namespace,
+        'attachments': sorted(contents.attachments),
+        # what our recorder has attached says of the topics what they are
+        'candidates': {} if PARAMETERS in contents.attachments else candidates(contents),
+        'notes': contents.notes,
+    }
+    if not options.json:
+        _print_info(document)
+    return document
+
+
+def _print_info(document: dict[str, Any]) -> None:
+    out = TextConsole()
+    span = 'no messages' if document['duration'] is None else f'{document["duration"]:g} s'
+    out.print(f'{document["bag"]}: {document["messages"]} messages, {span}')
+    table = Table(box=None, header_style='bold')
+    for column in ('topic', 'type', 'messages'):
+        table.add_column(column)
+    for topic, entry in document['topics'].items():
+        table.add_row(topic, entry['type'], str(entry['messages']))
+    out.print(table)
+    if document['namespace'] is not None:
+        out.print(f'namespace: {document["namespace"]}')
+    out.print(f'attachments: {", ".join(document["attachments"]) or "none"}')
+    for role, topics in document['candidates'].items():
+        if topics:
+            out.print(f'could be mapped as {role}: {", ".join(topics)}')
+    for note in document['notes']:
+        out.print(f'note: {note}')

@@ -1,0 +1,86 @@
+"""`auv linearize`: poles and matrices of a vehicle, or of a scenario's closed loops."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from auv_analysis.output.folder import results_folder
+from auv_analysis.output.new_files import write_json
+from auv_analysis.output.progress import say, waiting
+from auv_analysis.scenario.scaling import UNFIT
+from auv_analysis.scenario.scenario import Scenario, load_scenario
+from auv_analysis.studies.linearize.modes import document_of, linear_models, print_poles
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import read_yaml
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
+from auv_gvc_controller.laws.law import refusal
+
+DOCUMENT = 'linearization.json'
+LONGEST = 90  # of the name in that of the folder
+
+
+def linearize(options: argparse.Namespace) -> dict[str, Any]:
+    """Poles and matrices of a vehicle, or of a scenario's closed loops."""
+    subject, paths = _subject(options.subject)
+    names = _controllers(subject, options.controller, paths[0])
+    eta0 = None if options.attitude is None else [0.0, 0.0, 0.0, *options.attitude]
+    try:
+        with waiting('linearising'):
+            models = linear_models(subject, names, options.nu0, eta0)
+    except ValueError as error:
+        raise InputError(paths[0], *refusal(error)) from None
+    folder = f'linearize_{UNFIT.sub("_", subject.name)[:LONGEST]}'
+    out = options.out or Path('runs') / folder
+    left_out = subject.sampled if isinstance(subject, Scenario) else ()
+    document = document_of(subject.name, models, left_out)
+    with results_folder(out, overwrite=options.overwrite, inputs=paths) as results:
+        write_json(results.folder / DOCUMENT, document)
+        from auv_analysis.studies.linearize.modes import draw  # with matplotlib, which loads slowly
+
+        with waiting('drawing the pole map'):
+            draw(models, results.folder / 'figures')
+    if not options.json:
+        print_poles(document)
+    say(f'matrices: {out / DOCUMENT}, pole map: {out / "figures" / "poles.png"}')
+    return document
+
+
+def _subject(given: str) -> tuple[Vehicle | Scenario, list[Path]]:
+    """What is linearised, a scenario being what has controllers, and the files it was read from."""
+    for kind in ('scenarios', 'vehicles'):
+        try:
+            path = shipped(kind, given)
+        except InputError:
+            continue
+        if 'controllers' in read_yaml(path, 'vehicle or scenario'):
+            scenario = load_scenario(path)
+            return scenario, scenario.inputs
+        return load_vehicle(path), [path]
+    expected = 'a vehicle or scenario file, or the bare name of a shipped one'
+    raise InputError(given, '', expected, 'no such file or name')
+
+
+def _controllers(subject: Vehicle | Scenario, asked: list[str] | None, path: Path) -> list[str]:
+    if isinstance(subject, Scenario):
+        names = list(dict.fromkeys(asked or subject.controllers))
+        for name in names:
+            subject.controller(name)
+        return names
+    if asked:
+        raise InputError(path, '--controller', 'a scenario, which has controllers', 'a vehicle')
+    return []
+
+
+def add_options(command: argparse.ArgumentParser) -> None:
+    """What is linearised, and about which point."""
+    text = 'of a vehicle or a scenario: a file, or the bare name of a shipped one'
+    command.add_argument('subject', metavar='VEHICLE_OR_SCENARIO', help=text)
+    text = "only this one of a scenario's; may be repeated"
+    command.add_argument('--controller', action='append', help=text)
+    six = ('U', 'V', 'W', 'P', 'Q', 'R')
+    text = 'velocity about which, m/s and rad/s; default: at rest'
+    command.add_argument('--nu0', nargs=6, type=float, metavar=six, help=text)
+    text, three = 'attitude about which, rad; default: level', ('PHI', 'THETA', 'PSI')
+    command.add_argument('--attitude', nargs=3, type=float, metavar=three, help=text)

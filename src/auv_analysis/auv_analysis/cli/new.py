@@ -1,0 +1,51 @@
+"""`auv new`: a commented vehicle, scenario or law of one's own that works as it is."""
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+from auv_analysis.scenario.templates import (
+    checked_name,
+    law_files,
+    scenario_files,
+    vehicle_files,
+)
+from auv_dynamics.files.errors import InputError, reason
+
+
+def new(options: argparse.Namespace) -> dict[str, Any]:
+    """Write the files into the working folder; nothing is ever overwritten."""
+    kind, vehicle = options.kind, options.vehicle
+    name = checked_name(kind, options.name)
+    if kind == 'vehicle':
+        if vehicle is not None:
+            raise InputError('--vehicle', '', 'a scenario or a law to be made', 'vehicle')
+        files = vehicle_files(name)
+    else:
+        files = (scenario_files if kind == 'scenario' else law_files)(name, vehicle)
+    _write({Path(file): text for file, text in files.items()})
+    following = {
+        'vehicle': [
+            f'auv check-vehicle {name}.yaml',
+            f'auv new scenario {name}_case1 --vehicle {name}.yaml',
+        ],
+        'scenario': [f'auv simulate {name}.yaml', f'auv run {name}.yaml'],
+        'law': [f'auv simulate {name}.yaml', f'auv run {name}.yaml'],
+    }[kind]
+    if not options.json:
+        print(f'made {" and ".join(files)}')
+        print('next:', *(f'  {line}' for line in following), sep='\n')
+    return {'files': list(files), 'next': following}
+
+
+def _write(files: dict[Path, str]) -> None:
+    for path in files:
+        if os.path.lexists(path):
+            raise InputError(path, '', 'a name that is free here', 'an existing file')
+    for path, text in files.items():
+        try:
+            with path.open('x', encoding='utf-8') as file:
+                file.write(text)
+        except OSError as error:
+            raise InputError(path, '', 'a file that can be written', reason(error)) from None

@@ -1,0 +1,51 @@
+"""`auv params`: the parameter file that `auv run` would write."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from auv_analysis.graph.node_parameters import CONTROLLER, node_parameters, parameter_file
+from auv_analysis.output.new_files import write_text
+from auv_analysis.output.progress import say
+from auv_analysis.replay.recorded_controller import recorded_settings
+from auv_analysis.scenario.scenario import load_scenario
+from auv_dynamics.files.errors import InputError
+
+
+def params(options: argparse.Namespace) -> dict[str, Any]:
+    """The parameter file that `auv run` would write, for plain `ros2 run`."""
+    scenario = load_scenario(options.scenario)
+    plant = not options.no_plant
+    attachments = {}
+    if not plant and options.out is not None:  # what a bag needs to be read by itself
+        attachments = {'params.yaml': options.out, 'vehicle.yaml': scenario.vehicle_path}
+    bag = Path('runs') / scenario.name / options.controller
+    parameters = node_parameters(
+        scenario,
+        options.controller,
+        bag=bag,
+        plant=plant,
+        lockstep=plant and not options.real_time,
+        use_sim_time=plant,
+        vehicle=scenario.shipped_vehicle,
+        attachments={name: path.resolve() for name, path in attachments.items()},
+    )
+    if note := _missing(parameters[CONTROLLER]):
+        say(note)
+    text = parameter_file(
+        parameters, f'auv params {scenario.name} --controller {options.controller}'
+    )
+    if options.out is not None:
+        write_text(options.out, text, overwrite=options.overwrite, inputs=scenario.inputs)
+    elif not options.json:
+        print(text, end='')
+    return parameters
+
+
+def _missing(controller: dict[str, Any]) -> str:
+    """What the controller will not be configured without, where the scenario does not say it."""
+    try:
+        recorded_settings(controller, CONTROLLER).check_bounded()
+    except InputError as error:
+        return f'{error}; give it, or the scenario `actuators: {{limit: ...}}`'
+    return ''

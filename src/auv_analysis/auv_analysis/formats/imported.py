@@ -1,0 +1,176 @@
+"""A vehicle on its way into a file of ours: its numbers, where each came from, what was decided."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.frames import swap_body_matrix, swap_inertia
+
+SNAME, POSITIVE = 'sname', 'positive'
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What a user says of a file that the file itself does not; None: nothing.
+
+    Attributes
+    ----------
+    sign : 'sname' (damping, lift, added mass are negative derivatives) or 'positive'
+    products : 'integral' (Ixy is the integral of x y dm) or 'tensor' (the tensor's entry)
+    inertia_reference : 'cg' or 'co'
+    lift : 'alone' (of body and fins) or 'combined' (with the terms of the added mass)
+    quadratic_abs : xUU is meant as xUabsU
+    swap_weight_buoyancy : W and B stand for each other
+    leave_out : what a vehicle file cannot hold is left out and reported, not refused
+    water_density, gravity, volume : kg/m3, m/s2, m3
+    center_of_buoyancy : (3,) FSD, m
+
+    """
+
+    sign: str | None = None
+    products: str | None = None
+    inertia_reference: str | None = None
+    lift: str | None = None
+    quadratic_abs: bool = False
+    swap_weight_buoyancy: bool = False
+    leave_out: bool = False
+    water_density: float | None = None
+    gravity: float | None = None
+    volume: float | None = None
+    center_of_buoyancy: Sequence[float] | None = None
+
+
+@dataclass
+class Draft:
+    """What an importer gathers.
+
+    Attributes
+    ----------
+    file : it is read from, for errors
+    choices : of the user
+    name : of the vehicle
+    values : key of a vehicle file, such as 'rigid_body.mass', to its value in FSD, positive
+    comments : the same keys to where the value is from
+    traps, assumed, left_out : sentences of the report
+
+    """
+
+    file: object
+    choices: Choices
+    name: str = ''
+    values: dict[str, Any] = field(default_factory=dict)
+    comments: dict[str, str] = field(default_factory=dict)
+    traps: list[str] = field(default_factory=list)
+    assumed: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+    @property
+    def report(self) -> dict[str, list[str]]:
+        """The sentences of the report under their titles."""
+        return {'handled': self.traps, 'assumed': self.assumed, 'left out': self.left_out}
+
+    def put(self, key: str, value: Any, comment: str) -> None:
+        """Set a value, with the text of its comment; a zero has no sign."""
+        self.values[key] = np.asarray(value, float) + 0.0 if np.ndim(value) else value
+        self.comments[key] = comment
+
+    def refuse(self, key: str, expected: str, found: object) -> InputError:
+        """Error that names this file."""
+        return InputError(self.file, key, expected, found)
+
+    def cannot_hold(self, key: str, why: str) -> None:
+        """Leave a coefficient out where that was asked for; else InputError."""
+        if not self.choices.leave_out:
+            expected = 'what a vehicle file can hold, or --leave-out'
+            raise self.refuse(key, expected, why)
+        self.left_out.append(f'{key}: {why}')
+
+    def above_zero(self, key: str, value: float) -> float:
+        """The number itself, which others are divided by; InputError where it is not positive."""
+        if not 0 < value < float('inf'):
+            raise self.refuse(key, 'a positive number', value)
+        return value
+
+    def positive(self, key: str, A: np.ndarray, convention: str, name: str) -> np.ndarray:
+        """(6, 6) matrix of positive sign of coefficients that follow a sign convention.
+
+        The user's choice of sign takes the place of the format's; a diagonal entry that then acts
+        the wrong way is refused, as signs are then not what they were taken for.
+        """
+        used = self.choices.sign or convention
+        turned = -A if used == SNAME else A.copy()
+        wrong = np.flatnonzero(np.diagonal(turned) < 0)
+        if len(wrong):
+            i = int(wrong[0])
+            other = POSITIVE if used == SNAME else SNAME
+            sign = 'negative, as derivatives are' if used == SNAME else 'positive'
+            raise self.refuse(
+                key,
+                f'{sign}, or --sign {other} if all are of the other sign',
+                f'{A[i, i]:g} in {name}',
+            )
+        if not np.any(A):
+            self.assumed.append(f'{key}: zero, as there is none in the file')
+        elif used == SNAME:
+            self.traps.append(f'{key}: SNAME derivatives, sign turned: positive matrices here')
+        return turned
+
+    def lift_by_abs_u(self, names: Sequence[str]) -> None:
+        """Say that products with u become products with abs(u)."""
+        if names:
+            self.traps.append(
+                f'{", ".join(names)}: u nu_j there, abs(u) nu_j here, which is the same ahead'
+            )
+
+    def from_flu(self, key: str, A: np.ndarray) -> np.ndarray:
+        """The matrix in FSD of one in FLU, (6, 6) or the tensor (3, 3)."""
+        turned = swap_inertia(A) if A.shape == (3, 3) else swap_body_matrix(A)
+        changed = int(np.count_nonzero(turned != A))
+        if changed:
+            self.traps.append(f'{key}: from forward-left-up to FSD, {changed} entries turn sign')
+        return turned
+
+    def point_from_flu(self, key: str, point: np.ndarray, comment: str) -> None:
+        """Put a point that is given in FLU."""
+        if np.any(point[1:]):
+            self.traps.append(f'{key}: from forward-left-up to FSD, y and z turn sign')
+        self.put(key, point * [1.0, -1.0, -1.0], comment)
+
+    def environment(self, density: tuple[float, str] | None, gravity: tuple[float, str]) -> None:
+        """Put density and gravity: the user's, else the file's; gravity else an assumed one.
+
+        Each is a value with its comment; density None: not given.
+        """
+        if self.choices.water_density is not None:
+            density = self.choices.water_density, 'given by --water-density'
+        if density is None:
+            expected = '--water-density (kg/m3): the file does not say it'
+            raise self.refuse('environment.water_density', expected, None)
+        if self.choices.gravity is not None:
+            gravity = self.choices.gravity, 'given by --gravity'
+        elif gravity[1].startswith('assumed'):
+            self.assumed.append(
+                f'environment.gravity: {gravity[0]:g} m/s2{gravity[1].removeprefix("assumed")}'
+            )
+        for key, (value, said) in (('water_density', density), ('gravity', gravity)):
+            self.put(f'environment.{key}', self.above_zero(f'environment.{key}', value), said)
+
+    def buoyancy(self, volume: tuple[float, str] | None, point: tuple[Any, str] | None) -> None:
+        """Put volume and, in FLU, its centre: the user's (FSD), else the file's."""
+        if self.choices.volume is not None:
+            volume = self.choices.volume, 'given by --volume'
+        if volume is None:
+            expected = '--volume (m3): the file does not say it'
+            raise self.refuse('hydrostatics.volume', expected, None)
+        self.put('hydrostatics.volume', *volume)
+        key = 'hydrostatics.center_of_buoyancy'
+        if self.choices.center_of_buoyancy is not None:
+            self.put(key, self.choices.center_of_buoyancy, 'given by --center-of-buoyancy')
+        elif point is None:
+            expected = '--center-of-buoyancy X Y Z (m, FSD): the file does not say it'
+            raise self.refuse(key, expected, None)
+        else:
+            self.point_from_flu(key, np.asarray(point[0], float), point[1])

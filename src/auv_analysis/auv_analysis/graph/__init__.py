@@ -1,0 +1,1 @@
+"""`auv run`: parameter files, processes and domain of a node graph."""

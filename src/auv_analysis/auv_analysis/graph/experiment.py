@@ -1,0 +1,175 @@
+"""`auv run`: a scenario on real nodes, in lock-step, recorded; one run per controller."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+import yaml
+
+from auv_analysis.graph.node_parameters import (
+    ANALYSIS,
+    CONTROLLER,
+    PLANT,
+    RECORDER,
+    SETPOINT,
+    node_parameters,
+    parameter_file,
+)
+from auv_analysis.graph.supervisor import (
+    NodeDiedError,
+    Supervisor,
+    TroubleError,
+    executable,
+)
+from auv_analysis.scenario.scenario import Scenario
+from auv_dynamics.ros.reach import loopback
+from auv_dynamics.ros.security import enclave
+
+PACKAGES = {
+    RECORDER: 'auv_analysis',
+    PLANT: 'auv_dynamics',
+    SETPOINT: 'auv_gvc_controller',
+    CONTROLLER: 'auv_gvc_controller',
+    ANALYSIS: 'auv_analysis',
+}
+COMPOSED = 'composed_graph'  # the executable that holds them all
+START_TIMEOUT = 60.0  # s until the start barrier must be down
+END_TIMEOUT = 30.0  # s for the recorder to close after the last step
+
+
+class Graph(Protocol):
+    """What an experiment sees of the node graph."""
+
+    complete_ns: int
+    running: bool
+    waits_for: str
+
+    def spin(self, seconds: float) -> None:
+        """Handle what comes in for so long."""
+
+    def ask_to_run(self) -> bool:
+        """Whether the plant has agreed to run."""
+
+
+def environment(domain: int) -> dict[str, str]:
+    """Environment of the nodes: loopback only, the domain."""
+    return {
+        **os.environ,
+        **loopback(),
+        'ROS_DOMAIN_ID': str(domain),
+        'RCUTILS_COLORIZED_OUTPUT': '0',
+        'PYTHONUNBUFFERED': '1',
+    }
+
+
+def write_inputs(scenario: Scenario, out: Path) -> dict[str, Path]:
+    """Write the resolved scenario and its files into the results' folder: name -> path."""
+    files = dict(scenario.attachments)
+    resolved = {**scenario.data, 'vehicle': 'vehicle.yaml'}
+    if 'setpoint.csv' in files:
+        resolved['setpoint'] = {'file': 'setpoint.csv'}
+    header = f'# {scenario.path.name} with every default filled in\n'
+    files['scenario.yaml'] = header + yaml.safe_dump(
+        resolved, sort_keys=False, default_flow_style=None, width=100
+    )
+    paths = {}
+    for name, text in files.items():
+        paths[name] = out / name
+        paths[name].write_text(text, encoding='utf-8')
+    return paths
+
+
+def run_controller(
+    scenario: Scenario,
+    controller: str,
+    out: Path,
+    domain: int,
+    graph: Graph,
+    progress: Callable[[int], None],
+    *,
+    composed: bool = False,
+) -> Path:
+    """Run one controller on the node graph and wait for its bag.
+
+    Parameters
+    ----------
+    scenario : resolved scenario
+    controller : name of one of its controllers
+    out : folder of the results; the bag goes to out/<controller>
+    domain : ROS domain id
+    graph : the graph as seen from here, a `Watcher` of the same domain
+    progress : told the last complete step whenever it changes
+    composed : all nodes in one process, else one each
+
+    Returns
+    -------
+    bag : folder of the closed bag
+
+    Raises
+    ------
+    NodeDiedError : a node ended, did not start or fell silent; nothing is left running
+    TroubleError : the run came to its end, its bag is whole, but the controller met an error
+
+    """
+    bag = out / controller
+    bag.mkdir(parents=True)
+    path = bag / 'params.yaml'
+    inputs = {**write_inputs(scenario, out), 'params.yaml': path}
+    parameters = node_parameters(
+        scenario, controller, bag=bag.resolve(), vehicle=str(inputs['vehicle.yaml'].resolve()),
+        attachments={name: file.resolve() for name, file in inputs.items()},
+    )  # fmt: skip
+    parameters[PLANT]['start_paused'] = True
+    text = parameter_file(parameters, f'{scenario.name}, controller {controller}: auv run')
+    path.write_text(text, encoding='utf-8')
+    graph.complete_ns, graph.running = -1, False
+    supervisor = Supervisor(out / 'logs' / controller, environment(domain))
+    try:
+        for name, package in ({COMPOSED: PACKAGES[RECORDER]} if composed else PACKAGES).items():
+            arguments = [*enclave(name), '--params-file', str(path)]
+            supervisor.start(name, [str(executable(package, name)), *arguments])
+        _start(supervisor, graph)
+        _follow(supervisor, COMPOSED if composed else RECORDER, graph, scenario, progress)
+        said = supervisor.complaints(COMPOSED if composed else CONTROLLER, CONTROLLER)
+    finally:
+        supervisor.stop()
+    if said:
+        raise TroubleError(
+            f'{controller}: {CONTROLLER}: {said[0]}; see {out / "logs" / controller}'
+        )
+    return bag
+
+
+def _start(supervisor: Supervisor, graph: Graph) -> None:
+    until = time.monotonic() + START_TIMEOUT
+    while not graph.ask_to_run():
+        graph.spin(0.05)
+        supervisor.check(may_end='')
+        if time.monotonic() > until:
+            raise NodeDiedError(
+                f'no start within {START_TIMEOUT:g} s: waiting for {graph.waits_for}'
+            )
+
+
+def _follow(
+    supervisor: Supervisor,
+    last: str,
+    graph: Graph,
+    scenario: Scenario,
+    progress: Callable[[int], None],
+) -> None:
+    """Show the progress until the process that ends last has ended well."""
+    step, done_since = -1, None
+    while not supervisor.check(may_end=last):
+        graph.spin(0.1)
+        complete = graph.complete_ns // scenario.step_ns
+        if complete > step:
+            step = complete
+            progress(step)
+        if step >= scenario.steps:
+            done_since = done_since or time.monotonic()
+            if time.monotonic() - done_since > END_TIMEOUT:
+                raise NodeDiedError(f'{last} does not close the bag{supervisor.last_lines(last)}')
+    progress(scenario.steps)

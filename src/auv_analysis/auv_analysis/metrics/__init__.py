@@ -1,0 +1,1 @@
+"""Metrics of runs: energy, coupling, certificate, summary; the registry of quantities."""

@@ -1,0 +1,74 @@
+"""What is commanded, held against the weight of a vehicle and what its thrusters can give."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from auv_analysis.report.text import join, number
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.thrusters import Thrusters
+from auv_dynamics.vehicle.vehicle import Vehicle
+
+NOTHING = 1e-6  # of the largest command of its kind: rounding
+UNITS = ('N', 'N', 'N', 'N m', 'N m', 'N m')
+
+
+def largest_wrench(thrusters: Thrusters) -> np.ndarray:
+    """Largest magnitude (6,) of each degree of freedom that thrusters give, N and N m.
+
+    Each by itself, whatever the others then are: with T of tau = T u, the largest T_i u and the
+    largest -T_i u over all thrusts within their limits.
+    """
+    T, forward, reverse = thrusters.matrix, thrusters.forward, thrusters.reverse
+    along, against = np.maximum(T, 0.0), np.maximum(-T, 0.0)
+    return np.maximum(along @ forward + against @ reverse, along @ reverse + against @ forward)
+
+
+def beyond_authority(vehicle: Vehicle, largest: Sequence[float]) -> list[str]:
+    """What is remarkable of the largest commands of a run, a phrase each; none where all is well.
+
+    Parameters
+    ----------
+    vehicle : whose weight and thrusters are known, the latter where its file gives them
+    largest : (6,) magnitudes of the command, N and N m
+
+    """
+    found = list(_above_weight(float(vehicle.weight), largest))
+    if vehicle.thrusters is not None:
+        found += _without_actuators(vehicle.thrusters, largest)
+        found += _above_thrust(vehicle.thrusters, largest)
+    return found
+
+
+def _above_weight(weight: float, largest: Sequence[float]) -> Iterator[str]:
+    i = int(np.argmax(largest[:3]))
+    if largest[i] > weight:
+        yield (
+            f'the largest force commanded, {number(largest[i])} N in {DOFS[i]}, is '
+            f'{number(largest[i] / weight, 2)} times the weight of the vehicle'
+        )
+
+
+def _without_actuators(thrusters: Thrusters, largest: Sequence[float]) -> Iterator[str]:
+    asked = []
+    for dof, others in thrusters.unactuated().items():
+        i = DOFS.index(dof)
+        if largest[i] > NOTHING * max(largest[:3] if i < 3 else largest[3:]):
+            apart = f', not apart from {join(list(others))}' if others else ''
+            asked.append(f'{dof} (up to {number(largest[i])} {UNITS[i]}{apart})')
+    if asked:
+        yield (
+            f'{join(asked)} {"is" if len(asked) == 1 else "are"} commanded, which no thruster '
+            f'actuates: T has rank {thrusters.rank} of 6'
+        )
+
+
+def _above_thrust(thrusters: Thrusters, largest: Sequence[float]) -> Iterator[str]:
+    lost, most = thrusters.unactuated(), largest_wrench(thrusters)
+    asked = [
+        f'{number(largest[i])} of at most {number(most[i])} {UNITS[i]} in {dof}'
+        for i, dof in enumerate(DOFS)
+        if dof not in lost and largest[i] > most[i]
+    ]
+    if asked:
+        yield f'more is commanded than the thrusters can give: {join(asked)}'

@@ -1,0 +1,122 @@
+"""How much each degree of freedom is deformed by the others, equations (31) to (34)."""
+
+from typing import Any
+
+import numpy as np
+
+from auv_dynamics.vehicle import DOFS
+
+NEGLIGIBLE = 1e-12  # an entry below this, relative to the largest, is a zero of the structure
+
+
+def velocity_deformation(Upsilon_inv: np.ndarray) -> np.ndarray:
+    """Matrix (6, 6) from nu to delta_xi, (33)."""
+    return Upsilon_inv - np.eye(6)
+
+
+def input_deformation(Upsilon: np.ndarray) -> np.ndarray:
+    """Matrix (6, 6) from tau to delta_pi, (34)."""
+    return (Upsilon - np.eye(6)).T
+
+
+def delta_xi(Upsilon_inv: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """Xi - nu, (33): nu (..., 6) in m/s, rad/s to (..., 6) in the same units."""
+    return nu @ velocity_deformation(Upsilon_inv).T
+
+
+def delta_pi(Upsilon: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """Pi - tau with pi = Upsilon^T tau, (34): tau (..., 6) in N, N m to (..., 6)."""
+    return tau @ input_deformation(Upsilon).T
+
+
+def structural_zeros(Upsilon: np.ndarray, Upsilon_inv: np.ndarray) -> dict[str, list[str]]:
+    """Degrees of freedom whose delta_xi or delta_pi vanishes for every motion.
+
+    Row i of Upsilon^-1 - I gives delta_xi_i, column i of Upsilon - I gives delta_pi_i.
+    """
+
+    def empty(rows: np.ndarray) -> list[str]:
+        size = np.abs(rows).max(axis=1)
+        return [dof for dof, entry in zip(DOFS, size, strict=True) if entry <= NEGLIGIBLE]
+
+    return {
+        'delta_xi': empty(velocity_deformation(Upsilon_inv)),
+        'delta_pi': empty(input_deformation(Upsilon)),
+    }
+
+
+class Products:
+    """Sums of products of six signals, gathered over blocks of samples."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.sums = np.zeros((6, 6))
+        self.peaks = np.zeros(6)
+
+    def add(self, signals: np.ndarray) -> None:
+        """Add the next samples (n, 6)."""
+        self.count += len(signals)
+        self.sums += signals.T @ signals
+        np.maximum(self.peaks, np.abs(signals).max(axis=0, initial=0.0), out=self.peaks)
+
+    @property
+    def means(self) -> np.ndarray:
+        """Mean products (6, 6): the squares of the root mean squares on the diagonal."""
+        return self.sums / max(self.count, 1)
+
+    @property
+    def rms(self) -> list[float]:
+        """Root mean squares of the six signals."""
+        return np.sqrt(np.diagonal(self.means)).tolist()
+
+
+def pieces(weights: np.ndarray, signals: np.ndarray) -> np.ndarray:
+    """Pieces of (31) or (32) that add to a deformation.
+
+    Parameters
+    ----------
+    weights : (6, 6) of `velocity_deformation` or `input_deformation`
+    signals : (..., 6) nu in m/s, rad/s, or tau in N, N m
+
+    Returns
+    -------
+    pieces : (..., 6, 6); [..., i, j] is what signal j adds to component i, their sum over j the
+        deformation (33) or (34)
+
+    """
+    return weights * signals[..., np.newaxis, :]
+
+
+def coupling_terms(weights: np.ndarray, products: Products) -> list[dict[str, Any]]:
+    """Pieces of (31) or (32) in figures: which degree of freedom deforms which other, and how much.
+
+    Parameters
+    ----------
+    weights : (6, 6) of `velocity_deformation` or `input_deformation`
+    products : of the signals that they are applied to, nu or tau
+
+    Returns
+    -------
+    terms : a dict for each entry that is no structural zero: `to` and `from`, the `coefficient`,
+        the `rms` and `max` of the piece in the unit of the component `to`, and `share_percent`,
+        its part of the mean square of the deformation. The shares of one component add to 100 %;
+        one is negative where the piece takes away from what the others add. None: nothing moves.
+
+    """
+    mean = products.means
+    along = weights @ mean  # (6, 6): mean of deformation i times signal j
+    squares = (along * weights).sum(axis=1)
+    found = []
+    for i, j in zip(*np.nonzero(np.abs(weights) > NEGLIGIBLE), strict=True):
+        weight, part = weights[i, j], weights[i, j] * along[i, j]
+        found.append(
+            {
+                'to': DOFS[i],
+                'from': DOFS[j],
+                'coefficient': float(weight),
+                'rms': float(abs(weight) * np.sqrt(mean[j, j])),
+                'max': float(abs(weight) * products.peaks[j]),
+                'share_percent': float(100.0 * part / squares[i]) if squares[i] > 0 else None,
+            }
+        )
+    return found

@@ -1,0 +1,191 @@
+"""What the faults of a run do to it: errors and effort before, during and after each."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.metrics.summary import TRANSIENT, band_of, has_settled
+from auv_analysis.output.new_files import write_table
+from auv_analysis.runs.run import AnyRun, Facts
+from auv_analysis.scenario.fault_words import Mark
+from auv_dynamics.vehicle import DOFS
+
+FILE = 'faults.parquet'
+SHORTEST = 1.0  # s: least length of the time before and after that a fault is held against
+PARTS = ('before', 'during', 'after')
+Window = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Response:
+    """A fault in one degree of freedom of one run; None is what does not exist.
+
+    Attributes
+    ----------
+    mark : the fault
+    controller, law, dof : of the run
+    windows : times of `rms` and `effort`, s
+    rms : of nu_d - nu before, during and after, m/s or rad/s
+    peak : largest absolute error before, during and after
+    band : of a settled error
+    recovery : s from the end of the fault until the error has settled in the band, dwell time
+        included, up to the next begin or end of a fault or the end of the run
+    until : s, when the time that `recovery` looks at ends; None where the fault has no end
+    effort : RMS of the commanded wrench of this axis before, during and after, N or N m
+
+    """
+
+    mark: Mark
+    controller: str
+    law: str
+    dof: str
+    windows: tuple[Window, Window, Window]
+    rms: tuple[float | None, float | None, float | None]
+    peak: tuple[float | None, float | None, float | None]
+    band: float
+    recovery: float | None
+    until: float | None
+    effort: tuple[float | None, float | None, float | None]
+
+
+def windows_of(mark: Mark, run: Facts) -> tuple[Window, Window, Window]:
+    """Times [from, to) before, during and after a fault, s; empty where there is none.
+
+    Before and after are as long as the fault, `SHORTEST` at least, and end where another fault
+    begins or ends; what comes before has nothing of the transient that a run begins with, unless
+    the fault does.
+    """
+    first, last = run.start, run.start + run.duration + run.step / 2
+    if mark.start > first + TRANSIENT:
+        first += TRANSIENT
+    start, end = max(mark.start, first), min(mark.end, last)
+    length = max(end - start, SHORTEST)
+    others = [time for other in run.faults if other != mark for time in (other.start, other.end)]
+    before = max([first, start - length, *(time for time in others if time < start)])
+    return (before, start), (start, end), (end, min(end + length, next_change(mark, run)))
+
+
+def next_change(mark: Mark, run: Facts) -> float:
+    """Time of the first begin or end of another fault behind the end of this one, or of the end."""
+    last = run.start + run.duration + run.step / 2
+    others = [time for other in run.faults if other != mark for time in (other.start, other.end)]
+    return min([last, *(time for time in others if time > mark.end)])
+
+
+def responses(run: AnyRun) -> list[Response]:
+    """Every fault of a run in every degree of freedom; none where no set-point is known."""
+    if not run.faults or not run.knows_setpoint:
+        return []
+    tallies = [_Tally(mark, run) for mark in run.faults]
+    peak = np.zeros(6)
+    for block in run.blocks():
+        peak = np.maximum(peak, np.abs(block.nu_d).max(axis=0))
+    band = band_of(peak)
+    for block in run.blocks():
+        error = np.abs(block.nu_d - block.nu)
+        for tally in tallies:
+            tally.add(block.t, error, block.tau, band)
+    return [response for tally in tallies for response in tally.responses(band)]
+
+
+class _Tally:
+    """Sums over the windows of one fault, block by block."""
+
+    def __init__(self, mark: Mark, run: Facts):
+        self._mark, self._run = mark, run
+        self._windows = windows_of(mark, run)
+        self._count = np.zeros(3, int)
+        self._error, self._effort = np.zeros((3, 6)), np.zeros((3, 6))  # sums of squares
+        self._peak = np.zeros((3, 6))
+        self._until = next_change(mark, run)
+        self._outside = np.full(6, -math.inf)  # time of the last sample outside the band
+        self._seen, self._left = 0, np.full(6, -1)  # samples of recovery, and the last one outside
+
+    def add(self, t: np.ndarray, error: np.ndarray, tau: np.ndarray, band: np.ndarray) -> None:
+        """Take in consecutive samples."""
+        tiny = 1e-6 * self._run.step
+        for i, (begin, end) in enumerate(self._windows):
+            inside = (t >= begin - tiny) & (t < end - tiny)
+            if inside.any():
+                self._count[i] += inside.sum()
+                self._error[i] += (error[inside] ** 2).sum(axis=0)
+                self._effort[i] += (tau[inside] ** 2).sum(axis=0)
+                self._peak[i] = np.maximum(self._peak[i], error[inside].max(axis=0))
+        behind = np.flatnonzero((t >= self._mark.end - tiny) & (t < self._until - tiny))
+        if len(behind):
+            for i in range(6):
+                outside = np.flatnonzero(error[behind, i] > band[i])
+                if len(outside):
+                    self._left[i] = self._seen + outside[-1]
+                    self._outside[i] = t[behind[outside[-1]]]
+            self._seen += len(behind)
+
+    def responses(self, band: np.ndarray) -> list[Response]:
+        """Of every degree of freedom."""
+        run = self._run
+        return [
+            Response(
+                self._mark,
+                run.controller,
+                run.law,
+                dof,
+                self._windows,
+                self._roots(self._error, i),
+                self._of_parts(self._peak[:, i]),
+                float(band[i]),
+                self._recovery(i),
+                min(self._until, run.start + run.duration) if self._seen else None,
+                self._roots(self._effort, i),
+            )
+            for i, dof in enumerate(DOFS)
+        ]
+
+    def _roots(self, sums: np.ndarray, i: int) -> tuple[Any, ...]:
+        return self._of_parts(np.sqrt(sums[:, i] / np.maximum(self._count, 1)))
+
+    def _of_parts(self, values: np.ndarray) -> tuple[Any, ...]:
+        pairs = zip(values, self._count, strict=True)
+        return tuple(float(value) if count else None for value, count in pairs)
+
+    def _recovery(self, i: int) -> float | None:
+        if not self._seen or not has_settled(self._left[i], self._seen):
+            return None
+        if self._left[i] < 0:
+            return 0.0
+        return round(float(self._outside[i] + self._run.step - self._mark.end), 9)
+
+
+def write_responses(folder: Path, found: Mapping[str, list[Response]]) -> Path:
+    """Write `faults.parquet`, a row per fault, controller and degree of freedom."""
+    rows = [_row(name, response) for name, several in found.items() for response in several]
+    return write_table(folder / FILE, {key: [row[key] for row in rows] for key in rows[0]})
+
+
+def _row(controller: str, response: Response) -> dict[str, str | int | float | None]:
+    mark, angular = response.mark, response.dof in DOFS[3:]
+    row: dict[str, str | int | float | None] = {
+        'fault': mark.number,
+        'kind': mark.kind,
+        'label': mark.label,
+        'start': mark.start,
+        'end': None if math.isinf(mark.end) else mark.end,
+        'controller': controller,
+        'law': response.law,
+        'dof': response.dof,
+        'unit': 'rad/s' if angular else 'm/s',
+        'effort_unit': 'N m' if angular else 'N',
+        'band': response.band,
+        'recovery': response.recovery,
+        'until': response.until,
+    }
+    for name, values in (
+        ('rms', response.rms), ('max', response.peak), ('effort', response.effort),
+    ):  # fmt: skip
+        row |= {f'{name}_{part}': value for part, value in zip(PARTS, values, strict=True)}
+    for part, (begin, end) in zip(PARTS, response.windows, strict=True):
+        row |= {f'{part}_from': begin, f'{part}_to': end}
+    return row

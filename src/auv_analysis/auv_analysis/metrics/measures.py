@@ -1,0 +1,205 @@
+"""Figures of runs as columns: their names, units and meanings, and the few that sum up six.
+
+A column is named like its keys in `summary.json`, such as `velocity_error.rms.surge`: of one run in
+a comparison, of a rollout in a sweep.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from auv_analysis.metrics.summary import SETTLED
+from auv_dynamics.vehicle import DOFS
+
+VELOCITY, WRENCH, SECONDS = ('m/s', 'rad/s'), ('N', 'N m'), ('s', 's')
+
+
+@dataclass(frozen=True)
+class Family:
+    """Six columns, one per degree of freedom: units of the linear and of the angular ones."""
+
+    label: str
+    units: tuple[str, str]
+    meaning: str
+
+
+MATRICES = ('gains.K_D', 'gains.K_f')
+FAMILIES = {
+    'kinetic_energy.mean_by_component': Family(
+        'energy', ('J', 'J'), 'mean kinetic energy of a component, 1/2 N_i xi_i^2'
+    ),
+    'kinetic_energy.shares_percent': Family(
+        'share', ('%', '%'), 'share of a component of the decomposition in the mean kinetic energy'
+    ),
+    'velocity_error.rms': Family(
+        'rms error', VELOCITY, 'root mean square of set-point minus velocity over the whole run'
+    ),
+    'velocity_error.max_after_2s': Family(
+        'late error', VELOCITY, 'largest magnitude of the velocity error after the first 2 s'
+    ),
+    'velocity_error.settling_time': Family(
+        'settled', SECONDS, f'time from which the velocity error stays within {SETTLED}'
+    ),
+    'lumped_error.rms': Family(
+        'rms w', WRENCH, 'root mean square of the estimation error w = f - F of the uncertainty'
+    ),
+    'lumped_error.max_after_2s': Family(
+        'late w', WRENCH, 'largest magnitude of the estimation error w = f - F after 2 s'
+    ),
+    'coupling.delta_xi_max': Family(
+        'Δξ', VELOCITY, 'largest magnitude of xi - nu: what inertial coupling adds to a velocity'
+    ),
+    'coupling.delta_pi_max': Family(
+        'Δπ', WRENCH, 'largest magnitude of pi - tau: what inertial coupling adds to an input'
+    ),
+    'effort.rms': Family('rms input', WRENCH, 'root mean square of the commanded input tau'),
+    'effort.max': Family('peak input', WRENCH, 'largest magnitude of the commanded input tau'),
+}
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A figure that sums up columns.
+
+    Attributes
+    ----------
+    name : of its own column
+    label : for axes and heads of tables
+    unit : of its values
+    meaning : one line that a reader without the paper understands
+    columns : it is made of
+    rule : 'norm' is the root of the sum of squares, 'largest' the largest, 'only' the one that
+        there is
+    """
+
+    name: str
+    label: str
+    unit: str
+    meaning: str
+    columns: tuple[str, ...]
+    rule: Literal['norm', 'largest', 'only']
+
+    def of(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
+        """Values (n,) from those of its columns; NaN where one of them does not exist."""
+        values = np.stack([column(name) for name in self.columns])
+        if self.rule == 'norm':
+            return np.sqrt(np.square(values).sum(axis=0))
+        return values.max(axis=0)
+
+
+def _halves(family: str, rule: Literal['norm', 'largest']) -> list[Measure]:
+    """Measures of the linear and of the angular columns of a family."""
+    found, entry = [], FAMILIES[family]
+    sums_up = 'of the vector of the three' if rule == 'norm' else 'the largest of the three'
+    for word, unit, dofs in zip(
+        ('linear', 'angular'), entry.units, (DOFS[:3], DOFS[3:]), strict=True
+    ):
+        found.append(
+            Measure(
+                f'overall.{family}.{word}',
+                f'{entry.label}, {word}',
+                unit,
+                f'{entry.meaning}; {sums_up} {word} degrees of freedom',
+                tuple(f'{family}.{dof}' for dof in dofs),
+                rule,
+            )
+        )
+    return found
+
+
+MEASURES = (
+    Measure(
+        'kinetic_energy.mean',
+        'kinetic energy',
+        'J',
+        'mean kinetic energy ½ νᵀ M ν over its window',
+        ('kinetic_energy.mean',),
+        'only',
+    ),
+    Measure(
+        'overall.velocity_error.settling_time',
+        'settled',
+        's',
+        f'time from which all six velocity errors stay within {SETTLED}; none: not in this run',
+        tuple(f'velocity_error.settling_time.{dof}' for dof in DOFS),
+        'largest',
+    ),
+    *_halves('velocity_error.rms', 'norm'),
+    *_halves('velocity_error.max_after_2s', 'largest'),
+    *_halves('lumped_error.rms', 'norm'),
+    *_halves('coupling.delta_xi_max', 'largest'),
+    *_halves('coupling.delta_pi_max', 'largest'),
+    *_halves('effort.rms', 'norm'),
+    *_halves('effort.max', 'largest'),
+)
+BY_NAME = {measure.name: measure for measure in MEASURES}
+
+
+def described(column: str) -> tuple[str, str, str]:
+    """Label, unit and meaning of a measure or of a column of a family; ('', '', '') of others."""
+    if column in BY_NAME:
+        measure = BY_NAME[column]
+        return measure.label, measure.unit, measure.meaning
+    family, _, dof = column.rpartition('.')
+    if family not in FAMILIES or dof not in DOFS:
+        return column, '', ''
+    entry = FAMILIES[family]
+    return f'{entry.label}, {dof}', entry.units[DOFS.index(dof) // 3], entry.meaning
+
+
+def flat(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Columns of a run from its summary; matrices go entry by entry.
+
+    Parameters
+    ----------
+    summary : of `summarize`
+
+    Returns
+    -------
+    columns : name -> number, word, truth or None; then those of `MEASURES`
+
+    """
+    found: dict[str, Any] = {}
+    for key, value in summary.items():
+        found |= _columns(key, value)
+    for measure in MEASURES:
+        parts = {name: np.array([_number(found.get(name))]) for name in measure.columns}
+        value = float(measure.of(parts.__getitem__)[0])
+        found[measure.name] = None if np.isnan(value) else value
+    return found
+
+
+def _number(value: float | None) -> float:
+    return np.nan if value is None else value
+
+
+def _columns(key: str, value: Any) -> dict[str, Any]:
+    if isinstance(value, Mapping):
+        parts = [_columns(f'{key}.{name}', entry) for name, entry in value.items()]
+        return {name: entry for part in parts for name, entry in part.items()}
+    if value is None and (key in FAMILIES or key in MATRICES):
+        value = [None] * 6 if key in FAMILIES else []
+    if not isinstance(value, list):
+        return {key: value}
+    if value and isinstance(value[0], Mapping):
+        return _columns(key, {_item(entry): _figures(entry) for entry in value})
+    if key in MATRICES and not value:
+        return {}
+    if not value or isinstance(value[0], str):
+        return {key: '; '.join(value)}
+    names = DOFS if len(value) == 6 else ('from', 'to')
+    pairs = zip(names, value, strict=True)
+    return {k: v for name, entry in pairs for k, v in _columns(f'{key}.{name}', entry).items()}
+
+
+def _item(entry: Mapping[str, Any]) -> str:
+    """Name of an entry of a list: what deforms what, or a window of time."""
+    if 'window' in entry:
+        return 'to'.join(f'{time:g}' for time in entry['window'])
+    return f'{entry["to"]}.{entry["from"]}'
+
+
+def _figures(entry: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in entry.items() if key not in ('to', 'from', 'window')}

@@ -1,0 +1,241 @@
+"""The figures of a run, as written to summary.json."""
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.foreign.figures import gap_figures, unexplained_figures
+from auv_analysis.metrics import moments
+from auv_analysis.metrics.coupling import (
+    Products,
+    coupling_terms,
+    input_deformation,
+    structural_zeros,
+    velocity_deformation,
+)
+from auv_analysis.metrics.energy import shares
+from auv_analysis.metrics.lyapunov import lyapunov
+from auv_analysis.metrics.moments import Moments, Tally, maps_of
+from auv_analysis.runs.run import AnyRun, Run
+from auv_gvc_controller.control.gains import body_gains
+from auv_gvc_controller.laws.law import make_gains
+from auv_gvc_controller.laws.model import control_model
+
+TRANSIENT = 2.0  # s, after which the paper reads off the errors
+ENERGY_WINDOW = 10.0  # s: the paper prints no window; over this one its energy is met within 2 %
+Window = tuple[float, float]
+BAND = 0.02  # of the peak of nu_d: settled
+SMALLEST_BAND = 0.005  # m/s, rad/s
+DWELL = 5  # % of the run at its end that a settled error stays in its band
+SHORTEST_DWELL = 10  # steps
+BAND_TEXT = f'{100 * BAND:g} % of the peak of the set-point, at least {SMALLEST_BAND:g}'
+SETTLED = f'{BAND_TEXT}, and dwells there for the last {DWELL} % of the run or longer'
+
+
+def summarize(
+    run: AnyRun, window: Window | None = None, windows: Sequence[Window] = ()
+) -> dict[str, Any]:
+    """Figures of a run as a plain dict, ready for JSON.
+
+    Parameters
+    ----------
+    run : of `simulate`, `load_run` or `open_bag`; it is gone through in blocks
+    window : (from, to) in s over whose samples energy is averaged; none: the whole run
+    windows : more of them, listed beside those that are always there: the first 10 s, the whole
+        run and what follows the transient
+
+    Returns
+    -------
+    summary : the keys of `summary.json`; what is not known is None, never NaN
+
+    """
+    model = control_model(run.vehicle)
+    Upsilon, Upsilon_inv = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
+    gains = [None, None]
+    if run.gains:
+        gains = [K.tolist() for K in body_gains(make_gains(run.law, run.gains), model)]
+    chosen = window or (run.start, run.start + run.duration)
+    usual = _usual_windows(run)
+    asked = [entry for entry in (chosen, *windows) if entry not in usual]
+    late = run.start + TRANSIENT - 1e-9
+    cuts = {entry: _cuts(run, entry) for entry in (*usual, *asked)}
+    maps = maps_of(model)
+    tally = Tally(maps, (late, *chain.from_iterable(cuts[entry] for entry in usual)))
+    # apart, so that the other figures do not depend on what is asked for, to the last bit
+    special = Tally(maps, chain.from_iterable(cuts[entry] for entry in asked))
+    tallies = {entry: tally if entry in usual else special for entry in cuts}
+    velocities, inputs = Products(), Products()
+    for block in run.blocks():
+        for one in {tally, *tallies.values()}:
+            one.add(block)
+        velocities.add(block.nu)
+        inputs.add(block.tau)
+    whole, after = tally.between(), tally.between(late)
+    energies = {w: _energy(tallies[w].between(*cuts[w]), w) for w in cuts}
+    listed = dict.fromkeys([*usual, *windows])
+    figures = {
+        'scenario': run.scenario,
+        'law': run.law,
+        'source': run.source,
+        'duration': run.duration,
+        'step': run.step,
+        'samples': run.samples,
+        'kinetic_energy': energies[chosen],
+        'kinetic_energy_windows': [energies[entry] for entry in listed],
+        'velocity': {'rms': velocities.rms, 'max': velocities.peaks.tolist()},
+        **_errors(run, whole, after),
+        'lumped_error': {
+            'rms': whole.rms(moments.LUMPED) if run.knows_disturbance else None,
+            'max_after_2s': _peak(after, moments.LUMPED) if run.knows_disturbance else None,
+        },
+        'coupling': {
+            'delta_xi_max': whole.peak(moments.DELTA_XI),
+            'delta_pi_max': whole.peak(moments.DELTA_PI),
+            'structural_zeros': structural_zeros(Upsilon, Upsilon_inv),
+        },
+        'coupling_terms': {
+            'delta_xi': coupling_terms(velocity_deformation(Upsilon_inv), velocities),
+            'delta_pi': coupling_terms(input_deformation(Upsilon), inputs),
+        },
+        'effort': {'rms': whole.rms(moments.TAU), 'max': whole.peak(moments.TAU)},
+        'gains': {'K_D': gains[0], 'K_f': gains[1]},
+        'decomposition': {'Upsilon': Upsilon.tolist(), 'N': model.N.tolist()},
+        'lyapunov': lyapunov(run, model),
+        'acceleration': run.acceleration,
+        'unexplained': unexplained_figures(run),
+        'gaps': gap_figures(run),
+        'notes': list(run.notes),
+    }
+    return _known(figures)
+
+
+def _known(value: Any) -> Any:
+    """The same with null in place of every number that is not finite, such as an overflow."""
+    if isinstance(value, dict):
+        return {key: _known(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_known(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def lumped_error(run: Run) -> np.ndarray | None:
+    """W = f - F in the body frame, (n + 1, 6) in N, N m; None where F is not known."""
+    return None if run.disturbance is None else run.disturbance_estimate - run.disturbance
+
+
+def band_of(peak: np.ndarray) -> np.ndarray:
+    """Band of a settled error for the peak (6,) of abs(nu_d), m/s and rad/s."""
+    return np.maximum(BAND * peak, SMALLEST_BAND)
+
+
+def settling_time(t: np.ndarray, error: np.ndarray, nu_d: np.ndarray) -> list[float | None]:
+    """Time from which each error stays within its band; None where it has not settled.
+
+    The band is 2 % of the peak of nu_d of that degree of freedom, at least 0.005 m/s or rad/s. An
+    error has settled when it is inside at the end and has been for the dwell time (IEEE Std 181:
+    settling needs a specified duration inside): one that only happens to end inside has not.
+
+    Parameters
+    ----------
+    t : (n,) s
+    error, nu_d : (n, 6) m/s, rad/s
+
+    """
+    return _settling([(t, error)], len(t), band_of(np.abs(nu_d).max(axis=0)))[0]
+
+
+def dwell(samples: int) -> int:
+    """Steps that a settled error stays in its band: 5 % of a run, 10 at least, no more than all."""
+    return min(max(-(-DWELL * (samples - 1) // 100), SHORTEST_DWELL), samples - 1)
+
+
+def has_settled(outside: np.ndarray, samples: int) -> np.ndarray:
+    """Whether errors dwell in their bands at the end of a run.
+
+    Parameters
+    ----------
+    outside : index of the last sample outside the band, -1 where there is none
+    samples : of the run
+
+    """
+    return samples - 2 - outside >= dwell(samples)
+
+
+def _settling(
+    blocks: Iterable[tuple[np.ndarray, np.ndarray]], samples: int, band: np.ndarray
+) -> tuple[list[float | None], list[float]]:
+    """Settling times and largest errors of the final dwell time, of consecutive blocks."""
+    entered, outside, residual = np.full(6, np.nan), np.full(6, -1), np.zeros(6)
+    seen, last = 0, samples - 1 - dwell(samples)
+    for t, error in blocks:
+        size = np.abs(error)
+        far = size > band
+        for i in range(6):
+            where = np.flatnonzero(far[:, i])
+            begin = where[-1] + 1 if len(where) else 0
+            if len(where):
+                outside[i], entered[i] = seen + where[-1], np.nan
+            if np.isnan(entered[i]) and begin < len(t):
+                entered[i] = t[begin]
+        residual = np.maximum(residual, size[max(last - seen, 0) :].max(axis=0, initial=0.0))
+        seen += len(t)
+    settled = has_settled(outside, samples)
+    times = [float(t) if inside else None for t, inside in zip(entered, settled, strict=True)]
+    return times, residual.tolist()
+
+
+def _usual_windows(run: AnyRun) -> list[Window]:
+    end = run.start + run.duration
+    starts = (run.start, run.start + min(ENERGY_WINDOW, run.duration)), (run.start, end)
+    return [*starts, (run.start + TRANSIENT, end)] if run.duration > TRANSIENT else [*starts]
+
+
+def _cuts(run: AnyRun, window: Window) -> Window:
+    """Cuts before the first and behind the last sample of a window."""
+    first, last = window
+    return first - run.step / 2, float(np.nextafter(last + run.step / 2, np.inf))
+
+
+def _errors(run: AnyRun, whole: Moments, after: Moments) -> dict[str, Any]:
+    if not run.knows_setpoint:
+        none = dict.fromkeys(('rms', 'max_after_2s', 'settling_time'))
+        return {'velocity_error': none, 'settling': None}
+    band = band_of(whole.peaks[moments.SETPOINT])
+    blocks = ((block.t, block.nu_d - block.nu) for block in run.blocks())
+    times, residual = _settling(blocks, run.samples, band)
+    return {
+        'velocity_error': {
+            'rms': whole.rms(moments.ERROR),
+            'max_after_2s': _peak(after, moments.ERROR),
+            'settling_time': times,
+        },
+        'settling': {
+            'band': band.tolist(),
+            'dwell': dwell(run.samples) * run.step,
+            'residual': residual,
+        },
+    }
+
+
+def _energy(inside: Moments, window: tuple[float, float]) -> dict[str, Any]:
+    if inside.count < 2:
+        return {
+            'mean': None,
+            'mean_by_component': None,
+            'shares_percent': None,
+            'window': list(window),
+        }
+    components = inside.mean(moments.ENERGY)
+    return {
+        'mean': float(components.sum()),
+        'mean_by_component': components.tolist(),
+        'shares_percent': shares(components).tolist(),
+        'window': [float(inside.first), float(inside.last)],
+    }
+
+
+def _peak(part: Moments, signal: int) -> list[float] | None:
+    return part.peak(signal) if part.count else None

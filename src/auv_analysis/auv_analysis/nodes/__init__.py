@@ -1,0 +1,1 @@
+"""ROS nodes of the analysis: analysis, recorder, replay, watch and driver check."""

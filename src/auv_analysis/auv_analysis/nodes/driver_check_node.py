@@ -1,0 +1,192 @@
+"""Listens to a vehicle driver, and commands it only where that was asked for.
+
+A node that listens publishes nothing at all, not even what every node of rclpy does by itself, and
+subscribes with best effort: nobody waits for it.
+"""
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from geometry_msgs.msg import WrenchStamped
+from nav_msgs.msg import Odometry
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.publisher import Publisher
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from auv_analysis.driver_check.recording import Recording, Tape
+from auv_analysis.driver_check.scene import Scene
+from auv_analysis.driver_check.scene_of_node import scene_of
+from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.bulk import BulkNode, DataPath
+from auv_dynamics.ros.codec import Codec, first_stamp, message_of
+from auv_dynamics.ros.endpoints import full_name, other_publishers
+from auv_dynamics.ros.interface import Frames
+from auv_dynamics.ros.participant import Participant
+from auv_dynamics.ros.private import PLAIN
+
+COMMANDER = 'auv_check_driver'  # its name when it commands: then it is no mere observer
+ACKNOWLEDGED = 0.5  # s that are waited for the last zero to arrive
+
+
+def _sight() -> QoSProfile:
+    """Whatever there is, from whomever, without being waited for."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=topics.DEPTH,
+        reliability=ReliabilityPolicy.BEST_EFFORT,
+    )
+
+
+class CheckNode(BulkNode):
+    """Hears odometry and sees endpoints.
+
+    Parameters
+    ----------
+    context : of rclpy
+    namespace : of the driver
+    names : of odometry and wrench, by their usual names; relative to it or absolute
+    commands : whether it is going to publish a wrench
+
+    """
+
+    prompt = True
+
+    def __init__(self, context: Context, namespace: str, names: Mapping[str, str], commands: bool):
+        super().__init__(
+            COMMANDER if commands else interface.OBSERVER,
+            context=context,
+            namespace=namespace,
+            use_global_arguments=False,
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
+        for publisher in list(self.publishers):  # /parameter_events
+            self.destroy_publisher(publisher)
+        self.tape = Tape()
+        self.odom = self.resolve_topic_name(names[interface.ODOM])
+        self.wrench = self.resolve_topic_name(names[interface.WRENCH])
+        self._hear(Odometry, self.odom, self._on_odometry)
+        self._hear(topics.CLOCK.type, topics.CLOCK.name, self._on_clock)
+        if commands:
+            self._hear(WrenchStamped, topics.WRENCH_APPLIED.name, self._on_applied)
+
+    def _hear(self, kind: type, topic: str, callback: Any) -> None:
+        def take(data: bytes, info: dict[str, Any]) -> None:
+            try:
+                callback(data, info)
+            except interface.BadMessageError:
+                number = info.get('publication_sequence_number') if topic == self.odom else None
+                self.tape.unreadable(topic, number)
+
+        hear: Any = take  # rclpy's types do not know that it may be told the way of a message
+        events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        self.add_data(
+            self.create_subscription(kind, topic, hear, _sight(), event_callbacks=events, raw=True)
+        )
+
+    def _on_odometry(self, data: bytes, info: dict[str, Any]) -> None:
+        message = message_of(data, Odometry, self.odom)
+        frames = (message.header.frame_id, message.child_frame_id)
+        x, number = interface.state_of(message), info.get('publication_sequence_number')
+        self.tape.odometry(_arrived(info), first_stamp(data), x, frames, number)
+
+    def _on_clock(self, data: bytes, info: dict[str, Any]) -> None:
+        self.tape.clock(_arrived(info), first_stamp(data))
+
+    def _on_applied(self, data: bytes, info: dict[str, Any]) -> None:
+        message = message_of(data, WrenchStamped, topics.WRENCH_APPLIED.name)
+        self.tape.wrench_applied(_arrived(info), interface.wrench_of(message))
+
+
+def _arrived(info: dict[str, Any]) -> int:
+    """When a message arrived, ns of this machine's clock; now, where the middleware tells none."""
+    return info.get('received_timestamp') or time.time_ns()
+
+
+class Ear(Participant):
+    """A participant that listens to a driver, and may be given a voice.
+
+    Parameters
+    ----------
+    domain : ROS domain id
+    namespace : of the driver
+    names : of odometry and wrench, by their usual names
+    frames : frame ids that the wrench carries
+    commands : whether it is going to publish a wrench
+
+    """
+
+    def __init__(
+        self,
+        domain: int,
+        namespace: str,
+        names: Mapping[str, str],
+        frames: Frames,
+        *,
+        commands: bool = False,
+    ):
+        executable = COMMANDER if commands else interface.OBSERVER
+        super().__init__(domain, lambda ctx: CheckNode(ctx, namespace, names, commands), executable)
+        self._frames, self._commands = frames, commands
+        self._path = DataPath([self._node])
+        self._publisher: Publisher | None = None
+
+    @property
+    def tape(self) -> Tape:
+        """What has been heard so far."""
+        return self._node.tape
+
+    def listen(self, seconds: float) -> None:
+        """Take what comes in for so long."""
+        if PLAIN:
+            self.spin(seconds)
+        else:
+            self._path.serve(time.monotonic() + seconds, lambda: False)
+
+    def publishes(self) -> bool:
+        """Whether anybody publishes the odometry."""
+        return self._node.count_publishers(self._node.odom) > 0
+
+    def scene(self, place: str) -> Scene:
+        """Who is there."""
+        return scene_of(self._node, self._node.odom, self._node.wrench, place)
+
+    def recording(self, began_ns: int) -> Recording:
+        """What was heard since a time, up to now."""
+        return self._node.tape.recording(began_ns, time.time_ns())
+
+    def others(self) -> list[str]:
+        """Who else publishes the wrench."""
+        return [full_name(one) for one in other_publishers(self._node, self._node.wrench)]
+
+    def speak(self) -> bool:
+        """Begin to publish wrenches, of which none is sent yet; whether somebody hears them."""
+        if not self._commands:
+            raise RuntimeError('a node that only listens has no voice')
+        if self._publisher is None:
+            codec = Codec(WrenchStamped, self._frames, topics.WRENCH.name)
+            self._encode = codec.encode
+            qos = topics.every_step()
+            self._publisher = self._node.create_publisher(WrenchStamped, self._node.wrench, qos)
+        return self._publisher.get_subscription_count() > 0
+
+    def send(self, tau: tuple[float, ...]) -> int:
+        """Publish a wrench with the stamp of the newest odometry; the time at which it left, ns."""
+        if self._publisher is None or self.tape.newest is None:
+            raise RuntimeError('no wrench before speak() and an odometry')
+        self._publisher.publish(self._encode(self.tape.newest[1], tau))
+        return time.time_ns()
+
+    def now_ns(self) -> int:
+        """What the clock of this machine shows, ns."""
+        return time.time_ns()
+
+    def hush(self) -> None:
+        """Wait until what was sent last has arrived, and publish no more."""
+        if self._publisher is not None:
+            self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED))
+            self._node.destroy_publisher(self._publisher)
+            self._publisher = None

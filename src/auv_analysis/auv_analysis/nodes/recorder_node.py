@@ -1,0 +1,214 @@
+"""The recorder as a node: the topics of a vehicle into an MCAP bag, every step checked."""
+
+import time
+from typing import Any
+
+from rclpy.duration import Duration
+from std_msgs.msg import Header
+
+from auv_analysis.bag.schemas import schema_text
+from auv_analysis.nodes.ledger import LostStepError, PublicationLedger, StepLedger
+from auv_analysis.nodes.recorder_clock import GraphClock
+from auv_analysis.nodes.recorder_parameters import recorder_parameters
+from auv_analysis.nodes.recorder_topics import OtherTopics
+from auv_analysis.recording import RecordingError
+from auv_dynamics.ros import convert, topics
+from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.codec import first_stamp
+from auv_dynamics.ros.graph import Graph, steady_timer
+from auv_dynamics.ros.interface import RECORDER, BadMessageError
+from auv_dynamics.ros.kinds import qos_entry, type_name
+from auv_dynamics.ros.life import main_of
+
+PATIENCE = 2.0  # s for the clock of the last steps, which nothing else waits for
+NUMBERED = (*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK)  # with one publisher each
+TIMED = (*topics.STEP_TOPICS, topics.CLOCK)  # whose stamp is the log time, and the publish time
+
+
+class RecorderNode(BulkNode):
+    """Records raw messages; log time is the stamp of steps, of others the time when they came."""
+
+    def __init__(self) -> None:
+        super().__init__(RECORDER)
+        self._settings = p = recorder_parameters(self)
+        self._writer = p.writer
+        # in real time set-points lie on a grid of their own, ahead of the odometry
+        ahead = () if p.strict else (topics.CMD_VEL.name, topics.CMD_ACCEL.name)
+        self._counted = [topic for topic in p.topics if topic not in ahead] or list(p.topics)
+        self._ledger = StepLedger(self._counted, p.step_ns, p.strict)
+        self._publications = PublicationLedger(p.strict)
+        self._time = GraphClock(self, p.strict)
+        self._newest = {topics.LUMPED_ERROR.name: -1, topics.CLOCK.name: -1}  # stamps, ns
+        self._whole_since: float | None = None  # steady s
+        self._reported = -1
+        self._complaints: set[str] = set()
+        self.graph = Graph(self, barrier=False)
+        self._progress = self.graph.publisher(topics.PROGRESS, topics.one_at_a_time())
+        self._ours = {self._record(topic) for topic in topics.TOPICS}
+        self._others = OtherTopics(self, p.others, self._take)
+        steady_timer(self, 0.02, self._report)
+        steady_timer(self, 0.2, self._keep)
+        steady_timer(self, 0.5, lambda: self._others.look(self._ours))
+        expected = ', '.join(p.topics)
+        self.begin(f'records {p.others.namespace} into {p.bag}, expects {expected}')
+
+    def _record(self, topic: topics.Topic) -> str:
+        """Subscribe to a topic of the graph; its full name."""
+        name, kind = topic.name, type_name(topic.type)
+        resolved = self.resolve_topic_name(name)
+        step_topic = name if name in self._counted else ''
+        numbered, awaited = topic in NUMBERED, name in self._newest
+        # what is said of a step in lock-step belongs to it, however late it comes
+        of_a_step = self._settings.strict and topic in topics.ANALYSIS_TOPICS
+        timed = topic in TIMED or of_a_step
+        zero_is_a_time = self._time.simulated or topic is topics.CLOCK
+
+        def callback(message: bytes, way: dict[str, Any]) -> None:
+            ns = 0
+            try:
+                if timed or awaited:
+                    ns = first_stamp(message)
+            except BadMessageError:
+                self._take(resolved, kind, message, way)
+                raise
+            if timed and (ns or zero_is_a_time):
+                if step_topic:
+                    self._time.follow(ns)
+                    if self._time.early:
+                        self._release()
+                published = (of_a_step and way.get('source_timestamp')) or ns
+                self._write(resolved, kind, message, ns, published)
+            else:
+                self._take(resolved, kind, message, way)
+            if numbered:
+                self._count(name, step_topic, ns, way.get('publication_sequence_number'))
+            if awaited:
+                self._newest[name] = max(self._newest[name], ns)
+
+        self.graph.subscribe(topic, callback, topics.every_step())
+        return resolved
+
+    def _take(self, topic: str, kind: str, message: bytes, way: dict[str, Any]) -> None:
+        """Write a message at the time when it came; before that is known, it waits."""
+        ns = self._time.now(way.get('received_timestamp') or 0)
+        if ns is None:
+            self._meet(topic, kind)  # its publisher may be gone by then
+            self._time.hold((topic, kind, message, way))
+        else:
+            self._write(topic, kind, message, ns, max(0, way.get('source_timestamp') or ns))
+
+    def _release(self, *, ends: bool = False) -> None:
+        """Write what has waited, once the time of the graph is known or not waited for."""
+        for entry in self._time.released(ends=ends) if self._time.early else ():
+            self._take(*entry)
+
+    def _write(self, topic: str, kind: str, message: bytes, ns: int, published: int) -> None:
+        self._meet(topic, kind)
+        if self._writer.broken:
+            return
+        try:
+            self._writer.write(topic, ns, message, published)
+        except RecordingError as error:
+            self._end(1, str(error))
+        if self._writer.trouble:
+            self._end(1, self._writer.trouble)
+
+    def _meet(self, topic: str, kind: str) -> None:
+        """Define a topic in the bag, with what its publishers offer."""
+        if self._writer.broken or self._writer.has_channel(topic):
+            return
+        found = self.get_publishers_info_by_topic(topic)
+        offered = [one for one in found if one.topic_type == kind]
+        qos = [qos_entry(one.qos_profile) for one in offered]
+        known = offered or self.get_subscriptions_info_by_topic(topic)
+        digest = str(known[0].topic_type_hash) if known else ''
+        try:
+            self._writer.add_channel(topic, kind, schema_text(kind), qos, digest)
+        except RecordingError as error:
+            self._end(1, str(error))
+
+    def _count(self, name: str, step_topic: str, ns: int, number: int | None) -> None:
+        try:
+            if step_topic:
+                self._ledger.add(step_topic, ns)
+            self._publications.add(name, number)
+        except LostStepError as error:
+            self._end(1, str(error))
+
+    def _report(self) -> None:
+        """Publish the last complete step when it is new, and end when it is the last one."""
+        if self._writer.trouble:
+            self._end(1, self._writer.trouble)
+        complete = self._ledger.complete
+        if complete > self._reported:
+            self._reported = complete
+            self._say_progress()
+        p = self._settings
+        analysed = p.last_due is None or self._newest[topics.LUMPED_ERROR.name] >= p.last_due
+        if p.last is not None and complete >= p.last and analysed and self._clock_is_whole():
+            self._end(0)
+
+    def _clock_is_whole(self) -> bool:
+        """Whether the clock, if there is one, has come to the last step too, or stands still."""
+        now = time.monotonic()
+        self._whole_since = self._whole_since or now
+        late = 0 <= self._newest[topics.CLOCK.name] < self._ledger.complete_ns
+        return not late or now - self._whole_since > PATIENCE
+
+    def _say_progress(self) -> None:
+        if self._reported >= 0:
+            message = Header(stamp=convert.stamp(self._ledger.complete_ns))
+            message.frame_id = self.graph.frames.base
+            self._progress.publish(message)
+
+    def _keep(self) -> None:
+        """Repeat the progress for whoever has joined since."""
+        self._release()
+        self._say_progress()
+        self.graph.latest_ns = max(0, self._time.latest)
+        self.graph.facts.update(complete=self._ledger.complete, behind=self._ledger.behind())
+
+    def _end(self, code: int, text: str = '') -> None:
+        if self.exit_code is not None:
+            return
+        if text:
+            self._complain(text)
+        self.exit_code = code
+        self._progress.wait_for_all_acked(Duration(seconds=1.0))
+
+    def _complain(self, text: str) -> None:
+        if text not in self._complaints:
+            self.get_logger().error(text)
+        self._complaints.add(text)
+
+    def close(self) -> None:
+        """Finish the bag with everything that has arrived, and say what has not."""
+        self.take_data()
+        self._release(ends=True)
+        try:
+            self._writer.close()
+        except RecordingError as error:
+            self._complain(str(error))
+            self.exit_code = 1
+        lost = {topic: gaps for topic, gaps in self._ledger.gaps.items() if gaps}
+        if lost or self._publications.gaps:
+            lost.update(self._publications.gaps)
+            self.get_logger().warning(f'steps or messages that did not arrive: {lost}')
+        if not self._complaints:
+            self._name_silent()
+        left = [f'{topic} ({why})' for topic, why in sorted(self._others.left.items())]
+        self.task = f'recorded {self._writer.count} messages into {self._settings.bag}'
+        self.task += f', not {", ".join(left)}' if left else ''
+
+    def _name_silent(self) -> None:
+        """Fail where a topic that is expected has had no message."""
+        p, has = self._settings, self._writer.has_channel
+        silent = [topic for topic in p.topics if not has(self.resolve_topic_name(topic))]
+        if silent:
+            self._complain(f'{p.bag}: expected topics without any message: {", ".join(silent)}')
+            self.exit_code = 1
+
+
+def main() -> None:
+    """Run the node."""
+    main_of(RecorderNode)

@@ -1,0 +1,202 @@
+"""Listens to a graph without taking part in it: nothing is published, nobody waits for it.
+
+Only what is published is subscribed, and with best effort: that fits every publisher, and a
+publisher never waits for such a subscriber, not even for one that is stopped.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.qos import HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+
+from auv_analysis.watch.gauge import HEARD, Gauge
+from auv_analysis.watch.snapshot import LEVELS, NodeState
+from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.codec import KINDS, Codec, first_stamp, message_of
+from auv_dynamics.ros.endpoints import Endpoints, endpoints
+from auv_dynamics.ros.interface import BadMessageError, Frames
+from auv_dynamics.ros.life import serve
+from auv_dynamics.ros.participant import Participant
+from auv_dynamics.ros.private import PLAIN
+
+DEPTH = 256  # messages of a topic between two looks; of more, the oldest are dropped
+LOOK = 0.5  # s between two looks at who is there
+SERVED = 2000  # callbacks at each look, at most; only a plain executor brings messages as well
+BRIEF = 0.001  # s: without any patience it brings one message of each topic, however many wait
+# without a pause: few messages, or set-points, which are published long before their odometry
+ALWAYS = (topics.CMD_VEL, topics.DIAGNOSTICS, topics.PROGRESS)
+
+
+def _sight() -> QoSProfile:
+    """Whatever there is, the newest of it, from whomever."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST, depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT
+    )
+
+
+class WatchNode(BulkNode):
+    """Subscribes what is published and hands it to a gauge.
+
+    Parameters
+    ----------
+    context : of rclpy
+    namespace : of the graph
+    frames : frame ids that are accepted
+    gauge : is told of everything, with the steady time in s
+
+    """
+
+    def __init__(self, context: Context, namespace: str, frames: Frames, gauge: Gauge):
+        super().__init__(
+            interface.OBSERVER,
+            context=context,
+            namespace=namespace,
+            use_global_arguments=False,
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
+        self._gauge = gauge
+        self._frames = frames
+        self._topics = [topic for topic in topics.TOPICS if topic.name in HEARD]
+        # made once: which messages are laid out how takes some time to find out
+        self._callbacks: dict[topics.Topic, Any] = {t: self._callback(t) for t in self._topics}
+        self._subscribed: dict[topics.Topic, Subscription] = {}
+        self._now = 0.0
+
+    def take(self) -> None:
+        """Take what has come, all at the same time."""
+        self._now = time.monotonic()
+        self.take_data()
+
+    def look(self, *, listening: bool) -> None:
+        """See who is there; subscribe what is published, leave what is not."""
+        found = {topic.name: endpoints(self, topic) for topic in self._topics}
+        self._gauge.see(time.monotonic(), found)
+        for topic in self._topics:
+            self._set(topic, found[topic.name], wanted=listening or topic in ALWAYS)
+
+    def _set(self, topic: topics.Topic, ends: Endpoints, *, wanted: bool) -> None:
+        wanted = wanted and ends.publishers > 0
+        if wanted and topic not in self._subscribed:
+            self._subscribed[topic] = self._subscribe(topic)
+        elif not wanted and topic in self._subscribed:
+            self.drop_data(self._subscribed.pop(topic))
+
+    def _subscribe(self, topic: topics.Topic) -> Subscription:
+        events = SubscriptionEventCallbacks(
+            incompatible_qos=lambda event: self._incompatible(topic, event),
+            use_default_callbacks=False,
+        )
+        subscription = self.create_subscription(
+            topic.type,
+            topic.name,
+            self._guarded(topic),
+            _sight(),
+            event_callbacks=events,
+            raw=True,
+        )
+        self.add_data(subscription)
+        # set-points come first, so that the one of an odometry is there before it
+        setpoints = self.resolve_topic_name(topics.CMD_VEL.name)
+        self.data_subscriptions().sort(key=lambda one: one.topic_name != setpoints)
+        return subscription
+
+    def _guarded(self, topic: topics.Topic) -> Any:
+        """The callback of a topic, with bytes that are no message refused."""
+
+        def take(data: bytes, info: dict[str, Any]) -> None:
+            try:
+                self._callbacks[topic](data, info)
+            except BadMessageError as error:
+                self._gauge.refuse(self._now, topic.name, str(error))
+
+        return take
+
+    def _callback(self, topic: topics.Topic) -> Callable[[bytes, dict[str, Any]], None]:
+        if topic is topics.DIAGNOSTICS:
+            return self._on_diagnostics
+        known = topic.type in KINDS
+        decode = Codec(topic.type, self._frames, topic.name).decode if known else None
+
+        def take(data: bytes, info: dict[str, Any]) -> None:
+            now, number, values = self._now, _number(info), None
+            try:
+                values = decode(data)[1] if decode else None
+            except BadMessageError as error:
+                self._gauge.refuse(now, topic.name, str(error))
+            self._gauge.hear(now, topic.name, number, first_stamp(data), values)
+
+        return take
+
+    def _on_diagnostics(self, data: bytes, info: dict[str, Any]) -> None:
+        now, name = self._now, topics.DIAGNOSTICS.name
+        self._gauge.hear(now, name, _number(info), first_stamp(data), None)
+        for status in message_of(data, DiagnosticArray, name).status:
+            level = LEVELS[min(int.from_bytes(status.level, 'little'), len(LEVELS) - 1)]
+            facts = {pair.key: pair.value for pair in status.values}
+            state = NodeState(status.name, level, status.message, 0.0, facts)
+            self._gauge.diagnose(now, state)
+
+    def _incompatible(self, topic: topics.Topic, event: Any) -> None:
+        policy = QoSPolicyKind(event.last_policy_kind).name.lower()
+        text = f'{topic.name}: incompatible QoS with another endpoint: {policy}'
+        self._gauge.complain(time.monotonic(), text)
+
+    def elsewhere(self) -> list[str]:
+        """Other namespaces in which odometry is published."""
+        own = self.resolve_topic_name(topics.ODOM.name)
+        names = {name for name, _ in self.get_topic_names_and_types()} - {own}
+        ending, truth = (f'/{topic.name}' for topic in (topics.ODOM, topics.GROUND_TRUTH))
+        found = [name for name in names if name.endswith(ending) and not name.endswith(truth)]
+        return sorted(name.removesuffix(ending) or '/' for name in found)
+
+
+def _number(info: dict[str, Any]) -> int | None:
+    return info.get('publication_sequence_number')
+
+
+class Listener(Participant):
+    """A participant that listens for a gauge.
+
+    Parameters
+    ----------
+    domain : ROS domain id
+    namespace : of the graph
+    frames : frame ids that are accepted
+    gauge : is told of everything
+
+    """
+
+    def __init__(self, domain: int, namespace: str, frames: Frames, gauge: Gauge):
+        def make(context: Context) -> WatchNode:
+            return WatchNode(context, namespace, frames, gauge)
+
+        super().__init__(domain, make, interface.OBSERVER)
+        self._looked: float | None = None
+        self._listened = False
+
+    def listen(self, *, listening: bool) -> None:
+        """Take what has come; `listening`: whether topics with many messages are subscribed."""
+        self._node.take()
+        now = time.monotonic()
+        if PLAIN:
+            self._serve(BRIEF)
+        if self._looked is None or now - self._looked > LOOK or listening != self._listened:
+            self._looked, self._listened = now, listening
+            self._serve(0.0)
+            self._node.look(listening=listening)
+
+    def _serve(self, timeout: float) -> None:
+        for _ in range(SERVED):
+            if not serve(self._node, self._executor, timeout):
+                break
+
+    def elsewhere(self) -> list[str]:
+        """Other namespaces in which odometry is published."""
+        return self._node.elsewhere()

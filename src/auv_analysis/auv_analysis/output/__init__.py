@@ -1,0 +1,1 @@
+"""What commands leave and show: results folders, new files, progress on a terminal."""

@@ -1,0 +1,1 @@
+"""The experiment's file: its grammar, values by dotted path, scaling to a vehicle, templates."""

@@ -1,0 +1,152 @@
+"""Case 1 of the paper on another vehicle, as a scenario."""
+
+import copy
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from auv_dynamics.files.shipped import shipped, shipped_names
+from auv_dynamics.files.yaml_files import read_yaml
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
+
+REFERENCE = 'herman2018'  # the vehicle that case1 was made for
+SLOWER = 0.5  # of the set-point (35): 0.6 m/s in surge, 0.8 m/s in heave, 0.05 rad/s in yaw
+DIGITS = 10  # of a written scale: the last ones differ between BLAS libraries
+ROUNDING = 1e-12  # relative to the largest entry, below which an entry of the scale is zero
+UNFIT = re.compile('[^A-Za-z0-9_.+-]+')  # in the name of a scenario, which names a folder
+LONGEST = 90
+
+TOP_SPEED = {
+    'bluerov2': '1.5 m/s (Blue Robotics)',
+    'bluerov2_heavy': '0.85 m/s (four T200, 114 N, against 13.7 u + 141 u^2)',
+    'girona500': '1.4 m/s (in its source: two thrusters of 154 N against 148 u^2)',
+    'lauv': '2 m/s (as the model of gym-auv limits it)',
+    'lrauv_tethys': '1.0 m/s (MBARI)',
+}
+COMMENT = """\
+# yaml-language-server: $schema=../../src/auv_analysis/auv_analysis/scenario/scenario.schema.json
+#
+# Case 1 of Herman 2018 on {name}: what do the paper's gains do on another vehicle?
+# Kept from case1: controllers with their gains, duration, step.
+# Set-point (35) times {factor}: at most {surge:g} m/s in surge, {heave:g} m/s in heave and
+# {yaw:g} rad/s in yaw, for every shipped vehicle. Top speed of this one: {speed}.
+# All six degrees of freedom count as actuated, as in the paper. A torpedo-shaped vehicle has
+# nothing to heave with: there it is an experiment on paper.
+# Disturbance (39): the same acceleration a(t) for every vehicle, F = M a(t).
+{scale}
+# Written by write_scaled_scenarios in scenario/scaling.py; a test holds the two together.
+"""
+
+
+SCALE = (
+    'scale, 6x6: F = scale F_39, where F_39 is (39) as printed, in N and N m. It is M M_ref^-1',
+    'with M of this vehicle and M_ref of {reference}, and no coupling of the water: row i says how',
+    'much of each entry of F_39, surge to yaw, acts in degree of freedom i.',
+)
+
+
+def scale_lines(reference: str = REFERENCE) -> list[str]:
+    """What the `scale` of a scaled disturbance is, for a comment."""
+    return [line.format(reference=reference) for line in SCALE]
+
+
+def scaled_case1(vehicle: str | Path, reference: str = REFERENCE) -> dict[str, Any]:
+    """Case 1 of the paper for another vehicle, as the contents of a scenario file.
+
+    Parameters
+    ----------
+    vehicle : path of a vehicle file, or the bare name of a shipped one
+    reference : name or path of the vehicle whose accelerations under (39) are kept
+
+    Returns
+    -------
+    scenario : case1 with that vehicle, the set-point (35) times 0.5 and `scale` of the
+        disturbance (39) so that F = M a(t), a(t) = M_ref^-1 F(t); a path is made absolute
+
+    Raises
+    ------
+    InputError : naming file, key, expected and found
+
+    """
+    scenario = copy.deepcopy(read_yaml(shipped('scenarios', 'case1'), 'scenario'))
+    loaded = load_vehicle(vehicle)
+    scenario['name'] = f'case1_{UNFIT.sub("_", loaded.name)[:LONGEST]}'
+    bare = shipped('vehicles', vehicle) != Path(vehicle)
+    scenario['vehicle'] = str(vehicle if bare else Path(vehicle).resolve())
+    scenario['setpoint'] = {
+        dof: _slower(harmonics) for dof, harmonics in scenario['setpoint'].items()
+    }
+    scale = _rounded(loaded.M @ np.linalg.inv(load_vehicle(reference).M))
+    scenario['disturbance'] = scenario['disturbance'] | {'scale': scale.tolist()}
+    return scenario
+
+
+def _slower(harmonics: dict[str, Any]) -> dict[str, Any]:
+    slower: dict[str, Any] = {}
+    if 'offset' in harmonics:
+        slower['offset'] = SLOWER * harmonics['offset']
+    slower['terms'] = [
+        term | {'amplitude': SLOWER * term['amplitude']} for term in harmonics.get('terms', [])
+    ]
+    return slower
+
+
+def _rounded(A: np.ndarray) -> np.ndarray:
+    A = np.where(np.abs(A) < ROUNDING * np.abs(A).max(), 0.0, A)
+    return np.array([[float(f'{entry:.{DIGITS}g}') for entry in row] for row in A])
+
+
+def scenario_text(scenario: dict[str, Any], reference: str = REFERENCE) -> str:
+    """Text of a scenario file with what was scaled in its comment.
+
+    Parameters
+    ----------
+    scenario : of `scaled_case1`
+    reference : the same as there
+
+    """
+    name = Path(scenario['vehicle']).stem
+    comment = COMMENT.format(
+        name=name,
+        reference=reference,
+        factor=SLOWER,
+        scale='\n'.join(f'# {line}' for line in scale_lines(reference)),
+        speed=TOP_SPEED.get(name, 'not found in its sources'),
+        **{dof: round(_peak(harmonics), 6) for dof, harmonics in scenario['setpoint'].items()},
+    )
+    return comment + yaml.safe_dump(scenario, sort_keys=False, default_flow_style=None, width=200)
+
+
+def _peak(harmonics: dict[str, Any]) -> float:
+    """Bound of a harmonic: offset plus all amplitudes."""
+    return abs(harmonics.get('offset', 0.0)) + sum(abs(t['amplitude']) for t in harmonics['terms'])
+
+
+def scaled_scenarios() -> Iterator[tuple[str, str]]:
+    """File name and text of case1 for each shipped vehicle but the paper's own."""
+    for name in shipped_names('vehicles'):
+        if name != REFERENCE:
+            yield f'case1_{name}.yaml', scenario_text(scaled_case1(name))
+
+
+def write_scaled_scenarios(folder: Path) -> list[Path]:
+    """Write the scenarios of `scaled_scenarios` into a folder; same input, same bytes.
+
+    Parameters
+    ----------
+    folder : existing; for the shipped ones, the folder of `shipped('scenarios', 'case1')`
+
+    Returns
+    -------
+    paths : of the files, in the order of their names
+
+    """
+    paths = []
+    for name, text in scaled_scenarios():
+        paths.append(folder / name)
+        paths[-1].write_text(text, encoding='utf-8')
+    return paths

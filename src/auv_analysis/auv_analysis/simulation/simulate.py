@@ -1,0 +1,182 @@
+"""In-process simulation of a scenario by the one kernel."""
+
+from collections.abc import Iterator
+from typing import Any, Literal
+
+import numpy as np
+
+from auv_analysis.output.progress import each
+from auv_analysis.runs.run import Run
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.closed_loop import (
+    Grid,
+    Loop,
+    Motion,
+    Tables,
+    Workspace,
+    run_continuous,
+    run_held,
+)
+from auv_analysis.simulation.records import Log
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import LARGEST
+from auv_dynamics.kernel.compile import plain
+from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
+from auv_dynamics.plant.actuators import memory
+from auv_dynamics.plant.fault_rows import FaultRows
+from auv_dynamics.plant.faulty_devices import history_shape
+from auv_dynamics.plant.plant import SIZE, eta_of, initial_state
+from auv_dynamics.plant.sensors import WIDTH, SensorNoise
+from auv_dynamics.vehicle.kinematics import unwrapped
+from auv_gvc_controller.control.sampled import anti_windup, is_compiled, user_law
+from auv_gvc_controller.control.setpoint import Setpoint
+from auv_gvc_controller.laws.model import control_model
+
+Hold = Literal['continuous', 'zoh']
+HOLDS = ('continuous', 'zoh')
+BLOCK = 1024  # steps that are tabulated at once
+
+
+class DivergedError(ArithmeticError):
+    """The closed loop left the finite numbers."""
+
+
+def simulate(scenario: Scenario, controller: str, hold: Hold = 'continuous') -> Run:
+    """Run one controller of a scenario.
+
+    Parameters
+    ----------
+    scenario : of `load_scenario`
+    controller : name of one of its controllers
+    hold : 'continuous' puts the law inside every stage of the integrator, as the paper does;
+        'zoh' samples it at every step and holds the wrench, as the nodes do
+
+    Returns
+    -------
+    run : Run of n + 1 samples, n = duration / step
+
+    Raises
+    ------
+    InputError : no controller of that name; actuators, sensors or faults with hold 'continuous'
+    ValueError : no such hold
+    DivergedError : a value stopped being finite; the text says when
+
+    """
+    if hold not in HOLDS:
+        raise ValueError(f'hold: expected {" or ".join(HOLDS)}, found {hold!r}')
+    gains = scenario.gains(controller)
+    check_hold(scenario, hold)
+    log = Log.empty(scenario.steps, type(gains).STATES)
+    nu_d_dot = _run_kernel(scenario, controller, hold, gains, log)
+    t = np.arange(scenario.steps + 1) * scenario.step
+    _check_finite(log, t, scenario, controller)
+    return Run(
+        t=t,
+        eta=unwrapped_eta(log.x),
+        nu=log.x[:, 7:],
+        nu_d=log.nu_d,
+        nu_d_dot=nu_d_dot,
+        tau=log.tau,
+        disturbance=log.F,
+        disturbance_estimate=log.f,
+        vehicle=scenario.vehicle,
+        scenario=scenario.name,
+        controller=controller,
+        law=scenario.controller(controller)['law'],
+        gains=scenario.gain_values(controller),
+        step=scenario.step,
+        source='simulate',
+        hold=hold,
+        measured=log.measured[:, 7:] if scenario.senses else None,
+        applied=log.applied if scenario.acts else None,
+        law_state=log.state,
+        kinds=scenario.kinds,
+        faults=scenario.marks,
+    )
+
+
+def check_hold(scenario: Scenario, hold: Hold) -> None:
+    """Raise InputError where the scenario has something that acts on samples only."""
+    if hold == 'continuous' and scenario.sampled:
+        expected = "hold 'zoh' (--hold zoh): they act on samples"
+        raise InputError(scenario.path, scenario.sampled[0], expected, "hold 'continuous'")
+
+
+def blocks(scenario: Scenario) -> Iterator[tuple[Grid, Tables]]:
+    """What is known of a run before it starts, a block of steps at a time."""
+    tableau, count = TABLEAUS[scenario.data['integrator']], scenario.steps + 1
+    noise, faults = scenario.noise(), scenario.fault_rows()
+    for first in range(0, count, BLOCK):
+        t = stage_times(tableau, scenario.step, first, min(BLOCK, count - first))
+        yield Grid(t, scenario.step, first, count - 1), tables(scenario, t, noise, faults)
+
+
+def tables(
+    scenario: Scenario,
+    t: np.ndarray,
+    noise: SensorNoise | None = None,
+    faults: FaultRows | None = None,
+) -> Tables:
+    """Set-points, disturbance, current and the next rows of noise and faults at t (T, s)."""
+    rows = np.zeros((0, WIDTH)) if noise is None else noise.rows(len(t))
+    failing = np.zeros((0, 0)) if faults is None else faults.rows(len(t))
+    known = scenario.uncertainty.tables(t)
+    return Tables(reference(scenario.setpoint, t), *known, rows, failing)
+
+
+def reference(setpoint: Setpoint, t: np.ndarray) -> np.ndarray:
+    """nu_d and nu_d_dot (..., T, s, 12) at the stage times t (T, s)."""
+    return np.concatenate([setpoint.value(t), setpoint.derivative(t)], axis=-1)
+
+
+def _run_kernel(
+    scenario: Scenario, controller: str, hold: Hold, gains: Any, log: Log
+) -> np.ndarray:
+    """Fill the log; nu_d_dot (n + 1, 6) at the samples."""
+
+    def kernel(function: Any) -> Any:
+        return function if is_compiled(gains) else plain(function)
+
+    tableau, loop = TABLEAUS[scenario.data['integrator']], one_loop(scenario, controller)
+    function = kernel(run_continuous if hold == 'continuous' else run_held)
+    motion, work = at_start(scenario, loop)
+    nu_d_dot = np.empty((scenario.steps + 1, 6))
+    for grid, known in each(blocks(scenario), scenario.steps // BLOCK + 1):
+        nu_d_dot[grid.first : grid.first + len(grid.t)] = known.reference[:, 0, 6:]
+        with np.errstate(all='ignore'), user_law(gains):
+            function(loop, known, grid, tableau, motion, work, log)
+    return nu_d_dot
+
+
+def one_loop(scenario: Scenario, controller: str) -> Loop:
+    """The vehicle of a scenario with one of its controllers."""
+    gains = scenario.gains(controller)
+    guard = anti_windup(gains, scenario.reach(controller))
+    model, actuators = control_model(scenario.vehicle), scenario.actuators
+    return Loop(scenario.uncertainty.truth, actuators, gains, model, guard, scenario.faults.shape)
+
+
+def at_start(scenario: Scenario, loop: Loop) -> tuple[Motion, Workspace]:
+    """Where a run begins, and room for its stages."""
+    states = type(loop.gains).STATES
+    x = np.concatenate([initial_state(*scenario.initial), np.zeros(states)])
+    stages = len(TABLEAUS[scenario.data['integrator']].b)
+    faults = loop.faults
+    held, history = memory(loop.actuators, faults=faults.any), np.zeros(history_shape(faults))
+    motion = Motion(x, x[:SIZE].copy(), np.zeros(states), held, history)
+    return motion, Workspace(np.zeros((stages, len(x))), np.zeros(len(x)))
+
+
+def unwrapped_eta(x: np.ndarray) -> np.ndarray:
+    """Eta (n, 6) of the states (n, 13) of consecutive samples."""
+    eta = eta_of(x)
+    eta[:, 3:] = unwrapped(eta[:, 3:])
+    return eta
+
+
+def _check_finite(log: Log, t: np.ndarray, scenario: Scenario, controller: str) -> None:
+    finite = np.all([(np.abs(part) < LARGEST).all(axis=1) for part in log], axis=0)
+    if not finite.all():
+        first = t[np.argmin(finite)]
+        where = f'{scenario.name}, {controller}'
+        raise DivergedError(f'{where}: the closed loop diverges, not finite from t = {first:g} s')

@@ -1,0 +1,1 @@
+"""Atlas: couplings by inertia of several vehicles, without units."""

@@ -1,0 +1,401 @@
+"""What a vehicle file says: inertia, couplings, hydrostatics, poles, thrusters, largest step."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from auv_analysis.metrics.coupling import NEGLIGIBLE, structural_zeros
+from auv_analysis.output.progress import TextConsole
+from auv_analysis.scenario.scaling import TOP_SPEED
+from auv_analysis.studies.linearize.linearize import linearize
+from auv_analysis.studies.linearize.modes import modes
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.thrusters import Thrusters
+from auv_dynamics.vehicle.vehicle import Vehicle, munk_terms
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
+from auv_gvc_controller.control.gains import RINGS, UNSTABLE, sampled_rate
+from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
+
+K_D = 12.0  # k_D of the paper, (36)
+CRUISE = 1.0  # m/s, where the top speed of a vehicle is not known
+VELOCITY = ('m/s',) * 3 + ('rad/s',) * 3
+WRENCH = ('N',) * 3 + ('N m',) * 3
+
+
+def check_vehicle(name_or_path: str | Path, speed: float | None = None) -> dict[str, Any]:
+    """Properties of a vehicle file that decide how it can be controlled, ready for JSON.
+
+    Parameters
+    ----------
+    name_or_path : a vehicle file, or the bare name of a shipped one
+    speed : m/s, ahead, at which the poles are; None: the top speed of a shipped vehicle, else 1
+
+    Returns
+    -------
+    document : name, source, M, N, Upsilon, inertia, couplings, structural_zeros, statement,
+        hydrostatics, damping, cruise, thrusters (None without), sampling, warnings; SI units, None
+        for what does not exist (a time constant without damping, a frequency without restoring)
+
+    Raises
+    ------
+    InputError : naming file, key, expected and found
+
+    """
+    vehicle = load_vehicle(name_or_path)
+    Upsilon, N = decompose(vehicle.M)
+    inverse = inverse_upper(Upsilon)
+    couplings = _couplings(Upsilon, inverse)
+    moments = np.linalg.eigvalsh(vehicle.M)
+    return {
+        'name': vehicle.name,
+        'source': vehicle.source,
+        'M': vehicle.M.tolist(),
+        'N': N.tolist(),
+        'Upsilon': Upsilon.tolist(),
+        'inertia': {
+            'eigenvalues': moments.tolist(),
+            'condition_number': float(moments[-1] / moments[0]),
+        },
+        'couplings': couplings,
+        'structural_zeros': structural_zeros(Upsilon, inverse),
+        'statement': _statement(couplings),
+        'hydrostatics': _hydrostatics(vehicle),
+        'damping': _damping(vehicle),
+        'cruise': _cruise(vehicle, speed),
+        'thrusters': None if vehicle.thrusters is None else _thrusters(vehicle.thrusters),
+        'sampling': _sampling(vehicle.M),
+        'warnings': list(vehicle.warnings),
+    }
+
+
+def _couplings(Upsilon: np.ndarray, inverse: np.ndarray) -> list[dict[str, Any]]:
+    """Entries of (33) and (34): delta_xi_i by nu_j, j > i, and delta_pi_i by tau_j, j < i."""
+    found: list[dict[str, Any]] = []
+    for key, weights, units in (
+        ('delta_xi', inverse, VELOCITY),
+        ('delta_pi', Upsilon.T, WRENCH),
+    ):
+        for i, j in zip(*np.nonzero(np.abs(weights - np.eye(6)) > NEGLIGIBLE), strict=True):
+            found.append(
+                {
+                    'from': DOFS[j],
+                    'to': DOFS[i],
+                    key: float(weights[i, j]),
+                    'unit': f'{units[i]} per {units[j]}',
+                }
+            )
+    return found
+
+
+def _statement(couplings: list[dict[str, Any]]) -> str:
+    if not couplings:
+        return (
+            'M is diagonal: Upsilon is the identity and there is no inertial coupling; '
+            'delta_xi and delta_pi are zero in every motion'
+        )
+    number = sum('delta_xi' in entry for entry in couplings)
+    word = 'coupling' if number == 1 else 'couplings'
+    return f'M is not diagonal: {number} {word} of velocities by its inertia'
+
+
+def _hydrostatics(vehicle: Vehicle) -> dict[str, Any]:
+    """N, m, N m: metacentric height is z_G - z_B, positive with the weight below the buoyancy.
+
+    `moment_when_level` acts in roll and pitch at phi = theta = 0; not zero: the vehicle does
+    not float level.
+    """
+    difference = vehicle.buoyancy - vehicle.weight
+    couple = vehicle.weight * vehicle.r_G - vehicle.buoyancy * vehicle.r_B
+    return {
+        'weight': vehicle.weight,
+        'buoyancy': vehicle.buoyancy,
+        'difference': difference,
+        'difference_percent': 100 * difference / vehicle.weight,
+        'r_G': vehicle.r_G.tolist(),
+        'r_B': vehicle.r_B.tolist(),
+        'metacentric_height': float(vehicle.r_G[2] - vehicle.r_B[2]),
+        'moment_when_level': [float(couple[1]), float(0.0 - couple[0])],
+        'modes': _pendulum(vehicle),
+    }
+
+
+def _pendulum(vehicle: Vehicle) -> dict[str, dict[str, float | None]]:
+    """Undamped motion in phi and theta about level: its stiffness M^-1 dg/d(phi, theta), 1/s2.
+
+    The eigenvalue is the square of the natural frequency; negative: the vehicle turns over.
+    """
+    small = 1e-6
+
+    def g(phi: float, theta: float) -> np.ndarray:
+        return vehicle.g(np.array([0.0, 0.0, 0.0, phi, theta, 0.0]))
+
+    slope = np.stack([g(small, 0.0) - g(-small, 0.0), g(0.0, small) - g(0.0, -small)], axis=1) / (
+        2 * small
+    )
+    values, modes = np.linalg.eig(np.linalg.solve(vehicle.M, slope)[3:5])
+    roll = int(np.argmax(np.abs(modes[0])))
+    named = {}
+    for dof, i in (('roll', roll), ('pitch', 1 - roll)):
+        value = float(values[i].real)
+        stable = value > NEGLIGIBLE
+        omega = float(np.sqrt(value)) if stable else None
+        named[dof] = {
+            'eigenvalue': value,
+            'natural_frequency': omega,
+            'period': None if omega is None else 2 * np.pi / omega,
+        }
+    return named
+
+
+def _damping(vehicle: Vehicle) -> dict[str, Any]:
+    """Linear damping: eigenvalues of its symmetric part, time constants of M nu_dot = -D nu."""
+    rates, modes = np.linalg.eig(np.linalg.solve(vehicle.M, vehicle.D_linear))
+    constants = []
+    for i in np.argsort(rates.real):
+        energy = np.abs(np.conj(modes[:, i]) * (vehicle.M @ modes[:, i]))
+        rate = float(rates[i].real)
+        constants.append(
+            {
+                'mostly': DOFS[int(np.argmax(energy))],
+                'rate': rate,
+                'time_constant': 1 / rate if rate > NEGLIGIBLE else None,
+            }
+        )
+    symmetric = (vehicle.D_linear + vehicle.D_linear.T) / 2
+    return {
+        'linear_symmetric_eigenvalues': np.linalg.eigvalsh(symmetric).tolist(),
+        'time_constants': constants,
+    }
+
+
+def _cruise(vehicle: Vehicle, speed: float | None) -> dict[str, Any]:
+    """Poles of straight and level motion ahead, held by a constant wrench, and what they mean."""
+    known = TOP_SPEED.get(vehicle.name)
+    source = 'given' if speed is not None else 'top speed' if known else 'assumed'
+    if speed is None:
+        speed = float(known.split()[0]) if known else CRUISE
+    found = modes(linearize(vehicle, [speed, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    fastest = max(found, key=lambda mode: mode['pole'][0])
+    growth = fastest['pole'][0]
+    return {
+        'speed': speed,
+        'speed_source': source,
+        'modes': found,
+        'verdict': 'unstable' if growth > 0 else 'marginal' if growth == 0 else 'stable',
+        'mostly': fastest['mostly'],
+        'hint': _munk(vehicle) if growth > 0 else None,
+    }
+
+
+def _munk(vehicle: Vehicle) -> str | None:
+    """Why a vehicle turns across the flow; None where the added mass does not turn it."""
+    yaw, pitch = (munk_terms(vehicle.M)[place] for place in ((5, 1), (4, 2)))
+    if yaw >= 0 and pitch <= 0:
+        return None
+    because = 'the Munk moment of the added mass turns it across the flow'
+    if vehicle.lift is None:
+        return (
+            f'{because}, and the file has no lift of body and fins (key lift), without which a '
+            'torpedo vehicle is unstable'
+        )
+    return f'{because}; lift and damping are too small against it'
+
+
+def _thrusters(thrusters: Thrusters) -> dict[str, Any]:
+    """What is there, and how much of each degree of freedom it gives; None where it gives none."""
+    lost = thrusters.unactuated()
+    much = 1e6 * (thrusters.forward.sum() + thrusters.reverse.sum())  # beyond any limit
+
+    def largest(axis: np.ndarray) -> list[float]:
+        return [float(abs(axis @ thrusters.allocate(way * much * axis)[1])) for way in (-1, 1)]
+
+    axes = zip(DOFS, np.eye(6), strict=True)
+    return {
+        'names': list(thrusters.names),
+        'matrix': thrusters.matrix.tolist(),
+        'reverse': thrusters.reverse.tolist(),
+        'forward': thrusters.forward.tolist(),
+        'rank': thrusters.rank,
+        'unactuated': {dof: list(others) for dof, others in lost.items()},
+        'largest': {dof: None if dof in lost else largest(axis) for dof, axis in axes},
+    }
+
+
+def _sampling(M: np.ndarray) -> dict[str, dict[str, Any]]:
+    """Rate of the sampled velocity loop with k_D = 12, and the steps where it rings and grows.
+
+    GVC with a scalar k_D has K_D = k_D M: the rate is k_D in every degree of freedom.
+    """
+    found = {}
+    for law, (rate, dof) in (('cl', sampled_rate(K_D * np.eye(6), M)), ('gvc', (K_D, 'all'))):
+        found[law] = {
+            'k_D': K_D,
+            'rate': rate,
+            'mostly': dof,
+            'rings_above': RINGS / rate,
+            'unstable_above': UNSTABLE / rate,
+        }
+    return found
+
+
+def print_check(document: dict[str, Any], out: Console | None = None) -> None:
+    """Print what `check_vehicle` found.
+
+    Parameters
+    ----------
+    document : of `check_vehicle`
+    out : none: standard output
+
+    """
+    out = out or TextConsole(highlight=False)
+    _say(out, f'{document["name"]}: {document["source"] or "no source is given"}')
+    _inertia(document, out)
+    _couplings_table(document, out)
+    _hydrostatics_table(document['hydrostatics'], out)
+    _damping_table(document['damping'], out)
+    _cruise_table(document['cruise'], out)
+    if document['thrusters'] is not None:
+        _thrusters_table(document['thrusters'], out)
+    _sampling_table(document['sampling'], out)
+    for warning in document['warnings']:
+        _say(out, f'warning: {warning}')
+
+
+def _say(out: Console, text: str) -> None:
+    out.print(text, markup=False, soft_wrap=True)
+
+
+def _print(
+    out: Console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1
+) -> None:
+    """Table with `words` columns of text on the left and numbers on the right."""
+    table = Table(box=None, header_style='bold')
+    for i, column in enumerate(columns):
+        table.add_column(column, justify='left' if i < words else 'right', no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    _say(out, f'\n{title}')
+    out.print(table)
+
+
+def _number(value: float | None) -> str:
+    return 'none' if value is None else f'{value:.4g}'
+
+
+def _inertia(document: dict[str, Any], out: Console) -> None:
+    rows = [
+        (dof, *(_number(entry) for entry in row), _number(N))
+        for dof, row, N in zip(DOFS, document['M'], document['N'], strict=True)
+    ]
+    _print(out, 'M and N, kg, kg m, kg m2', ('', *DOFS, 'N'), rows)
+    inertia = document['inertia']
+    values = ', '.join(_number(value) for value in inertia['eigenvalues'])
+    _say(out, f'eigenvalues {values}; condition number {inertia["condition_number"]:.4g}')
+
+
+def _couplings_table(document: dict[str, Any], out: Console) -> None:
+    _say(out, f'\n{document["statement"]}')
+    for key in ('delta_xi', 'delta_pi'):
+        rows = [
+            (entry['from'], entry['to'], f'{entry[key]:+.4g}', entry['unit'])
+            for entry in document['couplings']
+            if key in entry
+        ]
+        if rows:
+            columns = ('of', 'in', key, 'unit')
+            _print(out, f'{key}: what one degree of freedom adds to another', columns, rows, 2)
+            zero = ', '.join(document['structural_zeros'][key]) or 'none'
+            _say(out, f'zero in every motion: {zero}')
+
+
+def _hydrostatics_table(found: dict[str, Any], out: Console) -> None:
+    percent = found['difference_percent']
+    _say(
+        out,
+        f'\nweight {found["weight"]:.1f} N, buoyancy {found["buoyancy"]:.1f} N: '
+        f'{found["difference"]:+.2f} N ({percent:+.2f} %); '
+        f'metacentric height {found["metacentric_height"]:.4g} m',
+    )
+    roll, pitch = found['moment_when_level']
+    if roll or pitch:
+        _say(out, f'not level at rest: {roll:.4g} N m in roll, {pitch:.4g} N m in pitch')
+    rows = [
+        (
+            dof,
+            _number(mode['eigenvalue']),
+            _number(mode['natural_frequency']),
+            _number(mode['period']),
+        )
+        for dof, mode in found['modes'].items()
+    ]
+    columns = ('', 'eigenvalue, 1/s2', 'frequency, rad/s', 'period, s')
+    _print(out, 'restoring about level, without damping', columns, rows)
+    for dof, mode in found['modes'].items():
+        if mode['eigenvalue'] < 0:
+            _say(out, f'unstable in {dof}: the vehicle turns over')
+
+
+def _damping_table(found: dict[str, Any], out: Console) -> None:
+    rows = [
+        (entry['mostly'], _number(entry['rate']), _number(entry['time_constant']))
+        for entry in found['time_constants']
+    ]
+    columns = ('mostly', 'rate, 1/s', 'time constant, s')
+    _print(out, 'open loop with linear damping alone', columns, rows)
+    values = ', '.join(_number(value) for value in found['linear_symmetric_eigenvalues'])
+    _say(out, f'eigenvalues of the symmetric part of linear D: {values}')
+
+
+def _cruise_table(found: dict[str, Any], out: Console) -> None:
+    why = {'given': '--speed', 'top speed': 'its top speed', 'assumed': 'assumed, see --speed'}
+    rows = []
+    for mode in found['modes']:
+        real, imaginary = mode['pole']
+        pole = f'{real:.4g} ± {imaginary:.4g}i' if imaginary else _number(real)
+        rows.append((mode['mostly'], pole, _number(mode['time_constant'])))
+    title = f'poles straight ahead at {found["speed"]:g} m/s ({why[found["speed_source"]]})'
+    _print(out, title, ('mostly', 'pole, 1/s', 'time constant, s'), rows)
+    said = {
+        'unstable': 'it leaves straight motion',
+        'marginal': 'no pole grows, one does not decay',
+    }
+    text = f'{found["verdict"]} at {found["speed"]:g} m/s without control'
+    if found['verdict'] in said:
+        text += f': {said[found["verdict"]]}, in {found["mostly"]} first'
+    _say(out, text)
+    if found['hint']:
+        _say(out, f'hint: {found["hint"]}')
+
+
+def _thrusters_table(found: dict[str, Any], out: Console) -> None:
+    rows = [
+        (dof, 'none', 'none') if pair is None else (dof, _number(pair[0]), _number(pair[1]))
+        for dof, pair in found['largest'].items()
+    ]
+    title = f'{len(found["names"])} thrusters, T has rank {found["rank"]}: largest wrench, N, N m'
+    _print(out, title, ('', 'backward', 'forward'), rows)
+    for dof, others in found['unactuated'].items():
+        apart = f' apart from {" and ".join(others)}' if others else ''
+        _say(out, f'{dof} cannot be actuated{apart}')
+
+
+def _sampling_table(found: dict[str, dict[str, Any]], out: Console) -> None:
+    rows = [
+        (
+            law,
+            entry['mostly'],
+            _number(entry['k_D']),
+            _number(entry['rate']),
+            _number(entry['rings_above']),
+            _number(entry['unstable_above']),
+        )
+        for law, entry in found.items()
+    ]
+    columns = ('law', 'mostly', 'k_D', 'rate, 1/s', 'rings above, s', 'unstable above, s')
+    _print(
+        out, 'largest step of a sampled velocity loop, with the gain of the paper', columns, rows, 2
+    )

@@ -1,0 +1,220 @@
+"""The poles of linear models: damping, frequency, where each one lives; document, table and map."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from matplotlib.axes import Axes
+from rich.console import Console
+from rich.table import Table
+
+from auv_analysis.output.progress import TextConsole
+from auv_analysis.report import plotting
+from auv_analysis.report.figure_files import Drawn, FigureRecord, save_figures
+from auv_analysis.report.plotting import COLOURS, GREY
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.studies.linearize.linearize import Linearization, linearize
+from auv_dynamics.vehicle.vehicle import Vehicle
+
+STABLE, MARGINAL, UNSTABLE = 'asymptotically stable', 'marginal', 'unstable'
+NEGLIGIBLE = 1e-8  # of the fastest pole, below which one is zero
+
+
+def modes(model: Linearization) -> list[dict[str, Any]]:
+    """Poles, the slowest first; a conjugate pair is one entry.
+
+    Parameters
+    ----------
+    model : Linearization
+
+    Returns
+    -------
+    modes : of each `pole` (real and imaginary part, 1/s, the latter not negative),
+        `natural_frequency` abs(pole) in rad/s, `damping_ratio` -real/abs (None at zero),
+        `time_constant` -1/real in s (None where it does not decay), `mostly` the degree of freedom
+        or angle with the largest part of it and `part`, that part: participation factors, left
+        times right eigenvector, without units (Perez-Arriaga et al. 1982)
+
+    """
+    values, left, right = scipy.linalg.eig(model.A, left=True, right=True)
+    weights = np.abs(left.conj() * right)
+    weights /= np.maximum(weights.sum(axis=0), np.finfo(float).tiny)
+    smallest = NEGLIGIBLE * np.abs(values).max(initial=0.0)
+    order = np.lexsort((values.imag, -values.real, np.abs(values)))
+    kept = [i for i in order if values[i].imag >= 0]
+    return [_mode(complex(values[i]), weights[:, i], model.states, smallest) for i in kept]
+
+
+def stability(found: Sequence[Mapping[str, Any]]) -> str:
+    """Stability of a linear model from its modes.
+
+    Asymptotically stable where every pole lies in the open left half plane, unstable where one lies
+    in the right one. Else poles on the imaginary axis, such as at zero, make it marginal: what they
+    belong to neither decays nor grows exponentially, and the linear model does not decide.
+    """
+    largest = max(mode['pole'][0] for mode in found)
+    return STABLE if largest < 0 else UNSTABLE if largest > 0 else MARGINAL
+
+
+def _mode(
+    value: complex, weights: np.ndarray, states: tuple[str, ...], smallest: float
+) -> dict[str, Any]:
+    real, imaginary = (part if abs(part) > smallest else 0.0 for part in (value.real, value.imag))
+    size = abs(complex(real, imaginary))
+    parts: dict[str, float] = {}
+    for name, weight in zip(states, weights, strict=True):
+        place = name.rstrip(']').rpartition('[')[2]  # states of a law are of a degree of freedom
+        parts[place] = parts.get(place, 0.0) + float(weight)
+    mostly = max(parts, key=lambda place: parts[place])
+    return {
+        'pole': [real, imaginary],
+        'natural_frequency': size,
+        'damping_ratio': 0.0 - real / size if size else None,
+        'time_constant': -1 / real if real < 0 else None,
+        'mostly': mostly,
+        'part': parts[mostly],
+    }
+
+
+OPEN = 'open loop'
+
+
+def linear_models(
+    subject: Vehicle | Scenario,
+    controllers: Sequence[str],
+    nu0: Sequence[float] | None,
+    eta0: Sequence[float] | None,
+) -> dict[str, Linearization]:
+    """Linear models by name: the vehicle alone, then the loop with each controller.
+
+    Parameters
+    ----------
+    subject : a vehicle, or a scenario with its controllers
+    controllers : names of some of them
+    nu0, eta0 : (6,) the point; none: at rest, level
+
+    """
+    found = {OPEN: linearize(subject, nu0, eta0=eta0)}
+    for name in controllers:
+        found[name] = linearize(subject, nu0, controller=name, eta0=eta0)
+    return found
+
+
+def document_of(
+    name: str, models: Mapping[str, Linearization], left_out: Sequence[str]
+) -> dict[str, Any]:
+    """Matrices, names, point and modes of each model, and what stands in none of them."""
+    return {
+        'name': name,
+        'models': {name: _model(model) for name, model in models.items()},
+        'left_out': list(left_out),
+    }
+
+
+def _model(model: Linearization) -> dict[str, Any]:
+    found = modes(model)
+    return {
+        **{key: matrix.tolist() for key, matrix in zip('ABCD', model, strict=True)},
+        **{key: list(getattr(model, key)) for key in ('states', 'inputs', 'outputs')},
+        **{key: getattr(model, key).tolist() for key in ('x0', 'u0', 'y0', 'drift')},
+        'error': model.error,
+        'modes': found,
+        'stable': stability(found) == STABLE,
+        'stability': stability(found),
+    }
+
+
+COLUMNS = ('pole, 1/s', 'damping', 'frequency, rad/s', 'time constant, s', 'mostly', 'part')
+
+
+def print_poles(document: dict[str, Any], out: Console | None = None) -> None:
+    """Print the poles of every model, the slowest first; default: on standard output."""
+    out = out or TextConsole(highlight=False)
+    for name, model in document['models'].items():
+        table = Table(box=None, header_style='bold')
+        for column in COLUMNS:
+            table.add_column(column, justify='left' if column == 'mostly' else 'right')
+        for mode in model['modes']:
+            table.add_row(*_row(mode))
+        out.print(f'\n{name}: {_verdict(model)}')
+        out.print(table)
+    if document['left_out']:
+        out.print(f'\nnot in these models: {", ".join(document["left_out"])}')
+
+
+def _verdict(model: dict[str, Any]) -> str:
+    rates = [mode['pole'][0] for mode in model['modes']]
+    text = f'{len(model["states"])} states, {model["stability"]}'
+    for count, what in (
+        (sum(rate > 0 for rate in rates), 'grow'),
+        (sum(rate == 0 for rate in rates), 'neither grow nor decay'),
+    ):
+        text += f', {count} of its {len(rates)} modes {what}' if count else ''
+    if any(abs(rate) > 1e-9 for rate in model['drift']):
+        text += '; the point moves: it turns while it is inclined'
+    return text
+
+
+def _row(mode: dict[str, Any]) -> tuple[str, ...]:
+    real, imaginary = mode['pole']
+    pole = f'{real:.4g}' + (f' ± {imaginary:.4g}i' if imaginary else '')
+    keys = ('damping_ratio', 'natural_frequency', 'time_constant')
+    numbers = ('none' if mode[key] is None else f'{mode[key]:.4g}' for key in keys)
+    return pole, *numbers, mode['mostly'], f'{100 * mode["part"]:.0f} %'
+
+
+MARKS = ('o', 'x', '+', 's', '^', 'v')
+DAMPING = (0.2, 0.4, 0.6, 0.8)  # lines of constant damping ratio
+SLOW = 1.5  # the second panel ends at so many times the median size of the poles
+
+
+def draw(models: Mapping[str, Linearization], folder: Path) -> dict[str, FigureRecord]:
+    """Draw the pole map as PNG and PDF: name -> figure; `folder` is made where it is not there."""
+    return save_figures(folder, {'poles': lambda: _pole_map(models)})
+
+
+def _pole_map(models: Mapping[str, Linearization]) -> Drawn:
+    poles = {name: np.linalg.eigvals(model.A) for name, model in models.items()}
+    every = np.concatenate(list(poles.values()))
+    sizes = np.abs(every)[np.abs(every) > 1e-9]
+    near = SLOW * float(np.median(sizes)) if len(sizes) else 1.0
+    figure = plotting.new_figure(3.1)
+    panels = figure.subplots(1, 2)
+    for index, (axes, limit) in enumerate(zip(panels, (np.abs(every).max(), near), strict=True)):
+        _panel(axes, poles, max(float(limit), 1e-9))
+        plotting.letter(axes, index, ('all poles', 'the slow ones')[index])
+    panels[0].set_ylabel('imaginary part (rad/s)')
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc='outside lower center', ncols=min(len(labels), 4))
+    title = 'Poles'
+    ratios = ', '.join(f'{ratio:g}' for ratio in DAMPING)
+    caption = (
+        f'{title} of {", ".join(models)}. Left of the dark line a motion decays. Grey rays: '
+        f'damping ratios {ratios}, the steepest the least damped.'
+    )
+    return figure, title, caption
+
+
+def _panel(axes: Axes, poles: Mapping[str, np.ndarray], limit: float) -> None:
+    """Poles within +-limit, with the rays of constant damping; both axes of one scale."""
+    reach = 1.1 * limit
+    for ratio in DAMPING:
+        height = reach * np.sqrt(1 - ratio**2) / ratio
+        ray = ([-reach, 0, -reach], [height, 0, -height])
+        axes.plot(*ray, color=GREY, linewidth=0.4, alpha=0.7)
+    axes.axvline(0.0, color='black', linewidth=0.7)
+    right = 0.08 * reach
+    for index, (name, values) in enumerate(poles.items()):
+        shown = values[np.abs(values) <= limit * (1 + 1e-9)]
+        right = max(right, 1.1 * shown.real.max(initial=0.0))
+        colour, mark = COLOURS[index % len(COLOURS)], MARKS[index % len(MARKS)]
+        face = colour if mark in 'x+' else 'none'
+        style: dict[str, Any] = {'color': colour, 'facecolors': face, 's': 22, 'linewidths': 0.9}
+        axes.scatter(shown.real, shown.imag, marker=mark, label=name, zorder=3, **style)
+    axes.set_xlim(-reach, right)
+    largest = max(float(np.abs(v[np.abs(v) <= limit * (1 + 1e-9)].imag).max(initial=0.0))
+                  for v in poles.values())  # fmt: skip
+    axes.set_ylim(-max(1.15 * largest, 0.3 * reach), max(1.15 * largest, 0.3 * reach))
+    axes.set_xlabel('real part (1/s)')

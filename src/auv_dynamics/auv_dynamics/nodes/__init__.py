@@ -1,0 +1,1 @@
+"""ROS nodes of the plant: parameters in, core object built, messages converted."""

@@ -1,0 +1,1 @@
+"""What the water really does: uncertainty, current, actuators, sensors, faults, the plant."""

@@ -1,0 +1,239 @@
+"""Faults of sensors, actuators and links: what fails and when, checked against the vehicle."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import one_of
+from auv_dynamics.plant.actuators import MOST_STEPS, WHOLE
+from auv_dynamics.vehicle.thrusters import Thrusters
+
+SENSING = ('sensor_drop_out', 'sensor_delay', 'sensor_bias')
+ACTING = ('thruster', 'actuator', 'wrench_loss')
+KINDS = (*SENSING, *ACTING)
+RANDOM = ('sensor_drop_out', 'wrench_loss')  # of a probability
+END = 1 << 62  # step at which what has no end ends
+
+
+class FaultShape(NamedTuple):
+    """What the kernel must know before it starts.
+
+    Attributes
+    ----------
+    any : whether there is any fault
+    delay : longest delay of the sensors, steps
+
+    """
+
+    any: bool
+    delay: int
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One entry of `faults`.
+
+    Attributes
+    ----------
+    spec : as the scenario writes it; `thruster` is a name
+    first, end : it is there at steps k with first <= k < end
+    nth : of its kind, from 0: with the kind it says which random stream is its own
+
+    """
+
+    spec: Mapping[str, Any]
+    first: int
+    end: int
+    nth: int
+
+    @property
+    def kind(self) -> str:
+        """One of `KINDS`."""
+        return self.spec['kind']
+
+    def there(self, k: np.ndarray) -> np.ndarray:
+        """(n,) whether it is there at steps k (n,)."""
+        return (k >= self.first) & (k < self.end)
+
+    @property
+    def stays(self) -> bool:
+        """Whether it lasts to the end of the run."""
+        return self.end == END
+
+
+@dataclass(frozen=True)
+class Faults:
+    """Faults of a scenario.
+
+    Attributes
+    ----------
+    entries : in the scenario's order
+    step : s
+    thrusters : names of those that the wrench is allocated to; none where it is not
+
+    """
+
+    entries: tuple[Fault, ...]
+    step: float
+    thrusters: tuple[str, ...]
+
+    def of(self, *kinds: str) -> list[Fault]:
+        """Entries of these kinds."""
+        return [fault for fault in self.entries if fault.kind in kinds]
+
+    @property
+    def sensing(self) -> bool:
+        """Whether any of them stands between the true and the measured state."""
+        return bool(self.of(*SENSING))
+
+    @property
+    def acting(self) -> bool:
+        """Whether any of them stands between the command and the applied wrench."""
+        return bool(self.of(*ACTING))
+
+    @property
+    def random(self) -> bool:
+        """Whether the seed matters to any of them."""
+        return any(fault.spec.get('probability', 1.0) < 1.0 for fault in self.of(*RANDOM))
+
+    def delay_of(self, fault: Fault) -> int:
+        """Steps that a `sensor_delay` takes."""
+        return round(fault.spec['delay'] / self.step)
+
+    @property
+    def shape(self) -> FaultShape:
+        """What the kernel must know."""
+        delays = [self.delay_of(fault) for fault in self.of('sensor_delay')]
+        return FaultShape(bool(self.entries), max(delays, default=0))
+
+
+NONE = Faults((), 1.0, ())
+
+
+class FaultSetting(NamedTuple):
+    """What faults are checked against.
+
+    Attributes
+    ----------
+    step : s
+    duration : s; 0 or None: without end
+    thrusters : of the vehicle file, None where it has none
+    allocated : whether the actuators allocate the wrench to them
+    vehicle : its name
+    file : named in errors
+
+    """
+
+    step: float
+    duration: float | None
+    thrusters: Thrusters | None
+    allocated: bool
+    vehicle: str
+    file: object
+
+
+def make_faults(
+    specs: Sequence[Mapping[str, Any]], places: Sequence[str], setting: FaultSetting
+) -> Faults:
+    """Faults of a checked scenario.
+
+    Parameters
+    ----------
+    specs : mappings with `kind`, `from`, `to` (s) and what that kind takes, see docs/faults.md
+    places : the key of each, for errors
+    setting : what they must fit to
+
+    Raises
+    ------
+    InputError : times without a step between them, a thruster that there is not, what overlaps
+
+    """
+    entries: list[Fault] = []
+    for given, place in zip(specs, places, strict=True):
+        spec, (first, end) = dict(given), _interval(given, place, setting)
+        if spec['kind'] == 'thruster':
+            spec['thruster'] = _thruster(spec, place, setting)
+        if spec['kind'] == 'sensor_delay':
+            _check_delay(spec, place, setting)
+        nth = sum(other.kind == spec['kind'] for other in entries)
+        fault = Fault(spec, first, end, nth)
+        for other, where in zip(entries, places, strict=False):
+            _check_apart(fault, other, place, where, setting)
+        entries.append(fault)
+    names = setting.thrusters.names if setting.thrusters and setting.allocated else ()
+    return Faults(tuple(entries), setting.step, names)
+
+
+def _interval(spec: Mapping[str, Any], place: str, setting: FaultSetting) -> tuple[int, int]:
+    begin, end = float(spec.get('from', 0.0)), spec.get('to')
+    if setting.duration and begin > setting.duration:
+        expected = f'a time within the run of {setting.duration:g} s'
+        raise InputError(setting.file, f'{place}.from', expected, f'{begin:g} s')
+    if end is not None and end <= begin:
+        expected = f'a time after from ({begin:g} s)'
+        raise InputError(setting.file, f'{place}.to', expected, f'{end:g} s')
+    first = _step_at(begin, setting)
+    last = END if end is None else _step_at(float(end), setting)
+    if first == last:
+        expected = f'a step between from ({begin:g} s) and to, steps are {setting.step:g} s apart'
+        raise InputError(setting.file, f'{place}.to', expected, f'{end:g} s')
+    return first, last
+
+
+def _step_at(time: float, setting: FaultSetting) -> int:
+    """Index of the first step at or after a time, s."""
+    return int(min(np.ceil(time / setting.step - WHOLE), END))
+
+
+def _thruster(spec: Mapping[str, Any], place: str, setting: FaultSetting) -> str:
+    """Name of the thruster that a fault is of; its stuck thrust is checked."""
+    key, file, given = f'{place}.thruster', setting.file, spec['thruster']
+    if setting.thrusters is None:
+        expected = f'a vehicle with thrusters, {setting.vehicle} has none (kind actuator instead)'
+        raise InputError(file, key, expected, str(given))
+    if not setting.allocated:
+        expected = 'actuators: {thrusters: true}, else no wrench is allocated to thrusters'
+        raise InputError(file, key, expected, str(given))
+    names = setting.thrusters.names
+    if isinstance(given, str):
+        if given not in names:
+            raise InputError(file, key, one_of(given, names), given)
+        name = given
+    elif given >= len(names):
+        raise InputError(file, key, f'an index below {len(names)}', f'{given:g}')
+    else:
+        name = names[int(given)]
+    if 'stuck' in spec:
+        i = names.index(name)
+        least, most = -setting.thrusters.reverse[i], setting.thrusters.forward[i]
+        if not least <= spec['stuck'] <= most:
+            expected = f'a thrust of {name}, {least:g} to {most:g} N'
+            raise InputError(file, f'{place}.stuck', expected, f'{spec["stuck"]:g} N')
+    return name
+
+
+def _check_delay(spec: Mapping[str, Any], place: str, setting: FaultSetting) -> None:
+    steps = spec['delay'] / setting.step
+    if abs(steps - round(steps)) > WHOLE or round(steps) < 1:
+        expected = f'a multiple of step ({setting.step:g} s)'
+        raise InputError(setting.file, f'{place}.delay', expected, f'{spec["delay"]:g} s')
+    if steps > MOST_STEPS:
+        expected = f'at most {MOST_STEPS} steps of {setting.step:g} s'
+        raise InputError(setting.file, f'{place}.delay', expected, f'{spec["delay"]:g} s')
+
+
+def _check_apart(fault: Fault, other: Fault, place: str, where: str, setting: FaultSetting) -> None:
+    """Refuse two faults that say different things of the same device at the same time."""
+    if fault.kind != other.kind or fault.end <= other.first or other.end <= fault.first:
+        return
+    if fault.kind == 'sensor_delay':
+        raise InputError(setting.file, place, 'one sensor_delay at a time', f'{where} as well')
+    device = {'thruster': 'thruster', 'actuator': 'axis'}.get(fault.kind)
+    if device is None or fault.spec[device] != other.spec[device]:
+        return
+    if 'stuck' in fault.spec or 'stuck' in other.spec:
+        expected = f'{device} {fault.spec[device]} stuck at one value and with no other fault'
+        raise InputError(setting.file, place, expected, f'{where} as well')

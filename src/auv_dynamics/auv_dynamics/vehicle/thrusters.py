@@ -1,0 +1,144 @@
+"""Thrusters of a vehicle: allocation of a wrench to thrusts, with their limits.
+
+The numbers of a vehicle file become T, (6, n), whose column i is the wrench of one newton of
+thruster i: (e_i, r_i x e_i), Fossen 2021, section 11.2.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle import DOFS
+
+DEPENDENT = 1e-9  # a singular value or a row below this, relative to the largest, counts as zero
+UNIT = 0.01  # deviation of the norm of a direction from 1 that is worth a warning
+
+
+@dataclass(frozen=True, eq=False)
+class Thrusters:
+    """What n thrusters can do, body frame forward-starboard-down, SI units.
+
+    Attributes
+    ----------
+    names : n words
+    matrix : (6, n) T of tau = T u, u in N; N and N m per N
+    reverse, forward : (n,) largest thrusts against and along each direction, N, both positive
+    inverse : (n, 6) T^+, the pseudo-inverse of T: least squares, and of these the smallest u
+
+    """
+
+    names: tuple[str, ...]
+    matrix: np.ndarray
+    reverse: np.ndarray
+    forward: np.ndarray
+    inverse: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Invert T; what rounding alone makes non-zero stays out of the inverse."""
+        object.__setattr__(self, 'inverse', np.linalg.pinv(self.matrix, rcond=DEPENDENT))
+
+    @property
+    def rank(self) -> int:
+        """Number of independent wrenches, at most 6."""
+        largest = np.linalg.norm(self.matrix, 2)
+        return int(np.linalg.matrix_rank(self.matrix, tol=DEPENDENT * largest))
+
+    def allocate(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Thrusts for a wrench, and the wrench that they deliver.
+
+        u = T^+ tau; where one of them is beyond its limit, all are scaled down by the one
+        factor that brings each within its limits, so that the direction of T u stays.
+
+        Parameters
+        ----------
+        tau : (6,) wrench asked for, N and N m
+
+        Returns
+        -------
+        u : (n,) thrusts, N, positive along each thruster's direction
+        delivered : (6,) T u, N and N m; tau itself where T has rank 6 and no limit is reached
+
+        """
+        u = self.inverse @ np.asarray(tau, float)
+        most = np.max(np.abs(u) / np.where(u < 0, self.reverse, self.forward))
+        u = u / max(1.0, most)
+        return u, self.matrix @ u
+
+    def largest(self) -> np.ndarray:
+        """(6,) largest wrench along each axis, N and N m, whichever way it is larger."""
+        ahead = np.where(self.matrix > 0, self.matrix * self.forward, -self.matrix * self.reverse)
+        astern = np.where(self.matrix > 0, self.matrix * self.reverse, -self.matrix * self.forward)
+        return np.maximum(ahead.sum(axis=1), astern.sum(axis=1))
+
+    def unactuated(self) -> dict[str, tuple[str, ...]]:
+        """Degrees of freedom without a wrench of their own, and what each comes along with.
+
+        Rows of T are taken in the order surge to yaw. One that depends on those before it is
+        a degree of freedom that cannot be commanded; its value is a sum of the ones named,
+        none where no thruster acts on it at all.
+        """
+        size = np.linalg.norm(self.matrix)
+        independent: list[int] = []
+        lost: dict[str, tuple[str, ...]] = {}
+        for i, row in enumerate(self.matrix):
+            basis = self.matrix[independent].T
+            weights = np.linalg.lstsq(basis, row, rcond=None)[0]
+            if np.linalg.norm(row - basis @ weights) > DEPENDENT * size:
+                independent.append(i)
+            else:
+                pairs = zip(independent, weights, strict=True)
+                lost[DOFS[i]] = tuple(DOFS[j] for j, weight in pairs if abs(weight) > DEPENDENT)
+        return lost
+
+
+def thrusters_of(
+    entries: Sequence[Mapping[str, Any]], file: object
+) -> tuple[Thrusters, list[tuple[str, str]]]:
+    """Thrusters of the `thrusters` of a checked vehicle file.
+
+    Parameters
+    ----------
+    entries : mappings with name, position (3,) in m, direction (3,) and limit: a number, or
+        reverse and forward, in N
+    file : named in errors
+
+    Returns
+    -------
+    thrusters : Thrusters, directions normalised
+    warnings : key and text of what is odd but usable
+
+    Raises
+    ------
+    InputError : a name that stands twice, a direction of length zero
+
+    """
+    warnings: list[tuple[str, str]] = []
+    names = [entry['name'] for entry in entries]
+    columns = []
+    for i, entry in enumerate(entries):
+        key = f'thrusters[{i}]'
+        if names.index(entry['name']) < i:
+            raise InputError(file, f'{key}.name', 'each name once', f'{entry["name"]} again')
+        r, e = np.array(entry['position'], float), np.array(entry['direction'], float)
+        length = float(np.linalg.norm(e))
+        if length == 0.0:
+            raise InputError(file, f'{key}.direction', 'a direction that is not zero', e.tolist())
+        if abs(length - 1.0) > UNIT:
+            warnings.append((f'{key}.direction', f'its length is {length:.4g}: normalised'))
+        columns.append(np.concatenate([e / length, np.cross(r, e / length)]))
+    limits = np.array([np.broadcast_to(entry['limit'], 2) for entry in entries], float)
+    thrusters = Thrusters(tuple(names), np.array(columns).T, limits[:, 0], limits[:, 1])
+    lost = thrusters.unactuated()
+    if lost:
+        axes = '; '.join(_without(dof, others) for dof, others in lost.items())
+        warnings.append(('thrusters', f'T has rank {thrusters.rank} of 6: {axes}'))
+    return thrusters, warnings
+
+
+def _without(dof: str, others: tuple[str, ...]) -> str:
+    if not others:
+        return f'{dof} cannot be actuated'
+    return f'{dof} cannot be actuated apart from {" and ".join(others)}'

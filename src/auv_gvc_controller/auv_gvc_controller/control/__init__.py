@@ -1,0 +1,1 @@
+"""The controller without ROS: settings, sampled law, set-points, watchdogs, output stage."""

@@ -1,0 +1,202 @@
+"""The velocity controller without ROS: odometry and set-points in, wrench out."""
+
+from dataclasses import dataclass
+
+from auv_gvc_controller.control.odometry_guard import UNTIMED, OdometryGuard
+from auv_gvc_controller.control.output_stage import HandOver
+from auv_gvc_controller.control.plausibility import ZERO
+from auv_gvc_controller.control.reference_filter import ReferenceFilter
+from auv_gvc_controller.control.sampled import SampledLaw
+from auv_gvc_controller.control.setpoint_buffer import Pairing, Reference
+from auv_gvc_controller.control.stamp_age import Now
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the controller says to an odometry: wrench and estimate, and why it lets go."""
+
+    ns: int
+    tau: tuple[float, ...]
+    f: tuple[float, ...]
+    trouble: str = ''
+
+
+@dataclass(frozen=True)
+class Timeouts:
+    """Real time: after what the law lets go, s.
+
+    Attributes
+    ----------
+    odometry : silence on `odom`
+    setpoint : silence on `cmd_vel`, however far ahead its stamps are, or age of the set-point in
+        use by its stamp
+
+    """
+
+    odometry: float
+    setpoint: float
+
+
+class VelocityController:
+    """A sampled law behind its guards.
+
+    Parameters
+    ----------
+    law : with its gains, its model and its state
+    pairing : which set-point belongs to an odometry
+    guard : which odometry may be used
+    output : what the wrench passes before it is published
+    reference_filter : smooths the set-points; None: they are followed as they come
+    timeouts : of the watchdogs; None in lock-step: it waits for the set-point, whatever the time
+
+    Attributes
+    ----------
+    watchdog : why the law is not in charge, empty while it is
+    trips : how often it had to let go
+
+    """
+
+    def __init__(
+        self,
+        law: SampledLaw,
+        pairing: Pairing,
+        guard: OdometryGuard,
+        output: HandOver,
+        *,
+        exact: bool,
+        timeouts: Timeouts | None,
+        reference_filter: ReferenceFilter | None = None,
+    ):
+        self._filter = reference_filter
+        self._law, self._pairing, self._guard, self._output = law, pairing, guard, output
+        self._exact, self._timeouts = exact, timeouts
+        self._waiting: tuple[int, tuple[float, ...], float] | None = None
+        self._heard: float | None = None  # steady s of the last odometry; None: none is missed
+        self._unanswered_since = 0.0
+        self._bridge = False  # the law was silent: its old rate must not be integrated
+        self._in_charge = False
+        self.watchdog, self.trips = '', 0
+
+    def reset(self) -> None:
+        """Forget the integrals; the law comes in anew over the ramp."""
+        self._law.reset()
+        self._output.restart()
+
+    def odometry(self, ns: int, x: tuple[float, ...], now: Now = UNTIMED) -> Answer | None:
+        """Take an odometry.
+
+        Parameters
+        ----------
+        ns : its stamp
+        x : state: position, quaternion, nu (13 floats)
+        now : when it arrived; without meaning in lock-step
+
+        Returns
+        -------
+        answer : or None while its set-point is missing
+
+        Raises
+        ------
+        ValueError : the odometry must not be used
+
+        """
+        restarts = self._guard.restarts
+        dt = self._guard.elapsed(ns, x[7:], now)
+        if self._guard.restarts > restarts:
+            self._waiting = None
+            self._pairing.forget()
+        self._heard = now.steady
+        if self._waiting is None:
+            self._unanswered_since = now.steady
+        else:
+            dt += self._waiting[2]  # the one before was never answered: its time counts as well
+        self._waiting = (ns, x, dt)
+        return self.answer(now)
+
+    def answer(self, now: Now = UNTIMED) -> Answer | None:
+        """Answer the odometry that waits, once its set-point is here."""
+        if self._waiting is None:
+            return None
+        ns, x, dt = self._waiting
+        reference = self._pairing.find(ns)
+        if reference is None:
+            return None if self._exact else self._trip(ns, 'no set-point yet', now)
+        stale = self._stale(ns, reference, now)
+        if stale:
+            return self._trip(ns, stale, now)
+        self._waiting = None
+        if self._bridge:
+            self._law.forget_rate()
+            self._bridge = False
+        t = (ns - self._guard.origin) / 1e9
+        nu_d, nu_d_dot = reference.nu_d, reference.nu_d_dot
+        if self._filter is not None:
+            if not self._in_charge:
+                self._filter.start(x[7:])
+            nu_d, nu_d_dot = self._filter.advance(dt if self._in_charge else 0.0, nu_d)
+        try:
+            tau, f = self._law.sample(t, dt, x[7:], x[3:7], nu_d, nu_d_dot)
+        except ArithmeticError as error:
+            return self._let_go(ns, str(error), now)
+        self.watchdog, self._in_charge = '', True
+        return Answer(ns, self._output.follow(tau, self._clock(ns, now)), f)
+
+    def watch(self, now: Now) -> Answer | None:
+        """What has to be said without a new odometry: real time, to be asked again and again."""
+        late = self._timeouts
+        if late is None or self._heard is None:
+            return None
+        waits = self._waiting is not None and now.steady - self._unanswered_since > late.setpoint
+        if self._waiting is not None and (waits or self.watchdog):
+            return self._trip(self._waiting[0], 'no set-point of its stamp', now)
+        if now.steady - self._heard <= late.odometry:
+            return None
+        answer = self._trip(self._guard.last or 0, f'no odometry for {late.odometry:g} s', now)
+        if self._output.idle:
+            self._heard = None  # said
+        return answer
+
+    @property
+    def newest(self) -> int | None:
+        """Stamp of the last odometry, ns; None before the first."""
+        return self._guard.last
+
+    @property
+    def unanswered(self) -> int | None:
+        """Stamp of the odometry that still waits for its answer."""
+        return self._waiting[0] if self._waiting else None
+
+    def silence(self) -> Answer:
+        """Zero wrench at once, stamped with the last odometry: the controller leaves."""
+        self._waiting, self._heard, self._bridge = None, None, True
+        return Answer(self._guard.last or 0, self._output.drop(), ZERO)
+
+    def _stale(self, ns: int, reference: Reference, now: Now) -> str:
+        """Why a set-point is not followed any more, or an empty text."""
+        if self._timeouts is None:
+            return ''
+        most, age = self._timeouts.setpoint, (ns - reference.ns) / 1e9
+        if age > most:
+            return f'no set-point for {age:.3g} s'
+        if now.steady - self._pairing.heard > most:
+            return f'no set-point heard for {most:g} s'
+        return ''
+
+    def _trip(self, ns: int, trouble: str, now: Now) -> Answer:
+        """Let go because of a watchdog: in real time the integrals do not outlive it."""
+        if self._timeouts is not None:
+            self._law.reset()
+        return self._let_go(ns, trouble, now)
+
+    def _let_go(self, ns: int, trouble: str, now: Now) -> Answer:
+        self._waiting = None
+        self._bridge = True
+        self.trips += self._in_charge
+        self.watchdog, self._in_charge = trouble, False
+        tau = self._output.release(self._clock(ns, now))
+        how = 'zero wrench' if self._output.idle else 'the wrench goes to zero'
+        return Answer(ns, tau, ZERO, f'{trouble}: {how}')
+
+    def _clock(self, ns: int, now: Now) -> float:
+        """Seconds that do not go back: of the stamps in lock-step, else of the steady clock."""
+        return ns / 1e9 if self._timeouts is None else now.steady

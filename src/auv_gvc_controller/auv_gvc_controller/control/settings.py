@@ -1,0 +1,249 @@
+"""Everything that makes a controller but law, gains and vehicle: defaults, ranges, construction."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.allocation import Reach, make_reach
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_gvc_controller.control.controller import Timeouts, VelocityController
+from auv_gvc_controller.control.odometry_guard import OdometryGuard
+from auv_gvc_controller.control.output_stage import HandOver
+from auv_gvc_controller.control.plausibility import Limits
+from auv_gvc_controller.control.reference_filter import FilterSettings, ReferenceFilter
+from auv_gvc_controller.control.sampled import SampledLaw
+from auv_gvc_controller.control.setpoint_buffer import (
+    DIFFERENCE,
+    FILTER,
+    NONE,
+    SAME,
+    Pairing,
+)
+from auv_gvc_controller.control.stamp_age import AUTO, CLOCKS, StampAge
+from auv_gvc_controller.laws.model import control_model
+
+LATEST, EXACT = 'latest', 'exact'
+Reader = Callable[..., Any]  # name, type, default, description, range -> value
+
+
+def _setting(default: Any, name: str, description: str, **accepted: Any) -> Any:
+    told = {'name': name, 'description': description, 'accepted': accepted}
+    return field(default=default, metadata=told)
+
+
+_number = partial(_setting, at_least=0.0)
+_six = partial(_setting, ())
+
+
+@dataclass(frozen=True)
+class ControllerSettings:
+    """Settings of a controller, by the names of its parameters with `_` for a dot.
+
+    Times in s; `()` stands for six numbers that are not given.
+
+    Attributes
+    ----------
+    source : node or file that they come from, for refusals
+
+    """
+
+    source: str
+    lockstep: bool = _setting(False, 'lockstep', 'answer every odometry, in its time')
+    setpoint_pairing: str = _setting(
+        LATEST,
+        'setpoint_pairing',
+        'set-point of the same stamp as odom (exact), or the newest at or before it (latest)',
+        one_of=(EXACT, LATEST),
+    )
+    setpoint_acceleration: str = _setting(
+        FILTER,
+        'setpoint_acceleration',
+        'where nu_d_dot comes from: cmd_accel of the same stamp (topic), a reference filter that '
+        'smooths nu_d as well (filter; usual in real time), nowhere, zero (none), or the '
+        'difference of two set-points (difference; usual in lock-step)',
+        one_of=(SAME, FILTER, NONE, DIFFERENCE),
+    )
+    filter_omega: float = _setting(
+        1.0, 'setpoint_filter.omega', 'rad/s, natural frequency', at_least=0.01, at_most=20.0
+    )
+    filter_zeta: float = _setting(
+        1.0, 'setpoint_filter.zeta', 'damping ratio', at_least=0.5, at_most=5.0
+    )
+    filter_speed: float = _number(3.0, 'setpoint_filter.speed', 'm/s, largest nu_d of an axis')
+    filter_rate: float = _number(1.0, 'setpoint_filter.rate', 'rad/s, largest nu_d of an axis')
+    filter_acceleration: float = _number(
+        0.2, 'setpoint_filter.acceleration', 'm/s2, largest of an axis; of the difference as well'
+    )
+    filter_angular_acceleration: float = _number(
+        0.2, 'setpoint_filter.angular_acceleration', 'rad/s2, the same of roll, pitch and yaw'
+    )
+    odometry_timeout: float = _number(
+        0.5, 'odometry_timeout', 's, silence or age of the stamp: zero wrench'
+    )
+    setpoint_timeout: float = _number(
+        0.5, 'setpoint_timeout', 's, silence or age of the stamp: zero wrench'
+    )
+    limits_gap: float = _number(1.0, 'limits.gap', 's, longest step of time that is integrated')
+    limits_speed: float = _number(20.0, 'limits.speed', 'm/s; more is refused')
+    limits_rate: float = _number(20.0, 'limits.rate', 'rad/s; more is refused')
+    limits_acceleration: float = _number(
+        100.0, 'limits.acceleration', 'm/s2, rad/s2; more is refused'
+    )
+    limits_wrench: tuple[float, ...] = _six(
+        'limits.wrench', 'largest wrench; must be known in real time'
+    )
+    limits_wrench_rate: tuple[float, ...] = _six('limits.wrench_rate', 'per s, its fastest change')
+    ramp: float = _number(0.2, 'ramp', 's, real time: over which a law takes over and lets go')
+    stamp_clock: str = _setting(
+        AUTO,
+        'stamp_clock',
+        "that odometry is stamped with: the node's own (ros), a free-running one (own), "
+        'or auto: ros if they count from the same beginning, else own',
+        one_of=CLOCKS,
+    )
+    actuators_limit: tuple[float, ...] = _six(
+        'actuators.limit', 'largest wrench of the actuators, for anti-windup'
+    )
+    actuators_thrusters: bool = _setting(
+        False, 'actuators.thrusters', "anti-windup knows the vehicle's thrusters"
+    )
+    anti_windup: bool = _setting(
+        True, 'anti_windup', 'stop integrating what pushes beyond these limits'
+    )
+
+    @classmethod
+    def read(cls, reader: Reader, source: str) -> 'ControllerSettings':
+        """Settings from whatever knows parameters.
+
+        Parameters
+        ----------
+        reader : `(name, type, default, description, *, at_least, at_most, one_of)` -> value
+        source : node or file, for refusals
+
+        Raises
+        ------
+        InputError : what the reader refuses, or six numbers that are none
+
+        """
+        values: dict[str, Any] = {}
+        for entry in fields(cls)[1:]:
+            name, text = entry.metadata['name'], entry.metadata['description']
+            if entry.type == tuple[float, ...]:
+                text = f'1 or 6 numbers, N, N m, {text}; none: off'
+                found = reader(name, list[float], None, text)
+                values[entry.name] = _six_numbers(found or [], source, name)
+            else:
+                own = name == 'setpoint_acceleration'
+                default = usual_acceleration(values['lockstep']) if own else entry.default
+                values[entry.name] = reader(
+                    name, entry.type, default, text, **entry.metadata['accepted']
+                )
+        return cls(source, **values)
+
+    def pairing(self) -> Pairing:
+        """What keeps set-points until their odometry comes."""
+        return Pairing(self.exact, self.setpoint_acceleration, *self.believed)
+
+    @property
+    def believed(self) -> tuple[Limits, tuple[float, ...] | None]:
+        """Limits of set-points, and those of the difference of two."""
+        return self.limits, None if self.lockstep else self.reference_filter.steepest
+
+    @property
+    def exact(self) -> bool:
+        """Whether only the set-point of the odometry's own stamp is taken."""
+        return self.setpoint_pairing == EXACT
+
+    @property
+    def limits(self) -> Limits:
+        """Velocities and accelerations that are believed."""
+        return Limits(self.limits_speed, self.limits_rate, self.limits_acceleration)
+
+    @property
+    def reference_filter(self) -> FilterSettings:
+        """Settings of the reference filter, whether it is used or not."""
+        return FilterSettings(
+            *(self.filter_omega, self.filter_zeta, self.filter_speed, self.filter_rate),
+            *(self.filter_acceleration, self.filter_angular_acceleration),
+        )
+
+    def build(self, gains: Any, vehicle: Vehicle, pairing: Pairing) -> VelocityController:
+        """Controller with a law.
+
+        Parameters
+        ----------
+        gains : of the law, which they name (`make_gains`)
+        vehicle : what the law knows
+        pairing : with the set-points that have come
+
+        """
+        law = SampledLaw(gains, control_model(vehicle), self._reach(vehicle))
+        timeouts = Timeouts(self.odometry_timeout, self.setpoint_timeout)
+        live = not self.lockstep
+        guard = OdometryGuard(
+            round(self.limits_gap * 1e9),
+            self.limits,
+            self.lockstep,
+            patience=timeouts.odometry if live else 0.0,
+            age=StampAge(self.stamp_clock, round(timeouts.odometry * 1e9)) if live else None,
+        )
+        ramp = 0.0 if self.lockstep else self.ramp
+        filtered = self.setpoint_acceleration == FILTER
+        return VelocityController(
+            law,
+            pairing,
+            guard,
+            HandOver(self._wrench_limit(vehicle), self.limits_wrench_rate, ramp),
+            exact=self.exact,
+            timeouts=timeouts if live else None,
+            reference_filter=ReferenceFilter(self.reference_filter) if filtered else None,
+        )
+
+    def check_bounded(self) -> None:
+        """Raise InputError for a controller beside a vehicle whose wrench nothing limits."""
+        if self.lockstep or self.limits_wrench or self.actuators_limit or self.actuators_thrusters:
+            return
+        expected = 'in real time the largest wrench of the vehicle, 1 or 6 numbers in N, N m'
+        raise InputError(self.source, 'limits.wrench', expected, None)
+
+    def _wrench_limit(self, vehicle: Vehicle) -> tuple[float, ...]:
+        """Largest wrench; without limits what accelerations beyond belief take."""
+        if not self.lockstep and not self.limits_wrench:
+            if self.actuators_limit:
+                return self.actuators_limit
+            if self.actuators_thrusters and vehicle.thrusters is not None:
+                return tuple(vehicle.thrusters.largest().tolist())
+        believable = np.abs(vehicle.M).sum(axis=1) * self.limits_acceleration
+        return self.limits_wrench or tuple(believable.tolist())
+
+    def _reach(self, vehicle: Vehicle) -> Reach:
+        """What anti-windup knows of the wrenches that can be had."""
+        if self.actuators_thrusters and vehicle.thrusters is None:
+            expected = f'a vehicle with thrusters, not {vehicle.name}'
+            raise InputError(self.source, 'actuators.thrusters', expected, 'true')
+        if not self.anti_windup:
+            return make_reach(None, None)
+        limits = [limit for limit in (self.limits_wrench, self.actuators_limit) if limit]
+        smallest = [min(axis) for axis in zip(*limits, strict=True)]
+        return make_reach(smallest or None, vehicle if self.actuators_thrusters else None)
+
+
+def usual_acceleration(lockstep: bool) -> str:
+    """Where nu_d_dot comes from when nobody says it."""
+    return DIFFERENCE if lockstep else FILTER
+
+
+def _six_numbers(values: list[Any], source: str, name: str) -> tuple[float, ...]:
+    """Six numbers of one or six, zero for an axis without actuators; none of none."""
+    listed = values * 6 if len(values) == 1 else values
+    good = all(
+        isinstance(v, int | float) and not isinstance(v, bool) and 0 <= v < math.inf for v in listed
+    )
+    if len(listed) not in (0, 6) or not good or (listed and not any(listed)):
+        raise InputError(source, name, '1 or 6 numbers of at least 0, one above it', values)
+    return tuple(map(float, listed))

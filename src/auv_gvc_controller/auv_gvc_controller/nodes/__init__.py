@@ -1,0 +1,1 @@
+"""ROS nodes of the controller: the velocity controller and the set-points."""

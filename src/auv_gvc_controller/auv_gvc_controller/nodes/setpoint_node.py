@@ -1,0 +1,127 @@
+"""Set-points as a node: `cmd_vel` and `cmd_accel`, published ahead of the odometry."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.endpoints import why_silent
+from auv_dynamics.ros.graph import Graph, steady_timer
+from auv_dynamics.ros.health import OK, STALE, Health
+from auv_dynamics.ros.life import main_of
+from auv_dynamics.ros.parameters import (
+    declare,
+    declare_grid,
+    harmonic_parameters,
+    refuse_unknown,
+)
+from auv_gvc_controller.control.odometry_guard import OdometryGuard
+from auv_gvc_controller.control.plausibility import Limits
+from auv_gvc_controller.control.setpoint import Setpoint, make_setpoint
+from auv_gvc_controller.control.stamp_age import Now
+
+BLOCK = 256  # set-points that are evaluated at once
+PATIENCE = 0.3  # s without odometry after which stamps that have gone back are believed
+
+
+class SetpointNode(BulkNode):
+    """Publishes nu_d and nu_d_dot for every step up to `horizon` steps ahead.
+
+    At least up to the next odometry, which must find its set-point when it comes.
+    """
+
+    def __init__(self) -> None:
+        super().__init__('setpoint_node')
+        self.graph = Graph(self)
+        grid = declare_grid(self)
+        self._horizon = declare(
+            self, 'horizon', int, 0, 'steps ahead of odom, those until the next one at least',
+            at_least=0, at_most=topics.DEPTH - 1,
+        )  # fmt: skip
+        self._step_ns, self._last = grid.step_ns, grid.last
+        self._setpoint = self._declare_setpoint(grid.duration)
+        refuse_unknown(self)
+        self.graph.must_hold = self._horizon
+        self._say_velocity = self.graph.output(topics.CMD_VEL)
+        self._say_acceleration = self.graph.output(topics.CMD_ACCEL)
+        self.graph.listen(topics.ODOM, self._on_odometry, topics.one_at_a_time())
+        # in lock-step the odometry may go on for `horizon` steps while this node does not look
+        gap = max(interface.NANOSECONDS, (10 + self._horizon) * self._step_ns)
+        self._guard = OdometryGuard(gap, Limits(), lockstep=False, patience=PATIENCE)
+        self._newest = -1
+        self._stride = 1  # steps from one odometry to the next
+        self._next = 0
+        self._first, self._rows = 0, np.zeros((0, 12))
+        steady_timer(self, 0.02, self._publish)
+        self.graph.in_trouble_while(self._trouble)
+        self.begin(f'publishes set-points every {grid.step:g} s, once there is odometry')
+
+    def _trouble(self) -> Health:
+        if self._guard.last is not None:
+            return OK, ''
+        return STALE, why_silent(self, topics.ODOM) or 'no odometry yet'
+
+    def _declare_setpoint(self, duration: float) -> Setpoint:
+        file = declare(
+            self,
+            'setpoint.file',
+            str,
+            '',
+            'CSV file of set-points with the columns t, surge, ..., yaw',
+        )
+        spec = harmonic_parameters(self, 'setpoint.', 'm/s, rad/s')
+        if file:
+            if spec:
+                key = f'setpoint.{next(iter(spec))}'
+                raise InputError(self.get_name(), key, 'setpoint.file alone', 'both')
+            return make_setpoint({'file': Path(file)}, duration)
+        return make_setpoint(spec, duration)
+
+    def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
+        restarts = self._guard.restarts
+        try:
+            elapsed = self._guard.elapsed(ns, x[7:], Now(time.monotonic()))
+        except ValueError as error:
+            self.graph.refuse(f'{topics.ODOM.name}: {error}')
+            return
+        newest = (ns - self._guard.origin) // self._step_ns
+        if elapsed:
+            self._stride = max(1, newest - self._newest)
+        elif self._guard.restarts > restarts:  # what was published has stamps of the old time
+            self._next = newest
+        else:  # the first one, or the clock has jumped forward: no step is published twice
+            self._next = max(self._next, newest)
+        self._newest = newest
+        self._publish()
+
+    def _publish(self) -> None:
+        if self._guard.last is None or not self.graph.ready():
+            return
+        until = self._newest + max(self._horizon, self._stride)
+        until = until if self._last is None else min(until, self._last)
+        # after a jump of the odometry's clock what lies behind it is of no use to anybody
+        if self._last is None:
+            self._next = max(self._next, self._newest - self._horizon)
+        while self._next <= until:
+            row = self._row(self._next)
+            ns = self._guard.origin + self._next * self._step_ns
+            self._say_velocity(ns, row[:6])
+            self._say_acceleration(ns, row[6:])
+            self.graph.latest_ns = ns
+            self._next += 1
+
+    def _row(self, k: int) -> np.ndarray:
+        if not self._first <= k < self._first + len(self._rows):
+            self._first = k
+            t = np.arange(k, k + BLOCK) * (self._step_ns / interface.NANOSECONDS)
+            values, slopes = self._setpoint.value(t), self._setpoint.derivative(t)
+            self._rows = np.concatenate([values, slopes], axis=1)
+        return self._rows[k - self._first]
+
+
+def main() -> None:
+    """Run the node."""
+    main_of(SetpointNode)

@@ -1,0 +1,74 @@
+"""What the TAB key offers, asked as the shell asks."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from auv_analysis.cli import main
+from auv_analysis.cli.tune_options import LAWS
+from auv_gvc_controller.laws.law import SHIPPED
+
+AUV = Path(sys.executable).with_name('auv')
+SCENARIO = 'controllers:\n  first: {law: gvc}\n  "second one": {law: cl}\n'
+
+
+def _offered(line: str, folder: Path) -> list[str]:
+    answer = folder / 'answer'
+    asked = {
+        '_ARGCOMPLETE': '1', '_ARGCOMPLETE_IFS': '\n', 'COMP_LINE': line,
+        'COMP_POINT': str(len(line)), '_ARGCOMPLETE_STDOUT_FILENAME': str(answer),
+    }  # fmt: skip
+    subprocess.run([AUV], cwd=folder, env={**os.environ, **asked}, check=False)
+    text = answer.read_text()
+    answer.unlink()
+    return [entry.strip() for entry in text.split('\n')]
+
+
+@pytest.mark.parametrize(
+    ('line', 'offered'),
+    [
+        ('auv simul', {'simulate'}),
+        ('auv run case1_b', {'case1_bluerov2', 'case1_bluerov2_heavy'}),
+        ('auv simulate mi', {'mine.yaml'}),
+        ('auv check-vehicle herman', {'herman2018', 'herman2018_neutral'}),
+        ('auv sweep case1', {'case1_gains'}),
+        ('auv run case1 --controller ', {'gvc', 'cl'}),
+        ('auv simulate mine.yaml --controller f', {'first'}),
+        ('auv tune case1 --law s', {'smc'}),
+        ('auv design rexrov --red', {'--reduce'}),
+    ],
+)
+def test_names_are_offered(line: str, offered: set[str], tmp_path: Path) -> None:
+    (tmp_path / 'mine.yaml').write_text(SCENARIO)
+    assert set(_offered(line, tmp_path)) == offered
+
+
+def test_without_a_readable_scenario_no_controller_is_offered(tmp_path: Path) -> None:
+    assert _offered('auv run gone.yaml --controller ', tmp_path) in ([], [''])
+
+
+def test_laws_on_the_command_line_are_those_that_are_shipped() -> None:
+    assert tuple(SHIPPED) == LAWS
+
+
+@pytest.mark.parametrize('shell', ['bash', 'zsh', 'fish'])
+def test_code_is_valid_in_its_shell(shell: str, capsys: pytest.CaptureFixture) -> None:
+    main.main(['completion', shell])
+    code = capsys.readouterr().out
+    assert 'auv' in code
+    if shutil.which(shell) is None:
+        pytest.skip(f'{shell} is not installed')
+    subprocess.run([shell, '-n'], input=code, text=True, check=True)
+
+
+def test_light_commands_load_no_numpy() -> None:
+    code = (
+        'import sys; from auv_analysis.cli.command_line import parser; parser()\n'
+        'import auv_analysis.cli.completion, auv_analysis.cli.guide, auv_analysis.cli.doctor\n'
+        'assert not {"numpy", "rich", "jsonschema", "rclpy"} & set(sys.modules), sys.modules'
+    )
+    subprocess.run([sys.executable, '-c', code], check=True)

@@ -1,0 +1,72 @@
+"""What `auv` says without a command, by what lies where one is."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from auv_analysis.cli import main
+from auv_analysis.cli.command_line import COMMANDS, GROUPS
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def _said(capsys: pytest.CaptureFixture) -> str:
+    main.main([])
+    captured = capsys.readouterr()
+    assert captured.err == ''
+    return captured.out
+
+
+def test_where_nothing_was_run_the_first_experiments_are_proposed(folder, capsys):
+    text = _said(capsys)
+    for line in ('auv simulate case1', 'auv run case1', 'auv new vehicle', 'auv doctor'):
+        assert line in text
+    assert not list(folder.iterdir())
+
+
+def test_results_are_proposed_to_be_looked_at_the_newest_first(folder, capsys):
+    for name in ('older', 'newer'):
+        bag = folder / 'runs' / name / 'gvc'
+        bag.mkdir(parents=True)
+        for file in (
+            bag / 'metadata.yaml',
+            bag.parent / 'report.html',
+            bag.parent / 'summary.json',
+        ):
+            file.touch()
+    os.utime(folder / 'runs' / 'older', (1, 1))
+    text = _said(capsys)
+    assert 'runs/newer/report.html' in text
+    assert 'auv replay runs/newer/gvc' in text
+    assert 'auv analyze runs/older runs/newer' in text
+    assert 'simulate case1' not in text
+
+
+@pytest.mark.parametrize(
+    ('text', 'line'),
+    [
+        ('controllers: {}\n', 'auv simulate mine.yaml'),
+        ('name: x\nrigid_body: {}\n', 'auv check-vehicle mine.yaml'),
+        ('vary: []\n', 'auv sweep mine.yaml'),
+        ('colour: red\n', 'auv simulate case1'),
+        ('\x00\ufffe', 'auv simulate case1'),
+    ],
+)
+def test_files_at_hand_are_proposed_by_what_they_are(text, line, folder, capsys):
+    (folder / 'mine.yaml').write_text(text)
+    assert line in _said(capsys)
+
+
+def test_help_lists_every_command_once_below_a_heading(capsys):
+    with pytest.raises(SystemExit) as end:
+        main.main(['--help'])
+    lines = capsys.readouterr().out.splitlines()
+    assert end.value.code == 0
+    assert [line.rstrip(':') for line in lines if line.endswith(':')] == list(GROUPS)
+    assert [line.split()[0] for line in lines if line.startswith('  ')] == list(COMMANDS)
+    assert max(map(len, lines)) <= 80

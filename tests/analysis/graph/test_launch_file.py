@@ -1,0 +1,130 @@
+"""The launch file without `launch`, which has no wheel: what it makes of its arguments."""
+
+import runpy
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+import yaml
+
+from auv_analysis.graph.experiment import PACKAGES
+
+FILE = Path(__file__).parents[3] / 'src/auv_analysis/launch/experiment.launch.py'
+MODULES = {
+    'launch': ['LaunchContext', 'LaunchDescription'],
+    'launch.actions': [
+        'DeclareLaunchArgument',
+        'EmitEvent',
+        'OpaqueFunction',
+        'RegisterEventHandler',
+        'SetEnvironmentVariable',
+    ],
+    'launch.event_handlers': ['OnProcessExit'],
+    'launch.events': ['Shutdown'],
+    'launch.events.process': ['ProcessExited'],
+    'launch.substitutions': ['LaunchConfiguration'],
+    'launch_ros': [],
+    'launch_ros.actions': ['Node'],
+}
+
+
+class Made:
+    """Anything of launch: it keeps what it was made of."""
+
+    def __init__(self, *positional: Any, **named: Any):
+        self.positional, self.named = positional, named
+
+    def perform(self, values: dict[str, str]) -> str:
+        return values[self.positional[0]]
+
+
+@pytest.fixture
+def launch_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[dict[str, Any]]:
+    """Globals of the launch file; `kept` is what it leaves to be done at the end."""
+    for name, classes in MODULES.items():
+        module = ModuleType(name)
+        vars(module).update({one: type(one, (Made,), {}) for one in classes})
+        monkeypatch.setitem(sys.modules, name, module)
+    kept: list[tuple] = []
+    monkeypatch.setattr('atexit.register', lambda *call, **named: kept.append((call, named)))
+    monkeypatch.chdir(tmp_path)
+    yield runpy.run_path(str(FILE)) | {'kept': kept}
+    for (do, *rest), named in kept:
+        do(*rest, **named)
+
+
+def actions(launch_file: dict[str, Any], **values: str) -> list[Any]:
+    described = launch_file['generate_launch_description']().positional[0]
+    declared = {one.positional[0]: one.named for one in described if one.positional}
+    assert all(v in (declared[k]['choices'] or [v]) for k, v in values.items())
+    defaults = {name: one['default_value'] for name, one in declared.items()}
+    return launch_file['_nodes'](defaults | values)
+
+
+def of(kind: str, listed: list[Any]) -> list[Any]:
+    return [one for one in listed if type(one).__name__ == kind]
+
+
+def nodes(listed: list[Any]) -> tuple[list[str], dict[str, dict[str, Any]]]:
+    """Names of the nodes, and the parameters in their file."""
+    found = of('Node', listed)
+    (path,) = {one.named['parameters'][0] for one in found}
+    data = yaml.safe_load(Path(path).read_text())
+    named = {name.rpartition('/')[2]: value['ros__parameters'] for name, value in data.items()}
+    assert {one.named['package'] for one in found} == {PACKAGES[name] for name in named}
+    return [one.named['executable'] for one in found], named
+
+
+def test_every_node_gets_its_parameters_and_the_bag_that_of_its_namespace(launch_file) -> None:
+    names, given = nodes(actions(launch_file, namespace='/auv1'))
+    assert names == list(given)
+    assert set(names) == set(PACKAGES)
+    assert Path(given['recorder_node']['bag']) == Path('runs/case1/auv1/gvc').resolve()
+    assert all(given[name]['use_sim_time'] == (name != 'plant_node') for name in names)
+
+
+def test_beside_another_plant_there_is_no_clock(launch_file) -> None:
+    _, given = nodes(actions(launch_file, publish_clock='false'))
+    assert not given['plant_node']['publish_clock']
+    assert not any(values['use_sim_time'] for values in given.values())
+
+
+def test_a_driver_in_place_of_the_plant_is_real_time(launch_file) -> None:
+    listed = actions(launch_file, plant='false', record='False', analysis='false')
+    names, given = nodes(listed)
+    assert names == ['setpoint_node', 'controller_node']
+    assert not given['controller_node']['lockstep']
+    assert not given['controller_node']['use_sim_time']
+    assert of('SetEnvironmentVariable', listed) == [], 'it may be on another machine'
+
+
+@pytest.mark.parametrize('switch', ['plant', 'record', 'analysis', 'use_sim_time', 'lockstep'])
+def test_a_switch_takes_no_other_word(launch_file, switch: str) -> None:
+    described = launch_file['generate_launch_description']().positional[0]
+    declared = {one.positional[0]: one.named for one in described if one.positional}
+    assert 'maybe' not in declared[switch]['choices']
+    assert declared[switch]['default_value'] in declared[switch]['choices']
+
+
+def test_a_node_that_fails_ends_the_launch_and_the_last_one_ends_it_well(launch_file) -> None:
+    handlers = of('RegisterEventHandler', actions(launch_file))
+    ends = [one.positional[0].named['on_exit'] for one in handlers]
+    running = SimpleNamespace(is_shutdown=False)
+    well, failed = (SimpleNamespace(returncode=code) for code in (0, 2))
+    assert [bool(end(well, running)) for end in ends] == [False] * 4 + [True]
+    for end in ends:
+        with pytest.raises(RuntimeError, match='_node ended with exit code 2'):
+            end(failed, running)
+        end(failed, SimpleNamespace(is_shutdown=True))
+
+
+def test_the_folder_of_its_files_goes_with_it(launch_file) -> None:
+    (node, *_) = of('Node', actions(launch_file))
+    folder = Path(node.named['parameters'][0]).parent
+    assert folder.is_dir()
+    for (do, *rest), named in launch_file['kept']:
+        do(*rest, **named)
+    assert not folder.exists()

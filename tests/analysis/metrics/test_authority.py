@@ -1,0 +1,60 @@
+"""Commands above the weight, above the thrusters, and where there are none, are remarked on."""
+
+import numpy as np
+import pytest
+import yaml
+from numpy.testing import assert_allclose
+
+from auv_analysis.cli.main import main
+from auv_analysis.metrics.authority import beyond_authority, largest_wrench
+from auv_dynamics import load_vehicle
+from auv_dynamics.files.shipped import shipped
+
+
+def test_the_largest_wrench_is_that_of_the_best_thrusts() -> None:
+    thrusters = load_vehicle('bluerov2').thrusters
+    rng = np.random.default_rng(2)
+    u = rng.uniform(-thrusters.reverse, thrusters.forward, (2000, len(thrusters.names)))
+    found = largest_wrench(thrusters)
+    assert np.all(np.abs(u @ thrusters.matrix.T) <= found + 1e-9)
+    for i, row in enumerate(thrusters.matrix):
+        best = np.where(row > 0, thrusters.forward, -thrusters.reverse)
+        worst = np.where(row > 0, -thrusters.reverse, thrusters.forward)
+        assert_allclose(found[i], max(row @ best, -(row @ worst)))
+
+
+@pytest.mark.parametrize(
+    ('largest', 'words'),
+    [
+        ([1.0, 0, 1, 0, 0, 0.1], []),
+        ([1.0, 0, 1, 0, 1e-12, 0.1], []),
+        ([1.0, 0, 1, 0.1, 0.2, 0.1], ['is commanded, which no thruster actuates']),
+        ([1e3, 0, 0, 0, 0, 0], ['times the weight', 'more is commanded than the thrusters']),
+    ],
+)
+def test_what_is_remarkable_of_the_largest_commands(largest, words) -> None:
+    vehicle = load_vehicle('bluerov2')
+    assert list(vehicle.thrusters.unactuated()) == ['pitch']
+    found = beyond_authority(vehicle, largest)
+    assert len(found) == len(words)
+    assert all(word in text for word, text in zip(words, found, strict=True))
+
+
+def test_without_thrusters_only_the_weight_is_known() -> None:
+    vehicle = load_vehicle('rexrov')
+    assert beyond_authority(vehicle, [1.0, 0, 0, 9e9, 0, 0]) == []
+    (text,) = beyond_authority(vehicle, [0.0, 0, 3 * vehicle.weight, 0, 0, 0])
+    assert 'in heave, is 3.0 times the weight' in text
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_a_study_of_a_vehicle_says_what_no_thruster_actuates(tmp_path, capsys) -> None:
+    data = yaml.safe_load(shipped('scenarios', 'case1_bluerov2').read_text())
+    (tmp_path / 'short.yaml').write_text(yaml.safe_dump(data | {'duration': 2.5}))
+    out = tmp_path / 'out'
+    words = ['--controller', 'gvc', '--sensitivity', 'none', '--out', str(out)]
+    main(['study', str(tmp_path / 'short.yaml'), *words])
+    assert 'which no thruster actuates: T has rank 5 of 6' in ' '.join(
+        ''.join(capsys.readouterr()).split()
+    )
+    assert 'which no thruster actuates' in (out / 'report.html').read_text()

@@ -1,0 +1,164 @@
+"""What a fault does to a run, measured on runs whose errors are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from auv_analysis import simulate
+from auv_analysis.metrics.fault_response import (
+    FILE,
+    responses,
+    windows_of,
+    write_responses,
+)
+from auv_analysis.report.document import write_numbers
+from auv_analysis.report.fault_sentences import fault_overview, fault_sentences
+from auv_analysis.report.tables.faults import fault_tables
+from auv_analysis.runs.run import Run
+from auv_analysis.scenario.fault_words import Mark, label, marks_of
+from auv_analysis.scenario.scenario import load_scenario
+from auv_dynamics import load_vehicle
+
+H = 0.01
+LOST = Mark(1, 'thruster', 'thruster T3 lost', 10.0, 14.0)
+LATE = Mark(2, 'sensor_delay', 'measurements 0.1 s late', 20.0, float('inf'))
+
+
+@pytest.fixture(scope='module')
+def made() -> Run:
+    """30 s with nu_d of 1 m/s: errors 0.01, then 0.1 in sway for 4 s, then a decay, then 0.3."""
+    base = simulate(load_scenario('case1'), 'gvc', 'zoh')
+    t = np.arange(3001) * H
+    error = np.full((len(t), 6), 0.001)
+    error[:, 1] = np.select([t < 10 - H / 2, t < 14 - H / 2, t < 20 - H / 2],
+                            [0.01, 0.1, 0.1 * np.exp(-(t - 14.0))], 0.3)  # fmt: skip
+    nu_d = np.ones((len(t), 6))
+    tau = np.tile(np.where(t < 10 - H / 2, 5.0, 7.0)[:, None], 6)
+    return replace(
+        base.part(slice(0, len(t))), t=t, nu_d=nu_d, nu=nu_d - error, tau=tau, faults=(LOST, LATE)
+    )
+
+
+def test_times_before_during_and_after(made):
+    assert windows_of(LOST, made) == ((6.0, 10.0), (10.0, 14.0), (14.0, 18.0))
+    before, during, after = windows_of(LATE, made)
+    assert before == (14.0, 20.0)
+    assert during == (20.0, 30.005)
+    assert after[1] <= after[0]
+    early = LOST._replace(start=2.5)
+    assert windows_of(early, replace(made, faults=(early,)))[0] == (2.0, 2.5)
+    first = LOST._replace(start=0.0, end=0.5)
+    assert windows_of(first, replace(made, faults=(first, LATE))) == ((0, 0), (0, 0.5), (0.5, 1.5))
+
+
+def test_errors_recovery_and_effort(made):
+    found = {(one.mark.number, one.dof): one for one in responses(made)}
+    sway = found[1, 'sway']
+    assert sway.rms[:2] == pytest.approx((0.01, 0.1), rel=1e-12)
+    assert sway.peak[1] == pytest.approx(0.1)
+    assert sway.band == pytest.approx(0.02)
+    assert sway.recovery == pytest.approx(np.log(0.1 / 0.02), abs=H)
+    assert sway.until == 20.0
+    assert sway.effort == pytest.approx((5.0, 7.0, 7.0))
+    assert found[1, 'surge'].recovery == 0.0
+    stays = found[2, 'sway']
+    assert (stays.rms[2], stays.recovery, stays.until) == (None, None, None)
+    assert stays.rms[1] == pytest.approx(0.3)
+
+
+def test_an_error_that_is_outside_at_the_end_is_not_recovered(made):
+    slow = replace(made, nu=made.nu_d - 0.05)
+    found = {(one.mark.number, one.dof): one for one in responses(slow)}
+    assert found[1, 'sway'].recovery is None
+    assert found[1, 'sway'].until == 20.0
+
+
+def test_blocks_of_a_run_give_the_same(made):
+    class InBlocks:
+        def __getattr__(self, name):
+            return getattr(made, name)
+
+        def blocks(self, rows=0):
+            return made.blocks(137)
+
+    for one, other in zip(responses(InBlocks()), responses(made), strict=True):
+        pairs = zip(one.rms, other.rms, strict=True)
+        assert all(a == b or a == pytest.approx(b, rel=1e-12) for a, b in pairs)
+        assert (one.recovery, one.peak, one.until) == (other.recovery, other.peak, other.until)
+
+
+def test_without_faults_or_set_point_there_is_nothing(made):
+    assert responses(replace(made, faults=())) == []
+    assert responses(replace(made, nu_d=np.full_like(made.nu_d, np.nan))) == []
+
+
+def test_sentences(made):
+    found = {'gvc': responses(made), 'cl': responses(replace(made, nu=made.nu_d - 0.03))}
+    first, second = (sentence.text for sentence in fault_sentences(found))
+    assert first == (
+        'Fault 1 (thruster T3 lost, 10–14 s) shows most in sway: under gvc its RMS error rises '
+        'from 0.010 to 0.10 m/s (at most 0.10), back within ± 0.02 after 1.61 s; under cl its RMS '
+        'error stays at 0.030 m/s (at most 0.030), not back within ± 0.02 by 20 s, nor was it '
+        'always before the fault.'
+    )
+    assert 'from 20 s on' in second
+    assert 'and the fault stays' in second
+    overview = [sentence.text for sentence in fault_overview(found)]
+    assert 'disturbs gvc most is number 2' in overview[0]
+    assert 'after 1 of the 1 that end' in overview[0]
+    assert 'after 0 of the 1 that end' in overview[1]
+
+
+def test_a_fault_without_effect_is_said_to_have_none(made):
+    calm = replace(made, nu=made.nu_d - 0.001)
+    texts = [sentence.text for sentence in fault_sentences({'gvc': responses(calm)})]
+    assert texts[0].endswith(': no velocity error leaves its settling band.')
+
+
+def test_every_number_of_the_tables_is_in_the_file(made, tmp_path):
+    import pyarrow.parquet as parquet
+
+    found = {'gvc': responses(made)}
+    write_responses(tmp_path, found)
+    tables = list(fault_tables(found))
+    write_numbers(tmp_path / 'numbers.parquet', tables)
+    held = parquet.read_table(tmp_path / FILE)
+    numbers = parquet.read_table(tmp_path / 'numbers.parquet').to_pylist()
+    assert len(numbers) == 90
+    for row in numbers:
+        file, _, column = row['source'].partition(':')
+        assert file == FILE
+        assert row['value'] in held.column(column).to_pylist()
+
+
+@pytest.mark.parametrize(
+    ('spec', 'words'),
+    [
+        ({'kind': 'sensor_drop_out'}, 'measurements lost'),
+        ({'kind': 'wrench_loss', 'probability': 0.25}, '25 % of the wrenches lost'),
+        ({'kind': 'sensor_delay', 'delay': 0.2}, 'measurements 0.2 s late'),
+        ({'kind': 'thruster', 'thruster': 'T1', 'efficiency': 0}, 'thruster T1 lost'),
+        ({'kind': 'thruster', 'thruster': 'T1', 'stuck': -3.5}, 'thruster T1 stuck at -3.5 N'),
+        ({'kind': 'actuator', 'axis': 'yaw', 'stuck': 2}, 'yaw actuator stuck at 2 N m'),
+        ({'kind': 'actuator', 'axis': 'sway', 'efficiency': 0.4}, 'sway actuator at 40 %'),
+        (
+            {'kind': 'sensor_bias', 'velocity': [0.1, 0, 0, 0, 0, -0.2], 'attitude': [0, 0.3, 0]},
+            'biased surge +0.1 m/s, yaw -0.2 rad/s, pitch angle +0.3 rad',
+        ),
+    ],
+)
+def test_faults_in_words(spec, words):
+    assert label(spec) == words
+
+
+def test_marks_name_thrusters_and_times():
+    specs = [{'kind': 'thruster', 'thruster': 2, 'efficiency': 0.0, 'to': 3.0},
+             {'kind': 'wrench_loss', 'from': 1.5}, {'kind': 'sensor_drop_out'}]  # fmt: skip
+    marks = marks_of(specs, load_vehicle('bluerov2_heavy'))
+    assert [mark.label for mark in marks] == [
+        'thruster T3 lost',
+        'wrenches lost',
+        'measurements lost',
+    ]
+    assert [mark.times for mark in marks] == ['0–3 s', 'from 1.5 s on', 'throughout']

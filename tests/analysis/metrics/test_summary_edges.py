@@ -1,0 +1,79 @@
+"""Edges of the windows of a summary: which sample still counts."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.metrics.summary import lumped_error, settling_time
+
+
+@pytest.fixture(scope='module')
+def run():
+    scenario = load_scenario('case1')
+    return simulate(replace(scenario, data=scenario.data | {'duration': 0.2}), 'gvc')
+
+
+@pytest.mark.parametrize(
+    ('window', 'samples'),
+    [
+        ((0.054, 0.146), (0.05, 0.15)),  # the nearest sample
+        ((0.056, 0.144), (0.06, 0.14)),
+        ((0.05, 0.06), (0.05, 0.06)),  # two are enough
+        (None, (0.0, 0.2)),
+    ],
+)
+def test_a_window_takes_the_samples_nearest_to_its_edges(run, window, samples):
+    energy = summarize(run, window)['kinetic_energy']
+    assert energy['window'] == pytest.approx(samples, abs=1e-12)
+    assert energy['mean'] > 0.0
+
+
+def test_one_sample_has_no_mean(run):
+    assert summarize(run, (0.05, 0.05))['kinetic_energy']['mean'] is None
+
+
+@pytest.mark.parametrize('start', [0.0, 5.0])
+def test_the_transient_is_two_seconds_from_the_first_sample(run, start):
+    late = replace(run, t=start + 100.0 * run.t)  # samples 1 s apart
+    error = np.abs(run.nu_d - run.nu)
+    found = summarize(late)['velocity_error']['max_after_2s']
+    assert found == pytest.approx(error[2:].max(axis=0), rel=1e-12)
+    assert summarize(replace(run, t=start + 99.9 * run.t))['velocity_error'][
+        'max_after_2s'
+    ] == pytest.approx(error[3:].max(axis=0), rel=1e-12)
+
+
+@pytest.mark.parametrize('axis', range(6))
+def test_each_axis_settles_by_itself(axis):
+    t, nu_d, error = 3.0 + np.arange(13.0), np.zeros((13, 6)), np.zeros((13, 6))
+    nu_d[2, axis] = 1.0
+    error[1, axis] = 0.021
+    expected = [3.0] * 6
+    expected[axis] = 5.0
+    assert settling_time(t, error, nu_d) == expected
+    error[-1, axis] = -0.021
+    expected[axis] = None
+    assert settling_time(t, error, nu_d) == expected
+
+
+def test_a_run_without_gains_has_none(run):
+    found = summarize(replace(run, gains={}))['gains']
+    assert found == {'K_D': None, 'K_f': None}
+    assert summarize(run)['gains']['K_D'] is not None
+
+
+def test_without_set_points_or_a_disturbance_there_is_no_error_to_tell(run):
+    blind = replace(run, disturbance=None, nu_d=np.full_like(run.nu_d, np.nan))
+    assert lumped_error(blind) is None
+    summary = summarize(blind)
+    assert set(summary['velocity_error'].values()) == {None}
+    assert summary['velocity']['rms'] == summarize(run)['velocity']['rms']
+
+
+def test_what_overflows_is_null(run):
+    found = summarize(replace(run, tau=np.full_like(run.tau, 1e200)))
+    assert found['effort']['rms'] == [None] * 6
+    json.dumps(found, allow_nan=False)

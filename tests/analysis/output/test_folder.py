@@ -1,0 +1,368 @@
+"""The results' folder: made, refused, and with --overwrite replaced, as a whole and nothing else.
+
+Whatever a user keeps in or beside it, the recordings and files that a command was given included,
+outlives the command.
+"""
+
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from auv_analysis.cli import main, run, simulate
+from auv_analysis.output.folder import results_folder
+from auv_analysis.output.new_files import replacing, unfinished_name, write_text
+from auv_dynamics.files.errors import FailedError, InputError
+from auv_dynamics.files.shipped import shipped
+
+EARLIER = {
+    'summary.json': 'old', 'report.html': 'old', 'figures/nu.png': 'old', 'scenario.yaml': 'old',
+    'logs/gvc/plant_node.log': 'old', 'gvc/params.yaml': 'old', 'gvc/gvc_0.mcap': 'old',
+}  # fmt: skip
+LATER = {'summary.json': 'new', 'figures/tau.png': 'new', 'gvc/gvc_0.mcap': 'new'}
+THEIRS = [
+    'notes.md', 'thesis/chapter.npz', 'figures/my_photo.png', 'logs/my.log', 'rawdata/field_0.mcap',
+    'metadata.yaml', 'measured.npz', 'params.yaml', '.hidden', 'my_vehicle.yaml', 'cl.txt',
+    'rollouts/mine.txt', 'unfinished_ideas.txt',
+]  # fmt: skip
+OWN = ['gvc/*', 'cl.npz']
+
+
+def fill(folder: Path, texts: Mapping[str, str]) -> None:
+    for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+
+
+def write(
+    out: Path,
+    texts: Mapping[str, str],
+    *,
+    overwrite: bool = False,
+    end: BaseException | None = None,
+) -> None:
+    """What a command does, which may not come to its end."""
+    with results_folder(out, overwrite=overwrite, own=OWN) as results:
+        fill(results.folder, texts)
+        if end is not None:
+            raise end
+
+
+def tree(folder: Path) -> dict[str, str]:
+    """Text of every file; of the manifest, and of a link, none."""
+    files = {str(path.relative_to(folder)): path for path in folder.rglob('*')}
+    return {
+        name: '' if path.is_symlink() or name == 'manifest.json' else path.read_text()
+        for name, path in files.items()
+        if path.is_symlink() or not path.is_dir()
+    }
+
+
+def refused(out: Path, *, overwrite: bool, **options: Any) -> str:
+    with (
+        pytest.raises(InputError) as caught,
+        results_folder(out, overwrite=overwrite, own=OWN, **options),
+    ):
+        pytest.fail('work has begun')
+    line = str(caught.value)
+    assert line.startswith(str(out))
+    assert ', found ' in line
+    assert len(line.splitlines()) == 1
+    return line
+
+
+@pytest.mark.parametrize('overwrite', [False, True])
+@pytest.mark.parametrize('there', [False, True])
+def test_results_of_a_new_or_empty_folder_are_written_in_place(overwrite, there, tmp_path) -> None:
+    out = tmp_path / 'runs' / 'case1'
+    if there:
+        out.mkdir(parents=True)
+    with results_folder(out, overwrite=overwrite, own=OWN) as results:
+        assert results == (out, out)
+        fill(out, EARLIER)
+    assert tree(out) == {**EARLIER, 'manifest.json': ''}
+
+
+@pytest.mark.parametrize('name', ['summary.json', 'notes.md', '.hidden'])
+@pytest.mark.parametrize('overwrite', [False, True])
+def test_folder_that_no_manifest_lists_is_refused(name, overwrite, tmp_path: Path) -> None:
+    fill(tmp_path, {name: 'mine'})
+    assert ('manifest.json' if overwrite else '--overwrite') in refused(
+        tmp_path, overwrite=overwrite
+    )
+    assert tree(tmp_path) == {name: 'mine'}
+
+
+FOREIGN = [
+    '{}',
+    '[]',
+    '{"name": "My app"}',
+    'x',
+    '{"files": {"../x": "1"}}',
+    '{"files": {"/x": "1"}}',
+]
+
+
+@pytest.mark.parametrize('text', FOREIGN)
+def test_manifest_of_somebody_else_lists_nothing(text: str, tmp_path: Path) -> None:
+    fill(tmp_path, {'out/manifest.json': text, 'x': 'mine'})
+    refused(tmp_path / 'out', overwrite=True)
+    assert (tmp_path / 'x').read_text() == 'mine'
+
+
+def test_overwrite_replaces_what_the_manifest_lists(tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    write(tmp_path, LATER, overwrite=True)
+    assert tree(tmp_path) == {**LATER, 'manifest.json': ''}
+    assert not (tmp_path / 'logs').exists()  # nothing of ours is left in it
+    write(tmp_path, EARLIER, overwrite=True)
+    assert tree(tmp_path) == {**EARLIER, 'manifest.json': ''}
+
+
+def test_overwrite_keeps_what_is_not_ours(tmp_path: Path) -> None:
+    theirs = dict.fromkeys(THEIRS, 'mine')
+    write(tmp_path, EARLIER)
+    fill(tmp_path, theirs)
+    write(tmp_path, LATER, overwrite=True)
+    assert tree(tmp_path) == {**LATER, **theirs, 'manifest.json': ''}
+
+
+def test_file_that_comes_while_a_command_writes_is_not_ours(tmp_path: Path) -> None:
+    write(tmp_path, {**EARLIER, 'notes.md': 'mine'})  # in place: the user writes there as well
+    write(tmp_path, LATER, overwrite=True)
+    assert tree(tmp_path) == {**LATER, 'notes.md': 'mine', 'manifest.json': ''}
+
+
+@pytest.mark.parametrize('name', ['summary.json', 'figures/nu.png', 'gvc/gvc_0.mcap'])
+def test_result_that_has_been_edited_is_kept(name: str, tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    fill(tmp_path, {name: 'edited'})
+    assert name in refused(tmp_path, overwrite=True)
+    assert tree(tmp_path) == {**EARLIER, name: 'edited', 'manifest.json': ''}
+
+
+@pytest.mark.parametrize(
+    'name', ['gvc/notes.md', 'cl.npz', 'tune.json', 'tune.json/x', 'setpoint.csv']
+)
+def test_what_stands_where_a_result_must_go_is_refused(name: str, tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    fill(tmp_path, {name: 'mine'})
+    assert name in refused(tmp_path, overwrite=True)
+    assert tree(tmp_path) == {**EARLIER, name: 'mine', 'manifest.json': ''}
+
+
+def test_figure_of_the_users_in_the_way_of_a_new_one_is_kept_beside_it(tmp_path, capsys) -> None:
+    write(tmp_path, EARLIER)
+    fill(tmp_path, {'figures/tau.png': 'mine'})  # only drawing shows that it is in the way
+    with pytest.raises(FailedError, match=r'tau\.png: expected no such file'):
+        write(tmp_path, LATER, overwrite=True)
+    assert EARLIER.items() <= tree(tmp_path).items()
+    assert (tmp_path / 'figures/tau.png').read_text() == 'mine'
+    left = tmp_path / 'unfinished'
+    assert tree(left) == {**LATER, 'manifest.json': ''}
+    assert str(left) in capsys.readouterr().err
+
+
+def test_folder_with_what_is_read_is_refused(tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    for given in ('gvc', 'gvc/gvc_0.mcap', 'scenario.yaml'):
+        assert given in refused(tmp_path, overwrite=True, inputs=[tmp_path / given])
+    assert tree(tmp_path) == {**EARLIER, 'manifest.json': ''}
+
+
+def test_overwrite_follows_no_link_out_of_the_folder(tmp_path: Path) -> None:
+    elsewhere, out = tmp_path / 'elsewhere', tmp_path / 'out'
+    write(out, EARLIER)
+    (out / 'figures').rename(elsewhere)
+    (out / 'figures').symlink_to(elsewhere)
+    refused(out, overwrite=True)
+    (out / 'figures').unlink()
+    (out / 'summary.json').rename(elsewhere / 'summary.json')
+    (out / 'summary.json').symlink_to(elsewhere / 'summary.json')
+    refused(out, overwrite=True)
+    assert tree(elsewhere) == {'nu.png': 'old', 'summary.json': 'old'}
+
+
+ENDS = [KeyboardInterrupt(), OSError(28, 'No space left'), InputError('x', '', 'y', 'z')]
+
+
+@pytest.mark.parametrize('end', ENDS)
+def test_command_that_does_not_come_to_its_end_leaves_the_results(end, tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    before = tree(tmp_path)
+    with pytest.raises(type(end)):
+        write(tmp_path, {'summary.json': 'half'}, overwrite=True, end=end)
+    assert tree(tmp_path) == before
+    write(tmp_path, LATER, overwrite=True)
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from auv_analysis.output.folder import results_folder
+
+with results_folder(Path(sys.argv[1]), overwrite=True) as results:
+    (results.folder / 'summary.json').write_text('half')
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_command_that_is_killed_leaves_the_results(tmp_path: Path) -> None:
+    write(tmp_path, EARLIER)
+    before = tree(tmp_path)
+    subprocess.run([sys.executable, '-c', KILLED, str(tmp_path)], check=False)
+    left = {'unfinished/summary.json': 'half'}
+    assert tree(tmp_path) == {**before, **left}
+    write(tmp_path, LATER, overwrite=True)
+    assert tree(tmp_path) == {**LATER, **left, 'manifest.json': ''}  # no manifest lists it
+
+
+@pytest.mark.parametrize('end', [FailedError('a node ended'), KeyboardInterrupt()])
+def test_recording_is_kept_until_the_next_command_succeeds(end, tmp_path: Path, capsys) -> None:
+    write(tmp_path, EARLIER)
+    for name in ('unfinished', 'unfinished_1'):
+        with pytest.raises(type(end)):
+            write(tmp_path, {'gvc/gvc_0.mcap': 'half'}, overwrite=True, end=end)
+        assert str(tmp_path / name) in capsys.readouterr().err
+        assert tree(tmp_path / name) == {'gvc/gvc_0.mcap': 'half', 'manifest.json': ''}
+        assert EARLIER.items() <= tree(tmp_path).items()
+    fill(tmp_path / 'unfinished_1', {'gvc/gvc_0.mcap': 'recovered'})
+    write(tmp_path, LATER, overwrite=True)
+    assert not (tmp_path / 'unfinished').exists()
+    assert (tmp_path / 'unfinished_1/gvc/gvc_0.mcap').read_text() == 'recovered'
+
+
+def test_new_results_that_are_not_whole_can_be_overwritten(tmp_path: Path) -> None:
+    half = {'gvc/gvc_0.mcap': 'half', 'notes.md': 'mine'}
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path, half, end=KeyboardInterrupt())
+    write(tmp_path, LATER, overwrite=True)
+    assert tree(tmp_path) == {**LATER, 'notes.md': 'mine', 'manifest.json': ''}
+
+
+def test_folder_that_nothing_was_written_into_is_not_left(tmp_path: Path) -> None:
+    with pytest.raises(FailedError), results_folder(tmp_path / 'runs/x', overwrite=False):
+        raise FailedError('no')
+    assert tree(tmp_path) == {}
+    assert not (tmp_path / 'runs').exists()
+
+
+def test_interrupt_of_the_exchange_waits_for_its_end(tmp_path: Path, monkeypatch) -> None:
+    write(tmp_path, EARLIER)
+    replace, calls = Path.replace, []
+
+    def interrupted(path: Path, target: Path) -> Path:
+        calls.append(path)
+        signal.raise_signal(signal.SIGINT)
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, 'replace', interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path, LATER, overwrite=True)
+    assert len(calls) == len(LATER)
+    assert tree(tmp_path) == {**LATER, 'manifest.json': ''}
+
+
+@pytest.mark.parametrize('overwrite', [False, True])
+def test_folder_that_another_command_writes_into_is_refused(overwrite: bool, tmp_path) -> None:
+    out = tmp_path / 'out'
+    with results_folder(out, overwrite=False, own=OWN):
+        assert 'no other command' in refused(out, overwrite=overwrite)
+        fill(out, EARLIER)
+        assert 'no other command' in refused(out, overwrite=overwrite)
+    write(out, LATER, overwrite=True)
+
+
+def test_no_file_is_written_through_a_link(tmp_path: Path) -> None:
+    target, victim = tmp_path / 'sweep.json', tmp_path / 'elsewhere'
+    target.symlink_to(victim)
+    with pytest.raises(InputError, match='an existing file'):
+        write_text(target, 'new', overwrite=False)
+    assert not victim.exists()
+    unfinished_name(target).symlink_to(victim)
+    with replacing(target) as file:
+        file.write(b'new')
+    assert not victim.exists()
+    assert {path.name for path in tmp_path.iterdir()} == {target.name}
+    assert target.read_text() == 'new'
+
+
+@pytest.mark.parametrize('overwrite', [False, True])
+@pytest.mark.parametrize('kind', ['file', 'below a file', 'broken link', 'link to itself', 'long'])
+def test_path_that_can_be_no_folder_is_refused(kind, overwrite, tmp_path) -> None:
+    out = tmp_path / 'out'
+    if kind in ('file', 'below a file'):
+        out.write_text('mine')
+    elif kind == 'broken link':
+        out.symlink_to('gone/away')
+    elif kind == 'link to itself':
+        out.symlink_to('out')
+    before = tree(tmp_path)
+    asked = {'below a file': out / 'x', 'long': tmp_path / ('n' * 300)}.get(kind, out)
+    refused(asked, overwrite=overwrite)
+    assert tree(tmp_path) == before
+    assert not out.is_file() or out.read_text() == 'mine'
+
+
+def test_folder_that_cannot_be_written_is_refused() -> None:
+    refused(Path('/proc/auv'), overwrite=False)  # not even root makes a folder there
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder in which a user keeps scenario and vehicle under the names that we use as well."""
+    for module, work in ((run, 'warm_up'), (simulate, 'write_inputs')):
+        monkeypatch.setattr(module, work, lambda *_: pytest.fail('work has begun'))
+    shutil.copy(shipped('scenarios', 'case1'), tmp_path / 'scenario.yaml')
+    shutil.copy(shipped('vehicles', 'herman2018'), tmp_path / 'vehicle.yaml')
+    text = (tmp_path / 'scenario.yaml').read_text()
+    table = 't,surge,sway,heave,roll,pitch,yaw\n0,0,0,0,0,0,0\n30,0,0,0,0,0,0\n'
+    (tmp_path / 'setpoint.csv').write_text(table)
+    text = text.replace('vehicle: herman2018', 'vehicle: vehicle.yaml')
+    (tmp_path / 'scenario.yaml').write_text(text)
+    return tmp_path
+
+
+@pytest.mark.parametrize('command', ['simulate', 'run'])
+def test_folder_that_holds_the_inputs_is_refused(command, project, capsys) -> None:
+    before = {path: path.read_text() for path in project.iterdir()}
+    arguments = [command, str(project / 'scenario.yaml'), '--out', str(project), '--overwrite']
+    with pytest.raises(SystemExit) as end:
+        main.main(arguments)
+    lines = capsys.readouterr().err.splitlines()
+    assert {path: path.read_text() for path in project.iterdir()} == before
+    assert (end.value.code, len(lines)) == (2, 1)
+    assert '--out: expected ' in lines[0]
+
+
+@pytest.mark.parametrize('name', ['figures', 'summary.json', 'manifest.json', 'unfinished'])
+def test_controller_may_not_be_named_like_our_files(name, project, capsys) -> None:
+    path = project / 'scenario.yaml'
+    path.write_text(path.read_text().replace('  gvc: {', f'  {name}: {{'))
+    with pytest.raises(SystemExit) as end:
+        main.main(['simulate', str(path), '--out', str(project / 'out')])
+    lines = capsys.readouterr().err.splitlines()
+    assert (end.value.code, len(lines)) == (2, 1)
+    assert f'{path}: controllers' in lines[0]
+    assert name in lines[0]
+    assert not (project / 'out').exists()
+
+
+@pytest.mark.parametrize('key', ['name', 'controller'])
+def test_name_too_long_for_a_file_is_refused(key, project, capsys) -> None:
+    path, name = project / 'scenario.yaml', 'n' * 300
+    old, new = {'name': ('name: case1', f'name: {name}'), 'controller': ('  gvc:', f'  {name}:')}[
+        key
+    ]
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(SystemExit) as end:
+        main.main(['simulate', str(path), '--out', str(project / 'out')])
+    lines = capsys.readouterr().err.splitlines()
+    assert (end.value.code, len(lines)) == (2, 1)
+    assert str(path) in lines[0]
+    assert not (project / 'out').exists()

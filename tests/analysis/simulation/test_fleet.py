@@ -1,0 +1,147 @@
+"""A fleet is the vehicles of as many files, and knows which of them would be refused."""
+
+import copy
+
+import numpy as np
+import pytest
+from closed_loops import file_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+
+from auv_analysis.simulation.fleet import fleet, matrices, numbers
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
+from auv_gvc_controller.laws.decomposition import decompose
+from auv_gvc_controller.laws.model import control_model
+
+FILES = {name: file_of(name) for name in ('rexrov', 'herman2018', 'lauv', 'lrauv_tethys')}
+PLACES = {
+    'rexrov': [
+        ('rigid_body', 'mass'), ('rigid_body', 'center_of_gravity', 1),
+        ('rigid_body', 'inertia', 0, 0), ('rigid_body', 'inertia', 2, 2),
+        ('added_mass', 0, 0), ('added_mass', 3, 3), ('damping', 'linear', 2),
+        ('damping', 'quadratic', 5), ('hydrostatics', 'volume'),
+        ('hydrostatics', 'center_of_buoyancy', 2), ('environment', 'gravity'),
+        ('environment', 'water_density'),
+    ],
+    'herman2018': [('rigid_body', 'mass'), ('inertia_matrix', 0, 0), ('inertia_matrix', 5, 5)],
+    'lauv': [('rigid_body', 'mass'), ('added_mass', 1, 1), ('damping', 'linear', 1, 1),
+             ('lift', 1, 5)],
+    'lrauv_tethys': [('added_mass', 2), ('damping', 'quadratic', 4), ('rigid_body', 'mass')],
+}  # fmt: skip
+
+
+def changed(data, columns, i):
+    data = copy.deepcopy(data)
+    for keys, values in columns.items():
+        *way, last = keys
+        inner = data
+        for key in way:
+            inner = inner[key]
+        inner[last] = values[i].tolist()
+    return data
+
+
+def at(data, keys):
+    for key in keys:
+        data = data[key]
+    return data
+
+
+def there(name):
+    """Places of this file that hold numbers: its matrices may be written in either form."""
+    found = []
+    for keys in PLACES[name]:
+        try:
+            value = at(FILES[name], keys)
+        except (TypeError, IndexError, KeyError):
+            continue
+        if np.ndim(value) == 0:
+            found.append(keys)
+    return found
+
+
+@pytest.mark.parametrize('name', FILES)
+@settings(max_examples=25)
+@given(data=st.data())
+def test_a_fleet_is_the_vehicles_of_as_many_files(name, data):
+    """Bit for bit, and refused where a file is."""
+    file, count = FILES[name], data.draw(st.integers(1, 4))
+    places = data.draw(st.lists(st.sampled_from(there(name)), unique=True, min_size=1))
+    factor = st.sampled_from([1.0, 0.5, 1.1, 3.0, -1.0, 0.0, 40.0])
+    columns = {
+        keys: np.array([at(file, keys) * data.draw(factor) for _ in range(count)])
+        for keys in places
+    }
+    vehicle = vehicle_from_dict(file, 'file')
+    found, good = fleet(file, columns, vehicle, count)
+    for i in range(count):
+        expected, refusal = vehicle_or_refusal(changed(file, columns, i))
+        if expected is None:
+            # what the schema alone refuses is not the fleet's business
+            assert not good[i] or 'a positive number' in refusal
+            continue
+        assert good[i]
+        parts = ('M', 'D_linear', 'D_quadratic', 'weight', 'buoyancy', 'r_G', 'r_B')
+        for part in (*parts, 'lift') if 'lift' in file else parts:
+            assert_array_equal(getattr(found, part)[i], getattr(expected, part), err_msg=part)
+        model, alone = control_model(found.changed(M=found.M[i : i + 1])), control_model(expected)
+        for part in ('Upsilon', 'Upsilon_inv', 'N'):
+            assert_array_equal(getattr(model, part)[0], getattr(alone, part))
+        assert_array_equal(model.dynamics.M_inv[0], alone.dynamics.M_inv)
+        forces = found.changed(M=np.eye(6)).model.hydrostatics[i]
+        assert_array_equal(forces, alone.dynamics.hydrostatics)
+
+
+def vehicle_or_refusal(data):
+    try:
+        return vehicle_from_dict(data, 'file'), ''
+    except InputError as error:
+        return None, str(error)
+
+
+def test_there_are_places_in_every_form():
+    assert len(there('rexrov')) >= 10
+    assert all(there(name) for name in FILES)
+
+
+def test_whole_entries():
+    file = FILES['rexrov']
+    generator = np.random.default_rng(0)
+    linear = generator.uniform(10, 20, (3, 6))
+    added = np.abs(generator.normal(size=(3, 6, 6)))
+    added = added @ np.swapaxes(added, 1, 2)
+    columns = {('damping', 'linear'): linear, ('added_mass',): added}
+    found, good = fleet(file, columns, vehicle_from_dict(file, 'file'), 3)
+    assert good.all()
+    for i in range(3):
+        expected = vehicle_from_dict(changed(file, columns, i), 'file')
+        assert_array_equal(found.D_linear[i], expected.D_linear)
+        assert_array_equal(found.M[i], expected.M)
+
+
+def test_a_single_change_is_made_after_that_of_the_whole():
+    columns = {('k', 1): np.array([7.0, 8.0]), ('k',): np.array([[1.0, 2.0], [3.0, 4.0]])}
+    assert_array_equal(numbers([0.0, 0.0], columns, ('k',), 2), [[1, 7], [3, 8]])
+    assert_array_equal(numbers([5.0, 6.0], {}, ('k',), 2), [[5, 6]])
+
+
+def test_matrices_of_numbers_diagonals_and_matrices():
+    full = np.arange(72.0).reshape(2, 6, 6)
+    assert matrices(full) is full
+    assert_array_equal(matrices(np.array([2.0, 3.0])), [2 * np.eye(6), 3 * np.eye(6)])
+    assert_array_equal(matrices(full[:, 0]), [np.diag(full[0, 0]), np.diag(full[1, 0])])
+
+
+@settings(max_examples=50)
+@given(seed=st.integers(0, 2**32 - 1), shape=st.sampled_from([(1,), (5,), (2, 3)]))
+def test_stacked_matrices_decompose_like_single_ones(seed, shape):
+    A = np.random.default_rng(seed).normal(size=(*shape, 6, 6))
+    M = A @ np.swapaxes(A, -2, -1) + np.eye(6)
+    M = (M + np.swapaxes(M, -2, -1)) / 2
+    Upsilon, N = decompose(M)
+    for index in np.ndindex(*shape):
+        alone = decompose(M[index])
+        assert_array_equal(Upsilon[index], alone[0])
+        assert_array_equal(N[index], alone[1])

@@ -1,0 +1,288 @@
+"""Rollouts in lanes give what single runs give, whatever runs beside them."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from closed_loops import SIX, TURNED
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+
+import auv_analysis.simulation.rollouts as module
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.simulation.reduction import COLUMNS
+from auv_analysis.simulation.rollouts import rollouts
+from auv_analysis.simulation.simulate import DivergedError
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.kernel.compile import JITTED
+from auv_dynamics.vehicle import DOFS
+
+LAWS = {
+    'gvc': {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0},
+    'cl': {'k_D': 400.0, 'k_I': 20.0, 'Lambda': 0.5, 'Gamma': 200.0},
+    'pid': {'k_P': 400.0, 'k_I': 50.0, 'k_D': 5.0},
+    'smc': {'k_D': 300.0, 'Lambda': 0.5, 'Gamma': 50.0, 'k_S': 20.0},
+}
+ROUGH = [
+    {'kind': 'harmonic', 'sway': {'offset': 25.0, 'terms': [{'amplitude': 40.0, 'omega': 0.8}]}},
+    {'kind': 'model_error', 'mass': 0.05, 'added_mass': -0.2, 'damping': 0.3},
+    {
+        'kind': 'current',
+        'velocity': [0.3, 0.1, 0.0],
+        'down': {'terms': [{'amplitude': 0.1, 'omega': 1.0}]},
+    },
+]
+LIMITS = {'limit': [60, 60, 80, 20, 20, 20], 'rate': 400.0, 'lag': 0.05, 'delay': 0.02}
+NOISY = {'velocity_noise': 0.02, 'attitude_noise': 0.01, 'drop_out': 0.1}
+
+
+def scenario_of(law, vehicle='rexrov', duration=0.6, **changes):
+    values = {
+        'vehicle': vehicle,
+        'duration': duration,
+        'controllers': {law: {'law': law, **LAWS[law]}},
+        'setpoint': SIX,
+        'initial': TURNED,
+        **changes,
+    }
+    return changed_scenario(load_scenario('case1'), values)
+
+
+def flat(summary):
+    """Figures of a summary by the names of the columns."""
+    found = {}
+    for name in COLUMNS:
+        group, key, *dof = name.split('.')[:3] if '.' in name else (name, None)
+        if key is None:
+            continue
+        value = summary[group][key]
+        value = value[DOFS.index(dof[0])] if dof and value is not None else value
+        found[name] = np.nan if value is None else value
+    return found
+
+
+def same_as_alone(scenario, controller, changes, hold, columns, rows, seeds=None):
+    """Compare some rollouts with single runs of their scenarios."""
+    for i in rows:
+        values = {path: column[i] for path, column in changes.items()}
+        if seeds is not None:
+            values['seed'] = int(seeds[i])
+        expected = flat(summarize(simulate(changed_scenario(scenario, values), controller, hold)))
+        for name, value in expected.items():
+            np.testing.assert_allclose(
+                columns[name][i], value, rtol=1e-9, atol=1e-11, err_msg=f'{name} of {i}'
+            )
+
+
+# what numba must compile first is compared once; all laws without it, see the last test
+SMC_ZOH = pytest.param('smc', 'zoh', marks=pytest.mark.long)
+COMPILED = [('gvc', 'continuous'), ('gvc', 'zoh'), SMC_ZOH]
+EVERY = [(law, hold) for law in LAWS for hold in ('continuous', 'zoh')]
+
+
+@pytest.mark.parametrize(('law', 'hold'), COMPILED if JITTED else EVERY)
+def test_columns_give_what_single_runs_give(law, hold):
+    count = 11
+    generator = np.random.default_rng(3)
+    gain = next(iter(LAWS[law]))
+    scenario = scenario_of(law, disturbance=[ROUGH[0], {'kind': 'model_error', 'mass': 0.1}])
+    changes = {
+        f'controllers.{law}.{gain}': LAWS[law][gain] * generator.uniform(0.5, 1.5, count),
+        'vehicle.rigid_body.mass': 1862.87 * generator.uniform(0.8, 1.2, count),
+        'vehicle.rigid_body.center_of_gravity[2]': generator.uniform(-0.02, 0.02, count),
+        'vehicle.damping.linear': generator.uniform(50, 100, (count, 6)),
+        'disturbance[1].damping': generator.uniform(-0.5, 0.5, count),
+        'disturbance[1].mass': generator.uniform(-0.1, 0.1, count),
+        'initial.nu[1]': generator.normal(size=count) * 0.3,
+        'initial.eta': generator.normal(size=(count, 6)),
+    }
+    columns = rollouts(scenario, law, changes, hold=hold)
+    assert set(columns['status']) == {'ok'}
+    same_as_alone(scenario, law, changes, hold, columns, (0, 6, 10))
+
+
+def test_columns_of_lift_give_what_single_runs_give():
+    changes = {
+        'vehicle.lift[1][1]': np.array([0.0, 20.6, 300.0]),
+        'vehicle.lift[5][1]': np.array([-6.0, 6.0, -40.0]),
+        'disturbance[0].damping': np.array([0.0, 0.5, -0.5]),
+    }
+    scenario = scenario_of('gvc', 'lauv', disturbance=[{'kind': 'model_error', 'damping': 0.1}])
+    columns = rollouts(scenario, 'gvc', changes)
+    assert set(columns['status']) == {'ok'}
+    assert len(set(columns['effort.rms.sway'])) == 3
+    same_as_alone(scenario, 'gvc', changes, 'continuous', columns, range(3))
+    mixed = {'vehicle': ['lauv', 'rexrov', 'lauv']}  # with and without
+    columns = rollouts(scenario, 'gvc', mixed)
+    same_as_alone(scenario, 'gvc', mixed, 'continuous', columns, range(2))
+
+
+SMC = pytest.param('smc', marks=pytest.mark.long)
+
+
+@pytest.mark.parametrize('law', ['gvc', SMC] if JITTED else LAWS)
+def test_actuators_sensors_and_a_current_act_on_each_rollout(law):
+    thrusters = {'thrusters': True, **LIMITS}
+    scenario = scenario_of(
+        law, 'bluerov2_heavy', disturbance=ROUGH, actuators=thrusters, sensors=NOISY
+    )
+    count = 10
+    gain = next(iter(LAWS[law]))
+    changes = {f'controllers.{law}.{gain}': np.geomspace(1.0, 300.0, count)}
+    seeds = np.arange(100, 100 + count)
+    columns = rollouts(scenario, law, changes, seeds=seeds, hold='zoh')
+    same_as_alone(scenario, law, changes, 'zoh', columns, (0, 4, 9), seeds)
+    others = rollouts(scenario, law, changes, seeds=seeds + 1, hold='zoh')
+    assert (others['effort.rms.yaw'] != columns['effort.rms.yaw']).all()
+
+
+def equal(one, other):
+    for name, column in one.items():
+        assert_array_equal(column, other[name], err_msg=name)
+
+
+GVC = scenario_of('gvc', 'herman2018', duration=0.3)
+MANY = {
+    'controllers.gvc.k_D': np.linspace(2.0, 20.0, 37),
+    'vehicle.inertia_matrix[0][0]': np.linspace(100.0, 200.0, 37),
+    'initial.nu[0]': np.linspace(-0.5, 0.5, 37),
+}
+if JITTED:
+    ALL = rollouts(GVC, 'gvc', MANY)
+
+
+@pytest.mark.skipif(not JITTED, reason='lanes are as wide as the batch')
+@settings(max_examples=25)
+@given(st.lists(st.integers(0, 36), min_size=1, max_size=40), st.integers(1, 3))
+def test_no_rollout_depends_on_those_beside_it(rows, threads):
+    """Bit for bit, whatever their number, order and lane, and the number of threads."""
+    chosen = {path: column[rows] for path, column in MANY.items()}
+    found = rollouts(GVC, 'gvc', chosen, threads=threads)
+    equal(found, {name: column[rows] for name, column in ALL.items()})
+
+
+def test_columns_and_scenarios_of_their_own_give_the_same_bits(monkeypatch):
+    scenario = scenario_of('gvc', duration=0.1, disturbance=ROUGH[:2])
+    generator = np.random.default_rng(5)
+    count = 9
+    changes = {
+        'controllers.gvc.Gamma': generator.uniform(10, 50, (count, 6)),
+        'controllers.gvc.k_D': generator.uniform(5, 15, count),
+        'vehicle.rigid_body.inertia[0][0]': generator.uniform(500, 600, count),
+        'vehicle.rigid_body.center_of_gravity': generator.uniform(-0.1, 0.1, (count, 3)),
+        'vehicle.hydrostatics.volume': generator.uniform(1.7, 1.9, count),
+        'vehicle.environment.gravity': generator.uniform(9.7, 9.9, count),
+        'disturbance[1].added_mass': generator.uniform(-0.3, 0.3, count),
+        'disturbance[1].mass': generator.uniform(-0.3, 0.3, count),
+        'initial.eta[4]': generator.uniform(-1.5, 1.5, count),
+        'setpoint.surge.offset': generator.uniform(-0.5, 0.5, count),
+        'setpoint.yaw.terms[0].omega': generator.uniform(0.1, 3.0, count),
+        'setpoint.sway.terms[0].amplitude': generator.uniform(-0.5, 0.5, count),
+        'setpoint.heave.terms[0].phase': generator.uniform(-3.0, 3.0, count),
+    }
+    in_columns = rollouts(scenario, 'gvc', changes)
+    monkeypatch.setattr(module, 'in_columns', lambda *_: False)
+    equal(rollouts(scenario, 'gvc', changes), in_columns)
+
+
+def test_values_that_are_no_numbers():
+    names = ['herman2018', 'rexrov', 'girona500', 'rexrov']
+    changes = {'vehicle': names, 'initial.nu[0]': [0.1, 0.2, 0.3, 0.4]}
+    columns = rollouts(scenario_of('gvc', duration=0.2), 'gvc', changes)
+    assert set(columns['status']) == {'ok'}
+    same_as_alone(scenario_of('gvc', duration=0.2), 'gvc', changes, 'continuous', columns, range(4))
+
+
+def test_set_points_durations_and_steps_of_their_own():
+    changes = {
+        'setpoint.surge.offset': [0.1, 0.2, 0.2, 0.5],
+        'duration': [0.1, 0.2, 0.1, 0.1],
+        'integrator': ['rk4', 'ode5', 'rk4', 'euler'],
+    }
+    columns = rollouts(GVC, 'gvc', changes)
+    same_as_alone(GVC, 'gvc', changes, 'continuous', columns, range(4))
+
+
+def test_what_makes_no_scenario_is_refused_and_the_rest_runs():
+    scenario = scenario_of('gvc', duration=0.1, disturbance=ROUGH[1:2])
+    mass = [1800.0, -1.0, 1900.0, np.nan, 1e200, 1850.0]
+    changes = {
+        'vehicle.rigid_body.mass': mass,
+        'vehicle.rigid_body.inertia[0][0]': [500.0, 500.0, 1.0e5, 500.0, 500.0, 500.0],
+        'disturbance[0].mass': [0.1, 0.1, 0.1, 0.1, 0.1, -1.5],
+    }
+    columns = rollouts(scenario, 'gvc', changes)
+    assert columns['status'].tolist() == ['ok', *['refused'] * 5]
+    assert columns['reason'][0] == ''
+    keys = ['mass', 'inertia', 'mass', 'mass', 'disturbance[0]']
+    for i, key in enumerate(keys, start=1):
+        assert key in columns['reason'][i]
+        assert ', found ' in columns['reason'][i]
+        with pytest.raises(InputError) as refused:
+            changed_scenario(scenario, {path: column[i] for path, column in changes.items()})
+        assert columns['reason'][i] in str(refused.value)
+        assert np.isnan(columns['effort.rms.surge'][i])
+    same_as_alone(scenario, 'gvc', changes, 'continuous', columns, [0])
+
+
+def test_all_refused():
+    columns = rollouts(GVC, 'gvc', {'vehicle.inertia_matrix[0][0]': [-1.0, 0.0, -5.0]})
+    assert set(columns['status']) == {'refused'}
+
+
+def test_a_rollout_that_diverges_says_when_and_leaves_the_others_alone():
+    scenario = scenario_of('gvc', 'herman2018', duration=0.5)
+    gains = np.array([12.0, 12.0, 1e7, 12.0])
+    columns = rollouts(scenario, 'gvc', {'controllers.gvc.k_D': gains})
+    assert columns['status'].tolist() == ['ok', 'ok', 'diverged', 'ok']
+    with pytest.raises(DivergedError) as diverged:
+        simulate(changed_scenario(scenario, {'controllers.gvc.k_D': 1e7}), 'gvc')
+    assert f'{columns["reason"][2]}' in str(diverged.value)
+    assert columns['reason'][2] == f'not finite from t = {columns["diverged_at"][2]:g} s'
+    assert np.isnan(columns['kinetic_energy.mean'][2])
+    assert columns['kinetic_energy.mean'][0] == columns['kinetic_energy.mean'][3]
+
+
+@pytest.mark.parametrize(
+    ('changes', 'options', 'match'),
+    [
+        ({'controllers.gvc.k_d': [1.0]}, {}, 'k_D'),
+        ({'nothing': [1.0]}, {}, 'expected one of'),
+    ],
+)
+def test_a_path_that_leads_nowhere_is_refused_at_once(changes, options, match):
+    with pytest.raises(InputError, match=match):
+        rollouts(GVC, 'gvc', changes, **options)
+
+
+def test_other_wrong_arguments():
+    with pytest.raises(InputError, match='one of gvc'):
+        rollouts(GVC, 'lqr', {})
+    with pytest.raises(ValueError, match='as many values'):
+        rollouts(GVC, 'gvc', {'duration': [0.1], 'initial.nu[0]': [0.1, 0.2]})
+    sensed = scenario_of('gvc', sensors=NOISY)
+    with pytest.raises(InputError, match='zoh'):
+        rollouts(sensed, 'gvc', {})
+
+
+def test_no_changes_give_the_run_of_the_scenario():
+    columns = rollouts(GVC, 'gvc', {})
+    same_as_alone(GVC, 'gvc', {}, 'continuous', columns, [0])
+    assert len(columns['status']) == 1
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not JITTED, reason='runs this file again without numba')
+def test_the_same_source_runs_without_numba_for_every_law():
+    command = [sys.executable, '-m', 'pytest', '-q', '-x', '-p', 'no:cacheprovider', __file__]
+    environment = {**os.environ, 'NUMBA_DISABLE_JIT': '1'}
+    root = Path(__file__).parents[3]
+    done = subprocess.run(
+        command, check=False, env=environment, cwd=root, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout[-3000:]

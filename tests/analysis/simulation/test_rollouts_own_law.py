@@ -1,0 +1,119 @@
+"""A user's own law in rollouts: compiled as far as numba takes it, with the same figures."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.cli import main
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.simulation import batch
+from auv_analysis.simulation.kernels import Kernel, kernels
+from auv_analysis.simulation.rollouts import rollouts
+from auv_dynamics.kernel.compile import JITTED
+
+# all have the same name, which numba alone would not tell apart; types change nothing
+LAW = """
+from typing import NamedTuple
+import numpy as np
+from auv_dynamics.kernel.six import add, mul, sub, vector
+
+class PI(NamedTuple):
+    k_P: np.ndarray
+    k_I: np.ndarray
+    STATES = 6
+
+    @staticmethod
+    def wrench(t: float, nu: tuple, attitude, nu_d, nu_d_dot, state, gains: 'PI', model) -> tuple:
+        {before}
+        error = sub(nu_d, nu)
+        return add(mul(gains.k_P, error), mul(gains.k_I, vector(state, 0))), (0.0,) * 6
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return sub(nu_d, nu)
+"""
+BRANCHES = """if nu[0] > 0.05:
+            nu_d = nu"""
+NOT_FOR_NUMBA = "assert isinstance({'a': 1, 2: 'b'}, dict)"
+FAILS = """if t > 0.1:
+            raise KeyError('lost')"""
+GAINS = np.geomspace(50.0, 400.0, 9)
+
+
+@pytest.fixture
+def scenario(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def with_law(name, before):
+        (tmp_path / f'{name}.py').write_text(LAW.format(before=before or 'pass'))
+        values = {
+            'duration': 0.3,
+            'controllers': {'own': {'law': f'{name}:PI', 'k_P': 300.0, 'k_I': 20.0}},
+        }
+        return changed_scenario(load_scenario('case1'), values)
+
+    return with_law
+
+
+@pytest.mark.parametrize(
+    ('name', 'before', 'how'),
+    [
+        pytest.param('own_plain_arithmetic', '', 'in vector registers', marks=pytest.mark.long),
+        pytest.param('own_branch', BRANCHES, 'compiled', marks=pytest.mark.long),
+        pytest.param('own_python', NOT_FOR_NUMBA, 'as plain Python', marks=pytest.mark.long),
+    ],
+)
+def test_a_law_runs_as_compiled_as_can_be(scenario, name, before, how):
+    base = scenario(name, before)
+    changes = {'controllers.own.k_P': GAINS}
+    columns = rollouts(base, 'own', changes, threads=2)
+    chosen = {law.__module__: k.how for (law, _), k in batch._CHOSEN.items()}
+    assert chosen[name] == (how if JITTED else 'as plain Python')
+    assert set(columns['status']) == {'ok'}
+    for i in (0, 8):
+        single = changed_scenario(base, {'controllers.own.k_P': float(GAINS[i])})
+        expected = summarize(simulate(single, 'own'))
+        for j, dof in enumerate(('surge', 'sway')):
+            rms = expected['velocity_error']['rms'][j]
+            assert columns[f'velocity_error.rms.{dof}'][i] == pytest.approx(rms, rel=1e-10)
+    alone = rollouts(base, 'own', {'controllers.own.k_P': GAINS[3:4]})
+    assert_array_equal(alone['effort.rms.yaw'], columns['effort.rms.yaw'][3:4])
+
+
+@pytest.mark.long
+def test_a_law_that_fails_is_named(scenario):
+    with pytest.raises(ArithmeticError, match="the law PI failed: KeyError: 'lost'"):
+        rollouts(scenario('own_failing', FAILS), 'own', {})
+
+
+@pytest.mark.parametrize('error', [AssertionError('register'), KeyError('x'), RuntimeError('a\nb')])
+def test_law_that_numba_fails_on_in_any_way_runs_as_plain_python(
+    scenario, error, monkeypatch, capsys
+):
+    def fails(*_):
+        raise error
+
+    tried = [Kernel(fails, False, 'in vector registers'), Kernel(fails, True, 'compiled')]
+    monkeypatch.setattr(batch, 'kernels', lambda *given: [*tried, kernels(*given)[-1]])
+    monkeypatch.setattr(batch, '_CHOSEN', {})
+    base = scenario(f'own_{type(error).__name__}', '')
+    columns = rollouts(base, 'own', {'controllers.own.k_P': GAINS}, threads=2)
+    assert set(columns['status']) == {'ok'}
+    (line,) = capsys.readouterr().err.splitlines()  # once, whatever the number of threads
+    assert 'the law PI runs as plain Python' in line
+    assert type(error).__name__ in line
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not JITTED, reason='nothing is compiled')
+def test_the_template_of_a_law_is_compiled(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    main.main(['new', 'law', 'template_of_a_law'])
+    base = load_scenario('template_of_a_law.yaml')
+    columns = rollouts(base, 'mine', {'controllers.mine.k_P': [3.0, 4.0]})
+    assert set(columns['status']) == {'ok'}
+    chosen = {law.__module__: k.how for (law, _), k in batch._CHOSEN.items()}
+    assert chosen['template_of_a_law'] == 'compiled'
+    assert 'plain Python' not in capsys.readouterr().err

@@ -1,0 +1,313 @@
+"""What `auv check-vehicle` says, against identities, the paper's numbers and a free oscillation."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+import yaml
+from foreign_vehicles import REMUS, REMUS_LIFT
+from hypothesis import given
+from numpy.testing import assert_allclose
+from rich.console import Console
+from strategies import QUICK, vehicles
+
+from auv_analysis.cli.main import main
+from auv_analysis.metrics.coupling import delta_pi, delta_xi
+from auv_analysis.studies.check_vehicle import check_vehicle, print_check
+from auv_dynamics import load_vehicle
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.kinematics import jacobian
+from auv_dynamics.vehicle.vehicle import munk_terms
+from auv_gvc_controller import decompose
+
+NAMES = sorted(path.stem for path in shipped('vehicles', 'herman2018').parent.glob('*.yaml'))
+KEYS = {'name', 'source', 'M', 'N', 'Upsilon', 'inertia', 'couplings', 'structural_zeros',
+        'statement', 'hydrostatics', 'damping', 'cruise', 'thrusters', 'sampling',
+        'warnings'}  # fmt: skip
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(data):
+        path = tmp_path / 'vehicle.yaml'
+        path.write_text(yaml.safe_dump(data), encoding='utf-8')
+        return path
+
+    return write
+
+
+def file_of(name):
+    return yaml.safe_load(shipped('vehicles', name).read_text(encoding='utf-8'))
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_one_document_ready_for_json(name):
+    document = check_vehicle(name)
+    assert set(document) == KEYS
+    assert json.loads(json.dumps(document, allow_nan=False)) == document
+    vehicle = load_vehicle(name)
+    assert document['name'] == name
+    assert document['warnings'] == list(vehicle.warnings)
+    U = np.array(document['Upsilon'])
+    assert_allclose(U.T @ vehicle.M @ U, np.diag(document['N']), atol=1e-9 * vehicle.M.max())
+    moments = document['inertia']['eigenvalues']
+    assert sum(moments) == pytest.approx(np.trace(vehicle.M))
+    assert document['inertia']['condition_number'] == pytest.approx(np.linalg.cond(vehicle.M))
+
+
+def coupled(document, key, vector):
+    """delta of the listed entries for a velocity or wrench."""
+    total = np.zeros(6)
+    for entry in document['couplings']:
+        if key in entry:
+            total[DOFS.index(entry['to'])] += entry[key] * vector[DOFS.index(entry['from'])]
+    return total
+
+
+@QUICK
+@given(vehicles())
+def test_the_listed_couplings_are_all_there_are(tmp_path_factory, data):
+    path = tmp_path_factory.mktemp('vehicle') / 'vehicle.yaml'
+    path.write_text(yaml.safe_dump(data), encoding='utf-8')
+    document, M = check_vehicle(path), load_vehicle(path).M
+    U, _ = decompose(M)
+    nu, tau = np.arange(1.0, 7.0), np.array([3.0, -1.0, 4.0, 1.0, -5.0, 9.0])
+    assert_allclose(coupled(document, 'delta_xi', nu), delta_xi(np.linalg.inv(U), nu), atol=1e-9)
+    assert_allclose(coupled(document, 'delta_pi', tau), delta_pi(U, tau), atol=1e-9)
+    for key in ('delta_xi', 'delta_pi'):
+        deformed = {entry['to'] for entry in document['couplings'] if key in entry}
+        assert deformed.isdisjoint(document['structural_zeros'][key])
+        assert len(deformed) + len(document['structural_zeros'][key]) == 6
+
+
+def test_couplings_of_the_paper():
+    document = check_vehicle('herman2018')
+    found = {
+        (entry['from'], entry['to']): (round(entry['delta_xi'], 3), entry['unit'])
+        for entry in document['couplings']
+        if 'delta_xi' in entry
+    }
+    assert found == {
+        ('pitch', 'surge'): (0.025, 'm/s per rad/s'),
+        ('roll', 'sway'): (-0.015, 'm/s per rad/s'),
+        ('yaw', 'sway'): (0.075, 'm/s per rad/s'),
+        ('pitch', 'heave'): (-0.075, 'm/s per rad/s'),
+        ('yaw', 'roll'): (0.514, 'rad/s per rad/s'),
+    }
+    units = {(e['from'], e['to']): e['unit'] for e in document['couplings'] if 'delta_pi' in e}
+    assert units['surge', 'pitch'] == 'N m per N'
+    assert units['roll', 'yaw'] == 'N m per N m'
+    assert document['structural_zeros'] == {
+        'delta_xi': ['pitch', 'yaw'], 'delta_pi': ['surge', 'sway', 'heave']
+    }  # fmt: skip
+    assert_allclose(document['N'], [300, 500, 500, 39.988, 175.5, 141.114], atol=5e-4)
+    assert document['statement'] == ('M is not diagonal: 5 couplings of velocities by its inertia')
+
+
+@pytest.mark.parametrize('name', ['bluerov2_heavy', 'lauv', 'lrauv_tethys'])
+def test_a_diagonal_M_is_said_to_have_no_coupling(name):
+    document = check_vehicle(name)
+    assert document['couplings'] == []
+    assert 'no inertial coupling' in document['statement']
+    assert document['structural_zeros'] == {'delta_xi': list(DOFS), 'delta_pi': list(DOFS)}
+
+
+def test_hydrostatics():
+    found = check_vehicle('herman2018')['hydrostatics']
+    assert found['difference'] == pytest.approx(1079.1, abs=0.05)
+    assert found['difference_percent'] == pytest.approx(44.0)
+    assert found['metacentric_height'] == pytest.approx(0.03)
+    assert found['moment_when_level'] == pytest.approx([0, -250 * 9.81 * 0.15])  # bow down
+    assert check_vehicle('bluerov2')['hydrostatics']['moment_when_level'] == [0, 0]
+
+
+def period(vehicle, axis):
+    """Of a small free oscillation without damping, by the equations of motion and RK4."""
+
+    def rate(x):
+        nu_dot = np.linalg.solve(vehicle.M, -vehicle.g(x[:6]))
+        return np.concatenate([jacobian(x[:6]) @ x[6:], nu_dot])
+
+    x, h, times = np.zeros(12), 0.01, []
+    x[axis] = 1e-4
+    for k in range(2000):
+        a = rate(x)
+        b = rate(x + h / 2 * a)
+        c = rate(x + h / 2 * b)
+        before, x = x[axis], x + h / 6 * (a + 2 * b + 2 * c + rate(x + h * c))
+        if before < 0 <= x[axis]:
+            times.append(h * (k + before / (before - x[axis])))
+    return np.diff(times).mean()
+
+
+@pytest.mark.parametrize('name', ['bluerov2', 'bluerov2_heavy', 'girona500'])
+@pytest.mark.parametrize('dof', ['roll', 'pitch'])
+def test_periods_are_those_of_a_free_oscillation(name, dof):
+    mode = check_vehicle(name)['hydrostatics']['modes'][dof]
+    assert mode['period'] == pytest.approx(period(load_vehicle(name), DOFS.index(dof)), rel=2e-3)
+    assert mode['natural_frequency'] ** 2 == pytest.approx(mode['eigenvalue'])
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_frequencies_are_those_of_all_twelve_states(name):
+    vehicle, small = load_vehicle(name), 1e-6
+
+    def rate(x):
+        nu_dot = np.linalg.solve(vehicle.M, -vehicle.g(x[:6]))
+        return np.concatenate([jacobian(x[:6]) @ x[6:], nu_dot])
+
+    steps = small * np.eye(12)
+    A = np.stack([(rate(step) - rate(-step)) / (2 * small) for step in steps], axis=1)
+    found = np.linalg.eigvals(A).imag
+    for mode in check_vehicle(name)['hydrostatics']['modes'].values():
+        assert np.abs(found - mode['natural_frequency']).min() < 1e-4
+
+
+def test_a_vehicle_with_its_weight_above_turns_over(written):
+    data = file_of('bluerov2')
+    data['rigid_body']['center_of_gravity'] = [0.0, 0.0, -0.02]
+    document = check_vehicle(written(data))
+    assert document['hydrostatics']['metacentric_height'] == -0.02
+    for mode in document['hydrostatics']['modes'].values():
+        assert mode['eigenvalue'] < -8
+        assert mode['natural_frequency'] is mode['period'] is None
+    out = io.StringIO()
+    print_check(document, Console(file=out, width=120))
+    assert 'unstable in roll: the vehicle turns over' in out.getvalue()
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_open_loop_rates(name):
+    vehicle, found = load_vehicle(name), check_vehicle(name)['damping']
+    rates = [entry['rate'] for entry in found['time_constants']]
+    assert sum(rates) == pytest.approx(np.trace(np.linalg.solve(vehicle.M, vehicle.D_linear)))
+    for entry in found['time_constants']:
+        product = None if entry['time_constant'] is None else entry['rate'] * entry['time_constant']
+        assert product == (pytest.approx(1.0) if entry['rate'] > 0 else None)
+    assert sum(found['linear_symmetric_eigenvalues']) == pytest.approx(np.trace(vehicle.D_linear))
+    assert min(found['linear_symmetric_eigenvalues']) >= -1e-12
+
+
+def test_time_constants_that_can_be_read_off():
+    by_name = {}
+    for name in ('girona500', 'lauv', 'lrauv_tethys'):
+        entries = check_vehicle(name)['damping']['time_constants']
+        by_name[name] = {entry['mostly']: entry['time_constant'] for entry in entries}
+    assert by_name['girona500']['yaw'] == pytest.approx(8 / 130)
+    assert by_name['girona500']['surge'] is None
+    assert by_name['lauv']['roll'] == pytest.approx(0.04 / 0.3)
+    assert by_name['lauv']['surge'] == pytest.approx(19 / 2.4)
+    assert set(by_name['lrauv_tethys'].values()) == {None}
+
+
+def test_thrusters():
+    assert check_vehicle('lauv')['thrusters'] is None
+    heavy = check_vehicle('bluerov2_heavy')['thrusters']
+    assert (heavy['rank'], heavy['unactuated']) == (6, {})
+    assert heavy['largest']['surge'] == pytest.approx([4 * 40.2 / np.sqrt(2)] * 2)
+    assert heavy['largest']['heave'] == pytest.approx([4 * 40.2, 4 * 51.5])  # up, down
+    assert heavy['largest']['yaw'] == pytest.approx([4 * 40.2 * 0.267 / np.sqrt(2)] * 2)
+    light = check_vehicle('bluerov2')['thrusters']
+    assert (light['rank'], light['unactuated']) == (5, {'pitch': ['surge', 'heave']})
+    assert light['largest']['pitch'] is None
+    assert light['largest']['heave'] == pytest.approx([2 * 40.2, 2 * 51.5], rel=1e-3)
+
+
+def test_largest_steps():
+    found = check_vehicle('lauv')['sampling']
+    assert found['cl']['rate'] == pytest.approx(12 / 0.04)
+    assert found['cl']['mostly'] == 'roll'
+    assert found['cl']['rings_above'] == pytest.approx(0.04 / 12)
+    assert found['cl']['unstable_above'] == pytest.approx(0.08 / 12)
+    for name in NAMES:
+        gvc = check_vehicle(name)['sampling']['gvc']
+        assert (gvc['rate'], gvc['rings_above'], gvc['unstable_above']) == (12.0, 1 / 12, 1 / 6)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_the_tables_carry_the_numbers(name, capsys):
+    document = check_vehicle(name)
+    out = io.StringIO()
+    print_check(document, Console(file=out, width=120))
+    text = out.getvalue()
+    for entry in document['couplings']:
+        value = entry.get('delta_xi', entry.get('delta_pi'))
+        row = [entry['from'], entry['to'], f'{value:+.4g}', *entry['unit'].split()]
+        assert row in [line.split() for line in text.splitlines()]
+    for expected in (document['statement'], f'{document["hydrostatics"]["weight"]:.1f} N'):
+        assert expected in text
+    for warning in document['warnings']:
+        assert f'warning: {warning}' in text
+    assert ('thrusters, T has rank' in text) == (document['thrusters'] is not None)
+    print_check(document)
+    assert document['statement'] in capsys.readouterr().out
+
+
+def test_command_prints_tables_or_one_document(capsys):
+    main(['check-vehicle', 'bluerov2'])
+    captured = capsys.readouterr()
+    assert 'pitch cannot be actuated apart from surge and heave' in captured.out
+    assert captured.err == ''
+    main(['check-vehicle', 'bluerov2', '--json'])
+    captured = capsys.readouterr()
+    assert json.loads(captured.out) == check_vehicle('bluerov2')
+    assert captured.out.count('\n') == 1
+
+
+@pytest.mark.parametrize('options', [[], ['--json']])
+def test_command_refuses_a_bad_file_in_one_line(options, written, capsys):
+    path = written(file_of('bluerov2') | {'added_mass': [1, 1, 1, 1, 1, -1]})
+    with pytest.raises(SystemExit) as caught:
+        main(['check-vehicle', str(path), *options])
+    assert caught.value.code == 2
+    captured = capsys.readouterr()
+    assert captured.out == ''
+    assert captured.err.startswith(f'{path}: added_mass: expected a positive semidefinite matrix')
+    assert captured.err.count('\n') == 1
+
+
+def cruise(vehicle_file, *options):
+    return check_vehicle(vehicle_file, *options)['cruise']
+
+
+def test_poles_of_a_torpedo_without_and_with_lift(tmp_path, monkeypatch, capsys):
+    """REMUS of Prestero 2001: its published lift halves the growth, and leaves it unstable."""
+    monkeypatch.chdir(tmp_path)
+    growth = {}
+    for name, text in (('bare', REMUS), ('with_lift', REMUS + REMUS_LIFT)):
+        (tmp_path / f'{name}.m').write_text(text)
+        options = ['--inertia-reference', 'co', '--lift', 'combined', '--json']
+        main(['import-vehicle', f'{name}.m', *options, '--out', f'{name}.yaml'])
+        capsys.readouterr()
+        main(['check-vehicle', f'{name}.yaml', '--speed', '1.5', '--json'])
+        found = json.loads(capsys.readouterr().out)['cruise']
+        assert (found['verdict'], found['speed']) == ('unstable', 1.5)
+        assert ('no lift' in found['hint']) == (name == 'bare')
+        growth[name] = max(mode['pole'][0] for mode in found['modes'])
+    assert 1.8 < growth['bare'] < 2.2
+    assert 0.9 < growth['with_lift'] < 1.1
+
+
+def test_poles_ahead_say_whether_a_vehicle_keeps_its_course(written):
+    assert cruise('lauv')['verdict'] == 'stable'
+    assert cruise('lauv')['speed'] == 2.0
+    data = file_of('lauv')
+    del data['lift']
+    bare = cruise(written(data), 2.0)
+    assert (bare['verdict'], bare['speed_source']) == ('unstable', 'given')
+    assert 'key lift' in bare['hint']
+    assert cruise(written(data | {'name': 'other'}))['speed_source'] == 'assumed'
+    data['damping'] = {'linear': [0.0] * 6, 'quadratic': [0.0] * 6}
+    at_rest = cruise(written(data), 0.0)
+    assert (at_rest['verdict'], at_rest['hint']) == ('marginal', None)
+
+
+def test_munk_terms_are_the_slopes_of_the_coriolis_wrench():
+    M = load_vehicle('rexrov').M
+    vehicle, h = load_vehicle('rexrov'), 1e-6
+    for j in range(1, 6):
+        ahead, slip = np.eye(6)[0], h * np.eye(6)[j]
+        slope = [-vehicle.C(ahead + s * slip) @ (ahead + s * slip) for s in (1, -1)]
+        assert_allclose(munk_terms(M)[:, j], (slope[0] - slope[1]) / (2 * h), rtol=1e-7, atol=1e-4)

@@ -1,0 +1,198 @@
+"""Files that are no YAML mapping: one line that names file, expected and found, never a traceback.
+
+The reader is called directly here; `test_bad_files` goes through the command.
+"""
+
+import copy
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import QUICK
+
+from auv_analysis import load_scenario
+from auv_dynamics import load_vehicle
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import read_yaml
+from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
+
+BOMB = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
+    f'{new}: &{new} [{", ".join([f"*{old}"] * 9)}]\n'
+    for old, new in zip('abcde', 'bcdef', strict=True)
+)
+TEXTS = {  # what it is -> text, what the line must say was found
+    'empty': ('', 'nothing'),
+    'comment only': ('# nothing yet\n', 'nothing'),
+    'scalar': ('hello\n', 'hello'),
+    'list': ('- a\n- b\n', "['a', 'b']"),
+    'unbalanced': ('name: [1, 2\nfoo: }\n', "','"),
+    'unclosed quote': ('name: "x\n', 'end of stream'),
+    'tab': ('name: x\n\tfoo: 1\n', 'line 2'),
+    'NUL': ('name: a\0b\n', '#x0000'),
+    'control character': ('name: a\x07b\n', '#x0007'),
+    'doubled key': ('name: a\nname: b\n', 'line 2'),
+    'doubled key below': ('rigid_body:\n  mass: 1\n  mass: 2\n', 'line 3'),
+    'number as key': ('1: a\n', 'found 1'),
+    'list as key': ('? [a]\n: b\n', "['a']"),
+    'unknown alias': ('a: *b\n', "'b'"),
+    'alias of itself': ('a: &a {b: *a}\n', 'recursive'),
+    'merge key': ('base: &b {x: 1}\nfoo:\n  <<: *b\n', '<<'),
+    'python tag': ('name: !!python/object/apply:os.getcwd []\n', 'python/object'),
+    'tag of ours': ('name: !foo bar\n', '!foo'),
+    'map tag on a scalar': ('name: !!map 5\n', ''),
+    'map tag on a list': ('name: !!map [a]\n', ''),
+    'bool tag on a word': ('name: !!bool perhaps\n', ''),
+    'int tag on nothing': ('name: !!int ""\n', ''),
+    'float tag on a word': ('name: !!float abc\n', ''),
+    'too many digits': (f'name: {"9" * 5000}\n', ''),
+    'two documents': ('name: a\n---\nname: b\n', 'another document'),
+    'other version': ('%YAML 9.9\n---\nname: x\n', 'version'),
+    'deep list': ('[' * 3000 + ']' * 3000, ''),
+    'deep mapping': ('{a: ' * 3000 + '}' * 3000, ''),
+    'not UTF-8': ('name: café\n'.encode('latin-1'), 'UTF-8'),
+    'UTF-16': ('name: x\n'.encode('utf-16'), 'UTF-8'),
+    'binary': (bytes(range(256)), 'UTF-8'),
+}  # fmt: skip
+VALUES = [
+    None, True, False, 0, -1, 1.5, 1e299, 1e200, 1e-300, float('nan'), float('inf'), 10**400,
+    '', 'x', 'x' * 5000, '1', 'rexrov', '..', 'a\nb', [], [1], [1] * 6, [[1] * 6] * 6, [None] * 6,
+    [[]], [{}], {}, {'x': 1}, {'file': 'x'}, {'kind': 'herman2018'}, [[1] * 3] * 3, [1e200] * 6,
+]  # fmt: skip
+
+
+def one_line(error: InputError, *words: str) -> None:
+    text = str(error)
+    assert len(text.splitlines()) == 1
+    assert len(text) < 600
+    for word in ('expected', 'found', *words):
+        assert word in text
+
+
+@pytest.mark.parametrize('name', TEXTS)
+def test_text_that_is_no_mapping_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
+    path = tmp_path / 'odd.yaml'
+    text, found = TEXTS[name]
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(InputError) as caught:
+        read_yaml(path, 'vehicle')
+    one_line(caught.value, str(path), found)
+    assert not re.search('found (but )?found', str(caught.value))
+
+
+def test_alias_bomb_is_refused_for_what_it_is(tmp_path: Path) -> None:
+    path = tmp_path / 'bomb.yaml'
+    path.write_text(BOMB)  # half a million leaves out of 300 bytes; three lines more never end
+    with pytest.raises(InputError, match=r': expected .*alias') as caught:
+        load_vehicle(path)
+    one_line(caught.value, str(path))
+
+
+def test_plain_aliases_are_fine(tmp_path: Path) -> None:
+    path = tmp_path / 'shared.yaml'
+    path.write_text('a: &six [1, 2, 3, 4, 5, 6]\nb: *six\n')
+    assert read_yaml(path, 'vehicle')['b'] == [1, 2, 3, 4, 5, 6]
+
+
+@pytest.mark.parametrize('text', ['1e-3', '1E+3', '-2.5e3', '.5e-1', '12e0', '+1.e2'])
+def test_exponents_are_numbers(text: str, tmp_path: Path) -> None:
+    path = tmp_path / 'number.yaml'
+    path.write_text(f'step: {text}\n')
+    assert read_yaml(path, 'scenario')['step'] == float(text)
+
+
+def test_byte_order_mark_is_no_part_of_the_first_key(tmp_path: Path) -> None:
+    path = tmp_path / 'windows.yaml'
+    path.write_text('name: x\r\nseed: 1\r\n', encoding='utf-8-sig', newline='')
+    assert read_yaml(path, 'scenario') == {'name': 'x', 'seed': 1}
+
+
+def _place(kind: str, folder: Path) -> Path:
+    path = folder / 'place.yaml'
+    if kind == 'folder':
+        path.mkdir()
+    elif kind == 'broken link':
+        path.symlink_to('gone.yaml')
+    elif kind == 'link to itself':
+        path.symlink_to('place.yaml')
+    elif kind == 'long name':
+        path = folder / ('n' * 300 + '.yaml')
+    elif kind == 'long bare name':
+        path = Path('n' * 5000)
+    elif kind == 'NUL in the name':
+        path = folder / 'a\0b.yaml'
+    elif kind == 'below a file':
+        path.write_text('')
+        path /= 'x.yaml'
+    return path
+
+
+@pytest.mark.parametrize(
+    'kind',
+    ['missing', 'folder', 'broken link', 'link to itself', 'long name', 'long bare name',
+     'NUL in the name', 'below a file'],
+)  # fmt: skip
+@pytest.mark.parametrize('load', [load_vehicle, load_scenario])
+def test_path_that_is_no_file_is_refused(kind: str, load: Any, tmp_path: Path) -> None:
+    path = _place(kind, tmp_path)
+    with pytest.raises(InputError, match='expected a') as caught:
+        load(path)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def _paths(value: Any, path: tuple = ()) -> Iterator[tuple]:
+    entries = value.items() if isinstance(value, dict) else enumerate(value)
+    for key, entry in entries:
+        yield (*path, key)
+        if isinstance(entry, dict | list):
+            yield from _paths(entry, (*path, key))
+
+
+def _load(kind: str, name: str) -> dict[str, Any]:
+    return yaml.safe_load(shipped(kind, name).read_text(encoding='utf-8'))
+
+
+FILES = [
+    _load('vehicles', 'rexrov'),
+    _load('vehicles', 'herman2018'),
+    _load('scenarios', 'case1'),
+]
+
+
+@QUICK
+@given(st.data())
+@pytest.mark.parametrize('which', range(3))
+@pytest.mark.filterwarnings('error')
+def test_any_entry_replaced_by_anything_loads_or_is_refused(
+    which: int, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    contents = copy.deepcopy(FILES[which])
+    *parents, last = data.draw(st.sampled_from(list(_paths(contents))))
+    place = contents
+    for key in parents:
+        place = place[key]
+    place[last] = data.draw(st.sampled_from(VALUES))
+    try:
+        if 'rigid_body' in FILES[which]:
+            vehicle_from_dict(contents, 'odd.yaml')
+        else:
+            path = tmp_path_factory.getbasetemp() / 'odd.yaml'
+            path.write_text(yaml.safe_dump(contents))
+            load_scenario(path)
+    except InputError as error:
+        one_line(error, 'odd.yaml')
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('largest', [1e100, 1e150, 1e200, 1e299])
+def test_absurd_centre_of_gravity_is_refused(largest: float) -> None:
+    contents = copy.deepcopy(FILES[0])
+    contents['rigid_body']['center_of_gravity'] = [largest, 0.0, 0.0]
+    with pytest.raises(InputError) as caught:
+        vehicle_from_dict(contents, 'odd.yaml')
+    one_line(caught.value, 'odd.yaml')

@@ -1,0 +1,100 @@
+"""Offsets and sinusoids: values, derivatives, and the round trip through ROS parameters."""
+
+import herman_reference as reference
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from strategies import QUICK
+
+from auv_dynamics.plant.signals import Harmonics, harmonic_columns, harmonic_spec
+from auv_dynamics.vehicle import DOFS
+
+NUMBERS = st.floats(-5.0, 5.0, allow_subnormal=False)
+TERMS = st.fixed_dictionaries(
+    {'amplitude': NUMBERS, 'omega': NUMBERS}, optional={'phase': NUMBERS}
+)  # fmt: skip
+ENTRIES = st.fixed_dictionaries(
+    {}, optional={'offset': NUMBERS, 'terms': st.lists(TERMS, max_size=3)}
+)
+SPECS = st.dictionaries(st.sampled_from(DOFS), ENTRIES)
+WORKED = {
+    'surge': {'offset': 0.2, 'terms': [{'amplitude': 1.0, 'omega': np.pi / 20}]},
+    'heave': {'terms': [{'amplitude': 1.5, 'omega': 0.4, 'phase': np.pi / 2},
+                        {'amplitude': -0.5, 'omega': 2.0}]},
+    'yaw': {'offset': -0.1},
+}  # fmt: skip
+
+
+@QUICK
+@given(SPECS, st.floats(-100.0, 100.0))
+def test_values_and_derivatives_agree_with_the_reference(spec, t):
+    signal = Harmonics.from_spec(spec)
+    value, rate = reference.setpoint(spec, t)
+    assert_allclose(signal.value(t), value, atol=1e-12)
+    assert_allclose(signal.derivative(t), rate, atol=1e-12)
+
+
+def test_worked_values():
+    signal = Harmonics.from_spec(WORKED)
+    assert_allclose(signal.value(0.0), [0.2, 0, 1.5, 0, 0, -0.1], atol=1e-15)
+    assert_allclose(signal.value(10.0)[0], 1.2, atol=1e-15)
+    assert_allclose(signal.derivative(0.0), [np.pi / 20, 0, -1.0, 0, 0, 0], atol=1e-15)
+
+
+def test_derivative_is_the_slope_of_the_value():
+    signal, t, h = Harmonics.from_spec(WORKED), np.linspace(0.0, 30.0, 301), 1e-5
+    slope = (signal.value(t + h) - signal.value(t - h)) / (2 * h)
+    assert_allclose(signal.derivative(t), slope, atol=1e-8)
+    assert np.abs(slope).max() > 1.0
+
+
+@pytest.mark.parametrize('shape', [(), (4,), (3, 5)])
+def test_times_of_any_shape(shape):
+    signal = Harmonics.from_spec(WORKED)
+    t = np.arange(np.prod(shape, dtype=int), dtype=float).reshape(shape)
+    for result in (signal.value(t), signal.derivative(t)):
+        assert result.shape == (*shape, 6)
+    one_by_one = [signal.value(moment) for moment in t.ravel()]
+    assert_array_equal(signal.value(t).reshape(-1, 6), one_by_one)
+
+
+@QUICK
+@given(SPECS, st.floats(0.0, 100.0))
+def test_columns_lead_back_to_the_same_signal(spec, t):
+    columns = harmonic_columns(spec)
+    back = Harmonics.from_spec(harmonic_spec(columns))
+    assert_array_equal(back.value(t), Harmonics.from_spec(spec).value(t))
+    assert_array_equal(back.derivative(t), Harmonics.from_spec(spec).derivative(t))
+    assert harmonic_columns(harmonic_spec(columns)) == columns | {
+        f'{dof}.offset': columns.get(f'{dof}.offset', 0.0) for dof in DOFS
+    }
+
+
+def test_columns_of_a_worked_spec():
+    columns = harmonic_columns(WORKED)
+    assert columns == {
+        'surge.offset': 0.2, 'surge.amplitude': [1.0], 'surge.omega': [np.pi / 20],
+        'surge.phase': [0.0], 'heave.offset': 0.0, 'heave.amplitude': [1.5, -0.5],
+        'heave.omega': [0.4, 2.0], 'heave.phase': [np.pi / 2, 0.0], 'yaw.offset': -0.1,
+    }  # fmt: skip
+    assert all(type(n) is float for v in columns.values() for n in np.atleast_1d(v).tolist())
+
+
+def test_phase_may_be_absent_and_lengths_must_agree():
+    spec = harmonic_spec({'sway.amplitude': [1.0, 2.0], 'sway.omega': [3.0, 4.0]})
+    assert [term['phase'] for term in spec['sway']['terms']] == [0.0, 0.0]
+    for columns in (
+        {'sway.amplitude': [1.0, 2.0], 'sway.omega': [3.0]},
+        {'sway.amplitude': [1.0], 'sway.omega': [3.0], 'sway.phase': [0.0, 1.0]},
+        {'sway.phase': [1.0]},
+    ):
+        with pytest.raises(ValueError, match='sway: amplitude, omega and phase of equal length'):
+            harmonic_spec(columns)
+
+
+def test_a_part_of_many_is_what_they_are():
+    many = Harmonics(np.arange(18.0).reshape(3, 6), tuple(np.full((3, 1, 3), i) for i in range(6)))
+    t = np.linspace(0.0, 1.0, 5)
+    assert_array_equal(many.part([2, 0]).value(t), many.value(t)[[2, 0]])

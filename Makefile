@@ -108,9 +108,10 @@ wheels: setup  ## sdist and wheel of the three packages, in dist/
 	  $(BIN)/python -m build --no-isolation --outdir dist src/$$package || exit 1; \
 	done
 
-lint: setup  ## formatting, style, types
+lint: setup  ## formatting, style, order of imports, types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/lint-imports --no-cache
 	$(BIN)/mypy
 
 format: setup  ## apply the formatting

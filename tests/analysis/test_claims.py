@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.output.text import MISSING
 from auv_analysis.report.claims import claims_table
 from auv_analysis.report.evidence import grade
-from auv_analysis.report.text import MISSING
 from auv_analysis.runs.run import Run
 
 CASE2_ONLY = {17, 18, 19, 20}

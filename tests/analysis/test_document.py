@@ -9,10 +9,10 @@ import yaml
 from pages import Page, check_numbers, tokens
 
 from auv_analysis.cli import main
+from auv_analysis.output.text import MISSING
 from auv_analysis.report import document, rendering
 from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
 from auv_analysis.report.quantities import Maths
-from auv_analysis.report.text import MISSING
 
 
 @pytest.fixture(scope='module')

@@ -13,11 +13,11 @@ import pytest
 from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.output.text import fixed, join, number, plain, tied
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.page import write_report
-from auv_analysis.report.text import fixed, join, number, plain, tied
 from auv_analysis.report.traces import decimate
 from auv_analysis.runs.run import Run
 

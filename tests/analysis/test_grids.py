@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import LogNorm
 
+from auv_analysis.output.text import number, typeset
 from auv_analysis.report import plotting
 from auv_analysis.report.grids import ALWAYS, Grid, draw_grid, grid_figure
-from auv_analysis.report.text import number, typeset
 
 
 def texts(grid: Grid) -> list[str]:

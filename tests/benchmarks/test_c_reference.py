@@ -10,7 +10,8 @@ from closed_loops import FULL, SIX, TURNED, file_of
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.simulation.simulate import DivergedError, unwrapped_eta
+from auv_analysis.simulation.simulate import DivergedError
+from auv_dynamics.plant.plant import unwrapped_eta
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 
 SKEWED = {key: (np.array(gain) @ np.triu(np.ones((6, 6)))).tolist() for key, gain in FULL.items()}

@@ -10,8 +10,8 @@ from sweeps import run as run_sweep
 from sweeps import write_files
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.graph.experiment import write_inputs
 from auv_analysis.runs.samples import write_samples
+from auv_analysis.scenario.scenario import write_inputs
 
 
 def drawn(out: Path) -> set[str]:

@@ -9,7 +9,7 @@ from rich.console import Console
 from strategies import QUICK
 
 from auv_analysis.cli.terminal import summary_tables
-from auv_analysis.report.text import number
+from auv_analysis.output.text import number
 from auv_dynamics.vehicle import DOFS
 
 COLUMNS = [

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.graph.experiment import write_inputs
 from auv_analysis.runs.samples import load_samples, write_samples
+from auv_analysis.scenario.scenario import write_inputs
 from auv_analysis.studies.compare.sources import Source, is_sweep, named, open_source, sources_of
 from auv_dynamics import InputError
 

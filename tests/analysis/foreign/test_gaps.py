@@ -15,10 +15,10 @@ from auv_analysis.cli.terminal import summary_tables
 from auv_analysis.foreign.time_base import sensible_step, time_base
 from auv_analysis.foreign.tracks import Track, at_times, integral, means_over, usual_limit
 from auv_analysis.metrics.lyapunov import lyapunov
+from auv_analysis.output.text import number
 from auv_analysis.report import plotting
 from auv_analysis.report.figures import draw_figures
 from auv_analysis.report.sketching import sketch
-from auv_analysis.report.text import number
 from auv_analysis.runs.run import Run
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS

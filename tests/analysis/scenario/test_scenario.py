@@ -12,8 +12,7 @@ import pytest
 import yaml
 
 from auv_analysis import load_scenario
-from auv_analysis.graph.experiment import write_inputs
-from auv_analysis.scenario.scenario import SCHEMA, Scenario
+from auv_analysis.scenario.scenario import SCHEMA, Scenario, write_inputs
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped

@@ -9,12 +9,12 @@ import pyarrow.parquet as parquet
 import pytest
 
 from auv_analysis import load_scenario, simulate
+from auv_analysis.output.text import MISSING
 from auv_analysis.report import paper
 from auv_analysis.report.claims import judged
 from auv_analysis.report.evidence import Response
 from auv_analysis.report.quotes import Quotes
 from auv_analysis.report.tables.claims import claims_table, write_claims
-from auv_analysis.report.text import MISSING
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.studies.study.procedure import claims_sentences
 from auv_analysis.studies.study.sensitivity import sensitivity

@@ -27,7 +27,7 @@ from auv_analysis.runs.run import (
     Run,
     widened,
 )
-from auv_analysis.simulation.simulate import unwrapped_eta
+from auv_dynamics.plant.plant import unwrapped_eta
 from auv_dynamics.ros import interface
 
 WHOLE = 1 << 16  # steps up to which a recording is kept in memory

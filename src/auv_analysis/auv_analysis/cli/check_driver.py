@@ -25,7 +25,7 @@ from auv_analysis.driver_check.terminal import findings_table
 from auv_analysis.graph.domain import joined_domain
 from auv_analysis.output.folder import check_free, results_folder
 from auv_analysis.output.progress import TextConsole, bar, say, waiting
-from auv_analysis.report.text import join
+from auv_analysis.output.text import join
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.ending import on_signals
 from auv_dynamics.files.errors import FailedError, InputError

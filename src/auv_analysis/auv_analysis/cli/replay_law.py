@@ -17,6 +17,7 @@ from auv_analysis.output.progress import (
     say,
     waiting,
 )
+from auv_analysis.output.text import number
 from auv_analysis.replay.compared import (
     UNCHECKED,
     Compared,
@@ -27,7 +28,6 @@ from auv_analysis.replay.compared import (
     reproduction,
 )
 from auv_analysis.replay.open_loop import OpenLoop, RecordedLoop, open_loop, recorded_loop
-from auv_analysis.report.text import number
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.law import is_unasked, law_class, refusal

@@ -5,12 +5,11 @@ from typing import Any
 
 from auv_analysis.cli.conclude import Outcome, finish
 from auv_analysis.cli.scenarios import open_scenario, scenario_folder
-from auv_analysis.graph.experiment import write_inputs
 from auv_analysis.output.folder import Results
 from auv_analysis.output.progress import waiting
 from auv_analysis.runs.run import AnyRun
 from auv_analysis.runs.samples import ENDING, write_samples
-from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.scenario.scenario import Scenario, write_inputs
 from auv_analysis.simulation.simulate import check_hold
 from auv_analysis.simulation.simulate import simulate as simulate_run
 from auv_analysis.simulation.warm_up import announce

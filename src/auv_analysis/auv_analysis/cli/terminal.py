@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from auv_analysis.output.progress import share_bar
-from auv_analysis.report.text import MISSING, join, number, plain, residuals
+from auv_analysis.output.text import MISSING, join, number, plain, residuals
 from auv_dynamics.vehicle import DOFS
 
 VELOCITY, WRENCH = 'm,rad/s', 'N,N m'

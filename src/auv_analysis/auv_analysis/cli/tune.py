@@ -18,7 +18,7 @@ from auv_analysis.output.progress import (
     say,
     waiting,
 )
-from auv_analysis.report.text import number
+from auv_analysis.output.text import number
 from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_analysis.simulation.simulate import check_hold
 from auv_analysis.simulation.warm_up import announce

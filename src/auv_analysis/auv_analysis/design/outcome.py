@@ -6,9 +6,9 @@ from typing import Any
 
 from auv_analysis.design.couplings import KINDS, present
 from auv_analysis.metrics.summary import summarize
-from auv_analysis.runs.run import Run
+from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.simulate import Hold, simulate
+from auv_analysis.simulation.simulate import simulate
 from auv_dynamics.files.errors import first_line
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle

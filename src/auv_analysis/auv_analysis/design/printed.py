@@ -8,7 +8,7 @@ from rich.table import Table
 
 from auv_analysis.design.words import part_words
 from auv_analysis.output.progress import TextConsole
-from auv_analysis.report.text import number
+from auv_analysis.output.text import number
 
 NEAR = 1e-9  # relative: no change
 

@@ -8,11 +8,11 @@ from auv_analysis.design import tables
 from auv_analysis.design.figures import draw_design
 from auv_analysis.design.objective import OTHERS, PART, SIZE, UNREST
 from auv_analysis.design.result import Result
+from auv_analysis.output.text import number
 from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.rendering import write_document
-from auv_analysis.report.text import number
 
 METHOD = tuple(
     map(

@@ -10,10 +10,10 @@ import numpy as np
 from auv_analysis.design.changed_file import changed_data
 from auv_analysis.design.couplings import Sizes, sizes_of
 from auv_analysis.design.space import Space
-from auv_analysis.runs.run import Run
+from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scaling import REFERENCE, scaled_case1
 from auv_analysis.scenario.scenario import SCHEMA, Scenario, scenario_from
-from auv_analysis.simulation.simulate import Hold, simulate
+from auv_analysis.simulation.simulate import simulate
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import check, read_text, read_yaml
 from auv_gvc_controller.control.sampled import is_compiled

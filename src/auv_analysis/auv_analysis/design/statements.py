@@ -10,7 +10,7 @@ from auv_analysis.design.couplings import COUPLINGS, UNITS
 from auv_analysis.design.parameters import BALLAST, DISC_PART, NAMES, semi_axes
 from auv_analysis.design.search import parts_of
 from auv_analysis.design.space import Space
-from auv_analysis.report.text import join, number, plain
+from auv_analysis.output.text import join, number, plain
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 ASSUMPTIONS = (

@@ -5,9 +5,9 @@ from typing import Any
 
 from auv_analysis.design.printed import change
 from auv_analysis.design.words import part_words
+from auv_analysis.output.text import MISSING, plain
 from auv_analysis.report.document import Cell, Column, Table, cell, percent
 from auv_analysis.report.quantities import Maths
-from auv_analysis.report.text import MISSING, plain
 
 FILE = 'design.json:'
 Document = Mapping[str, Any]

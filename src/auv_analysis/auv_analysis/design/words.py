@@ -6,7 +6,7 @@ from auv_analysis.design.bodies import disc_mass, normal_of
 from auv_analysis.design.parameters import NAMES
 from auv_analysis.design.search import parts_of
 from auv_analysis.design.space import Space
-from auv_analysis.report.text import join, number, plain
+from auv_analysis.output.text import join, number, plain
 
 WAYS = (('forward', 'aft'), ('to starboard', 'to port'), ('down', 'up'))
 PLACES = (('forward', 'aft'), ('to starboard', 'to port'), ('below', 'above'))

@@ -8,7 +8,7 @@ from auv_analysis.driver_check.finding import Finding, judged, unchecked
 from auv_analysis.driver_check.fits import FITS, STILL, Fits
 from auv_analysis.driver_check.hypotheses import CHILD
 from auv_analysis.driver_check.motion import Compared, Motion, compared
-from auv_analysis.report.text import number
+from auv_analysis.output.text import number
 
 SLOPES = (0.75, 1.33)  # of the pose's rate over the twist, where they mean the same
 PART = 0.15  # of the whole speed: a smaller component says nothing against the others' errors

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from auv_analysis.driver_check.finding import Finding, judged
 from auv_analysis.driver_check.scene import Endpoint, Scene
 from auv_analysis.driver_check.settings import Settings
-from auv_analysis.report.text import join
+from auv_analysis.output.text import join
 from auv_dynamics.files.nearest import nearest
 from auv_dynamics.ros import interface
 

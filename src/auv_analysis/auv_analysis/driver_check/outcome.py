@@ -13,7 +13,7 @@ from auv_analysis.driver_check.recording import Recording
 from auv_analysis.driver_check.scene import Scene
 from auv_analysis.driver_check.settings import Settings
 from auv_analysis.driver_check.trials import Answered
-from auv_analysis.report.text import join
+from auv_analysis.output.text import join
 from auv_dynamics.ros.interface import ODOM, WRENCH
 from auv_dynamics.vehicle.vehicle import Vehicle
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from auv_analysis.driver_check.prediction import predicted
-from auv_analysis.report.text import join
+from auv_analysis.output.text import join
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from auv_analysis.driver_check.finding import Finding, judged, unchecked
 from auv_analysis.driver_check.scene import Endpoint, Scene
-from auv_analysis.report.text import join
+from auv_analysis.output.text import join
 
 DEPTH = 'depths are not told by discovery'
 CONTROLLER = 'what a best-effort subscription of the controller can hear'

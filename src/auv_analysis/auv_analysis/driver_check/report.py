@@ -13,9 +13,9 @@ from auv_analysis.driver_check.figures import draw
 from auv_analysis.driver_check.finding import FAIL, NOT_CHECKED, PASS, Finding
 from auv_analysis.driver_check.outcome import DOCUMENT, Result
 from auv_analysis.output.new_files import write_json
+from auv_analysis.output.text import join
 from auv_analysis.report.document import Block, Cell, Column, Section, Sentence, Table
 from auv_analysis.report.rendering import write_document
-from auv_analysis.report.text import join
 
 SAMPLES, WRENCHES = 'samples.parquet', 'wrenches.parquet'
 STATE = ('x', 'y', 'z', 'qw', 'qx', 'qy', 'qz', 'u', 'v', 'w', 'p', 'q', 'r')

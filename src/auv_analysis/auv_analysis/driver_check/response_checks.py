@@ -8,7 +8,7 @@ from auv_analysis.driver_check.finding import FAIL, PASS, Finding, judged, unche
 from auv_analysis.driver_check.plan import Plan
 from auv_analysis.driver_check.procedure import Actuation
 from auv_analysis.driver_check.trials import Answered
-from auv_analysis.report.text import join, number
+from auv_analysis.output.text import join, number
 from auv_dynamics.vehicle import DOFS
 
 GAINS = (0.5, 2.0)  # of the measured over the predicted answer

@@ -5,7 +5,7 @@ import numpy as np
 from auv_analysis.driver_check.finding import Finding, judged, unchecked
 from auv_analysis.driver_check.motion import Motion
 from auv_analysis.driver_check.settings import Settings
-from auv_analysis.report.text import number
+from auv_analysis.output.text import number
 
 
 def speed_findings(motion: Motion | None, settings: Settings) -> list[Finding]:

@@ -5,7 +5,7 @@ import numpy as np
 from auv_analysis.driver_check.finding import Finding, judged, unchecked
 from auv_analysis.driver_check.recording import Recording
 from auv_analysis.driver_check.settings import Settings
-from auv_analysis.report.text import join
+from auv_analysis.output.text import join
 from auv_dynamics.ros.interface import NANOSECONDS
 
 ENOUGH = 5  # messages within the controller's odometry_timeout: one or two may then be lost

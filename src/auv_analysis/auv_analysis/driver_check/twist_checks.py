@@ -10,7 +10,7 @@ from auv_analysis.driver_check.finding import FAIL, PASS, Finding, unchecked
 from auv_analysis.driver_check.fits import FITS, STILL, Fits, fits_of
 from auv_analysis.driver_check.hypotheses import ANGULAR, CHILD, LINEAR, Hypothesis
 from auv_analysis.driver_check.motion import Motion
-from auv_analysis.report.text import join, number
+from auv_analysis.output.text import join, number
 from auv_dynamics.vehicle import DOFS
 
 STANDS = 0.1  # of the larger speed: the other does not move

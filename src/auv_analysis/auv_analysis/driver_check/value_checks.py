@@ -6,7 +6,7 @@ from auv_analysis.driver_check.attitude import reordered, tilt
 from auv_analysis.driver_check.finding import Finding, judged, unchecked
 from auv_analysis.driver_check.recording import Recording
 from auv_analysis.driver_check.settings import Settings
-from auv_analysis.report.text import join, number
+from auv_analysis.output.text import join, number
 from auv_dynamics.ros.interface import ODOM, UNIT
 from auv_dynamics.vehicle.frames import ENU_FLU, named_axes
 

@@ -15,10 +15,10 @@ from auv_analysis.foreign.time_base import TimeBase, sensible_step, time_base
 from auv_analysis.foreign.tracks import Track, at_times, means_over
 from auv_analysis.foreign.unexplained import unexplained
 from auv_analysis.runs.run import FOREIGN, Run
-from auv_analysis.simulation.simulate import unwrapped_eta
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import read_text
+from auv_dynamics.plant.plant import unwrapped_eta
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from auv_analysis.foreign.time_base import TimeBase
 from auv_analysis.foreign.tracks import Track
 from auv_analysis.foreign.unexplained import FILTER, Unexplained
-from auv_analysis.report.text import join
+from auv_analysis.output.text import join
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS
 

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-import yaml
-
 from auv_analysis.graph.node_parameters import (
     ANALYSIS,
     CONTROLLER,
@@ -23,7 +21,7 @@ from auv_analysis.graph.supervisor import (
     TroubleError,
     executable,
 )
-from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.scenario.scenario import Scenario, write_inputs
 from auv_dynamics.ros.reach import loopback
 from auv_dynamics.ros.security import enclave
 
@@ -62,23 +60,6 @@ def environment(domain: int) -> dict[str, str]:
         'RCUTILS_COLORIZED_OUTPUT': '0',
         'PYTHONUNBUFFERED': '1',
     }
-
-
-def write_inputs(scenario: Scenario, out: Path) -> dict[str, Path]:
-    """Write the resolved scenario and its files into the results' folder: name -> path."""
-    files = dict(scenario.attachments)
-    resolved = {**scenario.data, 'vehicle': 'vehicle.yaml'}
-    if 'setpoint.csv' in files:
-        resolved['setpoint'] = {'file': 'setpoint.csv'}
-    header = f'# {scenario.path.name} with every default filled in\n'
-    files['scenario.yaml'] = header + yaml.safe_dump(
-        resolved, sort_keys=False, default_flow_style=None, width=100
-    )
-    paths = {}
-    for name, text in files.items():
-        paths[name] = out / name
-        paths[name].write_text(text, encoding='utf-8')
-    return paths
 
 
 def run_controller(

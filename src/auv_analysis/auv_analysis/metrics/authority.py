@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from auv_analysis.report.text import join, number
+from auv_analysis.output.text import join, number
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.thrusters import Thrusters
 from auv_dynamics.vehicle.vehicle import Vehicle

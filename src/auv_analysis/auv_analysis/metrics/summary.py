@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.foreign.figures import gap_figures, unexplained_figures
 from auv_analysis.metrics import moments
 from auv_analysis.metrics.coupling import (
     Products,
@@ -19,7 +18,7 @@ from auv_analysis.metrics.coupling import (
 from auv_analysis.metrics.energy import shares
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.metrics.moments import Moments, Tally, maps_of
-from auv_analysis.runs.run import AnyRun, Run
+from auv_analysis.runs.run import AnyRun, Facts, LongRun, Run
 from auv_gvc_controller.control.gains import body_gains
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
@@ -239,3 +238,23 @@ def _energy(inside: Moments, window: tuple[float, float]) -> dict[str, Any]:
 
 def _peak(part: Moments, signal: int) -> list[float] | None:
     return part.peak(signal) if part.count else None
+
+
+def gap_figures(run: Facts) -> dict[str, Any]:
+    """Share of the run's length that has samples, and where there are none."""
+    spans = [{'window': list(span)} for span in run.gaps]
+    return {'valid_share': run.valid_share, 'spans': spans}
+
+
+def unexplained_figures(run: AnyRun) -> dict[str, list[float]] | None:
+    """Figures of F as estimated from measurements, N and N m; None where it is not."""
+    if isinstance(run, LongRun) or run.unexplained is None or run.unexplained_error is None:
+        return None
+    F, error = run.unexplained, run.unexplained_error
+    found = {
+        'mean': F.mean(axis=0),
+        'rms': np.sqrt((F**2).mean(axis=0)),
+        'max': np.abs(F).max(axis=0),
+        'error_rms': np.sqrt((error**2).mean(axis=0)),
+    }
+    return {name: values.tolist() for name, values in found.items()}

@@ -7,10 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from auv_analysis.output.text import join, number
 from auv_analysis.report import plotting
 from auv_analysis.report.plotting import COLOURS
 from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.text import join, number
 from auv_dynamics.vehicle import DOFS
 
 BEYOND = 3.0  # times what else is to be seen: a command that is cut off and told in the panel

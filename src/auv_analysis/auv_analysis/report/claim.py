@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from auv_analysis.output.text import MISSING
 from auv_analysis.report.evidence import Evidence, Finding, Verdict
 from auv_analysis.report.quotes import Value
-from auv_analysis.report.text import MISSING
 
 BOTH = ('gvc', 'cl')
 

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.output.text import MISSING
 from auv_analysis.report.claim import BOTH, Claim, Row
 from auv_analysis.report.claims_rows import ROWS
 from auv_analysis.report.evidence import Evidence, Signals, Verdict
 from auv_analysis.report.paper import CASES, is_plain, paper_run
 from auv_analysis.report.sketch import TINY, Sketch
 from auv_analysis.report.sketching import sketches
-from auv_analysis.report.text import MISSING
 from auv_analysis.runs.run import AnyRun
 from auv_analysis.scenario.scenario import load_scenario
 from auv_dynamics.plant.disturbance import make_disturbance

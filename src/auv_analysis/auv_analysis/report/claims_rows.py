@@ -1,12 +1,12 @@
 """The 21 claims of Herman 2018, each with its judge and the criterion that it goes by."""
 
+from auv_analysis.output.text import fixed
 from auv_analysis.report import claims_case as case
 from auv_analysis.report import claims_coupling as coupling
 from auv_analysis.report import claims_motion as motion
 from auv_analysis.report import paper
 from auv_analysis.report.claim import BOTH, Row
 from auv_analysis.report.quotes import Value
-from auv_analysis.report.text import fixed
 
 
 def _listed(name: str, values: tuple[float, ...], unit: str) -> tuple[Value, ...]:

@@ -12,9 +12,9 @@ import pyarrow as pa
 from markupsafe import Markup
 from pyarrow import parquet
 
+from auv_analysis.output.text import MISSING, number
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.panel import PanelSet
-from auv_analysis.report.text import MISSING, number
 
 Kind = TypeVar('Kind')
 NUMBERS = 'numbers.parquet'  # beside the report: every number that its tables show

@@ -7,10 +7,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from auv_analysis.metrics.summary import TRANSIENT
+from auv_analysis.output.text import MISSING
 from auv_analysis.report.quotes import Quotes, Value, decimals, short
 from auv_analysis.report.sketch import FOREVER, Sketch, last_third
 from auv_analysis.report.statistics import Part
-from auv_analysis.report.text import MISSING
 
 Verdict = Literal['reproduced', 'partly', 'not reproduced', 'other case', 'not evaluated']
 DECIDED: tuple[Verdict, ...] = ('reproduced', 'partly', 'not reproduced')

@@ -11,12 +11,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from auv_analysis.metrics.summary import TRANSIENT
+from auv_analysis.output.text import join
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import Drawn, FigureRecord, save_figures
 from auv_analysis.report.overview import RUNS, common_bands, left_out
 from auv_analysis.report.plotting import DASHES, GREY
 from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.text import join
 from auv_dynamics.vehicle import DOFS
 
 ROOM = 1.3  # of the axis above what it shows, for the numbers of the faults

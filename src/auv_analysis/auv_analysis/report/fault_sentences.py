@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from auv_analysis.metrics.fault_response import Response
+from auv_analysis.output.text import fixed, number, plain
 from auv_analysis.report.document import Sentence
-from auv_analysis.report.text import fixed, number, plain
 from auv_dynamics.vehicle import DOFS
 
 Found = Mapping[str, Sequence[Response]]

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from auv_analysis.metrics.coupling import structural_zeros
 from auv_analysis.metrics.lyapunov import OF_THE_MOTION
 from auv_analysis.metrics.summary import TRANSIENT
+from auv_analysis.output.text import join, number
 from auv_analysis.report import overview, plotting
 from auv_analysis.report.applied import applied_figure
 from auv_analysis.report.certificates import certificate_figure, is_drawn
@@ -22,7 +23,6 @@ from auv_analysis.report.plotting import Quantity
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
 from auv_analysis.report.statistics import Part
-from auv_analysis.report.text import join, number
 from auv_analysis.report.unexplained import unexplained_figure
 from auv_analysis.runs.run import AnyRun
 from auv_dynamics.vehicle import DOFS

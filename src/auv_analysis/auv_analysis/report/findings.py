@@ -7,12 +7,12 @@ import numpy as np
 
 from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.summary import band_of
+from auv_analysis.output.text import fixed, join, number, plain, residuals
 from auv_analysis.report import paper
 from auv_analysis.report.claim import Claim
 from auv_analysis.report.document import Sentence
 from auv_analysis.report.figures import reference
 from auv_analysis.report.sketch import Sketch, alike, last_third
-from auv_analysis.report.text import fixed, join, number, plain, residuals
 from auv_analysis.report.unexplained import unexplained_finding
 from auv_analysis.report.verdict import verdict
 from auv_dynamics.vehicle import DOFS

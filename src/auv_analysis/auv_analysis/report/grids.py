@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator
 
+from auv_analysis.output.text import fixed, number, plain, typeset
 from auv_analysis.report import plotting
 from auv_analysis.report.plotting import GREY
-from auv_analysis.report.text import fixed, number, plain, typeset
 
 MOST_NAMED = 60  # rows whose names and numbers still have room
 TALLEST = 11.0  # in

@@ -10,11 +10,11 @@ from matplotlib.lines import Line2D
 
 from auv_analysis.metrics.energy import shares
 from auv_analysis.metrics.summary import BAND_TEXT, DWELL, band_of
+from auv_analysis.output.text import join
 from auv_analysis.report import paper, plotting
 from auv_analysis.report.plotting import COLOURS, DASHES, GREY
 from auv_analysis.report.sketch import FOREVER, Sketch, alike
 from auv_analysis.report.sketching import common_window
-from auv_analysis.report.text import join
 from auv_dynamics.vehicle import DOFS
 
 GREY_LINE = ', and in grey that of a vehicle that moves exactly as the set-point{} asks'

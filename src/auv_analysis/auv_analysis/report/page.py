@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from auv_analysis.output.text import join
 from auv_analysis.report import paper
 from auv_analysis.report.claim import Claim
 from auv_analysis.report.claims import claims_table
@@ -18,7 +19,6 @@ from auv_analysis.report.set_up import set_up
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
 from auv_analysis.report.tables.claims import write_claims
-from auv_analysis.report.text import join
 from auv_analysis.runs.run import AnyRun
 
 Texts = str | Mapping[str, str]

@@ -4,12 +4,12 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from auv_analysis.output.text import join
 from auv_analysis.report import plotting
 from auv_analysis.report.certificates import BOUND, IDENTITY
 from auv_analysis.report.panel import Key, Panel, PanelLine, PanelSet
 from auv_analysis.report.plotting import COLOURS, GREY, Quantity
 from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.text import join
 from auv_analysis.report.traces import Line
 from auv_dynamics.vehicle import DOFS
 

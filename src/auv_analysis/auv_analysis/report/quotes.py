@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from math import isfinite
 from typing import NamedTuple
 
-from auv_analysis.report.text import fixed, number
+from auv_analysis.output.text import fixed, number
 
 Text = Callable[[float], str]
 UNBOUNDED = 'unbounded'

@@ -10,6 +10,7 @@ from typing import Any
 import jinja2
 import markupsafe
 
+from auv_analysis.output.text import fixed, join, number, plain, tied
 from auv_analysis.report.document import (
     NUMBERS,
     Block,
@@ -24,7 +25,6 @@ from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.interactive import Interactive
 from auv_analysis.report.provenance import provenance
 from auv_analysis.report.quantities import QUANTITIES, Maths
-from auv_analysis.report.text import fixed, join, number, plain, tied
 
 HERE = Path(__file__).parent
 KINDS = {

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.output.text import join, number, plain
 from auv_analysis.report.tables.sources import numbers_in
-from auv_analysis.report.text import join, number, plain
 from auv_analysis.report.words import (
     RELATIVE,
     current,

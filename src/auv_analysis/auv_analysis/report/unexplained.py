@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from auv_analysis.output.text import number
 from auv_analysis.report import plotting
 from auv_analysis.report.plotting import COLOURS, GREY
 from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.text import number
 from auv_dynamics.vehicle import DOFS
 
 BEYOND = 3.0  # times F: a wrench that is cut off, its extremes told above the panel

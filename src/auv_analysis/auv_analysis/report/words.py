@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.report.text import join, plain
+from auv_analysis.output.text import join, plain
 from auv_dynamics.files.yaml_files import matrix6
 
 AXES = ('north', 'east', 'down')

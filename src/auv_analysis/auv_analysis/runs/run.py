@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 if TYPE_CHECKING:
     import pandas as pd
 
+Hold = Literal['continuous', 'zoh']  # law in every stage of the integrator, or sampled and held
+HOLDS = get_args(Hold)
 FOREIGN = 'foreign_bag'  # source of a run that another system recorded
 BLOCK = 8192  # samples that are worked on together: their arrays fit into a processor's cache
 

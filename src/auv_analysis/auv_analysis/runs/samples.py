@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.runs.run import Run
+from auv_analysis.runs.run import HOLDS, Run
 from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.simulate import HOLDS
 from auv_dynamics.files.errors import InputError, reason
 
 MOTION, FORCES = ('t', 'eta', 'nu', 'nu_d', 'nu_d_dot'), ('tau', 'disturbance_estimate')

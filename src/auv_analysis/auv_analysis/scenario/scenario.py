@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from auv_analysis.output.folder import NAMES, ROLLOUTS, STAGING
 from auv_analysis.scenario.fault_words import Mark, marks_of
@@ -360,3 +361,20 @@ def _check_gains(scenario: Scenario, name: str) -> None:
         key, expected, found = refusal(error)
         place = f'controllers.{name}.{key or "law"}'
         raise InputError(scenario.path, place, expected, found) from None
+
+
+def write_inputs(scenario: Scenario, out: Path) -> dict[str, Path]:
+    """Write the resolved scenario and its files into the results' folder: name -> path."""
+    files = dict(scenario.attachments)
+    resolved = {**scenario.data, 'vehicle': 'vehicle.yaml'}
+    if 'setpoint.csv' in files:
+        resolved['setpoint'] = {'file': 'setpoint.csv'}
+    header = f'# {scenario.path.name} with every default filled in\n'
+    files['scenario.yaml'] = header + yaml.safe_dump(
+        resolved, sort_keys=False, default_flow_style=None, width=100
+    )
+    paths = {}
+    for name, text in files.items():
+        paths[name] = out / name
+        paths[name].write_text(text, encoding='utf-8')
+    return paths

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.summary import band_of
+from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.changes import changed_scenario, check_paths
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import Batch, Known, run_batch
@@ -14,7 +15,6 @@ from auv_analysis.simulation.closed_loop import Tables
 from auv_analysis.simulation.columns import in_columns
 from auv_analysis.simulation.reduction import COLUMNS, columns
 from auv_analysis.simulation.simulate import (
-    Hold,
     check_hold,
     reference,
     tables,

@@ -1,12 +1,12 @@
 """In-process simulation of a scenario by the one kernel."""
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from auv_analysis.output.progress import each
-from auv_analysis.runs.run import Run
+from auv_analysis.runs.run import HOLDS, Hold, Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.closed_loop import (
     Grid,
@@ -25,15 +25,12 @@ from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
 from auv_dynamics.plant.actuators import memory
 from auv_dynamics.plant.fault_rows import FaultRows
 from auv_dynamics.plant.faulty_devices import history_shape
-from auv_dynamics.plant.plant import SIZE, eta_of, initial_state
+from auv_dynamics.plant.plant import SIZE, initial_state, unwrapped_eta
 from auv_dynamics.plant.sensors import WIDTH, SensorNoise
-from auv_dynamics.vehicle.kinematics import unwrapped
 from auv_gvc_controller.control.sampled import anti_windup, is_compiled, user_law
 from auv_gvc_controller.control.setpoint import Setpoint
 from auv_gvc_controller.laws.model import control_model
 
-Hold = Literal['continuous', 'zoh']
-HOLDS = ('continuous', 'zoh')
 BLOCK = 1024  # steps that are tabulated at once
 
 
@@ -165,13 +162,6 @@ def at_start(scenario: Scenario, loop: Loop) -> tuple[Motion, Workspace]:
     held, history = memory(loop.actuators, faults=faults.any), np.zeros(history_shape(faults))
     motion = Motion(x, x[:SIZE].copy(), np.zeros(states), held, history)
     return motion, Workspace(np.zeros((stages, len(x))), np.zeros(len(x)))
-
-
-def unwrapped_eta(x: np.ndarray) -> np.ndarray:
-    """Eta (n, 6) of the states (n, 13) of consecutive samples."""
-    eta = eta_of(x)
-    eta[:, 3:] = unwrapped(eta[:, 3:])
-    return eta
 
 
 def _check_finite(log: Log, t: np.ndarray, scenario: Scenario, controller: str) -> None:

@@ -10,10 +10,10 @@ from auv_analysis.report.claims import judged
 from auv_analysis.report.evidence import Evidence, Response, Signals
 from auv_analysis.report.sketch import Sketch
 from auv_analysis.report.sketching import sketches
-from auv_analysis.runs.run import AnyRun
+from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario, load_scenario
-from auv_analysis.simulation.simulate import Hold, simulate
+from auv_analysis.simulation.simulate import simulate
 from auv_analysis.studies.study.responses import response
 from auv_analysis.studies.study.sensitivity import Sensitivity, sensitivity
 from auv_gvc_controller.laws.model import control_model

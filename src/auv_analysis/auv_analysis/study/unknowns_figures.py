@@ -7,11 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
+from auv_analysis.output.text import fixed
 from auv_analysis.report import plotting
 from auv_analysis.report.evidence import DECIDED
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.paper import KINETIC_ENERGY
-from auv_analysis.report.text import fixed
 from auv_analysis.study.robustness import met
 from auv_analysis.study.unknowns import Variant
 from auv_analysis.study.unknowns_run import Unknowns

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from auv_analysis.metrics.energy import shares
+from auv_analysis.output.text import fixed, join, number
 from auv_analysis.report import paper
 from auv_analysis.report.document import Cell, Column, Sentence, Table, cell
 from auv_analysis.report.quantities import Maths
-from auv_analysis.report.text import fixed, join, number
 from auv_analysis.study.attribution import Split
 from auv_analysis.study.robustness import FAILS, HOLDS, Held, Robustness, energy_ranges, met
 from auv_analysis.study.unknowns import DAMPING, M46, MASS

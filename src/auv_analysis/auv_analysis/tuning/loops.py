@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import run_batch
 from auv_analysis.simulation.rollouts import batch_of
-from auv_analysis.simulation.simulate import Hold
 from auv_analysis.simulation.variants import packed_variants
 from auv_analysis.tuning.measures import Measures, measures_of
 from auv_analysis.tuning.record import Cost

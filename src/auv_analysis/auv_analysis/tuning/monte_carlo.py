@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import Batch, run_batch
 from auv_analysis.simulation.closed_loop import Tables
 from auv_analysis.simulation.rollouts import batch_of
-from auv_analysis.simulation.simulate import Hold
 from auv_analysis.simulation.variants import Variants, merged, packed_variants
 from auv_analysis.tuning.draws import Spread, drawn
 from auv_analysis.tuning.measures import Measures, measures_of

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.report.text import join, number
+from auv_analysis.output.text import join, number
+from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.simulate import DivergedError, Hold
+from auv_analysis.simulation.simulate import DivergedError
 from auv_analysis.tuning.loops import measured
 from auv_analysis.tuning.measures import Measures
 from auv_analysis.tuning.search import Found, Goal, search

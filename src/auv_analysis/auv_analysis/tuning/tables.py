@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
+from auv_analysis.output.text import MISSING
 from auv_analysis.report.document import Cell, Column, Table, cell, percent
 from auv_analysis.report.quantities import Maths, symbol
-from auv_analysis.report.text import MISSING
 from auv_analysis.report.words import gain_text
 from auv_analysis.tuning.measures import MEANINGS, Measures
 from auv_analysis.tuning.verdict import p_text

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from auv_analysis.output.text import fixed, join, number
 from auv_analysis.report.document import Sentence
-from auv_analysis.report.text import fixed, join, number
 from auv_analysis.tuning.comparison import LEVEL, Comparison
 from auv_analysis.tuning.measures import MEANINGS
 from auv_analysis.tuning.outcome import Outcome

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.graph.experiment import write_inputs
 from auv_analysis.scenario.changes import changed_scenario
-from auv_analysis.scenario.scenario import Scenario, load_scenario
+from auv_analysis.scenario.scenario import Scenario, load_scenario, write_inputs
 from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.tuning.comparison import Comparison, compare
 from auv_analysis.tuning.draws import Spread

@@ -35,6 +35,7 @@ from auv_dynamics.vehicle.kinematics import (
     euler,
     position_rate,
     quaternion,
+    unwrapped,
 )
 
 SIZE = 13
@@ -112,6 +113,13 @@ def initial_state(eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
 def eta_of(x: np.ndarray) -> np.ndarray:
     """Position and Euler angles (..., 6) of states (..., 13); psi is not unwrapped."""
     return np.concatenate([x[..., :3], euler(x[..., 3:7])], axis=-1)
+
+
+def unwrapped_eta(x: np.ndarray) -> np.ndarray:
+    """Eta (n, 6) of the states (n, 13) of consecutive samples."""
+    eta = eta_of(x)
+    eta[:, 3:] = unwrapped(eta[:, 3:])
+    return eta
 
 
 class Plant:

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
+from auv_analysis.output.text import MISSING, number
 from auv_analysis.report.document import Cell, Column, Table
 from auv_analysis.report.tables.sources import Summaries, summary_source
-from auv_analysis.report.text import MISSING, number
 
 ROWS = (  # symbol or words, unit or '', key of summary.json, factor
     ('identity (26): largest residual', '% of max |(26)|', 'identity_residual', 100.0),

@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from auv_analysis.output.text import fixed, join, plain
 from auv_analysis.report.document import Cell, Column, Table
 from auv_analysis.report.quantities import Maths, symbol
 from auv_analysis.report.set_up import SetUp
 from auv_analysis.report.tables.sources import numbers_in, summary_source
-from auv_analysis.report.text import fixed, join, plain
 from auv_analysis.report.words import gain_text
 from auv_analysis.runs.run import FOREIGN, Facts
 from auv_gvc_controller.laws.law import SHIPPED

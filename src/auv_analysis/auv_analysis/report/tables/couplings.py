@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.coupling import input_deformation, velocity_deformation
+from auv_analysis.output.text import MISSING, plain
 from auv_analysis.report.document import Cell, Column, Table, cell
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import (
@@ -16,7 +17,6 @@ from auv_analysis.report.tables.sources import (
     Summaries,
     summary_source,
 )
-from auv_analysis.report.text import MISSING, plain
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.decomposition import inverse_upper
 

@@ -2,11 +2,11 @@
 
 from typing import Any
 
+from auv_analysis.output.text import MISSING, fixed, number
 from auv_analysis.report import paper
 from auv_analysis.report.document import Cell, Column, Table
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import Summaries, summary_source
-from auv_analysis.report.text import MISSING, fixed, number
 
 SHARES = tuple(
     Column(Maths(f'ξ{i}'), '%', Maths(f'share of ½ N_{i} ξ{i}² in the kinetic energy, (30)'))

@@ -9,10 +9,10 @@ from auv_analysis.metrics.fault_response import (
     Response,
 )
 from auv_analysis.metrics.summary import BAND_TEXT
+from auv_analysis.output.text import MISSING, fixed
 from auv_analysis.report.document import Cell, Column, Table, cell
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import WRENCH
-from auv_analysis.report.text import MISSING, fixed
 from auv_dynamics.vehicle import DOFS
 
 ERROR, EFFORT = Maths('RMS of ν_d − ν'), 'RMS of τ'

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.output.text import join, plain
 from auv_analysis.report import paper
 from auv_analysis.report.document import Cell, Column, Table, cell
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import Summaries, summary_source
-from auv_analysis.report.text import join, plain
 from auv_analysis.runs.run import Facts
 from auv_dynamics.vehicle import DOFS
 

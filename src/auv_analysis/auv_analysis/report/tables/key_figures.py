@@ -3,10 +3,10 @@
 from typing import Any
 
 from auv_analysis.metrics.summary import SETTLED, TRANSIENT
+from auv_analysis.output.text import MISSING, fixed, join
 from auv_analysis.report.document import Cell, Column, Table, cell
 from auv_analysis.report.quantities import Maths
 from auv_analysis.report.tables.sources import Summaries, summary_source
-from auv_analysis.report.text import MISSING, fixed, join
 from auv_dynamics.vehicle import DOFS
 
 ERROR, ESTIMATE, INPUT = 'velocity error', 'estimation error w', 'input τ'

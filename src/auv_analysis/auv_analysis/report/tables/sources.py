@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from auv_analysis.output.text import fixed
 from auv_analysis.report.document import Cell
-from auv_analysis.report.text import fixed
 
 Summaries = Mapping[str, Mapping[str, Any]]
 VELOCITIES, WRENCHES = 'uvwpqr', 'XYZKMN'

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from auv_analysis.output.text import number
 from auv_analysis.report.document import Cell, Column, Table, cell
 from auv_analysis.report.tables.sources import WRENCH, Summaries, summary_source
-from auv_analysis.report.text import number
 from auv_dynamics.vehicle import DOFS
 
 COLUMNS = (

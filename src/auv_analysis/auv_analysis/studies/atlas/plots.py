@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
+from auv_analysis.output.text import join
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.grids import ALWAYS, Grid, draw_grid, grid_figure, scale_bar
 from auv_analysis.report.plotting import COLOURS
 from auv_analysis.report.quantities import Maths
-from auv_analysis.report.text import join
 from auv_analysis.studies.atlas.atlas import Chart
 from auv_dynamics.vehicle import DOFS
 

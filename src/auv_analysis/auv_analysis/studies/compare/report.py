@@ -17,13 +17,13 @@ from auv_analysis.metrics.measures import (
 from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import each, say, waiting
+from auv_analysis.output.text import join, number
 from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.findings import namesakes
 from auv_analysis.report.grids import ALWAYS
 from auv_analysis.report.rendering import write_document
 from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.text import join, number
 from auv_analysis.studies.compare.plots import SIX
 from auv_analysis.studies.compare.ranking import (
     CSV,

@@ -13,10 +13,10 @@ from auv_analysis.bag.load import Recording
 from auv_analysis.foreign.candidates import with_candidates
 from auv_analysis.foreign.mapping import TopicMap
 from auv_analysis.output.folder import SWEEP
-from auv_analysis.runs.run import AnyRun
+from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.runs.samples import ENDING, load_samples
 from auv_analysis.scenario.scenario import Scenario, load_scenario
-from auv_analysis.simulation.simulate import Hold, simulate
+from auv_analysis.simulation.simulate import simulate
 from auv_analysis.simulation.warm_up import announce
 from auv_dynamics.files.errors import InputError, reason
 from auv_dynamics.files.shipped import shipped_by_name

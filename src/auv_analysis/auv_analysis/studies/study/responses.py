@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from auv_analysis.report.evidence import Response
-from auv_analysis.runs.run import Run
+from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.simulate import DivergedError, Hold, simulate
+from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.studies.study.sensitivity import Sensitivity
 from auv_dynamics.vehicle import DOFS
 

@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from auv_analysis.output.new_files import write_table
+from auv_analysis.output.text import fixed, join, number, plain
 from auv_analysis.report import plotting
 from auv_analysis.report.document import Cell, Column, Sentence, Table
 from auv_analysis.report.figure_files import FigureRecord
 from auv_analysis.report.quantities import Maths, mathtext, symbol
-from auv_analysis.report.text import fixed, join, number, plain
 from auv_analysis.studies.study.kpis import Excluded
 from auv_analysis.studies.study.sensitivity import Index, Sensitivity, Variable
 

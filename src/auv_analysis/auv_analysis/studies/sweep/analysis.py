@@ -12,7 +12,7 @@ from pyarrow import parquet
 
 from auv_analysis.metrics.measures import BY_NAME, MEASURES, Measure
 from auv_analysis.output.progress import each
-from auv_analysis.report.text import join
+from auv_analysis.output.text import join
 from auv_analysis.studies.sweep import statistics
 from auv_analysis.studies.sweep.dataset import STATUSES, Sweep
 from auv_analysis.studies.sweep.factors import Varied, varied_paths

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.changes import (
     VEHICLE,
     Parts,
@@ -15,7 +16,7 @@ from auv_analysis.scenario.changes import (
     split,
 )
 from auv_analysis.scenario.scenario import SAMPLED, Scenario, load_scenario
-from auv_analysis.simulation.simulate import Hold, check_hold
+from auv_analysis.simulation.simulate import check_hold
 from auv_analysis.studies.distributions import Values
 from auv_analysis.studies.sweep.variation import Group, kind_of, make_group
 from auv_dynamics.files.errors import InputError

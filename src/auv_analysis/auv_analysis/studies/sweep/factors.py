@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from auv_analysis.report.text import plain
+from auv_analysis.output.text import plain
 from auv_analysis.scenario.changes import said_of, split
 from auv_analysis.studies.sweep.dataset import Sweep
 from auv_dynamics.files.errors import shorten

@@ -152,7 +152,7 @@ def _sampling_versions(campaign: Campaign) -> dict[str, str]:
 
 def _write_inputs(out: Path, campaign: Campaign) -> None:
     """Texts for people: the manifest alone is read again."""
-    from auv_analysis.graph.experiment import write_inputs
+    from auv_analysis.scenario.scenario import write_inputs
 
     write_inputs(campaign.scenario, out)
     header = f'# {campaign.path.name} with every default filled in\n'

@@ -11,11 +11,11 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from auv_analysis.metrics.measures import BY_NAME, Measure
+from auv_analysis.output.text import join, plain, typeset
 from auv_analysis.report import plotting
 from auv_analysis.report.figure_files import FigureRecord, save_figures
 from auv_analysis.report.grids import Grid, draw_grid, grid_figure, scale_bar, small_heads
 from auv_analysis.report.plotting import COLOURS, GREY
-from auv_analysis.report.text import join, plain, typeset
 from auv_analysis.studies.compare.plots import look
 from auv_analysis.studies.sweep.analysis import SAMPLE, Results, Row
 from auv_analysis.studies.sweep.factors import Varied, cut, short_names, with_unit

@@ -1,0 +1,1 @@
+"""The kernel: integrator, six-vectors, lanes, compilation; `simd` is optional."""

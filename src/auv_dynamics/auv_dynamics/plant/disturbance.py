@@ -15,7 +15,7 @@ def herman2018(t: np.ndarray, exponent_sign: float = -1.0) -> np.ndarray:
     """F of equation (39).
 
     The print lost the signs of the exponents; `exponent_sign` is the reading taken, -1 or +1, and
-    it holds for f2's first term as well. The other readings stand in the README.
+    it holds for f2's first term as well. The other readings stand in docs/vehicles.md.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.rollouts import rollouts
 from auv_analysis.simulation.warm_up import warm_up
-from auv_analysis.tuning.loops import measured
+from auv_analysis.studies.tune.cost import measured
 
 STEPS = 20
 SHARED, OWN = 'controllers.{}.k_D', 'setpoint.surge.offset'  # set-points that are shared, or not

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from auv_analysis.cli import main
-from auv_analysis.cli.tune_options import LAWS
+from auv_analysis.cli.tune import LAWS
 from auv_gvc_controller.laws.law import SHIPPED
 
 AUV = Path(sys.executable).with_name('auv')

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from auv_analysis.cli.command_parser import Parser
 from auv_analysis.cli.linearize import add_options as add_linearize
-from auv_analysis.cli.tune_options import add_options as add_tune
+from auv_analysis.cli.tune import add_arguments as add_tune
 from auv_analysis.cli.vehicle_formats import add_export, add_import
 from auv_analysis.foreign.options import add_options as add_foreign
 from auv_analysis.replay.options import add_options as add_replay

@@ -9,7 +9,7 @@ from argcomplete.completers import BaseCompleter, FilesCompleter
 from argcomplete.shell_integration import shellcode
 
 from auv_analysis.cli.command_parser import Parser
-from auv_analysis.cli.tune_options import LAWS
+from auv_analysis.cli.tune import LAWS
 from auv_dynamics.files.shipped import shipped, shipped_names
 from auv_dynamics.files.yaml_files import parse_any_yaml
 

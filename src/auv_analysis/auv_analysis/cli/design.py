@@ -5,16 +5,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.design.couplings import coupling_named, present
-from auv_analysis.design.parameters import NAMES
-from auv_analysis.design.printed import print_design
-from auv_analysis.design.proposal import Proposal, propose
-from auv_analysis.design.result import concluded
-from auv_analysis.design.setting import Setting, open_setting
-from auv_analysis.output.folder import results_folder
-from auv_analysis.output.progress import bar, count, say, waiting
-from auv_analysis.scenario.scaling import UNFIT
-from auv_analysis.simulation.warm_up import announce
 from auv_dynamics.files.errors import InputError
 
 BOUND = re.compile(r'([a-z.]+)=([^:=]+):([^:=]+)')
@@ -23,6 +13,15 @@ LONGEST = 90  # of the vehicle's name in that of the folder
 
 def design(options: argparse.Namespace) -> dict[str, Any]:
     """Which change of a vehicle removes which coupling."""
+    from auv_analysis.output.folder import results_folder
+    from auv_analysis.output.progress import bar, count, say, waiting
+    from auv_analysis.scenario.scaling import UNFIT
+    from auv_analysis.simulation.warm_up import announce
+    from auv_analysis.studies.design.couplings import coupling_named, present
+    from auv_analysis.studies.design.results import write_results
+    from auv_analysis.studies.design.search import propose
+    from auv_analysis.studies.design.setting import open_setting
+
     own = [_bound(text) for text in options.bound]
     setting = open_setting(options.vehicle, options.scenario, own)
     if options.reduce is not None:
@@ -33,27 +32,26 @@ def design(options: argparse.Namespace) -> dict[str, Any]:
         for warning in setting.scenario.warnings:
             say(f'warning: {warning}')
         announce(setting.scenario, [setting.controller])
-        found = _found(setting, options.reduce)
+        with bar(count('couplings')) as shown:
+            task = shown.add_task('searching', total=1)
+            proposal = propose(
+                setting, options.reduce,
+                lambda done, of: shown.update(task, completed=done, total=of),
+            )  # fmt: skip
         with waiting('simulating the vehicle before and after'):
-            result = concluded(found, results)
-        from auv_analysis.design.report import write_design_report  # with matplotlib, which is slow
+            found = write_results(proposal, results)
+        from auv_analysis.studies.design.report import print_design, write_report
 
         with waiting('drawing figures, writing the report'):
-            write_design_report(result, results.folder)
+            write_report(found, results.folder)
         if not options.json:
-            print_design(result.document)
-    return result.document
-
-
-def _found(setting: Setting, reduce: str | None) -> Proposal:
-    with bar(count('couplings')) as shown:
-        task = shown.add_task('searching', total=1)
-        return propose(
-            setting, reduce, lambda done, of: shown.update(task, completed=done, total=of)
-        )
+            print_design(found.document)
+    return found.document
 
 
 def _bound(text: str) -> tuple[str, float, float]:
+    from auv_analysis.studies.design.change import NAMES
+
     match = BOUND.fullmatch(text)
     expected = f'NAME=LOWER:UPPER with NAME one of {", ".join(NAMES)}'
     if match is None:

@@ -1,1 +1,0 @@
-"""Which change of a vehicle removes which inertial coupling: proposed, then simulated."""

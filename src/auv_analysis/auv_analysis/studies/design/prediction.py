@@ -1,0 +1,300 @@
+"""Prediction: couplings of changed vehicles that move as in a run, and the objective function.
+
+Dynamics is linear in the inertial parameters, so the input of the changed vehicle is that of the
+run plus a linear map of the effect, (1): dtau = dM nu_dot + dC(nu) nu + dD(nu) nu + dg(eta).
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from auv_analysis.metrics.coupling import delta_pi, delta_xi
+from auv_analysis.runs.run import Run
+from auv_analysis.studies.design.change import UPPER, WIDTH, ChangeEffect, ChangeSpace
+from auv_analysis.studies.design.couplings import COUPLINGS, Sizes, effort_of, shares_of
+from auv_dynamics.vehicle.kinematics import quaternion, rotation
+from auv_gvc_controller.laws.decomposition import inverse_upper
+from auv_gvc_controller.laws.model import control_model
+
+EVERY = tuple(range(len(COUPLINGS)))
+SAMPLES = 120  # that are spread over a run, denser where much happens
+PEAKS = 3  # samples that are added for every signal, at its largest values
+OTHERS = 0.1  # weight of the other couplings and of the effort beside the one to be reduced
+AT_REST = 0.3  # weight of the hydrostatic penalty
+SIZE = 0.01  # weight of the size of the change
+LEAST = 0.01  # of all couplings before: the least by which the others are judged
+IMPOSSIBLE = 1e6  # objective of a change whose M is not positive definite
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Samples of a run, and what its input would be for another vehicle.
+
+    Attributes
+    ----------
+    nu, tau : (n, 6) velocity and commanded wrench at some samples
+    response : (6 n, WIDTH) from a `ChangeEffect` as a row to what it adds to tau
+    row : (WIDTH,) effect that the run's own vehicle already has
+    weights : (n,) of the samples in a mean over the run, their sum is 1
+
+    """
+
+    nu: np.ndarray
+    tau: np.ndarray
+    response: np.ndarray
+    row: np.ndarray
+    weights: np.ndarray
+
+    @classmethod
+    def of(cls, run: Run, row: np.ndarray) -> 'Motion':
+        """Motion of a run; `row` is the effect that its vehicle already has."""
+        where = _samples(run)
+        part = run.part(where)
+        down = rotation(quaternion(part.eta[:, 3:]))[:, 2]
+        nu_dot = acceleration(part, down)
+        columns = [added_wrench(_unit(k), part.nu, nu_dot, down).ravel() for k in range(WIDTH)]
+        weights = _weights(where, len(run.t))
+        return cls(part.nu, part.tau, np.stack(columns, axis=-1), np.asarray(row), weights)
+
+    def inputs(self, row: np.ndarray) -> np.ndarray:
+        """Tau (..., n, 6) of vehicles in this motion; row (..., WIDTH)."""
+        change = row - self.row
+        added = self.response @ change.reshape(-1, WIDTH).T
+        return self.tau + added.T.reshape(*change.shape[:-1], *self.tau.shape)
+
+
+def added_wrench(
+    change: ChangeEffect, nu: np.ndarray, nu_dot: np.ndarray, down: np.ndarray
+) -> np.ndarray:
+    """What an effect adds to tau in the same motion, (1).
+
+    Parameters
+    ----------
+    change : of the vehicle, no leading axes
+    nu, nu_dot : (n, 6) velocity and acceleration, body frame
+    down : (n, 3) direction of gravity in the body frame
+
+    Returns
+    -------
+    dtau : (n, 6) N, N m
+
+    """
+    v, omega = nu[:, :3], nu[:, 3:]
+    momentum = nu @ change.M.T
+    linear, angular = momentum[:, :3], momentum[:, 3:]
+    dtau = nu_dot @ change.M.T + np.abs(nu) * nu * change.drag
+    dtau[:, :3] += np.cross(omega, linear)
+    dtau[:, 3:] += np.cross(v, linear) + np.cross(omega, angular)
+    dtau[:, 3:] += np.cross(down, np.broadcast_to(change.couple, down.shape))
+    return dtau
+
+
+def acceleration(run: Run, down: np.ndarray) -> np.ndarray:
+    """nu_dot (n, 6) of a run's samples by (1), with the wrench that was applied."""
+    vehicle, nu = run.vehicle, run.nu
+    couple = vehicle.weight * vehicle.r_G - vehicle.buoyancy * vehicle.r_B
+    whole = ChangeEffect(vehicle.M, couple, np.zeros(6))
+    rest = run.tau_applied - added_wrench(whole, nu, np.zeros_like(nu), down)
+    rest -= nu @ vehicle.D_linear.T + (np.abs(nu) * nu) @ vehicle.D_quadratic.T
+    if vehicle.lift is not None:
+        rest -= (np.abs(nu[:, :1]) * nu) @ vehicle.lift.T
+    rest[:, :3] += (vehicle.weight - vehicle.buoyancy) * down
+    if run.disturbance is not None:
+        rest -= run.disturbance
+    return np.linalg.solve(vehicle.M, rest.T).T
+
+
+def _unit(k: int) -> ChangeEffect:
+    row = np.zeros(WIDTH)
+    row[k] = 1.0
+    M = np.zeros((6, 6))
+    M[UPPER] = row[: len(UPPER[0])]
+    M = np.maximum(M, M.T)
+    return ChangeEffect(M, row[-9:-6], row[-6:])
+
+
+def _samples(run: Run) -> np.ndarray:
+    """Indices of samples, ascending: dense where energy and effort are, and at the peaks."""
+    model = control_model(run.vehicle)
+    Upsilon, inverse = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
+    energy = (run.nu @ run.vehicle.M * run.nu).sum(axis=1)
+    effort = (run.tau * np.linalg.solve(run.vehicle.M, run.tau.T).T).sum(axis=1)
+    parts = (part / total for part in (energy, effort) if (total := part.sum()) > 0)
+    activity = np.cumsum(sum(parts, np.full(len(run.t), 1 / len(run.t))))
+    levels = (np.arange(SAMPLES) + 0.5) / SAMPLES * activity[-1]
+    spread = np.minimum(np.searchsorted(activity, levels), len(run.t) - 1)
+    signals = run.nu, run.tau, delta_xi(inverse, run.nu), delta_pi(Upsilon, run.tau)
+    size = np.abs(np.concatenate(signals, axis=1))
+    peaks = np.argsort(-size, axis=0, kind='stable')[:PEAKS]
+    return np.union1d(spread, peaks)
+
+
+def _weights(where: np.ndarray, count: int) -> np.ndarray:
+    """Share of the run that is nearer to each of some samples than to the others."""
+    between = np.concatenate([[-0.5], (where[1:] + where[:-1]) / 2, [count - 0.5]])
+    return np.diff(between) / count
+
+
+class Metrics(NamedTuple):
+    """What a change is judged by; any number of leading axes.
+
+    Attributes
+    ----------
+    ratios : (..., m) largest magnitudes of some couplings, after by before
+    shares : (..., 12) of `shares_of`
+    effort : (...,) mean of tau^T M^-1 tau, after by before
+    at_rest : (...,) of `ChangeSpace.hydrostatic_penalty`
+    size : (...,) of the change, see `ChangeSpace.size`
+    definite : (...,) whether M is positive definite
+
+    """
+
+    ratios: np.ndarray
+    shares: np.ndarray
+    effort: Any
+    at_rest: Any
+    size: Any
+    definite: Any
+
+
+class Signals(NamedTuple):
+    """Of changed vehicles: delta_xi beside delta_pi (..., n, 12), xi, pi, tau (..., n, 6), N."""
+
+    deformed: np.ndarray
+    xi: np.ndarray
+    pi: np.ndarray
+    tau: np.ndarray
+    N: np.ndarray
+
+
+class Prediction:
+    """What changes of a vehicle would do to its couplings if it moved as in a run.
+
+    Parameters
+    ----------
+    space : the changes
+    motion : samples of a run
+    before : sizes of the couplings of the unchanged vehicle
+    smooth : (12,) its smooth largest magnitudes; none: from the motion, which must be its own
+
+    """
+
+    def __init__(
+        self, space: ChangeSpace, motion: Motion, before: Sizes, smooth: np.ndarray | None = None
+    ):
+        self.space, self.motion, self.before = space, motion, before
+        self._M_inv = np.linalg.inv(space.vehicle.M)  # weighs the effort
+        if smooth is None:
+            peaks = smooth_peak(self.signals(space.unchanged).deformed)
+            smooth = np.where(peaks > 0, peaks, np.inf)
+        self.smooth = smooth
+
+    def metrics(self, x: np.ndarray, targets: tuple[int, ...] = EVERY) -> Metrics:
+        """Metrics of changes (..., 13); `targets` are places in `COUPLINGS`."""
+        (deformed, xi, pi, tau, N), weights = self.signals(x), self.motion.weights
+        return Metrics(
+            ratios=smooth_peak(deformed[..., targets]) / self.smooth[list(targets)],
+            shares=shares_of(deformed[..., :6], deformed[..., 6:], N, xi, pi, weights),
+            effort=effort_of(tau, self._M_inv, weights) / self.before.by_effort,
+            at_rest=self.space.hydrostatic_penalty(x),
+            size=self.space.size(x),
+            definite=(N > 0).all(axis=-1),
+        )
+
+    def ratios(self, x: np.ndarray) -> np.ndarray:
+        """Predicted largest magnitudes (12,) after a change (13,), by those before; 0 by 0 is 0."""
+        peaks = np.abs(self.signals(x).deformed).max(axis=-2)
+        return peaks / np.where(self.before.peaks > 0, self.before.peaks, np.inf)
+
+    def signals(self, x: np.ndarray) -> Signals:
+        """Signals of changes (..., 13) at the samples of the motion."""
+        change = self.space.effect(x)
+        Upsilon, inverse, N = decomposed(self.space.vehicle.M + change.M)
+        tau, nu = self.motion.inputs(change.row), self.motion.nu
+        xi, pi = nu @ np.swapaxes(inverse, -2, -1), tau @ Upsilon
+        return Signals(np.concatenate([xi - nu, pi - tau], axis=-1), xi, pi, tau, N)
+
+
+def smooth_peak(signals: np.ndarray) -> np.ndarray:
+    """(mean of s^8)^(1/8) over the samples of signals: (..., n, m) to (..., m)."""
+    return (signals**8).mean(axis=-2) ** 0.125
+
+
+def decomposed(M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Upsilon, its inverse and N of matrices M = Upsilon^-T N Upsilon^-1, (4) and (9).
+
+    Parameters
+    ----------
+    M : (..., 6, 6) symmetric; where it is not positive definite, N has a pivot that is not positive
+
+    Returns
+    -------
+    Upsilon, Upsilon_inv : (..., 6, 6) upper triangular, unit diagonal
+    N : (..., 6)
+
+    """
+    rest = np.array(M)
+    upper = np.zeros_like(rest)  # L^T of M = L N L^T
+    N = np.zeros(rest.shape[:-1], rest.dtype)
+    with np.errstate(all='ignore'):
+        for k in range(6):
+            N[..., k] = rest[..., k, k]
+            upper[..., k, k:] = rest[..., k, k:] / N[..., k, None]
+            upper[..., k, k] = 1.0
+            row = upper[..., k, :]
+            rest = rest - N[..., k, None, None] * row[..., :, None] * row[..., None, :]
+        return inverse_upper(upper), upper, N
+
+
+def score(metrics: Metrics, before: Sizes, target: int, others: float = OTHERS) -> np.ndarray:
+    """r^2 + 0.1 (o^2 + e^2) + 0.3 at_rest + 0.01 size.
+
+    r is the largest magnitude of the coupling, o the root sum square of the shares of all others,
+    e the root of the effort: each after by before.
+
+    Parameters
+    ----------
+    metrics : (...,), with the ratio of the target alone
+    before : of the unchanged vehicle
+    target : place in `COUPLINGS` of what is to be reduced
+    others : weight 0.1 of o^2 and e^2
+
+    """
+    rest = _without(metrics.shares, target) / (
+        _without(before.shares, target) + LEAST * (before.shares @ before.shares)
+    )
+    burden = AT_REST * metrics.at_rest + SIZE * metrics.size
+    value = metrics.ratios[..., 0] ** 2 + others * (rest + metrics.effort) + burden
+    return np.where(metrics.definite, value, IMPOSSIBLE)
+
+
+def _without(shares: np.ndarray, target: int) -> np.ndarray:
+    """Sum of squares (...) of the shares (..., 12) of all couplings but one."""
+    squares = shares**2
+    return squares.sum(axis=-1) - squares[..., target]
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """Score of changes by which one coupling is to be reduced.
+
+    Attributes
+    ----------
+    prediction : of the metrics
+    target : place in `COUPLINGS`
+    others : weight of the other couplings and of the effort
+
+    """
+
+    prediction: Prediction
+    target: int
+    others: float = OTHERS
+
+    def value(self, x: np.ndarray) -> np.ndarray:
+        """Score (...) of changes (..., 13)."""
+        return self.of(self.prediction.metrics(x, (self.target,)))
+
+    def of(self, metrics: Metrics) -> np.ndarray:
+        """Score (...) of metrics, with the ratio of the target alone."""
+        return score(metrics, self.prediction.before, self.target, self.others)

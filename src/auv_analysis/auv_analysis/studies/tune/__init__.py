@@ -1,0 +1,1 @@
+"""Tuning: laws at equal effort or equal error, compared over perturbed plants."""

@@ -1,0 +1,209 @@
+"""Search space of a law's gains: coordinates, structure and bounds.
+
+A gain of a rate's or a squared rate's dimension is searched as such where the law multiplies it by
+the inertia itself (GVC's k_D and Gamma), and as a multiple of a matrix of inertia where the law
+does not (CL's k_D, in N s/m). Which matrix, the structure says.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from auv_analysis.scenario.scenario import Scenario
+from auv_dynamics.dofs import DOFS
+from auv_dynamics.files.yaml_files import matrix6
+from auv_gvc_controller.control.gains import body_gains, sampled_rate
+from auv_gvc_controller.laws.law import make_gains
+from auv_gvc_controller.laws.model import ControlModel
+
+STRUCTURES = {
+    'scalar': 'a number times the identity',
+    'mass': 'a number times the diagonal of M',
+    'diagonal': 'six numbers',
+    'inertia': 'a number times M',
+}
+EDGE = 1e-3  # of the distance of two bounds: a value that is nearer to one lies on it
+BEST = 'best'  # the better of `scalar` and `mass`
+
+
+class Gain(NamedTuple):
+    """A gain of a law: whether it stands for an inertia times what is bounded here, and how."""
+
+    inertial: bool
+    low: float
+    high: float
+
+
+def searched(step: float) -> dict[str, dict[str, Gain]]:
+    """Law -> gain -> its bounds for a step in s: no rate is searched above 1/step.
+
+    k_FF of the PID stays 1: the other laws have no share of the feed-forward to choose either.
+    """
+    fastest = 1 / step
+    rate, slow_rate, filtering = (0.05, fastest), (0.01, fastest), (0.01 * fastest, fastest)
+    squared_rate = 1e-3, fastest**2
+    return {
+        'gvc': {
+            'k_D': Gain(False, *rate), 'k_I': Gain(True, *squared_rate),
+            'Lambda': Gain(False, *slow_rate), 'Gamma': Gain(False, *squared_rate),
+        },
+        'cl': {
+            'k_D': Gain(True, *rate), 'k_I': Gain(True, *squared_rate),
+            'Lambda': Gain(False, *slow_rate), 'Gamma': Gain(True, *squared_rate),
+        },
+        'pid': {
+            'k_P': Gain(True, *rate), 'k_I': Gain(True, *squared_rate),
+            'k_D': Gain(True, 1e-3, 3.0), 'omega_f': Gain(False, *filtering),
+        },
+        'smc': {
+            'k_D': Gain(True, *rate), 'Lambda': Gain(False, *slow_rate),
+            'Gamma': Gain(True, *squared_rate),
+            'k_S': Gain(True, 1e-3, 10.0), 'phi': Gain(False, 1e-3, 1.0),
+        },
+    }  # fmt: skip
+
+
+LAWS = tuple(searched(1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class GainSpace:
+    """Gains of one law in one structure, as n logarithms.
+
+    Attributes
+    ----------
+    law : one of `LAWS`
+    structure : a key of `STRUCTURES`
+    names : of the n coordinates: a gain, or a gain and its degree of freedom
+    low, high : (n,) bounds of the logarithms
+    basis : gain -> () 1.0, (6,) or (6, 6): what its coordinate multiplies; of `diagonal` ones
+    model : ControlModel of the vehicle
+    fastest : rate that the velocity loop may have, 1/s
+
+    """
+
+    law: str
+    structure: str
+    names: tuple[str, ...]
+    low: np.ndarray
+    high: np.ndarray
+    basis: dict[str, np.ndarray]
+    model: ControlModel
+    fastest: float
+
+    def gains(self, x: np.ndarray) -> dict[str, np.ndarray]:
+        """Gain -> (B,), (B, 6) or (B, 6, 6) in the units of the law, of points (B, n)."""
+        values, found, at = np.exp(x), {}, 0
+        for gain, basis in self.basis.items():
+            if self.structure == 'diagonal':
+                found[gain] = values[:, at : at + 6]
+                at += 6
+            else:
+                found[gain] = values[:, at].reshape(-1, *(1,) * basis.ndim) * basis
+                at += 1
+        return found
+
+    def rate_margin(self, x: np.ndarray) -> np.ndarray:
+        """Logarithms (B,) of how far the velocity loops of points (B, n) are below `fastest`."""
+        gains = self.gains(x)
+        M = np.reshape(self.model.dynamics.M, (6, 6))
+        rates = np.empty(len(x))
+        for i in range(len(x)):
+            made = make_gains(self.law, {gain: values[i] for gain, values in gains.items()})
+            rates[i] = sampled_rate(body_gains(made, self.model)[0], M)[0]
+        return np.log(self.fastest / rates)
+
+    def at_bound(self, x: np.ndarray) -> dict[str, str]:
+        """Coordinates of a point (n,) that lie on a bound of the search: 'lower' or 'upper'."""
+        near = EDGE * (self.high - self.low)
+        sides = np.where(
+            x <= self.low + near, 'lower', np.where(x >= self.high - near, 'upper', '')
+        )
+        return {name: str(side) for name, side in zip(self.names, sides, strict=True) if side}
+
+    def entry(self, x: np.ndarray) -> dict[str, Any]:
+        """Law and gains of one point (n,) as a scenario file gives them."""
+        return {'law': self.law, **{k: v[0].tolist() for k, v in self.gains(x[None]).items()}}
+
+    def nearest(self, gains: Mapping[str, Any]) -> np.ndarray:
+        """(n,) point next to gains as a scenario file gives them.
+
+        The diagonals are what is compared; a gain that is absent, or not positive, stands in the
+        middle.
+        """
+        parts: list[float] = []
+        for gain, basis in self.basis.items():
+            at = slice(len(parts), len(parts) + (6 if self.structure == 'diagonal' else 1))
+            middle = (self.low[at] + self.high[at]) / 2
+            diagonal = np.diagonal(matrix6(gains.get(gain, 0.0)))
+            if not np.all(diagonal > 0):
+                parts += middle.tolist()
+                continue
+            per_axis = np.log(diagonal / np.diagonal(matrix6(basis)))
+            parts += per_axis.tolist() if len(middle) == 6 else [per_axis.mean()]
+        return np.clip(parts, self.low, self.high)
+
+
+def make_space(
+    law: str, structure: str, model: ControlModel, step: float, fastest: float
+) -> GainSpace:
+    """Space of a law's gains.
+
+    Parameters
+    ----------
+    law : one of `LAWS`
+    structure : a key of `STRUCTURES`
+    model : ControlModel of the vehicle
+    step : s; no gain that is a rate is searched above 1/step
+    fastest : rate that the velocity loop may have, 1/s
+
+    Returns
+    -------
+    space : GainSpace
+
+    """
+    M = np.reshape(model.dynamics.M, (6, 6))
+    inertia = np.diagonal(M)
+    names, low, high, basis = [], [], [], {}
+    for gain, about in searched(step)[law].items():
+        matrix, smallest, largest = _scale(structure, M, inertial=about.inertial)
+        basis[gain] = matrix
+        if structure == 'diagonal':
+            size = inertia if about.inertial else np.ones(6)
+            names += [f'{gain}.{dof}' for dof in DOFS]
+            low += np.log(about.low * size).tolist()
+            high += np.log(about.high * size).tolist()
+        else:
+            names.append(gain)
+            low.append(np.log(about.low * smallest))
+            high.append(np.log(about.high * largest))
+    return GainSpace(
+        law, structure, tuple(names), np.array(low), np.array(high), basis, model, fastest
+    )
+
+
+def _scale(structure: str, M: np.ndarray, *, inertial: bool) -> tuple[np.ndarray, float, float]:
+    """What a coordinate multiplies, and by how much its bounds grow."""
+    inertia = np.diagonal(M)
+    if inertial and structure == 'mass':
+        return inertia.copy(), 1.0, 1.0
+    if inertial and structure == 'inertia':
+        return M.copy(), 1.0, 1.0
+    if inertial and structure == 'scalar':
+        return np.array(1.0), float(inertia.min()), float(inertia.max())
+    return np.array(1.0), 1.0, 1.0
+
+
+def starts_of(space: GainSpace, scenario: Scenario, reference: str) -> list[np.ndarray]:
+    """Two points, whatever the law: next to the reference's gains, and the middle of the space."""
+    gains = scenario.gain_values(reference)
+    if scenario.controller(reference)['law'] != space.law:
+        K_D, K_f = (np.diagonal(K) for K in body_gains(scenario.gains(reference), space.model))
+        inertia = np.diagonal(np.reshape(space.model.dynamics.M, (6, 6)))
+        unit = inertia if space.law == 'gvc' else 1.0  # GVC multiplies its gains by M itself
+        shared = {k: v for k, v in gains.items() if k in ('k_I', 'Lambda')}
+        fast = 'k_P' if space.law == 'pid' else 'k_D'
+        gains = {fast: (K_D / unit).tolist(), 'Gamma': (K_f / unit).tolist(), **shared}
+    return [space.nearest(gains), (space.low + space.high) / 2]

@@ -1,0 +1,282 @@
+"""Results of a tuning: tuned laws, Monte Carlo and paired comparisons, as JSON and Parquet."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from pyarrow import parquet
+
+from auv_analysis.metrics.authority import beyond_authority
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.studies.pairs import Pairs, holm, log_ratios, paired
+from auv_analysis.studies.tune.cost import MEANINGS, Measures
+from auv_analysis.studies.tune.gain_space import STRUCTURES, searched
+from auv_analysis.studies.tune.perturbations import Spread, applicable
+from auv_analysis.studies.tune.search import Goal, Request, TunedLaw
+
+SEARCH, MONTE_CARLO = 'search.parquet', 'monte_carlo.parquet'
+COMPARED = ('weighted_error', 'error', 'effort', 'late_error', 'settling')
+LEVEL = 0.05  # of Holm's p below which a difference is called one
+QUANTILES = {'q05': 0.05, 'q25': 0.25, 'median': 0.5, 'q75': 0.75, 'q95': 0.95}
+
+
+@dataclass(frozen=True)
+class Comparison(Pairs):
+    """A controller against another one in one measure, over the same draws; ratios of `Pairs`.
+
+    Attributes
+    ----------
+    controller, against : their names
+    measure : one of `COMPARED`
+    draws : number of pairs
+    p_holm : p after Holm's correction for all comparisons of the document
+
+    """
+
+    controller: str
+    against: str
+    measure: str
+    draws: int
+    p_holm: float
+
+    @property
+    def verdict(self) -> int:
+        """-1 smaller, 1 larger, 0 no difference that the test tells from chance."""
+        return 0 if self.p_holm >= LEVEL else int(np.sign(self.effect))
+
+
+def compare(found: Mapping[str, Measures], pairs: Iterable[tuple[str, str]]) -> list[Comparison]:
+    """Compare pairs of controllers in every measure that exists, of a loop in a draw at least.
+
+    Parameters
+    ----------
+    found : controller -> Measures of (n,), row i of all of the same draw
+    pairs : (controller, against)
+
+    Returns
+    -------
+    comparisons : corrected for their number
+
+    """
+    known = [
+        measure
+        for measure in COMPARED
+        if any(np.isfinite(getattr(measures, measure)).any() for measures in found.values())
+    ]
+    names = [(a, b, measure) for a, b in pairs for measure in known]
+    ratios = [log_ratios(getattr(found[a], m), getattr(found[b], m)) for a, b, m in names]
+    rows = [paired(d) for d in ratios]
+    adjusted = holm([row.p for row in rows])
+    return [
+        Comparison(**asdict(row), controller=a, against=b, measure=m, draws=len(d), p_holm=p)
+        for row, (a, b, m), d, p in zip(rows, names, ratios, adjusted, strict=True)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Tuning:
+    """All that a tuning gave.
+
+    Attributes
+    ----------
+    request, goal : what was asked, and the reference's measures
+    scenario : with the scenario's own controllers and the tuned ones
+    laws : name in that scenario -> tuned law
+    nominal : controller -> measures (1,) in the scenario itself
+    deviation : largest relative difference of these to the same from `simulate`
+    commands : controller -> largest magnitudes (6,) of its command, N and N m; not of diverged ones
+    spread : of the draws
+    draws : controller -> measures (n,), row i of the same draw; empty without Monte Carlo
+
+    """
+
+    request: Request
+    goal: Goal
+    scenario: Scenario
+    laws: Mapping[str, TunedLaw]
+    nominal: Mapping[str, Measures]
+    deviation: float
+    commands: Mapping[str, np.ndarray]
+    spread: Spread
+    draws: Mapping[str, Measures]
+
+    @property
+    def retuned(self) -> str | None:
+        """Name of the reference's own law with searched gains; None where it is no shipped law."""
+        law = self.scenario.controller(self.request.reference)['law']
+        return next((name for name, tuned in self.laws.items() if tuned.law == law), None)
+
+    @cached_property
+    def comparisons(self) -> list[Comparison]:
+        """Each controller against the reference, each tuned law against the reference's own."""
+        reference, own = self.request.reference, self.retuned
+        pairs = [(name, reference) for name in self.scenario.controllers if name != reference]
+        if own is not None:
+            pairs += [(name, own) for name in self.laws if name != own]
+        return compare(self.draws, pairs) if self.draws else []
+
+    def ratio(self, name: str, measure: str) -> float:
+        """A measure of a controller in the scenario itself, to the reference's."""
+        value, base = (getattr(self.nominal[n], measure)[0] for n in (name, self.request.reference))
+        return float(value / base)
+
+    def remarks(self, name: str) -> list[str]:
+        """What a reader of a controller's numbers must know, a phrase each."""
+        found = []
+        if name in self.laws:
+            found += self.laws[name].remarks(self.scenario.duration)
+        if name in self.commands:
+            found += beyond_authority(self.scenario.vehicle, self.commands[name].tolist())
+        return found
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """Contents of `tune.json`, without the sentences."""
+        request = self.request
+        names = list(self.scenario.controllers)
+        document: dict[str, Any] = {
+            'scenario': request.scenario.name,
+            'vehicle': request.scenario.vehicle.name,
+            'reference': request.reference,
+            'equal': request.equal,
+            'index': request.index,
+            'tolerance': request.tolerance,
+            'structure': request.structure,
+            'hold': request.hold,
+            'seed': request.seed,
+            'measures': {name: asdict(meaning) for name, meaning in MEANINGS.items()},
+            'controllers': {name: self._controller(name) for name in names},
+            'validation': {'largest_relative_deviation': self.deviation},
+            'monte_carlo': None,
+        }
+        if self.draws:
+            document['monte_carlo'] = {
+                'samples': len(self.draws[request.reference].error),
+                'spread': applicable(self.spread, request.scenario.vehicle),
+                'controllers': {name: _distribution(self.draws[name]) for name in names},
+                'comparisons': [
+                    asdict(c) | {'verdict': c.verdict} for c in self.comparisons
+                ],
+            }  # fmt: skip
+        return document
+
+    def _controller(self, name: str) -> dict[str, Any]:
+        entry = self.scenario.controller(name)
+        found: dict[str, Any] = {
+            'law': entry['law'],
+            'tuned': name in self.laws,
+            'gains': self.scenario.gain_values(name),
+            'measures': plain(self.nominal[name]),
+            'equality': self._equality(name),
+            'remarks': self.remarks(name),
+        }
+        if name not in self.laws:
+            return found
+        tuned = self.laws[name]
+        return found | {
+            'structure': tuned.best.space.structure,
+            'structure_means': STRUCTURES[tuned.best.space.structure],
+            'at_bound': tuned.best.space.at_bound(tuned.best.x),
+            'reached': tuned.best.reached,
+            'price': tuned.best.price,
+            'evaluations': sum(len(s.points) for s in tuned.searches),
+            'searches': [
+                {
+                    'structure': s.space.structure,
+                    'reached': s.reached,
+                    'evaluations': len(s.points),
+                    'searched': self._bounds(s.space.law),
+                    'measures': plain(s.measures),
+                }
+                for s in tuned.searches
+            ],
+        }
+
+    def _equality(self, name: str) -> float | None:
+        """Relative distance of the measure that is made equal from the reference's."""
+        same = self.goal.names[1]
+        distance = self.ratio(name, same) - 1.0
+        return distance if np.isfinite(distance) else None
+
+    def _bounds(self, law: str) -> dict[str, Any]:
+        gains = searched(self.request.scenario.step)[law]
+        return {
+            gain: {'low': about.low, 'high': about.high, 'times_inertia': about.inertial}
+            for gain, about in gains.items()
+        }
+
+
+def plain(measures: Measures) -> dict[str, float | None]:
+    """Measures (1,) as numbers; None for what diverged or does not settle."""
+    values = {name: float(getattr(measures, name)[0]) for name in Measures._fields}
+    return {name: value if np.isfinite(value) else None for name, value in values.items()}
+
+
+def _distribution(draws: Measures) -> dict[str, Any]:
+    """Quantiles of each measure, a loop that diverged or does not settle above all others."""
+    diverged = np.isnan(draws.error)
+    found: dict[str, Any] = {
+        'diverged': float(diverged.mean()),
+        'settled': float(np.isfinite(draws.settling).mean()),
+    }
+    for name in Measures._fields:
+        values = np.nan_to_num(getattr(draws, name), nan=np.inf, posinf=np.inf)
+        at = np.quantile(values, list(QUANTILES.values()), method='higher')
+        found[name] = {
+            key: float(q) if np.isfinite(q) else None for key, q in zip(QUANTILES, at, strict=True)
+        }
+    return found
+
+
+def write_search(path: Path, laws: Mapping[str, TunedLaw]) -> None:
+    """Write a row for every point that was evaluated.
+
+    Parameters
+    ----------
+    path : of the file; columns controller, law, structure, stage, diverged, allowed (its velocity
+        loop is slow enough for the control period), the measures, then what was searched: a gain
+        as the law takes it or, where the structure is a matrix times a number, that number
+
+    """
+    tables = []
+    for name, tuned in laws.items():
+        for one in tuned.searches:
+            columns: dict[str, object] = {
+                'controller': [name] * len(one.points),
+                'law': [tuned.law] * len(one.points),
+                'structure': [one.space.structure] * len(one.points),
+                'stage': one.stages.tolist(),
+                'diverged': np.isnan(one.evaluations.error),
+                'allowed': one.margins >= 0.0,
+                **_columns(one.evaluations),
+            }
+            gains = np.exp(one.points.T)
+            columns |= {f'gain.{n}': x for n, x in zip(one.space.names, gains, strict=True)}
+            tables.append(pa.table(columns))
+    parquet.write_table(pa.concat_tables(tables, promote_options='default'), path)
+
+
+def write_draws(path: Path, draws: Mapping[str, Measures]) -> None:
+    """Write a row per draw and controller: draw, controller, diverged, the measures."""
+    tables = [
+        pa.table({
+            'draw': np.arange(len(measures.error)),
+            'controller': [name] * len(measures.error),
+            'diverged': np.isnan(measures.error),
+            **_columns(measures),
+        })
+        for name, measures in draws.items()
+    ]  # fmt: skip
+    parquet.write_table(pa.concat_tables(tables), path)
+
+
+def _columns(measures: Measures) -> dict[str, pa.Array]:
+    """The measures; null for what diverged or does not settle."""
+    return {
+        name: pa.array(values, pa.float64(), mask=~np.isfinite(values))
+        for name, values in measures._asdict().items()
+    }

@@ -1,0 +1,354 @@
+"""What `auv design` proposes, says and writes, and that a fresh run gives just these numbers."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+from pages import check_numbers
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.output.folder import Results
+from auv_analysis.studies.design import search
+from auv_analysis.studies.design.change import NAMES, semi_axes
+from auv_analysis.studies.design.couplings import COUPLINGS, coupling_named
+from auv_analysis.studies.design.printed import change, print_design
+from auv_analysis.studies.design.report import write_report
+from auv_analysis.studies.design.results import (
+    bound_warnings,
+    place_warnings,
+    side_effect_warnings,
+    side_effects,
+    warnings_of,
+    write_results,
+)
+from auv_analysis.studies.design.search import propose
+from auv_analysis.studies.design.setting import open_setting
+from auv_analysis.studies.design.vehicle_file import change_words
+from auv_dynamics import InputError, load_vehicle
+from auv_dynamics.files.shipped import shipped
+
+SHORT = """
+name: short
+vehicle: herman2018
+duration: 3.0
+step: 0.01
+controllers:
+  soft: {law: cl, k_D: 12, k_I: 1, Lambda: 0.8, Gamma: 60}
+  firm: {law: gvc, k_D: 12, k_I: 1, Lambda: 0.8, Gamma: 60}
+setpoint:
+  surge: {offset: 0.3}
+  heave: {offset: 0.2}
+  yaw: {offset: 0.1}
+disturbance: {kind: herman2018}
+"""
+
+
+@pytest.fixture(autouse=True)
+def only_the_target(monkeypatch):
+    """The remedies against the other couplings, and many starts, take most of the time."""
+    monkeypatch.setattr(search, 'MOST', 1)
+    monkeypatch.setattr(search, 'STARTS', 1)
+
+
+@pytest.fixture
+def short(tmp_path):
+    path = tmp_path / 'short.yaml'
+    path.write_text(SHORT)
+    return str(path)
+
+
+def designed(vehicle, tmp_path, scenario=None, reduce=None, own=()):
+    out = tmp_path / 'out'
+    out.mkdir()
+    found = propose(open_setting(vehicle, scenario, own), reduce)
+    return write_results(found, Results(out, out)), out
+
+
+def by_name(document):
+    return {row['name']: row for row in document['measures']}
+
+
+@pytest.mark.parametrize('name', ['rexrov', 'herman2018', 'bluerov2', 'girona500'])
+def test_the_largest_coupling_is_halved_and_a_fresh_run_says_so(name, tmp_path):
+    result, out = designed(name, tmp_path)
+    document = result.document
+    first = document['ranking'][0]
+    assert document['reduce'] == first['coupling'] == 'delta_pi.pitch'
+    assert first['share']['before'] == max(row['share']['before'] for row in document['ranking'])
+    row = by_name(document)['delta_pi_max.pitch']
+    assert row['after'] <= 0.5 * row['before']
+    assert document['halved'] is True
+
+    scenario = load_scenario(out / 'scenario.yaml')
+    for controller in scenario.controllers:
+        summary = summarize(simulate(scenario, controller))
+        before = summarize(simulate(result.proposal.setting.scenario, controller))
+        rows = document['controllers'][controller]['measures']
+        assert rows
+        for row in rows:
+            assert row['after'] == figure(summary, row['name']), row['name']
+            assert row['before'] == figure(before, row['name']), row['name']
+        kept = json.loads((out / 'summary_before.json').read_text())[controller]
+        assert kept == json.loads(json.dumps(before))
+    assert document['measures'] == document['controllers']['gvc']['measures']
+
+    proposed = [one for one in document['alternatives'] if one['proposed']]
+    assert len(proposed) == 1
+    assert proposed[0]['predicted'] == pytest.approx(proposed[0]['ratio'], abs=0.02)
+    for one, parameter in zip(document['parameters'], NAMES, strict=True):
+        assert one['name'] == parameter
+        if one['value'] is not None:
+            assert one['lower'] <= one['value'] <= one['upper']
+    assert json.loads((out / 'design.json').read_text()) == json.loads(json.dumps(document))
+
+
+def figure(summary, name):
+    """A measure in a summary, looked up by its name."""
+    *group, dof = name.split('.')
+    if name == 'kinetic_energy.mean':
+        return summary['kinetic_energy']['mean']
+    i = ['surge', 'sway', 'heave', 'roll', 'pitch', 'yaw'].index(dof)
+    keys = ['coupling', *group] if name.startswith('delta') else group
+    value = summary
+    for key in keys:
+        value = value[key]
+    return value[i]
+
+
+def test_case1_of_the_paper_is_the_setting_of_its_vehicle(tmp_path):
+    setting = open_setting('herman2018', None)
+    assert setting.scenario.name == 'case1'
+    assert setting.scenario.data['setpoint'] == load_scenario('case1').data['setpoint']
+    other = open_setting('rexrov', None).scenario
+    shipped_one = load_scenario('case1_rexrov')
+    assert {**other.data, 'vehicle': 0} == {**shipped_one.data, 'vehicle': 0}
+
+
+@pytest.mark.parametrize('name', ['lauv', 'bluerov2_heavy', 'lrauv_tethys'])
+@pytest.mark.parametrize('reduce', [None, 'delta_xi.sway'])
+def test_a_diagonal_M_has_nothing_to_remove(name, reduce, tmp_path):
+    result, out = designed(name, tmp_path, reduce=reduce)
+    assert result.document['measures'] == []
+    assert 'M is diagonal' in result.document['statement']
+    assert (out / 'vehicle.yaml').read_text() == shipped('vehicles', name).read_text()
+    assert write_report(result, out).is_file()
+
+
+def test_a_structural_zero_is_told(short, tmp_path):
+    result, _ = designed('herman2018', tmp_path, short, 'delta_pi.heave')
+    assert result.document['measures'] == []
+    statement = result.document['statement']
+    assert 'delta_pi.heave is zero in every motion by the structure of M' in statement
+    assert 'delta_pi.pitch' in statement
+
+
+def test_a_coupling_that_the_scenario_does_not_move_is_told(tmp_path):
+    path = tmp_path / 'rest.yaml'
+    path.write_text(
+        'name: rest\nvehicle: girona500\nduration: 0.5\nstep: 0.01\nsetpoint: {}\n'
+        'controllers: {gvc: {law: gvc, k_D: 12, k_I: 1, Lambda: 0.8, Gamma: 60}}\n'
+    )
+    data = yaml.safe_load(shipped('vehicles', 'girona500').read_text())
+    data['hydrostatics']['volume'] = data['rigid_body']['mass'] / 1000.0
+    (tmp_path / 'v.yaml').write_text(yaml.safe_dump(data))
+    result, _ = designed(str(tmp_path / 'v.yaml'), tmp_path, str(path))
+    assert result.document['measures'] == []
+    assert 'zero throughout this scenario' in result.document['statement']
+
+
+def test_the_scenario_keeps_its_own_controllers(short, tmp_path):
+    result, out = designed('rexrov', tmp_path, short, 'delta_xi.surge')
+    document = result.document
+    assert (document['scenario'], document['controller']) == ('short', 'firm')
+    assert set(document['controllers']) == {'soft', 'firm'}
+    assert document['reduce'] == 'delta_xi.surge'
+    row = by_name(document)['delta_xi_max.surge']
+    assert row['after'] < row['before']
+    assert row['unit'] == 'm/s'
+    data = yaml.safe_load((out / 'scenario.yaml').read_text())
+    assert (data['name'], data['vehicle']) == ('short_changed', 'vehicle.yaml')
+    assert load_scenario(out / 'scenario.yaml').vehicle.name == 'design_rexrov'
+
+
+def test_a_sampled_scenario_with_a_set_point_of_its_own(tmp_path):
+    rows = ''.join(f'{t},{0.3},0,{0.1 * t},0,0,0.05\n' for t in (0.0, 1.0, 2.0))
+    (tmp_path / 'way.csv').write_text(f't,surge,sway,heave,roll,pitch,yaw\n{rows}')
+    data = yaml.safe_load(SHORT)
+    data |= {'setpoint': {'file': 'way.csv'}, 'duration': 2.0, 'sensors': {'velocity_noise': 1e-4}}
+    del data['controllers']['soft']
+    (tmp_path / 's.yaml').write_text(yaml.safe_dump(data))
+    result, out = designed('rexrov', tmp_path, str(tmp_path / 's.yaml'))
+    assert result.document['hold'] == 'zoh'
+    assert (out / 'setpoint.csv').read_text() == (tmp_path / 'way.csv').read_text()
+    summary = summarize(simulate(load_scenario(out / 'scenario.yaml'), 'firm', 'zoh'))
+    for row in result.document['measures']:
+        assert row['after'] == figure(summary, row['name'])
+
+
+@pytest.mark.parametrize(
+    ('share', 'words'), [(0.02, 'The bounds do not allow half'), (0.0, 'No change within')]
+)
+def test_bounds_that_do_not_allow_half_are_told(share, words, short, tmp_path):
+    setting = open_setting('rexrov', short)
+    own = []
+    for one in setting.space.parameters:
+        if one.name.startswith('shift') or one.name in ('ballast.mass', 'disc.radius'):
+            own.append((one.name, share * one.lower, share * one.upper))
+    result, _ = designed('rexrov', tmp_path, short, 'delta_pi.pitch', own)
+    document = result.document
+    assert words in document['statement']
+    assert document['halved'] is False
+    row = by_name(document)['delta_pi_max.pitch']
+    assert (row['after'] < row['before']) == (share > 0)
+    assert f'{100 * (1 - row["after"] / row["before"]):.1f} %' in document['statement'] or not share
+
+
+def test_the_same_input_gives_the_same_proposal(short):
+    first, second = (propose(open_setting('herman2018', short), None) for _ in range(2))
+    assert first.best.x.tolist() == second.best.x.tolist()
+    assert first.best.ratio == second.best.ratio
+
+
+def test_a_part_that_is_held_is_not_changed(short, tmp_path):
+    own = [('ballast.mass', 0.0, 0.0), ('disc.radius', 0.0, 0.0), ('shift.x', 0.0, 0.05)]
+    result, _ = designed('rexrov', tmp_path, short, None, own)
+    assert set(result.document['proposal']['parts']) <= {'shift'}
+    assert result.proposal.best.x[0] >= 0
+
+
+@pytest.mark.parametrize(
+    ('own', 'match'),
+    [
+        (('shift.q', 0, 1), 'shift.q'),
+        (('shift.x', 0.1, 0.2), 'bounds with 0 between them'),
+        (('shift.x', 1.0, -1.0), 'ascending'),
+        (('ballast.x', float('nan'), 1.0), 'two numbers'),
+        (('ballast.mass', 1.0, 2.0), 'expected 0:UPPER'),
+    ],
+)
+def test_wrong_bounds_are_refused(own, match):
+    with pytest.raises(InputError, match=match):
+        open_setting('rexrov', None, [own])
+
+
+def test_bounds_of_ones_own():
+    space = open_setting('rexrov', None, [('ballast.mass', 0.0, 12.5)]).space
+    lower, upper = space.bounds
+    assert (lower[3], upper[3]) == (0.0, 12.5)
+    assert 'as asked for' in {one.reason for one in space.parameters}
+
+
+def test_an_unknown_coupling_is_refused_with_those_that_exist():
+    with pytest.raises(InputError, match=r'one of delta_xi\.surge .*, found delta_xi\.sideways'):
+        coupling_named('delta_xi.sideways', ['delta_xi.surge'])
+    assert coupling_named('delta_pi_max.pitch', []) == 'delta_pi.pitch'
+
+
+def test_the_report_and_its_numbers(short, tmp_path, capsys):
+    result, out = designed('rexrov', tmp_path, short)
+    page = write_report(result, out).read_text(encoding='utf-8')
+    for word in ('delta_pi.pitch', 'Which change removes which coupling', 'vehicle_before.yaml'):
+        assert word in page
+    for name in ('couplings', 'reduced', 'Upsilon'):
+        for ending in ('png', 'pdf'):
+            assert (out / 'figures' / f'{name}.{ending}').stat().st_size > 1000
+    assert check_numbers(out) > 100
+    document = json.loads((out / 'design.json').read_text())
+    print_design(document)
+    printed = capsys.readouterr().out
+    assert document['statement'] in printed
+    assert 'delta_pi_max.pitch' in printed
+
+
+def test_a_vehicle_that_rights_itself_less_is_warned_of():
+    vehicle = load_vehicle('rexrov')
+    worse = replace(vehicle, r_G=np.array([0.05, 0.0, -0.1]))
+    upside = replace(vehicle, r_G=np.array([0.0, 0.0, -0.5]))
+    assert warnings_of(vehicle, vehicle) == []
+    falls, tilts = warnings_of(vehicle, worse)
+    assert 'falls from 5561 to 3734 N m' in falls.replace('\u202f', '')
+    assert 'tilts by' in tilts
+    assert warnings_of(vehicle, upside) == ['the changed vehicle is statically unstable']
+
+
+def test_what_lies_on_a_bound_or_outside_the_hull_is_warned_of():
+    space = open_setting('rexrov', None).space
+    axes, _ = semi_axes(space.vehicle, space.data)
+    inside = space.unchanged.copy()
+    inside[7:11] = (0.2, *space.vehicle.r_B)
+    corner = inside.copy()
+    corner[8:11] += 0.9 * axes
+    assert place_warnings(space, inside) == []
+    (text,) = place_warnings(space, corner)
+    assert text.startswith('the disc is placed outside the hull')
+    rows = [{'name': 'disc.x', 'value': -1.135, 'unit': 'm', 'at_bound': 'lower'},
+            {'name': 'disc.y', 'value': 0.1, 'unit': 'm', 'at_bound': None}]  # fmt: skip
+    assert 'disc.x = −1.135 m (lower)' in bound_warnings(rows)[0]
+    assert bound_warnings(rows[1:]) == []
+
+
+def test_what_grows_beside_the_target_is_named_however_small_its_share():
+    def row(name, before, after, unit='N m'):
+        return {'name': name, 'unit': unit, 'before': before, 'after': after}
+
+    rows = [
+        row('delta_pi_max.pitch', 4000.0, 4800.0),
+        row('delta_pi_max.yaw', 10.0, 38.4),
+        row('delta_pi_max.roll', 50.0, 54.0),
+        row('delta_pi_max.sway', 1e-12, 1e-9, 'N'),
+        row('delta_pi_max.heave', 0.0, 3.0, 'N'),
+        row('kinetic_energy.shares_percent.roll', 1.0, 5.0, '%'),
+        row('velocity_error.max_after_2s.roll', None, None, 'rad/s'),
+    ]
+    found = {one['name']: one['percent'] for one in side_effects(rows, 'delta_pi.pitch')}
+    assert found == {'delta_pi_max.heave': None, 'delta_pi_max.yaw': pytest.approx(284.0)}
+    (text,) = side_effect_warnings(side_effects(rows, 'delta_pi.pitch'))
+    assert '10.0 to 38.4 N m (+284 %)' in text
+
+
+def test_a_change_in_words():
+    space = open_setting('rexrov', None).space
+    x = space.unchanged.copy()
+    x[:3] = (0.1, -0.02, 0.03)
+    assert change_words(space, x) == [
+        'move the centre of gravity 0.1 m forward, 0.02 m to port and 0.03 m down'
+    ]
+    x[3], x[7], x[12] = 10.0, 0.2, -90.0
+    _, ballast, disc = change_words(space, x)
+    assert (
+        ballast
+        == 'add 10.0 kg of ballast at the reference point, trimmed by foam at the same place'
+    )
+    assert disc == (
+        'fit a thin circular plate of 0.400 m diameter, at the reference point, facing down '
+        '(21.9 kg of added mass)'
+    )
+    x[8:13] = (-1.135, 0.2, -0.1, 0.0, 69.0)
+    plate = change_words(space, x)[2]
+    assert (
+        ' 1.135 m aft, 0.2 m to starboard and 0.1 m above, seen from the reference point' in plate
+    )
+    assert 'facing down, turned 21.0° forward, its normal (0.358, 0, 0.934)' in plate
+
+
+@pytest.mark.parametrize(
+    ('before', 'after', 'text'),
+    [
+        (2.0, 1.0, '−50.0 %'),
+        (1.0, 2.5, '+150.0 %'),
+        (1.0, 1.0001, '0.0 %'),
+        (0.0, 1.0, 'new'),
+        (1.0, 1.0, '='),
+        (0.0, 0.0, '='),
+        (None, 1.0, ''),
+    ],
+)
+def test_a_change_in_per_cent(before, after, text):
+    assert change(before, after) == text
+
+
+def test_the_couplings_are_named_like_the_summary():
+    assert COUPLINGS[1] == 'delta_xi.sway'
+    assert len(COUPLINGS) == 12

@@ -1,0 +1,157 @@
+"""A changed vehicle file is the vehicle that the search had in mind, and a vehicle that loads."""
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from strategies import QUICK, vectors, vehicles
+
+from auv_analysis.studies.design.change import NAMES, ChangeSpace, rounded
+from auv_analysis.studies.design.vehicle_file import changed_data, changed_text
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import parse_yaml, read_yaml
+from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
+
+FORMS = ('cg', 'co', 'M')
+SHIPPED = sorted(path.stem for path in shipped('vehicles', 'rexrov').parent.glob('*.yaml'))
+
+
+def in_form(data, form):
+    """The same vehicle, its inertia given in another way."""
+    body = dict(data['rigid_body'])
+    r, vehicle = np.array(body['center_of_gravity']), vehicle_from_dict(data, 'x')
+    if form == 'co':
+        moved = body['mass'] * (r @ r * np.eye(3) - np.outer(r, r))
+        body |= {'inertia': (np.array(body['inertia']) + moved).tolist(), 'inertia_reference': 'co'}
+    if form == 'M':
+        body = {key: body[key] for key in ('mass', 'center_of_gravity')}
+        rest = {key: value for key, value in data.items() if key != 'added_mass'}
+        return {**rest, 'rigid_body': body, 'inertia_matrix': vehicle.M.tolist()}
+    return {**data, 'rigid_body': body}
+
+
+def within(space, unit):
+    """Change at a place (13,) in the unit cube, as a proposal would round it."""
+    lower, upper = space.bounds
+    return rounded(lower + unit * (upper - lower), space)
+
+
+def change_at(space, **values):
+    x = space.unchanged.copy()
+    for name, value in values.items():
+        x[NAMES.index(name.replace('_', '.'))] = value
+    return x
+
+
+@QUICK
+@given(vehicles(), st.sampled_from(FORMS), vectors(13, 0.5))
+def test_the_file_is_the_vehicle_of_the_search(data, form, unit):
+    data = in_form(data, form)
+    space = ChangeSpace.of(data, 'x')
+    x = within(space, unit + 0.5)
+    before, after = space.vehicle, vehicle_from_dict(changed_data(space, x), 'x')
+    change = space.effect(x)
+    assert_allclose(after.M, before.M + change.M, atol=1e-9 * np.abs(after.M).max())
+    D = after.D_quadratic - before.D_quadratic
+    assert_allclose(D, np.diag(change.drag), atol=1e-9 * np.abs(after.D_quadratic).max())
+    assert_allclose(after.D_linear, before.D_linear)
+    balance = 1e-9 * before.weight
+    assert after.weight - after.buoyancy == pytest.approx(
+        before.weight - before.buoyancy, abs=balance
+    )
+    couples = [v.weight * v.r_G - v.buoyancy * v.r_B for v in (before, after)]
+    assert_allclose(couples[1] - couples[0], change.couple, atol=balance)
+
+
+@QUICK
+@given(vehicles(), vectors(3, 0.5), vectors())
+def test_a_moved_centre_of_gravity_keeps_the_inertia_about_it(data, unit, nu):
+    """Kinetic energy of the rigid body: that of its centre, and that of turning about it."""
+    space = ChangeSpace.of(data, 'x')
+    whole = np.full(13, 0.5)
+    whole[:3] += unit
+    x = np.where(np.arange(13) < 3, within(space, whole), 0.0)
+    after = vehicle_from_dict(changed_data(space, x), 'x')
+    v = nu[:3] + np.cross(nu[3:], space.vehicle.r_G + x[:3])
+    turning = nu[3:] @ np.array(data['rigid_body']['inertia']) @ nu[3:]
+    energy = space.mass * v @ v + turning
+    assert nu @ after.M_RB @ nu == pytest.approx(energy, rel=1e-9, abs=1e-9 * space.mass)
+
+
+@pytest.mark.parametrize('name', SHIPPED)
+def test_shipped_vehicles_change_and_load_again(name, tmp_path):
+    path = shipped('vehicles', name)
+    space = ChangeSpace.of(read_yaml(path, 'vehicle'), path)
+    x = within(space, np.full(13, 0.9))
+    data = changed_data(space, x, 'words')
+    text = changed_text(data, f'{name}\nin two lines')
+    assert text.startswith(f'# {name}\n# in two lines\n')
+    (tmp_path / 'v.yaml').write_text(text, encoding='utf-8')
+    vehicle = load_vehicle(tmp_path / 'v.yaml')
+    assert vehicle.name == f'design_{name}'
+    assert vehicle.source.startswith(space.vehicle.source)
+    assert vehicle.source.endswith('changed by auv design: words')
+    assert np.array_equal(vehicle.M, vehicle_from_dict(data, 'x').M)
+    assert parse_yaml(text, 'x', 'vehicle') == data
+
+
+@pytest.mark.parametrize('form', FORMS)
+def test_only_what_changes_is_written_anew(form):
+    data = in_form(read_yaml(shipped('vehicles', 'rexrov'), 'vehicle'), form)
+    space = ChangeSpace.of(data, 'x')
+    assert changed_data(space, space.unchanged) == data
+    shifted = changed_data(space, change_at(space, shift_x=0.1))
+    assert shifted['rigid_body']['center_of_gravity'] == [0.1, 0.0, 0.0]
+    for key in ('hydrostatics', 'damping', 'environment'):
+        assert shifted[key] == data[key]
+    assert shifted['rigid_body'].get('inertia') == data['rigid_body'].get('inertia') or form == 'co'
+    dense = changed_data(space, change_at(space, disc_radius=0.2, disc_x=-1.0))
+    assert dense['rigid_body'] == data['rigid_body']
+    assert np.shape(dense['damping']['quadratic']) == (6,)
+
+
+def test_the_stability_that_must_be_left_is_left():
+    for name in SHIPPED:
+        path = shipped('vehicles', name)
+        space = ChangeSpace.of(read_yaml(path, 'vehicle'), path)
+        x = change_at(space, shift_z=space.bounds[0][2])
+        couples = [
+            vehicle.weight * vehicle.r_G[2] - vehicle.buoyancy * vehicle.r_B[2]
+            for vehicle in (space.vehicle, vehicle_from_dict(changed_data(space, x), 'x'))
+        ]
+        assert couples[1] >= 0.5 * couples[0] * (1 - 1e-9)
+
+
+def test_foam_carries_the_ballast():
+    data = yaml.safe_load(shipped('vehicles', 'bluerov2').read_text())
+    space = ChangeSpace.of(data, 'x')
+    after = changed_data(space, change_at(space, ballast_mass=0.5, ballast_x=0.1))
+    foam = after['hydrostatics']['volume'] - data['hydrostatics']['volume']
+    assert foam * space.density == pytest.approx(0.5)
+    assert after['rigid_body']['mass'] == pytest.approx(data['rigid_body']['mass'] + 0.5)
+
+
+def test_what_is_worse_at_rest():
+    space = ChangeSpace.of(read_yaml(shipped('vehicles', 'bluerov2'), 'vehicle'), 'x')
+    couple = space.vehicle.weight * space.vehicle.r_G - space.vehicle.buoyancy * space.vehicle.r_B
+    rights = couple[2]
+    assert rights > 0
+    assert space.hydrostatic_penalty(space.unchanged) == 0.0
+    for sign in (-1, 1):
+        for name in ('shift_x', 'shift_y'):
+            x = change_at(space, **{name: 0.01 * sign})
+            turned = (space.vehicle.weight * 0.01 / rights) ** 2
+            assert space.hydrostatic_penalty(x) == pytest.approx(turned, rel=1e-9)
+    assert space.hydrostatic_penalty(change_at(space, shift_z=0.01)) == 0.0
+    lost = space.hydrostatic_penalty(change_at(space, shift_z=-0.01))
+    assert lost == pytest.approx((space.vehicle.weight * 0.01 / rights) ** 2)
+    trimmed = change_at(space, ballast_mass=0.5, ballast_x=0.1, disc_radius=0.05)
+    assert space.hydrostatic_penalty(trimmed) == 0.0
+
+
+def test_a_vehicle_that_comes_nearer_to_level_is_better_at_rest():
+    space = ChangeSpace.of(read_yaml(shipped('vehicles', 'herman2018'), 'vehicle'), 'x')
+    aft, forward = (space.hydrostatic_penalty(change_at(space, shift_x=d)) for d in (-0.04, 0.04))
+    assert aft < 0 < forward

@@ -1,0 +1,114 @@
+"""Draws: physical, within their spread, and of seed and index alone."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import QUICK
+from tunings import GVC, SAME_CL, scenario
+
+from auv_analysis import load_scenario
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.studies.tune.perturbations import (
+    Perturbations,
+    Spread,
+    applicable,
+    monte_carlo,
+    perturbed,
+    spread_of,
+)
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import matrix6
+
+HERMAN = load_scenario('case1')
+REXROV = load_scenario('case1_rexrov')
+NONE = Spread(**dict.fromkeys(Spread.__dataclass_fields__, 0.0))
+
+
+def of_kind(scenario, kind):
+    return [spec for spec in scenario.data['disturbance'] if spec['kind'] == kind]
+
+
+@QUICK
+@given(seed=st.integers(0, 2**62), size=st.floats(0.01, 0.9))
+def test_relative_error_of_M_stays_within_its_size(seed: int, size: float) -> None:
+    found = perturbed(HERMAN, Spread(inertia=size, damping=size), seed, 0)
+    dM = np.array(of_kind(found, 'model_error')[0]['dM'])
+    L = np.linalg.cholesky(HERMAN.vehicle.M)
+    relative = np.linalg.eigvalsh(np.linalg.solve(L, np.linalg.solve(L, dM).T))
+    assert np.abs(relative).max() <= size * (1 + 1e-9)
+    assert np.abs(relative).max() > 0
+    D = HERMAN.vehicle.D_linear + matrix6(of_kind(found, 'model_error')[0]['dD'])
+    assert np.linalg.eigvalsh(D + D.T)[0] >= 0
+
+
+def test_drawn_numbers_fill_their_spread_on_either_side() -> None:
+    found = [of_kind(perturbed(REXROV, Spread(), 1, i), 'model_error')[0] for i in range(60)]
+    for name, largest in (
+        ('mass', 0.05),
+        ('added_mass', 0.2),
+        ('damping', 0.3),
+        ('buoyancy', 0.02),
+    ):
+        values = np.array([spec[name] for spec in found])
+        assert np.abs(values).max() <= largest
+        assert values.min() < -0.7 * largest
+        assert values.max() > 0.7 * largest
+    scales = [matrix6(of_kind(perturbed(REXROV, Spread(), 1, i), 'herman2018')[0]['scale'])
+              / matrix6(of_kind(REXROV, 'herman2018')[0]['scale']) for i in range(60)]  # fmt: skip
+    factors = np.array([np.nanmax(scale) for scale in scales])
+    assert 0.5 <= factors.min() < 0.65
+    assert 1.35 < factors.max() <= 1.5
+
+
+def test_draw_depends_on_seed_and_index_alone() -> None:
+    one = perturbed(REXROV, Spread(), 5, 3).data['disturbance']
+    assert perturbed(REXROV, Spread(), 5, 3).data['disturbance'] == one
+    assert perturbed(REXROV, Spread(), 5, 4).data['disturbance'] != one
+    assert perturbed(REXROV, Spread(), 6, 3).data['disturbance'] != one
+
+
+def test_without_spread_nothing_is_added() -> None:
+    assert perturbed(HERMAN, NONE, 0, 0).data['disturbance'] == [
+        {'kind': 'herman2018', 'exponent_sign': -1, 'scale': 1.0}
+    ]
+
+
+def test_own_harmonic_changes_size_and_phase(tmp_path) -> None:
+    base = scenario(tmp_path, {'gvc': GVC})
+    waves = [of_kind(perturbed(base, Spread(waves=0.0), 0, i), 'harmonic')[0] for i in range(4)]
+    sizes = [w['surge']['terms'][0]['amplitude'] / 9.0 for w in waves]
+    assert [w['surge']['offset'] / 5.0 for w in waves] == pytest.approx(sizes)
+    assert len({w['surge']['terms'][0]['phase'] for w in waves}) == 4
+
+
+def test_every_controller_meets_the_same_draws(tmp_path) -> None:
+    """Rows do not depend on which controllers are compared, nor on the order or the threads."""
+    both = scenario(tmp_path, {'gvc': GVC, 'again': GVC, 'cl': SAME_CL | {'k_D': 300.0}})
+    alone = changed_scenario(both, {'controllers': {'cl': both.controllers['cl']}})
+    found = monte_carlo(both, Perturbations(12, Spread(), 3), 'continuous', 2)
+    np.testing.assert_array_equal(found['gvc'], found['again'])
+    np.testing.assert_array_equal(
+        found['cl'], monte_carlo(alone, Perturbations(12, Spread(), 3), 'continuous', 1)['cl']
+    )
+    assert len(set(found['gvc'].error.tolist())) == 12
+
+
+def test_spread_of_the_command_line() -> None:
+    assert spread_of(['mass=0', 'waves=2.5']) == Spread(mass=0.0, waves=2.5)
+    assert 'inertia' not in applicable(Spread(), REXROV.vehicle)
+    assert applicable(Spread(), HERMAN.vehicle).keys() >= {'inertia', 'damping'}
+    for text, match in (
+        ('size=1', 'with NAME one of mass, added_mass'), ('mass', 'from 0 up below 1, found'),
+        ('mass=1', 'below 1, found 1'), ('current=-1', 'from 0 up, found -1'),
+        ('waves=nan', 'found nan'), ('current=inf', 'found inf'),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=match):
+            spread_of([text])
+
+
+def test_errors_that_leave_no_plant_are_one_line(tmp_path) -> None:
+    base = scenario(tmp_path, {'gvc': GVC},
+                    disturbance={'kind': 'model_error', 'mass': -0.99})  # fmt: skip
+    with pytest.raises(InputError, match=r'--spread: expected draws that leave disturbance\[0\]'):
+        [perturbed(base, Spread(mass=0.9), 0, i) for i in range(10)]

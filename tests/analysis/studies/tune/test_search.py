@@ -1,0 +1,127 @@
+"""The search against optima that are known on paper."""
+
+import numpy as np
+import pytest
+from tunings import DIAGONAL, GVC, scenario
+
+from auv_analysis.studies.tune import search as searching
+from auv_analysis.studies.tune.cost import Measures
+from auv_analysis.studies.tune.gain_space import make_space
+from auv_analysis.studies.tune.search import Goal, Request, search, tuned
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
+from auv_gvc_controller.control.gains import sampled_rate
+from auv_gvc_controller.laws.model import control_model
+
+VEHICLE = load_vehicle('girona500')
+SPACE = make_space('gvc', 'scalar', control_model(VEHICLE), 0.01, 100.0)
+
+
+def measures(error: np.ndarray, effort: np.ndarray) -> Measures:
+    none = np.zeros_like(error)
+    return Measures(error, error, effort, none, none, none)
+
+
+def bowl(gains: dict[str, np.ndarray]) -> Measures:
+    """Effort a + b, error 1/(a b^2): at effort 3 the least error is 1/4, at a = 1, b = 2."""
+    a, b = gains['k_D'], gains['Lambda']
+    rest = np.log(gains['Gamma']) ** 2 + np.log(gains['k_I']) ** 2
+    return measures((1 + rest) / (a * b**2), a + b)
+
+
+def goal(equal: str, error: float, effort: float, tolerance: float = 1e-3) -> Goal:
+    return Goal(equal, 'error', measures(np.array([error]), np.array([effort])), tolerance)
+
+
+@pytest.mark.parametrize('seed', [0, 1])
+@pytest.mark.parametrize('equal', ['effort', 'error'])
+def test_known_optimum_is_found_with_its_price(equal: str, seed: int) -> None:
+    found = search(SPACE, bowl, goal(equal, 0.25, 3.0), points=256, seed=seed)
+    best = {name: g[0] for name, g in SPACE.gains(found.x[None]).items()}
+    assert found.reached
+    assert best == pytest.approx({'k_D': 1.0, 'Lambda': 2.0, 'k_I': 1.0, 'Gamma': 1.0}, rel=1e-2)
+    assert found.measures.error[0] == pytest.approx(0.25, rel=1e-5)
+    assert found.measures.effort[0] == pytest.approx(3.0, rel=1e-5)
+    # error goes with the inverse cube of the effort
+    assert found.price == pytest.approx(-3.0 if equal == 'effort' else -1 / 3, rel=1e-2)
+
+
+def test_same_seed_same_points_another_seed_others() -> None:
+    runs = [search(SPACE, bowl, goal('effort', 0.25, 3.0), points=64, seed=s) for s in (3, 3, 4)]
+    points = [run.points for run in runs]
+    np.testing.assert_array_equal(points[0], points[1])
+    assert not np.array_equal(points[0][:64], points[2][:64])
+
+
+def test_effort_that_no_gains_have_is_said_to_be_unreached() -> None:
+    found = search(SPACE, bowl, goal('effort', 1.0, 1e4), points=64, seed=0)
+    assert not found.reached
+    assert found.price is None
+    assert found.measures.effort[0] == pytest.approx(200.0, rel=1e-3)  # both at 1/step
+
+
+def test_diverging_gains_do_not_stop_a_search() -> None:
+    def partly(gains: dict[str, np.ndarray]) -> Measures:
+        found = bowl(gains)
+        diverged = gains['k_D'] > 5.0
+        return Measures(*(np.where(diverged, np.nan, values) for values in found))
+
+    found = search(SPACE, partly, goal('effort', 0.25, 3.0), points=256, seed=0)
+    assert found.measures.error[0] == pytest.approx(0.25, rel=1e-4)
+
+
+def test_loop_stays_slower_than_the_samples() -> None:
+    slow = make_space('cl', 'inertia', control_model(VEHICLE), 0.01, 7.0)
+
+    def fast(gains: dict[str, np.ndarray]) -> Measures:
+        rate, stiffness = (gains[g][:, 0, 0] / VEHICLE.M[0, 0] for g in ('k_D', 'Gamma'))
+        return measures(1 / rate, stiffness)
+
+    found = search(slow, fast, goal('effort', 1.0, 1.0), points=256, seed=0)
+    rate, _ = sampled_rate(np.array(slow.entry(found.x)['k_D']), VEHICLE.M)
+    assert rate == pytest.approx(7.0, rel=1e-6)
+
+
+INTEGRATORS = {
+    **DIAGONAL, 'added_mass': [0.0] * 6, 'damping': {'linear': [0.0] * 6, 'quadratic': [0.0] * 6}
+}  # fmt: skip
+STEPPED = {'surge': {'offset': 1.0}}
+
+
+@pytest.mark.parametrize('law', ['gvc', 'cl', pytest.param('pid', marks=pytest.mark.long)])
+def test_of_an_integrator_no_law_beats_proportional_feedback(tmp_path, monkeypatch, law) -> None:
+    """LQR: m u_dot = tau with cost e^2 + r tau^2 has tau = k e, so that nothing beats k = 6 m."""
+    monkeypatch.setattr(searching, 'POINTS', 128)
+    alone = {'law': 'gvc', 'k_D': 6.0, 'k_I': 1e-9, 'Lambda': 1e-9, 'Gamma': 1e-9}
+    base = scenario(
+        tmp_path,
+        {'gvc': alone},
+        vehicle=INTEGRATORS,
+        setpoint=STEPPED,
+        disturbance=[],
+        duration=3.0,
+    )
+    request = Request(base, 'gvc', (law,), 'effort', 'error', 1e-3, 'mass', 'continuous', 0, 1)
+    goal = Goal.of(request)
+    # e = exp(-6 t) at 301 samples: a geometric series; 1/2 tau^2 / m is 36 times 1/2 m e^2
+    mean = 0.5 * 100 / (1 - np.exp(-2 * 6 * 0.01)) / 301
+    assert goal.reference.error[0] == pytest.approx(mean, rel=1e-6)
+    assert goal.reference.effort[0] == pytest.approx(36 * goal.reference.error[0], rel=1e-6)
+    found = tuned(request, law, goal).best
+    assert found.reached
+    assert found.measures.effort[0] == pytest.approx(goal.reference.effort[0], rel=1e-6)
+    assert found.measures.error[0] == pytest.approx(goal.reference.error[0], rel=2e-3)
+    gains = found.space.entry(found.x)
+    if law != 'gvc':
+        assert gains['k_P' if law == 'pid' else 'k_D'][0] / 100 < 6.1
+
+
+def test_on_multiples_of_M_gvc_and_cl_are_one_law(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(searching, 'POINTS', 64)
+    base = scenario(tmp_path, {'gvc': GVC}, vehicle='rexrov', duration=0.5)
+    request = Request(
+        base, 'gvc', ('gvc', 'cl'), 'effort', 'weighted_error', 1e-3, 'inertia', 'continuous', 0, 1
+    )
+    goal = Goal.of(request)
+    errors = [tuned(request, law, goal).best.measures.weighted_error[0] for law in request.laws]
+    assert errors[0] == pytest.approx(errors[1], rel=1e-3)
+    assert errors[0] <= goal.reference.weighted_error[0] * (1 + 1e-3)

@@ -1,0 +1,203 @@
+"""`auv tune`: its folder, its document, and one line for what it cannot take."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from pages import check_numbers
+from tunings import GVC, SAME_CL, write
+
+from auv_analysis import load_scenario, simulate
+from auv_analysis.cli import main
+from auv_analysis.studies.tune import search as searching
+from auv_analysis.studies.tune.cost import measures_of_run
+
+FILES = {'tune.json', 'scenario.yaml', 'vehicle.yaml', 'search.parquet', 'monte_carlo.parquet',
+         'numbers.parquet', 'report.html', 'figures', 'manifest.json'}  # fmt: skip
+FIGURES = {f'{name}.{kind}' for name in ('trade_off', 'draws', 'paired') for kind in ('png', 'pdf')}
+QUICK = ('--law', 'cl', '--samples', '12', '--structure', 'mass')
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch, capsys) -> Callable:
+    """`auv tune s.yaml` in this process: exit code, stdout, lines of stderr."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(searching, 'POINTS', 64)
+    write(tmp_path, {'gvc': GVC, 'cl': SAME_CL | {'k_D': 300.0}}, duration=3.0)
+
+    def call(*arguments: str) -> tuple[object, str, list[str]]:
+        code: object = 0
+        try:
+            main(['tune', 's.yaml', *arguments])
+        except SystemExit as end:
+            code = end.code
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err.splitlines()
+
+    return call
+
+
+def test_folder_document_and_files_agree(command: Callable, tmp_path: Path) -> None:
+    code, out, lines = command(*QUICK, '--json')
+    folder = tmp_path / 'runs/tune_small'
+    document = json.loads(out)
+    assert code == 0
+    assert {entry.name for entry in folder.iterdir()} == FILES
+    assert {entry.name for entry in (folder / 'figures').iterdir()} == FIGURES
+    assert json.loads((folder / 'tune.json').read_text()) == document
+    assert list(document['controllers']) == ['gvc', 'cl', 'gvc_tuned', 'cl_tuned']
+    assert lines[-1].endswith('runs/tune_small/report.html')
+    _equal(document, 'effort', 1e-3)
+    _repeated(document, folder)
+    _searched(document, folder)
+    _perturbed(document, folder)
+    assert all(sentence['source'] for sentence in document['verdict'])
+    assert check_numbers(folder) > 100
+    said = {sentence['text'] for sentence in document['verdict']}
+    entries = document['controllers'].items()
+    assert {f'{name}: {text}.' for name, entry in entries for text in entry['remarks']} <= said
+
+
+def _equal(document: dict, measure: str, tolerance: float) -> None:
+    entries = document['controllers']
+    base = entries['gvc']['measures'][measure]
+    for name in ('gvc_tuned', 'cl_tuned'):
+        assert entries[name]['reached']
+        assert entries[name]['measures'][measure] == pytest.approx(base, rel=tolerance)
+        assert entries[name]['equality'] == pytest.approx(
+            entries[name]['measures'][measure] / base - 1, abs=1e-12
+        )
+
+
+def _repeated(document: dict, folder: Path) -> None:
+    """The scenario that is left behind gives the numbers of the document."""
+    scenario = load_scenario(folder / 'scenario.yaml')
+    for name, entry in document['controllers'].items():
+        found = measures_of_run(simulate(scenario, name))
+        for measure, expected in entry['measures'].items():
+            value = getattr(found, measure)[0]
+            assert (value if np.isfinite(value) else None) == (
+                expected if expected is None else pytest.approx(expected, rel=1e-6)
+            )
+    assert document['validation']['largest_relative_deviation'] < 1e-6
+
+
+def _searched(document: dict, folder: Path) -> None:
+    table = pq.read_table(folder / 'search.parquet')
+    tuned = {n: e for n, e in document['controllers'].items() if e['tuned']}
+    assert len(table) == sum(entry['evaluations'] for entry in tuned.values())
+    rows = table.to_pylist()
+    for name, entry in tuned.items():
+        mine = [r for r in rows if r['controller'] == name and r['allowed'] and not r['diverged']
+                and r['stage'] != 'gradient']  # fmt: skip
+        base = document['controllers']['gvc']['measures']['effort']
+        equal = [r for r in mine if abs(r['effort'] / base - 1) < 1e-9]
+        assert (
+            entry['measures']['weighted_error'] <= min(r['weighted_error'] for r in equal) * 1.001
+        )
+
+
+def _perturbed(document: dict, folder: Path) -> None:
+    draws = pq.read_table(folder / 'monte_carlo.parquet').to_pandas()
+    assert draws.groupby('controller')['draw'].apply(list).map(len).tolist() == [12] * 4
+    for name, entry in document['monte_carlo']['controllers'].items():
+        mine = draws[draws.controller == name]
+        assert entry['error']['q95'] == np.quantile(mine.error, 0.95, method='higher')
+    wide = draws.pivot_table(index='draw', columns='controller', values='weighted_error')
+    for row in document['monte_carlo']['comparisons']:
+        if row['measure'] == 'weighted_error':
+            ratios = wide[row['controller']] / wide[row['against']]
+            assert row['interval'][0] <= row['ratio'] <= row['interval'][1]
+            assert row['verdict'] * row['effect'] >= 0 <= row['effect'] * np.log(row['ratio'])
+            assert row['smaller'] == pytest.approx((ratios < 1 - 1e-9).mean())
+
+
+@pytest.mark.usefixtures('unrendered')
+@pytest.mark.long
+def test_same_seed_same_document_another_seed_another(command: Callable) -> None:
+    arguments = ('--json', '--law', 'cl', '--samples', '10', '--structure', 'mass', '--overwrite')
+    first, again, other = (
+        json.loads(command(*arguments, '--seed', seed)[1]) for seed in ('1', '1', '2')
+    )
+    assert first == again
+    assert first['monte_carlo']['controllers'] != other['monte_carlo']['controllers']
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_equal_error_and_no_draws(command: Callable, tmp_path: Path) -> None:
+    arguments = ('--equal', 'error', '--index', 'mean', '--samples', '0', *QUICK[:2])
+    code, out, _ = command(*arguments, '--json')
+    document = json.loads(out)
+    assert (code, document['monte_carlo']) == (0, None)
+    assert {e['structure'] for e in document['controllers'].values() if e['tuned']} <= {
+        'mass',
+        'scalar',
+    }
+    _equal(document, 'error', 1e-3)
+    effort = {n: e['measures']['effort'] for n, e in document['controllers'].items()}
+    assert effort['gvc_tuned'] <= effort['gvc'] * 1.001
+    assert not (tmp_path / 'runs/tune_small/monte_carlo.parquet').exists()
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_scenario_without_gvc_needs_a_reference(command: Callable, tmp_path: Path) -> None:
+    write(tmp_path, {'cl': SAME_CL}, duration=0.5)
+    code, _, lines = command(*QUICK)
+    assert (code, len(lines)) == (2, 1)
+    assert 'controllers: expected a controller of law gvc, or --reference' in lines[0]
+    code, out, _ = command('--reference', 'cl', '--law', 'cl', '--samples', '0', '--json')
+    assert code == 0
+    assert [n for n, e in json.loads(out)['controllers'].items() if e['tuned']] == ['cl_tuned']
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures('unrendered')
+def test_effort_out_of_reach_is_said_plainly(command: Callable, tmp_path: Path) -> None:
+    weak = {'law': 'pid', 'k_P': 1e-3, 'k_I': 1e-3, 'k_D': 1e-3, 'k_FF': 0.0}
+    write(tmp_path, {'lazy': weak}, disturbance=[])
+    code, out, lines = command('--reference', 'lazy', *QUICK[:2], '--samples', '0', '--json')
+    entry = json.loads(out)['controllers']['cl_tuned']
+    assert (code, entry['reached'], entry['price']) == (0, False, None)
+    assert entry['equality'] > 1
+    assert any('No gains of cl that were tried have the effort of lazy' in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'match'),
+    [
+        (('--reference', 'none'), 'controllers: expected one of gvc, cl, found none'),
+        (('--samples', '3'), '--samples: expected 0 for none, or a whole number from 10'),
+        (('--tolerance', '0'), '--tolerance: expected a number above 0, below 0.1, found 0.0'),
+        (('--tolerance', 'nan'), '--tolerance: expected a finite number'),
+        (('--seed', '-1'), '--seed: expected a whole number from 0'),
+        (('--spread', 'mass=2'), '--spread: mass: expected a number from 0 up below 1, found 2'),
+        (('--equal', 'cost'), '--equal: expected one of effort, error, found cost'),
+        (('--law', 'lqr'), '--law: expected one of gvc, cl, pid, smc, found lqr'),
+    ],
+)
+def test_wrong_options_are_one_line(command, arguments, match, tmp_path: Path) -> None:
+    code, _, lines = command(*arguments)
+    assert (code, len(lines)) == (2, 1)
+    assert match in lines[0]
+    assert not (tmp_path / 'runs').exists()
+
+
+def test_actuators_need_sampling(command: Callable, tmp_path: Path) -> None:
+    write(tmp_path, {'gvc': GVC}, actuators={'limit': [500.0] * 6})
+    code, _, lines = command(*QUICK)
+    assert (code, len(lines)) == (2, 1)
+    assert 'actuators: expected hold' in lines[0]
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_names_that_are_taken_stay_what_they_are(command: Callable, tmp_path: Path) -> None:
+    write(tmp_path, {'gvc': GVC, 'cl_tuned': SAME_CL}, duration=0.3)
+    code, out, _ = command(*QUICK[:2], '--samples', '0', '--json')
+    names = ['gvc', 'cl_tuned', 'gvc_tuned', 'cl_tuned_again']
+    assert (code, list(json.loads(out)['controllers'])) == (0, names)
+    left = yaml.safe_load((tmp_path / 'runs/tune_small/scenario.yaml').read_text())
+    assert left['name'] == 'small_tuned'

@@ -12,9 +12,9 @@ from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.folder import Results
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.text import join, number, plain
-from auv_analysis.runs.run import Run
+from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.simulate import Hold, simulate
+from auv_analysis.simulation.simulate import simulate
 from auv_analysis.studies.design.change import (
     BALLAST,
     DISC_PART,

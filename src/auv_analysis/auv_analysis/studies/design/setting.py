@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from auv_analysis.runs.run import Run
+from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scaling import REFERENCE, scaled_case1
 from auv_analysis.scenario.scenario import SCHEMA, Scenario, load_scenario, scenario_from
-from auv_analysis.simulation.simulate import Hold, simulate
+from auv_analysis.simulation.simulate import simulate
 from auv_analysis.studies.design.change import ChangeSpace
 from auv_analysis.studies.design.couplings import Sizes, sizes_of
 from auv_analysis.studies.design.vehicle_file import change_words, changed_data, changed_text

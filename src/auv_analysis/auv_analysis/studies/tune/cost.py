@@ -12,13 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.metrics.summary import SETTLED, TRANSIENT, has_settled, settling_time
-from auv_analysis.runs.run import Run
+from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import run_batch
 from auv_analysis.simulation.records import Sample
 from auv_analysis.simulation.reduction import at_start, keep_divergence, keep_last
 from auv_analysis.simulation.rollouts import batch_of
-from auv_analysis.simulation.simulate import Hold
 from auv_analysis.simulation.variants import Variants, merged, packed_variants
 from auv_dynamics.kernel.compile import helper
 from auv_dynamics.kernel.lanes import Number, select

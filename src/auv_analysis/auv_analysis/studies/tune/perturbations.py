@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.simulate import Hold
 from auv_analysis.studies.tune.cost import Measures, joined, of_each
 from auv_dynamics.dofs import DOFS
 from auv_dynamics.files.errors import InputError

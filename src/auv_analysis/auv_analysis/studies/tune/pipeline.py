@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.graph.experiment import write_inputs
 from auv_analysis.scenario.changes import changed_scenario
-from auv_analysis.scenario.scenario import Scenario, load_scenario
+from auv_analysis.scenario.scenario import Scenario, load_scenario, write_inputs
 from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.studies.tune.cost import Measures, measures_of_run, of_each
 from auv_analysis.studies.tune.perturbations import Perturbations, monte_carlo

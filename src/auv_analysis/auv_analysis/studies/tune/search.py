@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.output.text import join, number
+from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.simulate import DivergedError, Hold
+from auv_analysis.simulation.simulate import DivergedError
 from auv_analysis.studies.optimise import DIFFERENCE, GRADIENT, WEIGHT, Search, sobol_points
 from auv_analysis.studies.tune.cost import Measures, joined, measured
 from auv_analysis.studies.tune.gain_space import BEST, EDGE, GainSpace, make_space, starts_of

@@ -11,8 +11,9 @@ import yaml
 from rosbags.typesys import Stores, get_typestore
 
 from auv_analysis import load_scenario, simulate
+from auv_analysis.bag.output import Storage
+from auv_analysis.bag.writer import BagWriter
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
-from auv_analysis.recording import BagWriter, Storage
 from auv_analysis.runs.run import Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_dynamics.ros.interface import NANOSECONDS, Frames

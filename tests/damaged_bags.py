@@ -13,7 +13,8 @@ from mcap.records import Attachment, Channel, Chunk, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.highlevel import AnyReader
 
-from auv_analysis.recording import BagWriter, Storage
+from auv_analysis.bag.output import Storage
+from auv_analysis.bag.writer import BagWriter
 
 STEP = 10_000_000
 UPRIGHT = [0, 0, 0, 1, *[0] * 9]

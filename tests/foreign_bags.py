@@ -14,8 +14,8 @@ from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.foreign.load import load_foreign
-from auv_analysis.foreign.mapping import read_mapping
+from auv_analysis.bag.foreign_run import load_foreign
+from auv_analysis.bag.foreign_topics import read_mapping
 from auv_analysis.runs.run import Run
 
 SECOND = 10**9

@@ -10,7 +10,7 @@ from harness import Peer, fresh_domain, graph, parameters
 from made_messages import STRING, Bag, new, odometry, serialized, stamped
 from rclpy.parameter import Parameter
 
-from auv_analysis.bag.roles import ODOMETRY
+from auv_analysis.bag.step_topics import ODOMETRY
 from auv_analysis.nodes.replay_node import ReplayNode
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.interface import nanoseconds

@@ -9,12 +9,12 @@ from typing import Any
 
 from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from mcap_ros2.decoder import DecoderFactory
 from zstandard import ZstdError
 
-from auv_analysis.bag.contents import Contents
-from auv_analysis.bag.files import bag_files
+from auv_analysis.bag.metadata import bag_files
+from auv_analysis.bag.reading import Contents
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface
 
@@ -142,7 +142,20 @@ def _parsed(opcode: int, body: bytes, before: bytes) -> list[Any]:
     content, length = get_chunk_data_stream(record, validate_crc=True)
     if length != record.uncompressed_size or record.compression not in ('', 'zstd', 'lz4'):
         raise McapError('sizes that do not agree')
-    return breakup_chunk(Chunk('', content.read(length), 0, 0, 0, length))
+    return _inside(content.read(length))
+
+
+def _inside(data: bytes) -> list[Any]:
+    """Schemas, channels and messages of a chunk, which its records must fill."""
+    place, found = 0, []
+    while place < len(data):
+        (length,) = struct.unpack('<Q', data[place + 1 : place + 9])
+        opcode, body = data[place], data[place + 9 : place + 9 + length]
+        if len(body) < length:
+            raise McapError('a chunk that ends within a record')
+        found += _parsed(opcode, body, b'') if opcode in (3, 4, 5) else []
+        place += 9 + length
+    return found
 
 
 class _Whole(BytesIO):

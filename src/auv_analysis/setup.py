@@ -35,7 +35,7 @@ setup(
             'report/*.css',
             'report/*.js',
             'studies/sweep/*.json',
-            'foreign/*.json',
+            'bag/*.json',
         ]
     },
     data_files=[

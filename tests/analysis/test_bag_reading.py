@@ -21,7 +21,7 @@ from made_messages import (
 )
 from slow_bag import slow_read_bag
 
-from auv_analysis.bag import Contents, decoding, read_bag
+from auv_analysis.bag import Contents, read_bag, step_topics
 from auv_dynamics.files.errors import InputError
 
 STEP = 10_000_000
@@ -191,13 +191,13 @@ def test_channels_of_constant_length_never_meet_the_decoder(
             kind, data = message(role, k)
             bag.add(f'/{role}', kind, k * STEP, data)
     path, decoded = bag.close(), []
-    original = decoding.DecoderFactory.decoder_for
+    original = step_topics.DecoderFactory.decoder_for
 
     def counting(self: Any, encoding: str, schema: Any) -> Any:
         decoder = original(self, encoding, schema)
         return lambda data: decoded.append(len(data)) or decoder(data)
 
-    monkeypatch.setattr(decoding.DecoderFactory, 'decoder_for', counting)
+    monkeypatch.setattr(step_topics.DecoderFactory, 'decoder_for', counting)
     contents = read_bag(path)
     assert contents.counts == dict.fromkeys(('/cmd_vel', '/odom', '/wrench'), 300)
     assert len(decoded) <= 4, 'one proof per channel, and the frames of the first odometry'

@@ -17,11 +17,11 @@ from damaged_bags import (
 )
 from made_messages import STRING, TYPES, serialized
 
-from auv_analysis.bag import read_bag
-from auv_analysis.recording import BagWriter, RecordingError, Storage, keeper, output
-from auv_analysis.recording import writer as writer_module
-from auv_analysis.recording.storage import LEAST_SIZE
-from auv_analysis.recovery.bag import recover
+from auv_analysis.bag import output, read_bag
+from auv_analysis.bag import writer as writer_module
+from auv_analysis.bag.output import LEAST_SIZE, Storage
+from auv_analysis.bag.recover import recover
+from auv_analysis.bag.writer import BagWriter, RecordingError
 
 PATIENCE = 20.0  # s
 
@@ -138,7 +138,7 @@ def test_any_exception_of_the_thread_ends_the_recording_in_good_order(
 def test_the_thread_does_not_stumble_over_files_that_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(keeper, 'LOOK', 0.0)
+    monkeypatch.setattr(writer_module, 'LOOK', 0.0)
     monkeypatch.setattr(writer_module, 'CHECK_PERIOD', 0.0)
     monkeypatch.setattr(writer_module, 'SYNC_PERIOD', 0.0)
     writer = writer_of(tmp_path / 'bag', max_duration=3 * STEP)
@@ -172,9 +172,7 @@ def test_bursts_of_topics_do_not_multiply_the_files(tmp_path: Path) -> None:
 def test_a_topic_that_begins_a_file_and_falls_silent(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from auv_analysis.recording import bag_file
-
-    monkeypatch.setattr(bag_file, 'SILENCE', -1.0)
+    monkeypatch.setattr(output, 'SILENCE', -1.0)
     writer = writer_of(tmp_path / 'bag', max_duration=100 * STEP)
     writer.write('/a', 0, said(''))
     for k in range(250):

@@ -14,7 +14,7 @@ from numpy.testing import assert_array_equal
 
 from auv_analysis import load_scenario
 from auv_analysis.bag import load_run, open_bag, read_bag
-from auv_analysis.bag.recording import NAME, recording_text
+from auv_analysis.bag.metadata import RECORDING, recording_text
 from auv_analysis.nodes.ledger import StepLedger
 from auv_analysis.runs.run import Run, joined
 from auv_dynamics.files.errors import InputError
@@ -38,7 +38,7 @@ def write(
     names = names or {}
     bag = Bag(folder / 'bag.mcap', chunk_size=2000)
     bag.attach('vehicle.yaml', VEHICLE)
-    bag.attach(NAME, attached.pop('recording', recording_text(False, {})))
+    bag.attach(RECORDING, attached.pop('recording', recording_text(False, {})))
     for name, text in attached.items():
         bag.attach(f'{name}.yaml', text)
     plan = [(ms, 'odom', k, ms) for k, ms in enumerate(stamps)]
@@ -139,7 +139,7 @@ def test_without_the_note_they_are_not_guessed(tmp_path: Path) -> None:
 )
 def test_a_note_that_is_none_is_refused(tmp_path: Path, text: str, said: str) -> None:
     path = write(tmp_path, STAMPS, SETPOINTS, recording=text)
-    with pytest.raises(InputError, match=f'{NAME}: {said}'):
+    with pytest.raises(InputError, match=f'{RECORDING}: {said}'):
         load_run(path)
 
 
@@ -158,7 +158,7 @@ def with_unusable_messages(path: Path, *, strict: bool) -> Path:
     wrong = {40: np.inf, 50: 1e200}
     bag = Bag(path, chunk_size=100_000)
     bag.attach('vehicle.yaml', VEHICLE)
-    bag.attach(NAME, recording_text(strict, {}))
+    bag.attach(RECORDING, recording_text(strict, {}))
     for k in range(60):
         ns, values = k * 10 * MS, state(k)
         values[7] = np.nan if k == 20 else 1.0
@@ -197,7 +197,7 @@ def test_the_namespace_of_the_recorder_is_the_one_that_is_read(tmp_path: Path) -
         made = Bag(path / 'bag.mcap')
         made.attach('vehicle.yaml', VEHICLE)
         if namespace is not None:
-            made.attach(NAME, recording_text(False, {}, namespace))
+            made.attach(RECORDING, recording_text(False, {}, namespace))
         for ms, (k, space) in product(range(0, 50, 10), enumerate(('/auv1', '/auv2', '/auv3'))):
             odom = serialized(odometry(ms * MS, state(k)))
             made.add(f'{space}/odom', ODOMETRY, ms * MS, odom)

@@ -1,5 +1,6 @@
-"""A bag in blocks is the run that reading it whole gives, whatever its messages are like."""
+"""A bag in mapped files is the run that reading it into memory gives, whatever its messages."""
 
+import mmap
 import tempfile
 import tracemalloc
 from pathlib import Path
@@ -15,8 +16,8 @@ from made_messages import ODOMETRY, Bag, odometry, serialized, stamped
 from auv_analysis import load_scenario, summarize
 from auv_analysis.bag import load_run, open_bag
 from auv_analysis.report.sketching import sketch
-from auv_analysis.runs.run import LongRun, Run, joined
-from auv_dynamics.files.errors import InputError
+from auv_analysis.runs.run import Run, joined
+from auv_dynamics.files.errors import FailedError, InputError
 
 STEP = 10_000_000
 ROLES = {
@@ -103,11 +104,29 @@ def test_blocks_of_a_bag(write: Any, rows: int, whole: int) -> None:
         assert_same(joined(blocks), expected)
 
 
-def test_a_short_bag_is_kept_and_a_long_one_is_not(tmp_path) -> None:
+def mapped(run: Run) -> set[str]:
+    """Names of the arrays that lie in files."""
+    return {name for name, values in run.arrays().items() if isinstance(root(values), mmap.mmap)}
+
+
+def root(values: Any) -> Any:
+    while getattr(values, 'base', None) is not None:
+        values = values.base
+    return values
+
+
+def test_a_short_bag_is_kept_in_memory_and_a_long_one_in_files(tmp_path) -> None:
     bag = make_bag(tmp_path / 'bag', 100)
-    assert isinstance(open_bag(bag).run, Run)
-    assert isinstance(open_bag(bag, whole=101).run, Run)
-    assert isinstance(open_bag(bag, whole=100).run, LongRun)
+    assert not mapped(open_bag(bag).run)
+    assert not mapped(open_bag(bag, whole=101).run)
+    long = open_bag(bag, whole=100).run
+    assert {'t', 'eta', 'nu', 'nu_d', 'nu_d_dot', 'tau'} <= mapped(long)
+
+
+def test_no_room_for_the_files_of_a_long_bag(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(tempfile, 'tempdir', '/dev/full')
+    with pytest.raises(FailedError, match='/dev/full: '):
+        open_bag(make_bag(tmp_path / 'bag', 100), whole=10)
 
 
 def test_summaries_do_not_depend_on_how_a_bag_is_read(tmp_path) -> None:

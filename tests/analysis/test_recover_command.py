@@ -26,10 +26,11 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk
 
 from auv_analysis.bag import read_bag
+from auv_analysis.bag import recover as recovery
+from auv_analysis.bag.output import Storage
+from auv_analysis.bag.recover import recover
+from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli.main import main
-from auv_analysis.recording import BagWriter, Storage
-from auv_analysis.recovery import in_place
-from auv_analysis.recovery.bag import recover
 
 
 def aged(bag: Path) -> Path:
@@ -274,11 +275,11 @@ def test_a_file_that_grows_is_refused(
     path.touch()
 
     def grow(seconds: float) -> None:
-        assert 0 < seconds <= in_place.QUIET
+        assert 0 < seconds <= recovery.QUIET
         with path.open('ab') as file:
             file.write(b'more')
 
-    monkeypatch.setattr(in_place.time, 'sleep', grow)
+    monkeypatch.setattr(recovery.time, 'sleep', grow)
     code, _, err = command(capsys, bag)
     assert code == 2
     assert 'found a file that is being written' in err

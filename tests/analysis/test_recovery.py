@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from made_messages import COMPRESSIONS, STRING, TYPES, Bag, serialized
 
 from auv_analysis.bag import read_bag
-from auv_analysis.recovery.bag import recover
+from auv_analysis.bag.recover import recover
 from auv_dynamics.files.errors import FailedError, InputError
 
 STEP = 10_000_000

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from block_runs import in_blocks
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
@@ -16,7 +17,7 @@ from auv_analysis.report.page import write_report
 from auv_analysis.report.sketching import sketch
 from auv_analysis.report.statistics import Statistics, followed, part_of
 from auv_analysis.report.traces import COLUMNS, FEW, Trace, decimate, thinned
-from auv_analysis.runs.run import LongRun, Run
+from auv_analysis.runs.run import Run
 
 quick = settings(max_examples=40)
 
@@ -57,17 +58,10 @@ def test_columns_keep_their_extremes_in_the_order_of_time(seed, n) -> None:
         assert y[column == c].min() == few_y[few_column == c].min()
 
 
-def in_memory(run: Run, n: int) -> LongRun:
-    """The samples of a run over and over, n of them, made when they are asked for."""
-    length = len(run.t)
-
-    def blocks(rows: int):
-        for first in range(0, n, rows):
-            k = np.arange(first, min(first + rows, n))
-            yield replace(run.part(k % length), t=k * run.step)
-
-    extent = run.extent._replace(samples=n, end=(n - 1) * run.step)
-    return LongRun(**run.facts(), known_extent=extent, source_of_blocks=blocks)
+def repeated(run: Run, n: int) -> Run:
+    """The samples of a run over and over, n of them."""
+    k = np.arange(n)
+    return replace(run.part(k % len(run.t)), t=k * run.step)
 
 
 @pytest.fixture(scope='module')
@@ -82,16 +76,10 @@ def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
     n, quiet = 500_000, replace(run, nu=0.0 * run.nu, nu_d=0.0 * run.nu_d, tau=0.0 * run.tau)
     pictures = []
     for spike in (0.0, 5.0):
-        long = in_memory(quiet, n)
-
-        def blocks(rows: int, long: LongRun = long, spike: float = spike):
-            for block in long.blocks(rows):
-                nu_d = block.nu_d.copy()
-                nu_d[:, 2] += 1e-3 * np.sin(block.t)
-                nu_d[block.t == 3210.0, 2] = spike
-                yield replace(block, nu_d=nu_d)
-
-        drawn = sketch(replace(long, source_of_blocks=blocks))
+        long = repeated(quiet, n)
+        long.nu_d[:, 2] += 1e-3 * np.sin(long.t)
+        long.nu_d[long.t == 3210.0, 2] = spike
+        drawn = sketch(long)
         t, y = drawn.line('error', 2, 'late')
         assert (y == spike).sum() >= (spike > 0)
         assert len(t) <= 2 * COLUMNS
@@ -112,7 +100,7 @@ def test_a_report_does_not_grow_with_the_run(run, tmp_path) -> None:
     """The page is flat; a PDF grows until its lines are full, 4000 points each."""
     sizes = []
     for n in (50_000, 400_000):
-        long = in_memory(run, n)
+        long = repeated(run, n)
         out = tmp_path / str(n)
         out.mkdir()
         report = write_report(out, {'gvc': long}, {'gvc': summarize(long)}, '', '')
@@ -152,9 +140,7 @@ def test_statistics_between_cuts() -> None:
 
 def test_a_sketch_in_blocks_is_that_of_the_whole(run) -> None:
     whole = sketch(run)
-    parts = sketch(
-        LongRun(**run.facts(), known_extent=run.extent, source_of_blocks=lambda _: run.blocks(37))
-    )
+    parts = sketch(in_blocks(run, 37))
     assert whole.columns == parts.columns
     assert (whole.settled, whole.F_digest) == (parts.settled, parts.F_digest)
     for name in whole.columns:
@@ -176,7 +162,7 @@ def test_a_sketch_in_blocks_is_that_of_the_whole(run) -> None:
 def test_memory_does_not_grow_with_the_run(run) -> None:
     peaks = []
     for n in (40_000, 160_000):
-        long = in_memory(run, n)
+        long = repeated(run, n)
         tracemalloc.start()
         summarize(long)
         sketch(long)

@@ -18,15 +18,16 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Message, Schema
 
 from auv_analysis import load_scenario
-from auv_analysis.bag import files, framing, limits, load_run, messages, read_bag
+from auv_analysis.bag import attachments, limits, load_run, mcap_file, metadata, read_bag
+from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli.main import main
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
-from auv_analysis.recording import BagWriter
 from auv_dynamics.files.errors import InputError
 
 MIB = 1 << 20
 HUGE = 3 << 30  # bytes that a bomb holds
-MAGIC = framing.MAGIC
+MAGIC = mcap_file.MAGIC
 
 
 @pytest.fixture
@@ -202,8 +203,7 @@ def test_strings_that_reach_beyond_their_record(tmp_path: Path) -> None:
 def test_attachments_that_are_too_long_or_too_many(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(messages, 'LARGEST_ATTACHMENT', 100_000)
-    monkeypatch.setattr(framing.frame_at, '__defaults__', (100_000,))
+    monkeypatch.setattr(limits, 'LARGEST_ATTACHMENT', 100_000)
     sizes = {'long': 200_000, 'first': 60_000, 'second': 30_000, 'third': 30_000}
     items = [Attachment(0, 0, name, '', b'x' * size) for name, size in sizes.items()]
     path = tmp_path / 'bag.mcap'
@@ -277,12 +277,11 @@ def test_attached_yaml_whose_aliases_explode(tmp_path: Path, name: str, inner: s
     bag = hostile(tmp_path / 'usual')
     contents = read_bag(bag)
     contents.attachments.update(texts)
-    from auv_analysis.bag import attached
 
     reading = {
-        'params.yaml': attached.parameters_of,
-        'scenario.yaml': attached.scenario_name,
-        'vehicle.yaml': lambda c, b: attached.vehicle_of(c, b, None),
+        'params.yaml': attachments.parameters_of,
+        'scenario.yaml': attachments.scenario_name,
+        'vehicle.yaml': lambda c, b: attachments.vehicle_of(c, b, None),
     }
     with pytest.raises(InputError, match='at most 100000 entries with all aliases written out'):
         reading[name](contents, bag)
@@ -291,10 +290,9 @@ def test_attached_yaml_whose_aliases_explode(tmp_path: Path, name: str, inner: s
 def test_attached_yaml_that_is_too_long(tmp_path: Path) -> None:
     contents = read_bag(hostile(tmp_path / 'bag'))
     contents.attachments['params.yaml'] = 'a: ' + 'x' * (5 << 20)
-    from auv_analysis.bag import attached
 
     with pytest.raises(InputError, match='YAML of at most 4194304 characters'):
-        attached.parameters_of(contents, tmp_path)
+        attachments.parameters_of(contents, tmp_path)
 
 
 def linked(bag: Path) -> None:
@@ -314,7 +312,7 @@ def test_files_of_a_folder_that_are_none_of_its_own(
     bag = hostile(tmp_path / 'bag')
     harm(bag)
     with pytest.raises(InputError, match=r'a link to|something else of that name'):
-        files.bag_files(bag)
+        metadata.bag_files(bag)
 
 
 METADATA = {
@@ -356,9 +354,7 @@ def test_a_metadata_yaml_that_leads_elsewhere(
 
 
 def test_a_metadata_yaml_of_sqlite_whose_aliases_explode(tmp_path: Path) -> None:
-    from auv_analysis.foreign.rosbags_files import survey_of_rosbags
-
     (tmp_path / 'bag_0.db3').write_bytes(b'')
     (tmp_path / 'metadata.yaml').write_text(LAUGHS.format(''))
     with pytest.raises(InputError, match='with all aliases written out'):
-        survey_of_rosbags(tmp_path)
+        survey(tmp_path)

@@ -19,7 +19,7 @@ import files
 import watchman
 
 READERS = ('files', 'vehicle_file', 'interface', 'ros.codec', 'scenario', 'scenario_values')
-WHERE = re.compile(rf'auv_(dynamics|analysis)\.({"|".join(READERS)}|bag\..*|foreign\..*)')
+WHERE = re.compile(rf'auv_(dynamics|analysis)\.({"|".join(READERS)}|bag\..*)')
 
 
 def instrument() -> None:

@@ -26,8 +26,8 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Header, String
 
 from auv_analysis.bag import read_bag
-from auv_analysis.bag.records import records
-from auv_analysis.bag.tables import Table
+from auv_analysis.bag.chunks import Table
+from auv_analysis.bag.mcap_file import McapFile
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import NANOSECONDS, Frames, nanoseconds
 from auv_dynamics.ros.raw_types import raw_class
@@ -260,7 +260,7 @@ def whole(bag: Path) -> bytes:
     return b''.join(
         bytes(item.data)
         for path in bag.glob('*.mcap')
-        for item in records(path, [])
+        for item in McapFile(path).records()
         if isinstance(item, Table)
     )
 

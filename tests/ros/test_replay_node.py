@@ -25,7 +25,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag import read_bag
-from auv_analysis.bag.roles import ODOMETRY
+from auv_analysis.bag.step_topics import ODOMETRY
 from auv_analysis.nodes.replay_node import ReplayNode
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import topics

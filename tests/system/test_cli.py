@@ -21,12 +21,13 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 
 from auv_analysis import load_scenario
-from auv_analysis.bag.schemas import schema_text
+from auv_analysis.bag.output import Storage
+from auv_analysis.bag.ros2msg import schema_text
+from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli import main
 from auv_analysis.cli.command_line import COMMANDS
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.output.folder import SWEEP, digest, write_manifest
-from auv_analysis.recording import BagWriter, Storage
 from auv_dynamics.files.shipped import shipped
 
 AUV = Path(sys.executable).with_name('auv')

@@ -18,7 +18,8 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from auv_analysis.bag import bag_files, load_run, read_bag
-from auv_analysis.recording import BagWriter, Storage
+from auv_analysis.bag.output import Storage
+from auv_analysis.bag.writer import BagWriter
 from auv_dynamics.ros import interface
 
 HERE = Path(__file__).parent

@@ -13,9 +13,9 @@ from auv_analysis.cli import main
 def test_every_bag_is_read_once_and_shows_its_own_files(tmp_path, monkeypatch) -> None:
     bags = [make_bag(tmp_path / name, 300, name) for name in ('case1', 'case2', 'case1_rexrov')]
     read: list[str] = []
-    original = reading.records
+    original = reading.McapFile
     monkeypatch.setattr(
-        reading, 'records', lambda path, notes: read.append(path.name) or original(path, notes)
+        reading, 'McapFile', lambda path, notes: read.append(path.name) or original(path, notes)
     )
     main.main(['analyze', *map(str, bags), '--out', str(tmp_path / 'out')])
     assert read == ['case1_0.mcap', 'case2_0.mcap', 'case1_rexrov_0.mcap']

@@ -3,9 +3,10 @@
 import pytest
 from foreign_bags import UNNAMED, Maker, loaded, motion, simple, simulated, write, write_chunks
 
-from auv_analysis.bag.files import files_of, is_mcap
-from auv_analysis.foreign.candidates import survey
-from auv_analysis.recording import BagWriter, Storage
+from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.metadata import files_of, is_mcap
+from auv_analysis.bag.output import Storage
+from auv_analysis.bag.writer import BagWriter
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
 

@@ -11,9 +11,16 @@ from rich.console import Console
 from scipy.integrate import trapezoid
 
 from auv_analysis import summarize
+from auv_analysis.bag.foreign_tracks import (
+    Track,
+    at_times,
+    integral,
+    means_over,
+    sensible_step,
+    time_base,
+    usual_limit,
+)
 from auv_analysis.cli.terminal import summary_tables
-from auv_analysis.foreign.time_base import sensible_step, time_base
-from auv_analysis.foreign.tracks import Track, at_times, integral, means_over, usual_limit
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.output.text import number
 from auv_analysis.report import plotting

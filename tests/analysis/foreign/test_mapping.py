@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from auv_analysis.foreign.mapping import read_mapping
+from auv_analysis.bag.foreign_topics import read_mapping
 from auv_dynamics.files.errors import InputError
 
 GOOD = 'odometry: /o\nwrench: /w\n'

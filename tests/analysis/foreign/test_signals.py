@@ -16,8 +16,8 @@ from foreign_bags import (
 )
 from numpy.testing import assert_allclose, assert_array_equal
 
-from auv_analysis.foreign.mapping import Source
-from auv_analysis.foreign.signals import Recorded, longest_stretch, on_the_clock, ordered
+from auv_analysis.bag.foreign_messages import Recorded, longest_stretch, on_the_clock, ordered
+from auv_analysis.bag.foreign_topics import Source
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
 

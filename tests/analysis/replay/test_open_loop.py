@@ -10,7 +10,7 @@ import rclpy
 import yaml
 from made_messages import Bag, odometry, serialized, stamped
 
-from auv_analysis.bag.roles import ACCEL, ODOMETRY, TWIST, WRENCH
+from auv_analysis.bag.step_topics import ACCEL, ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import main
 from auv_analysis.replay.compared import compared, figures_of, reproduction
 from auv_analysis.replay.open_loop import OpenLoop, open_loop, recorded_loop

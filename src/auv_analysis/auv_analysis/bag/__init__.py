@@ -1,8 +1,7 @@
 """Reading recorded bags, finished or not: what lies in them, runs, and long runs in blocks."""
 
-from auv_analysis.bag.contents import Contents
-from auv_analysis.bag.files import bag_files
 from auv_analysis.bag.load import Recording, load_run, open_bag
-from auv_analysis.bag.reading import batches, read_bag
+from auv_analysis.bag.metadata import bag_files
+from auv_analysis.bag.reading import Contents, batches, read_bag
 
 __all__ = ['Contents', 'Recording', 'bag_files', 'batches', 'load_run', 'open_bag', 'read_bag']

@@ -1,15 +1,351 @@
-"""A bag from its first file to its last: batch by batch, or all of it."""
+"""Reading a bag: its contents, and the values of its step topics batch by batch.
 
-from collections.abc import Iterator
+A channel is taken at once where all its messages in a table have one layout, the same strings and
+usable numbers. Whatever differs goes through the decoder, and where a message is refused, so does
+the whole table, in the order of the file: the refusal is that of its first bad message. Only where
+the recording says that a driver was free to say anything, bad messages are left out and counted:
+the controller has refused them as well.
+"""
+
+import contextlib
+import math
+import tempfile
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO, NamedTuple
 
-from auv_analysis.bag.contents import Contents, Series
-from auv_analysis.bag.files import bag_files
-from auv_analysis.bag.messages import Batch, FileReader
-from auv_analysis.bag.records import records
-from auv_analysis.bag.steps import joined_series
+import numpy as np
+from mcap.records import Attachment, Channel, McapRecord, Metadata
 
+from auv_analysis.bag import limits
+from auv_analysis.bag.chunks import Table
+from auv_analysis.bag.mcap_file import McapFile
+from auv_analysis.bag.metadata import RECORDING, bag_files, read_recording
+from auv_analysis.bag.step_topics import (
+    ODOMETRIES,
+    READERS,
+    Decoding,
+    Layout,
+    check_type,
+    learned,
+    namespace_of,
+    role_of,
+)
+from auv_dynamics.files.errors import FailedError, InputError, reason
+from auv_dynamics.ros import interface
+from auv_dynamics.ros.interface import Frames
+
+Series = tuple[np.ndarray, np.ndarray]  # stamps (n,) in ns, values (n, 6) or (n, 13)
 TOGETHER = 64  # chunks whose small arrays are joined at once: thousands of them scatter the memory
+
+
+class Column:
+    """Rows that come block by block: kept in memory up to a number of them, else in a file.
+
+    The file has no name; it lies where temporary files do (`TMPDIR`) and is mapped for reading, see
+    `rows_of`.
+
+    Parameters
+    ----------
+    whole : rows up to which they are kept in memory
+
+    """
+
+    def __init__(self, whole: float):
+        self._whole, self._count = whole, 0
+        self._small: list[np.ndarray] = []
+        self._parts: list[np.ndarray] = []
+        self._file: IO[bytes] | None = None
+
+    def append(self, rows: np.ndarray) -> None:
+        """Take the next rows; FailedError where the file cannot take them."""
+        self._count += len(rows)
+        self._small.append(rows)
+        if self._count > self._whole:
+            self._spool()
+        elif len(self._small) == TOGETHER:
+            self._parts.append(np.concatenate(self._small))
+            self._small.clear()
+
+    def _spool(self) -> None:
+        try:
+            self._file = self._file or tempfile.TemporaryFile()  # noqa: SIM115
+            for rows in (*self._parts, *self._small):
+                self._file.write(np.ascontiguousarray(rows).data)
+        except OSError as error:
+            raise FailedError(f'{tempfile.gettempdir()}: {reason(error)}') from None
+        self._parts.clear()
+        del self._small[:-1]
+        self._small[0] = self._small[0][:0]  # dtype and shape of a row
+
+    def array(self) -> np.ndarray:
+        """All rows, of which there must be some."""
+        if self._file is None:
+            return np.concatenate([*self._parts, *self._small])
+        empty = self._small[0]
+        shape = self._count, *empty.shape[1:]
+        with self._file as file:
+            file.flush()
+            return np.asarray(np.memmap(file, empty.dtype, 'r', shape=shape))
+
+
+def gathered(blocks: Iterable[np.ndarray], whole: float) -> np.ndarray:
+    """All rows of blocks, in memory if they are at most `whole`."""
+    column = Column(whole)
+    for block in blocks:
+        column.append(block)
+    return column.array()
+
+
+def slices(count: int, rows: int = 1 << 16) -> Iterator[slice]:
+    """Slices of so many rows that make up a count of them."""
+    return (slice(i, min(i + rows, count)) for i in range(0, count, rows))
+
+
+@dataclass
+class Contents:
+    """What lies in a bag, before anything is made of it.
+
+    Attributes
+    ----------
+    attachments : name -> text
+    metadata : name -> mapping
+    types : topic -> message type
+    counts : topic -> number of messages
+    first, last : ns, None when the bag is empty
+    messages : topic -> stamps (n,) in ns and values (n, 6) or (n, 13), of our topics
+    notes : what is odd, one line each
+    frames : namespace -> frames of its first odometry
+    names : recorded topic -> our name of it, where the recorder's topics were remapped
+    namespace : that is read: the one asked for, else that of the recorder; None: any
+    asked : whether it was asked for
+    lenient : whether a driver was free to say anything: what cannot be used is left out
+
+    """
+
+    attachments: dict[str, str] = field(default_factory=dict)
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    types: dict[str, str] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+    first: int | None = None
+    last: int | None = None
+    messages: dict[str, Series] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    frames: dict[str, Frames] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
+    namespace: str | None = None
+    asked: bool = False
+    lenient: bool = False
+
+    def span(self, first: int, last: int) -> None:
+        """Note that there are messages logged from `first` to `last`, ns."""
+        self.first = first if self.first is None else min(self.first, first)
+        self.last = last if self.last is None else max(self.last, last)
+
+
+class Batch(NamedTuple):
+    """Messages of one topic: stamps (n,) in ns, values (n, 6) or (n, 13)."""
+
+    topic: str
+    stamps: np.ndarray
+    rows: np.ndarray
+
+
+class FileReader:
+    """Reads one file of a bag into `contents`.
+
+    Parameters
+    ----------
+    path : the file
+    contents : of the whole bag, filled here but for its messages
+    decode : whether the messages of our topics are read, or only counted
+
+    """
+
+    def __init__(self, path: Path, contents: Contents, decode: bool):
+        self._path, self._contents, self._decode = path, contents, decode
+        self._file = McapFile(path, contents.notes)
+        self._frames = contents.frames
+        self._decoders = Decoding(path)
+        self._layouts: dict[int, Layout] = {}
+        self._sizes = {name: len(text) for name, text in contents.attachments.items()}
+        self._attached = sum(self._sizes.values())
+        self._left_out: Counter[str] = Counter()
+        self._reasons: dict[str, str] = {}  # topic -> why its first message was left out
+
+    def batches(self) -> Iterator[Batch]:
+        """Messages of our topics, a table at a time; then note what was left out."""
+        for item in self._file.records():
+            if isinstance(item, Table):
+                yield from self._table(item)
+            else:
+                self._record(item)
+        for topic, count in self._left_out.items():
+            counted = f'{self._path.name}: {topic}: {count} unusable messages left out'
+            self._contents.notes.append(f'{counted}, the first one: {self._reasons[topic]}')
+
+    def _record(self, item: McapRecord) -> None:
+        if isinstance(item, Channel):
+            self._channel(item)
+        elif isinstance(item, Attachment):
+            self._attachment(item)
+        elif isinstance(item, Metadata):
+            self._contents.metadata[item.name] = dict(item.metadata)
+
+    def _attachment(self, item: Attachment) -> None:
+        kept = self._contents.attachments
+        more = len(item.data) - self._sizes.get(item.name, 0)
+        if self._attached + more > limits.LARGEST_ATTACHMENT:
+            note = f'{self._path.name}: attachment {item.name!r} not read, they are too many'
+            self._contents.notes.append(note)
+            return
+        self._attached += more
+        self._sizes[item.name] = len(item.data)
+        text = item.data.decode('utf-8', 'replace')
+        kept[item.name] = text
+        if item.name == RECORDING:
+            strict, self._contents.names, namespace = read_recording(text, self._path)
+            self._contents.lenient = not strict
+            if not self._contents.asked:
+                self._contents.namespace = namespace
+
+    def _topic(self, channel: int) -> str:
+        """Our name of a channel's topic."""
+        topic = self._file.channels[channel].topic
+        return self._contents.names.get(topic, topic)
+
+    def _is_read(self, topic: str) -> bool:
+        space = self._contents.namespace
+        return space is None or namespace_of(topic).strip('/') == space.strip('/')
+
+    def _channel(self, channel: Channel) -> None:
+        schema = self._file.schema_of(channel)
+        kind = schema.name if schema else ''
+        self._contents.types[channel.topic] = kind
+        topic = self._topic(channel.id)
+        if self._decode and role_of(topic) in READERS and self._is_read(topic):
+            check_type(self._path, topic, kind)
+            self._decoders.add(channel, schema)
+
+    def _table(self, table: Table) -> Iterator[Batch]:
+        members = {}
+        for channel, index in self._file.by_channel(table):
+            counts = self._contents.counts
+            counts[channel.topic] = counts.get(channel.topic, 0) + len(index)
+            if channel.id in self._decoders:
+                members[channel.id] = index
+        self._contents.span(int(table.log_times.min()), int(table.log_times.max()))
+        known = dict(self._frames)
+        try:
+            found = self._found(table, members)
+        except InputError:
+            self._in_order(table, known)
+            raise
+        for topic, entries in found.items():
+            if len(entries) > 1:  # several channels of one topic
+                order = np.argsort(np.concatenate([index for index, _ in entries]))
+                parts = zip(*(series for _, series in entries), strict=True)
+                yield Batch(topic, *(np.concatenate(part)[order] for part in parts))
+            else:
+                yield Batch(topic, *entries[0][1])
+
+    def _found(
+        self, table: Table, members: dict[int, np.ndarray]
+    ) -> dict[str, list[tuple[np.ndarray, Series]]]:
+        """Numbers of messages and what is in them by topic, an entry per channel."""
+        since = self._meet(table, members)
+        found: dict[str, list[tuple[np.ndarray, Series]]] = {}
+        for channel, index in members.items():
+            topic = self._topic(channel)
+            first = since.get(namespace_of(topic), len(table.starts))
+            series = self._at_once(table, channel, index, first)
+            entry = (index, series) if series else self._one_by_one(table, channel, index, first)
+            if len(entry[0]):
+                found.setdefault(topic, []).append(entry)
+        return found
+
+    def _meet(self, table: Table, members: dict[int, np.ndarray]) -> dict[str, int]:
+        """Namespace -> number of the message of the table from which its frames hold."""
+        since = dict.fromkeys(self._frames, 0)
+        met: dict[str, tuple[int, interface.Frames]] = {}
+        for channel, index in members.items():
+            topic = self._topic(channel)
+            namespace = namespace_of(topic)
+            if role_of(topic) in ODOMETRIES and namespace not in self._frames:
+                told = self._told(table, index, channel)
+                if told and (namespace not in met or told[0] < met[namespace][0]):
+                    met[namespace] = told
+        for namespace, (i, frames) in met.items():
+            self._frames[namespace] = frames
+            since[namespace] = i
+        return since
+
+    def _told(
+        self, table: Table, index: np.ndarray, channel: int
+    ) -> tuple[int, interface.Frames] | None:
+        """The first odometry that may be left in, and its frames."""
+        known = self._decoders
+        if not self._contents.lenient:
+            i = int(index[0])
+            return i, known.frames_of(channel, known.message(table, i, channel))
+        for i in index.tolist():
+            with contextlib.suppress(InputError):
+                odometry = known.message(table, i, channel)
+                frames = known.frames_of(channel, odometry)
+                known.value(self._topic(channel), odometry, frames)
+                return i, frames
+        return None
+
+    def _at_once(self, table: Table, channel: int, index: np.ndarray, first: int) -> Series | None:
+        """Stamps and rows of a channel; None where its messages must be looked at one by one."""
+        topic, like = self._topic(channel), table.payload(index[0])
+        layout = self._layouts.get(channel)
+        if layout is None or not layout.fits(like):
+            layout = learned(like, role_of(topic), self._decoders[channel])
+            if layout is None:
+                return None
+            self._layouts[channel] = layout
+        starts, sizes = table.starts[index], table.sizes[index]
+        frames = self._frames.get(namespace_of(topic))
+        strangers = index[-1] >= first and not layout.is_in(frames)
+        return None if strangers else layout.read(table.data, starts, sizes)
+
+    def _one_by_one(
+        self, table: Table, channel: int, index: np.ndarray, first: int
+    ) -> tuple[np.ndarray, Series]:
+        """Numbers of the messages that are taken, stamps and rows, by the channel's decoder.
+
+        Messages from `first` on have frames.
+        """
+        topic = self._topic(channel)
+        frames = self._frames.get(namespace_of(topic))
+        taken, stamps, rows = [], [], []
+        for i in index.tolist():
+            try:
+                message = self._decoders.message(table, i, channel)
+                ns, row = self._decoders.value(topic, message, frames if i >= first else None)
+            except InputError as error:
+                if not self._contents.lenient:
+                    raise
+                self._left_out[topic] += 1
+                self._reasons.setdefault(topic, error.found)
+            else:
+                taken.append(i)
+                stamps.append(ns)
+                rows.append(row)
+        return np.array(taken, np.int64), (np.array(stamps, np.int64), np.array(rows, float))
+
+    def _in_order(self, table: Table, frames: dict[str, interface.Frames]) -> None:
+        """Refuse the first message of a table that must be refused."""
+        for i, channel in enumerate(table.channels.tolist()):
+            if channel in self._decoders:
+                topic = self._topic(channel)
+                message, namespace = self._decoders.message(table, i, channel), namespace_of(topic)
+                if role_of(topic) in ODOMETRIES and namespace not in frames:
+                    frames[namespace] = self._decoders.frames_of(channel, message)
+                self._decoders.value(topic, message, frames.get(namespace))
 
 
 def batches(bag: str | Path, contents: Contents, *, decode: bool = True) -> Iterator[Batch]:
@@ -27,13 +363,12 @@ def batches(bag: str | Path, contents: Contents, *, decode: bool = True) -> Iter
 
     """
     for path in bag_files(bag):
-        reader = FileReader(path, contents, decode)
-        for item in records(path, contents.notes):
-            yield from reader.take(item)
-        reader.finish()
+        yield from FileReader(path, contents, decode).batches()
 
 
-def read_bag(bag: str | Path, namespace: str | None = None, *, decode: bool = True) -> Contents:
+def read_bag(
+    bag: str | Path, namespace: str | None = None, *, decode: bool = True, whole: float = math.inf
+) -> Contents:
     """Read a bag.
 
     Parameters
@@ -41,6 +376,7 @@ def read_bag(bag: str | Path, namespace: str | None = None, *, decode: bool = Tr
     bag : folder or .mcap file
     namespace : whose topics are ours; None: what the bag says, else any
     decode : read the messages of our topics; else only count
+    whole : messages of a topic up to which they are kept in memory, see `Column`
 
     Raises
     ------
@@ -48,14 +384,12 @@ def read_bag(bag: str | Path, namespace: str | None = None, *, decode: bool = Tr
 
     """
     contents = Contents(namespace=namespace, asked=namespace is not None)
-    found: dict[str, list[Series]] = {}
-    small: dict[str, list[Series]] = {}
-    for topic, stamps, rows in batches(bag, contents, decode=decode):
-        parts = small.setdefault(topic, [])
-        parts.append((stamps, rows))
-        if len(parts) == TOGETHER:
-            found.setdefault(topic, []).append(joined_series(parts))
-            parts.clear()
-    for topic, parts in small.items():  # one topic after the other, so that little is held twice
-        contents.messages[topic] = joined_series([*found.pop(topic, []), *parts])
+    columns: dict[str, tuple[Column, Column]] = {}
+    for topic, *series in batches(bag, contents, decode=decode):
+        pair = columns.setdefault(topic, (Column(whole), Column(whole)))
+        for column, rows in zip(pair, series, strict=True):
+            column.append(rows)
+    for topic in [*columns]:  # one topic after the other, so that little is held twice
+        stamps, values = columns.pop(topic)
+        contents.messages[topic] = stamps.array(), values.array()
     return contents

@@ -1,18 +1,22 @@
-"""The steps of a bag that are complete on all step topics."""
+"""Steps that are complete on all step topics, set-points held to the odometry."""
 
-from collections.abc import Iterable, Iterator, Mapping
+import math
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from auv_analysis.bag.contents import Contents, NotOursError, Series
-from auv_analysis.bag.roles import READERS, namespace_of, role_of
+from auv_analysis.bag.reading import Contents, Series, gathered, slices
+from auv_analysis.bag.step_topics import READERS, NotOursError, namespace_of, role_of
+from auv_analysis.runs.run import rows_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface
 from auv_dynamics.vehicle.frames import NED_FSD, named_axes
 
 REQUIRED = (interface.ODOM, interface.WRENCH)
 Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> values
+SETPOINTS = (interface.CMD_VEL, interface.CMD_ACCEL)
+LATEST = 'latest'
 
 
 def topics_of_one_graph(topics: Iterable[str], contents: Contents, bag: Path) -> dict[str, str]:
@@ -67,10 +71,17 @@ def _namespace(topics: set[str], contents: Contents, bag: Path) -> str:
     return whole[0] if whole else spaces[0]
 
 
-def complete(series: Mapping[str, Series]) -> Steps:
-    """Stamps that are on every topic, rising, and the values there; of a doubled one the first."""
+def complete(series: Mapping[str, Series], whole: float = math.inf) -> Steps:
+    """Stamps that are on every topic, rising, and the values there; of a doubled one the first.
+
+    Parameters
+    ----------
+    series : role -> stamps and rows
+    whole : steps up to which values that have to be picked are kept in memory
+
+    """
     stamps, *others = (ns for ns, _ in series.values())
-    if np.all(np.diff(stamps) > 0) and all(np.array_equal(stamps, ns) for ns in others):
+    if _is_rising(stamps) and all(_are_equal(stamps, ns) for ns in others):
         return stamps, {role: rows for role, (_, rows) in series.items()}
     for ns in others:
         stamps = np.intersect1d(stamps, ns)
@@ -78,69 +89,27 @@ def complete(series: Mapping[str, Series]) -> Steps:
     values = {}
     for role, (ns, rows) in series.items():
         order = np.argsort(ns, kind='stable')
-        values[role] = rows[order[np.searchsorted(ns, stamps, sorter=order)]]
+        values[role] = _picked(rows, order[np.searchsorted(ns, stamps, sorter=order)], whole)
     return stamps, values
 
 
-def complete_blocks(
-    parts: Iterable[tuple[str, Series]], last: Mapping[str, int], size: int
-) -> Iterator[Steps]:
-    """The same of topics whose stamps rise, in blocks of `size` steps; the last may be shorter.
-
-    Parameters
-    ----------
-    parts : roles and what comes next of them, in any interleaving
-    last : role -> its last stamp: what comes behind the earliest of them is not complete
-    size : steps of a block
-
-    """
-    end = min(last.values())
-    waiting: dict[str, list[Series]] = {role: [] for role in last}
-    counts = dict.fromkeys(last, 0)
-    ready: list[Steps] = []
-    for role, (stamps, rows) in parts:
-        if role not in last:
-            continue
-        inside = slice(0, int(np.searchsorted(stamps, end, 'right')))
-        waiting[role].append((stamps[inside], rows[inside]))
-        counts[role] += len(stamps[inside])
-        if min(counts.values()) >= size:
-            ready.append(_settled(waiting, counts, finished=False))
-            yield from _cut(ready, size)
-    ready.append(_settled(waiting, counts, finished=True))
-    yield from _cut(ready, size)
-    if len(ready[0][0]):
-        yield ready[0]
+def _is_rising(ns: np.ndarray) -> bool:
+    overlapping = (slice(here.start, here.stop + 1) for here in slices(len(ns)))
+    return all(np.all(np.diff(rows_of(ns, here)) > 0) for here in overlapping)
 
 
-def _settled(waiting: dict[str, list[Series]], counts: dict[str, int], *, finished: bool) -> Steps:
-    """Take the steps that no topic can add to any more from what waits."""
-    series = {role: joined_series(parts) for role, parts in waiting.items()}
-    sure = None if finished else min(int(ns[-1]) for ns, _ in series.values())
-    early = {}
-    for role, (ns, rows) in series.items():
-        n = len(ns) if sure is None else int(np.searchsorted(ns, sure))  # it may come once more
-        early[role] = ns[:n], rows[:n]
-        waiting[role], counts[role] = [(ns[n:], rows[n:])], len(ns) - n
-    return complete(early)
+def _are_equal(one: np.ndarray, other: np.ndarray) -> bool:
+    same = len(one) == len(other)
+    return same and all(
+        np.array_equal(rows_of(one, here), rows_of(other, here)) for here in slices(len(one))
+    )
 
 
-def _cut(ready: list[Steps], size: int) -> Iterator[Steps]:
-    """Blocks of exactly `size` steps; one shorter one is left in `ready`."""
-    roles = ready[0][1].keys()
-    ns = np.concatenate([stamps for stamps, _ in ready])
-    values = {role: np.concatenate([rows[role] for _, rows in ready]) for role in roles}
-    full = len(ns) // size * size
-    for i in range(0, full, size):
-        here = slice(i, i + size)
-        yield ns[here], {role: rows[here] for role, rows in values.items()}
-    ready[:] = [(ns[full:], {role: rows[full:] for role, rows in values.items()})]
-
-
-def joined_series(parts: Iterable[Series]) -> Series:
-    """One series of consecutive ones."""
-    stamps, rows = zip(*parts, strict=True)
-    return np.concatenate(stamps), np.concatenate(rows)
+def _picked(rows: np.ndarray, index: np.ndarray, whole: float) -> np.ndarray:
+    """Rows of some numbers (n,)."""
+    if not len(index):
+        return rows[:0]
+    return gathered((rows_of(rows, index[here]) for here in slices(len(index))), whole)
 
 
 def dropped(counts: dict[str, int], steps: int, bag: Path) -> list[str]:
@@ -164,3 +133,34 @@ def dropped(counts: dict[str, int], steps: int, bag: Path) -> list[str]:
         for role, count in counts.items()
         if count > steps
     ]
+
+
+def holds(contents: Contents, controller: Mapping[str, object]) -> bool:
+    """Whether the recorded controller held its set-points.
+
+    Parameters
+    ----------
+    contents : of the bag
+    controller : parameters of the controller node; empty: not recorded
+
+    """
+    if 'setpoint_pairing' in controller:
+        return controller['setpoint_pairing'] == LATEST
+    return contents.lenient
+
+
+def held_series(series: Mapping[str, Series], whole: float = math.inf) -> dict[str, Series]:
+    """The series, role -> stamps and rows, with set-points at the stamps of the odometry.
+
+    A set-point holds until the next one: each odometry has the newest at or before its stamp.
+    """
+    stamps = np.sort(series[interface.ODOM][0])
+    held = dict(series)
+    for role in SETPOINTS:
+        if role in series:
+            ns, rows = series[role]
+            order = np.argsort(ns, kind='stable')
+            index = np.searchsorted(ns, stamps, 'right', sorter=order) - 1
+            known = index >= 0
+            held[role] = stamps[known], _picked(rows, order[index[known]], whole)
+    return held

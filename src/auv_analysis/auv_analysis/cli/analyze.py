@@ -6,8 +6,8 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+from auv_analysis.bag.foreign_topics import OPTIONS, TopicMap, read_mapping
 from auv_analysis.cli.conclude import conclude
-from auv_analysis.foreign.mapping import OPTIONS, TopicMap, read_mapping
 from auv_analysis.output.folder import Results, check_free, results_folder
 from auv_analysis.output.progress import waiting
 from auv_analysis.studies.compare.sources import Source, is_sweep, named, open_source, sources_of

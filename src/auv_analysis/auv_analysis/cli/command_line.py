@@ -9,7 +9,6 @@ from auv_analysis.cli.command_parser import Parser
 from auv_analysis.cli.linearize import add_options as add_linearize
 from auv_analysis.cli.tune import add_arguments as add_tune
 from auv_analysis.cli.vehicle_formats import add_export, add_import
-from auv_analysis.foreign.options import add_options as add_foreign
 from auv_analysis.replay.options import add_options as add_replay
 
 SCENARIO = 'a scenario file, or the bare name of a shipped one'
@@ -100,7 +99,21 @@ def _analyze(command: argparse.ArgumentParser) -> None:
     _no_report(command)
     text = 'own law that results may name, as its code may run; may be repeated'
     command.add_argument('--law', metavar='MODULE:CLASS', action='append', help=text)
-    add_foreign(command.add_argument_group('bags of other systems'))
+    _add_foreign(command.add_argument_group('bags of other systems'))
+
+
+def _add_foreign(group: argparse._ArgumentGroup) -> None:
+    """Options that tell what the topics of a bag of another system hold."""
+    group.add_argument('--map', metavar='FILE', help='mapping file; options replace its keys')
+    group.add_argument('--odom', dest='odometry', metavar='TOPIC', help='nav_msgs/Odometry')
+    group.add_argument('--wrench', metavar='TOPIC', help='the commanded WrenchStamped or Wrench')
+    group.add_argument('--setpoint', metavar='TOPIC', help='TwistStamped, Twist or Odometry')
+    group.add_argument('--frames', choices=('ned_fsd', 'enu_flu'), help='axes of all topics')
+    text = 'axes in which the odometry writes the velocity, default: child'
+    group.add_argument('--twist-frame', choices=('child', 'world'), help=text)
+    text = 'common time base, default: the median period of the velocity'
+    group.add_argument('--step', type=float, metavar='S', help=text)
+    group.add_argument('--gap', type=float, metavar='S', help='longer pauses are gaps')
 
 
 def _atlas(command: argparse.ArgumentParser) -> None:

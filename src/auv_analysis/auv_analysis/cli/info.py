@@ -5,8 +5,9 @@ from typing import Any
 
 from rich.table import Table
 
-from auv_analysis.bag.files import files_of
-from auv_analysis.foreign.candidates import candidates, survey
+from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.foreign_topics import candidates
+from auv_analysis.bag.metadata import files_of
 from auv_analysis.output.progress import TextConsole
 
 PARAMETERS = 'params.yaml'

@@ -6,8 +6,8 @@ from typing import Any
 from rich.progress import DownloadColumn
 from rich.table import Table
 
+from auv_analysis.bag.recover import recover as recover_bag
 from auv_analysis.output.progress import TextConsole, bar
-from auv_analysis.recovery.bag import recover as recover_bag
 
 SHOWN = 5  # damages of a file, and gaps of a topic, that are listed
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from auv_analysis.bag.attached import UNKNOWN
+from auv_analysis.bag.attachments import UNKNOWN
 from auv_analysis.output.folder import check_free, results_folder
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import (

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from auv_analysis.bag.local_polynomials import SMALLEST, rates, residuals
 from auv_analysis.driver_check.attitude import travelled, turned
 from auv_analysis.driver_check.recording import Recording
-from auv_analysis.foreign.local_polynomials import SMALLEST, rates, residuals
 from auv_dynamics.ros.interface import NANOSECONDS
 
 WINDOW = 1.0  # s over which rates are fitted

@@ -18,7 +18,7 @@ from auv_analysis.metrics.coupling import (
 from auv_analysis.metrics.energy import shares
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.metrics.moments import Moments, Tally, maps_of
-from auv_analysis.runs.run import AnyRun, Facts, LongRun, Run
+from auv_analysis.runs.run import AnyRun, Facts, Run
 from auv_gvc_controller.control.gains import body_gains
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
@@ -248,7 +248,7 @@ def gap_figures(run: Facts) -> dict[str, Any]:
 
 def unexplained_figures(run: AnyRun) -> dict[str, list[float]] | None:
     """Figures of F as estimated from measurements, N and N m; None where it is not."""
-    if isinstance(run, LongRun) or run.unexplained is None or run.unexplained_error is None:
+    if run.unexplained is None or run.unexplained_error is None:
         return None
     F, error = run.unexplained, run.unexplained_error
     found = {

@@ -6,12 +6,10 @@ from typing import Any
 from rclpy.duration import Duration
 from std_msgs.msg import Header
 
-from auv_analysis.bag.schemas import schema_text
+from auv_analysis.bag.ros2msg import schema_text
+from auv_analysis.bag.writer import RecordingError
 from auv_analysis.nodes.ledger import LostStepError, PublicationLedger, StepLedger
-from auv_analysis.nodes.recorder_clock import GraphClock
-from auv_analysis.nodes.recorder_parameters import recorder_parameters
-from auv_analysis.nodes.recorder_topics import OtherTopics
-from auv_analysis.recording import RecordingError
+from auv_analysis.nodes.recorder import GraphClock, OtherTopics, recorder_parameters
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.codec import first_stamp

@@ -3,7 +3,7 @@
 import time
 from typing import Any
 
-from auv_analysis.bag.roles import ODOMETRY, role_of
+from auv_analysis.bag.step_topics import ODOMETRY, role_of
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.graph import Graph

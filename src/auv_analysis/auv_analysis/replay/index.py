@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from mcap.records import Channel, McapRecord, Schema
+from mcap.records import Channel
 
-from auv_analysis.bag.files import bag_files
-from auv_analysis.bag.records import records
-from auv_analysis.bag.tables import Table, by_channel
+from auv_analysis.bag.chunks import Table
+from auv_analysis.bag.mcap_file import McapFile
+from auv_analysis.bag.metadata import bag_files
 from auv_analysis.replay.playback import GAP
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -116,43 +116,33 @@ def index_bag(bag: str | Path) -> BagIndex:
 
 
 def _indexed(path: Path, index: BagIndex) -> PlayedFile:
-    schemas: dict[int, Schema] = {}
-    names: dict[int, str] = {}
-    earliest: list[int] = []
-    for item in records(path, index.notes):
+    file, earliest = McapFile(path, index.notes), list[int]()
+    for item in file.records():
         if isinstance(item, Table):
-            _count(item, names, path, index)
+            _count(item, file, index)
             earliest.append(int(item.log_times.min()))
-        else:
-            _meet(item, schemas, names, index)
+        elif isinstance(item, Channel):
+            _meet(item, file, index)
     least = np.minimum.accumulate(np.array(earliest[::-1], np.uint64))[::-1]
     return PlayedFile(path, [int(ns) for ns in least])
 
 
-def _meet(
-    item: McapRecord, schemas: dict[int, Schema], names: dict[int, str], index: BagIndex
-) -> None:
-    if isinstance(item, Schema):
-        schemas[item.id] = item
-    elif isinstance(item, Channel) and item.id not in names:
-        names[item.id] = item.topic
-        schema, about = schemas.get(item.schema_id), item.metadata
-        topic = PlayedTopic(
-            schema.name if schema else '',
-            item.message_encoding,
-            about.get('offered_qos_profiles', ''),
-            about.get('topic_type_hash', ''),
-        )
-        known = index.topics.setdefault(item.topic, topic)
-        if (known.kind, known.encoding) != (topic.kind, topic.encoding):
-            index.clashes.add(item.topic)
+def _meet(channel: Channel, file: McapFile, index: BagIndex) -> None:
+    schema, about = file.schema_of(channel), channel.metadata
+    topic = PlayedTopic(
+        schema.name if schema else '',
+        channel.message_encoding,
+        about.get('offered_qos_profiles', ''),
+        about.get('topic_type_hash', ''),
+    )
+    known = index.topics.setdefault(channel.topic, topic)
+    if (known.kind, known.encoding) != (topic.kind, topic.encoding):
+        index.clashes.add(channel.topic)
 
 
-def _count(table: Table, names: dict[int, str], path: Path, index: BagIndex) -> None:
-    for channel, messages in by_channel(table.channels):
-        if channel not in names:
-            raise InputError(path, f'channel {channel}', 'a channel before its messages', None)
-        topic = names[channel]
+def _count(table: Table, file: McapFile, index: BagIndex) -> None:
+    for channel, messages in file.by_channel(table):
+        topic = channel.topic
         index.counts[topic] = index.counts.get(topic, 0) + len(messages)
         _span(index.spans.setdefault(topic, []), table.log_times[messages])
     index.first = min(index.first, int(table.log_times.min()))

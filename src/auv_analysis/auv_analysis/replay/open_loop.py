@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.bag import attached
-from auv_analysis.bag.contents import Contents, NotOursError, Series
-from auv_analysis.bag.reading import read_bag
+from auv_analysis.bag import attachments
+from auv_analysis.bag.reading import Contents, Series, read_bag
+from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.bag.steps import topics_of_one_graph
 from auv_analysis.graph.node_parameters import CONTROLLER
 from auv_analysis.replay.recorded_controller import RecordedController
@@ -101,13 +101,13 @@ def recorded_loop(bag: str | Path, vehicle: str | Path | None = None) -> Recorde
 def _loop(
     series: dict[str, Series], contents: Contents, bag: Path, vehicle: str | Path | None
 ) -> RecordedLoop:
-    parameters = attached.parameters_of(contents, bag)
-    known, own = attached.vehicle_of(contents, bag, vehicle), parameters.get(CONTROLLER, {})
+    parameters = attachments.parameters_of(contents, bag)
+    known, own = attachments.vehicle_of(contents, bag, vehicle), parameters.get(CONTROLLER, {})
     return RecordedLoop(
         series,
         RecordedController(own, known, bag, derivatives=interface.CMD_ACCEL in series),
-        attached.scenario_name(contents, bag),
-        attached.controller_name(parameters, bag),
+        attachments.scenario_name(contents, bag),
+        attachments.controller_name(parameters, bag),
         tuple(contents.notes),
     )
 

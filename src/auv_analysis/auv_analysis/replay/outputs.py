@@ -3,7 +3,7 @@
 import re
 from typing import Any
 
-from auv_analysis.bag.schemas import definition
+from auv_analysis.bag.ros2msg import definition
 from auv_analysis.replay.index import PlayedTopic
 from auv_analysis.replay.selection import Selection
 from auv_dynamics.ros.endpoints import full_name

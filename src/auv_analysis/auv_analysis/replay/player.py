@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
-from auv_analysis.bag.roles import ODOMETRY
+from auv_analysis.bag.step_topics import ODOMETRY
 from auv_analysis.nodes.replay_parameters import ReplayParameters
 from auv_analysis.replay.answers import Answers, is_odometry
 from auv_analysis.replay.guard import Guard

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.bag import attached
+from auv_analysis.bag import attachments
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.control.controller import VelocityController
@@ -46,7 +46,7 @@ class RecordedController:
         self, parameters: Mapping[str, Any], vehicle: Vehicle, bag: Path, *, derivatives: bool
     ):
         self._vehicle = vehicle
-        self.law, self.gains = attached.law_and_gains(dict(parameters), bag)
+        self.law, self.gains = attachments.law_and_gains(dict(parameters), bag)
         source = f'{bag}: params.yaml: controller_node'
         self.settings = recorded_settings(parameters, source)
         if self.settings.setpoint_acceleration == SAME and not derivatives:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
-from auv_analysis.bag.roles import WRENCH
+from auv_analysis.bag.step_topics import WRENCH
 from auv_analysis.replay.index import BagIndex
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of

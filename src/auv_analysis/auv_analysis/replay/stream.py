@@ -7,10 +7,9 @@ from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from mcap.records import Channel
 
-from auv_analysis.bag.records import records
-from auv_analysis.bag.tables import Table
+from auv_analysis.bag.chunks import Table
+from auv_analysis.bag.mcap_file import McapFile
 from auv_analysis.replay.index import NEVER, BagIndex, PlayedFile
 
 
@@ -57,16 +56,14 @@ def messages(
 
 def _of_file(file: PlayedFile, topics: Collection[str], begin: int, end: int) -> Iterator[Logged]:
     waiting: list[tuple[int, int, Logged]] = []
-    known: dict[int, str] = {}
+    opened = McapFile(file.path)
     tables, order = 0, itertools.count()
-    for item in records(file.path, []):
-        if isinstance(item, Channel):
-            known.setdefault(item.id, item.topic)
+    for item in opened.records():
         if not isinstance(item, Table):
             continue
         tables += 1
         for i in _inside(item, begin, end):
-            topic = known[int(item.channels[i])]
+            topic = opened.channels[int(item.channels[i])].topic
             if topic in topics:
                 message = Logged(int(item.log_times[i]), topic, item.payload(i))
                 heapq.heappush(waiting, (message.ns, next(order), message))

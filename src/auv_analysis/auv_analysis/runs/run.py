@@ -1,7 +1,8 @@
 """A run: the samples of a simulated or recorded closed loop, with what is known of it."""
 
+import mmap
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
@@ -167,7 +168,8 @@ class Run(Facts):
 
     def part(self, keep: Any) -> 'Run':
         """Run of the samples that an index, slice or mask of samples keeps."""
-        return replace(self, **{name: values[keep] for name, values in self.arrays().items()})
+        kept: dict[str, Any] = {name: rows_of(a, keep) for name, a in self.arrays().items()}
+        return replace(self, **kept)
 
     def blocks(self, rows: int = BLOCK) -> Iterator['Run']:
         """The run in parts of so many samples."""
@@ -233,37 +235,26 @@ class Run(Facts):
         return self.tau if self.applied is None else self.applied
 
 
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class LongRun(Facts):
-    """A run whose samples are read in blocks, whenever they are asked for.
+AnyRun = Run
 
-    Attributes
+
+def rows_of(values: np.ndarray, keep: Any) -> np.ndarray:
+    """Rows of an array; of one that is mapped from a file a copy, so that its pages can go again.
+
+    Parameters
     ----------
-    known_extent : length and optional signals
-    source_of_blocks : reads the run from its beginning, in blocks of so many samples
-
-    The other attributes are those of `Facts`.
+    values : (n, ...)
+    keep : index, slice or mask of rows
 
     """
-
-    known_extent: Extent
-    source_of_blocks: Callable[[int], Iterator[Run]]
-
-    @property
-    def extent(self) -> Extent:
-        """Length and optional signals, as they were found when the run was opened."""
-        return self.known_extent
-
-    def blocks(self, rows: int = BLOCK) -> Iterator[Run]:
-        """The run in parts of so many samples."""
-        return self.source_of_blocks(rows)
-
-    def wide_blocks(self, margin: int, rows: int = BLOCK) -> Iterator[tuple[Run, slice]]:
-        """The same parts with up to `margin` samples at either side, and where the part is."""
-        return widened(self.blocks(rows), margin)
-
-
-AnyRun = Run | LongRun
+    base: Any = values
+    while isinstance(base, np.ndarray):
+        base = base.base
+    if not isinstance(base, mmap.mmap):
+        return values[keep]
+    rows = np.array(values[keep])
+    base.madvise(mmap.MADV_DONTNEED)
+    return rows
 
 
 def joined(parts: Sequence[Run]) -> Run:
@@ -274,25 +265,6 @@ def joined(parts: Sequence[Run]) -> Run:
     arrays = [part.arrays() for part in parts]
     whole: dict[str, Any] = {n: np.concatenate([a[n] for a in arrays]) for n in arrays[0]}
     return replace(first, **whole)
-
-
-def widened(blocks: Iterable[Run], margin: int) -> Iterator[tuple[Run, slice]]:
-    """Each block with up to `margin` samples of its neighbours, and where it lies in that."""
-    before: list[Run] = []
-    queue: list[Run] = []
-
-    def first_of_queue() -> tuple[Run, slice]:
-        wide, start = joined([*before, *queue]), sum(len(part.t) for part in before)
-        inside = slice(start, start + len(queue.pop(0).t))
-        before[:] = [wide.part(slice(max(inside.stop - margin, 0), inside.stop))]
-        return wide.part(slice(0, inside.stop + margin)), inside
-
-    for block in blocks:
-        queue.append(block)
-        while sum(len(part.t) for part in queue[1:]) >= max(margin, 1):
-            yield first_of_queue()
-    while queue:
-        yield first_of_queue()
 
 
 class Windows:

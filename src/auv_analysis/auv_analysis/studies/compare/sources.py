@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
 from auv_analysis.bag import open_bag
-from auv_analysis.bag.contents import NotOursError
-from auv_analysis.bag.files import OTHERS, files_of, is_mcap
+from auv_analysis.bag.foreign_topics import TopicMap, with_candidates
 from auv_analysis.bag.load import Recording
-from auv_analysis.foreign.candidates import with_candidates
-from auv_analysis.foreign.mapping import TopicMap
+from auv_analysis.bag.metadata import OTHERS, files_of, is_mcap
+from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.output.folder import SWEEP
 from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.runs.samples import ENDING, load_samples
@@ -247,7 +246,7 @@ def open_source(source: Source, vehicle: str | None = None) -> Opened:
 def _open_bag(source: Source, vehicle: str | None) -> Recording:
     bag = source.path
     if source.mapping is not None:
-        from auv_analysis.foreign.load import load_foreign  # with libraries that load slowly
+        from auv_analysis.bag.foreign_run import load_foreign
 
         return load_foreign(bag, source.mapping)
     try:

@@ -1,0 +1,261 @@
+"""The messages of any bag, decoded: MCAP by our own reader, others by the rosbags library."""
+
+import shutil
+import tempfile
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+import zstandard
+from mcap.records import Channel
+
+from auv_analysis.bag.chunks import Table
+from auv_analysis.bag.limits import LARGEST_PARSED, MOST_NAMED
+from auv_analysis.bag.mcap_file import McapFile
+from auv_analysis.bag.metadata import bag_files, check_regular, is_mcap
+from auv_analysis.bag.reading import Contents, read_bag
+from auv_analysis.bag.step_topics import refusal
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import read_yaml
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+
+Result = TypeVar('Result')
+Decoder = Callable[[bytes], Any]
+RULE = '=' * 80 + '\n'  # between the parts of a definition
+LANGUAGES = {'ros2msg': 'msg', 'ros1msg': 'msg', 'ros2idl': 'idl'}  # of MCAP's schemas
+
+
+class Logged(NamedTuple):
+    """A message and when it was logged, ns."""
+
+    topic: str
+    log_time: int
+    message: Any
+
+
+def type_name(name: str) -> str:
+    """A message type as ROS 2 writes it: 'nav_msgs/Odometry' becomes 'nav_msgs/msg/Odometry'.
+
+    A name without a package stays as it is: nobody's type, but a schema may be called so.
+    """
+    package, slash, rest = name.partition('/')
+    return f'{package}/msg/{rest.rpartition("/")[2]}' if slash else name
+
+
+def survey(bag: Path) -> Contents:
+    """Topics, types, counts and span of a bag of any kind, without its messages."""
+    if not is_mcap(bag):
+        return _survey_of_rosbags(bag)
+    contents = read_bag(bag, decode=False)
+    contents.types = {topic: type_name(kind) for topic, kind in contents.types.items()}
+    return contents
+
+
+def messages(bag: Path, topics: Collection[str], notes: list[str]) -> Iterator[Logged]:
+    """Messages of some topics in the order of the bag.
+
+    Parameters
+    ----------
+    bag : folder or file
+    topics : names as the bag has them
+    notes : gets a line where a file is damaged or was not finished
+
+    Raises
+    ------
+    InputError : not a bag, or messages that cannot be decoded
+
+    """
+    if is_mcap(bag):
+        for path in bag_files(bag):
+            yield from _of_mcap(path, topics, notes)
+    else:
+        yield from _messages_of_rosbags(bag, topics)
+
+
+def _of_mcap(path: Path, topics: Collection[str], notes: list[str]) -> Iterator[Logged]:
+    file = McapFile(path, notes)
+    wanted: dict[int, tuple[str, Decoder]] = {}
+    for item in file.records():
+        if isinstance(item, Channel) and item.topic in topics:
+            schema = file.schema_of(item)
+            name = type_name(schema.name) if schema and '/' in schema.name else ''
+            text = schema.data.decode('utf-8', 'replace') if schema else ''
+            language = LANGUAGES.get(schema.encoding, schema.encoding) if schema else 'nothing'
+            decode = decoder_of(path, item.topic, (name, text, language, item.message_encoding))
+            wanted[item.id] = item.topic, decode
+        elif isinstance(item, Table):
+            for i, channel in enumerate(item.channels.tolist()):
+                if channel in wanted:
+                    topic, decode = wanted[channel]
+                    message = decoded(path, topic, decode, item.payload(i))
+                    yield Logged(topic, int(item.log_times[i]), message)
+
+
+def _survey_of_rosbags(bag: Path) -> Contents:
+    """Topics, types, counts and span of a bag, without its messages."""
+    contents = Contents()
+    for part in _parts(bag):
+        with _opened(part) as reader:
+            for connection in reader.connections:
+                topic = connection.topic
+                contents.types[topic] = connection.msgtype
+                contents.counts[topic] = contents.counts.get(topic, 0) + connection.msgcount
+            if reader.message_count:
+                contents.span(reader.start_time, reader.end_time - 1)
+    return contents
+
+
+def _messages_of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[Logged]:
+    """Messages of some topics, in the order of logging."""
+    for part in _parts(bag):
+        yield from _of_rosbags(part, topics)
+
+
+def _of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[Logged]:
+    with _opened(bag) as reader:
+        wanted = [c for c in reader.connections if c.topic in topics]
+        if not wanted:
+            return
+        decoders = {c.id: _of_connection(bag, c) for c in wanted}
+        found = reader.messages(connections=wanted)
+        while True:
+            try:
+                connection, log_time, data = next(found)
+            except StopIteration:
+                return
+            except Exception as error:  # whatever the library meets in a damaged file
+                raise refusal(bag, '', 'a bag that can be read to its end', error) from None
+            topic = connection.topic
+            message = decoded(bag, topic, decoders[connection.id], bytes(data))
+            yield Logged(topic, log_time, message)
+
+
+def _of_connection(bag: Path, connection: 'Connection') -> Decoder:
+    definition = connection.msgdef
+    known = definition.format.name != 'NONE'
+    language = 'idl' if definition.format.name == 'IDL' else 'msg'
+    encoding = 'ros1' if _is_ros1(bag) else 'cdr'
+    text = definition.data if known else ''
+    return decoder_of(bag, connection.topic, (connection.msgtype, text, language, encoding))
+
+
+def _parts(bag: Path) -> list[Path]:
+    """What rosbags opens: a folder whose recorder was killed has no metadata, but its files."""
+    if not bag.is_dir():
+        return [bag]
+    if (bag / 'metadata.yaml').exists():
+        _check_metadata(bag)
+        return [bag]
+    files = sorted(bag.glob('*.db3'))
+    for file in files:
+        check_regular(file, bag)
+    return files
+
+
+def _check_metadata(bag: Path) -> None:
+    """Refuse a metadata.yaml that leads out of its folder or decompresses to more than fits."""
+    path = bag / 'metadata.yaml'
+    check_regular(path, bag)
+    told = read_yaml(path, 'metadata').get('rosbag2_bagfile_information')
+    listed = told.get('relative_file_paths') if isinstance(told, dict) else None
+    if not isinstance(told, dict) or not isinstance(listed, list):
+        raise InputError(path, 'relative_file_paths', 'a list of files', listed)
+    for name in listed:
+        if not isinstance(name, str) or Path(name).is_absolute() or '..' in Path(name).parts:
+            expected = 'names of files in the folder of the bag'
+            raise InputError(path, 'relative_file_paths', expected, name)
+        file = bag / Path(name).name  # as rosbags reads it, which some versions write with folders
+        check_regular(file, bag)
+        if str(told.get('compression_mode', '')).lower() == 'file':
+            _check_size(file)
+
+
+def _check_size(file: Path) -> None:
+    """Refuse a compressed file that rosbags would fill the disk with."""
+    with file.open('rb') as stream:
+        head = stream.read(18)
+    try:
+        size = zstandard.frame_content_size(head)
+    except zstandard.ZstdError:
+        size = -1
+    free = shutil.disk_usage(tempfile.gettempdir()).free
+    if not 0 <= size <= free:
+        expected = f'a zstd file that says that it holds at most the {free} bytes that are free'
+        raise InputError(file, '', expected, 'no size' if size < 0 else f'{size} bytes')
+
+
+def _is_ros1(bag: Path) -> bool:
+    return bag.suffix == '.bag' and not bag.is_dir()
+
+
+@contextmanager
+def _opened(bag: Path) -> Iterator[Any]:
+    """An open reader of the rosbags library."""
+    from rosbags import rosbag1, rosbag2  # loads slowly, and is not needed for MCAP
+
+    try:
+        reader: Any = rosbag1.Reader(bag) if _is_ros1(bag) else rosbag2.Reader(bag)
+        reader.open()
+    except Exception as error:  # of SQLite, of YAML, of the library: by what the file is
+        raise refusal(bag, '', 'a bag that rosbags can open', error) from None
+    try:
+        if len(reader.connections) > MOST_NAMED:
+            raise InputError(bag, '', f'at most {MOST_NAMED} topics', f'{len(reader.connections)}')
+        yield reader
+    finally:
+        reader.close()
+
+
+def decoder(name: str, definition: str, language: str, encoding: str) -> Decoder:
+    """Decoder of one type.
+
+    Parameters
+    ----------
+    name : type as ROS 2 writes it
+    definition : of the type and of all that it contains; '': the one that ROS 2 Humble has
+    language : of the definition: 'msg' or 'idl'
+    encoding : of the messages: 'cdr' or 'ros1'
+
+    Raises
+    ------
+    ValueError : another language or encoding, or a definition that is too long
+    Exception : whatever the parser of the definition stumbles over
+
+    """
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    if encoding not in ('cdr', 'ros1') or language not in ('msg', 'idl'):
+        raise ValueError(f'messages in {encoding or "no encoding"}, described in {language}')
+    if len(definition) > LARGEST_PARSED:
+        raise ValueError(f'a definition of {len(definition)} bytes, above {LARGEST_PARSED}')
+    store = get_typestore(Stores.EMPTY if definition else Stores.ROS2_HUMBLE)
+    if definition and language == 'msg':
+        store.register(get_types_from_msg(definition, name))
+    for part in definition.split(RULE) if language == 'idl' else ():
+        text = part.partition('\n')[2] if part.startswith('IDL: ') else part
+        if text.strip():
+            store.register(get_types_from_idl(text))
+    store.get_msgdef(name)  # that the definition defines it shows here
+    read = store.deserialize_cdr if encoding == 'cdr' else store.deserialize_ros1
+    return partial(read, typename=name)
+
+
+def decoder_of(path: Path, topic: str, how: tuple[str, str, str, str]) -> Decoder:
+    """The same decoder as `decoder`; InputError, which names the topic, where there is none."""
+    return _guarded(path, topic, 'a definition of its type', lambda: decoder(*how))
+
+
+def decoded(path: Path, topic: str, decode: Decoder, data: bytes) -> Any:
+    """A message; InputError, which names its topic, where it cannot be decoded."""
+    return _guarded(path, topic, 'messages of its type', lambda: decode(data))
+
+
+def _guarded(path: Path, topic: str, expected: str, work: Callable[[], Result]) -> Result:
+    try:
+        return work()
+    except Exception as error:  # by its definition, a message may be anything
+        raise refusal(path, topic, expected, error) from None

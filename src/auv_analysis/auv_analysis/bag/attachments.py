@@ -1,0 +1,130 @@
+"""What the attachments of a bag say of its run: parameters, law, vehicle, scenario."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+from auv_analysis.bag.reading import Contents
+from auv_analysis.scenario.fault_words import Mark, marks_of
+from auv_analysis.scenario.scenario import SCHEMA
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import check, parse_yaml
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
+from auv_gvc_controller.laws.law import is_unasked, make_gains
+
+NAME = re.compile('[A-Za-z0-9][A-Za-z0-9_.+-]{0,99}')
+LAW = re.compile(r'[A-Za-z_][\w.]*:[A-Za-z_]\w*', re.ASCII)  # module:Class
+UNFIT = re.compile('[^A-Za-z0-9_.+-]+')
+UNKNOWN = 'unknown'  # law of a bag without params.yaml
+
+
+def parameters_of(contents: Contents, bag: Path) -> dict[str, dict[str, Any]]:
+    """Node name -> its parameters, from the attached parameter file."""
+    text = contents.attachments.get('params.yaml')
+    if text is None:
+        return {}
+    file = f'{bag}: params.yaml'
+    found: dict[str, dict[str, Any]] = {}
+    for name, entry in parse_yaml(text, file, 'parameter').items():
+        values = entry.get('ros__parameters') if isinstance(entry, dict) else None
+        if not isinstance(values, dict):
+            raise InputError(file, name, 'a mapping with ros__parameters', entry)
+        found[name.rpartition('/')[2]] = values
+    return found
+
+
+def step_of(parameters: dict[str, dict[str, Any]], bag: Path) -> float | None:
+    """Control period, s; None where the parameters do not say it."""
+    step = parameters.get('plant_node', {}).get('step')
+    if step is None:
+        return None
+    if not (isinstance(step, int | float) and 0 < step < float('inf')):
+        raise InputError(f'{bag}: params.yaml', 'plant_node: step', 'a positive number (s)', step)
+    return float(step)
+
+
+def controller_name(parameters: dict[str, dict[str, Any]], bag: Path) -> str:
+    """Name of the controller: that of the folder that was recorded into, as a word.
+
+    It becomes part of names of files and stands in figures.
+    """
+    recorded = parameters.get('recorder_node', {}).get('bag', str(bag))
+    if not isinstance(recorded, str):
+        raise InputError(f'{bag}: params.yaml', 'recorder_node: bag', 'a folder', recorded)
+    return UNFIT.sub('_', Path(recorded).name)[:100].lstrip('_.+-') or 'controller'
+
+
+def law_and_gains(controller: dict[str, Any], bag: Path) -> tuple[str, dict[str, Any]]:
+    """Law and gains, from the parameters of the controller node; no gains of an unasked law."""
+    gains = {}
+    for key, value in controller.items():
+        if key.startswith('gains.'):
+            one = isinstance(value, list) and len(value) == 1
+            gains[key.removeprefix('gains.')] = value[0] if one else value
+    law = controller.get('law')
+    file = f'{bag}: params.yaml'
+    if law is None:
+        return UNKNOWN, {}  # a bag that somebody else recorded says nothing of it
+    if is_unasked(law):
+        if not LAW.fullmatch(law):
+            raise InputError(file, 'controller_node', 'a law, shipped or module:Class', law)
+        return law, {}
+    try:
+        make_gains(law, gains)
+    except ValueError as error:
+        raise InputError(file, 'controller_node', str(error), 'another law or gain') from None
+    return law, gains
+
+
+def notes_on(law: str) -> list[str]:
+    """What is worth saying of a law."""
+    if not is_unasked(law):
+        return []
+    return [f'gains of {law} not looked at: a bag brings no code; --law {law} imports its module']
+
+
+def vehicle_of(contents: Contents, bag: Path, vehicle: str | Path | None) -> Vehicle:
+    """The given vehicle, else the one that the bag carries."""
+    if vehicle is not None:
+        return load_vehicle(vehicle)
+    text = contents.attachments.get('vehicle.yaml')
+    if text is None:
+        raise InputError(bag, 'vehicle.yaml', 'an attachment, or --vehicle FILE', None)
+    file = f'{bag}: vehicle.yaml'
+    return vehicle_from_dict(parse_yaml(text, file, 'vehicle'), file)
+
+
+def faults_of(contents: Contents, vehicle: Vehicle) -> tuple[Mark, ...]:
+    """Faults of the scenario that the bag carries, none where that is not one."""
+    try:
+        data = parse_yaml(
+            contents.attachments.get('scenario.yaml', ''), 'scenario.yaml', 'scenario'
+        )
+        check(data, SCHEMA, 'scenario.yaml')
+    except InputError:
+        return ()
+    return marks_of(data.get('faults', []), vehicle)
+
+
+def kinds_of(contents: Contents, bag: Path) -> frozenset[str] | None:
+    """Kinds of the disturbances, None where the bag does not say."""
+    text, file = contents.attachments.get('scenario.yaml'), f'{bag}: scenario.yaml'
+    if text is None:
+        return None
+    listed = parse_yaml(text, file, 'scenario').get('disturbance', [])
+    specs = listed if isinstance(listed, list) else [listed]
+    return frozenset(
+        str(spec['kind']) for spec in specs if isinstance(spec, dict) and 'kind' in spec
+    )
+
+
+def scenario_name(contents: Contents, bag: Path) -> str:
+    """Name of the scenario; without its file, that of the folder around the bag."""
+    text, file = contents.attachments.get('scenario.yaml'), f'{bag}: scenario.yaml'
+    if text is None:
+        return bag.resolve().parent.name
+    name = parse_yaml(text, file, 'scenario').get('name')
+    if not (isinstance(name, str) and NAME.fullmatch(name)):
+        raise InputError(file, 'name', 'a word without blanks or slashes', name)
+    return name

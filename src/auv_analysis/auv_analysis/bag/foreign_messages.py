@@ -1,0 +1,231 @@
+"""Mapped topics of a bag as arrays: which numbers a message holds, stamps put in order."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.bag.any_bag import messages, survey
+from auv_analysis.bag.foreign_topics import HELD, READERS, Reading, Source, TopicMap, are_usable
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import meant
+from auv_dynamics.ros.interface import NANOSECONDS
+
+TOGETHER = 4096  # messages that wait as objects before they become rows of arrays
+BACK = NANOSECONDS  # ns: stamps that fall by more have begun anew, less is a message that came late
+APART = NANOSECONDS  # ns between logged and stamped time from which they are two clocks
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Messages of one topic in the order of the bag.
+
+    Attributes
+    ----------
+    bag : where it comes from
+    source : the topic
+    frame, child : frame ids of its first message
+    log : (n,) times of logging, ns
+    stamps : (n,) stamps in ns; those of logging where the messages have none
+    stamped : whether the stamps are those of headers
+    rows : (n, k) numbers
+
+    """
+
+    bag: Path
+    source: Source
+    frame: str
+    child: str
+    log: np.ndarray
+    stamps: np.ndarray
+    stamped: bool
+    rows: np.ndarray
+
+    def part(self, keep: Any, columns: Any = slice(None)) -> 'Recorded':
+        """The messages that an index, slice or mask keeps, and some of their numbers."""
+        rows = self.rows[keep][:, columns]
+        return replace(self, log=self.log[keep], stamps=self.stamps[keep], rows=rows)
+
+
+def on_the_clock(of: Recorded, clock: Recorded, notes: list[str]) -> Recorded:
+    """Logged times of a topic put on the clock of the stamps of another one.
+
+    Parameters
+    ----------
+    of : a topic without stamps; one with stamps is returned as it is
+    clock : the topic whose stamps count
+    notes : gets a line where the clocks are not the same
+
+    """
+    if of.stamped or not clock.stamped:
+        return of
+    apart = float(np.median(clock.log - clock.stamps)) / NANOSECONDS
+    if abs(apart) * NANOSECONDS < APART:
+        return of
+    order = np.argsort(clock.log, kind='stable')
+    log, stamps = clock.log[order], np.maximum.accumulate(clock.stamps[order])
+    inside = np.clip(of.log, log[0], log[-1])  # before and behind it, both clocks go on alike
+    moved = np.interp(inside - log[0], log - log[0], stamps - stamps[0])
+    moved_ns = stamps[0] + np.round(moved).astype(np.int64) + of.log - inside
+    notes.append(
+        f'{of.source.topic}: logged {apart:.6g} s off the stamps of {clock.source.topic}; put on '
+        'its clock by the messages that were logged around each'
+    )
+    return replace(of, stamps=moved_ns)
+
+
+def longest_stretch(of: Recorded, notes: list[str]) -> Recorded:
+    """The longest part, in messages, in which the clock never starts anew."""
+    cuts = np.flatnonzero(np.diff(of.stamps) < -BACK) + 1
+    if not len(cuts):
+        return of
+    parts = np.split(np.arange(len(of.stamps)), cuts)
+    kept = max(parts, key=len)
+    back = np.max(-np.diff(of.stamps)[cuts - 1]) / NANOSECONDS
+    notes.append(
+        f'{of.source.topic}: the clock jumps back {len(cuts)} times, by up to {back:.6g} s; '
+        f'read the longest of {len(parts)} stretches, left {len(of.stamps) - len(kept)} messages'
+    )
+    return of.part(kept)
+
+
+def logged_with(of: Recorded, clock: Recorded) -> Recorded:
+    """What was logged while the kept part of another topic was."""
+    return of.part((of.log >= clock.log.min()) & (of.log <= clock.log.max()))
+
+
+def ordered(of: Recorded, notes: list[str]) -> Recorded:
+    """Messages by rising stamps, each stamp once.
+
+    Of a doubled stamp the first measurement is kept, but the last command: it is the one that held.
+    """
+    late = int(np.count_nonzero(of.stamps < np.maximum.accumulate(of.stamps)))
+    last = of.source.role in HELD
+    of = of.part(slice(None, None, -1)) if last else of
+    stamps, index = np.unique(of.stamps, return_index=True)
+    doubled = len(of.stamps) - len(stamps)
+    if late:
+        notes.append(f'{of.source.topic}: {late} messages came out of order and were sorted')
+    if doubled:
+        which = 'last' if last else 'first'
+        notes.append(f'{of.source.topic}: {doubled} stamps came again, the {which} of each is kept')
+    return of.part(index)
+
+
+def read_sources(bag: Path, mapping: TopicMap, notes: list[str]) -> dict[str, Recorded]:
+    """Role -> its messages, in their order in the bag.
+
+    Parameters
+    ----------
+    bag : folder or file
+    mapping : its topics
+    notes : gets a line for everything that is odd
+
+    Raises
+    ------
+    InputError : a topic is not in the bag, of another type, empty or of no use
+
+    """
+    types = survey(bag).types
+    found = {role: _Messages(bag, source, types) for role, source in mapping.sources.items()}
+    by_topic: dict[str, list[_Messages]] = {}
+    for one in found.values():
+        by_topic.setdefault(one.source.topic, []).append(one)
+    for topic, log, message in messages(bag, by_topic.keys(), notes):
+        for one in by_topic[topic]:
+            one.add(log, message)
+    return {role: one.recorded(notes) for role, one in found.items()}
+
+
+class _Messages:
+    """Takes the messages of one topic for one role.
+
+    Parameters
+    ----------
+    bag : for refusals
+    source : the topic
+    types : topic -> type, of the bag
+
+    """
+
+    def __init__(self, bag: Path, source: Source, types: dict[str, str]):
+        self.source, self._bag = source, bag
+        self._read = self._reader(types)
+        self._waiting: list[tuple[int, Reading]] = []
+        self._parts: list[tuple[np.ndarray, np.ndarray]] = []
+        self._frames: set[tuple[str, str]] = set()
+        self._width, self._stamped = 0, False
+
+    def _reader(self, types: dict[str, str]) -> Callable[[Any], Reading]:
+        readers, topic = READERS[self.source.role], self.source.topic
+        kind = types.get(topic)
+        if kind is None:
+            fitting = [name for name in sorted(types) if types[name] in readers]
+            listed = f': {", ".join(fitting)}{meant(topic, fitting)}' if fitting else ''
+            expected = f'a topic of the bag{listed}'
+            raise InputError(self._bag, self.source.role, expected, topic)
+        if kind not in readers:
+            raise InputError(self._bag, topic, ' or '.join(readers), kind)
+        return readers[kind]
+
+    def add(self, log: int, message: Any) -> None:
+        """Take the next message, logged at a time in ns."""
+        try:
+            reading = self._read(message)
+        except (AttributeError, TypeError, ValueError) as error:  # other fields than its type has
+            raise self._refusal('messages of its type', str(error)) from None
+        self._width = self._width or len(reading.row)
+        if len(reading.row) != self._width:
+            expected = f'{self._width} numbers in each message'
+            raise self._refusal(expected, f'{len(reading.row)}')
+        self._frames.add((reading.frame, reading.child))
+        if len(self._frames) > 1:
+            ids = sorted(' '.join(filter(None, pair)) or 'none' for pair in self._frames)
+            raise self._refusal('the same frame_id in all messages', '; '.join(ids))
+        self._stamped = reading.stamp is not None
+        self._waiting.append((log, reading))
+        if len(self._waiting) == TOGETHER:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Turn what waits into arrays."""
+        times = [(log, log if one.stamp is None else one.stamp) for log, one in self._waiting]
+        rows = np.array([one.row for _, one in self._waiting], float)
+        self._parts.append((np.array(times, np.int64), rows))
+        self._waiting.clear()
+
+    def recorded(self, notes: list[str]) -> Recorded:
+        """All messages; those without usable numbers are left out, and counted in the notes."""
+        topic = self.source.topic
+        if self._waiting:
+            self._settle()
+        if not self._parts:
+            raise self._refusal('messages', 'none')
+        times, rows = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        self._parts.clear()
+        log, stamps = times.T
+        stamped = self._stamped and self.source.stamps == 'header'
+        if stamped and not stamps.any():
+            notes.append(f'{topic}: every stamp is zero, so the time of logging is taken')
+            stamped = False
+        elif not self._stamped:
+            notes.append(f'{topic}: messages without stamp, so the time of logging is taken')
+        usable = are_usable(rows, self.source.role)
+        if not usable.any():
+            raise self._refusal('finite numbers and unit quaternions', 'none')
+        if not usable.all():
+            lost = np.count_nonzero(~usable)
+            notes.append(
+                f'{topic}: {lost} of {len(rows)} messages were left out: not finite, or without '
+                'a unit quaternion'
+            )
+        frame, child = next(iter(self._frames))
+        found = Recorded(
+            self._bag, self.source, frame, child, log, stamps if stamped else log, stamped, rows
+        )
+        return found.part(usable)
+
+    def _refusal(self, expected: str, found: str) -> InputError:
+        return InputError(self._bag, self.source.topic, expected, found)

@@ -1,0 +1,194 @@
+"""A bag of another system as a `Run`: mapped, put into our axes, brought to one time base."""
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from auv_analysis.bag.foreign_messages import read_sources
+from auv_analysis.bag.foreign_topics import TopicMap
+from auv_analysis.bag.foreign_tracks import (
+    TimeBase,
+    Track,
+    at_times,
+    means_over,
+    sensible_step,
+    time_base,
+    tracks_of,
+)
+from auv_analysis.bag.load import Recording
+from auv_analysis.bag.unexplained import FILTER, Unexplained, unexplained
+from auv_analysis.runs.run import FOREIGN, Run
+from auv_dynamics.dofs import DOFS
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import read_text
+from auv_dynamics.plant.plant import unwrapped_eta
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
+
+HOW = {
+    'pose': 'position by straight lines, attitude by slerp',
+    'twist': 'velocity by straight lines between its samples',
+}
+
+
+def load_foreign(bag: str | Path, mapping: TopicMap) -> Recording:
+    """Run of a bag of another system, and the vehicle file that it is interpreted with.
+
+    All its messages are held in memory.
+
+    Parameters
+    ----------
+    bag : folder or file: MCAP, rosbag2's SQLite or ROS 1
+    mapping : which topics hold what; it must name a vehicle
+
+    Returns
+    -------
+    recording : a run in NED and FSD with equal steps wherever motion and wrench are known;
+        `run.notes` says every assumption, `run.unexplained` is F by (1)
+
+    Raises
+    ------
+    InputError : naming file, key, expected and found
+
+    """
+    bag, notes = Path(bag), list[str]()
+    if mapping.vehicle is None:
+        expected = 'a vehicle file or a shipped bare name: M, D and g of the analysis'
+        raise InputError(mapping.origin, 'vehicle (--vehicle)', expected, None)
+    vehicle = load_vehicle(mapping.vehicle)
+    text = read_text(shipped('vehicles', mapping.vehicle), 'vehicle')
+    tracks = tracks_of(read_sources(bag, mapping, notes), mapping, vehicle, notes)
+    step = round((mapping.step or 0.0) * NANOSECONDS) or sensible_step(tracks['twist'].period)
+    base = time_base([*tracks.values()], tracks['twist'], step)
+    if len(base.ns) < 2:
+        expected = 'a time with all mapped topics and velocities enough for rates'
+        raise InputError(bag, '', expected, _time_spans(tracks.values()))
+    notes += _notes_on_time_base(base, tracks)
+    return Recording(_run(bag, mapping, vehicle, base, tracks, notes), {'vehicle.yaml': text})
+
+
+def _run(
+    bag: Path,
+    mapping: TopicMap,
+    vehicle: Vehicle,
+    base: TimeBase,
+    tracks: Mapping[str, Track],
+    notes: list[str],
+) -> Run:
+    acted = tracks.get('wrench_applied', tracks['wrench'])
+    estimate = unexplained(vehicle, base, tracks['pose'], tracks['twist'], acted, mapping.window)
+    rows = {role: _sampled(track, base) for role, track in tracks.items()}
+    unknown = np.full((len(base.ns), 6), np.nan)
+    state = np.concatenate([rows['pose'], rows['twist']], axis=1)
+    name = mapping.name or _name_of(bag.resolve())
+    return Run(
+        vehicle=vehicle,
+        scenario=name,
+        controller=name,
+        law='unknown',
+        gains={},
+        step=base.step / NANOSECONDS,
+        source=FOREIGN,
+        notes=(*notes, *_notes_on_estimate(estimate)),
+        gaps=base.spans(),
+        acceleration=estimate.figures(),
+        t=base.t,
+        eta=unwrapped_eta(state),
+        nu=rows['twist'],
+        nu_d=rows.get('setpoint', unknown),
+        nu_d_dot=unknown,
+        tau=rows['wrench'],
+        disturbance=None,
+        disturbance_estimate=np.zeros((len(base.ns), 6)),
+        applied=rows.get('wrench_applied'),
+        unexplained=estimate.F,
+        unexplained_error=estimate.error,
+    )
+
+
+def _name_of(bag: Path) -> str:
+    """Name of a bag as a word that may name files."""
+    return re.sub(r'[^A-Za-z0-9_.+-]', '_', bag.name if bag.is_dir() else bag.stem)[:100]
+
+
+def _sampled(track: Track, base: TimeBase) -> np.ndarray:
+    """Values of a signal at the samples, means over a step where it has several in one."""
+    if not track.is_averaged(base.step):
+        return at_times(track, base.ns)
+    return means_over(track, base.ns - base.step // 2, base.ns + base.step // 2)
+
+
+def _notes_on_time_base(base: TimeBase, tracks: Mapping[str, Track]) -> list[str]:
+    """Step, methods of resampling, gaps."""
+    step = base.step / NANOSECONDS
+    notes = [f'time base: {step:.6g} s, from the first time at which all mapped topics are known']
+    between = [_between(role, track, base.step) for role, track in tracks.items()]
+    notes.append(f'resampling: {"; ".join(between)}')
+    notes += dict.fromkeys(note for track in tracks.values() for note in _gaps(track))
+    spans = base.spans()
+    if spans:
+        lost = sum(end - begin for begin, end in spans)
+        notes.append(
+            f'no samples in {_counted(len(spans), "gap")}, {lost:.6g} s together: nothing is '
+            'interpolated across'
+        )
+    if base.left_out:
+        notes.append(f'{_counted(base.left_out, "part")} between gaps too short to be of use')
+    ns = tracks['twist'].ns
+    before, behind = (int(t) / NANOSECONDS for t in (base.ns[0] - ns[0], ns[-1] - base.ns[-1]))
+    if max(before, behind) > 2.0 * step:
+        notes.append(
+            f'velocities of {before:.6g} s before and {behind:.6g} s behind the samples are not '
+            'used: there another topic is missing'
+        )
+    return notes
+
+
+def _notes_on_estimate(found: Unexplained) -> list[str]:
+    """Filter of the unexplained wrench, and what its error does not hold."""
+    windows = ', '.join(f'{dof} {time:.3g} s' for dof, time in zip(DOFS, found.window, strict=True))
+    return [
+        f'F by (1) is estimated, not known: rate of impulse less momentum by {FILTER}; windows '
+        f'{windows}. Its error counts white noise of the velocity and the bias of the filter, '
+        'neither noise that is correlated over the window nor a wrench that acted at another time'
+    ]
+
+
+def _time_spans(tracks: Iterable[Track]) -> str:
+    """When each topic was there, s from the first of all, for a refusal."""
+    tracks = list(tracks)
+    origin = min(int(track.ns[0]) for track in tracks)
+    parts = []
+    for track in tracks:
+        begin, end = ((int(ns) - origin) / NANOSECONDS for ns in (track.ns[0], track.ns[-1]))
+        parts.append(f'{track.topic} {begin:.6g} to {end:.6g} s')
+    return ', '.join(dict.fromkeys(parts))
+
+
+def _between(role: str, track: Track, step: int) -> str:
+    if role == 'pose':
+        return f'{HOW[role]}'
+    if track.is_averaged(step):
+        return f'{role.replace("_", " ")} by its mean over each step, against aliasing'
+    if track.held:
+        return f'{role.replace("_", " ")} held until the next message'
+    return HOW.get(role, f'{role.replace("_", " ")} by straight lines')
+
+
+def _counted(number: int, word: str) -> str:
+    return f'{number} {word}{"" if number == 1 else "s"}'
+
+
+def _gaps(track: Track) -> list[str]:
+    """Pauses of a topic that are gaps; the same of the pose and velocity of an odometry."""
+    found = track.gaps()
+    if not len(found):
+        return []
+    lost = float((found[:, 1] - found[:, 0]).sum()) / NANOSECONDS
+    longer = f'longer than {track.limit / NANOSECONDS:.3g} s'
+    counted = _counted(len(found), 'pause')
+    return [f'{track.topic}: {counted} {longer}, {lost:.6g} s together']

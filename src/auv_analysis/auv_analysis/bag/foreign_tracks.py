@@ -1,0 +1,438 @@
+"""Signals of another system in NED and FSD, over one clock, and their common time base."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from auv_analysis.bag.foreign_messages import (
+    Recorded,
+    logged_with,
+    longest_stretch,
+    on_the_clock,
+    ordered,
+)
+from auv_analysis.bag.foreign_topics import Source, TopicMap
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle.frames import (
+    ENU_FLU,
+    NED_FSD,
+    named_axes,
+    swap_attitude,
+    swap_body,
+    swap_position,
+)
+from auv_dynamics.vehicle.kinematics import rotation
+from auv_dynamics.vehicle.vehicle import Vehicle
+
+FRAMES = ('child', 'world')  # in which a velocity may be written
+POSE, TWIST = slice(0, 7), slice(7, 13)  # of an odometry's row
+GAP_PERIODS = 5.0  # median periods, at least, that make a pause a gap
+GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in bursts
+USUAL = 90.0  # percentile
+AVERAGED = 1.5  # periods per step of the time base from which a signal is averaged over the step
+ENOUGH = 12  # velocity samples of a stretch, fewer are left out: no rate could be estimated
+STILL = 0.02  # m/s: motion below this says nothing about axes
+WORSE = 2.0  # times: from here on the other reading fits clearly better
+_SWAPS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    'pose': lambda x: np.concatenate([swap_position(x[:, :3]), swap_attitude(x[:, 3:])], axis=1),
+    'twist': swap_body,
+    'wrench': swap_body,
+    'wrench_applied': swap_body,
+    'setpoint': swap_body,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A signal in our axes, with rising stamps.
+
+    Attributes
+    ----------
+    role, topic : what it holds, where it comes from
+    ns : (n,) stamps, ns
+    rows : (n, k) numbers
+    limit : ns, longest pause that is no gap; inf: there are none
+    held : whether a sample holds until the next; else a straight line leads there
+
+    """
+
+    role: str
+    topic: str
+    ns: np.ndarray
+    rows: np.ndarray
+    limit: float
+    held: bool
+
+    @property
+    def period(self) -> float:
+        """Median period, ns; inf of a single sample."""
+        return float(np.median(np.diff(self.ns))) if len(self.ns) > 1 else np.inf
+
+    def gaps(self) -> np.ndarray:
+        """Begin and end of each gap, (g, 2) ns."""
+        where = np.flatnonzero(np.diff(self.ns) > self.limit)
+        return np.stack([self.ns[where], self.ns[where + 1]], axis=1)
+
+    def is_averaged(self, step: int) -> bool:
+        """Whether several samples fall into one step, ns, so that single ones would alias."""
+        return step > AVERAGED * self.period
+
+
+def usual_limit(ns: np.ndarray) -> float:
+    """Longest pause that is no gap, by the intervals of rising stamps (n,), ns."""
+    if len(ns) < 2:
+        return np.inf
+    apart = np.diff(ns)
+    return float(max(GAP_PERIODS * np.median(apart), GAP_USUAL * np.percentile(apart, USUAL)))
+
+
+def at_times(track: Track, ns: np.ndarray) -> np.ndarray:
+    """Values (m, k) at times within a track, ns.
+
+    Of a pose, position by straight lines and attitude by slerp; of what is held, the sample before;
+    else straight lines.
+    """
+    seconds, at = (_seconds(times, track.ns[0]) for times in (track.ns, ns))
+    if track.held:
+        return track.rows[np.clip(np.searchsorted(track.ns, ns, 'right') - 1, 0, None)]
+    if track.role != 'pose':
+        return _lines(seconds, track.rows, at)
+    at = np.clip(at, seconds[0], seconds[-1])
+    w, *xyz = track.rows[:, 3:].T
+    turned = Slerp(seconds, Rotation.from_quat(np.stack([*xyz, w], axis=1)))(at).as_quat()
+    attitude = turned[:, [3, 0, 1, 2]]
+    return np.concatenate([_lines(seconds, track.rows[:, :3], at), attitude], axis=1)
+
+
+def means_over(track: Track, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Means (m, k) over spans of time [begin, end] within a track, ns, of what is between samples.
+
+    Of a pose the value in the middle: attitudes have no mean of this kind.
+    """
+    if track.role == 'pose':
+        return at_times(track, (begin + end) // 2)
+    area = integral(track, np.concatenate([begin, end]))
+    length = (end - begin)[:, None] / NANOSECONDS
+    return (area[len(begin) :] - area[: len(begin)]) / length
+
+
+def integral(track: Track, ns: np.ndarray) -> np.ndarray:
+    """Integral over time (m, k) of a signal from its first sample to some times, unit times s."""
+    knots = np.unique(np.concatenate([track.ns, ns]))
+    values = at_times(track, knots)
+    dt = np.diff(knots)[:, None] / NANOSECONDS
+    parts = values[:-1] * dt if track.held else 0.5 * (values[:-1] + values[1:]) * dt
+    area = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(parts, axis=0)])
+    return area[np.searchsorted(knots, ns)] - area[np.searchsorted(knots, track.ns[0])]
+
+
+def _seconds(ns: np.ndarray, origin: int) -> np.ndarray:
+    return (ns - origin) / NANOSECONDS
+
+
+def _lines(seconds: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(at, seconds, column) for column in rows.T], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class TimeBase:
+    """Where a run has samples.
+
+    Attributes
+    ----------
+    ns : (n,) times of the samples; multiples of the step apart
+    step : ns
+    stretches : (begin, end) in ns of each part of the recording without a gap
+    owner : (n,) number of the stretch of each sample
+    left_out : number of stretches too short to be of use
+
+    """
+
+    ns: np.ndarray
+    step: int
+    stretches: list[tuple[int, int]]
+    owner: np.ndarray
+    left_out: int
+
+    @property
+    def t(self) -> np.ndarray:
+        """(n,) times from the first sample, s."""
+        return (self.ns - self.ns[0]) / NANOSECONDS
+
+    def spans(self) -> tuple[tuple[float, float], ...]:
+        """Gaps between the samples: last time before and first behind each, s from the start."""
+        t = self.t
+        where = np.flatnonzero(np.diff(self.ns) > self.step).tolist()
+        return tuple((float(t[i]), float(t[i + 1])) for i in where)
+
+
+def sensible_step(period: float) -> int:
+    """A median period, ns, rounded to two digits."""
+    return max(round(float(f'{period:.2g}')), 1)
+
+
+def time_base(tracks: Sequence[Track], velocity: Track, step: int) -> TimeBase:
+    """Time base of signals that must all be known.
+
+    Parameters
+    ----------
+    tracks : the signals, the velocity included
+    velocity : that of which every stretch needs samples
+    step : ns
+
+    Returns
+    -------
+    base : without samples where there is no stretch
+
+    """
+    begin = max(int(track.ns[0]) for track in tracks)
+    ends = [int(track.ns[-1]) for track in tracks if np.isfinite(track.limit)]
+    stretches, left_out = [], 0
+    for first, last in _between_gaps(begin, min(ends), tracks):
+        inside = np.searchsorted(velocity.ns, [first, last + 1])
+        if inside[1] - inside[0] >= ENOUGH:
+            stretches.append((first, last))
+        else:
+            left_out += 1
+    half = step // 2 if any(track.is_averaged(step) for track in tracks) else 0
+    origin = stretches[0][0] + half if stretches else 0
+    parts, kept = [], []
+    for first, last in stretches:
+        k = np.arange(-(-(first + half - origin) // step), (last - half - origin) // step + 1)
+        if len(k) > 1:
+            parts.append(origin + step * k.astype(np.int64))
+            kept.append((first, last))
+        else:
+            left_out += 1
+    owner = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    ns = np.concatenate([np.zeros(0, np.int64), *parts])
+    return TimeBase(ns, step, kept, owner, left_out)
+
+
+def _between_gaps(begin: int, end: int, tracks: Sequence[Track]) -> list[tuple[int, int]]:
+    """Parts of a span, ns, that no gap of any signal overlaps."""
+    gaps = np.concatenate([track.gaps() for track in tracks])
+    gaps = gaps[np.argsort(gaps[:, 0])]
+    found, place = [], begin
+    for first, last in gaps.tolist():
+        if min(first, end) > place:
+            found.append((place, min(first, end)))
+        place = max(place, last)
+    if end > place:
+        found.append((place, end))
+    return found
+
+
+def tracks_of(
+    found: dict[str, Recorded], mapping: TopicMap, vehicle: Vehicle, notes: list[str]
+) -> dict[str, Track]:
+    """Signals of the mapped topics.
+
+    Parameters
+    ----------
+    found : role -> messages in the order of the bag
+    mapping : how they are meant
+    vehicle : whose thrusters turn thrusts into a wrench
+    notes : gets a line for everything that was assumed or is odd
+
+    Returns
+    -------
+    tracks : 'pose', 'twist' and 'wrench', and 'wrench_applied' and 'setpoint' where mapped
+
+    Raises
+    ------
+    InputError : axes that nobody told, thrusts that do not fit the vehicle
+
+    """
+    found = _on_one_clock(found, notes)
+    axes = {role: axes_of(one, notes) for role, one in found.items()}
+    notes.append(_said(axes, found))
+    if 'odometry' in found:
+        both, told = found.pop('odometry'), axes.pop('odometry')
+        for role, columns in (('pose', POSE), ('twist', TWIST)):
+            found[role] = both.part(slice(None), columns)
+            axes[role] = told
+    tracks = {'pose': _track('pose', found['pose'], axes['pose'])}
+    told, other = FRAMES if found['twist'].source.twist_frame == 'child' else FRAMES[::-1]
+    twist, instead = (
+        _velocity(found['twist'], axes['twist'], tracks['pose'], frame) for frame in (told, other)
+    )
+    tracks['twist'] = twist
+    notes += of_the_motion(tracks['pose'], twist, instead, told)
+    for role, one in found.items():
+        if role == 'thrusters':
+            tracks['wrench'] = _of_thrusters(one, vehicle, mapping)
+        elif role not in tracks:
+            tracks[role] = _track(role, one, axes[role])
+    return tracks
+
+
+def _on_one_clock(found: Mapping[str, Recorded], notes: list[str]) -> dict[str, Recorded]:
+    """The same with rising stamps of one clock that does not start anew."""
+    clock = found['odometry' if 'odometry' in found else 'twist']
+    kept = longest_stretch(clock, [])
+    timed = {role: on_the_clock(one, clock, notes) for role, one in found.items()}
+    if len(kept.log) < len(clock.log):
+        timed = {
+            role: one if one.source.topic == clock.source.topic else logged_with(one, kept)
+            for role, one in timed.items()
+        }
+    return {role: ordered(longest_stretch(one, notes), notes) for role, one in timed.items()}
+
+
+def _said(axes: Mapping[str, str], found: Mapping[str, Recorded]) -> str:
+    """Which axes the topics have and who says so."""
+    parts = []
+    for told in dict.fromkeys(axes.values()):
+        members = [found[role].source for role in axes if axes[role] == told and told]
+        topics = ', '.join(dict.fromkeys(source.topic for source in members))
+        by = 'as told' if any(source.frames for source in members) else 'by their frame ids'
+        turned = ', turned into NED and FSD' if told == ENU_FLU else ''
+        parts += [f'{told} {by}{turned}: {topics}'] if topics else []
+    return f'axes {"; ".join(parts)}'
+
+
+def _track(role: str, one: Recorded, axes: str, rows: np.ndarray | None = None) -> Track:
+    rows = in_our_axes(one.rows, role, axes) if rows is None else rows
+    least = 2 if role in ('pose', 'twist') else 1  # a motion has a rate
+    if len(one.stamps) < least:
+        expected = f'at least {least} messages on the clock of the velocity'
+        raise InputError(one.bag, one.source.topic, expected, len(one.stamps) or 'none')
+    return Track(role, one.source.topic, one.stamps, rows, _limit(one), _is_held(one.source))
+
+
+def _limit(one: Recorded) -> float:
+    if one.source.gap is not None:
+        return one.source.gap * NANOSECONDS
+    return np.inf if one.source.role == 'setpoint' else usual_limit(one.stamps)
+
+
+def _is_held(source: Source) -> bool:
+    return source.between == 'hold'
+
+
+def _velocity(one: Recorded, axes: str, pose: Track, frame: str) -> Track:
+    """Velocity in FSD if its messages write it in the axes of that frame."""
+    if frame == 'child':
+        return _track('twist', one, axes)
+    earth = swap_earth(one.rows) if axes == ENU_FLU else one.rows
+    inside = np.clip(one.stamps, pose.ns[0], pose.ns[-1])
+    return _track('twist', one, axes, from_earth(earth, at_times(pose, inside)[:, 3:]))
+
+
+def _of_thrusters(one: Recorded, vehicle: Vehicle, mapping: TopicMap) -> Track:
+    """The wrench T u of thrusts u; the vehicle file gives T in FSD."""
+    thrusters = vehicle.thrusters
+    if thrusters is None:
+        raise InputError(mapping.vehicle, 'thrusters', 'the thrusters of the mapped topic', None)
+    if one.rows.shape[1] != len(thrusters.names):
+        expected = f'{len(thrusters.names)} numbers, one per thruster of {vehicle.name}'
+        raise InputError(one.bag, one.source.topic, expected, f'{one.rows.shape[1]}')
+    return _track('wrench', one, '', one.rows @ thrusters.matrix.T)
+
+
+def axes_of(found: Recorded, notes: list[str]) -> str:
+    """Axes of a topic, by what was said or, if its frame ids all say NED and FSD, by these.
+
+    Parameters
+    ----------
+    found : the topic
+    notes : gets a line where frame ids contradict what was said
+
+    Raises
+    ------
+    InputError : nothing was said, and the frame ids do not say NED and FSD
+
+    """
+    source = found.source
+    if source.role == 'thrusters':
+        return ''  # thrusts have none: the vehicle file says where they point
+    ids = [name for name in (found.frame, found.child) if name]
+    if source.frames is None:
+        if ids and all(named_axes(name) == NED_FSD for name in ids):
+            return NED_FSD
+        where = f'{source.topic}: frame_id' if ids else f'{source.topic}: frames'
+        shown = ', '.join(repr(name) for name in ids) if ids else 'a type without frame_id'
+        expected = f'--frames {NED_FSD} or {ENU_FLU}, since only what is named ned, fsd or frd'
+        raise InputError(found.bag, where, f'{expected} is taken as that', shown)
+    against = [name for name in ids if named_axes(name) not in (None, source.frames)]
+    if against:
+        notes.append(f'{source.topic}: frame_id {against[0]} taken as {source.frames}, as told')
+    return source.frames
+
+
+def in_our_axes(rows: np.ndarray, role: str, axes: str) -> np.ndarray:
+    """Rows of a role (n, k) in NED and FSD; those of thrusters have no axes."""
+    return _SWAPS[role](rows) if axes == ENU_FLU and role in _SWAPS else rows
+
+
+def from_earth(twist: np.ndarray, attitude: np.ndarray) -> np.ndarray:
+    """Velocity written in earth axes turned into body axes.
+
+    Parameters
+    ----------
+    twist : (n, 6) linear and angular velocity of the body, m/s and rad/s, in NED
+    attitude : (n, 4) quaternions w, x, y, z, FSD to NED
+
+    Returns
+    -------
+    nu : (n, 6) in FSD
+
+    """
+    R = rotation(attitude)
+    return np.concatenate(
+        [np.einsum('nji,nj->ni', R, half) for half in (twist[:, :3], twist[:, 3:])], axis=1
+    )
+
+
+def swap_earth(twist: np.ndarray) -> np.ndarray:
+    """Velocity (n, 6) in ENU axes to NED axes, or back."""
+    return np.concatenate([swap_position(twist[:, :3]), swap_position(twist[:, 3:])], axis=1)
+
+
+def of_the_motion(pose: Track, twist: Track, other: Track, frame: str) -> list[str]:
+    """Notes where the motion contradicts what was told of it.
+
+    Parameters
+    ----------
+    pose, twist : in NED and FSD, as told
+    other : the velocity if its twist_frame were the other one
+    frame : the twist_frame as told
+
+    """
+    notes = []
+    if np.all(pose.rows[:, 2] < 0):
+        low, high = -pose.rows[:, 2].max(), -pose.rows[:, 2].min()
+        notes.append(
+            f'{pose.topic}: the position is {low:.3g} to {high:.3g} m above its origin throughout; '
+            'if the vehicle was below it, the earth axes are not those that were told'
+        )
+    speed, told, otherwise = _misfits(pose, twist, other)
+    if speed > STILL and told > WORSE * otherwise:
+        right = 'world' if frame == 'child' else 'child'
+        notes.append(
+            f'{twist.topic}: with twist_frame {frame} the velocity differs from the rate of the '
+            f'position by {told:.2g} m/s (median), with twist_frame {right} by {otherwise:.2g}: '
+            f'{right} fits better'
+        )
+    return notes
+
+
+def _misfits(pose: Track, *velocities: Track) -> tuple[float, ...]:
+    """Median speed by the position, and median size of p_dot - R nu of each velocity, m/s."""
+    apart = np.diff(pose.ns)
+    middle = pose.ns[:-1] + apart // 2
+    span = velocities[0].ns[[0, -1]]
+    good = (apart <= pose.limit) & (middle >= span[0]) & (middle <= span[1])
+    if not good.any():
+        return (0.0,) * (1 + len(velocities))
+    rate = np.diff(pose.rows[:, :3], axis=0)[good] / (apart[good, None] / NANOSECONDS)
+    R = rotation(at_times(pose, middle[good])[:, 3:])
+    found = [rate]
+    for velocity in velocities:
+        nu = at_times(velocity, middle[good])[:, :3]
+        found.append(rate - np.einsum('nij,nj->ni', R, nu))
+    return tuple(float(np.median(np.linalg.norm(rows, axis=1))) for rows in found)

@@ -1,0 +1,395 @@
+"""Inspection of a file before its repair: what can be kept, what is wrong, which gaps it has."""
+
+import heapq
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Header, Metadata, Schema, Statistics
+
+from auv_analysis.bag.chunks import Table, by_channel
+from auv_analysis.bag.mcap_file import Lost, McapFile, MessageIndex, Read
+from auv_analysis.bag.metadata import Definition, Extent
+from auv_analysis.bag.step_topics import role_of
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import parse_any_yaml
+from auv_dynamics.ros.interface import NANOSECONDS, OPTIONAL_STEP_TOPICS, STEP_TOPICS
+
+ROSBAG2 = 'rosbag2'  # metadata that rosbag2 and our recorder write when a file is closed
+PROFILE = 'ros2'
+LARGEST_POLICIES = 1 << 21  # characters of the offered profiles of all topics; more are left out
+BETWEEN, SUMMARY, CHUNK = range(3)  # where a definition stands: the better its checksum, the higher
+MOST = 4096  # different intervals that are told apart
+SHOWN = 10  # longest intervals whose place is remembered
+WIDE = 1.5  # times the usual interval: from here on something is missing
+
+
+class Definitions:
+    """The most trustworthy definition of each id."""
+
+    def __init__(self) -> None:
+        self._schemas: dict[int, tuple[int, Schema]] = {}
+        self._channels: dict[int, tuple[int, Channel]] = {}
+        self.doubtful: set[str] = set()  # topics or types that are defined differently elsewhere
+
+    def add(self, record: Schema | Channel, trust: int) -> None:
+        """Take a definition, of which `trust` says where it stands."""
+        if isinstance(record, Schema):
+            self._add(self._schemas, record, trust, record.name)
+        else:
+            self._add(self._channels, record, trust, record.topic)
+
+    def _add(self, known: dict[int, Any], record: Schema | Channel, trust: int, name: str) -> None:
+        old = known.get(record.id)
+        if old is not None and old[1] != record:
+            self.doubtful.add(name)
+        if old is None or old[0] < trust:
+            known[record.id] = trust, record
+
+    def channel(self, number: int) -> Channel | None:
+        """Channel of an id."""
+        found = self._channels.get(number)
+        return found[1] if found else None
+
+    def schema_of(self, channel: Channel) -> Schema | None:
+        """Schema of a channel."""
+        found = self._schemas.get(channel.schema_id)
+        return found[1] if found else None
+
+    def channels(self) -> Iterator[Channel]:
+        """All channels, by their ids."""
+        for _, (_, channel) in sorted(self._channels.items()):
+            yield channel
+
+    def of_rosbag2(self) -> list[Definition] | None:
+        """The topics for a metadata.yaml; None where not all are as rosbag2 writes them."""
+        found: dict[str, Definition] = {}
+        known: dict[str, list[Any]] = {}
+        left = LARGEST_POLICIES
+        for channel in self.channels():
+            schema = self.schema_of(channel)
+            if channel.message_encoding != 'cdr' or schema is None:
+                return None
+            digest = channel.metadata.get('topic_type_hash', '')
+            text = channel.metadata.get('offered_qos_profiles', '')
+            left -= len(text)
+            if text not in known and left >= 0:
+                known[text] = _qos(text)
+            qos = known[text] if left >= 0 else []
+            definition = Definition(channel.topic, schema.name, qos=qos, digest=digest)
+            found.setdefault(channel.topic, definition)
+        return [*found.values()]
+
+
+def _qos(text: str) -> list[Any]:
+    """Offered profiles, none where the text is no list of them, or one that refers to itself."""
+    if '*' in text:
+        return []
+    try:
+        found = parse_any_yaml(text, 'offered_qos_profiles')
+    except InputError:
+        return []
+    return found if isinstance(found, list) else []
+
+
+class Spacing:
+    """Intervals between the stamps of a topic, in the order of the bag.
+
+    Attributes
+    ----------
+    first, last, earliest, latest : stamps in ns, in the order of the bag and by their size
+    count : number of stamps
+    intervals : ns -> how often
+    longest : the longest of them, and where they begin, ns
+
+    """
+
+    def __init__(self) -> None:
+        self.first: int | None = None
+        self.last: int | None = None
+        self.earliest: int | None = None
+        self.latest: int | None = None
+        self.count = 0
+        self.intervals: Counter[int] = Counter()
+        self.longest: list[tuple[int, int]] = []  # interval and where it begins, ns
+
+    def add(self, stamps: np.ndarray) -> None:
+        """Take the next stamps (n,), ns."""
+        if not len(stamps):
+            return
+        if self.last is not None:
+            stamps = np.insert(stamps, 0, self.last)
+        else:
+            self.first = int(stamps[0])
+            self.count += 1
+        self.count += len(stamps) - 1
+        self._span(int(stamps.min()), int(stamps.max()))
+        self.last = int(stamps[-1])
+        apart = np.diff(stamps)
+        values, counts = np.unique(apart, return_counts=True)
+        for value, count in zip(values.tolist(), counts.tolist(), strict=True):
+            self._note(value, count)
+        for i in np.argsort(apart)[-SHOWN:].tolist():
+            self._keep(int(apart[i]), int(stamps[i]))
+
+    def join(self, other: 'Spacing') -> None:
+        """Go on with what another file has of the topic."""
+        if other.first is None or other.earliest is None or other.latest is None:
+            return
+        if self.last is not None:
+            between = other.first - self.last
+            self._note(between, 1)
+            self._keep(between, self.last)
+        else:
+            self.first = other.first
+        self.count += other.count
+        self._span(other.earliest, other.latest)
+        self.last = other.last
+        for value, count in other.intervals.items():
+            self._note(value, count)
+        for interval, begin in other.longest:
+            self._keep(interval, begin)
+
+    def _span(self, earliest: int, latest: int) -> None:
+        self.earliest = earliest if self.earliest is None else min(self.earliest, earliest)
+        self.latest = latest if self.latest is None else max(self.latest, latest)
+
+    def _note(self, interval: int, count: int) -> None:
+        if len(self.intervals) < MOST or interval in self.intervals:
+            self.intervals[interval] += count
+
+    def _keep(self, interval: int, begin: int) -> None:
+        heapq.heappush(self.longest, (interval, begin))
+        if len(self.longest) > SHOWN:
+            heapq.heappop(self.longest)
+
+    def gaps(self) -> dict[str, Any]:
+        """Number of gaps, of messages missing in them, and the longest ones in s, in order."""
+        usual = self._usual()
+        wide = {value: n for value, n in self.intervals.items() if usual and value > WIDE * usual}
+        shown = sorted(
+            (begin, interval)
+            for interval, begin in self.longest
+            if usual and interval > WIDE * usual
+        )
+        return {
+            'gaps': sum(wide.values()),
+            'missing': sum((round(value / usual) - 1) * n for value, n in wide.items()),
+            'longest': [
+                [begin / NANOSECONDS, (begin + interval) / NANOSECONDS] for begin, interval in shown
+            ],
+        }
+
+    def _usual(self) -> int:
+        """The median interval, ns; 0 where there is none."""
+        rising = sorted((value, n) for value, n in self.intervals.items() if value > 0)
+        half, seen = sum(n for _, n in rising) / 2, 0
+        for value, n in rising:
+            seen += n
+            if seen >= half:
+                return value
+        return 0
+
+
+class Inspection:
+    """What is found in a file.
+
+    Attributes
+    ----------
+    path, size : of the file, bytes
+    definitions : of its topics
+    header : None where it is lost
+    spacings : channel id -> the stamps of its messages
+    attachments : names and sizes
+    lost : bytes that cannot be used
+    faults : what else is wrong, a few words each; empty: the file is healthy
+    compression : of its first chunk, None: it has no chunks
+
+    """
+
+    def __init__(self, path: Path, progress: Callable[[int], None] = lambda _: None):
+        self.path = path
+        self.definitions = Definitions()
+        self.header: Header | None = None
+        self.spacings: dict[int, Spacing] = {}
+        self.attachments: list[tuple[str, int]] = []
+        self.lost: list[Lost] = []
+        self.compression: str | None = None
+        self._told: int | None = None  # number of messages by the statistics
+        self._orphans = 0  # messages in indices whose chunk is lost
+        self._data_end, self._footer, self._is_rosbag2 = False, False, False
+        file = McapFile(path, resync=True)
+        self.size = file.size
+        has_chunk = False
+        for item in file.items():
+            if isinstance(item, Lost):
+                self.lost.append(item)
+                has_chunk = False
+            else:
+                has_chunk = has_chunk or item.opcode == Opcode.CHUNK
+                self._take(item, has_chunk)
+            progress(item.end)
+        self.begins_well = file.begins_well
+        self.faults = self._faults(file)
+        if file.faults:
+            self._told = None
+
+    @property
+    def count(self) -> int:
+        """Number of messages that can be kept."""
+        known = self.definitions
+        return sum(s.count for c, s in self.spacings.items() if known.channel(c) is not None)
+
+    @property
+    def messages_lost(self) -> int | None:
+        """Number of messages that are lost, as far as indices or statistics tell; None: unknown."""
+        unknown = sum(s.count for s in self.spacings.values()) - self.count
+        if self._told is not None:
+            return max(0, self._told - self.count)
+        if self._orphans or unknown:
+            return self._orphans + unknown
+        return None if self.lost else 0
+
+    def extent(self, name: str) -> Extent:
+        """What can be kept, as a file of some name."""
+        extent = Extent(name)
+        for number, spacing in self.spacings.items():
+            channel = self.definitions.channel(number)
+            if channel is not None and spacing.earliest is not None and spacing.latest is not None:
+                extent.add(channel.topic, spacing.earliest, spacing.latest, spacing.count)
+        return extent
+
+    def _take(self, item: Read, has_chunk: bool) -> None:
+        if item.opcode == Opcode.CHUNK:
+            self.compression = self.compression or item.compression
+        in_chunk = item.opcode == Opcode.CHUNK
+        trust = CHUNK if in_chunk else SUMMARY if self._data_end else BETWEEN
+        for part in item.parts:
+            if isinstance(part, Table):
+                for channel, index in by_channel(part.channels):
+                    spacing = self.spacings.setdefault(channel, Spacing())
+                    spacing.add(part.log_times[index].astype(np.int64))
+            elif isinstance(part, Schema | Channel):
+                self.definitions.add(part, trust)
+            elif isinstance(part, Attachment):
+                self.attachments.append((part.name, len(part.data)))
+            elif isinstance(part, MessageIndex):
+                self._orphans += 0 if has_chunk else part.messages
+            elif isinstance(part, Metadata):
+                self._is_rosbag2 |= part.name == ROSBAG2
+            elif isinstance(part, Header):
+                self.header = self.header or part
+            elif isinstance(part, Statistics):
+                self._told = part.message_count
+        self._data_end |= item.opcode == Opcode.DATA_END
+        self._footer |= item.opcode == Opcode.FOOTER
+
+    def _faults(self, file: McapFile) -> list[str]:
+        found = [f'damaged: {lost.why}' for lost in self.lost]
+        if not (self._data_end and self._footer and file.ends_well):
+            found.append('was not finished')
+        if self.header is None:
+            found.append('has no header')
+        elif self._is_rosbag2 and self.header.profile != PROFILE:
+            found.append('has another profile than rosbag2 writes')
+        if any(self.definitions.channel(channel) is None for channel in self.spacings):
+            found.append('has messages whose topic is not known')
+        found += file.faults
+        found += [f'{name} is defined twice' for name in sorted(self.definitions.doubtful)]
+        return list(dict.fromkeys(found))
+
+
+@dataclass
+class FileReport:
+    """What became of a file: 'healthy', 'repaired' or 'left out'."""
+
+    inspection: Inspection
+    name: str
+    state: str
+    kept_as: str | None = None
+
+    def document(self) -> dict[str, Any]:
+        """As `--json` prints it."""
+        return {
+            'file': self.name,
+            'state': self.state,
+            'kept_as': self.kept_as,
+            'faults': self.inspection.faults,
+            'lost': [
+                {'from': lost.start, 'to': lost.end, 'why': lost.why}
+                for lost in self.inspection.lost
+            ],
+            'messages': self.inspection.count,
+            'messages_lost': self.inspection.messages_lost,
+        }
+
+
+@dataclass
+class Report:
+    """What became of a bag.
+
+    Attributes
+    ----------
+    bag : as it was named
+    files : in their order
+    metadata : 'unchanged', 'written' or 'none': a bag that rosbag2 has nothing to say of
+    notes : what could not be done, one line each
+
+    """
+
+    bag: str
+    files: list[FileReport] = field(default_factory=list)
+    metadata: str = 'unchanged'
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything was written."""
+        return self.metadata == 'written' or any(file.state != 'healthy' for file in self.files)
+
+    def document(self) -> dict[str, Any]:
+        """As `--json` prints it."""
+        topics = _topics(file.inspection for file in self.files)
+        spans = [s for _, s in topics.values() if s.earliest is not None]
+        first = min((s.earliest for s in spans if s.earliest is not None), default=None)
+        last = max((s.latest for s in spans if s.latest is not None), default=None)
+        lost = [file.inspection.messages_lost for file in self.files]
+        return {
+            'bag': self.bag,
+            'changed': self.changed,
+            'files': [file.document() for file in self.files],
+            'metadata': self.metadata,
+            'duration': None if first is None or last is None else (last - first) / NANOSECONDS,
+            'messages': sum(file.inspection.count for file in self.files),
+            'messages_lost': None if None in lost else sum(n for n in lost if n is not None),
+            'topics': {
+                topic: {'type': kind, 'messages': spacing.count, **_gaps(topic, spacing)}
+                for topic, (kind, spacing) in sorted(topics.items())
+            },
+            'attachments': sorted(
+                {name for file in self.files for name, _ in file.inspection.attachments}
+            ),
+            'notes': self.notes,
+        }
+
+
+def _topics(inspections: Iterable[Inspection]) -> Mapping[str, tuple[str, Spacing]]:
+    """Topic -> type and stamps, over all files."""
+    found: dict[str, tuple[str, Spacing]] = {}
+    for one in inspections:
+        for channel in one.definitions.channels():
+            schema = one.definitions.schema_of(channel)
+            kind = schema.name if schema else ''
+            _, spacing = found.setdefault(channel.topic, (kind, Spacing()))
+            spacing.join(one.spacings.get(channel.id, Spacing()))
+    return found
+
+
+def _gaps(topic: str, spacing: Spacing) -> dict[str, Any]:
+    """Gaps of a step topic; other topics come when they come."""
+    is_step = role_of(topic) in (*STEP_TOPICS, *OPTIONAL_STEP_TOPICS)
+    return {'spacing': spacing.gaps() if is_step else None}

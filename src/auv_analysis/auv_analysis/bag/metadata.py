@@ -1,0 +1,212 @@
+"""The files of a bag, and what its metadata.yaml and recording.yaml say of it."""
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from auv_analysis.output.new_files import replacing
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import parse_yaml
+
+DISTRO = 'jazzy'
+BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file'
+OTHERS = ('.db3', '.bag')  # endings of files that rosbags reads
+METADATA = 'metadata.yaml'
+RECORDING = 'recording.yaml'
+ROOT = 'rosbag2_bagfile_information'
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A topic as a bag defines it.
+
+    Attributes
+    ----------
+    topic : full name
+    kind : message type, 'package/msg/Name'
+    encoding : of its messages
+    qos : offered profiles as rosbag2 writes them
+    digest : RIHS01 type hash
+
+    """
+
+    topic: str
+    kind: str
+    encoding: str = 'cdr'
+    qos: list[Any] = field(default_factory=list)
+    digest: str = ''
+
+
+@dataclass
+class Extent:
+    """What lies in a file of a bag: messages per topic, first and last log time in ns."""
+
+    name: str
+    counts: dict[str, int] = field(default_factory=dict)
+    first: int | None = None
+    last: int | None = None
+
+    def add(self, topic: str, first: int, last: int, count: int = 1) -> None:
+        """Count messages of a topic that were logged from `first` to `last`, ns."""
+        self.counts[topic] = self.counts.get(topic, 0) + count
+        self.first = first if self.first is None else min(self.first, first)
+        self.last = last if self.last is None else max(self.last, last)
+
+
+def metadata(definitions: Iterable[Definition], extents: Sequence[Extent]) -> dict[str, Any]:
+    """What stands below `rosbag2_bagfile_information`.
+
+    Parameters
+    ----------
+    definitions : of the topics
+    extents : of the files, in their order
+
+    """
+    counts: dict[str, int] = {}
+    for extent in extents:
+        for topic, count in extent.counts.items():
+            counts[topic] = counts.get(topic, 0) + count
+    firsts = [extent.first for extent in extents if extent.first is not None]
+    lasts = [extent.last for extent in extents if extent.last is not None]
+    span = _span(min(firsts, default=None), max(lasts, default=None), sum(counts.values()))
+    return {
+        'version': 9,
+        'storage_identifier': 'mcap',
+        **span,
+        'topics_with_message_count': [
+            {'topic_metadata': _about(definition), 'message_count': counts.get(definition.topic, 0)}
+            for definition in definitions
+        ],
+        'compression_format': '',
+        'compression_mode': '',
+        'relative_file_paths': [extent.name for extent in extents],
+        'files': [
+            {'path': e.name, **_span(e.first, e.last, sum(e.counts.values()))} for e in extents
+        ],
+        'custom_data': None,
+        'ros_distro': DISTRO,
+    }
+
+
+def _span(first: int | None, last: int | None, count: int) -> dict[str, Any]:
+    return {
+        'starting_time': {'nanoseconds_since_epoch': first or 0},
+        'duration': {'nanoseconds': (last or 0) - (first or 0)},
+        'message_count': count,
+    }
+
+
+def _about(definition: Definition) -> dict[str, Any]:
+    return {
+        'name': definition.topic,
+        'type': definition.kind,
+        'serialization_format': definition.encoding,
+        'offered_qos_profiles': definition.qos,
+        'type_description_hash': definition.digest,
+    }
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes out what stands in several places."""
+
+    def ignore_aliases(self, _: Any) -> bool:
+        return True
+
+
+def as_text(document: Mapping[str, Any]) -> str:
+    """Text of a metadata.yaml."""
+    return yaml.dump({ROOT: document}, Dumper=_Dumper, sort_keys=False)
+
+
+def qos_text(qos: list[Any]) -> str:
+    """Offered profiles as they stand in the metadata of a channel."""
+    return yaml.dump(qos, Dumper=_Dumper, default_flow_style=False, sort_keys=False)
+
+
+def write_metadata(folder: Path, text: str) -> None:
+    """Write metadata.yaml: it is there as a whole, or as it was before."""
+    with replacing(folder / METADATA) as file:
+        file.write(text.encode())
+
+
+def is_mcap(bag: Path) -> bool:
+    """Whether our own reader reads this bag; InputError when there is no bag at all."""
+    if os.path.isdir(bag):
+        if any(bag.glob('*.mcap')):
+            return True
+        if not any(bag.glob('*.db3*')):
+            raise InputError(bag, '', BAG, 'a folder with neither .mcap nor .db3 files')
+        return False
+    if not os.path.isfile(bag):
+        raise InputError(bag, '', BAG, 'no such file or folder')
+    return bag.suffix not in OTHERS
+
+
+def files_of(bag: Path) -> list[Path]:
+    """Files that a bag of any kind consists of, which results must not overwrite."""
+    if is_mcap(bag):
+        return bag_files(bag)
+    return sorted(bag.iterdir()) if bag.is_dir() else [bag]
+
+
+def bag_files(bag: str | Path) -> list[Path]:
+    """MCAP files of a bag, in order; InputError when there are none."""
+    path = Path(bag)
+    is_folder = os.path.isdir(path)  # Path.is_dir raises for a name that is too long
+    files = sorted(path.glob('*.mcap'), key=split_order) if is_folder else [path]
+    if not files or not os.path.isfile(files[0]):
+        found = 'a folder without .mcap files' if is_folder else 'no such file or folder'
+        raise InputError(path, '', 'a bag folder or an .mcap file', found)
+    for file in files:
+        check_regular(file, path if is_folder else file.resolve().parent)
+    return files
+
+
+def check_regular(path: Path, folder: Path) -> None:
+    """Refuse what is no file, such as a pipe, or lies outside of the folder of its bag."""
+    if not os.path.isfile(path):
+        raise InputError(path, '', 'a file', 'something else of that name')
+    if not path.resolve().is_relative_to(folder.resolve()):
+        expected = 'a file in the folder of its bag, or the file itself'
+        raise InputError(path, '', expected, f'a link to {path.resolve()}')
+
+
+def split_order(path: Path) -> tuple[int, str]:
+    """Place of a file in its bag: by the number at the end of its name."""
+    number = path.stem.rpartition('_')[2]
+    return (int(number) if number.isdecimal() else 0, path.name)
+
+
+def recording_text(strict: bool, names: Mapping[str, str], namespace: str = '/') -> str:
+    """What the recorder notes of its recording, as an attachment.
+
+    Parameters
+    ----------
+    strict : whether every step had to come once and in order
+    names : recorded topic -> the name that it has where nothing is remapped, of those that differ
+    namespace : of the recorder
+
+    """
+    noted = {'strict': strict, 'namespace': namespace, 'topics': dict(names)}
+    return yaml.safe_dump(noted, sort_keys=False)
+
+
+def read_recording(text: str, bag: object) -> tuple[bool, dict[str, str], str | None]:
+    """Strict, names and namespace as `recording_text` noted them; a namespace may be missing."""
+    file = f'{bag}: {RECORDING}'
+    noted = parse_yaml(text, file, 'recording')
+    names: Any = noted.get('topics', {})
+    if not isinstance(names, dict) or not all(
+        isinstance(n, str) for n in (*names, *names.values())
+    ):
+        raise InputError(file, 'topics', 'a mapping of topics to names', names)
+    if len(set(names.values())) < len(names):
+        raise InputError(file, 'topics', 'each name once', names)
+    namespace = noted.get('namespace')
+    if not (namespace is None or isinstance(namespace, str)):
+        raise InputError(file, 'namespace', 'the name of a namespace', namespace)
+    return noted.get('strict') is not False, names, namespace

@@ -1,1 +1,0 @@
-"""Bags of other systems: any topics that hold odometry and wrench, read as a `Run`."""

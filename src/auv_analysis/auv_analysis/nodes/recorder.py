@@ -1,0 +1,389 @@
+"""The recorder's parameters, clock and topics: what it records, and when a message came."""
+
+import re
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSCompatibility,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
+from rclpy.subscription import Subscription
+
+from auv_analysis.bag.metadata import RECORDING, recording_text
+from auv_analysis.bag.output import (
+    COMPRESSIONS,
+    FREE_SPACE,
+    LARGEST_CHUNK,
+    LEAST_DURATION,
+    LEAST_SIZE,
+    Storage,
+)
+from auv_analysis.bag.ros2msg import schema_text
+from auv_analysis.bag.writer import BagWriter
+from auv_dynamics.files.errors import InputError, first_line, reason
+from auv_dynamics.files.nearest import meant
+from auv_dynamics.files.yaml_files import read_text
+from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros.interface import GLOBALS, NANOSECONDS
+from auv_dynamics.ros.kinds import message_class
+from auv_dynamics.ros.parameters import declare, refuse_unknown
+from auv_dynamics.ros.private import RCLError
+from auv_dynamics.ros.raw_types import raw_class
+from auv_dynamics.ros.topics import DEPTH
+
+ALL = 'all'
+UNRECORDED = ('/rosout', '/parameter_events')  # unless they are asked for by name
+Take = Callable[[str, str, bytes, dict[str, Any]], None]  # topic, type, message, what is known
+EPOCH = 86_400 * NANOSECONDS  # ns between two clocks, from which they have different epochs
+EARLY_TIME = 60.0  # s that messages wait for the first step, which tells the time of the graph
+EARLY_COUNT, EARLY_SIZE = 10_000, 1 << 24  # messages and bytes that wait at most
+Entry = tuple[str, str, bytes, dict[str, Any]]  # topic, type, message, what is known of its way
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which topics are recorded beside those of the graph.
+
+    Attributes
+    ----------
+    namespace : of the recorder; what lies in it is recorded
+    extra : full names, or 'all'
+    exclude : what is found in a name that is not recorded; None: nothing
+
+    """
+
+    namespace: str
+    extra: tuple[str, ...] = ()
+    exclude: re.Pattern[str] | None = None
+
+    def __contains__(self, topic: str) -> bool:
+        if self.exclude and self.exclude.search(topic):
+            return False
+        if topic in self.extra:
+            return True
+        if topic in UNRECORDED:
+            return False
+        inside = topic.startswith(f'{self.namespace.rstrip("/")}/')
+        return inside or topic in GLOBALS or ALL in self.extra
+
+
+class OtherTopics:
+    """Subscribes to topics as they appear, with the quality of service that is offered.
+
+    Parameters
+    ----------
+    node : the recorder
+    wanted : which
+    take : gets every message
+
+    Attributes
+    ----------
+    left : topic -> why it is not recorded
+
+    """
+
+    def __init__(self, node: BulkNode, wanted: Wanted, take: Take):
+        self._node, self._wanted, self._take = node, wanted, take
+        self._heard: dict[str, Subscription] = {}
+        self._kinds: dict[str, str] = {}
+        self.left: dict[str, str] = {}
+
+    def look(self, ours: set[str]) -> None:
+        """Subscribe to what has appeared, but for `ours`, and follow publishers that have come."""
+        for topic, _ in self._node.get_topic_names_and_types():
+            if topic in ours or topic in self.left or topic not in self._wanted:
+                continue
+            found = self._node.get_publishers_info_by_topic(topic)
+            if found:
+                kind = self._kinds.setdefault(topic, found[0].topic_type)
+                follow = self._adapt if topic in self._heard else self._begin
+                follow(topic, [one for one in found if one.topic_type == kind])
+                for other in {one.topic_type for one in found} - {kind}:
+                    self._leave(f'{topic} of {other}', f'it is recorded as {kind}')
+
+    def _begin(self, topic: str, publishers: list[Any]) -> None:
+        kind = self._kinds[topic]
+        try:
+            schema_text(kind)
+        except (OSError, ValueError):
+            self._leave(topic, f'no definition of {kind}')
+            return
+        self._subscribe(topic, adapted(publishers))
+
+    def _adapt(self, topic: str, publishers: list[Any]) -> None:
+        """Ask for less where a publisher would not be heard, never for more."""
+        asked = self._heard[topic].qos_profile
+        if all(_is_heard(asked, one.qos_profile) for one in publishers):
+            return
+        self._node.take_data()
+        self._node.drop_data(self._heard.pop(topic))
+        self._subscribe(topic, adapted(publishers, asked))
+
+    def _subscribe(self, topic: str, qos: QoSProfile) -> None:
+        kind = self._kinds[topic]
+        # what comes late is seen at the next look
+        events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        callback: Any = partial(self._take, topic, kind)
+        try:
+            subscription = self._node.create_subscription(
+                _class(kind), topic, callback, qos, event_callbacks=events, raw=True
+            )
+        except (ImportError, RCLError) as error:
+            self._leave(topic, first_line(error))
+            return
+        self._heard[topic] = subscription
+        self._node.add_data(subscription)
+
+    def _leave(self, topic: str, why: str) -> None:
+        if topic not in self.left:
+            node: Any = self._node
+            node.get_logger().warning(f'{topic}: not recorded, {why}')
+        self.left[topic] = why
+
+
+def _class(kind: str) -> type:
+    try:
+        return message_class(kind)
+    except Exception:  # a package that is not installed, or whatever it raises
+        return raw_class(kind)
+
+
+def adapted(publishers: list[Any], asked: QoSProfile | None = None) -> QoSProfile:
+    """Profile that every publisher of a topic offers at least.
+
+    Parameters
+    ----------
+    publishers : their endpoints
+    asked : profile so far, of which nothing is asked anew; None: there is none
+
+    """
+    offered = [one.qos_profile for one in publishers] + ([asked] if asked else [])
+    reliable = all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offered)
+    kept = all(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for qos in offered)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=DEPTH,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
+    )
+
+
+def _is_heard(asked: QoSProfile, offered: QoSProfile) -> bool:
+    return qos_check_compatible(offered, asked)[0] != QoSCompatibility.ERROR
+
+
+class GraphClock:
+    """Time of the graph: that of the steps in lock-step, else of the node's clock.
+
+    Where a driver stamps by a clock of another epoch, the node's clock is moved there by the first
+    step, so that all of a bag lies together.
+
+    Attributes
+    ----------
+    latest : newest stamp of a step, ns; -1 before the first
+    early : messages that came before the time was known
+
+    """
+
+    def __init__(self, node: BulkNode, strict: bool):
+        self._node, self._strict, self.latest = node, strict, -1
+        self.simulated = strict or bool(node.get_parameter('use_sim_time').value)
+        self._offset: int | None = None
+        self.early: list[Entry] = []
+        self._since = 0.0  # steady s
+
+    def follow(self, ns: int) -> None:
+        """Note the stamp of a step."""
+        self.latest = max(self.latest, ns)
+        if self._offset is None:
+            apart = ns - self._node.get_clock().now().nanoseconds
+            self._offset = apart if abs(apart) > EPOCH else 0
+
+    def now(self, received: int) -> int | None:
+        """Time in ns of a message that came at `received` of the system's; None: not known yet."""
+        if not self.simulated:
+            wall = received or int(self._node.get_clock().now().nanoseconds)
+            return None if self._offset is None else max(0, wall + self._offset)
+        told = 0 if self._strict else int(self._node.get_clock().now().nanoseconds)
+        return told or (self.latest if self.latest >= 0 else None)
+
+    def hold(self, entry: Entry) -> None:
+        """Let a message wait until the time is known."""
+        self._since = self._since or time.monotonic()
+        self.early.append(entry)
+
+    def released(self, *, ends: bool = False) -> list[Entry]:
+        """What has waited, once the time is known; it is not waited for without bounds."""
+        late = time.monotonic() - self._since > EARLY_TIME
+        size = sum(len(message) for _, _, message, _ in self.early)
+        if ends or late or len(self.early) > EARLY_COUNT or size > EARLY_SIZE:
+            # without a step the time is the node's, zero where it is simulated
+            self.latest, self._offset = max(self.latest, 0), self._offset or 0
+        waiting, self.early = self.early, []
+        return waiting
+
+
+@dataclass(frozen=True)
+class RecorderParameters:
+    """What the recorder was asked for.
+
+    Attributes
+    ----------
+    bag : its folder
+    writer : of the bag, open
+    topics : step topics that are expected, each step of each
+    others : which other topics are recorded
+    step_ns : ns between steps
+    last : index of the last step, None: until SIGTERM
+    last_due : stamp in ns of analysis' last sample, None: not waited for
+    strict : every step once and in order, as in lock-step; else gaps are only counted
+
+    """
+
+    bag: Path
+    writer: BagWriter
+    topics: tuple[str, ...]
+    others: Wanted
+    step_ns: int
+    last: int | None
+    last_due: int | None
+    strict: bool
+
+
+def recorder_parameters(node: Node) -> RecorderParameters:
+    """Declare and check the parameters, open the bag; InputError when something is wrong."""
+    name = node.get_name()
+    known = [topic.name for topic in topics.STEP_TOPICS]
+    bag = declare(node, 'bag', str, '', 'folder of the bag')
+    usual = list(interface.STEP_TOPICS)
+    expected = declare(node, 'topics', list[str], usual, 'step topics that are expected')
+    others = _others(node)
+    duration = declare(
+        node,
+        'duration',
+        float,
+        0.0,
+        'length of the recording, s; 0: until a signal ends it',
+        at_least=0.0,
+    )
+    step = declare(node, 'step', float, 0.01, 'time step, s', at_least=1e-9)
+    every = declare(
+        node, 'analysis_every', int, 0, 'steps between analysis samples, 0: not waited for',
+        at_least=0,
+    )  # fmt: skip
+    strict = declare(node, 'strict', bool, True, 'a lost or doubled step ends the recording')
+    pace = node.resolve_topic_name(expected[0]) if expected else ''
+    storage = _storage(node, pace)
+    files = declare(node, 'attachments', list[str], None, 'name=path of files kept in the bag')
+    refuse_unknown(node)
+    unknown = [topic for topic in expected if topic not in known]
+    if unknown:
+        listed = f'step topics: {", ".join(known)}{meant(unknown[0], known)}'
+        raise InputError(name, 'topics', listed, unknown[0])
+    if not bag:
+        raise InputError(name, 'bag', 'the folder of the bag', None)
+    attachments = {}
+    for entry in files or []:
+        label, equals, path = entry.partition('=')
+        source = Path(path if equals else label)
+        attachments[label if equals else source.name] = read_text(source, 'attachment')
+    attachments[RECORDING] = recording_text(strict, remapped(node), node.get_namespace())
+    writer = _writer(name, Path(bag), attachments, storage)
+    last = round(duration / step) if duration else None
+    step_ns = round(step * interface.NANOSECONDS)
+    due = last // every * every * step_ns if last is not None and every else None
+    return RecorderParameters(
+        Path(bag), writer, tuple(expected), others, step_ns, last, due, strict
+    )
+
+
+def _others(node: Node) -> Wanted:
+    """Topics beside those of the graph."""
+    name = node.get_name()
+    text = f'topics outside of the namespace that are recorded as well, or {ALL}'
+    listed = declare(node, 'extra_topics', list[str], None, text) or []
+    text = 'regular expression: topics in whose names it is found are not recorded, but for ours'
+    exclude = declare(node, 'exclude', str, '', text)
+    extra = []
+    for topic in listed:
+        try:
+            extra.append(topic if topic == ALL else node.resolve_topic_name(topic))
+        except (RCLError, ValueError):
+            expected = f'names of topics, or {ALL}'
+            raise InputError(name, 'extra_topics', expected, topic) from None
+    try:
+        pattern = re.compile(exclude) if exclude else None
+    except (re.error, RecursionError, OverflowError) as error:
+        raise InputError(name, 'exclude', f'a regular expression ({error})', exclude) from None
+    return Wanted(node.get_namespace(), tuple(extra), pattern)
+
+
+def remapped(node: Node) -> dict[str, str]:
+    """Topics of ours that have another name here -> what they would be called in this namespace."""
+    space = node.get_namespace().rstrip('/')
+    names = {}
+    for topic in topics.TOPICS:
+        usual = topic.name if topic.name.startswith('/') else f'{space}/{topic.name}'
+        if (resolved := node.resolve_topic_name(topic.name)) != usual:
+            names[resolved] = usual
+    return names
+
+
+def _storage(node: Node, pace: str) -> Storage:
+    compression = declare(
+        node, 'storage.compression', str, 'zstd', 'compression of chunks', one_of=list(COMPRESSIONS)
+    )
+    chunk_size = declare(
+        node,
+        'storage.chunk_size',
+        int,
+        1 << 20,
+        'bytes of a chunk',
+        at_least=1024,
+        at_most=LARGEST_CHUNK,
+    )
+    text = 'most bytes of a file; 0: one file'
+    max_size = declare(node, 'storage.max_size', int, 0, text, at_least=0)
+    text = 'most log time in a file, s; 0: one file'
+    max_duration = declare(
+        node, 'storage.max_duration', float, 0.0, text, at_least=0.0, at_most=1e9
+    )
+    text = 'bytes that stay free on the file system: with less, the recording ends'
+    free_space = declare(node, 'storage.free_space', int, FREE_SPACE, text, at_least=0)
+    if 0 < max_duration < LEAST_DURATION:
+        expected = f'0 for one file, or at least {LEAST_DURATION:g} s'
+        raise InputError(node.get_name(), 'storage.max_duration', expected, max_duration)
+    longest = round(max_duration * interface.NANOSECONDS)
+    return Storage(compression, chunk_size, max_size, longest, pace, free_space)
+
+
+def _writer(name: str, bag: Path, attachments: dict[str, str], storage: Storage) -> BagWriter:
+    """Open the bag."""
+    least = LEAST_SIZE + sum(len(text.encode()) for text in attachments.values())
+    if 0 < storage.max_size < least:
+        expected = f'0 for one file, or at least {least} bytes with these attachments'
+        raise InputError(name, 'storage.max_size', expected, storage.max_size)
+    if storage.free_space:
+        there = next((folder for folder in bag.absolute().parents if folder.is_dir()), Path('/'))
+        free = shutil.disk_usage(there).free
+        if free < storage.free_space:
+            expected = f'at most what is free on the file system of {bag}'
+            raise InputError(name, 'storage.free_space', expected, f'{free} bytes free')
+    try:
+        return BagWriter(bag, attachments, storage)
+    except OSError as error:
+        found = reason(error)
+        raise InputError(bag, '', 'a folder without a bag that can be written', found) from None

@@ -1,1 +1,0 @@
-"""Repair of bags that were cut or damaged: everything that its checksum confirms is kept."""

@@ -137,7 +137,7 @@ docs: docs-tools  ## the documentation as a site that needs no network: build/do
 docs-links: docs-tools  ## ask for every link that leaves the site, and list those that are dead
 	PATH="$(abspath $(BIN)):$$PATH" $(SPHINX) -b linkcheck build/docs/links
 
-docs-test: docs-tools  ## every block of README and docs, both notebooks and the site
+docs-test: docs-tools  ## every block of README and docs, the notebooks and the site
 	$(BIN)/python -m pytest tests/docs -m 'long or not long'
 
 clean:  ## remove what is made here

@@ -13,8 +13,8 @@ from auv_analysis.cli.run import free_graph, recorded
 from auv_analysis.cli.scenarios import open_scenario, scenario_folder
 from auv_analysis.cli.simulate import simulated
 from auv_analysis.metrics.summary import Window
-from auv_analysis.output.progress import bar, say, waiting
-from auv_analysis.report.document import Section, Sentence
+from auv_analysis.output.progress import say, waiting
+from auv_analysis.report.document import Section
 from auv_analysis.report.paper import CASES
 from auv_analysis.runs.run import AnyRun
 from auv_analysis.runs.samples import ENDING
@@ -25,12 +25,10 @@ from auv_analysis.studies.study.indices import Design, Method
 from auv_analysis.studies.study.procedure import (
     claims_sentences,
     sensitivity_section,
-    unknowns_section,
     write_samples,
 )
 from auv_analysis.studies.study.sensitivity import Sensitivity, sensitivity
 from auv_analysis.study.paper_claims import PaperClaims, paper_claims
-from auv_analysis.study.unknowns_run import unknowns
 from auv_dynamics.files.errors import InputError
 
 LARGEST_SPAN = 1e3
@@ -117,10 +115,6 @@ class Procedure:
             sentences += gains
             said = [*gains[:1], *said]
         more['couplings'] = [Section('discussion', 'Step 6: discussion', sentences)]
-        if claims and claims.claims and self._as_shipped(claims):
-            section, open_ones = self._unknowns()
-            more['claims'] = [section]
-            said += open_ones[:1]
         judged = claims.claims if claims else None
         return {'more': more, 'sentences': said, 'claims': judged}
 
@@ -148,21 +142,6 @@ class Procedure:
                 self.scenario, runs, found, hold=self.options.hold, threads=_threads()
             )
         return claims if claims.claims or self.scenario.name in CASES else None
-
-    @staticmethod
-    def _as_shipped(claims: PaperClaims) -> bool:
-        return all(path == 'duration' for path, *_ in claims.departures)
-
-    def _unknowns(self) -> tuple[Section, list[Sentence]]:
-        with bar() as shown:
-            task = shown.add_task('what the paper leaves open', total=None)
-            found = unknowns(
-                self.scenario,
-                seed=self.options.seed,
-                threads=_threads(),
-                progress=lambda done, total: shown.update(task, completed=done, total=total),
-            )
-        return unknowns_section(self.out, found)
 
 
 def _threads() -> int:

@@ -99,15 +99,13 @@ REPORT, SUMMARY = 'report.html', 'summary.json'
 SHARED = ('figures', 'logs')  # folders of ours in which a user's files may lie as well
 NAMES = (
     MANIFEST, SUMMARY, REPORT, *SHARED, 'numbers.parquet', 'scenario.yaml',
-    'vehicle.yaml', 'setpoint.csv', 'claims.parquet', 'sensitivity.parquet', 'unknowns.parquet',
-    'unknowns_claims.parquet', 'energy_window.parquet', 'comparison.parquet', 'comparison.csv',
-    'atlas.json', 'atlas.parquet', 'analysis.json', 'quantiles.parquet', 'influence.parquet',
-    'dependence.parquet', 'together.parquet', 'failures.parquet', 'paired.parquet',
-    'indices.parquet', 'best.parquet', 'design.json', 'summary_before.json',
-    'vehicle_before.yaml',
-    'tune.json', 'search.parquet', 'monte_carlo.parquet', 'open_loop.json', 'check.json',
-    'samples.parquet', 'wrenches.parquet', 'faults.parquet', 'linearization.json',
-    SWEEP, CAMPAIGN,
+    'vehicle.yaml', 'setpoint.csv', 'claims.parquet', 'sensitivity.parquet',
+    'comparison.parquet', 'comparison.csv', 'atlas.json', 'atlas.parquet', 'analysis.json',
+    'quantiles.parquet', 'influence.parquet', 'dependence.parquet', 'together.parquet',
+    'failures.parquet', 'paired.parquet', 'indices.parquet', 'best.parquet', 'design.json',
+    'summary_before.json', 'vehicle_before.yaml', 'tune.json', 'search.parquet',
+    'monte_carlo.parquet', 'open_loop.json', 'check.json', 'samples.parquet',
+    'wrenches.parquet', 'faults.parquet', 'linearization.json', SWEEP, CAMPAIGN,
 )  # fmt: skip
 
 

@@ -36,21 +36,20 @@ def common_window(runs: Mapping[str, Facts]) -> float:
     return min([paper.ENERGY_WINDOW, *(run.duration for run in runs.values())])
 
 
-def sketch(run: AnyRun, window: float = paper.ENERGY_WINDOW, *, lines: bool = True) -> Sketch:
+def sketch(run: AnyRun, window: float = paper.ENERGY_WINDOW) -> Sketch:
     """Sketch of a run.
 
     Parameters
     ----------
     run : of `simulate`, `load_run` or `open_bag`
     window : time of interest, s from the start: statistics may be asked for that end there
-    lines : whether its lines are kept as well, and those of its certificate
 
     """
-    builder = _Builder(run, window, lines=lines)
+    builder = _Builder(run, window)
     for block in run.blocks():
         builder.add(block)
     true = run.knows_disturbance and not (run.sensing or run.acting)
-    if lines and true and run.law in LAWS and run.gains:
+    if true and run.law in LAWS and run.gains:
         builder.add_certificate()
     return builder.built()
 
@@ -90,8 +89,8 @@ def is_split(run: AnyRun | Sketch) -> bool:
 class _Builder:
     """Takes the blocks of a run in their order."""
 
-    def __init__(self, run: AnyRun, window: float, *, lines: bool):
-        self._run, self._model, self._lines = run, control_model(run.vehicle), lines
+    def __init__(self, run: AnyRun, window: float):
+        self._run, self._model = run, control_model(run.vehicle)
         behind = [cut_behind(run, time) for time in (TRANSIENT, paper.ENERGY_WINDOW, window)]
         before = [cut_before(run, time) for time in (TRANSIENT, last_third(run))]
         self._statistics = Statistics([*behind, *before])
@@ -116,7 +115,7 @@ class _Builder:
             starts = [0, *stops[:-1]]
             self._columns = {n: slice(a, b) for n, a, b in zip(found, starts, stops, strict=True)}
         self._statistics.add(block.t, np.concatenate([*found.values()], axis=1))
-        for name, values in found.items() if self._lines else ():
+        for name, values in found.items():
             self._draw(name, block.t, values)
         if not self._seen:
             self._begin = np.concatenate([block.eta[0], block.nu[0]])

@@ -19,15 +19,6 @@ from auv_analysis.studies.study.sensitivity_report import (
     write_sensitivities,
 )
 from auv_analysis.study.paper_claims import PaperClaims
-from auv_analysis.study.robustness import robustness
-from auv_analysis.study.unknowns_figures import energy_window_figure, unknowns_figure
-from auv_analysis.study.unknowns_file import write_unknowns
-from auv_analysis.study.unknowns_report import (
-    energy_table,
-    unknowns_sentences,
-    unknowns_tables,
-)
-from auv_analysis.study.unknowns_run import Unknowns
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import ControlModel, control_model
 
@@ -37,11 +28,6 @@ GAINS = (
     'is taken by its logarithm, so that its standard deviation is about a relative change. '
     'Sensitive is what has a large one. The index of a gain is the share of the variance that it '
     'makes.'
-)
-OPEN = (
-    'The text of the paper that could be had lacks the tables of the vehicle, the signs of the '
-    'exponents of (39) and the length of the runs. The claims are therefore judged again, by the '
-    'same rules, for vehicles that all have the printed N.'
 )
 
 
@@ -72,19 +58,6 @@ def _of_controllers(out: Path, found: Sequence[Sensitivity]) -> Iterator[Block]:
     left_out = left_out_table(found)
     if left_out is not None:
         yield left_out
-
-
-def unknowns_section(out: Path, found: Unknowns) -> Part:
-    """Section on what the paper leaves open; writes its three files and its figures."""
-    rows = robustness(found)
-    write_unknowns(out, found, rows)
-    sentences = unknowns_sentences(found, rows)
-    figures = out / 'figures'
-    blocks: list[Block] = [
-        OPEN, *sentences, unknowns_figure(found, figures), *unknowns_tables(found, rows),
-        energy_window_figure(found, figures), energy_table(found),
-    ]  # fmt: skip
-    return Section('unknowns', 'What the paper leaves open', blocks), sentences
 
 
 def claims_sentences(found: PaperClaims) -> list[Sentence]:

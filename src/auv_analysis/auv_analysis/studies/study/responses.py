@@ -1,7 +1,5 @@
 """How the velocity errors follow the set-points of the other degrees of freedom."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from auv_analysis.report.evidence import Response
@@ -60,11 +58,6 @@ def followed(errors: np.ndarray, moved: list[int]) -> np.ndarray:
     change = np.where(np.isfinite(change), change, 0.0)  # an error that is zero throughout
     other = np.array(moved)[:, None] != np.arange(6)
     return np.sqrt((change**2 * other).sum(axis=0))
-
-
-def error_columns(found: Mapping[str, np.ndarray]) -> np.ndarray:
-    """RMS velocity errors (B, 6) of the columns of `rollouts`, m/s and rad/s."""
-    return np.column_stack([found[f'{ERROR}.{dof}'] for dof in DOFS])
 
 
 def rms_errors(run: Run) -> np.ndarray:

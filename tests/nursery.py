@@ -277,7 +277,7 @@ def serve(line: socket.socket, mains: Mapping[str, Callable[[], Any]]) -> None:
 def main() -> None:
     """Import the programs and load what they call most, then serve."""
     setproctitle('nursery')  # before the environment is changed, in which it finds its room
-    modules = {**{name: f'{package}.{name}' for name, package in NODES.items()}, **STARTERS}
+    modules = {**{name: f'{package}.nodes.{name}' for name, package in NODES.items()}, **STARTERS}
     mains = {name: import_module(module).main for name, module in modules.items()}
     for module in LOADED:
         import_module(module)

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from auv_analysis.driver_check.recording import Recording
-from auv_analysis.driver_check.scene import Endpoint, Scene
+from auv_analysis.driver.checks import judge
+from auv_analysis.driver.evidence import Endpoint, Evidence, Finding, GraphSnapshot, Settings
+from auv_analysis.driver.odometry_log import OdometryLog
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.vehicle.frames import swap_state
 from auv_dynamics.vehicle.kinematics import euler, quaternion, rotation
@@ -59,24 +60,24 @@ def motion(
     return x
 
 
-def recording(x: np.ndarray, rate: float = 50.0, latency: float = 0.004) -> Recording:
+def odometry_log(x: np.ndarray, rate: float = 50.0, latency: float = 0.004) -> OdometryLog:
     """What is heard of a driver that publishes states (n, 13) at a steady rate."""
     stamp = BEGAN + np.round(np.arange(len(x)) * 1e9 / rate).astype(np.int64)
     arrived = stamp + round(latency * 1e9)
     frames = Frames()
-    return Recording(
+    return OdometryLog(
         int(arrived[0]), int(arrived[-1]), arrived, stamp, x, {(frames.odom, frames.base): len(x)}
     )
 
 
-def healthy(**values: object) -> Recording:
-    """A recording without a fault, some of its fields replaced."""
-    return replace(recording(motion(noise=1e-4)), **values)
+def healthy(**values: object) -> OdometryLog:
+    """A log without a fault, some of its fields replaced."""
+    return replace(odometry_log(motion(noise=1e-4)), **values)
 
 
-def scene(**values: object) -> Scene:
+def graph(**values: object) -> GraphSnapshot:
     """A driver and nobody else, some of the fields replaced."""
-    right = Scene(
+    right = GraphSnapshot(
         'ROS_DOMAIN_ID=7',
         '/odom',
         '/wrench',
@@ -86,6 +87,14 @@ def scene(**values: object) -> Scene:
         wrench_subscribers=(Endpoint(DRIVER, WRENCH),),
     )
     return replace(right, **values)
+
+
+def found_in(
+    log: OdometryLog, *ids: str, seen: GraphSnapshot | None = None, **settings: object
+) -> dict[str, Finding]:
+    """Check -> what comes of it, of some checks of a driver that was listened to."""
+    evidence = Evidence(seen or graph(), log, Settings(**settings), passive='not asked for')
+    return {one.id: one for one in judge(evidence, ids)}
 
 
 def turned_to_ros(x: np.ndarray) -> np.ndarray:

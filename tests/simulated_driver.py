@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from made_odometry import BEGAN
 
-from auv_analysis.driver_check.recording import Recording, Tape
+from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
 from auv_dynamics import load_vehicle
 from auv_dynamics.plant.plant import initial_state
 from auv_dynamics.ros.interface import NANOSECONDS, Frames
@@ -17,7 +17,7 @@ ZERO = (0.0,) * 6
 
 
 class SimulatedDriver:
-    """What `carry_out` speaks to.
+    """The client that `carry_out` takes.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class SimulatedDriver:
         self._delay, self._noise, self._applied = delay, noise, applied
         self._drift = np.array(drift)
         self._until = {'silent': silent_after, 'fast': fast_after, 'joined': joined_after}
-        self.tape, self.sent = Tape(), []
+        self.buffer, self.sent = OdometryBuffer(), []
         self._random = np.random.default_rng(3)
         self._eta, self._nu = np.array([0.0, 0.0, 5.0, 0.0, 0.0, 0.7]), np.zeros(6)
         self._k = 0
@@ -93,9 +93,9 @@ class SimulatedDriver:
         x = initial_state(self._eta, self._nu + self._noise * self._random.normal(size=6))
         frames = Frames()
         ns = self.now_ns()
-        self.tape.odometry(ns, ns, tuple(x.tolist()), (frames.odom, frames.base), self._k)
+        self.buffer.odometry(ns, ns, tuple(x.tolist()), (frames.odom, frames.base), self._k)
         if self._applied:
-            self.tape.wrench_applied(ns, tuple(tau.tolist()))
+            self.buffer.wrench_applied(ns, tuple(tau.tolist()))
 
-    def recording(self) -> Recording:
-        return self.tape.recording(BEGAN, self.now_ns())
+    def log(self) -> OdometryLog:
+        return self.buffer.log(BEGAN, self.now_ns())

@@ -3,11 +3,11 @@
 import pytest
 from harness import Peer, fresh_domain
 
-from auv_analysis.doctor import graph_checks
+from auv_analysis.doctor import discovery
 
 
 def test_two_participants_find_each_other() -> None:
-    (finding,) = graph_checks.discovery()
+    (finding,) = discovery.discovery()
     assert (finding.check, finding.verdict) == ('discovery', 'ok'), finding
 
 
@@ -16,7 +16,7 @@ def test_a_foreign_node_in_the_domain_is_named(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
     peer = Peer(domain)
     try:
-        (finding,) = graph_checks.neighbours()
+        (finding,) = discovery.neighbours()
     finally:
         peer.close()
     assert finding.verdict == 'warning'

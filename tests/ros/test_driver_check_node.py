@@ -11,11 +11,10 @@ from faulty_drivers import NAMES
 from geometry_msgs.msg import WrenchStamped
 from harness import PATIENCE, Peer, environment, fresh_domain
 
-from auv_analysis.cli.check_driver import refusal
-from auv_analysis.driver_check.checks import findings_of
-from auv_analysis.driver_check.finding import FAIL, NOT_CHECKED, PASS, Finding
-from auv_analysis.driver_check.settings import Settings
-from auv_analysis.nodes.driver_check_node import COMMANDER, Ear
+from auv_analysis.driver.checks import PASSIVE, judge
+from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Evidence, Finding, Settings
+from auv_analysis.driver.verdict import refusal
+from auv_analysis.nodes.driver_check_node import COMMANDER, RosDriverClient
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.interface import Frames
 
@@ -44,25 +43,25 @@ def domain() -> Iterator[int]:
 @pytest.fixture(scope='module')
 def judged(domain: int) -> dict[str, dict[str, Finding]]:
     """Driver -> check -> finding."""
-    ears = {name: Ear(domain, f'/{name}', TOPICS, Frames()) for name in NAMES}
+    clients = {name: RosDriverClient(domain, f'/{name}', TOPICS, Frames()) for name in NAMES}
     found = {}
     try:
         limit = time.monotonic() + PATIENCE
         until = None
         while until is None or time.monotonic() < until:
             assert time.monotonic() < limit
-            for ear in ears.values():
-                ear.listen(0.005)
-            if until is None and all(len(ear.tape) for ear in ears.values()):
+            for client in clients.values():
+                client.listen(0.005)
+            if until is None and all(len(client.buffer) for client in clients.values()):
                 until = time.monotonic() + SECONDS
-        for name, ear in ears.items():
+        for name, client in clients.items():
             settings = Settings() if name == 'slow' else PATIENT
-            heard = ear.recording(int(ear.tape.recording(0, 0).arrived_ns[0]))
-            listed = findings_of(ear.scene('the test'), heard, settings)
+            heard = client.log(int(client.buffer.log(0, 0).arrived_ns[0]))
+            listed = judge(Evidence(client.graph('the test'), heard, settings), PASSIVE)
             found[name] = {one.id: one for one in listed}
     finally:
-        for ear in ears.values():
-            ear.close()
+        for client in clients.values():
+            client.close()
     return found
 
 
@@ -112,17 +111,17 @@ def test_a_conflict_of_policies_is_that_of_the_middleware(judged) -> None:
 
 
 def test_what_there_is_elsewhere_is_named(domain: int) -> None:
-    ear = Ear(domain, '/', TOPICS, Frames())
+    client = RosDriverClient(domain, '/', TOPICS, Frames())
     try:
         limit = time.monotonic() + PATIENCE
-        while len(named := ear.scene('here').elsewhere) < len(NAMES) or not all(
+        while len(named := client.graph('here').elsewhere) < len(NAMES) or not all(
             node.endswith('/driver') for nodes in named.values() for node in nodes
         ):
             assert time.monotonic() < limit
-            ear.listen(0.1)
-        found = findings_of(ear.scene('here'), ear.recording(0), Settings())
+            client.listen(0.1)
+        found = judge(Evidence(client.graph('here'), client.log(0), Settings()), PASSIVE)
     finally:
-        ear.close()
+        client.close()
     assert found[0].verdict == FAIL
     assert 'nav_msgs/msg/Odometry is on' in found[0].found
     assert '/healthy/odom of /healthy/driver' in found[0].found
@@ -132,12 +131,12 @@ def test_what_there_is_elsewhere_is_named(domain: int) -> None:
 @pytest.mark.parametrize('commands', [False, True])
 def test_nothing_is_published_until_it_speaks(commands: bool) -> None:
     domain = fresh_domain()
-    peer, ear = Peer(domain), Ear(domain, '/', TOPICS, Frames(), commands=commands)
+    peer, client = Peer(domain), RosDriverClient(domain, '/', TOPICS, Frames(), commands=commands)
     name = COMMANDER if commands else interface.OBSERVER
     try:
 
         def listens() -> bool:
-            ear.listen(0.01)
+            client.listen(0.01)
             return peer.node.count_subscribers('odom') > 0 and name in peer.node.get_node_names()
 
         peer.until(listens)
@@ -145,51 +144,51 @@ def test_nothing_is_published_until_it_speaks(commands: bool) -> None:
         assert published(name, '/') == []
         assert peer.node.get_client_names_and_types_by_node(name, '/') == []
         if not commands:
-            with pytest.raises(RuntimeError, match='no voice'):
-                ear.speak()
+            with pytest.raises(RuntimeError, match='publishes nothing'):
+                client.advertise()
             return
-        ear.speak()
+        client.advertise()
         peer.until(
             lambda: published(name, '/') == [('/wrench', ['geometry_msgs/msg/WrenchStamped'])]
         )
         with pytest.raises(RuntimeError, match='odometry'):
-            ear.send((0.0,) * 6)  # nothing has been heard yet
-        ear.hush()
+            client.send((0.0,) * 6)  # nothing has been heard yet
+        client.retire()
         peer.until(lambda: published(name, '/') == [])
     finally:
-        ear.close()
+        client.close()
         peer.close()
 
 
 def test_two_that_command_see_each_other_although_they_have_one_name() -> None:
     domain = fresh_domain()
-    ears = [Ear(domain, '/', TOPICS, Frames(), commands=True) for _ in '12']
+    clients = [RosDriverClient(domain, '/', TOPICS, Frames(), commands=True) for _ in '12']
     try:
-        assert [ear.speak() for ear in ears] == [False, False]
+        assert [client.advertise() for client in clients] == [False, False]
         limit = time.monotonic() + PATIENCE
-        while not all(ear.others() == [f'/{COMMANDER}'] for ear in ears):
+        while not all(client.others() == [f'/{COMMANDER}'] for client in clients):
             assert time.monotonic() < limit
-            for ear in ears:
-                ear.listen(0.05)
-        ears[0].hush()
-        while ears[1].others():
+            for client in clients:
+                client.listen(0.05)
+        clients[0].retire()
+        while clients[1].others():
             assert time.monotonic() < limit
-            ears[1].listen(0.05)
+            clients[1].listen(0.05)
     finally:
-        for ear in ears:
-            ear.close()
+        for client in clients:
+            client.close()
 
 
 def test_with_another_commander_nothing_is_sent(domain: int) -> None:
     peer = Peer(domain)
     peer.node.create_publisher(WrenchStamped, '/healthy/wrench', topics.every_step())
-    ear = Ear(domain, '/healthy', TOPICS, Frames(), commands=True)
+    client = RosDriverClient(domain, '/healthy', TOPICS, Frames(), commands=True)
     try:
-        peer.until(lambda: ear.listen(0.05) or (len(ear.tape) > 50 and ear.others()))
+        peer.until(lambda: client.listen(0.05) or (len(client.buffer) > 50 and client.others()))
         settings = Settings(timeout=4.0, actuates=True)
-        found = findings_of(ear.scene('here'), ear.recording(0), settings)
-        assert ear.others() == ['/test_peer']
+        found = judge(Evidence(client.graph('here'), client.log(0), settings), PASSIVE)
+        assert client.others() == ['/test_peer']
         assert 'wrench_publishers' in refusal(found)  # and whatever a busy machine adds
     finally:
-        ear.close()
+        client.close()
         peer.close()

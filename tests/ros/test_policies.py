@@ -17,7 +17,7 @@ from rclpy.serialization import serialize_message
 from auv_analysis import load_scenario
 from auv_analysis.graph.experiment import PACKAGES
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
-from auv_analysis.nodes.driver_check_node import Ear
+from auv_analysis.nodes.driver_check_node import RosDriverClient
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.kinds import message_class, type_name
@@ -147,10 +147,10 @@ def test_policy_is_that_of_a_run_in_real_time_in_one_process_in_a_namespace(tmp_
     here = {interface.ODOM: interface.ODOM, interface.WRENCH: interface.WRENCH}
     with (
         ended(start_node('composed_graph', domain, *names, *enclave)),
-        closing(Ear(domain, '/auv1', here, Frames())),
-        closing(Ear(domain, '/auv1', here, Frames(), commands=True)) as checks,
+        closing(RosDriverClient(domain, '/auv1', here, Frames())),
+        closing(RosDriverClient(domain, '/auv1', here, Frames(), commands=True)) as checks,
     ):
-        checks.speak()
+        checks.advertise()
         wanted = expected({**COMPOSED, **LOOKING}, REAL_TIME_LACKS, '/auv1')
         wanted['/auv_gvc/auv_watch']['auv_watch'] &= CHECKS
         assert_exact(domain, wanted, '/auv1')

@@ -13,9 +13,9 @@ import pytest
 from harness import Peer, fresh_domain, parameters, start_auv, start_node, stop
 from nursery import Process
 
-from auv_analysis.driver_check.catalogue import CHECKS
-from auv_analysis.driver_check.finding import FAIL, PASS
-from auv_analysis.driver_check.procedure import GOODBYE, PERIOD
+from auv_analysis.driver.checks import CHECKS
+from auv_analysis.driver.evidence import FAIL, PASS
+from auv_analysis.driver.excitation import GOODBYE, PERIOD
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import Frames, wrench_of
 

@@ -13,15 +13,11 @@ from pathlib import Path
 import pytest
 
 from auv_analysis.cli import doctor, main
-from auv_analysis.doctor import (
-    graph_checks,
-    machine_checks,
-    python_checks,
-    ros_checks,
-)
-from auv_analysis.doctor.finding import Finding, findings_of
+from auv_analysis.cli.doctor import findings_of
+from auv_analysis.doctor import checks, discovery
+from auv_analysis.doctor.checks import Finding
 
-RANGE = ros_checks.RANGE
+RANGE = checks.RANGE
 Usage = namedtuple('Usage', 'total used free')
 
 
@@ -50,17 +46,17 @@ def _distribution(folder: Path, name: str, version: str, *requires: str, code: s
 @pytest.mark.parametrize(
     ('check', 'name', 'value', 'verdict', 'word'),
     [
-        (ros_checks.distro, 'ROS_DISTRO', 'humble', 'broken', 'humble'),
-        (ros_checks.distro, 'AMENT_PREFIX_PATH', '/opt/ros/iron:/x', 'broken', '/opt/ros/iron'),
-        (ros_checks.distro, 'PYTHONPATH', '/x/lib/python3.8/site-packages', 'broken', '3.8'),
-        (ros_checks.middleware, 'RMW_IMPLEMENTATION', 'rmw_zenoh_cpp', 'warning', 'rmw_zenoh_cpp'),
-        (ros_checks.reach, RANGE, 'SUBNET', 'warning', 'everybody on the network'),
-        (ros_checks.reach, RANGE, 'OFF', 'broken', 'no node finds another'),
-        (ros_checks.reach, RANGE, 'LOCALHSOT', 'broken', 'nearest: LOCALHOST'),
-        (ros_checks.reach, 'ROS_LOCALHOST_ONLY', '1', 'warning', 'ROS_LOCALHOST_ONLY'),
-        (ros_checks.domain, 'ROS_DOMAIN_ID', '102', 'broken', '0 to 101, found '),
-        (ros_checks.domain, 'ROS_DOMAIN_ID', 'x', 'broken', 'found x'),
-        (python_checks.compiler, 'NUMBA_DISABLE_JIT', '1', 'warning', 'unset NUMBA_DISABLE_JIT'),
+        (checks.distro, 'ROS_DISTRO', 'humble', 'broken', 'humble'),
+        (checks.distro, 'AMENT_PREFIX_PATH', '/opt/ros/iron:/x', 'broken', '/opt/ros/iron'),
+        (checks.distro, 'PYTHONPATH', '/x/lib/python3.8/site-packages', 'broken', '3.8'),
+        (checks.middleware, 'RMW_IMPLEMENTATION', 'rmw_zenoh_cpp', 'warning', 'rmw_zenoh_cpp'),
+        (checks.reach, RANGE, 'SUBNET', 'warning', 'everybody on the network'),
+        (checks.reach, RANGE, 'OFF', 'broken', 'no node finds another'),
+        (checks.reach, RANGE, 'LOCALHSOT', 'broken', 'nearest: LOCALHOST'),
+        (checks.reach, 'ROS_LOCALHOST_ONLY', '1', 'warning', 'ROS_LOCALHOST_ONLY'),
+        (checks.domain, 'ROS_DOMAIN_ID', '102', 'broken', '0 to 101, found '),
+        (checks.domain, 'ROS_DOMAIN_ID', 'x', 'broken', 'found x'),
+        (checks.compiler, 'NUMBA_DISABLE_JIT', '1', 'warning', 'unset NUMBA_DISABLE_JIT'),
     ],
 )
 def test_variables_that_break_something_are_named(check, name, value, verdict, word, monkeypatch):
@@ -70,9 +66,9 @@ def test_variables_that_break_something_are_named(check, name, value, verdict, w
 
 
 def test_version_of_python_is_judged(monkeypatch):
-    assert next(python_checks.python()).verdict == 'ok'
-    monkeypatch.setattr(python_checks, 'NEWEST', (3, 10))
-    _one(python_checks.python, 'broken', '3.11 to 3.10')
+    assert next(checks.python()).verdict == 'ok'
+    monkeypatch.setattr(checks, 'NEWEST', (3, 10))
+    _one(checks.python, 'broken', '3.11 to 3.10')
 
 
 def test_packages_that_are_missing_old_or_broken_are_named(tmp_path, monkeypatch):
@@ -81,8 +77,8 @@ def test_packages_that_are_missing_old_or_broken_are_named(tmp_path, monkeypatch
     _distribution(tmp_path, 'fake_bad', '1.0', code='raise RuntimeError("built for another")')
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    monkeypatch.setattr(python_checks, 'OURS', ('fake_auv',))
-    found = [finding.found for finding in python_checks.packages()]
+    monkeypatch.setattr(checks, 'OURS', ('fake_auv',))
+    found = [finding.found for finding in checks.packages()]
     assert found == [
         'missing: not-there>=2',
         'wrong version: fake_old 2.0, not fake_old>=3',
@@ -93,21 +89,21 @@ def test_packages_that_are_missing_old_or_broken_are_named(tmp_path, monkeypatch
 def test_a_package_that_ends_the_process_is_named(tmp_path, monkeypatch):
     (tmp_path / 'fake_crash.py').write_text('import os\nos._exit(7)\n')
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    failing = python_checks._failing(['json', 'fake_crash', 'csv'])
+    failing = checks._failing(['json', 'fake_crash', 'csv'])
     assert failing == {'fake_crash': 'it ends the process with exit code 7'}
 
 
 def test_absent_compiler_is_a_warning(monkeypatch):
-    monkeypatch.setattr(python_checks, '_version', lambda name: None)
-    _one(python_checks.compiler, 'warning', 'numba is not installed')
+    monkeypatch.setattr(checks, '_version', lambda name: None)
+    _one(checks.compiler, 'warning', 'numba is not installed')
 
 
 def test_cache_that_cannot_be_written_is_a_warning(tmp_path, monkeypatch):
     monkeypatch.setenv('AUV_GVC_CACHE_DIR', str(tmp_path / 'good'))
-    assert python_checks._kept().verdict == 'ok'
+    assert checks._kept().verdict == 'ok'
     (tmp_path / 'file').touch()  # not a folder: nobody can write into it, not even root
     monkeypatch.setenv('AUV_GVC_CACHE_DIR', str(tmp_path / 'file'))
-    _one(python_checks.compiler, 'warning', 'at every start', 'AUV_GVC_CACHE_DIR')
+    _one(checks.compiler, 'warning', 'at every start', 'AUV_GVC_CACHE_DIR')
 
 
 def test_another_auv_in_front_is_a_warning(tmp_path, monkeypatch):
@@ -115,13 +111,13 @@ def test_another_auv_in_front_is_a_warning(tmp_path, monkeypatch):
     other.write_text('#!/bin/sh\n')
     other.chmod(0o755)
     monkeypatch.setenv('PATH', str(tmp_path))
-    _one(python_checks.executables, 'warning', str(other))
+    _one(checks.executables, 'warning', str(other))
 
 
 @pytest.mark.parametrize(('free', 'verdict'), [(1 << 20, 'broken'), (1 << 30, 'warning')])
 def test_full_disk_is_said(free, verdict, monkeypatch):
     monkeypatch.setattr(shutil, 'disk_usage', lambda _: Usage(1 << 40, 0, free))
-    _one(machine_checks.disk, verdict, 'make room')
+    _one(checks.disk, verdict, 'make room')
 
 
 def test_left_over_segments_are_counted_and_those_in_use_are_not(tmp_path):
@@ -129,48 +125,48 @@ def test_left_over_segments_are_counted_and_those_in_use_are_not(tmp_path):
         (tmp_path / f'fastrtps_{i}').touch()
     (tmp_path / 'somebody_else').touch()
     with (tmp_path / 'fastrtps_0').open():
-        left = machine_checks.left_over(tmp_path)
+        left = checks.left_over(tmp_path)
         assert len(left) == 59
         assert tmp_path / 'fastrtps_0' not in left
-    _one(lambda: machine_checks.shared_memory(tmp_path), 'warning', '60 files', 'rm ')
+    _one(lambda: checks.shared_memory(tmp_path), 'warning', '60 files', 'rm ')
 
 
 def test_full_or_absent_shared_memory_is_said(tmp_path, monkeypatch):
-    _one(lambda: machine_checks.shared_memory(tmp_path / 'gone'), 'note', 'is not there')
+    _one(lambda: checks.shared_memory(tmp_path / 'gone'), 'note', 'is not there')
     monkeypatch.setattr(shutil, 'disk_usage', lambda _: Usage(1 << 20, 1 << 20, 0))
-    _one(lambda: machine_checks.shared_memory(tmp_path), 'broken', '0 MB free')
+    _one(lambda: checks.shared_memory(tmp_path), 'broken', '0 MB free')
 
 
 @pytest.mark.parametrize(('limit', 'verdict'), [(64, 'broken'), (512, 'warning'), (4096, 'ok')])
 def test_few_open_files_are_said(limit, verdict, monkeypatch):
     monkeypatch.setattr(resource, 'getrlimit', lambda _: (limit, limit))
-    _one(machine_checks.files, verdict, f'{limit} per process')
+    _one(checks.files, verdict, f'{limit} per process')
 
 
 def test_clock_before_the_program_was_made_is_said(monkeypatch):
-    monkeypatch.setattr(machine_checks.time, 'time', lambda: 1e6)
-    _one(machine_checks.clock, 'warning', '1970')
+    monkeypatch.setattr(checks.time, 'time', lambda: 1e6)
+    _one(checks.clock, 'warning', '1970')
 
 
 def test_single_core_and_absent_programs_are_said(monkeypatch):
     monkeypatch.setattr(os, 'sched_getaffinity', lambda _: {0})
-    _one(machine_checks.cores, 'warning', '--composed')
+    _one(checks.cores, 'warning', '--composed')
     monkeypatch.setattr(shutil, 'which', lambda _: None)
-    assert [finding.check for finding in machine_checks.programs()] == ['chromium', 'ros2']
+    assert [finding.check for finding in checks.programs()] == ['chromium', 'ros2']
 
 
 def test_participants_that_cannot_start_are_broken(tmp_path, monkeypatch):
     (tmp_path / 'rclpy').mkdir()
     (tmp_path / 'rclpy' / '__init__.py').write_text('raise ImportError("no such library")\n')
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    _one(graph_checks.discovery, 'broken', 'cannot start: ImportError: no such library')
+    _one(discovery.discovery, 'broken', 'cannot start: ImportError: no such library')
 
 
 def test_a_check_that_fails_is_a_finding_and_the_others_go_on():
     def bad_check():
         raise OSError('gone')
 
-    found = list(findings_of([bad_check, machine_checks.cores]))
+    found = list(findings_of([bad_check, checks.cores]))
     assert found[0].verdict == 'broken'
     assert 'bad check: could not be looked at: OSError: gone' in found[0].line()
     assert found[1].check == 'cores'
@@ -206,8 +202,8 @@ def test_it_runs_where_everything_is_broken(tmp_path):
 
 
 def _auv(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    doctor = [sys.executable, '-m', 'auv_analysis.cli.main', *arguments]
+    command = [sys.executable, '-m', 'auv_analysis.cli.main', *arguments]
     environ = {**os.environ, 'PYTHONPATH': str(folder)}
     return subprocess.run(
-        doctor, cwd=folder, env=environ, capture_output=True, text=True, check=False
+        command, cwd=folder, env=environ, capture_output=True, text=True, check=False
     )

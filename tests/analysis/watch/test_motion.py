@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from strategies import QUICK
 
 from auv_analysis.metrics.live_analysis import LiveAnalysis
-from auv_analysis.watch.motion import FRESH, HELD_NS, Motion
+from auv_analysis.watch.motion import FRESH, HELD_NS, LiveMotion
 from auv_dynamics import load_vehicle
 from auv_dynamics.ros import interface
 
@@ -25,7 +25,7 @@ def state(nu: tuple) -> tuple:
 @QUICK
 @given(SIX, SIX)
 def test_the_error_is_the_set_point_less_the_velocity(nu: tuple, nu_d: tuple) -> None:
-    motion = Motion()
+    motion = LiveMotion()
     motion.hear(0.0, interface.CMD_VEL, 7 * STEP, nu_d)
     motion.hear(0.1, interface.ODOM, 7 * STEP, state(nu))
     assert (motion.nu, motion.nu_d, motion.ns) == (nu, nu_d, 7 * STEP)
@@ -36,7 +36,7 @@ def test_the_error_is_the_set_point_less_the_velocity(nu: tuple, nu_d: tuple) ->
 @QUICK
 @given(st.lists(st.integers(0, 400), min_size=1, max_size=40, unique=True), st.integers(0, 500))
 def test_the_set_point_is_the_newest_at_or_before_the_odometry(ks: list[int], k: int) -> None:
-    motion = Motion()
+    motion = LiveMotion()
     for one in sorted(ks):
         motion.hear(0.0, interface.CMD_VEL, one * STEP, (float(one),) * 6)
     motion.hear(0.0, interface.ODOM, k * STEP, state(NU))
@@ -45,7 +45,7 @@ def test_the_set_point_is_the_newest_at_or_before_the_odometry(ks: list[int], k:
 
 
 def test_set_points_published_far_ahead_are_kept() -> None:
-    motion = Motion()
+    motion = LiveMotion()
     for k in range(20_000):
         motion.hear(0.0, interface.CMD_VEL, k * STEP, (float(k),) * 6)
     motion.hear(0.0, interface.ODOM, 17_000 * STEP, state(NU))
@@ -53,7 +53,7 @@ def test_set_points_published_far_ahead_are_kept() -> None:
 
 
 def test_set_points_that_begin_anew_replace_the_old_ones() -> None:
-    motion = Motion()
+    motion = LiveMotion()
     for k in (5, 6, 7):
         motion.hear(0.0, interface.CMD_VEL, k * STEP, (1.0,) * 6)
     motion.hear(0.0, interface.CMD_VEL, 6 * STEP, (2.0,) * 6)
@@ -62,7 +62,7 @@ def test_set_points_that_begin_anew_replace_the_old_ones() -> None:
 
 
 def test_a_velocity_without_its_set_point_does_not_replace_a_pair_at_once() -> None:
-    motion = Motion()
+    motion = LiveMotion()
     motion.hear(0.0, interface.CMD_VEL, 0, NU_D)
     motion.hear(0.0, interface.ODOM, 0, state(NU))
     motion.hear(0.1, interface.ODOM, 2 * HELD_NS, state(TAU))
@@ -73,7 +73,7 @@ def test_a_velocity_without_its_set_point_does_not_replace_a_pair_at_once() -> N
 
 
 def test_the_true_state_comes_before_the_measured_one() -> None:
-    motion = Motion()
+    motion = LiveMotion()
     motion.hear(0.0, interface.ODOM, 0, state((9.0,) * 6))
     motion.hear(0.0, interface.GROUND_TRUTH, 0, state(NU))
     motion.hear(0.0, interface.ODOM, STEP, state((9.0,) * 6))
@@ -83,7 +83,7 @@ def test_the_true_state_comes_before_the_measured_one() -> None:
 @QUICK
 @given(SIX, SIX)
 def test_the_lumped_error_is_of_one_stamp(F: tuple, f: tuple) -> None:
-    motion = Motion()
+    motion = LiveMotion()
     motion.hear(0.0, interface.DISTURBANCE, 0, F)
     motion.hear(0.0, interface.DISTURBANCE, STEP, (100.0,) * 6)
     assert motion.lumped(0.0) is None
@@ -94,7 +94,7 @@ def test_the_lumped_error_is_of_one_stamp(F: tuple, f: tuple) -> None:
 @QUICK
 @given(SIX, SIX)
 def test_without_an_analysis_node_the_vehicle_tells(nu: tuple, tau: tuple) -> None:
-    motion = Motion(LIVE)
+    motion = LiveMotion(LIVE)
     motion.hear(0.0, interface.ODOM, 0, state(nu))
     motion.hear(0.0, interface.WRENCH, 0, tau)
     energy, (components, shares) = motion.energy(0.0), LIVE.energy(nu)
@@ -106,7 +106,7 @@ def test_without_an_analysis_node_the_vehicle_tells(nu: tuple, tau: tuple) -> No
 
 
 def test_what_is_published_comes_first_as_long_as_it_comes() -> None:
-    motion = Motion(LIVE)
+    motion = LiveMotion(LIVE)
     motion.hear(0.0, interface.ODOM, 0, state(NU))
     motion.hear(0.0, interface.WRENCH, 0, TAU)
     for topic in interface.ANALYSIS_TOPICS:
@@ -118,7 +118,7 @@ def test_what_is_published_comes_first_as_long_as_it_comes() -> None:
 
 
 def test_without_vehicle_and_analysis_energy_and_couplings_are_unknown() -> None:
-    motion = Motion()
+    motion = LiveMotion()
     motion.hear(0.0, interface.ODOM, 0, state(NU))
     motion.hear(0.0, interface.WRENCH, 0, TAU)
     assert motion.energy(0.0) is motion.delta_xi(0.0) is motion.delta_pi(0.0) is None

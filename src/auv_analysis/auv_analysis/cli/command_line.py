@@ -179,7 +179,7 @@ def _check_vehicle(command: argparse.ArgumentParser) -> None:
 
 
 def _check_driver(command: argparse.ArgumentParser) -> None:
-    from auv_analysis.driver_check.options import add_options
+    from auv_analysis.driver.options import add_options
 
     add_options(command)
 

@@ -2,19 +2,43 @@
 
 import argparse
 from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from auv_analysis.doctor import graph_checks, machine_checks, python_checks, ros_checks
-from auv_analysis.doctor.finding import Check, findings_of
-from auv_dynamics.files.errors import FailedError, printable
+from auv_analysis.doctor import checks, discovery
+from auv_analysis.doctor.checks import Finding
+from auv_dynamics.files.errors import FailedError, named_line, printable
 
+Check = Callable[[], Iterable[Finding]]
 CHECKS: tuple[Check, ...] = (
-    python_checks.python, python_checks.packages, python_checks.compiler,
-    python_checks.executables, ros_checks.distro, ros_checks.middleware, ros_checks.reach,
-    ros_checks.domain, graph_checks.discovery, graph_checks.neighbours, machine_checks.disk,
-    machine_checks.shared_memory, machine_checks.files, machine_checks.clock,
-    machine_checks.cores, machine_checks.programs,
-)  # fmt: skip
+    checks.python,
+    checks.packages,
+    checks.compiler,
+    checks.executables,
+    checks.distro,
+    checks.middleware,
+    checks.reach,
+    checks.domain,
+    discovery.discovery,
+    discovery.neighbours,
+    checks.disk,
+    checks.shared_memory,
+    checks.files,
+    checks.clock,
+    checks.cores,
+    checks.programs,
+)
+
+
+def findings_of(checks: Iterable[Check]) -> Iterator[Finding]:
+    """Findings of checks, one after the other; a check that fails is a finding itself."""
+    for check in checks:
+        try:
+            yield from check()
+        except Exception as error:  # whatever a broken set-up does: the other checks go on
+            name = getattr(check, '__name__', 'check').replace('_', ' ')
+            found = f'could not be looked at: {named_line(error)}'
+            yield Finding(name, 'broken', found, 'make clean, then make setup')
 
 
 def doctor(options: argparse.Namespace) -> dict[str, Any]:

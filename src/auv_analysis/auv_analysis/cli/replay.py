@@ -16,7 +16,7 @@ from auv_analysis.cli.graphs import (
 )
 from auv_analysis.graph.domain import joined_domain
 from auv_analysis.output.progress import bar, say, waiting
-from auv_analysis.watch.keyboard import Keyboard
+from auv_analysis.watch.terminal import Keyboard
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.ros.interface import NANOSECONDS
 

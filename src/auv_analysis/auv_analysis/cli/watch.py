@@ -1,28 +1,19 @@
 """`auv watch`: a live dashboard of a node graph, which is not disturbed by it."""
 
 import argparse
-import io
 import math
-import sys
 import time
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
-from auv_analysis.cli.graphs import (
-    checked_namespace,
-    join_domain,
-    place_of,
-    positive,
-)
+from auv_analysis.cli.graphs import checked_namespace, join_domain, place_of, positive
 from auv_analysis.graph.domain import joined_domain
-from auv_analysis.output.progress import TextConsole, say
-from auv_analysis.watch.display import Display, Live, Printed
-from auv_analysis.watch.gauge import Gauge
-from auv_analysis.watch.keyboard import Keyboard
-from auv_analysis.watch.panels import BASIC
-from auv_analysis.watch.sampling import Sampling
-from auv_analysis.watch.snapshot import Snapshot, Trouble
+from auv_analysis.output.progress import say
+from auv_analysis.watch.monitor import GraphMonitor
+from auv_analysis.watch.screen import BASIC
+from auv_analysis.watch.snapshot import Alert, Snapshot
+from auv_analysis.watch.terminal import Display, Keyboard
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import FailedError
 from auv_dynamics.ros.interface import Frames
@@ -49,35 +40,25 @@ def watch(options: argparse.Namespace) -> dict[str, Any]:
         from auv_dynamics.ros.life import give_way
 
         give_way()
-        gauge = Gauge(domain, namespace, vehicle, begin=time.monotonic())
+        monitor = GraphMonitor(domain, namespace, vehicle, begin=time.monotonic())
         usual = Frames()
         frames = Frames(options.odom_frame or usual.odom, options.base_frame or usual.base)
-        listener = Listener(domain, namespace, frames, gauge)
+        listener = Listener(domain, namespace, frames, monitor)
         stack.callback(listener.close)
         say(f'listens on {place_of(domain, namespace)}')
-        console = _console(stderr=options.json)
         single = options.once or limit < math.inf
-        live = console.is_terminal and not single
-        display = Live(console) if live else Printed(console, every=not single)
-        stack.enter_context(display)
-        session = _Session(gauge, listener, display, rate or (ON_SCREEN if live else IN_PIPE))
+        display = stack.enter_context(Display(stderr=options.json, single=single))
+        rate = rate or (ON_SCREEN if display.live else IN_PIPE)
+        session = _Session(monitor, listener, display, rate)
         return session.run(keyboard, limit, once=options.once).document()
-
-
-def _console(*, stderr: bool) -> TextConsole:
-    stream = sys.stderr if stderr else sys.stdout
-    if isinstance(stream, io.TextIOWrapper):
-        stream.reconfigure(errors='replace')  # bars and dashes, where the encoding has none
-    return TextConsole(stderr=stderr, highlight=False)
 
 
 class _Session:
     """Listens and shows until there is a reason to end."""
 
-    def __init__(self, gauge: Gauge, listener: Any, display: Display, rate: float):
-        self._gauge, self._listener, self._display = gauge, listener, display
+    def __init__(self, monitor: GraphMonitor, listener: Any, display: Display, rate: float):
+        self._monitor, self._listener, self._display = monitor, listener, display
         self._period = 1.0 / rate
-        self._sampling = Sampling()
         self._said = False
 
     def run(self, keyboard: Keyboard, limit: float, *, once: bool) -> Snapshot:
@@ -85,11 +66,9 @@ class _Session:
         begin = due = time.monotonic()
         settled = math.inf
         while True:
+            self._listener.listen()
             now = time.monotonic()
-            load = self._gauge.load(now)
-            self._listener.listen(listening=self._sampling.listens(now, load))
-            now = time.monotonic()
-            if self._gauge.moves and settled == math.inf:
+            if self._monitor.moves and settled == math.inf:
                 settled = now + SETTLED
             if now >= due:
                 self._show(now, waits=now - begin > PATIENCE)
@@ -97,23 +76,20 @@ class _Session:
             if keyboard.ended or (once and now >= settled):
                 break
             if now - begin >= limit:
-                snapshot = self._snapshot(now)
+                snapshot = self._monitor.snapshot(now)
                 if not snapshot.heard:
                     raise FailedError(f'{self._waits_for(snapshot)}: gave up after {limit:g} s')
                 break
             keyboard.wait(LOOK)
-        snapshot = self._snapshot(time.monotonic())
+        snapshot = self._monitor.snapshot(time.monotonic())
         self._display.end(snapshot)
         return snapshot
 
-    def _snapshot(self, now: float) -> Snapshot:
-        return self._gauge.snapshot(now, sampled=self._sampling.sampled)
-
     def _show(self, now: float, *, waits: bool) -> None:
-        snapshot = self._snapshot(now)
+        snapshot = self._monitor.snapshot(now)
         if waits and not snapshot.heard:
             text = f'{self._waits_for(snapshot)}; waiting'
-            snapshot = replace(snapshot, troubles=(Trouble('warning', text), *snapshot.troubles))
+            snapshot = replace(snapshot, alerts=(Alert('warning', text), *snapshot.alerts))
             if not (self._said or self._display.live):
                 say(text)
                 self._said = True

@@ -5,30 +5,39 @@ subscribes with best effort: nobody waits for it.
 """
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.context import Context
-from rclpy.duration import Duration
+from rclpy.duration import Duration, Infinite
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.publisher import Publisher
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSCompatibility,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
 
-from auv_analysis.driver_check.recording import Recording, Tape
-from auv_analysis.driver_check.scene import Scene
-from auv_analysis.driver_check.scene_of_node import scene_of
+from auv_analysis.driver.evidence import Endpoint, GraphSnapshot
+from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.bulk import BulkNode, DataPath
 from auv_dynamics.ros.codec import Codec, first_stamp, message_of
-from auv_dynamics.ros.endpoints import full_name, other_publishers
+from auv_dynamics.ros.endpoints import acts, full_name, other_publishers, other_subscribers
 from auv_dynamics.ros.interface import Frames
+from auv_dynamics.ros.kinds import type_name
 from auv_dynamics.ros.participant import Participant
 from auv_dynamics.ros.private import PLAIN
 
 COMMANDER = 'auv_check_driver'  # its name when it commands: then it is no mere observer
 ACKNOWLEDGED = 0.5  # s that are waited for the last zero to arrive
+ODOMETRY, WRENCH = type_name(Odometry), type_name(WrenchStamped)
 
 
 def _sight() -> QoSProfile:
@@ -65,7 +74,7 @@ class CheckNode(BulkNode):
         )
         for publisher in list(self.publishers):  # /parameter_events
             self.destroy_publisher(publisher)
-        self.tape = Tape()
+        self.buffer = OdometryBuffer()
         self.odom = self.resolve_topic_name(names[interface.ODOM])
         self.wrench = self.resolve_topic_name(names[interface.WRENCH])
         self._hear(Odometry, self.odom, self._on_odometry)
@@ -79,7 +88,7 @@ class CheckNode(BulkNode):
                 callback(data, info)
             except interface.BadMessageError:
                 number = info.get('publication_sequence_number') if topic == self.odom else None
-                self.tape.unreadable(topic, number)
+                self.buffer.unreadable(topic, number)
 
         hear: Any = take  # rclpy's types do not know that it may be told the way of a message
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
@@ -91,14 +100,14 @@ class CheckNode(BulkNode):
         message = message_of(data, Odometry, self.odom)
         frames = (message.header.frame_id, message.child_frame_id)
         x, number = interface.state_of(message), info.get('publication_sequence_number')
-        self.tape.odometry(_arrived(info), first_stamp(data), x, frames, number)
+        self.buffer.odometry(_arrived(info), first_stamp(data), x, frames, number)
 
     def _on_clock(self, data: bytes, info: dict[str, Any]) -> None:
-        self.tape.clock(_arrived(info), first_stamp(data))
+        self.buffer.clock(_arrived(info), first_stamp(data))
 
     def _on_applied(self, data: bytes, info: dict[str, Any]) -> None:
         message = message_of(data, WrenchStamped, topics.WRENCH_APPLIED.name)
-        self.tape.wrench_applied(_arrived(info), interface.wrench_of(message))
+        self.buffer.wrench_applied(_arrived(info), interface.wrench_of(message))
 
 
 def _arrived(info: dict[str, Any]) -> int:
@@ -106,8 +115,99 @@ def _arrived(info: dict[str, Any]) -> int:
     return info.get('received_timestamp') or time.time_ns()
 
 
-class Ear(Participant):
-    """A participant that listens to a driver, and may be given a voice.
+def graph_snapshot(node: Any, odom: str, wrench: str, place: str) -> GraphSnapshot:
+    """Endpoints beside a node.
+
+    Parameters
+    ----------
+    node : that looks; it is no part of the snapshot
+    odom, wrench : full names of the topics
+    place : domain and namespace, in words
+
+    """
+    odometry = node.get_publishers_info_by_topic(odom)
+    takers = list(filter(acts, other_subscribers(node, wrench)))
+    clocks = node.get_publishers_info_by_topic(topics.CLOCK.name)
+    names = [name for name, _ in node.get_topic_names_and_types()]
+    rest = [name for name in names if name not in (odom, wrench)]
+    return GraphSnapshot(
+        place,
+        odom,
+        wrench,
+        ODOMETRY,
+        WRENCH,
+        odom_publishers=tuple(map(_endpoint, odometry)),
+        wrench_publishers=tuple(map(_endpoint, other_publishers(node, wrench))),
+        wrench_subscribers=tuple(map(_endpoint, takers)),
+        clock_publishers=tuple(map(_endpoint, clocks)),
+        conflicts={
+            'controller': _conflict(
+                (one, _spelled(topics.newest_measurement())) for one in _of(odometry)
+            ),
+            'recorder': _conflict((one, _spelled(topics.every_step())) for one in _of(odometry)),
+            'wrench': _conflict(
+                (_spelled(topics.every_step()), one) for one in _of(takers, WRENCH)
+            ),
+        },
+        elsewhere=_nodes(
+            (name, one)
+            for name in rest
+            for one in node.get_publishers_info_by_topic(name)
+            if one.topic_type == ODOMETRY
+        ),
+        listeners=_nodes(
+            (name, one)
+            for name in rest
+            for one in other_subscribers(node, name)
+            if one.topic_type == WRENCH and acts(one)
+        ),
+        topics=tuple(names),
+    )
+
+
+def _endpoint(info: Any) -> Endpoint:
+    qos = info.qos_profile
+    policies = qos.reliability.name.lower(), qos.durability.name.lower()
+    return Endpoint(full_name(info), info.topic_type, *policies)
+
+
+def _of(ends: Iterable[Any], kind: str = ODOMETRY) -> list[QoSProfile]:
+    return [end.qos_profile for end in ends if end.topic_type == kind]
+
+
+def _nodes(found: Iterable[tuple[str, Any]]) -> dict[str, tuple[str, ...]]:
+    """Topic -> its nodes."""
+    nodes: dict[str, set[str]] = {}
+    for topic, info in found:
+        nodes.setdefault(topic, set()).add(full_name(info))
+    return {topic: tuple(sorted(names)) for topic, names in nodes.items()}
+
+
+def _spelled(qos: QoSProfile) -> QoSProfile:
+    """A profile of ours with what the middleware fills in, as discovery tells it of others."""
+    return QoSProfile(
+        history=qos.history,
+        depth=qos.depth,
+        reliability=qos.reliability,
+        durability=DurabilityPolicy.VOLATILE,
+        deadline=Infinite,
+        liveliness=LivelinessPolicy.AUTOMATIC,
+        liveliness_lease_duration=Infinite,
+    )
+
+
+def _conflict(pairs: Iterable[tuple[QoSProfile, QoSProfile]]) -> str:
+    """Why a publisher and a subscription of some pairs do not match, or an empty text."""
+    for publisher, subscription in pairs:
+        verdict, reason = qos_check_compatible(publisher, subscription)
+        if verdict == QoSCompatibility.ERROR:
+            parts = reason.lower().replace('error:', '').split(';')
+            return ', '.join(part.strip() for part in parts if part.strip())
+    return ''
+
+
+class RosDriverClient(Participant):
+    """Connection to a driver: listens, and publishes wrenches where that was asked for.
 
     Parameters
     ----------
@@ -135,9 +235,9 @@ class Ear(Participant):
         self._publisher: Publisher | None = None
 
     @property
-    def tape(self) -> Tape:
+    def buffer(self) -> OdometryBuffer:
         """What has been heard so far."""
-        return self._node.tape
+        return self._node.buffer
 
     def listen(self, seconds: float) -> None:
         """Take what comes in for so long."""
@@ -150,22 +250,22 @@ class Ear(Participant):
         """Whether anybody publishes the odometry."""
         return self._node.count_publishers(self._node.odom) > 0
 
-    def scene(self, place: str) -> Scene:
+    def graph(self, place: str) -> GraphSnapshot:
         """Who is there."""
-        return scene_of(self._node, self._node.odom, self._node.wrench, place)
+        return graph_snapshot(self._node, self._node.odom, self._node.wrench, place)
 
-    def recording(self, began_ns: int) -> Recording:
+    def log(self, began_ns: int) -> OdometryLog:
         """What was heard since a time, up to now."""
-        return self._node.tape.recording(began_ns, time.time_ns())
+        return self._node.buffer.log(began_ns, time.time_ns())
 
     def others(self) -> list[str]:
         """Who else publishes the wrench."""
         return [full_name(one) for one in other_publishers(self._node, self._node.wrench)]
 
-    def speak(self) -> bool:
-        """Begin to publish wrenches, of which none is sent yet; whether somebody hears them."""
+    def advertise(self) -> bool:
+        """Create the publisher of wrenches, if there is none; whether somebody hears it."""
         if not self._commands:
-            raise RuntimeError('a node that only listens has no voice')
+            raise RuntimeError('a node that only listens publishes nothing')
         if self._publisher is None:
             codec = Codec(WrenchStamped, self._frames, topics.WRENCH.name)
             self._encode = codec.encode
@@ -175,16 +275,16 @@ class Ear(Participant):
 
     def send(self, tau: tuple[float, ...]) -> int:
         """Publish a wrench with the stamp of the newest odometry; the time at which it left, ns."""
-        if self._publisher is None or self.tape.newest is None:
-            raise RuntimeError('no wrench before speak() and an odometry')
-        self._publisher.publish(self._encode(self.tape.newest[1], tau))
+        if self._publisher is None or self.buffer.newest is None:
+            raise RuntimeError('no wrench before advertise() and an odometry')
+        self._publisher.publish(self._encode(self.buffer.newest[1], tau))
         return time.time_ns()
 
     def now_ns(self) -> int:
         """What the clock of this machine shows, ns."""
         return time.time_ns()
 
-    def hush(self) -> None:
+    def retire(self) -> None:
         """Wait until what was sent last has arrived, and publish no more."""
         if self._publisher is not None:
             self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED))

@@ -4,6 +4,7 @@ Only what is published is subscribed, and with best effort: that fits every publ
 publisher never waits for such a subscriber, not even for one that is stopped.
 """
 
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -14,12 +15,12 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
-from auv_analysis.watch.gauge import HEARD, Gauge
+from auv_analysis.watch.monitor import HEARD, GraphMonitor
 from auv_analysis.watch.snapshot import LEVELS, NodeState
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.codec import KINDS, Codec, first_stamp, message_of
-from auv_dynamics.ros.endpoints import Endpoints, endpoints
+from auv_dynamics.ros.endpoints import endpoints
 from auv_dynamics.ros.interface import BadMessageError, Frames
 from auv_dynamics.ros.life import serve
 from auv_dynamics.ros.participant import Participant
@@ -29,8 +30,6 @@ DEPTH = 256  # messages of a topic between two looks; of more, the oldest are dr
 LOOK = 0.5  # s between two looks at who is there
 SERVED = 2000  # callbacks at each look, at most; only a plain executor brings messages as well
 BRIEF = 0.001  # s: without any patience it brings one message of each topic, however many wait
-# without a pause: few messages, or set-points, which are published long before their odometry
-ALWAYS = (topics.CMD_VEL, topics.DIAGNOSTICS, topics.PROGRESS)
 
 
 def _sight() -> QoSProfile:
@@ -41,18 +40,18 @@ def _sight() -> QoSProfile:
 
 
 class WatchNode(BulkNode):
-    """Subscribes what is published and hands it to a gauge.
+    """Subscribes what is published and hands it to a monitor.
 
     Parameters
     ----------
     context : of rclpy
     namespace : of the graph
     frames : frame ids that are accepted
-    gauge : is told of everything, with the steady time in s
+    monitor : is told of everything, with the steady time in s
 
     """
 
-    def __init__(self, context: Context, namespace: str, frames: Frames, gauge: Gauge):
+    def __init__(self, context: Context, namespace: str, frames: Frames, monitor: GraphMonitor):
         super().__init__(
             interface.OBSERVER,
             context=context,
@@ -61,7 +60,7 @@ class WatchNode(BulkNode):
             start_parameter_services=False,
             enable_rosout=False,
         )
-        self._gauge = gauge
+        self._monitor = monitor
         self._frames = frames
         self._topics = [topic for topic in topics.TOPICS if topic.name in HEARD]
         # made once: which messages are laid out how takes some time to find out
@@ -74,19 +73,16 @@ class WatchNode(BulkNode):
         self._now = time.monotonic()
         self.take_data()
 
-    def look(self, *, listening: bool) -> None:
+    def look(self) -> None:
         """See who is there; subscribe what is published, leave what is not."""
         found = {topic.name: endpoints(self, topic) for topic in self._topics}
-        self._gauge.see(time.monotonic(), found)
+        self._monitor.see(time.monotonic(), found)
         for topic in self._topics:
-            self._set(topic, found[topic.name], wanted=listening or topic in ALWAYS)
-
-    def _set(self, topic: topics.Topic, ends: Endpoints, *, wanted: bool) -> None:
-        wanted = wanted and ends.publishers > 0
-        if wanted and topic not in self._subscribed:
-            self._subscribed[topic] = self._subscribe(topic)
-        elif not wanted and topic in self._subscribed:
-            self.drop_data(self._subscribed.pop(topic))
+            published = found[topic.name].publishers > 0
+            if published and topic not in self._subscribed:
+                self._subscribed[topic] = self._subscribe(topic)
+            elif not published and topic in self._subscribed:
+                self.drop_data(self._subscribed.pop(topic))
 
     def _subscribe(self, topic: topics.Topic) -> Subscription:
         events = SubscriptionEventCallbacks(
@@ -114,7 +110,7 @@ class WatchNode(BulkNode):
             try:
                 self._callbacks[topic](data, info)
             except BadMessageError as error:
-                self._gauge.refuse(self._now, topic.name, str(error))
+                self._monitor.refuse(self._now, topic.name, str(error))
 
         return take
 
@@ -129,24 +125,24 @@ class WatchNode(BulkNode):
             try:
                 values = decode(data)[1] if decode else None
             except BadMessageError as error:
-                self._gauge.refuse(now, topic.name, str(error))
-            self._gauge.hear(now, topic.name, number, first_stamp(data), values)
+                self._monitor.refuse(now, topic.name, str(error))
+            self._monitor.hear(now, topic.name, number, first_stamp(data), values)
 
         return take
 
     def _on_diagnostics(self, data: bytes, info: dict[str, Any]) -> None:
         now, name = self._now, topics.DIAGNOSTICS.name
-        self._gauge.hear(now, name, _number(info), first_stamp(data), None)
+        self._monitor.hear(now, name, _number(info), first_stamp(data), None)
         for status in message_of(data, DiagnosticArray, name).status:
             level = LEVELS[min(int.from_bytes(status.level, 'little'), len(LEVELS) - 1)]
             facts = {pair.key: pair.value for pair in status.values}
             state = NodeState(status.name, level, status.message, 0.0, facts)
-            self._gauge.diagnose(now, state)
+            self._monitor.diagnose(now, state)
 
     def _incompatible(self, topic: topics.Topic, event: Any) -> None:
         policy = QoSPolicyKind(event.last_policy_kind).name.lower()
         text = f'{topic.name}: incompatible QoS with another endpoint: {policy}'
-        self._gauge.complain(time.monotonic(), text)
+        self._monitor.complain(time.monotonic(), text)
 
     def elsewhere(self) -> list[str]:
         """Other namespaces in which odometry is published."""
@@ -162,35 +158,34 @@ def _number(info: dict[str, Any]) -> int | None:
 
 
 class Listener(Participant):
-    """A participant that listens for a gauge.
+    """A participant that listens for a monitor.
 
     Parameters
     ----------
     domain : ROS domain id
     namespace : of the graph
     frames : frame ids that are accepted
-    gauge : is told of everything
+    monitor : is told of everything
 
     """
 
-    def __init__(self, domain: int, namespace: str, frames: Frames, gauge: Gauge):
+    def __init__(self, domain: int, namespace: str, frames: Frames, monitor: GraphMonitor):
         def make(context: Context) -> WatchNode:
-            return WatchNode(context, namespace, frames, gauge)
+            return WatchNode(context, namespace, frames, monitor)
 
         super().__init__(domain, make, interface.OBSERVER)
-        self._looked: float | None = None
-        self._listened = False
+        self._looked = -math.inf
 
-    def listen(self, *, listening: bool) -> None:
-        """Take what has come; `listening`: whether topics with many messages are subscribed."""
+    def listen(self) -> None:
+        """Take what has come, and look now and then who is there."""
         self._node.take()
         now = time.monotonic()
         if PLAIN:
             self._serve(BRIEF)
-        if self._looked is None or now - self._looked > LOOK or listening != self._listened:
-            self._looked, self._listened = now, listening
+        if now - self._looked > LOOK:
+            self._looked = now
             self._serve(0.0)
-            self._node.look(listening=listening)
+            self._node.look()
 
     def _serve(self, timeout: float) -> None:
         for _ in range(SERVED):

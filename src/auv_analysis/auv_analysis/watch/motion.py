@@ -1,14 +1,14 @@
-"""Errors, energy and couplings of what was heard last."""
+"""Motion as it was heard last: errors of the last seconds, energy and couplings."""
 
 import math
 from bisect import bisect_right
-from collections import OrderedDict
+from collections import OrderedDict, deque
+from typing import NamedTuple
 
 import numpy as np
 
 from auv_analysis.metrics.live_analysis import LiveAnalysis
 from auv_analysis.watch.snapshot import Energy, Errors, Six
-from auv_analysis.watch.trend import BUCKET, BUCKETS, Trend
 from auv_dynamics.ros import interface
 
 CAPACITY = 4096  # set-points that are kept; more than any horizon that is accepted
@@ -16,9 +16,57 @@ PENDING = 512  # messages that wait for the one of the same stamp
 FRESH = 3.0  # s for which an analysis that was published is shown
 HELD_NS = interface.NANOSECONDS  # how far a set-point may lie behind the odometry
 VELOCITY = 7  # numbers of a state before its velocity: position and quaternion
+BUCKET, BUCKETS = 0.5, 20  # s, and how many of them errors are shown of
 
 
-class Motion:
+class Bucket(NamedTuple):
+    """Samples (6,) of half a second: steady time of the first, largest sizes, squares, count."""
+
+    begin: float
+    largest: np.ndarray
+    squares: np.ndarray
+    count: int
+
+
+class Trend:
+    """The last ten seconds of six numbers that come in at steady times."""
+
+    def __init__(self) -> None:
+        self._buckets: deque[Bucket] = deque(maxlen=BUCKETS)
+
+    def add(self, now: float, values: np.ndarray) -> None:
+        """Take a sample (6,) at a steady time in s."""
+        size = np.abs(values)
+        new = Bucket(now, size, size * size, 1)
+        if self._buckets and now - self._buckets[-1].begin < BUCKET:
+            last = self._buckets.pop()
+            largest = np.maximum(last.largest, size)
+            new = Bucket(last.begin, largest, last.squares + new.squares, last.count + 1)
+        self._buckets.append(new)
+
+    @property
+    def largest(self) -> Six | None:
+        """Largest absolute values (6,), or None without a sample."""
+        if not self._buckets:
+            return None
+        return tuple(np.max([bucket.largest for bucket in self._buckets], axis=0).tolist())
+
+    @property
+    def rms(self) -> Six | None:
+        """Root mean squares (6,) of the samples, or None without one."""
+        count = sum(bucket.count for bucket in self._buckets)
+        if not count:
+            return None
+        squares = np.sum([bucket.squares for bucket in self._buckets], axis=0)
+        return tuple(np.sqrt(squares / count).tolist())
+
+    @property
+    def history(self) -> tuple[Six, ...]:
+        """Largest absolute values (6,) of each half second, the oldest first."""
+        return tuple(tuple(bucket.largest.tolist()) for bucket in self._buckets)
+
+
+class LiveMotion:
     """The newest numbers of each topic and what follows from them.
 
     Parameters

@@ -1,17 +1,30 @@
 """A snapshot as something that rich prints: on a terminal of any size, or into a pipe."""
 
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from textwrap import wrap
+
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from auv_analysis.watch.motion_table import WIDE, motion_table
-from auv_analysis.watch.panels import nodes_table, topics_table, troubles_lines
-from auv_analysis.watch.sampling import LISTEN, PERIOD
-from auv_analysis.watch.snapshot import Snapshot
-from auv_analysis.watch.text import short, stamp
+from auv_analysis.output.progress import share_bar
+from auv_analysis.watch.snapshot import Alert, NodeState, Six, Snapshot, TopicState
 from auv_dynamics.ros import interface
+from auv_dynamics.vehicle import DOFS
 
 ABOVE = 11  # lines of heading, motion, footnote and the head of the lists
+WIDE = 116  # columns from which set-points, rms and history are shown as well
+HISTORY = 20  # half seconds
+BAR = 9  # columns
+NAME = 15  # columns, of the longest of our nodes
+SHOWN_FACTS = 2
+VELOCITY, WRENCH = 'm,rad/s', 'N,N m'
+BASIC = (interface.ODOM, interface.CMD_VEL, interface.WRENCH)  # shown though nobody publishes them
+STYLES = {'ok': 'green', 'warning': 'yellow', 'error': 'bold red', 'stale': 'yellow'}
+MISSING = '–'
+BLOCKS = ' ▁▂▃▄▅▆▇█'
+DATES = 1e9  # s: stamps from here on are of the wall clock
 
 
 def screen(snapshot: Snapshot, width: int, height: int | None = None) -> RenderableType:
@@ -24,28 +37,37 @@ def screen(snapshot: Snapshot, width: int, height: int | None = None) -> Rendera
     height : lines; None: as many as it takes
 
     """
-    narrow = width < WIDE
     most = None if height is None else max(2, height // 6)
-    health = troubles_lines(snapshot.troubles, width, most) or [nothing_wrong(snapshot)]
-    rows = None if height is None else max(1, height - ABOVE - len(health))
+    alerts = alert_lines(snapshot.alerts, width, most)
+    if not alerts:
+        alerts = [Text('nothing wrong seen' if snapshot.heard else '', 'green')]
+    rows = None if height is None else max(1, height - ABOVE - len(alerts))
     lists = Table.grid(padding=(0, 2, 0, 0), expand=True)
     lists.add_column(no_wrap=True)
     lists.add_column(no_wrap=True, ratio=1)
-    lists.add_row(
-        topics_table(snapshot, rows, folded=narrow), nodes_table(snapshot, rows, facts=not narrow)
-    )
+    lists.add_row(topics_table(snapshot, rows), nodes_table(snapshot, rows, facts=width >= WIDE))
     return Group(
-        heading(snapshot, width),
+        _line(heading(snapshot).ljust(width), width, 'bold reverse'),
         motion_table(snapshot, width),
         _line(footnote(snapshot), width, 'dim'),
-        *health,
+        *alerts,
         lists,
     )
 
 
-def heading(snapshot: Snapshot, width: int) -> Text:
+def _line(text: str, width: int, style: str) -> Text:
+    line = Text(text, style=style, no_wrap=True)
+    line.truncate(width, overflow='ellipsis')
+    return line
+
+
+def _table(spacing: int) -> Table:
+    return Table(box=None, padding=(0, spacing, 0, 0), pad_edge=False, header_style='bold')
+
+
+def heading(snapshot: Snapshot) -> str:
     """Where is listened, and how far the graph is."""
-    facts = [f'domain {snapshot.domain}']
+    facts = ['auv watch', f'domain {snapshot.domain}']
     if snapshot.namespace != '/':
         facts.append(snapshot.namespace)
     if snapshot.time is None:
@@ -56,12 +78,7 @@ def heading(snapshot: Snapshot, width: int) -> Text:
             facts.append(f'{snapshot.pace:.3g} x real time')
         if snapshot.recorded is not None:
             facts.append(f'recorded to {stamp(snapshot.recorded)}')
-    return _line(f'auv watch  {"  ".join(facts)}'.ljust(width), width, 'bold reverse')
-
-
-def nothing_wrong(snapshot: Snapshot) -> Text:
-    """What stands where troubles would stand."""
-    return Text('nothing wrong seen' if snapshot.heard else '', 'green')
+    return '  '.join(facts)
 
 
 def footnote(snapshot: Snapshot) -> str:
@@ -77,12 +94,184 @@ def footnote(snapshot: Snapshot) -> str:
         parts.append(f'computed for {snapshot.vehicle}')
     elif snapshot.time is not None and snapshot.kinetic_energy is None:
         parts.append('energy, couplings: by analysis_node, or with --vehicle')
-    if snapshot.sampled:
-        parts.append(f'listens {LISTEN:g} s of each {PERIOD:g} s')
     return '; '.join(parts)
 
 
-def _line(text: str, width: int, style: str) -> Text:
-    line = Text(text, style=style, no_wrap=True)
-    line.truncate(width, overflow='ellipsis')
-    return line
+def motion_table(snapshot: Snapshot, width: int) -> Table:
+    """Errors, wrench, couplings and energy, a line per degree of freedom, for so many columns."""
+    wide = width >= WIDE
+    errors, zeros = snapshot.velocity_error, snapshot.structural_zeros or {}
+    columns = {
+        'nu': (VELOCITY, _texts(snapshot.nu, fixed)),
+        'nu_d': (VELOCITY, _texts(snapshot.nu_d, fixed)),
+        'error': (VELOCITY, _texts(errors.now, fixed)),
+        'largest': (VELOCITY, _texts(errors.largest, fixed)),
+        'rms': (VELOCITY, _texts(errors.rms, fixed)),
+        'tau': (WRENCH, _texts(snapshot.tau, short)),
+        'w': (WRENCH, _texts(snapshot.lumped_error, short)),
+        'delta_xi': (VELOCITY, _texts(snapshot.delta_xi, fixed, zeros.get('delta_xi', ()))),
+        'delta_pi': (WRENCH, _texts(snapshot.delta_pi, short, zeros.get('delta_pi', ()))),
+    }
+    if not wide:
+        del columns['nu_d'], columns['rms']
+    table = _table(1)
+    table.add_column('')
+    for name, (unit, _) in columns.items():
+        table.add_column(f'{name}\n{unit}', justify='right', no_wrap=True, min_width=7)
+    table.add_column('energy\n%', justify='right', no_wrap=True)
+    table.add_column('', width=BAR, no_wrap=True)
+    if wide:
+        table.add_column('error, last 10 s', width=HISTORY, no_wrap=True)
+    energy, history = snapshot.kinetic_energy, errors.history[-HISTORY:]
+    for i, dof in enumerate(DOFS):
+        share = energy.shares_percent[i] if energy else None
+        row: list[RenderableType] = [dof, *(texts[i] for _, texts in columns.values())]
+        row += [fixed(share, 1), '' if share is None else share_bar(share, BAR)]
+        if wide:
+            row.append(spark([largest[i] for largest in history]))
+        table.add_row(*row)
+    return table
+
+
+def _texts(
+    values: Six | None, form: Callable[[float], str], zeros: Sequence[str] = ()
+) -> list[str]:
+    """Six numbers; couplings that vanish whatever the vehicle does, `zeros`, are no measurement."""
+    texts = [MISSING] * 6 if values is None else [form(value) for value in values]
+    return ['zero' if dof in zeros else text for dof, text in zip(DOFS, texts, strict=True)]
+
+
+def topics_table(snapshot: Snapshot, rows: int | None = None) -> Table:
+    """Table of the topics that are published; `rows` at most."""
+    table = _table(2)
+    table.add_column('topic', no_wrap=True)
+    for name, width in (('msg/s', 6), ('age', 6), ('gaps', 4), ('dups', 4)):
+        table.add_column(name, justify='right', no_wrap=True, min_width=width)
+    shown = [
+        topic
+        for topic in snapshot.topics
+        if (topic.publishers or topic.heard or topic.name in BASIC)
+        and topic.name != interface.DIAGNOSTICS  # shown as nodes
+    ]
+    left_out = 0
+    if rows is not None and len(shown) > rows:
+        left_out = len(shown) - rows + 1  # the line that says so takes one as well
+    for topic in shown[: len(shown) - left_out]:
+        table.add_row(*_topic_row(topic))
+    if left_out:
+        table.add_row(f'and {left_out} more', style='dim')
+    return table
+
+
+def _topic_row(topic: TopicState) -> list[Text]:
+    if not topic.publishers:
+        state = 'no publisher' if not topic.heard else 'ended'
+        return [Text(topic.name, 'dim'), Text(state, 'dim')]
+    counts = (MISSING if value is None else str(value) for value in (topic.gaps, topic.repeats))
+    return [
+        Text(topic.name, 'bold red' if topic.refused else ''),
+        Text(rate(topic.rate)),
+        Text(seconds(topic.age)),
+        *(Text(text, '' if text in ('0', MISSING) else 'yellow') for text in counts),
+    ]
+
+
+def nodes_table(snapshot: Snapshot, rows: int | None = None, *, facts: bool = True) -> Table:
+    """Table of what the nodes say of themselves; `rows` at most, with or without their facts."""
+    table = _table(2)
+    table.add_column('node', no_wrap=True, min_width=NAME)
+    table.add_column('health', no_wrap=True, overflow='ellipsis')
+    for node in snapshot.nodes[:rows]:
+        table.add_row(Text(node.name.removeprefix('/')), _health(node, facts=facts))
+    if not snapshot.nodes:
+        table.add_row(Text(f'none on {interface.DIAGNOSTICS}', 'dim'))
+    return table
+
+
+def _health(node: NodeState, *, facts: bool) -> Text:
+    text = Text().append(node.level, STYLES[node.level])
+    if node.level == 'stale':
+        text.append(f' for {seconds(node.age)}')
+    if node.facts.get('ready') == 'False':
+        text.append(' not ready', 'yellow')
+    if node.facts.get('refused', '0') != '0':
+        text.append(f' refused {node.facts["refused"]}', 'red')
+    others = {key: value for key, value in node.facts.items() if key not in ('ready', 'refused')}
+    for key, value in list(others.items())[: SHOWN_FACTS if facts else 0]:
+        text.append(f' {key} {fact(value)}', 'dim')
+    return text
+
+
+def alert_lines(alerts: Sequence[Alert], width: int, most: int | None = None) -> list[Text]:
+    """What is wrong, the worst first, in lines of so many columns; `most` lines at most."""
+    lines = []
+    for alert in alerts:
+        seen = [f'{alert.count} times'] if alert.count > 1 else []
+        seen += [f'{seconds(alert.age)} ago'] if alert.age >= 1.0 else []
+        line = f'{", ".join([alert.level, *seen])}: {alert.text}'
+        style = STYLES[alert.level]
+        lines += [Text(part, style) for part in wrap(line, width, subsequent_indent='  ')]
+    if most is not None and len(lines) > most:
+        lines[most - 1 :] = [Text(f'and more: {len(alerts)} in all', lines[0].style)]
+    return lines
+
+
+def fixed(value: float | None, digits: int = 4) -> str:
+    """Number with so many decimals; those that are very large in powers of ten."""
+    if value is None:
+        return MISSING
+    return _unsigned_zero(f'{value:.{digits}f}') if abs(value) < 1000 else f'{value:.1e}'
+
+
+def short(value: float | None) -> str:
+    """Number in at most eight characters, with the decimals that its size leaves room for."""
+    if value is None:
+        return MISSING
+    size = abs(value)
+    if size >= 1e6:
+        return f'{value:.1e}'
+    digits = 0 if size >= 1000 else 1 if size >= 100 else 2 if size >= 10 else 3
+    return _unsigned_zero(f'{value:.{digits}f}')
+
+
+def _unsigned_zero(text: str) -> str:
+    """Text of a number without the sign of a zero."""
+    return text.removeprefix('-') if not text.strip('-0.') else text
+
+
+def seconds(value: float | None) -> str:
+    """Age or time in s."""
+    if value is None:
+        return MISSING
+    return f'{value:.1f} s' if value < 100 else f'{value:.0f} s'
+
+
+def stamp(value: float) -> str:
+    """Time of a message: s since the start of a simulation, else the time of day."""
+    if value < DATES:
+        return f'{value:.2f} s'
+    return datetime.fromtimestamp(value, UTC).strftime('%H:%M:%S.%f')[:-5] + ' UTC'
+
+
+def fact(value: str) -> str:
+    """What a node says of itself; a number with three digits."""
+    try:
+        return value if value.lstrip('-').isdecimal() else f'{float(value):.3g}'
+    except ValueError:
+        return value
+
+
+def rate(value: float | None) -> str:
+    """Messages per second."""
+    if value is None:
+        return MISSING
+    return f'{value:.1f}' if value < 99.95 else f'{value:.0f}'
+
+
+def spark(values: list[float]) -> str:
+    """Values from 0 up as a row of blocks, the largest one full."""
+    top = max(values, default=0.0)
+    if top <= 0:
+        return BLOCKS[1] * len(values)
+    steps = len(BLOCKS) - 2
+    return ''.join(BLOCKS[1 + round(steps * value / top)] for value in values)

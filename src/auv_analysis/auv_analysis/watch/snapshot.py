@@ -50,7 +50,7 @@ class NodeState:
 
 
 @dataclass(frozen=True)
-class Trouble:
+class Alert:
     """Something that is wrong: `level` is 'error' or 'warning', `age` s since it was last seen."""
 
     level: str
@@ -88,7 +88,6 @@ class Snapshot:
     domain, namespace : where was listened
     vehicle : name of the vehicle file that was given, or None
     seconds : how long was listened
-    sampled : whether only a part of the messages is taken, because they are very many
     motion : topic that the true velocity is taken from
     time, pace : stamp of the newest odometry in s; s of stamps per s of the wall
     recorded : stamp of the last step that the recorder has complete, s
@@ -97,7 +96,7 @@ class Snapshot:
     kinetic_energy, delta_xi, delta_pi : (30), (33), (34)
     computed : whether these were computed here, as the graph does not publish them
     structural_zeros : degrees of freedom whose couplings vanish for this vehicle
-    topics, nodes, troubles : health
+    topics, nodes, alerts : health; alerts are `troubles` in the document
 
     """
 
@@ -105,7 +104,6 @@ class Snapshot:
     namespace: str = '/'
     vehicle: str | None = None
     seconds: float = 0.0
-    sampled: bool = False
     motion: str | None = None
     time: float | None = None
     pace: float | None = None
@@ -122,7 +120,7 @@ class Snapshot:
     structural_zeros: dict[str, list[str]] | None = None
     topics: tuple[TopicState, ...] = ()
     nodes: tuple[NodeState, ...] = ()
-    troubles: tuple[Trouble, ...] = ()
+    alerts: tuple[Alert, ...] = ()
 
     @property
     def heard(self) -> bool:
@@ -140,4 +138,6 @@ class Snapshot:
 
     def document(self) -> dict[str, Any]:
         """The snapshot ready for JSON."""
-        return asdict(self)
+        document = asdict(self)
+        document['troubles'] = document.pop('alerts')
+        return document

@@ -1,0 +1,1 @@
+"""Whether a vehicle's driver keeps the contract of odometry and wrench."""

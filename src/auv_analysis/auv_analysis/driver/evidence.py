@@ -1,0 +1,235 @@
+"""Evidence on a driver: who was there, what was heard and sent; and the finding of a check."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.driver.excitation import Excitation, MeasuredTrial
+from auv_analysis.driver.odometry_log import OdometryLog
+from auv_analysis.foreign.local_polynomials import SMALLEST
+from auv_analysis.metrics.pose_twist import ANGULAR, LINEAR, PoseTwist, TwistFit, fit_readings
+from auv_dynamics.ros.interface import NANOSECONDS, Frames
+from auv_gvc_controller.control.settings import ControllerSettings
+
+PASS, FAIL, NOT_CHECKED = 'pass', 'fail', 'not checked'
+VERDICTS = (PASS, FAIL, NOT_CHECKED)
+UNIT = 0.1  # deviation of the norm of a quaternion that still tells an attitude
+Number = float | int | None
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is expected of odometry: by default what the controller's parameters ask for.
+
+    Attributes
+    ----------
+    frames : frame ids
+    rate : Hz that is promised; None: enough for the watchdog
+    sim_time : stamps are those of `/clock`
+    actuates : a wrench is going to be sent
+    timeout : s, `odometry_timeout` of the controller
+    gap : s, its `limits.gap`
+    speed, turning : m/s and rad/s, its `limits.speed` and `limits.rate`
+    acceleration : m/s2 and rad/s2, its `limits.acceleration`
+
+    """
+
+    frames: Frames = field(default_factory=Frames)
+    rate: float | None = None
+    sim_time: bool = False
+    actuates: bool = False
+    timeout: float = ControllerSettings.odometry_timeout
+    gap: float = ControllerSettings.limits_gap
+    speed: float = ControllerSettings.limits_speed
+    turning: float = ControllerSettings.limits_rate
+    acceleration: float = ControllerSettings.limits_acceleration
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A publisher or a subscription.
+
+    Attributes
+    ----------
+    node : its full name
+    type : of the messages, such as nav_msgs/msg/Odometry
+    reliability, durability : of its quality of service, in lower case
+
+    """
+
+    node: str
+    type: str
+    reliability: str = 'reliable'
+    durability: str = 'volatile'
+
+
+@dataclass(frozen=True)
+class GraphSnapshot:
+    """The endpoints of a driver and of whoever is beside it; observers are left out.
+
+    Attributes
+    ----------
+    place : domain and namespace, in words
+    odom, wrench : full names of the topics
+    odom_type, wrench_type : that they should have
+    odom_publishers, wrench_publishers, wrench_subscribers, clock_publishers : of these topics
+    conflicts : 'controller', 'recorder', 'wrench' -> why our end and the driver's do not match;
+        empty where they do
+    elsewhere : other topics of the odometry's type -> who publishes them
+    listeners : other topics of the wrench's type -> who subscribes them
+    topics : names of all topics
+
+    """
+
+    place: str
+    odom: str
+    wrench: str
+    odom_type: str
+    wrench_type: str
+    odom_publishers: tuple[Endpoint, ...] = ()
+    wrench_publishers: tuple[Endpoint, ...] = ()
+    wrench_subscribers: tuple[Endpoint, ...] = ()
+    clock_publishers: tuple[Endpoint, ...] = ()
+    conflicts: Mapping[str, str] = field(default_factory=dict)
+    elsewhere: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    listeners: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    topics: tuple[str, ...] = ()
+
+    @property
+    def drivers(self) -> tuple[Endpoint, ...]:
+        """Publishers of odometry that has its type."""
+        return tuple(end for end in self.odom_publishers if end.type == self.odom_type)
+
+    @property
+    def takers(self) -> tuple[Endpoint, ...]:
+        """Subscriptions to the wrench that have its type."""
+        return tuple(end for end in self.wrench_subscribers if end.type == self.wrench_type)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """All that a driver is judged by.
+
+    Attributes
+    ----------
+    graph : who was there
+    log : odometry that was heard, of a single publisher; else only the graph is judged
+    settings : what is expected
+    excitation : what was sent; None: nothing
+    passive : why nothing was sent
+
+    """
+
+    graph: GraphSnapshot
+    log: OdometryLog
+    settings: Settings
+    excitation: Excitation | None = None
+    passive: str = ''
+
+    @cached_property
+    def _poses(self) -> tuple[np.ndarray, np.ndarray, bool]:
+        """States (n, 13) with an attitude, their rising times in ns, whether those of arrival."""
+        log = self.log
+        norm = np.linalg.norm(log.x[:, 3:7], axis=1)
+        good = log.finite & (np.abs(norm - 1.0) < UNIT)
+        x, stamps, arrived = log.x[good], log.stamp_ns[good], log.arrived_ns[good]
+        if (np.diff(stamps) > 0).all():
+            return x, stamps, False
+        newer = np.diff(np.maximum.accumulate(arrived), prepend=-1) > 0
+        return x[newer], arrived[newer], True
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether enough messages tell pose and twist."""
+        return len(self._poses[0]) >= SMALLEST
+
+    @cached_property
+    def motion(self) -> PoseTwist:
+        """Pose and twist of the messages that tell them, where they are enough."""
+        x, ns, by_arrival = self._poses
+        q = x[:, 3:7] / np.linalg.norm(x[:, 3:7], axis=1, keepdims=True)
+        return PoseTwist((ns - ns[0]) / NANOSECONDS, x[:, :3], q, x[:, 7:], by_arrival)
+
+    @cached_property
+    def twist_fits(self) -> dict[str, TwistFit]:
+        """Readings of 'linear' and 'angular' velocity against the motion."""
+        halves = {'linear': LINEAR, 'angular': ANGULAR}
+        return {half: fit_readings(self.motion, readings) for half, readings in halves.items()}
+
+    @property
+    def sent(self) -> Excitation:
+        """The excitation, where there was one."""
+        if self.excitation is None:
+            raise ValueError(self.passive)
+        return self.excitation
+
+    @cached_property
+    def trials(self) -> list[MeasuredTrial]:
+        """What was heard of the wrenches that were sent."""
+        return self.excitation.measured(self.log) if self.excitation else []
+
+    @property
+    def answered(self) -> list[MeasuredTrial]:
+        """Trials that show a response: all but the one that ends in silence."""
+        return [one for one in self.trials if not one.trial.silent]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was expected of a driver and what was found.
+
+    Attributes
+    ----------
+    expected, found : a line each; that of a check that was not made says why
+    verdict : 'pass', 'fail' or 'not checked'
+    advice : a line: how to mend it, or how to have it checked; empty where it passed
+    numbers : name with its unit -> what was measured
+    id : of the check
+
+    """
+
+    expected: str
+    found: str
+    verdict: str
+    advice: str = ''
+    numbers: Mapping[str, Number] = field(default_factory=dict)
+    id: str = ''
+
+    def document(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {
+            'id': self.id,
+            'verdict': self.verdict,
+            'expected': self.expected,
+            'found': self.found,
+            'advice': self.advice,
+            'numbers': dict.fromkeys(self.numbers) | self.measured,
+        }
+
+    @property
+    def measured(self) -> dict[str, float]:
+        """The numbers that are finite."""
+        return {
+            name: value
+            for name, value in self.numbers.items()
+            if value is not None and math.isfinite(value)
+        }
+
+
+def judged(good: bool, expected: str, found: str, advice: str = '', **numbers: Number) -> Finding:
+    """Finding that passes or fails; the advice is for the failure."""
+    return Finding(expected, found, PASS if good else FAIL, '' if good else advice, numbers)
+
+
+def unchecked(expected: str, why: str, advice: str = '', **numbers: Number) -> Finding:
+    """Finding of a check that could not be made."""
+    return Finding(expected, why, NOT_CHECKED, advice, numbers)
+
+
+def counts(findings: Sequence[Finding]) -> dict[str, int]:
+    """How many findings there are of each verdict."""
+    return {verdict: sum(f.verdict == verdict for f in findings) for verdict in VERDICTS}

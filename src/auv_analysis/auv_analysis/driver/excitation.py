@@ -1,0 +1,406 @@
+"""Excitation: small wrenches along one axis at a time, and what was heard meanwhile.
+
+Their size follows from the vehicle's inertia; they go out at a steady rate, each is preceded by a
+look at the vehicle, and the last ones are zero however it ends.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import groupby
+from typing import Any, Protocol
+
+import numpy as np
+
+from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
+from auv_analysis.driver.response import Response, Wrench, fit_response, predicted
+from auv_analysis.output.text import join
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.vehicle import Vehicle
+
+PULSE = 1.0  # s that a wrench acts one way, then the other
+REST = 0.5  # s of zero before and after
+HELD, UNHEARD = 0.5, 2.0  # s of a wrench, then of silence, to see whether the driver lets go
+SPEED = 0.1  # m/s and rad/s that no wrench brings the vehicle beyond, by the model
+ROUNDS = 4  # of making a wrench smaller: drag is not linear
+LEVEL = np.eye(13)[3]  # at rest, upright
+CALM = ('surge', 'sway', 'yaw', 'heave', 'roll', 'pitch')  # those first that nothing restores
+PERIOD = 0.02  # s between two wrenches
+GOODBYE = 0.3  # s of zero at the end
+RECENT = 5  # messages whose median is the speed
+LOOK = 10  # wrenches between two looks at who else commands
+TOO_FAST = 3.0  # times the speed of the plan, beyond what it moved at before
+LEAST = 20  # messages of a trial
+ZERO = (0.0,) * 6
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A wrench along one axis.
+
+    Attributes
+    ----------
+    dof : its axis
+    size : N or N m
+    silent : whether it ends by silence, not by its opposite and zero
+
+    """
+
+    dof: str
+    size: float
+    silent: bool = False
+
+    @property
+    def axis(self) -> int:
+        """Index of its axis."""
+        return DOFS.index(self.dof)
+
+    @property
+    def tau(self) -> Wrench:
+        """The wrench, N and N m."""
+        return tuple(self.size if i == self.axis else 0.0 for i in range(6))
+
+    @property
+    def unit(self) -> str:
+        """Of its size."""
+        return 'N' if self.axis < 3 else 'N m'
+
+    @property
+    def speed_unit(self) -> str:
+        """Of the velocity along its axis."""
+        return 'm/s' if self.axis < 3 else 'rad/s'
+
+    @property
+    def parts(self) -> list[tuple[Wrench, float]]:
+        """Wrenches one after the other, and for how many s each is sent."""
+        if self.silent:
+            return [(ZERO, REST), (self.tau, HELD)]
+        back = tuple(-number for number in self.tau)
+        return [(ZERO, REST), (self.tau, PULSE), (back, PULSE), (ZERO, REST)]
+
+    @property
+    def seconds(self) -> float:
+        """How long it takes."""
+        return sum(seconds for _, seconds in self.parts) + (UNHEARD if self.silent else 0.0)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is going to be sent.
+
+    Attributes
+    ----------
+    vehicle : the model that it is made for
+    trials : one after the other, that with silence last
+    skipped : degree of freedom -> why none is sent for it
+    speed : m/s and rad/s that are not passed, by the model
+
+    """
+
+    vehicle: Vehicle
+    trials: tuple[Trial, ...]
+    skipped: Mapping[str, str]
+    speed: float
+
+    def lines(self) -> list[str]:
+        """What is going to happen, for people."""
+        seconds = sum(trial.seconds for trial in self.trials)
+        moved = [f'{one.dof} ±{one.size:.3g} {one.unit}' for one in self.trials if not one.silent]
+        last = self.trials[-1]
+        return [
+            f'THE VEHICLE WILL MOVE for {seconds:.0f} s: {join(moved)}, {PULSE:g} s each way, '
+            f'then {last.dof} {last.size:.3g} {last.unit} without a zero behind it',
+            f'by the model at most {self.speed:g} m/s and rad/s; Ctrl-C sends zero and ends',
+        ]
+
+
+def plan_of(
+    vehicle: Vehicle, dofs: Sequence[str], speed: float, force: float | None, torque: float | None
+) -> Plan:
+    """Wrenches that move a vehicle a little.
+
+    Parameters
+    ----------
+    vehicle : the model
+    dofs : axes that are asked for; none: all
+    speed : m/s and rad/s that no degree of freedom passes by the model
+    force, torque : N and N m that none passes; none: only the speed limits them
+
+    """
+    lost = vehicle.thrusters.unactuated() if vehicle.thrusters is not None else {}
+    asked = [dof for dof in DOFS if dof in (dofs or DOFS)]
+    skipped = {dof: 'not asked for: --axis' for dof in DOFS if dof not in asked}
+    skipped |= {dof: 'the thrusters of the vehicle file cannot' for dof in asked if dof in lost}
+    moved = [dof for dof in asked if dof not in skipped]
+    caps = (force, torque)
+
+    def bounded(trial: Trial) -> Trial:
+        most = _largest(vehicle, trial, speed)
+        cap = caps[trial.axis // 3]
+        return replace(trial, size=most if cap is None else min(most, cap))
+
+    trials = [Trial(dof, 1.0) for dof in moved]
+    if moved:
+        trials.append(Trial(min(moved, key=CALM.index), 1.0, silent=True))
+    return Plan(vehicle, tuple(map(bounded, trials)), skipped, speed)
+
+
+def _largest(vehicle: Vehicle, trial: Trial, speed: float) -> float:
+    """N or N m that no velocity passes a speed with: by inertia alone, and by the whole model."""
+    seconds = HELD + UNHEARD if trial.silent else PULSE
+    size = speed / (seconds * float(np.abs(np.linalg.inv(vehicle.M)[:, trial.axis]).max()))
+    for _ in range(ROUNDS):
+        tau = replace(trial, size=size).tau
+        back = tuple(-number for number in tau)
+        held = [(0.0, seconds, tau)]
+        if not trial.silent:  # what rights the vehicle can swing it faster on the way back
+            held += [(seconds, 2 * seconds, back), (2 * seconds, 4 * seconds, ZERO)]
+        fastest = float(np.abs(predicted(vehicle, LEVEL, held).added).max())
+        if fastest <= speed:
+            break
+        size *= speed / fastest
+    return size
+
+
+class DriverClient(Protocol):
+    """Connection to a driver, as far as an excitation needs one."""
+
+    @property
+    def buffer(self) -> OdometryBuffer:
+        """What has been heard so far."""
+
+    def send(self, tau: Wrench) -> int:
+        """Publish a wrench; when it left, ns of this machine's clock."""
+
+    def listen(self, seconds: float) -> None:
+        """Take what comes in for so long."""
+
+    def others(self) -> list[str]:
+        """Who else publishes the wrench."""
+
+    def now_ns(self) -> int:
+        """What the clock of this machine shows, ns."""
+
+
+@dataclass
+class Sent:
+    """A trial as it was carried out.
+
+    Attributes
+    ----------
+    trial : what was planned
+    steps : time in ns and wrench of each message
+    ended_ns : 0 where it was broken off
+
+    """
+
+    trial: Trial
+    steps: list[tuple[int, Wrench]] = field(default_factory=list[Any])
+    ended_ns: int = 0
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What was sent of a plan, and why it ended early; empty: it did not."""
+
+    plan: Plan
+    sent: Sequence[Sent]
+    aborted: str = ''
+
+    def measured(self, log: OdometryLog) -> 'list[MeasuredTrial]':
+        """Trials that were not broken off and of which enough was heard."""
+        return [trial for sent in self.sent if (trial := _measured(self.plan.vehicle, sent, log))]
+
+
+class AbortError(RuntimeError):
+    """The wrenches must not go on; the text says why."""
+
+
+class StoppedError(RuntimeError):
+    """The user wants an end."""
+
+
+class Guard:
+    """Looks at the vehicle between two wrenches.
+
+    Parameters
+    ----------
+    client : of whom it hears
+    speed : m/s and rad/s of the plan
+    timeout : s of silence of the odometry that end it
+    stopped : whether the user wants an end
+
+    Raises
+    ------
+    AbortError : it moves too fast already
+
+    """
+
+    def __init__(
+        self, client: DriverClient, speed: float, timeout: float, stopped: Callable[[], bool]
+    ):
+        self._client, self._timeout, self._stopped = client, timeout, stopped
+        self._count = 0
+        before, most = self._speed(), TOO_FAST * speed
+        if not before <= most:
+            raise AbortError(f'it moves by {before:.3g} m/s or rad/s already, over {most:.3g}')
+        self._most = most + before
+
+    def _speed(self) -> float:
+        recent = self._client.buffer.recent(RECENT)[:, 7:]
+        nu = np.median(recent, axis=0) if len(recent) else np.zeros(6)
+        return max(float(np.linalg.norm(nu[:3])), float(np.linalg.norm(nu[3:])))
+
+    def look(self) -> None:
+        """Raise AbortError or StoppedError where the next wrench must not be sent."""
+        if self._stopped():
+            raise StoppedError
+        newest = self._client.buffer.newest
+        if newest is None or self._client.now_ns() - newest[0] > self._timeout * NANOSECONDS:
+            raise AbortError(f'no odometry for {self._timeout:g} s')
+        speed = self._speed()
+        if not speed <= self._most:  # NaN is too fast as well
+            raise AbortError(f'{speed:.3g} m/s or rad/s, more than {self._most:.3g}')
+        if self._count % LOOK == 0 and (others := self._client.others()):
+            raise AbortError(f'{others[0]} publishes the wrench as well')
+        self._count += 1
+
+
+def carry_out(
+    client: DriverClient,
+    plan: Plan,
+    timeout: float,
+    stopped: Callable[[], bool],
+    begins: Callable[[Trial], None],
+) -> Excitation:
+    """Send the wrenches of a plan; the last ones are zero, however it ends.
+
+    Parameters
+    ----------
+    client : that sends
+    plan : what
+    timeout : s of silence of the odometry that end it
+    stopped : whether the user wants an end
+    begins : is told of each trial
+
+    Raises
+    ------
+    StoppedError : the user wanted an end; zero was sent
+
+    """
+    done: list[Sent] = []
+    try:
+        guard = Guard(client, plan.speed, timeout, stopped)
+        for trial in plan.trials:
+            begins(trial)
+            done.append(Sent(trial))
+            _send(client, guard, done[-1])
+    except AbortError as error:
+        return Excitation(plan, done, str(error))
+    finally:
+        for _ in range(round(GOODBYE / PERIOD)):
+            client.send(ZERO)
+            client.listen(PERIOD)
+    return Excitation(plan, done)
+
+
+def _send(client: DriverClient, guard: Guard, sent: Sent) -> None:
+    for tau, seconds in sent.trial.parts:
+        for _ in range(round(seconds / PERIOD)):
+            sent.steps.append((client.send(tau), tau))
+            guard.look()
+            client.listen(PERIOD)
+    if sent.trial.silent:
+        for _ in range(round(UNHEARD / PERIOD)):
+            client.listen(PERIOD)
+            guard.look()
+    sent.ended_ns = client.now_ns()
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredTrial:
+    """A trial: velocities against the time since it began, and the response of the model.
+
+    Attributes
+    ----------
+    vehicle : the model
+    trial : what was sent
+    t, nu : (n,) s and (n, 6) m/s and rad/s, measured, by the times of arrival
+    x : (13,) state at its beginning
+    held : begin, end in s and wrench of each piece
+    applied_t, applied : (m,) s and (m, 6) of wrench_applied
+    silent_from : s, when the last wrench was sent
+
+    """
+
+    vehicle: Vehicle
+    trial: Trial
+    t: np.ndarray
+    nu: np.ndarray
+    x: np.ndarray
+    held: list[tuple[float, float, Wrench]]
+    applied_t: np.ndarray
+    applied: np.ndarray
+    silent_from: float
+
+    @cached_property
+    def response(self) -> Response:
+        """Response to the wrenches as they were sent."""
+        return self.response_to(self.held)
+
+    def response_to(self, held: Sequence[tuple[float, float, Wrench]]) -> Response:
+        """Response if these wrenches had acted."""
+        model = predicted(self.vehicle, self.x, held)
+        return fit_response(self.t, self.nu, model, self.trial.axis)
+
+    def document(self) -> Mapping[str, Any]:
+        """Ready for JSON."""
+        trial, found = self.trial, self.response
+        return {
+            'dof': trial.dof,
+            'size': trial.size,
+            'unit': trial.unit,
+            'gain': found.gain,
+            'delay': found.delay,
+            'peaks_measured': found.measured.tolist(),
+            'peaks_predicted': found.predicted.tolist(),
+        }
+
+
+def _measured(vehicle: Vehicle, sent: Sent, log: OdometryLog) -> MeasuredTrial | None:
+    """What was heard of a trial; None where it was broken off or too little came."""
+    if not sent.ended_ns:
+        return None
+    began = sent.steps[0][0]
+
+    def during(ns: np.ndarray) -> np.ndarray:
+        return (ns >= began) & (ns <= sent.ended_ns)
+
+    def seconds(ns: Any) -> Any:
+        return (ns - began) / NANOSECONDS
+
+    inside = during(log.arrived_ns) & log.finite
+    if int(inside.sum()) < LEAST:
+        return None
+    t, first = np.unique(seconds(log.arrived_ns[inside]), return_index=True)
+    x = log.x[inside][first]
+    before = x[t <= REST] if (t <= REST).any() else x[:1]
+    start = before[0].copy()
+    start[7:] = np.median(before[:, 7:], axis=0)
+    # pieces of time in which one wrench was held
+    runs = [(next(run)[0], tau) for tau, run in groupby(sent.steps, key=lambda step: step[1])]
+    ends = [*(ns for ns, _ in runs[1:]), sent.ended_ns]
+    held = [(seconds(ns), seconds(end), tau) for (ns, tau), end in zip(runs, ends, strict=True)]
+    acted = during(log.applied_arrived_ns)
+    return MeasuredTrial(
+        vehicle,
+        sent.trial,
+        t,
+        x[:, 7:],
+        start,
+        held,
+        seconds(log.applied_arrived_ns[acted]),
+        log.applied[acted],
+        seconds(sent.steps[-1][0]),
+    )

@@ -1,0 +1,181 @@
+"""What a check of a driver leaves: the report, its figures, and what was heard and sent."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from matplotlib.figure import Figure
+from pyarrow import parquet
+
+from auv_analysis.driver.checks import CHECKS, GROUPS
+from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Evidence, Finding
+from auv_analysis.driver.excitation import MeasuredTrial
+from auv_analysis.driver.time_checks import reference_ns
+from auv_analysis.metrics.pose_twist import compare_rates
+from auv_analysis.output.new_files import write_json
+from auv_analysis.output.text import join
+from auv_analysis.report import plotting
+from auv_analysis.report.document import Block, Cell, Column, Section, Sentence, Table
+from auv_analysis.report.figure_files import FigureRecord, save_figures
+from auv_analysis.report.plotting import COLOURS, GREY
+from auv_analysis.report.rendering import write_document
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle import DOFS
+
+DOCUMENT, SAMPLES, WRENCHES = 'check.json', 'samples.parquet', 'wrenches.parquet'
+STATE = ('x', 'y', 'z', 'qw', 'qx', 'qy', 'qz', 'u', 'v', 'w', 'p', 'q', 'r')
+TAU = ('X', 'Y', 'Z', 'K', 'M', 'N')
+COLUMNS = [Column(name, numeric=False) for name in ('check', 'verdict', 'expected', 'found')]
+LOOKS = {PASS: 'good', FAIL: 'bad', NOT_CHECKED: ''}
+DRAWN = {'time': ('timing',), 'motion': ('linear', 'angular'), 'response': ('answers',)}
+MS = 1e3
+BINS = 60
+WIDER = 1.05
+FEW = 3  # messages
+Drawn = tuple[Figure, str, str]  # with title and caption
+
+
+def write_results(
+    out: Path, evidence: Evidence, findings: Sequence[Finding], document: Mapping[str, Any]
+) -> Path:
+    """Write check.json, Parquet files, figures and report.html; returns the path of the last.
+
+    Parameters
+    ----------
+    out : folder, existing
+    evidence, findings : on a driver
+    document : of `document_of`
+
+    """
+    write_json(out / DOCUMENT, document)
+    _write_samples(out, evidence)
+    figures = draw(evidence, out / 'figures')
+    sections = []
+    for group, title in GROUPS.items():
+        rows = [_row(one) for one in findings if CHECKS[one.id].group == group]
+        table = Table(f'checks_{group}', f'{title}.', COLUMNS, rows)
+        drawn: list[Block] = [figures[name] for name in DRAWN.get(group, ()) if name in figures]
+        sections.append(Section(group, title, [table, *drawn]))
+    graph = evidence.graph
+    about = (
+        f'{graph.odom} and {graph.wrench} in {graph.place}, {evidence.log.seconds:.1f} s. '
+        f'All numbers: {DOCUMENT}; what was heard: {SAMPLES}.'
+    )
+    sentences = [
+        Sentence(f'{verdict.capitalize()}, {len(ids)}: {join(ids)}.')
+        for verdict in (FAIL, NOT_CHECKED, PASS)
+        if (ids := [one.id for one in findings if one.verdict == verdict])
+    ]
+    return write_document(out, 'Check of a vehicle driver', about, sentences, sections)
+
+
+def _row(finding: Finding) -> tuple[Cell, ...]:
+    return (
+        Cell(finding.id, anchor=finding.id),
+        Cell(finding.verdict, kind=LOOKS[finding.verdict]),
+        Cell(finding.expected),
+        Cell(finding.found, figures=finding.measured, remark=finding.advice),
+    )
+
+
+def _write_samples(out: Path, evidence: Evidence) -> None:
+    log = evidence.log
+    columns = {'arrived_ns': log.arrived_ns, 'stamp_ns': log.stamp_ns}
+    columns |= dict(zip(STATE, log.x.T, strict=True))
+    parquet.write_table(pa.table(columns), out / SAMPLES)
+    if evidence.excitation is None:
+        return
+    steps = [(one.trial.dof, ns, *tau) for one in evidence.excitation.sent for ns, tau in one.steps]
+    names = ('trial', 'sent_ns', *TAU)
+    table = pa.table({name: [row[i] for row in steps] for i, name in enumerate(names)})
+    parquet.write_table(table, out / WRENCHES)
+
+
+def draw(evidence: Evidence, folder: Path) -> dict[str, FigureRecord]:
+    """Draw what the evidence allows, as PNG and PDF: name -> figure."""
+    drawn: dict[str, Callable[[], Drawn]] = {}
+    if len(evidence.log.arrived_ns) >= FEW:
+        drawn['timing'] = partial(_timing, evidence)
+    if evidence.has_motion:
+        drawn['linear'] = partial(_motion, evidence, 'Linear', slice(3), 'm/s')
+        drawn['angular'] = partial(_motion, evidence, 'Angular', slice(3, 6), 'rad/s')
+    if evidence.answered:
+        drawn['answers'] = partial(_answers, evidence.answered)
+    return save_figures(folder, drawn)
+
+
+def _timing(evidence: Evidence) -> Drawn:
+    log = evidence.log
+    t = (log.arrived_ns - log.began_ns) / NANOSECONDS
+    now, _ = reference_ns(evidence)
+    ages = (now - log.stamp_ns) / NANOSECONDS
+    ages = ages - np.nanmin(ages) if np.isfinite(ages).any() else np.zeros_like(ages)
+    figure = plotting.new_figure(2.4)
+    left, right = figure.subplots(1, 2)
+    apart = np.diff(np.sort(t)) * MS
+    left.hist(apart, bins=BINS, range=(0.0, WIDER * float(np.max(apart))), color=COLOURS[0])
+    left.set(xlabel='between two messages (ms)', ylabel='messages', yscale='log')
+    right.plot(t, ages * MS, '.', markersize=2, color=COLOURS[0])
+    right.set(xlabel='$t$ (s)', ylabel='older than the freshest (ms)')
+    for i, axes in enumerate((left, right)):
+        plotting.letter(axes, i)
+    title = 'When messages came'
+    caption = (
+        f'{title}: (a) times between arrivals; (b) age of each stamp beyond the smallest one, '
+        'which grows or falls steadily where the two clocks drift apart.'
+    )
+    return figure, title, caption
+
+
+def _motion(evidence: Evidence, word: str, half: slice, unit: str) -> Drawn:
+    motion = evidence.motion
+    path = motion.travelled if word == 'Linear' else motion.turned
+    pair = compare_rates(motion.t, path, motion.nu[:, half])
+    figure = plotting.new_figure(3.6)
+    panels = figure.subplots(3, 1, sharex=True)
+    colours = COLOURS[half]
+    for i, (axes, dof) in enumerate(zip(panels, DOFS[half], strict=True)):
+        axes.plot(pair.t, pair.path[:, i], color=GREY, linewidth=2.4, label='by the pose')
+        axes.plot(pair.t, pair.velocity[:, i], color=colours[i], label='twist')
+        axes.set_ylabel(f'{dof} ({unit})')
+        plotting.letter(axes, i)
+    _legend(panels[0])
+    panels[-1].set_xlabel('$t$ (s)')
+    title = f'{word} velocity by pose and twist'
+    caption = (
+        f'{title}: rates of the pose in body axes, and the twist, both through local polynomials '
+        'of order 3; where they part, axes, sign or unit of the twist are not what they should be.'
+    )
+    return figure, title, caption
+
+
+def _answers(trials: Sequence[MeasuredTrial]) -> Drawn:
+    across = 2 if len(trials) > 1 else 1
+    down = -(-len(trials) // across)
+    figure = plotting.new_figure(0.4 + 1.7 * down)
+    panels = figure.subplots(down, across, squeeze=False).ravel()
+    for i, (axes, measured) in enumerate(zip(panels, trials, strict=False)):
+        trial, response = measured.trial, measured.response
+        nu, model = measured.nu[:, trial.axis], response.model
+        axes.plot(measured.t, nu - nu[0], color=COLOURS[trial.axis], label='measured')
+        late, added = model.t + response.delay, model.added[:, trial.axis]
+        axes.plot(late, added, color=GREY, linestyle='--', label='model')
+        axes.set_ylabel(f'{trial.dof} ({trial.speed_unit})')
+        axes.set_xlabel('$t$ (s)')
+        plotting.letter(axes, i)
+    for axes in panels[len(trials) :]:
+        axes.set_axis_off()
+    _legend(panels[0])
+    title = 'Answers to small wrenches'
+    caption = (
+        f'{title}: velocity since the beginning of each trial, and what the wrench adds to it by '
+        'the model, shifted by the delay that was found; drift beside it is taken off by the fit.'
+    )
+    return figure, title, caption
+
+
+def _legend(axes: Any) -> None:
+    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)

@@ -1,0 +1,197 @@
+"""Monitor of a node graph: takes what is heard of it, says what is known and what is wrong."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from auv_analysis.metrics.live_analysis import LiveAnalysis
+from auv_analysis.watch.motion import LiveMotion
+from auv_analysis.watch.snapshot import Alert, NodeState, Six, Snapshot, TopicState
+from auv_analysis.watch.stream import Stream
+from auv_dynamics.ros import interface
+from auv_dynamics.vehicle.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from auv_dynamics.ros.endpoints import Endpoints
+
+STEP_TOPICS = (*interface.STEP_TOPICS, *interface.OPTIONAL_STEP_TOPICS)
+EVEN = (*STEP_TOPICS, *interface.ANALYSIS_TOPICS)  # one publisher each, stamps at even distances
+HEARD = (*EVEN, interface.PROGRESS, interface.DIAGNOSTICS)
+KEPT = 30.0  # s for which what was wrong once is shown
+MOST = 50  # different complaints and nodes that are kept
+SILENT = 3.0  # s without a message of a topic that is published every step
+
+
+class GraphMonitor:
+    """What is known of one graph; all times are steady, in s.
+
+    Parameters
+    ----------
+    domain, namespace : where is listened
+    vehicle : for energy and couplings that the graph does not publish
+    begin : when listening began
+
+    """
+
+    def __init__(
+        self, domain: int, namespace: str = '/', vehicle: Vehicle | None = None, begin: float = 0.0
+    ):
+        self.domain, self.namespace, self._vehicle = domain, namespace, vehicle
+        self._live = None if vehicle is None else LiveAnalysis(vehicle)
+        self._motion = LiveMotion(self._live)
+        self._streams = {name: Stream(judged=name in EVEN) for name in HEARD}
+        self._refused = dict.fromkeys(HEARD, 0)
+        self._begin = begin
+        self._endpoints: Mapping[str, Endpoints] = {}
+        self._since: dict[str, float] = {}  # when a topic was first seen to be published
+        self._complaints: dict[str, tuple[str, int, float]] = {}
+        self._nodes: dict[str, tuple[float, NodeState]] = {}
+
+    def hear(self, now: float, topic: str, number: int | None, ns: int, values: Six | None) -> None:
+        """Take a message: number by its publisher, stamp in ns, numbers where it carries some."""
+        anew = self._streams[topic].hear(now, number, ns)
+        if anew and topic in (self._motion.source, interface.ODOM):
+            self._motion.forget()
+        if values is not None:
+            self._motion.hear(now, topic, ns, values)
+
+    def refuse(self, now: float, topic: str, text: str) -> None:
+        """Take note of a message that must not be used."""
+        self._refused[topic] += 1
+        self.complain(now, text)
+
+    def complain(self, now: float, text: str) -> None:
+        """Take note of an error; those that differ only in what was found are one."""
+        text = ' '.join(text.split())
+        key = text.partition(', found')[0]
+        _, count, _ = self._complaints.pop(key, ('', 0, 0.0))
+        self._complaints[key] = text, count + 1, now
+        while len(self._complaints) > MOST:
+            del self._complaints[next(iter(self._complaints))]
+
+    def diagnose(self, now: float, state: NodeState) -> None:
+        """Take what a node says of itself."""
+        self._nodes.pop(state.name, None)
+        self._nodes[state.name] = now, state
+        while len(self._nodes) > MOST:
+            del self._nodes[next(iter(self._nodes))]
+
+    def see(self, now: float, endpoints: 'Mapping[str, Endpoints]') -> None:
+        """Take who publishes and subscribes what."""
+        self._endpoints = endpoints
+        published = [name for name, ends in endpoints.items() if ends.publishers]
+        self._since = {name: self._since.get(name, now) for name in published}
+        for name, ends in endpoints.items():
+            self._streams[name].publishers = ends.publishers
+
+    @property
+    def moves(self) -> bool:
+        """Whether any message has come that is published every step."""
+        return any(self._streams[name].heard for name in STEP_TOPICS)
+
+    def snapshot(self, now: float) -> Snapshot:
+        """All that is known."""
+        motion, live = self._motion, self._live
+        topics = tuple(self._topic(now, name) for name in HEARD)
+        nodes = self._recent_nodes(now)
+        source = self._streams.get(motion.source or '')
+        recorded = self._streams[interface.PROGRESS].newest
+        computed = live is not None and not (
+            motion.published(now, interface.KINETIC_ENERGY)
+            and motion.published(now, interface.DELTA_PI)
+        )
+        return Snapshot(
+            domain=self.domain,
+            namespace=self.namespace,
+            vehicle=self._vehicle.name if self._vehicle else None,
+            seconds=now - self._begin,
+            motion=motion.source,
+            time=None if motion.ns is None else motion.ns / interface.NANOSECONDS,
+            pace=source.pace(now) if source else None,
+            recorded=None if recorded is None else recorded / interface.NANOSECONDS,
+            nu=motion.nu,
+            nu_d=motion.nu_d,
+            tau=motion.tau,
+            velocity_error=motion.errors,
+            lumped_error=motion.lumped(now),
+            kinetic_energy=motion.energy(now),
+            delta_xi=motion.delta_xi(now),
+            delta_pi=motion.delta_pi(now),
+            computed=computed,
+            structural_zeros=live.structural_zeros if live else None,
+            topics=topics,
+            nodes=nodes,
+            alerts=self._alerts(now, topics, nodes),
+        )
+
+    def _topic(self, now: float, name: str) -> TopicState:
+        stream, ends = self._streams[name], self._endpoints.get(name)
+        return TopicState(
+            name,
+            publishers=ends.publishers if ends else 0,
+            subscribers=ends.subscribers if ends else 0,
+            rate=stream.rate(now),
+            age=stream.age(now),
+            heard=stream.heard,
+            published=stream.published,
+            gaps=stream.gaps,
+            repeats=stream.repeats,
+            refused=self._refused[name],
+        )
+
+    def _recent_nodes(self, now: float) -> tuple[NodeState, ...]:
+        """Nodes that were heard lately, by name."""
+        found = []
+        for name, (at, state) in sorted(self._nodes.items()):
+            age = now - at
+            if age < KEPT:
+                level = 'stale' if age > SILENT else state.level
+                found.append(NodeState(name, level, state.text, age, state.facts))
+        return tuple(found)
+
+    def _alerts(
+        self, now: float, topics: tuple[TopicState, ...], nodes: tuple[NodeState, ...]
+    ) -> tuple[Alert, ...]:
+        """All that is wrong, errors first."""
+        found = [
+            Alert('error', text, count, now - at)
+            for text, count, at in reversed(self._complaints.values())
+            if now - at < KEPT
+        ]
+        for name, ends in self._endpoints.items():
+            found += [Alert('error', text) for text in ends.conflicts]
+            if ends.foreign:
+                text = f'{name}: expected the type of this topic, found {ends.foreign}'
+                found.append(Alert('error', text))
+        found += [
+            Alert(node.level, f'{node.name}: {node.text}', age=node.age)
+            for node in nodes
+            if node.level in ('warning', 'error')
+        ]
+        found += [
+            Alert('warning', f'{one.name}: expected one publisher, found {one.publishers}')
+            for one in topics
+            if one.name in EVEN and one.publishers > 1
+        ]
+        found += self._silences(now, topics)
+        return (*sorted(found, key=lambda alert: alert.level != 'error'), *self._unmatched(topics))
+
+    def _silences(self, now: float, topics: tuple[TopicState, ...]) -> list[Alert]:
+        """Topics that are published and do not come."""
+        ages = {
+            topic.name: now - self._since[topic.name] if topic.age is None else topic.age
+            for topic in topics
+            if topic.name in STEP_TOPICS and topic.name in self._since
+        }
+        silent = [name for name, age in ages.items() if age > SILENT]
+        if not silent:
+            return []
+        text = f'published, but nothing comes: {", ".join(silent)}'
+        return [Alert('warning', text, age=min(ages[name] for name in silent))]
+
+    def _unmatched(self, topics: tuple[TopicState, ...]) -> list[Alert]:
+        """Set-points and odometry that come, but not at times that fit."""
+        rate = next(topic.rate for topic in topics if topic.name == interface.CMD_VEL)
+        if not rate or self._motion.nu is None or self._motion.nu_d is not None:
+            return []
+        text = f'{interface.CMD_VEL}: expected a set-point of the last second, found none'
+        return [Alert('warning', text)]

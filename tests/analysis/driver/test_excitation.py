@@ -1,0 +1,108 @@
+"""Wrenches are sent at a steady rate, and the last ones are zero whatever happens."""
+
+import signal
+import threading
+
+import numpy as np
+import pytest
+from simulated_driver import SimulatedDriver
+
+from auv_analysis.cli import check_driver
+from auv_analysis.driver.excitation import GOODBYE, PERIOD, StoppedError, carry_out, plan_of
+from auv_dynamics.files.ending import ENDING, on_signals
+
+ZERO = (0.0,) * 6
+LAST = round(GOODBYE / PERIOD)
+
+
+def sent_by(driver: SimulatedDriver, stopped=lambda: False):
+    plan = plan_of(driver.vehicle, ['surge', 'yaw'], 0.1, None, None)
+    return carry_out(driver, plan, 0.5, stopped, lambda _: None)
+
+
+def test_it_begins_and_ends_with_zero_and_goes_both_ways() -> None:
+    driver = SimulatedDriver()
+    excitation = sent_by(driver)
+    assert not excitation.aborted
+    assert [one.trial.dof for one in excitation.sent] == ['surge', 'yaw', 'surge']
+    assert driver.sent[0] == ZERO
+    assert driver.sent[-LAST:] == [ZERO] * LAST
+    rows = np.array(driver.sent)
+    assert rows[:, 0].max() == -rows[:, 0].min() > 0
+    assert rows[:, 5].max() == -rows[:, 5].min() > 0
+    assert not rows[:, 1:5].any()
+    apart = np.diff([ns for ns, _ in excitation.sent[0].steps]) / 1e9
+    np.testing.assert_allclose(apart, PERIOD)
+
+
+@pytest.mark.parametrize(
+    ('fault', 'word'),
+    [('silent_after', 'no odometry'), ('fast_after', 'm/s'), ('joined_after', '/somebody')],
+)
+def test_what_must_end_it_ends_it_with_zero(fault: str, word: str) -> None:
+    driver = SimulatedDriver(**{fault: 1.0})
+    excitation = sent_by(driver)
+    assert word in excitation.aborted
+    assert driver.sent[-LAST:] == [ZERO] * LAST
+    assert len(driver.sent) < 1.8 / PERIOD + LAST
+    assert not excitation.sent[-1].ended_ns
+
+
+def test_a_vehicle_that_moves_already_gets_nothing_but_zero() -> None:
+    driver = SimulatedDriver(fast_after=0.0)
+    assert 'already' in sent_by(driver).aborted
+    assert set(driver.sent) == {ZERO}
+
+
+def test_nan_is_too_fast() -> None:
+    driver = SimulatedDriver(mapping=lambda tau: tau * (np.nan if tau.any() else 1.0))
+    assert 'nan' in sent_by(driver).aborted
+    assert driver.sent[-LAST:] == [ZERO] * LAST
+
+
+def test_a_user_who_wants_an_end_gets_it_and_the_vehicle_gets_zero() -> None:
+    driver = SimulatedDriver()
+    with pytest.raises(StoppedError):
+        sent_by(driver, stopped=lambda: len(driver.sent) > 40)
+    assert any(tau != ZERO for tau in driver.sent)
+    assert driver.sent[-LAST:] == [ZERO] * LAST
+
+
+@pytest.mark.parametrize('number', ENDING)
+def test_a_signal_is_no_exception_but_a_wish_while_wrenches_are_sent(number: int) -> None:
+    driver, stop = SimulatedDriver(), threading.Event()
+    before = signal.getsignal(number)
+
+    def stopped() -> bool:
+        if len(driver.sent) == 40:
+            signal.raise_signal(number)
+        return stop.is_set()
+
+    with pytest.raises(StoppedError), on_signals(stop.set):
+        sent_by(driver, stopped)
+    assert len(driver.sent) == 40 + LAST
+    assert driver.sent[-LAST:] == [ZERO] * LAST
+    assert signal.getsignal(number) == before
+
+
+def test_nothing_is_sent_where_another_begins_to_command_in_the_countdown(monkeypatch) -> None:
+    driver = SimulatedDriver(joined_after=0.0)
+    driver.advertise = driver.retire = lambda: True
+    monkeypatch.setattr(check_driver, 'COUNTDOWN', 0)
+    plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
+    excitation = check_driver.actuate(driver, plan, 0.5)
+    assert excitation.aborted == '/somebody publishes the wrench as well'
+    assert driver.sent == []
+
+
+def test_any_other_error_ends_it_with_zero_as_well() -> None:
+    driver = SimulatedDriver()
+
+    def broken() -> bool:
+        if len(driver.sent) > 40:
+            raise OSError('the network is gone')
+        return False
+
+    with pytest.raises(OSError, match='network'):
+        sent_by(driver, stopped=broken)
+    assert driver.sent[-LAST:] == [ZERO] * LAST

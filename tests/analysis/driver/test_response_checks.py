@@ -1,0 +1,134 @@
+"""Small wrenches and the answer to them: each fault of a mapping is told, a healthy one passes."""
+
+import numpy as np
+import pytest
+from made_odometry import graph
+from simulated_driver import SimulatedDriver
+
+from auv_analysis.driver.checks import CHECKS
+from auv_analysis.driver.checks import judge as judged
+from auv_analysis.driver.evidence import (
+    FAIL,
+    NOT_CHECKED,
+    PASS,
+    Evidence,
+    Finding,
+    Settings,
+)
+from auv_analysis.driver.excitation import PULSE, Plan, carry_out, plan_of
+from auv_analysis.driver.response import predicted
+from auv_dynamics import load_vehicle
+from auv_dynamics.vehicle import DOFS
+
+AXES = ('surge', 'sway', 'yaw')
+
+
+def gains(**factors: float):
+    """A mapping that multiplies some axes."""
+    size = np.array([factors.get(dof, 1.0) for dof in DOFS])
+    return lambda tau: size * tau
+
+
+def exchanged(one: str, other: str):
+    order = list(range(6))
+    i, j = DOFS.index(one), DOFS.index(other)
+    order[i], order[j] = j, i
+    return lambda tau: tau[order]
+
+
+def judge(driver: SimulatedDriver, *axes: str, vehicle: str = '') -> dict[str, Finding]:
+    model = load_vehicle(vehicle) if vehicle else driver.vehicle
+    plan = plan_of(model, axes, 0.1, None, None)
+    excitation = carry_out(driver, plan, 0.5, lambda: False, lambda _: None)
+    evidence = Evidence(graph(), driver.log(), Settings(), excitation)
+    ids = [id for id, check in CHECKS.items() if check.group == 'response']
+    return {finding.id: finding for finding in judged(evidence, ids)}
+
+
+@pytest.mark.parametrize('vehicle', ['bluerov2_heavy', 'rexrov', 'lauv'])
+def test_a_healthy_driver_passes_in_every_axis(vehicle: str) -> None:
+    found = judge(SimulatedDriver(vehicle, delay=0.05, noise=1e-3))
+    assert {finding.verdict for finding in found.values()} == {PASS}, found
+    for dof in DOFS:
+        assert found[f'response_{dof}'].numbers['gain'] == pytest.approx(1.0, abs=0.15)
+    assert found['response_delay'].numbers['median_s'] == pytest.approx(0.05, abs=0.04)
+    assert found['silence'].numbers['ceased_s'] == pytest.approx(0.5, abs=0.2)
+
+
+def test_a_steady_force_of_the_water_is_no_answer() -> None:
+    found = judge(SimulatedDriver(drift=(1.0, -1.0, 0.0, 0.0, 0.0, 0.02), noise=1e-3), *AXES)
+    for dof in AXES:
+        assert found[f'response_{dof}'].numbers['gain'] == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_reversed_axis_is_named_and_the_others_pass() -> None:
+    found = judge(SimulatedDriver(mapping=gains(sway=-1.0), noise=1e-3), *AXES)
+    assert found['response_sway'].verdict == FAIL
+    assert found['response_sway'].numbers['gain'] == pytest.approx(-1.0, abs=0.1)
+    assert 'sign is reversed' in found['response_sway'].advice
+    assert found['response_surge'].verdict == found['response_yaw'].verdict == PASS
+    assert found['response_roll'].verdict == NOT_CHECKED
+    assert '--axis' in found['response_roll'].found
+
+
+def test_exchanged_axes_are_named() -> None:
+    found = judge(SimulatedDriver(mapping=exchanged('surge', 'sway'), noise=1e-3), *AXES)
+    assert found['response_surge'].verdict == found['response_sway'].verdict == FAIL
+    assert 'it answers in sway' in found['response_surge'].found
+    assert 'surge and sway are exchanged' in found['response_surge'].advice
+    assert found['response_yaw'].verdict == PASS
+
+
+@pytest.mark.parametrize(('factor', 'word'), [(0.0, 'no answer'), (3.0, 'scale'), (0.3, 'scale')])
+def test_too_little_and_too_much_are_told(factor: float, word: str) -> None:
+    found = judge(SimulatedDriver(mapping=gains(surge=factor), noise=1e-3), *AXES)
+    assert found['response_surge'].verdict == FAIL
+    assert found['response_surge'].numbers['gain'] == pytest.approx(factor, rel=0.2, abs=0.05)
+    assert word in found['response_surge'].advice
+
+
+def test_a_late_answer_is_told() -> None:
+    found = judge(SimulatedDriver(delay=0.45, noise=1e-3), *AXES)
+    assert found['response_delay'].verdict == FAIL
+    assert found['response_delay'].numbers['median_s'] == pytest.approx(0.45, abs=0.04)
+
+
+def test_noise_that_hides_the_answer_gives_no_verdict() -> None:
+    found = judge(SimulatedDriver(noise=0.2), 'surge')
+    assert found['response_surge'].verdict == NOT_CHECKED
+    assert 'too vague' in found['response_surge'].found
+    assert found['silence'].verdict == NOT_CHECKED
+
+
+@pytest.mark.parametrize('applied', [False, True])
+def test_a_driver_without_a_watchdog_fails(applied: bool) -> None:
+    found = judge(SimulatedDriver(watchdog=None, applied=applied, noise=1e-3), 'surge')
+    assert found['response_surge'].verdict == PASS
+    assert found['silence'].verdict == FAIL
+    assert 'not within' in found['silence'].found
+    assert ('wrench_applied' in found['silence'].found) == applied
+
+
+def test_a_slow_watchdog_fails_and_what_was_applied_tells_it_exactly() -> None:
+    found = judge(SimulatedDriver(watchdog=1.5, applied=True, noise=0.2), 'surge')
+    assert found['silence'].verdict == FAIL
+    assert found['silence'].numbers['ceased_s'] == pytest.approx(1.5, abs=0.03)
+
+
+def test_the_bound_holds_on_the_model_and_caps_are_kept() -> None:
+    for name in ('bluerov2_heavy', 'lauv', 'rexrov'):
+        vehicle = load_vehicle(name)
+        for trial in plan_of(vehicle, (), 0.1, None, None).trials[:-1]:
+            back = tuple(-number for number in trial.tau)
+            held = [(0.0, PULSE, trial.tau), (PULSE, 2 * PULSE, back)]
+            added = predicted(vehicle, np.eye(13)[3], held).added
+            assert 0.01 < np.abs(added).max() <= 0.101, (name, trial.dof)
+    plan: Plan = plan_of(load_vehicle('rexrov'), (), 0.1, 5.0, 2.0)
+    assert {trial.size for trial in plan.trials} == {5.0, 2.0}
+    assert plan.trials[-1].silent
+
+
+def test_axes_without_thrusters_are_left_out() -> None:
+    plan = plan_of(load_vehicle('bluerov2'), (), 0.1, None, None)
+    assert set(plan.skipped) == {'pitch'}
+    assert 'pitch' not in [trial.dof for trial in plan.trials]

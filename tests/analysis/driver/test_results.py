@@ -1,0 +1,146 @@
+"""What a check leaves and shows: document, samples, report, terminal; and what is documented."""
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_odometry import graph, healthy
+from pyarrow import parquet
+from rich.console import Console
+from simulated_driver import SimulatedDriver
+
+from auv_analysis.cli.main import main
+from auv_analysis.driver.checks import CHECKS, GROUPS, judge
+from auv_analysis.driver.evidence import NOT_CHECKED, PASS, VERDICTS, Evidence, Settings
+from auv_analysis.driver.excitation import carry_out, plan_of
+from auv_analysis.driver.report import write_results
+from auv_analysis.driver.verdict import document_of, failure_of, findings_table
+
+ROOT = Path(__file__).parents[3]
+
+
+def listened(**fields: object) -> Evidence:
+    why = 'nothing is sent without --actuate'
+    return Evidence(graph(), healthy(**fields), Settings(), passive=why)
+
+
+def commanded() -> Evidence:
+    driver = SimulatedDriver(noise=1e-3)
+    plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
+    excitation = carry_out(driver, plan, 0.5, lambda: False, lambda _: None)
+    return Evidence(graph(), driver.log(), Settings(actuates=True), excitation)
+
+
+def shown(evidence: Evidence) -> str:
+    out = io.StringIO()
+    Console(file=out, width=80).print(findings_table(judge(evidence)))
+    return out.getvalue()
+
+
+def test_a_document_is_json_and_counts_add_up() -> None:
+    x = healthy().x.copy()
+    x[3, 8] = np.inf
+    for evidence in (listened(), listened(x=x)):
+        document = document_of(evidence, judge(evidence))
+        document = json.loads(json.dumps(document, allow_nan=False))
+        assert sum(document['counts'].values()) == len(document['checks']) == len(CHECKS)
+        assert {one['verdict'] for one in document['checks']} <= set(VERDICTS)
+        assert document['settings']['frames'] == {'odom': 'odom_ned', 'base': 'base_link_fsd'}
+
+
+def test_only_failures_fail() -> None:
+    findings = judge(listened())
+    assert failure_of(findings) == ''
+    assert {one.verdict for one in findings} == {PASS, NOT_CHECKED}
+    broken = judge(listened(frames={('odom', 'base_link'): 500}))
+    assert failure_of(broken) == f'1 of {len(CHECKS)} checks failed: frames'
+    gone = judge(replace(listened(), graph=graph(odom_publishers=())))
+    assert failure_of(gone).startswith('nobody publishes /odom in ROS_DOMAIN_ID=7')
+
+
+def test_the_terminal_shows_each_failure_with_what_was_expected_and_advice() -> None:
+    text = ' '.join(shown(listened(frames={('odom', 'base_link'): 500})).split())
+    for words in (
+        "frames fail 'odom' and 'base_link'",
+        'expected: header.frame_id odom_ned',
+        'frame_converter_node',
+        'nothing is sent without --actuate',
+        '1 fail',
+    ):
+        assert words in text
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_the_folder_holds_report_document_and_all_that_was_heard_and_sent(tmp_path: Path) -> None:
+    evidence = commanded()
+    findings = judge(evidence)
+    document = document_of(evidence, findings)
+    page = write_results(tmp_path, evidence, findings, document).read_text()
+    assert json.loads((tmp_path / 'check.json').read_text()) == document
+    for title in GROUPS.values():
+        assert title in page
+    for id in CHECKS:
+        assert f'>{id}' in page
+    samples = parquet.read_table(tmp_path / 'samples.parquet')
+    assert samples.num_rows == len(evidence.log.arrived_ns)
+    np.testing.assert_array_equal(samples['u'], evidence.log.x[:, 7])
+    sent = parquet.read_table(tmp_path / 'wrenches.parquet')
+    assert set(sent['trial'].to_pylist()) == {'surge'}
+    assert np.abs(sent['X']).max() == pytest.approx(document['trials'][0]['size'])
+    figures = {path.stem for path in (tmp_path / 'figures').iterdir()}
+    assert figures == {'timing', 'linear', 'angular', 'answers'}
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_a_driver_that_is_not_there_leaves_a_report_as_well(tmp_path: Path) -> None:
+    heard = healthy()
+    nothing = replace(heard, **{name: getattr(heard, name)[:0] for name in
+                                ('arrived_ns', 'stamp_ns', 'x')}, frames={})  # fmt: skip
+    evidence = Evidence(graph(odom_publishers=()), nothing, Settings(), passive='not asked for')
+    findings = judge(evidence)
+    write_results(tmp_path, evidence, findings, document_of(evidence, findings))
+    assert parquet.read_table(tmp_path / 'samples.parquet').num_rows == 0
+
+
+def test_every_check_is_documented() -> None:
+    text = (ROOT / 'docs/check-driver.md').read_text()
+    for id in CHECKS:
+        assert f'`{id}`' in text or f'`{id.partition("_")[0]}_<dof>`' in text, id
+
+
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        (['--actuate'], ('--vehicle', 'a vehicle file with --actuate')),
+        (['--actuate', '--vehicle', 'nowhere'], ('nowhere',)),
+        (['--actuate', '--vehicle', 'bluerov2', '--axis', 'pitch'], ('--axis', 'bluerov2')),
+        (['--seconds', '0'], ('--seconds', 'a number above 0')),
+        (['--speed', '2'], ('--speed', 'at most 0.5')),
+        (['--force', 'much'], ('--force',)),
+        (['--expect-rate', 'nan'], ('--expect-rate',)),
+        (['--namespace', '/a b'], ('--namespace',)),
+        (['--odom', 'no topic'], ('--odom', 'a ROS topic')),
+        (['--domain-id', '200'], ('--domain-id',)),
+    ],
+)
+def test_wrong_input_is_one_line_and_exit_code_2(options, words, capsys) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(['check-driver', *options])
+    assert ended.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == ''
+    assert len(err.splitlines()) == 1
+    for word in (*words, 'expected', 'found'):
+        assert word in err
+
+
+def test_a_folder_that_is_there_is_refused_before_anything_is_heard(tmp_path, capsys) -> None:
+    (tmp_path / 'mine.txt').write_text('kept')
+    with pytest.raises(SystemExit) as ended:
+        main(['check-driver', '--out', str(tmp_path)])
+    assert ended.value.code == 2
+    assert '--overwrite' in capsys.readouterr().err
+    assert (tmp_path / 'mine.txt').read_text() == 'kept'

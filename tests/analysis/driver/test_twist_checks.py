@@ -1,0 +1,226 @@
+"""Twist against pose: each usual mistake is told by its name, with noise as without it."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from made_odometry import found_in as found_by
+from made_odometry import graph, motion, odometry_log
+
+from auv_analysis.driver.checks import CHECKS
+from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Evidence, Finding, Settings
+from auv_analysis.metrics.pose_twist import ANGULAR, CHILD, LINEAR, fit_readings
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.frames import swap_attitude, swap_body, swap_position, swap_state
+from auv_dynamics.vehicle.kinematics import euler, rotation
+
+MOTION = [id for id, check in CHECKS.items() if check.group == 'motion']
+NOISES = (0.0, 0.01)  # m, rad, m/s, rad/s
+
+
+def found_in(x: np.ndarray, rate: float = 50.0) -> dict[str, Finding]:
+    return found_by(odometry_log(x, rate), *MOTION)
+
+
+def with_parts(x: np.ndarray, **parts: np.ndarray) -> np.ndarray:
+    """The same states with position p, quaternion q, velocity v or angular velocity w replaced."""
+    x = x.copy()
+    for name, where in {'p': (0, 3), 'q': (3, 7), 'v': (7, 10), 'w': (10, 13)}.items():
+        if name in parts:
+            x[:, slice(*where)] = parts[name]
+    return x
+
+
+def in_world(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return np.einsum('nij,nj->ni', rotation(x[:, 3:7]), v)
+
+
+def euler_rates(x: np.ndarray) -> np.ndarray:
+    phi, theta, _ = euler(x[:, 3:7]).T
+    p, q, r = x[:, 10:].T
+    psi_rate = (q * np.sin(phi) + r * np.cos(phi)) / np.cos(theta)
+    return np.stack(
+        [p + psi_rate * np.sin(theta), q * np.cos(phi) - r * np.sin(phi), psi_rate], axis=1
+    )
+
+
+def flu(x: np.ndarray) -> np.ndarray:
+    return swap_body(x[:, 7:])
+
+
+MISTAKES: dict[str, tuple[Callable[[np.ndarray], np.ndarray], str, str]] = {
+    'world': (
+        lambda x: with_parts(x, v=in_world(x, x[:, 7:10])),
+        'twist_frame',
+        'the axes of header.frame_id',
+    ),
+    'world, angular': (
+        lambda x: with_parts(x, w=in_world(x, x[:, 10:])),
+        'angular_frame',
+        'the axes of header.frame_id',
+    ),
+    'flu': (lambda x: with_parts(x, v=flu(x)[:, :3]), 'twist_frame', 'forward-left-up'),
+    'flu, angular': (lambda x: with_parts(x, w=flu(x)[:, 3:]), 'angular_frame', 'forward-left-up'),
+    'pose alone in ENU': (
+        lambda x: with_parts(swap_state(x), v=x[:, 7:10], w=x[:, 10:]),
+        'twist_frame',
+        'forward-left-up',
+    ),
+    'position in ENU': (
+        lambda x: with_parts(x, p=swap_position(x[:, :3])),
+        'twist_frame',
+        'the position is east-north-up',
+    ),
+    'attitude in ENU': (
+        lambda x: with_parts(x, q=swap_attitude(x[:, 3:7])),
+        'twist_frame',
+        'the attitude is of FLU in ENU',
+    ),
+    'world in ENU': (
+        lambda x: with_parts(x, v=swap_position(in_world(x, x[:, 7:10]))),
+        'twist_frame',
+        'east-north-up, not the axes of child_frame_id',
+    ),
+    'z up': (
+        lambda x: with_parts(x, p=x[:, :3] * [1.0, 1.0, -1.0]),
+        'twist_frame',
+        'grows upwards',
+    ),
+    'w first': (
+        lambda x: with_parts(x, q=np.roll(x[:, 3:7], 1, axis=1)),
+        'twist_frame',
+        'w first',
+    ),
+    'w first, angular': (
+        lambda x: with_parts(x, q=np.roll(x[:, 3:7], 1, axis=1)),
+        'angular_frame',
+        'w first',
+    ),
+    'inverse': (
+        lambda x: with_parts(x, q=x[:, 3:7] * [1.0, -1.0, -1.0, -1.0]),
+        'twist_frame',
+        'from earth to body',
+    ),
+    'degrees': (lambda x: with_parts(x, w=np.degrees(x[:, 10:])), 'angular_frame', 'deg/s'),
+    'knots': (lambda x: with_parts(x, v=x[:, 7:10] / 0.5144), 'twist_frame', 'multiplied by 0.51'),
+    'through the water': (
+        lambda x: with_parts(x, p=x[:, :3] + np.arange(len(x))[:, None] * [0.003, 0.002, 0.0]),
+        'twist_frame',
+        'a current',
+    ),
+    'no twist': (
+        lambda x: with_parts(x, v=np.zeros((len(x), 3))),
+        'twist_frame',
+        'the twist stands still',
+    ),
+    'no attitude': (
+        lambda x: with_parts(x, q=np.tile([1.0, 0.0, 0.0, 0.0], (len(x), 1))),
+        'angular_frame',
+        'the pose stands still',
+    ),
+}
+
+
+@pytest.mark.parametrize('noise', NOISES)
+@pytest.mark.parametrize('mistake', MISTAKES)
+def test_a_mistake_is_told_by_its_name(mistake: str, noise: float) -> None:
+    make, id, words = MISTAKES[mistake]
+    finding = found_in(make(motion(noise=noise)))[id]
+    assert finding.verdict == FAIL
+    assert words in finding.found
+    assert finding.advice
+
+
+@pytest.mark.parametrize('noise', NOISES)
+@pytest.mark.parametrize('rate', [10.0, 50.0, 200.0])
+@pytest.mark.parametrize('heading', [-2.5, 0.7, 3.1])
+def test_a_healthy_driver_passes(noise: float, rate: float, heading: float) -> None:
+    found = found_in(motion(rate=rate, heading=heading, noise=noise), rate)
+    for id in ('twist_frame', 'angular_frame'):
+        assert found[id].verdict == PASS, found[id]
+    for dof in DOFS:
+        # at 10 Hz so much noise hides the smaller motions
+        assert found[f'axis_{dof}'].verdict in ((PASS, NOT_CHECKED) if noise else (PASS,))
+
+
+def test_rates_of_angles_are_told_where_the_vehicle_tilts() -> None:
+    x = motion(speed=4.0)
+    finding = found_in(with_parts(x, w=euler_rates(x)))['angular_frame']
+    assert finding.verdict == FAIL
+    assert 'rates of roll, pitch and yaw' in finding.found
+
+
+def test_everything_in_ros_axes_is_consistent_and_passes() -> None:
+    found = found_in(swap_state(motion()))  # its frame ids are what tells it: see `frames`
+    assert found['twist_frame'].verdict == found['angular_frame'].verdict == PASS
+
+
+@pytest.mark.parametrize('noise', NOISES)
+def test_a_vehicle_at_rest_tells_nothing(noise: float) -> None:
+    found = found_in(motion(speed=0.01, noise=noise))
+    assert {one.verdict for one in found.values()} == {NOT_CHECKED}
+    assert 'moved too little' in found['twist_frame'].found
+    assert 'move the vehicle' in found['twist_frame'].advice
+
+
+def test_child_and_world_are_one_while_it_heads_north() -> None:
+    x = motion(heading=0.0, speed=0.2)
+    for states in (x, with_parts(x, v=in_world(x, x[:, 7:10]))):
+        finding = found_in(states)['twist_frame']
+        assert finding.verdict == NOT_CHECKED or 'header.frame_id' in finding.found
+    assert 'turn the vehicle away from north' in found_in(x)['twist_frame'].advice
+
+
+def test_a_single_reversed_axis_is_named() -> None:
+    x = motion(noise=1e-3)
+    x[:, 8] *= -1.0
+    found = found_in(x)
+    assert found['axis_sway'].verdict == FAIL
+    assert found['axis_sway'].numbers['slope'] == pytest.approx(-1.0, abs=0.05)
+    assert 'sign is reversed' in found['axis_sway'].advice
+    assert found['axis_surge'].verdict == found['axis_heave'].verdict == PASS
+    assert found['twist_frame'].verdict == FAIL
+
+
+def test_degrees_are_named_in_each_axis() -> None:
+    x = motion()
+    x[:, 10:] = np.degrees(x[:, 10:])
+    found = found_in(x)
+    for dof in DOFS[3:]:
+        assert found[f'axis_{dof}'].verdict == FAIL
+        assert 'deg/s' in found[f'axis_{dof}'].advice
+
+
+def test_a_driver_without_a_position_is_not_blamed() -> None:
+    x = motion()
+    x[:, :3] = 0.0
+    found = found_in(x)
+    assert found['twist_frame'].verdict == found['axis_surge'].verdict == NOT_CHECKED
+    assert found['angular_frame'].verdict == PASS
+
+
+def test_stamps_that_stand_still_leave_the_times_of_arrival() -> None:
+    heard = odometry_log(motion())
+    heard.stamp_ns[:] = heard.stamp_ns[0]
+    finding = found_by(heard, 'twist_frame')['twist_frame']
+    assert finding.verdict == PASS
+    assert 'by the times of arrival' in finding.found
+
+
+def test_broken_messages_are_left_out_and_few_tell_nothing() -> None:
+    x = motion()
+    x[100:110, 8] = np.nan
+    x[200, 3:7] = 0.0
+    assert found_in(x)['twist_frame'].verdict == PASS
+    assert {one.verdict for one in found_in(x[:5]).values()} == {NOT_CHECKED}
+
+
+def test_the_right_reading_fits_and_all_others_do_not() -> None:
+    heard = odometry_log(motion(speed=3.0, noise=1e-3))
+    m = Evidence(graph(), heard, Settings()).motion
+    for readings in (LINEAR, ANGULAR):
+        fits = fit_readings(m, readings)
+        assert fits.best == CHILD
+        assert fits.right
+        assert not fits.others
+        assert fits.off[CHILD] < 0.03

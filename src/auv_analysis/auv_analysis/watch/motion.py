@@ -20,12 +20,12 @@ BUCKET, BUCKETS = 0.5, 20  # s, and how many of them errors are shown of
 
 
 class Bucket(NamedTuple):
-    """Samples (6,) of half a second: steady time of the first, largest sizes, squares, count."""
+    """Samples (6,) of half a second: steady time of the first, largest sizes, squares, how many."""
 
     begin: float
     largest: np.ndarray
     squares: np.ndarray
-    count: int
+    samples: int
 
 
 class Trend:
@@ -41,7 +41,7 @@ class Trend:
         if self._buckets and now - self._buckets[-1].begin < BUCKET:
             last = self._buckets.pop()
             largest = np.maximum(last.largest, size)
-            new = Bucket(last.begin, largest, last.squares + new.squares, last.count + 1)
+            new = Bucket(last.begin, largest, last.squares + new.squares, last.samples + 1)
         self._buckets.append(new)
 
     @property
@@ -54,7 +54,7 @@ class Trend:
     @property
     def rms(self) -> Six | None:
         """Root mean squares (6,) of the samples, or None without one."""
-        count = sum(bucket.count for bucket in self._buckets)
+        count = sum(bucket.samples for bucket in self._buckets)
         if not count:
             return None
         squares = np.sum([bucket.squares for bucket in self._buckets], axis=0)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from auv_analysis.bag.foreign_tracks import TimeBase, Track, at_times, integral
-from auv_analysis.bag.local_polynomials import (
+from auv_analysis.metrics.local_polynomials import (
     ORDER,
     Stretch,
     filtered,

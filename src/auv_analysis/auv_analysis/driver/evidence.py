@@ -10,7 +10,7 @@ import numpy as np
 
 from auv_analysis.driver.excitation import Excitation, MeasuredTrial
 from auv_analysis.driver.odometry_log import OdometryLog
-from auv_analysis.foreign.local_polynomials import SMALLEST
+from auv_analysis.metrics.local_polynomials import SMALLEST
 from auv_analysis.metrics.pose_twist import ANGULAR, LINEAR, PoseTwist, TwistFit, fit_readings
 from auv_dynamics.ros.interface import NANOSECONDS, Frames
 from auv_gvc_controller.control.settings import ControllerSettings

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
-from auv_analysis.foreign.local_polynomials import SMALLEST, rates, residuals
+from auv_analysis.metrics.local_polynomials import SMALLEST, rates, residuals
 from auv_dynamics.vehicle.frames import swap_position
 from auv_dynamics.vehicle.kinematics import euler, rotation
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import savgol_coeffs, savgol_filter
 from strategies import QUICK
 
-from auv_analysis.bag.local_polynomials import (
+from auv_analysis.metrics.local_polynomials import (
     ORDER,
     SMALLEST,
     nearest,

@@ -54,10 +54,13 @@ def judged(domain: int) -> dict[str, dict[str, Finding]]:
                 client.listen(0.005)
             if until is None and all(len(client.buffer) for client in clients.values()):
                 until = time.monotonic() + SECONDS
+        logs = {
+            name: client.log(int(client.buffer.log(0, 0).arrived_ns[0]))
+            for name, client in clients.items()
+        }  # all at one time: judging takes a while, in which nobody listens
         for name, client in clients.items():
             settings = Settings() if name == 'slow' else PATIENT
-            heard = client.log(int(client.buffer.log(0, 0).arrived_ns[0]))
-            listed = judge(Evidence(client.graph('the test'), heard, settings), PASSIVE)
+            listed = judge(Evidence(client.graph('the test'), logs[name], settings), PASSIVE)
             found[name] = {one.id: one for one in listed}
     finally:
         for client in clients.values():

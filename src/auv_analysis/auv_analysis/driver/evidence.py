@@ -11,7 +11,15 @@ import numpy as np
 from auv_analysis.driver.excitation import Excitation, MeasuredTrial
 from auv_analysis.driver.odometry_log import OdometryLog
 from auv_analysis.metrics.local_polynomials import SMALLEST
-from auv_analysis.metrics.pose_twist import ANGULAR, LINEAR, PoseTwist, TwistFit, fit_readings
+from auv_analysis.metrics.pose_twist import (
+    ANGULAR,
+    LINEAR,
+    PoseTwist,
+    RatePair,
+    TwistFit,
+    compare_rates,
+    fit_readings,
+)
 from auv_dynamics.ros.interface import NANOSECONDS, Frames
 from auv_gvc_controller.control.settings import ControllerSettings
 
@@ -159,6 +167,15 @@ class Evidence:
         """Readings of 'linear' and 'angular' velocity against the motion."""
         halves = {'linear': LINEAR, 'angular': ANGULAR}
         return {half: fit_readings(self.motion, readings) for half, readings in halves.items()}
+
+    @cached_property
+    def rates(self) -> dict[str, RatePair]:
+        """Rate of the pose beside the twist, both in body axes, 'linear' and 'angular'."""
+        motion = self.motion
+        return {
+            'linear': compare_rates(motion.t, motion.travelled, motion.nu[:, :3]),
+            'angular': compare_rates(motion.t, motion.turned, motion.nu[:, 3:]),
+        }
 
     @property
     def sent(self) -> Excitation:

@@ -14,7 +14,6 @@ from auv_analysis.driver.checks import CHECKS, GROUPS
 from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Evidence, Finding
 from auv_analysis.driver.excitation import MeasuredTrial
 from auv_analysis.driver.time_checks import reference_ns
-from auv_analysis.metrics.pose_twist import compare_rates
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.text import join
 from auv_analysis.report import plotting
@@ -131,9 +130,7 @@ def _timing(evidence: Evidence) -> Drawn:
 
 
 def _motion(evidence: Evidence, word: str, half: slice, unit: str) -> Drawn:
-    motion = evidence.motion
-    path = motion.travelled if word == 'Linear' else motion.turned
-    pair = compare_rates(motion.t, path, motion.nu[:, half])
+    pair = evidence.rates[word.lower()]
     figure = plotting.new_figure(3.6)
     panels = figure.subplots(3, 1, sharex=True)
     colours = COLOURS[half]

@@ -9,7 +9,6 @@ from auv_analysis.metrics.pose_twist import (
     STILL,
     PoseTwist,
     TwistFit,
-    compare_rates,
 )
 from auv_analysis.output.text import join, number
 from auv_dynamics.vehicle import DOFS
@@ -182,10 +181,10 @@ def axis(dof: str, evidence: Evidence) -> Finding:
     other_axes = fit.off[fit.best] <= FITS and fit.best not in PER_AXIS and not fit.right
     if not fit.told or other_axes or (half == 'linear' and _no_position(motion)):
         return unchecked(expected, see)
-    path = motion.travelled if half == 'linear' else motion.turned
-    pair = compare_rates(motion.t, path[:, [i % 3]], motion.nu[:, [i]])
-    noise = float(pair.path_noise[0]), float(pair.velocity_noise[0])
-    by_path, by_twist = _rms(pair.path, noise[0]), _rms(pair.velocity, noise[1])
+    pair, i = evidence.rates[half], i % 3
+    path, velocity = pair.path[:, i], pair.velocity[:, i]
+    noise = float(pair.path_noise[i]), float(pair.velocity_noise[i])
+    by_path, by_twist = _rms(path, noise[0]), _rms(velocity, noise[1])
     largest, both = max(by_path, by_twist), float(np.sqrt(sum(noise)))
     numbers = {'speed_by_pose': by_path, 'speed_by_twist': by_twist, 'noise': both}
     if largest < max(STILL, PART * fit.speed, CLEAR * both):
@@ -194,8 +193,7 @@ def axis(dof: str, evidence: Evidence) -> Finding:
     if by_twist < PART * by_path:
         found = f'{number(by_path)} {unit} by the pose, {number(by_twist)} by the twist'
         return judged(False, expected, found, 'fill in this component', **numbers)
-    squares = float((pair.velocity**2).sum()) - len(pair.t) * noise[1]
-    slope = float((pair.path * pair.velocity).sum()) / squares
+    slope = float((path * velocity).sum() / ((velocity**2).sum() - len(velocity) * noise[1]))
     found = f'the pose gives {number(slope)} times the twist, at {number(largest)} {unit}'
     good = SLOPES[0] <= slope <= SLOPES[1]
     return judged(good, expected, found, _advice(slope, unit), slope=slope, **numbers)
@@ -210,6 +208,6 @@ def _advice(slope: float, unit: str) -> str:
 
 
 def _rms(values: np.ndarray, noise: float) -> float:
-    """Root mean square of the strongest part of a signal (n, 1), less that of its noise."""
-    strongest = np.sort(values[:, 0] ** 2)[-max(round(STRONGEST * len(values)), 1) :]
+    """Root mean square of the strongest part of a signal (n,), less that of its noise."""
+    strongest = np.sort(values**2)[-max(round(STRONGEST * len(values)), 1) :]
     return float(np.sqrt(max(float(strongest.mean()) - noise, 0.0)))

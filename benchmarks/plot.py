@@ -9,7 +9,7 @@ from curves import CURVES
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
-from auv_analysis.report.plotting import COLOURS, DPI, GREY, letter, new_figure, style
+from auv_analysis.report.plots import COLOURS, DPI, GREY, letter, new_figure, style
 
 COLUMNS = 3
 MANY_DECADES = 2.5  # beyond which only powers of ten are named

@@ -13,7 +13,7 @@ import numpy as np
 from auv_analysis import load_scenario, simulate
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.metrics.energy import kinetic_energy
-from auv_analysis.report.plotting import COLOURS, STYLE
+from auv_analysis.report.plots import COLOURS, STYLE
 from auv_analysis.runs.run import Run
 from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle import DOFS

@@ -12,25 +12,11 @@ import pytest
 from PIL import Image
 
 NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable')
-FIGURE = (
-    """(name) => Bokeh.documents.flatMap((doc) => doc.roots()).find((root) => root.name === name)"""
-)
-SHOWN = f"""(name) => {{
-  const figure = ({FIGURE})(name);
-  const {'{'} start, end {'}'} = figure.x_range;
-  return {{
-    window: [start, end],
-    values: [figure.y_range.start, figure.y_range.end],
-    lines: figure.renderers.filter((line) => line.visible).map((line) => line.name),
-    axis: figure.left[0].type,
-    ink: figure.left[0].axis_label_text_color,
-    cursor: [...figure.references()].find((model) => model.name === 'cursor').location,
-  }};
-}}"""
-
-DRAWN = """(name) => {
-  const version = document.querySelector('.panel-controls').dataset.version;
-  return document.querySelector(`[data-panel="${name}"]`).dataset.version === version;
+SHOWN = """(name) => {
+  const figure = Bokeh.documents.flatMap((doc) => doc.roots()).find((root) => root.name === name);
+  const { start, end } = figure.x_range;
+  const lines = figure.renderers.filter((line) => line.visible).map((line) => line.name);
+  return { window: [start, end], lines };
 }"""
 
 
@@ -77,10 +63,11 @@ class Watched:
         assert asked == {self.path.as_uri()}
 
     def panel(self, name: str) -> Any:
-        """Element of a panel, in view and drawn as was last asked for."""
+        """Element of a panel, in view and drawn."""
+        self.page.wait_for_selector('.panel-controls[data-ready]', state='attached')
         panel = self.page.locator(f'[data-panel="{name}"]')
         panel.scroll_into_view_if_needed()
-        self.page.wait_for_function(DRAWN, arg=name)
+        panel.locator('.plot > *').first.wait_for()
         return panel
 
     def shown(self, name: str) -> dict[str, Any]:

@@ -31,6 +31,7 @@ setup(
             'py.typed',
             '*/*.json',
             '*/*/*.json',
+            'herman2018/*.j2',
             'report/*.j2',
             'report/*.css',
             'report/*.js',

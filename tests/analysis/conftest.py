@@ -11,8 +11,8 @@ from browser import Watched, chromium
 from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.report import plotting
-from auv_analysis.report.page import write_report
+from auv_analysis.report import plots
+from auv_analysis.report.run_report import write_report
 from auv_analysis.runs.run import Run
 
 
@@ -70,5 +70,5 @@ def _composing() -> Iterator[None]:
         return png, pdf
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plotting, 'save', save)
+        patch.setattr(plots, 'save', save)
         yield

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.report.contents import Contents
-from auv_analysis.report.findings import findings
-from auv_analysis.report.overview import common_bands
-from auv_analysis.report.set_up import set_up
-from auv_analysis.report.sketch import alike
-from auv_analysis.report.sketching import sketches
+from auv_analysis.report.digest import alike, sketches
+from auv_analysis.report.run_plots import common_bands
+from auv_analysis.report.run_report import Contents, findings
+from auv_analysis.report.scenario_text import set_up
 from auv_analysis.runs.run import Run
 
 
@@ -32,9 +30,9 @@ def said(runs: dict[str, Run]) -> str:
     drawn = sketches(runs)
     summaries = {name: summarize(one) for name, one in runs.items()}
     scenes = {tuple(runs): set_up(drawn, summaries, '')}
-    sections = Contents(drawn, summaries, scenes, [], [], {}).sections()
+    sections = Contents(drawn, summaries, scenes, [], {}).sections()
     experiment = ' '.join(str(block) for block in sections[0].blocks)
-    return ' '.join([experiment, *(s.text for s in findings(drawn, summaries, []))])
+    return ' '.join([experiment, *(s.text for s in findings(drawn, summaries))])
 
 
 def test_runs_of_one_name_are_told_apart_by_their_samples(run, other) -> None:

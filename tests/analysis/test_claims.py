@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.herman2018.claims import judge_runs
+from auv_analysis.herman2018.evidence import grade
 from auv_analysis.output.text import MISSING
-from auv_analysis.report.claims import claims_table
-from auv_analysis.report.evidence import grade
 from auv_analysis.runs.run import Run
 
 CASE2_ONLY = {17, 18, 19, 20}
@@ -30,7 +30,7 @@ def _runs(name: str) -> dict[str, Run]:
 
 
 def _table(runs: dict[str, Run]) -> dict:
-    claims = claims_table(runs, {name: summarize(run) for name, run in runs.items()})
+    claims = judge_runs(runs, {name: summarize(run) for name, run in runs.items()})
     return {claim.number: claim for claim in claims}
 
 

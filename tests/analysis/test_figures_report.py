@@ -14,10 +14,10 @@ from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.output.text import fixed, join, number, plain, tied
-from auv_analysis.report import plotting
-from auv_analysis.report.figure_files import FigureRecord
-from auv_analysis.report.figures import draw_figures
-from auv_analysis.report.page import write_report
+from auv_analysis.report import plots
+from auv_analysis.report.plots import FigureRecord
+from auv_analysis.report.run_plots import draw_figures
+from auv_analysis.report.run_report import write_report
 from auv_analysis.report.traces import decimate
 from auv_analysis.runs.run import Run
 
@@ -126,13 +126,13 @@ def test_structural_zeros_are_named_and_not_drawn(
     assert 'not drawn: pitch and yaw.' in figures['delta_xi'].caption
     assert 'not drawn: surge, sway and heave.' in figures['delta_pi'].caption
     drawn = []
-    original = plotting.draw_lines
+    original = plots.draw_lines
 
     def spy(axes, run, signal, part, columns):
         drawn.append(tuple(columns))
         original(axes, run, signal, part, columns)
 
-    monkeypatch.setattr(plotting, 'draw_lines', spy)
+    monkeypatch.setattr(plots, 'draw_lines', spy)
     draw_figures({'gvc': _short(case1['gvc'], 5.0)}, tmp_path)
     assert drawn[-4:] == [(0, 1, 2), (3,), (3, 4, 5), (3, 4, 5)]
 

@@ -5,12 +5,12 @@ import pytest
 from matplotlib.colors import LogNorm
 
 from auv_analysis.output.text import number, typeset
-from auv_analysis.report import plotting
-from auv_analysis.report.grids import ALWAYS, Grid, draw_grid, grid_figure
+from auv_analysis.report import plots
+from auv_analysis.report.plots import ALWAYS, Grid, draw_grid, heat_map
 
 
 def texts(grid: Grid) -> list[str]:
-    axes = plotting.new_figure(2.0).subplots()
+    axes = plots.new_figure(2.0).subplots()
     draw_grid(axes, grid)
     return [text.get_text() for text in axes.texts]
 
@@ -37,7 +37,7 @@ def test_cells_say_zero_always_zero_and_nothing() -> None:
 
 
 def test_names_and_numbers_give_way_where_rows_are_many() -> None:
-    many = grid_figure([f'run {i}' for i in range(150)], [Grid(np.ones((150, 3)), 'abc', 'x')])
+    many = heat_map([f'run {i}' for i in range(150)], [Grid(np.ones((150, 3)), 'abc', 'x')])
     axes = many.axes[0]
     assert [label.get_text() for label in axes.get_yticklabels()][:2] == ['run 0', 'run 3']
     assert len(axes.texts) == 0

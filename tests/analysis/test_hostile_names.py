@@ -15,10 +15,10 @@ from stranger_bags import SCENARIO, write
 from auv_analysis import load_run, load_scenario, simulate
 from auv_analysis.cli import main
 from auv_analysis.output.progress import TextConsole
-from auv_analysis.report.overview import settling
-from auv_analysis.report.quantities import Maths, symbol
-from auv_analysis.report.rendering import maths
-from auv_analysis.report.sketching import sketches
+from auv_analysis.output.text import Maths, symbol
+from auv_analysis.report.digest import sketches
+from auv_analysis.report.document import maths
+from auv_analysis.report.run_plots import settling
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import MARK, InputError, printable
 

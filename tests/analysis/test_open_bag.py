@@ -15,7 +15,7 @@ from made_messages import ODOMETRY, Bag, odometry, serialized, stamped
 
 from auv_analysis import load_scenario, summarize
 from auv_analysis.bag import load_run, open_bag
-from auv_analysis.report.sketching import sketch
+from auv_analysis.report.digest import sketch
 from auv_analysis.runs.run import Run, joined
 from auv_dynamics.files.errors import FailedError, InputError
 

@@ -1,4 +1,4 @@
-"""Panels of a report: every controller's lines in few bytes, and what they leave out."""
+"""Panels of a report: every controller's lines on one time axis, and what they leave out."""
 
 import base64
 import json
@@ -7,17 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as arrays
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.report import interactive as page
-from auv_analysis.report.interactive import interactive
-from auv_analysis.report.packing import Packer, packed
-from auv_analysis.report.panels import different_disturbances, panel_sets
-from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.sketching import sketches
+from auv_analysis.report import panels as page
+from auv_analysis.report.digest import Sketch, sketches
+from auv_analysis.report.panels import different_disturbances, interactive, panel_sets
 from auv_dynamics.vehicle import DOFS
 
 
@@ -28,74 +22,34 @@ def case1() -> dict[str, Sketch]:
     return sketches({name: run.part(run.t <= 5.0) for name, run in runs.items()})
 
 
-def _inflated(text: str) -> bytes:
-    return zlib.decompress(base64.b64decode(text))
+def test_all_figures_of_a_page_share_one_time_axis_and_cursor(case1):
+    content, roots = json.loads(zlib.decompress(base64.b64decode(interactive(case1).data)))
+    text = json.dumps(content)
+    assert len(roots) == sum(len(one.panels) for one in panel_sets(case1).values())
+    ranges = {json.dumps(root['attributes']['x_range']) for root in content['roots'][1:]}
+    assert len(ranges) == 1
+    assert text.count('"name": "CrosshairTool"') == 1
+    assert text.count('"name": "HoverTool"') > 10
 
 
-def _times(content: bytes, axis: dict) -> np.ndarray:
-    planes = np.frombuffer(content, np.uint8, 4 * axis['count'], axis['at']).reshape(4, -1)
-    ticks = np.cumsum(planes.astype(np.int64).T @ 256 ** np.arange(4))
-    return axis['start'] + ticks * axis['tick']
-
-
-def _values(content: bytes, at: int, count: int) -> np.ndarray:
-    planes = np.frombuffer(content, np.uint8, 3 * count, at).reshape(3, -1)
-    words = planes.astype(np.uint32).T @ (256 ** np.arange(1, 4, dtype=np.uint32))
-    return words.astype('<u4').view('<f4').astype(float)
-
-
-FLOATS = st.floats(-(2.0**100), 2.0**100, width=32, allow_subnormal=False)
-
-
-@given(arrays.arrays(float, st.integers(1, 50), elements=FLOATS))
-def test_packed_values_keep_four_digits(y):
-    packer = Packer()
-    packer.add_values(np.ones(3))
-    at = packer.add_values(y)
-    found = _values(_inflated(packer.packed()), at, len(y))
-    assert np.all(np.abs(found - y) <= 2.0**-16 * np.abs(y))
-
-
-def test_packed_times_are_exact_where_they_are_steps_apart():
-    packer, step = Packer(), 0.01
-    t = 3.0 + step * np.array([0, 1, 5, 70_000, 90_000_000])
-    uneven = np.array([0.0, 0.1234567, 1.0, 3600.0])
-    axes = [packer.add_axis(times, step) for times in (t, uneven, t.copy())]
-    assert axes == [0, 1, 0]
-    content = _inflated(packer.packed())
-    assert _times(content, packer.axes[0]) == pytest.approx(t, abs=1e-9)
-    assert _times(content, packer.axes[1]) == pytest.approx(uneven, abs=4e-6)
-
-
-def test_one_line_of_one_time_has_an_axis():
-    packer = Packer()
-    packer.add_axis(np.array([2.0]), 0.01)
-    assert _times(_inflated(packer.packed()), packer.axes[0]).tolist() == [2.0]
-
-
-def test_lines_of_a_page_are_those_of_the_sketches(case1):
-    found = interactive(case1)
-    index, content = json.loads(_inflated(found.index)), _inflated(found.data)
-    panel = index['panels']['tau-linear']
-    assert [(line['run'], line['key']) for line in panel['lines']] == [
-        (name, i) for name in case1 for i in range(3)
+def test_lines_of_a_panel_are_those_of_the_sketches(case1):
+    (panel, _) = panel_sets(case1)['inputs'].panels
+    assert [(curve.run, curve.dof) for curve in panel.curves] == [
+        (name, dof) for name in case1 for dof in DOFS[:3]
     ]
-    axis = index['axes'][panel['lines'][5]['axis']]
-    run, t = case1['cl'], _times(content, axis)
+    run, curve = case1['cl'], panel.curves[5]
     ends = [run.line('tau', 2, part) for part in ('early', 'late')]
-    wanted_t, wanted = (np.concatenate(parts) for parts in zip(*ends, strict=True))
-    assert t == pytest.approx(wanted_t, abs=1e-9)
-    values = _values(content, panel['lines'][5]['at'], axis['count'])
-    assert values == pytest.approx(wanted, rel=2.0**-16)
+    wanted = [np.concatenate(parts) for parts in zip(*ends, strict=True)]
+    assert np.array_equal([curve.t, curve.y], wanted)
 
 
 def test_every_section_has_panels_with_all_controllers(case1):
     sets = panel_sets(case1)
     assert list(sets) == ['errors', 'estimates', 'inputs', 'certificates', 'energy', 'couplings']
     panels = {panel.name: panel for members in sets.values() for panel in members.panels}
-    assert list(panels['error-linear'].rows) == ['gvc', 'cl']
-    assert list(panels['F-linear'].rows) == ['gvc']
-    assert {panel.kind for panel in panels.values()} == {'line', 'log', 'both', 'stack'}
+    assert {curve.run for curve in panels['error-linear'].curves} == {'gvc', 'cl'}
+    assert {curve.run for curve in panels['F-linear'].curves} == {'gvc'}
+    assert {panel.kind for panel in panels.values()} == {'line', 'log', 'stack'}
     assert sets['errors'].stands_for('errors_gvc')
     assert not sets['errors'].stands_for('settling')
     assert not sets['inputs'].stands_for('inputs_compared')
@@ -103,22 +57,25 @@ def test_every_section_has_panels_with_all_controllers(case1):
 
 def test_energies_of_xi_add_up_to_the_kinetic_energy(case1):
     panels = {panel.name: panel for panel in panel_sets(case1)['energy'].panels}
-    rows = [panels[name].rows['gvc'] for name in ('energy-linear', 'energy-angular')]
     lines = [
-        panels[name].lines[number].line[1]
-        for name, numbers in zip(('energy-linear', 'energy-angular'), rows, strict=True)
-        for number in numbers
+        curve.y
+        for name in ('energy-linear', 'energy-angular')
+        for curve in panels[name].curves
+        if curve.run == 'gvc'
     ]
     assert np.sum(lines, axis=0) == pytest.approx(case1['gvc'].line('kinetic')[1], rel=1e-12)
 
 
 def test_structural_zeros_and_unknown_disturbances_have_no_panel(case1):
-    names = [panel.name for panel in panel_sets(case1)['couplings'].panels]
-    assert names == ['delta_xi-linear', 'delta_xi-angular', 'delta_pi-angular']
-    keys = [key.label for key in panel_sets(case1)['couplings'].panels[1].keys]
-    assert keys == [DOFS[3]]
+    panels = panel_sets(case1)['couplings'].panels
+    assert [panel.name for panel in panels] == [
+        'delta_xi-linear', 'delta_xi-angular', 'delta_pi-angular',
+    ]  # fmt: skip
+    assert {curve.dof for curve in panels[1].curves} == {DOFS[3]}
     bare = {
-        name: replace(run, columns=_without(run.columns), F_digest=b'')
+        name: replace(
+            run, F_digest=b'', columns={k: v for k, v in run.columns.items() if k != 'lumped_error'}
+        )
         for name, run in case1.items()
     }
     assert not any(
@@ -126,33 +83,35 @@ def test_structural_zeros_and_unknown_disturbances_have_no_panel(case1):
     )
 
 
-def _without(columns: dict[str, slice]) -> dict[str, slice]:
-    return {name: place for name, place in columns.items() if name != 'lumped_error'}
-
-
 def test_a_controller_that_estimates_nothing_has_no_lumped_error(case1):
     runs = {'gvc': case1['gvc'], 'cl': replace(case1['cl'], estimates=False)}
     panel = panel_sets(runs)['estimates'].panels[0]
-    assert list(panel.rows) == ['gvc']
+    assert {curve.run for curve in panel.curves} == {'gvc'}
     assert list(different_disturbances(runs)) == ['gvc']
 
 
-def test_many_lines_are_thinned_to_a_budget_and_keep_their_extremes(case1, monkeypatch):
+def test_many_lines_are_thinned_to_a_budget(case1, monkeypatch):
+    whole = len(interactive(case1).data)
     monkeypatch.setattr(page, 'POINTS', 1_000)
-    found = interactive(case1)
-    index, content = json.loads(_inflated(found.index)), _inflated(found.data)
-    line = index['panels']['tau-linear']['lines'][2]
-    axis = index['axes'][line['axis']]
-    assert axis['count'] <= 2 * page.FEWEST
-    values = _values(content, line['at'], axis['count'])
-    assert np.abs(values).max() == pytest.approx(case1['gvc'].part('tau').peak[2], rel=2.0**-16)
-    assert len(found.data) < len(_data(case1, monkeypatch))
+    monkeypatch.setattr(page, 'FEWEST', 50)
+    assert len(interactive(case1).data) < 0.8 * whole
 
 
-def _data(runs: dict[str, Sketch], monkeypatch) -> str:
-    monkeypatch.undo()
-    return interactive(runs).data
+def test_lines_break_where_there_are_no_samples(case1):
+    gap = {name: replace(run, gaps=((1.0, 2.0),)) for name, run in case1.items()}
+    content = json.loads(zlib.decompress(base64.b64decode(interactive(gap).data)))[0]
+    arrays = []
 
+    def visit(value):
+        if isinstance(value, dict):
+            if value.get('type') == 'ndarray':
+                data = base64.b64decode(value['array']['data'])
+                arrays.append(np.frombuffer(data, value['dtype']))
+            for entry in value.values():
+                visit(entry)
+        elif isinstance(value, list):
+            for entry in value:
+                visit(entry)
 
-def test_packed_content_comes_back():
-    assert _inflated(packed(b'abc' * 100)) == b'abc' * 100
+    visit(content)
+    assert any(np.isnan(array).any() for array in arrays)

@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as parquet
 import pytest
 import yaml
@@ -12,13 +13,12 @@ from pages import Page
 
 from auv_analysis import simulate, summarize
 from auv_analysis.cli import main
-from auv_analysis.report import plotting
+from auv_analysis.report import plots
+from auv_analysis.report.digest import sketches
 from auv_analysis.report.document import NUMBERS
 from auv_analysis.report.faults import fault_part
-from auv_analysis.report.interactive import interactive
-from auv_analysis.report.panel_models import model
-from auv_analysis.report.set_up import set_up
-from auv_analysis.report.sketching import sketches
+from auv_analysis.report.panels import Curve, Panel, document, interactive
+from auv_analysis.report.scenario_text import set_up
 from auv_analysis.runs.run import Run
 from auv_analysis.scenario.fault_words import Mark
 from auv_analysis.scenario.scenario import load_scenario
@@ -75,19 +75,12 @@ def test_the_set_up_says_every_fault(runs):
     assert rows['seed'] == ['0']
 
 
-def test_numbers_of_the_set_up_are_those_of_the_scenario(runs):
-    scene = set_up(runs, {name: summarize(run) for name, run in runs.items()}, TEXT)
-    numbers = {value for _, value in scene.numbers('faults')}
-    said = {float(x) for line in dict(scene.rows)['faults'] for x in re.findall(r'[\d.]+', line)}
-    assert said - {3.0} <= numbers  # of T3
-
-
 def test_spans_and_numbers_of_a_figure(runs):
     sketch = sketches(runs)['gvc']
-    with plotting.style():
-        axes = plotting.new_figure(2.0).subplots()
+    with plots.style():
+        axes = plots.new_figure(2.0).subplots()
         axes.set_xlim(0.0, 2.2)
-        plotting.shade(axes, sketch)
+        plots.shade(axes, sketch)
     spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
     assert spans == [(1.0, 2.0), pytest.approx((1.5, 1.8))]
     assert [(text.get_text(), text.get_position()[0]) for text in axes.texts] == [
@@ -96,7 +89,7 @@ def test_spans_and_numbers_of_a_figure(runs):
     high = [text.get_position()[1] for text in axes.texts]
     assert high[1] < high[0], 'two at one time stand below each other'
     assert axes.get_xlim() == (0.0, 2.2)
-    sentence = plotting.shade_sentence(sketch)
+    sentence = plots.shade_sentence(sketch)
     assert sentence.startswith(' Shaded: 1 thruster T3 at 50 %, 1–2 s; 2 25 % of the meas')
 
 
@@ -110,11 +103,14 @@ def test_panels_are_shaded_where_all_runs_have_the_same_faults(runs):
 
 def test_a_panel_has_a_span_and_a_number_per_fault():
     marks = (Mark(1, 'x', 'x', 1.0, 2.0), Mark(2, 'x', 'x', 3.0, float('inf')))
-    text = json.dumps(model(1, 'line', marks))
+    t = np.linspace(0.0, 4.0, 5)
+    panel = Panel('p', 'P', 'y (m)', (Curve('gvc', 'surge', '#000000', t, t),))
+    (marked, _), (bare, _) = (document([panel], {'gvc': []}, m, (0.0, 4.0)) for m in (marks, ()))
+    text = json.dumps(marked)
     left = re.findall(r'"name": "BoxAnnotation".{0,400}?"left": ([\d.]+)', text)
     assert {float(x) for x in left} >= {1.0, 3.0}
     assert text.count('"name": "Label"') == 2
-    assert '"name": "Label"' not in json.dumps(model(1, 'line'))
+    assert '"name": "Label"' not in json.dumps(bare)
 
 
 def test_every_number_of_the_section_is_in_the_file(folder):

@@ -12,9 +12,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.report import plotting
-from auv_analysis.report.page import write_report
-from auv_analysis.report.sketching import sketch
+from auv_analysis.report import plots
+from auv_analysis.report.digest import sketch
+from auv_analysis.report.run_report import write_report
 from auv_analysis.report.statistics import Statistics, followed, part_of
 from auv_analysis.report.traces import COLUMNS, FEW, Trace, decimate, thinned
 from auv_analysis.runs.run import Run
@@ -83,12 +83,12 @@ def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
         t, y = drawn.line('error', 2, 'late')
         assert (y == spike).sum() >= (spike > 0)
         assert len(t) <= 2 * COLUMNS
-        with plotting.style():
-            figure = plotting.new_figure(3.0)
+        with plots.style():
+            figure = plots.new_figure(3.0)
             axes = figure.subplots()
-            plotting.draw_lines(axes, drawn, 'error', 'late', [2])
+            plots.draw_lines(axes, drawn, 'error', 'late', [2])
             axes.set_ylim(-1.0, 6.0)
-            png, _ = plotting.save(figure, tmp_path, f'spike_{spike:g}')
+            png, _ = plots.save(figure, tmp_path, f'spike_{spike:g}')
         pictures.append(np.asarray(Image.open(png).convert('L'), float))
     rows, columns = np.nonzero(pictures[0] - pictures[1] > 60.0)
     assert np.ptp(rows) > 0.6 * pictures[0].shape[0], 'a line over most of the height'

@@ -12,8 +12,7 @@ from pages import tokens
 
 from auv_analysis import simulate, summarize
 from auv_analysis.cli import main
-from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.sketching import sketches
+from auv_analysis.report.digest import Sketch, sketches
 from auv_analysis.report.verdict import FAILED, verdict
 
 CL = tunings.SAME_CL | {'k_D': 30.0}
@@ -66,11 +65,13 @@ def test_errors_gains_and_peaks_are_in_the_first_sentence(two: Runs) -> None:
 def test_the_verdict_stands_above_the_tables_and_first_in_the_report(
     tmp_path: Path, capsys, monkeypatch
 ) -> None:
-    from auv_analysis.report import page
+    from auv_analysis.report import run_report
 
     found = []
-    monkeypatch.setattr(page, 'draw_figures', lambda *_: [])
-    monkeypatch.setattr(page, 'write_document', lambda out, *rest: found.append(rest[2]) or out)
+    monkeypatch.setattr(run_report, 'draw_figures', lambda *_: [])
+    monkeypatch.setattr(
+        run_report, 'write_document', lambda out, *rest: found.append(rest[2]) or out
+    )
     path = tunings.write(tmp_path, {'cl': CL, 'gvc': tunings.GVC}, duration=0.5)
     main.main(['simulate', str(path), '--out', str(tmp_path / 'out')])
     shown = capsys.readouterr().err

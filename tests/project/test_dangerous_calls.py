@@ -40,8 +40,8 @@ LISTED = {
     *((f'{package}/__init__.py', 'importlib.import_module') for package in PACKAGES),
     ('auv_analysis/graph/domain.py', 'socket'),  # which ports are free
     ('udp.py', 'socket'),  # of the example's driver
-    ('auv_analysis/report/rendering.py', 'markupsafe.Markup'),  # of text that was escaped before
-    ('auv_analysis/report/quantities.py', 'markupsafe.Markup'),  # of words of ours, and escaped
+    ('auv_analysis/report/document.py', 'markupsafe.Markup'),  # of text that was escaped before
+    ('auv_analysis/output/text.py', 'markupsafe.Markup'),  # of words of ours, and escaped
 }
 
 

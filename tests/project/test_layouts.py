@@ -11,8 +11,8 @@ from xml.etree import ElementTree
 import pytest
 from sensor_msgs.msg import JointState
 
-from auv_analysis.report.overview import RUNS
-from auv_analysis.report.plotting import COLOURS, GREY
+from auv_analysis.report.plots import COLOURS, GREY
+from auv_analysis.report.run_plots import RUNS
 from auv_dynamics.ros import topics
 from auv_dynamics.vehicle import DOFS
 

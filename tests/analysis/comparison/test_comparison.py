@@ -8,7 +8,7 @@ import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics.summary import band_of
-from auv_analysis.report.sketching import sketch
+from auv_analysis.report.digest import sketch
 from auv_analysis.studies.compare import plots
 from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank
 

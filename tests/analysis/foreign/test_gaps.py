@@ -23,9 +23,9 @@ from auv_analysis.bag.foreign_tracks import (
 from auv_analysis.cli.terminal import summary_tables
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.output.text import number
-from auv_analysis.report import plotting
-from auv_analysis.report.figures import draw_figures
-from auv_analysis.report.sketching import sketch
+from auv_analysis.report import plots
+from auv_analysis.report.digest import sketch
+from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.runs.run import Run
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS
@@ -141,7 +141,7 @@ def test_lines_break_and_the_gap_is_shaded(run, tmp_path, monkeypatch) -> None:
         figures[name] = figure
         return folder / f'{name}.png', folder / f'{name}.pdf'
 
-    monkeypatch.setattr(plotting, 'save', save)
+    monkeypatch.setattr(plots, 'save', save)
     records = {
         record.name: record for record in draw_figures({'dive': found}, tmp_path / 'figures')
     }

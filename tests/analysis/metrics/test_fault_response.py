@@ -13,8 +13,7 @@ from auv_analysis.metrics.fault_response import (
     write_responses,
 )
 from auv_analysis.report.document import write_numbers
-from auv_analysis.report.fault_sentences import fault_overview, fault_sentences
-from auv_analysis.report.tables.faults import fault_tables
+from auv_analysis.report.faults import fault_overview, fault_sentences, fault_tables
 from auv_analysis.runs.run import Run
 from auv_analysis.scenario.fault_words import Mark, label, marks_of
 from auv_analysis.scenario.scenario import load_scenario

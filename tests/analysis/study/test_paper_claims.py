@@ -9,16 +9,14 @@ import pyarrow.parquet as parquet
 import pytest
 
 from auv_analysis import load_scenario, simulate
+from auv_analysis.herman2018 import paper
+from auv_analysis.herman2018.cases import case_evidence, case_of, paper_claims
+from auv_analysis.herman2018.claims import judged, write_claims
+from auv_analysis.herman2018.evidence import Quotes, Response
 from auv_analysis.output.text import MISSING
-from auv_analysis.report import paper
-from auv_analysis.report.claims import judged
-from auv_analysis.report.evidence import Response
-from auv_analysis.report.quotes import Quotes
-from auv_analysis.report.tables.claims import claims_table, write_claims
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.studies.study.procedure import claims_sentences
 from auv_analysis.studies.study.sensitivity import sensitivity
-from auv_analysis.study.paper_claims import case_evidence, case_of, paper_claims
 
 NUMBER = re.compile(r'([+−]?)(\d[\d\u202f]*)(?:\.(\d+))?(?:·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?')
 POWERS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
@@ -96,13 +94,6 @@ def test_every_number_of_the_texts_is_in_the_file(name, tmp_path):
                 assert near.any(), f'{claim.number} {of}: {number} of {text!r} in {mine}'
             assert all(row[of] == text for row in mine)
     assert found > 120
-
-
-def test_the_tables_cells_carry_the_numbers():
-    table = claims_table(study().claims)
-    shares = table.rows[9][2].figures
-    assert list(shares.values()) == list(paper.SHARES)
-    assert len(table.rows[9][3].figures) == 12 + 3
 
 
 def responses(gains, others):

@@ -11,8 +11,7 @@ from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.summary import Window, summarize
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import console, say, waiting
-from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.sketching import sketches
+from auv_analysis.report.digest import Sketch, sketches
 from auv_analysis.report.verdict import FAILED, verdict
 from auv_analysis.runs.run import AnyRun
 from auv_analysis.scenario.scenario import Scenario
@@ -114,18 +113,27 @@ def _report(
     study: Study | None,
 ) -> None:
     # with matplotlib, which loads slowly
+    from auv_analysis.herman2018.claims import claims_part, judge_runs
     from auv_analysis.report.faults import fault_part
-    from auv_analysis.report.page import write_report
+    from auv_analysis.report.run_report import write_report
 
-    more: dict[str, Any] = study.examine(runs, summaries) if study else {}
+    added: dict[str, Any] = study.examine(runs, summaries) if study else {}
+    more = {name: [*sections] for name, sections in added.get('more', {}).items()}
+    judged = added.get('claims')
+    judged = judge_runs(shown, summaries) if judged is None else judged
+    claims, counted = claims_part(out, judged, shown)
+    of_claims = [*claims[:1], *more.pop('claims', ()), *claims[1:]]
+    more['couplings'] = [*more.get('couplings', ()), *of_claims]
+    sentences = [*counted, *added.get('sentences', ())]
     part = fault_part(out, runs)
     if part is not None:
-        section, sentences = part
-        behind = more.get('more', {})
-        more['more'] = {**behind, 'tracking': [section, *behind.get('tracking', ())]}
-        more['sentences'] = [*sentences, *more.get('sentences', ())]
+        section, on_faults = part
+        more['tracking'] = [section, *more.get('tracking', ())]
+        sentences = [*on_faults, *sentences]
     with waiting('drawing figures, writing the report'):
-        write_report(out, shown, summaries, scenario_text, vehicle_text, **more)
+        write_report(
+            out, shown, summaries, scenario_text, vehicle_text, more=more, sentences=sentences
+        )
 
 
 def show(summaries: Mapping[str, Mapping[str, Any]]) -> None:

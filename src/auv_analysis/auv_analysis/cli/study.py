@@ -12,10 +12,11 @@ from auv_analysis.cli.conclude import finish
 from auv_analysis.cli.run import free_graph, recorded
 from auv_analysis.cli.scenarios import open_scenario, scenario_folder
 from auv_analysis.cli.simulate import simulated
+from auv_analysis.herman2018.cases import PaperClaims, paper_claims
+from auv_analysis.herman2018.paper import CASES
 from auv_analysis.metrics.summary import Window
 from auv_analysis.output.progress import say, waiting
 from auv_analysis.report.document import Section
-from auv_analysis.report.paper import CASES
 from auv_analysis.runs.run import AnyRun
 from auv_analysis.runs.samples import ENDING
 from auv_analysis.scenario.scenario import Scenario
@@ -28,7 +29,6 @@ from auv_analysis.studies.study.procedure import (
     write_samples,
 )
 from auv_analysis.studies.study.sensitivity import Sensitivity, sensitivity
-from auv_analysis.study.paper_claims import PaperClaims, paper_claims
 from auv_dynamics.files.errors import InputError
 
 LARGEST_SPAN = 1e3

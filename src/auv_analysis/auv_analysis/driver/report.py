@@ -16,11 +16,17 @@ from auv_analysis.driver.excitation import MeasuredTrial
 from auv_analysis.driver.time_checks import reference_ns
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.text import join
-from auv_analysis.report import plotting
-from auv_analysis.report.document import Block, Cell, Column, Section, Sentence, Table
-from auv_analysis.report.figure_files import FigureRecord, save_figures
-from auv_analysis.report.plotting import COLOURS, GREY
-from auv_analysis.report.rendering import write_document
+from auv_analysis.report import plots
+from auv_analysis.report.document import (
+    Block,
+    Cell,
+    Column,
+    Section,
+    Sentence,
+    Table,
+    write_document,
+)
+from auv_analysis.report.plots import COLOURS, GREY, FigureRecord, save_figures
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS
 
@@ -112,7 +118,7 @@ def _timing(evidence: Evidence) -> Drawn:
     now, _ = reference_ns(evidence)
     ages = (now - log.stamp_ns) / NANOSECONDS
     ages = ages - np.nanmin(ages) if np.isfinite(ages).any() else np.zeros_like(ages)
-    figure = plotting.new_figure(2.4)
+    figure = plots.new_figure(2.4)
     left, right = figure.subplots(1, 2)
     apart = np.diff(np.sort(t)) * MS
     left.hist(apart, bins=BINS, range=(0.0, WIDER * float(np.max(apart))), color=COLOURS[0])
@@ -120,7 +126,7 @@ def _timing(evidence: Evidence) -> Drawn:
     right.plot(t, ages * MS, '.', markersize=2, color=COLOURS[0])
     right.set(xlabel='$t$ (s)', ylabel='older than the freshest (ms)')
     for i, axes in enumerate((left, right)):
-        plotting.letter(axes, i)
+        plots.letter(axes, i)
     title = 'When messages came'
     caption = (
         f'{title}: (a) times between arrivals; (b) age of each stamp beyond the smallest one, '
@@ -131,14 +137,14 @@ def _timing(evidence: Evidence) -> Drawn:
 
 def _motion(evidence: Evidence, word: str, half: slice, unit: str) -> Drawn:
     pair = evidence.rates[word.lower()]
-    figure = plotting.new_figure(3.6)
+    figure = plots.new_figure(3.6)
     panels = figure.subplots(3, 1, sharex=True)
     colours = COLOURS[half]
     for i, (axes, dof) in enumerate(zip(panels, DOFS[half], strict=True)):
         axes.plot(pair.t, pair.path[:, i], color=GREY, linewidth=2.4, label='by the pose')
         axes.plot(pair.t, pair.velocity[:, i], color=colours[i], label='twist')
         axes.set_ylabel(f'{dof} ({unit})')
-        plotting.letter(axes, i)
+        plots.letter(axes, i)
     _legend(panels[0])
     panels[-1].set_xlabel('$t$ (s)')
     title = f'{word} velocity by pose and twist'
@@ -152,7 +158,7 @@ def _motion(evidence: Evidence, word: str, half: slice, unit: str) -> Drawn:
 def _answers(trials: Sequence[MeasuredTrial]) -> Drawn:
     across = 2 if len(trials) > 1 else 1
     down = -(-len(trials) // across)
-    figure = plotting.new_figure(0.4 + 1.7 * down)
+    figure = plots.new_figure(0.4 + 1.7 * down)
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for i, (axes, measured) in enumerate(zip(panels, trials, strict=False)):
         trial, response = measured.trial, measured.response
@@ -162,7 +168,7 @@ def _answers(trials: Sequence[MeasuredTrial]) -> Drawn:
         axes.plot(late, added, color=GREY, linestyle='--', label='model')
         axes.set_ylabel(f'{trial.dof} ({trial.speed_unit})')
         axes.set_xlabel('$t$ (s)')
-        plotting.letter(axes, i)
+        plots.letter(axes, i)
     for axes in panels[len(trials) :]:
         axes.set_axis_off()
     _legend(panels[0])

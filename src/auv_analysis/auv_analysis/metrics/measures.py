@@ -10,53 +10,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from auv_analysis.metrics.quantities import METRICS, quantity
 from auv_analysis.metrics.summary import SETTLED
 from auv_dynamics.vehicle import DOFS
 
-VELOCITY, WRENCH, SECONDS = ('m/s', 'rad/s'), ('N', 'N m'), ('s', 's')
-
-
-@dataclass(frozen=True)
-class Family:
-    """Six columns, one per degree of freedom: units of the linear and of the angular ones."""
-
-    label: str
-    units: tuple[str, str]
-    meaning: str
-
-
 MATRICES = ('gains.K_D', 'gains.K_f')
-FAMILIES = {
-    'kinetic_energy.mean_by_component': Family(
-        'energy', ('J', 'J'), 'mean kinetic energy of a component, 1/2 N_i xi_i^2'
-    ),
-    'kinetic_energy.shares_percent': Family(
-        'share', ('%', '%'), 'share of a component of the decomposition in the mean kinetic energy'
-    ),
-    'velocity_error.rms': Family(
-        'rms error', VELOCITY, 'root mean square of set-point minus velocity over the whole run'
-    ),
-    'velocity_error.max_after_2s': Family(
-        'late error', VELOCITY, 'largest magnitude of the velocity error after the first 2 s'
-    ),
-    'velocity_error.settling_time': Family(
-        'settled', SECONDS, f'time from which the velocity error stays within {SETTLED}'
-    ),
-    'lumped_error.rms': Family(
-        'rms w', WRENCH, 'root mean square of the estimation error w = f - F of the uncertainty'
-    ),
-    'lumped_error.max_after_2s': Family(
-        'late w', WRENCH, 'largest magnitude of the estimation error w = f - F after 2 s'
-    ),
-    'coupling.delta_xi_max': Family(
-        'Δξ', VELOCITY, 'largest magnitude of xi - nu: what inertial coupling adds to a velocity'
-    ),
-    'coupling.delta_pi_max': Family(
-        'Δπ', WRENCH, 'largest magnitude of pi - tau: what inertial coupling adds to an input'
-    ),
-    'effort.rms': Family('rms input', WRENCH, 'root mean square of the commanded input tau'),
-    'effort.max': Family('peak input', WRENCH, 'largest magnitude of the commanded input tau'),
-}
+FAMILIES = {name: METRICS[name] for name in METRICS if name != 'kinetic_energy.mean'}
 
 
 @dataclass(frozen=True)
@@ -142,11 +101,8 @@ def described(column: str) -> tuple[str, str, str]:
     if column in BY_NAME:
         measure = BY_NAME[column]
         return measure.label, measure.unit, measure.meaning
-    family, _, dof = column.rpartition('.')
-    if family not in FAMILIES or dof not in DOFS:
-        return column, '', ''
-    entry = FAMILIES[family]
-    return f'{entry.label}, {dof}', entry.units[DOFS.index(dof) // 3], entry.meaning
+    found = quantity(column)
+    return found.label, found.unit, found.meaning
 
 
 def flat(summary: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,12 +1,21 @@
-"""Numbers and lists as a reader wants them: rounded, grouped, with a true minus."""
+"""Text of numbers, lists and symbols: rounded, grouped, with a true minus, indices lowered."""
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import chain, zip_longest
 from typing import Any
+
+from markupsafe import Markup, escape
 
 MISSING = '–'
 _RAISED = '-0123456789'
 _SUPERSCRIPT = str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹')
+LETTERS = {'Lambda': 'Λ', 'Gamma': 'Γ', 'lambda': 'λ', 'omega': 'ω', 'phi': 'φ'}
+GAINS = ('k_D', 'k_I', 'k_P', 'k_S', 'K_D', 'K_f', 'Lambda', 'Gamma', 'omega_f', 'phi')
+_LETTER = re.compile(rf'(?<![^\W_])({"|".join(LETTERS)})(?![^\W_])')
+_INDEX = re.compile(r'\b(Δ?[A-Za-zτξπωνΓΛΥλ])_([A-Za-z0-9]{1,3})\b')
+_POWER = re.compile(r'\^([-−]?[A-Za-z0-9]+(?:/\d)?)')
+_NUMBERED = re.compile(r'(?<=[ξπ])([1-6])\b')
 
 
 def number(value: Any, digits: int = 3) -> str:
@@ -71,3 +80,47 @@ def residuals(summary: Mapping[str, Any]) -> list[str]:
         f'{number(value, 2)} {unit}'
         for value, unit in zip(summary['settling']['residual'], units, strict=True)
     ]
+
+
+class Maths(str):
+    """Words of ours whose symbols a page sets: w_X, k_D, ξ3, M^-1, Lambda.
+
+    Every other text is a user's, or may be, and is shown as it stands.
+
+    Parameters
+    ----------
+    words : ours; each `{}` stands for the next field
+    fields : of users, shown as they stand, or `Maths` again
+
+    """
+
+    __slots__ = ('parts',)
+    parts: tuple[str, ...]  # words and fields in turn
+
+    def __new__(cls, words: str, *fields: str) -> 'Maths':
+        """Words with fields as a text in which the symbols are ASCII."""
+        pieces = zip_longest(words.split('{}'), fields, fillvalue='')
+        parts = tuple(chain.from_iterable(pieces))
+        found = super().__new__(cls, ''.join(parts))
+        found.parts = parts
+        return found
+
+    def html(self) -> Markup:
+        """The text with indices lowered, powers raised, and Greek letters for their names."""
+        fields = (
+            part.html() if isinstance(part, Maths) else escape(part) for part in self.parts[1::2]
+        )
+        words = map(_set, self.parts[::2])
+        return Markup('').join(chain.from_iterable(zip(words, fields, strict=True)))
+
+
+def _set(words: str) -> Markup:
+    text = _LETTER.sub(lambda match: LETTERS[match[0]], str(escape(words)))
+    text = _INDEX.sub(r'\1<sub>\2</sub>', text)
+    text = _POWER.sub(lambda match: f'<sup>{match[1].replace("-", "−")}</sup>', text)
+    return Markup(_NUMBERED.sub(r'<sub>\1</sub>', text))
+
+
+def symbol(gain: str) -> str:
+    """A gain's name, to be set where it is one of ours; that of a user's law stays as it stands."""
+    return Maths(gain) if gain in GAINS else gain

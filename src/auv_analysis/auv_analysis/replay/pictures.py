@@ -5,14 +5,14 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.replay.compared import Compared
-from auv_analysis.report import plotting
-from auv_analysis.report.figure_files import save_figures
-from auv_analysis.report.plotting import COLOURS, DASHES, INPUT
+from auv_analysis.report import plots
+from auv_analysis.report.plots import COLOURS, DASHES, save_figures
 from auv_analysis.report.traces import FEW, thinned
 from auv_dynamics.vehicle import DOFS
 
-NAME = 'open_loop_wrench'
+NAME, INPUT = 'open_loop_wrench', SIGNALS['tau']
 ORDER = (0, 3, 1, 4, 2, 5)  # forces left, moments right
 
 
@@ -32,7 +32,7 @@ def draw(both: Compared, names: tuple[str, str], verdict: str, folder: Path) -> 
 
 
 def _figure(both: Compared, names: tuple[str, str], verdict: str) -> tuple[Figure, str, str]:
-    figure = plotting.new_figure(5.2)
+    figure = plots.new_figure(5.2)
     panels = figure.subplots(3, 2, sharex=True)
     for axes, i in zip(panels.flat, ORDER, strict=True):
         pairs = zip(names, (both.recorded, both.answered), DASHES, strict=False)
@@ -41,7 +41,7 @@ def _figure(both: Compared, names: tuple[str, str], verdict: str) -> tuple[Figur
             if len(t) > FEW:
                 t, tau = thinned(t, tau, t[0], t[-1])
             axes.plot(t, tau, color=COLOURS[k], linestyle=dash, label=name)
-        axes.set_ylabel(f'{INPUT.symbols[i]} {DOFS[i]} ({INPUT.unit(i)})')
+        axes.set_ylabel(f'{DOFS[i]}: {INPUT.axis([i])}')
     for axes in panels[-1]:
         axes.set_xlabel('$t$ (s)')
     panels[0, 1].legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)

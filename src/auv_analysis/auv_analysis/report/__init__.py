@@ -1,1 +1,1 @@
-"""The report of an experiment: figures, tables, the paper's claims, one HTML page."""
+"""Results, tables, plots and the HTML document that shows them; knows no study and no paper."""

@@ -1,50 +1,36 @@
-"""What a report consists of: sections of paragraphs, sentences, tables and figures, as data."""
+"""A document of sections, tables and figures, and the one HTML file that shows it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+import base64
+import platform
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cache
+from importlib import metadata
 from itertools import groupby
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
+import jinja2
+import markupsafe
 import pyarrow as pa
 from markupsafe import Markup
 from pyarrow import parquet
 
-from auv_analysis.output.text import MISSING, number
-from auv_analysis.report.figure_files import FigureRecord
-from auv_analysis.report.panel import PanelSet
+from auv_analysis.metrics.quantities import SIGNALS
+from auv_analysis.output.text import MISSING, Maths, fixed, join, number, plain, tied
+from auv_analysis.report import results
+from auv_analysis.report.panels import Interactive, PanelSet
+from auv_analysis.report.plots import FigureRecord
+from auv_analysis.report.results import numbers_of
+from auv_dynamics.kernel.compile import sources_digest
 
-Kind = TypeVar('Kind')
+Cell = results.Cell
 NUMBERS = 'numbers.parquet'  # beside the report: every number that its tables show
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One cell of a table.
-
-    Attributes
-    ----------
-    text : as it is shown
-    value : the number behind the text, in the unit of its column; None where there is none
-    source : where that number is found: 'summary.json:/gvc/velocity_error/rms/0' (a JSON pointer),
-        'sensitivity.parquet:ST', 'scenario.yaml:/duration'; '*100' behind it where it is shown in %
-    kind : of its look: 'zero', 'good', 'bad', 'badge'; of a row's first cell that of the row, such
-        as 'paper'
-    figures : name -> number, of a text with several
-    remark : below the text, smaller
-    anchor : of a row's first cell: that of the row
-
-    """
-
-    text: str
-    value: float | None = None
-    source: str = ''
-    kind: str = ''
-    figures: Mapping[str, float] = field(default_factory=dict)
-    remark: str = ''
-    anchor: str = ''
 
 
 @dataclass(frozen=True)
@@ -139,7 +125,8 @@ class Gallery:
     figures: Sequence[FigureRecord]
 
 
-Block = str | Prose | Sentence | Table | FigureRecord | Gallery
+AnyTable = Table | results.Table
+Block = str | Prose | Sentence | AnyTable | FigureRecord | Gallery
 
 
 @dataclass(frozen=True)
@@ -150,11 +137,16 @@ class Section:
     title: str
     blocks: Sequence[Block]
 
-    def of(self, kind: type[Kind]) -> Iterator[Kind]:
-        """Blocks of one kind, those in galleries too."""
-        for block in self.blocks:
-            members = block.figures if isinstance(block, Gallery) else (block,)
-            yield from (member for member in members if isinstance(member, kind))
+    @property
+    def tables(self) -> list[AnyTable]:
+        """Its tables."""
+        return [block for block in self.blocks if isinstance(block, Table | results.Table)]
+
+    @property
+    def figures(self) -> list[FigureRecord]:
+        """Its figures, those in galleries too."""
+        members = (b.figures if isinstance(b, Gallery) else (b,) for b in self.blocks)
+        return [one for some in members for one in some if isinstance(one, FigureRecord)]
 
 
 def cell(value: float | None, source: str = '', *, digits: int = 3, kind: str = '') -> Cell:
@@ -170,7 +162,7 @@ def percent(share: float | None, source: str, *, digits: int = 3, kind: str = ''
     return cell(value, f'{source}*100', digits=digits, kind=kind)
 
 
-def write_numbers(path: Path, tables: Sequence[Table]) -> None:
+def write_numbers(path: Path, tables: Sequence[AnyTable]) -> None:
     """Write a row for every number that some tables show.
 
     Parameters
@@ -180,19 +172,161 @@ def write_numbers(path: Path, tables: Sequence[Table]) -> None:
     tables : of one report
 
     """
-    rows = [entry for table in tables for entry in _numbers(table)]
     columns = ('table', 'row', 'column', 'name', 'text', 'value', 'unit', 'source')
-    types = [pa.float64() if column == 'value' else pa.string() for column in columns]
-    values = [pa.array([row[i] for row in rows], kind) for i, kind in enumerate(types)]
-    parquet.write_table(pa.table(dict(zip(columns, values, strict=True))), path)
+    types = [(column, pa.float64() if column == 'value' else pa.string()) for column in columns]
+    rows = list(numbers_of(tables))
+    parquet.write_table(pa.Table.from_pylist(rows, schema=pa.schema(types)), path)
 
 
-def _numbers(table: Table) -> Iterator[tuple[Any, ...]]:
-    for row in table.rows:
-        name = ', '.join(entry.text for entry in row[: table.stub])
-        for column, entry in zip(table.columns, row, strict=True):
-            where = table.name, name, ' '.join(filter(None, [column.group, column.label]))
-            if entry.value is not None:
-                yield *where, '', entry.text, entry.value, column.unit, entry.source
-            for figure, value in entry.figures.items():
-                yield *where, figure, entry.text, value, column.unit, entry.source
+HERE = Path(__file__).parent
+KINDS = {
+    Prose: 'prose',
+    Table: 'table',
+    results.Table: 'table',
+    FigureRecord: 'picture',
+    Gallery: 'gallery',
+    Sentence: 'sentence',
+    str: 'text',
+    Maths: 'text',
+}
+
+
+def write_document(
+    out: Path,
+    title: str,
+    about: str,
+    findings: Sequence[Sentence],
+    sections: Sequence[Section],
+    listings: Sequence[tuple[str, str]] = (),
+    interactive: Interactive | None = None,
+) -> Path:
+    """Write `report.html`, and beside it `numbers.parquet` with every number of its tables.
+
+    Parameters
+    ----------
+    out : folder, existing
+    title : of the page
+    about : a line below it: vehicles, controllers, source
+    findings : sentences of the summary, first on the page
+    sections : in their order; those without blocks are left out, the list of quantities follows
+    listings : name and text of files that are shown in full at the end
+    interactive : what the panels of its galleries show; none: it has no galleries
+
+    Returns
+    -------
+    path : of report.html
+
+    """
+    quantities = Section(
+        'quantities', 'Quantities', [prose('quantities', entries=SIGNALS.values())]
+    )
+    sections = [section for section in (*sections, quantities) if section.blocks]
+    text = (
+        environment()
+        .get_template('document.html.j2')
+        .render(
+            title=title,
+            about=about,
+            findings=findings,
+            sections=sections,
+            section_numbers={s.name: i for i, s in enumerate(sections, start=1)},
+            names=names_of(sections),
+            listings=listings,
+            interactive=interactive,
+            provenance=provenance(),
+        )
+    )
+    path = out / 'report.html'
+    path.write_text(text + '\n', encoding='utf-8')
+    write_numbers(out / NUMBERS, [table for section in sections for table in section.tables])
+    return path
+
+
+def names_of(sections: Sequence[Section]) -> dict[str, str]:
+    """Anchor -> what it is called in the text: 'table 2', 'figure 5', 'section 3'."""
+    names = {section.name: f'section {i}' for i, section in enumerate(sections, start=1)}
+    tables = (f'table-{table.name}' for section in sections for table in section.tables)
+    figures = (figure.name for section in sections for figure in section.figures if figure.png)
+    names |= {anchor: f'table {i}' for i, anchor in enumerate(tables, start=1)}
+    return names | {anchor: f'figure {i}' for i, anchor in enumerate(figures, start=1)}
+
+
+@cache
+def environment() -> jinja2.Environment:
+    """Where the report's templates are, with the filters that they use."""
+    found = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(HERE),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    found.filters |= {
+        'num': number, 'plain': plain, 'fixed': fixed, 'tied': tied, 'join_words': join,
+        'maths': maths, 'symbols': lambda text: maths(Maths(text)),
+        'by_kind': by_kind, 'data': data_of,
+    }  # fmt: skip
+    return found
+
+
+def prose(name: str, *, folder: Path = HERE, **context: Any) -> Prose:
+    """Paragraphs of a macro of a folder's `prose.html.j2`, that sees the context."""
+    loader = jinja2.FileSystemLoader(folder)
+    module = environment().overlay(loader=loader).get_template('prose.html.j2').make_module(context)
+    return Prose(getattr(module, name)())
+
+
+def by_kind(blocks: Sequence[Block]) -> list[tuple[str, list[Block]]]:
+    """Consecutive blocks of one kind together, with the name of that kind."""
+    return [(kind, list(run)) for kind, run in groupby(blocks, key=lambda b: KINDS[type(b)])]
+
+
+def data_of(path: Path) -> str:
+    """Contents of a PNG for a `src` attribute."""
+    return f'data:image/png;base64,{base64.b64encode(path.read_bytes()).decode("ascii")}'
+
+
+def maths(text: str) -> markupsafe.Markup:
+    """Our own words with their symbols set, every other text as it stands; see `Maths`."""
+    set_text = text.html() if isinstance(text, Maths) else markupsafe.escape(text)
+    return markupsafe.Markup(tied(str(set_text)))
+
+
+PACKAGES = ('auv_analysis', 'auv_gvc_controller', 'auv_dynamics', 'numpy', 'numba', 'scipy')
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a report comes from.
+
+    Attributes
+    ----------
+    command : as it was typed, '' where it was no command
+    versions : name -> version of Python and of the packages that the numbers depend on
+    sources : digest of the workspace's own sources
+    written : UTC
+
+    """
+
+    command: str
+    versions: dict[str, str]
+    sources: str
+    written: str
+
+
+def provenance() -> Provenance:
+    """What made a report that is written now."""
+    program = Path(sys.argv[0])
+    ours = program.stem == 'auv' or program.match('auv_analysis/cli.py')
+    versions = {'Python': platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return Provenance(
+        command=shlex.join(['auv', *sys.argv[1:]]) if ours else '',
+        versions=versions,
+        sources=sources_digest(),
+        written=f'{datetime.now(UTC):%Y-%m-%d %H:%M} UTC',
+    )

@@ -1,15 +1,33 @@
-"""The part of a report that is about faults, with its file and its figure written."""
+"""Faults in the report: a table and a sentence each, and one plot over all of them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from auv_analysis.metrics.fault_response import Response, responses, write_responses
-from auv_analysis.report.document import Block, Section, Sentence
-from auv_analysis.report.fault_figure import fault_figure
-from auv_analysis.report.fault_sentences import fault_overview, fault_sentences
-from auv_analysis.report.sketching import sketches
-from auv_analysis.report.tables.faults import fault_tables
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from auv_analysis.metrics.fault_response import (
+    FILE,
+    PARTS,
+    SHORTEST,
+    Response,
+    responses,
+    write_responses,
+)
+from auv_analysis.metrics.quantities import SIGNALS, WRENCH, mathtext
+from auv_analysis.metrics.summary import BAND_TEXT, TRANSIENT
+from auv_analysis.output.text import MISSING, Maths, fixed, join, number, plain
+from auv_analysis.report import plots
+from auv_analysis.report.digest import Sketch, sketches
+from auv_analysis.report.document import Block, Cell, Column, Section, Sentence, Table, cell
+from auv_analysis.report.plots import DASHES, GREY, Drawn, FigureRecord, save_figures
+from auv_analysis.report.run_plots import RUNS, common_bands, left_out
 from auv_analysis.runs.run import AnyRun
+from auv_dynamics.dofs import DOFS
 
 ABOUT = (
     'The simulated vehicle has faults that the controllers do not know of. Each is held against '
@@ -42,3 +60,235 @@ def fault_part(out: Path, runs: Mapping[str, AnyRun]) -> tuple[Section, list[Sen
     figure = fault_figure(sketches(runs), out / 'figures')
     blocks: list[Block] = [ABOUT, *fault_sentences(found), figure, *fault_tables(found)]
     return Section('faults', TITLE, blocks), [*fault_overview(found)]
+
+
+Found = Mapping[str, Sequence[Response]]
+SAME = 0.1  # of the error before: a smaller change is none
+
+
+def fault_sentences(found: Found) -> list[Sentence]:
+    """A sentence per fault on the degree of freedom that it disturbs most.
+
+    Parameters
+    ----------
+    found : controller -> `responses(run)`, of one scenario
+
+    """
+    numbers = dict.fromkeys(one.mark.number for several in found.values() for one in several)
+    return [
+        Sentence(text, f'table-faults_{number}')
+        for number in numbers
+        for text in _of_fault(
+            [(n, r) for n, s in found.items() for r in s if r.mark.number == number]
+        )
+    ]
+
+
+def fault_overview(found: Found) -> Iterator[Sentence]:
+    """A sentence per controller on all faults together."""
+    for name, several in found.items():
+        there = [response for response in several if response.rms[1] is not None]
+        if not there:
+            continue
+        worst = max(there, key=_rise)
+        ended = {one.mark.number for one in several if one.until is not None}
+        open_ones = {n.mark.number for n in several if n.until is not None and n.recovery is None}
+        text = f'The fault that disturbs {name} most is number {worst.mark.number} '
+        text += f'({worst.mark.label}, {worst.mark.times}): up to {number(worst.peak[1], 2)} '
+        text += f'{_unit(worst)} in {worst.dof}'
+        if ended:
+            back = len(ended) - len(open_ones)
+            text += f'; after {back} of the {len(ended)} that end every error comes back into its '
+            text += 'settling band before anything else changes'
+        yield Sentence(f'{text}.', 'faults')
+
+
+def _unit(response: Response) -> str:
+    return 'rad/s' if response.dof in DOFS[3:] else 'm/s'
+
+
+def _of_fault(members: Sequence[tuple[str, Response]]) -> Iterator[str]:
+    seen = [response for _, response in members if response.rms[1] is not None]
+    if not seen:
+        return
+    worst = max(seen, key=_rise)
+    mark = worst.mark
+    head = f'Fault {mark.number} ({mark.label}, {mark.times})'
+    if not any(_leaves(response) for response in seen):
+        yield f'{head}: no velocity error leaves its settling band.'
+        return
+    parts = [_of_run(name, one) for name, one in members if one.dof == worst.dof]
+    yield f'{head} shows most in {worst.dof}: {"; ".join(parts)}.'
+
+
+def _rise(response: Response) -> float:
+    """How much the error grows, in settling bands."""
+    before, during, _ = response.rms
+    return ((during or 0.0) - (before or 0.0)) / response.band
+
+
+def _leaves(response: Response) -> bool:
+    return (response.peak[1] or 0.0) > response.band
+
+
+def _of_run(name: str, response: Response) -> str:
+    unit = _unit(response)
+    before, during, _ = response.rms
+    if during is None:
+        return f'under {name} it is not reached'
+    if before is None:
+        text = f'under {name} its RMS error is {number(during, 2)} {unit}'
+    elif abs(during - before) <= SAME * before:
+        text = f'under {name} its RMS error stays at {number(during, 2)} {unit}'
+    else:
+        verb = 'rises' if during > before else 'falls'
+        change = f'from {number(before, 2)} to {number(during, 2)} {unit}'
+        text = f'under {name} its RMS error {verb} {change}'
+    return f'{text} (at most {number(response.peak[1], 2)}), {_recovery(response)}'
+
+
+def _recovery(response: Response) -> str:
+    if response.until is None:
+        return 'and the fault stays'
+    if response.recovery is None:
+        before = response.peak[0]
+        always = before is not None and before > response.band
+        text = f'not back within ± {plain(response.band)} by {response.until:g} s'
+        return f'{text}, nor was it always before the fault' if always else text
+    if response.recovery == 0.0:
+        return 'within the settling band from its end on'
+    return f'back within ± {plain(response.band)} after {fixed(response.recovery, 2)} s'
+
+
+ROOM = 1.3  # of the axis above what it shows, for the numbers of the faults
+
+
+def fault_figure(runs: Mapping[str, Sketch], folder: Path) -> FigureRecord:
+    """Draw and save `faults.png` and `.pdf`.
+
+    Parameters
+    ----------
+    runs : of one scenario with faults, each with a set-point
+    folder : of the figures
+
+    """
+    return save_figures(folder, {'faults': lambda: _drawn(runs)})['faults']
+
+
+def _drawn(runs: Mapping[str, Sketch]) -> Drawn:
+    figure: Figure = plots.new_figure(7.2)
+    panels = figure.subplots(6, 1, sharex=True)
+    first = next(iter(runs.values()))
+    bands = common_bands(runs)
+    for i, axes in enumerate(panels):
+        _panel(axes, runs, i, bands[i])
+        axes.set_ylabel(
+            f'{mathtext(SIGNALS["error"].components[i])} ({SIGNALS["error"].unit_of(i)})'
+        )
+        plots.letter(axes, i, DOFS[i])
+    panels[-1].set_xlabel('$t$ (s)')
+    handles = [Line2D([], [], **_look(n)) for n in range(len(runs))]
+    figure.legend(handles, list(runs), loc='outside upper right', ncols=4, handlelength=2.6)
+    named = [f'{mark.number}  {mark.label}, {mark.times}' for mark in first.faults]
+    patches = [Patch(color=plots.FAULT) for _ in named]
+    figure.legend(patches, named, loc='outside lower left', ncols=2)
+    title = 'Velocity errors under faults'
+    caption = (
+        f'{title}, of {join(list(runs))}. Dotted: settling band{left_out(bands)}. '
+        f'The axes are those of the errors after {TRANSIENT:g} s.{plots.shade_sentence(first)}'
+    )
+    return figure, title, caption
+
+
+def _panel(axes: Axes, runs: Mapping[str, Sketch], i: int, band: float | None) -> None:
+    low, high = 0.0, 0.0
+    for n, run in enumerate(runs.values()):
+        split = ('error', 'early') in run.traces
+        for part in ('early', 'late') if split else ('whole',):
+            t, error = run.drawn('error', i, part)
+            axes.plot(t, error, **_look(n))
+            if part != 'early':
+                low, high = min(low, np.nanmin(error)), max(high, np.nanmax(error))
+        axes.set_xlim(run.start, run.start + run.duration)
+    for level in () if band is None else (-band, band):
+        axes.axhline(level, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)), zorder=1.5)
+        low, high = min(low, 1.2 * level), max(high, 1.2 * level)
+    axes.set_ylim(1.1 * low, ROOM * high)
+    plots.shade(axes, next(iter(runs.values())))
+
+
+def _look(n: int) -> dict[str, Any]:
+    return {
+        'linestyle': DASHES[n % len(DASHES)],
+        'color': RUNS[n % len(RUNS)],
+        'linewidth': 0.9,
+    }
+
+
+ERROR, EFFORT = Maths('RMS of ν_d − ν'), 'RMS of τ'
+COLUMNS = (
+    Column('', meaning='degree of freedom', numeric=False),
+    Column('controller', meaning='name of the run', numeric=False),
+    Column('before', '', 'RMS of the velocity error before the fault; m/s, rad/s', group=ERROR),
+    Column('during', '', 'the same while it is there', group=ERROR),
+    Column('after', '', 'the same behind it', group=ERROR),
+    Column('max', '', Maths('largest |ν_d − ν| during the fault; m/s, rad/s')),
+    Column('band', '', f'of a settled error: {BAND_TEXT}; m/s, rad/s'),
+    Column('recovery', 's', 'time behind the end of the fault from which the error stays within'),
+    Column('before', '', 'RMS of the command before the fault; N, N m', group=EFFORT),
+    Column('during', '', 'the same while it is there', group=EFFORT),
+    Column('after', '', 'the same behind it', group=EFFORT),
+    Column('unit', numeric=False),
+)
+
+
+def fault_tables(found: Mapping[str, Sequence[Response]]) -> Iterator[Table]:
+    """A table per fault: a row per degree of freedom and controller.
+
+    Parameters
+    ----------
+    found : controller -> `responses(run)`, of one scenario
+
+    """
+    of_fault: dict[int, list[tuple[str, Response]]] = {}
+    for name, several in found.items():
+        for response in several:
+            of_fault.setdefault(response.mark.number, []).append((name, response))
+    for index, members in of_fault.items():
+        first = members[0][1]
+        members.sort(key=lambda pair: DOFS.index(pair[1].dof))
+        caption = f'Fault {index}: {first.mark.label}, {first.mark.times}. {_times(first)}'
+        rows = [_row(name, response) for name, response in members]
+        yield Table(f'faults_{index}', caption, COLUMNS, rows, stub=2)
+
+
+def _times(response: Response) -> str:
+    texts = [
+        f'{part} is {begin:g}–{end:.6g} s' if end > begin else f'there is no time {part}'
+        for part, (begin, end) in zip(PARTS, response.windows, strict=True)
+        if part != 'during'
+    ]
+    note = f'as long as the fault ({SHORTEST:g} s at least) or up to the next change'
+    until = '' if response.until is None else f'; recovery is looked for up to {response.until:g} s'
+    text = ', '.join(texts)
+    return f'{text[0].upper()}{text[1:]} ({note}){until}.'
+
+
+def _row(name: str, response: Response) -> list[Cell]:
+    def three(values: Sequence[float | None], key: str) -> list[Cell]:
+        pairs = zip(values, PARTS, strict=True)
+        return [cell(value, f'{FILE}:{key}_{part}') for value, part in pairs]
+
+    recovery = response.recovery
+    return [
+        Cell(response.dof),
+        Cell(name),
+        *three(response.rms, 'rms'),
+        cell(response.peak[1], f'{FILE}:max_during'),
+        cell(response.band, f'{FILE}:band'),
+        Cell(MISSING)
+        if recovery is None
+        else Cell(fixed(recovery, 2), recovery, f'{FILE}:recovery'),
+        *three(response.effort, 'effort'),
+        Cell(WRENCH[DOFS.index(response.dof) // 3]),
+    ]

@@ -1,34 +1,34 @@
-"""What the interactive panels of a report show: lines of the sketches, of all controllers."""
+"""Interactive panels over time: Bokeh figures of all controllers that share one time axis."""
 
+import base64
+import json
+import math
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
-from auv_analysis.output.text import join
-from auv_analysis.report import plotting
-from auv_analysis.report.certificates import BOUND, IDENTITY
-from auv_analysis.report.panel import Key, Panel, PanelLine, PanelSet
-from auv_analysis.report.plotting import COLOURS, GREY, Quantity
-from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.traces import Line
-from auv_dynamics.vehicle import DOFS
+from auv_analysis.metrics.quantities import SIGNALS, Quantity
+from auv_analysis.metrics.summary import TRANSIENT
+from auv_analysis.report.digest import Sketch
+from auv_analysis.report.plots import COLOURS, GREY, moving
+from auv_analysis.report.traces import broken, thinned
+from auv_analysis.scenario.fault_words import Mark
+from auv_dynamics.dofs import DOFS
 
-THIN, THICK = 1.0, 3.0  # of lines, px; the thick ones lie under others
-INK = 'ink'  # the colour of the text, light or dark
+INK, BOUND, IDENTITY = '#1a1a1a', '#D55E00', '#56B4E9'
+FAULT = '#e69f00'
+HEIGHT = 215  # px
+LEFT = 58  # px, so that the time axes of all panels lie above each other
+POINTS = 300_000  # of all panels together, so that a page stays small
+FEWEST = 200  # columns of pixels that a line keeps however many lines there are
+DASHES: tuple[list[int], ...] = ([], [7, 3], [2, 2], [10, 2, 2, 2], [15, 4], [5, 2, 2, 2, 2, 2])
+HERE = Path(__file__).parent
 GROUPS = {'linear': range(3), 'angular': range(3, 6)}
-ENERGY = Quantity('energy of ξ', tuple(f'ξ{i}' for i in range(1, 7)), ('J', 'J'))
-SIX = {  # signal of `Sketch` -> what it is, whether its size also shows on a logarithmic axis
-    'error': (plotting.ERROR, True),
-    'lumped_error': (plotting.LUMPED, True),
-    'F': (plotting.UNCERTAINTY, False),
-    'tau': (plotting.INPUT, False),
-    'applied': (Quantity('applied wrench', (), plotting.WRENCH), False),
-    'unexplained': (Quantity('unexplained wrench', (), plotting.WRENCH), False),
-    'energy': (ENERGY, False),
-    'delta_xi': (plotting.DELTA_XI, False),
-    'delta_pi': (plotting.DELTA_PI, False),
-}
-SECTIONS = {  # set of panels -> its signals, beginnings of the names of the figures it stands for
+SECTIONS = {  # part of the report -> its signals, beginnings of the figures its panels stand for
     'errors': (('error',), ('errors_',)),
     'estimates': (('lumped_error', 'F', 'unexplained'), ('lumped_error_', 'uncertainty_')),
     'inputs': (('tau', 'applied'), ('inputs_',)),
@@ -36,10 +36,222 @@ SECTIONS = {  # set of panels -> its signals, beginnings of the names of the fig
     'energy': (('energy',), ('kinetic_energy',)),
     'couplings': (('delta_xi', 'delta_pi'), ('delta_xi', 'delta_pi')),
 }
+STILL = ('inputs_compared',)  # figures of logarithmic time: shown beside the panels
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A line of a run: its degree of freedom or what it is, colour, times and values (n,).
+
+    It breaks at gaps, from and to in s, of a run with samples a step apart.
+    """
+
+    run: str
+    key: str
+    colour: str
+    t: np.ndarray
+    y: np.ndarray
+    width: float = 1.6
+    gaps: tuple[tuple[float, float], ...] = ()
+    step: float = 0.0
+
+    @property
+    def dof(self) -> str:
+        """Its degree of freedom; '' of a line that has none."""
+        return self.key if self.key in DOFS else ''
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One pair of axes over time: 'line', 'log' with a logarithmic vertical axis, or 'stack'."""
+
+    name: str
+    title: str
+    label: str
+    curves: tuple[Curve, ...]
+    kind: Literal['line', 'log', 'stack'] = 'line'
+
+
+@dataclass(frozen=True)
+class PanelSet:
+    """Panels of a part of the report, in the place of some figures."""
+
+    panels: tuple[Panel, ...]
+    figures: tuple[str, ...]
+
+    def stands_for(self, figure: str) -> bool:
+        """Whether these panels show what the figure of that name shows."""
+        return figure.startswith(self.figures) and figure not in STILL
+
+
+@dataclass(frozen=True)
+class Interactive:
+    """Panels of a report, ready for its template.
+
+    Attributes
+    ----------
+    sets : part of the report -> its panels
+    runs : name of a run -> dashes of its lines, px
+    data : Bokeh's document, deflated, in Base64: nothing in it is read as HTML
+    library, script : source of BokehJS, and ours
+    faults : what is shaded, in words
+    start, end : of the time axis, s
+    dofs : degree of freedom -> colour
+
+    """
+
+    sets: Mapping[str, PanelSet]
+    runs: Mapping[str, str]
+    data: str
+    library: str
+    script: str
+    faults: str
+    start: float
+    end: float
+    dofs: Mapping[str, str] = field(default_factory=lambda: dict(zip(DOFS, COLOURS, strict=True)))
+    transient: float = TRANSIENT
+
+
+def interactive(runs: Mapping[str, Sketch]) -> Interactive:
+    """Panels of some runs with all that a page needs to show them; one run at least."""
+    from bokeh.resources import Resources  # loads slowly
+
+    sets = panel_sets(runs)
+    marks = _marks(runs)
+    start = min(run.start for run in runs.values())
+    end = max(run.start + run.duration for run in runs.values())
+    dashes = {name: DASHES[i % len(DASHES)] for i, name in enumerate(runs)}
+    panels = [panel for members in sets.values() for panel in members.panels]
+    return Interactive(
+        sets=sets,
+        runs={name: ' '.join(map(str, dash)) for name, dash in dashes.items()},
+        data=packed(json.dumps(document(panels, dashes, marks, (start, end)), allow_nan=False)),
+        library='\n'.join(Resources(mode='inline', components=['bokeh']).js_raw),
+        script=(HERE / 'panels.js').read_text(encoding='utf-8'),
+        faults='; '.join(f'{mark.number} {mark.label}, {mark.times}' for mark in marks),
+        start=start,
+        end=end,
+    )
+
+
+def packed(text: str) -> str:
+    """A text, deflated, in Base64."""
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode('ascii')
+
+
+def _marks(runs: Mapping[str, Sketch]) -> tuple[Mark, ...]:
+    """Faults that all runs have."""
+    of_each = {run.faults for run in runs.values()}
+    return next(iter(of_each)) if len(of_each) == 1 else ()
+
+
+def document(
+    panels: Sequence[Panel],
+    dashes: Mapping[str, list[int]],
+    faults: Sequence[Mark],
+    ends: tuple[float, float],
+) -> list[Any]:
+    """Bokeh's JSON of a document, and names of its roots: a figure per panel, ranges shared."""
+    from bokeh.document import Document  # loads slowly
+    from bokeh.models import CrosshairTool, Range1d
+    from bokeh.models.annotations import Span
+
+    time = Range1d(start=ends[0], end=ends[1], bounds=ends)
+    cursor = CrosshairTool(overlay=Span(dimension='height', line_dash=[3, 3], line_color=GREY))
+    found = Document()
+    columns = _columns(panels)
+    for panel in panels:
+        plot = _figure(panel, dashes, columns, time)
+        plot.add_tools(cursor)
+        for mark in faults:
+            _shade(plot, mark, faults)
+        found.add_root(plot)
+    roots = {str(plot.name): plot.id for plot in found.roots}
+    return [found.to_json(deferred=False), roots]
+
+
+def _columns(panels: Sequence[Panel]) -> int:
+    """Columns of pixels in which lines are thinned, so that all of them stay within `POINTS`."""
+    points = sum(len(curve.t) for panel in panels for curve in panel.curves)
+    longest = max((len(curve.t) for panel in panels for curve in panel.curves), default=0)
+    return longest if points <= POINTS else max(FEWEST, longest // 2 * POINTS // points)
+
+
+def _figure(panel: Panel, dashes: Mapping[str, list[int]], columns: int, time: Any) -> Any:
+    from bokeh.models import HoverTool
+    from bokeh.models.annotations import Legend
+    from bokeh.plotting import figure
+
+    plot: Any = figure(
+        name=panel.name, height=HEIGHT, sizing_mode='stretch_width', x_range=time,
+        y_axis_type='log' if panel.kind == 'log' else 'linear', y_axis_label=panel.label,
+        tools='xpan,xbox_zoom,xwheel_zoom,reset', active_drag='xbox_zoom', active_scroll=None,
+        toolbar_location='right', min_border_left=LEFT, window_axis='x', lod_threshold=None,
+        background_fill_color=None, border_fill_color=None, outline_line_color=None,
+    )  # fmt: skip
+    plot.toolbar.autohide = True
+    plot.add_layout(Legend(orientation='horizontal', ncols=3, click_policy='hide'), 'above')
+    plot.legend.update(
+        label_text_font_size='10px', padding=2, spacing=6, glyph_height=8, glyph_width=18,
+        label_height=8, border_line_color=None, background_fill_alpha=0.0,
+    )  # fmt: skip
+    _draw(plot, panel, dashes, columns)
+    if panel.kind != 'stack':
+        plot.y_range.only_visible = True
+        shown: dict[str, Any] = {'tooltips': [('$name', '$snap_y{%.4g}')]}
+        shown |= {'formatters': {'$snap_y': 'printf'}, 'line_policy': 'nearest'}
+        plot.add_tools(HoverTool(mode='vline', **shown))
+    for axis in (plot.xaxis, plot.yaxis):
+        axis.axis_label_text_font_style = 'normal'
+        axis.axis_label_text_font_size = '11px'
+        axis.minor_tick_line_color = None
+    return plot
+
+
+def _draw(plot: Any, panel: Panel, dashes: Mapping[str, list[int]], columns: int) -> None:
+    from bokeh.models import ColumnDataSource
+
+    sources: dict[bytes, Any] = {}
+    base = np.zeros(1)
+    for number, curve in enumerate(panel.curves):
+        t, y = curve.t, curve.y
+        if panel.kind != 'stack' and len(t) > 2 * columns:
+            t, y = thinned(t, y, t[0], t[-1], columns=columns)
+        t, y = broken((t, y), curve.gaps, curve.step)
+        source = sources.setdefault(t.tobytes(), ColumnDataSource({'t': t.astype(np.float32)}))
+        at, look = f'y{number}', {'source': source, 'name': f'{curve.run} {curve.key}'}
+        look['legend_label'], look['tags'] = look['name'], [curve.run, curve.dof]
+        if panel.kind == 'stack':
+            below, base = base, base + y
+            source.data[f'{at}_below'] = np.broadcast_to(below, y.shape).astype(np.float32)
+            source.data[at] = base.astype(np.float32)
+            plot.varea('t', f'{at}_below', at, color=curve.colour, **look)
+        else:
+            source.data[at] = y.astype(np.float32)
+            dash = dashes[curve.run]
+            look |= {'line_color': curve.colour, 'line_dash': dash, 'line_width': curve.width}
+            plot.line('t', at, **look)
+
+
+def _shade(plot: Any, mark: Mark, faults: Sequence[Mark]) -> None:
+    """Shade a fault, its number on it."""
+    from bokeh.models.annotations import BoxAnnotation, Label
+
+    level = sum(other.start <= mark.start < other.end for other in faults[: mark.number - 1])
+    box: dict[str, Any] = {
+        'fill_color': FAULT,
+        'fill_alpha': 0.14,
+        'line_color': None,
+        'level': 'underlay',
+    }
+    box |= {} if math.isinf(mark.end) else {'right': mark.end}
+    plot.add_layout(BoxAnnotation(left=mark.start, level='underlay', **box))
+    number: dict[str, Any] = {'text': f'{mark.number}', 'text_font_size': '10px', 'x_offset': 3}
+    plot.add_layout(Label(x=mark.start, y=120 - 13 * (level % 4), y_units='screen', **number))
 
 
 def panel_sets(runs: Mapping[str, Sketch]) -> dict[str, PanelSet]:
-    """Panels of all runs by section of the report; no set is without panels."""
+    """Panels of all runs by part of the report; no set is without panels."""
     sets = {}
     for name, (signals, figures) in SECTIONS.items():
         panels = [panel for signal in signals for panel in _six_signals(signal, runs)]
@@ -48,7 +260,7 @@ def panel_sets(runs: Mapping[str, Sketch]) -> dict[str, PanelSet]:
         elif name == 'energy':
             panels = [_kinetic(runs), *_shares(runs), *panels]
         if panels:
-            sets[name] = PanelSet(name, tuple(panels), figures)
+            sets[name] = PanelSet(tuple(panels), figures)
     return sets
 
 
@@ -72,79 +284,75 @@ def _with(signal: str, runs: Mapping[str, Sketch]) -> Mapping[str, Sketch]:
 
 
 def _six_signals(signal: str, runs: Mapping[str, Sketch]) -> Iterator[Panel]:
-    quantity, logarithmic = SIX[signal]
-    there = _with(signal, runs)
-    moving = {i for run in there.values() for i in plotting.moving(run.part(signal))}
+    quantity, there = SIGNALS[signal], _with(signal, runs)
+    moved = {i for run in there.values() for i in moving(run.part(signal))}
     for group, members in GROUPS.items():
-        columns = [i for i in members if i in moving]
-        if not columns:
-            continue
-        unit = quantity.unit(columns[0])
-        yield Panel(
-            f'{signal}-{group}',
-            f'{quantity.name.capitalize()}, {group}' if signal != 'energy' else _energies(columns),
-            quantity.name,
-            unit,
-            tuple(Key(DOFS[i], COLOURS[i]) for i in columns),
-            tuple(_lines(there, [(signal, i) for i in columns])),
-            'both' if logarithmic else 'line',
-        )
+        curves = [
+            _curve(name, run, DOFS[i], COLOURS[i], signal, i)
+            for name, run in there.items()
+            for i in members
+            if i in moved
+        ]
+        if curves:
+            title = f'{quantity.label.capitalize()}, {group}'
+            label = _label(quantity, members[0])
+            yield Panel(f'{signal}-{group}', title, label, tuple(curves))
 
 
-def _energies(columns: Sequence[int]) -> str:
-    return f'Kinetic energy of {join([ENERGY.symbols[i] for i in columns])}'
+def _label(quantity: Quantity, component: int) -> str:
+    return f'{quantity.label} ({quantity.unit_of(component)})'
 
 
 def _certificates(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
-    there = {name: run for name, run in runs.items() if ('L', 'whole') in run.traces}
-    there = {name: run for name, run in there.items() if len(run.line('L')[0])}
-    if there:
-        keys = (Key('L', INK, dof=False),)
-        yield Panel('L', 'L of (23)', 'L', 'J', keys, tuple(_lines(there, [('L', 0)])), 'log')
-        rates = {
-            'bound': Key('bound (28)', BOUND, dof=False),
-            'identity': Key('identity (26)', IDENTITY, dof=False, width=THICK),
-            'L_dot': Key('measured', INK, dof=False, width=THIN),
-        }
-        for name, run in there.items():
-            yield Panel(
-                f'rates-{name}',
-                f'Derivative of L, {name}',
-                'dL/dt',
-                'W',
-                tuple(rates.values()),
-                tuple(_lines({name: run}, [(signal, 0) for signal in rates])),
-            )
+    there = {n: r for n, r in runs.items() if ('L', 'whole') in r.traces and len(r.line('L')[0])}
+    if not there:
+        return
+    lines = tuple(_curve(name, run, 'L', INK, 'L') for name, run in there.items())
+    yield Panel('L', 'Lyapunov function, (23)', 'L (J)', lines, 'log')
+    looks = {
+        'bound': ('bound (28)', BOUND, 1.6),
+        'identity': ('identity (26)', IDENTITY, 3.0),
+        'L_dot': ('measured', INK, 1.0),
+    }
+    for name, run in there.items():
+        curves = tuple(
+            _curve(name, run, key, colour, signal, width=width)
+            for signal, (key, colour, width) in looks.items()
+        )
+        yield Panel(f'rates-{name}', f'Derivative of L, {name}', 'dL/dt (W)', curves)
 
 
 def _kinetic(runs: Mapping[str, Sketch]) -> Panel:
-    wanted = Key('of the set-point', GREY, dof=False, width=THICK)
-    keys = wanted, Key('of the run', INK, dof=False)
-    lines = tuple(_lines(runs, [('wanted', 0), ('kinetic', 0)]))
-    return Panel('kinetic', 'Kinetic energy', 'kinetic energy', 'J', keys, lines)
+    looks = {'wanted': ('of the set-point', GREY, 3.0), 'kinetic': ('of the run', INK, 1.6)}
+    curves = tuple(
+        _curve(name, run, key, colour, signal, width=width)
+        for name, run in runs.items()
+        for signal, (key, colour, width) in looks.items()
+        if (signal, 'whole') in run.traces
+    )
+    return Panel('kinetic', 'Kinetic energy', 'kinetic energy (J)', curves)
 
 
 def _shares(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
-    keys = tuple(Key(dof, colour) for dof, colour in zip(DOFS, COLOURS, strict=True))
     for name, run in runs.items():
         t, parts = run.shares()
         if len(t):
-            lines = tuple(PanelLine(name, i, (t, parts[:, i]), run.step) for i in range(6))
+            curves = tuple(Curve(name, DOFS[i], COLOURS[i], t, parts[:, i]) for i in range(6))
             title = f'Shares of ξ1 to ξ6 in the kinetic energy, {name}'
-            yield Panel(f'shares-{name}', title, 'share', '%', keys, lines, 'stack')
+            yield Panel(f'shares-{name}', title, 'share (%)', curves, 'stack')
 
 
-def _lines(runs: Mapping[str, Sketch], signals: Sequence[tuple[str, int]]) -> Iterator[PanelLine]:
-    for name, run in runs.items():
-        for key, (signal, column) in enumerate(signals):
-            if any((signal, part) in run.traces for part in ('whole', 'early')):
-                yield PanelLine(name, key, _whole(run, signal, column), run.step, run.gaps)
-
-
-def _whole(run: Sketch, signal: str, column: int) -> Line:
+def _curve(
+    name: str,
+    run: Sketch,
+    key: str,
+    colour: str,
+    signal: str,
+    column: int = 0,
+    width: float = 1.6,
+) -> Curve:
     """Line over the whole run, of its phases where it is drawn in two."""
-    if (signal, 'whole') in run.traces:
-        return run.line(signal, column)
-    phases = [run.line(signal, column, part) for part in ('early', 'late')]
-    t, y = (np.concatenate(values) for values in zip(*phases, strict=True))
-    return t, y
+    parts = ('whole',) if (signal, 'whole') in run.traces else ('early', 'late')
+    lines = [run.line(signal, column, part) for part in parts]
+    t, y = (np.concatenate(values) for values in zip(*lines, strict=True))
+    return Curve(name, key, colour, t, y, width, run.gaps, run.step)

@@ -8,7 +8,7 @@ import numpy as np
 
 from auv_analysis.metrics.energy import kinetic_energy, shares
 from auv_analysis.output.new_files import created, unfinished_name
-from auv_analysis.report.plotting import COLOURS, GREY
+from auv_analysis.report.plots import COLOURS, GREY
 from auv_analysis.runs.run import AnyRun, Run
 from auv_dynamics.files.errors import InputError, reason
 from auv_dynamics.vehicle import DOFS

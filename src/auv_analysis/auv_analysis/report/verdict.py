@@ -7,11 +7,10 @@ import numpy as np
 
 from auv_analysis.metrics.lyapunov import OF_THE_MOTION
 from auv_analysis.metrics.summary import SMALLEST_BAND
-from auv_analysis.output.text import join, number
-from auv_analysis.report.quantities import Maths
-from auv_analysis.report.sketch import Sketch, alike
+from auv_analysis.output.text import Maths, join, number
+from auv_analysis.report.digest import Sketch, alike
+from auv_dynamics.dofs import DOFS
 from auv_dynamics.files.shipped import shipped_names
-from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.law import SHIPPED
 
 Summary = Mapping[str, Any]

@@ -8,12 +8,18 @@ import numpy as np
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from auv_analysis.output.text import join
-from auv_analysis.report import plotting
-from auv_analysis.report.figure_files import FigureRecord, save_figures
-from auv_analysis.report.grids import ALWAYS, Grid, draw_grid, grid_figure, scale_bar
-from auv_analysis.report.plotting import COLOURS
-from auv_analysis.report.quantities import Maths
+from auv_analysis.output.text import Maths, join
+from auv_analysis.report import plots
+from auv_analysis.report.plots import (
+    ALWAYS,
+    COLOURS,
+    FigureRecord,
+    Grid,
+    draw_grid,
+    heat_map,
+    save_figures,
+    scale_bar,
+)
 from auv_analysis.studies.atlas.atlas import Chart
 from auv_dynamics.vehicle import DOFS
 
@@ -115,7 +121,7 @@ def _panels(grids: dict[str, Grid]) -> Figure | None:
     if not grids:
         return None
     down = -(-len(grids) // ACROSS)
-    figure = plotting.new_figure(0.6 + 2.9 * down)
+    figure = plots.new_figure(0.6 + 2.9 * down)
     panels = figure.subplots(down, ACROSS, squeeze=False).ravel()
     for axes, (name, grid) in zip(panels, grids.items(), strict=False):
         draw_grid(axes, grid)
@@ -134,7 +140,7 @@ def _strength(charts: Sequence[Chart]) -> Drawn:
     title = 'Strength of inertial coupling'
     if not shown:
         return None, title, f'{title}: {uncoupled(charts)}'
-    figure = plotting.new_figure(0.9 + 0.3 * len(shown))
+    figure = plots.new_figure(0.9 + 0.3 * len(shown))
     axes = figure.subplots()
     places = np.arange(len(shown))
     axes.barh(places, [100 * c.couplings.strength for c in shown], color=COLOURS[5], height=0.7)
@@ -173,4 +179,4 @@ def _reached(charts: Sequence[Chart], kind: str) -> Drawn:
         'zero for every motion by the structure of M. '
     )
     names = [chart.name for chart in shown]
-    return grid_figure(names, grids), title, caption + uncoupled(charts)
+    return heat_map(names, grids), title, caption + uncoupled(charts)

@@ -3,12 +3,17 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from auv_analysis.output.text import join, number
-from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
-from auv_analysis.report.figure_files import FigureRecord
-from auv_analysis.report.grids import ALWAYS
-from auv_analysis.report.quantities import Maths
-from auv_analysis.report.rendering import write_document
+from auv_analysis.output.text import Maths, join, number
+from auv_analysis.report.document import (
+    Cell,
+    Column,
+    Section,
+    Sentence,
+    Table,
+    cell,
+    write_document,
+)
+from auv_analysis.report.plots import ALWAYS, FigureRecord
 from auv_analysis.report.tables.sources import VELOCITY, WRENCH, count, pointer
 from auv_analysis.studies.atlas.atlas import DOCUMENT, TABLE, Chart
 from auv_analysis.studies.atlas.plots import uncoupled

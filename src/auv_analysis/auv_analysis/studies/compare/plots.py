@@ -13,12 +13,23 @@ from matplotlib.lines import Line2D
 
 from auv_analysis.metrics.measures import FAMILIES
 from auv_analysis.metrics.summary import BAND_TEXT, DWELL, band_of
-from auv_analysis.report import plotting
-from auv_analysis.report.figure_files import FigureRecord, save_figures
-from auv_analysis.report.grids import ALWAYS, MARGIN, ROW, TALLEST, Grid, grid_figure, name_rows
-from auv_analysis.report.overview import RUNS, XI
-from auv_analysis.report.plotting import COLOURS, DASHES, GREY
-from auv_analysis.report.sketch import Sketch
+from auv_analysis.report import plots
+from auv_analysis.report.digest import Sketch
+from auv_analysis.report.plots import (
+    ALWAYS,
+    COLOURS,
+    DASHES,
+    GREY,
+    MARGIN,
+    ROW,
+    TALLEST,
+    FigureRecord,
+    Grid,
+    heat_map,
+    name_rows,
+    save_figures,
+)
+from auv_analysis.report.run_plots import RUNS, XI
 from auv_analysis.studies.compare.ranking import Entry, Ranking
 from auv_dynamics.vehicle import DOFS
 
@@ -86,7 +97,7 @@ def _six(name: str, table: pa.Table) -> Drawn:
     ]
     always = f', {ALWAYS}: for every motion by the structure of M' if zeros.any() else ''
     caption = f'{title}, a row per run ({entry.meaning}); {MARKS}{always}.'
-    return grid_figure(table['run'].to_pylist(), grids), title, caption
+    return heat_map(table['run'].to_pylist(), grids), title, caption
 
 
 def structural(table: pa.Table, family: str) -> np.ndarray:
@@ -101,7 +112,7 @@ def structural(table: pa.Table, family: str) -> np.ndarray:
 def _energy(table: pa.Table) -> Drawn:
     """Shares of the mean kinetic energy as bars, and the energy beside them."""
     names, shares = table['run'].to_pylist(), six(table, 'kinetic_energy.shares_percent')
-    figure = plotting.new_figure(min(MARGIN + ROW * len(names), TALLEST))
+    figure = plots.new_figure(min(MARGIN + ROW * len(names), TALLEST))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
     places = np.arange(len(names))
     known = np.nan_to_num(shares)
@@ -116,7 +127,7 @@ def _energy(table: pa.Table) -> Drawn:
     mean = column(table, 'kinetic_energy.mean')
     right.plot(mean, places, 'o', color='#1a1a1a', markersize=4)
     right.set_xlabel('mean kinetic energy (J)')
-    plotting.logarithmic(right, 'x')
+    plots.logarithmic(right, 'x')
     right.margins(x=0.08)
     for axes in (left, right):
         axes.grid(axis='y', visible=False)
@@ -144,7 +155,7 @@ def _ranking(ranking: Ranking) -> Drawn:
         Normalize(-end, end),
         decimals=1,
     )
-    figure = grid_figure(ranking.runs, [grid])
+    figure = heat_map(ranking.runs, [grid])
     axes = figure.axes[0]
     axes.tick_params(axis='x', labelrotation=90, labelsize='small')
     text = (
@@ -157,7 +168,7 @@ def _ranking(ranking: Ranking) -> Drawn:
 
 def _parallel(ranking: Ranking, labels: Sequence[str]) -> Figure:
     """Ranks of each run along the measures."""
-    figure = plotting.new_figure(1.6 + 0.24 * len(ranking.runs))
+    figure = plots.new_figure(1.6 + 0.24 * len(ranking.runs))
     axes = figure.subplots()
     places = np.arange(len(labels))
     for i, run in enumerate(ranking.runs):
@@ -224,7 +235,7 @@ def _groups(entries: Sequence[Entry]) -> dict[str, dict[str, Sketch]]:
 def _panels(groups: Mapping[str, Mapping[str, Sketch]], labels: Sequence[str]) -> Figure:
     down = -(-len(groups) // ACROSS)
     across = -(-len(groups) // down)
-    figure = plotting.new_figure(0.5 + 1.75 * down)
+    figure = plots.new_figure(0.5 + 1.75 * down)
     panels = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True).ravel()
     looks = {label: look(i) for i, label in enumerate(labels)}
     for axes, (scenario, runs) in zip(panels, groups.items(), strict=False):
@@ -233,7 +244,7 @@ def _panels(groups: Mapping[str, Mapping[str, Sketch]], labels: Sequence[str]) -
             axes.plot(t[ratio > 0], ratio[ratio > 0], **looks[label])
         axes.axhline(1.0, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
         axes.set_title(scenario, loc='left')
-        plotting.logarithmic(axes, 'x', 'y')
+        plots.logarithmic(axes, 'x', 'y')
     low, high = panels[0].get_ylim()
     panels[0].set_ylim(max(low, SMALLEST), min(high, LARGEST))
     for axes in panels[len(groups) :]:
@@ -261,7 +272,7 @@ def _rows(entries: Sequence[Entry]) -> Figure:
         inside = times <= t[-1]
         row[inside] = ratio[np.searchsorted(t, times[inside])]
     shown = np.ma.masked_where(~(values >= 1.0), values)
-    figure = plotting.new_figure(min(MARGIN + ROW * len(lines), TALLEST))
+    figure = plots.new_figure(min(MARGIN + ROW * len(lines), TALLEST))
     axes = figure.subplots()
     edges = np.geomspace(first, times[-1], TIMES + 1)
     mesh = axes.pcolormesh(

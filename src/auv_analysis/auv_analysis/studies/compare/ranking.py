@@ -11,7 +11,7 @@ from pyarrow import csv, parquet
 from scipy.stats import rankdata
 
 from auv_analysis.metrics.measures import MEASURES, Measure, flat
-from auv_analysis.report.sketch import Sketch
+from auv_analysis.report.digest import Sketch
 
 ERRORS = 'overall.velocity_error.rms.linear'
 

@@ -18,12 +18,18 @@ from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import each, say, waiting
 from auv_analysis.output.text import join, number
-from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
-from auv_analysis.report.figure_files import FigureRecord
-from auv_analysis.report.findings import namesakes
-from auv_analysis.report.grids import ALWAYS
-from auv_analysis.report.rendering import write_document
-from auv_analysis.report.sketch import Sketch
+from auv_analysis.report.digest import Sketch
+from auv_analysis.report.document import (
+    Cell,
+    Column,
+    Section,
+    Sentence,
+    Table,
+    cell,
+    write_document,
+)
+from auv_analysis.report.plots import ALWAYS, FigureRecord
+from auv_analysis.report.run_report import namesakes
 from auv_analysis.studies.compare.plots import SIX
 from auv_analysis.studies.compare.ranking import (
     CSV,
@@ -266,7 +272,7 @@ def entries_of(sources: Sequence[Source], vehicle: str | None = None) -> list[En
     FailedError : every one diverged
 
     """
-    from auv_analysis.report.sketching import sketch  # with matplotlib, which loads slowly
+    from auv_analysis.report.digest import sketch  # with matplotlib, which loads slowly
 
     found = []
     for source in each(sources, len(sources)):

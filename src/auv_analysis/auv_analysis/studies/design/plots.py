@@ -10,14 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from auv_analysis.metrics.summary import TRANSIENT
-from auv_analysis.report import plotting
-from auv_analysis.report.figure_files import Drawn, FigureRecord, save_figures
-from auv_analysis.report.quantities import Maths
-from auv_analysis.report.sketching import sketches
+from auv_analysis.output.text import Maths
+from auv_analysis.report import plots
+from auv_analysis.report.digest import sketches
+from auv_analysis.report.plots import Drawn, FigureRecord, save_figures
 from auv_analysis.studies.design.results import Design
 from auv_dynamics.dofs import DOFS
 
-WAS, IS = plotting.GREY, plotting.COLOURS[0]
+WAS, IS = plots.GREY, plots.COLOURS[0]
 FAINT = 1e-4  # of the largest share: smaller couplings are not drawn
 Picture = tuple[Callable[[], Figure], str]  # what draws it, and its caption
 SYMBOLS = {'delta_xi': r'\Delta\xi', 'delta_pi': r'\Delta\pi'}
@@ -57,7 +57,7 @@ def _couplings(document: Mapping[str, Any]) -> Picture:
     rows = [row for row in document['ranking'] if max(row['share'].values()) > FAINT * largest]
 
     def draw() -> Figure:
-        figure = plotting.new_figure(0.9 + 0.27 * len(rows))
+        figure = plots.new_figure(0.9 + 0.27 * len(rows))
         axes = figure.subplots()
         for y, row in enumerate(rows):
             before, after = (
@@ -102,7 +102,7 @@ def _reduced(result: Design) -> Picture:
     unit = next(row['unit'] for row in document['measures'] if row['name'] == f'{kind}_max.{dof}')
 
     def draw() -> Figure:
-        figure = plotting.new_figure(2.5)
+        figure = plots.new_figure(2.5)
         ratios = (1, 1.9) if split else (1,)
         grid = figure.subplots(1, len(parts), squeeze=False, width_ratios=ratios)[0]
         for axes, part in zip(grid, parts, strict=True):
@@ -130,7 +130,7 @@ def _upsilon(result: Design) -> Picture:
     top = max(size.max() for size in sizes.values())
 
     def draw() -> Figure:
-        figure = plotting.new_figure(3.4)
+        figure = plots.new_figure(3.4)
         grid = figure.subplots(1, 2)
         for i, (axes, (key, U)) in enumerate(zip(grid, pair.items(), strict=True)):
             axes.imshow(sizes[key], cmap='Blues', vmin=0.0, vmax=top)
@@ -142,7 +142,7 @@ def _upsilon(result: Design) -> Picture:
             axes.grid(False)
             axes.set_xticks(range(6), DOFS, rotation=45, ha='right')
             axes.set_yticks(range(6), DOFS if i == 0 else [''] * 6)
-            plotting.letter(axes, i, key)
+            plots.letter(axes, i, key)
         label = 'weight of the entry (free of units)'
         figure.colorbar(grid[0].images[0], ax=grid, label=label, shrink=0.8)
         return figure

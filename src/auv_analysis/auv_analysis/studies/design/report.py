@@ -4,11 +4,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.output.text import number
-from auv_analysis.report.document import Block, Section, Sentence
-from auv_analysis.report.figure_files import FigureRecord
-from auv_analysis.report.quantities import Maths
-from auv_analysis.report.rendering import write_document
+from auv_analysis.output.text import Maths, number
+from auv_analysis.report.document import Block, Section, Sentence, write_document
+from auv_analysis.report.plots import FigureRecord
 from auv_analysis.studies.design import tables
 from auv_analysis.studies.design.plots import draw_design
 from auv_analysis.studies.design.prediction import AT_REST, OTHERS, SIZE

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from auv_analysis.output.text import MISSING, plain
+from auv_analysis.output.text import MISSING, Maths, plain
 from auv_analysis.report.document import Cell, Column, Table, cell, percent
-from auv_analysis.report.quantities import Maths
 from auv_analysis.studies.design.change import part_words
 from auv_analysis.studies.design.printed import change
 

@@ -11,9 +11,8 @@ from rich.console import Console
 from rich.table import Table
 
 from auv_analysis.output.progress import TextConsole
-from auv_analysis.report import plotting
-from auv_analysis.report.figure_files import Drawn, FigureRecord, save_figures
-from auv_analysis.report.plotting import COLOURS, GREY
+from auv_analysis.report import plots
+from auv_analysis.report.plots import COLOURS, GREY, Drawn, FigureRecord, save_figures
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.studies.linearize.linearize import Linearization, linearize
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -180,11 +179,11 @@ def _pole_map(models: Mapping[str, Linearization]) -> Drawn:
     every = np.concatenate(list(poles.values()))
     sizes = np.abs(every)[np.abs(every) > 1e-9]
     near = SLOW * float(np.median(sizes)) if len(sizes) else 1.0
-    figure = plotting.new_figure(3.1)
+    figure = plots.new_figure(3.1)
     panels = figure.subplots(1, 2)
     for index, (axes, limit) in enumerate(zip(panels, (np.abs(every).max(), near), strict=True)):
         _panel(axes, poles, max(float(limit), 1e-9))
-        plotting.letter(axes, index, ('all poles', 'the slow ones')[index])
+        plots.letter(axes, index, ('all poles', 'the slow ones')[index])
     panels[0].set_ylabel('imaginary part (rad/s)')
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc='outside lower center', ncols=min(len(labels), 4))

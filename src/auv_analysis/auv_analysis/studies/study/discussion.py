@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.summary import TRANSIENT
-from auv_analysis.output.text import fixed, join, number
+from auv_analysis.output.text import Maths, fixed, join, number
 from auv_analysis.report.document import Sentence
-from auv_analysis.report.quantities import Maths
 from auv_dynamics.vehicle import DOFS
 
 Summary = Mapping[str, Any]

@@ -6,6 +6,7 @@ from pathlib import Path
 import pyarrow as pa
 from pyarrow import parquet
 
+from auv_analysis.herman2018.cases import PaperClaims
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.metrics.energy import kinetic_energy
 from auv_analysis.report.document import Block, Section, Sentence
@@ -18,7 +19,6 @@ from auv_analysis.studies.study.sensitivity_report import (
     sensitivity_table,
     write_sensitivities,
 )
-from auv_analysis.study.paper_claims import PaperClaims
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import ControlModel, control_model
 

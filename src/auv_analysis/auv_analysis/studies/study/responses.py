@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from auv_analysis.report.evidence import Response
+from auv_analysis.herman2018.evidence import Response
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario

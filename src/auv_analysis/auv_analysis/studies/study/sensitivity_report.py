@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from auv_analysis.metrics.quantities import gain_mathtext as mathtext
 from auv_analysis.output.new_files import write_table
-from auv_analysis.output.text import fixed, join, number, plain
-from auv_analysis.report import plotting
+from auv_analysis.output.text import Maths, fixed, join, number, plain, symbol
+from auv_analysis.report import plots
 from auv_analysis.report.document import Cell, Column, Sentence, Table
-from auv_analysis.report.figure_files import FigureRecord
-from auv_analysis.report.quantities import Maths, mathtext, symbol
+from auv_analysis.report.plots import FigureRecord
 from auv_analysis.studies.study.kpis import Excluded
 from auv_analysis.studies.study.sensitivity import Index, Sensitivity, Variable
 
@@ -254,15 +254,15 @@ def sensitivity_figure(found: Sensitivity, folder: Path) -> FigureRecord:
     if not shown:
         return FigureRecord(name, title, f'{title}: nothing to draw.', None, None)
     sobol = found.method == 'sobol'
-    with plotting.style():
-        figure = plotting.new_figure(ROW * len(shown) + 0.9)
+    with plots.style():
+        figure = plots.new_figure(ROW * len(shown) + 0.9)
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.5, 1.0))
         _bars(left, shown)
         _map(right, shown, found)
         _part(left, right, shown)
-        plotting.letter(left, 0, 'spread, 95 % interval')
-        plotting.letter(right, 1, 'total index $S_T$' if sobol else r'$\mu^*$')
-        files = plotting.save(figure, folder, name)
+        plots.letter(left, 0, 'spread, 95 % interval')
+        plots.letter(right, 1, 'total index $S_T$' if sobol else r'$\mu^*$')
+        files = plots.save(figure, folder, name)
     what = (
         'share of its variance that each gain makes, alone and with the others (total index of '
         'Sobol’; the sum may exceed 1)'
@@ -283,7 +283,7 @@ def _bars(axes: Axes, shown: list[Variable]) -> None:
         np.array([getattr(variable, name) for variable in shown])
         for name in ('spread', 'spread_low', 'spread_high')
     )
-    colours = [plotting.COLOURS[SHOWN.index(variable.figure.name)] for variable in shown]
+    colours = [plots.COLOURS[SHOWN.index(variable.figure.name)] for variable in shown]
     axes.barh(rows, spread, color=colours, height=0.72)
     axes.errorbar(
         spread, rows, xerr=[np.maximum(spread - low, 0.0), np.maximum(high - spread, 0.0)],
@@ -317,5 +317,5 @@ def _part(left: Axes, right: Axes, shown: list[Variable]) -> None:
     names = [variable.figure.name for variable in shown]
     for i in range(1, len(names)):
         if names[i] != names[i - 1]:
-            left.axhline(i - 0.5, color=plotting.GREY, linewidth=0.6)
+            left.axhline(i - 0.5, color=plots.GREY, linewidth=0.6)
             right.axhline(i - 0.5, color='white', linewidth=2.5)

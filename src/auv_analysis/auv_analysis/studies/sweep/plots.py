@@ -12,10 +12,18 @@ from matplotlib.figure import Figure
 
 from auv_analysis.metrics.measures import BY_NAME, Measure
 from auv_analysis.output.text import join, plain, typeset
-from auv_analysis.report import plotting
-from auv_analysis.report.figure_files import FigureRecord, save_figures
-from auv_analysis.report.grids import Grid, draw_grid, grid_figure, scale_bar, small_heads
-from auv_analysis.report.plotting import COLOURS, GREY
+from auv_analysis.report import plots
+from auv_analysis.report.plots import (
+    COLOURS,
+    GREY,
+    FigureRecord,
+    Grid,
+    draw_grid,
+    heat_map,
+    save_figures,
+    scale_bar,
+    small_heads,
+)
 from auv_analysis.studies.compare.plots import look
 from auv_analysis.studies.sweep.analysis import SAMPLE, Results, Row
 from auv_analysis.studies.sweep.factors import Varied, cut, short_names, with_unit
@@ -83,7 +91,7 @@ def logarithmic(axes: Axes, direction: str, values: np.ndarray) -> None:
 
 def _distributions(results: Results) -> Drawn:
     down = -(-len(results.measures) // 4)
-    figure = plotting.new_figure(0.4 + 1.75 * down)
+    figure = plots.new_figure(0.4 + 1.75 * down)
     panels = figure.subplots(down, 4, squeeze=False, sharey=True).ravel()
     controllers = results.sweep.controllers
     for axes, measure in zip(panels, results.measures, strict=False):
@@ -152,7 +160,7 @@ def _influence(results: Results) -> Drawn:
                 decimals=0,
             )
         )
-    figure = grid_figure([m.label for m in results.measures], grids)
+    figure = heat_map([m.label for m in results.measures], grids)
     small_heads(figure, grids)
     title = 'What matters'
     caption = (
@@ -172,7 +180,7 @@ def dependence(
 ) -> tuple[Figure, str, str]:
     """Quantiles of measures in the groups of a path. Returns figure, title and caption."""
     down = -(-len(measures) // ACROSS)
-    figure = plotting.new_figure(0.5 + 1.95 * down)
+    figure = plots.new_figure(0.5 + 1.95 * down)
     panels = figure.subplots(down, ACROSS, squeeze=False).ravel()
     controllers = [name for name in results.sweep.controllers if varied.concerns(name)]
     for axes, measure in zip(panels, measures, strict=False):
@@ -277,7 +285,7 @@ def total_indices(results: Results) -> Drawn:
         heads = [names[path] for path in paths]
         known = np.array(values, float)
         grids.append(Grid(known, heads, label, 'Blues', Normalize(0.0, 1.0), decimals=2))
-    figure = grid_figure([BY_NAME[name].label for name in figures], grids)
+    figure = heat_map([BY_NAME[name].label for name in figures], grids)
     small_heads(figure, grids)
     title = 'Total sensitivity indices'
     caption = (
@@ -298,7 +306,7 @@ def effects(results: Results, measures: Sequence[Measure]) -> Drawn:
     names, paths = short_names(results.varied), list(dict.fromkeys(row['path'] for row in rows))
     controllers = list(dict.fromkeys(row['controller'] for row in rows))
     down = -(-len(shown) // ACROSS)
-    figure = plotting.new_figure(0.5 + 2.0 * down)
+    figure = plots.new_figure(0.5 + 2.0 * down)
     panels = figure.subplots(down, ACROSS, squeeze=False).ravel()
     for axes, measure in zip(panels, shown, strict=False):
         mine = [row for row in rows if row['figure'] == measure.name]
@@ -307,7 +315,7 @@ def effects(results: Results, measures: Sequence[Measure]) -> Drawn:
             marker = 'os^vPX'[controllers.index(row['controller']) % 6]
             axes.plot(row['mu_star'], row['sigma'], marker, color=style['color'], markersize=5)
         ends = [0.0, max((row['mu_star'] for row in mine), default=1.0) * 1.1]
-        axes.plot(ends, ends, color=plotting.GREY, linewidth=0.7, linestyle=(0, (1, 2)))
+        axes.plot(ends, ends, color=plots.GREY, linewidth=0.7, linestyle=(0, (1, 2)))
         axes.set_title(f'{measure.label} ({measure.unit})', loc='left', fontsize='medium')
         axes.tick_params(labelsize='small')
         axes.margins(0.1)
@@ -339,7 +347,7 @@ def together(results: Results, measures: Sequence[Measure]) -> Drawn:
         for name in results.sweep.controllers
         if any(row['controller'] == name for row in results.tables['together'])
     ][:MOST_GRIDS]
-    figure = plotting.new_figure(0.5 + 2.6 * len(measures))
+    figure = plots.new_figure(0.5 + 2.6 * len(measures))
     panels = figure.subplots(len(measures), len(controllers), squeeze=False)
     first, second = results.pair
     names = short_names(results.varied)
@@ -387,7 +395,7 @@ def failures(results: Results) -> Drawn:
     names = short_names(results.varied)
     across = min(len(paths), 3)
     down = -(-len(paths) // across)
-    figure = plotting.new_figure(0.5 + 2.2 * down)
+    figure = plots.new_figure(0.5 + 2.2 * down)
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for axes, path in zip(panels, paths, strict=False):
         rows = [row for row in results.tables['failures'] if row['path'] == path]

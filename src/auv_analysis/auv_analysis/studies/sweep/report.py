@@ -8,11 +8,18 @@ from typing import Any
 from auv_analysis.metrics.measures import BY_NAME
 from auv_analysis.output.folder import SWEEP, results_folder
 from auv_analysis.output.progress import console, say, waiting
-from auv_analysis.output.text import join, number
-from auv_analysis.report.document import Block, Cell, Column, Section, Sentence, Table, cell
-from auv_analysis.report.figure_files import FigureRecord
-from auv_analysis.report.quantities import Maths
-from auv_analysis.report.rendering import write_document
+from auv_analysis.output.text import Maths, join, number
+from auv_analysis.report.document import (
+    Block,
+    Cell,
+    Column,
+    Section,
+    Sentence,
+    Table,
+    cell,
+    write_document,
+)
+from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.tables.sources import count, pointer
 from auv_analysis.studies.sweep.analysis import (
     BEST_BY,

@@ -10,9 +10,8 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from auv_analysis.report import plotting
-from auv_analysis.report.figure_files import FigureRecord, save_figures
-from auv_analysis.report.plotting import COLOURS, DASHES, GREY
+from auv_analysis.report import plots
+from auv_analysis.report.plots import COLOURS, DASHES, GREY, FigureRecord, save_figures
 from auv_analysis.studies.optimise import GRADIENT
 from auv_analysis.studies.pairs import KNOWN, log_ratios
 from auv_analysis.studies.tune.cost import MEANINGS, Measures
@@ -35,7 +34,7 @@ def pictures(outcome: Tuning, folder: Path) -> list[FigureRecord]:
 
 def trade_off(outcome: Tuning) -> Drawn:
     """Error and effort of every gain that was tried, and the line of equality."""
-    figure = plotting.new_figure(4.2)
+    figure = plots.new_figure(4.2)
     axes = figure.add_subplot()
     least = min(1.0, *(_law(axes, outcome, name) for name in outcome.laws))
     _controllers(axes, outcome)
@@ -105,7 +104,7 @@ def _front(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def distributions(outcome: Tuning) -> Drawn:
     """Empirical distribution functions of error and effort over the draws."""
-    figure = plotting.new_figure(3.2)
+    figure = plots.new_figure(3.2)
     every = outcome.draws.values()
     shown = [
         measure
@@ -138,7 +137,7 @@ def paired(outcome: Tuning) -> Drawn:
     """Ratios to the reference, draw by draw."""
     reference = outcome.request.reference
     names = [name for name in outcome.draws if name != reference]
-    figure = plotting.new_figure(0.9 + 0.42 * len(names))
+    figure = plots.new_figure(0.9 + 0.42 * len(names))
     shown = outcome.goal.index, 'effort'
     for i, measure in enumerate(shown):
         axes = figure.add_subplot(1, len(shown), i + 1)

@@ -6,10 +6,8 @@ from rich.table import Table
 
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import console, say
-from auv_analysis.output.text import number
-from auv_analysis.report.document import Block, Section
-from auv_analysis.report.quantities import Maths
-from auv_analysis.report.rendering import write_document
+from auv_analysis.output.text import Maths, number
+from auv_analysis.report.document import Block, Section, write_document
 from auv_analysis.studies.tune import tables
 from auv_analysis.studies.tune.plots import pictures
 from auv_analysis.studies.tune.results import (

@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from auv_analysis.output.text import MISSING
+from auv_analysis.output.text import MISSING, Maths, symbol
 from auv_analysis.report.document import Cell, Column, Table, cell, percent
-from auv_analysis.report.quantities import Maths, symbol
-from auv_analysis.report.words import gain_text
+from auv_analysis.report.scenario_text import gain_text
 from auv_analysis.studies.tune.cost import MEANINGS, Measures
 from auv_analysis.studies.tune.verdict import p_text
 

@@ -23,7 +23,6 @@ N = (300.0, 500.0, 500.0, 40.0, 175.5, 141.1)  # kg, kg m2; (38)
 KINETIC_ENERGY = 519.47  # J; section 5, step 4
 SHARES = (23.34, 0.00, 76.57, 0.01, 0.00, 0.08)  # %; section 5, step 4
 SWAY_DEFORMATION = 0.01  # m/s; section 5, step 5
-SHARES_DIGIT = 0.005  # %, half of the last digit that is printed
 ENERGY_WINDOW = summary.ENERGY_WINDOW  # s
 
 _BOTH = {
@@ -73,3 +72,10 @@ def paper_figure(run: Facts, kind: str) -> str | None:
     """Number of the paper's figure that a run's figure of this kind reproduces, or None."""
     number = FIGURES.get(run.scenario, {}).get((kind, run.law))
     return number if number and paper_run({run.controller: run}, run.law) else None
+
+
+def paper_figures(run: Facts) -> list[str]:
+    """Which figures of a run show what a figure of the paper shows, in words."""
+    found = {kind: paper_figure(run, kind) for kind in ('errors', 'lumped_error', 'inputs')}
+    found |= {kind: paper_figure(run, kind) for kind in ('delta_xi', 'delta_pi')}
+    return [f'{kind} is the paper’s figure {number}' for kind, number in found.items() if number]

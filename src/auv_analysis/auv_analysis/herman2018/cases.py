@@ -1,15 +1,13 @@
-"""All 21 claims of Herman 2018 in a study of one of its cases, the other one simulated too."""
+"""All 21 claims in a study of one of the paper's cases, the other one simulated too."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from auv_analysis.report import paper
-from auv_analysis.report.claim import BOTH, Claim
-from auv_analysis.report.claims import judged
-from auv_analysis.report.evidence import Evidence, Response, Signals
-from auv_analysis.report.sketch import Sketch
-from auv_analysis.report.sketching import sketches
+from auv_analysis.herman2018 import paper
+from auv_analysis.herman2018.claims import judged
+from auv_analysis.herman2018.evidence import BOTH, Claim, Evidence, Response, Signals
+from auv_analysis.report.digest import Sketch, sketches
 from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario, load_scenario

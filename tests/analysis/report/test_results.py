@@ -1,0 +1,98 @@
+"""Results: stored once, every view says the same, every pointer leads to the number shown."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pyarrow.parquet as parquet
+import pytest
+from rich.console import Console
+
+from auv_analysis.metrics.quantities import METRICS, SIGNALS, mathtext, quantity
+from auv_analysis.output.text import MISSING
+from auv_analysis.report.results import Column, Results, numbers_of, terminal, to_csv
+from auv_dynamics.vehicle import DOFS
+
+ROWS = [
+    {'controller': '<a>', 'effort.rms.surge': 1234.5, 'share': 0.25, 'verdict': 'good', 'n': 3},
+    {'controller': 'b', 'effort.rms.surge': None, 'share': float('nan'), 'verdict': '', 'n': 12000},
+]
+SHOWN = {
+    'controller': 'controller',
+    'effort.rms.surge': Column(quantity('effort.rms.surge'), group='input'),
+    'share': Column('share', scale=100.0, decimals=1, kind='verdict'),
+    'n': 'count',
+}
+
+
+@pytest.fixture(name='results')
+def results_fixture() -> Results:
+    results = Results('study', {'seed': 7})
+    results.add('draws', 'What was drawn.', ROWS, SHOWN)
+    results.add('listed', 'What is listed.', ROWS, SHOWN, file='')
+    return results
+
+
+def test_results_are_written_once_with_unknown_as_null(results: Results, tmp_path: Path) -> None:
+    paths = results.write(tmp_path)
+    assert [path.name for path in paths] == ['study.json', 'draws.parquet']
+    document = json.loads(paths[0].read_text())
+    assert document['seed'] == 7
+    assert document['listed'][1]['share'] is None
+    assert 'draws' not in document
+    table = parquet.read_table(paths[1])
+    assert table.to_pylist()[0] == ROWS[0]
+    assert table['share'].null_count == 1
+    about = table.schema.field('effort.rms.surge').metadata
+    assert about[b'unit'] == b'N'
+    assert about[b'meaning'].startswith(b'root mean square')
+
+
+def test_every_pointer_leads_to_the_number_that_is_shown(results: Results, tmp_path: Path) -> None:
+    paths = results.write(tmp_path)
+    document, table = json.loads(paths[0].read_text()), parquet.read_table(paths[1]).to_pylist()
+    shown = [*numbers_of(results.tables.values())]
+    assert len(shown) == 8
+    for row in shown:
+        file, _, place = row['source'].partition(':')
+        place, _, factor = place.partition('*')
+        if file == 'study.json':
+            _, name, index, column = place.split('/')
+            value = document[name][int(index)][column]
+        else:
+            column, _, index = place.removesuffix(']').partition('[')
+            value = table[int(index)][column]
+        assert value * float(factor or 1) == row['value']
+
+
+def test_a_share_is_shown_in_percent_with_its_verdict(results: Results) -> None:
+    (first, second) = results.tables['draws'].rows
+    assert (first[2].text, first[2].value, first[2].kind) == ('25.0', 25.0, 'good')
+    assert [cell.text for cell in second] == ['b', MISSING, MISSING, '12\u202f000']
+    assert [head.unit for head in results.tables['draws'].columns] == ['', 'N', '%', '']
+
+
+def test_terminal_and_csv_show_the_same_table(results: Results) -> None:
+    table = results.tables['draws']
+    console = Console(width=100, file=io.StringIO(), markup=False)
+    console.print(terminal(table))
+    assert '1\u202f234' in console.file.getvalue()
+    rows = list(csv.reader(io.StringIO(to_csv(table))))
+    assert rows[0] == ['controller', 'input RMS input, surge, N', 'share, %', 'count']
+    assert rows[1] == ['<a>', '1234.5', '25.0', '3']
+
+
+@pytest.mark.parametrize('name', [*METRICS])
+def test_a_metric_of_a_degree_of_freedom_has_one_unit(name: str) -> None:
+    units = {quantity(f'{name}.{dof}').unit for dof in DOFS}
+    assert all(unit and ',' not in unit for unit in units)
+    assert len(units) == len(set(METRICS[name].units))
+    assert quantity(f'overall.{name}.angular').unit == METRICS[name].units[1]
+
+
+def test_symbols_are_set_for_plots() -> None:
+    assert mathtext('Δξ_1') == r'$\Delta \xi_{1}$'
+    assert mathtext('omega_f') == r'$\omega_{f}$'
+    assert SIGNALS['tau'].axis([0, 2]) == r'$\tau_{X}$, $\tau_{Z}$ (N)'
+    assert quantity('no such column').label == 'no such column'

@@ -1,21 +1,16 @@
 """`auv linearize`: poles and matrices of a vehicle, or of a scenario's closed loops."""
 
+from __future__ import annotations
+
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from auv_analysis.output.folder import results_folder
-from auv_analysis.output.new_files import write_json
-from auv_analysis.output.progress import say, waiting
-from auv_analysis.scenario.scaling import UNFIT
-from auv_analysis.scenario.scenario import Scenario, load_scenario
-from auv_analysis.studies.linearize.modes import document_of, linear_models, print_poles
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.files.shipped import shipped
-from auv_dynamics.files.yaml_files import read_yaml
-from auv_dynamics.vehicle.vehicle import Vehicle
-from auv_dynamics.vehicle.vehicle_file import load_vehicle
-from auv_gvc_controller.laws.law import refusal
+
+if TYPE_CHECKING:
+    from auv_analysis.scenario.scenario import Scenario
+    from auv_dynamics.vehicle.vehicle import Vehicle
 
 DOCUMENT = 'linearization.json'
 LONGEST = 90  # of the name in that of the folder
@@ -23,6 +18,14 @@ LONGEST = 90  # of the name in that of the folder
 
 def linearize(options: argparse.Namespace) -> dict[str, Any]:
     """Poles and matrices of a vehicle, or of a scenario's closed loops."""
+    from auv_analysis.output.folder import results_folder
+    from auv_analysis.output.new_files import write_json
+    from auv_analysis.output.progress import say, waiting
+    from auv_analysis.scenario.scaling import UNFIT
+    from auv_analysis.scenario.scenario import Scenario
+    from auv_analysis.studies.linearize.modes import document_of, linear_models, print_poles
+    from auv_gvc_controller.laws.law import refusal
+
     subject, paths = _subject(options.subject)
     names = _controllers(subject, options.controller, paths[0])
     eta0 = None if options.attitude is None else [0.0, 0.0, 0.0, *options.attitude]
@@ -49,6 +52,11 @@ def linearize(options: argparse.Namespace) -> dict[str, Any]:
 
 def _subject(given: str) -> tuple[Vehicle | Scenario, list[Path]]:
     """What is linearised, a scenario being what has controllers, and the files it was read from."""
+    from auv_analysis.scenario.scenario import load_scenario
+    from auv_dynamics.files.shipped import shipped
+    from auv_dynamics.files.yaml_files import read_yaml
+    from auv_dynamics.vehicle.vehicle_file import load_vehicle
+
     for kind in ('scenarios', 'vehicles'):
         try:
             path = shipped(kind, given)
@@ -63,6 +71,8 @@ def _subject(given: str) -> tuple[Vehicle | Scenario, list[Path]]:
 
 
 def _controllers(subject: Vehicle | Scenario, asked: list[str] | None, path: Path) -> list[str]:
+    from auv_analysis.scenario.scenario import Scenario
+
     if isinstance(subject, Scenario):
         names = list(dict.fromkeys(asked or subject.controllers))
         for name in names:

@@ -1,23 +1,25 @@
 """`auv import-vehicle` and `auv export-vehicle`: vehicle parameters from and to other systems."""
 
+from __future__ import annotations
+
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from auv_analysis.formats.convert import read_vehicle, vehicle_text
-from auv_analysis.formats.imported import Choices, Draft
-from auv_analysis.formats.sdf import notes, sdf_text
-from auv_analysis.output.new_files import write_text
-from auv_analysis.output.progress import say
-from auv_dynamics.files.shipped import shipped
-from auv_dynamics.files.yaml_files import parse_yaml, read_yaml
-from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
+if TYPE_CHECKING:
+    from auv_analysis.formats.imported import Draft
 
 NAMES = {'uuv': 'uuv_simulator', 'gazebo': 'Gazebo', 'mss': 'a list of derivatives'}
 
 
 def import_vehicle(options: argparse.Namespace) -> dict[str, Any]:
     """A vehicle file of what another system holds of a vehicle."""
+    from auv_analysis.formats.convert import read_vehicle, vehicle_text
+    from auv_analysis.formats.imported import Choices
+    from auv_analysis.output.new_files import write_text
+    from auv_dynamics.files.yaml_files import parse_yaml
+    from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
+
     chosen = {name: getattr(options, name) for name in Choices.__dataclass_fields__}
     kind, draft = read_vehicle(options.file, options.format, Choices(**chosen))
     name = options.out.stem if options.out else draft.name
@@ -38,6 +40,8 @@ def import_vehicle(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _report(draft: Draft, warnings: list[str]) -> None:
+    from auv_analysis.output.progress import say
+
     for title, sentences in draft.report.items():
         for sentence in sentences:
             say(f'{title}: {sentence}')
@@ -47,6 +51,13 @@ def _report(draft: Draft, warnings: list[str]) -> None:
 
 def export_vehicle(options: argparse.Namespace) -> dict[str, Any]:
     """A vehicle as an SDF model for Gazebo."""
+    from auv_analysis.formats.sdf import notes, sdf_text
+    from auv_analysis.output.new_files import write_text
+    from auv_analysis.output.progress import say
+    from auv_dynamics.files.shipped import shipped
+    from auv_dynamics.files.yaml_files import read_yaml
+    from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
+
     path = shipped('vehicles', options.vehicle)
     data = read_yaml(path, 'vehicle')
     vehicle = vehicle_from_dict(data, path)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from auv_analysis.simulation.reduction import COLUMNS
-from auv_analysis.studies.sweep.analysis import Results
+from auv_analysis.studies.sweep.analysis import Analysis
 from auv_analysis.studies.sweep.blocks import table_of
 from auv_analysis.studies.sweep.campaign import Campaign, load_campaign
 from auv_analysis.studies.sweep.folder import sweep_folder
@@ -104,6 +104,6 @@ def change_manifest(out: Path, **entries: object) -> None:
     path.write_text(json.dumps(json.loads(path.read_text()) | entries))
 
 
-def rows(results: Results, table: str, **names: object) -> list[dict]:
+def rows(results: Analysis, table: str, **names: object) -> list[dict]:
     """Rows of a table of what was found, with these entries."""
     return [r for r in results.tables[table] if all(r[k] == v for k, v in names.items())]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.bag.foreign_topics import OPTIONS, TopicMap, read_mapping
-from auv_analysis.cli.conclude import conclude
+from auv_analysis.cli.conclude import conclude, show
 from auv_analysis.output.folder import Results, check_free, results_folder
 from auv_analysis.output.progress import waiting
 from auv_analysis.studies.compare.sources import Source, is_sweep, named, open_source, sources_of
@@ -29,7 +29,8 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
             raise InputError('--no-report', '', 'runs', f'{sweeps[0]}, a sweep')
         from auv_analysis.studies.sweep.report import explore
 
-        return explore(Path(sweeps[0]), options)
+        chosen = {'out': options.out, 'by': options.by, 'overwrite': options.overwrite}
+        return explore(Path(sweeps[0]), **chosen)
     _import_laws(options.law or ())
     mapping = _mapping(options)
     sources = sources_of(options.results, mapping, options.namespace)
@@ -77,7 +78,9 @@ def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, A
     with waiting(f'reading {len(sources)} runs'):
         entries = entries_of(sources, options.vehicle)
     with _folder([entry.scenario for entry in entries], sources, options) as results:
-        return conclude_comparison(results.folder, entries, report=not options.no_report)
+        summaries = conclude_comparison(results.folder, entries, report=not options.no_report)
+    show({name: summary for name, summary in summaries.items() if summary})
+    return summaries
 
 
 def _folder(

@@ -24,8 +24,8 @@ from auv_analysis.output.text import MISSING, Maths, fixed, join, number, plain
 from auv_analysis.report import plots
 from auv_analysis.report.digest import Sketch, sketches
 from auv_analysis.report.document import Block, Cell, Column, Section, Sentence, Table, cell
-from auv_analysis.report.plots import DASHES, GREY, Drawn, FigureRecord, save_figures
-from auv_analysis.report.run_plots import RUNS, common_bands, left_out
+from auv_analysis.report.plots import DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
+from auv_analysis.report.run_plots import common_bands, left_out
 from auv_analysis.runs.run import AnyRun
 from auv_dynamics.dofs import DOFS
 

@@ -21,7 +21,7 @@ from auv_analysis.output.text import join, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import FOREVER, Sketch, alike, common_window, sketches
 from auv_analysis.report.panels import different_disturbances
-from auv_analysis.report.plots import COLOURS, DASHES, GREY, Drawn, FigureRecord, save_figures
+from auv_analysis.report.plots import COLOURS, DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
 from auv_analysis.report.statistics import Part
 from auv_analysis.runs.run import AnyRun
 from auv_dynamics.dofs import DOFS
@@ -216,7 +216,6 @@ def _whole_panels(run: Sketch, signal: str, quantity: Quantity, drawn: Sequence[
 GREY_LINE = ', and in grey that of a vehicle that moves exactly as the set-point{} asks'
 MARKERS = 'os^vPX'
 SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
-RUNS = ('#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00')  # of three runs and more
 APART = 20.0  # ratio of peaks from which runs share no linear scale
 XI = tuple(rf'$\xi_{i}$' for i in range(1, 7))
 

@@ -1,9 +1,8 @@
-"""Figures of a comparison, whatever the number of its runs."""
+"""Plots of a comparison, whatever the number of its runs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -15,26 +14,11 @@ from auv_analysis.metrics.measures import FAMILIES
 from auv_analysis.metrics.summary import BAND_TEXT, DWELL, band_of
 from auv_analysis.report import plots
 from auv_analysis.report.digest import Sketch
-from auv_analysis.report.plots import (
-    ALWAYS,
-    COLOURS,
-    DASHES,
-    GREY,
-    MARGIN,
-    ROW,
-    TALLEST,
-    FigureRecord,
-    Grid,
-    heat_map,
-    name_rows,
-    save_figures,
-)
-from auv_analysis.report.run_plots import RUNS, XI
+from auv_analysis.report.plots import ALWAYS, COLOURS, GREY, MOST_LINES, FigureRecord, Grid, look
+from auv_analysis.report.run_plots import XI
 from auv_analysis.studies.compare.ranking import Entry, Ranking
 from auv_dynamics.vehicle import DOFS
 
-MANY = (*RUNS, COLOURS[-1], '#8c8c8c')
-MOST_LINES = len(MANY)  # that can be told apart in a panel
 MOST_PANELS = 12
 ACROSS = 4  # panels in a row
 SMALLEST, LARGEST = 1e-3, 1e4  # of the axis, multiples of the band
@@ -56,7 +40,7 @@ MARKS = 'pale 0: exactly zero; crossed out: there is none'
 def draw(
     entries: Sequence[Entry], table: pa.Table, ranking: Ranking, folder: Path
 ) -> dict[str, FigureRecord]:
-    """Draw the figures of a comparison as PNG and PDF: name -> figure.
+    """Draw the plots of a comparison as PNG and PDF: name -> plot.
 
     Parameters
     ----------
@@ -72,7 +56,7 @@ def draw(
         'kinetic_energy': partial(_energy, table),
         **{name: partial(_six, name, table) for name in SIX},
     }
-    return save_figures(folder, drawn)
+    return plots.save_figures(folder, drawn)
 
 
 def column(table: pa.Table, name: str) -> np.ndarray:
@@ -97,7 +81,7 @@ def _six(name: str, table: pa.Table) -> Drawn:
     ]
     always = f', {ALWAYS}: for every motion by the structure of M' if zeros.any() else ''
     caption = f'{title}, a row per run ({entry.meaning}); {MARKS}{always}.'
-    return heat_map(table['run'].to_pylist(), grids), title, caption
+    return plots.heat_map(table['run'].to_pylist(), grids), title, caption
 
 
 def structural(table: pa.Table, family: str) -> np.ndarray:
@@ -112,7 +96,7 @@ def structural(table: pa.Table, family: str) -> np.ndarray:
 def _energy(table: pa.Table) -> Drawn:
     """Shares of the mean kinetic energy as bars, and the energy beside them."""
     names, shares = table['run'].to_pylist(), six(table, 'kinetic_energy.shares_percent')
-    figure = plots.new_figure(min(MARGIN + ROW * len(names), TALLEST))
+    figure = plots.new_figure(min(plots.MARGIN + plots.ROW * len(names), plots.TALLEST))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
     places = np.arange(len(names))
     known = np.nan_to_num(shares)
@@ -122,7 +106,7 @@ def _energy(table: pa.Table) -> Drawn:
     handles = [Line2D([], [], color=COLOURS[i], linewidth=6) for i in range(6)]
     labels = [f'{XI[i]} {DOFS[i]}' for i in range(6)]
     figure.legend(handles, labels, loc='outside upper right', ncols=6, handlelength=0.9)
-    name_rows(left, names, len(names))
+    plots.name_rows(left, names, len(names))
     left.set(xlim=(0.0, 100.0), ylim=(len(names) - 0.5, -0.5), xlabel='share (%)')
     mean = column(table, 'kinetic_energy.mean')
     right.plot(mean, places, 'o', color='#1a1a1a', markersize=4)
@@ -155,7 +139,7 @@ def _ranking(ranking: Ranking) -> Drawn:
         Normalize(-end, end),
         decimals=1,
     )
-    figure = heat_map(ranking.runs, [grid])
+    figure = plots.heat_map(ranking.runs, [grid])
     axes = figure.axes[0]
     axes.tick_params(axis='x', labelrotation=90, labelsize='small')
     text = (
@@ -233,34 +217,22 @@ def _groups(entries: Sequence[Entry]) -> dict[str, dict[str, Sketch]]:
 
 
 def _panels(groups: Mapping[str, Mapping[str, Sketch]], labels: Sequence[str]) -> Figure:
-    down = -(-len(groups) // ACROSS)
-    across = -(-len(groups) // down)
-    figure = plots.new_figure(0.5 + 1.75 * down)
-    panels = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True).ravel()
-    looks = {label: look(i) for i, label in enumerate(labels)}
-    for axes, (scenario, runs) in zip(panels, groups.items(), strict=False):
+    across = -(-len(groups) // -(-len(groups) // ACROSS))
+    figure, panels = plots.small_multiples(len(groups), across, 1.75, sharex=True, sharey=True)
+    for axes, (scenario, runs) in zip(panels, groups.items(), strict=True):
         for label, run in runs.items():
             t, ratio = still_to_come(run)
-            axes.plot(t[ratio > 0], ratio[ratio > 0], **looks[label])
+            line = look(labels.index(label)) | {'label': label}
+            axes.plot(t[ratio > 0], ratio[ratio > 0], **line)
         axes.axhline(1.0, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
         axes.set_title(scenario, loc='left')
         plots.logarithmic(axes, 'x', 'y')
     low, high = panels[0].get_ylim()
     panels[0].set_ylim(max(low, SMALLEST), min(high, LARGEST))
-    for axes in panels[len(groups) :]:
-        axes.set_axis_off()
-    for axes in panels[max(len(groups) - across, 0) : len(groups)]:
-        axes.tick_params(labelbottom=True)  # nothing is below it
-    handles = [Line2D([], [], **looks[label]) for label in labels]
-    figure.legend(handles, labels, loc='outside upper right', ncols=4, handlelength=2.6)
+    plots.shared_legend(figure)
     figure.supxlabel('$t$ (s)', fontsize='medium')
     figure.supylabel('error still to come / band', fontsize='medium')
     return figure
-
-
-def look(index: int) -> dict[str, Any]:
-    """Colour and dashes of one of `MOST_LINES` lines."""
-    return {'color': MANY[index % len(MANY)], 'linestyle': DASHES[index % len(DASHES)]}
 
 
 def _rows(entries: Sequence[Entry]) -> Figure:
@@ -272,7 +244,7 @@ def _rows(entries: Sequence[Entry]) -> Figure:
         inside = times <= t[-1]
         row[inside] = ratio[np.searchsorted(t, times[inside])]
     shown = np.ma.masked_where(~(values >= 1.0), values)
-    figure = plots.new_figure(min(MARGIN + ROW * len(lines), TALLEST))
+    figure = plots.new_figure(min(plots.MARGIN + plots.ROW * len(lines), plots.TALLEST))
     axes = figure.subplots()
     edges = np.geomspace(first, times[-1], TIMES + 1)
     mesh = axes.pcolormesh(
@@ -280,6 +252,6 @@ def _rows(entries: Sequence[Entry]) -> Figure:
     )
     axes.set(xscale='log', ylim=(len(lines) - 0.5, -0.5), xlabel='$t$ (s)')
     axes.grid(False)
-    name_rows(axes, [entry.name for entry in entries], len(entries))
+    plots.name_rows(axes, [entry.name for entry in entries], len(entries))
     figure.colorbar(mesh, ax=axes, label='log10 of the error still to come / band', fraction=0.04)
     return figure

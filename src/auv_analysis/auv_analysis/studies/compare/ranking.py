@@ -1,4 +1,4 @@
-"""Runs in the order of the measures that sum them up."""
+"""Runs of a comparison as a table with a row each, and their ranks by every measure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from scipy.stats import rankdata
 
 from auv_analysis.metrics.measures import MEASURES, Measure, flat
 from auv_analysis.report.digest import Sketch
+from auv_analysis.report.results import array_of
 
 ERRORS = 'overall.velocity_error.rms.linear'
 
@@ -133,17 +134,11 @@ def comparison_table(entries: Sequence[Entry]) -> pa.Table:
     columns = dict.fromkeys(name for row in rows for name in row)
     last = [measure.name for measure in MEASURES if measure.rule != 'only']
     order = [name for name in columns if name not in last] + last
-    return pa.table({name: _column(name, [row.get(name) for row in rows]) for name in order})
-
-
-def _column(name: str, values: list[Any]) -> pa.Array:
-    """Array of numbers, words or truths; whole numbers among others become floats."""
-    kinds = {type(value) for value in values if value is not None}
-    if not kinds:
-        return pa.nulls(len(values), pa.string() if name in WORDS else pa.float64())
-    if kinds <= {int, float} and kinds != {int}:
-        return pa.array(values, pa.float64())
-    return pa.array(values)
+    values = {name: [row.get(name) for row in rows] for name in order}
+    return pa.table({
+        name: pa.array(column, pa.string()) if name in WORDS else array_of(column)
+        for name, column in values.items()
+    })  # fmt: skip
 
 
 def write_table(table: pa.Table, ranking: Ranking, out: Path) -> None:
@@ -152,7 +147,6 @@ def write_table(table: pa.Table, ranking: Ranking, out: Path) -> None:
     rows = [place.get(run) for run in table['run'].to_pylist()]
     for j, measure in enumerate(ranking.measures):
         ranks = [None if i is None else float(ranking.ranks[i, j]) for i in rows]
-        known = [None if rank is None or np.isnan(rank) else rank for rank in ranks]
-        table = table.append_column(f'rank.{measure.name}', pa.array(known, pa.float64()))
+        table = table.append_column(f'rank.{measure.name}', array_of(ranks))
     parquet.write_table(table, out / TABLE)
     csv.write_csv(table, out / CSV)

@@ -93,18 +93,14 @@ def _energy(name: str, summary: Summary) -> Iterator[Sentence]:
 
 
 def _deformed(kind: str, name: str, summary: Summary) -> Iterator[Sentence]:
-    """Which components are deformed, by how much of themselves, and by which other."""
+    """Which component is deformed most, by how much of itself, and by which other."""
     largest, own = summary['coupling'][f'{kind}_max'], summary[OWN[kind]]['max']
     terms = [term for term in summary['coupling_terms'][kind] if term['share_percent'] is not None]
     what, cause = WORDS[kind]
-    still = []
-    order = sorted(range(6), key=lambda i: -largest[i] / own[i] if own[i] > 0 else -np.inf)
-    for i in order:
+    ratios = [a / b if b > 0 else 0.0 for a, b in zip(largest, own, strict=True)]
+    for i in sorted(range(6), key=lambda i: -ratios[i])[:1]:
         mine = [term for term in terms if term['to'] == DOFS[i]]
-        if not mine or largest[i] == 0:
-            continue
-        if own[i] > 0 and largest[i] < SMALL * own[i]:
-            still.append(DOFS[i])
+        if not mine or ratios[i] < SMALL:
             continue
         main = max(mine, key=lambda term: term['share_percent'])
         unit = UNITS[kind][i // 3]
@@ -112,9 +108,6 @@ def _deformed(kind: str, name: str, summary: Summary) -> Iterator[Sentence]:
         text += f', where it reaches {number(own[i])} {unit} by itself'
         text += f'; the {cause} of {main["from"]} causes {fixed(main["share_percent"], 1)} % of it'
         yield Sentence(f'{text}.', 'table-terms')
-    if still:
-        text = f'Below {100 * SMALL:g} % of the {what} itself is the deformation of {join(still)}'
-        yield Sentence(f'{text}.', 'table-couplings')
 
 
 def _structure(summary: Summary) -> Iterator[Sentence]:

@@ -102,32 +102,18 @@ class Design:
         return first + np.array(inside)
 
 
-@dataclass(frozen=True)
-class Spreads:
-    """Standard deviations of F answers over the box of the factors, and how sure they are.
-
-    Attributes
-    ----------
-    value, low, high : (F,), with the ends of the 95 % interval
-    rank, rank_low, rank_high : (F,) place among the F answers, 1 the largest, and its interval
-
-    """
-
-    value: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    rank: np.ndarray
-    rank_low: np.ndarray
-    rank_high: np.ndarray
-
-
-def spreads(design: Design, answers: np.ndarray) -> Spreads:
-    """Spreads of several answers, their intervals by a bootstrap that keeps the answers paired.
+def spreads(design: Design, answers: np.ndarray) -> dict[str, np.ndarray]:
+    """Standard deviations of several answers, their intervals by a bootstrap that pairs answers.
 
     Parameters
     ----------
     design : whose points were tried
     answers : (n, F) finite
+
+    Returns
+    -------
+    spreads : name -> (F,): spread, spread_low, spread_high and spread_conf, with the 95 % interval
+        and half of it; rank, rank_low, rank_high, place among the F answers, 1 the largest
 
     """
     groups = answers[design.independent]  # (count, m, F)
@@ -141,7 +127,9 @@ def spreads(design: Design, answers: np.ndarray) -> Spreads:
     low, high = np.percentile(again, [tail, 100.0 - tail], axis=0)
     places = _ranks(again)
     ends = np.percentile(places, [tail, 100.0 - tail], axis=0, method='nearest')
-    return Spreads(value[0], low, high, _ranks(value)[0], *ends.astype(int))
+    found = {'spread': value[0], 'spread_low': low, 'spread_high': high}
+    found |= {'spread_conf': 0.5 * (high - low), 'rank': _ranks(value)[0]}
+    return found | dict(zip(('rank_low', 'rank_high'), ends.astype(int), strict=True))
 
 
 def _deviation(weights: np.ndarray, centred: np.ndarray, size: int) -> np.ndarray:

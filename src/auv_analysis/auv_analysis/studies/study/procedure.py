@@ -14,7 +14,7 @@ from auv_analysis.runs.run import AnyRun, Run
 from auv_analysis.studies.study.sensitivity import Sensitivity
 from auv_analysis.studies.study.sensitivity_report import (
     left_out_table,
-    sensitivity_figure,
+    sensitivity_plot,
     sensitivity_sentences,
     sensitivity_table,
     write_sensitivities,
@@ -24,7 +24,7 @@ from auv_gvc_controller.laws.model import ControlModel, control_model
 
 Part = tuple[Section, list[Sentence]]
 GAINS = (
-    'Every gain is multiplied by a number of its own, drawn log-uniformly; each figure of the run '
+    'Every gain is multiplied by a number of its own, drawn log-uniformly; each KPI of the run '
     'is taken by its logarithm, so that its standard deviation is about a relative change. '
     'Sensitive is what has a large one. The index of a gain is the share of the variance that it '
     'makes.'
@@ -53,8 +53,8 @@ def sensitivity_section(out: Path, found: Sequence[Sensitivity]) -> Part:
 def _of_controllers(out: Path, found: Sequence[Sensitivity]) -> Iterator[Block]:
     for of in found:
         if not of.refusal:
-            yield sensitivity_figure(of, out / 'figures')
-            yield sensitivity_table(of)
+            yield sensitivity_plot(of, out / 'figures')
+            yield sensitivity_table(found, of.controller)
     left_out = left_out_table(found)
     if left_out is not None:
         yield left_out

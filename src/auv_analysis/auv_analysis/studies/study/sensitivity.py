@@ -4,7 +4,7 @@ A sweep of the gains: a design of factors, rollouts at its points, Sobol' or Mor
 logarithms of the KPIs.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,94 +18,20 @@ from auv_analysis.simulation.kernels import IN_PYTHON
 from auv_analysis.simulation.rollouts import batch_of, rollouts
 from auv_analysis.simulation.variants import packed_variants
 from auv_analysis.studies.study.indices import Design, Method, spreads
-from auv_analysis.studies.study.kpis import Excluded, Figure, sort_out
+from auv_analysis.studies.study.kpis import Excluded, Kpi, sort_out
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.law import SHIPPED
 
 COUNTS = {'sobol': 256, 'morris': 32}  # default base points, trajectories
 OWN_COUNTS = {'sobol': 64, 'morris': 16}  # of a user's law, whose every loop is packed on its own
 SLOW_COUNT = 4  # trajectories of a law that runs as plain Python
+Row = dict[str, Any]
 SHRINKS = 4  # how often the span is tried, each time with the square root of the last
 
 
 @dataclass(frozen=True)
-class Index:
-    """What one gain does to one figure; None is what the method does not give.
-
-    Attributes
-    ----------
-    gain : its name
-    S1, ST : share of the variance of ln(figure) that it makes alone, and with all other gains
-    mu_star : of Morris: mean change of ln(figure) over its whole range, whatever the sign
-    sigma : of Morris: standard deviation of that change
-    S1_conf, ST_conf, mu_star_conf : half of the 95 % interval
-    elasticity : relative change of the figure per relative change of the gain, by least squares
-
-    """
-
-    gain: str
-    elasticity: float
-    S1: float | None = None
-    S1_conf: float | None = None
-    ST: float | None = None
-    ST_conf: float | None = None
-    mu_star: float | None = None
-    mu_star_conf: float | None = None
-    sigma: float | None = None
-
-    @property
-    def weight(self) -> float:
-        """What gains are ordered by: ST, or mu_star."""
-        return float(self.mu_star if self.ST is None else self.ST)  # type: ignore[arg-type]  # one of both
-
-    @property
-    def doubled(self) -> float:
-        """Change of the figure in % when the gain is doubled, by the elasticity."""
-        return 100.0 * (2.0**self.elasticity - 1.0)
-
-
-@dataclass(frozen=True)
-class Variable:
-    """One figure and how it follows the gains.
-
-    Attributes
-    ----------
-    figure : which it is
-    value : with the scenario's own gains
-    smallest, largest : over all rollouts
-    spread : standard deviation of ln(figure), about its relative change; with a 95 % interval
-    rank : place by spread among the degrees of freedom of this figure, 1 the largest; with a
-        95 % interval
-    indices : one of each gain
-
-    """
-
-    figure: Figure
-    value: float
-    smallest: float
-    largest: float
-    spread: float
-    spread_low: float
-    spread_high: float
-    rank: int
-    rank_low: int
-    rank_high: int
-    indices: tuple[Index, ...]
-
-    @property
-    def spread_conf(self) -> float:
-        """Half of the 95 % interval of the spread."""
-        return 0.5 * (self.spread_high - self.spread_low)
-
-    @property
-    def main(self) -> Index:
-        """The gain that does most of it."""
-        return max(self.indices, key=lambda index: index.weight)
-
-
-@dataclass(frozen=True)
 class Sensitivity:
-    """How the figures of one controller follow its gains.
+    """How the KPIs of one controller follow its gains.
 
     Attributes
     ----------
@@ -117,9 +43,19 @@ class Sensitivity:
     failed : span -> how many rollouts diverged or were refused there
     gains : names of the factors
     left_out : gain -> why it is none
-    variables : by falling spread
-    excluded : figures that have no spread, and why
-    refusal : why there are no variables; empty where there are
+    rows : of each KPI and gain, KPIs by falling spread, as in `sensitivity.parquet`:
+        figure, dof, unit : the KPI
+        value, smallest, largest : with the scenario's own gains, and over all rollouts
+        spread, spread_low, spread_high, spread_conf : standard deviation of ln(KPI), about its
+            relative change, with its 95 % interval and half of that
+        rank, rank_low, rank_high, alike : place by spread among so many degrees of freedom of
+            this KPI, 1 the largest, with its 95 % interval
+        gain, elasticity : relative change of the KPI per relative change of the gain, by least
+            squares; doubled : change in % when the gain is doubled, by that
+        S1, ST, mu_star, sigma : indices of ln(KPI), see `Design.indices`; '_conf' is half of the
+            95 % interval; absent what the method does not give
+    excluded : KPIs that have no spread, and why
+    refusal : why there are no rows; empty where there are
 
     """
 
@@ -134,24 +70,31 @@ class Sensitivity:
     failed: Mapping[float, int]
     gains: tuple[str, ...]
     left_out: Mapping[str, str]
-    variables: tuple[Variable, ...] = ()
+    rows: tuple[Row, ...] = ()
     excluded: tuple[Excluded, ...] = ()
     refusal: str = ''
 
-    def of(self, name: str) -> dict[str, Variable]:
-        """Degree of freedom -> variable of a figure such as 'velocity_error.rms'."""
-        return {v.figure.dof: v for v in self.variables if v.figure.name == name}
+    @property
+    def weight(self) -> str:
+        """Index that gains are ordered by."""
+        return 'ST' if self.method == 'sobol' else 'mu_star'
 
     @property
-    def alike(self) -> dict[str, int]:
-        """Figure -> number of its degrees of freedom that are ranked."""
-        names = [variable.figure.name for variable in self.variables]
-        return {name: names.count(name) for name in names}
+    def kpis(self) -> dict[Kpi, list[Row]]:
+        """KPI, by falling spread -> its rows, the gain that does most of it first."""
+        found: dict[Kpi, list[Row]] = {}
+        for row in sorted(self.rows, key=lambda row: (-row['spread'], -row[self.weight])):
+            found.setdefault(Kpi(row['figure'], row['dof']), []).append(row)
+        return found
+
+    def of(self, name: str) -> dict[str, list[Row]]:
+        """Degree of freedom -> rows of a KPI such as 'velocity_error.rms', as of `kpis`."""
+        return {kpi.dof: rows for kpi, rows in self.kpis.items() if kpi.name == name}
 
     def six(self, name: str) -> np.ndarray:
-        """Spreads (6,) of a figure; 0 where it has none."""
+        """Spreads (6,) of a KPI; 0 where it has none."""
         found = self.of(name)
-        return np.array([found[dof].spread if dof in found else 0.0 for dof in DOFS])
+        return np.array([found[dof][0]['spread'] if dof in found else 0.0 for dof in DOFS])
 
 
 @dataclass(frozen=True)
@@ -237,7 +180,7 @@ def sensitivity(
     hold: Hold = 'continuous',
     threads: int = 1,
 ) -> Sensitivity:
-    """Sensitivity of the figures of a closed loop to the gains of its law.
+    """Sensitivity of the KPIs of a closed loop to the gains of its law.
 
     Every gain, whatever its shape, is multiplied by a number of its own, log-uniform between
     1/span and span. Where a loop diverges the span is made smaller for all of them.
@@ -254,7 +197,7 @@ def sensitivity(
 
     Returns
     -------
-    sensitivity : with a refusal in place of variables where no span was narrow enough
+    sensitivity : with a refusal in place of rows where no span was narrow enough
 
     Raises
     ------
@@ -321,54 +264,24 @@ def _refusal(result: Sensitivity, found: Mapping[str, np.ndarray]) -> str:
 def _judged(
     result: Sensitivity, design: Design, found: Mapping[str, np.ndarray], factors: GainFactors
 ) -> Sensitivity:
-    vehicle = factors.scenario.vehicle
-    figures, excluded = sort_out({name: v[1:] for name, v in found.items()}, vehicle)
-    values = {figure: np.asarray(found[figure.column], float) for figure in figures}
-    variables = [
-        variable
-        for name in dict.fromkeys(figure.name for figure in figures)
-        for variable in _alike([f for f in figures if f.name == name], values, design, result)
-    ]
-    variables.sort(key=lambda variable: -variable.spread)
-    return replace(
-        result,
-        rollouts=len(design.points) + 1,
-        variables=tuple(variables),
-        excluded=tuple(excluded),
-    )
-
-
-def _alike(
-    figures: Sequence[Figure],
-    values: Mapping[Figure, np.ndarray],
-    design: Design,
-    result: Sensitivity,
-) -> list[Variable]:
-    """Variables of one kind, among which they are ranked."""
-    answers = np.log(np.column_stack([values[figure][1:] for figure in figures]))
-    found = spreads(design, answers)
-    return [
-        Variable(
-            figure,
-            value=float(values[figure][0]),
-            smallest=float(values[figure].min()),
-            largest=float(values[figure].max()),
-            spread=float(found.value[i]),
-            spread_low=float(found.low[i]),
-            spread_high=float(found.high[i]),
-            rank=int(found.rank[i]),
-            rank_low=int(found.rank_low[i]),
-            rank_high=int(found.rank_high[i]),
-            indices=_indices(design, answers[:, i], result.span),
-        )
-        for i, figure in enumerate(figures)
-    ]
-
-
-def _indices(design: Design, answers: np.ndarray, span: float) -> tuple[Index, ...]:
-    found = design.indices(answers)
-    elasticity = found.pop('slope') / np.log(span)
-    return tuple(
-        Index(gain, float(elasticity[i]), **{name: float(v[i]) for name, v in found.items()})
-        for i, gain in enumerate(design.names)
-    )
+    kpis, excluded = sort_out({k: v[1:] for k, v in found.items()}, factors.scenario.vehicle)
+    rows: list[Row] = []
+    for name in dict.fromkeys(kpi.name for kpi in kpis):
+        alike = [kpi for kpi in kpis if kpi.name == name]  # among which they are ranked
+        values = np.column_stack([np.asarray(found[kpi.column], float) for kpi in alike])
+        answers = np.log(values[1:])
+        ranked = spreads(design, answers)
+        for i, kpi in enumerate(alike):
+            row: Row = {'figure': kpi.name, 'dof': kpi.dof, 'unit': kpi.quantity.unit}
+            row |= {'value': values[0, i], 'smallest': values[:, i].min()}
+            row |= {'largest': values[:, i].max(), 'alike': len(alike)}
+            row |= {key: of_each[i] for key, of_each in ranked.items()}
+            indices = design.indices(answers[:, i])
+            indices['elasticity'] = indices.pop('slope') / np.log(result.span)
+            indices['doubled'] = 100.0 * (2.0 ** indices['elasticity'] - 1.0)
+            for j, gain in enumerate(design.names):
+                rows.append(row | {'gain': gain} | {key: v[j] for key, v in indices.items()})
+    plain = [{k: v.item() if hasattr(v, 'item') else v for k, v in row.items()} for row in rows]
+    plain.sort(key=lambda row: -row['spread'])
+    count = len(design.points) + 1
+    return replace(result, rollouts=count, rows=tuple(plain), excluded=tuple(excluded))

@@ -1,68 +1,53 @@
-"""All that is computed of a sweep, and the files that hold it."""
+"""All that is computed of a sweep: rows of its tables, and the results that hold them."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-from pyarrow import parquet
 
 from auv_analysis.metrics.measures import BY_NAME, MEASURES, Measure
 from auv_analysis.output.progress import each
 from auv_analysis.output.text import join
+from auv_analysis.report.results import Results
 from auv_analysis.studies.sweep import statistics
 from auv_analysis.studies.sweep.dataset import STATUSES, Sweep
-from auv_analysis.studies.sweep.factors import Varied, varied_paths
+from auv_analysis.studies.sweep.factors import Factor, factors_of
 from auv_analysis.studies.sweep.indices import designed, failing, indices, omitted
-from auv_analysis.studies.sweep.statistics import (
-    distribution,
-    figures_spread,
-    influence,
-    pairs,
-    ranks_of,
-    varying,
-)
 from auv_analysis.studies.sweep.variation import kind_of
 
-DOCUMENT = 'analysis.json'
 TABLES = ('quantiles', 'influence', 'dependence', 'together', 'failures', 'paired', 'indices',
           'best')  # fmt: skip
 BEST_BY = 'overall.velocity_error.rms.linear'
 MOST_REASONS = 5
 SAMPLE = 600  # rows of a controller that are drawn as points
 Row = dict[str, Any]
-Line = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(eq=False)
-class Results:
+class Analysis:
     """What was found in a sweep.
 
     Attributes
     ----------
     sweep : its rows
-    varied : its paths
+    factors : its paths
     tables : of `TABLES` -> rows
     measures : those that differ between rows
     fixed : those that do not, with their value, None where there is none
     values : measure -> (n,) of all rows
-    lines : measure, controller -> distribution function
     pair : the two paths that matter most; none where there are fewer
     notes : what is worth saying, one line each
 
     """
 
     sweep: Sweep
-    varied: list[Varied]
+    factors: list[Factor]
     tables: dict[str, list[Row]]
     measures: list[Measure] = field(default_factory=list)
     fixed: dict[str, float | None] = field(default_factory=dict)
     values: dict[str, np.ndarray] = field(default_factory=dict)
-    lines: dict[tuple[str, str], Line] = field(default_factory=dict)
-    pair: list[Varied] = field(default_factory=list)
+    pair: list[Factor] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def rows_of(self, controller: str) -> np.ndarray:
@@ -91,16 +76,16 @@ class Results:
         return [{'status': r['status'], 'reason': r['reason'], 'rows': r['count_all']}
                 for r in rows]  # fmt: skip
 
-    def most_influential(self) -> list[Varied]:
+    def most_influential(self) -> list[Factor]:
         """Paths that differ, by the share of the order of the figures that they explain."""
         shares: dict[str, list[float]] = {}
         for row in self.tables['influence']:
             shares.setdefault(row['path'], []).append(row['explained_percent'])
-        differing = [v for v in self.varied if v.differs]
+        differing = [v for v in self.factors if v.differs]
         return sorted(differing, key=lambda v: -float(np.mean(shares.get(v.path, 0.0))))
 
 
-def analysed(sweep: Sweep, by: str = BEST_BY) -> Results:
+def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
     """Everything that is reported of a sweep.
 
     Parameters
@@ -109,19 +94,21 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Results:
     by : measure that sorts the best rows
 
     """
-    results = Results(sweep, varied_paths(sweep), {name: [] for name in TABLES})
+    analysis = Analysis(sweep, factors_of(sweep), {name: [] for name in TABLES})
     groups, notes = designed(sweep)
-    results.notes = [*notes, *_tied(sweep), *(n for group in groups for n in failing(sweep, group))]
+    analysis.notes = [
+        *notes,
+        *_tied(sweep),
+        *(n for group in groups for n in failing(sweep, group)),
+    ]
     for measure in each(MEASURES, len(MEASURES)):
-        _one_measure(results, measure, groups)
-    results.pair = results.most_influential()[:2]
-    _pairs(results)
-    _failures(results)
-    chosen = BY_NAME[by]
-    found = statistics.smallest(sweep, results.values[by], chosen)
-    results.tables['best'] = statistics.with_values(sweep, found, results.values)
-    results.tables['quantiles'] = list(figures_spread(sweep))
-    return results
+        _one_measure(analysis, measure, groups)
+    analysis.pair = analysis.most_influential()[:2]
+    _pairs(analysis)
+    _failures(analysis)
+    analysis.tables['best'] = statistics.best(sweep, analysis.values, BY_NAME[by])
+    analysis.tables['quantiles'] = list(statistics.figures_spread(sweep))
+    return analysis
 
 
 def _tied(sweep: Sweep) -> Iterator[str]:
@@ -132,86 +119,75 @@ def _tied(sweep: Sweep) -> Iterator[str]:
             yield f'{names} vary side by side: what one explains may be the work of another'
 
 
-def _one_measure(results: Results, measure: Measure, groups: Sequence[Any]) -> None:
-    sweep, tables = results.sweep, results.tables
-    values = results.values[measure.name] = sweep.measure(measure)
-    ok = [results.rows_of(name) for name in sweep.controllers]
-    if not varying([values[rows] for rows in ok], measure.unit):
+def _one_measure(analysis: Analysis, measure: Measure, groups: Sequence[Any]) -> None:
+    sweep, tables = analysis.sweep, analysis.tables
+    values = analysis.values[measure.name] = sweep.measure(measure)
+    ok = [analysis.rows_of(name) for name in sweep.controllers]
+    if not statistics.varying([values[rows] for rows in ok], measure.unit):
         known = values[np.isfinite(values) & (sweep.status == 0)]
-        results.fixed[measure.name] = float(known[0]) if len(known) else None
+        analysis.fixed[measure.name] = float(known[0]) if len(known) else None
         return
-    results.measures.append(measure)
-    tables['paired'] += pairs(sweep, values, measure)
+    analysis.measures.append(measure)
+    tables['paired'] += statistics.pairs(sweep, values, measure)
     for controller, rows in zip(sweep.controllers, ok, strict=True):
-        results.lines[measure.name, controller] = distribution(values[rows], measure)
-        ranks, there = ranks_of(values[rows], measure)
+        ranks, there = statistics.ranks_of(values[rows], measure)
         names = {'controller': controller, 'figure': measure.name}
-        for varied in results.varied:
-            if not (varied.differs and varied.concerns(controller)):
+        for factor in analysis.factors:
+            if not (factor.differs and factor.concerns(controller)):
                 continue
-            for row in statistics.along(values, rows, varied, measure):
+            for row in statistics.along(values, rows, factor, measure):
                 tables['dependence'].append({'controller': controller} | row)
-            if found := influence(ranks, varied, rows[there]):
-                tables['influence'].append(names | {'path': varied.path} | found)
+            if found := statistics.influence(ranks, factor, rows[there]):
+                tables['influence'].append(names | {'path': factor.path} | found)
     for group in groups:
         tables['indices'] += indices(sweep, group, values, measure)
-        results.notes += omitted(sweep, group, values, measure)
+        analysis.notes += omitted(sweep, group, values, measure)
 
 
-def _pairs(results: Results) -> None:
-    if len(results.pair) < 2:
+def _pairs(analysis: Analysis) -> None:
+    if len(analysis.pair) < 2:
         return
-    for measure in results.measures:
-        for controller in results.sweep.controllers:
-            if all(varied.concerns(controller) for varied in results.pair):
-                rows = results.rows_of(controller)
-                values = results.values[measure.name]
-                for row in statistics.together(values, rows, results.pair, measure):
-                    results.tables['together'].append({'controller': controller} | row)
+    for measure in analysis.measures:
+        for controller in analysis.sweep.controllers:
+            if all(factor.concerns(controller) for factor in analysis.pair):
+                rows = analysis.rows_of(controller)
+                values = analysis.values[measure.name]
+                for row in statistics.together(values, rows, analysis.pair, measure):
+                    analysis.tables['together'].append({'controller': controller} | row)
 
 
-def _failures(results: Results) -> None:
-    sweep = results.sweep
+def _failures(analysis: Analysis) -> None:
+    sweep = analysis.sweep
     if not (sweep.status != 0).any():
         return
     for i, controller in enumerate(sweep.controllers):
         rows = np.flatnonzero(sweep.controller == i)
-        for varied in results.varied:
-            if varied.differs and varied.concerns(controller):
-                for row in statistics.failures(varied, sweep.status, rows):
-                    results.tables['failures'].append({'controller': controller} | row)
+        for factor in analysis.factors:
+            if factor.differs and factor.concerns(controller):
+                for row in statistics.failures(factor, sweep.status, rows):
+                    analysis.tables['failures'].append({'controller': controller} | row)
 
 
-def document(results: Results) -> dict[str, Any]:
-    """All of it, ready for JSON."""
-    sweep = results.sweep
-    return {
+def results_of(analysis: Analysis) -> Results:
+    """`analysis.json` and a Parquet file of each table that has rows."""
+    sweep = analysis.sweep
+    facts = {
         'campaign': sweep.name,
         'folder': str(sweep.folder),
         'rows': sweep.rows,
         'planned_rows': sweep.planned,
-        'controllers': results.counts(),
-        'reasons': results.reasons(),
-        'paths': [{'path': v.path, 'unit': v.unit, 'meaning': v.meaning, 'groups': len(v.labels)}
-                  for v in results.varied],
-        'fixed': results.fixed,
-        'notes': results.notes,
-        **results.tables,
-    }  # fmt: skip
-
-
-def write_results(results: Results, out: Path) -> dict[str, Any]:
-    """Write analysis.json and a Parquet file per table that has rows; returns the former."""
-    found = document(results)
-    text = json.dumps(found, allow_nan=False)
-    (out / DOCUMENT).write_text(text + '\n', encoding='utf-8')
-    for name, rows in results.tables.items():
+        'controllers': analysis.counts(),
+        'reasons': analysis.reasons(),
+        'paths': [
+            {'path': f.path, 'unit': f.unit, 'meaning': f.meaning, 'groups': len(f.labels)}
+            for f in analysis.factors
+        ],
+        'fixed': analysis.fixed,
+        'notes': analysis.notes,
+        **analysis.tables,
+    }
+    results = Results('analysis', facts)
+    for name, rows in analysis.tables.items():
         if rows:
-            parquet.write_table(pa.Table.from_pylist(_filled(rows)), out / f'{name}.parquet')
-    return found
-
-
-def _filled(rows: Sequence[Row]) -> list[Row]:
-    """Rows that have all columns, in the order in which they first appear."""
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    return [{name: row.get(name) for name in names} for row in rows]
+            results.add(name, name, rows, {})
+    return results

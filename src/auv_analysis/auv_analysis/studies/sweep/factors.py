@@ -1,4 +1,4 @@
-"""Values of one varied path, sorted into groups: bins of numbers, or what it may be."""
+"""Factors of a sweep: values of a varied path in groups, bins of numbers or what it may be."""
 
 import json
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ ROWS_PER_BIN = 12  # at least
 
 
 @dataclass(frozen=True, eq=False)
-class Varied:
+class Factor:
     """A path and its values in every row.
 
     Attributes
@@ -66,12 +66,12 @@ class Varied:
         return parts[0] != 'controllers' or parts[1] in ('*', controller)
 
 
-def varied_paths(sweep: Sweep) -> list[Varied]:
+def factors_of(sweep: Sweep) -> list[Factor]:
     """Paths of a sweep with their values, in the order of the campaign."""
     return [_varied(sweep, path) for path in sweep.paths]
 
 
-def _varied(sweep: Sweep, path: str) -> Varied:
+def _varied(sweep: Sweep, path: str) -> Factor:
     column = sweep.table([path])[path]
     unit, meaning = _said(sweep, path)
     kind = column.type
@@ -80,9 +80,9 @@ def _varied(sweep: Sweep, path: str) -> Varied:
         codes, edges, binned = _groups(numbers)
         labels = _labels(edges)
         codes = codes.astype(np.int32)
-        return Varied(path, unit, meaning, numbers, codes, labels, edges, binned)
+        return Factor(path, unit, meaning, numbers, codes, labels, edges, binned)
     codes, labels = _categories(column)
-    return Varied(path, unit, meaning, None, codes.astype(np.int32), labels, None, False)
+    return Factor(path, unit, meaning, None, codes.astype(np.int32), labels, None, False)
 
 
 def _said(sweep: Sweep, path: str) -> tuple[str, str]:
@@ -138,9 +138,9 @@ def _categories(column: pa.ChunkedArray) -> tuple[np.ndarray, list[str]]:
 PREFIXES = ('controllers.*.', 'vehicle.', 'setpoint.', 'controllers.')
 
 
-def short_names(varied: Sequence[Varied]) -> dict[str, str]:
+def short_names(factor: Sequence[Factor]) -> dict[str, str]:
     """Path -> its name without where it is from, as long as that tells it from the others."""
-    short = {v.path: _short(v.path) for v in varied}
+    short = {v.path: _short(v.path) for v in factor}
     names = list(short.values())
     return {path: name if names.count(name) == 1 else path for path, name in short.items()}
 
@@ -152,9 +152,9 @@ def _short(path: str) -> str:
     return path
 
 
-def with_unit(name: str, varied: Varied) -> str:
+def with_unit(name: str, factor: Factor) -> str:
     """Axis label: the name, and the unit where the schema says a short one."""
-    return f'{name} ({varied.unit})' if 0 < len(varied.unit) <= LONGEST_UNIT else name
+    return f'{name} ({factor.unit})' if 0 < len(factor.unit) <= LONGEST_UNIT else name
 
 
 def cut(label: str) -> str:

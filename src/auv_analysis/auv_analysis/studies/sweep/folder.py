@@ -13,14 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from auv_analysis.output.folder import (
-    CAMPAIGN,
-    PART,
-    ROLLOUTS,
-    SWEEP,
-    Results,
-    results_folder,
-)
+from auv_analysis.output.folder import CAMPAIGN, PART, ROLLOUTS, SWEEP, Results, results_folder
 from auv_analysis.output.new_files import UNFINISHED, write
 from auv_analysis.studies.sweep.blocks import laws_of, versions
 from auv_analysis.studies.sweep.campaign import Campaign

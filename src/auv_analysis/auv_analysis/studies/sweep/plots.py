@@ -1,6 +1,6 @@
-"""Figures of a sweep: distributions, what matters, combinations of two paths, failures, indices."""
+"""Plots of a sweep: distributions, what matters, dependence on one path and on two, failures."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,28 +13,17 @@ from matplotlib.figure import Figure
 from auv_analysis.metrics.measures import BY_NAME, Measure
 from auv_analysis.output.text import join, plain, typeset
 from auv_analysis.report import plots
-from auv_analysis.report.plots import (
-    COLOURS,
-    GREY,
-    FigureRecord,
-    Grid,
-    draw_grid,
-    heat_map,
-    save_figures,
-    scale_bar,
-    small_heads,
-)
-from auv_analysis.studies.compare.plots import look
-from auv_analysis.studies.sweep.analysis import SAMPLE, Results, Row
-from auv_analysis.studies.sweep.factors import Varied, cut, short_names, with_unit
+from auv_analysis.report.plots import COLOURS, GREY, FigureRecord, Grid, heat_map, look
+from auv_analysis.studies.sweep.analysis import SAMPLE, Analysis, Row
+from auv_analysis.studies.sweep.factors import Factor, cut, short_names, with_unit
+from auv_analysis.studies.sweep.statistics import ordered, thinned
 
-ACROSS = 3  # panels in a row
 MOST_PATHS = 6  # whose dependence is drawn
 MOST_GRIDS = 3  # controllers side by side
-LETTERS = 'abcd'  # of grids side by side
+LETTERS = 'abcd'  # of heat maps side by side
+MARKERS = 'os^vPX'  # of controllers
 WIDE = 30.0  # ratio from which an axis is logarithmic
 WIDTH = 0.6  # of the bars of all controllers at one value
-Drawn = tuple[Figure, str, str]
 PREFERRED = (
     'overall.velocity_error.settling_time',
     'overall.velocity_error.rms.linear',
@@ -43,175 +32,213 @@ PREFERRED = (
     'overall.effort.rms.linear',
     'overall.coupling.delta_xi_max.angular',
 )
+Drawn = tuple[Figure, str, str]  # with title and caption
 
 
-def draw(results: Results, folder: Path) -> dict[str, FigureRecord]:
-    """Draw the figures that the rows of a sweep allow, as PNG and PDF: name -> figure.
+def draw(analysis: Analysis, folder: Path) -> dict[str, FigureRecord]:
+    """Draw the plots that the rows of a sweep allow, as PNG and PDF: name -> plot.
 
     Parameters
     ----------
-    results : of `analysed`
+    analysis : of `analysed`
     folder : where the files go; made when it is not there
 
     """
-    chosen, tables = main_measures(results), results.tables
+    chosen, tables = main_measures(analysis), analysis.tables
     drawn: dict[str, Callable[[], Drawn]] = {}
-    if results.measures:
-        drawn['distributions'] = partial(_distributions, results)
+    if analysis.measures:
+        drawn['distributions'] = partial(_distributions, analysis)
     if tables['influence']:
-        drawn['influence'] = partial(_influence, results)
+        drawn['influence'] = partial(_influence, analysis)
     if tables['dependence']:
-        for i, varied in enumerate(results.most_influential()[:MOST_PATHS], start=1):
-            drawn[f'dependence_{i}'] = partial(dependence, results, varied, chosen)
+        for i, factor in enumerate(analysis.most_influential()[:MOST_PATHS], start=1):
+            drawn[f'dependence_{i}'] = partial(_dependence, analysis, factor, chosen)
     if tables['together']:
-        drawn['together'] = partial(together, results, chosen[:2])
+        drawn['together'] = partial(_together, analysis, chosen[:2])
     if tables['failures']:
-        drawn['failures'] = partial(failures, results)
+        drawn['failures'] = partial(_failures, analysis)
     methods = {row['method'] for row in tables['indices']}
     if 'sobol' in methods:
-        drawn['total_indices'] = partial(total_indices, results)
+        drawn['total_indices'] = partial(_total_indices, analysis)
     if 'morris' in methods:
-        drawn['elementary_effects'] = partial(effects, results, chosen)
-    return save_figures(folder, drawn)
+        drawn['elementary_effects'] = partial(_effects, analysis, chosen)
+    return plots.save_figures(folder, drawn)
 
 
-def main_measures(results: Results, count: int = 6) -> list[Measure]:
+def main_measures(analysis: Analysis, count: int = 6) -> list[Measure]:
     """The measures that are drawn where there is no room for all: settling and errors first."""
     order = {name: i for i, name in enumerate(PREFERRED)}
-    ranked = sorted(results.measures, key=lambda m: order.get(m.name, len(order)))
+    ranked = sorted(analysis.measures, key=lambda m: order.get(m.name, len(order)))
     return ranked[:count]
 
 
-def logarithmic(axes: Axes, direction: str, values: np.ndarray) -> None:
-    """Logarithmic axis where all values are positive and far apart."""
-    known = values[np.isfinite(values)]
-    if len(known) and known.min() > 0 and known.max() > WIDE * known.min():
-        axes.set(**{f'{direction}scale': 'log'})
-
-
-def _distributions(results: Results) -> Drawn:
-    down = -(-len(results.measures) // 4)
-    figure = plots.new_figure(0.4 + 1.75 * down)
-    panels = figure.subplots(down, 4, squeeze=False, sharey=True).ravel()
-    controllers = results.sweep.controllers
-    for axes, measure in zip(panels, results.measures, strict=False):
-        shown = []
-        for i, controller in enumerate(controllers):
-            x, y = results.lines[measure.name, controller]
-            axes.plot(x, y, drawstyle='steps-post', label=controller, **look(i))
-            shown.append(x)
-        logarithmic(axes, 'x', np.concatenate(shown))
-        axes.set_title(measure.label, loc='left', fontsize='medium')
+def _distributions(analysis: Analysis) -> Drawn:
+    measures, controllers = analysis.measures, analysis.sweep.controllers
+    looks = {name: look(i) for i, name in enumerate(controllers)}
+    figure, panels = plots.small_multiples(len(measures), 4, 1.75, sharey=True)
+    for axes, measure in zip(panels, measures, strict=True):
+        values = ordered(analysis.values[measure.name], measure.unit)
+        samples = {name: thinned(values[analysis.rows_of(name)]) for name in controllers}
+        plots.distribution(axes, samples, looks)
+        _logarithmic(axes, 'x', np.concatenate(list(samples.values())))
+        _head(axes, measure)
         axes.set_xlabel(measure.unit, fontsize='medium')
-        axes.tick_params(labelsize='small')
-        axes.set_ylim(0, 102)
         axes.margins(x=0.05)
-    for axes in panels[len(results.measures) :]:
-        axes.set_axis_off()
     for axes in panels[::4]:
-        axes.set_ylabel('rows (%)')
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc='outside upper right', ncols=6, handlelength=2.6)
+        axes.set_ylabel('share of rows')
+    plots.shared_legend(figure)
     title = 'Distributions'
     caption = (
         f'{title} of the measures over the rollouts of each controller: the share of rows at or '
-        'below a value. Where a line of settling times ends below 100 %, the rest never settled.'
+        'below a value. Where a line of settling times ends below 1, the rest never settled.'
     )
-    return figure, title, caption + fixed_sentence(results)
+    return figure, title, caption + _fixed(analysis.fixed)
 
 
-def fixed_sentence(results: Results) -> str:
+def _fixed(fixed: Mapping[str, float | None]) -> str:
     """Which measures are the same in every row, or have no value."""
-    from auv_analysis.metrics.measures import BY_NAME
-
-    zero = [BY_NAME[name].label for name, value in results.fixed.items() if value == 0.0]
-    same = [BY_NAME[name].label for name, value in results.fixed.items() if value]
-    none = [BY_NAME[name].label for name, value in results.fixed.items() if value is None]
-    parts = [
-        f'{word}: {join(labels)}.'
-        for word, labels in (
-            ('Zero in every row and not drawn', zero),
-            ('The same in every row', same),
-            ('Without a value in any row', none),
-        )
-        if labels
-    ]
-    return ' '.join(['', *parts])
+    groups = {
+        'Zero in every row and not drawn': [n for n, value in fixed.items() if value == 0.0],
+        'The same in every row': [n for n, value in fixed.items() if value],
+        'Without a value in any row': [n for n, value in fixed.items() if value is None],
+    }
+    return ''.join(
+        f' {word}: {join([BY_NAME[name].label for name in names])}.'
+        for word, names in groups.items()
+        if names
+    )
 
 
-def _influence(results: Results) -> Drawn:
-    paths = [v.path for v in results.most_influential()]
-    names = short_names(results.varied)
+def _influence(analysis: Analysis) -> Drawn:
+    paths = [factor.path for factor in analysis.most_influential()]
     grids = []
-    for controller in results.sweep.controllers[:MOST_GRIDS]:
-        cells = {
-            (row['figure'], row['path']): row['explained_percent']
-            for row in results.tables['influence']
-            if row['controller'] == controller
-        }
-        values = [[cells.get((m.name, path), np.nan) for path in paths] for m in results.measures]
-        grids.append(
-            Grid(
-                np.array(values),
-                [names[path] for path in paths],
-                f'{controller}: explained (%)',
-                'Blues',
-                Normalize(0.0, 100.0),
-                decimals=0,
-            )
-        )
-    figure = heat_map([m.label for m in results.measures], grids)
-    small_heads(figure, grids)
+    for controller in analysis.sweep.controllers[:MOST_GRIDS]:
+        rows = [r for r in analysis.tables['influence'] if r['controller'] == controller]
+        label = f'{controller}: explained (%)'
+        names = [m.name for m in analysis.measures]
+        grids.append(_shares(analysis, rows, names, paths, 'explained_percent', label, 100.0))
+    figure = heat_map([m.label for m in analysis.measures], grids)
+    plots.small_heads(figure, grids)
     title = 'What matters'
     caption = (
-        f'{title}: share of the variance of the ranks of a figure that lies between the groups of '
+        f'{title}: share of the variance of the ranks of a measure that lies between the groups of '
         'a path (bins of a number, or its values), corrected for their number; the paths in the '
         'order of their mean share. A pale 0: no more than chance; crossed out: of another '
         'controller.'
     )
-    left = results.sweep.controllers[MOST_GRIDS:]
+    left = analysis.sweep.controllers[MOST_GRIDS:]
     if left:
         caption += f' {join(left)}: in influence.parquet.'
     return figure, title, caption
 
 
-def dependence(
-    results: Results, varied: Varied, measures: Sequence[Measure]
-) -> tuple[Figure, str, str]:
-    """Quantiles of measures in the groups of a path. Returns figure, title and caption."""
-    down = -(-len(measures) // ACROSS)
-    figure = plots.new_figure(0.5 + 1.95 * down)
-    panels = figure.subplots(down, ACROSS, squeeze=False).ravel()
-    controllers = [name for name in results.sweep.controllers if varied.concerns(name)]
-    for axes, measure in zip(panels, measures, strict=False):
+def _shares(
+    analysis: Analysis,
+    rows: Sequence[Row],
+    measures: Sequence[str],
+    paths: Sequence[str],
+    key: str,
+    label: str,
+    whole: float = 1.0,
+) -> Grid:
+    """Heat map of shares: measures by paths."""
+    names = short_names(analysis.factors)
+    cells = {(row['figure'], row['path']): row[key] for row in rows}
+    values = np.array([[cells.get((m, path)) for path in paths] for m in measures], float)
+    heads, scale = [names[path] for path in paths], Normalize(0.0, whole)
+    return Grid(values, heads, label, 'Blues', scale, decimals=0 if whole > 1 else 2)
+
+
+def _total_indices(analysis: Analysis) -> Drawn:
+    """Total Sobol' indices of each measure."""
+    rows = [r for r in analysis.tables['indices'] if r['method'] == 'sobol' and r['with'] is None]
+    paths = list(dict.fromkeys(row['path'] for row in rows))
+    measures = list(dict.fromkeys(row['figure'] for row in rows))
+    cases = list(dict.fromkeys((row['controller'], row['case']) for row in rows))
+    grids, said = [], []
+    for letter, (controller, case) in zip(LETTERS, cases, strict=False):
+        mine = [r for r in rows if (r['controller'], r['case']) == (controller, case)]
+        grids.append(_shares(analysis, mine, measures, paths, 'ST', f'({letter}) $S_T$'))
+        said.append(f'({letter}) {controller}{f", {case}" if case else ""}')
+    figure = heat_map([BY_NAME[name].label for name in measures], grids)
+    plots.small_heads(figure, grids)
+    title = 'Total sensitivity indices'
+    caption = (
+        f'{title} of Sobol’: the share of the variance of a measure that would be left if all but '
+        'this path were known, its interactions included; an estimate may leave 0 to 1. Crossed '
+        f'out: the measure does not vary, or does not exist in all rows. {"; ".join(said)}.'
+    )
+    if len(cases) > len(LETTERS):
+        caption += f' The first {len(LETTERS)} of {len(cases)} cases; all are in indices.parquet.'
+    return figure, title, caption
+
+
+def _effects(analysis: Analysis, measures: Sequence[Measure]) -> Drawn:
+    """Elementary effects of Morris: their mean size and their standard deviation."""
+    rows = [row for row in analysis.tables['indices'] if row['method'] == 'morris']
+    shown = [m for m in measures if any(row['figure'] == m.name for row in rows)]
+    names, paths = short_names(analysis.factors), list(dict.fromkeys(row['path'] for row in rows))
+    controllers = list(dict.fromkeys(row['controller'] for row in rows))
+    figure, panels = plots.small_multiples(len(shown), height=2.0)
+    for axes, measure in zip(panels, shown, strict=True):
+        mine = [row for row in rows if row['figure'] == measure.name]
+        for row in mine:
+            colour = look(paths.index(row['path']))['color']
+            marker = MARKERS[controllers.index(row['controller']) % len(MARKERS)]
+            axes.plot(row['mu_star'], row['sigma'], marker, color=colour, markersize=5)
+        ends = [0.0, max(row['mu_star'] for row in mine) * 1.1]
+        axes.plot(ends, ends, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)))
+        _head(axes, measure, unit=True)
+        axes.margins(0.1)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(lambda x, _: typeset(plain(x, 3)))
+    figure.supxlabel(r'$\mu^*$: mean size of the effect', fontsize='medium')
+    figure.supylabel(r'$\sigma$: its standard deviation', fontsize='medium')
+    for i, path in enumerate(paths):
+        panels[0].plot([], [], 'o', color=look(i)['color'], label=names[path])
+    for i, controller in enumerate(controllers if len(controllers) > 1 else []):
+        panels[0].plot([], [], MARKERS[i % len(MARKERS)], color='black', label=controller)
+    plots.shared_legend(figure)
+    title = 'Elementary effects'
+    caption = (
+        f'{title} of Morris: how much a measure changes when one path goes through its whole '
+        'range, at random values of the others; above the dotted line the effect depends more on '
+        'the others than it is large.'
+    )
+    return figure, title, caption
+
+
+def _dependence(analysis: Analysis, factor: Factor, measures: Sequence[Measure]) -> Drawn:
+    """Quantiles of measures in the groups of a path: bands over a number, bars over choices."""
+    figure, panels = plots.small_multiples(len(measures), height=1.95)
+    every = analysis.sweep.controllers
+    controllers = [name for name in every if factor.concerns(name)]
+    for axes, measure in zip(panels, measures, strict=True):
         for i, controller in enumerate(controllers):
-            rows = [
-                row
-                for row in results.tables['dependence']
-                if (row['controller'], row['path'], row['figure'])
-                == (controller, varied.path, measure.name)
-            ]
-            style = look(results.sweep.controllers.index(controller))
-            if varied.binned:
-                _points(axes, results, varied, measure, controller)
+            mine = (controller, factor.path, measure.name)
+            rows = [r for r in analysis.tables['dependence']
+                    if (r['controller'], r['path'], r['figure']) == mine]  # fmt: skip
+            style = look(every.index(controller)) | {'label': controller}
+            if factor.binned and factor.numbers is not None:
+                sample = analysis.rows_of(controller)
+                sample = sample[:: max(len(sample) // SAMPLE, 1)][:SAMPLE]
+                values = analysis.values[measure.name][sample]
+                axes.plot(factor.numbers[sample], values, '.', color=style['color'], alpha=0.35,
+                          markersize=2, markeredgewidth=0, rasterized=True)  # fmt: skip
                 _bands(axes, rows, style)
             else:
                 _bars(axes, rows, style, (i + 0.5) / len(controllers) - 0.5)
-        _finish(axes, varied, measure)
-    for axes in panels[len(measures) :]:
-        axes.set_axis_off()
-    name = with_unit(short_names(results.varied)[varied.path], varied)
+        _finish(axes, factor, measure)
+    name = with_unit(short_names(analysis.factors)[factor.path], factor)
     figure.supxlabel(name, fontsize='medium')
-    handles = [panels[0].plot([], [], **look(results.sweep.controllers.index(c)))[0]
-               for c in controllers]  # fmt: skip
-    figure.legend(handles, controllers, loc='outside upper right', ncols=6, handlelength=2.6)
-    title = f'Dependence on {varied.path}'
+    plots.shared_legend(figure)
+    title = f'Dependence on {factor.path}'
     caption = (
-        f'{title}{f" ({varied.meaning})" if varied.meaning else ""}: median, '
+        f'{title}{f" ({factor.meaning})" if factor.meaning else ""}: median, '
         'middle half and 5–95 % of the rows, over whatever else varies; a time that does not exist '
         'counts as late, and what lies there is not drawn.'
     )
-    if varied.binned:
+    if factor.binned:
         caption += f' Points: at most {SAMPLE} rows of each controller.'
     return figure, title, caption
 
@@ -228,145 +255,67 @@ def _bands(axes: Axes, rows: Sequence[Row], style: dict[str, Any]) -> None:
     axes.plot(x, _array(rows, 'median'), **style)
 
 
-def _points(
-    axes: Axes, results: Results, varied: Varied, measure: Measure, controller: str
-) -> None:
-    rows = results.rows_of(controller)
-    rows = rows[:: max(len(rows) // SAMPLE, 1)][:SAMPLE]
-    if varied.numbers is not None:
-        colour = look(results.sweep.controllers.index(controller))['color']
-        axes.plot(varied.numbers[rows], results.values[measure.name][rows], '.', color=colour,
-                  markersize=2, alpha=0.35, markeredgewidth=0, rasterized=True)  # fmt: skip
-
-
 def _bars(axes: Axes, rows: Sequence[Row], style: dict[str, Any], offset: float) -> None:
     x = np.arange(len(rows)) + WIDTH * offset
     colour = style['color']
     axes.vlines(x, _array(rows, 'low'), _array(rows, 'high'), color=colour, linewidth=1.0)
     middle = _array(rows, 'quarter'), _array(rows, 'three_quarters')
     axes.vlines(x, *middle, color=colour, linewidth=4.0, alpha=0.5)
-    axes.plot(x, _array(rows, 'median'), 'o', color=colour, markersize=4)
+    axes.plot(x, _array(rows, 'median'), 'o', color=colour, markersize=4, label=style['label'])
 
 
-def _finish(axes: Axes, varied: Varied, measure: Measure) -> None:
-    axes.set_title(measure.label, loc='left', fontsize='medium')
+def _finish(axes: Axes, factor: Factor, measure: Measure) -> None:
+    _head(axes, measure)
     axes.set_ylabel(measure.unit, fontsize='medium')
-    axes.tick_params(labelsize='small')
     axes.margins(x=0.03, y=0.08)
-    if varied.binned and varied.numbers is not None:
-        low, high = varied.numbers.min(), varied.numbers.max()
-        if low > 0 and high > WIDE * low:
-            axes.set_xscale('log')
+    if factor.binned and factor.numbers is not None:
+        _logarithmic(axes, 'x', factor.numbers)
     else:
-        labels = [typeset(cut(label)) for label in varied.labels]
-        axes.set_xticks(range(len(labels)), labels)
+        labels = _values_below(axes, factor.labels)
         axes.set_xlim(-0.6, len(labels) - 0.4)
         if sum(map(len, labels)) > 20:
             axes.tick_params(axis='x', labelrotation=60)
-    low, high = axes.dataLim.intervaly
-    if low > 0 and high > WIDE * low:
-        axes.set_yscale('log')
+    _logarithmic(axes, 'y', np.array(axes.dataLim.intervaly))
 
 
-def total_indices(results: Results) -> Drawn:
-    """Total indices of Sobol of each measure. Returns figure, title and caption."""
-    rows = [r for r in results.tables['indices'] if r['method'] == 'sobol' and r['with'] is None]
-    names = short_names(results.varied)
-    paths = list(dict.fromkeys(row['path'] for row in rows))
-    figures = list(dict.fromkeys(row['figure'] for row in rows))
-    cases = list(dict.fromkeys((row['controller'], row['case']) for row in rows))
-    grids, said = [], []
-    for letter, (controller, case) in zip(LETTERS, cases, strict=False):
-        cells = {(row['figure'], row['path']): row['ST'] for row in rows
-                 if (row['controller'], row['case']) == (controller, case)}  # fmt: skip
-        values = [[cells.get((figure, path)) for path in paths] for figure in figures]
-        label = f'({letter}) $S_T$'
-        said.append(f'({letter}) {controller}{f", {case}" if case else ""}')
-        heads = [names[path] for path in paths]
-        known = np.array(values, float)
-        grids.append(Grid(known, heads, label, 'Blues', Normalize(0.0, 1.0), decimals=2))
-    figure = heat_map([BY_NAME[name].label for name in figures], grids)
-    small_heads(figure, grids)
-    title = 'Total sensitivity indices'
-    caption = (
-        f'{title} of Sobol: the share of the variance of a figure that would be left if all but '
-        'this path were known, its interactions included; an estimate may leave 0 to 1. Crossed '
-        'out: the figure does not vary, or does not exist in all rows. '
-        f'{"; ".join(said)}.'
-    )
-    if len(cases) > len(LETTERS):
-        caption += f' The first {len(LETTERS)} of {len(cases)} cases; all are in indices.parquet.'
-    return figure, title, caption
+def _head(axes: Axes, measure: Measure, *, unit: bool = False) -> None:
+    label = f'{measure.label} ({measure.unit})' if unit else measure.label
+    axes.set_title(label, loc='left', fontsize='medium')
+    axes.tick_params(labelsize='small')
 
 
-def effects(results: Results, measures: Sequence[Measure]) -> Drawn:
-    """Elementary effects of Morris: their mean size and their spread."""
-    rows = [row for row in results.tables['indices'] if row['method'] == 'morris']
-    shown = [m for m in measures if any(row['figure'] == m.name for row in rows)]
-    names, paths = short_names(results.varied), list(dict.fromkeys(row['path'] for row in rows))
-    controllers = list(dict.fromkeys(row['controller'] for row in rows))
-    down = -(-len(shown) // ACROSS)
-    figure = plots.new_figure(0.5 + 2.0 * down)
-    panels = figure.subplots(down, ACROSS, squeeze=False).ravel()
-    for axes, measure in zip(panels, shown, strict=False):
+def _values_below(axes: Axes, labels: Sequence[str]) -> list[str]:
+    texts = [typeset(cut(label)) for label in labels]
+    axes.set_xticks(range(len(texts)), texts)
+    return texts
+
+
+def _logarithmic(axes: Axes, direction: str, values: np.ndarray) -> None:
+    """Logarithmic axis where all values are positive and far apart."""
+    known = values[np.isfinite(values)]
+    if len(known) and known.min() > 0 and known.max() > WIDE * known.min():
+        axes.set(**{f'{direction}scale': 'log'})
+
+
+def _together(analysis: Analysis, measures: Sequence[Measure]) -> Drawn:
+    """Medians over the two paths that matter most: a row of heat maps per measure."""
+    rows = analysis.tables['together']
+    controllers = list(dict.fromkeys(row['controller'] for row in rows))[:MOST_GRIDS]
+    across = len(controllers)
+    figure, panels = plots.small_multiples(len(measures) * across, across, 2.6)
+    first, second = analysis.pair
+    names = short_names(analysis.factors)
+    for i, measure in enumerate(measures):
         mine = [row for row in rows if row['figure'] == measure.name]
-        for row in mine:
-            style = look(paths.index(row['path']))
-            marker = 'os^vPX'[controllers.index(row['controller']) % 6]
-            axes.plot(row['mu_star'], row['sigma'], marker, color=style['color'], markersize=5)
-        ends = [0.0, max((row['mu_star'] for row in mine), default=1.0) * 1.1]
-        axes.plot(ends, ends, color=plots.GREY, linewidth=0.7, linestyle=(0, (1, 2)))
-        axes.set_title(f'{measure.label} ({measure.unit})', loc='left', fontsize='medium')
-        axes.tick_params(labelsize='small')
-        axes.margins(0.1)
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_formatter(lambda x, _: typeset(plain(x, 3)))
-    for axes in panels[len(shown) :]:
-        axes.set_axis_off()
-    figure.supxlabel(r'$\mu^*$: mean size of the effect', fontsize='medium')
-    figure.supylabel(r'$\sigma$: its spread', fontsize='medium')
-    handles = [panels[0].plot([], [], 'o', color=look(i)['color'])[0] for i in range(len(paths))]
-    labels = [names[path] for path in paths]
-    for i, controller in enumerate(controllers if len(controllers) > 1 else []):
-        handles += panels[0].plot([], [], 'os^vPX'[i % 6], color='black')
-        labels.append(controller)
-    figure.legend(handles, labels, loc='outside upper center', ncols=4)
-    title = 'Elementary effects'
-    caption = (
-        f'{title} of Morris: how much a figure changes when one path goes through its whole range, '
-        'at random values of the others; above the dotted line the effect depends more on the '
-        'others than it is large.'
-    )
-    return figure, title, caption
-
-
-def together(results: Results, measures: Sequence[Measure]) -> Drawn:
-    """Medians over the two paths that matter most: a row of panels per measure."""
-    controllers = [
-        name
-        for name in results.sweep.controllers
-        if any(row['controller'] == name for row in results.tables['together'])
-    ][:MOST_GRIDS]
-    figure = plots.new_figure(0.5 + 2.6 * len(measures))
-    panels = figure.subplots(len(measures), len(controllers), squeeze=False)
-    first, second = results.pair
-    names = short_names(results.varied)
-    for measure, row in zip(measures, panels, strict=True):
-        medians = [c['median'] for c in results.tables['together'] if c['figure'] == measure.name]
-        known = np.array([m for m in medians if m is not None])
-        scale = Grid(known, (), '').norm()
-        for controller, axes in zip(controllers, row, strict=True):
-            cells = [
-                cell
-                for cell in results.tables['together']
-                if (cell['controller'], cell['figure']) == (controller, measure.name)
-            ]
+        scale = Grid(_array(mine, 'median'), (), '').norm()
+        for controller, axes in zip(controllers, panels[i * across :], strict=False):
+            cells = [cell for cell in mine if cell['controller'] == controller]
             _one_pair(axes, cells, measure.label, scale)
             axes.set_title(f'{controller}: {measure.label}', loc='left', pad=22, fontsize='medium')
             axes.set_ylabel(names[first.path])
             axes.set_xlabel(names[second.path])
             axes.xaxis.set_label_position('bottom')
-            scale_bar(figure, axes.images[0], measure.unit, ax=axes, fraction=0.05)
+            plots.scale_bar(figure, axes.images[0], measure.unit, ax=axes, fraction=0.05)
     title = 'The two paths that matter most'
     caption = (
         f'{title}, together: median of the rows of each combination of {first.path} and '
@@ -379,46 +328,38 @@ def together(results: Results, measures: Sequence[Measure]) -> Drawn:
 def _one_pair(axes: Axes, cells: Sequence[Row], label: str, scale: Normalize) -> None:
     down = list(dict.fromkeys(cell['value'] for cell in cells))
     across = list(dict.fromkeys(cell['other_value'] for cell in cells))
-    values = np.array([np.nan if c['median'] is None else c['median'] for c in cells])
-    values = values.reshape(len(down), len(across))
+    values = _array(cells, 'median').reshape(len(down), len(across))
     heads = [typeset(cut(word)) for word in across]
-    draw_grid(axes, Grid(values, heads, label, scale=scale), 6.0)
+    plots.draw_grid(axes, Grid(values, heads, label, scale=scale), 6.0)
     axes.set_yticks(range(len(down)), [typeset(cut(word)) for word in down])
     axes.tick_params(labelsize=7)
     if len(across) > 4:
         axes.tick_params(axis='x', labelrotation=60)
 
 
-def failures(results: Results) -> Drawn:
+def _failures(analysis: Analysis) -> Drawn:
     """Shares of diverged and refused rows along each path, of all controllers together."""
-    paths = list(dict.fromkeys(row['path'] for row in results.tables['failures']))
-    names = short_names(results.varied)
-    across = min(len(paths), 3)
-    down = -(-len(paths) // across)
-    figure = plots.new_figure(0.5 + 2.2 * down)
-    panels = figure.subplots(down, across, squeeze=False).ravel()
-    for axes, path in zip(panels, paths, strict=False):
-        rows = [row for row in results.tables['failures'] if row['path'] == path]
-        labels = list(dict.fromkeys(row['value'] for row in rows))
-        counts = {label: [r for r in rows if r['value'] == label] for label in labels}
-        bottom = np.zeros(len(labels))
+    paths = list(dict.fromkeys(row['path'] for row in analysis.tables['failures']))
+    names = short_names(analysis.factors)
+    figure, panels = plots.small_multiples(len(paths), height=2.2)
+    for axes, path in zip(panels, paths, strict=True):
+        groups: dict[str, list[Row]] = {}
+        for row in analysis.tables['failures']:
+            if row['path'] == path:
+                groups.setdefault(row['value'], []).append(row)
+        counts = np.array([sum(r['rows'] for r in group) for group in groups.values()])
+        bottom = np.zeros(len(groups))
         for word, colour in (('diverged', COLOURS[4]), ('refused', GREY)):
-            share = np.array([
-                100 * sum(r[word] for r in group) / max(sum(r['rows'] for r in group), 1)
-                for group in counts.values()
-            ])  # fmt: skip
-            axes.bar(range(len(labels)), share, bottom=bottom, color=colour, label=word)
+            failed = np.array([sum(r[word] for r in group) for group in groups.values()])
+            share = 100 * failed / np.maximum(counts, 1)
+            axes.bar(range(len(groups)), share, bottom=bottom, color=colour, label=word)
             bottom += share
-        heads = [typeset(cut(label)) for label in labels]
-        axes.set_xticks(range(len(labels)), heads, rotation=90, fontsize=7)
+        _values_below(axes, list(groups))
+        axes.tick_params(axis='x', labelrotation=90, labelsize=7)
         axes.set_title(names[path], loc='left', fontsize='medium')
-        axes.grid(axis='x', visible=False)
-    for axes in panels[::across]:
         axes.set_ylabel('rows (%)')
-    for axes in panels[len(paths) :]:
-        axes.set_axis_off()
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc='outside upper right', ncols=2)
+        axes.grid(axis='x', visible=False)
+    plots.shared_legend(figure)
     title = 'Where it fails'
     caption = (
         f'{title}: share of the rows that diverged or were refused, over the values of each path, '

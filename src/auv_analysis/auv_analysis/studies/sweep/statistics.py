@@ -6,20 +6,18 @@ from typing import Any
 import numpy as np
 from scipy.stats import rankdata
 
-from auv_analysis.metrics.measures import (
-    FAMILIES,
-    MEASURES,
-    Measure,
-    described,
-)
+from auv_analysis.metrics.measures import FAMILIES, MEASURES, Measure, described
 from auv_analysis.studies.pairs import log_ratios, paired
 from auv_analysis.studies.sweep.dataset import STATUSES, Sweep
-from auv_analysis.studies.sweep.factors import Varied, by_group
+from auv_analysis.studies.sweep.factors import Factor, by_group
 from auv_dynamics.vehicle import DOFS
 
 LEVELS = {'low': 0.05, 'quarter': 0.25, 'median': 0.5, 'three_quarters': 0.75, 'high': 0.95}
 Row = dict[str, Any]
 POINTS = 201  # of a distribution function as it is drawn
+FEWEST = 8  # rows that a correlation is worth computing of
+MOST_CELLS = 10  # groups of a path that a table of two has room for
+COUNT = 10  # best rows of each controller
 
 
 def ordered(values: np.ndarray, unit: str) -> np.ndarray:
@@ -73,20 +71,12 @@ def _of_column(sweep: Sweep, name: str, values: np.ndarray) -> Iterator[Row]:
         yield names | {'unit': unit, 'meaning': meaning} | spread(values[rows], unit)
 
 
-def distribution(values: np.ndarray, measure: Measure) -> tuple[np.ndarray, np.ndarray]:
-    """Distribution function as a line: values and the share of rows at or below each, in %.
-
-    Rows without the figure count as rows above every value where it is a time.
-    """
-    at = ordered(values, measure.unit)
-    at = at[~np.isnan(at)]
-    levels = np.linspace(0.0, 1.0, POINTS)
-    if len(at) == 0:
-        return np.empty(0), np.empty(0)
-    lines = np.quantile(at, levels, method='inverted_cdf')
-    below = np.searchsorted(np.sort(at), lines, side='right') / len(at)
-    inside = np.isfinite(lines)
-    return lines[inside], 100 * below[inside]
+def thinned(values: np.ndarray) -> np.ndarray:
+    """Values with the same quantiles, few enough to be drawn; NaN is left out."""
+    known = values[~np.isnan(values)]
+    if len(known) <= POINTS:
+        return known
+    return np.quantile(known, np.linspace(0.0, 1.0, POINTS), method='inverted_cdf')
 
 
 def varying(values: Sequence[np.ndarray], unit: str) -> bool:
@@ -99,16 +89,13 @@ def varying(values: Sequence[np.ndarray], unit: str) -> bool:
     return late or bool(np.ptp(known) > 1e-12 * np.abs(known).max())
 
 
-FEWEST = 8  # rows that a correlation is worth computing of
-
-
-def influence(ranks: np.ndarray, varied: Varied, rows: np.ndarray) -> Row | None:
+def influence(ranks: np.ndarray, factor: Factor, rows: np.ndarray) -> Row | None:
     """How much of the order of a figure a path explains.
 
     Parameters
     ----------
     ranks : (m,) of the figure
-    varied : the path
+    factor : the path
     rows : (m,) indices of these rows
 
     Returns
@@ -120,13 +107,13 @@ def influence(ranks: np.ndarray, varied: Varied, rows: np.ndarray) -> Row | None
             rises and falls again
 
     """
-    codes = varied.codes[rows]
+    codes = factor.codes[rows]
     groups = len(np.unique(codes))
     if len(ranks) < FEWEST or groups < 2 or np.ptp(ranks) == 0 or len(ranks) <= groups:
         return None
     spearman = None
-    if varied.numbers is not None:
-        others = rankdata(varied.numbers[rows])
+    if factor.numbers is not None:
+        others = rankdata(factor.numbers[rows])
         spearman = float(np.corrcoef(ranks, others)[0, 1])
     return {'spearman': spearman, 'explained_percent': 100 * explained(ranks, codes)}
 
@@ -150,30 +137,27 @@ def ranks_of(values: np.ndarray, measure: Measure) -> tuple[np.ndarray, np.ndarr
     return rankdata(at[there]), there
 
 
-MOST_CELLS = 10  # groups of a path that a table of two has room for
-
-
-def along(values: np.ndarray, rows: np.ndarray, varied: Varied, measure: Measure) -> Iterator[Row]:
+def along(values: np.ndarray, rows: np.ndarray, factor: Factor, measure: Measure) -> Iterator[Row]:
     """Quantiles of a figure in each group of a path.
 
     Parameters
     ----------
     values : (n,) of all rows
     rows : (m,) indices of the rows that count
-    varied : the path
+    factor : the path
     measure : whose values they are
 
     """
-    groups = by_group(values[rows], varied.codes[rows], len(varied.labels))
-    for i, (label, group) in enumerate(zip(varied.labels, groups, strict=True)):
-        row: Row = {'path': varied.path, 'figure': measure.name, 'unit': measure.unit}
-        row |= {'group': i, 'value': label, 'middle': finite(varied.middles[i])}
-        ends = (None, None) if varied.edges is None else map(float, varied.edges[i])
+    groups = by_group(values[rows], factor.codes[rows], len(factor.labels))
+    for i, (label, group) in enumerate(zip(factor.labels, groups, strict=True)):
+        row: Row = {'path': factor.path, 'figure': measure.name, 'unit': measure.unit}
+        row |= {'group': i, 'value': label, 'middle': finite(factor.middles[i])}
+        ends = (None, None) if factor.edges is None else map(float, factor.edges[i])
         yield row | dict(zip(('from', 'to'), ends, strict=True)) | spread(group, measure.unit)
 
 
 def together(
-    values: np.ndarray, rows: np.ndarray, pair: Sequence[Varied], measure: Measure
+    values: np.ndarray, rows: np.ndarray, pair: Sequence[Factor], measure: Measure
 ) -> Iterator[Row]:
     """Median of a figure for each combination of the groups of two paths.
 
@@ -183,7 +167,7 @@ def together(
     pair : two paths; bins are merged until they are few
 
     """
-    first, second = (merged(varied) for varied in pair)
+    first, second = (merged(factor) for factor in pair)
     width = len(second[1])
     codes = first[0][rows] * width + second[0][rows]
     groups = by_group(values[rows], codes, len(first[1]) * width)
@@ -196,31 +180,31 @@ def together(
         yield names | {'rows': len(group), 'known': known, 'median': finite(at)}
 
 
-def merged(varied: Varied) -> tuple[np.ndarray, list[str]]:
+def merged(factor: Factor) -> tuple[np.ndarray, list[str]]:
     """Codes and labels of a path with neighbouring bins joined until they are few."""
-    labels = list(varied.labels)
-    if not varied.binned or len(labels) <= MOST_CELLS:
-        return varied.codes, labels
+    labels = list(factor.labels)
+    if not factor.binned or len(labels) <= MOST_CELLS:
+        return factor.codes, labels
     step = -(-len(labels) // MOST_CELLS)
     starts = [label.split('–')[0] for label in labels[::step]]
     ends = [labels[min(i + step, len(labels)) - 1] for i in range(0, len(labels), step)]
     joined = [f'{a}–{b.split("–")[-1]}' for a, b in zip(starts, ends, strict=True)]
-    return varied.codes // step, joined
+    return factor.codes // step, joined
 
 
-def failures(varied: Varied, status: np.ndarray, rows: np.ndarray) -> Iterator[Row]:
+def failures(factor: Factor, status: np.ndarray, rows: np.ndarray) -> Iterator[Row]:
     """Shares of diverged and refused rows in each group of a path.
 
     Parameters
     ----------
-    varied : the path
+    factor : the path
     status : (n,) places in `STATUSES`
     rows : (m,) indices of the rows that count
 
     """
-    groups = by_group(status[rows], varied.codes[rows], len(varied.labels))
-    for label, group in zip(varied.labels, groups, strict=True):
-        row: Row = {'path': varied.path, 'value': label, 'rows': len(group)}
+    groups = by_group(status[rows], factor.codes[rows], len(factor.labels))
+    for label, group in zip(factor.labels, groups, strict=True):
+        row: Row = {'path': factor.path, 'value': label, 'rows': len(group)}
         for place, word in enumerate(STATUSES[1:], start=1):
             count = int((group == place).sum())
             share = 100.0 * count / len(group) if len(group) else None
@@ -265,50 +249,26 @@ def pairs(sweep: Sweep, values: np.ndarray, measure: Measure) -> Iterator[Row]:
         }
 
 
-COUNT = 10  # rows of each controller
-
-
-def smallest(
-    sweep: Sweep, values: np.ndarray, measure: Measure, count: int = COUNT
-) -> list[tuple[int, Row]]:
-    """Rows of each controller with the smallest values of a measure: place in the sweep, names.
+def best(
+    sweep: Sweep, figures: Mapping[str, np.ndarray], by: Measure, count: int = COUNT
+) -> list[Row]:
+    """Rows of each controller with the smallest values of a measure, with all that they have.
 
     Parameters
     ----------
     sweep : whose rows they are
-    values : (n,) of the measure in all rows
-    measure : by which they are sorted
+    figures : measure -> (n,) of all rows
+    by : by which they are sorted
     count : at most so many of a controller
 
     """
-    found = []
+    values, found = figures[by.name], []
     for i, controller in enumerate(sweep.controllers):
         rows = np.flatnonzero((sweep.controller == i) & (sweep.status == 0) & np.isfinite(values))
-        order = rows[np.argsort(values[rows], kind='stable')[:count]]
-        for rank, row in enumerate(order, start=1):
-            found.append((int(row), {'by': measure.name, 'controller': controller, 'rank': rank}))
+        places = rows[np.argsort(values[rows], kind='stable')[:count]]
+        table = sweep.table(['index', 'seed', *sweep.paths]).take(places).to_pylist()
+        for rank, (place, given) in enumerate(zip(places, table, strict=True), start=1):
+            row = {'by': by.name, 'controller': controller, 'rank': rank}
+            row |= {'rollout': given.pop('index'), **given}
+            found.append(row | {m.name: finite(figures[m.name][place]) for m in MEASURES})
     return found
-
-
-def with_values(
-    sweep: Sweep, found: Sequence[tuple[int, Row]], figures: Mapping[str, np.ndarray]
-) -> list[Row]:
-    """The same rows with rollout, seed, varied values and all measures.
-
-    Parameters
-    ----------
-    sweep : whose rows they are
-    found : of `smallest`
-    figures : measure -> (n,)
-
-    """
-    places = [row for row, _ in found]
-    table = sweep.table(['index', 'seed', *sweep.paths]).take(places)
-    rows = []
-    for (place, names), given in zip(found, table.to_pylist(), strict=True):
-        row = {**names, 'rollout': given.pop('index'), **given}
-        for measure in MEASURES:
-            value = figures[measure.name][place]
-            row[measure.name] = float(value) if np.isfinite(value) else None
-        rows.append(row)
-    return rows

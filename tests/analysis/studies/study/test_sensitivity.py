@@ -62,29 +62,36 @@ LAWS = dict(zip(NAMES, [
 def test_powers_of_the_gains_are_found(monkeypatch, method):
     known(monkeypatch, **LAWS)
     found = sensitivity(short(), 'gvc', method=method, count=256)
-    surge, sway = (found.of('velocity_error.rms')[dof] for dof in ('surge', 'sway'))
+    of = found.of('velocity_error.rms')
     expected = {'surge': (-1.0, 0.0, 0.0, -1.0), 'sway': (2.0, 0.0, 0.0, -1.0)}
-    for variable in (surge, sway):
-        powers = np.array(expected[variable.figure.dof])
-        assert_allclose([i.elasticity for i in variable.indices], powers, atol=1e-9)
+    for dof, exponents in expected.items():
+        powers = np.array(exponents)
+        assert_allclose(column(of[dof], 'elasticity'), powers, atol=1e-9)
         if method == 'sobol':
-            assert_allclose(variable.spread, SPREAD * np.sqrt((powers**2).sum()), rtol=0.02)
+            spread = SPREAD * np.sqrt((powers**2).sum())
+            assert_allclose(of[dof][0]['spread'], spread, rtol=0.02)
             shares = powers**2 / (powers**2).sum()
-            assert_allclose([i.ST for i in variable.indices], shares, atol=0.02)
-            assert all(index.mu_star is None for index in variable.indices)
+            assert_allclose(column(of[dof], 'ST'), shares, atol=0.02)
+            assert all('mu_star' not in row for row in of[dof])
         else:
             whole = 2.0 * math.log(2.0) * np.abs(powers)
-            assert_allclose([i.mu_star for i in variable.indices], whole, atol=1e-9)
-            assert all(index.ST is None for index in variable.indices)
-    assert [v.figure.dof for v in found.variables] == ['sway', 'surge']
-    assert (surge.rank, sway.rank) == (2, 1)
-    assert sway.main.gain == 'k_D'
-    assert sway.main.doubled == pytest.approx(300.0)
-    assert surge.value == pytest.approx(3.0)
-    reasons = {e.figure.column: e.reason for e in found.excluded}
+            assert_allclose(column(of[dof], 'mu_star'), whole, atol=1e-9)
+            assert all('ST' not in row for row in of[dof])
+    assert [kpi.dof for kpi in found.kpis] == ['sway', 'surge']
+    assert [of[dof][0]['rank'] for dof in ('surge', 'sway')] == [2, 1]
+    assert of['sway'][0]['gain'] == 'k_D'
+    assert of['sway'][0]['doubled'] == pytest.approx(300.0)
+    assert of['surge'][0]['value'] == pytest.approx(3.0)
+    reasons = {e.kpi.column: e.reason for e in found.excluded}
     assert reasons['velocity_error.rms.heave'] == 'the same whatever the gains'
     assert reasons['velocity_error.rms.yaw'] == 'zero throughout'
-    assert len(found.variables) + len(found.excluded) == 61
+    assert len(found.kpis) + len(found.excluded) == 61
+
+
+def column(rows, name: str) -> list[float]:
+    """Of each gain, in the order of the law."""
+    of = {row['gain']: row[name] for row in rows}
+    return [of[gain] for gain in ('k_D', 'k_I', 'Lambda', 'Gamma')]
 
 
 def test_what_cannot_be_followed_is_named(monkeypatch):
@@ -98,13 +105,13 @@ def test_what_cannot_be_followed_is_named(monkeypatch):
     }
     known(monkeypatch, **figures)
     found = sensitivity(short(), 'gvc', count=16)
-    reasons = {e.figure.column: e.reason for e in found.excluded}
+    reasons = {e.kpi.column: e.reason for e in found.excluded}
     assert 'does not settle in' in reasons['velocity_error.settling_time.surge']
     assert 'zero in' in reasons['velocity_error.settling_time.sway']
     assert 'rounding' in reasons['effort.rms.surge']
     assert 'does not exist in any' in reasons['lumped_error.rms.surge']
     assert 'structure of M' in reasons['coupling.delta_xi_max.yaw']
-    assert [v.figure.column for v in found.variables] == ['effort.rms.heave']
+    assert [kpi.column for kpi in found.kpis] == ['effort.rms.heave']
 
 
 def test_diverging_loops_narrow_the_span_and_are_counted(monkeypatch):
@@ -114,8 +121,8 @@ def test_diverging_loops_narrow_the_span_and_are_counted(monkeypatch):
     assert list(found.failed) == [2.0]
     assert 0 < found.failed[2.0] < 32 * 6
     surge = found.of('velocity_error.rms')['surge']
-    assert surge.spread == pytest.approx(0.5 * SPREAD * np.sqrt(2), rel=0.1)
-    assert_allclose([i.elasticity for i in surge.indices], [-1, 0, 0, -1], atol=1e-9)
+    assert surge[0]['spread'] == pytest.approx(0.5 * SPREAD * np.sqrt(2), rel=0.1)
+    assert_allclose(column(surge, 'elasticity'), [-1, 0, 0, -1], atol=1e-9)
     text = ' '.join(s.text for s in sensitivity_sentences([found]))
     assert f'{found.failed[2.0]} rollouts failed' in text
 
@@ -128,7 +135,7 @@ def test_loops_that_always_diverge_are_a_refusal_with_its_reason(monkeypatch, tm
     known(monkeypatch, limit=0.5, **LAWS)
     own = sensitivity(short(), 'gvc', count=32)
     assert 'own gains' in own.refusal
-    assert not own.variables
+    assert not own.rows
     table = left_out_table([own])
     assert own.refusal in [cell.text for row in table.rows for cell in row]
     path = write_sensitivities(tmp_path, [own, found])
@@ -143,11 +150,11 @@ def test_elasticity_is_the_derivative():
         run = simulate(changed_scenario(short(), {'controllers.gvc.Gamma': 60.0 * factor}), 'gvc')
         errors.append(summarize(run)['velocity_error']['rms'])
     slopes = np.log(np.divide(*errors)) / -np.log(1.01**2)
-    of_Gamma = [v.indices[3].elasticity for v in _six(found)]
+    of_Gamma = [column(rows, 'elasticity')[3] for rows in _six(found)]
     assert_allclose(of_Gamma, slopes, atol=0.01)
     assert min(of_Gamma) < -0.1
     value = summarize(simulate(short(), 'gvc'))['velocity_error']['rms']
-    assert_allclose([v.value for v in _six(found)], value, rtol=1e-9)
+    assert_allclose([rows[0]['value'] for rows in _six(found)], value, rtol=1e-9)
 
 
 def _six(found):
@@ -160,7 +167,7 @@ def test_every_form_of_a_gain_is_multiplied(value):
     plain = sensitivity(short(), 'gvc', count=4)
     other = sensitivity(changed_scenario(short(), {'controllers.gvc.k_D': value}), 'gvc', count=4)
     assert other.gains == plain.gains == ('k_D', 'k_I', 'Lambda', 'Gamma')
-    assert_allclose([v.spread for v in _six(other)], [v.spread for v in _six(plain)], rtol=1e-12)
+    assert_allclose(*(found.six('velocity_error.rms') for found in (other, plain)), rtol=1e-12)
 
 
 WITH_DEFAULTS = {
@@ -182,7 +189,7 @@ def test_figures_are_sensitive_to_gains_left_to_their_defaults():
     scenario = changed_scenario(short(), {'controllers': WITH_DEFAULTS})
     found = sensitivity(scenario, 'a.pid', method='morris', count=2)
     assert found.rollouts == 2 * 6 + 1
-    names = {index.gain for index in found.variables[0].indices}
+    names = {row['gain'] for row in found.rows}
     assert names == {'k_P', 'k_I', 'k_D', 'omega_f', 'k_FF'}
 
 
@@ -217,9 +224,9 @@ def test_a_users_own_law_is_studied_as_it_runs(monkeypatch, tmp_path):
     found = sensitivity(scenario, 'own')
     assert (found.method, found.count, found.rollouts) == ('morris', 4, 4 * 3 + 1)
     push = found.of('effort.max')['surge']
-    assert push.value == pytest.approx(0.75)
-    assert [index.elasticity for index in push.indices] == pytest.approx([1.0, -2.0])
-    assert push.main.gain == 'k_B'
+    assert [row['gain'] for row in push] == ['k_B', 'k_A']
+    assert [row['elasticity'] for row in push] == pytest.approx([-2.0, 1.0])
+    assert push[0]['value'] == pytest.approx(0.75)
 
 
 def test_wrong_input_is_refused():
@@ -232,18 +239,18 @@ def test_wrong_input_is_refused():
 def test_table_sentences_and_file_say_the_same(monkeypatch, tmp_path):
     known(monkeypatch, **LAWS)
     found = sensitivity(short(), 'gvc', count=64)
-    sway = found.variables[0]
-    table = sensitivity_table(found)
+    sway = found.of('velocity_error.rms')['sway'][0]
+    table = sensitivity_table([found], 'gvc')
     assert [row[0].text for row in table.rows] == ['RMS error, sway', 'RMS error, surge']
-    assert table.rows[0][2].value == sway.spread
+    assert table.rows[0][3].value == sway['spread']
     rows = parquet.read_table(write_sensitivities(tmp_path, [found])).to_pylist()
     first = rows[0]
     assert (first['figure'], first['dof'], first['gain']) == ('velocity_error.rms', 'sway', 'k_D')
-    assert (first['spread'], first['ST']) == (sway.spread, sway.indices[0].ST)
+    assert (first['spread'], first['ST']) == (sway['spread'], sway['ST'])
     assert first['mu_star'] is None
     assert sum(row['figure'] == 'velocity_error.rms' for row in rows) == 2 * 4 + 4
     (text,) = (s.text for s in sensitivity_sentences([found]) if 'follows' in s.text)
-    assert 'RMS velocity error that follows the gains most is that of sway' in text
+    assert 'RMS error that follows the gains most is that of sway' in text
     assert 'k_D makes' in text
     assert '+300 %' in text
     turned = {NAMES[1]: lambda k, G: 5.0 / k**2}

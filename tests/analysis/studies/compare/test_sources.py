@@ -13,7 +13,7 @@ from auv_analysis.scenario.scenario import write_inputs
 from auv_analysis.studies.compare.sources import Source, is_sweep, named, open_source, sources_of
 from auv_dynamics import InputError
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 SHORT = (ROOT / 'config/scenarios/case1.yaml').read_text().replace('30.0', '0.3')
 NOISY = SHORT + '\nsensors: {velocity_noise: 0.01}\nactuators: {lag: 0.02}\n'
 

@@ -84,12 +84,12 @@ def test_spreads_are_standard_deviations(method) -> None:
     answers = design.points @ np.array([[1.0, 0.5, 0.0], [0.0, 0.5, 0.1]])
     found = spreads(design, answers)
     one = np.sqrt(1 / 3) if method == 'sobol' else np.sqrt((1 + 1 / 9) / 2)
-    assert_allclose(found.value, one * np.array([1.0, np.sqrt(0.5), 0.1]), rtol=0.05)
-    assert (found.low < found.value).all()
-    assert (found.value < found.high).all()
-    assert_array_equal(found.rank, [1, 2, 3])
-    assert_array_equal(found.rank_low, [1, 2, 3])
-    assert_array_equal(found.rank_high, [1, 2, 3])
+    assert_allclose(found['spread'], one * np.array([1.0, np.sqrt(0.5), 0.1]), rtol=0.05)
+    assert (found['spread_low'] < found['spread']).all()
+    assert (found['spread'] < found['spread_high']).all()
+    assert_array_equal(found['rank'], [1, 2, 3])
+    assert_array_equal(found['rank_low'], [1, 2, 3])
+    assert_array_equal(found['rank_high'], [1, 2, 3])
 
 
 def test_the_interval_of_a_spread_holds_it_as_often_as_it_says() -> None:
@@ -98,7 +98,7 @@ def test_the_interval_of_a_spread_holds_it_as_often_as_it_says() -> None:
         design = Design('sobol', ('a',), 32, seed)
         design.__dict__['points'] = np.random.default_rng(seed).uniform(-1, 1, (96, 1))
         found = spreads(design, design.points)
-        inside += bool(found.low[0] <= true <= found.high[0])
+        inside += bool(found['spread_low'][0] <= true <= found['spread_high'][0])
     assert inside >= 50  # 57 expected
 
 
@@ -107,7 +107,7 @@ def test_places_are_paired() -> None:
     design = Design('sobol', ('a', 'b'), 64, 2)
     y = design.points @ [1.0, 1.0]
     found = spreads(design, np.column_stack([y, 1.02 * y, design.points[:, 0] * 1.41]))
-    assert found.low[1] < found.high[0]  # their intervals overlap
-    assert (found.rank[1], found.rank_low[1], found.rank_high[0]) == (1, 1, 3)
-    assert found.rank[0] > found.rank[1]
-    assert not np.array_equal(found.rank_low, found.rank_high)  # the third is not sure
+    assert found['spread_low'][1] < found['spread_high'][0]  # their intervals overlap
+    assert (found['rank'][1], found['rank_low'][1], found['rank_high'][0]) == (1, 1, 3)
+    assert found['rank'][0] > found['rank'][1]
+    assert not np.array_equal(found['rank_low'], found['rank_high'])  # the third is not sure

@@ -9,18 +9,18 @@ from made_sweeps import ENERGY, K_D, MIXED, SIMPLE, change_manifest, make_sweep,
 from pages import check_numbers
 from pyarrow import parquet
 
-from auv_analysis.cli import main
-from auv_analysis.studies.sweep.analysis import Results, analysed
+from auv_analysis.cli import main as cli
+from auv_analysis.studies.sweep.analysis import Analysis, analysed, results_of
 from auv_analysis.studies.sweep.dataset import open_sweep
-from auv_analysis.studies.sweep.factors import varied_paths
+from auv_analysis.studies.sweep.factors import factors_of
 from auv_analysis.studies.sweep.plots import draw
 from auv_analysis.studies.sweep.statistics import merged
-from auv_dynamics import InputError
+from auv_dynamics.files.errors import InputError
 
 
 def test_words_lists_and_failures(tmp_path: Path) -> None:
     results = analysed(open_sweep(make_sweep(tmp_path, MIXED, mixed)))
-    assert {v.path: list(v.labels) for v in results.varied} == {
+    assert {v.path: list(v.labels) for v in results.factors} == {
         'vehicle': ['herman2018', 'rexrov'],
         'controllers.gvc.k_D': ['[1.0, 1.0, 1.0, 1.0, 1.0, 1.0]', '[2.0, 2.0, 2.0, 2.0, 2.0, 2.0]'],
         'vehicle.rigid_body.mass': ['−1', '250', '300'],
@@ -49,8 +49,8 @@ def test_a_sweep_that_is_not_finished_is_analysed(tmp_path: Path) -> None:
     assert row['rollouts'] == 300
 
 
-def test_bins_are_joined_where_they_are_many(results: Results) -> None:
-    varied = next(v for v in varied_paths(results.sweep) if v.path == K_D)
+def test_bins_are_joined_where_they_are_many(results: Analysis) -> None:
+    varied = next(v for v in factors_of(results.sweep) if v.path == K_D)
     codes, labels = merged(varied)
     assert len(varied.labels) > 10 >= len(labels)
     assert labels[0].split('–')[0] == varied.labels[0].split('–')[0]
@@ -94,24 +94,23 @@ def _without(path: Path) -> None:
     parquet.write_table(parquet.read_table(path).drop_columns([K_D]), path)
 
 
-def test_the_document_has_no_nan(results: Results) -> None:
-    from auv_analysis.studies.sweep.analysis import document
-
-    assert json.loads(json.dumps(document(results), allow_nan=False))['rows'] == 1600
+def test_the_document_has_no_nan(results: Analysis) -> None:
+    document = results_of(results).to_json()
+    assert json.loads(json.dumps(document, allow_nan=False))['rows'] == 1600
 
 
 @pytest.mark.usefixtures('unrendered')
 @pytest.mark.parametrize(('campaign', 'known'), [(SIMPLE, simple), (MIXED, mixed)])
 def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known) -> None:
     out = tmp_path / 'report'
-    main.main(['analyze', str(make_sweep(tmp_path, campaign, known)), '--out', str(out)])
+    cli.main(['analyze', str(make_sweep(tmp_path, campaign, known)), '--out', str(out)])
     assert check_numbers(out) > 100
 
 
 @pytest.mark.usefixtures('unrendered')
 def test_an_unfinished_sweep_says_so(tmp_path: Path, capsys) -> None:
     out = make_sweep(tmp_path, SIMPLE, simple, range(0, 16, 3))
-    main.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
+    cli.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
     assert 'note: not finished, 600 of 1600 rows are there' in capsys.readouterr().err
     report = (tmp_path / 'report/report.html').read_text(encoding='utf-8')
     assert 'The sweep is not finished: 600 of 1600 rows are there.' in report
@@ -123,7 +122,7 @@ def test_a_sweep_without_figures_is_a_failure(tmp_path: Path, capsys) -> None:
 
     out = make_sweep(tmp_path, SIMPLE, refused, range(2))
     with pytest.raises(SystemExit) as end:
-        main.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
+        cli.main(['analyze', str(out), '--out', str(tmp_path / 'report')])
     assert end.value.code == 1
     assert capsys.readouterr().err.splitlines()[-1] == f'{out}: none of 200 rows has figures'
     assert not (tmp_path / 'report').exists()
@@ -133,19 +132,19 @@ def test_a_sweep_without_figures_is_a_failure(tmp_path: Path, capsys) -> None:
 def test_results_are_replaced_only_when_asked_and_the_rest_stays(tmp_path: Path, capsys) -> None:
     sweep, out = make_sweep(tmp_path, MIXED, mixed), tmp_path / 'report'
     command = ['analyze', str(sweep), '--out', str(out)]
-    main.main(command)
+    cli.main(command)
     (out / 'notes.md').write_text('mine')
     capsys.readouterr()
     with pytest.raises(SystemExit) as end:
-        main.main(command)
+        cli.main(command)
     assert (end.value.code, len(capsys.readouterr().err.splitlines())) == (2, 1)
-    main.main([*command, '--overwrite', '--by', ENERGY, '--json'])
+    cli.main([*command, '--overwrite', '--by', ENERGY, '--json'])
     document = json.loads(capsys.readouterr().out)
     assert document == json.loads((out / 'analysis.json').read_text())
     assert {row['by'] for row in document['best']} == {ENERGY}
     assert (out / 'notes.md').read_text() == 'mine'
     with pytest.raises(SystemExit):
-        main.main(['analyze', str(sweep), '--out', str(sweep), '--overwrite'])
+        cli.main(['analyze', str(sweep), '--out', str(sweep), '--overwrite'])
     assert (sweep / 'sweep.json').exists()
 
 

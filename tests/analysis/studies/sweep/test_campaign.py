@@ -94,7 +94,7 @@ def test_defaults_are_filled_in(tmp_path: Path) -> None:
 
 
 def test_scenario_is_named_relative_to_the_campaign(tmp_path: Path, monkeypatch) -> None:
-    text = (Path(__file__).parents[2] / 'config/scenarios/case2.yaml').read_text()
+    text = (Path(__file__).parents[4] / 'config/scenarios/case2.yaml').read_text()
     (tmp_path / 'mine.yaml').write_text(text)
     path = written(tmp_path, 'name: x\nscenario: mine.yaml\nvary: [{grid: {duration: [1.0]}}]')
     monkeypatch.chdir('/')
@@ -102,14 +102,14 @@ def test_scenario_is_named_relative_to_the_campaign(tmp_path: Path, monkeypatch)
 
 
 def test_readme_counts_the_shipped_campaign() -> None:
-    readme = (Path(__file__).parents[2] / 'README.md').read_text()
+    readme = (Path(__file__).parents[4] / 'README.md').read_text()
     campaign = load_campaign('case1_gains')
     assert f'{campaign.rollouts} rollouts of each controller' in readme
 
 
 def test_blocks_are_shorter_where_rollouts_are_longer(tmp_path: Path) -> None:
     def block(duration: float, count: int) -> int:
-        scenario = (Path(__file__).parents[2] / 'config/scenarios/case1.yaml').read_text()
+        scenario = (Path(__file__).parents[4] / 'config/scenarios/case1.yaml').read_text()
         text = scenario.replace('duration: 30.0', f'duration: {duration}')
         (tmp_path / 'scenario.yaml').write_text(text)
         text = ('name: x\nscenario: scenario.yaml\nvary: [{random: {duration: {uniform: '
@@ -183,7 +183,7 @@ def test_wrong_campaign_is_refused_in_one_line(old: str, new: str, tmp_path: Pat
 
 
 def test_samples_of_a_scenario_with_actuators_need_zero_order_hold(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[2] / 'config/scenarios/case1.yaml').read_text()
+    text = (Path(__file__).parents[4] / 'config/scenarios/case1.yaml').read_text()
     (tmp_path / 'scenario.yaml').write_text(text + 'actuators: {lag: 0.1}\n')
     text = 'name: x\nscenario: scenario.yaml\nvary: [{grid: {actuators.lag: [0.1, 0.2]}}]\n'
     with pytest.raises(InputError, match='actuators: expected hold'):

@@ -9,29 +9,25 @@ from made_sweeps import DAMPING, ENERGY, K_D, SETTLED, rows
 from scipy.stats import f_oneway, spearmanr
 from strategies import QUICK
 
-from auv_analysis.metrics.measures import BY_NAME
-from auv_analysis.studies.sweep.analysis import Results, analysed
-from auv_analysis.studies.sweep.statistics import (
-    by_group,
-    distribution,
-    explained,
-    quantiles,
-    spread,
-)
+from auv_analysis.report.plots import distribution
+from auv_analysis.report.plotting import new_figure
+from auv_analysis.studies.sweep.analysis import Analysis, analysed
+from auv_analysis.studies.sweep.factors import by_group
+from auv_analysis.studies.sweep.statistics import explained, ordered, quantiles, spread, thinned
 
 
-def test_figures_that_never_differ_are_named_not_analysed(results: Results) -> None:
+def test_figures_that_never_differ_are_named_not_analysed(results: Analysis) -> None:
     assert [m.name for m in results.measures] == [ENERGY, SETTLED, 'overall.effort.max.angular']
     assert results.fixed['overall.effort.rms.linear'] == pytest.approx(np.sqrt(3))
 
 
-def test_whether_a_row_settles_is_a_figure_too(results: Results) -> None:
+def test_whether_a_row_settles_is_a_figure_too(results: Analysis) -> None:
     (row,) = rows(results, 'influence', figure=SETTLED, controller='gvc', path=K_D)
     assert row['explained_percent'] > 80
     assert row['spearman'] < -0.8, 'a larger gain settles, and what does not is late'
 
 
-def test_what_matters_is_found_rising_or_not(results: Results) -> None:
+def test_what_matters_is_found_rising_or_not(results: Analysis) -> None:
     (energy,) = rows(results, 'influence', figure=ENERGY, controller='gvc', path=K_D)
     assert energy['spearman'] == pytest.approx(1.0)
     assert energy['explained_percent'] > 99
@@ -44,21 +40,21 @@ def test_what_matters_is_found_rising_or_not(results: Results) -> None:
     assert {v.path for v in results.pair} == {K_D, DAMPING}
 
 
-def test_a_path_of_another_controller_has_no_say(results: Results) -> None:
+def test_a_path_of_another_controller_has_no_say(results: Analysis) -> None:
     paths = {row['path'] for row in rows(results, 'influence', controller='gvc')}
     assert 'controllers.cl.k_I' not in paths
     assert 'controllers.cl.k_I' in {r['path'] for r in rows(results, 'influence', controller='cl')}
 
 
-def test_spearman_is_that_of_scipy(results: Results) -> None:
-    varied = next(v for v in results.varied if v.path == DAMPING)
+def test_spearman_is_that_of_scipy(results: Analysis) -> None:
+    varied = next(v for v in results.factors if v.path == DAMPING)
     mine = results.rows_of('cl')
     (row,) = rows(results, 'influence', figure=ENERGY, controller='cl', path=DAMPING)
     expected = spearmanr(varied.numbers[mine], results.values[ENERGY][mine]).statistic
     assert row['spearman'] == pytest.approx(expected)
 
 
-def test_groups_along_a_path_hold_its_quantiles(results: Results) -> None:
+def test_groups_along_a_path_hold_its_quantiles(results: Analysis) -> None:
     found = rows(results, 'dependence', figure=ENERGY, controller='gvc', path=K_D)
     assert sum(row['rows'] for row in found) == 800
     assert [row['from'] for row in found] == sorted(row['from'] for row in found)
@@ -67,7 +63,7 @@ def test_groups_along_a_path_hold_its_quantiles(results: Results) -> None:
         assert row['median'] == pytest.approx(row['middle'] ** 2, rel=0.05)
 
 
-def test_controllers_in_the_same_rollouts(results: Results) -> None:
+def test_controllers_in_the_same_rollouts(results: Analysis) -> None:
     (row,) = rows(results, 'paired', figure=ENERGY)
     assert (row['controller'], row['other'], row['rollouts']) == ('gvc', 'cl', 800)
     assert (row['smaller_percent'], row['equal_percent']) == (100.0, 0.0)
@@ -76,7 +72,7 @@ def test_controllers_in_the_same_rollouts(results: Results) -> None:
     assert same['equal_percent'] == 100.0
 
 
-def test_two_paths_together(results: Results) -> None:
+def test_two_paths_together(results: Analysis) -> None:
     cells = rows(results, 'together', figure=ENERGY, controller='gvc')
     assert sum(cell['rows'] for cell in cells) == 800
     first = {cell['value'] for cell in cells}
@@ -84,16 +80,16 @@ def test_two_paths_together(results: Results) -> None:
     assert all(cell['median'] is None or 1 <= cell['median'] <= 9 for cell in cells)
 
 
-def test_rows_that_settle_in_half(results: Results) -> None:
+def test_rows_that_settle_in_half(results: Analysis) -> None:
     name = 'velocity_error.settling_time.heave'
     (row,) = rows(results, 'quantiles', figure=name, controller='gvc')
-    share = np.mean(results.varied[0].numbers[results.rows_of('gvc')] > 2.0)
+    share = np.mean(results.factors[0].numbers[results.rows_of('gvc')] > 2.0)
     assert (row['rows'], row['known'] / row['rows']) == (800, pytest.approx(share))
     assert row['high'] is None, 'of a time, what does not exist is late'
     assert row['largest'] == 1.0
 
 
-def test_best_rows_are_the_smallest(results: Results) -> None:
+def test_best_rows_are_the_smallest(results: Analysis) -> None:
     found = analysed(results.sweep, ENERGY).tables['best']
     mine = [row for row in found if row['controller'] == 'cl']
     assert [row['rank'] for row in mine] == list(range(1, 11))
@@ -101,10 +97,10 @@ def test_best_rows_are_the_smallest(results: Results) -> None:
     assert mine[0][ENERGY] == pytest.approx(1.5 * mine[0][K_D] ** 2)
 
 
-def test_what_varies_says_its_unit(results: Results) -> None:
-    said = {v.path: (v.unit, v.meaning) for v in results.varied}
+def test_what_varies_says_its_unit(results: Analysis) -> None:
+    said = {v.path: (v.unit, v.meaning) for v in results.factors}
     assert 'velocity gain' in said[K_D][1]
-    assert [v.labels for v in results.varied if v.path == 'integrator'] == [['ode5', 'rk4']]
+    assert [v.labels for v in results.factors if v.path == 'integrator'] == [['ode5', 'rk4']]
 
 
 # the parts
@@ -124,21 +120,28 @@ def test_explained_share_is_that_of_the_f_test(seed, groups) -> None:
 
 
 @QUICK
-@given(arrays(float, st.integers(1, 40), elements=st.floats(-5, 5)))
-def test_quantiles_are_values_and_a_distribution_ends_at_all(values) -> None:
-    at = quantiles(values, [0.05, 0.5, 0.95])
+@given(arrays(float, st.integers(1, 600), elements=st.floats(-5, 5)))
+def test_quantiles_are_values_and_a_drawn_distribution_keeps_them(values) -> None:
+    levels = [0.05, 0.5, 0.95]
+    at = quantiles(values, levels)
     assert set(at) <= set(values)
     assert np.mean(values <= at[1]) >= 0.5
-    x, share = distribution(values, BY_NAME[ENERGY])
-    assert share[-1] == 100.0
-    assert x[0] == values.min()
-    for value, percent in zip(x, share, strict=True):
-        assert percent == pytest.approx(100 * np.mean(values <= value))
+    few = thinned(values)
+    assert len(few) <= max(len(values), 201)
+    assert set(few) <= set(values)
+    for value in at:
+        assert np.mean(few <= value) == pytest.approx(np.mean(values <= value), abs=0.006)
+    assert (few.min(), few.max()) == (values.min(), values.max())
 
 
-def test_a_distribution_of_times_ends_where_the_rest_never_settles() -> None:
-    x, share = distribution(np.array([1.0, 2.0, np.nan, np.nan]), BY_NAME[SETTLED])
-    assert (x[-1], share[-1]) == (2.0, 50.0)
+def test_a_time_that_does_not_exist_is_late() -> None:
     assert spread(np.array([1.0, 2.0, np.nan]), 's')['median'] == 2.0
     assert spread(np.array([1.0, 2.0, np.nan]), 'N')['median'] == 1.0
     assert spread(np.full(2, np.nan), 's')['median'] is None
+
+
+def test_a_distribution_of_times_ends_where_the_rest_never_settles() -> None:
+    axes = new_figure(1.0).subplots()
+    times = ordered(np.array([1.0, 2.0, np.nan, np.nan]), 's')
+    distribution(axes, {'gvc': thinned(times)}, {})
+    assert axes.lines[0].get_xydata()[-1].tolist() == [2.0, 0.5]

@@ -40,8 +40,7 @@ def design(options: argparse.Namespace) -> dict[str, Any]:
             )  # fmt: skip
         with waiting('simulating the vehicle before and after'):
             found = write_results(proposal, results)
-        from auv_analysis.studies.design.printed import print_design
-        from auv_analysis.studies.design.report import write_report
+        from auv_analysis.studies.design.report import print_design, write_report
 
         with waiting('drawing figures, writing the report'):
             write_report(found, results.folder)

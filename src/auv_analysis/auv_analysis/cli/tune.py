@@ -70,7 +70,7 @@ def tune(options: argparse.Namespace) -> dict[str, Any]:
         with waiting('drawing figures, writing the report'):
             write_report(tuning, results.folder)
         print_tuning(tuning)
-        return tuning.document
+        return tuning.results.to_json()
 
 
 def _request(options: argparse.Namespace, scenario: Scenario) -> Request:

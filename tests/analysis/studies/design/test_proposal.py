@@ -13,8 +13,7 @@ from auv_analysis.output.folder import Results
 from auv_analysis.studies.design import search
 from auv_analysis.studies.design.change import NAMES, semi_axes
 from auv_analysis.studies.design.couplings import COUPLINGS, coupling_named
-from auv_analysis.studies.design.printed import change, print_design
-from auv_analysis.studies.design.report import write_report
+from auv_analysis.studies.design.report import change, print_design, write_report
 from auv_analysis.studies.design.results import (
     bound_warnings,
     place_warnings,

@@ -6,11 +6,11 @@ import numpy as np
 from tunings import GVC, scenario
 
 from auv_analysis import load_scenario, simulate
+from auv_analysis.metrics.quantities import COSTS
 from auv_analysis.metrics.summary import band_of
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.simulation.records import Sample
 from auv_analysis.studies.tune.cost import (
-    MEANINGS,
     Cost,
     Measures,
     measured,
@@ -35,7 +35,7 @@ def test_measures_of_a_batch_are_those_of_the_samples() -> None:
         np.testing.assert_allclose(
             getattr(found, measure), getattr(expected, measure), rtol=1e-9, err_msg=measure
         )
-    assert set(MEANINGS) == set(Measures._fields)
+    assert set(COSTS) == set(Measures._fields)
 
 
 def test_effort_is_that_of_the_wrench_applicable(tmp_path) -> None:

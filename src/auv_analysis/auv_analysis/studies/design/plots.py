@@ -6,24 +6,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import Maths
-from auv_analysis.report import plots
+from auv_analysis.report import plots as plotting
 from auv_analysis.report.digest import sketches
-from auv_analysis.report.plots import Drawn, FigureRecord, save_figures
+from auv_analysis.report.plots import Drawn, FigureRecord, before_after, save_figures
 from auv_analysis.studies.design.results import Design
 from auv_dynamics.dofs import DOFS
 
-WAS, IS = plots.GREY, plots.COLOURS[0]
+WAS, IS = plotting.GREY, plotting.COLOURS[0]
 FAINT = 1e-4  # of the largest share: smaller couplings are not drawn
 Picture = tuple[Callable[[], Figure], str]  # what draws it, and its caption
 SYMBOLS = {'delta_xi': r'\Delta\xi', 'delta_pi': r'\Delta\pi'}
 
 
-def draw_design(result: Design, folder: Path) -> list[FigureRecord]:
+def draw_design(result: Design, folder: Path) -> dict[str, FigureRecord]:
     """Draw a design as PNG and PDF; nothing where there was nothing to reduce.
 
     Parameters
@@ -33,7 +32,7 @@ def draw_design(result: Design, folder: Path) -> list[FigureRecord]:
 
     """
     if result.before is None or result.after is None:
-        return []
+        return {}
     drawn = {
         'couplings': ('Couplings before and after', *_couplings(result.document)),
         'reduced': ('The reduced coupling over time', *_reduced(result)),
@@ -44,7 +43,7 @@ def draw_design(result: Design, folder: Path) -> list[FigureRecord]:
         return draw(), title, caption
 
     parts = {name: partial(made, *entry) for name, entry in drawn.items()}
-    return list(save_figures(folder, parts).values())
+    return save_figures(folder, parts)
 
 
 def _symbol(coupling: str) -> str:
@@ -57,23 +56,14 @@ def _couplings(document: Mapping[str, Any]) -> Picture:
     rows = [row for row in document['ranking'] if max(row['share'].values()) > FAINT * largest]
 
     def draw() -> Figure:
-        figure = plots.new_figure(0.9 + 0.27 * len(rows))
+        figure = plotting.new_figure(0.9 + 0.27 * len(rows))
         axes = figure.subplots()
-        for y, row in enumerate(rows):
-            before, after = (
-                max(row['share'][k], 1e-3 * FAINT * largest) for k in ('before', 'after')
-            )
-            axes.plot([before, after], [y, y], color='#c8c8c8', linewidth=2.2, zorder=1)
-            axes.plot(before, y, 'o', color=WAS, markersize=6, zorder=2)
-            axes.plot(after, y, 'D', color=IS, markersize=5.5, zorder=3)
+        pairs = ([row['share'][k] for row in rows] for k in ('before', 'after'))
+        before, after = (np.maximum(shares, 1e-3 * FAINT * largest) for shares in pairs)
+        names = [_symbol(row['coupling']) for row in rows]
+        before_after(axes, names, before, after, _symbol(document['reduce']))
         axes.set_xscale('log')
-        axes.margins(x=0.06)
-        axes.set_yticks(range(len(rows)), [_symbol(row['coupling']) for row in rows])
-        for tick, row in zip(axes.get_yticklabels(), rows, strict=True):
-            tick.set_fontweight('bold' if row['coupling'] == document['reduce'] else 'normal')
-        axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_xlabel('share of the motion (free of units)')
-        _key(axes)
         return figure
 
     caption = (
@@ -82,12 +72,6 @@ def _couplings(document: Mapping[str, Any]) -> Picture:
         f'reduced. Shares below {FAINT:g} of the largest are not drawn.'
     )
     return draw, caption
-
-
-def _key(axes: Axes) -> None:
-    axes.plot([], [], 'o', color=WAS, label='before')
-    axes.plot([], [], 'D', color=IS, label='after')
-    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
 
 
 def _reduced(result: Design) -> Picture:
@@ -102,7 +86,7 @@ def _reduced(result: Design) -> Picture:
     unit = next(row['unit'] for row in document['measures'] if row['name'] == f'{kind}_max.{dof}')
 
     def draw() -> Figure:
-        figure = plots.new_figure(2.5)
+        figure = plotting.new_figure(2.5)
         ratios = (1, 1.9) if split else (1,)
         grid = figure.subplots(1, len(parts), squeeze=False, width_ratios=ratios)[0]
         for axes, part in zip(grid, parts, strict=True):
@@ -130,7 +114,7 @@ def _upsilon(result: Design) -> Picture:
     top = max(size.max() for size in sizes.values())
 
     def draw() -> Figure:
-        figure = plots.new_figure(3.4)
+        figure = plotting.new_figure(3.4)
         grid = figure.subplots(1, 2)
         for i, (axes, (key, U)) in enumerate(zip(grid, pair.items(), strict=True)):
             axes.imshow(sizes[key], cmap='Blues', vmin=0.0, vmax=top)
@@ -142,7 +126,7 @@ def _upsilon(result: Design) -> Picture:
             axes.grid(False)
             axes.set_xticks(range(6), DOFS, rotation=45, ha='right')
             axes.set_yticks(range(6), DOFS if i == 0 else [''] * 6)
-            plots.letter(axes, i, key)
+            plotting.letter(axes, i, key)
         label = 'weight of the entry (free of units)'
         figure.colorbar(grid[0].images[0], ax=grid, label=label, shrink=0.8)
         return figure

@@ -6,12 +6,12 @@ squared that a wrench gives to the vehicle at rest. Both are the same in every b
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_analysis.metrics.summary import SETTLED, TRANSIENT, has_settled, settling_time
+from auv_analysis.metrics.summary import TRANSIENT, has_settled, settling_time
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import run_batch
@@ -49,35 +49,6 @@ class Measures(NamedTuple):
     def part(self, keep: np.ndarray | slice) -> 'Measures':
         """Those that a mask, indices or a slice keep."""
         return Measures(*(values[keep] for values in self))
-
-
-@dataclass(frozen=True)
-class Meaning:
-    """A measure in words: a short name, its unit, and one line for a reader without the paper."""
-
-    label: str
-    unit: str
-    text: str
-
-
-MEANINGS = {
-    'weighted_error': Meaning(
-        'time-weighted error',
-        'J',
-        'mean of ½ Δνᵀ M Δν, the kinetic energy of the velocity error, weighted by the time since '
-        'the start (ITSE)',
-    ),
-    'error': Meaning('error', 'J', 'the same without the weight (ISE)'),
-    'effort': Meaning(
-        'effort',
-        'J/s²',
-        'mean of ½ τᵀ M⁻¹ τ: the kinetic energy that the wrench alone would give the vehicle '
-        'from rest in a second',
-    ),
-    'late_error': Meaning(f'error after {TRANSIENT:g} s', 'J', 'largest ½ Δνᵀ M Δν from then on'),
-    'peak_effort': Meaning('peak effort', 'J/s²', 'largest ½ τᵀ M⁻¹ τ'),
-    'settling': Meaning('settled', 's', f'time from which every error stays within {SETTLED}'),
-}
 
 
 class Cost(NamedTuple):

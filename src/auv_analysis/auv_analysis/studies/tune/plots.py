@@ -1,8 +1,9 @@
-"""The figures of a tuning: what effort buys, and what the draws do to it."""
+"""Plots of a tuning: what effort buys, and what the draws do to it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,11 +11,19 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from auv_analysis.report import plots
-from auv_analysis.report.plots import COLOURS, DASHES, GREY, FigureRecord, save_figures
+from auv_analysis.metrics.quantities import COSTS
+from auv_analysis.report.plots import (
+    COLOURS,
+    DASHES,
+    GREY,
+    FigureRecord,
+    distribution,
+    new_figure,
+    save_figures,
+    shared_legend,
+)
 from auv_analysis.studies.optimise import GRADIENT
 from auv_analysis.studies.pairs import KNOWN, log_ratios
-from auv_analysis.studies.tune.cost import MEANINGS, Measures
 from auv_analysis.studies.tune.results import Tuning
 
 WIDEST = 2.0  # of the reference's effort, where the cloud is shown
@@ -23,22 +32,21 @@ LAWS = {'gvc': 0, 'cl': 1, 'pid': 2, 'smc': 3}  # colour of a law
 Drawn = tuple[Figure, str, str]
 
 
-def pictures(outcome: Tuning, folder: Path) -> list[FigureRecord]:
-    """Draw the figures of an outcome as PNG and PDF into a folder, made when it is not there."""
+def draw_tuning(tuning: Tuning, folder: Path) -> dict[str, FigureRecord]:
+    """Draw the figures of a tuning as PNG and PDF into a folder, made when it is not there."""
     drawn = {'trade_off': trade_off}
-    if outcome.draws:
+    if tuning.draws:
         drawn |= {'draws': distributions, 'paired': paired}
-    made = {name: partial(draw, outcome) for name, draw in drawn.items()}
-    return list(save_figures(folder, made).values())
+    return save_figures(folder, {name: partial(draw, tuning) for name, draw in drawn.items()})
 
 
-def trade_off(outcome: Tuning) -> Drawn:
+def trade_off(tuning: Tuning) -> Drawn:
     """Error and effort of every gain that was tried, and the line of equality."""
-    figure = plots.new_figure(4.2)
+    figure = new_figure(4.2)
     axes = figure.add_subplot()
-    least = min(1.0, *(_law(axes, outcome, name) for name in outcome.laws))
-    _controllers(axes, outcome)
-    line = axes.axvline if outcome.goal.equal == 'effort' else axes.axhline
+    least = min(1.0, *(_law(axes, tuning, name) for name in tuning.laws))
+    _controllers(axes, tuning)
+    line = axes.axvline if tuning.goal.equal == 'effort' else axes.axhline
     line(1.0, color=GREY, linestyle=DASHES[1], linewidth=1.0)
     axes.set(xscale='log', yscale='log')
     low, high = axes.dataLim.intervaly
@@ -46,47 +54,47 @@ def trade_off(outcome: Tuning) -> Drawn:
     _plain_ticks(axes.yaxis, (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0))
     axes.set_xlim(0.97 * least, WIDEST)
     axes.set_ylim(max(HEIGHTS[0], 0.8 * low), min(HEIGHTS[1], 1.2 * high))
-    name, label = outcome.request.reference, MEANINGS[outcome.goal.index].label
+    name, label = tuning.request.reference, COSTS[tuning.goal.index].label
     axes.set(xlabel=f'effort / that of {name}', ylabel=f'{label} / that of {name}')
     axes.legend(loc='upper right')
     title = f'What effort buys: {label} of all gains that were tried'
     caption = (
         f'{title}, a dot each; lines: the least found at that effort or below, by law, searched '
-        f'only where equality is. Star: {name}; dashed: equal {outcome.goal.equal}; circles: the '
+        f'only where equality is. Star: {name}; dashed: equal {tuning.goal.equal}; circles: the '
         f'gains that the search chose; diamonds: other controllers as the scenario has them, where '
         f'they lie inside. Gains too fast for the control period are left out.'
     )
     return figure, title, caption
 
 
-def _law(axes: Axes, outcome: Tuning, name: str) -> float:
+def _law(axes: Axes, tuning: Tuning, name: str) -> float:
     """Cloud and front of a law; least effort, to the reference's, of what is shown."""
-    tuned = outcome.laws[name]
-    colour = COLOURS[LAWS[tuned.law]]
-    x, y = _cloud(outcome, name)
+    law = tuning.laws[name].law
+    colour = COLOURS[LAWS[law]]
+    x, y = _cloud(tuning, name)
     front = _front(x, y)
     axes.plot(x, y, '.', color=colour, alpha=0.18, markersize=3, markeredgewidth=0)
-    axes.plot(x[front], y[front], color=colour, drawstyle='steps-post', label=tuned.law)
+    axes.plot(x[front], y[front], color=colour, drawstyle='steps-post', label=law)
     return float(min(x[front][y[front] < HEIGHTS[1]], default=1.0))
 
 
-def _controllers(axes: Axes, outcome: Tuning) -> None:
+def _controllers(axes: Axes, tuning: Tuning) -> None:
     """A mark for each controller."""
-    index, reference = outcome.goal.index, outcome.request.reference
-    for name in outcome.scenario.controllers:
-        place = outcome.ratio(name, 'effort'), outcome.ratio(name, index)
+    index, reference = tuning.goal.index, tuning.request.reference
+    for name in tuning.scenario.controllers:
+        place = tuning.ratio(name, 'effort'), tuning.ratio(name, index)
         if name == reference:
             label = f'{name}, as given'
             axes.plot(*place, '*', color='black', markersize=12, zorder=6, label=label)
         elif np.isfinite(place).all():
-            mark, colour = 'o' if name in outcome.laws else 'D', _look(outcome, name)[0]
+            mark, colour = 'o' if name in tuning.laws else 'D', _look(tuning, name)['color']
             axes.plot(*place, mark, color=colour, markeredgecolor='black', markersize=7, zorder=5)
 
 
-def _cloud(outcome: Tuning, name: str) -> tuple[np.ndarray, np.ndarray]:
+def _cloud(tuning: Tuning, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Effort and error of the gains tried for a law, to the reference's."""
-    index, reference, parts = outcome.goal.index, outcome.goal.reference, []
-    for one in outcome.laws[name].searches:
+    index, reference, parts = tuning.goal.index, tuning.goal.reference, []
+    for one in tuning.laws[name].searches:
         measures = one.evaluations
         keep = (one.margins >= 0) & (one.stages != GRADIENT) & np.isfinite(measures.error)
         error = getattr(measures, index)[keep] / getattr(reference, index)
@@ -102,57 +110,49 @@ def _front(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return order[np.concatenate([[True], least[1:] < least[:-1]])] if len(x) else order
 
 
-def distributions(outcome: Tuning) -> Drawn:
+def distributions(tuning: Tuning) -> Drawn:
     """Empirical distribution functions of error and effort over the draws."""
-    figure = plots.new_figure(3.2)
-    every = outcome.draws.values()
+    figure = new_figure(3.2)
+    every = tuning.draws.values()
     shown = [
         measure
-        for measure in (outcome.goal.index, 'effort', 'late_error')
+        for measure in (tuning.goal.index, 'effort', 'late_error')
         if any(np.isfinite(getattr(draws, measure)).any() for draws in every)
     ]
+    looks = {name: _look(tuning, name) for name in tuning.draws}
     for i, measure in enumerate(shown):
         axes = figure.add_subplot(1, len(shown), i + 1)
-        for name, draws in outcome.draws.items():
-            values = getattr(draws, measure)
-            finite = np.sort(values[np.isfinite(values)])
-            share = np.arange(1, len(finite) + 1) / len(values)
-            colour, dash = _look(outcome, name)
-            axes.plot(
-                finite, share, drawstyle='steps-post', color=colour, linestyle=dash, label=name
-            )
-        axes.set_ylim(0, 1)
-        axes.set_xlabel(f'{MEANINGS[measure].label} ({MEANINGS[measure].unit})')
+        samples = {name: getattr(draws, measure) for name, draws in tuning.draws.items()}
+        distribution(axes, samples, looks)
+        axes.set_xlabel(f'{COSTS[measure].label} ({COSTS[measure].unit})')
         _scaled(axes, measure)
-        if i == 0:
-            axes.set_ylabel('share of the draws')
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc='outside upper center', ncols=min(len(labels), 6))
-    count = len(outcome.draws[outcome.request.reference].error)
+    figure.axes[0].set_ylabel('share of the draws')
+    shared_legend(figure, 'outside upper center')
+    count = len(tuning.draws[tuning.request.reference].error)
     title = f'Distributions over {count} draws'
     return figure, title, f'{title} of model error and disturbance, the same for every controller.'
 
 
-def paired(outcome: Tuning) -> Drawn:
+def paired(tuning: Tuning) -> Drawn:
     """Ratios to the reference, draw by draw."""
-    reference = outcome.request.reference
-    names = [name for name in outcome.draws if name != reference]
-    figure = plots.new_figure(0.9 + 0.42 * len(names))
-    shown = outcome.goal.index, 'effort'
+    reference = tuning.request.reference
+    names = [name for name in tuning.draws if name != reference]
+    figure = new_figure(0.9 + 0.42 * len(names))
+    shown = tuning.goal.index, 'effort'
     for i, measure in enumerate(shown):
         axes = figure.add_subplot(1, len(shown), i + 1)
-        ratios = [_ratios(outcome.draws, name, reference, measure) for name in names]
+        ratios = [_ratios(tuning, name, measure) for name in names]
         boxes = axes.boxplot(
             ratios, orientation='horizontal', whis=(5, 95), widths=0.6, patch_artist=True,
             showfliers=False, medianprops={'color': 'black'},
         )  # fmt: skip
         for box, name in zip(boxes['boxes'], names, strict=True):
-            box.set_facecolor(_look(outcome, name)[0])
-            box.set_alpha(0.75 if name in outcome.laws else 0.35)
+            box.set_facecolor(_look(tuning, name)['color'])
+            box.set_alpha(0.75 if name in tuning.laws else 0.35)
         axes.axvline(1.0, color=GREY, linestyle=DASHES[1], linewidth=1.0)
         axes.set_yticks(range(1, len(names) + 1), names if i == 0 else [''] * len(names))
         axes.invert_yaxis()
-        axes.set_xlabel(f'{MEANINGS[measure].label} / that of {reference}')
+        axes.set_xlabel(f'{COSTS[measure].label} / that of {reference}')
         _scaled(axes, measure)
     title = f'Paired ratios to {reference}'
     caption = (
@@ -163,17 +163,18 @@ def paired(outcome: Tuning) -> Drawn:
     return figure, title, caption
 
 
-def _ratios(draws: Mapping[str, Measures], name: str, reference: str, measure: str) -> np.ndarray:
-    """Ratios of the draws in which neither loop diverged."""
-    d = log_ratios(getattr(draws[name], measure), getattr(draws[reference], measure))
+def _ratios(tuning: Tuning, name: str, measure: str) -> np.ndarray:
+    """Ratios to the reference of the draws in which neither loop diverged."""
+    pair = (getattr(tuning.draws[n], measure) for n in (name, tuning.request.reference))
+    d = log_ratios(*pair)
     return np.exp(d[np.abs(d) < KNOWN])
 
 
-def _look(outcome: Tuning, name: str) -> tuple[str, object]:
+def _look(tuning: Tuning, name: str) -> dict[str, Any]:
     """Colour of the law; full line where its gains were searched, dashed as the scenario has it."""
-    law = outcome.scenario.controller(name)['law']
+    law = tuning.scenario.controller(name)['law']
     colour = COLOURS[LAWS[law]] if law in LAWS else GREY
-    return colour, DASHES[0 if name in outcome.laws else 1]
+    return {'color': colour, 'linestyle': DASHES[0 if name in tuning.laws else 1]}
 
 
 def _scaled(axes: Axes, measure: str) -> None:

@@ -3,22 +3,21 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from pyarrow import parquet
 
 from auv_analysis.metrics.authority import beyond_authority
+from auv_analysis.metrics.quantities import COSTS
+from auv_analysis.report.results import Results, known
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.studies.pairs import Pairs, holm, log_ratios, paired
-from auv_analysis.studies.tune.cost import MEANINGS, Measures
+from auv_analysis.studies.tune.cost import Measures
 from auv_analysis.studies.tune.gain_space import STRUCTURES, searched
 from auv_analysis.studies.tune.perturbations import Spread, applicable
 from auv_analysis.studies.tune.search import Goal, Request, TunedLaw
 
-SEARCH, MONTE_CARLO = 'search.parquet', 'monte_carlo.parquet'
 COMPARED = ('weighted_error', 'error', 'effort', 'late_error', 'settling')
 LEVEL = 0.05  # of Holm's p below which a difference is called one
 QUANTILES = {'q05': 0.05, 'q25': 0.25, 'median': 0.5, 'q75': 0.75, 'q95': 0.95}
@@ -134,35 +133,35 @@ class Tuning:
         return found
 
     @cached_property
-    def document(self) -> dict[str, Any]:
-        """Contents of `tune.json`, without the sentences."""
-        request = self.request
-        names = list(self.scenario.controllers)
-        document: dict[str, Any] = {
+    def results(self) -> Results:
+        """`tune.json`, but for the sentences; `search.parquet` and `monte_carlo.parquet`."""
+        request, names = self.request, list(self.scenario.controllers)
+        asked = ('reference', 'equal', 'index', 'tolerance', 'structure', 'hold', 'seed')
+        facts: dict[str, Any] = {
             'scenario': request.scenario.name,
             'vehicle': request.scenario.vehicle.name,
-            'reference': request.reference,
-            'equal': request.equal,
-            'index': request.index,
-            'tolerance': request.tolerance,
-            'structure': request.structure,
-            'hold': request.hold,
-            'seed': request.seed,
-            'measures': {name: asdict(meaning) for name, meaning in MEANINGS.items()},
+            **{key: getattr(request, key) for key in asked},
+            'measures': {
+                name: {'label': cost.label, 'unit': cost.unit, 'text': cost.meaning}
+                for name, cost in COSTS.items()
+            },
             'controllers': {name: self._controller(name) for name in names},
             'validation': {'largest_relative_deviation': self.deviation},
             'monte_carlo': None,
         }
         if self.draws:
-            document['monte_carlo'] = {
+            comparisons = [asdict(c) | {'verdict': c.verdict} for c in self.comparisons]
+            facts['monte_carlo'] = {
                 'samples': len(self.draws[request.reference].error),
                 'spread': applicable(self.spread, request.scenario.vehicle),
                 'controllers': {name: _distribution(self.draws[name]) for name in names},
-                'comparisons': [
-                    asdict(c) | {'verdict': c.verdict} for c in self.comparisons
-                ],
-            }  # fmt: skip
-        return document
+                'comparisons': comparisons,
+            }
+        results = Results('tune', known(facts))
+        results.add('search', 'All gains that were evaluated', _evaluations(self.laws), {})
+        if self.draws:
+            results.add('monte_carlo', 'A row per draw and controller', _draws(self.draws), {})
+        return results
 
     def _controller(self, name: str) -> dict[str, Any]:
         entry = self.scenario.controller(name)
@@ -170,8 +169,8 @@ class Tuning:
             'law': entry['law'],
             'tuned': name in self.laws,
             'gains': self.scenario.gain_values(name),
-            'measures': plain(self.nominal[name]),
-            'equality': self._equality(name),
+            'measures': _numbers(self.nominal[name]),
+            'equality': self.ratio(name, self.goal.names[1]) - 1.0,
             'remarks': self.remarks(name),
         }
         if name not in self.laws:
@@ -190,17 +189,11 @@ class Tuning:
                     'reached': s.reached,
                     'evaluations': len(s.points),
                     'searched': self._bounds(s.space.law),
-                    'measures': plain(s.measures),
+                    'measures': _numbers(s.measures),
                 }
                 for s in tuned.searches
             ],
         }
-
-    def _equality(self, name: str) -> float | None:
-        """Relative distance of the measure that is made equal from the reference's."""
-        same = self.goal.names[1]
-        distance = self.ratio(name, same) - 1.0
-        return distance if np.isfinite(distance) else None
 
     def _bounds(self, law: str) -> dict[str, Any]:
         gains = searched(self.request.scenario.step)[law]
@@ -210,59 +203,52 @@ class Tuning:
         }
 
 
-def plain(measures: Measures) -> dict[str, float | None]:
-    """Measures (1,) as numbers; None for what diverged or does not settle."""
-    values = {name: float(getattr(measures, name)[0]) for name in Measures._fields}
-    return {name: value if np.isfinite(value) else None for name, value in values.items()}
+def _numbers(measures: Measures) -> dict[str, float]:
+    """Measures (1,) as numbers."""
+    return {name: float(values[0]) for name, values in measures._asdict().items()}
 
 
 def _distribution(draws: Measures) -> dict[str, Any]:
     """Quantiles of each measure, a loop that diverged or does not settle above all others."""
-    diverged = np.isnan(draws.error)
     found: dict[str, Any] = {
-        'diverged': float(diverged.mean()),
+        'diverged': float(np.isnan(draws.error).mean()),
         'settled': float(np.isfinite(draws.settling).mean()),
     }
-    for name in Measures._fields:
-        values = np.nan_to_num(getattr(draws, name), nan=np.inf, posinf=np.inf)
-        at = np.quantile(values, list(QUANTILES.values()), method='higher')
-        found[name] = {
-            key: float(q) if np.isfinite(q) else None for key, q in zip(QUANTILES, at, strict=True)
-        }
+    for name, values in draws._asdict().items():
+        ordered = np.nan_to_num(values, nan=np.inf, posinf=np.inf)
+        at = np.quantile(ordered, list(QUANTILES.values()), method='higher')
+        found[name] = dict(zip(QUANTILES, at.tolist(), strict=True))
     return found
 
 
-def write_search(path: Path, laws: Mapping[str, TunedLaw]) -> None:
-    """Write a row for every point that was evaluated.
+def _evaluations(laws: Mapping[str, TunedLaw]) -> pa.Table:
+    """A row for every point that a search evaluated.
 
-    Parameters
-    ----------
-    path : of the file; columns controller, law, structure, stage, diverged, allowed (its velocity
-        loop is slow enough for the control period), the measures, then what was searched: a gain
-        as the law takes it or, where the structure is a matrix times a number, that number
-
+    Columns controller, law, structure, stage, diverged, allowed (its velocity loop is slow enough
+    for the control period), the measures, then what was searched: a gain as the law takes it or,
+    where the structure is a matrix times a number, that number.
     """
     tables = []
     for name, tuned in laws.items():
         for one in tuned.searches:
-            columns: dict[str, object] = {
-                'controller': [name] * len(one.points),
-                'law': [tuned.law] * len(one.points),
-                'structure': [one.space.structure] * len(one.points),
-                'stage': one.stages.tolist(),
-                'diverged': np.isnan(one.evaluations.error),
-                'allowed': one.margins >= 0.0,
-                **_columns(one.evaluations),
-            }
-            gains = np.exp(one.points.T)
-            columns |= {f'gain.{n}': x for n, x in zip(one.space.names, gains, strict=True)}
-            tables.append(pa.table(columns))
-    parquet.write_table(pa.concat_tables(tables, promote_options='default'), path)
+            words = {'controller': name, 'law': tuned.law, 'structure': one.space.structure}
+            gains = zip(one.space.names, np.exp(one.points.T), strict=True)
+            tables.append(
+                pa.table({
+                    **{key: [word] * len(one.points) for key, word in words.items()},
+                    'stage': one.stages.tolist(),
+                    'diverged': np.isnan(one.evaluations.error),
+                    'allowed': one.margins >= 0.0,
+                    **_columns(one.evaluations),
+                    **{f'gain.{gain}': values for gain, values in gains},
+                })
+            )  # fmt: skip
+    return pa.concat_tables(tables, promote_options='default')
 
 
-def write_draws(path: Path, draws: Mapping[str, Measures]) -> None:
-    """Write a row per draw and controller: draw, controller, diverged, the measures."""
-    tables = [
+def _draws(draws: Mapping[str, Measures]) -> pa.Table:
+    """A row per draw and controller: draw, controller, diverged, the measures."""
+    return pa.concat_tables(
         pa.table({
             'draw': np.arange(len(measures.error)),
             'controller': [name] * len(measures.error),
@@ -270,13 +256,12 @@ def write_draws(path: Path, draws: Mapping[str, Measures]) -> None:
             **_columns(measures),
         })
         for name, measures in draws.items()
-    ]  # fmt: skip
-    parquet.write_table(pa.concat_tables(tables), path)
+    )  # fmt: skip
 
 
 def _columns(measures: Measures) -> dict[str, pa.Array]:
     """The measures; null for what diverged or does not settle."""
     return {
-        name: pa.array(values, pa.float64(), mask=~np.isfinite(values))
+        name: pa.array(values, mask=~np.isfinite(values))
         for name, values in measures._asdict().items()
     }

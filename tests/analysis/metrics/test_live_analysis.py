@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from auv_analysis.metrics.live_analysis import LiveAnalysis
+from auv_analysis.metrics.coupling import LiveAnalysis
 from auv_dynamics import load_vehicle
 
 NU = (0.5, -0.3, 0.2, 0.1, -0.4, 0.6)

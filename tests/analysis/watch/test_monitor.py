@@ -5,7 +5,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from auv_analysis.watch.monitor import HEARD, KEPT, SILENT, GraphMonitor
+from auv_analysis.watch.monitor import (
+    HEARD,
+    KEPT,
+    SILENT,
+    GraphMonitor,
+)
 from auv_analysis.watch.snapshot import NodeState
 from auv_dynamics import load_vehicle
 from auv_dynamics.ros import interface

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from strategies import QUICK
 
-from auv_analysis.metrics.live_analysis import LiveAnalysis
+from auv_analysis.metrics.coupling import LiveAnalysis
 from auv_analysis.watch.motion import FRESH, HELD_NS, LiveMotion
 from auv_dynamics import load_vehicle
 from auv_dynamics.ros import interface

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import QUICK
 
-from auv_analysis.watch.stream import WINDOW, Stream
+from auv_analysis.watch.monitor import WINDOW, Stream
 
 STEP = 10_000_000  # ns
 PERIOD = 0.01  # s of the wall between two messages

@@ -1,21 +1,163 @@
-"""How commands end: summary, report and a table of the runs."""
+"""How commands end: summary and report of the runs, and their tables for a terminal."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from auv_analysis.cli.terminal import comparison_table, summary_tables
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
 from auv_analysis.graph.supervisor import TroubleError
 from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.summary import Window, summarize
 from auv_analysis.output.new_files import write_json
-from auv_analysis.output.progress import console, say, waiting
+from auv_analysis.output.progress import console, say, share_bar, waiting
+from auv_analysis.output.text import MISSING, join, number, plain, residuals
 from auv_analysis.report.digest import Sketch, sketches
 from auv_analysis.report.verdict import FAILED, verdict
 from auv_analysis.runs.run import AnyRun
 from auv_analysis.scenario.scenario import Scenario
 from auv_dynamics.files.errors import first_line
+from auv_dynamics.vehicle import DOFS
+
+VELOCITY, WRENCH = 'm,rad/s', 'N,N m'
+BAR = 24  # columns
+WIDTH = 9  # columns of a number
+ZERO = 'zero'
+Column = tuple[str, Sequence[str]]
+
+
+def summary_tables(summaries: Mapping[str, Mapping[str, Any]]) -> RenderableType:
+    """Errors, effort, couplings and energy of each run; of several, a comparison at the end.
+
+    Parameters
+    ----------
+    summaries : name -> what `summarize` gives
+
+    """
+    parts: list[RenderableType] = []
+    for name, summary in summaries.items():
+        parts += [*_one(name, summary), Text()]
+    return Group(*parts, *([comparison_table(summaries)] if len(summaries) > 1 else []))
+
+
+def _one(name: str, summary: Mapping[str, Any]) -> list[RenderableType]:
+    law, duration, step = summary['law'], plain(summary['duration']), plain(summary['step'])
+    facts = f': law {law}, {duration} s in steps of {step} s, by {summary["source"]}'
+    title = Text(name, 'bold').append(facts, 'not bold')
+    parts: list[RenderableType] = [title, _tracking(summary), _couplings(summary)]
+    parts += [_unexplained(summary)] if summary.get('unexplained') else []
+    parts += [Text(line, 'dim') for line in _remarks(summary)]
+    parts += [Text(f'note: {note}', 'yellow') for note in summary['notes']]
+    return parts
+
+
+def _tracking(summary: Mapping[str, Any]) -> Table:
+    """Errors and effort, a line per degree of freedom."""
+    error, lumped, effort = (summary[k] for k in ('velocity_error', 'lumped_error', 'effort'))
+    return _table(
+        (f'error\nrms\n{VELOCITY}', _numbers(error['rms'])),
+        (f'error\nmax > 2 s\n{VELOCITY}', _numbers(error['max_after_2s'])),
+        ('settled\n\ns', _numbers(error['settling_time'])),
+        (f'w = f - F\nrms\n{WRENCH}', _numbers(lumped['rms'])),
+        (f'w = f - F\nmax > 2 s\n{WRENCH}', _numbers(lumped['max_after_2s'])),
+        (f'tau\nrms\n{WRENCH}', _numbers(effort['rms'])),
+        (f'tau\nmax\n{WRENCH}', _numbers(effort['max'])),
+    )
+
+
+def _couplings(summary: Mapping[str, Any]) -> Table:
+    """Couplings and kinetic energy, a line per degree of freedom."""
+    coupling, energy = summary['coupling'], summary['kinetic_energy']
+    shares, zeros = energy['shares_percent'], coupling['structural_zeros']
+    return _table(
+        (f'delta_xi\nmax\n{VELOCITY}', _coupled(coupling['delta_xi_max'], zeros['delta_xi'])),
+        (f'delta_pi\nmax\n{WRENCH}', _coupled(coupling['delta_pi_max'], zeros['delta_pi'])),
+        ('energy\nmean\nJ', _numbers(energy['mean_by_component'])),
+        ('share\n\n%', [MISSING] * 6 if shares is None else [f'{x:.2f}' for x in shares]),
+        bars=[] if shares is None else [share_bar(share, BAR) for share in shares],
+    )
+
+
+def _unexplained(summary: Mapping[str, Any]) -> Table:
+    """F by (1) of a recorded motion with its error, a line per degree of freedom."""
+    heads = {'mean': 'mean', 'rms': 'rms', 'max': 'max', 'error_rms': 'error'}
+    return _table(
+        *(
+            (f'F by (1)\n{head}\n{WRENCH}', _numbers(summary['unexplained'][key]))
+            for key, head in heads.items()
+        )
+    )
+
+
+def _remarks(summary: Mapping[str, Any]) -> Iterable[str]:
+    """What the tables leave open: window of the energy, zeros, errors that do not settle."""
+    energy = summary['kinetic_energy']
+    first, last = (plain(time) for time in energy['window'])
+    if energy['mean'] is not None:
+        mean = number(energy['mean'], 5)
+        yield f'kinetic energy {mean} J, mean over {first} to {last} s'
+    zeros = summary['coupling']['structural_zeros']
+    named = [f'{key} of {join(dofs)}' for key, dofs in zeros.items() if dofs]
+    if named:
+        yield f'{ZERO} in every motion: {"; ".join(named)}'
+    times = summary['velocity_error']['settling_time']
+    late = [i for i, time in enumerate(times or ()) if time is None]
+    if late:
+        reached, last = residuals(summary), plain(summary['settling']['dwell'])
+        listed = join([f'{DOFS[i]} ({reached[i]})' for i in late])
+        yield f'not settled: {listed}; in brackets the largest error of the last {last} s'
+
+
+def comparison_table(summaries: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Each run in a line."""
+    table = Table(box=None, header_style='bold', pad_edge=False)
+    table.add_column('', overflow='fold')
+    for column in ('energy, J', 'settled, s', 'largest error after 2 s', 'in'):
+        table.add_column(column, justify='right' if column != 'in' else 'left')
+    for name, summary in summaries.items():
+        times = summary['velocity_error']['settling_time']
+        settled = MISSING if times is None or None in times else number(max(times))
+        worst = _worst(summary['velocity_error']['max_after_2s'])
+        mean = number(summary['kinetic_energy']['mean'], 5)
+        table.add_row(Text(name), mean, settled, *worst)
+    return table
+
+
+def _worst(errors: Sequence[float] | None) -> tuple[str, str]:
+    if errors is None:
+        return MISSING, ''
+    i = int(np.argmax(errors))
+    return f'{number(errors[i])} {"m/s" if i < 3 else "rad/s"}', DOFS[i]
+
+
+def _table(*columns: Column, bars: Sequence[RenderableType] = ()) -> Table:
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style='bold')
+    table.add_column('')
+    for header, _ in columns:
+        table.add_column(header, justify='right', no_wrap=True, min_width=WIDTH)
+    for i, dof in enumerate(DOFS):
+        table.add_row(dof, *(texts[i] for _, texts in columns), *bars[i : i + 1])
+    return table
+
+
+def _numbers(values: Sequence[float | None] | None) -> list[str]:
+    return [_short(value) for value in values or [None] * 6]
+
+
+def _short(value: float | None) -> str:
+    """Number with three digits; with fewer, where it is so small that a column does not hold it."""
+    texts = (number(value, digits) for digits in (3, 2, 1))
+    return next(text for text in texts if len(text) <= WIDTH)
+
+
+def _coupled(values: Sequence[float | None] | None, zeros: Sequence[str]) -> list[str]:
+    """Couplings; those that vanish for this vehicle whatever it does are no measurement."""
+    texts = zip(DOFS, _numbers(values), strict=True)
+    return [ZERO if dof in zeros else text for dof, text in texts]
 
 
 class Study(Protocol):

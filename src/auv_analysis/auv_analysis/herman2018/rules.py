@@ -19,7 +19,7 @@ from auv_analysis.herman2018.evidence import (
 from auv_analysis.metrics.energy import shares
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report.digest import NEAR_ZERO, last_third
-from auv_dynamics.dofs import DOFS
+from auv_dynamics.vehicle import DOFS
 
 U, V, W, P, Q, R = range(6)
 FAR = 10.0  # times: what counts as much larger

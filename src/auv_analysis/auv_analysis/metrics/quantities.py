@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from auv_analysis.metrics.summary import SETTLED, TRANSIENT
 from auv_analysis.output.text import GAINS
-from auv_dynamics.dofs import DOFS
+from auv_dynamics.vehicle import DOFS
 
 VELOCITY, WRENCH, SECONDS = ('m/s', 'rad/s'), ('N', 'N m'), ('s', 's')
 HALVES = {'linear': DOFS[:3], 'angular': DOFS[3:]}

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.metrics.live_analysis import LiveAnalysis
+from auv_analysis.metrics.coupling import LiveAnalysis
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface, topics

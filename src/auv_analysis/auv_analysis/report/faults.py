@@ -27,7 +27,7 @@ from auv_analysis.report.document import Block, Cell, Column, Section, Sentence,
 from auv_analysis.report.plots import DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
 from auv_analysis.report.run_plots import common_bands, left_out
 from auv_analysis.runs.run import AnyRun
-from auv_dynamics.dofs import DOFS
+from auv_dynamics.vehicle import DOFS
 
 ABOUT = (
     'The simulated vehicle has faults that the controllers do not know of. Each is held against '

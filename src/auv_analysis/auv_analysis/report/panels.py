@@ -17,7 +17,7 @@ from auv_analysis.report.digest import Sketch
 from auv_analysis.report.plots import COLOURS, GREY, moving
 from auv_analysis.report.traces import broken, thinned
 from auv_analysis.scenario.fault_words import Mark
-from auv_dynamics.dofs import DOFS
+from auv_dynamics.vehicle import DOFS
 
 INK, BOUND, IDENTITY = '#1a1a1a', '#D55E00', '#56B4E9'
 FAULT = '#e69f00'

@@ -28,7 +28,7 @@ from auv_analysis.output.progress import each
 from auv_analysis.output.text import fixed, number, plain, typeset
 from auv_analysis.report.digest import Sketch
 from auv_analysis.report.statistics import Part
-from auv_dynamics.dofs import DOFS
+from auv_dynamics.vehicle import DOFS
 
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#D55E00', '#56B4E9')  # Okabe and Ito
 DASHES = ('-', (0, (4, 1.6)), (0, (1, 1.3)), (0, (6, 1.4, 1, 1.4)), (0, (9, 2)), (0, (3, 1, 1, 1)))

@@ -24,7 +24,7 @@ from auv_analysis.report.panels import different_disturbances
 from auv_analysis.report.plots import COLOURS, DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
 from auv_analysis.report.statistics import Part
 from auv_analysis.runs.run import AnyRun
-from auv_dynamics.dofs import DOFS
+from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import control_model
 
 DRAWN = {  # kind of figure -> signal of `Sketch`

@@ -19,7 +19,7 @@ from auv_analysis.report.run_plots import draw_figures, reference, unexplained_f
 from auv_analysis.report.scenario_text import SetUp, set_up
 from auv_analysis.report.verdict import verdict
 from auv_analysis.runs.run import FOREIGN, AnyRun
-from auv_dynamics.dofs import DOFS
+from auv_dynamics.vehicle import DOFS
 
 Texts = str | Mapping[str, str]
 Summaries = Mapping[str, Mapping[str, Any]]

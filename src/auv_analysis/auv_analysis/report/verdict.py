@@ -9,8 +9,8 @@ from auv_analysis.metrics.lyapunov import OF_THE_MOTION
 from auv_analysis.metrics.summary import SMALLEST_BAND
 from auv_analysis.output.text import Maths, join, number
 from auv_analysis.report.digest import Sketch, alike
-from auv_dynamics.dofs import DOFS
 from auv_dynamics.files.shipped import shipped_names
+from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.law import SHIPPED
 
 Summary = Mapping[str, Any]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_analysis.metrics.live_analysis import LiveAnalysis
+from auv_analysis.metrics.coupling import LiveAnalysis
 from auv_analysis.watch.snapshot import Energy, Errors, Six
 from auv_dynamics.ros import interface
 

@@ -15,13 +15,13 @@ from auv_analysis.simulation import batch
 from auv_analysis.simulation.kernels import kernels
 from auv_analysis.simulation.reduction import COLUMNS
 from auv_analysis.studies.study import sensitivity as module
-from auv_analysis.studies.study.sensitivity import gain_factors, sensitivity
-from auv_analysis.studies.study.sensitivity_report import (
+from auv_analysis.studies.study.procedure import (
     left_out_table,
     sensitivity_sentences,
     sensitivity_table,
     write_sensitivities,
 )
+from auv_analysis.studies.study.sensitivity import gain_factors, sensitivity
 from auv_dynamics.files.errors import InputError
 
 SPREAD = math.log(2.0) / math.sqrt(3.0)  # of one log-uniform factor up to 2

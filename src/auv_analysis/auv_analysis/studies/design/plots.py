@@ -14,7 +14,7 @@ from auv_analysis.report import plots as plotting
 from auv_analysis.report.digest import sketches
 from auv_analysis.report.plots import Drawn, FigureRecord, before_after, save_figures
 from auv_analysis.studies.design.results import Design
-from auv_dynamics.dofs import DOFS
+from auv_dynamics.vehicle import DOFS
 
 WAS, IS = plotting.GREY, plotting.COLOURS[0]
 FAINT = 1e-4  # of the largest share: smaller couplings are not drawn

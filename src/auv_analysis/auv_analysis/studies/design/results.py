@@ -29,8 +29,8 @@ from auv_analysis.studies.design.couplings import COUPLINGS, KINDS, UNITS, prese
 from auv_analysis.studies.design.search import HALF, Candidate, Proposal
 from auv_analysis.studies.design.setting import write_inputs
 from auv_analysis.studies.design.vehicle_file import change_words
-from auv_dynamics.dofs import DOFS
 from auv_dynamics.files.errors import first_line
+from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.laws.decomposition import decompose
 

@@ -1,26 +1,259 @@
-"""The parts of a study as sections of its report, with their files and figures written."""
+"""What a change of the gains does: the file, a table per controller, a plot, sentences."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
+from matplotlib.axes import Axes
 from pyarrow import parquet
 
 from auv_analysis.herman2018.cases import PaperClaims
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.metrics.energy import kinetic_energy
+from auv_analysis.metrics.quantities import Quantity, gain_mathtext, quantity
+from auv_analysis.output.new_files import write_table
+from auv_analysis.output.text import join, number, plain, symbol
+from auv_analysis.report import plots
 from auv_analysis.report.document import Block, Section, Sentence
+from auv_analysis.report.plots import FigureRecord, Grid
+from auv_analysis.report.results import Column, Table, make_table
 from auv_analysis.runs.run import AnyRun, Run
-from auv_analysis.studies.study.sensitivity import Sensitivity
-from auv_analysis.studies.study.sensitivity_report import (
-    left_out_table,
-    sensitivity_plot,
-    sensitivity_sentences,
-    sensitivity_table,
-    write_sensitivities,
-)
+from auv_analysis.studies.study.kpis import Kpi
+from auv_analysis.studies.study.sensitivity import Row, Sensitivity
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import ControlModel, control_model
+
+FILE = 'sensitivity.parquet'
+COLUMNS = (
+    'value', 'smallest', 'largest', 'spread', 'spread_conf', 'spread_low', 'spread_high', 'rank',
+    'rank_low', 'rank_high', 'gain', 'elasticity', 'S1', 'S1_conf', 'ST', 'ST_conf', 'mu_star',
+    'mu_star_conf', 'sigma', 'doubled', 'alike',
+)  # fmt: skip
+HEADLINES = ('velocity_error.rms', 'effort.rms')
+NOTHING = 0.01  # of the variance: a gain that never makes more decides nothing
+METHODS = {'sobol': 'Sobol’', 'morris': 'Morris'}
+WEIGHTS = {
+    'sobol': (
+        'total index',
+        'share of the variance that this gain makes, alone and with the others',
+    ),
+    'morris': ('effect μ*', 'mean change of the logarithm over the whole range of this gain'),
+}
+HEADS: dict[str, Column | Quantity | str] = {
+    'kpi': 'KPI',
+    'value': Quantity('', '', 'value', '', 'with the gains of the scenario'),
+    'unit': 'unit',
+    'spread': Column(
+        Quantity('', '', 'spread', '', 'standard deviation of its logarithm: about its relative '
+                 'change'), digits=2),
+    'spread_conf': Column(Quantity('', '', '±', '', 'half of its 95 % interval'), digits=1),
+    'rank': Quantity('', '', 'place', '', 'by spread among its degrees of freedom'),
+    'alike': 'of',
+    'gain': Quantity('', '', 'main gain', '', 'the gain that does most'),
+    'doubled': Column(
+        Quantity('', '%', '× 2', '', 'change of the KPI when that gain is doubled'), digits=2
+    ),
+}  # fmt: skip
+SHOWN = (  # what is drawn of step 3
+    'velocity_error.rms', 'velocity_error.max_after_2s', 'lumped_error.rms', 'effort.rms',
+    'effort.max',
+)  # fmt: skip
+ROW = 0.185  # in, height of a row
+
+
+def write_sensitivities(folder: Path, found: Sequence[Sensitivity]) -> Path:
+    """Write the sensitivities of all controllers as `sensitivity.parquet`.
+
+    Columns: controller, law, those of `Sensitivity.rows`, method, count, rollouts, span,
+    span_asked, diverged (at all spans together), seed, and reason: why a KPI, or all of them, has
+    no indices.
+
+    """
+    rows = [row for of in found for row in _stored(of)]
+    return write_table(folder / FILE, {name: [row[name] for row in rows] for name in rows[0]})
+
+
+def _stored(of: Sensitivity) -> Iterator[Row]:
+    """Rows of the file: of KPIs with indices, of those without, of a refusal."""
+    about = {'method': of.method, 'count': of.count, 'rollouts': of.rollouts, 'span': of.span}
+    about |= {'span_asked': of.asked, 'diverged': sum(of.failed.values()), 'seed': of.seed}
+    rows: list[Row] = [*of.rows]
+    rows += [
+        {'figure': e.kpi.name, 'dof': e.kpi.dof, 'unit': e.kpi.quantity.unit, 'reason': e.reason}
+        for e in of.excluded
+    ]
+    rows += [{'reason': of.refusal}] if of.refusal else []
+    for row in rows:
+        words = {'controller': of.controller, 'law': of.law}
+        words |= {name: row.get(name, '') for name in ('figure', 'dof', 'unit')}
+        numbers = {name: row.get(name, '' if name == 'gain' else None) for name in COLUMNS}
+        yield words | numbers | about | {'reason': row.get('reason', '')}
+
+
+def sensitivity_table(found: Sequence[Sensitivity], controller: str) -> Table:
+    """Every KPI of a controller by falling spread, with the gains that move it.
+
+    Parameters
+    ----------
+    found : of all controllers, as in the file
+    controller : one that has no refusal
+
+    """
+    stored = enumerate(row for of in found for row in _stored(of))
+    place = {(r['controller'], r['figure'], r['dof'], r['gain']): i for i, r in stored}
+    of = next(of for of in found if of.controller == controller)
+    group, meaning = WEIGHTS[of.method]
+    rows = [
+        {'kpi': kpi.quantity.label, **mine[0], **{row['gain']: row[of.weight] for row in mine}}
+        for kpi, mine in of.kpis.items()
+    ]
+
+    def pointer(i: int, column: str) -> str:
+        row = rows[i]
+        gain, name = (column, of.weight) if column in of.gains else (row['gain'], column)
+        return f'{FILE}:{name}[{place[controller, row["figure"], row["dof"], gain]}]'
+
+    gains: dict[str, Column | Quantity | str] = {
+        gain: Column(Quantity('', '', symbol(gain), '', meaning), group, decimals=2)
+        for gain in of.gains
+    }
+    caption = (
+        f'How the KPIs of {controller} change when every gain is multiplied by a number '
+        f'of its own between 1/{plain(of.span)} and {plain(of.span)} (log-uniform): '
+        f'{of.rollouts} runs, indices after {METHODS[of.method]}.'
+    )
+    name = f'sensitivity_{controller}'
+    return make_table(name, caption, rows, HEADS | gains, pointer=pointer)
+
+
+def left_out_table(found: Sequence[Sensitivity]) -> Table | None:
+    """KPIs and gains that have no indices, and why; None where there are none."""
+    heads = ('controller', 'what', 'why')
+    rows = [
+        dict(zip(heads, (of.controller, *entry), strict=True))
+        for of in found
+        for entry in _left_out(of)
+    ]
+    caption = 'What is left out of the study of gains: its logarithm does not exist or never moves.'
+    shown = {name: name for name in heads}
+    return make_table('sensitivity_left_out', caption, rows, shown, stub=2) if rows else None
+
+
+def _left_out(of: Sensitivity) -> Iterator[tuple[str, str]]:
+    if of.refusal:
+        yield 'all KPIs', of.refusal
+    yield from ((f'gain {gain}', reason) for gain, reason in of.left_out.items())
+    yield from ((entry.kpi.quantity.label, entry.reason) for entry in of.excluded)
+
+
+def sensitivity_sentences(found: Sequence[Sensitivity]) -> list[Sentence]:
+    """What the study of gains found, a few sentences for each controller."""
+    return [Sentence(text, source) for of in found for text, source in _sentences(of)]
+
+
+def _sentences(of: Sensitivity) -> Iterator[tuple[str, str]]:
+    table = f'table-sensitivity_{of.controller}'
+    if of.refusal:
+        yield (
+            f'How {of.controller} follows its gains is not known: {of.refusal}.',
+            'table-sensitivity_left_out',
+        )
+        return
+    for span, failed in of.failed.items():
+        yield (
+            f'Under {of.controller}, {failed} rollouts failed with gains within a factor of '
+            f'{plain(span)}; its study takes a factor of {plain(of.span)}.',
+            table,
+        )
+    for name in HEADLINES:
+        for dof, rows in [*of.of(name).items()][:1]:
+            yield _headline(of, name, dof, rows[0]), table
+    idle = [gain for gain in of.gains if _share(of, gain) < NOTHING]
+    if idle and of.rows and of.method == 'sobol':
+        most = max(_share(of, gain) for gain in idle)
+        yield (
+            f'Under {of.controller}, {join(idle)} {"decides" if len(idle) == 1 else "decide"} '
+            f'nothing: at most {number(100 * most, 2)} % of the variance of any KPI.',
+            table,
+        )
+
+
+def _headline(of: Sensitivity, name: str, dof: str, main: Row) -> str:
+    """The KPI of a kind that follows the gains most, by the row of the gain that does most."""
+    sure = (
+        f'first of {main["alike"]} in 95 % of the resamplings'
+        if main['rank_high'] == 1
+        else f'place {main["rank_low"]} to {main["rank_high"]} of {main["alike"]}'
+    )
+    sign, gain = '−' if main['doubled'] < 0 else '+', main['gain']
+    share = f'{gain} makes {number(100 * main["ST"], 2)} % of its variance, and '
+    return (
+        f'Under {of.controller} the {quantity(name).label} that follows the gains most is that of '
+        f'{dof} (spread {number(main["spread"], 2)}, {sure}): '
+        f'{share if of.method == "sobol" else ""}'
+        f'doubling {gain} changes it by about {sign}{number(abs(main["doubled"]), 2)} %.'
+    )
+
+
+def _share(of: Sensitivity, gain: str) -> float:
+    """Largest total index of a gain over all KPIs; 0 of another method."""
+    return max((row.get('ST', 0.0) for row in of.rows if row['gain'] == gain), default=0.0)
+
+
+def sensitivity_plot(found: Sensitivity, folder: Path) -> FigureRecord:
+    """Draw the errors, estimates and inputs of one controller; no files where nothing follows."""
+    name, title = f'sensitivity_{found.controller}', f'Sensitivity to the gains, {found.controller}'
+    shown = {kpi: rows for kind in SHOWN for kpi, rows in found.kpis.items() if kpi.name == kind}
+    if not shown:
+        return FigureRecord(name, title, f'{title}: nothing to draw.', None, None)
+    sobol = found.method == 'sobol'
+    with plots.style():
+        figure = plots.new_figure(ROW * len(shown) + 0.9)
+        left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.5, 1.0))
+        weights = np.array([
+            [row[found.weight] for gain in found.gains for row in rows if row['gain'] == gain]
+            for rows in shown.values()
+        ])  # fmt: skip
+        heads = [gain_mathtext(gain) for gain in found.gains]
+        plots.draw_grid(right, Grid(weights, heads, '', 'Blues', decimals=2), 7.5)
+        _bars(left, shown)
+        plots.letter(left, 0, 'spread, 95 % interval')
+        plots.letter(right, 1, 'total index $S_T$' if sobol else r'$\mu^*$')
+        files = plots.save(figure, folder, name)
+    what = (
+        'share of its variance that each gain makes, alone and with the others (total index of '
+        'Sobol’; the sum may exceed 1)'
+        if sobol
+        else 'mean change of its logarithm over the whole range of each gain (Morris)'
+    )
+    caption = (
+        f'{title}: (a) standard deviation of the logarithm of a KPI when every gain is '
+        f'multiplied by a number of its own between 1/{plain(found.span)} and '
+        f'{plain(found.span)}; (b) {what}.'
+    )
+    return FigureRecord(name, title, caption, *files)
+
+
+def _bars(axes: Axes, shown: Mapping[Kpi, Sequence[Row]]) -> None:
+    rows = np.arange(len(shown))
+    spread, low, high = (
+        np.array([of_gains[0][name] for of_gains in shown.values()])
+        for name in ('spread', 'spread_low', 'spread_high')
+    )
+    colours = [plots.COLOURS[SHOWN.index(kpi.name)] for kpi in shown]
+    axes.barh(rows, spread, color=colours, height=0.72)
+    axes.errorbar(
+        spread, rows, xerr=[np.maximum(spread - low, 0.0), np.maximum(high - spread, 0.0)],
+        fmt='none', ecolor='#222222', elinewidth=0.9, capsize=1.6,
+    )  # fmt: skip
+    axes.set_yticks(rows, [kpi.quantity.label for kpi in shown])
+    axes.set_ylim(len(shown) - 0.5, -0.5)
+    axes.set_xlim(0.0, 1.04 * float(high.max()))
+    axes.grid(visible=False, axis='y')
+    axes.tick_params(axis='y', length=0)
+    axes.set_xlabel('standard deviation of ln(KPI)')
+
 
 Part = tuple[Section, list[Sentence]]
 GAINS = (

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.scenario.scenario import Scenario
-from auv_dynamics.dofs import DOFS
 from auv_dynamics.files.yaml_files import matrix6
+from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.control.gains import body_gains, sampled_rate
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import ControlModel

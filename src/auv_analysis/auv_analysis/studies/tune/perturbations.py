@@ -12,9 +12,9 @@ from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.studies.tune.cost import Measures, joined, of_each
-from auv_dynamics.dofs import DOFS
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of
+from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 FREQUENCIES = 0.3, 1.5  # rad/s, of the waves' forces

@@ -12,7 +12,7 @@ from auv_analysis.cli.conclude import finish
 from auv_analysis.cli.run import free_graph, recorded
 from auv_analysis.cli.scenarios import open_scenario, scenario_folder
 from auv_analysis.cli.simulate import simulated
-from auv_analysis.herman2018.cases import PaperClaims, paper_claims
+from auv_analysis.herman2018.cases import PaperClaims, claims_sentences, paper_claims
 from auv_analysis.herman2018.paper import CASES
 from auv_analysis.metrics.summary import Window
 from auv_analysis.output.progress import say, waiting
@@ -24,7 +24,6 @@ from auv_analysis.simulation.simulate import check_hold
 from auv_analysis.studies.study.discussion import discussion
 from auv_analysis.studies.study.indices import Design, Method
 from auv_analysis.studies.study.procedure import (
-    claims_sentences,
     sensitivity_section,
     write_samples,
 )

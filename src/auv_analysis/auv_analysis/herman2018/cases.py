@@ -7,12 +7,13 @@ from typing import Any
 from auv_analysis.herman2018 import paper
 from auv_analysis.herman2018.claims import judged
 from auv_analysis.herman2018.evidence import BOTH, Claim, Evidence, Response, Signals
+from auv_analysis.herman2018.responses import response
 from auv_analysis.report.digest import Sketch, sketches
+from auv_analysis.report.document import Sentence
 from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_analysis.simulation.simulate import simulate
-from auv_analysis.studies.study.responses import response
 from auv_analysis.studies.study.sensitivity import Sensitivity, sensitivity
 from auv_gvc_controller.laws.model import control_model
 
@@ -133,3 +134,14 @@ def _responses(
         if answer is not None:
             known[law] = answer
     return known
+
+
+def claims_sentences(found: PaperClaims) -> list[Sentence]:
+    """What a reader of the claims table must know of the scenario; nothing for a shipped one."""
+    if found.reason:
+        return [Sentence(f'The paper’s claims are not judged: {found.reason}.')]
+    changes = [f'{path} = {ours} (shipped: {theirs})' for path, ours, theirs in found.departures]
+    if not changes:
+        return []
+    text = 'The claims are judged on a changed scenario, either case with the same changes'
+    return [Sentence(f'{text}: {"; ".join(changes)}.', 'table-claims')]

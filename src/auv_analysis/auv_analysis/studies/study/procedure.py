@@ -8,7 +8,6 @@ import pyarrow as pa
 from matplotlib.axes import Axes
 from pyarrow import parquet
 
-from auv_analysis.herman2018.cases import PaperClaims
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.metrics.energy import kinetic_energy
 from auv_analysis.metrics.quantities import Quantity, gain_mathtext, quantity
@@ -291,17 +290,6 @@ def _of_controllers(out: Path, found: Sequence[Sensitivity]) -> Iterator[Block]:
     left_out = left_out_table(found)
     if left_out is not None:
         yield left_out
-
-
-def claims_sentences(found: PaperClaims) -> list[Sentence]:
-    """What a reader of the claims table must know of the scenario; nothing for a shipped one."""
-    if found.reason:
-        return [Sentence(f'The paper’s claims are not judged: {found.reason}.')]
-    changes = [f'{path} = {ours} (shipped: {theirs})' for path, ours, theirs in found.departures]
-    if not changes:
-        return []
-    text = 'The claims are judged on a changed scenario, either case with the same changes'
-    return [Sentence(f'{text}: {"; ".join(changes)}.', 'table-claims')]
 
 
 def write_samples(run: AnyRun, path: Path) -> Path:

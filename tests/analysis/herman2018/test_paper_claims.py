@@ -10,12 +10,11 @@ import pytest
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.herman2018 import paper
-from auv_analysis.herman2018.cases import case_evidence, case_of, paper_claims
+from auv_analysis.herman2018.cases import case_evidence, case_of, claims_sentences, paper_claims
 from auv_analysis.herman2018.claims import judged, write_claims
 from auv_analysis.herman2018.evidence import Quotes, Response
 from auv_analysis.output.text import MISSING
 from auv_analysis.scenario.changes import changed_scenario
-from auv_analysis.studies.study.procedure import claims_sentences
 from auv_analysis.studies.study.sensitivity import sensitivity
 
 NUMBER = re.compile(r'([+−]?)(\d[\d\u202f]*)(?:\.(\d+))?(?:·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?')

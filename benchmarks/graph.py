@@ -22,7 +22,7 @@ from auv_analysis.graph.domain import chosen_domain
 from auv_analysis.graph.experiment import environment, run_controller
 from auv_analysis.scenario.scenario import load_scenario
 from auv_analysis.simulation.warm_up import warm_up
-from auv_dynamics.ros.reach import loopback
+from auv_dynamics.ros.security import loopback
 
 SETTLE = 1.0  # s of ping-pong before it is counted
 PATIENCE = 30.0  # s for the other end to appear
@@ -117,7 +117,7 @@ def graph_rate(steps: int, *, composed: bool = False) -> float:
     domain = chosen_domain(None)[0]
     os.environ.update(loopback())
     # the middleware reads its environment when it is loaded
-    from auv_dynamics.ros.watcher import Watcher
+    from auv_dynamics.ros.participant import Watcher
 
     progress: list[tuple[float, int]] = []
     with tempfile.TemporaryDirectory() as folder:

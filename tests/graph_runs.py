@@ -124,7 +124,7 @@ def main() -> None:
     """Record controllers of a scenario, all where none is named."""
     from auv_analysis.graph.experiment import run_controller
     from auv_analysis.simulation.warm_up import warm_up
-    from auv_dynamics.ros.watcher import Watcher
+    from auv_dynamics.ros.participant import Watcher
 
     path, out, *controllers = sys.argv[1:]
     scenario, domain = load_scenario(path), int(os.environ['ROS_DOMAIN_ID'])

@@ -20,7 +20,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from auv_analysis.graph.domain import is_free
 from auv_dynamics.ros import topics
-from auv_dynamics.ros.reach import loopback
+from auv_dynamics.ros.security import loopback
 
 PATIENCE = 30.0  # s, after which a test that waits has failed
 _domains = itertools.count()

@@ -19,10 +19,9 @@ from wrench_mapping import WrenchMapping
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import topics
-from auv_dynamics.ros.bulk import BulkNode
-from auv_dynamics.ros.graph import ERROR, Graph, steady_timer
 from auv_dynamics.ros.interface import BadMessageError
-from auv_dynamics.ros.life import main_of
+from auv_dynamics.ros.node_interface import ERROR, NodeInterface, steady_timer
+from auv_dynamics.ros.node_main import BulkNode, main_of
 from auv_dynamics.ros.parameters import declare, refuse_unknown
 
 POLL = 0.004  # s between two looks at the socket
@@ -36,7 +35,7 @@ class Driver(BulkNode):
 
     def __init__(self) -> None:
         super().__init__('bluerov2_driver')
-        self.graph = Graph(self)
+        self.graph = NodeInterface(self)
         settings = self._settings()
         how, voltage = settings.how, self._number('supply_voltage', 16.0, 'V at the thrusters')
         connection = declare(

@@ -22,9 +22,7 @@ MORE = {  # mathematics whose mutants are not tried, and its tests
     'auv_dynamics/auv_dynamics/plant/devices.py': ['analysis/test_simulate_faults.py'],
     'auv_dynamics/auv_dynamics/plant/fault_rows.py': ['dynamics/test_fault_rows.py'],
     'auv_dynamics/auv_dynamics/kernel/lanes.py': ['dynamics/test_lanes.py'],
-    'auv_gvc_controller/auv_gvc_controller/control/output_stage.py': [
-        'controller/test_hand_over.py'
-    ],
+    'auv_gvc_controller/auv_gvc_controller/control/controller.py': ['controller/test_hand_over.py'],
     'auv_gvc_controller/auv_gvc_controller/control/setpoint.py': ['controller/test_setpoint.py'],
 }
 CONFIG = """

@@ -9,13 +9,10 @@ from auv_dynamics import load_vehicle
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.codec import Codec, first_stamp
 from auv_dynamics.ros.interface import BadMessageError, Frames
-from auv_gvc_controller.control.controller import Timeouts, VelocityController
-from auv_gvc_controller.control.odometry_guard import OdometryGuard
-from auv_gvc_controller.control.output_stage import HandOver
-from auv_gvc_controller.control.plausibility import Limits
+from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
+from auv_gvc_controller.control.odometry_guard import Limits, Now, OdometryGuard, StampAge
 from auv_gvc_controller.control.sampled import SampledLaw
-from auv_gvc_controller.control.setpoint_buffer import DIFFERENCE, Pairing
-from auv_gvc_controller.control.stamp_age import Now, StampAge
+from auv_gvc_controller.control.setpoint_buffer import DIFFERENCE, SetpointBuffer
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
 
@@ -43,14 +40,14 @@ def try_messages(data: bytes) -> str:
     """One message after a good odometry and set-point, then good ones again."""
     if not data:
         return 'empty'
-    pairing = Pairing(exact=False, acceleration=DIFFERENCE, limits=Limits(20.0, 20.0, 100.0))
+    pairing = SetpointBuffer(exact=False, acceleration=DIFFERENCE, limits=Limits(20.0, 20.0, 100.0))
     guard = OdometryGuard(
         SECOND, Limits(20.0, 20.0, 100.0), lockstep=False, patience=0.5,
         age=StampAge('auto', SECOND // 2),
     )  # fmt: skip
     _law.reset()
     controller = VelocityController(
-        _law, pairing, guard, HandOver(LIMIT, ramp=0.2), exact=False, timeouts=Timeouts(0.5, 0.5)
+        _law, pairing, guard, OutputStage(LIMIT, ramp=0.2), exact=False, timeouts=Timeouts(0.5, 0.5)
     )
     good = [CODECS[TOPICS[i]].decode(message[1:]) for i, message in enumerate(messages())]
     topic = TOPICS[data[0] % len(TOPICS)]

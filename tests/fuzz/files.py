@@ -16,10 +16,9 @@ from watchman import playground, watched
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.cli import main
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
-from auv_analysis.replay.index import LATEST, index_bag
 from auv_analysis.replay.open_loop import open_loop, recorded_loop
+from auv_analysis.replay.played_bag import LATEST, index_bag, messages
 from auv_analysis.replay.selection import Wish, select
-from auv_analysis.replay.stream import messages
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 

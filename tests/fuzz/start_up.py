@@ -19,8 +19,8 @@ from auv_analysis.scenario.scenario import load_scenario
 from auv_dynamics.files.ending import ENDING
 from auv_dynamics.nodes.frame_converter_node import FrameConverterNode
 from auv_dynamics.nodes.plant_node import PlantNode
-from auv_dynamics.ros import life
-from auv_dynamics.ros.life import live
+from auv_dynamics.ros import node_main
+from auv_dynamics.ros.node_main import live
 from auv_gvc_controller.nodes.controller_node import ControllerNode
 from auv_gvc_controller.nodes.setpoint_node import SetpointNode
 
@@ -73,7 +73,7 @@ def started(make: Callable[[], Any], arguments: Sequence[str]) -> tuple[int, str
             node.exit_code = 0
         return node
 
-    life.TEARDOWN = PATIENCE  # a node that is torn down too slowly ends its process
+    node_main.TEARDOWN = PATIENCE  # a node that is torn down too slowly ends its process
     kept = {number: signal.getsignal(number) for number in ENDING}
     with tempfile.TemporaryFile(dir='.') as said:  # where the fuzzing lets files be written
         screens = os.dup(1), os.dup(2)

@@ -85,7 +85,9 @@ def test_topic_names_stand_in_one_module() -> None:
 def test_private_names_of_rclpy_stand_in_one_file() -> None:
     wired = [path for path in SOURCES if any(map(is_ros, imported(path)))]
     pattern = re.compile(r'rclpy\.impl|noqa: SLF001')
-    assert {path.name for path in wired if pattern.search(path.read_text())} == {'private.py'}
+    assert {path.name for path in wired if pattern.search(path.read_text())} == {
+        'rclpy_internals.py'
+    }
 
 
 @pytest.mark.parametrize('path', sorted((ROOT / 'config').glob('*/*.yaml')), ids=lambda p: p.stem)

@@ -34,8 +34,8 @@ KEYWORDS = {('shell', True), ('allow_pickle', True), ('autoescape', False)}
 LISTED = {
     ('auv_dynamics/kernel/compile.py', 'exec'),  # of argument names that stand in our own source
     ('auv_dynamics/kernel/simd_memory.py', 'exec'),  # the same
-    ('auv_gvc_controller/laws/__init__.py', 'importlib.import_module'),  # a user's own law
-    ('auv_dynamics/ros/kinds.py', 'importlib.import_module'),  # installed messages
+    ('auv_gvc_controller/laws/law.py', 'importlib.import_module'),  # a user's own law
+    ('auv_dynamics/ros/topics.py', 'importlib.import_module'),  # installed messages
     ('auv_analysis/cli/main.py', 'importlib.import_module'),  # names of ours, as below
     *((f'{package}/__init__.py', 'importlib.import_module') for package in PACKAGES),
     ('auv_analysis/graph/domain.py', 'socket'),  # which ports are free

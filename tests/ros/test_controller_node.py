@@ -28,8 +28,8 @@ from std_srvs.srv import Trigger
 
 from auv_dynamics.files.ending import ENDING
 from auv_dynamics.ros import convert, interface, topics
-from auv_dynamics.ros.health import ERROR, WARN
 from auv_dynamics.ros.interface import Frames
+from auv_dynamics.ros.node_interface import ERROR, WARN
 
 FRAMES = Frames()
 STEP = 10_000_000

@@ -15,8 +15,8 @@ from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
 from auv_dynamics.ros import convert, interface, topics
-from auv_dynamics.ros.health import ERROR, STALE, WARN
 from auv_dynamics.ros.interface import Frames
+from auv_dynamics.ros.node_interface import ERROR, STALE, WARN
 from auv_dynamics.ros.topics import DIAGNOSTICS
 
 FRAMES = Frames()
@@ -347,7 +347,7 @@ def test_the_network_cannot_name_a_module_to_run(driver: Driver) -> None:
 
 BROKEN_BUILD = """
 from auv_gvc_controller import controller_node
-from auv_gvc_controller.nodes.controller_parameters import ControllerParameters
+from auv_gvc_controller.nodes.controller_node import ControllerParameters
 
 build, calls = ControllerParameters.build, []
 

@@ -5,7 +5,7 @@ import sys
 import pytest
 from geometry_msgs.msg import WrenchStamped
 
-from auv_dynamics.ros.kinds import message_class, type_name
+from auv_dynamics.ros.topics import message_class, type_name
 
 
 def test_a_message_is_found_by_its_name() -> None:

@@ -6,12 +6,12 @@ import sys
 import pytest
 from harness import PATIENCE, environment, fresh_domain
 
-from auv_dynamics.ros import health
+from auv_dynamics.ros import node_interface
 
 STUCK = """
 import ctypes, sys
-from auv_dynamics.ros import life
-from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros import node_main
+from auv_dynamics.ros.node_main import BulkNode
 
 class Stuck(BulkNode):
     def __init__(self):
@@ -21,8 +21,8 @@ class Stuck(BulkNode):
     def destroy_node(self):
         ctypes.PyDLL(None).sleep(60)  # with the GIL held
 
-life.TEARDOWN = 0.5
-sys.exit(life.live([Stuck], args=[]))
+node_main.TEARDOWN = 0.5
+sys.exit(node_main.live([Stuck], args=[]))
 """
 
 
@@ -40,13 +40,13 @@ def test_what_lasts_is_logged_once_and_then_every_ten_seconds(monkeypatch) -> No
         def __getattr__(self, level: str):
             return lambda text: said.append((level, text))
 
-    lasting, now = health.Lasting(Logger()), 0.0
+    lasting, now = node_interface.Lasting(Logger()), 0.0
     monkeypatch.setattr('time.monotonic', lambda: now)
     for now in range(100, 125):
-        lasting.see(health.WARN, f'no set-point for {now} s')
+        lasting.see(node_interface.WARN, f'no set-point for {now} s')
     assert said == [('warning', f'no set-point for {at} s') for at in (101, 111, 121)]
-    lasting.see(health.OK, '')
+    lasting.see(node_interface.OK, '')
     assert said[3:] == [('info', 'over: no set-point for 124 s')]
-    lasting.see(health.ERROR, 'too short')
-    lasting.see(health.OK, '')
+    lasting.see(node_interface.ERROR, 'too short')
+    lasting.see(node_interface.OK, '')
     assert len(said) == 4

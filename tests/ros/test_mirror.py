@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from strategies import QUICK, vectors
 
+from auv_dynamics.nodes.frame_converter_node import WORLD, mirrored, mirrored_odometry
 from auv_dynamics.ros import convert, interface
 from auv_dynamics.ros.interface import BadMessageError, Frames
-from auv_dynamics.ros.mirror import WORLD, mirrored, mirrored_odometry
 from auv_dynamics.vehicle.kinematics import quaternion, rotation
 
 NED, ENU = Frames(), Frames('odom', 'base_link')

@@ -20,7 +20,7 @@ from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.nodes.driver_check_node import RosDriverClient
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.interface import Frames
-from auv_dynamics.ros.kinds import message_class, type_name
+from auv_dynamics.ros.topics import message_class, type_name
 
 LOOKS = {
     'publish': 'get_publisher_names_and_types_by_node',

@@ -30,7 +30,7 @@ from auv_analysis.bag.chunks import Table
 from auv_analysis.bag.mcap_file import McapFile
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import NANOSECONDS, Frames, nanoseconds
-from auv_dynamics.ros.raw_types import raw_class
+from auv_dynamics.ros.rclpy_internals import raw_class
 
 FRAMES = Frames()
 STEP = 10_000_000

@@ -17,7 +17,7 @@ from auv_analysis.watch.monitor import GraphMonitor
 from auv_analysis.watch.snapshot import Snapshot, TopicState
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
-from auv_dynamics.ros.watcher import Watcher
+from auv_dynamics.ros.participant import Watcher
 
 FRAMES = Frames()
 STEP = 10_000_000

@@ -20,8 +20,7 @@ from nursery import NODES
 from auv_analysis import load_scenario
 from auv_analysis.graph.supervisor import executable
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.ros.reach import PROFILE, RANGE, loopback, stay_local
-from auv_dynamics.ros.security import asked, require
+from auv_dynamics.ros.security import PROFILES, RANGE, asked, loopback, require, stay_local
 
 TESTS = Path(__file__).resolve().parents[1]
 PLANT = ('--ros-args', '-p', 'vehicle:=herman2018')
@@ -33,7 +32,7 @@ def bare(**extra: str) -> dict[str, str]:
     """Environment of somebody who has set nothing, in a domain of its own."""
     unset = (
         RANGE,
-        PROFILE,
+        *PROFILES,
         'ROS_SECURITY_ENABLE',
         'ROS_SECURITY_STRATEGY',
         'ROS_SECURITY_KEYSTORE',
@@ -139,21 +138,38 @@ def test_a_node_never_runs_without_the_security_that_is_enforced(tmp_path, keys)
     assert ended.stderr.splitlines()[-1].startswith(expected)
 
 
-def test_a_node_listens_on_the_loopback_alone_unless_it_is_opened() -> None:
-    with plant(bare()) as process:
-        assert 'this machine only' in process.stdout.readline()
-        assert listening(process) == {'127.0.0.1'}
-    with plant(bare(**{RANGE: 'SUBNET'})) as process:
+@pytest.mark.parametrize('chosen', [{}, {RANGE: 'SUBNET'}])
+def test_a_node_that_a_user_starts_is_heard_as_far_as_ros_lets_it(chosen) -> None:
+    with plant(bare(**chosen)) as process:
         assert '0.0.0.0' in listening(process)
+
+
+def test_in_the_environment_of_auv_run_a_node_listens_on_the_loopback_alone() -> None:
+    with plant({**bare(), **loopback()}) as process:
+        assert listening(process) == {'127.0.0.1'}
+
+
+@pytest.mark.parametrize('name', PROFILES)
+def test_a_profile_of_the_user_stays_by_its_old_name_and_its_new_one(monkeypatch, name) -> None:
+    for one in (RANGE, *PROFILES):
+        monkeypatch.delenv(one, raising=False)
+    monkeypatch.setenv(name, '/etc/own.xml')
+    stay_local()
+    assert os.environ[RANGE] == 'LOCALHOST'
+    assert [os.environ.get(one) for one in PROFILES if one != name] == [None]
+    assert os.environ[name] == '/etc/own.xml'
+    # a run stays on the loopback under either name
+    assert set(PROFILES) < set(loopback())
 
 
 @pytest.mark.parametrize('chosen', ['SUBNET', 'OFF'])
 def test_what_the_user_has_chosen_stays(monkeypatch, chosen) -> None:
     monkeypatch.setenv(RANGE, chosen)
-    monkeypatch.delenv(PROFILE, raising=False)
-    assert not stay_local()
+    for name in PROFILES:
+        monkeypatch.delenv(name, raising=False)
+    stay_local()
     assert os.environ[RANGE] == chosen
-    assert PROFILE not in os.environ
+    assert not any(name in os.environ for name in PROFILES)
 
 
 def found(machine: networks.Machine, environ: dict[str, str], seconds: float = PATIENCE) -> str:
@@ -167,14 +183,15 @@ def found(machine: networks.Machine, environ: dict[str, str], seconds: float = P
 
 def test_nothing_leaves_the_machine_and_nobody_outside_gets_in() -> None:
     with networks.two_machines() as (inside, outside):
-        environ = bare()
-        knows = {**environ, RANGE: 'SUBNET', 'ROS_STATIC_PEERS': networks.INSIDE}
+        environ = {**bare(), **loopback()}
+        opened = bare(ROS_DOMAIN_ID=environ['ROS_DOMAIN_ID'], **{RANGE: 'SUBNET'})
+        knows = {**opened, 'ROS_STATIC_PEERS': networks.INSIDE}
         with plant(environ, *inside.command()):
             assert found(inside, environ) == 'plant_node'
             assert inside.sent() == 0
             assert found(outside, knows, 3.0) == ''
         before = inside.sent()
-        with plant({**environ, RANGE: 'SUBNET'}, *inside.command()):
+        with plant(opened, *inside.command()):
             assert found(outside, knows) == 'plant_node'
             assert inside.sent() > before
 

@@ -33,8 +33,7 @@ from auv_analysis.graph.node_parameters import (
     parameter_file,
 )
 from auv_analysis.scenario.scenario import load_scenario
-from auv_dynamics.ros.reach import loopback
-from auv_dynamics.ros.security import enclave
+from auv_dynamics.ros.security import enclave, loopback
 
 SWITCH = ('true', 'false', 'True', 'False')
 ARGUMENTS = {  # name -> default, text, choices

@@ -13,8 +13,7 @@ from made_messages import Bag, odometry, serialized, stamped
 from auv_analysis.bag.step_topics import ACCEL, ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import main
 from auv_analysis.replay.compared import compared, figures_of, reproduction
-from auv_analysis.replay.open_loop import OpenLoop, open_loop, recorded_loop
-from auv_analysis.replay.recorded_controller import recorded_settings
+from auv_analysis.replay.open_loop import OpenLoop, open_loop, recorded_loop, recorded_settings
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
@@ -179,7 +178,7 @@ def test_unusable_messages_are_counted(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('lockstep', [True, False])
 def test_what_is_not_written_is_what_the_node_takes(tmp_path, lockstep, monkeypatch) -> None:
-    from auv_gvc_controller.nodes.controller_parameters import ControllerParameters
+    from auv_gvc_controller.nodes.controller_node import ControllerParameters
 
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
     context = rclpy.Context()

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from auv_analysis.bag.step_topics import ODOMETRY, TWIST, WRENCH
-from auv_analysis.replay.index import BagIndex, PlayedTopic
+from auv_analysis.replay.played_bag import BagIndex, PlayedTopic
 from auv_analysis.replay.selection import Wish, is_command, select
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface

@@ -9,8 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from made_messages import STRING, Bag, new, serialized
 
-from auv_analysis.replay.index import index_bag
-from auv_analysis.replay.stream import messages
+from auv_analysis.replay.played_bag import index_bag, messages
 from auv_dynamics.files.errors import InputError
 
 TOPICS = ('/a', '/b', '/c')
@@ -98,10 +97,10 @@ def test_a_file_is_opened_when_its_time_has_come(tmp_path: Path, monkeypatch) ->
     write(tmp_path, [[(k * 10 + i, 0) for i in range(10)] for k in range(20)])
     index = index_bag(tmp_path)
     opened = []
-    from auv_analysis.replay import stream
+    from auv_analysis.replay import played_bag
 
-    real = stream.records
-    monkeypatch.setattr(stream, 'records', lambda p, n: (opened.append(p.name), real(p, n))[1])
+    real = played_bag.records
+    monkeypatch.setattr(played_bag, 'records', lambda p, n: (opened.append(p.name), real(p, n))[1])
     played = messages(index, TOPICS)
     for _ in range(55):
         next(played)

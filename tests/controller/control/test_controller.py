@@ -7,14 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from auv_dynamics import load_vehicle
-from auv_gvc_controller.control.controller import Timeouts, VelocityController
-from auv_gvc_controller.control.odometry_guard import OdometryGuard
-from auv_gvc_controller.control.output_stage import HandOver
-from auv_gvc_controller.control.plausibility import ZERO, Limits
+from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
+from auv_gvc_controller.control.odometry_guard import ZERO, Limits, Now, OdometryGuard
 from auv_gvc_controller.control.reference_filter import FilterSettings, ReferenceFilter
 from auv_gvc_controller.control.sampled import SampledLaw
-from auv_gvc_controller.control.setpoint_buffer import DIFFERENCE, SAME, Pairing
-from auv_gvc_controller.control.stamp_age import Now
+from auv_gvc_controller.control.setpoint_buffer import DIFFERENCE, SAME, SetpointBuffer
 from auv_gvc_controller.laws.gvc import GVC
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
@@ -51,12 +48,12 @@ class Bench:
         steepest=None,
         reference=None,
     ):
-        self.pairing = Pairing(exact, acceleration, steepest=steepest)
+        self.pairing = SetpointBuffer(exact, acceleration, steepest=steepest)
         self.controller = VelocityController(
             SampledLaw(gains, MODEL),
             self.pairing,
             OdometryGuard(100 * MS, Limits(50.0, 50.0), lockstep, patience=odometry),
-            HandOver(limit, ramp=ramp),
+            OutputStage(limit, ramp=ramp),
             exact=exact,
             timeouts=None if lockstep else Timeouts(odometry, setpoint),
             reference_filter=reference,

@@ -2,15 +2,15 @@
 
 import pytest
 
-from auv_gvc_controller.control.plausibility import Limits
+from auv_gvc_controller.control.odometry_guard import Limits
 from auv_gvc_controller.control.setpoint_buffer import (
     CAPACITY,
     DIFFERENCE,
     FILTER,
     NONE,
     SAME,
-    Pairing,
     Reference,
+    SetpointBuffer,
 )
 
 MS = 1_000_000
@@ -24,7 +24,7 @@ ZERO = six(0.0)
 
 
 def test_exact_takes_the_set_point_of_the_very_same_stamp():
-    pairing = Pairing(exact=True, acceleration=SAME)
+    pairing = SetpointBuffer(exact=True, acceleration=SAME)
     for k in range(5):
         pairing.setpoint(k * MS, six(k))
         pairing.derivative(k * MS, six(10 * k))
@@ -38,7 +38,7 @@ def test_exact_takes_the_set_point_of_the_very_same_stamp():
 
 @pytest.mark.parametrize('exact', [True, False])
 def test_topic_waits_for_the_derivative_of_the_same_stamp(exact):
-    pairing = Pairing(exact=exact, acceleration=SAME)
+    pairing = SetpointBuffer(exact=exact, acceleration=SAME)
     pairing.setpoint(MS, six(1))
     pairing.derivative(2 * MS, six(7))
     assert pairing.find(MS) is None
@@ -50,7 +50,7 @@ def test_topic_waits_for_the_derivative_of_the_same_stamp(exact):
 
 
 def test_latest_takes_the_newest_at_or_before():
-    pairing = Pairing(exact=False, acceleration=DIFFERENCE)
+    pairing = SetpointBuffer(exact=False, acceleration=DIFFERENCE)
     assert pairing.find(0) is None
     for k in (1, 3, 5):
         pairing.setpoint(k * MS, six(k))
@@ -63,7 +63,7 @@ def test_latest_takes_the_newest_at_or_before():
 
 
 def test_latest_does_not_depend_on_the_order_of_arrival():
-    pairing = Pairing(exact=False, acceleration=DIFFERENCE)
+    pairing = SetpointBuffer(exact=False, acceleration=DIFFERENCE)
     for k in (5, 1, 3):
         pairing.setpoint(k * MS, six(k))
     assert pairing.find(4 * MS) == Reference(3 * MS, six(3), six(1000.0))
@@ -71,7 +71,7 @@ def test_latest_does_not_depend_on_the_order_of_arrival():
 
 @pytest.mark.parametrize('exact', [True, False])
 def test_the_backward_difference_is_zero_at_the_first(exact):
-    pairing = Pairing(exact=exact, acceleration=DIFFERENCE)
+    pairing = SetpointBuffer(exact=exact, acceleration=DIFFERENCE)
     pairing.setpoint(10 * MS, six(1.0))
     assert pairing.find(10 * MS) == Reference(10 * MS, six(1.0), ZERO)
     pairing.setpoint(30 * MS, six(2.0))
@@ -81,7 +81,7 @@ def test_the_backward_difference_is_zero_at_the_first(exact):
 
 
 def test_the_difference_is_to_the_set_point_just_before_even_if_unused():
-    pairing = Pairing(exact=False, acceleration=DIFFERENCE)
+    pairing = SetpointBuffer(exact=False, acceleration=DIFFERENCE)
     for k, value in ((0, 0.0), (10, 5.0), (20, 6.0)):
         pairing.setpoint(k * MS, six(value))
     pairing.find(0)
@@ -90,7 +90,7 @@ def test_the_difference_is_to_the_set_point_just_before_even_if_unused():
 
 @pytest.mark.parametrize('keep', ['setpoint', 'derivative'])
 def test_a_stamp_not_newer_than_the_one_in_use_is_refused(keep):
-    pairing = Pairing(exact=False, acceleration=DIFFERENCE)
+    pairing = SetpointBuffer(exact=False, acceleration=DIFFERENCE)
     pairing.setpoint(2 * MS, six(1))
     pairing.find(2 * MS)
     for ns in (MS, 2 * MS):
@@ -102,14 +102,14 @@ def test_a_stamp_not_newer_than_the_one_in_use_is_refused(keep):
 
 
 def test_before_anything_is_used_any_stamp_is_kept():
-    pairing = Pairing(exact=False, acceleration=DIFFERENCE)
+    pairing = SetpointBuffer(exact=False, acceleration=DIFFERENCE)
     pairing.setpoint(5 * MS, six(5))
     pairing.setpoint(MS, six(1))
     assert pairing.find(MS).nu_d == six(1)
 
 
 def test_reset_forgets_what_was_used_and_keeps_what_waits():
-    pairing = Pairing(exact=False, acceleration=DIFFERENCE)
+    pairing = SetpointBuffer(exact=False, acceleration=DIFFERENCE)
     pairing.setpoint(MS, six(1))
     pairing.setpoint(9 * MS, six(9))
     pairing.find(MS)
@@ -122,7 +122,7 @@ def test_reset_forgets_what_was_used_and_keeps_what_waits():
 
 
 def test_the_oldest_go_when_there_is_no_room():
-    pairing = Pairing(exact=True, acceleration=DIFFERENCE)
+    pairing = SetpointBuffer(exact=True, acceleration=DIFFERENCE)
     for k in range(CAPACITY + 10):
         pairing.setpoint(k, six(k))
     assert pairing.find(9) is None
@@ -131,7 +131,7 @@ def test_the_oldest_go_when_there_is_no_room():
 
 
 def test_what_was_used_is_not_kept():
-    pairing = Pairing(exact=True, acceleration=SAME)
+    pairing = SetpointBuffer(exact=True, acceleration=SAME)
     for k in range(3):
         pairing.setpoint(k, six(k))
         pairing.derivative(k, six(k))
@@ -141,7 +141,9 @@ def test_what_was_used_is_not_kept():
 
 
 def test_what_is_not_believed_is_refused() -> None:
-    pairing = Pairing(exact=True, acceleration=SAME, limits=Limits(speed=2.0, acceleration=5.0))
+    pairing = SetpointBuffer(
+        exact=True, acceleration=SAME, limits=Limits(speed=2.0, acceleration=5.0)
+    )
     with pytest.raises(ValueError, match=r'twist\.linear: expected at most 2 m/s, found 3'):
         pairing.setpoint(0, (3.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     with pytest.raises(ValueError, match=r'accel\.angular: expected at most 5 rad/s2, found 6'):
@@ -150,7 +152,7 @@ def test_what_is_not_believed_is_refused() -> None:
 
 
 def test_a_bounded_difference_ends_with_the_interval_that_it_was_taken_over() -> None:
-    pairing = Pairing(exact=False, acceleration=DIFFERENCE, steepest=(0.2,) * 6)
+    pairing = SetpointBuffer(exact=False, acceleration=DIFFERENCE, steepest=(0.2,) * 6)
     for ms, value in ((0, 0.0), (100, 0.01), (200, 0.5), (200.1, 0.505)):
         pairing.setpoint(round(ms * MS), six(value))
         slope = pairing.find(round(ms * MS)).nu_d_dot
@@ -164,7 +166,7 @@ def test_a_bounded_difference_ends_with_the_interval_that_it_was_taken_over() ->
 
 @pytest.mark.parametrize('acceleration', [NONE, FILTER])
 def test_without_a_difference_the_derivative_is_zero(acceleration) -> None:
-    pairing = Pairing(exact=False, acceleration=acceleration)
+    pairing = SetpointBuffer(exact=False, acceleration=acceleration)
     for k in range(2):
         pairing.setpoint(k * MS, six(k))
         assert pairing.find(k * MS) == Reference(k * MS, six(k), (0.0,) * 6)
@@ -172,7 +174,7 @@ def test_without_a_difference_the_derivative_is_zero(acceleration) -> None:
 
 def test_a_jump_of_the_set_point_has_no_derivative() -> None:
     limits = Limits(acceleration=100.0)
-    pairing = Pairing(exact=False, acceleration=DIFFERENCE, limits=limits)
+    pairing = SetpointBuffer(exact=False, acceleration=DIFFERENCE, limits=limits)
     pairing.setpoint(0, (0.0,) * 6)
     assert pairing.find(0) is not None
     pairing.setpoint(10_000_000, (0.5, 0.0, 0.0, 0.0, 0.0, 0.0))

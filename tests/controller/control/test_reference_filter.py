@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from auv_gvc_controller.control.plausibility import ZERO
+from auv_gvc_controller.control.odometry_guard import ZERO
 from auv_gvc_controller.control.reference_filter import FilterSettings, ReferenceFilter
 
 FREE = (math.inf,) * 4

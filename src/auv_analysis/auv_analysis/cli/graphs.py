@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from auv_analysis.graph.domain import VARIABLE
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.ros.reach import HERE, RANGE, stay_local
+from auv_dynamics.ros.security import HERE, RANGE, stay_local
 
 
 def join_domain(domain: int) -> None:

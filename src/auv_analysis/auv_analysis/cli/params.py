@@ -7,7 +7,7 @@ from typing import Any
 from auv_analysis.graph.node_parameters import CONTROLLER, node_parameters, parameter_file
 from auv_analysis.output.new_files import write_text
 from auv_analysis.output.progress import say
-from auv_analysis.replay.recorded_controller import recorded_settings
+from auv_analysis.replay.open_loop import recorded_settings
 from auv_analysis.scenario.scenario import load_scenario
 from auv_dynamics.files.errors import InputError
 

@@ -59,7 +59,7 @@ def free_graph(options: argparse.Namespace) -> Iterator[FreeGraph]:
     with own_domain(options.domain_id) as (domain, picked):
         os.environ.update(environment(domain))
         # the middleware reads its environment when it is loaded
-        from auv_dynamics.ros.watcher import Watcher
+        from auv_dynamics.ros.participant import Watcher
 
         graph = Watcher(domain)
         try:

@@ -36,8 +36,8 @@ def watch(options: argparse.Namespace) -> dict[str, Any]:
         keyboard = stack.enter_context(Keyboard())  # from here on Ctrl-C is an end like another
         join_domain(domain)
         # the middleware reads its environment when it is loaded
+        from auv_analysis.graph.supervisor import give_way
         from auv_analysis.nodes.watch_node import Listener
-        from auv_dynamics.ros.life import give_way
 
         give_way()
         monitor = GraphMonitor(domain, namespace, vehicle, begin=time.monotonic())

@@ -28,7 +28,7 @@ LOOK = 0.1  # s
 def discovery() -> Iterator[Finding]:
     """Let two participants look for each other on the loopback, in a domain of their own."""
     from auv_analysis.graph.domain import LARGEST, is_free
-    from auv_dynamics.ros.reach import loopback
+    from auv_dynamics.ros.security import loopback
 
     domains = [domain for domain in range(1, LARGEST + 1) if is_free(domain)]
     if not domains:
@@ -69,7 +69,7 @@ def neighbours() -> Iterator[Finding]:
     """Who is in the domain that commands join here."""
     from auv_analysis.graph.domain import VARIABLE, joined_domain
     from auv_dynamics.files.errors import InputError
-    from auv_dynamics.ros.reach import RANGE, loopback
+    from auv_dynamics.ros.security import RANGE, loopback
 
     try:
         domain = joined_domain(None)

@@ -15,15 +15,9 @@ from auv_analysis.graph.node_parameters import (
     node_parameters,
     parameter_file,
 )
-from auv_analysis.graph.supervisor import (
-    NodeDiedError,
-    Supervisor,
-    TroubleError,
-    executable,
-)
+from auv_analysis.graph.supervisor import NodeDiedError, Supervisor, TroubleError, executable
 from auv_analysis.scenario.scenario import Scenario, write_inputs
-from auv_dynamics.ros.reach import loopback
-from auv_dynamics.ros.security import enclave
+from auv_dynamics.ros.security import enclave, loopback
 
 PACKAGES = {
     RECORDER: 'auv_analysis',
@@ -32,6 +26,7 @@ PACKAGES = {
     CONTROLLER: 'auv_gvc_controller',
     ANALYSIS: 'auv_analysis',
 }
+OBSERVERS = (RECORDER, SETPOINT, ANALYSIS)  # nobody waits for an answer of theirs
 COMPOSED = 'composed_graph'  # the executable that holds them all
 START_TIMEOUT = 60.0  # s until the start barrier must be down
 END_TIMEOUT = 30.0  # s for the recorder to close after the last step
@@ -110,7 +105,8 @@ def run_controller(
     try:
         for name, package in ({COMPOSED: PACKAGES[RECORDER]} if composed else PACKAGES).items():
             arguments = [*enclave(name), '--params-file', str(path)]
-            supervisor.start(name, [str(executable(package, name)), *arguments])
+            command = [str(executable(package, name)), *arguments]
+            supervisor.start(name, command, observes=name in OBSERVERS)
         _start(supervisor, graph)
         _follow(supervisor, COMPOSED if composed else RECORDER, graph, scenario, progress)
         said = supervisor.complaints(COMPOSED if composed else CONTROLLER, CONTROLLER)

@@ -147,7 +147,7 @@ def node_parameters(
             if topic in published
         }
         listed = [f'{topic}={count}' for topic, count in counts.items() if count]
-        values.update(_frames(), expected_subscribers=listed)
+        values.update(_frames(), lockstep=lockstep, expected_subscribers=listed)
     if bag is not None:
         parameters[RECORDER] = {
             **clock,
@@ -193,7 +193,6 @@ def _plant(scenario: Scenario, vehicle: str, nodes: list[str], lockstep: bool) -
         'vehicle': vehicle,
         'step': scenario.step,
         'duration': scenario.duration,
-        'lockstep': lockstep,
         'start_paused': False,
         'publish_clock': True,
         'recorder_window': WINDOW if RECORDER in nodes and lockstep else 0,
@@ -233,7 +232,6 @@ def _controller(
     parameters = {
         **known,
         'vehicle': vehicle,
-        'lockstep': lockstep,
         'setpoint_pairing': 'exact' if lockstep else 'latest',
         'setpoint_acceleration': 'topic',
         'setpoint_timeout': TIMEOUT,

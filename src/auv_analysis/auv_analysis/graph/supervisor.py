@@ -1,5 +1,6 @@
 """Processes of a run: started together, watched, ended together. psutil does the waiting."""
 
+import contextlib
 import os
 import shutil
 import sys
@@ -43,6 +44,12 @@ def executable(package: str, name: str) -> Path:
     return Path(found)
 
 
+def give_way(process: int = 0) -> None:
+    """Let a process, by default this one, interrupt no other: it is scheduled as a batch job."""
+    with contextlib.suppress(OSError, AttributeError):  # not every system has it
+        os.sched_setscheduler(process, os.SCHED_BATCH, os.sched_param(0))
+
+
 class Supervisor:
     """A group of processes that lives and dies together.
 
@@ -59,8 +66,11 @@ class Supervisor:
         self._processes: dict[str, psutil.Popen] = {}
         self._outputs: dict[str, IO[bytes]] = {}  # open: the folder may be removed under us
 
-    def start(self, name: str, command: list[str]) -> None:
-        """Start one process; its output goes to <logs>/<name>.log."""
+    def start(self, name: str, command: list[str], *, observes: bool = False) -> None:
+        """Start one process; its output goes to <logs>/<name>.log.
+
+        One that only observes must not interrupt those whose answers are waited for.
+        """
         self._logs.mkdir(parents=True, exist_ok=True)
         log = (self._logs / f'{name}.log').open('w+b')
         self._outputs[name] = log
@@ -73,6 +83,8 @@ class Supervisor:
             stderr=log,
             start_new_session=True,
         )
+        if observes:
+            give_way(self._processes[name].pid)
 
     def ended(self) -> dict[str, int]:
         """Name -> exit code of the processes that have ended."""

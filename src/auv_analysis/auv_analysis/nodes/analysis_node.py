@@ -9,12 +9,10 @@ from auv_analysis.metrics.coupling import LiveAnalysis
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface, topics
-from auv_dynamics.ros.bulk import BulkNode
-from auv_dynamics.ros.codec import Codec, first_stamp
+from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.endpoints import why_silent
-from auv_dynamics.ros.graph import Graph
-from auv_dynamics.ros.health import OK, STALE, Health
-from auv_dynamics.ros.life import main_of
+from auv_dynamics.ros.node_interface import OK, STALE, Health, NodeInterface
+from auv_dynamics.ros.node_main import BulkNode, main_of
 from auv_dynamics.ros.parameters import declare, refuse_unknown
 
 CAPACITY = 2 * topics.DEPTH  # messages per topic that wait for their odometry
@@ -26,9 +24,9 @@ HEARD = (
 class AnalysisNode(BulkNode):
     """Publishes `analysis/*` for every step whose number is a multiple of `every`."""
 
-    def __init__(self) -> None:
-        super().__init__('analysis_node')
-        self.graph = Graph(self)
+    def __init__(self, **options: Any):
+        super().__init__('analysis_node', **options)
+        self.graph = NodeInterface(self)
         vehicle = declare(self, 'vehicle', str, '', 'vehicle file, or shipped bare name')
         self._every = declare(self, 'every', int, 10, 'steps between samples', at_least=1)
         truth = declare(
@@ -48,7 +46,7 @@ class AnalysisNode(BulkNode):
         }
         self._values: dict[int, dict[topics.Topic, tuple[float, ...]]] = {}
         self._outputs = {topic: self.graph.output(topic) for topic in topics.ANALYSIS_TOPICS}
-        self._codecs = {t: Codec(t.type, self.graph.frames, t.name) for t in HEARD}
+        self._codecs = {topic: self.graph.codec(topic) for topic in HEARD}
         for topic in HEARD:
             self._watch(topic)
         self.graph.in_trouble_while(self._trouble)

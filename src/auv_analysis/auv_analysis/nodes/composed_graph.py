@@ -7,7 +7,7 @@ are gone. The process ends with the first node that ends, in a run with the reco
 from auv_analysis.nodes.analysis_node import AnalysisNode
 from auv_analysis.nodes.recorder_node import RecorderNode
 from auv_dynamics.nodes.plant_node import PlantNode
-from auv_dynamics.ros.life import main_of
+from auv_dynamics.ros.node_main import main_of
 from auv_gvc_controller.nodes.controller_node import ControllerNode
 from auv_gvc_controller.nodes.setpoint_node import SetpointNode
 

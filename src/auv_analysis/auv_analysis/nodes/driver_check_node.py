@@ -27,13 +27,12 @@ from rclpy.qos import (
 from auv_analysis.driver.evidence import Endpoint, GraphSnapshot
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
 from auv_dynamics.ros import interface, topics
-from auv_dynamics.ros.bulk import BulkNode, DataPath
 from auv_dynamics.ros.codec import Codec, first_stamp, message_of
 from auv_dynamics.ros.endpoints import acts, full_name, other_publishers, other_subscribers
 from auv_dynamics.ros.interface import Frames
-from auv_dynamics.ros.kinds import type_name
+from auv_dynamics.ros.node_main import BulkNode
 from auv_dynamics.ros.participant import Participant
-from auv_dynamics.ros.private import PLAIN
+from auv_dynamics.ros.topics import type_name
 
 COMMANDER = 'auv_check_driver'  # its name when it commands: then it is no mere observer
 ACKNOWLEDGED = 0.5  # s that are waited for the last zero to arrive
@@ -231,7 +230,6 @@ class RosDriverClient(Participant):
         executable = COMMANDER if commands else interface.OBSERVER
         super().__init__(domain, lambda ctx: CheckNode(ctx, namespace, names, commands), executable)
         self._frames, self._commands = frames, commands
-        self._path = DataPath([self._node])
         self._publisher: Publisher | None = None
 
     @property
@@ -241,10 +239,7 @@ class RosDriverClient(Participant):
 
     def listen(self, seconds: float) -> None:
         """Take what comes in for so long."""
-        if PLAIN:
-            self.spin(seconds)
-        else:
-            self._path.serve(time.monotonic() + seconds, lambda: False)
+        self.spin(seconds)
 
     def publishes(self) -> bool:
         """Whether anybody publishes the odometry."""

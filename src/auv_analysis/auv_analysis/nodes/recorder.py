@@ -36,13 +36,11 @@ from auv_dynamics.files.errors import InputError, first_line, reason
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.files.yaml_files import read_text
 from auv_dynamics.ros import interface, topics
-from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.interface import GLOBALS, NANOSECONDS
-from auv_dynamics.ros.kinds import message_class
+from auv_dynamics.ros.node_main import BulkNode
 from auv_dynamics.ros.parameters import declare, refuse_unknown
-from auv_dynamics.ros.private import RCLError
-from auv_dynamics.ros.raw_types import raw_class
-from auv_dynamics.ros.topics import DEPTH
+from auv_dynamics.ros.rclpy_internals import RCLError, raw_class
+from auv_dynamics.ros.topics import DEPTH, message_class
 
 ALL = 'all'
 UNRECORDED = ('/rosout', '/parameter_events')  # unless they are asked for by name

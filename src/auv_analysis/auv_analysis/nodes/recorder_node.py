@@ -11,12 +11,11 @@ from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import RecordingError
 from auv_analysis.nodes.recorder import GraphClock, OtherTopics, recorder_parameters
 from auv_dynamics.ros import convert, topics
-from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.codec import first_stamp
-from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.interface import RECORDER, BadMessageError
-from auv_dynamics.ros.kinds import qos_entry, type_name
-from auv_dynamics.ros.life import main_of
+from auv_dynamics.ros.node_interface import NodeInterface, steady_timer
+from auv_dynamics.ros.node_main import BulkNode, main_of
+from auv_dynamics.ros.topics import qos_entry, type_name
 
 
 class LostStepError(RuntimeError):
@@ -111,8 +110,8 @@ TIMED = (*topics.STEP_TOPICS, topics.CLOCK)  # whose stamp is the log time, and 
 class RecorderNode(BulkNode):
     """Records raw messages; log time is the stamp of steps, of others the time when they came."""
 
-    def __init__(self) -> None:
-        super().__init__(RECORDER)
+    def __init__(self, **options: Any):
+        super().__init__(RECORDER, **options)
         self._settings = p = recorder_parameters(self)
         self._writer = p.writer
         # in real time set-points lie on a grid of their own, ahead of the odometry
@@ -125,7 +124,7 @@ class RecorderNode(BulkNode):
         self._whole_since: float | None = None  # steady s
         self._reported = -1
         self._complaints: set[str] = set()
-        self.graph = Graph(self, barrier=False)
+        self.graph = NodeInterface(self, barrier=False, lockstep=p.strict)
         self._progress = self.graph.publisher(topics.PROGRESS, topics.one_at_a_time())
         self._ours = {self._record(topic) for topic in topics.TOPICS}
         self._others = OtherTopics(self, p.others, self._take)

@@ -11,14 +11,13 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
-from auv_analysis.nodes.replay_parameters import replay_parameters
-from auv_analysis.replay.player import Player
+from auv_analysis.nodes.player import Player
+from auv_analysis.replay.selection import replay_parameters
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface
-from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.endpoints import NAMED, NAMELESS, full_name, other_publishers
-from auv_dynamics.ros.graph import Graph, steady_timer
-from auv_dynamics.ros.life import main_of
+from auv_dynamics.ros.node_interface import NodeInterface, steady_timer
+from auv_dynamics.ros.node_main import BulkNode, main_of
 from auv_dynamics.ros.participant import Participant
 
 NAME = 'replay_node'
@@ -33,7 +32,7 @@ class ReplayNode(BulkNode):
 
     def __init__(self, **options: Any):
         super().__init__(NAME, **options)
-        self.graph = Graph(self, barrier=False)
+        self.graph = NodeInterface(self, barrier=False)
         self.settings = p = replay_parameters(self)
         self.player = Player(self, p)
         careful = p.selection.guarded and not p.foreign
@@ -63,7 +62,6 @@ class ReplayNode(BulkNode):
 
     def _tick(self) -> None:
         if self.exit_code is None:
-            self.take_data()
             wait = self._phase(time.monotonic())
             self._timer.timer_period_ns = max(1, round(wait * interface.NANOSECONDS))
             self._timer.reset()
@@ -195,7 +193,7 @@ class Replay(Participant):
         super().close()
 
 
-def outspoken() -> ReplayNode:
+def make_node() -> ReplayNode:
     """A replay that says what is odd about its bag."""
     node = ReplayNode()
     node.aloud = True
@@ -206,4 +204,4 @@ def outspoken() -> ReplayNode:
 
 def main() -> None:
     """Run the node."""
-    main_of(outspoken)
+    main_of(make_node)

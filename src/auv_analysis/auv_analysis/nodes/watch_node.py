@@ -18,13 +18,12 @@ from rclpy.subscription import Subscription
 from auv_analysis.watch.monitor import HEARD, GraphMonitor
 from auv_analysis.watch.snapshot import LEVELS, NodeState
 from auv_dynamics.ros import interface, topics
-from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.codec import KINDS, Codec, first_stamp, message_of
 from auv_dynamics.ros.endpoints import endpoints
 from auv_dynamics.ros.interface import BadMessageError, Frames
-from auv_dynamics.ros.life import serve
+from auv_dynamics.ros.node_main import BulkNode, serve
 from auv_dynamics.ros.participant import Participant
-from auv_dynamics.ros.private import PLAIN
+from auv_dynamics.ros.rclpy_internals import has_data_path
 
 DEPTH = 256  # messages of a topic between two looks; of more, the oldest are dropped
 LOOK = 0.5  # s between two looks at who is there
@@ -60,6 +59,7 @@ class WatchNode(BulkNode):
             start_parameter_services=False,
             enable_rosout=False,
         )
+        self.bulk = has_data_path()
         self._monitor = monitor
         self._frames = frames
         self._topics = [topic for topic in topics.TOPICS if topic.name in HEARD]
@@ -180,7 +180,7 @@ class Listener(Participant):
         """Take what has come, and look now and then who is there."""
         self._node.take()
         now = time.monotonic()
-        if PLAIN:
+        if not self._node.bulk:
             self._serve(BRIEF)
         if now - self._looked > LOOK:
             self._looked = now

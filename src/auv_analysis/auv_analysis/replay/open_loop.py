@@ -6,8 +6,9 @@ In real time it is told what the recorded controller has answered, and begins an
 """
 
 import heapq
+import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,99 @@ from auv_analysis.bag.reading import Contents, Series, read_bag
 from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.bag.steps import topics_of_one_graph
 from auv_analysis.graph.node_parameters import CONTROLLER
-from auv_analysis.replay.recorded_controller import RecordedController
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface
-from auv_gvc_controller.control.controller import Answer, VelocityController
-from auv_gvc_controller.control.output_stage import FEWEST
-from auv_gvc_controller.control.setpoint_buffer import Pairing
-from auv_gvc_controller.control.stamp_age import Now
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_gvc_controller.control.controller import FEWEST, Answer, VelocityController
+from auv_gvc_controller.control.odometry_guard import Now
+from auv_gvc_controller.control.setpoint_buffer import SAME, SetpointBuffer
+from auv_gvc_controller.control.settings import ControllerSettings, usual_acceleration
+from auv_gvc_controller.laws.law import law_class, make_gains, refusal, try_law
+from auv_gvc_controller.laws.model import control_model
+
+
+class RecordedController:
+    """Everything of a controller but its law; its clock is that of the stamps.
+
+    Parameters
+    ----------
+    parameters : of the node, as they were attached to the bag; empty: not known
+    vehicle : what it knows
+    bag : for refusals
+    derivatives : whether nu_d_dot was recorded
+
+    Attributes
+    ----------
+    law, gains : as they were; 'unknown' and none where the bag does not say
+    settings : what the node runs with where it is given the same parameters
+
+    Raises
+    ------
+    InputError : a parameter is not what it should be
+
+    """
+
+    def __init__(
+        self, parameters: Mapping[str, Any], vehicle: Vehicle, bag: Path, *, derivatives: bool
+    ):
+        self._vehicle = vehicle
+        self.law, self.gains = attachments.law_and_gains(dict(parameters), bag)
+        source = f'{bag}: params.yaml: controller_node'
+        self.settings = recorded_settings(parameters, source)
+        if self.settings.setpoint_acceleration == SAME and not derivatives:
+            usual = usual_acceleration(self.settings.lockstep)
+            self.settings = replace(self.settings, setpoint_acceleration=usual)
+
+    def build(
+        self, law: str, gains: Mapping[str, Any], setpoints: SetpointBuffer
+    ) -> VelocityController:
+        """Controller with a law, and the set-points that have come; InputError: no such law."""
+        try:
+            made = make_gains(law, gains)
+            try_law(made, control_model(self._vehicle))
+        except ValueError as error:
+            gain, expected, found = refusal(error)
+            raise InputError('--gain' if gain else '--law', gain, expected, found) from None
+        return self.settings.build(made, self._vehicle, setpoints)
+
+    def gains_of(self, law: str, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Gains for a law: those that are given, the others as they were recorded."""
+        try:
+            names = law_class(law)._fields
+        except ValueError as error:
+            raise InputError('--law', '', *refusal(error)[1:]) from None
+        return {**{name: v for name, v in self.gains.items() if name in names}, **given}
+
+
+def recorded_settings(values: Mapping[str, Any], source: str) -> ControllerSettings:
+    """Settings of parameters by name, as a bag carries them; InputError for a wrong one."""
+
+    def reader(
+        name: str, kind: Any, default: Any, _: str, *, at_least: float = 0.0,
+        at_most: float = math.inf, one_of: tuple[str, ...] = (),
+    ) -> Any:  # fmt: skip
+        value = values.get(name, default)
+        if kind is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        good = {
+            float: lambda: (
+                isinstance(value, float) and at_least <= value <= at_most and value < math.inf
+            ),
+            list[float]: lambda: value is None or isinstance(value, list),
+            str: lambda: value in one_of,
+            bool: lambda: isinstance(value, bool),
+        }
+        if not good[kind]():
+            expected = {
+                float: f'a number from {at_least:g} to {at_most:g}',
+                str: f'one of {", ".join(one_of)}',
+                list[float]: 'a list of numbers', bool: 'true or false',
+            }  # fmt: skip
+            raise InputError(source, name, expected[kind], value)
+        return value
+
+    return ControllerSettings.read(reader, source)
+
 
 Progress = Callable[[int], None]
 
@@ -139,8 +227,8 @@ def open_loop(
 
     """
     own = recorded.controller
-    pairing, course = own.settings.pairing(), _Course(recorded)
-    controller, stretch, begin = own.build(law, gains, pairing), 0, (0, 0)
+    setpoints, course = own.settings.setpoints(), _Course(recorded)
+    controller, stretch, begin = own.build(law, gains, setpoints), 0, (0, 0)
     ramps: list[bool] = []
     answers: list[Answer] = []
     troubles: list[str] = []
@@ -150,10 +238,10 @@ def open_loop(
             if not now_in:
                 continue
             if now_in != stretch:
-                controller = own.build(law, gains, pairing) if stretch else controller
+                controller = own.build(law, gains, setpoints) if stretch else controller
                 stretch, begin = now_in, (ns, len(answers))
         try:
-            answer = _tell(controller, pairing, role, ns, values)
+            answer = _tell(controller, setpoints, role, ns, values)
         except ValueError as error:
             troubles.append(f'{role}: {error}')
             continue
@@ -229,15 +317,19 @@ class _Course:
 
 
 def _tell(
-    controller: VelocityController, pairing: Pairing, role: str, ns: int, values: tuple[float, ...]
+    controller: VelocityController,
+    setpoints: SetpointBuffer,
+    role: str,
+    ns: int,
+    values: tuple[float, ...],
 ) -> Answer | None:
     now = Now(ns / interface.NANOSECONDS, ns)  # of what arrives when it is stamped
     if role == interface.ODOM:
         return controller.odometry(ns, values, now)
     if role == interface.CMD_VEL:
-        pairing.setpoint(ns, values, now.steady)
+        setpoints.setpoint(ns, values, now.steady)
     else:
-        pairing.derivative(ns, values)
+        setpoints.derivative(ns, values)
     return controller.answer(now)
 
 

@@ -1,25 +1,109 @@
-"""The frame converter as a node: a driver in ENU and FLU on one side, our graph on the other."""
+"""The frame converter: a driver in ENU and FLU on one side, our graph on the other."""
 
+import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
+from nav_msgs.msg import Odometry
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.ros import topics
-from auv_dynamics.ros.bulk import BulkNode
+from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.codec import message_of
-from auv_dynamics.ros.graph import Graph, steady_timer
-from auv_dynamics.ros.interface import ROS_FRAMES, Frames, nanoseconds
-from auv_dynamics.ros.life import main_of
-from auv_dynamics.ros.mirror import CHILD, WORLD, mirrored, mirrored_odometry
+from auv_dynamics.ros.interface import ROS_FRAMES, BadMessageError, Frames, nanoseconds
+from auv_dynamics.ros.node_interface import NodeInterface, steady_timer
+from auv_dynamics.ros.node_main import BulkNode, main_of
 from auv_dynamics.ros.parameters import declare, refuse_unknown
 from auv_dynamics.ros.topics import Topic
 from auv_dynamics.vehicle import frames
+from auv_dynamics.vehicle.frames import swap_body, swap_body_matrix, swap_earth_matrix, swap_state
+
+CHILD, WORLD = 'child', 'world'  # frame in which an odometry's twist is written
+_MAKERS: dict[type, Callable[..., Any]] = {
+    TwistStamped: convert.twist,
+    AccelStamped: convert.accel,
+    WrenchStamped: convert.wrench,
+}
+_READERS: dict[type, Callable[..., Any]] = {
+    TwistStamped: interface.read_twist,
+    AccelStamped: interface.read_accel,
+    WrenchStamped: interface.read_wrench,
+}
+
+
+def mirrored(message: Any, here: Frames, there: Frames, topic: str) -> Any:
+    """TwistStamped, AccelStamped or WrenchStamped in the other body frame.
+
+    Parameters
+    ----------
+    message : in the body frame of `here`: FSD or FLU
+    here, there : frame ids that it must have, and those that it gets
+    topic : its name, for what is refused
+
+    Returns
+    -------
+    message : in the body frame of `there`: FLU or FSD, same stamp
+
+    Raises
+    ------
+    BadMessageError : another frame id, or a number that is not finite
+
+    """
+    ns, values = _READERS[type(message)](message, here, topic)
+    return _MAKERS[type(message)](ns, swap_body(values), there)
+
+
+def mirrored_odometry(
+    message: Odometry, here: Frames, there: Frames, topic: str, twist_frame: str = CHILD
+) -> Odometry:
+    """Odometry in the other frames, its twist in the child frame.
+
+    Parameters
+    ----------
+    message : pose in `here.odom`, NED or ENU
+    here, there : frame ids that it must have, and those that it gets
+    topic : its name, for what is refused
+    twist_frame : 'child': its twist and their covariance are in the child frame, as nav_msgs says;
+        'world': in the frame of the pose, as some drivers have them
+
+    Returns
+    -------
+    message : pose in `there.odom`, twist in `there.base`, covariances turned, same stamp
+
+    Raises
+    ------
+    BadMessageError : another frame id, a number that is not finite, no unit quaternion
+
+    """
+    ns, state = interface.read_odometry(message, here, topic)
+    x = np.array(state)
+    x[3:7] /= np.linalg.norm(x[3:7])
+    poses = _covariance(message.pose.covariance, f'{topic}: pose.covariance')
+    twists = _covariance(message.twist.covariance, f'{topic}: twist.covariance')
+    if twist_frame == WORLD:
+        from auv_dynamics.vehicle.kinematics import rotation
+
+        to_child = np.kron(np.eye(2), rotation(x[3:7]).T)
+        x[7:] = to_child @ x[7:]
+        twists = to_child @ twists @ to_child.T
+    result = convert.odometry(ns, swap_state(x), there)
+    result.pose.covariance = swap_earth_matrix(poses).ravel()
+    result.twist.covariance = swap_body_matrix(twists).ravel()
+    return result
+
+
+def _covariance(values: Sequence[float], what: str) -> np.ndarray:
+    bad = [float(value) for value in values if not math.isfinite(value)]
+    if bad:
+        raise BadMessageError(f'{what}: not finite: expected finite numbers, found {bad[0]}')
+    return np.array(values).reshape(6, 6)
+
 
 ENU_FLU = 'enu_flu'  # what the driver's topics begin with
 
@@ -29,9 +113,9 @@ class FrameConverterNode(BulkNode):
 
     prompt = True
 
-    def __init__(self) -> None:
-        super().__init__('frame_converter_node')
-        self.graph = Graph(self)
+    def __init__(self, **options: Any):
+        super().__init__('frame_converter_node', **options)
+        self.graph = NodeInterface(self)
         ours = self.graph.frames
         theirs = Frames(
             declare(
@@ -53,9 +137,6 @@ class FrameConverterNode(BulkNode):
             self, 'twist_frame', str, CHILD, "frame of the twist in the driver's odometry",
             one_of=(CHILD, WORLD),
         )  # fmt: skip
-        self.lockstep = declare(
-            self, 'lockstep', bool, False, 'each step waits for its wrench; else real time'
-        )
         refuse_unknown(self)
         self._check_axes(ours, theirs)
         self._held: deque[tuple[Publisher, Any]] = deque(maxlen=topics.DEPTH)
@@ -70,7 +151,7 @@ class FrameConverterNode(BulkNode):
             self._pass(_theirs(setpoint), setpoint, inward, every)
         self._commanded = self._pass(topics.WRENCH, _theirs(topics.WRENCH), outward, command)
         self.graph.also_ready_when(self._untaken)
-        steady_timer(self, 0.05, self._say_held)
+        steady_timer(self, 0.05, self._publish_held)
         self.begin(f'converts {ENU_FLU}/* of a driver to {ours.odom} and {ours.base}, and back')
 
     def _check_axes(self, ours: Frames, theirs: Frames) -> None:
@@ -97,12 +178,12 @@ class FrameConverterNode(BulkNode):
             converted = convert(message, topic=source.name)
             self.graph.facts[count] += 1
             self._held.append((publisher, converted))
-            self._say_held()
+            self._publish_held()
 
         self.graph.subscribe(source, take, qos)
         return publisher
 
-    def _say_held(self) -> None:
+    def _publish_held(self) -> None:
         """Publish what has been converted, in order, once the expected subscribers are there."""
         while self._held and self.graph.ready():
             publisher, message = self._held.popleft()

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from typing import Any
 
 import numpy as np
 from rclpy.duration import Duration
@@ -24,13 +25,11 @@ from auv_dynamics.plant.plant import Plant, initial_state
 from auv_dynamics.plant.sensors import SensorNoise
 from auv_dynamics.plant.uncertainty import make_uncertainty
 from auv_dynamics.ros import topics
-from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.endpoints import NAMELESS, full_name, other_publishers
-from auv_dynamics.ros.graph import Graph, steady_timer
 from auv_dynamics.ros.interface import NANOSECONDS
-from auv_dynamics.ros.life import main_of
+from auv_dynamics.ros.node_interface import NodeInterface, Peers, steady_timer
+from auv_dynamics.ros.node_main import BulkNode, main_of
 from auv_dynamics.ros.parameters import declare, declare_grid, refuse_unknown
-from auv_dynamics.ros.peers import Peers
 
 MET = 0.5  # s after its birth in which those who are there already are met, before it starts
 NEW = 3.0  # s after its start in which it gives way to another clock, and may wait for its name
@@ -41,19 +40,19 @@ class PlantNode(BulkNode):
 
     prompt = True
 
-    def __init__(self) -> None:
-        super().__init__('plant_node')
+    def __init__(self, **options: Any):
+        super().__init__('plant_node', **options)
         self._born, self._rivals_since = time.monotonic(), 0.0
-        self.graph = Graph(self)
+        self.graph = NodeInterface(self)
         self._declare()
         refuse_unknown(self)
         self.graph.must_hold = self.window
-        self._say_odometry = self.graph.output(topics.ODOM)
-        self._say_clock = self.graph.output(topics.CLOCK) if self._publish_clock else None
-        self._say_twist = self.graph.output(topics.TWIST)
-        self._say_disturbance = self.graph.output(topics.DISTURBANCE)
-        self._say_applied = self.graph.output(topics.WRENCH_APPLIED) if self._acts else None
-        self._say_truth = self.graph.output(topics.GROUND_TRUTH) if self._senses else None
+        self._publish_odometry = self.graph.output(topics.ODOM)
+        self._publish_clock = self.graph.output(topics.CLOCK) if self._offers_clock else None
+        self._publish_twist = self.graph.output(topics.TWIST)
+        self._publish_disturbance = self.graph.output(topics.DISTURBANCE)
+        self._publish_applied = self.graph.output(topics.WRENCH_APPLIED) if self._acts else None
+        self._publish_truth = self.graph.output(topics.GROUND_TRUTH) if self._senses else None
         self.peers = Peers(self, self._start_after)
         self.graph.also_ready_when(self.peers.not_ready)
         self.pace = LockStep(self) if self.lockstep else RealTime(self)
@@ -71,13 +70,10 @@ class PlantNode(BulkNode):
             raise InputError(self.get_name(), 'vehicle', 'a vehicle file', None)
         grid = declare_grid(self)
         self.step_ns, self.last = grid.step_ns, grid.last
-        self.lockstep = declare(
-            self, 'lockstep', bool, False, 'each step waits for its wrench; else real time'
-        )
         self._start_paused = declare(
             self, 'start_paused', bool, False, 'wait for ~/run before step 0'
         )
-        self._publish_clock = declare(
+        self._offers_clock = declare(
             self, 'publish_clock', bool, True, 'publish /clock; false beside another that does'
         )
         self.window = declare(
@@ -133,7 +129,7 @@ class PlantNode(BulkNode):
     def _start(self) -> None:
         now = time.monotonic()
         newcomer = self._started is None or now - self._started < NEW
-        if newcomer and self._say_clock is not None and not self._is_only_clock(now):
+        if newcomer and self._publish_clock is not None and not self._is_only_clock(now):
             return
         met = now - self._born >= MET and self.exit_code is None
         if met and self.graph.ready() and not self.peers.not_ready() and not self.paused:
@@ -164,21 +160,21 @@ class PlantNode(BulkNode):
         """
         plant, ns = self.plant, self.plant.k * self.step_ns
         if measured is not None:
-            self._say_odometry(measured * self.step_ns, plant.measured)
-        if self._say_clock is not None:
-            self._say_clock(ns, ())
+            self._publish_odometry(measured * self.step_ns, plant.measured)
+        if self._publish_clock is not None:
+            self._publish_clock(ns, ())
         if measured is not None:
-            self._say_twist(measured * self.step_ns, plant.measured[7:])
-        if self._say_truth is not None:
-            self._say_truth(ns, plant.x)
+            self._publish_twist(measured * self.step_ns, plant.measured[7:])
+        if self._publish_truth is not None:
+            self._publish_truth(ns, plant.x)
         self.graph.latest_ns = ns
         self.graph.facts['step'] = plant.k
 
     def publish_forces(self, k: int, applied: tuple[float, ...], F: tuple[float, ...]) -> None:
         """Publish what was applied at step k and F, what opposed it in (1)."""
-        self._say_disturbance(k * self.step_ns, F)
-        if self._say_applied is not None:
-            self._say_applied(k * self.step_ns, applied)
+        self._publish_disturbance(k * self.step_ns, F)
+        if self._publish_applied is not None:
+            self._publish_applied(k * self.step_ns, applied)
 
     def end(self, code: int, text: str = '') -> None:
         """End the node: 1 with the reason when the run failed."""

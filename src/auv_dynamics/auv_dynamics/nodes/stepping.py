@@ -6,8 +6,7 @@ from typing import Any
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.endpoints import UNNAMED
-from auv_dynamics.ros.graph import steady_timer
-from auv_dynamics.ros.health import OK, STALE, Health
+from auv_dynamics.ros.node_interface import OK, STALE, Health, steady_timer
 
 WATCH = 0.2  # s between two looks at the silence
 CATCH_UP = 0.5  # s that a plant in real time may be late: beyond, its time goes on from there

@@ -3,7 +3,7 @@
 Of the messages of a topic only the stamp and the numbers change. Where these stand in the
 serialized form is not written down here but looked up, in a message that carries marks; fields and
 checks are those of `convert` and `interface`. What is laid out in another way goes the long way,
-through message objects, and so does everything with AUV_GVC_EXECUTOR=plain.
+through message objects, and so does everything in real time.
 """
 
 import struct
@@ -20,7 +20,6 @@ from sensor_msgs.msg import JointState
 from auv_dynamics.files.errors import first_line
 from auv_dynamics.ros import convert, interface
 from auv_dynamics.ros.interface import NANOSECONDS, BadMessageError, Frames
-from auv_dynamics.ros.private import PLAIN
 from auv_dynamics.vehicle import DOFS
 
 STAMP = 'iI'  # Time: seconds and nanoseconds
@@ -176,12 +175,13 @@ class Codec:
     kind : message type
     frames : frame ids that are sent and accepted
     topic : its name, for what is refused
+    patched : whether templates are patched, else every message is an object
 
     """
 
-    def __init__(self, kind: type, frames: Frames, topic: str):
+    def __init__(self, kind: type, frames: Frames, topic: str, *, patched: bool = True):
         self._type, self._kind, self._frames, self._topic = kind, KINDS[kind], frames, topic
-        self.layout = None if PLAIN else verified_layout(kind, frames)
+        self.layout = verified_layout(kind, frames) if patched else None
 
     def encode(self, ns: int, values: Any) -> Any:
         """Message of a stamp in ns and numbers, serialized where the layout is known."""

@@ -8,8 +8,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, ReliabilityPolicy, qos_check_compatible
 
 from auv_dynamics.ros import interface
-from auv_dynamics.ros.kinds import type_name
-from auv_dynamics.ros.topics import Topic
+from auv_dynamics.ros.topics import Topic, type_name
 
 TOOLS = ('rosbag2_recorder', '_ros2cli')  # how the names of their nodes begin
 UNNAMED = '_NODE_NAME_UNKNOWN_'  # the names of nodes arrive behind their endpoints

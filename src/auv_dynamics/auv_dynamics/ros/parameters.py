@@ -5,15 +5,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from auv_dynamics.files import nearest
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import one_of as nearest_of
 from auv_dynamics.plant.signals import harmonic_spec
 from auv_dynamics.ros.interface import NANOSECONDS
-from auv_dynamics.ros.private import declared, overrides
 from auv_dynamics.vehicle import DOFS
 
 LONGEST = 1e9  # s of a step or a run: stamps end in 2038
@@ -36,13 +35,13 @@ TYPES = {
 }
 
 
-def given(node: Node, prefix: str = '') -> list[str]:
+def given(node: Any, prefix: str = '') -> list[str]:
     """Names of the parameters that the user gave and that begin with `prefix`."""
-    return sorted(name for name in overrides(node) if name.startswith(prefix))
+    return sorted(name for name in node.given if name.startswith(prefix))
 
 
 def declare(
-    node: Node,
+    node: Any,
     name: str,
     kind: Any,
     default: Any,
@@ -71,36 +70,28 @@ def declare(
     InputError : wrong type or out of range
 
     """
-    _coerce(node, name, kind)
-    if default is None:
-        _leave_unset(node, name)
+    value = _taken(node.given[name], kind) if name in node.given else default
+    if default is None and value == 'null':  # what `ros2 param dump` writes of what is not set
+        value = None
     descriptor = ParameterDescriptor(description=description, read_only=not writable)
     if one_of:
         descriptor.additional_constraints = f'one of {", ".join(one_of)}'
     if at_least is not None or at_most is not None:
         _set_range(descriptor, kind, at_least, at_most)
+    if value is None and default is None:
+        node.declare_parameter(name, TYPES[kind], descriptor, ignore_override=True)
+        return None
+    if value is None or Parameter.Type.from_parameter_value(value) != TYPES[kind]:
+        raise InputError(node.get_name(), name, TYPE_WORDS[TYPES[kind]], value)
     try:
-        if default is None:
-            node.declare_parameter(name, TYPES[kind], descriptor)
-            value = node.get_parameter_or(name, Parameter(name)).value
-        else:
-            value = node.declare_parameter(name, default, descriptor).value
-    except InvalidParameterTypeException:
-        found = overrides(node)[name].value
-        raise InputError(node.get_name(), name, TYPE_WORDS[TYPES[kind]], found) from None
+        node.declare_parameter(name, value, descriptor, ignore_override=True)
     except InvalidParameterValueException:
-        found = overrides(node)[name].value
         expected = f'{at_least if at_least is not None else "-inf"} to {at_most or "inf"}'
-        raise InputError(node.get_name(), name, f'a number from {expected}', found) from None
+        raise InputError(node.get_name(), name, f'a number from {expected}', value) from None
     if one_of and value not in one_of:
-        raise InputError(node.get_name(), name, nearest.one_of(value, one_of), value)
-    if value is None and (default is not None or name in overrides(node)):
-        raise InputError(node.get_name(), name, TYPE_WORDS[TYPES[kind]], None)
-    if hasattr(value, 'tolist'):
-        value = value.tolist()
-    value = list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
+        raise InputError(node.get_name(), name, nearest_of(value, one_of), value)
     numbers: Any = value if isinstance(value, list) else [value]
-    if kind in (float, list[float]) and value is not None and not all(map(math.isfinite, numbers)):
+    if kind in (float, list[float]) and not all(map(math.isfinite, numbers)):
         raise InputError(node.get_name(), name, 'finite numbers', value)
     return value
 
@@ -168,29 +159,19 @@ def harmonic_parameters(
     return {axis: entry for axis, entry in spec.items() if entry['offset'] or entry['terms']}
 
 
-def _coerce(node: Node, name: str, kind: Any) -> None:
-    """Take whole numbers where numbers are expected: `-p duration:=30` is not an error."""
-    override = overrides(node).get(name)
-    if override is None:
-        return
-    if kind is float and override.type_ == Parameter.Type.INTEGER:
-        value: Any = float(override.value)
-    elif kind == list[float] and override.type_ == Parameter.Type.INTEGER_ARRAY:
-        value = [float(number) for number in override.value]
-    elif kind == list[float] and override.type_ in (Parameter.Type.INTEGER, Parameter.Type.DOUBLE):
-        value = [float(override.value)]
-    elif kind == list[float] and override.type_ == Parameter.Type.DOUBLE_ARRAY:
-        value = [float(number) for number in override.value]
-    else:
-        return
-    overrides(node)[name] = Parameter(name, value=value)
-
-
-def _leave_unset(node: Node, name: str) -> None:
-    """Take `null`, as `ros2 param dump` writes what is not set, and `[]` for no value."""
-    override = overrides(node).get(name)
-    if override is not None and override.value in (None, 'null'):
-        del overrides(node)[name]
+def _taken(value: Any, kind: Any) -> Any:
+    """A value that was given, as a list and with whole numbers as numbers where these are meant."""
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        value = list(value)
+    whole = isinstance(value, int) and not isinstance(value, bool)
+    if kind is float and whole:
+        return float(value)
+    if kind == list[float] and (whole or isinstance(value, float)):
+        return [float(value)]
+    if kind == list[float] and isinstance(value, list):
+        numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
+        return [float(v) for v in value] if numbers else value
+    return value
 
 
 def _set_range(
@@ -206,15 +187,15 @@ def _set_range(
         descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
 
 
-def refuse_unknown(node: Node) -> None:
+def refuse_unknown(node: Any) -> None:
     """Raise InputError for a parameter that was given but that the node does not declare."""
     for name in given(node):
         if name in KNOWN_TO_ALL or name.startswith('qos_overrides.') or node.has_parameter(name):
             continue
         own = [
             k
-            for k in declared(node)
+            for k in sorted(node.get_parameters_by_prefix(''))
             if k not in KNOWN_TO_ALL and not k.startswith('qos_overrides.')
         ]
-        expected = nearest.one_of(name, own)
+        expected = nearest_of(name, own)
         raise InputError(node.get_name(), name, expected, 'an unknown parameter')

@@ -1,16 +1,24 @@
-"""A node of its own context in one domain, beside whatever else the process does."""
+"""A participant in a domain beside the program, and one that starts the plant and follows a run."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from rclpy.utilities import try_shutdown
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool
 
+from auv_dynamics.ros import interface
+from auv_dynamics.ros.endpoints import observes
+from auv_dynamics.ros.node_interface import ASK_AGAIN
 from auv_dynamics.ros.security import enclave, require
+from auv_dynamics.ros.topics import PROGRESS, one_at_a_time
 
 
 class Participant:
@@ -61,3 +69,62 @@ class Participant:
         self._node.destroy_node()
         self._executor.shutdown()
         try_shutdown(context=self._context)
+
+
+class Watcher(Participant):
+    """A participant of one domain that starts the plant and follows the recorder.
+
+    Parameters
+    ----------
+    domain : ROS domain id
+    plant : name of the plant node
+
+    """
+
+    def __init__(self, domain: int, plant: str = 'plant_node'):
+        super().__init__(domain, _silent_node)
+        self._node.create_subscription(
+            PROGRESS.type, PROGRESS.name, self._on_progress, one_at_a_time()
+        )
+        self._run = self._node.create_client(SetBool, f'{plant}/run')
+        self._asked: Future | None = None
+        self._asked_at = 0.0
+        self.complete_ns = -1
+        self.running = False
+        self.waits_for = f'{plant} to appear'
+
+    def ask_to_run(self) -> bool:
+        """Ask the plant to run, without waiting; True once it has agreed."""
+        if self._asked is not None and self._asked.done():
+            answer = self._asked.result()
+            self.running = answer.success
+            self.waits_for = f'{answer.message} to be ready'
+            self._asked = None
+        late = time.monotonic() - self._asked_at > ASK_AGAIN
+        if not self.running and (self._asked is None or late) and self._run.service_is_ready():
+            self._asked = self._run.call_async(SetBool.Request(data=True))
+            self._asked_at = time.monotonic()
+        return self.running
+
+    def endpoints(self, names: Iterable[str] = (interface.WRENCH, interface.ODOM)) -> list[str]:
+        """Nodes that publish or subscribe topics of such names already, in any namespace.
+
+        Observers are no strangers: they hold nothing up.
+        """
+        found: set[str] = set()
+        for topic, _ in self._node.get_topic_names_and_types():
+            if topic.rpartition('/')[2] in names:
+                for look in (
+                    self._node.get_publishers_info_by_topic,
+                    self._node.get_subscriptions_info_by_topic,
+                ):
+                    others = [info for info in look(topic) if not observes(info)]
+                    found.update(f'{info.node_name} on {topic}' for info in others)
+        return sorted(found)
+
+    def _on_progress(self, message: Header) -> None:
+        self.complete_ns = max(self.complete_ns, interface.nanoseconds(message.stamp))
+
+
+def _silent_node(context: Context) -> Node:
+    return Node('auv', context=context, start_parameter_services=False, enable_rosout=False)

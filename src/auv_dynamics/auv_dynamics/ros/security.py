@@ -1,15 +1,20 @@
-"""DDS security as the user asked for it: never less in silence.
+"""What a process is open to: its discovery range, and DDS security as the user asked for it.
 
-ROS reads its variables letter by letter: `ROS_SECURITY_ENABLE=1` is a no, and every strategy but
-`Enforce` lets a node without keys talk in the clear. Both would pass unnoticed.
+ROS reads its security variables letter by letter: `ROS_SECURITY_ENABLE=1` is a no, and every
+strategy but `Enforce` lets a node without keys talk in the clear. Both would pass unnoticed.
 """
 
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 from auv_dynamics.files.errors import InputError
 
+RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+HERE = 'LOCALHOST'
+# of Fast DDS 2, and of its later versions, which read both
+PROFILES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
 ENABLE, STRATEGY = 'ROS_SECURITY_ENABLE', 'ROS_SECURITY_STRATEGY'
 KEYSTORE = 'ROS_SECURITY_KEYSTORE'
 WORDS = {ENABLE: ('true', 'false'), STRATEGY: ('Enforce', 'Permissive')}
@@ -18,6 +23,26 @@ import sys, rclpy
 rclpy.init(args=sys.argv[1:])
 rclpy.create_node(sys.argv[-1].rpartition('/')[2], start_parameter_services=False, enable_rosout=False)
 """  # noqa: E501  what a participant does when it joins
+
+
+def loopback() -> dict[str, str]:
+    """Environment variables that keep a graph on this machine, with quick discovery.
+
+    With the range alone Fast DDS still listens on every interface, and answers whoever names this
+    machine as its peer; the profile binds its sockets to the loopback.
+    """
+    return {RANGE: HERE, **dict.fromkeys(PROFILES, str(Path(__file__).with_name('fastdds.xml')))}
+
+
+def stay_local() -> None:
+    """Keep this process on this machine, as far as the user has not said otherwise.
+
+    The middleware reads its environment when it is loaded, which `rclpy.init` does. Commands call
+    this; a node that a user starts is heard as far as ROS lets it.
+    """
+    os.environ[RANGE] = os.environ.get(RANGE) or HERE
+    if os.environ[RANGE] == HERE and not any(map(os.environ.get, PROFILES)):
+        os.environ.update(loopback())
 
 
 def enclave(executable: str) -> list[str]:

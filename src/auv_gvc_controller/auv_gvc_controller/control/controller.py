@@ -2,13 +2,94 @@
 
 from dataclasses import dataclass
 
-from auv_gvc_controller.control.odometry_guard import UNTIMED, OdometryGuard
-from auv_gvc_controller.control.output_stage import HandOver
-from auv_gvc_controller.control.plausibility import ZERO
+from auv_gvc_controller.control.odometry_guard import UNTIMED, ZERO, Now, OdometryGuard
 from auv_gvc_controller.control.reference_filter import ReferenceFilter
 from auv_gvc_controller.control.sampled import SampledLaw
-from auv_gvc_controller.control.setpoint_buffer import Pairing, Reference
-from auv_gvc_controller.control.stamp_age import Now
+from auv_gvc_controller.control.setpoint_buffer import Reference, SetpointBuffer
+
+FEWEST = 10  # answers over which a law takes over at least, however rare they are
+
+
+class OutputStage:
+    """The last stage before a wrench is published.
+
+    A law that takes over, at activation, after a watchdog or a reset, comes in over the ramp from
+    the wrench that was published last; one that lets go is taken back over it. So neither is a
+    jump for the vehicle.
+
+    Parameters
+    ----------
+    limit : (6,) largest absolute wrench per axis, N and N m
+    slew : (6,) largest change per second, N/s and N m/s; empty: none
+    ramp : s from the last wrench to the law's, and from it to none; 0: at once
+
+    """
+
+    def __init__(self, limit: tuple[float, ...], slew: tuple[float, ...] = (), ramp: float = 0.0):
+        self._limit, self._slew, self._ramp = limit, slew, ramp
+        self.drop()
+
+    def drop(self) -> tuple[float, ...]:
+        """Zero wrench at once, as at deactivation."""
+        self._tau: tuple[float, ...] = ZERO
+        self._at = self._since = 0.0  # s: of the last wrench, and of the beginning of a release
+        self._falling = False
+        self.restart()
+        return ZERO
+
+    def restart(self) -> None:
+        """Let the law come in anew, from the wrench that was published last."""
+        self._from, self._share = self._tau, 0.0  # share of the law's wrench
+        self._in_charge = False
+
+    @property
+    def idle(self) -> bool:
+        """Whether the last wrench was zero because the law is not in charge."""
+        return not self._in_charge and self._tau == ZERO
+
+    def follow(self, tau: tuple[float, ...], now: float) -> tuple[float, ...]:
+        """Wrench to publish while the law is in charge.
+
+        Parameters
+        ----------
+        tau : (6,) wanted by the law, N and N m
+        now : s, of a clock that never goes back
+
+        """
+        dt = now - self._at if self._in_charge else 0.0
+        if not self._in_charge:
+            self.restart()
+        if self._ramp <= 0.0:
+            self._share = 1.0
+        elif self._in_charge:
+            self._share = min(1.0, self._share + min(dt / self._ramp, 1.0 / FEWEST))
+        left = 1.0 - self._share
+        wanted = tuple(
+            left * begun + self._share * min(max(value, -most), most)
+            for begun, value, most in zip(self._from, tau, self._limit, strict=True)
+        )
+        self._falling, self._in_charge = False, True
+        return self._publish(wanted, dt, now)
+
+    def release(self, now: float) -> tuple[float, ...]:
+        """Wrench to publish while the law is not in charge: on its way to zero."""
+        if not self._falling:  # from now on, however long the law was silent
+            self.restart()
+            self._falling, self._since, self._at = True, now, now
+        passed = (now - self._since) / self._ramp if self._ramp > 0.0 else 1.0
+        left = max(0.0, 1.0 - passed)
+        wanted = tuple(left * value + 0.0 for value in self._from)  # no negative zero
+        return self._publish(wanted, now - self._at, now)
+
+    def _publish(self, wanted: tuple[float, ...], dt: float, now: float) -> tuple[float, ...]:
+        """Change the last wrench no faster than the slew limits."""
+        if self._slew:
+            wanted = tuple(
+                min(max(value, last - most * dt), last + most * dt)
+                for value, last, most in zip(wanted, self._tau, self._slew, strict=True)
+            )
+        self._tau, self._at = wanted, now
+        return self._tau
 
 
 @dataclass(frozen=True)
@@ -43,7 +124,7 @@ class VelocityController:
     Parameters
     ----------
     law : with its gains, its model and its state
-    pairing : which set-point belongs to an odometry
+    setpoints : which set-point belongs to an odometry
     guard : which odometry may be used
     output : what the wrench passes before it is published
     reference_filter : smooths the set-points; None: they are followed as they come
@@ -59,16 +140,16 @@ class VelocityController:
     def __init__(
         self,
         law: SampledLaw,
-        pairing: Pairing,
+        setpoints: SetpointBuffer,
         guard: OdometryGuard,
-        output: HandOver,
+        output: OutputStage,
         *,
         exact: bool,
         timeouts: Timeouts | None,
         reference_filter: ReferenceFilter | None = None,
     ):
         self._filter = reference_filter
-        self._law, self._pairing, self._guard, self._output = law, pairing, guard, output
+        self._law, self._setpoints, self._guard, self._output = law, setpoints, guard, output
         self._exact, self._timeouts = exact, timeouts
         self._waiting: tuple[int, tuple[float, ...], float] | None = None
         self._heard: float | None = None  # steady s of the last odometry; None: none is missed
@@ -101,10 +182,10 @@ class VelocityController:
 
         """
         restarts = self._guard.restarts
-        dt = self._guard.elapsed(ns, x[7:], now)
+        dt = self._guard.accept(ns, x[7:], now)
         if self._guard.restarts > restarts:
             self._waiting = None
-            self._pairing.forget()
+            self._setpoints.forget()
         self._heard = now.steady
         if self._waiting is None:
             self._unanswered_since = now.steady
@@ -118,7 +199,7 @@ class VelocityController:
         if self._waiting is None:
             return None
         ns, x, dt = self._waiting
-        reference = self._pairing.find(ns)
+        reference = self._setpoints.find(ns)
         if reference is None:
             return None if self._exact else self._trip(ns, 'no set-point yet', now)
         stale = self._stale(ns, reference, now)
@@ -178,7 +259,7 @@ class VelocityController:
         most, age = self._timeouts.setpoint, (ns - reference.ns) / 1e9
         if age > most:
             return f'no set-point for {age:.3g} s'
-        if now.steady - self._pairing.heard > most:
+        if now.steady - self._setpoints.heard > most:
             return f'no set-point heard for {most:g} s'
         return ''
 

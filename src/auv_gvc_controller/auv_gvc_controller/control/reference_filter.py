@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from auv_gvc_controller.control.plausibility import ZERO
+from auv_gvc_controller.control.odometry_guard import ZERO
 
 Six = tuple[float, ...]
 

@@ -3,7 +3,7 @@
 from collections import OrderedDict
 from typing import NamedTuple
 
-from auv_gvc_controller.control.plausibility import ZERO, Limits
+from auv_gvc_controller.control.odometry_guard import ZERO, Limits
 from auv_gvc_controller.control.reference_filter import clamped
 
 UNLIMITED = Limits()
@@ -20,7 +20,7 @@ class Reference(NamedTuple):
     nu_d_dot: tuple[float, ...]
 
 
-class Pairing:
+class SetpointBuffer:
     """Buffers set-points and their derivatives by stamp.
 
     Parameters

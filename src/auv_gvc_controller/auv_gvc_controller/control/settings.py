@@ -11,10 +11,8 @@ import numpy as np
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.allocation import Reach, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
-from auv_gvc_controller.control.controller import Timeouts, VelocityController
-from auv_gvc_controller.control.odometry_guard import OdometryGuard
-from auv_gvc_controller.control.output_stage import HandOver
-from auv_gvc_controller.control.plausibility import Limits
+from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
+from auv_gvc_controller.control.odometry_guard import AUTO, CLOCKS, Limits, OdometryGuard, StampAge
 from auv_gvc_controller.control.reference_filter import FilterSettings, ReferenceFilter
 from auv_gvc_controller.control.sampled import SampledLaw
 from auv_gvc_controller.control.setpoint_buffer import (
@@ -22,9 +20,8 @@ from auv_gvc_controller.control.setpoint_buffer import (
     FILTER,
     NONE,
     SAME,
-    Pairing,
+    SetpointBuffer,
 )
-from auv_gvc_controller.control.stamp_age import AUTO, CLOCKS, StampAge
 from auv_gvc_controller.laws.model import control_model
 
 LATEST, EXACT = 'latest', 'exact'
@@ -145,9 +142,9 @@ class ControllerSettings:
                 )
         return cls(source, **values)
 
-    def pairing(self) -> Pairing:
+    def setpoints(self) -> SetpointBuffer:
         """What keeps set-points until their odometry comes."""
-        return Pairing(self.exact, self.setpoint_acceleration, *self.believed)
+        return SetpointBuffer(self.exact, self.setpoint_acceleration, *self.believed)
 
     @property
     def believed(self) -> tuple[Limits, tuple[float, ...] | None]:
@@ -172,14 +169,14 @@ class ControllerSettings:
             *(self.filter_acceleration, self.filter_angular_acceleration),
         )
 
-    def build(self, gains: Any, vehicle: Vehicle, pairing: Pairing) -> VelocityController:
+    def build(self, gains: Any, vehicle: Vehicle, setpoints: SetpointBuffer) -> VelocityController:
         """Controller with a law.
 
         Parameters
         ----------
         gains : of the law, which they name (`make_gains`)
         vehicle : what the law knows
-        pairing : with the set-points that have come
+        setpoints : with the set-points that have come
 
         """
         law = SampledLaw(gains, control_model(vehicle), self._reach(vehicle))
@@ -196,9 +193,9 @@ class ControllerSettings:
         filtered = self.setpoint_acceleration == FILTER
         return VelocityController(
             law,
-            pairing,
+            setpoints,
             guard,
-            HandOver(self._wrench_limit(vehicle), self.limits_wrench_rate, ramp),
+            OutputStage(self._wrench_limit(vehicle), self.limits_wrench_rate, ramp),
             exact=self.exact,
             timeouts=timeouts if live else None,
             reference_filter=ReferenceFilter(self.reference_filter) if filtered else None,

@@ -1,26 +1,205 @@
 """The velocity controller as a lifecycle node: odometry and set-points in, wrench out."""
 
+import math
 import sys
 import time
-from collections.abc import Callable
+from array import array
+from collections.abc import Callable, Mapping
+from dataclasses import fields
 from typing import Any
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from auv_dynamics import load_vehicle
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import topics
-from auv_dynamics.ros.bulk import BulkMixin
-from auv_dynamics.ros.graph import Graph, steady_timer
-from auv_dynamics.ros.health import OK, Health
-from auv_dynamics.ros.life import main_of
-from auv_dynamics.ros.parameters import refuse_unknown
+from auv_dynamics.ros.endpoints import why_silent
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.ros.node_interface import (
+    ERROR,
+    OK,
+    STALE,
+    WARN,
+    Health,
+    NodeInterface,
+    steady_timer,
+)
+from auv_dynamics.ros.node_main import BulkMixin, main_of
+from auv_dynamics.ros.parameters import declare, given, refuse_unknown
 from auv_gvc_controller.control.controller import Answer, VelocityController
-from auv_gvc_controller.control.odometry_guard import UNTIMED
+from auv_gvc_controller.control.odometry_guard import UNTIMED, Now
 from auv_gvc_controller.control.setpoint_buffer import SAME
-from auv_gvc_controller.control.stamp_age import Now
-from auv_gvc_controller.nodes.controller_parameters import ControllerParameters
-from auv_gvc_controller.nodes.idle import Idle
+from auv_gvc_controller.control.settings import ControllerSettings
+from auv_gvc_controller.laws.law import SHIPPED, is_unasked, law_class, make_gains, refusal, try_law
+from auv_gvc_controller.laws.model import control_model
+
+GAINS = {gain for law in SHIPPED.values() for gain in law._fields}
+WRITABLE = 'gains.'
+SETTINGS = {entry.metadata['name'] for entry in fields(ControllerSettings)[1:]}
+FIXED = ('setpoint_pairing', 'setpoint_acceleration')  # which decide what is heard
+LAWS = f'{", ".join(SHIPPED)} or module:Class of your own'
+
+
+class ControllerParameters:
+    """Declares the parameters at construction, builds a controller from them on demand."""
+
+    def __init__(self, node: Any):
+        self._node = node
+        self._named = declare(node, 'law', str, '', LAWS, writable=True)
+        names = {*(f'{WRITABLE}{gain}' for gain in GAINS), *given(node, WRITABLE)}
+        for name in sorted(names):
+            text = '1 number (times identity), 6 (diagonal) or 36 (row-major)'
+            declare(node, name, list[float], None, text, writable=True)
+        self._vehicle = declare(node, 'vehicle', str, '', 'vehicle file, or shipped bare name')
+        self.settings = ControllerSettings.read(self._declare, node.get_name())
+        self.lockstep = self.settings.lockstep
+        self.acceleration = self.settings.setpoint_acceleration
+        self.setpoints = self.settings.setpoints()
+        self.autostart = declare(node, 'autostart', bool, True, 'configure and activate at once')
+
+    def _declare(self, name: str, *about: Any, **accepted: Any) -> Any:
+        if name == 'lockstep':
+            return self._node.lockstep
+        return declare(self._node, name, *about, writable=name not in FIXED, **accepted)
+
+    def _present(self, changed: Mapping[str, Any]) -> ControllerSettings:
+        """Settings of this moment, with what is about to change; InputError for a wrong value."""
+
+        def value(name: str, *_: Any, **__: Any) -> Any:
+            found = changed[name] if name in changed else self._node.get_parameter(name).value
+            if isinstance(found, float) and not math.isfinite(found):
+                raise InputError(self._node.get_name(), name, 'a finite number', found)
+            return list(found) if isinstance(found, array) else found
+
+        return ControllerSettings.read(value, self._node.get_name())
+
+    def build(self) -> VelocityController:
+        """Controller of the present values; InputError when law, vehicle or a gain is missing."""
+        node = self._node
+        name = node.get_name()
+        law = node.get_parameter('law').value
+        if not law:
+            raise InputError(name, 'law', LAWS, None)
+        if not self._vehicle:
+            raise InputError(name, 'vehicle', 'a vehicle file', None)
+        vehicle = load_vehicle(self._vehicle)
+        self.vehicle_name = vehicle.name
+        try:
+            gains = make_gains(law, self._gains(law))
+            try_law(gains, control_model(vehicle))
+        except ValueError as error:
+            gain, expected, found = refusal(error)
+            key = f'{WRITABLE}{gain}' if gain else 'law'
+            raise InputError(name, key, expected, found) from None
+        self.settings = self._present({})
+        self.settings.check_bounded()
+        self.setpoints.believe(*self.settings.believed)
+        self.setpoints.reset()
+        return self.settings.build(gains, vehicle, self.setpoints)
+
+    def _gains(self, law: str) -> dict[str, Any]:
+        values = {}
+        given_here = (name.removeprefix(WRITABLE) for name in given(self._node, WRITABLE))
+        for gain in {*law_class(law)._fields, *given_here}:
+            parameter = self._node.get_parameter_or(f'{WRITABLE}{gain}', None)
+            if parameter is not None and parameter.type_ != Parameter.Type.NOT_SET:
+                values[gain] = list(parameter.value)
+        return values
+
+    def refuse_while(self, active: bool, parameters: list[Parameter]) -> SetParametersResult:
+        """Answer a change of parameters: law, gains and settings are taken while inactive only."""
+        changed = {one.name: one.value for one in parameters if one.name in SETTINGS}
+        for parameter in parameters:
+            of_law = parameter.name == 'law' or parameter.name.startswith(WRITABLE)
+            if not of_law and parameter.name not in changed:
+                continue
+            if active:
+                reason = f'{parameter.name}: expected an inactive controller, found an active one'
+                return SetParametersResult(successful=False, reason=reason)
+            try:
+                if not of_law:
+                    self._present(changed)
+                elif parameter.name == 'law':
+                    self._check_law(parameter.value)
+                elif len(parameter.value) not in (1, 6, 36) or not all(
+                    map(math.isfinite, parameter.value)
+                ):
+                    found = f'{len(parameter.value)} numbers'
+                    raise ValueError(f'expected 1, 6 or 36 finite numbers, found {found}')
+            except (ValueError, TypeError) as error:
+                text = str(error).removeprefix(f'{self._node.get_name()}: ')
+                reason = text if not of_law else f'{parameter.name}: {text}'
+                return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
+
+    def _check_law(self, name: str) -> None:
+        """Refuse a module that only the network names: to import it is to run it."""
+        if is_unasked(name) and name != self._named:
+            expected = f'one of {", ".join(SHIPPED)}, or the law that was named at the start'
+            raise ValueError(f'expected {expected}, found {name!r}')
+        law_class(name)
+
+
+LATE = 1.0  # s without a message, after which nobody is said to publish
+NO_ODOMETRY, NO_SETPOINT = 'no odometry', 'no set-point'  # what the watchdog's texts begin with
+
+
+class Idle:
+    """Explains the watchdog of a controller by what has been heard.
+
+    Parameters
+    ----------
+    node : the controller node
+    derivative : whether each set-point needs its `cmd_accel`
+
+    """
+
+    def __init__(self, node: Any, derivative: bool):
+        self._node, self._derivative = node, derivative
+        self._heard: dict[str, tuple[int, float]] = {}  # topic -> newest stamp, steady s
+
+    def hear(self, topic: topics.Topic, ns: int) -> None:
+        """Note a set-point or its derivative."""
+        self._heard[topic.name] = ns, time.monotonic()
+
+    def health(self, watchdog: str, odometry_ns: int | None) -> Health:
+        """Level and explanation of what the watchdog says.
+
+        Parameters
+        ----------
+        watchdog : why the law is not in charge; empty while it is
+        odometry_ns : stamp of the last odometry; None: there was none yet
+
+        """
+        if not watchdog and odometry_ns is None:
+            watchdog = f'{NO_ODOMETRY} yet'
+        if watchdog.startswith(NO_ODOMETRY):
+            return STALE, _joined(watchdog, why_silent(self._node, topics.ODOM))
+        if watchdog.startswith(NO_SETPOINT):
+            return WARN, _joined(watchdog, self._no_setpoint(odometry_ns or 0))
+        return (ERROR, watchdog) if watchdog else (OK, '')
+
+    def _no_setpoint(self, odometry_ns: int) -> str:
+        ns, at = self._heard.get(topics.CMD_VEL.name, (0, -LATE))
+        if time.monotonic() - at > LATE:
+            return why_silent(self._node, topics.CMD_VEL)
+        _, derivative_at = self._heard.get(topics.CMD_ACCEL.name, (0, -LATE))
+        if self._derivative and time.monotonic() - derivative_at > LATE:
+            silent = why_silent(self._node, topics.CMD_ACCEL) or 'no cmd_accel of its stamp comes'
+            return f'{silent}; setpoint_acceleration: topic waits for it'
+        if abs(apart := (ns - odometry_ns) / NANOSECONDS) > LATE:
+            found = 'stamp 0' if ns == 0 else f'stamps {abs(apart):.3g} s apart from those of odom'
+            return f'cmd_vel: expected the time at which it is valid as stamp, found {found}'
+        return ''
+
+
+def _joined(watchdog: str, why: str) -> str:
+    return f'{watchdog}: {why}' if why else watchdog
+
 
 WATCH = 0.02  # s between two looks at what stays away
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -31,9 +210,9 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
     prompt = True
 
-    def __init__(self) -> None:
-        super().__init__('controller_node')
-        self.graph = Graph(self)
+    def __init__(self, **options: Any):
+        super().__init__('controller_node', **options)
+        self.graph = NodeInterface(self)
         self._settings = ControllerParameters(self)
         refuse_unknown(self)
         self.add_on_set_parameters_callback(
@@ -43,8 +222,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self._active = False
         self._held: Answer | None = None
         self._follows = False
-        self._say_wrench = self.graph.output(topics.WRENCH)
-        self._say_estimate = self.graph.output(topics.DISTURBANCE_ESTIMATE)
+        self._publish_wrench = self.graph.output(topics.WRENCH)
+        self._publish_estimate = self.graph.output(topics.DISTURBANCE_ESTIMATE)
         self.graph.also_ready_when(lambda: '' if self._active else 'inactive')
         self._idle = Idle(self, self._settings.acceleration == SAME)
         self.graph.in_trouble_while(self._trouble)
@@ -62,9 +241,11 @@ class ControllerNode(BulkMixin, LifecycleNode):
         p = self._settings
         odometry = topics.one_at_a_time() if p.lockstep else topics.newest_measurement()
         self.graph.listen(topics.ODOM, self._on_odometry, odometry)
-        self._keep(topics.CMD_VEL, lambda ns, nu_d: p.pairing.setpoint(ns, nu_d, time.monotonic()))
+        self._keep(
+            topics.CMD_VEL, lambda ns, nu_d: p.setpoints.setpoint(ns, nu_d, time.monotonic())
+        )
         if p.acceleration == SAME:
-            self._keep(topics.CMD_ACCEL, p.pairing.derivative)
+            self._keep(topics.CMD_ACCEL, p.setpoints.derivative)
 
     def _autostart(self) -> None:
         if self.trigger_configure() == SUCCESS and self.trigger_activate() == SUCCESS:
@@ -149,8 +330,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
         elif self._follows:
             self._follows = False
             self.get_logger().info('lets go: zero wrench')
-        self._say_wrench(answer.ns, answer.tau)
-        self._say_estimate(answer.ns, answer.f)
+        self._publish_wrench(answer.ns, answer.tau)
+        self._publish_estimate(answer.ns, answer.f)
         self.graph.latest_ns = answer.ns
 
     def _tell(self, trouble: str) -> None:

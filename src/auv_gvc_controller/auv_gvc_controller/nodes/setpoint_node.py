@@ -2,27 +2,20 @@
 
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface, topics
-from auv_dynamics.ros.bulk import BulkNode
 from auv_dynamics.ros.endpoints import why_silent
-from auv_dynamics.ros.graph import Graph, steady_timer
-from auv_dynamics.ros.health import OK, STALE, Health
-from auv_dynamics.ros.life import main_of
-from auv_dynamics.ros.parameters import (
-    declare,
-    declare_grid,
-    harmonic_parameters,
-    refuse_unknown,
-)
-from auv_gvc_controller.control.odometry_guard import OdometryGuard
-from auv_gvc_controller.control.plausibility import Limits
+from auv_dynamics.ros.node_interface import OK, STALE, Health, NodeInterface, steady_timer
+from auv_dynamics.ros.node_main import BulkNode, main_of
+from auv_dynamics.ros.parameters import declare, declare_grid, harmonic_parameters, refuse_unknown
+from auv_gvc_controller.control.odometry_guard import Limits, Now, OdometryGuard
 from auv_gvc_controller.control.setpoint import Setpoint, make_setpoint
-from auv_gvc_controller.control.stamp_age import Now
 
+AHEAD = 200  # steps, where lock-step waits for every set-point
 BLOCK = 256  # set-points that are evaluated at once
 PATIENCE = 0.3  # s without odometry after which stamps that have gone back are believed
 
@@ -33,20 +26,21 @@ class SetpointNode(BulkNode):
     At least up to the next odometry, which must find its set-point when it comes.
     """
 
-    def __init__(self) -> None:
-        super().__init__('setpoint_node')
-        self.graph = Graph(self)
+    def __init__(self, **options: Any):
+        super().__init__('setpoint_node', **options)
+        self.graph = NodeInterface(self)
         grid = declare_grid(self)
+        usual = AHEAD if self.lockstep else 0
         self._horizon = declare(
-            self, 'horizon', int, 0, 'steps ahead of odom, those until the next one at least',
+            self, 'horizon', int, usual, 'steps ahead of odom, those until the next one at least',
             at_least=0, at_most=topics.DEPTH - 1,
         )  # fmt: skip
         self._step_ns, self._last = grid.step_ns, grid.last
         self._setpoint = self._declare_setpoint(grid.duration)
         refuse_unknown(self)
         self.graph.must_hold = self._horizon
-        self._say_velocity = self.graph.output(topics.CMD_VEL)
-        self._say_acceleration = self.graph.output(topics.CMD_ACCEL)
+        self._publish_velocity = self.graph.output(topics.CMD_VEL)
+        self._publish_acceleration = self.graph.output(topics.CMD_ACCEL)
         self.graph.listen(topics.ODOM, self._on_odometry, topics.one_at_a_time())
         # in lock-step the odometry may go on for `horizon` steps while this node does not look
         gap = max(interface.NANOSECONDS, (10 + self._horizon) * self._step_ns)
@@ -83,7 +77,7 @@ class SetpointNode(BulkNode):
     def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
         restarts = self._guard.restarts
         try:
-            elapsed = self._guard.elapsed(ns, x[7:], Now(time.monotonic()))
+            elapsed = self._guard.accept(ns, x[7:], Now(time.monotonic()))
         except ValueError as error:
             self.graph.refuse(f'{topics.ODOM.name}: {error}')
             return
@@ -108,8 +102,8 @@ class SetpointNode(BulkNode):
         while self._next <= until:
             row = self._row(self._next)
             ns = self._guard.origin + self._next * self._step_ns
-            self._say_velocity(ns, row[:6])
-            self._say_acceleration(ns, row[6:])
+            self._publish_velocity(ns, row[:6])
+            self._publish_acceleration(ns, row[6:])
             self.graph.latest_ns = ns
             self._next += 1
 

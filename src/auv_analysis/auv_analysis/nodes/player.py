@@ -1,23 +1,99 @@
 """Plays a bag: what is due goes out, as long as those who listen have room for it."""
 
+import math
 import time
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
 from auv_analysis.bag.step_topics import ODOMETRY
-from auv_analysis.nodes.replay_parameters import ReplayParameters
-from auv_analysis.replay.answers import Answers, is_odometry
-from auv_analysis.replay.guard import Guard
-from auv_analysis.replay.outputs import make_publishers
-from auv_analysis.replay.playback import Playback
-from auv_analysis.replay.selection import REPLAY, nothing_left
-from auv_analysis.replay.stream import Logged, messages
+from auv_analysis.nodes.flow_control import Answers, Receivers, is_odometry
+from auv_analysis.nodes.replay_publishers import Commands, Guard, make_publishers
+from auv_analysis.replay.played_bag import GAP, Logged, messages
+from auv_analysis.replay.selection import REPLAY, ReplayParameters, nothing_left
 from auv_dynamics.ros import interface, topics
-from auv_dynamics.ros.commands import Commands
 from auv_dynamics.ros.endpoints import onlookers
-from auv_dynamics.ros.interface import BadMessageError
-from auv_dynamics.ros.receivers import Receivers
+from auv_dynamics.ros.interface import NANOSECONDS, BadMessageError
+
+HELD = math.inf
+
+
+class Playback:
+    """Says when a message is due; times are s of the steady clock and ns of the bag.
+
+    Due times are counted from one place in the bag, not from message to message, so that nothing
+    drifts.
+
+    Parameters
+    ----------
+    rate : seconds of the bag per second; 0: as fast as possible
+    paused : whether it begins paused
+    skips_gaps : whether a message behind a gap is due at once
+
+    Attributes
+    ----------
+    rate, paused : as they are now
+
+    """
+
+    def __init__(self, rate: float, paused: bool = False, *, skips_gaps: bool = False):
+        self.rate, self.paused, self._skips_gaps = rate, paused, skips_gaps
+        self._place: tuple[float, int] | None = None  # a time of the clock, and of the bag then
+        self._reached = 0
+        self._until = -1  # ns up to which is played although it is paused
+
+    def restart(self) -> None:
+        """Forget the place in the bag: the next message is the first one."""
+        self._place, self._reached, self._until = None, 0, -1
+
+    def wait(self, now: float, ns: int) -> float:
+        """Seconds until a message of this log time is due; 0 or less: it is; HELD: paused."""
+        if self._place is None:
+            self._place, self._reached = (now, ns), ns
+        if self.paused:
+            return 0.0 if ns <= self._until else HELD
+        if self.rate == 0.0:
+            return 0.0
+        if self._skips_gaps and ns - self._reached > GAP:
+            self._place = now, ns
+        clock, place = self._place
+        return clock + (ns - place) / (self.rate * NANOSECONDS) - now
+
+    def played(self, ns: int) -> None:
+        """Note that a message of this log time was published."""
+        self._reached = max(self._reached, ns)
+
+    def pause(self, now: float, ns: int) -> None:
+        """Hold; `ns` is the log time of the next message."""
+        if not self.paused:
+            self._hold(now, ns)
+            self.paused = True
+
+    def run(self, now: float) -> None:
+        """Go on from where it was held."""
+        if self.paused:
+            self.paused = False
+            self._place = (now, self._reached) if self._place else None
+
+    def step(self, ns: int) -> None:
+        """Although paused, play everything up to the log time `ns`."""
+        self._until = ns
+
+    def change_rate(self, now: float, ns: int, rate: float) -> None:
+        """Go on from here at another rate; `ns` is the log time of the next message."""
+        if not self.paused:
+            self._hold(now, ns)
+        self.rate = rate
+
+    def _hold(self, now: float, ns: int) -> None:
+        """Begin to count from the present place: between two messages, never beyond the next."""
+        if self._place is None:
+            return
+        clock, place = self._place
+        here = place + round((now - clock) * self.rate * NANOSECONDS)
+        self._reached = max(self._reached, min(here, ns) if self.rate else self._reached)
+        self._place = now, self._reached
+
 
 BATCH = 0.01  # s of messages between two looks at services and signals
 SOON = 0.002  # s until it is asked again whether subscribers have room
@@ -55,7 +131,7 @@ class Player:
         self._commands = Commands(guarded, settings.foreign)
         self._receivers = Receivers(node, self._publishers)
         self._answers = Answers(node.graph, settings.answers) if settings.answers else None
-        self._say_clock = node.graph.output(topics.CLOCK) if settings.clock else None
+        self._publish_clock = node.graph.output(topics.CLOCK) if settings.clock else None
         self.playback = Playback(
             settings.rate, settings.start_paused, skips_gaps=settings.skip_gaps
         )
@@ -76,7 +152,7 @@ class Player:
 
         A second odometry beside that of a vehicle would be believed by its controller.
         """
-        found = {interface.CLOCK: '--no-clock'} if self._say_clock is not None else {}
+        found = {interface.CLOCK: '--no-clock'} if self._publish_clock is not None else {}
         for topic, name in self.names.items():
             measured = self._settings.index.topics[topic].kind == ODOMETRY
             if measured and REPLAY not in name.split('/'):
@@ -176,8 +252,8 @@ class Player:
         if allowed is None or not self._receivers.have_room(topic):
             self._receivers.ask()
             return False
-        if message.ns != self._clock_ns and self._say_clock is not None:
-            self._say_clock(message.ns, ())
+        if message.ns != self._clock_ns and self._publish_clock is not None:
+            self._publish_clock(message.ns, ())
         self.now_ns = self._clock_ns = message.ns
         if allowed:
             self._publish(topic, kind, message.data)

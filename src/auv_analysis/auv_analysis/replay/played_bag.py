@@ -1,8 +1,12 @@
-"""What lies in a bag that is to be played: channels, span, and in which order its tables come."""
+"""A bag that is to be played: what lies in it, and its messages in the order of their log times."""
 
-from collections.abc import Collection
+import heapq
+import itertools
+import math
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from mcap.records import Channel
@@ -10,10 +14,10 @@ from mcap.records import Channel
 from auv_analysis.bag.chunks import Table
 from auv_analysis.bag.mcap_file import McapFile
 from auv_analysis.bag.metadata import bag_files
-from auv_analysis.replay.playback import GAP
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import NANOSECONDS
 
+GAP = 60 * NANOSECONDS  # ns without a message, from which it is a gap
 NEVER = 1 << 64  # ns, later than every log time
 LATEST = (1 << 31) * NANOSECONDS  # of a ROS time
 MOST_SPANS = 1000  # of a topic that are told apart
@@ -162,3 +166,69 @@ def _span(spans: list[Span], times: np.ndarray) -> None:
             spans[-1] = min(before[0], first), max(before[1], last)
         else:
             spans.append((first, last))
+
+
+class Logged(NamedTuple):
+    """A recorded message: log time in ns, recorded name of its topic, serialized bytes."""
+
+    ns: int
+    topic: str
+    data: bytes
+
+
+def messages(
+    index: BagIndex, topics: Collection[str], begin: int = 0, end: int = NEVER
+) -> Iterator[Logged]:
+    """Messages by log time; those of one log time as they stand in the bag.
+
+    What is held at a time is what the bag has out of order, and a file is opened only when its
+    first message is due, so neither long bags nor bags of many files need much memory.
+
+    Parameters
+    ----------
+    index : of the bag
+    topics : recorded names that are wanted
+    begin, end : first and last log time, ns
+
+    """
+    heap: list[tuple[int, int, Logged | None]] = []
+    sources: dict[int, Iterator[Logged]] = {}
+    for number, file in enumerate(index.files):
+        if file.least and file.least[0] <= end:
+            sources[number] = _of_file(file, topics, begin, end)
+            heap.append((file.least[0], number, None))
+    heapq.heapify(heap)
+    while heap:
+        _, number, message = heap[0]
+        if message is not None:
+            yield message
+        following = next(sources[number], None)
+        if following is None:
+            heapq.heappop(heap)
+        else:
+            heapq.heapreplace(heap, (following.ns, number, following))
+
+
+def _of_file(file: PlayedFile, topics: Collection[str], begin: int, end: int) -> Iterator[Logged]:
+    waiting: list[tuple[int, int, Logged]] = []
+    opened = McapFile(file.path)
+    tables, order = 0, itertools.count()
+    for item in opened.records():
+        if not isinstance(item, Table):
+            continue
+        tables += 1
+        for i in _inside(item, begin, end):
+            topic = opened.channels[int(item.channels[i])].topic
+            if topic in topics:
+                message = Logged(int(item.log_times[i]), topic, item.payload(i))
+                heapq.heappush(waiting, (message.ns, next(order), message))
+        sure = file.least[tables] if tables < len(file.least) else math.inf
+        while waiting and waiting[0][0] <= sure:
+            yield heapq.heappop(waiting)[2]
+        if sure > end:
+            break  # also where the file has grown since it was indexed
+
+
+def _inside(table: Table, begin: int, end: int) -> list[int]:
+    times = table.log_times
+    return np.flatnonzero((times >= begin) & (times <= min(end, NEVER - 1))).tolist()

@@ -1,5 +1,7 @@
-"""A node's part of the graph: publishers, subscriptions, the start barrier, diagnostics."""
+"""What every node has in common: publishers, subscriptions, start barrier, diagnostics."""
 
+import math
+import re
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -10,10 +12,12 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidServiceNameException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSPolicyKind, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.task import Future
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
@@ -22,9 +26,9 @@ from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.codec import Codec
 from auv_dynamics.ros.convert import stamp
 from auv_dynamics.ros.endpoints import crowds, has_conflict, onlookers
-from auv_dynamics.ros.health import ERROR, Health, Lasting, kind_of, worst
 from auv_dynamics.ros.interface import BadMessageError, Frames
 from auv_dynamics.ros.parameters import declare
+from auv_dynamics.ros.rclpy_internals import has_data_path
 from auv_dynamics.ros.topics import (
     ANALYSIS_TOPICS,
     CLOCK,
@@ -37,6 +41,56 @@ from auv_dynamics.ros.topics import (
 )
 
 LOUD = 1.0  # s between two reports of the same kind
+ASK_AGAIN = 1.0  # s: an answer is lost when it comes before both ends have matched
+LASTING = 1.0  # s, after which what is wrong is logged: names and matches may come late
+REPEATED = 10.0  # s between two logs of what is wrong and lasts
+OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN
+STALE, ERROR = DiagnosticStatus.STALE, DiagnosticStatus.ERROR
+WORSE = (OK, WARN, STALE, ERROR)
+NUMBER = re.compile(r'[-+]?\d')  # with the first one reports of the same kind may begin to differ
+Health = tuple[bytes, str]  # level of a DiagnosticStatus, and why it is not OK
+
+
+def kind_of(text: str) -> str:
+    """What reports of the same kind have in common."""
+    return NUMBER.split(text, maxsplit=1)[0]
+
+
+def worst(found: list[Health]) -> Health:
+    """The worst of some that have a text."""
+    return max(
+        (one for one in found if one[1]), key=lambda one: WORSE.index(one[0]), default=(OK, '')
+    )
+
+
+class Lasting:
+    """Logs what is wrong once it lasts, then now and then, and that it is over.
+
+    Parameters
+    ----------
+    logger : of the node
+
+    """
+
+    def __init__(self, logger: Any):
+        self._logger = logger
+        self._kind, self._text = '', ''
+        self._since = self._said = -math.inf
+
+    def see(self, level: bytes, text: str) -> None:
+        """Take the present state; an empty text: nothing is wrong."""
+        now, kind = time.monotonic(), kind_of(text)
+        if kind != self._kind:
+            if self._said > self._since and not text:
+                self._logger.info(f'over: {self._text}')
+            self._kind, self._since, self._said = kind, now, -math.inf
+        self._text = text
+        if text and now - self._since >= LASTING and now - self._said >= REPEATED:
+            self._said = now
+            if level == ERROR:
+                self._logger.error(text)
+            else:
+                self._logger.warning(text)
 
 
 def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Timer:
@@ -44,14 +98,21 @@ def steady_timer(node: Node, period: float, callback: Callable[[], None]) -> Tim
     return node.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
 
-class Graph:
+class NodeInterface:
     """What every node of the graph has in common.
 
-    Declares `odom_frame`, `base_frame` and `expected_subscribers`, offers `~/ready`, publishes
-    `/diagnostics` and reports what is refused.
+    Declares `lockstep`, `odom_frame`, `base_frame` and `expected_subscribers`, offers `~/ready`,
+    publishes `/diagnostics` and reports what is refused.
+
+    Parameters
+    ----------
+    node : that it is of
+    barrier : whether these parameters are declared
+    lockstep : without them: whether the node waits for nothing but messages
+
     """
 
-    def __init__(self, node: Any, *, barrier: bool = True):
+    def __init__(self, node: Any, *, barrier: bool = True, lockstep: bool = False):
         self.node = node
         self.publishers: dict[str, Publisher] = {}
         self.trouble = ''
@@ -70,6 +131,8 @@ class Graph:
         self.frames = Frames()
         self.must_hold = 0  # messages: a publisher of step topics needs a greater depth
         if barrier:
+            text = 'each step waits for its wrench, all nodes alike; else real time'
+            lockstep = declare(node, 'lockstep', bool, False, text)
             self.frames = Frames(
                 declare(node, 'odom_frame', str, 'odom_ned', 'frame id of poses: north-east-down'),
                 declare(
@@ -85,6 +148,7 @@ class Graph:
                 'topic=count: subscriptions that must match before step topics are published',
             )  # fmt: skip
             self._expected = self._counts(listed or [])
+        node.lockstep = lockstep
         self._diagnostics = node.create_publisher(
             DIAGNOSTICS.type, DIAGNOSTICS.name, one_at_a_time()
         )
@@ -110,23 +174,29 @@ class Graph:
         self._single |= {topic} & {*SINGLE}
         return publisher
 
+    def codec(self, topic: Topic) -> Codec:
+        """Numbers <-> messages of a topic; in real time message objects, as rclpy has them."""
+        return Codec(
+            topic.type, self.frames, topic.name, patched=self.node.lockstep and has_data_path()
+        )
+
     def output(self, topic: Topic) -> Callable[[int, Any], None]:
         """Publisher of a topic as a function of a stamp in ns and the numbers."""
         publish = self.publisher(topic).publish
-        encode = Codec(topic.type, self.frames, topic.name).encode
+        encode = self.codec(topic).encode
         return lambda ns, values: publish(encode(ns, values))
 
     def listen(
         self, topic: Topic, callback: Callable[[int, tuple[float, ...]], None], qos: QoSProfile
     ) -> None:
         """Subscription to the stamps in ns and the numbers of a topic; broken ones are refused."""
-        codec = Codec(topic.type, self.frames, topic.name)
+        codec = self.codec(topic)
         self.subscribe(topic, lambda data, _: callback(*codec.decode(data)), qos)
 
     def subscribe(
         self, topic: Topic, callback: Callable[[bytes, dict[str, Any]], None], qos: QoSProfile
     ) -> None:
-        """Subscription to the serialized messages of a topic, in the node's data path.
+        """Subscription to the serialized messages of a topic, which a data path may serve.
 
         The callback gets what rclpy knows of a message's way as well; a message for which it raises
         BadMessageError is refused. An incompatible publisher is an error that is heard.
@@ -248,3 +318,46 @@ class Graph:
         text = f'{topic.name}: incompatible QoS with another endpoint: {policy}'
         self._conflicts[text] = topic
         self.complain(text)
+
+
+class Peers:
+    """Asks the `~/ready` of other nodes until each has said yes.
+
+    Parameters
+    ----------
+    node : that asks
+    names : of the nodes, relative to its namespace
+
+    Raises
+    ------
+    InputError : a node cannot have such a name
+
+    """
+
+    def __init__(self, node: Node, names: list[str]):
+        try:
+            self._clients = {name: node.create_client(Trigger, f'{name}/ready') for name in names}
+        except InvalidServiceNameException:
+            raise InputError(node.get_name(), 'start_after', 'names of nodes', names) from None
+        self._pending: dict[str, tuple[float, Future]] = {}
+        self._ready: set[str] = set()
+        if names:
+            self._timer = steady_timer(node, 0.05, self._ask)
+
+    def not_ready(self) -> str:
+        """Name of the first node that has not said yes, or an empty text."""
+        return next((name for name in self._clients if name not in self._ready), '')
+
+    def _ask(self) -> None:
+        for name, client in self._clients.items():
+            if name in self._ready or not client.service_is_ready():
+                continue
+            asked, future = self._pending.get(name, (0.0, None))
+            if future is None or time.monotonic() - asked > ASK_AGAIN:
+                self._pending[name] = (time.monotonic(), client.call_async(Trigger.Request()))
+            elif future.done():
+                if future.result() is not None and future.result().success:
+                    self._ready.add(name)
+                del self._pending[name]
+        if not self.not_ready():
+            self._timer.cancel()

@@ -1,8 +1,9 @@
-"""What the subscribers of a node have taken, so that it publishes no more than they can hold."""
+"""Flow control of a replay by acknowledgement, and by the answers to its odometry."""
 
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from rclpy.client import Client
 from rclpy.duration import Duration
@@ -11,8 +12,12 @@ from rclpy.publisher import Publisher
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+from auv_analysis.bag.step_topics import ODOMETRY, role_of
+from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.endpoints import full_name
-from auv_dynamics.ros.peers import ASK_AGAIN
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.ros.node_interface import ASK_AGAIN, NodeInterface
 
 WINDOW = 1000  # messages of a topic that may be under way: far fewer than subscribers keep
 ANSWERS = 2  # the first may come from the moment before the data arrived, the next does not
@@ -129,3 +134,46 @@ class Receivers:
             self.silent.append(who)
             text = f'{who} did not answer for {PATIENCE:g} s, messages to it may be lost'
             self._node.get_logger().error(text)
+
+
+class Answers:
+    """Pairs odometry with the messages of a topic by their stamps, as lock-step does.
+
+    Parameters
+    ----------
+    graph : of the node
+    topic : of the wrenches that answer
+
+    """
+
+    def __init__(self, graph: NodeInterface, topic: str):
+        self._topic = topic
+        self._asked: int | None = None
+        self._since = 0.0
+        wrench = topics.Topic(topic, topics.WRENCH.type)
+        graph.subscribe(wrench, self._take, topics.every_step())
+
+    def _take(self, data: bytes, _: dict[str, Any]) -> None:
+        if first_stamp(data) == self._asked:
+            self._asked = None
+
+    def sent(self, topic: str, kind: str, data: bytes) -> None:
+        """Note a message that was published; of odometry, wait for the answer."""
+        if is_odometry(topic, kind):
+            self._asked, self._since = first_stamp(data), time.monotonic()
+
+    def are_complete(self) -> bool:
+        """Whether no answer is waited for."""
+        return self._asked is None
+
+    def overdue(self) -> str:
+        """What has been waited for too long, or an empty text."""
+        if self._asked is None or time.monotonic() - self._since < PATIENCE:
+            return ''
+        seconds = self._asked / NANOSECONDS
+        return f'no answer on {self._topic} to the odometry of {seconds:g} s for {PATIENCE:g} s'
+
+
+def is_odometry(topic: str, kind: str) -> bool:
+    """Whether a law answers the messages of a recorded topic."""
+    return role_of(topic) == interface.ODOM and kind == ODOMETRY

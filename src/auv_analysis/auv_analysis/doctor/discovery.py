@@ -122,17 +122,10 @@ def main() -> None:
 
     Prints how long OTHER took to be found, and all that were; without one it looks for so long.
     """
-    from rclpy.context import Context
-    from rclpy.node import Node
-
-    from auv_dynamics.ros.participant import Participant
+    from auv_dynamics.ros.participant import Participant, bare_node
 
     domain, name, other, seconds = sys.argv[1:]
-
-    def make(context: Context) -> Node:
-        return Node(name, context=context, start_parameter_services=False, enable_rosout=False)
-
-    participant = Participant(int(domain), make)
+    participant = Participant(int(domain), bare_node(name))
     began = time.monotonic()
     took, seen = None, set()
     while time.monotonic() - began < float(seconds) and took is None:

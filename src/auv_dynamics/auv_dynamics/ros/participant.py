@@ -71,6 +71,13 @@ class Participant:
         try_shutdown(context=self._context)
 
 
+def bare_node(name: str) -> Callable[[Context], Node]:
+    """What builds a node of this name that is there and nothing else."""
+    return lambda context: Node(
+        name, context=context, start_parameter_services=False, enable_rosout=False
+    )
+
+
 class Watcher(Participant):
     """A participant of one domain that starts the plant and follows the recorder.
 

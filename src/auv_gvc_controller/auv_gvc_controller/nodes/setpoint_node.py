@@ -15,7 +15,6 @@ from auv_dynamics.ros.parameters import declare, declare_grid, harmonic_paramete
 from auv_gvc_controller.control.odometry_guard import Limits, Now, OdometryGuard
 from auv_gvc_controller.control.setpoint import Setpoint, make_setpoint
 
-AHEAD = 200  # steps, where lock-step waits for every set-point
 BLOCK = 256  # set-points that are evaluated at once
 PATIENCE = 0.3  # s without odometry after which stamps that have gone back are believed
 
@@ -30,9 +29,8 @@ class SetpointNode(BulkNode):
         super().__init__('setpoint_node', **options)
         self.graph = NodeInterface(self)
         grid = declare_grid(self)
-        usual = AHEAD if self.lockstep else 0
         self._horizon = declare(
-            self, 'horizon', int, usual, 'steps ahead of odom, those until the next one at least',
+            self, 'horizon', int, 0, 'steps ahead of odom, those until the next one at least',
             at_least=0, at_most=topics.DEPTH - 1,
         )  # fmt: skip
         self._step_ns, self._last = grid.step_ns, grid.last

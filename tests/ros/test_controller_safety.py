@@ -346,7 +346,7 @@ def test_the_network_cannot_name_a_module_to_run(driver: Driver) -> None:
 
 
 BROKEN_BUILD = """
-from auv_gvc_controller import controller_node
+from auv_gvc_controller.nodes import controller_node
 from auv_gvc_controller.nodes.controller_node import ControllerParameters
 
 build, calls = ControllerParameters.build, []

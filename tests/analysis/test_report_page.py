@@ -29,6 +29,7 @@ def test_dark_pages_have_dark_panels(browser, report_path, how):
         button.click()
         button.click()
         assert button.inner_text() == 'Theme: dark'
+        report.settle()
     assert np.median(pixels(panel)) < 60
     report.close()
 

@@ -220,17 +220,18 @@ def _draw(plot: Any, panel: Panel, dashes: Mapping[str, list[int]], columns: int
         t, y = broken((t, y), curve.gaps, curve.step)
         source = sources.setdefault(t.tobytes(), ColumnDataSource({'t': t.astype(np.float32)}))
         at, look = f'y{number}', {'source': source, 'name': f'{curve.run} {curve.key}'}
-        look['legend_label'], look['tags'] = look['name'], [curve.run, curve.dof]
+        look['legend_label'] = look['name']
         if panel.kind == 'stack':
             below, base = base, base + y
             source.data[f'{at}_below'] = np.broadcast_to(below, y.shape).astype(np.float32)
             source.data[at] = base.astype(np.float32)
-            plot.varea('t', f'{at}_below', at, color=curve.colour, **look)
+            drawn = plot.varea('t', f'{at}_below', at, color=curve.colour, **look)
         else:
             source.data[at] = y.astype(np.float32)
             dash = dashes[curve.run]
             look |= {'line_color': curve.colour, 'line_dash': dash, 'line_width': curve.width}
-            plot.line('t', at, **look)
+            drawn = plot.line('t', at, **look)
+        drawn.tags = [curve.run, curve.dof]
 
 
 def _shade(plot: Any, mark: Mark, faults: Sequence[Mark]) -> None:

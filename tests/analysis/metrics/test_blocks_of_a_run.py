@@ -139,7 +139,7 @@ def test_moments_by_their_definition(run, seed, n) -> None:
 SCRIPT = """
 import json, sys
 import numpy as np
-from auv_analysis import moments as of
+from auv_analysis.metrics import moments as of
 from auv_dynamics import load_vehicle
 from auv_dynamics.kernel.compile import JITTED
 from auv_gvc_controller.laws.model import control_model

@@ -19,7 +19,7 @@ SCRIPT = """
 import sys
 import numpy as np
 from dataclasses import replace
-from auv_dynamics import jit
+from auv_dynamics.kernel import compile as jit
 from auv_analysis import load_scenario, simulate
 assert not jit.JITTED
 scenario = load_scenario('case1')

@@ -18,11 +18,12 @@ from auv_analysis.simulation.rollouts import batch_of
 from auv_analysis.simulation.simulate import (
     at_start,
     blocks,
-    one_loop,
+    loop_of,
     tables,
 )
 from auv_analysis.simulation.variants import packed_variants
 from auv_dynamics.kernel.integrator import TABLEAUS
+from auv_dynamics.kernel.lanes import with_batch_axis
 
 CONTROLLER = 'gvc'
 VARIED = (
@@ -77,8 +78,9 @@ def prepared(scenario: Scenario, changes: dict[str, np.ndarray]) -> Batch:
 
 def single(scenario: Scenario) -> Callable[[], Figures]:
     """One closed loop, prepared in the same way: a function that runs it and gives its figures."""
-    loop, known = one_loop(scenario, CONTROLLER), list(blocks(scenario))
-    motion, work = at_start(scenario, loop)
+    loop = loop_of(scenario, CONTROLLER)
+    vehicle, known = with_batch_axis(loop), list(blocks(scenario))
+    motion, work = (with_batch_axis(part) for part in at_start(scenario, loop))
     start, tableau = motion.x.copy(), TABLEAUS[scenario.data['integrator']]
     t = np.arange(scenario.steps + 1) * scenario.step
     band = band_of(np.abs(scenario.setpoint.value(t)).max(axis=0))
@@ -86,8 +88,10 @@ def single(scenario: Scenario) -> Callable[[], Figures]:
     def run() -> Figures:
         motion.x[:] = start
         figures = Figures.start(loop.model, band, scenario.step, np.full)
+        kept = with_batch_axis(figures)
         for grid, table in known:
-            run_continuous(loop, table, grid, tableau, motion, work, figures)
+            tables_of = with_batch_axis(table)
+            run_continuous(vehicle, tables_of, grid, tableau, motion, work, kept, 0, 1, None)
         return figures
 
     return run

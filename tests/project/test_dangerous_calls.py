@@ -32,8 +32,6 @@ NAMES = {'yaml.Loader', 'yaml.FullLoader', 'yaml.UnsafeLoader', 'yaml.CLoader'}
 METHODS = {'extractall', 'unsafe_load'}  # of archives: a member may lie outside the folder
 KEYWORDS = {('shell', True), ('allow_pickle', True), ('autoescape', False)}
 LISTED = {
-    ('auv_dynamics/kernel/compile.py', 'exec'),  # of argument names that stand in our own source
-    ('auv_dynamics/kernel/simd_memory.py', 'exec'),  # the same
     ('auv_gvc_controller/laws/law.py', 'importlib.import_module'),  # a user's own law
     ('auv_dynamics/ros/topics.py', 'importlib.import_module'),  # installed messages
     ('auv_analysis/cli/main.py', 'importlib.import_module'),  # names of ours, as below

@@ -152,11 +152,10 @@ MANY = {
     'vehicle.inertia_matrix[0][0]': np.linspace(100.0, 200.0, 37),
     'initial.nu[0]': np.linspace(-0.5, 0.5, 37),
 }
-if JITTED:
-    ALL = rollouts(GVC, 'gvc', MANY)
+ALL = rollouts(GVC, 'gvc', MANY)
 
 
-@pytest.mark.skipif(not JITTED, reason='lanes are as wide as the batch')
+@pytest.mark.skipif(not JITTED, reason='takes long')
 @settings(max_examples=25)
 @given(st.lists(st.integers(0, 36), min_size=1, max_size=40), st.integers(1, 3))
 def test_no_rollout_depends_on_those_beside_it(rows, threads):

@@ -8,7 +8,7 @@ from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.cli import main
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.simulation import batch
-from auv_analysis.simulation.kernels import Kernel, kernels
+from auv_analysis.simulation.batch import Kernel, kernels
 from auv_analysis.simulation.rollouts import rollouts
 from auv_dynamics.kernel.compile import JITTED
 
@@ -95,7 +95,7 @@ def test_law_that_numba_fails_on_in_any_way_runs_as_plain_python(
     def fails(*_):
         raise error
 
-    tried = [Kernel(fails, False, 'in vector registers'), Kernel(fails, True, 'compiled')]
+    tried = [Kernel(fails, 4, 'in vector registers'), Kernel(fails, None, 'compiled')]
     monkeypatch.setattr(batch, 'kernels', lambda *given: [*tried, kernels(*given)[-1]])
     monkeypatch.setattr(batch, '_CHOSEN', {})
     base = scenario(f'own_{type(error).__name__}', '')

@@ -1,5 +1,8 @@
-"""Lanes: numbers of several vehicles in one value, compiled and as NumPy arrays."""
+"""Lanes: numbers of several vehicles in one value, compiled, and each vehicle alone."""
 
+import os
+import subprocess
+import sys
 from typing import NamedTuple
 
 import numpy as np
@@ -8,11 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from auv_dynamics.kernel.compile import JITTED, compiled, plain
+from auv_dynamics.kernel import LANES
+from auv_dynamics.kernel.compile import JITTED, compiled
 from auv_dynamics.kernel.lanes import (
     ALIGNMENT,
-    LANES,
     anywhere,
+    block_count,
     clip,
     empty,
     of_block,
@@ -21,27 +25,26 @@ from auv_dynamics.kernel.lanes import (
     sqrt,
     uncounted,
     unpacked,
-    width,
 )
-from auv_dynamics.kernel.six import (
-    mul,
-    upper,
-    upper_T,
-    vector,
-)
+from auv_dynamics.kernel.six import mul, vector
 
-SIZES = st.integers(min_value=1, max_value=3 * LANES + 1)
+WIDE = LANES or 4
+SIZES = st.integers(min_value=1, max_value=3 * WIDE + 1)
 NUMBERS = np.array([-np.inf, -2.5, -1.0, -0.0, 0.0, 1e-300, 1.0, 2.5, np.inf, np.nan])
 
 
-@given(SIZES, st.sampled_from([1, 3, LANES]), st.sampled_from([(), (3,), (2, 5), (0, 4)]))
+@given(SIZES, st.sampled_from([None, 1, 3, WIDE]), st.sampled_from([(), (3,), (2, 5), (0, 4)]))
 def test_values_come_back_from_lanes(count, lanes, shape):
     values = np.arange(count * int(np.prod(shape)), dtype=float).reshape(count, *shape)
     blocks = packed(values, lanes)
-    assert blocks.shape == (-(-count // lanes), *shape, lanes)
+    assert_array_equal(unpacked(blocks, count, lanes), values)
+    assert not np.shares_memory(blocks, values)
+    if lanes is None:
+        assert blocks.shape == values.shape
+        return
+    assert blocks.shape == (block_count(count, lanes), *shape, lanes)
     assert blocks.size == 0 or blocks.ctypes.data % ALIGNMENT == 0
-    assert_array_equal(unpacked(blocks, count), values)
-    filled = unpacked(blocks, len(blocks) * lanes)[count:]
+    filled = unpacked(blocks, len(blocks) * lanes, lanes)[count:]
     assert_array_equal(filled, np.broadcast_to(values[-1], filled.shape))
 
 
@@ -54,10 +57,6 @@ def test_memory_begins_at_a_cache_line():
         assert array.flags.c_contiguous
 
 
-def test_width_of_the_lanes():
-    assert width(100) == (LANES if JITTED else 100)
-
-
 class Both(NamedTuple):
     """Coefficients of each vehicle and a number that all have."""
 
@@ -66,21 +65,15 @@ class Both(NamedTuple):
 
 
 class Table(NamedTuple):
-    """What all vehicles have."""
+    """What all vehicles have: a leading axis of 1."""
 
     t: np.ndarray
 
 
-class SharedTable(Table):
-    """The same, and says so."""
-
-    SHARED = True
-
-
-def chosen(both, table, b, x, out):
+def chosen(both, table, b, x, out, lanes):
     """All that lanes offer, on x (n,): used compiled and as it is."""
-    own = of_block(both, b)
-    t = uncounted(of_block(table, b)).t
+    own = of_block(both, b, lanes)
+    t = uncounted(of_block(table, b, lanes)).t
     product = mul(own.A, vector(x, 0))
     for i in range(6):
         out[i] = select(x[i] > t[i], product[i], -x[i]) / 2.0 + abs(x[i]) * own.shared
@@ -99,28 +92,33 @@ def chosen(both, table, b, x, out):
     out[11] = total
 
 
-def fill_blocks(both, table, x, out):
+def fill_blocks(both, table, x, out, lanes):
     for b in range(x.shape[0]):
-        chosen(both, table, b, of_block(x, b), of_block(out, b))
+        chosen(both, table, b, of_block(x, b, lanes), of_block(out, b, lanes), lanes)
 
 
-@pytest.mark.skipif(not JITTED, reason='needs numba')
+@pytest.mark.skipif(not LANES, reason='needs numba')
 @given(count=SIZES, seed=st.integers(0, 2**32 - 1))
-def test_compiled_lanes_do_what_numpy_does_for_each_vehicle(count, seed):
+def test_compiled_lanes_do_what_is_done_to_each_vehicle(count, seed):
+    """In registers, and compiled for one vehicle after the other, as in plain Python."""
     generator = np.random.default_rng(seed)
     A = generator.normal(size=(count, 36))
     x = np.round(generator.normal(size=(count, 6)), 1)
-    table = SharedTable(generator.normal(size=6))
-    out = packed(np.zeros((count, 12)), LANES)
-    _compiled_blocks()(Both(packed(A, LANES), 0.25), table, packed(x, LANES), out)
-    found = unpacked(out, count)
+    table = generator.normal(size=(1, 6))
     negative = np.repeat((packed(x, LANES)[:, 0] < 0).any(axis=1), LANES)[:count]
-    for i in range(count):
-        expected = np.zeros(12)
-        chosen(Both(A[i][None], 0.25), table, 0, x[i], expected)
-        expected[9] = x[i, 0] != x[i, 1]
-        expected[9] = (expected[9] + 10) * 2 if negative[i] else expected[9]
-        np.testing.assert_allclose(found[i], expected, rtol=1e-13, atol=1e-14)
+    for lanes in (LANES, None):
+        out = packed(np.zeros((count, 12)), lanes)
+        both = Both(packed(A, lanes), 0.25)
+        _compiled_blocks()(both, Table(packed(table, lanes)), packed(x, lanes), out, lanes)
+        found = unpacked(out, count, lanes)
+        for i in range(count):
+            expected = np.zeros((1, 12))
+            fill_blocks(Both(A[i][None], 0.25), Table(table), x[i][None], expected, None)
+            if lanes:
+                expected[0, 9] = x[i, 0] != x[i, 1]
+                expected[0, 9] += 10 if negative[i] else 0
+                expected[0, 9] *= 2 if negative[i] else 1
+            np.testing.assert_allclose(found[i], expected[0], rtol=1e-13, atol=1e-14)
 
 
 def _compiled_blocks(known=[]):  # noqa: B006  compiled once
@@ -137,28 +135,13 @@ def test_choices_of_single_numbers(x):
     for low, high in ((-1.0, 1.0), (0.0, 2.5)):
         expected = x if np.isnan(x) else min(max(x, low), high)
         np.testing.assert_equal(clip(x, low, high), expected)
-        assert_array_equal(plain(clip)(np.array([x, 0.5]), low, high), [expected, 0.5])
     assert select(x > 0, 1.0, 2.0) == (1.0 if x > 0 else 2.0)
-    assert_array_equal(select(np.array([x > 0, True]), 1.0, 2.0), [1.0 if x > 0 else 2.0, 1.0])
-    assert anywhere(np.array([x > 0, False])) == (x > 0)
-
-
-@given(seed=st.integers(0, 2**32 - 1))
-def test_lanes_of_the_decomposition(seed):
-    """U x and U^T x of lanes are those of each vehicle."""
-    generator = np.random.default_rng(seed)
-    U = np.triu(generator.normal(size=(5, 6, 6)), 1) + np.eye(6)
-    x = generator.normal(size=(5, 6))
-    lanes = packed(U.reshape(5, 36), 5)[0]
-    for product, matrices in ((upper, U), (upper_T, np.swapaxes(U, 1, 2))):
-        found = np.array(plain(product)(lanes, tuple(x.T))).T
-        np.testing.assert_allclose(found, np.einsum('bij,bj->bi', matrices, x), rtol=0, atol=1e-12)
+    assert anywhere(x > 0) == (x > 0)
 
 
 @pytest.mark.skipif(not JITTED, reason='needs numba')
 def test_compiled_functions_keep_nothing_alive():
     """Arrays that are seen uncounted are freed when their owner lets them go."""
-    import sys
 
     @compiled
     def first(table):
@@ -171,7 +154,58 @@ def test_compiled_functions_keep_nothing_alive():
     assert len(set(counts)) == 1
 
 
-def test_what_is_shared_is_given_to_every_block_as_it_is():
-    shared, own = SharedTable(np.arange(12.0)), Table(np.arange(12.0).reshape(2, 6))
-    assert of_block(shared, 1) is shared
-    assert_array_equal(of_block(own, 1).t, np.arange(6.0, 12.0))
+def test_what_all_vehicles_have_is_given_to_every_block():
+    shared, own = Table(np.arange(6.0)[None]), Table(np.arange(12.0).reshape(2, 6))
+    assert_array_equal(of_block(shared, 1, None).t, np.arange(6.0))
+    assert_array_equal(of_block(own, 1, None).t, np.arange(6.0, 12.0))
+
+
+# found before every other sitecustomize: the module then looks as if it had been deleted
+STUB = """
+import sys
+
+
+class Blocked:
+    def find_spec(self, name, path=None, target=None):
+        if name.startswith('auv_dynamics') and name.endswith('.simd'):
+            raise ModuleNotFoundError(f'No module named {name!r}', name=name)
+
+
+sys.meta_path.insert(0, Blocked())
+"""
+SCRIPT = """
+import sys
+import numpy as np
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.changes import changed_scenario
+from auv_analysis.rollouts import rollouts
+from auv_dynamics.kernel import LANES
+
+assert (LANES is None) == (sys.argv[1] == 'without')
+scenario = changed_scenario(load_scenario('case1'), {'duration': 0.3})
+found = rollouts(scenario, 'gvc', {'controllers.gvc.k_D': [0.9, 1.0, 1.1]})
+summary = summarize(simulate(scenario, 'gvc'))
+np.savez(
+    sys.argv[2], rms=[found[f'velocity_error.rms.{dof}'] for dof in ('surge', 'roll', 'yaw')],
+    effort=summary['effort']['rms'], energy=summary['kinetic_energy']['mean'],
+)
+"""
+
+
+@pytest.mark.skipif(not LANES, reason='needs numba')
+def test_everything_runs_without_vector_registers(tmp_path):
+    """`simd` is optional: deleted, every vehicle is computed alone, with the same numbers."""
+    (tmp_path / 'without').mkdir()
+    (tmp_path / 'without' / 'sitecustomize.py').write_text(STUB)
+    arrays = {}
+    for how in ('with', 'without'):
+        out, path = tmp_path / f'{how}.npz', [os.environ.get('PYTHONPATH', '')]
+        path = [str(tmp_path / how), *filter(None, path)]
+        subprocess.run(
+            [sys.executable, '-c', SCRIPT, how, str(out)],
+            env=os.environ | {'PYTHONPATH': os.pathsep.join(path)},
+            check=True,
+        )
+        arrays[how] = dict(np.load(out))
+    for name, expected in arrays['with'].items():
+        np.testing.assert_allclose(arrays['without'][name], expected, rtol=1e-12)

@@ -15,8 +15,9 @@ import numpy as np
 from auv_analysis.metrics.coupling import input_deformation, velocity_deformation
 from auv_analysis.metrics.energy import component
 from auv_analysis.runs.run import Run, Windows
-from auv_dynamics.kernel.compile import JITTED, compiled, helper
-from auv_dynamics.kernel.lanes import LANES, of_block, uncounted
+from auv_dynamics.kernel import LANES
+from auv_dynamics.kernel.compile import compiled, helper
+from auv_dynamics.kernel.lanes import of_block, uncounted
 from auv_dynamics.kernel.six import (
     Vector,
     add,
@@ -124,8 +125,9 @@ def add_samples(
 
     `beside` (1, 30, LANES) is workspace. Zeros, which fill up the last register, add nothing.
     """
-    known, block = uncounted(maps), of_block(beside, 0)
-    s, q, p = of_block(sums, 0), of_block(squares, 0), of_block(peaks, 0)
+    known, block = uncounted(maps), of_block(beside, 0, LANES)
+    s, q = of_block(sums, 0, LANES), of_block(squares, 0, LANES)
+    p = of_block(peaks, 0, LANES)
     for k in range(0, nu.shape[0], 6 * LANES):
         if k + 6 * LANES <= nu.shape[0]:
             fill_signals(beside, nu, nu_d, tau, f, F, k, LANES)
@@ -193,7 +195,7 @@ class Moments:
         nu, nu_d, tau, f, F = (np.ascontiguousarray(value, float).ravel() for value in values)
         self.count += len(run.t)
         self.first, self.last = min(self.first, run.t[0]), max(self.last, run.t[-1])
-        add = add_compiled if JITTED else add_columns
+        add = add_compiled if LANES else add_columns
         add(nu, nu_d, tau, f, F, maps, self.sums, self.squares, self.peaks)
 
     def joined(self, other: 'Moments') -> 'Moments':

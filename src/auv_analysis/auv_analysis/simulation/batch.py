@@ -1,4 +1,4 @@
-"""Many closed loops at once: vehicles in lanes, blocks of lanes over threads, figures reduced."""
+"""Many closed loops at once: vehicles in lanes, blocks of them over threads, metrics reduced."""
 
 import re
 import threading
@@ -7,39 +7,42 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
-from functools import partial
-from math import prod
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from auv_analysis.output.progress import each, say
 from auv_analysis.simulation.closed_loop import (
+    RUNS,
     Grid,
     Loop,
     Motion,
-    SharedTables,
     Tables,
     Workspace,
 )
-from auv_analysis.simulation.kernels import Kernel, kernels
 from auv_analysis.simulation.reduction import Figures
-from auv_analysis.simulation.trees import kept, mapped
+from auv_dynamics.kernel import LANES
+from auv_dynamics.kernel.compile import JITTED, plain, uncached
 from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
 from auv_dynamics.kernel.lanes import (
+    block_count,
     empty,
+    mapped,
     packed,
+    take_rows,
     unpacked,
-    width,
 )
 from auv_dynamics.plant.actuators import memory
 from auv_dynamics.plant.faulty_devices import history_shape
 from auv_dynamics.plant.plant import SIZE
 from auv_gvc_controller.control.sampled import user_law
+from auv_gvc_controller.laws import SHIPPED
 
 Known = Callable[[np.ndarray], Tables]  # stage times t (T, s) of the next block -> its tables
-SHARED_STEPS = 1024  # steps that are tabulated at once where all vehicles share the tables
+SHARED_STEPS = 128  # steps that are tabulated at once where all vehicles share the tables
 OWN_STEPS = 256  # the same where each has its own
+LISTED = 64  # blocks of shared tables that are kept for all parts of a batch
 PARTS = 4  # of a batch per thread, so that a slow one is made up for
 NESTED = re.compile(r'\w+Error: ')
 LONGEST = 160  # of what is said of it
@@ -95,7 +98,7 @@ def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) 
 
     """
     job = _job(batch, kernel_of(batch))
-    parts = _parts(len(job.record.outside), job.lanes, threads, own=batch.shared is None)
+    parts = _parts(len(job.record.outside), job.kernel.lanes, threads, own=batch.shared is None)
     if executor is None and (threads == 1 or len(parts) == 1):
         for part in each(parts, len(parts)):
             _run_part(job, part)
@@ -104,13 +107,62 @@ def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) 
     else:
         with ThreadPoolExecutor(threads) as pool:
             list(each(pool.map(partial(_run_part, job), parts), len(parts)))
-    return mapped(lambda blocks: unpacked(blocks, len(batch)), job.record)
+    return mapped(lambda blocks: unpacked(blocks, len(batch), job.kernel.lanes), job.record)
+
+
+class Kernel(NamedTuple):
+    """A function of `RUNS`, compiled or not, and how many vehicles it takes side by side.
+
+    Attributes
+    ----------
+    run : takes the blocks from `first` to before `last`
+    lanes : vehicles of a block; None: one, alone
+    how : in words, for people
+
+    """
+
+    run: Callable[..., None]
+    lanes: int | None
+    how: str
+
+
+IN_REGISTERS, ALONE, IN_PYTHON = 'in vector registers', 'compiled', 'as plain Python'
+
+
+def kernels(law: Any, hold: str) -> Sequence[Kernel]:
+    """Kernels for a law, the fastest first; the last one always works.
+
+    A user's law runs in vector registers where numba can compile it so: plain arithmetic on
+    six-tuples, without branches. Else it is compiled for one vehicle at a time, and where that
+    fails as well it runs as plain Python. Code compiled for it is not kept in the shared folder.
+
+    Parameters
+    ----------
+    law : its class
+    hold : 'continuous' or 'zoh'
+
+    """
+    if law not in SHIPPED.values():
+        return _of_user(law, hold)
+    if not JITTED:
+        return [Kernel(plain(RUNS[hold]), None, IN_PYTHON)]
+    return [Kernel(RUNS[hold], LANES, IN_REGISTERS if LANES else ALONE)]
+
+
+@cache
+def _of_user(law: Any, hold: str) -> Sequence[Kernel]:
+    """Kernels of their own for each law: numba takes two classes of one name for the same."""
+    source = plain(RUNS[hold])
+    in_python = Kernel(source, None, IN_PYTHON)
+    if not JITTED:
+        return [in_python]
+    in_registers = [Kernel(uncached(source), LANES, IN_REGISTERS)] if LANES else []
+    return [*in_registers, Kernel(uncached(source), None, ALONE), in_python]
 
 
 class _Job(NamedTuple):
     batch: Batch
     kernel: Kernel
-    lanes: int
     loop: Loop
     record: Any
     tables: Sequence[tuple[Grid, Tables]] | None
@@ -157,15 +209,15 @@ def _why(error: Exception) -> str:
 
 
 def _job(batch: Batch, kernel: Kernel) -> _Job:
-    lanes = 1 if kernel.alone else width(len(batch))
+    lanes = kernel.lanes
     loop, band = pack(batch.loop, lanes), packed(batch.band, lanes)
-    count = -(-len(batch) // lanes)
-    record = batch.record.start(loop.model, band, batch.step, partial(_full, count, lanes))
-    return _Job(batch, kernel, lanes, loop, record, _listed(batch))
+    like = partial(_full, block_count(len(batch), lanes), lanes)
+    record = batch.record.start(loop.model, band, batch.step, like)
+    return _Job(batch, kernel, loop, record, _listed(batch, lanes))
 
 
-def pack(value: Any, lanes: int) -> Any:
-    """Lanes of every array (B, ...) or (1, ...); one that stands in several places only once."""
+def pack(value: Any, lanes: int | None) -> Any:
+    """Blocks of every array (B, ...) or (1, ...); one that stands in several places only once."""
     done: dict[tuple[Any, ...], np.ndarray] = {}
 
     def once(array: np.ndarray) -> np.ndarray:
@@ -177,17 +229,18 @@ def pack(value: Any, lanes: int) -> Any:
     return mapped(once, value)
 
 
-def _full(count: int, lanes: int, n: int, value: float) -> np.ndarray:
-    array = empty((count, n, lanes))
+def _full(count: int, lanes: int | None, shape: int | tuple[int, ...], value: float) -> np.ndarray:
+    inner = (shape,) if isinstance(shape, int) else shape
+    array = empty((count, *inner, *([] if lanes is None else [lanes])))
     array[...] = value
     return array
 
 
-def _parts(count: int, lanes: int, threads: int, *, own: bool) -> list[range]:
+def _parts(count: int, lanes: int | None, threads: int, *, own: bool) -> list[range]:
     """Blocks 0 ... count in pieces that threads work on."""
     size = -(-count // (PARTS * threads)) if threads > 1 else count
     if own:
-        size = min(size, max(1, OWN_VEHICLES // lanes))
+        size = min(size, max(1, OWN_VEHICLES // (lanes or 1)))
     return [range(first, min(first + size, count)) for first in range(0, count, size)]
 
 
@@ -198,47 +251,43 @@ def _grids(batch: Batch, size: int) -> Iterator[Grid]:
         yield Grid(t, batch.step, first, batch.steps)
 
 
-def _listed(batch: Batch) -> Sequence[tuple[Grid, Tables]] | None:
+def _listed(batch: Batch, lanes: int | None) -> Sequence[tuple[Grid, Tables]] | None:
     """Shared tables of the whole run where they are few; else each part makes them anew."""
-    if batch.shared is None or batch.steps > 64 * SHARED_STEPS:
+    if batch.shared is None or batch.steps > LISTED * SHARED_STEPS:
         return None
-    return list(_shared(batch))
+    return list(_shared(batch, lanes))
 
 
-def _shared(batch: Batch) -> Iterator[tuple[Grid, Tables]]:
+def _shared(batch: Batch, lanes: int | None) -> Iterator[tuple[Grid, Tables]]:
     assert batch.shared is not None
     for grid in _grids(batch, SHARED_STEPS):
-        yield grid, SharedTables(*batch.shared(grid.t))
+        yield grid, Tables(*(packed(table[None], lanes) for table in batch.shared(grid.t)))
 
 
-def _own(batch: Batch, lanes: int, blocks: range) -> Iterator[tuple[Grid, Tables]]:
+def _own(batch: Batch, lanes: int | None, blocks: range) -> Iterator[tuple[Grid, Tables]]:
     assert batch.own is not None
-    known = batch.own(range(blocks.start * lanes, min(blocks.stop * lanes, len(batch))))
+    wide = lanes or 1
+    known = batch.own(range(blocks.start * wide, min(blocks.stop * wide, len(batch))))
     for grid in _grids(batch, OWN_STEPS):
         yield grid, Tables(*(packed(table, lanes) for table in known(grid.t)))
 
 
 def _run_part(job: _Job, blocks: range, *, trial: bool = False) -> None:
-    """Run some blocks of lanes from the first step to the last; a trial takes no step."""
-    batch, lanes = job.batch, job.lanes
-    tableau, size = TABLEAUS[batch.integrator], batch.x.shape[1]
-    x = packed(batch.x[blocks.start * lanes : blocks.stop * lanes], lanes)
+    """Run some blocks of vehicles from the first step to the last; a trial takes no step."""
+    batch, lanes = job.batch, job.kernel.lanes
+    tableau, size, wide = TABLEAUS[batch.integrator], batch.x.shape[1], lanes or 1
+    x = packed(batch.x[blocks.start * wide : blocks.stop * wide], lanes)
     count, faults = len(x), job.loop.faults
     held, history = memory(job.loop.actuators, faults=faults.any).shape, history_shape(faults)
-    motion = Motion(
-        x,
-        x[:, :SIZE].copy(),
-        _full(count, lanes, size - SIZE, 0.0),
-        _full(count, lanes, prod(held), 0.0).reshape(count, *held, lanes),
-        _full(count, lanes, prod(history), 0.0).reshape(count, *history, lanes),
-    )
-    work = Workspace(empty((1, len(tableau.b), size, lanes)), empty((1, size, lanes)))
+    zeros = partial(_full, count, lanes, value=0.0)
+    motion = Motion(x, x[:, :SIZE].copy(), zeros(size - SIZE), zeros(held), zeros(history))
+    work = Workspace(_full(1, lanes, (len(tableau.b), size), 0.0), _full(1, lanes, size, 0.0))
     here = slice(blocks.start, blocks.stop)
-    loop, record = kept(job.loop, here), kept(job.record, here)
-    known = job.tables or (_shared(batch) if batch.shared else _own(batch, lanes, blocks))
+    loop, record = take_rows(job.loop, here), take_rows(job.record, here)
+    known = job.tables or (_shared(batch, lanes) if batch.shared else _own(batch, lanes, blocks))
     for grid, tables in known:
         steps = grid._replace(t=grid.t[:0]) if trial else grid
         with np.errstate(all='ignore'), nullcontext() if trial else user_law(loop.gains):
-            job.kernel.run(loop, tables, steps, tableau, motion, work, record, 0, count)
+            job.kernel.run(loop, tables, steps, tableau, motion, work, record, 0, count, lanes)
         if trial:
             return

@@ -1,6 +1,6 @@
 """The one kernel: plant, law and integrator composed into a closed loop, for one or many vehicles.
 
-What stands here is written for one vehicle; with `lanes` it takes several of them at a time.
+What stands here is written for one vehicle, and takes several of them at a time as `lanes`.
 """
 
 from typing import Any, NamedTuple
@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.simulation.records import Sample, fill_record
-from auv_dynamics.kernel.compile import compiled, helper
-from auv_dynamics.kernel.integrator import Tableau, fill_step
-from auv_dynamics.kernel.lanes import uncounted
-from auv_dynamics.kernel.six import Numbers, Vector, vector
+from auv_dynamics.kernel.compile import compiled, once
+from auv_dynamics.kernel.integrator import Tableau, fill_stages, fill_step, fill_sum
+from auv_dynamics.kernel.lanes import align_stack, of_block, uncounted
+from auv_dynamics.kernel.six import vector
 from auv_dynamics.plant.actuators import Actuators, fill_applied
 from auv_dynamics.plant.faults import FaultShape
 from auv_dynamics.plant.faulty_devices import fill_arrived, fill_faulty
@@ -60,46 +60,39 @@ class LawInside(NamedTuple):
     Attributes
     ----------
     loop : the vehicle and its controller
+    k : index of the sample at which the step begins
     t : (s,) times of the stages of this step, s
     reference : (s, 12) nu_d, nu_d_dot at the stages
     F : (s, 6) external disturbance at the stages
     current : (s, 6) at the stages, (0, 6) in still water
+    record : takes the sample at stage 0
 
     """
 
     loop: Loop
+    k: int
     t: np.ndarray
     reference: np.ndarray
     F: np.ndarray
     current: np.ndarray
+    record: Any
 
     @staticmethod
     def fill_rate(system: 'LawInside', stage: int, x: np.ndarray, rate: np.ndarray) -> None:
-        """x_dot at one stage."""
-        tau, _, change = answer(system, stage, x)
-        fill_answered(system, stage, x, tau, change, rate)
-
-
-@helper
-def answer(system: LawInside, stage: int, x: np.ndarray) -> tuple[Numbers, Numbers, Vector]:
-    """(tau, f, state rate) of the law at a stage of the step."""
-    t, nu, attitude, state = system.t[stage], vector(x, 7), attitude_of(x), x[SIZE:]
-    nu_d, nu_d_dot = vector(system.reference[stage], 0), vector(system.reference[stage], 6)
-    gains, model = system.loop.gains, system.loop.model
-    tau, f = wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
-    change = state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
-    return tau, f, change
-
-
-@helper
-def fill_answered(
-    system: LawInside, stage: int, x: np.ndarray, tau: Vector, change: Vector, rate: np.ndarray
-) -> None:
-    """Write x_dot at a stage of the step at which the law has answered into `rate`."""
-    F = vector(system.F[stage], 0)
-    fill_plant_rate(system.loop.truth, x, tau, F, system.current, stage, rate)
-    for i in range(x.shape[0] - SIZE):
-        rate[SIZE + i] = change[i]
+        """x_dot at one stage; what is known at the first one is the sample."""
+        truth, gains, model = system.loop.truth, system.loop.gains, system.loop.model
+        body, state, F = x[:SIZE], x[SIZE:], vector(system.F[stage], 0)
+        t, nu, attitude = system.t[stage], vector(x, 7), attitude_of(x)
+        nu_d, nu_d_dot = vector(system.reference[stage], 0), vector(system.reference[stage], 6)
+        tau, f = wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+        change = state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+        if stage == 0:
+            total = lumped(truth, attitude, nu, tau, F, system.current)
+            sample = Sample(body, body, state, nu_d, tau, tau, f, total)
+            fill_record(system.record, system.k, sample)
+        fill_plant_rate(truth, x, tau, F, system.current, stage, rate)
+        for i in range(x.shape[0] - SIZE):
+            rate[SIZE + i] = change[i]
 
 
 class Grid(NamedTuple):
@@ -139,12 +132,6 @@ class Tables(NamedTuple):
     faults: np.ndarray
 
 
-class SharedTables(Tables):
-    """Tables of a batch that are the same for all its vehicles."""
-
-    SHARED = True
-
-
 class Motion(NamedTuple):
     """What goes on from one block of steps to the next.
 
@@ -172,29 +159,25 @@ class Workspace(NamedTuple):
     trial: np.ndarray
 
 
-@helper
+@once
 def fill_continuous(
     loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
     record: Any,
 ) -> None:  # fmt: skip
     """Take a block of steps with the law inside every stage."""
-    x = motion.x
-    body, state = x[:SIZE], x[SIZE:]
+    x, stages, step, every = motion.x, work.stages, grid.step, tableau.b.shape[0]
     for row in range(grid.t.shape[0]):
         k = grid.first + row
         reference, F, current = tables.reference[row], tables.F[row], tables.current[row]
-        system = LawInside(loop, grid.t[row], reference, F, current)
-        tau, f, change = answer(system, 0, x)
-        total = lumped(loop.truth, attitude_of(x), vector(x, 7), tau, vector(F[0], 0), current)
-        nu_d = vector(reference[0], 0)
-        fill_record(record, k, Sample(body, body, state, nu_d, tau, tau, f, total))
+        system = LawInside(loop, k, grid.t[row], reference, F, current, record)
+        count = every if k < grid.last else 1  # of the last sample nothing but its record
+        fill_stages(system, x, step, tableau, stages, work.trial, count)
         if k < grid.last:
-            fill_answered(system, 0, x, tau, change, work.stages[0])
-            fill_step(system, x, grid.step, tableau, work.stages, work.trial, 1)
+            fill_sum(x, x, step, tableau.b, stages, count)
             fill_unit_attitude(x)
 
 
-@helper
+@once
 def fill_held(
     loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
     record: Any,
@@ -235,22 +218,35 @@ def fill_held(
 @compiled
 def run_continuous(
     loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
-    record: Any,
+    record: Any, first: int, last: int, lanes: int | None,
 ) -> None:  # fmt: skip
-    """`fill_continuous` for one vehicle, to be called from Python."""
-    fill_continuous(
-        uncounted(loop), uncounted(tables), uncounted(grid), uncounted(tableau),
-        uncounted(motion), uncounted(work), uncounted(record),
-    )  # fmt: skip
+    """`fill_continuous` for the blocks of vehicles from `first` to before `last`.
+
+    All arrays but those of `grid` and `tableau` have a leading axis of blocks, see `of_block`;
+    `work` has one block, which all use.
+    """
+    align_stack(lanes)
+    steps, method = uncounted(grid), uncounted(tableau)
+    for b in range(first, last):
+        fill_continuous(
+            of_block(loop, b, lanes), of_block(tables, b, lanes), steps, method,
+            of_block(motion, b, lanes), of_block(work, 0, lanes), of_block(record, b, lanes),
+        )  # fmt: skip
 
 
 @compiled
 def run_held(
     loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
-    record: Any,
+    record: Any, first: int, last: int, lanes: int | None,
 ) -> None:  # fmt: skip
-    """`fill_held` for one vehicle, to be called from Python."""
-    fill_held(
-        uncounted(loop), uncounted(tables), uncounted(grid), uncounted(tableau),
-        uncounted(motion), uncounted(work), uncounted(record),
-    )  # fmt: skip
+    """`fill_held` for the same."""
+    align_stack(lanes)
+    steps, method = uncounted(grid), uncounted(tableau)
+    for b in range(first, last):
+        fill_held(
+            of_block(loop, b, lanes), of_block(tables, b, lanes), steps, method,
+            of_block(motion, b, lanes), of_block(work, 0, lanes), of_block(record, b, lanes),
+        )  # fmt: skip
+
+
+RUNS = {'continuous': run_continuous, 'zoh': run_held}

@@ -9,19 +9,19 @@ from auv_analysis.output.progress import each
 from auv_analysis.runs.run import HOLDS, Hold, Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.closed_loop import (
+    RUNS,
     Grid,
     Loop,
     Motion,
     Tables,
     Workspace,
-    run_continuous,
-    run_held,
 )
 from auv_analysis.simulation.records import Log
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import LARGEST
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
+from auv_dynamics.kernel.lanes import with_batch_axis
 from auv_dynamics.plant.actuators import memory
 from auv_dynamics.plant.fault_rows import FaultRows
 from auv_dynamics.plant.faulty_devices import history_shape
@@ -130,22 +130,19 @@ def _run_kernel(
     scenario: Scenario, controller: str, hold: Hold, gains: Any, log: Log
 ) -> np.ndarray:
     """Fill the log; nu_d_dot (n + 1, 6) at the samples."""
-
-    def kernel(function: Any) -> Any:
-        return function if is_compiled(gains) else plain(function)
-
-    tableau, loop = TABLEAUS[scenario.data['integrator']], one_loop(scenario, controller)
-    function = kernel(run_continuous if hold == 'continuous' else run_held)
-    motion, work = at_start(scenario, loop)
-    nu_d_dot = np.empty((scenario.steps + 1, 6))
+    tableau, loop = TABLEAUS[scenario.data['integrator']], loop_of(scenario, controller)
+    run = RUNS[hold] if is_compiled(gains) else plain(RUNS[hold])
+    held = [with_batch_axis(part) for part in (*at_start(scenario, loop), log)]
+    nu_d_dot, vehicle = np.empty((scenario.steps + 1, 6)), with_batch_axis(loop)
     for grid, known in each(blocks(scenario), scenario.steps // BLOCK + 1):
         nu_d_dot[grid.first : grid.first + len(grid.t)] = known.reference[:, 0, 6:]
         with np.errstate(all='ignore'), user_law(gains):
-            function(loop, known, grid, tableau, motion, work, log)
+            tables_of = with_batch_axis(known)
+            run(vehicle, tables_of, grid, tableau, *held, 0, 1, None)
     return nu_d_dot
 
 
-def one_loop(scenario: Scenario, controller: str) -> Loop:
+def loop_of(scenario: Scenario, controller: str) -> Loop:
     """The vehicle of a scenario with one of its controllers."""
     gains = scenario.gains(controller)
     guard = anti_windup(gains, scenario.reach(controller))

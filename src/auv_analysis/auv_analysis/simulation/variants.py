@@ -16,19 +16,14 @@ from auv_analysis.simulation.fleet import (
     matrices,
     numbers,
 )
-from auv_analysis.simulation.trees import (
-    arrays,
-    joined,
-    kept,
-    led,
-)
+from auv_analysis.simulation.simulate import loop_of
+from auv_dynamics.kernel.lanes import arrays, joined, take_rows, with_batch_axis
 from auv_dynamics.plant.plant import initial_state
 from auv_dynamics.plant.signals import Harmonics
 from auv_dynamics.plant.uncertainty import Truth, with_errors
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle, row_major
 from auv_dynamics.vehicle.vehicle_file import is_definite
-from auv_gvc_controller.control.sampled import anti_windup
 from auv_gvc_controller.laws.model import control_model
 
 
@@ -62,7 +57,7 @@ class Variants:
             return self
         arrays = {name: getattr(self, name)[keep] for name in ('rows', 'of', 'x', 'seeds')}
         setpoint = self.setpoint and self.setpoint.part(keep)
-        return replace(self, loop=kept(self.loop, keep), setpoint=setpoint, **arrays)
+        return replace(self, loop=take_rows(self.loop, keep), setpoint=setpoint, **arrays)
 
     @property
     def structure(self) -> tuple[Any, ...]:
@@ -103,14 +98,6 @@ def _joined_setpoints(parts: Sequence[Harmonics]) -> Harmonics | None:
     return Harmonics(np.concatenate([part.offset for part in parts]), tuple(terms))
 
 
-def loop_of(scenario: Scenario, controller: str) -> Loop:
-    """Vehicle and controller of one scenario, arrays without a leading axis."""
-    gains, reach = scenario.gains(controller), scenario.reach(controller)
-    truth, model = scenario.uncertainty.truth, control_model(scenario.vehicle)
-    guard = anti_windup(gains, reach)
-    return Loop(truth, scenario.actuators, gains, model, guard, scenario.faults.shape)
-
-
 def packed_variants(
     scenario: Scenario,
     controller: str,
@@ -139,7 +126,7 @@ def packed_variants(
         good &= within(scenario, path, values)
     by_keys = {split(path): np.array(values, float) for path, values in columns.items()}
     safe = {keys: _harmless(scenario, keys, values, good) for keys, values in by_keys.items()}
-    loop = led(loop_of(scenario, controller))
+    loop = with_batch_axis(loop_of(scenario, controller))
     gains = _gains(scenario, controller, safe, count, good)
     loop = loop._replace(gains=gains or loop.gains)
     vehicle = scenario.vehicle
@@ -247,7 +234,12 @@ def _truth(
     exact = scenario.uncertainty.truth.exact
     known = vehicle.model
     model = known if plant is vehicle else plant.changed(M=M).model
-    return Truth(led(model, 2), led(row_major(M_RB), 2), led(known, 2), exact)
+    return Truth(
+        with_batch_axis(model, 2),
+        with_batch_axis(row_major(M_RB), 2),
+        with_batch_axis(known, 2),
+        exact,
+    )
 
 
 def _initial(

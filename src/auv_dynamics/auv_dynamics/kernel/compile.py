@@ -1,9 +1,10 @@
 """Compile the kernel with numba where it is installed; the same source runs without it.
 
-Three decorators are all that the mathematics knows of numba: `helper` for functions that are
+Few decorators are all that the mathematics knows of numba: `helper` for functions that are
 inlined wherever a compiled one calls them and stay plain Python by themselves: they may meet a
-user's own law, which need not be compilable; `compiled` for those that are called from Python as
-well, whose code other processes load; `uncached` where a user's law must not enter that cache.
+user's own law, which need not be compilable; `once` for a helper that is large and called from one
+place, which numba then compiles as part of its caller; `compiled` for those that are called from
+Python, whose code other processes load; `uncached` where a user's law must not enter that cache.
 
 Compiled code is kept in one explicit folder whose name changes with every source file that the
 kernels can depend on, so that a stale binary cannot be loaded: numba itself only looks at the file
@@ -21,7 +22,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
-COMPILES = re.compile(rb'^@(?:helper|compiled|uncached|specialised)\b', re.M)
+COMPILES = re.compile(rb'^@(?:helper|once|of_numbers|compiled|uncached|specialised)\b', re.M)
 IMPORT = re.compile(rb'^\s*(?:from|import)\s+(auv_[\w.]+)(?:\s+import\s+(\([^)]*\)|.*))?', re.M)
 Function = TypeVar('Function', bound=Callable[..., Any])
 
@@ -119,13 +120,15 @@ if JITTED:
     helper: Decorator = register_jitable(forceinline=True, **OPTIONS)
     compiled: Decorator = numba.njit(cache=KEPT, nogil=True, forceinline=True, **OPTIONS)
     uncached: Decorator = numba.njit(nogil=True, **OPTIONS)
+    once: Decorator = register_jitable(inline='always')
+    NUMBERS = numba.types.Number, numba.types.Boolean
 else:
 
     def helper(function: Function, /) -> Function:
         """Return the function as it is: numba is absent or switched off."""
         return function
 
-    compiled = uncached = helper
+    compiled = uncached = once = helper
 
 
 def plain(function: Function) -> Function:
@@ -141,21 +144,30 @@ def specialised(argument: str) -> Decorator:
     """
 
     def decorate(generic: Function, /) -> Function:
-        if not JITTED:
-            return generic
         names = generic.__code__.co_varnames[: generic.__code__.co_argcount]
         position = names.index(argument)
-
-        def choose(*types: Any) -> Callable[..., Any]:
-            return getattr(types[position].instance_class, generic.__name__)
-
-        # numba asks for an implementation through a function with the same argument names
-        scope: dict[str, Any] = {'choose': choose}
-        listed = ', '.join(names)
-        exec(f'def overloading({listed}): return choose({listed})', scope)
-        # not strict: numba would take an argument with an annotation for another one
-        options: Any = {'forceinline': True, **OPTIONS}
-        overload(generic, jit_options=options, strict=False)(scope['overloading'])
-        return generic
+        return overloaded(
+            generic, lambda *types: getattr(types[position].instance_class, generic.__name__)
+        )
 
     return decorate
+
+
+def of_numbers(function: Function, /) -> Function:
+    """Compile a helper for single numbers; what it does to vector registers stands in `simd`."""
+
+    def choose(*types: Any) -> Any:
+        return function if all(isinstance(kind, NUMBERS) for kind in types) else None
+
+    return overloaded(function, choose)
+
+
+def overloaded(function: Function, choose: Callable[..., Any], /) -> Function:
+    """Let numba compile in place of a function what is chosen for the types of its arguments."""
+    if JITTED:
+        # not strict: numba would take an argument with an annotation for another one
+        options: Any = {'forceinline': True, **OPTIONS}
+        overload(function, jit_options=options, strict=False)(
+            lambda *types: choose(*types)  # noqa: PLW0108  numba looks at its code
+        )
+    return function

@@ -53,19 +53,31 @@ def fill_step(
     tableau: Tableau,
     stages: np.ndarray,
     trial: np.ndarray,
-    known: int = 0,
 ) -> None:
-    """Advance x (n,) in place by one step of `step` s.
+    """Advance x (n,) in place by one step of `step` s; `stages` (s, n), `trial` (n,): workspace."""
+    count = tableau.b.shape[0]
+    fill_stages(system, x, step, tableau, stages, trial, count)
+    fill_sum(x, x, step, tableau.b, stages, count)
 
-    `stages` (s, n) and `trial` (n,) are workspace, of which the first `known` stages are there
-    already; the time of a stage is the system's business, which knows its inputs on the grid
+
+@helper
+def fill_stages(
+    system: Any,
+    x: np.ndarray,
+    step: float,
+    tableau: Tableau,
+    stages: np.ndarray,
+    trial: np.ndarray,
+    count: int,
+) -> None:
+    """Write x_dot at the first `count` stages of a step from x into `stages`.
+
+    The time of a stage is the system's business, which knows its inputs on the grid
     (k + c) * step, so that no time is ever accumulated.
     """
-    count = tableau.b.shape[0]
-    for s in range(known, count):
+    for s in range(count):
         fill_sum(trial, x, step, tableau.A[s], stages, s)
         fill_rate(system, s, trial, stages[s])
-    fill_sum(x, x, step, tableau.b, stages, count)
 
 
 @helper

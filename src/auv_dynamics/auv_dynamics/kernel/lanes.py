@@ -1,43 +1,34 @@
-"""Several vehicles at once: arrays whose last axis is the vehicles, and choices without branches.
+"""Several vehicles at once: batches of arrays, their lanes, and choices without branches.
 
 The mathematics is written for one vehicle, whose coefficients and state are arrays of floats. A
-batch runs the same source on *lanes*: arrays (n, W) of W vehicles, an element of which is W numbers
-that are added and multiplied together. Compiled, those are the numbers in one vector register, see
-`simd`; without numba they are NumPy arrays, and W is the size of the batch.
+batch has a leading axis of the vehicles on each of them. It is run in *blocks*: of one vehicle, or,
+where `simd` is there, of as many as a vector register holds. Those are *lanes*: arrays (n, W), an
+element of which is W numbers that are added and multiplied together.
 
 What the vehicles may decide differently cannot be an `if`: it is a `select`.
 """
 
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from auv_dynamics.kernel.compile import JITTED, helper
+from auv_dynamics.kernel.compile import JITTED, helper, of_numbers, overloaded
 
 Number = Any  # a float, or that of each of several vehicles: a lane
 ALIGNMENT = 64  # bytes of a cache line
 
 
-def _register() -> int:
-    """How many float64 a vector register of this machine holds, at least four."""
-    if JITTED:
-        from llvmlite.binding import get_host_cpu_features
-
-        return 8 if get_host_cpu_features().get('avx512f') else 4
-    return 4
-
-
-LANES = _register()
-
-
+@of_numbers
 def select(condition: Any, a: Number, b: Number) -> Number:
     """`a` where the condition holds, else `b`."""
-    return np.where(condition, a, b) if isinstance(condition, np.ndarray) else a if condition else b
+    return a if condition else b
 
 
+@of_numbers
 def anywhere(condition: Any) -> bool:
     """Whether a condition holds for any of the vehicles."""
-    return bool(np.any(condition))
+    return bool(condition)
 
 
 @helper
@@ -46,9 +37,18 @@ def clip(x: Number, low: Number, high: Number) -> Number:
     return select(x < low, low, select(x > high, high, x))
 
 
+@of_numbers
 def sqrt(x: Number) -> Number:
     """Square root."""
     return np.sqrt(x)
+
+
+def align_stack(lanes: int | None) -> None:
+    """Let a kernel put the lanes that find no register at the borders of cache lines.
+
+    Else it depends on the caller's depth whether they straddle them, and on that a fifth of the
+    time.
+    """
 
 
 def uncounted(value: Any) -> Any:
@@ -59,67 +59,58 @@ def uncounted(value: Any) -> Any:
     return value
 
 
-def align_stack() -> None:
-    """Let a kernel put the lanes that find no register at the borders of cache lines.
-
-    Else it depends on the caller's depth whether they straddle them, and on that a fifth of the
-    time.
-    """
-
-
-def of_block(value: Any, b: int) -> Any:
-    """Lanes of one block of a batch.
+def of_block(value: Any, b: int, lanes: int | None) -> Any:
+    """One block of a batch, uncounted.
 
     Parameters
     ----------
-    value : array (blocks, ..., W), or a named tuple of such arrays and of numbers; a named tuple
-        whose class says `SHARED` belongs to all vehicles and is given as it is
+    value : array (blocks, ...) or (blocks, ..., W), or a named tuple of such arrays and of numbers
     b : index of the block; an array of one block is that of all
+    lanes : W; None: a block is one vehicle
 
     Returns
     -------
-    value : the same with arrays (..., W)
+    value : the same with arrays (...), of floats or of lanes
 
     """
-    if getattr(value, 'SHARED', False):
-        return value
-    if isinstance(value, np.ndarray):
-        return value[b if len(value) > 1 else 0]
-    if isinstance(value, tuple):
-        return type(value)(*(of_block(part, b) for part in value))
-    return value
+    return mapped(lambda array: array[b if len(array) > 1 else 0], value)
 
 
-def width(batch: int) -> int:
-    """Number of lanes W of a batch of so many vehicles."""
-    return LANES if JITTED else max(batch, 1)
-
-
-def packed(values: np.ndarray, lanes: int) -> np.ndarray:
-    """Lanes of the values of a batch.
+def packed(values: np.ndarray, lanes: int | None) -> np.ndarray:
+    """Blocks of the values of a batch.
 
     Parameters
     ----------
     values : (B, ...) a row per vehicle; B = 1: the same for all
-    lanes : W
+    lanes : W; None: a block is one vehicle
 
     Returns
     -------
-    blocks : (blocks, ..., W), the last block filled up with its last vehicle; blocks = 1 for B = 1
+    blocks : (blocks, ..., W), the last block filled up with its last vehicle, or (B, ...), a copy;
+        blocks = 1 for B = 1
 
     """
     values = np.asarray(values, float)
-    count = -(-len(values) // lanes)
+    if lanes is None:
+        return np.array(values, order='C')
+    count = block_count(len(values), lanes)
     rows = np.minimum(np.arange(count * lanes), len(values) - 1)
     blocks = empty((count, *values.shape[1:], lanes))
     blocks[...] = np.moveaxis(values[rows].reshape(count, lanes, *values.shape[1:]), 1, -1)
     return blocks
 
 
-def unpacked(blocks: np.ndarray, count: int) -> np.ndarray:
-    """Values (B, ...) of the first `count` vehicles of blocks (blocks, ..., W)."""
+def unpacked(blocks: np.ndarray, count: int, lanes: int | None) -> np.ndarray:
+    """Values (B, ...) of the first `count` vehicles of blocks."""
+    if lanes is None:
+        return blocks[:count].copy()
     rows = np.moveaxis(blocks, -1, 1)
     return rows.reshape(rows.shape[0] * rows.shape[1], *rows.shape[2:])[:count].copy()
+
+
+def block_count(count: int, lanes: int | None) -> int:
+    """Number of blocks of so many vehicles."""
+    return -(-count // (lanes or 1))
 
 
 def empty(shape: tuple[int, ...]) -> np.ndarray:
@@ -130,7 +121,113 @@ def empty(shape: tuple[int, ...]) -> np.ndarray:
     return memory[start : start + size].view(float).reshape(shape)
 
 
+def mapped(function: Callable[[np.ndarray], Any], value: Any) -> Any:
+    """A tree of named tuples of arrays, with what a function makes of each array."""
+    if isinstance(value, np.ndarray):
+        return function(value)
+    if isinstance(value, tuple):
+        return type(value)(*(mapped(function, part) for part in value))
+    return value
+
+
+def arrays(value: Any) -> Iterator[np.ndarray]:
+    """Every array of such a tree, in the order of the fields."""
+    if isinstance(value, np.ndarray):
+        yield value
+    elif isinstance(value, tuple):
+        for part in value:
+            yield from arrays(part)
+
+
+def with_batch_axis(value: Any, axes: int = 0) -> Any:
+    """With a leading axis of 1 on every array, or on those that have less than so many axes."""
+    return mapped(lambda array: array if 0 < axes <= array.ndim else array[None], value)
+
+
+def take_rows(value: Any, rows: np.ndarray | slice) -> Any:
+    """Rows that a mask or slice takes of arrays (B, ...); arrays (1, ...) are those of all rows."""
+    return mapped(lambda array: array if len(array) == 1 else array[rows], value)
+
+
+def joined(values: Sequence[Any], counts: Sequence[int]) -> Any:
+    """Rows of several, each of as many rows as `counts` says or of one that stands for all."""
+    first = values[0]
+    if isinstance(first, np.ndarray):
+        pairs = zip(values, counts, strict=True)
+        return np.concatenate([np.broadcast_to(v, (n, *v.shape[1:])) for v, n in pairs])
+    if isinstance(first, tuple):
+        return type(first)(*(joined(parts, counts) for parts in zip(*values, strict=True)))
+    return first
+
+
 if JITTED:
-    # both give the functions above their compiled form
-    import auv_dynamics.kernel.simd
-    import auv_dynamics.kernel.simd_memory  # noqa: F401
+    from numba import types
+    from numba.core import cgutils
+    from numba.extending import intrinsic
+    from numba.np.arrayobj import make_array, populate_array
+
+    def viewed(value: Any, lost: int, dtype: Any) -> Any:
+        """Numba's type of a tree of arrays that lose so many axes; dtype None: their own."""
+        if isinstance(value, types.Array):
+            return types.Array(
+                dtype or value.dtype, value.ndim - lost, value.layout, aligned=dtype is None
+            )
+        if isinstance(value, types.BaseNamedTuple):
+            parts = [viewed(part, lost, dtype) for part in value]
+            return types.BaseTuple.from_types(parts, value.instance_class)
+        return value
+
+    def view(context: Any, builder: Any, kinds: Any, value: Any, b: Any) -> Any:
+        """LLVM value of a tree of type kinds[0] as kinds[1], without counts; b: block or None."""
+        before, after = kinds
+        if isinstance(before, types.BaseNamedTuple):
+            parts = zip(zip(before, after, strict=True), range(len(before)), strict=True)
+            inner = [
+                view(context, builder, pair, builder.extract_value(value, i), b)
+                for pair, i in parts
+            ]
+            return context.make_tuple(builder, after, inner)
+        if not isinstance(before, types.Array):
+            return value
+        array, seen = (
+            make_array(before)(context, builder, value),
+            make_array(after)(context, builder),
+        )
+        shape = cgutils.unpack_tuple(builder, array.shape)
+        strides = cgutils.unpack_tuple(builder, array.strides)
+        data, first = array.data, 0
+        if b is not None:
+            single = builder.icmp_signed('<=', shape[0], shape[0].type(1))
+            offset = builder.mul(builder.select(single, b.type(0), b), strides[0])
+            data, first = cgutils.pointer_add(builder, data, offset, seen.data.type), 1
+        last = first + after.ndim
+        size = context.get_constant(
+            types.intp, context.get_abi_sizeof(context.get_data_type(after.dtype))
+        )
+        populate_array(seen, data, shape[first:last], strides[first:last], size, meminfo=None)
+        return seen._getvalue()  # noqa: SLF001  numba's own way
+
+    @intrinsic
+    def _uncounted(typingctx: Any, value: Any) -> Any:
+        result = viewed(value, 0, None)
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return view(context, builder, (value, result), arguments[0], None)
+
+        return result(value), generate
+
+    @intrinsic
+    def _of_block(typingctx: Any, value: Any, b: Any) -> Any:
+        result = viewed(value, 1, None)
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return view(context, builder, (value, result), *arguments)
+
+        return result(value, types.intp), generate
+
+    def _alone(function: Any) -> Callable[..., Any]:
+        return lambda *given: function if isinstance(given[-1], types.NoneType) else None
+
+    overloaded(uncounted, lambda _: lambda value: _uncounted(value))  # noqa: PLW0108  numba's way
+    overloaded(of_block, _alone(lambda value, b, lanes: _of_block(value, b)))
+    overloaded(align_stack, _alone(lambda lanes: None))

@@ -1,29 +1,30 @@
-"""Lanes as numba compiles them: a number of four vehicles is one value in a vector register.
+"""Lanes as numba compiles them: a number of several vehicles is one value in a vector register.
 
 `Lane` is that value, `Choice` a comparison of two. An array of lanes is a numba array with `Lane`
-as its element, so that indexing, slicing and assignment are numba's own. What numba does not
-offer in its public interface stands here and, as far as memory is concerned, in `simd_memory`.
+as its element, so that indexing, slicing and assignment are numba's own. What numba does not offer
+in its public interface stands here. The module is optional: without it, as without numba, every
+vehicle is computed alone.
 """
 
-import math
 import operator
+from collections.abc import Callable
 from typing import Any
 
+from auv_dynamics.kernel import lanes
+from auv_dynamics.kernel.compile import JITTED, overloaded
+
+if not JITTED:
+    raise ImportError('nothing is compiled')
+
 from llvmlite import ir
+from llvmlite.binding import get_host_cpu_features
 from numba import types
 from numba.core.typeconv.castgraph import Conversion
-from numba.extending import (
-    intrinsic,
-    lower_cast,
-    models,
-    overload,
-    register_model,
-)
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
-from auv_dynamics.kernel import lanes
-from auv_dynamics.kernel.lanes import LANES
-
-CONTRACT = ('contract',)  # as in jit.OPTIONS: a product may be fused with the sum that follows
+LANES = 8 if get_host_cpu_features().get('avx512f') else 4  # float64 in a vector register
+CONTRACT = ('contract',)  # as in compile.OPTIONS: a product may be fused with the sum that follows
 REGISTER = ir.VectorType(ir.DoubleType(), LANES)
 CHOICES = ir.VectorType(ir.IntType(1), LANES)
 INDEX = ir.IntType(32)
@@ -62,82 +63,37 @@ class _ChoiceModel(models.PrimitiveModel):
         super().__init__(dmm, fe_type, CHOICES)
 
 
-def _lifted(context: Any, builder: Any, value: Any, kind: Any) -> Any:
-    """The LLVM value of an operand in all lanes."""
-    if kind == Lane:
-        return value
-    number = context.cast(builder, value, kind, types.float64)
+@lower_cast(types.Float, LaneType)
+@lower_cast(types.Integer, LaneType)
+def _cast(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
+    number = context.cast(builder, value, fromty, types.float64)
     one = builder.insert_element(ir.Constant(REGISTER, ir.Undefined), number, INDEX(0))
     every = ir.Constant(ir.VectorType(INDEX, LANES), [0] * LANES)
     return builder.shuffle_vector(one, ir.Constant(REGISTER, ir.Undefined), every)
 
 
-@lower_cast(types.Float, LaneType)
-@lower_cast(types.Integer, LaneType)
-def _cast(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
-    return _lifted(context, builder, value, fromty)
+def _lower(function: Any, result: Any, expected: tuple[Any, ...], emit: Callable[..., Any]) -> None:
+    """Let a function of these arguments, numbers among them cast to lanes, be an instruction."""
+
+    def fits(kind: Any, wanted: Any) -> bool:
+        return kind == wanted or (wanted == Lane and isinstance(kind, types.Float | types.Integer))
+
+    @infer_global(function)
+    class _Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            has_lanes = Lane in args or Choice in args
+            if has_lanes and len(args) == len(expected) and all(map(fits, args, expected)):
+                return signature(result, *expected)
+            return None
+
+    @lower_builtin(function, *expected)
+    def _generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return emit(builder, *args)
 
 
-def _are_numbers(*kinds: Any) -> bool:
-    numbers = (LaneType, types.Float, types.Integer)
-    return Lane in kinds and all(isinstance(kind, numbers) for kind in kinds)
+def _intrinsic(name: str) -> Callable[..., Any]:
+    """The LLVM intrinsic function of this name, of lanes."""
 
-
-def _binary(operation: Any, result: Any, emit: Any) -> None:
-    @intrinsic
-    def of_lanes(typingctx, a, b):
-        def generate(context, builder, signature, arguments):
-            pairs = zip(arguments, signature.args, strict=True)
-            return emit(builder, *(_lifted(context, builder, *pair) for pair in pairs))
-
-        return result(a, b), generate
-
-    @overload(operation)
-    def implementation(a, b):
-        if _are_numbers(a, b):
-            return lambda a, b: of_lanes(a, b)
-        return None
-
-
-for _name, _operations in {
-    'fadd': (operator.add, operator.iadd),
-    'fsub': (operator.sub, operator.isub),
-    'fmul': (operator.mul, operator.imul),
-    'fdiv': (operator.truediv, operator.itruediv),
-}.items():
-    for _operation in _operations:
-        _binary(
-            _operation,
-            Lane,
-            lambda builder, a, b, name=_name: getattr(builder, name)(a, b, flags=CONTRACT),
-        )
-for _operation, _sign in (
-    (operator.lt, '<'),
-    (operator.le, '<='),
-    (operator.gt, '>'),
-    (operator.ge, '>='),
-    (operator.eq, '=='),
-):
-    _binary(_operation, Choice, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
-_binary(operator.ne, Choice, lambda builder, a, b: builder.fcmp_unordered('!=', a, b))
-
-
-def _unary(function: Any, kind: Any, result: Any, emit: Any) -> None:
-    @intrinsic
-    def of_lanes(typingctx, a):
-        def generate(context, builder, signature, arguments):
-            return emit(builder, arguments[0])
-
-        return result(a), generate
-
-    @overload(function)
-    def implementation(a):
-        if a == kind:
-            return lambda a: of_lanes(a)
-        return None
-
-
-def _call(name: str) -> Any:
     def emit(builder: Any, value: Any) -> Any:
         full = f'llvm.{name}.v{LANES}f64'
         kind = ir.FunctionType(REGISTER, [REGISTER])
@@ -152,33 +108,65 @@ def _any(builder: Any, value: Any) -> Any:
     return builder.icmp_unsigned('!=', builder.bitcast(value, bits), bits(0))
 
 
-_unary(operator.neg, Lane, Lane, lambda builder, a: builder.fneg(a))
-_unary(abs, Lane, Lane, _call('fabs'))
-_unary(lanes.sqrt, Lane, Lane, _call('sqrt'))
-_unary(lanes.anywhere, Choice, types.boolean, _any)
-
-
-@overload(lanes.sqrt)
-def _sqrt(x):
-    return (lambda x: math.sqrt(x)) if isinstance(x, types.Float) else None
-
-
-@overload(lanes.anywhere)
-def _anywhere(condition):
-    return (lambda condition: condition) if isinstance(condition, types.Boolean) else None
+for _name, _operations in {
+    'fadd': (operator.add, operator.iadd),
+    'fsub': (operator.sub, operator.isub),
+    'fmul': (operator.mul, operator.imul),
+    'fdiv': (operator.truediv, operator.itruediv),
+}.items():
+    for _operation in _operations:
+        _lower(
+            _operation, Lane, (Lane, Lane),
+            lambda builder, a, b, name=_name: getattr(builder, name)(a, b, flags=CONTRACT),
+        )  # fmt: skip
+for _operation, _sign in (
+    (operator.lt, '<'),
+    (operator.le, '<='),
+    (operator.gt, '>'),
+    (operator.ge, '>='),
+    (operator.eq, '=='),
+):
+    _lower(
+        _operation, Choice, (Lane, Lane),
+        lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b),
+    )  # fmt: skip
+_lower(operator.ne, Choice, (Lane, Lane), lambda builder, a, b: builder.fcmp_unordered('!=', a, b))
+_lower(operator.neg, Lane, (Lane,), lambda builder, a: builder.fneg(a))
+_lower(abs, Lane, (Lane,), _intrinsic('fabs'))
+_lower(lanes.sqrt, Lane, (Lane,), _intrinsic('sqrt'))
+_lower(lanes.anywhere, types.boolean, (Choice,), _any)
+_lower(lanes.select, Lane, (Choice, Lane, Lane), lambda builder, c, a, b: builder.select(c, a, b))
 
 
 @intrinsic
-def _select(typingctx, condition, a, b):
+def _lanes_of(typingctx, value, b):
+    """Lanes (...,) of one block of arrays (blocks, ..., LANES)."""
+    result = lanes.viewed(value, 2, Lane)
+
     def generate(context, builder, signature, arguments):
-        pairs = zip(arguments[1:], signature.args[1:], strict=True)
-        return builder.select(arguments[0], *(_lifted(context, builder, *pair) for pair in pairs))
+        return lanes.view(context, builder, (value, result), *arguments)
 
-    return Lane(condition, a, b), generate
+    return result(value, types.intp), generate
 
 
-@overload(lanes.select)
-def _select_of(condition, a, b):
-    if condition == Choice:
-        return lambda condition, a, b: _select(condition, a, b)
-    return lambda condition, a, b: a if condition else b
+@intrinsic
+def _align_stack(typingctx):
+    """A place on the stack that must be aligned: LLVM then also aligns what it spills."""
+
+    def generate(context, builder, signature, arguments):
+        with builder.goto_entry_block():
+            place = builder.alloca(REGISTER)
+            place.align = lanes.ALIGNMENT
+            kind = ir.FunctionType(ir.VoidType(), [place.type])
+            builder.asm(kind, '', 'r', [place], side_effect=True)  # no code, but it is used
+        return context.get_dummy_value()
+
+    return types.none(), generate
+
+
+def _together(function: Any) -> Callable[..., Any]:
+    return lambda *given: function if isinstance(given[-1], types.Integer) else None
+
+
+overloaded(lanes.of_block, _together(lambda value, b, lanes: _lanes_of(value, b)))
+overloaded(lanes.align_stack, _together(lambda lanes: _align_stack()))

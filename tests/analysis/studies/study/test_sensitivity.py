@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.simulation import batch
-from auv_analysis.simulation.kernels import kernels
+from auv_analysis.simulation.batch import kernels
 from auv_analysis.simulation.reduction import COLUMNS
 from auv_analysis.studies.study import sensitivity as module
 from auv_analysis.studies.study.procedure import (

@@ -13,8 +13,7 @@ import numpy as np
 from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.batch import kernel_of
-from auv_analysis.simulation.kernels import IN_PYTHON
+from auv_analysis.simulation.batch import IN_PYTHON, kernel_of
 from auv_analysis.simulation.rollouts import batch_of, rollouts
 from auv_analysis.simulation.variants import packed_variants
 from auv_analysis.studies.study.indices import Design, Method, spreads

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from auv_analysis.simulation.fleet import fleet, matrices, numbers
+from auv_analysis.simulation.variants import fleet, matrices, numbers
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.laws.decomposition import decompose

@@ -37,7 +37,7 @@ from auv_dynamics.plant.actuators import memory
 from auv_dynamics.plant.faulty_devices import history_shape
 from auv_dynamics.plant.plant import SIZE
 from auv_gvc_controller.control.sampled import user_law
-from auv_gvc_controller.laws import SHIPPED
+from auv_gvc_controller.laws.law import SHIPPED
 
 Known = Callable[[np.ndarray], Tables]  # stage times t (T, s) of the next block -> its tables
 SHARED_STEPS = 128  # steps that are tabulated at once where all vehicles share the tables

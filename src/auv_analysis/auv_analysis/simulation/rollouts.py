@@ -12,14 +12,13 @@ from auv_analysis.scenario.changes import changed_scenario, check_paths
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import Batch, Known, run_batch
 from auv_analysis.simulation.closed_loop import Tables
-from auv_analysis.simulation.columns import in_columns
 from auv_analysis.simulation.reduction import COLUMNS, columns
 from auv_analysis.simulation.simulate import (
     check_hold,
     reference,
     tables,
 )
-from auv_analysis.simulation.variants import Variants, merged, packed_variants
+from auv_analysis.simulation.variants import Variants, in_columns, merged, packed_variants
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.fault_rows import FaultRows
 from auv_dynamics.plant.sensors import SensorNoise

@@ -1,4 +1,9 @@
-"""Many closed loops that differ in numbers of one scenario, packed as arrays for a batch."""
+"""Many closed loops that differ in numbers of one scenario, packed as arrays for a batch.
+
+Gains, the vehicle's numbers, relative model errors, set-points and initial states are packed as
+columns of numbers; any other value makes a scenario of its own, checked like a file. Both ways give
+the same numbers, and what a column cannot vouch for goes the long way.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -6,25 +11,113 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.scenario.changes import split
+from auv_analysis.scenario.changes import bounds, split
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.closed_loop import Loop
-from auv_analysis.simulation.columns import RELATIVE, TERM, within
-from auv_analysis.simulation.fleet import (
-    Keys,
-    fleet,
-    matrices,
-    numbers,
-)
 from auv_analysis.simulation.simulate import loop_of
+from auv_dynamics.files.yaml_files import LARGEST
 from auv_dynamics.kernel.lanes import arrays, joined, take_rows, with_batch_axis
 from auv_dynamics.plant.plant import initial_state
 from auv_dynamics.plant.signals import Harmonics
 from auv_dynamics.plant.uncertainty import Truth, with_errors
 from auv_dynamics.vehicle import DOFS
-from auv_dynamics.vehicle.vehicle import Vehicle, row_major
-from auv_dynamics.vehicle.vehicle_file import is_definite
+from auv_dynamics.vehicle.vehicle import Vehicle, rigid_body_matrix, row_major
+from auv_dynamics.vehicle.vehicle_file import (
+    is_definite,
+    is_semidefinite,
+    is_symmetric,
+    principal_moments,
+    satisfies_triangle,
+)
+from auv_gvc_controller.laws.law import SHIPPED
 from auv_gvc_controller.laws.model import control_model
+
+Keys = tuple[str | int, ...]  # place of a value in a file, such as ('damping', 'linear', 0)
+RELATIVE = ('mass', 'added_mass', 'damping', 'buoyancy')  # errors of a plant
+NUMERIC = (
+    'rigid_body', 'inertia_matrix', 'hydrostatics', 'added_mass', 'damping', 'lift', 'environment',
+)  # fmt: skip
+TERM = ('amplitude', 'omega', 'phase')
+SHAPES = ((6,), (6, 6))  # of what stands for a matrix, beside a number where that may stand
+
+
+def in_columns(scenario: Scenario, controller: str, path: str, values: np.ndarray) -> bool:
+    """Whether values of this path are packed as a column.
+
+    Parameters
+    ----------
+    scenario, controller : that are changed
+    path : of `changes`
+    values : (B, ...) that stand there
+
+    """
+    if values.dtype.kind not in 'iuf' or path == 'vehicle':
+        return False
+    keys = split(path)
+    head, rest = keys[0], keys[1:]
+    if head == 'controllers':
+        return rest[0] == controller and _gain_fits(scenario, controller, rest[1:], values)
+    if head == 'vehicle':
+        return _vehicle_fits(scenario, rest, values)
+    if head == 'disturbance':
+        apart = scenario.vehicle.M_RB is not None
+        return apart and len(rest) == 2 and rest[1] in RELATIVE and values.ndim == 1
+    if head == 'setpoint':
+        return values.ndim == 1 and _setpoint_fits(scenario.data['setpoint'], rest)
+    return head == 'seed' or (head == 'initial' and _fits(scenario.data, keys, values, ()))
+
+
+def _setpoint_fits(spec: Mapping[str, Any], keys: Keys) -> bool:
+    """A number of a degree of freedom that has a set-point, of a term that there is."""
+    entry = spec.get(str(keys[0]))
+    if 'file' in spec or entry is None:
+        return False
+    match keys[1:]:
+        case ('offset',):
+            return True
+        case ('terms', int(j), name):
+            return j < len(entry.get('terms', [])) and name in TERM
+    return False
+
+
+def _gain_fits(scenario: Scenario, controller: str, keys: Keys, values: np.ndarray) -> bool:
+    entry = scenario.data['controllers'][controller]
+    known = keys and keys[0] in entry and keys[0] not in ('law', 'anti_windup')
+    return bool(known and entry['law'] in SHIPPED and _fits(entry, keys, values, (*SHAPES, ())))
+
+
+def _vehicle_fits(scenario: Scenario, keys: Keys, values: np.ndarray) -> bool:
+    """Not where more than M, D and g depends on the vehicle, nor for what is no number."""
+    thrusters = scenario.data.get('actuators', {}).get('thrusters', False)
+    currents = any(spec['kind'] == 'current' for spec in scenario.data['disturbance'])
+    numeric = keys[0] in NUMERIC
+    return (
+        numeric
+        and not (thrusters or currents)
+        and _fits(scenario.vehicle_data, keys, values, SHAPES)
+    )
+
+
+def _fits(data: Any, keys: Keys, values: np.ndarray, shapes: Sequence[tuple[int, ...]]) -> bool:
+    """Whether values stand where numbers stood, in the same shape or another one that may."""
+    try:
+        for key in keys:
+            data = data[key]
+        there = np.shape(np.asarray(data, float))
+    except (KeyError, IndexError, TypeError, ValueError):
+        return False
+    shape = values.shape[1:]
+    return shape == there or (shape in shapes and there in shapes)
+
+
+def within(scenario: Scenario, path: str, values: np.ndarray) -> np.ndarray:
+    """(B,) whether each value of a column is one that the schema takes."""
+    allowed = bounds(scenario, path)
+    if allowed is None:
+        return np.zeros(len(values), bool)
+    flat = np.reshape(values, (len(values), -1)).astype(float)
+    inside = (flat > allowed[0]) & (flat < allowed[1]) & (np.abs(flat) < LARGEST)
+    return inside.all(axis=1)
 
 
 @dataclass(frozen=True)
@@ -250,3 +343,104 @@ def _initial(
         for name, of in zip(('eta', 'nu'), scenario.initial, strict=True)
     )
     return np.hstack([initial_state(eta, nu), np.zeros((count, states))])
+
+
+def numbers(data: Any, columns: Mapping[Keys, np.ndarray], at: Keys, count: int) -> np.ndarray:
+    """The number, list or matrix at a place of a file, for each of many files.
+
+    Parameters
+    ----------
+    data : what stands there in the file that all of them are changed from
+    columns : place -> (count, ...) values that are put there
+    at : its keys
+    count : of the files
+
+    Returns
+    -------
+    values : (count, ...), or (1, ...) where nothing there is changed
+
+    """
+    values = np.asarray(data, float)[None]
+    inside = sorted((keys for keys in columns if keys[: len(at)] == at), key=len)
+    for keys in inside:
+        index: tuple[Any, ...] = keys[len(at) :]
+        if not index:
+            values = np.array(columns[keys], float)
+            continue
+        if len(values) != count:
+            values = np.repeat(values, count, axis=0)
+        values[(slice(None), *index)] = columns[keys]
+    return values
+
+
+def matrices(values: np.ndarray) -> np.ndarray:
+    """Matrices (B, 6, 6) of scalars (B,) times identity, diagonals (B, 6) or (B, 6, 6)."""
+    if values.ndim == 3:
+        return values
+    rows = values[:, None] if values.ndim == 1 else values
+    return np.broadcast_to(rows, (len(rows), 6))[:, :, None] * np.eye(6)
+
+
+def fleet(
+    data: dict[str, Any], columns: Mapping[Keys, np.ndarray], vehicle: Vehicle, count: int
+) -> tuple[Vehicle, np.ndarray]:
+    """Vehicles of one file with columns of numbers in the place of its own.
+
+    Parameters
+    ----------
+    data : contents of a checked vehicle file
+    columns : place in it, such as ('damping', 'linear', 0) -> (count, ...) finite numbers
+    vehicle : of `data`
+    count : of the vehicles
+
+    Returns
+    -------
+    fleet : Vehicle whose M, D, forces and centres have a leading axis of `count`
+    good : (count,) whether the file would be accepted
+
+    """
+
+    def of(*at: str) -> np.ndarray:
+        found: Any = data
+        for key in at:
+            found = found[key]
+        return np.broadcast_to(
+            given := numbers(found, columns, at, count), (count, *given.shape[1:])
+        )
+
+    sign = -1.0 if data.get('sign') == 'sname' else 1.0
+    mass, r_G = of('rigid_body', 'mass'), of('rigid_body', 'center_of_gravity')
+    good = np.ones(count, bool)
+    M_RB = M_A = None
+    if 'inertia_matrix' in data:
+        M = of('inertia_matrix')
+        good &= is_symmetric(M)
+        M = _symmetric(M)
+    else:
+        inertia, reference = of('rigid_body', 'inertia'), data['rigid_body']['inertia_reference']
+        added = sign * matrices(of('added_mass'))
+        good &= is_symmetric(inertia) & is_symmetric(added)
+        inertia, M_A = _symmetric(inertia), _symmetric(added)
+        moments = principal_moments(mass, r_G, inertia, reference)
+        good &= (moments[:, 0] > 0) & satisfies_triangle(moments) & is_semidefinite(M_A)
+        M_RB = rigid_body_matrix(mass, r_G, inertia, reference)
+        M = M_RB + M_A
+    linear = sign * matrices(of('damping', 'linear'))
+    gravity = of('environment', 'gravity')
+    result = vehicle.changed(
+        M=M,
+        D_linear=linear,
+        D_quadratic=sign * matrices(of('damping', 'quadratic')),
+        lift=sign * matrices(of('lift')) if 'lift' in data else None,
+        weight=mass * gravity,
+        buoyancy=of('environment', 'water_density') * gravity * of('hydrostatics', 'volume'),
+        r_G=r_G,
+        r_B=of('hydrostatics', 'center_of_buoyancy'),
+        M_RB=M_RB,
+        M_A=M_A,
+    )
+    return result, good & is_definite(M) & is_semidefinite(_symmetric(linear))
+
+
+def _symmetric(A: np.ndarray) -> np.ndarray:
+    return (A + np.swapaxes(A, -2, -1)) / 2

@@ -178,7 +178,7 @@ def check_algebra(module: Any) -> None:
     """Products of 6-vectors against numpy."""
     A, U = FULL, np.triu(FULL, 1) + np.eye(6)
     x, y = tuple(X), tuple(NU)
-    assert_allclose(plain(module.mul)(A.ravel(), x), A @ X, rtol=1e-12)
+    assert_allclose(plain(module.matvec)(A.ravel(), x), A @ X, rtol=1e-12)
     assert_allclose(plain(module.upper)(U.ravel(), x), U @ X, rtol=1e-12)
     assert_allclose(plain(module.upper_T)(U.ravel(), x), U.T @ X, rtol=1e-12)
     assert_allclose(plain(module.add)(x, y), X + NU)

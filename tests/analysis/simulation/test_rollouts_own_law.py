@@ -16,7 +16,7 @@ from auv_dynamics.kernel.compile import JITTED
 LAW = """
 from typing import NamedTuple
 import numpy as np
-from auv_dynamics.kernel.six import add, mul, sub, vector
+from auv_dynamics.kernel.six import add, matvec, sub, vector
 
 class PI(NamedTuple):
     k_P: np.ndarray
@@ -27,7 +27,7 @@ class PI(NamedTuple):
     def wrench(t: float, nu: tuple, attitude, nu_d, nu_d_dot, state, gains: 'PI', model) -> tuple:
         {before}
         error = sub(nu_d, nu)
-        return add(mul(gains.k_P, error), mul(gains.k_I, vector(state, 0))), (0.0,) * 6
+        return add(matvec(gains.k_P, error), matvec(gains.k_I, vector(state, 0))), (0.0,) * 6
 
     @staticmethod
     def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):

@@ -26,7 +26,7 @@ from auv_dynamics.kernel.lanes import (
     uncounted,
     unpacked,
 )
-from auv_dynamics.kernel.six import mul, vector
+from auv_dynamics.kernel.six import matvec, vector
 
 WIDE = LANES or 4
 SIZES = st.integers(min_value=1, max_value=3 * WIDE + 1)
@@ -74,7 +74,7 @@ def chosen(both, table, b, x, out, lanes):
     """All that lanes offer, on x (n,): used compiled and as it is."""
     own = of_block(both, b, lanes)
     t = uncounted(of_block(table, b, lanes)).t
-    product = mul(own.A, vector(x, 0))
+    product = matvec(own.A, vector(x, 0))
     for i in range(6):
         out[i] = select(x[i] > t[i], product[i], -x[i]) / 2.0 + abs(x[i]) * own.shared
     out[6] = clip(x[0], -1.0, 1.0)

@@ -8,11 +8,10 @@ where it is not.
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_analysis.metrics.coupling import input_deformation, velocity_deformation
 from auv_analysis.metrics.energy import component
 from auv_analysis.runs.run import Run, Windows
 from auv_dynamics.kernel import LANES
@@ -24,9 +23,9 @@ from auv_dynamics.kernel.six import (
     add_products,
     fill_vector,
     keep_largest,
-    mul,
     sub,
     upper,
+    upper_T,
     vector,
 )  # fmt: skip
 from auv_gvc_controller.laws.model import ControlModel
@@ -38,24 +37,24 @@ ERROR, LUMPED, TAU, DELTA_XI, DELTA_PI, ENERGY, SETPOINT = range(len(NAMES))
 class Maps(NamedTuple):
     """What leads from nu and tau to the signals: flat, row-major."""
 
+    Upsilon: np.ndarray
     Upsilon_inv: np.ndarray
     N: np.ndarray
-    to_delta_xi: np.ndarray
-    to_delta_pi: np.ndarray
 
 
 def maps_of(model: ControlModel) -> Maps:
     """Maps of a vehicle."""
-    Upsilon, Upsilon_inv = (m.reshape(6, 6) for m in (model.Upsilon, model.Upsilon_inv))
-    deformations = velocity_deformation(Upsilon_inv), input_deformation(Upsilon)
-    return Maps(model.Upsilon_inv, model.N, *(np.ravel(matrix) for matrix in deformations))
+    return Maps(model.Upsilon, model.Upsilon_inv, model.N)
 
 
 @helper
 def signals(
-    nu: Vector, nu_d: Vector, tau: Vector, f: Vector, F: Vector, maps: Maps
+    nu: Vector, nu_d: Vector, tau: Vector, f: Vector, F: Vector, maps: Any
 ) -> tuple[Vector, ...]:
-    """The signals of `NAMES`, six numbers each: m/s, rad/s; N, N m; J."""
+    """The signals of `NAMES`, six numbers each: m/s, rad/s; N, N m; J.
+
+    `maps` has the fields of `Maps`. Equations (30) for the energy, (33) and (34).
+    """
     xi, N = upper(maps.Upsilon_inv, nu), maps.N
     energy = (
         component(N[0], xi[0]), component(N[1], xi[1]), component(N[2], xi[2]),
@@ -65,8 +64,8 @@ def signals(
         sub(nu_d, nu),
         sub(f, F),
         tau,
-        mul(maps.to_delta_xi, nu),
-        mul(maps.to_delta_pi, tau),
+        sub(xi, nu),
+        sub(upper_T(maps.Upsilon, tau), tau),
         energy,
         nu_d,
     )

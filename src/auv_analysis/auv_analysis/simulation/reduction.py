@@ -4,6 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from auv_analysis.metrics.energy import shares
+from auv_analysis.metrics.moments import signals
 from auv_analysis.metrics.summary import TRANSIENT, has_settled
 from auv_analysis.simulation.records import Sample
 from auv_dynamics.files.yaml_files import LARGEST
@@ -14,11 +16,8 @@ from auv_dynamics.kernel.six import (
     Vector,
     add,
     add_products,
-    diag,
+    fill_vector,
     keep_largest,
-    sub,
-    upper,
-    upper_T,
     vector,
 )
 from auv_dynamics.vehicle import DOFS
@@ -33,7 +32,7 @@ class Figures(NamedTuple):
     late : index of the first sample after the transient
     Upsilon, Upsilon_inv, N : of the vehicle file's M, (4), (9)
     band : (6,) of a settled error, m/s and rad/s
-    energy : (6,) sum of N_i xi_i^2, (30)
+    energy : (6,) sum of 1/2 N_i xi_i^2, (30)
     error_squares, error_late : (6,) sum of squares and largest after the transient of nu_d - nu
     outside : (6,) index of the last sample outside the band, -1 where there is none
     w_squares, w_late : (6,) the same two of w = f - F
@@ -78,15 +77,16 @@ class Figures(NamedTuple):
     @staticmethod
     def fill_record(record: 'Figures', k: int, sample: Sample) -> None:
         """Add sample k."""
-        nu, tau = vector(sample.x, 7), sample.tau
-        xi = upper(record.Upsilon_inv, nu)
-        error, w = sub(sample.nu_d, nu), sub(sample.f, sample.F)
-        add_products(record.energy, diag(record.N, xi), xi)
+        nu = vector(sample.x, 7)
+        error, w, tau, delta_xi, delta_pi, energy, _ = signals(
+            nu, sample.nu_d, sample.tau, sample.f, sample.F, record
+        )
+        fill_vector(record.energy, 0, add(vector(record.energy, 0), energy))
         add_products(record.error_squares, error, error)
         add_products(record.w_squares, w, w)
         add_products(record.tau_squares, tau, tau)
-        keep_largest(record.delta_xi, sub(xi, nu))
-        keep_largest(record.delta_pi, sub(upper_T(record.Upsilon, tau), tau))
+        keep_largest(record.delta_xi, delta_xi)
+        keep_largest(record.delta_pi, delta_pi)
         keep_largest(record.tau, tau)
         if k >= record.late:
             keep_largest(record.error_late, error)
@@ -181,15 +181,13 @@ def columns(found: Figures, samples: int, step: float) -> dict[str, np.ndarray]:
     columns : name -> (B,); NaN where a run diverged or a figure does not exist
 
     """
-    energy = 0.5 * found.energy / samples
-    total = energy.sum(axis=1, keepdims=True)
-    shares = 100.0 * np.divide(energy, total, out=np.zeros_like(energy), where=total > 0)
+    energy = found.energy / samples
     late = samples > found.late
     inside = has_settled(found.outside, samples)
     settled = np.where(inside, (found.outside + 1) * step, np.nan)
     six = (
         energy,
-        shares,
+        shares(energy),
         np.sqrt(found.error_squares / samples),
         found.error_late if late else np.nan * found.error_late,
         settled,
@@ -202,7 +200,7 @@ def columns(found: Figures, samples: int, step: float) -> dict[str, np.ndarray]:
     )
     diverged = np.isfinite(found.diverged[:, 0])
     result = {'diverged_at': np.where(diverged, found.diverged[:, 0] * step, np.nan)}
-    result['kinetic_energy.mean'] = np.where(diverged, np.nan, total[:, 0])
+    result['kinetic_energy.mean'] = np.where(diverged, np.nan, energy.sum(axis=1))
     for name, values in zip(SIX, six, strict=True):
         for i, dof in enumerate(DOFS):
             result[f'{name}.{dof}'] = np.where(diverged, np.nan, values[:, i])

@@ -70,7 +70,7 @@ def clipped(a: Vector, limit: Vector) -> Six:
 
 
 @helper
-def diag(N: Vector, a: Vector) -> Six:
+def scale(N: Vector, a: Vector) -> Six:
     """N a with the diagonal N (6,)."""
     return (N[0] * a[0], N[1] * a[1], N[2] * a[2], N[3] * a[3], N[4] * a[4], N[5] * a[5])
 
@@ -88,7 +88,7 @@ def _row(A: np.ndarray, i: int, a: Vector) -> Number:
 
 
 @helper
-def mul(A: np.ndarray, a: Vector) -> Six:
+def matvec(A: np.ndarray, a: Vector) -> Six:
     """A a with the full matrix A (36,)."""
     return (
         _row(A, 0, a),

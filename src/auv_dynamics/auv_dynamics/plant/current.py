@@ -11,7 +11,7 @@ from auv_dynamics.kernel.six import (
     Six,
     Vector,
     add,
-    mul,
+    matvec,
 )
 from auv_dynamics.plant.signals import Harmonics
 from auv_dynamics.vehicle.model import Model, acceleration
@@ -93,7 +93,7 @@ def acceleration_in_current(
     a0, a1, a2 = to_body(attitude, (flow[3], flow[4], flow[5]))
     p, q, r = nu[3], nu[4], nu[5]
     nu_r = (nu[0] - c0, nu[1] - c1, nu[2] - c2, p, q, r)
-    carried = mul(M_RB, (a0, a1, a2, 0.0, 0.0, 0.0))
+    carried = matvec(M_RB, (a0, a1, a2, 0.0, 0.0, 0.0))
     b = acceleration(model, attitude, nu_r, tau, add(F, carried))
     return (
         b[0] + a0 - (q * c2 - r * c1),

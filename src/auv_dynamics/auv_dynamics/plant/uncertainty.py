@@ -14,7 +14,7 @@ from auv_dynamics.kernel.six import (
     Six,
     Vector,
     add,
-    mul,
+    matvec,
     sub,
     vector,
 )
@@ -217,7 +217,7 @@ def lumped(
     return sub(
         tau,
         add(
-            add(mul(known.M, nu_dot), coriolis(known.M, nu, nu)),
+            add(matvec(known.M, nu_dot), coriolis(known.M, nu, nu)),
             add(damping(known, nu, nu), restoring(known, attitude)),
         ),
     )

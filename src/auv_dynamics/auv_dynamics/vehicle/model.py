@@ -14,7 +14,7 @@ from auv_dynamics.kernel.six import (
     Six,
     Vector,
     add,
-    mul,
+    matvec,
 )
 
 
@@ -41,7 +41,7 @@ class Model(NamedTuple):
 @helper
 def coriolis(M: np.ndarray, nu: Vector, x: Vector) -> Six:
     """C(nu) x with Fossen's C = [[0, -S(a)], [-S(a), -S(b)]], (a, b) = M nu, below (8)."""
-    a0, a1, a2, b0, b1, b2 = mul(M, nu)
+    a0, a1, a2, b0, b1, b2 = matvec(M, nu)
     return (
         a2 * x[4] - a1 * x[5],
         a0 * x[5] - a2 * x[3],
@@ -63,8 +63,8 @@ def damping(model: Model, nu: Vector, x: Vector) -> Six:
         abs(nu[4]) * x[4],
         abs(nu[5]) * x[5],
     )
-    linear = mul(model.D_linear, x)
-    return _with_lift(model.lift, nu, x, add(linear, mul(model.D_quadratic, drag)))
+    linear = matvec(model.D_linear, x)
+    return _with_lift(model.lift, nu, x, add(linear, matvec(model.D_quadratic, drag)))
 
 
 @helper
@@ -73,7 +73,7 @@ def _with_lift(lift: np.ndarray | None, nu: Vector, x: Vector, rest: Six) -> Six
     if lift is None:
         return rest
     u = abs(nu[0])
-    return add(rest, mul(lift, (u * x[0], u * x[1], u * x[2], u * x[3], u * x[4], u * x[5])))
+    return add(rest, matvec(lift, (u * x[0], u * x[1], u * x[2], u * x[3], u * x[4], u * x[5])))
 
 
 @helper
@@ -105,7 +105,7 @@ def acceleration(model: Model, attitude: Vector, nu: Vector, tau: Vector, F: Vec
     c = coriolis(model.M, nu, nu)
     d = damping(model, nu, nu)
     g = restoring(model, attitude)
-    return mul(
+    return matvec(
         model.M_inv,
         (
             tau[0] - c[0] - d[0] - g[0] - F[0],

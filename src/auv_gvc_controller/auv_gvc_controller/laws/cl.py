@@ -8,7 +8,7 @@ from auv_dynamics.kernel.six import (
     Numbers,
     Vector,
     add,
-    mul,
+    matvec,
     sub,
     vector,
 )
@@ -35,17 +35,17 @@ class CL(NamedTuple):
         M = model.dynamics.M
         z, S = vector(state, 0), vector(state, 6)
         nu_err = sub(nu_d, nu)
-        nu_r = add(nu_d, mul(gains.Lambda, z))
-        nu_r_dot = add(nu_d_dot, mul(gains.Lambda, nu_err))
+        nu_r = add(nu_d, matvec(gains.Lambda, z))
+        nu_r_dot = add(nu_d_dot, matvec(gains.Lambda, nu_err))
         s = sub(nu_r, nu)
-        f = mul(gains.Gamma, S)
+        f = matvec(gains.Gamma, S)
 
         tau = add(  # (29)
             add(
-                add(mul(M, nu_r_dot), coriolis(M, nu, nu_r)),
+                add(matvec(M, nu_r_dot), coriolis(M, nu, nu_r)),
                 add(damping(model.dynamics, nu, nu_r), restoring(model.dynamics, attitude)),
             ),
-            add(add(mul(gains.k_D, s), mul(gains.k_I, z)), f),
+            add(add(matvec(gains.k_D, s), matvec(gains.k_I, z)), f),
         )
         return tau, f
 
@@ -56,4 +56,4 @@ class CL(NamedTuple):
     ) -> Vector:  # fmt: skip
         """Twelve rates: z_dot = nu_err, then s = nu_err + Lambda z, which f integrates."""
         nu_err = sub(nu_d, nu)
-        return nu_err + add(nu_err, mul(gains.Lambda, vector(state, 0)))
+        return nu_err + add(nu_err, matvec(gains.Lambda, vector(state, 0)))

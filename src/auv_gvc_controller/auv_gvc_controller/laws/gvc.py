@@ -8,8 +8,8 @@ from auv_dynamics.kernel.six import (
     Numbers,
     Vector,
     add,
-    diag,
-    mul,
+    matvec,
+    scale,
     sub,
     upper,
     upper_T,
@@ -45,15 +45,15 @@ class GVC(NamedTuple):
         z, S = vector(state, 0), vector(state, 6)
         nu_err = sub(nu_d, nu)  # (17)
 
-        nu_r = add(nu_d, mul(gains.Lambda, z))
+        nu_r = add(nu_d, matvec(gains.Lambda, z))
         xi_r = upper(U_inv, nu_r)  # (18)
         s_xi = sub(xi_r, upper(U_inv, nu))  # (19)
-        xi_r_dot = upper(U_inv, add(nu_d_dot, mul(gains.Lambda, nu_err)))  # (20)
-        f_xi = diag(N, mul(gains.Gamma, S))  # (21), integrated
+        xi_r_dot = upper(U_inv, add(nu_d_dot, matvec(gains.Lambda, nu_err)))  # (20)
+        f_xi = scale(N, matvec(gains.Gamma, S))  # (21), integrated
 
         pi = add(  # (16)
             add(
-                diag(N, xi_r_dot),  # N xi_r_dot
+                scale(N, xi_r_dot),  # N xi_r_dot
                 upper_T(
                     U,
                     add(
@@ -63,13 +63,13 @@ class GVC(NamedTuple):
                         ),
                         add(
                             restoring(model.dynamics, attitude),  # g_xi = U^T g, (12)
-                            mul(gains.k_I, z),  # U^T k_I z
+                            matvec(gains.k_I, z),  # U^T k_I z
                         ),
                     ),
                 ),
             ),
             add(
-                diag(N, mul(gains.k_D, s_xi)),  # N k_D s_xi
+                scale(N, matvec(gains.k_D, s_xi)),  # N k_D s_xi
                 f_xi,
             ),
         )
@@ -83,7 +83,7 @@ class GVC(NamedTuple):
         """Twelve rates: z_dot = nu_err (17), then s_xi (19), which (21) integrates."""
         nu_err = sub(nu_d, nu)
         z = vector(state, 0)
-        s_xi = upper(model.Upsilon_inv, add(nu_err, mul(gains.Lambda, z)))
+        s_xi = upper(model.Upsilon_inv, add(nu_err, matvec(gains.Lambda, z)))
         return nu_err + s_xi
 
     @staticmethod

@@ -8,7 +8,7 @@ from auv_dynamics.kernel.six import (
     Numbers,
     Vector,
     add,
-    mul,
+    matvec,
     sub,
     vector,
 )
@@ -41,14 +41,14 @@ class PID(NamedTuple):
         M = model.dynamics.M
         z, x = vector(state, 0), vector(state, 6)
         nu_err = sub(nu_d, nu)
-        d = mul(gains.omega_f, sub(nu_err, x))  # nu_err_dot behind the filter
+        d = matvec(gains.omega_f, sub(nu_err, x))  # nu_err_dot behind the filter
         feed_forward = add(
-            mul(M, nu_d_dot),
+            matvec(M, nu_d_dot),
             add(coriolis(M, nu_d, nu_d), damping(model.dynamics, nu_d, nu_d)),
         )
         tau = add(
-            add(restoring(model.dynamics, attitude), mul(gains.k_FF, feed_forward)),
-            add(mul(gains.k_P, nu_err), add(mul(gains.k_I, z), mul(gains.k_D, d))),
+            add(restoring(model.dynamics, attitude), matvec(gains.k_FF, feed_forward)),
+            add(matvec(gains.k_P, nu_err), add(matvec(gains.k_I, z), matvec(gains.k_D, d))),
         )
         return tau, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -59,7 +59,7 @@ class PID(NamedTuple):
     ) -> Vector:  # fmt: skip
         """Twelve rates: z_dot = nu_err, then x_dot = omega_f (nu_err - x)."""
         nu_err = sub(nu_d, nu)
-        return nu_err + mul(gains.omega_f, sub(nu_err, vector(state, 6)))
+        return nu_err + matvec(gains.omega_f, sub(nu_err, vector(state, 6)))
 
     @staticmethod
     def body_gains(gains: 'PID', model: ControlModel) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from auv_dynamics.kernel.six import (
     Six,
     Vector,
     add,
-    mul,
+    matvec,
     sub,
     vector,
 )
@@ -45,15 +45,15 @@ class SMC(NamedTuple):
         nu_err = sub(nu_d, nu)
         s = manifold(nu_err, state, gains)
         nu_r = add(nu, s)
-        twice = mul(gains.Lambda, add(nu_err, nu_err))
-        nu_r_dot = add(nu_d_dot, add(twice, mul(gains.Lambda, mul(gains.Lambda, z))))
-        f = mul(gains.Gamma, vector(state, 12))
+        twice = matvec(gains.Lambda, add(nu_err, nu_err))
+        nu_r_dot = add(nu_d_dot, add(twice, matvec(gains.Lambda, matvec(gains.Lambda, z))))
+        f = matvec(gains.Gamma, vector(state, 12))
         equivalent = add(
-            add(mul(M, nu_r_dot), coriolis(M, nu, nu_r)),
+            add(matvec(M, nu_r_dot), coriolis(M, nu, nu_r)),
             add(damping(model.dynamics, nu, nu_r), restoring(model.dynamics, attitude)),
         )
-        switched = mul(gains.k_S, saturated(s, gains.phi))
-        return add(add(equivalent, mul(gains.k_D, s)), add(switched, f)), f
+        switched = matvec(gains.k_S, saturated(s, gains.phi))
+        return add(add(equivalent, matvec(gains.k_D, s)), add(switched, f)), f
 
     @staticmethod
     def state_rate(
@@ -89,7 +89,7 @@ class SMC(NamedTuple):
 def manifold(nu_err: Vector, state: Vector, gains: SMC) -> Six:
     """S = (d/dt + Lambda)^2 of the integral of z: nu_err + 2 Lambda z + Lambda^2 integral(z)."""
     z, Z = vector(state, 0), vector(state, 6)
-    return add(nu_err, mul(gains.Lambda, add(add(z, z), mul(gains.Lambda, Z))))
+    return add(nu_err, matvec(gains.Lambda, add(add(z, z), matvec(gains.Lambda, Z))))
 
 
 @helper

@@ -34,12 +34,7 @@ def wrench(
 ) -> tuple[Numbers, Numbers]:  # fmt: skip
     """(tau, f) of the law to which `gains` belongs."""
     tau, f = type(gains).wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
-    return tuple(map(number, tau)), tuple(map(number, f))
-
-
-def number(value: Any) -> Any:
-    """A float of whatever a user's law returns, or lanes as they are."""
-    return value if isinstance(value, np.ndarray) and value.ndim == 1 else float(value)
+    return tuple(map(float, tau)), tuple(map(float, f))
 
 
 @specialised('gains')

@@ -154,10 +154,13 @@ def specialised(argument: str) -> Decorator:
 
 
 def of_numbers(function: Function, /) -> Function:
-    """Compile a helper for single numbers; what it does to vector registers stands in `simd`."""
+    """Compile a helper whose first argument is one number, or one choice.
 
-    def choose(*types: Any) -> Any:
-        return function if all(isinstance(kind, NUMBERS) for kind in types) else None
+    What it does to a vector register of them stands in `simd`.
+    """
+
+    def choose(first: Any, *_: Any) -> Any:
+        return function if isinstance(first, NUMBERS) else None
 
     return overloaded(function, choose)
 

@@ -32,6 +32,7 @@ from auv_gvc_controller.laws.model import ControlModel
 
 NAMES = ('error', 'lumped_error', 'tau', 'delta_xi', 'delta_pi', 'energy', 'nu_d')
 ERROR, LUMPED, TAU, DELTA_XI, DELTA_PI, ENERGY, SETPOINT = range(len(NAMES))
+WIDTH = LANES or 1  # samples that are added side by side
 
 
 class Maps(NamedTuple):
@@ -107,7 +108,7 @@ def fill_signals(
     beside: np.ndarray, nu: np.ndarray, nu_d: np.ndarray, tau: np.ndarray, f: np.ndarray,
     F: np.ndarray, k: int, lanes: int,
 ) -> None:  # fmt: skip
-    """Put the numbers of `lanes` samples from index `k` side by side: (1, 30, LANES)."""
+    """Put the numbers of `lanes` samples from index `k` side by side: (1, 30, WIDTH)."""
     fill_beside(beside, 0, nu, k, lanes)
     fill_beside(beside, 6, nu_d, k, lanes)
     fill_beside(beside, 12, tau, k, lanes)
@@ -120,16 +121,16 @@ def add_samples(
     nu: np.ndarray, nu_d: np.ndarray, tau: np.ndarray, f: np.ndarray, F: np.ndarray, maps: Maps,
     beside: np.ndarray, sums: np.ndarray, squares: np.ndarray, peaks: np.ndarray,
 ) -> None:  # fmt: skip
-    """Add samples, flat arrays (6 n,), to lanes (1, 7, 6, LANES): as many at a time as fit.
+    """Add samples, flat arrays (6 n,), to lanes (1, 7, 6, WIDTH): as many at a time as fit.
 
-    `beside` (1, 30, LANES) is workspace. Zeros, which fill up the last register, add nothing.
+    `beside` (1, 30, WIDTH) is workspace. Zeros, which fill up the last register, add nothing.
     """
-    known, block = uncounted(maps), of_block(beside, 0, LANES)
-    s, q = of_block(sums, 0, LANES), of_block(squares, 0, LANES)
-    p = of_block(peaks, 0, LANES)
-    for k in range(0, nu.shape[0], 6 * LANES):
-        if k + 6 * LANES <= nu.shape[0]:
-            fill_signals(beside, nu, nu_d, tau, f, F, k, LANES)
+    known, block = uncounted(maps), of_block(beside, 0, WIDTH)
+    s, q = of_block(sums, 0, WIDTH), of_block(squares, 0, WIDTH)
+    p = of_block(peaks, 0, WIDTH)
+    for k in range(0, nu.shape[0], 6 * WIDTH):
+        if k + 6 * WIDTH <= nu.shape[0]:
+            fill_signals(beside, nu, nu_d, tau, f, F, k, WIDTH)
         else:
             beside[:] = 0.0
             fill_signals(beside, nu, nu_d, tau, f, F, k, (nu.shape[0] - k) // 6)
@@ -144,8 +145,8 @@ def add_compiled(
     sums: np.ndarray, squares: np.ndarray, peaks: np.ndarray,
 ) -> None:  # fmt: skip
     """Add samples, flat arrays (6 n,), to what (7, 6) is known of those before them."""
-    lanes = np.zeros((3, 1, *sums.shape, LANES))
-    add_samples(nu, nu_d, tau, f, F, maps, np.empty((1, 30, LANES)), *lanes)
+    lanes = np.zeros((3, 1, *sums.shape, WIDTH))
+    add_samples(nu, nu_d, tau, f, F, maps, np.empty((1, 30, WIDTH)), *lanes)
     sums += lanes[0, 0].sum(axis=-1)
     squares += lanes[1, 0].sum(axis=-1)
     np.maximum(peaks, lanes[2, 0].max(axis=-1), out=peaks)

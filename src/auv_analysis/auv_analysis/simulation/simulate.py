@@ -132,13 +132,14 @@ def _run_kernel(
     """Fill the log; nu_d_dot (n + 1, 6) at the samples."""
     tableau, loop = TABLEAUS[scenario.data['integrator']], loop_of(scenario, controller)
     run = RUNS[hold] if is_compiled(gains) else plain(RUNS[hold])
-    held = [with_batch_axis(part) for part in (*at_start(scenario, loop), log)]
+    motion, work = (with_batch_axis(part) for part in at_start(scenario, loop))
+    kept = with_batch_axis(log)
     nu_d_dot, vehicle = np.empty((scenario.steps + 1, 6)), with_batch_axis(loop)
     for grid, known in each(blocks(scenario), scenario.steps // BLOCK + 1):
         nu_d_dot[grid.first : grid.first + len(grid.t)] = known.reference[:, 0, 6:]
         with np.errstate(all='ignore'), user_law(gains):
             tables_of = with_batch_axis(known)
-            run(vehicle, tables_of, grid, tableau, *held, 0, 1, None)
+            run(vehicle, tables_of, grid, tableau, motion, work, kept, 0, 1, None)
     return nu_d_dot
 
 

@@ -161,10 +161,12 @@ def joined(values: Sequence[Any], counts: Sequence[int]) -> Any:
 
 
 if JITTED:
-    from numba import types
+    import numba
     from numba.core import cgutils
     from numba.extending import intrinsic
     from numba.np.arrayobj import make_array, populate_array
+
+    types: Any = numba.types  # its own annotations know no named tuples
 
     def viewed(value: Any, lost: int, dtype: Any) -> Any:
         """Numba's type of a tree of arrays that lose so many axes; dtype None: their own."""
@@ -228,6 +230,7 @@ if JITTED:
     def _alone(function: Any) -> Callable[..., Any]:
         return lambda *given: function if isinstance(given[-1], types.NoneType) else None
 
-    overloaded(uncounted, lambda _: lambda value: _uncounted(value))  # noqa: PLW0108  numba's way
-    overloaded(of_block, _alone(lambda value, b, lanes: _of_block(value, b)))
+    # an intrinsic is called without the typing context that its definition takes
+    overloaded(uncounted, lambda _: lambda value: _uncounted(value))  # type: ignore[call-arg]  # noqa: PLW0108
+    overloaded(of_block, _alone(lambda value, b, lanes: _of_block(value, b)))  # type: ignore[call-arg]
     overloaded(align_stack, _alone(lambda lanes: None))

@@ -177,8 +177,8 @@ SCRIPT = """
 import sys
 import numpy as np
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.changes import changed_scenario
-from auv_analysis.rollouts import rollouts
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.simulation.rollouts import rollouts
 from auv_dynamics.kernel import LANES
 
 assert (LANES is None) == (sys.argv[1] == 'without')

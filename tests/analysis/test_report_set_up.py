@@ -15,10 +15,11 @@ from auv_analysis.herman2018.paper import paper_figure
 from auv_analysis.metrics.lyapunov import certificate_of
 from auv_analysis.report import plots, run_plots
 from auv_analysis.report.digest import sketch, sketches
-from auv_analysis.report.run_plots import applied_figure, certificate_figure, draw_figures
+from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.run_tables import certificate_table, reasons
 from auv_analysis.report.scenario_text import set_up
+from auv_analysis.report.wrench_plots import applied_figure, certificate_figure
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
 

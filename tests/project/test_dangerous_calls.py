@@ -141,6 +141,6 @@ def test_only_our_own_scripts_are_put_into_a_report_unescaped() -> None:
     assert len(templates) > 3
     assert 'autoescape' not in text
     unescaped = set(re.findall(r'[^{ ]+(?= *\|\s*safe)', text))
-    ours = {'interactive.library', 'interactive.scripts'}
+    ours = {'interactive.library', 'interactive.script'}
     assert ours < unescaped
     assert all(entry.startswith("'") or entry.endswith("'") for entry in unescaped - ours)

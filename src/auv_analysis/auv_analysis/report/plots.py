@@ -50,36 +50,16 @@ RUNS = ('#1a1a1a', '#D55E00', '#0072B2', '#009E73', '#CC79A7', '#E69F00')  # of 
 MANY = (*RUNS, COLOURS[-1], '#8c8c8c')
 MOST_LINES = len(MANY)  # that can be told apart in a panel
 STYLE = {
-    'font.family': 'STIXGeneral',
-    'mathtext.fontset': 'stix',
-    'font.size': 8.3,
-    'axes.labelsize': 8.3,
-    'axes.titlesize': 8.3,
-    'axes.titlepad': 4.4,
-    'axes.linewidth': 0.6,
-    'axes.spines.top': False,
-    'axes.spines.right': False,
-    'axes.grid': True,
-    'axes.axisbelow': True,
-    'axes.xmargin': 0.0,
-    'axes.formatter.limits': (-5, 6),
-    'grid.color': '#e6e6e6',
-    'grid.linewidth': 0.5,
-    'lines.linewidth': 1.0,
-    'lines.solid_joinstyle': 'round',
-    'xtick.major.width': 0.6,
-    'ytick.major.width': 0.6,
-    'xtick.labelsize': 7.5,
-    'ytick.labelsize': 7.5,
-    'legend.frameon': False,
-    'legend.fontsize': 7.8,
-    'legend.handlelength': 1.6,
-    'legend.columnspacing': 1.2,
-    'legend.borderaxespad': 0.0,
-    'pdf.fonttype': 42,
-    'figure.dpi': DPI,
-    'savefig.dpi': DPI,
-}
+    'font.family': 'STIXGeneral', 'mathtext.fontset': 'stix', 'font.size': 8.3,
+    'axes.labelsize': 8.3, 'axes.titlesize': 8.3, 'axes.titlepad': 4.4, 'axes.linewidth': 0.6,
+    'axes.spines.top': False, 'axes.spines.right': False, 'axes.grid': True,
+    'axes.axisbelow': True, 'axes.xmargin': 0.0, 'axes.formatter.limits': (-5, 6),
+    'grid.color': '#e6e6e6', 'grid.linewidth': 0.5, 'lines.linewidth': 1.0,
+    'lines.solid_joinstyle': 'round', 'xtick.major.width': 0.6, 'ytick.major.width': 0.6,
+    'xtick.labelsize': 7.5, 'ytick.labelsize': 7.5, 'legend.frameon': False,
+    'legend.fontsize': 7.8, 'legend.handlelength': 1.6, 'legend.columnspacing': 1.2,
+    'legend.borderaxespad': 0.0, 'pdf.fonttype': 42, 'figure.dpi': DPI, 'savefig.dpi': DPI,
+}  # fmt: skip
 
 
 Drawn = tuple[Figure | None, str, str]  # with title and caption

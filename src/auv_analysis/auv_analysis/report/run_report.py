@@ -15,9 +15,10 @@ from auv_analysis.report.digest import TINY, Sketch, alike, last_third, sketches
 from auv_analysis.report.document import Block, Gallery, Section, Sentence, prose, write_document
 from auv_analysis.report.panels import PanelSet, interactive
 from auv_analysis.report.plots import FigureRecord
-from auv_analysis.report.run_plots import draw_figures, reference, unexplained_finding
+from auv_analysis.report.run_plots import draw_figures, reference
 from auv_analysis.report.scenario_text import SetUp, set_up
 from auv_analysis.report.verdict import verdict
+from auv_analysis.report.wrench_plots import unexplained_finding
 from auv_analysis.runs.run import FOREIGN, AnyRun
 from auv_dynamics.vehicle import DOFS
 

@@ -60,8 +60,6 @@ STYLE = {
     'legend.fontsize': 7.8, 'legend.handlelength': 1.6, 'legend.columnspacing': 1.2,
     'legend.borderaxespad': 0.0, 'pdf.fonttype': 42, 'figure.dpi': DPI, 'savefig.dpi': DPI,
 }  # fmt: skip
-
-
 Drawn = tuple[Figure | None, str, str]  # with title and caption
 
 

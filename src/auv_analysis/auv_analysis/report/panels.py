@@ -238,17 +238,12 @@ def _shade(plot: Any, mark: Mark, faults: Sequence[Mark]) -> None:
     """Shade a fault, its number on it."""
     from bokeh.models.annotations import BoxAnnotation, Label
 
-    level = sum(other.start <= mark.start < other.end for other in faults[: mark.number - 1])
-    box: dict[str, Any] = {
-        'fill_color': FAULT,
-        'fill_alpha': 0.14,
-        'line_color': None,
-        'level': 'underlay',
-    }
-    box |= {} if math.isinf(mark.end) else {'right': mark.end}
-    plot.add_layout(BoxAnnotation(left=mark.start, level='underlay', **box))
+    row = sum(other.start <= mark.start < other.end for other in faults[: mark.number - 1])
+    ends = {} if math.isinf(mark.end) else {'right': mark.end}
+    fill = {'fill_color': FAULT, 'fill_alpha': 0.14, 'line_color': None, 'level': 'underlay'}
+    plot.add_layout(BoxAnnotation(left=mark.start, **ends, **fill))
     number: dict[str, Any] = {'text': f'{mark.number}', 'text_font_size': '10px', 'x_offset': 3}
-    plot.add_layout(Label(x=mark.start, y=120 - 13 * (level % 4), y_units='screen', **number))
+    plot.add_layout(Label(x=mark.start, y=120 - 13 * (row % 4), y_units='screen', **number))
 
 
 def panel_sets(runs: Mapping[str, Sketch]) -> dict[str, PanelSet]:

@@ -10,7 +10,7 @@ from scipy.stats import f_oneway, spearmanr
 from strategies import QUICK
 
 from auv_analysis.report.plots import distribution
-from auv_analysis.report.plotting import new_figure
+from auv_analysis.report.plots import new_figure
 from auv_analysis.studies.sweep.analysis import Analysis, analysed
 from auv_analysis.studies.sweep.factors import by_group
 from auv_analysis.studies.sweep.statistics import explained, ordered, quantiles, spread, thinned

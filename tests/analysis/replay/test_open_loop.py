@@ -178,13 +178,16 @@ def test_unusable_messages_are_counted(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('lockstep', [True, False])
 def test_what_is_not_written_is_what_the_node_takes(tmp_path, lockstep, monkeypatch) -> None:
+    from auv_dynamics.ros.node_interface import NodeInterface
+    from auv_dynamics.ros.node_main import BulkNode
     from auv_gvc_controller.nodes.controller_node import ControllerParameters
 
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
     context = rclpy.Context()
     rclpy.init(context=context, args=['--ros-args', '-p', f'lockstep:={str(lockstep).lower()}'])
     try:
-        node = rclpy.create_node('controller_node', context=context)
+        node = BulkNode('controller_node', context=context)
+        NodeInterface(node)
         taken = ControllerParameters(node).settings
         node.destroy_node()
     finally:
@@ -193,6 +196,7 @@ def test_what_is_not_written_is_what_the_node_takes(tmp_path, lockstep, monkeypa
     assert replayed == taken
     assert {entry.metadata['name'] for entry in fields(taken)[1:]} | {
         'law', 'vehicle', 'autostart', 'use_sim_time', 'start_type_description_service',
+        'base_frame', 'odom_frame', 'expected_subscribers',
     } == {name for name in node._parameters if not name.startswith('gains.')}  # fmt: skip
 
 

@@ -99,8 +99,8 @@ def test_a_file_is_opened_when_its_time_has_come(tmp_path: Path, monkeypatch) ->
     opened = []
     from auv_analysis.replay import played_bag
 
-    real = played_bag.records
-    monkeypatch.setattr(played_bag, 'records', lambda p, n: (opened.append(p.name), real(p, n))[1])
+    real = played_bag.McapFile
+    monkeypatch.setattr(played_bag, 'McapFile', lambda p: (opened.append(p.name), real(p))[1])
     played = messages(index, TOPICS)
     for _ in range(55):
         next(played)

@@ -197,13 +197,13 @@ def test_everything_runs_without_vector_registers(tmp_path):
     """`simd` is optional: deleted, every vehicle is computed alone, with the same numbers."""
     (tmp_path / 'without').mkdir()
     (tmp_path / 'without' / 'sitecustomize.py').write_text(STUB)
-    arrays = {}
+    arrays, caches = {}, {'with': {}, 'without': {'AUV_GVC_CACHE_DIR': str(tmp_path / 'cache')}}
     for how in ('with', 'without'):
         out, path = tmp_path / f'{how}.npz', [os.environ.get('PYTHONPATH', '')]
         path = [str(tmp_path / how), *filter(None, path)]
         subprocess.run(
             [sys.executable, '-c', SCRIPT, how, str(out)],
-            env=os.environ | {'PYTHONPATH': os.pathsep.join(path)},
+            env=os.environ | {'PYTHONPATH': os.pathsep.join(path)} | caches[how],
             check=True,
         )
         arrays[how] = dict(np.load(out))

@@ -1,4 +1,4 @@
-"""The Lyapunov certificate (23) to (28), evaluated on a run."""
+"""The certificate (23) to (28) of the error dynamics (22), evaluated on a run."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields

@@ -9,8 +9,7 @@ from made_sweeps import DAMPING, ENERGY, K_D, SETTLED, rows
 from scipy.stats import f_oneway, spearmanr
 from strategies import QUICK
 
-from auv_analysis.report.plots import distribution
-from auv_analysis.report.plots import new_figure
+from auv_analysis.report.plots import distribution, new_figure
 from auv_analysis.studies.sweep.analysis import Analysis, analysed
 from auv_analysis.studies.sweep.factors import by_group
 from auv_analysis.studies.sweep.statistics import explained, ordered, quantiles, spread, thinned

@@ -32,7 +32,7 @@ def command(tmp_path: Path, monkeypatch, capsys) -> Callable:
     def call(*arguments: str) -> tuple[object, str, list[str]]:
         code: object = 0
         try:
-            main(['tune', 's.yaml', *arguments])
+            main.main(['tune', 's.yaml', *arguments])
         except SystemExit as end:
             code = end.code
         captured = capsys.readouterr()

@@ -67,8 +67,8 @@ def part_of(t: np.ndarray, values: np.ndarray) -> Part:
         count=len(t),
         start=float(t[0]),
         end=float(t[-1]),
-        first=values[0],
-        last=values[-1],
+        first=values[0].copy(),  # a view would keep the block
+        last=values[-1].copy(),
         sums=values.sum(axis=0),
         squares=np.einsum('ij,ij->j', values, values),
         low=values.min(axis=0),

@@ -53,7 +53,7 @@ def test_every_section_has_panels_with_all_controllers(case1):
     assert {panel.kind for panel in panels.values()} == {'line', 'log', 'stack'}
     assert sets['errors'].stands_for('errors_gvc')
     assert not sets['errors'].stands_for('settling')
-    assert not sets['inputs'].stands_for('inputs_compared')
+    assert sets['inputs'].stands_for('inputs_compared')
 
 
 def test_energies_of_xi_add_up_to_the_kinetic_energy(case1):

@@ -1,4 +1,4 @@
-"""Faults in the report: a table and a sentence each, and one plot over all of them."""
+"""Faults in the report: a table each, one plot and a sentence per controller over all of them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -20,7 +20,7 @@ from auv_analysis.metrics.fault_response import (
 )
 from auv_analysis.metrics.quantities import SIGNALS, WRENCH, mathtext
 from auv_analysis.metrics.summary import BAND_TEXT, TRANSIENT
-from auv_analysis.output.text import MISSING, Maths, fixed, join, number, plain
+from auv_analysis.output.text import MISSING, Maths, fixed, join, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import Sketch, sketches
 from auv_analysis.report.document import Block, Cell, Column, Section, Sentence, Table, cell
@@ -58,30 +58,11 @@ def fault_part(out: Path, runs: Mapping[str, AnyRun]) -> tuple[Section, list[Sen
         return Section('faults', TITLE, [NO_ERROR]), []
     write_responses(out, found)
     figure = fault_figure(sketches(runs), out / 'figures')
-    blocks: list[Block] = [ABOUT, *fault_sentences(found), figure, *fault_tables(found)]
+    blocks: list[Block] = [ABOUT, figure, *fault_tables(found)]
     return Section('faults', TITLE, blocks), [*fault_overview(found)]
 
 
 Found = Mapping[str, Sequence[Response]]
-SAME = 0.1  # of the error before: a smaller change is none
-
-
-def fault_sentences(found: Found) -> list[Sentence]:
-    """A sentence per fault on the degree of freedom that it disturbs most.
-
-    Parameters
-    ----------
-    found : controller -> `responses(run)`, of one scenario
-
-    """
-    numbers = dict.fromkeys(one.mark.number for several in found.values() for one in several)
-    return [
-        Sentence(text, f'table-faults_{number}')
-        for number in numbers
-        for text in _of_fault(
-            [(n, r) for n, s in found.items() for r in s if r.mark.number == number]
-        )
-    ]
 
 
 def fault_overview(found: Found) -> Iterator[Sentence]:
@@ -107,57 +88,10 @@ def _unit(response: Response) -> str:
     return 'rad/s' if response.dof in DOFS[3:] else 'm/s'
 
 
-def _of_fault(members: Sequence[tuple[str, Response]]) -> Iterator[str]:
-    seen = [response for _, response in members if response.rms[1] is not None]
-    if not seen:
-        return
-    worst = max(seen, key=_rise)
-    mark = worst.mark
-    head = f'Fault {mark.number} ({mark.label}, {mark.times})'
-    if not any(_leaves(response) for response in seen):
-        yield f'{head}: no velocity error leaves its settling band.'
-        return
-    parts = [_of_run(name, one) for name, one in members if one.dof == worst.dof]
-    yield f'{head} shows most in {worst.dof}: {"; ".join(parts)}.'
-
-
 def _rise(response: Response) -> float:
     """How much the error grows, in settling bands."""
     before, during, _ = response.rms
     return ((during or 0.0) - (before or 0.0)) / response.band
-
-
-def _leaves(response: Response) -> bool:
-    return (response.peak[1] or 0.0) > response.band
-
-
-def _of_run(name: str, response: Response) -> str:
-    unit = _unit(response)
-    before, during, _ = response.rms
-    if during is None:
-        return f'under {name} it is not reached'
-    if before is None:
-        text = f'under {name} its RMS error is {number(during, 2)} {unit}'
-    elif abs(during - before) <= SAME * before:
-        text = f'under {name} its RMS error stays at {number(during, 2)} {unit}'
-    else:
-        verb = 'rises' if during > before else 'falls'
-        change = f'from {number(before, 2)} to {number(during, 2)} {unit}'
-        text = f'under {name} its RMS error {verb} {change}'
-    return f'{text} (at most {number(response.peak[1], 2)}), {_recovery(response)}'
-
-
-def _recovery(response: Response) -> str:
-    if response.until is None:
-        return 'and the fault stays'
-    if response.recovery is None:
-        before = response.peak[0]
-        always = before is not None and before > response.band
-        text = f'not back within ± {plain(response.band)} by {response.until:g} s'
-        return f'{text}, nor was it always before the fault' if always else text
-    if response.recovery == 0.0:
-        return 'within the settling band from its end on'
-    return f'back within ± {plain(response.band)} after {fixed(response.recovery, 2)} s'
 
 
 ROOM = 1.3  # of the axis above what it shows, for the numbers of the faults

@@ -36,7 +36,6 @@ SECTIONS = {  # part of the report -> its signals, beginnings of the figures its
     'energy': (('energy',), ('kinetic_energy',)),
     'couplings': (('delta_xi', 'delta_pi'), ('delta_xi', 'delta_pi')),
 }
-STILL = ('inputs_compared',)  # figures of logarithmic time: shown beside the panels
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +80,7 @@ class PanelSet:
 
     def stands_for(self, figure: str) -> bool:
         """Whether these panels show what the figure of that name shows."""
-        return figure.startswith(self.figures) and figure not in STILL
+        return figure.startswith(self.figures)
 
 
 @dataclass(frozen=True)

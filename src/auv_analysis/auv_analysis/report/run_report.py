@@ -147,14 +147,12 @@ class Contents:
         return [figure for figure in self.figures if figure.name.startswith(FIGURES[part])]
 
     def _shown(self, part: str) -> Iterator[Block]:
-        """Panels of a part with the figures that they stand for, then its other figures."""
+        """Figures of a part, then its panels with those figures that they stand for."""
         drawn, panels = self._drawn(part), self.panels.get(part)
-        if panels is None:
-            yield from drawn
-            return
-        stills = [figure for figure in drawn if figure.png and panels.stands_for(figure.name)]
-        yield Gallery(panels, stills)
+        stills = [one for one in drawn if one.png and panels and panels.stands_for(one.name)]
         yield from (figure for figure in drawn if figure not in stills)
+        if panels is not None:
+            yield Gallery(panels, stills)
 
     def _experiment(self) -> Iterator[Block]:
         scenarios = list(dict.fromkeys(run.scenario for run in self.runs.values()))

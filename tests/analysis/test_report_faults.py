@@ -127,7 +127,7 @@ def test_the_section_and_its_sentences_are_on_the_page(folder):
     page = Page(text)
     assert 'faults' in page.ids
     assert len(page.tables['faults_1']) == 12
-    for words in ('Fault 1 (thruster T3 at 50 %', 'The fault that disturbs gvc most', 'Shaded: '):
+    for words in ('Fault 1: thruster T3 at 50 %', 'The fault that disturbs gvc most', 'Shaded: '):
         assert words in text.replace('\u00a0', ' '), words
     assert (folder / 'figures' / 'faults.pdf').is_file()
 

@@ -11,9 +11,8 @@ from faulty_drivers import NAMES
 from geometry_msgs.msg import WrenchStamped
 from harness import PATIENCE, Peer, environment, fresh_domain
 
-from auv_analysis.driver.checks import PASSIVE, judge
+from auv_analysis.driver.checks import PASSIVE, judge, refusal
 from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Evidence, Finding, Settings
-from auv_analysis.driver.verdict import refusal
 from auv_analysis.nodes.driver_check_node import COMMANDER, RosDriverClient
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.interface import Frames

@@ -13,11 +13,17 @@ from rich.console import Console
 from simulated_driver import SimulatedDriver
 
 from auv_analysis.cli.main import main
-from auv_analysis.driver.checks import CHECKS, GROUPS, judge
+from auv_analysis.driver.checks import (
+    CHECKS,
+    GROUPS,
+    document_of,
+    failure_of,
+    findings_table,
+    judge,
+)
 from auv_analysis.driver.evidence import NOT_CHECKED, PASS, VERDICTS, Evidence, Settings
 from auv_analysis.driver.excitation import carry_out, plan_of
 from auv_analysis.driver.report import write_results
-from auv_analysis.driver.verdict import document_of, failure_of, findings_table
 
 ROOT = Path(__file__).parents[3]
 

@@ -14,6 +14,8 @@ from auv_analysis.bag.foreign_messages import (
     ordered,
 )
 from auv_analysis.bag.foreign_topics import Source, TopicMap
+from auv_analysis.metrics.local_polynomials import SMALLEST
+from auv_analysis.metrics.pose_twist import CONJUGATE, STILL, compare_rates, turn
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle.frames import (
@@ -24,7 +26,6 @@ from auv_dynamics.vehicle.frames import (
     swap_body,
     swap_position,
 )
-from auv_dynamics.vehicle.kinematics import rotation
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 FRAMES = ('child', 'world')  # in which a velocity may be written
@@ -34,7 +35,6 @@ GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in
 USUAL = 90.0  # percentile
 AVERAGED = 1.5  # periods per step of the time base from which a signal is averaged over the step
 ENOUGH = 12  # velocity samples of a stretch, fewer are left out: no rate could be estimated
-STILL = 0.02  # m/s: motion below this says nothing about axes
 WORSE = 2.0  # times: from here on the other reading fits clearly better
 _SWAPS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     'pose': lambda x: np.concatenate([swap_position(x[:, :3]), swap_attitude(x[:, 3:])], axis=1),
@@ -382,10 +382,8 @@ def from_earth(twist: np.ndarray, attitude: np.ndarray) -> np.ndarray:
     nu : (n, 6) in FSD
 
     """
-    R = rotation(attitude)
-    return np.concatenate(
-        [np.einsum('nji,nj->ni', R, half) for half in (twist[:, :3], twist[:, 3:])], axis=1
-    )
+    halves = (twist[:, :3], twist[:, 3:])
+    return np.concatenate([turn(attitude * CONJUGATE, half) for half in halves], axis=1)
 
 
 def swap_earth(twist: np.ndarray) -> np.ndarray:
@@ -415,24 +413,24 @@ def of_the_motion(pose: Track, twist: Track, other: Track, frame: str) -> list[s
         right = 'world' if frame == 'child' else 'child'
         notes.append(
             f'{twist.topic}: with twist_frame {frame} the velocity differs from the rate of the '
-            f'position by {told:.2g} m/s (median), with twist_frame {right} by {otherwise:.2g}: '
+            f'position by {told:.2g} m/s (RMS), with twist_frame {right} by {otherwise:.2g}: '
             f'{right} fits better'
         )
     return notes
 
 
 def _misfits(pose: Track, *velocities: Track) -> tuple[float, ...]:
-    """Median speed by the position, and median size of p_dot - R nu of each velocity, m/s."""
-    apart = np.diff(pose.ns)
-    middle = pose.ns[:-1] + apart // 2
-    span = velocities[0].ns[[0, -1]]
-    good = (apart <= pose.limit) & (middle >= span[0]) & (middle <= span[1])
-    if not good.any():
+    """Speed by the position, and its difference from each velocity: RMS in m/s, noise taken off.
+
+    Over the longest stretch without a gap; zeros where that is too short.
+    """
+    first = velocities[0]
+    span = max(pose.ns[0], first.ns[0]), min(pose.ns[-1], first.ns[-1])
+    begin, end = max(_between_gaps(*span, (pose, first)), key=np.ptp, default=span)
+    ns = pose.ns[(pose.ns >= begin) & (pose.ns <= end)]
+    if len(ns) < SMALLEST:
         return (0.0,) * (1 + len(velocities))
-    rate = np.diff(pose.rows[:, :3], axis=0)[good] / (apart[good, None] / NANOSECONDS)
-    R = rotation(at_times(pose, middle[good])[:, 3:])
-    found = [rate]
-    for velocity in velocities:
-        nu = at_times(velocity, middle[good])[:, :3]
-        found.append(rate - np.einsum('nij,nj->ni', R, nu))
-    return tuple(float(np.median(np.linalg.norm(rows, axis=1))) for rows in found)
+    at, t = at_times(pose, ns), _seconds(ns, ns[0])
+    moved = (turn(at[:, 3:], at_times(velocity, ns)[:, :3]) for velocity in velocities)
+    pairs = [compare_rates(t, at[:, :3], velocity) for velocity in moved]
+    return pairs[0].sizes[0], *(pair.sizes[2] for pair in pairs)

@@ -1,27 +1,26 @@
-"""A recorded run, in memory or, where it is long, in files that are mapped."""
+"""A recorded run: the steps that are complete on all topics, in memory or in mapped files."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from auv_analysis.bag import attachments
-from auv_analysis.bag.reading import Contents, gathered, read_bag, slices
-from auv_analysis.bag.steps import (
-    SETPOINTS,
-    complete,
-    dropped,
-    held_series,
-    holds,
-    topics_of_one_graph,
-)
+from auv_analysis.bag.reading import Contents, Series, gathered, read_bag, slices
+from auv_analysis.bag.step_topics import READERS, NotOursError, namespace_of, role_of
 from auv_analysis.runs.run import Run, rows_of
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.plant import unwrapped_eta
 from auv_dynamics.ros import interface
+from auv_dynamics.vehicle.frames import NED_FSD, named_axes
 
 WHOLE = 1 << 16  # steps up to which a recording is kept in memory
+REQUIRED = (interface.ODOM, interface.WRENCH)
+Steps = tuple[np.ndarray, dict[str, np.ndarray]]  # stamps (n,) in ns, role -> values
+SETPOINTS = (interface.CMD_VEL, interface.CMD_ACCEL)
+LATEST = 'latest'
 
 
 class Recording(NamedTuple):
@@ -152,3 +151,150 @@ def _slopes(rows: np.ndarray, step: float) -> Iterator[np.ndarray]:
         first = max(here.start - 1, 0)
         slope = np.gradient(rows_of(rows, slice(first, here.stop + 1)), step, axis=0)
         yield slope[here.start - first :][: here.stop - here.start]
+
+
+def topics_of_one_graph(topics: Iterable[str], contents: Contents, bag: Path) -> dict[str, str]:
+    """Role -> topic, of the namespace that is read, or of the only one that is complete.
+
+    Parameters
+    ----------
+    topics : those of ours that have messages
+    contents : of the bag
+    bag : for the refusal
+
+    Raises
+    ------
+    InputError : a topic without which there is no run has no messages, or there are several runs
+
+    """
+    topics = set(topics)
+    space = _namespace(topics, contents, bag)
+    found = ', '.join(sorted(contents.types)) or 'no topics'
+    frames = contents.frames[space]
+    named = all(named_axes(name) == NED_FSD for name in (frames.odom, frames.base))
+    if 'params.yaml' not in contents.attachments and not named:
+        expected = 'frames whose names say that they are NED and FSD'
+        found = f'{frames.odom}, {frames.base}'
+        raise NotOursError(bag, f'{space}{interface.ODOM}: frame_id', expected, found)
+    ours = {role: f'{space}{role}' for role in READERS if f'{space}{role}' in topics}
+    for role in REQUIRED:
+        if role not in ours:
+            raise NotOursError(bag, role, 'messages', found)
+    return ours
+
+
+def _namespace(topics: set[str], contents: Contents, bag: Path) -> str:
+    """Namespace that is read, as it stands before our names."""
+    found = ', '.join(sorted(contents.types)) or 'no topics'
+    spaces = sorted(namespace_of(t) for t in topics if role_of(t) == interface.ODOM)
+    whole = [space for space in spaces if all(f'{space}{role}' in topics for role in REQUIRED)]
+    if not spaces and contents.namespace is not None:
+        others = {namespace_of(t) for t in contents.counts if role_of(t) == interface.ODOM}
+        listed = ', '.join(sorted(space.rstrip('/') or '/' for space in others))
+        key = f'namespace {contents.namespace}'
+        if others:
+            expected = f'{interface.ODOM} in it, or --namespace with one that has it'
+            raise InputError(bag, key, expected, listed)
+        if contents.asked:
+            raise InputError(bag, key, interface.ODOM, found)
+    if not spaces:
+        raise NotOursError(bag, interface.ODOM, 'messages', found)
+    if len(whole) > 1:
+        listed = ', '.join(space.rstrip('/') or '/' for space in whole)
+        raise InputError(bag, '', 'one vehicle, or --namespace with that of one', listed)
+    return whole[0] if whole else spaces[0]
+
+
+def complete(series: Mapping[str, Series], whole: float = math.inf) -> Steps:
+    """Stamps that are on every topic, rising, and the values there; of a doubled one the first.
+
+    Parameters
+    ----------
+    series : role -> stamps and rows
+    whole : steps up to which values that have to be picked are kept in memory
+
+    """
+    stamps, *others = (ns for ns, _ in series.values())
+    if _is_rising(stamps) and all(_are_equal(stamps, ns) for ns in others):
+        return stamps, {role: rows for role, (_, rows) in series.items()}
+    for ns in others:
+        stamps = np.intersect1d(stamps, ns)
+    stamps = np.unique(stamps)
+    values = {}
+    for role, (ns, rows) in series.items():
+        order = np.argsort(ns, kind='stable')
+        values[role] = _picked(rows, order[np.searchsorted(ns, stamps, sorter=order)], whole)
+    return stamps, values
+
+
+def _is_rising(ns: np.ndarray) -> bool:
+    overlapping = (slice(here.start, here.stop + 1) for here in slices(len(ns)))
+    return all(np.all(np.diff(rows_of(ns, here)) > 0) for here in overlapping)
+
+
+def _are_equal(one: np.ndarray, other: np.ndarray) -> bool:
+    same = len(one) == len(other)
+    return same and all(
+        np.array_equal(rows_of(one, here), rows_of(other, here)) for here in slices(len(one))
+    )
+
+
+def _picked(rows: np.ndarray, index: np.ndarray, whole: float) -> np.ndarray:
+    """Rows of some numbers (n,)."""
+    if not len(index):
+        return rows[:0]
+    return gathered((rows_of(rows, index[here]) for here in slices(len(index))), whole)
+
+
+def dropped(counts: dict[str, int], steps: int, bag: Path) -> list[str]:
+    """Notes on messages that are not complete on all topics.
+
+    Parameters
+    ----------
+    counts : role -> number of messages
+    steps : that are complete
+    bag : for the refusal
+
+    Raises
+    ------
+    InputError : there is no run in fewer than two steps
+
+    """
+    if steps < 2:
+        raise NotOursError(bag, '', 'at least two steps that are complete on all step topics', '0')
+    return [
+        f'{role}: {count - steps} of {count} messages are not complete on all topics'
+        for role, count in counts.items()
+        if count > steps
+    ]
+
+
+def holds(contents: Contents, controller: Mapping[str, object]) -> bool:
+    """Whether the recorded controller held its set-points.
+
+    Parameters
+    ----------
+    contents : of the bag
+    controller : parameters of the controller node; empty: not recorded
+
+    """
+    if 'setpoint_pairing' in controller:
+        return controller['setpoint_pairing'] == LATEST
+    return contents.lenient
+
+
+def held_series(series: Mapping[str, Series], whole: float = math.inf) -> dict[str, Series]:
+    """The series, role -> stamps and rows, with set-points at the stamps of the odometry.
+
+    A set-point holds until the next one: each odometry has the newest at or before its stamp.
+    """
+    stamps = np.sort(series[interface.ODOM][0])
+    held = dict(series)
+    for role in SETPOINTS:
+        if role in series:
+            ns, rows = series[role]
+            order = np.argsort(ns, kind='stable')
+            index = np.searchsorted(ns, stamps, 'right', sorter=order) - 1
+            known = index >= 0
+            held[role] = stamps[known], _picked(rows, order[index[known]], whole)
+    return held

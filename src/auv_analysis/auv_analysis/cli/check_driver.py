@@ -15,10 +15,16 @@ from auv_analysis.cli.graphs import (
     positive,
     short_place,
 )
-from auv_analysis.driver.checks import PASSIVE, judge
+from auv_analysis.driver.checks import (
+    PASSIVE,
+    document_of,
+    failure_of,
+    findings_table,
+    judge,
+    refusal,
+)
 from auv_analysis.driver.evidence import Evidence, Settings
 from auv_analysis.driver.excitation import SPEED, Excitation, Plan, StoppedError, carry_out, plan_of
-from auv_analysis.driver.verdict import document_of, failure_of, findings_table, refusal
 from auv_analysis.graph.domain import joined_domain
 from auv_analysis.output.folder import check_free, results_folder
 from auv_analysis.output.progress import TextConsole, bar, say, waiting

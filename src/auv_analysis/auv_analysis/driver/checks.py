@@ -1,16 +1,35 @@
-"""Graph checks: who publishes and subscribes what, and whether their QoS lets them hear it."""
+"""The registry of checks with those of the graph, and the verdict on a driver.
+
+Graph checks: who publishes and subscribes what, and whether their QoS lets them hear it.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
-from typing import NamedTuple
+from itertools import groupby
+from typing import Any, NamedTuple
 
-from auv_analysis.driver import message_checks, time_checks, twist_checks
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from auv_analysis.driver import odometry_checks, twist_checks
 from auv_analysis.driver import response_checks as response
-from auv_analysis.driver.evidence import Endpoint, Evidence, Finding, judged, unchecked
+from auv_analysis.driver.evidence import (
+    FAIL,
+    NOT_CHECKED,
+    PASS,
+    Endpoint,
+    Evidence,
+    Finding,
+    counts,
+    judged,
+    unchecked,
+)
 from auv_analysis.output.text import join
 from auv_dynamics.files.nearest import nearest
 from auv_dynamics.ros import interface
+from auv_dynamics.ros.interface import ODOM, WRENCH
 from auv_dynamics.vehicle import DOFS
 
 NAMED = 3  # topics of a like name
@@ -163,7 +182,7 @@ def driver(evidence: Evidence) -> str:
 
 def odometry(evidence: Evidence) -> str:
     """Need of a message."""
-    return driver(evidence) or ('' if len(evidence.log.arrived_ns) else time_checks.MUTE)
+    return driver(evidence) or ('' if len(evidence.log.arrived_ns) else odometry_checks.MUTE)
 
 
 def motion(evidence: Evidence) -> str:
@@ -233,18 +252,18 @@ CHECKS = {
         _check('qos', nothing, qos_controller),
         _check('qos', nothing, qos_recorder),
         _check('qos', nothing, qos_wrench),
-        _check('values', odometry, message_checks.frames),
-        _check('values', odometry, message_checks.finite),
-        _check('values', odometry, message_checks.quaternion_norm),
-        _check('values', odometry, message_checks.upright),
-        _check('values', odometry, message_checks.depth),
-        _check('values', motion, message_checks.speeds),
-        _check('values', motion, message_checks.jumps),
-        _check('time', driver, time_checks.rate),
-        _check('time', odometry, time_checks.gaps),
-        _check('time', odometry, time_checks.stamps),
-        _check('time', odometry, time_checks.age),
-        _check('time', odometry, time_checks.drift),
+        _check('values', odometry, odometry_checks.frames),
+        _check('values', odometry, odometry_checks.finite),
+        _check('values', odometry, odometry_checks.quaternion_norm),
+        _check('values', odometry, odometry_checks.upright),
+        _check('values', odometry, odometry_checks.depth),
+        _check('values', motion, odometry_checks.speeds),
+        _check('values', motion, odometry_checks.jumps),
+        _check('time', driver, odometry_checks.rate),
+        _check('time', odometry, odometry_checks.gaps),
+        _check('time', odometry, odometry_checks.stamps),
+        _check('time', odometry, odometry_checks.age),
+        _check('time', odometry, odometry_checks.drift),
         _check('motion', motion, twist_checks.twist_frame),
         _check('motion', motion, twist_checks.angular_frame),
         *_per_dof('motion', motion, twist_checks.axis),
@@ -260,3 +279,75 @@ PASSIVE = [id for id, check in CHECKS.items() if check.group != 'response']
 def judge(evidence: Evidence, ids: Iterable[str] = CHECKS) -> list[Finding]:
     """Findings of some checks, by default of all."""
     return [CHECKS[id].finding(evidence) for id in ids]
+
+
+STYLES = {PASS: 'green', FAIL: 'bold red', NOT_CHECKED: 'yellow'}
+NEEDED = (  # to pass before a wrench may be sent
+    *('odom_publisher', 'wrench_subscriber', 'wrench_publishers', 'qos_wrench', 'frames'),
+    *('finite', 'quaternion_norm', 'rate', 'gaps', 'stamps'),
+)
+
+
+def failure_of(findings: Sequence[Finding]) -> str:
+    """One line that names the checks that failed; empty where none did."""
+    failed = [finding for finding in findings if finding.verdict == FAIL]
+    if not failed:
+        return ''
+    first = failed[0]
+    if first.id == 'odom_publisher' and not first.numbers['publishers']:
+        return first.found
+    names = join([finding.id for finding in failed])
+    return f'{len(failed)} of {len(findings)} checks failed: {names}'
+
+
+def refusal(findings: Sequence[Finding]) -> str:
+    """Why no wrench may be sent after the passive checks, or an empty text."""
+    against = [one.id for one in findings if one.id in NEEDED and one.verdict != PASS]
+    return f'nothing was sent, since {join(against)} did not pass' if against else ''
+
+
+def document_of(evidence: Evidence, findings: Sequence[Finding]) -> dict[str, Any]:
+    """All that was found, ready for JSON."""
+    graph, log = evidence.graph, evidence.log
+    return {
+        'place': graph.place,
+        'topics': {ODOM: graph.odom, WRENCH: graph.wrench},
+        'messages': len(log.arrived_ns),
+        'seconds': log.seconds,
+        'settings': asdict(evidence.settings),
+        'counts': counts(findings),
+        'checks': [finding.document() for finding in findings],
+        'trials': [trial.document() for trial in evidence.answered],
+    }
+
+
+def findings_table(findings: Sequence[Finding]) -> RenderableType:
+    """Findings by group, and at the end how many there are of each verdict.
+
+    What passed is a line; the rest comes with what was expected and with advice.
+    """
+    table = Table(box=None, show_header=False, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column(no_wrap=True)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow='fold')
+    for group, members in groupby(findings, key=lambda finding: CHECKS[finding.id].group):
+        table.add_row(Text(GROUPS[group], 'bold'))
+        for _, alike in groupby(members, key=_reason):
+            first, *others = alike
+            name = f'{1 + len(others)} checks' if others else first.id
+            text = Text(first.found)
+            if first.verdict == FAIL:
+                text.append(f'\nexpected: {first.expected}', 'dim')
+            if first.advice:
+                text.append(f'\n{first.advice}', 'italic')
+            table.add_row(Text(f'  {name}'), Text(first.verdict, STYLES[first.verdict]), text)
+    total = Text('\n')
+    for verdict, count in counts(findings).items():
+        total.append(f'{count} {verdict}', STYLES[verdict] if count else 'dim').append('  ')
+    return Group(table, total)
+
+
+def _reason(finding: Finding) -> str:
+    """What checks have in common that were not made and of which there is nothing else to say."""
+    alone = finding.verdict != NOT_CHECKED or finding.advice
+    return finding.id if alone else f' {finding.found}'

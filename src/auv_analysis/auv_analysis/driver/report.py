@@ -13,7 +13,7 @@ from pyarrow import parquet
 from auv_analysis.driver.checks import CHECKS, GROUPS
 from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Evidence, Finding
 from auv_analysis.driver.excitation import MeasuredTrial
-from auv_analysis.driver.time_checks import reference_ns
+from auv_analysis.driver.odometry_checks import reference_ns
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.text import join
 from auv_analysis.report import plots

@@ -83,8 +83,8 @@ def w_first(q: np.ndarray) -> np.ndarray:
 Reading = Callable[[PoseTwist], tuple[np.ndarray, np.ndarray]]
 
 
-def _turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """R(q) v of rows (n, 4) and (n, 3)."""
+def turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """R(q) v, the vectors (n, 3) turned by the quaternions (n, 4), w, x, y, z."""
     return np.einsum('nij,nj->ni', rotation(q), v)
 
 
@@ -106,21 +106,21 @@ def _body_rates(m: PoseTwist) -> np.ndarray:
 
 
 LINEAR: Mapping[str, Reading] = {
-    CHILD: _linear(_turn),
+    CHILD: _linear(turn),
     'world': _linear(lambda q, v: v),
-    'flu': _linear(lambda q, v: _turn(q, v * FLIP)),
+    'flu': _linear(lambda q, v: turn(q, v * FLIP)),
     'world_enu': _linear(lambda q, v: swap_position(v)),
-    'position_enu': _linear(lambda q, v: swap_position(_turn(q, v))),
-    'attitude_enu': _linear(lambda q, v: swap_position(_turn(q, v * FLIP))),
-    'z_up': _linear(lambda q, v: _turn(q, v) * UP),
-    'w_first': _linear(lambda q, v: _turn(w_first(q), v)),
-    'inverse': _linear(lambda q, v: _turn(q * CONJUGATE, v)),
+    'position_enu': _linear(lambda q, v: swap_position(turn(q, v))),
+    'attitude_enu': _linear(lambda q, v: swap_position(turn(q, v * FLIP))),
+    'z_up': _linear(lambda q, v: turn(q, v) * UP),
+    'w_first': _linear(lambda q, v: turn(w_first(q), v)),
+    'inverse': _linear(lambda q, v: turn(q * CONJUGATE, v)),
 }
 ANGULAR: Mapping[str, Reading] = {
     CHILD: lambda m: (m.turned, m.nu[:, 3:]),
     'degrees': lambda m: (m.turned, np.radians(m.nu[:, 3:])),
     'flu': lambda m: (m.turned, m.nu[:, 3:] * FLIP),
-    'world': lambda m: (m.turned, _turn(m.q * CONJUGATE, m.nu[:, 3:])),
+    'world': lambda m: (m.turned, turn(m.q * CONJUGATE, m.nu[:, 3:])),
     'euler_rates': lambda m: (m.turned, _body_rates(m)),
     'w_first': lambda m: (turned(w_first(m.q)), m.nu[:, 3:]),
     'inverse': lambda m: (turned(m.q * CONJUGATE), m.nu[:, 3:]),

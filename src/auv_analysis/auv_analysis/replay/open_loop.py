@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.bag import attachments
+from auv_analysis.bag.load import topics_of_one_graph
 from auv_analysis.bag.reading import Contents, Series, read_bag
 from auv_analysis.bag.step_topics import NotOursError
-from auv_analysis.bag.steps import topics_of_one_graph
 from auv_analysis.graph.node_parameters import CONTROLLER
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface

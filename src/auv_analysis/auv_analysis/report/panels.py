@@ -238,9 +238,11 @@ def _shade(plot: Any, mark: Mark, faults: Sequence[Mark]) -> None:
     from bokeh.models.annotations import BoxAnnotation, Label
 
     row = sum(other.start <= mark.start < other.end for other in faults[: mark.number - 1])
-    ends = {} if math.isinf(mark.end) else {'right': mark.end}
-    fill = {'fill_color': FAULT, 'fill_alpha': 0.14, 'line_color': None, 'level': 'underlay'}
-    plot.add_layout(BoxAnnotation(left=mark.start, **ends, **fill))
+    box: Any = BoxAnnotation(left=mark.start, fill_color=FAULT, fill_alpha=0.14, line_color=None)
+    box.level = 'underlay'
+    if not math.isinf(mark.end):
+        box.right = mark.end
+    plot.add_layout(box)
     number: dict[str, Any] = {'text': f'{mark.number}', 'text_font_size': '10px', 'x_offset': 3}
     plot.add_layout(Label(x=mark.start, y=120 - 13 * (row % 4), y_units='screen', **number))
 

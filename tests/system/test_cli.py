@@ -25,7 +25,7 @@ from auv_analysis.bag.output import Storage
 from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli import main
-from auv_analysis.cli.command_line import COMMANDS
+from auv_analysis.cli.main import COMMANDS
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.output.folder import SWEEP, digest, write_manifest
 from auv_dynamics.files.shipped import shipped
@@ -371,14 +371,15 @@ def test_analyze_refuses_a_bag_with_a_bad_attachment(what, recording, folder, ca
 @pytest.fixture
 def stopped(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """Folders that a command asked for; it ends, all well, where the summaries would begin."""
-    from auv_analysis.cli import analyze, conclude
+    from auv_analysis.cli import scenario_runs
+    from auv_analysis.output import folder
 
     asked: list[Path] = []
-    made = analyze.results_folder
+    made = folder.results_folder
     monkeypatch.setattr(
-        analyze, 'results_folder', lambda out, **options: asked.append(out) or made(out, **options)
+        folder, 'results_folder', lambda out, **options: asked.append(out) or made(out, **options)
     )
-    monkeypatch.setattr(conclude, 'summarize', lambda *_, **__: sys.exit(0))
+    monkeypatch.setattr(scenario_runs, 'summarize', lambda *_, **__: sys.exit(0))
     return asked
 
 

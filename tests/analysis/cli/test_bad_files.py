@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from auv_analysis.cli import main, scenarios
+from auv_analysis.cli import main, scenario_runs
 from auv_dynamics.files.shipped import shipped
 
 HEADER = 't,surge,sway,heave,roll,pitch,yaw'
@@ -187,7 +187,9 @@ TABLES = {  # what is wrong with the CSV file -> text, key, expected, found
 @pytest.fixture(autouse=True)
 def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fail where the results' folder would be made, which comes before all work."""
-    monkeypatch.setattr(scenarios, 'results_folder', lambda *_, **__: pytest.fail('work has begun'))
+    monkeypatch.setattr(
+        scenario_runs, 'results_folder', lambda *_, **__: pytest.fail('work has begun')
+    )
 
 
 def _cases(table: str) -> list[tuple[str, str, str, str, str]]:

@@ -67,7 +67,7 @@ def test_code_is_valid_in_its_shell(shell: str, capsys: pytest.CaptureFixture) -
 
 def test_light_commands_load_no_numpy() -> None:
     code = (
-        'import sys; from auv_analysis.cli.command_line import parser; parser()\n'
+        'import sys; from auv_analysis.cli.main import parser; parser()\n'
         'import auv_analysis.cli.completion, auv_analysis.cli.guide, auv_analysis.cli.doctor\n'
         'assert not {"numpy", "rich", "jsonschema", "rclpy"} & set(sys.modules), sys.modules'
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from auv_analysis.cli import main
-from auv_analysis.cli.command_line import COMMANDS, GROUPS
+from auv_analysis.cli.main import COMMANDS, GROUPS
 
 
 @pytest.fixture

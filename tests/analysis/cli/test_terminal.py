@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 from strategies import QUICK
 
-from auv_analysis.cli.conclude import summary_tables
+from auv_analysis.cli.scenario_runs import summary_tables
 from auv_analysis.output.text import number
 from auv_dynamics.vehicle import DOFS
 

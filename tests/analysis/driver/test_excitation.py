@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 from simulated_driver import SimulatedDriver
 
-from auv_analysis.cli import check_driver
-from auv_analysis.driver.excitation import GOODBYE, PERIOD, StoppedError, carry_out, plan_of
+from auv_analysis.driver.excitation import (
+    GOODBYE,
+    PERIOD,
+    StoppedError,
+    actuate,
+    carry_out,
+    plan_of,
+)
 from auv_dynamics.files.ending import ENDING, on_signals
 
 ZERO = (0.0,) * 6
@@ -88,9 +94,9 @@ def test_a_signal_is_no_exception_but_a_wish_while_wrenches_are_sent(number: int
 def test_nothing_is_sent_where_another_begins_to_command_in_the_countdown(monkeypatch) -> None:
     driver = SimulatedDriver(joined_after=0.0)
     driver.advertise = driver.retire = lambda: True
-    monkeypatch.setattr(check_driver, 'COUNTDOWN', 0)
+    monkeypatch.setattr('auv_analysis.driver.excitation.COUNTDOWN', 0)
     plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
-    excitation = check_driver.actuate(driver, plan, 0.5)
+    excitation = actuate(driver, plan, 0.5)
     assert excitation.aborted == '/somebody publishes the wrench as well'
     assert driver.sent == []
 

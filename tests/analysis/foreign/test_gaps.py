@@ -20,7 +20,7 @@ from auv_analysis.bag.foreign_tracks import (
     time_base,
     usual_limit,
 )
-from auv_analysis.cli.conclude import summary_tables
+from auv_analysis.cli.scenario_runs import summary_tables
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.output.text import number
 from auv_analysis.report import plots

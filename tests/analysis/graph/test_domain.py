@@ -5,7 +5,7 @@ from contextlib import suppress
 
 import pytest
 
-from auv_analysis.cli import main, scenarios
+from auv_analysis.cli import main, scenario_runs
 from auv_analysis.graph.domain import (
     LARGEST,
     VARIABLE,
@@ -71,7 +71,9 @@ def test_wrong_environment_is_refused(value: str, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize('where', ['--domain-id', VARIABLE])
 @pytest.mark.parametrize('value', WRONG)
 def test_run_refuses_a_wrong_domain_in_one_line(where, value, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(scenarios, 'results_folder', lambda *_, **__: pytest.fail('work has begun'))
+    monkeypatch.setattr(
+        scenario_runs, 'results_folder', lambda *_, **__: pytest.fail('work has begun')
+    )
     arguments = ['run', 'case1']
     if where == VARIABLE:
         monkeypatch.setenv(VARIABLE, value)

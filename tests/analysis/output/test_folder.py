@@ -14,7 +14,8 @@ from typing import Any
 
 import pytest
 
-from auv_analysis.cli import main, run, simulate
+from auv_analysis.cli import main, scenario_runs
+from auv_analysis.graph import recorded_runs
 from auv_analysis.output.folder import results_folder
 from auv_analysis.output.new_files import replacing, unfinished_name, write_text
 from auv_dynamics.files.errors import FailedError, InputError
@@ -316,7 +317,7 @@ def test_folder_that_cannot_be_written_is_refused() -> None:
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder in which a user keeps scenario and vehicle under the names that we use as well."""
-    for module, work in ((run, 'warm_up'), (simulate, 'write_inputs')):
+    for module, work in ((recorded_runs, 'warm_up'), (scenario_runs, 'write_inputs')):
         monkeypatch.setattr(module, work, lambda *_: pytest.fail('work has begun'))
     shutil.copy(shipped('scenarios', 'case1'), tmp_path / 'scenario.yaml')
     shutil.copy(shipped('vehicles', 'herman2018'), tmp_path / 'vehicle.yaml')

@@ -12,7 +12,7 @@ from made_messages import Bag, odometry, serialized, stamped
 
 from auv_analysis.bag.step_topics import ACCEL, ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import main
-from auv_analysis.replay.compared import compared, figures_of, reproduction
+from auv_analysis.replay.compared import compared, metrics_of, reproduction
 from auv_analysis.replay.open_loop import OpenLoop, open_loop, recorded_loop, recorded_settings
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
@@ -215,11 +215,11 @@ def test_wrenches_are_compared_where_there_are_both(tmp_path: Path) -> None:
     )
     assert both.t.tolist() == [0.02, 0.03]
     assert both.recorded[:, 0].tolist() == [2.0, 3.0]
-    figures = figures_of(both)
+    figures = metrics_of(both)
     assert figures['difference']['max'] == [4.0] * 6
     assert figures['difference']['rms'] == [12.5**0.5] * 6
     none = compared(loop, OpenLoop(ns[2:], np.zeros((1, 6)), np.zeros((1, 6))))
-    assert figures_of(none)['answered'] == {'rms': None, 'max': None}
+    assert metrics_of(none)['answered'] == {'rms': None, 'max': None}
 
 
 @pytest.mark.parametrize(

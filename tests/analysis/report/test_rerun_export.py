@@ -57,7 +57,7 @@ def test_without_rerun_one_line_says_how_to_get_it(monkeypatch, capsys, tmp_path
 
 
 def test_an_earlier_file_is_not_replaced_unasked(monkeypatch, capsys, tmp_path) -> None:
-    monkeypatch.setattr('auv_analysis.cli.export_rerun.library', lambda: None)
+    monkeypatch.setattr('auv_analysis.report.rerun_export.library', lambda: None)
     (tmp_path / 'gvc.rrd').touch()
     with pytest.raises(SystemExit) as ended:
         main(['export-rerun', str(tmp_path / 'gvc')])

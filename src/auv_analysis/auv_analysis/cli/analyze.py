@@ -1,25 +1,55 @@
 """`auv analyze`: summary and report of runs, recorded or simulated, and of sweeps."""
 
+from __future__ import annotations
+
 import argparse
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from auv_analysis.bag.foreign_topics import OPTIONS, TopicMap, read_mapping
-from auv_analysis.cli.conclude import conclude, show
-from auv_analysis.output.folder import Results, check_free, results_folder
-from auv_analysis.output.progress import waiting
-from auv_analysis.studies.compare.sources import Source, is_sweep, named, open_source, sources_of
+from auv_analysis.cli.arguments import add_no_report, add_results, import_law
 from auv_dynamics.files.errors import InputError
-from auv_gvc_controller.laws.law import law_class, refusal
+
+if TYPE_CHECKING:
+    from auv_analysis.bag.foreign_topics import TopicMap
+    from auv_analysis.output.folder import Results
+    from auv_analysis.studies.compare.sources import Source
 
 FEW = 3  # runs up to which the report shows every figure of each
 LONGEST = 80  # of a folder's name
 
 
-def analyze(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Runs, and what their bags do not say of themselves."""
+    add_results(command)
+    text = 'a bag, a folder of results or of a sweep, or a scenario, which is simulated'
+    command.add_argument('results', nargs='+', metavar='BAG', help=text)
+    command.add_argument('--by', metavar='METRIC', help='of a sweep: what sorts the best rows')
+    command.add_argument('--vehicle', help='for bags that do not carry their own')
+    text = 'of the vehicle in a bag of several; default: that of the recorder'
+    command.add_argument('--namespace', metavar='NS', help=text)
+    add_no_report(command)
+    text = 'own law that results may name, as its code may run; may be repeated'
+    command.add_argument('--law', metavar='MODULE:CLASS', action='append', help=text)
+    group = command.add_argument_group('bags of other systems')
+    group.add_argument('--map', metavar='FILE', help='mapping file; options replace its keys')
+    group.add_argument('--odom', dest='odometry', metavar='TOPIC', help='nav_msgs/Odometry')
+    group.add_argument('--wrench', metavar='TOPIC', help='the commanded WrenchStamped or Wrench')
+    group.add_argument('--setpoint', metavar='TOPIC', help='TwistStamped, Twist or Odometry')
+    group.add_argument('--frames', choices=('ned_fsd', 'enu_flu'), help='axes of all topics')
+    text = 'axes in which the odometry writes the velocity, default: child'
+    group.add_argument('--twist-frame', choices=('child', 'world'), help=text)
+    text = 'common time base, default: the median period of the velocity'
+    group.add_argument('--step', type=float, metavar='S', help=text)
+    group.add_argument('--gap', type=float, metavar='S', help='longer pauses are gaps')
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Summary and report of runs, recorded or simulated, or of a sweep."""
+    from auv_analysis.output.folder import check_free
+    from auv_analysis.studies.compare.sources import is_sweep, sources_of
+
     sweeps = [argument for argument in options.results if is_sweep(argument)]
     if sweeps:
         if len(options.results) > 1:
@@ -31,7 +61,8 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
 
         chosen = {'out': options.out, 'by': options.by, 'overwrite': options.overwrite}
         return explore(Path(sweeps[0]), **chosen)
-    _import_laws(options.law or ())
+    for law in options.law or ():
+        import_law(law)
     mapping = _mapping(options)
     sources = sources_of(options.results, mapping, options.namespace)
     if options.out:
@@ -39,18 +70,10 @@ def analyze(options: argparse.Namespace) -> dict[str, Any]:
     return _few(sources, options) if len(sources) <= FEW else _many(sources, options)
 
 
-def _import_laws(names: Sequence[str]) -> None:
-    """Import the own laws that may be: bags and results that name them do not."""
-    for name in names:
-        try:
-            law_class(name)
-        except ValueError as error:
-            _, expected, found = refusal(error)
-            raise InputError('--law', '', expected, found) from None
-
-
 def _mapping(options: argparse.Namespace) -> TopicMap | None:
     """What is told of bags of other systems; None where nothing is."""
+    from auv_analysis.bag.foreign_topics import OPTIONS, read_mapping
+
     given = {key: getattr(options, key) for key in OPTIONS}
     if options.map is None and all(value is None for value in given.values()):
         return None
@@ -58,6 +81,10 @@ def _mapping(options: argparse.Namespace) -> TopicMap | None:
 
 
 def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
+    from auv_analysis.cli.scenario_runs import conclude
+    from auv_analysis.output.progress import waiting
+    from auv_analysis.studies.compare.sources import named, open_source
+
     opened = []
     for source in sources:
         with waiting(f'reading {source.path}'):
@@ -73,13 +100,16 @@ def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, An
 
 
 def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
+    from auv_analysis.cli.scenario_runs import comparison_table
+    from auv_analysis.output.progress import console, waiting
     from auv_analysis.studies.compare.report import conclude_comparison, entries_of
 
     with waiting(f'reading {len(sources)} runs'):
         entries = entries_of(sources, options.vehicle)
     with _folder([entry.scenario for entry in entries], sources, options) as results:
         summaries = conclude_comparison(results.folder, entries, report=not options.no_report)
-    show({name: summary for name, summary in summaries.items() if summary})
+    table = comparison_table({name: summary for name, summary in summaries.items() if summary})
+    console.print(table)
     return summaries
 
 
@@ -87,6 +117,8 @@ def _folder(
     scenarios: Sequence[str], sources: Sequence[Source], options: argparse.Namespace
 ) -> AbstractContextManager[Results]:
     """Folder of the results, only now that all has been read."""
+    from auv_analysis.output.folder import results_folder
+
     names = list(dict.fromkeys(scenarios))
     name = '_'.join(names)
     if len(names) > FEW or len(name) > LONGEST:

@@ -1,26 +1,34 @@
-"""`auv atlas`: couplings by inertia of vehicles, side by side."""
+"""`auv atlas`: inertial couplings of vehicles, side by side."""
 
 import argparse
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.output.folder import results_folder
-from auv_analysis.output.progress import say, waiting
-from auv_analysis.studies.atlas.atlas import charts, write_atlas
+from auv_analysis.cli.arguments import add_results
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.files.shipped import shipped, shipped_names
-
-FOLDER = Path('runs') / 'atlas'
 
 
-def atlas(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Which vehicles."""
+    add_results(command)
+    text = 'beside the shipped ones'
+    command.add_argument('vehicles', nargs='*', metavar='VEHICLE', help=text)
+    command.add_argument('--only', action='store_true', help='the given ones alone')
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Couplings of the shipped vehicles and of the given ones, or of these alone."""
+    from auv_analysis.output.folder import results_folder
+    from auv_analysis.output.progress import say, waiting
+    from auv_analysis.studies.atlas.atlas import charts, write_atlas
+    from auv_dynamics.files.shipped import shipped, shipped_names
+
     given = list(dict.fromkeys(options.vehicles))
     if options.only and not given:
         raise InputError('--only', '', 'VEHICLE, one at least', 'none')
     known = [] if options.only else shipped_names('vehicles')
     vehicles = [*known, *(vehicle for vehicle in given if vehicle not in known)]
-    out = options.out or FOLDER
+    out = options.out or Path('runs') / 'atlas'
     files = [shipped('vehicles', vehicle) for vehicle in vehicles]
     with results_folder(out, overwrite=options.overwrite, inputs=files) as results:
         with waiting(f'case 1 on {len(vehicles)} vehicles'):
@@ -29,7 +37,7 @@ def atlas(options: argparse.Namespace) -> dict[str, Any]:
         from auv_analysis.studies.atlas.plots import draw  # with matplotlib, which loads slowly
         from auv_analysis.studies.atlas.report import findings, write_report
 
-        with waiting('drawing figures, writing the report'):
+        with waiting('drawing plots, writing the report'):
             write_report(results.folder, found, draw(found, results.folder / 'figures'))
         for sentence in findings(found):
             say(sentence.text)

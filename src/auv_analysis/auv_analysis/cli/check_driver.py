@@ -1,72 +1,87 @@
 """`auv check-driver`: whether a vehicle driver offers what our nodes need."""
 
+from __future__ import annotations
+
 import argparse
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
-from threading import Event
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from auv_analysis.cli.graphs import (
-    checked_namespace,
-    checked_topic,
-    join_domain,
-    place_of,
-    positive,
-    short_place,
+from auv_analysis.cli.arguments import (
+    add_domain,
+    add_frames,
+    add_results,
+    namespace,
+    number,
+    topic,
 )
-from auv_analysis.driver.checks import (
-    PASSIVE,
-    document_of,
-    failure_of,
-    findings_table,
-    judge,
-    refusal,
-)
-from auv_analysis.driver.evidence import Evidence, Settings
-from auv_analysis.driver.excitation import SPEED, Excitation, Plan, StoppedError, carry_out, plan_of
-from auv_analysis.graph.domain import joined_domain
-from auv_analysis.output.folder import check_free, results_folder
-from auv_analysis.output.progress import TextConsole, bar, say, waiting
-from auv_analysis.output.text import join
-from auv_dynamics import load_vehicle
-from auv_dynamics.files.ending import on_signals
-from auv_dynamics.files.errors import FailedError, InputError
-from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface
-from auv_dynamics.ros.interface import Frames
+from auv_dynamics.vehicle import DOFS
 
-USUAL = 10.0  # s of listening
-LONGEST = 600.0  # s
+if TYPE_CHECKING:
+    from auv_analysis.driver.evidence import Evidence
+    from auv_analysis.driver.excitation import Plan
+
 APPEARS = 5.0  # s within which discovery finds a driver that is there
 LOOK = 0.1  # s between two looks
-FASTEST = 0.5  # m/s and rad/s that may be asked for
-COUNTDOWN = 3  # s before the first wrench
-MATCHES = 5.0  # s for the driver to be seen by a new publisher
 
 
-def check_driver(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Where the driver is, how long it is listened to, and what may be sent to it."""
+    add_results(command)
+    add_domain(command)
+    add = command.add_argument
+    add('--namespace', type=namespace, default='/', help='of the driver, such as /auv1')
+    text = 'its odometry, default: odom'
+    add('--odom', type=topic, default=interface.ODOM, metavar='TOPIC', help=text)
+    text = 'what it takes, default: wrench'
+    add('--wrench', type=topic, default=interface.WRENCH, metavar='TOPIC', help=text)
+    add_frames(command)
+    text = 'how long to listen, default: 10'
+    add('--seconds', type=number(above=0, at_most=600), default=10.0, metavar='S', help=text)
+    text = 'that the driver promises'
+    add('--expect-rate', type=number(above=0, at_most=1e4), metavar='HZ', help=text)
+    text = 'stamps are those of /clock: the driver is a simulation'
+    add('--use-sim-time', action='store_true', help=text)
+    text = 'file or shipped bare name; for --actuate: bounds the wrench, predicts the response'
+    add('--vehicle', help=text)
+    group = command.add_argument_group('wrenches, none of which is sent without --actuate')
+    add = group.add_argument
+    text = 'send small wrenches, an axis at a time: THE VEHICLE MOVES'
+    add('--actuate', action='store_true', help=text)
+    text = 'only this one; may be repeated; default: all that the vehicle can'
+    add('--axis', action='append', choices=DOFS, help=text)
+    text = 'largest speed by the model, m/s and rad/s, default: 0.1'
+    add('--speed', type=number(above=0, at_most=0.5), default=0.1, metavar='V', help=text)
+    add('--force', type=number(above=0), metavar='N', help='never more than this')
+    add('--torque', type=number(above=0), metavar='NM', help='never more than this, N m')
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Listen to a driver and judge it; FailedError where a check fails."""
-    seconds = positive(options.seconds, '--seconds', LONGEST) or USUAL
-    plan, settings = _plan(options), _settings(options)
-    names = {
-        interface.ODOM: checked_topic(options.odom or interface.ODOM, '--odom'),
-        interface.WRENCH: checked_topic(options.wrench or interface.WRENCH, '--wrench'),
-    }
-    domain = joined_domain(options.domain_id)
-    namespace = checked_namespace(options.namespace)
+    from auv_analysis.driver.checks import PASSIVE, judge, refusal
+    from auv_analysis.driver.evidence import Evidence, Settings
+    from auv_analysis.driver.excitation import actuate
+    from auv_analysis.graph.domain import join_domain, place_of
+    from auv_analysis.output.folder import check_free
+    from auv_analysis.output.progress import say
+
+    plan, frames = _plan(options), interface.Frames(options.odom_frame, options.base_frame)
+    settings = Settings(frames, options.expect_rate, options.use_sim_time, options.actuate)
     if options.out is not None:
         check_free(options.out, overwrite=options.overwrite)
-    join_domain(domain)
+    domain = join_domain(options.domain_id)
     # the middleware reads its environment when it is loaded
     from auv_analysis.nodes.driver_check_node import RosDriverClient
 
+    names = {interface.ODOM: options.odom, interface.WRENCH: options.wrench}
     with ExitStack() as stack:
-        client = RosDriverClient(domain, namespace, names, settings.frames, commands=bool(plan))
+        client = RosDriverClient(domain, options.namespace, names, frames, commands=bool(plan))
         stack.callback(client.close)
-        say(f'listens on {place_of(domain, namespace)}')
-        began = _listen(client, seconds)
-        graph = client.graph(short_place(domain, namespace))
+        say(f'listens on {place_of(domain, options.namespace)}')
+        began = _listen(client, options.seconds)
+        graph = client.graph(place_of(domain, options.namespace, with_range=False))
         why, excitation = 'nothing is sent without --actuate', None
         if plan is not None:
             why = refusal(judge(Evidence(graph, client.log(began), settings), PASSIVE))
@@ -76,27 +91,18 @@ def check_driver(options: argparse.Namespace) -> dict[str, Any]:
     return _conclude(options, evidence)
 
 
-def _settings(options: argparse.Namespace) -> Settings:
-    usual = Frames()
-    return Settings(
-        frames=Frames(options.odom_frame or usual.odom, options.base_frame or usual.base),
-        rate=positive(options.expect_rate, '--expect-rate', 1e4),
-        sim_time=options.use_sim_time,
-        actuates=options.actuate,
-    )
-
-
 def _plan(options: argparse.Namespace) -> Plan | None:
     """What is going to be sent; None without --actuate."""
-    speed = positive(options.speed, '--speed', FASTEST) or SPEED
-    force, torque = positive(options.force, '--force'), positive(options.torque, '--torque')
+    from auv_analysis.driver.excitation import plan_of
+    from auv_dynamics import load_vehicle
+
     vehicle = None if options.vehicle is None else load_vehicle(options.vehicle)
     if not options.actuate:
         return None
     if vehicle is None:
-        expected = 'a vehicle file with --actuate: it bounds the wrenches and predicts the answer'
+        expected = 'a vehicle file with --actuate: it bounds the wrench and predicts the response'
         raise InputError('--vehicle', '', expected, None)
-    plan = plan_of(vehicle, options.axis or (), speed, force, torque)
+    plan = plan_of(vehicle, options.axis or (), options.speed, options.force, options.torque)
     if not plan.trials:
         expected = f'axes that the thrusters of {vehicle.name} can move'
         raise InputError('--axis', '', expected, ', '.join(options.axis or ()))
@@ -105,6 +111,8 @@ def _plan(options: argparse.Namespace) -> Plan | None:
 
 def _listen(client: Any, seconds: float) -> int:
     """Listen for so long from the first odometry on; the time of the first, ns."""
+    from auv_analysis.output.progress import bar
+
     appears = time.monotonic() + APPEARS
     while not len(client.buffer) and time.monotonic() < appears:
         client.listen(LOOK)
@@ -120,57 +128,13 @@ def _listen(client: Any, seconds: float) -> int:
     return began
 
 
-def actuate(client: Any, plan: Plan, timeout: float) -> Excitation:
-    """Announce and carry out a plan.
-
-    Parameters
-    ----------
-    client : the connection, which publishes nothing yet
-    plan : what is sent
-    timeout : s of silence of the odometry that end it
-
-    Raises
-    ------
-    KeyboardInterrupt : the user wanted an end; zero was sent
-
-    """
-    stop = Event()  # a signal only asks for an end: zero is sent before it is one
-    with on_signals(stop.set):
-        try:
-            return _announced(client, plan, timeout, stop.is_set)
-        except StoppedError:
-            raise KeyboardInterrupt from None
-        finally:
-            client.retire()
-
-
-def _announced(client: Any, plan: Plan, timeout: float, stopped: Callable[[], bool]) -> Excitation:
-    for line in plan.lines():
-        say(line)
-    client.advertise()  # nothing is sent yet, but whoever else is about to command sees it
-    for left in range(COUNTDOWN, 0, -1):
-        say(f'begins in {left} s')
-        _wait(client, 1.0, stopped)
-    if others := client.others():
-        return Excitation(plan, (), f'{join(others)} publishes the wrench as well')
-    until = time.monotonic() + MATCHES
-    while not client.advertise():
-        if time.monotonic() > until:
-            why = f'the driver does not hear a publisher within {MATCHES:g} s'
-            return Excitation(plan, (), why)
-        _wait(client, LOOK, stopped)
-    return carry_out(client, plan, timeout, stopped, lambda trial: say(f'{trial.dof} ...'))
-
-
-def _wait(client: Any, seconds: float, stopped: Callable[[], bool]) -> None:
-    until = time.monotonic() + seconds
-    while (left := until - time.monotonic()) > 0:
-        client.listen(min(LOOK, left))
-        if stopped():
-            raise StoppedError
-
-
 def _conclude(options: argparse.Namespace, evidence: Evidence) -> dict[str, Any]:
+    from auv_analysis.driver.checks import document_of, failure_of, findings_table, judge
+    from auv_analysis.output.folder import results_folder
+    from auv_analysis.output.progress import TextConsole, waiting
+    from auv_dynamics.files.errors import FailedError
+    from auv_dynamics.files.shipped import shipped
+
     findings = judge(evidence)
     document = document_of(evidence, findings)
     if not options.json:
@@ -181,7 +145,7 @@ def _conclude(options: argparse.Namespace, evidence: Evidence) -> dict[str, Any]
         inputs = [shipped('vehicles', options.vehicle)] if options.vehicle else []
         with (
             results_folder(options.out, overwrite=options.overwrite, inputs=inputs) as results,
-            waiting('drawing figures, writing the report'),
+            waiting('drawing plots, writing the report'),
         ):
             write_results(results.folder, evidence, findings, document)
     failure = failure_of(findings)

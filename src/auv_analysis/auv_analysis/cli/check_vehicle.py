@@ -3,13 +3,21 @@
 import argparse
 from typing import Any
 
-from auv_analysis.studies import check_vehicle as vehicle_check
-from auv_analysis.studies.check_vehicle import print_check
+from auv_analysis.cli.arguments import VEHICLE
 
 
-def check_vehicle(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """A vehicle, and its speed."""
+    command.add_argument('vehicle', metavar='FILE', help=VEHICLE)
+    text = 'ahead, at which the poles are, m/s; default: the top speed of a shipped one, else 1'
+    command.add_argument('--speed', type=float, metavar='U', help=text)
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """What a vehicle file says about how it can be controlled."""
-    document = vehicle_check.check_vehicle(options.vehicle, options.speed)
+    from auv_analysis.studies.check_vehicle import check_vehicle, print_check
+
+    document = check_vehicle(options.vehicle, options.speed)
     if not options.json:
         print_check(document)
     return document

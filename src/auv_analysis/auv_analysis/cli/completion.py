@@ -8,10 +8,9 @@ import argcomplete
 from argcomplete.completers import BaseCompleter, FilesCompleter
 from argcomplete.shell_integration import shellcode
 
-from auv_analysis.cli.command_parser import Parser
+from auv_analysis.cli.arguments import Parser
 from auv_analysis.cli.tune import LAWS
 from auv_dynamics.files.shipped import shipped, shipped_names
-from auv_dynamics.files.yaml_files import parse_any_yaml
 
 YAML = FilesCompleter(('yaml', 'yml'))
 
@@ -44,6 +43,8 @@ class _Names(BaseCompleter):
 
 def controllers(parsed_args: Any, **_: Any) -> list[str]:
     """Names of the controllers of the scenario on the command line."""
+    from auv_dynamics.files.yaml_files import parse_any_yaml
+
     try:
         path = shipped('scenarios', parsed_args.scenario)
         return list(parse_any_yaml(path.read_text(encoding='utf-8'), path)['controllers'])
@@ -74,7 +75,12 @@ COMPLETERS: dict[str, Callable[..., Iterable[str]]] = {
 }
 
 
-def completion(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Which shell."""
+    command.add_argument('shell', choices=('bash', 'zsh', 'fish'))
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Code for the shell, to be evaluated there."""
     text = shellcode(['auv'], shell=options.shell)
     if not options.json:

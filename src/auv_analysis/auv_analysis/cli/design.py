@@ -5,13 +5,24 @@ import re
 from pathlib import Path
 from typing import Any
 
-from auv_dynamics.files.errors import InputError
+from auv_analysis.cli.arguments import SCENARIO, VEHICLE, add_results, refused
 
 BOUND = re.compile(r'([a-z.]+)=([^:=]+):([^:=]+)')
 LONGEST = 90  # of the vehicle's name in that of the folder
 
 
-def design(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """A vehicle, which of its couplings, and how far it may be changed."""
+    add_results(command)
+    command.add_argument('vehicle', help=VEHICLE)
+    command.add_argument('--scenario', help=f'{SCENARIO}, with this vehicle in it')
+    text = 'such as delta_pi.pitch; default: the largest'
+    command.add_argument('--reduce', metavar='COUPLING', help=text)
+    text = 'NAME=LOWER:UPPER of a parameter, such as shift.x=-0.05:0.05; may be repeated'
+    command.add_argument('--bound', type=_bound, action='append', default=[], help=text)
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Which change of a vehicle removes which coupling."""
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import bar, count, say, waiting
@@ -22,8 +33,7 @@ def design(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.studies.design.search import propose
     from auv_analysis.studies.design.setting import open_setting
 
-    own = [_bound(text) for text in options.bound]
-    setting = open_setting(options.vehicle, options.scenario, own)
+    setting = open_setting(options.vehicle, options.scenario, options.bound)
     if options.reduce is not None:
         coupling_named(options.reduce, present(setting.space.vehicle))
     name = UNFIT.sub('_', setting.space.vehicle.name)[:LONGEST]
@@ -42,7 +52,7 @@ def design(options: argparse.Namespace) -> dict[str, Any]:
             found = write_results(proposal, results)
         from auv_analysis.studies.design.report import print_design, write_report
 
-        with waiting('drawing figures, writing the report'):
+        with waiting('drawing plots, writing the report'):
             write_report(found, results.folder)
         if not options.json:
             print_design(found.document)
@@ -53,10 +63,9 @@ def _bound(text: str) -> tuple[str, float, float]:
     from auv_analysis.studies.design.change import NAMES
 
     match = BOUND.fullmatch(text)
-    expected = f'NAME=LOWER:UPPER with NAME one of {", ".join(NAMES)}'
-    if match is None:
-        raise InputError('--bound', '', expected, text)
     try:
-        return match[1], float(match[2]), float(match[3])
+        if match:
+            return match[1], float(match[2]), float(match[3])
     except ValueError:
-        raise InputError('--bound', match[1], 'two numbers LOWER:UPPER', text) from None
+        pass
+    raise refused(f'NAME=LOWER:UPPER with NAME one of {", ".join(NAMES)}', text)

@@ -41,7 +41,11 @@ def findings_of(checks: Iterable[Check]) -> Iterator[Finding]:
             yield Finding(name, 'broken', found, 'make clean, then make setup')
 
 
-def doctor(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(_: argparse.ArgumentParser) -> None:
+    """No option of its own."""
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Print each finding as it comes; FailedError where something is broken."""
     findings = []
     for finding in findings_of(CHECKS):

@@ -4,16 +4,24 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.bag import open_bag
-from auv_analysis.output.new_files import check_file
-from auv_analysis.report.rerun_export import export, library
-from auv_dynamics.files.errors import printable
+from auv_analysis.cli.arguments import add_results
 
 
-def export_rerun(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """A bag."""
+    add_results(command, 'file to write; default: beside the bag')
+    command.add_argument('bag', type=Path, metavar='BAG')
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Write a bag as a file for the rerun viewer."""
+    from auv_analysis.bag import open_bag
+    from auv_analysis.output.new_files import check_file
+    from auv_analysis.report.rerun_export import export, library
+    from auv_dynamics.files.errors import printable
+
     library()  # before anything is read
-    bag = Path(options.bag)
+    bag = options.bag
     out = options.out or bag.with_suffix('.rrd')
     check_file(out, overwrite=options.overwrite, inputs=[bag])
     run = open_bag(bag).run

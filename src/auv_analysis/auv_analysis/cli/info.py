@@ -1,20 +1,23 @@
 """`auv info`: what lies in a bag."""
 
 import argparse
+from pathlib import Path
 from typing import Any
-
-from rich.table import Table
-
-from auv_analysis.bag.any_bag import survey
-from auv_analysis.bag.foreign_topics import candidates
-from auv_analysis.bag.metadata import files_of
-from auv_analysis.output.progress import TextConsole
 
 PARAMETERS = 'params.yaml'
 
 
-def info(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """A bag."""
+    command.add_argument('bag', type=Path, metavar='BAG')
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """What lies in a bag."""
+    from auv_analysis.bag.any_bag import survey
+    from auv_analysis.bag.foreign_topics import candidates
+    from auv_analysis.bag.metadata import files_of
+
     contents = survey(options.bag)
     first, last = contents.first, contents.last
     span = None if first is None or last is None else (last - first) / 1e9
@@ -39,12 +42,14 @@ def info(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _print_info(document: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    from auv_analysis.output.progress import TextConsole
+
     out = TextConsole()
     span = 'no messages' if document['duration'] is None else f'{document["duration"]:g} s'
     out.print(f'{document["bag"]}: {document["messages"]} messages, {span}')
-    table = Table(box=None, header_style='bold')
-    for column in ('topic', 'type', 'messages'):
-        table.add_column(column)
+    table = Table('topic', 'type', 'messages', box=None, header_style='bold')
     for topic, entry in document['topics'].items():
         table.add_row(topic, entry['type'], str(entry['messages']))
     out.print(table)

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from auv_analysis.cli.arguments import add_results
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,7 +17,21 @@ DOCUMENT = 'linearization.json'
 LONGEST = 90  # of the name in that of the folder
 
 
-def linearize(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """What is linearised, and about which point."""
+    add_results(command)
+    text = 'of a vehicle or a scenario: a file, or the bare name of a shipped one'
+    command.add_argument('subject', metavar='VEHICLE_OR_SCENARIO', help=text)
+    text = "only this one of a scenario's; may be repeated"
+    command.add_argument('--controller', action='append', help=text)
+    six = ('U', 'V', 'W', 'P', 'Q', 'R')
+    text = 'velocity about which, m/s and rad/s; default: at rest'
+    command.add_argument('--nu0', nargs=6, type=float, metavar=six, help=text)
+    text, three = 'attitude about which, rad; default: level', ('PHI', 'THETA', 'PSI')
+    command.add_argument('--attitude', nargs=3, type=float, metavar=three, help=text)
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Poles and matrices of a vehicle, or of a scenario's closed loops."""
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.new_files import write_json
@@ -81,16 +96,3 @@ def _controllers(subject: Vehicle | Scenario, asked: list[str] | None, path: Pat
     if asked:
         raise InputError(path, '--controller', 'a scenario, which has controllers', 'a vehicle')
     return []
-
-
-def add_options(command: argparse.ArgumentParser) -> None:
-    """What is linearised, and about which point."""
-    text = 'of a vehicle or a scenario: a file, or the bare name of a shipped one'
-    command.add_argument('subject', metavar='VEHICLE_OR_SCENARIO', help=text)
-    text = "only this one of a scenario's; may be repeated"
-    command.add_argument('--controller', action='append', help=text)
-    six = ('U', 'V', 'W', 'P', 'Q', 'R')
-    text = 'velocity about which, m/s and rad/s; default: at rest'
-    command.add_argument('--nu0', nargs=6, type=float, metavar=six, help=text)
-    text, three = 'attitude about which, rad; default: level', ('PHI', 'THETA', 'PSI')
-    command.add_argument('--attitude', nargs=3, type=float, metavar=three, help=text)

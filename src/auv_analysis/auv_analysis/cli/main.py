@@ -1,4 +1,8 @@
-"""The `auv` command: one function per subcommand, imports only when they are needed."""
+"""The `auv` command: a table of its subcommands, each a module of this room, and exit codes.
+
+A module has `add_arguments(parser)` and `run(options)`, and imports what is heavy when it runs:
+help and completion are quick.
+"""
 
 import _thread
 import importlib
@@ -7,14 +11,49 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from argparse import Namespace
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.cli.command_line import parser
+from auv_analysis.cli.arguments import Parser
 
-HOME = {'import-vehicle': 'vehicle_formats', 'export-vehicle': 'vehicle_formats'}
+GROUPS = {
+    'To begin with': {
+        'new': 'a vehicle, a scenario or a law of your own to start from',
+        'doctor': 'what is wrong with the set-up, and what to do',
+        'completion': 'names of commands and files by the TAB key',
+    },
+    'Experiments': {
+        'simulate': 'simulate a scenario in this process, analyse and report',
+        'run': 'run a scenario on real nodes, record, analyse and report',
+        'study': 'the procedure of the paper, steps 1 to 6, as one report',
+        'watch': 'live dashboard in the terminal',
+        'params': 'the ROS parameter file of a scenario',
+    },
+    'Results and bags': {
+        'analyze': 'summary and report of bags, folders of results, or a sweep',
+        'info': 'what lies in a bag',
+        'replay': 'a bag as live topics again, or what another law would command',
+        'recover': 'repair a bag that was cut or damaged, in place',
+        'export-rerun': 'a bag as a file for the rerun viewer',
+    },
+    'Vehicles and laws compared': {
+        'check-vehicle': 'inertia, couplings and limits of a vehicle',
+        'design': 'which change of a vehicle removes which coupling, simulated',
+        'linearize': 'poles and matrices of a vehicle or of its closed loops',
+        'import-vehicle': 'a vehicle file from that of another system',
+        'export-vehicle': 'a vehicle as an SDF model for Gazebo',
+        'atlas': 'inertial couplings of the shipped vehicles, side by side',
+        'tune': 'laws tuned to equal effort or error, and compared over draws',
+        'sweep': 'many rollouts of a scenario, with values that vary, to Parquet',
+    },
+    'A real vehicle': {
+        'check-driver': 'whether a driver offers what our nodes need',
+    },
+}
+COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 AGAIN = 0.05  # s after which a Ctrl-C that was dropped is repeated
 
 
@@ -30,10 +69,32 @@ def main(arguments: list[str] | None = None) -> None:
         sys.unraisablehook = before
 
 
-def _function(command: str) -> Callable[..., dict[str, Any]]:
+def parser(named: Collection[str] = COMMANDS) -> Parser:
+    """Grammar of `auv`, with the options of the subcommands that are named.
+
+    Without a subcommand on the line, `command` is None.
+    """
+    main = Parser(
+        prog='auv', description='Experiments with underwater vehicles, and what they say.'
+    )
+    main.groups = GROUPS
+    commands = main.add_subparsers(dest='command', metavar='COMMAND')
+    for name, text in COMMANDS.items():
+        command = commands.add_parser(name, help=text, description=text)
+        main.children[name] = command
+        command.add_argument('--json', action='store_true', help='one JSON document on stdout')
+        if name in named:
+            _module(name).add_arguments(command)
+    return main
+
+
+def _module(command: str) -> Any:
+    return importlib.import_module(f'auv_analysis.cli.{command.replace("-", "_")}')
+
+
+def _function(command: str) -> Callable[[Namespace], dict[str, Any]]:
     """Function of a subcommand: options in, a JSON-ready document out."""
-    name = command.replace('-', '_')
-    return getattr(importlib.import_module(f'auv_analysis.cli.{HOME.get(command, name)}'), name)
+    return _module(command).run
 
 
 def _repeat_interrupt(dropped: Any) -> None:
@@ -51,12 +112,12 @@ def _repeat_interrupt(dropped: Any) -> None:
 
 def _main(arguments: list[str] | None) -> None:
     # it must start where packages are broken, for `auv doctor`: nothing here imports any
-    grammar = parser()
     if '_ARGCOMPLETE' in os.environ:  # the shell asks what could follow
         from auv_analysis.cli.completion import complete
 
-        complete(grammar)
-    options = grammar.parse_args(arguments)
+        complete(parser())
+    arguments = sys.argv[1:] if arguments is None else arguments
+    options = parser(arguments).parse_args(arguments)
     if options.command is None:
         from auv_analysis.cli.guide import print_guide
 

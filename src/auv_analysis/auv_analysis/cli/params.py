@@ -4,16 +4,27 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.graph.node_parameters import CONTROLLER, node_parameters, parameter_file
-from auv_analysis.output.new_files import write_text
-from auv_analysis.output.progress import say
-from auv_analysis.replay.open_loop import recorded_settings
-from auv_analysis.scenario.scenario import load_scenario
+from auv_analysis.cli.arguments import SCENARIO, TO_FILE, add_results
 from auv_dynamics.files.errors import InputError
 
 
-def params(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Scenario, controller, and whether the plant takes part."""
+    add_results(command, TO_FILE)
+    command.add_argument('scenario', help=SCENARIO)
+    command.add_argument('--controller', required=True)
+    command.add_argument('--real-time', action='store_true', help='paced by the clock')
+    text = "for a vehicle driver in the plant's place: in real time, without simulated time"
+    command.add_argument('--no-plant', action='store_true', help=text)
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """The parameter file that `auv run` would write, for plain `ros2 run`."""
+    from auv_analysis.graph.node_parameters import CONTROLLER, node_parameters, parameter_file
+    from auv_analysis.output.new_files import write_text
+    from auv_analysis.output.progress import say
+    from auv_analysis.scenario.scenario import load_scenario
+
     scenario = load_scenario(options.scenario)
     plant = not options.no_plant
     attachments = {}
@@ -30,11 +41,10 @@ def params(options: argparse.Namespace) -> dict[str, Any]:
         vehicle=scenario.shipped_vehicle,
         attachments={name: path.resolve() for name, path in attachments.items()},
     )
-    if note := _missing(parameters[CONTROLLER]):
+    if note := _missing(parameters[CONTROLLER], CONTROLLER):
         say(note)
-    text = parameter_file(
-        parameters, f'auv params {scenario.name} --controller {options.controller}'
-    )
+    command = f'auv params {scenario.name} --controller {options.controller}'
+    text = parameter_file(parameters, command)
     if options.out is not None:
         write_text(options.out, text, overwrite=options.overwrite, inputs=scenario.inputs)
     elif not options.json:
@@ -42,10 +52,12 @@ def params(options: argparse.Namespace) -> dict[str, Any]:
     return parameters
 
 
-def _missing(controller: dict[str, Any]) -> str:
+def _missing(controller: dict[str, Any], node: str) -> str:
     """What the controller will not be configured without, where the scenario does not say it."""
+    from auv_analysis.replay.open_loop import recorded_settings
+
     try:
-        recorded_settings(controller, CONTROLLER).check_bounded()
+        recorded_settings(controller, node).check_bounded()
     except InputError as error:
         return f'{error}; give it, or the scenario `actuators: {{limit: ...}}`'
     return ''

@@ -1,32 +1,41 @@
 """`auv recover`: a bag that was cut or damaged, repaired where it lies."""
 
 import argparse
+from pathlib import Path
 from typing import Any
-
-from rich.progress import DownloadColumn
-from rich.table import Table
-
-from auv_analysis.bag.recover import recover as recover_bag
-from auv_analysis.output.progress import TextConsole, bar
 
 SHOWN = 5  # damages of a file, and gaps of a topic, that are listed
 
 
-def recover(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """A bag."""
+    command.add_argument('bag', type=Path, metavar='BAG')
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Repair a bag in place."""
+    from rich.progress import DownloadColumn
+
+    from auv_analysis.bag.recover import recover
+    from auv_analysis.output.progress import bar
+
     with bar(DownloadColumn()) as shown:
         task = shown.add_task('')
 
         def show(what: str, done: int, of: int) -> None:
             shown.update(task, description=what, completed=done, total=of)
 
-        document = recover_bag(options.bag, show).document()
+        document = recover(options.bag, show).document()
     if not options.json:
         _print(document)
     return document
 
 
 def _print(document: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    from auv_analysis.output.progress import TextConsole
+
     out = TextConsole(highlight=False)
     for file in document['files']:
         kept = f', the damaged one is kept as {file["kept_as"]}' if file['kept_as'] else ''
@@ -39,7 +48,13 @@ def _print(document: dict[str, Any]) -> None:
             out.print(f'  and {len(file["lost"]) - SHOWN} more')
     if document['metadata'] == 'written':
         out.print('metadata.yaml: written')
-    out.print(_table(document['topics']))
+    table = Table('topic', box=None, header_style='bold')
+    for column in ('messages', 'gaps', 'missing'):
+        table.add_column(column, justify='right')
+    for topic, entry in document['topics'].items():
+        gaps = entry['spacing'] or {'gaps': '', 'missing': ''}
+        table.add_row(topic, str(entry['messages']), str(gaps['gaps']), str(gaps['missing']))
+    out.print(table)
     for topic, entry in document['topics'].items():
         for begin, end in (entry['spacing'] or {'longest': []})['longest'][:SHOWN]:
             out.print(f'{topic}: nothing between {begin:g} and {end:g} s')
@@ -52,14 +67,3 @@ def _print(document: dict[str, Any]) -> None:
         out.print(f'note: {note}')
     if not document['changed']:
         out.print('nothing was changed')
-
-
-def _table(topics: dict[str, Any]) -> Table:
-    table = Table(box=None, header_style='bold')
-    table.add_column('topic')
-    for column in ('messages', 'gaps', 'missing'):
-        table.add_column(column, justify='right')
-    for topic, entry in topics.items():
-        gaps = entry['spacing'] or {'gaps': '', 'missing': ''}
-        table.add_row(topic, str(entry['messages']), str(gaps['gaps']), str(gaps['missing']))
-    return table

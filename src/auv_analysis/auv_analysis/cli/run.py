@@ -1,128 +1,28 @@
 """`auv run`: real nodes, in lock-step, recorded."""
 
 import argparse
-import os
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import partial
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from rich.progress import Progress, TaskID
-
-from auv_analysis.bag import open_bag
-from auv_analysis.cli.conclude import Outcome, finish
-from auv_analysis.cli.scenarios import open_scenario, scenario_folder
-from auv_analysis.graph.domain import VARIABLE, own_domain
-from auv_analysis.graph.experiment import environment, run_controller
-from auv_analysis.graph.supervisor import NodeDiedError, TroubleError
-from auv_analysis.output.folder import Results
-from auv_analysis.output.progress import (
-    Speed,
-    bar,
-    count,
-    say,
-    waiting,
-)
-from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.warm_up import warm_up
-from auv_dynamics.files.errors import FailedError, InputError
-
-DISCOVERY = 3.0  # s: discovery may take so long
+from auv_analysis.cli.arguments import add_graph, add_no_report, add_results, add_scenario
 
 
-class FreeGraph(NamedTuple):
-    """A domain that nobody else drives a vehicle on, and what is seen of it."""
-
-    domain: int
-    watcher: Any
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Scenario, and how its nodes are started."""
+    add_results(command)
+    add_scenario(command)
+    add_no_report(command)
+    add_graph(command)
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Real nodes, in lock-step, recorded."""
+    """Run the nodes, record, analyse and report."""
+    from auv_analysis.cli.scenario_runs import finish, open_scenario, scenario_folder
+    from auv_analysis.graph.recorded_runs import free_graph, recorded
+
     scenario, names = open_scenario(options)
-    with free_graph(options) as graph, scenario_folder(options, scenario, names, '/*') as results:
-        outcome = recorded(options, scenario, names, results, graph)
-        return finish(results.folder, *outcome, scenario, report=not options.no_report)
-
-
-@contextmanager
-def free_graph(options: argparse.Namespace) -> Iterator[FreeGraph]:
-    """Join the domain of the command line, or a free one.
-
-    Raises
-    ------
-    InputError : no such domain, or somebody's vehicle is on it
-
-    """
-    with own_domain(options.domain_id) as (domain, picked):
-        os.environ.update(environment(domain))
-        # the middleware reads its environment when it is loaded
-        from auv_dynamics.ros.participant import Watcher
-
-        graph = Watcher(domain)
-        try:
-            if not picked:
-                _refuse_strangers(graph, domain)
-            yield FreeGraph(domain, graph)
-        finally:
-            graph.close()
-
-
-def recorded(
-    options: argparse.Namespace,
-    scenario: Scenario,
-    names: list[str],
-    results: Results,
-    graph: FreeGraph,
-) -> Outcome:
-    """Runs of the node graph from their bags, and what went wrong."""
-    out = results.folder
-    with waiting('loading or compiling the kernel'):
-        warm_up(scenario, names)
-    say(f'export {VARIABLE}={graph.domain}')
-    failure: FailedError | None = None
-    done = []
-    for name in names:
-        with bar(count('steps'), Speed('steps'), keep=True) as shown:
-            task = shown.add_task(f'{scenario.name} {name}', total=scenario.steps)
-            show = partial(_show_step, shown, task)
-            try:
-                run_controller(scenario, name, out, *graph, show, composed=options.composed)
-            except NodeDiedError as error:
-                failure = error
-                break  # the graph is broken; what was recorded is still worth a report
-            except TroubleError as error:
-                failure = failure or error  # the others may fare better
-        done.append(name)
-    if failure is not None and not out.is_dir():
-        raise failure  # the results were removed under us: there is nothing to report
-    if failure is None:
-        for name in names:
-            _move_paths(out / name / 'params.yaml', results)
-    return Outcome({name: open_bag(out / name).run for name in done}, failure)
-
-
-def _move_paths(parameters: Path, results: Results) -> None:
-    """Let a parameter file name the files of the run where they lie in the end."""
-    text = parameters.read_text(encoding='utf-8')
-    before, then = (str(path.resolve()) for path in results)
-    parameters.write_text(text.replace(before, then), encoding='utf-8')
-
-
-def _refuse_strangers(graph: Any, domain: int) -> None:
-    until = time.monotonic() + DISCOVERY
-    strangers: list[str] = []
-    while not strangers and time.monotonic() < until:
-        graph.spin(0.1)
-        strangers = graph.endpoints()
-    if strangers:
-        graph.spin(0.5)  # the names of nodes arrive behind their endpoints
-        strangers = graph.endpoints() or strangers
-        expected = 'a domain without endpoints on wrench or odom'
-        raise InputError(f'{VARIABLE}={domain}', '', expected, ', '.join(strangers))
-
-
-def _show_step(shown: Progress, task: TaskID, step: int) -> None:
-    shown.update(task, completed=step)
+    with (
+        free_graph(options.domain_id) as graph,
+        scenario_folder(options, scenario, names, '/*') as results,
+    ):
+        runs, failure = recorded(scenario, names, results, graph, composed=options.composed)
+        return finish(results.folder, runs, failure, scenario, report=not options.no_report)

@@ -1,75 +1,94 @@
 """`auv study`: the paper's procedure, steps 1 to 6, as one report."""
 
+from __future__ import annotations
+
 import argparse
 import os
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from auv_analysis.cli.conclude import finish
-from auv_analysis.cli.run import free_graph, recorded
-from auv_analysis.cli.scenarios import open_scenario, scenario_folder
-from auv_analysis.cli.simulate import simulated
-from auv_analysis.herman2018.cases import PaperClaims, claims_sentences, paper_claims
-from auv_analysis.herman2018.paper import CASES
-from auv_analysis.metrics.summary import Window
-from auv_analysis.output.progress import say, waiting
-from auv_analysis.report.document import Section
-from auv_analysis.runs.run import AnyRun
-from auv_analysis.runs.samples import ENDING
-from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.simulate import check_hold
-from auv_analysis.studies.study.discussion import discussion
-from auv_analysis.studies.study.indices import Design, Method
-from auv_analysis.studies.study.procedure import (
-    sensitivity_section,
-    write_samples,
+from auv_analysis.cli.arguments import (
+    add_graph,
+    add_hold,
+    add_results,
+    add_scenario,
+    number,
+    seed,
 )
-from auv_analysis.studies.study.sensitivity import Sensitivity, sensitivity
 from auv_dynamics.files.errors import InputError
 
-LARGEST_SPAN = 1e3
+if TYPE_CHECKING:
+    from auv_analysis.runs.run import AnyRun
+    from auv_analysis.scenario.scenario import Scenario
+    from auv_analysis.studies.study.sensitivity import Sensitivity
 
 
-def study(options: argparse.Namespace) -> dict[str, Any]:
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Scenario, windows of the energy, and how the sensitivity to the gains is estimated."""
+    add_results(command)
+    add_scenario(command)
+    add_hold(command)
+    text = 'real nodes, recorded, in place of this process'
+    command.add_argument('--run', action='store_true', help=text)
+    add_graph(command, 'with --run: ')
+    command.add_argument(
+        '--window', nargs=2, action='append', type=float, metavar=('FROM', 'TO'), default=[],
+        help='kinetic energy over this window as well, s; may be repeated',
+    )  # fmt: skip
+    text = 'indices of the metrics with respect to the gains; default: sobol'
+    command.add_argument('--sensitivity', choices=('sobol', 'morris', 'none'), help=text)
+    text = 'base points of sobol, a power of two; trajectories of morris'
+    command.add_argument('--samples', type=int, metavar='N', help=text)
+    text = 'gains vary from 1/SPAN to SPAN times their value; default: 2'
+    command.add_argument('--span', type=number(above=1, at_most=1e3), default=2.0, help=text)
+    command.add_argument('--seed', type=seed, default=0, help='of the samples; default: 0')
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """The paper's procedure, by `simulate` or on the node graph."""
+    from auv_analysis.cli.scenario_runs import finish, open_scenario, scenario_folder, simulated
+    from auv_analysis.graph.recorded_runs import free_graph, recorded
+    from auv_analysis.runs.samples import ENDING
+    from auv_analysis.simulation.simulate import check_hold
+
     scenario, names = open_scenario(options)
     windows = [_window(scenario, first, last) for first, last in options.window]
-    _check(options)
+    _check_samples(options)
     if options.run:
         options.hold = 'zoh'  # as the nodes do
     check_hold(scenario, options.hold)
-    of_a_run = '/*' if options.run else ENDING
     with ExitStack() as stack:
-        graph = stack.enter_context(free_graph(options)) if options.run else None
+        graph = stack.enter_context(free_graph(options.domain_id)) if options.run else None
+        of_a_run = '/*' if options.run else ENDING
         folder = scenario_folder(options, scenario, names, '.parquet', of_a_run)
         results = stack.enter_context(folder)
-        outcome = (
-            recorded(options, scenario, names, results, graph)
+        runs, failure = (
+            recorded(scenario, names, results, graph, composed=options.composed)
             if graph
-            else simulated(options, scenario, names, results)
+            else simulated(scenario, names, results.folder, options.hold)
         )
-        procedure = Procedure(scenario, results.folder, windows, options)
-        return finish(results.folder, *outcome, scenario, procedure)
+        examine = partial(_examine, options, scenario, results.folder)
+        return finish(
+            results.folder, runs, failure, scenario, windows=windows, examine=examine
+        )  # fmt: skip
 
 
-def _window(scenario: Scenario, first: float, last: float) -> Window:
+def _window(scenario: Scenario, first: float, last: float) -> tuple[float, float]:
     if not 0.0 <= first < last <= scenario.duration + scenario.step / 2:
         expected = f'two times, FROM < TO, from 0 to {scenario.duration:g} s'
         raise InputError('--window', '', expected, f'{first:g} {last:g}')
     return first, last
 
 
-def _check(options: argparse.Namespace) -> None:
-    if not 1.0 < options.span <= LARGEST_SPAN:
-        expected = f'a number above 1, up to {LARGEST_SPAN:g}'
-        raise InputError('--span', '', expected, f'{options.span:g}')
-    if options.seed < 0:
-        raise InputError('--seed', '', 'a whole number from 0 on', str(options.seed))
+def _check_samples(options: argparse.Namespace) -> None:
+    """Refuse a number of samples that the method of the sensitivity does not take."""
+    from auv_analysis.studies.study.indices import Design
+
     if options.samples is not None:
-        method: Method = 'morris' if options.sensitivity == 'morris' else 'sobol'
+        method: Any = 'morris' if options.sensitivity == 'morris' else 'sobol'
         try:
             Design(method, ('gain',), options.samples, 0)
         except ValueError as error:
@@ -77,70 +96,57 @@ def _check(options: argparse.Namespace) -> None:
             raise InputError('--samples', '', expected, str(options.samples)) from None
 
 
-@dataclass(frozen=True)
-class Procedure:
-    """What a study has beside its runs.
+def _examine(
+    options: argparse.Namespace,
+    scenario: Scenario,
+    out: Path,
+    runs: Mapping[str, AnyRun],
+    summaries: Mapping[str, Mapping[str, Any]],
+) -> dict[str, Any]:
+    """What the report has beside the runs, and the Parquet files that it rests on."""
+    from auv_analysis.herman2018.cases import claims_sentences, paper_claims
+    from auv_analysis.herman2018.paper import CASES
+    from auv_analysis.output.progress import waiting
+    from auv_analysis.report.document import Section
+    from auv_analysis.studies.study.discussion import discussion
+    from auv_analysis.studies.study.procedure import sensitivity_section, write_samples
 
-    Attributes
-    ----------
-    scenario : that is studied
-    out : folder of the results
-    windows : of the kinetic energy, s
-    options : of the command line
+    for name, run in runs.items():
+        with waiting(f'writing {name}.parquet'):
+            write_samples(run, out / f'{name}.parquet')
+    found = {} if options.sensitivity == 'none' else _sensitivities(options, scenario, runs)
+    with waiting('judging the claims of the paper'):
+        claims = paper_claims(scenario, runs, found, hold=options.hold, threads=_threads())
+    judged = claims if claims.claims or scenario.name in CASES else None
+    said = claims_sentences(judged) if judged else []
+    leading = min(runs.values(), key=lambda run: run.law != 'gvc').controller
+    more: dict[str, list[Section]] = {}
+    sentences = discussion(summaries, leading)
+    if found:
+        section, gains = sensitivity_section(out, list(found.values()))
+        more['tracking'] = [section]
+        sentences += gains
+        said = [*gains[:1], *said]
+    more['couplings'] = [Section('discussion', 'Step 6: discussion', sentences)]
+    return {'more': more, 'sentences': said, 'claims': judged.claims if judged else None}
 
-    """
 
-    scenario: Scenario
-    out: Path
-    windows: list[Window]
-    options: argparse.Namespace
+def _sensitivities(
+    options: argparse.Namespace, scenario: Scenario, names: Mapping[str, Any]
+) -> dict[str, Sensitivity]:
+    from auv_analysis.output.progress import say, waiting
+    from auv_analysis.studies.study.sensitivity import sensitivity
 
-    def examine(
-        self, runs: Mapping[str, AnyRun], summaries: Mapping[str, Mapping[str, Any]]
-    ) -> dict[str, Any]:
-        """Further arguments of `write_report`, and the Parquet files that they rest on."""
-        for name, run in runs.items():
-            with waiting(f'writing {name}.parquet'):
-                write_samples(run, self.out / f'{name}.parquet')
-        found = self._sensitivities(list(runs))
-        claims = self._claims(runs, found)
-        said = claims_sentences(claims) if claims else []
-        leading = min(runs.values(), key=lambda run: run.law != 'gvc').controller
-        more: dict[str, list[Section]] = {}
-        sentences = discussion(summaries, leading)
-        if found:
-            section, gains = sensitivity_section(self.out, list(found.values()))
-            more['tracking'] = [section]
-            sentences += gains
-            said = [*gains[:1], *said]
-        more['couplings'] = [Section('discussion', 'Step 6: discussion', sentences)]
-        judged = claims.claims if claims else None
-        return {'more': more, 'sentences': said, 'claims': judged}
-
-    def _sensitivities(self, names: list[str]) -> dict[str, Sensitivity]:
-        options = self.options
-        if options.sensitivity == 'none':
-            return {}
-        found = {}
-        for name in names:
-            with waiting(f'{self.scenario.name} {name}: varying the gains'):
-                found[name] = sensitivity(
-                    self.scenario, name, method=options.sensitivity, count=options.samples,
-                    span=options.span, seed=options.seed, hold=options.hold, threads=_threads(),
-                )  # fmt: skip
-            if found[name].refusal:
-                say(f'note: {name}: no sensitivity to the gains: {found[name].refusal}')
-        return found
-
-    def _claims(
-        self, runs: Mapping[str, AnyRun], found: Mapping[str, Sensitivity]
-    ) -> PaperClaims | None:
-        """The 21 claims; None for a scenario that is none of the paper's."""
-        with waiting('judging the claims of the paper'):
-            claims = paper_claims(
-                self.scenario, runs, found, hold=self.options.hold, threads=_threads()
-            )
-        return claims if claims.claims or self.scenario.name in CASES else None
+    found = {}
+    for name in names:
+        with waiting(f'{scenario.name} {name}: varying the gains'):
+            found[name] = sensitivity(
+                scenario, name, method=options.sensitivity, count=options.samples,
+                span=options.span, seed=options.seed, hold=options.hold, threads=_threads(),
+            )  # fmt: skip
+        if found[name].refusal:
+            say(f'note: {name}: no sensitivity to the gains: {found[name].refusal}')
+    return found
 
 
 def _threads() -> int:

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from auv_analysis.cli.arguments import SCENARIO, add_hold, add_results, number, refused, seed
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,7 +20,9 @@ INDICES = {'time': 'weighted_error', 'mean': 'error'}
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the options of `auv tune` that no other command has."""
+    """Scenario, laws, what they are given alike, and the perturbations that compare them."""
+    add_results(command)
+    command.add_argument('scenario', help=SCENARIO)
     text = 'controller to equal; default: the first under gvc'
     command.add_argument('--reference', metavar='NAME', help=text)
     text = "only this one beside the reference's own; may be repeated; default: all shipped"
@@ -32,16 +35,17 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     text = 'of gains: times I, M_ii, six numbers, times M; default: the better of the first two'
     command.add_argument('--structure', choices=structures, default='best', help=text)
     text = 'relative, of the equality; default: 0.001'
-    command.add_argument('--tolerance', type=float, default=0.001, help=text)
+    command.add_argument('--tolerance', type=number(above=0, below=0.1), default=0.001, help=text)
     text = 'draws of the Monte Carlo; 0: none; default: 256'
-    command.add_argument('--samples', type=int, metavar='N', default=256, help=text)
+    command.add_argument('--samples', type=_samples, metavar='N', default=256, help=text)
     text = 'how far draws go, such as damping=0.3 or current=0.1; may be repeated'
     command.add_argument('--spread', action='append', metavar='NAME=VALUE', help=text)
     text = 'of search and draws; default: 0'
-    command.add_argument('--seed', type=int, default=0, help=text)
+    command.add_argument('--seed', type=seed, default=0, help=text)
+    add_hold(command)
 
 
-def tune(options: argparse.Namespace) -> dict[str, Any]:
+def run(options: argparse.Namespace) -> dict[str, Any]:
     """Tune, compare and report."""
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import bar, count, say, waiting
@@ -52,7 +56,7 @@ def tune(options: argparse.Namespace) -> dict[str, Any]:
 
     scenario = load_scenario(options.scenario)
     request = _request(options, scenario)
-    asked = Perturbations(_samples(options.samples), spread_of(options.spread or ()), request.seed)
+    asked = Perturbations(options.samples, spread_of(options.spread or ()), request.seed)
     out = options.out or Path('runs') / f'tune_{scenario.name}'
     with results_folder(out, overwrite=options.overwrite, inputs=scenario.inputs) as results:
         for warning in scenario.warnings:
@@ -67,7 +71,7 @@ def tune(options: argparse.Namespace) -> dict[str, Any]:
             tuning = tune(request, asked, results.folder, stage)
         from auv_analysis.studies.tune.report import print_tuning, write_report  # with matplotlib
 
-        with waiting('drawing figures, writing the report'):
+        with waiting('drawing plots, writing the report'):
             write_report(tuning, results.folder)
         print_tuning(tuning)
         return tuning.results.to_json()
@@ -83,10 +87,6 @@ def _request(options: argparse.Namespace, scenario: Scenario) -> Request:
     laws = options.law or [law for law in LAWS if law != own]
     if own in LAWS:
         laws = [own, *laws]
-    if not 0 < options.tolerance < 0.1:
-        raise InputError('--tolerance', '', 'a number above 0, below 0.1', str(options.tolerance))
-    if not 0 <= options.seed < 2**63:
-        raise InputError('--seed', '', 'a whole number from 0 to 2^63 - 1', str(options.seed))
     return Request(
         scenario, reference, tuple(dict.fromkeys(laws)), options.equal, INDICES[options.index],
         options.tolerance, options.structure, options.hold, options.seed,
@@ -106,8 +106,11 @@ def _reference(scenario: Scenario, name: str | None) -> str:
     raise InputError(scenario.path, 'controllers', expected, ', '.join(scenario.controllers))
 
 
-def _samples(samples: int) -> int:
+def _samples(text: str) -> int:
+    try:
+        samples = int(text)
+    except ValueError:
+        samples = -1
     if samples != 0 and not FEWEST <= samples <= MOST:
-        expected = f'0 for none, or a whole number from {FEWEST} to {MOST}'
-        raise InputError('--samples', '', expected, str(samples))
+        raise refused(f'0 for none, or a whole number from {FEWEST} to {MOST}', text)
     return samples

@@ -4,17 +4,21 @@ Their size follows from the vehicle's inertia; they go out at a steady rate, eac
 look at the vehicle, and the last ones are zero however it ends.
 """
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
+from threading import Event
 from typing import Any, Protocol
 
 import numpy as np
 
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
 from auv_analysis.driver.response import Response, Wrench, fit_response, predicted
+from auv_analysis.output.progress import say
 from auv_analysis.output.text import join
+from auv_dynamics.files.ending import on_signals
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -22,7 +26,6 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 PULSE = 1.0  # s that a wrench acts one way, then the other
 REST = 0.5  # s of zero before and after
 HELD, UNHEARD = 0.5, 2.0  # s of a wrench, then of silence, to see whether the driver lets go
-SPEED = 0.1  # m/s and rad/s that no wrench brings the vehicle beyond, by the model
 ROUNDS = 4  # of making a wrench smaller: drag is not linear
 LEVEL = np.eye(13)[3]  # at rest, upright
 CALM = ('surge', 'sway', 'yaw', 'heave', 'roll', 'pitch')  # those first that nothing restores
@@ -32,6 +35,9 @@ RECENT = 5  # messages whose median is the speed
 LOOK = 10  # wrenches between two looks at who else commands
 TOO_FAST = 3.0  # times the speed of the plan, beyond what it moved at before
 LEAST = 20  # messages of a trial
+COUNTDOWN = 3  # s before the first wrench
+MATCHES = 5.0  # s for the driver to be seen by a new publisher
+LOOK_AGAIN = 0.1  # s between two looks at what has come before that
 ZERO = (0.0,) * 6
 
 
@@ -179,6 +185,12 @@ class DriverClient(Protocol):
     def others(self) -> list[str]:
         """Who else publishes the wrench."""
 
+    def advertise(self) -> bool:
+        """Make it known that wrenches are going to be published; whether the driver hears them."""
+
+    def retire(self) -> None:
+        """Publish no more."""
+
     def now_ns(self) -> int:
         """What the clock of this machine shows, ns."""
 
@@ -265,6 +277,58 @@ class Guard:
         if self._count % LOOK == 0 and (others := self._client.others()):
             raise AbortError(f'{others[0]} publishes the wrench as well')
         self._count += 1
+
+
+def actuate(client: DriverClient, plan: Plan, timeout: float) -> Excitation:
+    """Announce and carry out a plan.
+
+    Parameters
+    ----------
+    client : the connection, which publishes nothing yet
+    plan : what is sent
+    timeout : s of silence of the odometry that end it
+
+    Raises
+    ------
+    KeyboardInterrupt : the user wanted an end; zero was sent
+
+    """
+    stop = Event()  # a signal only asks for an end: zero is sent before it is one
+    with on_signals(stop.set):
+        try:
+            return _announced(client, plan, timeout, stop.is_set)
+        except StoppedError:
+            raise KeyboardInterrupt from None
+        finally:
+            client.retire()
+
+
+def _announced(
+    client: DriverClient, plan: Plan, timeout: float, stopped: Callable[[], bool]
+) -> Excitation:
+    for line in plan.lines():
+        say(line)
+    client.advertise()  # nothing is sent yet, but whoever else is about to command sees it
+    for left in range(COUNTDOWN, 0, -1):
+        say(f'begins in {left} s')
+        _wait(client, 1.0, stopped)
+    if others := client.others():
+        return Excitation(plan, (), f'{join(others)} publishes the wrench as well')
+    until = time.monotonic() + MATCHES
+    while not client.advertise():
+        if time.monotonic() > until:
+            why = f'the driver does not hear a publisher within {MATCHES:g} s'
+            return Excitation(plan, (), why)
+        _wait(client, LOOK_AGAIN, stopped)
+    return carry_out(client, plan, timeout, stopped, lambda trial: say(f'{trial.dof} ...'))
+
+
+def _wait(client: DriverClient, seconds: float, stopped: Callable[[], bool]) -> None:
+    until = time.monotonic() + seconds
+    while (left := until - time.monotonic()) > 0:
+        client.listen(min(LOOK_AGAIN, left))
+        if stopped():
+            raise StoppedError
 
 
 def carry_out(

@@ -1,4 +1,4 @@
-"""Which ROS domain a run uses, and that nobody else's vehicle is on it."""
+"""Which ROS domain a command joins, and that no other run is on it."""
 
 import fcntl
 import os
@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from auv_dynamics.files.errors import InputError, shorten
+from auv_dynamics.ros.security import HERE, RANGE, stay_local
 
 LARGEST = 101  # above it, DDS ports fall into the range that the system hands out
 VARIABLE = 'ROS_DOMAIN_ID'
@@ -107,3 +108,28 @@ def _is_unused(port: int) -> bool:
         except OSError:
             return False
     return True
+
+
+def join_domain(option: int | None) -> int:
+    """Let the middleware join a domain: set its environment, as far as the user has not.
+
+    Parameters
+    ----------
+    option : see `joined_domain`
+
+    """
+    domain = joined_domain(option)
+    os.environ[VARIABLE] = str(domain)
+    stay_local()
+    return domain
+
+
+def place_of(domain: int, namespace: str = '/', *, with_range: bool = True) -> str:
+    """Domain and namespace in words, and how far nodes are heard."""
+    inside = '' if namespace == '/' else f', namespace {namespace}'
+    place = f'{VARIABLE}={domain}{inside}'
+    if not with_range:
+        return place
+    where = os.environ[RANGE]
+    heard = f'this machine only ({RANGE}={HERE})' if where == HERE else f'{RANGE}={where}'
+    return f'{place}, {heard}'

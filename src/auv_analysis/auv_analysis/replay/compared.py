@@ -1,18 +1,32 @@
-"""What a law would have commanded beside what was commanded: figures, and a picture."""
+"""What a law would have commanded beside what was commanded: metrics, and a plot."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from auv_analysis.bag.attachments import UNKNOWN
 from auv_analysis.replay.open_loop import OpenLoop, RecordedLoop
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle import DOFS
+from auv_gvc_controller.laws.law import is_unasked
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LOCKSTEP = 1e-9  # of the rms: rounding of another machine; on the same one nothing differs
 REAL_TIME = 0.05  # the bag does not say when each message arrived
 UNCHECKED = 'reproduction not checked'
+UNNAMED = f'{UNCHECKED}: the bag does not name its law, or it is not imported'
+NAME = 'open_loop_wrench'  # of the plot
+ORDER = (0, 3, 1, 4, 2, 5)  # forces left, moments right
+Ask = Callable[[RecordedLoop, str, dict[str, Any]], OpenLoop]
 
 
 class Compared(NamedTuple):
@@ -39,17 +53,17 @@ def compared(recorded: RecordedLoop, answers: OpenLoop) -> Compared:
     return Compared(t, tau[theirs], answers.tau[ours])
 
 
-def figures_of(both: Compared) -> dict[str, dict[str, list[float] | None]]:
+def metrics_of(both: Compared) -> dict[str, dict[str, list[float] | None]]:
     """Root mean square and largest absolute value of both wrenches and of their difference."""
     parts = {
         'recorded': both.recorded,
         'answered': both.answered,
         'difference': both.answered - both.recorded,
     }
-    return {name: _figures(wrench) for name, wrench in parts.items()}
+    return {name: _metrics(wrench) for name, wrench in parts.items()}
 
 
-def _figures(wrench: np.ndarray) -> dict[str, list[float] | None]:
+def _metrics(wrench: np.ndarray) -> dict[str, list[float] | None]:
     if not len(wrench):
         return {'rms': None, 'max': None}
     most = np.abs(wrench).max(axis=0)
@@ -113,6 +127,92 @@ def reproduction(recorded: RecordedLoop, again: OpenLoop) -> Reproduction:
     return Reproduction(float(np.divide(*parts)), within, limit)
 
 
-def listed(gains: Mapping[str, Any]) -> dict[str, Any]:
-    """Gains as numbers and lists, for a document."""
+def ask_law(
+    recorded: RecordedLoop, law: str, given: Mapping[str, Any], ask: Ask
+) -> tuple[dict[str, Any], Compared]:
+    """Ask a law, and the recorded one again, what they would have commanded.
+
+    Parameters
+    ----------
+    recorded : what was recorded of a controller
+    law : that is asked
+    given : its gains by name; those that are not given are the recorded ones
+    ask : as `open_loop`
+
+    Returns
+    -------
+    document : metrics of both wrenches, and whether the recorded law gives the recorded one
+    both : the wrenches
+
+    """
+    own = recorded.controller
+    gains = own.gains_of(law, given)
+    answers = ask(recorded, law, gains)
+    known, verdict = own.law != UNKNOWN, None
+    if known and not is_unasked(own.law):
+        same = law == own.law and not given  # as recorded: asked once
+        again = answers if same else ask(recorded, own.law, dict(own.gains))
+        verdict = reproduction(recorded, again)
+    both = compared(recorded, answers)
+    refused = f'{answers.refused} messages without an answer of the law; first: {answers.trouble}'
+    document = {
+        'reproduced': verdict.holds if verdict else None,
+        'reproduction': verdict.sentence() if verdict else UNNAMED,
+        'reproduced_relative': verdict.relative if verdict else None,
+        'reproduced_within': verdict.within if verdict else None,
+        'scenario': recorded.scenario,
+        'controller': recorded.name,
+        'recorded': {'law': own.law if known else None, 'gains': _listed(own.gains)},
+        'answered': {'law': law, 'gains': _listed(gains)},
+        'samples': len(both.t),
+        'wrench': metrics_of(both),
+        'not_used': answers.refused,
+        'notes': [*recorded.notes, *answers.notes, *[refused] * bool(answers.refused)],
+    }
+    return document, both
+
+
+def _listed(gains: Mapping[str, Any]) -> dict[str, Any]:
     return {name: np.asarray(value, float).tolist() for name, value in gains.items()}
+
+
+def draw(document: Mapping[str, Any], both: Compared, folder: Path) -> Path:
+    """Draw both wrenches, a panel per degree of freedom, as PNG and PDF; the path of the PNG.
+
+    Parameters
+    ----------
+    document, both : of `ask_law`
+    folder : of the plots, made when it is not there
+
+    """
+    from auv_analysis.report.plots import save_figures  # with matplotlib, which loads slowly
+
+    save_figures(folder, {NAME: partial(_figure, document, both)})
+    return folder / f'{NAME}.png'
+
+
+def _figure(document: Mapping[str, Any], both: Compared) -> tuple[Figure, str, str]:
+    from auv_analysis.metrics.quantities import SIGNALS
+    from auv_analysis.report.plots import COLOURS, DASHES, new_figure
+    from auv_analysis.report.traces import FEW, thinned
+
+    law, verdict = document['answered']['law'], document['reproduction']
+    names = f'recorded ({document["recorded"]["law"] or "unknown law"})', f'{law}, open loop'
+    figure = new_figure(5.2)
+    panels = figure.subplots(3, 2, sharex=True)
+    for axes, i in zip(panels.flat, ORDER, strict=True):
+        pairs = zip(names, (both.recorded, both.answered), DASHES, strict=False)
+        for k, (name, wrench, dash) in enumerate(pairs):
+            t, tau = both.t, wrench[:, i]
+            if len(t) > FEW:
+                t, tau = thinned(t, tau, t[0], t[-1])
+            axes.plot(t, tau, color=COLOURS[k], linestyle=dash, label=name)
+        axes.set_ylabel(f'{DOFS[i]}: {SIGNALS["tau"].axis([i])}')
+    for axes in panels[-1]:
+        axes.set_xlabel('$t$ (s)')
+    panels[0, 1].legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
+    said = f'{verdict[0].upper()}{verdict[1:]}'
+    figure.suptitle(said, fontsize='small')
+    title = f'What {names[1]} would have commanded'
+    recorded = 'at the recorded velocity and set-point, beside the recorded wrench'
+    return figure, title, f'{title} {recorded}. {said}.'

@@ -1,6 +1,7 @@
-"""The terminal of a dashboard: what is shown on it, and the keys that are pressed in it."""
+"""The dashboard of a terminal: what is shown on it, keys that are pressed in it, and its end."""
 
 import io
+import math
 import os
 import select
 import sys
@@ -8,13 +9,25 @@ import termios
 import time
 import tty
 from contextlib import ExitStack, suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import rich.live
 
-from auv_analysis.output.progress import TextConsole
-from auv_analysis.watch.screen import screen
-from auv_analysis.watch.snapshot import Snapshot
+from auv_analysis.graph.domain import place_of
+from auv_analysis.output.progress import TextConsole, say
+from auv_analysis.watch.screen import BASIC, screen
+from auv_analysis.watch.snapshot import Alert, Snapshot
 from auv_dynamics.files.ending import on_signals
+from auv_dynamics.files.errors import FailedError
+
+if TYPE_CHECKING:
+    from auv_analysis.watch.monitor import GraphMonitor
+
+LOOK = 0.05  # s between two looks at what has come
+PATIENCE = 3.0  # s after which it is said what is waited for
+SETTLED = 2.0  # s after the first message, when rates are known
+ON_SCREEN, IN_PIPE = 4.0, 1.0  # refreshes per second where nothing is asked for
 
 
 class Display:
@@ -122,3 +135,64 @@ def _has_keys() -> bool:
         return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
     except OSError:  # not the terminal of this session
         return True
+
+
+class Session:
+    """Listens and shows until there is a reason to end.
+
+    Parameters
+    ----------
+    monitor : what is known of the graph
+    listener : tells the monitor what comes in
+    display : shows snapshots
+    rate : refreshes per second; None: as many as suit the display
+
+    """
+
+    def __init__(
+        self, monitor: 'GraphMonitor', listener: Any, display: Display, rate: float | None
+    ):
+        self._monitor, self._listener, self._display = monitor, listener, display
+        self._period = 1.0 / (rate or (ON_SCREEN if display.live else IN_PIPE))
+        self._said = False
+
+    def run(self, keyboard: Keyboard, limit: float, *, once: bool) -> Snapshot:
+        """Run for at most so many s; FailedError when nothing was heard in them."""
+        begin = due = time.monotonic()
+        settled = math.inf
+        while True:
+            self._listener.listen()
+            now = time.monotonic()
+            if self._monitor.moves and settled == math.inf:
+                settled = now + SETTLED
+            if now >= due:
+                self._show(now, waits=now - begin > PATIENCE)
+                due = max(due + self._period, now)
+            if keyboard.ended or (once and now >= settled):
+                break
+            if now - begin >= limit:
+                snapshot = self._monitor.snapshot(now)
+                if not snapshot.heard:
+                    raise FailedError(f'{self._waits_for(snapshot)}: gave up after {limit:g} s')
+                break
+            keyboard.wait(LOOK)
+        snapshot = self._monitor.snapshot(time.monotonic())
+        self._display.end(snapshot)
+        return snapshot
+
+    def _show(self, now: float, *, waits: bool) -> None:
+        snapshot = self._monitor.snapshot(now)
+        if waits and not snapshot.heard:
+            text = f'{self._waits_for(snapshot)}; waiting'
+            snapshot = replace(snapshot, alerts=(Alert('warning', text), *snapshot.alerts))
+            if not (self._said or self._display.live):
+                say(text)
+                self._said = True
+        self._display.show(snapshot)
+
+    def _waits_for(self, snapshot: Snapshot) -> str:
+        what = 'nothing comes of' if snapshot.published else 'nobody publishes'
+        names = f'{", ".join(BASIC[:-1])} or {BASIC[-1]}'
+        text = f'{what} {names} on {place_of(snapshot.domain, snapshot.namespace)}'
+        elsewhere = ' or '.join(self._listener.elsewhere())
+        return f'{text}, but odometry in {elsewhere}: see --namespace' if elsewhere else text

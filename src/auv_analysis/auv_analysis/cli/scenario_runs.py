@@ -1,9 +1,12 @@
-"""How commands end: summary and report of the runs, and their tables for a terminal."""
+"""What commands on scenarios and runs share: scenario and folder, runs, summary and report."""
 
-from collections.abc import Iterable, Mapping, Sequence
+import argparse
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from glob import escape
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -13,13 +16,17 @@ from rich.text import Text
 from auv_analysis.graph.supervisor import TroubleError
 from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.summary import Window, summarize
+from auv_analysis.output.folder import Results, results_folder
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import console, say, share_bar, waiting
 from auv_analysis.output.text import MISSING, join, number, plain, residuals
 from auv_analysis.report.digest import Sketch, sketches
 from auv_analysis.report.verdict import FAILED, verdict
-from auv_analysis.runs.run import AnyRun
-from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.runs.run import AnyRun, Hold
+from auv_analysis.runs.samples import ENDING, write_samples
+from auv_analysis.scenario.scenario import Scenario, load_scenario, write_inputs
+from auv_analysis.simulation.simulate import simulate
+from auv_analysis.simulation.warm_up import announce
 from auv_dynamics.files.errors import first_line
 from auv_dynamics.vehicle import DOFS
 
@@ -28,6 +35,61 @@ BAR = 24  # columns
 WIDTH = 9  # columns of a number
 ZERO = 'zero'
 Column = tuple[str, Sequence[str]]
+Examine = Callable[[Mapping[str, AnyRun], Mapping[str, Mapping[str, Any]]], dict[str, Any]]
+
+
+def open_scenario(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
+    """Scenario of the command line and those of its controllers that are asked for."""
+    scenario = load_scenario(options.scenario)
+    names = list(dict.fromkeys(options.controller or scenario.controllers))
+    for name in names:
+        scenario.controller(name)
+    return scenario, names
+
+
+@contextmanager
+def scenario_folder(
+    options: argparse.Namespace, scenario: Scenario, names: Sequence[str], *own: str
+) -> Iterator[Results]:
+    """Folder of the results; warnings only now, so that a refusal is one line.
+
+    Parameters
+    ----------
+    options : out and overwrite of the command line
+    scenario : whose files must not be replaced
+    names : of the controllers
+    own : endings of what is written of each controller, such as '.npz' or '/*'
+
+    """
+    with results_folder(
+        options.out or Path('runs') / scenario.name,
+        overwrite=options.overwrite,
+        own=[f'{escape(name)}{ending}' for name in names for ending in own],
+        inputs=scenario.inputs,
+    ) as results:
+        for warning in scenario.warnings:
+            say(f'warning: {warning}')
+        yield results
+
+
+def simulated(
+    scenario: Scenario, names: list[str], out: Path, hold: Hold
+) -> tuple[dict[str, AnyRun], Exception | None]:
+    """Simulate controllers into a folder; runs by name, and the first failure."""
+    write_inputs(scenario, out)
+    announce(scenario, names)
+    runs: dict[str, AnyRun] = {}
+    failure = None
+    for name in names:
+        try:
+            with waiting(f'{scenario.name} {name}: simulating'):
+                run = simulate(scenario, name, hold)
+        except ArithmeticError as error:  # it diverges, or a user's own law fails
+            failure = failure or error
+            continue
+        runs[name] = run
+        write_samples(run, out / f'{name}{ENDING}')
+    return runs, failure
 
 
 def summary_tables(summaries: Mapping[str, Mapping[str, Any]]) -> RenderableType:
@@ -160,36 +222,14 @@ def _coupled(values: Sequence[float | None] | None, zeros: Sequence[str]) -> lis
     return [ZERO if dof in zeros else text for dof, text in texts]
 
 
-class Study(Protocol):
-    """What a command adds to the report of its runs."""
-
-    @property
-    def windows(self) -> Sequence[Window]:
-        """Windows of the kinetic energy beside the usual ones, s."""
-
-    def examine(
-        self, runs: Mapping[str, AnyRun], summaries: Mapping[str, Mapping[str, Any]]
-    ) -> dict[str, Any]:
-        """Further arguments of `write_report`."""
-
-
-class Outcome(NamedTuple):
-    """Runs that came to their end, and the failure of another one."""
-
-    runs: Mapping[str, AnyRun]
-    failure: Exception | None
-
-
 def finish(
     out: Path,
     runs: Mapping[str, AnyRun],
     failure: Exception | None,
     scenario: Scenario,
-    study: Study | None = None,
-    *,
-    report: bool = True,
+    **chosen: Any,
 ) -> dict[str, Any]:
-    """Summary and report of the runs that came to their end; then the failure of another one."""
+    """Conclude the runs that came to their end; then raise the failure of another one."""
     texts, document = scenario.attachments, {}
     if failure is not None:
         note = first_line(failure)
@@ -197,9 +237,7 @@ def finish(
             note = f'{FAILED}: {note}'
         runs = {name: replace(run, notes=(*run.notes, note)) for name, run in runs.items()}
     if runs:
-        document = conclude(
-            out, runs, texts['scenario.yaml'], texts['vehicle.yaml'], study, report=report
-        )
+        document = conclude(out, runs, texts['scenario.yaml'], texts['vehicle.yaml'], **chosen)
     if failure is not None:
         raise failure
     return document
@@ -210,8 +248,9 @@ def conclude(
     runs: Mapping[str, AnyRun],
     scenario_text: str | dict[str, str],
     vehicle_text: str | dict[str, str],
-    study: Study | None = None,
     *,
+    windows: Sequence[Window] = (),
+    examine: Examine = lambda *_: {},
     report: bool = True,
 ) -> dict[str, Any]:
     """Write summary and report, show the tables.
@@ -221,21 +260,23 @@ def conclude(
     out : folder of the results
     runs : name -> run
     scenario_text, vehicle_text : as for `write_report`
-    study : what the report has beside the runs, made from their summaries
-    report : whether there is a report, with its figures
+    windows : of the kinetic energy beside the usual ones, s
+    examine : runs and summaries -> what the report has beside them: sections by place in `more`,
+        `sentences`, and `claims` of the paper, as they were judged
+    report : whether there is a report, with its plots
 
     Returns
     -------
     summaries : name -> summary
 
     """
-    windows = study.windows if study else ()
-    with waiting('computing the figures of summary.json'):
+    with waiting('computing the metrics of summary.json'):
         summaries = {name: summarize(run, windows=windows) for name, run in runs.items()}
         shown = sketches(runs) if report or len(runs) > 1 else {}
     write_json(out / 'summary.json', summaries)
     if report:
-        _report(out, runs, shown, summaries, scenario_text, vehicle_text, study)
+        added = examine(runs, summaries)
+        _report(out, runs, shown, summaries, (scenario_text, vehicle_text), added)
     for sentence in verdict(shown, summaries):
         say(sentence)
     console.print(summary_tables(summaries))
@@ -250,34 +291,24 @@ def _report(
     runs: Mapping[str, AnyRun],
     shown: Mapping[str, Sketch],
     summaries: dict[str, Any],
-    scenario_text: str | dict[str, str],
-    vehicle_text: str | dict[str, str],
-    study: Study | None,
+    texts: tuple[Any, Any],
+    added: Mapping[str, Any],
 ) -> None:
     # with matplotlib, which loads slowly
     from auv_analysis.herman2018.claims import claims_part, judge_runs
     from auv_analysis.report.faults import fault_part
     from auv_analysis.report.run_report import write_report
 
-    added: dict[str, Any] = study.examine(runs, summaries) if study else {}
     more = {name: [*sections] for name, sections in added.get('more', {}).items()}
     judged = added.get('claims')
     judged = judge_runs(shown, summaries) if judged is None else judged
     claims, counted = claims_part(out, judged, shown)
-    of_claims = [*claims[:1], *more.pop('claims', ()), *claims[1:]]
-    more['couplings'] = [*more.get('couplings', ()), *of_claims]
+    more['couplings'] = [*more.get('couplings', ()), *claims]
     sentences = [*counted, *added.get('sentences', ())]
     part = fault_part(out, runs)
     if part is not None:
         section, on_faults = part
         more['tracking'] = [section, *more.get('tracking', ())]
         sentences = [*on_faults, *sentences]
-    with waiting('drawing figures, writing the report'):
-        write_report(
-            out, shown, summaries, scenario_text, vehicle_text, more=more, sentences=sentences
-        )
-
-
-def show(summaries: Mapping[str, Mapping[str, Any]]) -> None:
-    """Print a row per run on stderr."""
-    console.print(comparison_table(summaries))
+    with waiting('drawing plots, writing the report'):
+        write_report(out, shown, summaries, *texts, more=more, sentences=sentences)

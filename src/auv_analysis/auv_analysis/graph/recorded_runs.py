@@ -1,0 +1,128 @@
+"""Runs of a scenario's controllers on a domain of their own, read back from their bags."""
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.progress import Progress, TaskID
+
+from auv_analysis.bag import open_bag
+from auv_analysis.graph.domain import VARIABLE, own_domain
+from auv_analysis.graph.experiment import environment, run_controller
+from auv_analysis.graph.supervisor import NodeDiedError, TroubleError
+from auv_analysis.output.folder import Results
+from auv_analysis.output.progress import Speed, bar, count, say, waiting
+from auv_analysis.runs.run import AnyRun
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.simulation.warm_up import warm_up
+from auv_dynamics.files.errors import FailedError, InputError
+
+DISCOVERY = 3.0  # s: discovery may take so long
+
+
+class FreeGraph(NamedTuple):
+    """A domain that nobody else drives a vehicle on, and what is seen of it."""
+
+    domain: int
+    watcher: Any
+
+
+@contextmanager
+def free_graph(asked: int | None) -> Iterator[FreeGraph]:
+    """Join the domain that is asked for, or a free one.
+
+    Raises
+    ------
+    InputError : no such domain, or somebody's vehicle is on it
+
+    """
+    with own_domain(asked) as (domain, picked):
+        os.environ.update(environment(domain))
+        # the middleware reads its environment when it is loaded
+        from auv_dynamics.ros.participant import Watcher
+
+        graph = Watcher(domain)
+        try:
+            if not picked:
+                _refuse_strangers(graph, domain)
+            yield FreeGraph(domain, graph)
+        finally:
+            graph.close()
+
+
+def recorded(
+    scenario: Scenario,
+    names: list[str],
+    results: Results,
+    graph: FreeGraph,
+    *,
+    composed: bool = False,
+) -> tuple[dict[str, AnyRun], FailedError | None]:
+    """Run controllers on the node graph, one after the other.
+
+    Parameters
+    ----------
+    scenario : resolved scenario
+    names : of its controllers
+    results : folder of the bags, one per controller
+    graph : the domain
+    composed : all nodes in one process, else one each
+
+    Returns
+    -------
+    runs : name -> run that came to its end
+    failure : what went wrong first
+
+    """
+    out = results.folder
+    with waiting('loading or compiling the kernel'):
+        warm_up(scenario, names)
+    say(f'export {VARIABLE}={graph.domain}')
+    failure: FailedError | None = None
+    done = []
+    for name in names:
+        with bar(count('steps'), Speed('steps'), keep=True) as shown:
+            task = shown.add_task(f'{scenario.name} {name}', total=scenario.steps)
+            show = partial(_show_step, shown, task)
+            try:
+                run_controller(scenario, name, out, *graph, show, composed=composed)
+            except NodeDiedError as error:
+                failure = error
+                break  # the graph is broken; what was recorded is still worth a report
+            except TroubleError as error:
+                failure = failure or error  # the others may fare better
+        done.append(name)
+    if failure is not None and not out.is_dir():
+        raise failure  # the results were removed under us: there is nothing to report
+    if failure is None:
+        for name in names:
+            _move_paths(out / name / 'params.yaml', results)
+    return {name: open_bag(out / name).run for name in done}, failure
+
+
+def _move_paths(parameters: Path, results: Results) -> None:
+    """Let a parameter file name the files of the run where they lie in the end."""
+    text = parameters.read_text(encoding='utf-8')
+    before, then = (str(path.resolve()) for path in results)
+    parameters.write_text(text.replace(before, then), encoding='utf-8')
+
+
+def _refuse_strangers(graph: Any, domain: int) -> None:
+    until = time.monotonic() + DISCOVERY
+    strangers: list[str] = []
+    while not strangers and time.monotonic() < until:
+        graph.spin(0.1)
+        strangers = graph.endpoints()
+    if strangers:
+        graph.spin(0.5)  # the names of nodes arrive behind their endpoints
+        strangers = graph.endpoints() or strangers
+        expected = 'a domain without endpoints on wrench or odom'
+        raise InputError(f'{VARIABLE}={domain}', '', expected, ', '.join(strangers))
+
+
+def _show_step(shown: Progress, task: TaskID, step: int) -> None:
+    shown.update(task, completed=step)

@@ -12,7 +12,6 @@ NAMES = 15  # columns of the names of commands in the help
 SCENARIO = 'a scenario file, or the bare name of a shipped one'
 VEHICLE = 'a vehicle file, or the bare name of a shipped one'
 TO_FILE = 'file to write; default: printed'
-LARGEST_SEED = 2**63 - 1
 NAMESPACE = re.compile(r'/|(/[A-Za-z_][A-Za-z0-9_]*)+')
 TOPIC = re.compile(r'/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*')
 
@@ -135,22 +134,20 @@ def number(
     return parse
 
 
-def whole(at_least: int, at_most: int) -> Callable[[str], int]:
+def whole(at_least: int, at_most: int | None = None) -> Callable[[str], int]:
     """Type of an option that is a whole number within bounds."""
+    upper = 'on' if at_most is None else f'to {at_most}'
 
     def parse(text: str) -> int:
         try:
             value = int(text)
         except ValueError:
             value = at_least - 1
-        if not at_least <= value <= at_most:
-            raise refused(f'a whole number from {at_least} to {at_most}', text)
+        if value < at_least or (at_most is not None and value > at_most):
+            raise refused(f'a whole number from {at_least} {upper}', text)
         return value
 
     return parse
-
-
-seed = whole(0, LARGEST_SEED)
 
 
 def namespace(text: str) -> str:

@@ -16,7 +16,7 @@ from auv_analysis.cli.arguments import (
     add_results,
     add_scenario,
     number,
-    seed,
+    whole,
 )
 from auv_dynamics.files.errors import InputError
 
@@ -44,7 +44,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument('--samples', type=int, metavar='N', help=text)
     text = 'gains vary from 1/SPAN to SPAN times their value; default: 2'
     command.add_argument('--span', type=number(above=1, at_most=1e3), default=2.0, help=text)
-    command.add_argument('--seed', type=seed, default=0, help='of the samples; default: 0')
+    command.add_argument('--seed', type=whole(0), default=0, help='of the samples; default: 0')
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from auv_analysis.cli.arguments import SCENARIO, add_hold, add_results, number, refused, seed
+from auv_analysis.cli.arguments import SCENARIO, add_hold, add_results, number, refused, whole
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     text = 'how far draws go, such as damping=0.3 or current=0.1; may be repeated'
     command.add_argument('--spread', action='append', metavar='NAME=VALUE', help=text)
     text = 'of search and draws; default: 0'
-    command.add_argument('--seed', type=seed, default=0, help=text)
+    command.add_argument('--seed', type=whole(0, 2**63 - 1), default=0, help=text)
     add_hold(command)
 
 

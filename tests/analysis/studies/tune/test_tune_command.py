@@ -171,7 +171,7 @@ def test_effort_out_of_reach_is_said_plainly(command: Callable, tmp_path: Path) 
     [
         (('--reference', 'none'), 'controllers: expected one of gvc, cl, found none'),
         (('--samples', '3'), '--samples: expected 0 for none, or a whole number from 10'),
-        (('--tolerance', '0'), '--tolerance: expected a number above 0, below 0.1, found 0.0'),
+        (('--tolerance', '0.0'), '--tolerance: expected a number above 0, below 0.1, found 0.0'),
         (('--tolerance', 'nan'), '--tolerance: expected a finite number'),
         (('--seed', '-1'), '--seed: expected a whole number from 0'),
         (('--spread', 'mass=2'), '--spread: mass: expected a number from 0 up below 1, found 2'),

@@ -119,12 +119,15 @@ class Peer:
 
     def publish(self, topic: topics.Topic, message: Any, *, subscribers: int = 1) -> None:
         """Publish once a subscriber has matched."""
-        if topic.name not in self._outputs:
+        is_new = topic.name not in self._outputs
+        if is_new:
             self._outputs[topic.name] = self.node.create_publisher(
                 topic.type, topic.name, topics.every_step()
             )
         output = self._outputs[topic.name]
         self.until(lambda: output.get_subscription_count() >= subscribers, f'match {topic.name}')
+        if is_new:  # the other end may match later, and a best-effort one misses what came before
+            self.spin(0.2)
         output.publish(message)
 
     def until(

@@ -288,8 +288,12 @@ def test_a_foreign_listener_is_named_by_the_command(tmp_path: Path) -> None:
 
 
 def in_real_time(folder: Path) -> Path:
-    """A run that is not in lock-step: activated late, and without set-points for a while."""
-    path, text = folder / 'played.yaml', yaml.safe_dump({**SCENARIO, 'duration': 600.0})
+    """A run that is not in lock-step: activated late, and without set-points for a while.
+
+    At 20 Hz, so that other tests on the machine do not make every second set-point late.
+    """
+    path = folder / 'played.yaml'
+    text = yaml.safe_dump({**SCENARIO, 'duration': 600.0, 'step': 0.05})
     path.write_text(text)
     scenario, bag = load_scenario(path), folder / 'bag'
     nodes = node_parameters(
@@ -312,7 +316,7 @@ def in_real_time(folder: Path) -> Path:
         peer, processes = found
         peer.listen(topics.ODOM, topics.WRENCH)
         odometry, wrenches = peer.heard[topics.ODOM.name], peer.heard[topics.WRENCH.name]
-        peer.until(lambda: len(odometry) > 100, 'odometry')
+        peer.until(lambda: len(odometry) > 20, 'odometry')
         for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
             request = ChangeState.Request(transition=Transition(id=transition))
             assert peer.call(ChangeState, 'controller_node/change_state', request).success
@@ -320,11 +324,11 @@ def in_real_time(folder: Path) -> Path:
         def acts(number: int) -> bool:
             return sum(message.wrench.force.x != 0.0 for message in wrenches) > number
 
-        peer.until(lambda: acts(200), 'wrenches')
+        peer.until(lambda: acts(60), 'wrenches')
         processes['setpoint_node'].send_signal(signal.SIGSTOP)
         peer.until(lambda: wrenches[-1].wrench.force.x == 0.0, 'watchdog')
         processes['setpoint_node'].send_signal(signal.SIGCONT)
-        peer.until(lambda: acts(500), 'wrenches again')
+        peer.until(lambda: acts(140), 'wrenches again')
         code, _ = stop(processes['recorder_node'], signal.SIGINT)
         assert code == 0
     return bag

@@ -294,6 +294,8 @@ class _Course:
             if f.any():  # zero while the law is not in charge, and in its first answer
                 adapts = np.isin(answered, stamps[f.any(axis=1)])
                 active &= adapts | np.append(adapts[1:], False)
+        if self._ramp:  # which begins with no wrench at all
+            active[:-1] |= active[1:] & ~silenced[:-1]
         silence = round(settings.odometry_timeout * interface.NANOSECONDS)
         anew = np.ones(len(answered), bool)
         anew[1:] = ~active[:-1] | silenced[:-1] | (np.diff(answered) > silence)

@@ -70,9 +70,9 @@ def one_at_a_time() -> QoSProfile:
     return _qos(ReliabilityPolicy.RELIABLE, 10)
 
 
-def newest_measurement() -> QoSProfile:
-    """Real time: the controller's odometry."""
-    return _qos(ReliabilityPolicy.BEST_EFFORT, 10)
+def newest_measurement(depth: int = 10) -> QoSProfile:
+    """Real time: odometry of any driver; the set-point node asks for the newest one alone."""
+    return _qos(ReliabilityPolicy.BEST_EFFORT, depth)
 
 
 def newest_command() -> QoSProfile:

@@ -39,7 +39,8 @@ class SetpointNode(BulkNode):
         self.graph.must_hold = self._horizon
         self._publish_velocity = self.graph.output(topics.CMD_VEL)
         self._publish_acceleration = self.graph.output(topics.CMD_ACCEL)
-        self.graph.listen(topics.ODOM, self._on_odometry, topics.one_at_a_time())
+        odometry = topics.one_at_a_time() if self.lockstep else topics.newest_measurement(1)
+        self.graph.listen(topics.ODOM, self._on_odometry, odometry)
         # in lock-step the odometry may go on for `horizon` steps while this node does not look
         gap = max(interface.NANOSECONDS, (10 + self._horizon) * self._step_ns)
         self._guard = OdometryGuard(gap, Limits(), lockstep=False, patience=PATIENCE)
@@ -94,8 +95,9 @@ class SetpointNode(BulkNode):
             return
         until = self._newest + max(self._horizon, self._stride)
         until = until if self._last is None else min(until, self._last)
-        # after a jump of the odometry's clock what lies behind it is of no use to anybody
-        if self._last is None:
+        # what lies behind the odometry is of no use to anybody: in real time after a delay of this
+        # node, without an end after a jump of the clock
+        if self._last is None or not self.lockstep:
             self._next = max(self._next, self._newest - self._horizon)
         while self._next <= until:
             row = self._row(self._next)

@@ -20,7 +20,7 @@ from auv_analysis.report import plots
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.report.run_report import write_report
-from auv_analysis.report.traces import decimate
+from auv_analysis.report.traces import thinned
 from auv_analysis.runs.run import Run
 
 EMPTY_TAGS = {'meta', 'img', 'br', 'input'}
@@ -193,7 +193,7 @@ def test_decimation_keeps_every_extreme_and_few_points(n, logarithmic):
     rng = np.random.default_rng(n)
     t, y = np.arange(1.0, n + 1), rng.normal(size=n)
     y[n // 3], y[-1] = 50.0, -60.0
-    few_t, few_y = decimate(t, y, logarithmic=logarithmic)
+    few_t, few_y = thinned(t, y, t[0], t[-1], logarithmic=logarithmic)
     assert len(few_t) <= 4000
     assert few_y.max() == 50.0
     assert few_y.min() == -60.0

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from block_runs import in_blocks
+from certificates import certificate_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
@@ -18,7 +19,6 @@ from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics import certificate
 from auv_analysis.metrics import moments as of
 from auv_analysis.metrics.certificate import certificate_blocks
-from auv_analysis.metrics.lyapunov import certificate_of
 from auv_analysis.runs.run import Run, joined
 from auv_gvc_controller.laws.model import control_model
 

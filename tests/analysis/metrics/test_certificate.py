@@ -8,6 +8,7 @@ import herman_reference as reference
 import numpy as np
 import pytest
 import yaml
+from certificates import lyapunov_summary
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
@@ -15,7 +16,7 @@ from strategies import QUICK, attitudes, full, gains, vectors, vehicles
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.metrics.certificate import certificate, sampled_integral
-from auv_analysis.metrics.lyapunov import applicability, lyapunov_summary
+from auv_analysis.metrics.lyapunov import applicability
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict

@@ -13,12 +13,10 @@ from auv_analysis.metrics.certificate import (
     Certificate,
     Form,
     as_figures,
-    certificate,
     certificate_blocks,
     form_of,
-    integral_of,
 )
-from auv_analysis.runs.run import AnyRun, Run
+from auv_analysis.runs.run import AnyRun
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import ControlModel
 
@@ -66,65 +64,12 @@ def _no_decrease(law: str, form: Form) -> str:
 
 
 def lyapunov(run: AnyRun, model: ControlModel) -> dict[str, Any]:
-    """Figures of the certificate of a run, see `lyapunov_summary`.
+    """Figures of the certificate of a run, ready for JSON.
 
     Parameters
     ----------
     run : of `simulate`, `load_run` or `open_bag`
     model : what the law knows of the vehicle
-
-    """
-    gains = make_gains(run.law, run.gains) if run.gains else None
-    return _summary(
-        lambda: certificate_blocks(run, model),
-        run.start,
-        run.law,
-        gains,
-        model,
-        knows_F=run.knows_disturbance,
-        kinds=run.kinds,
-        sensors=run.sensing,
-        actuators=run.acting,
-        sampled=run.hold == 'zoh',
-        gaps=len(run.gaps),
-    )
-
-
-def certificate_of(run: Run, model: ControlModel) -> Certificate | None:
-    """The certificate at every sample; None without law, gains, z or F that it could be of."""
-    z = integral_of(run)
-    if run.law not in LAWS or not run.gains or z is None or run.disturbance is None:
-        return None
-    F, f, gains = run.disturbance, run.disturbance_estimate, make_gains(run.law, run.gains)
-    return certificate(run.t, run.nu, run.nu_d, z, F, f, run.law, gains, model)
-
-
-def lyapunov_summary(
-    t: np.ndarray,
-    nu: np.ndarray,
-    nu_d: np.ndarray,
-    z: np.ndarray | None,
-    disturbance: np.ndarray | None,
-    disturbance_estimate: np.ndarray,
-    law: str,
-    gains: Any,
-    model: ControlModel,
-    *,
-    kinds: Collection[str] | None,
-    sensors: bool = False,
-    actuators: bool = False,
-    sampled: bool = False,
-) -> dict[str, Any]:
-    """Figures of the certificate of a run, ready for JSON.
-
-    Parameters
-    ----------
-    t, nu, nu_d, disturbance_estimate, law, model : as `certificate` takes them
-    z, disturbance, gains : the same, or None where not known
-    kinds : kinds of disturbance of the run, None where not known
-    sensors, actuators : the law does not see the true velocity; its wrench is not the one applied
-    sampled : zero-order hold; the residual then also has what sampling does, of the first order
-        in the step
 
     Returns
     -------
@@ -140,30 +85,27 @@ def lyapunov_summary(
         sup_s, sup_z, sup_w : largest Euclidean norms
         L_first, L_last : J
         rho_max : W
-        sampled : as given
+        sampled : zero-order hold; the residual then also has what sampling does, of the first
+            order in the step
 
     """
-    found: list[Certificate] = []
-    if law in LAWS and gains is not None:
-        unknown = np.full(np.shape(nu), np.nan)
-        z = unknown if z is None else z
-        F = unknown if disturbance is None else disturbance
-        found = [certificate(t, nu, nu_d, z, F, disturbance_estimate, law, gains, model)]
-    return _summary(
-        lambda: iter(found),
-        float(t[0]),
-        law,
+    gains = make_gains(run.law, run.gains) if run.gains else None
+    return summary_of(
+        lambda: certificate_blocks(run, model),
+        run.start,
+        run.law,
         gains,
         model,
-        knows_F=disturbance is not None,
-        kinds=kinds,
-        sensors=sensors,
-        actuators=actuators,
-        sampled=sampled,
+        knows_F=run.knows_disturbance,
+        kinds=run.kinds,
+        sensors=run.sensing,
+        actuators=run.acting,
+        sampled=run.hold == 'zoh',
+        gaps=len(run.gaps),
     )
 
 
-def _summary(
+def summary_of(
     found: Callable[[], Iterator[Certificate]],
     start: float,
     law: str,
@@ -177,7 +119,19 @@ def _summary(
     sampled: bool,
     gaps: int = 0,
 ) -> dict[str, Any]:
-    """The summary from the certificates of consecutive blocks, none where there is none."""
+    """The same from the certificates of consecutive blocks, and what is known of their run.
+
+    Parameters
+    ----------
+    found : goes through the certificates from the beginning
+    start : time of the first sample, s
+    law, gains, model : name, named tuple or None, and what the law knows of the vehicle
+    knows_F, kinds : whether F is known; kinds of disturbance, None where not known
+    sensors, actuators : the law does not see the true velocity; its wrench is not the one applied
+    sampled : zero-order hold
+    gaps : number of times without samples
+
+    """
     reasons = [
         applicability(law, gains, model),
         _against_15(knows_F, kinds),

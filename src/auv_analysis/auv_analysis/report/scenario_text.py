@@ -1,13 +1,15 @@
-"""The scenario in words: what acts on the plant, and what lies between it and the law."""
+"""The scenario in a report: what acts on the plant, and what lies between it and the law."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import yaml
 
-from auv_analysis.output.text import join, number, plain
+from auv_analysis.output.text import join, plain
 from auv_analysis.runs.run import FOREIGN, Facts
 from auv_analysis.scenario.fault_words import Mark, marks_of
 from auv_analysis.scenario.scenario import SCHEMA
@@ -17,7 +19,9 @@ from auv_dynamics.plant.faults import ACTING, SENSING
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.control.gains import sampling_warning
 
-VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
+VELOCITY = 'm/s', 'rad/s'
+IDEAL = 'ideal: the commanded wrench is the applied one'
+PERFECT = 'perfect: the law sees the true state'
 FOLDERS = re.compile(r'^.*?(?=[^/\s]+\.ya?ml: )')  # before a file's name: a report is passed on
 ELSEWHERE = 'not known: another system ran the law; the notes say how its bag was read'
 
@@ -42,7 +46,7 @@ class SetUp:
 
 
 def set_up(runs: Mapping[str, Facts], summaries: Mapping[str, Any], scenario_text: str) -> SetUp:
-    """Words about the scenario of some runs.
+    """What the report says of the scenario of some runs.
 
     Parameters
     ----------
@@ -56,19 +60,18 @@ def set_up(runs: Mapping[str, Facts], summaries: Mapping[str, Any], scenario_tex
     mine = {name: run for name, run in runs.items() if run.scenario == data['name']}
     actuators, sensors = data.get('actuators'), data.get('sensors')
     rows = [('set-point', [_setpoint(data['setpoint'])])]
-    start = _start(data.get('initial', {}))
-    rows += [('start', [start])] if start else []
+    rows += [('start', [_entries(data['initial'])])] if data.get('initial') else []
     rows += [('disturbances', _disturbances(data.get('disturbance', [])))]
     faults = data.get('faults', [])
     marks = marks_of(faults, next(iter(mine.values())).vehicle)
-    rows += [('actuators', _but(_actuators(actuators, mine), marks, ACTING))]
+    acts = _entries(actuators) if actuators else IDEAL
+    rows += [('actuators', [acts + _but(marks, ACTING)])]
     if actuators and ('limit' in actuators or actuators.get('thrusters')):
         rows += [('anti-windup', [_anti_windup(data['controllers'], mine)])]
-    rows += [('sensors', _but([_sensors(sensors)], marks, SENSING))]
+    sees = _entries(sensors) if sensors else PERFECT
+    rows += [('sensors', [sees + _but(marks, SENSING)])]
     rows += [('faults', [f'{mark.label}, {mark.times}' for mark in marks])] if marks else []
-    seed, drawn = f'{data.get("seed", 0)}', any('probability' in spec for spec in faults)
-    quiet = f'{seed}; nothing in this scenario is random'
-    rows += [('seed', [seed if sensors or drawn else quiet])]
+    rows += [('seed', [f'{data.get("seed", 0)}'])]
     rows += _shared(runs, summaries, str(data.get('integrator', 'ode5')))
     limit = (actuators or {}).get('limit')
     bounds = None if limit is None else np.broadcast_to(np.asarray(limit, float), 6)
@@ -137,59 +140,19 @@ def _setpoint(spec: Mapping[str, Any]) -> str:
     return harmonics(spec, DOFS, VELOCITY) or 'zero'
 
 
-def _start(initial: Mapping[str, Any]) -> str:
-    eta, nu = initial.get('eta', [0.0] * 6), initial.get('nu', [0.0] * 6)
-    parts = []
-    if any(eta):
-        parts.append(f'η = ({", ".join(plain(x) for x in eta)}) m, rad')
-    if any(nu):
-        parts.append(f'ν = ({", ".join(plain(x) for x in nu)}) m/s, rad/s')
-    return '; '.join(parts)
-
-
 def _disturbances(specs: Any) -> list[str]:
     specs = specs if isinstance(specs, list) else [specs]
-    return [KINDS[spec['kind']](spec) for spec in specs] or ['none: F is zero']
+    return [_entries(spec) for spec in specs] or ['none: F is zero']
 
 
-def _actuators(spec: Mapping[str, Any] | None, runs: Mapping[str, Facts]) -> list[str]:
-    if spec is None:
-        return ['ideal: the commanded wrench is the applied one']
-    parts = []
-    if spec.get('thrusters'):
-        parts.append(_thrusters(next(iter(runs.values()))))
-    if 'limit' in spec:
-        parts.append(f'axis limits ± {per_axis(spec["limit"], WRENCH)}')
-    if 'rate' in spec:
-        parts.append(f'slew rate at most {per_axis(spec["rate"], ("N/s", "N m/s"))}')
-    slow = [f'{key} {plain(spec[key])} s' for key in ('lag', 'delay') if spec.get(key)]
-    parts += [', '.join(slow)] if slow else []
-    return parts or ['ideal: the commanded wrench is the applied one']
+def _entries(spec: Mapping[str, Any]) -> str:
+    """Entries of the scenario's file as they stand there, in one line."""
+    text = yaml.safe_dump(dict(spec), default_flow_style=True, sort_keys=False, width=math.inf)
+    return text.strip().removeprefix('{').removesuffix('}')
 
 
-def _but(lines: list[str], marks: Sequence[Mark], kinds: Sequence[str]) -> list[str]:
-    """The same lines, and that there are faults of these kinds as well."""
-    if not any(mark.kind in kinds for mark in marks):
-        return lines
-    return [*lines[:-1], f'{lines[-1]}; but for the faults']
-
-
-def _thrusters(run: Facts) -> str:
-    thrusters = run.vehicle.thrusters
-    if thrusters is None:
-        return 'thrusters of the vehicle file'
-    n = len(thrusters.names)
-    reverse, forward = thrusters.reverse, thrusters.forward
-    most = f'{_span(-reverse)} to {_span(forward)} N'
-    return (
-        f'{n} thrusters of {run.vehicle.name} (T of rank {thrusters.rank} of 6) with thrusts from '
-        f'{most}, allocated by the pseudo-inverse and scaled down together'
-    )
-
-
-def _span(values: np.ndarray) -> str:
-    texts = dict.fromkeys(number(x) for x in (values.min(), values.max()))
-    return '…'.join(texts)
+def _but(marks: Sequence[Mark], kinds: Sequence[str]) -> str:
+    return '; but for the faults' if any(mark.kind in kinds for mark in marks) else ''
 
 
 def _anti_windup(controllers: Mapping[str, Any], runs: Mapping[str, Facts]) -> str:
@@ -197,29 +160,6 @@ def _anti_windup(controllers: Mapping[str, Any], runs: Mapping[str, Facts]) -> s
     on = [name for name in runs if name not in off]
     parts = [f'on for {join(on)}'] if on else []
     return '; '.join(parts + ([f'off for {join(off)}'] if off else []))
-
-
-def _sensors(spec: Mapping[str, Any] | None) -> str:
-    if spec is None:
-        return 'perfect: the law sees the true state'
-    parts = []
-    if np.any(spec.get('velocity_noise', 0.0)):
-        parts.append(f'velocity noise {per_axis(spec["velocity_noise"], VELOCITY)}')
-    if np.any(spec.get('attitude_noise', 0.0)):
-        parts.append(f'attitude noise {rotations(spec["attitude_noise"])} rad')
-    text = f'{join(parts)} (standard deviations)' if parts else ''
-    lost = spec.get('drop_out', 0.0)
-    lost_text = f'a sample is lost with probability {plain(lost)}' if lost else ''
-    return '; '.join(filter(None, [text, lost_text])) or 'perfect: the law sees the true state'
-
-
-AXES = ('north', 'east', 'down')
-RELATIVE = {
-    'mass': 'mass',
-    'added_mass': 'added mass',
-    'damping': 'damping',
-    'buoyancy': 'buoyancy',
-}
 
 
 def gain_text(value: Any) -> str:
@@ -250,65 +190,6 @@ def harmonics(spec: Mapping[str, Any], axes: Sequence[str], units: Sequence[str]
     return '; '.join(parts)
 
 
-def herman2018(spec: Mapping[str, Any]) -> str:
-    """F of (39) and what multiplies it."""
-    sign = '−' if spec.get('exponent_sign', -1) < 0 else '+'
-    scale = spec.get('scale', 1)
-    text = f'equation (39), exponents read with {sign}'
-    if isinstance(scale, int | float):
-        return text if scale == 1 else f'{text}, times {plain(scale)}'
-    words = gain_text(scale)
-    return f'{text}, times {"a " if words.startswith("full") else ""}{words}'
-
-
-def model_error(spec: Mapping[str, Any]) -> str:
-    """How the plant differs from the vehicle file."""
-    parts = [f'{word} {signed(100 * spec[key])} %' for key, word in RELATIVE.items() if key in spec]
-    parts += [f'{key} = {gain_text(spec[key])}' for key in ('dM', 'dD') if key in spec]
-    return f'model error of the plant: {", ".join(parts)}'
-
-
-def current(spec: Mapping[str, Any]) -> str:
-    """Velocity of the water in NED."""
-    parts = []
-    if 'velocity' in spec:
-        parts.append(f'{", ".join(fixed_two(x) for x in spec["velocity"])} m/s NED, constant')
-    waves = harmonics(spec, AXES, ('m/s', 'm/s'))
-    return f'current {" and ".join(filter(None, [*parts, waves]))}'
-
-
-def per_axis(value: Any, units: Sequence[str]) -> str:
-    """One number or six with their units: '3000, 3000, 4000 N and 800, 800, 500 N m'."""
-    six = np.broadcast_to(np.asarray(value, float), 6)
-    if np.all(six == six[0]):
-        return f'{plain(six[0], 6)} {units[0]} and {units[1]}'
-    halves = zip((six[:3], six[3:]), units, strict=True)
-    return join([f'{_three(half)} {unit}' for half, unit in halves])
-
-
-def rotations(value: Any) -> str:
-    """One number, or three about the body axes."""
-    return _three(np.broadcast_to(np.asarray(value, float), 3))
-
-
-def signed(value: float) -> str:
-    """Text of a number with its sign."""
-    return f'{"−" if value < 0 else "+"}{plain(abs(value))}'
-
-
-def fixed_two(value: float) -> str:
-    """At least two decimals, as many as the number needs."""
-    text = plain(value)
-    whole, _, decimals = text.partition('.')
-    return text if '·' in text else f'{whole}.{decimals:0<2}'
-
-
-def _three(values: np.ndarray) -> str:
-    """Three numbers, or the one that all of them are."""
-    texts = [plain(x, 6) for x in values]
-    return texts[0] if len(set(texts)) == 1 else ', '.join(texts)
-
-
 def _signal(entry: Mapping[str, Any]) -> str:
     offset = entry.get('offset', 0.0)
     text = plain(offset) if offset else ''
@@ -321,11 +202,3 @@ def _signal(entry: Mapping[str, Any]) -> str:
         sign = '−' if amplitude < 0 else '+' if text else ''
         text = f'{text} {sign} {wave}' if text else f'{sign}{wave}'
     return text
-
-
-KINDS = {
-    'herman2018': herman2018,
-    'harmonic': lambda spec: f'harmonic, opposing τ: {harmonics(spec, DOFS, WRENCH)}',
-    'model_error': model_error,
-    'current': current,
-}

@@ -83,10 +83,3 @@ def broken(line: Line, gaps: Iterable[tuple[float, float]], step: float) -> Line
     at = np.searchsorted(t, places)
     inside = (at > 0) & (at < len(t))
     return np.insert(t, at[inside], places[inside]), np.insert(y, at[inside], np.nan)
-
-
-def decimate(t: np.ndarray, y: np.ndarray, *, logarithmic: bool = False) -> Line:
-    """Line of all samples (n,) of a signal, thinned where they are many."""
-    if len(t) <= FEW:
-        return t, y
-    return thinned(t, y, t[0], t[-1], logarithmic=logarithmic)

@@ -38,7 +38,7 @@ NODES = {  # and the package of each
 STARTERS = {'auv': 'auv_analysis.cli.main', 'record': 'graph_runs'}  # of nodes, and their modules
 LOADED = (  # what `auv` imports once it knows what it has to do
     *('auv_analysis.cli.scenario_runs', 'auv_analysis.graph.recorded_runs'),
-    *('auv_analysis.studies.compare.sources', 'auv_analysis.watch.terminal'),
+    *('auv_analysis.studies.compare.sources', 'auv_analysis.output.keyboard'),
     *('auv_analysis.report.document', 'auv_analysis.report.plots'),
 )
 INTERPRETER = Path(sys.executable).name.encode()

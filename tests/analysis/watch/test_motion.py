@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from strategies import QUICK
 
 from auv_analysis.metrics.coupling import LiveAnalysis
-from auv_analysis.watch.motion import FRESH, HELD_NS, LiveMotion
+from auv_analysis.watch.monitor import FRESH, HELD_NS, LiveMotion
 from auv_dynamics import load_vehicle
 from auv_dynamics.ros import interface
 

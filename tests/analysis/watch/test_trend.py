@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from strategies import QUICK
 
-from auv_analysis.watch.motion import BUCKET, BUCKETS, Trend
+from auv_analysis.watch.monitor import BUCKET, BUCKETS, Trend
 
 SPAN = BUCKET * BUCKETS
 VALUES = st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6)

@@ -25,8 +25,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add_results(command)
     text = 'a bag, a folder of results or of a sweep, or a scenario, which is simulated'
     command.add_argument('results', nargs='+', metavar='BAG', help=text)
-    command.add_argument('--by', metavar='METRIC', help='of a sweep: what sorts the best rows')
-    command.add_argument('--vehicle', help='for bags that do not carry their own')
+    command.add_argument('--by', metavar='METRIC', help='of a sweep: metric that ranks its rows')
+    command.add_argument('--vehicle', help='vehicle file, for bags without their own')
     text = 'of the vehicle in a bag of several; default: that of the recorder'
     command.add_argument('--namespace', metavar='NS', help=text)
     add_no_report(command)
@@ -40,9 +40,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     group.add_argument('--frames', choices=('ned_fsd', 'enu_flu'), help='axes of all topics')
     text = 'axes in which the odometry writes the velocity, default: child'
     group.add_argument('--twist-frame', choices=('child', 'world'), help=text)
-    text = 'common time base, default: the median period of the velocity'
+    text = 'resampling period, default: the median period of the velocity'
     group.add_argument('--step', type=float, metavar='S', help=text)
-    group.add_argument('--gap', type=float, metavar='S', help='longer pauses are gaps')
+    group.add_argument('--gap', type=float, metavar='S', help='longer pauses are gaps, s')
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:

@@ -183,7 +183,8 @@ def add_results(command: argparse.ArgumentParser, text: str = 'folder of the res
 
 
 def add_scenario(command: argparse.ArgumentParser) -> None:
-    """A scenario, and which of its controllers."""
+    """A scenario, which of its controllers, and where their results go."""
+    add_results(command)
     command.add_argument('scenario', help=SCENARIO)
     command.add_argument('--controller', action='append', help='only this one; may be repeated')
 
@@ -222,5 +223,5 @@ def add_no_report(command: argparse.ArgumentParser) -> None:
 
 def add_hold(command: argparse.ArgumentParser) -> None:
     """How the law is evaluated between samples."""
-    text = 'law in every stage of the integrator, or sampled and held; default: continuous'
+    text = 'law in every stage of the integrator, or by zero-order hold; default: continuous'
     command.add_argument('--hold', choices=('continuous', 'zoh'), default='continuous', help=text)

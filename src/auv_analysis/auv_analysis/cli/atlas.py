@@ -11,9 +11,9 @@ from auv_dynamics.files.errors import InputError
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Which vehicles."""
     add_results(command)
-    text = 'beside the shipped ones'
+    text = 'a vehicle file, beside the shipped ones'
     command.add_argument('vehicles', nargs='*', metavar='VEHICLE', help=text)
-    command.add_argument('--only', action='store_true', help='the given ones alone')
+    command.add_argument('--only', action='store_true', help='the given vehicles alone')
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:

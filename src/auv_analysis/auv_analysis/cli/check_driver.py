@@ -50,12 +50,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add = group.add_argument
     text = 'send small wrenches, an axis at a time: THE VEHICLE MOVES'
     add('--actuate', action='store_true', help=text)
-    text = 'only this one; may be repeated; default: all that the vehicle can'
+    text = 'only this one; may be repeated; default: all that are actuated'
     add('--axis', action='append', choices=DOFS, help=text)
-    text = 'largest speed by the model, m/s and rad/s, default: 0.1'
+    text = 'largest predicted speed, m/s and rad/s, default: 0.1'
     add('--speed', type=number(above=0, at_most=0.5), default=0.1, metavar='V', help=text)
-    add('--force', type=number(above=0), metavar='N', help='never more than this')
-    add('--torque', type=number(above=0), metavar='NM', help='never more than this, N m')
+    add('--force', type=number(above=0), metavar='N', help='largest force, N')
+    add('--torque', type=number(above=0), metavar='NM', help='largest torque, N m')
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from auv_analysis.cli.arguments import VEHICLE
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """A vehicle, and its speed."""
     command.add_argument('vehicle', metavar='FILE', help=VEHICLE)
-    text = 'ahead, at which the poles are, m/s; default: the top speed of a shipped one, else 1'
+    text = 'surge speed at which it is linearised, m/s; default: top speed if shipped, else 1'
     command.add_argument('--speed', type=float, metavar='U', help=text)
 
 

@@ -2,16 +2,18 @@
 
 import argparse
 from collections.abc import Callable, Iterable
+from itertools import chain
 from typing import Any
 
 import argcomplete
-from argcomplete.completers import BaseCompleter, FilesCompleter
+from argcomplete.completers import FilesCompleter
 from argcomplete.shell_integration import shellcode
 
 from auv_analysis.cli.arguments import Parser
 from auv_analysis.cli.tune import LAWS
 from auv_dynamics.files.shipped import shipped, shipped_names
 
+Offer = Callable[..., Iterable[str]]
 YAML = FilesCompleter(('yaml', 'yml'))
 
 
@@ -24,21 +26,14 @@ def complete(main: Parser) -> None:
     argcomplete.autocomplete(main)
 
 
-class _Names(BaseCompleter):
-    """Shipped names and the files of the user.
+def names(*kinds: str, files: Offer = YAML) -> Offer:
+    """Shipped names of some kinds, and files of the user."""
 
-    Parameters
-    ----------
-    kind : of the shipped files
-    files : of the user; none: YAML
+    def offer(prefix: str = '', **options: Any) -> list[str]:
+        shipped_ones = chain.from_iterable(map(shipped_names, kinds))
+        return [*shipped_ones, *files(prefix=prefix, **options)]
 
-    """
-
-    def __init__(self, kind: str, files: Callable[..., Iterable[str]] = YAML):
-        self._kind, self._files = kind, files
-
-    def __call__(self, prefix: str = '', **options: Any) -> list[str]:
-        return [*shipped_names(self._kind), *self._files(prefix=prefix, **options)]
+    return offer
 
 
 def controllers(parsed_args: Any, **_: Any) -> list[str]:
@@ -52,26 +47,16 @@ def controllers(parsed_args: Any, **_: Any) -> list[str]:
         return []  # no scenario is typed yet, or none that can be read
 
 
-def laws(**_: Any) -> tuple[str, ...]:
-    """Shipped laws."""
-    return LAWS
-
-
-def subjects(prefix: str = '', **options: Any) -> list[str]:
-    """Shipped scenarios and vehicles, and the files of the user."""
-    return [*shipped_names('scenarios'), *_Names('vehicles')(prefix, **options)]
-
-
-COMPLETERS: dict[str, Callable[..., Iterable[str]]] = {
-    'scenario': _Names('scenarios'),
-    'vehicle': _Names('vehicles'),
-    'vehicles': _Names('vehicles'),
-    'subject': subjects,
-    'campaign': _Names('campaigns'),
-    'results': _Names('scenarios', FilesCompleter()),
+COMPLETERS: dict[str, Offer] = {
+    'scenario': names('scenarios'),
+    'vehicle': names('vehicles'),
+    'vehicles': names('vehicles'),
+    'subject': names('scenarios', 'vehicles'),
+    'campaign': names('campaigns'),
+    'results': names('scenarios', files=FilesCompleter()),
     'controller': controllers,
     'reference': controllers,
-    'law': laws,
+    'law': lambda **_: LAWS,
 }
 
 

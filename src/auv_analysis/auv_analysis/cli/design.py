@@ -16,9 +16,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add_results(command)
     command.add_argument('vehicle', help=VEHICLE)
     command.add_argument('--scenario', help=f'{SCENARIO}, with this vehicle in it')
-    text = 'such as delta_pi.pitch; default: the largest'
+    text = 'coupling to reduce, such as delta_pi.pitch; default: the largest'
     command.add_argument('--reduce', metavar='COUPLING', help=text)
-    text = 'NAME=LOWER:UPPER of a parameter, such as shift.x=-0.05:0.05; may be repeated'
+    text = 'NAME=LOWER:UPPER: a design parameter, such as shift.x=-0.05:0.05; may be repeated'
     command.add_argument('--bound', type=_bound, action='append', default=[], help=text)
 
 

@@ -17,19 +17,17 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     text = 'uuv_simulator, Gazebo, a list of derivatives; default: by its contents'
     command.add_argument('--format', choices=formats, default='auto', help=text)
     command.add_argument('--source', help='citation for the vehicle file')
-    text = (
-        'of damping, lift and added mass in the file, where it is not the usual one of its format'
-    )
+    text = 'sign convention of damping, lift, added mass, where not the usual one of the format'
     command.add_argument('--sign', choices=('sname', 'positive'), help=text)
-    text = 'what Ixy, Ixz, Iyz of a list are: of x y dm, or entries of the tensor'
+    text = 'products of inertia Ixy, Ixz, Iyz of a list: integrals of x y dm, or tensor entries'
     command.add_argument('--products', choices=('integral', 'tensor'), help=text)
-    text = 'point that the tensor of a list is about'
+    text = 'reference point of the inertia tensor of a list'
     command.add_argument('--inertia-reference', choices=('cg', 'co'), help=text)
     text = 'what Yuv, Nuv, Muw ... of a list are: of body and fins, or with the terms of added mass'
     command.add_argument('--lift', choices=('alone', 'combined'), help=text)
     text = 'xUU is meant as xUabsU (Gazebo)'
     command.add_argument('--quadratic-abs', action='store_true', help=text)
-    text = 'W and B stand for each other'
+    text = 'W and B are exchanged in the file'
     command.add_argument('--swap-weight-buoyancy', action='store_true', help=text)
     text = 'leave out, and report, what a vehicle file cannot hold'
     command.add_argument('--leave-out', action='store_true', help=text)

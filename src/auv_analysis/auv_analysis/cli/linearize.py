@@ -25,9 +25,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     text = "only this one of a scenario's; may be repeated"
     command.add_argument('--controller', action='append', help=text)
     six = ('U', 'V', 'W', 'P', 'Q', 'R')
-    text = 'velocity about which, m/s and rad/s; default: at rest'
+    text = 'velocity of the operating point, m/s and rad/s; default: at rest'
     command.add_argument('--nu0', nargs=6, type=float, metavar=six, help=text)
-    text, three = 'attitude about which, rad; default: level', ('PHI', 'THETA', 'PSI')
+    text, three = 'attitude of the operating point, rad; default: level', ('PHI', 'THETA', 'PSI')
     command.add_argument('--attitude', nargs=3, type=float, metavar=three, help=text)
 
 

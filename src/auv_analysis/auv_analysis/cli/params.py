@@ -13,7 +13,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add_results(command, TO_FILE)
     command.add_argument('scenario', help=SCENARIO)
     command.add_argument('--controller', required=True)
-    command.add_argument('--real-time', action='store_true', help='paced by the clock')
+    command.add_argument('--real-time', action='store_true', help='in real time, not in lock-step')
     text = "for a vehicle driver in the plant's place: in real time, without simulated time"
     command.add_argument('--no-plant', action='store_true', help=text)
 

@@ -14,8 +14,8 @@ from auv_analysis.cli.arguments import add_domain, add_results, import_law, numb
 from auv_dynamics.files.errors import FailedError, InputError
 
 if TYPE_CHECKING:
+    from auv_analysis.output.keyboard import Keyboard
     from auv_analysis.replay.open_loop import OpenLoop, RecordedLoop
-    from auv_analysis.watch.terminal import Keyboard
 
 FASTEST = 'max'
 SERVED = 0.05  # s of messages between two looks at keys
@@ -33,9 +33,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add('bag', type=Path, metavar='BAG', help='a bag folder or an .mcap file')
     text = 's of the bag per s, or max: as fast as it goes without loss; default: 1'
     add('--rate', type=_rate, metavar='R', default=1.0, help=text)
-    text = 'begin so many s behind its beginning'
+    text = 'offset from the beginning of the bag, s'
     add('--start', type=number(at_least=0), metavar='S', help=text)
-    add('--duration', type=number(above=0), metavar='S', help='play so many s of it')
+    add('--duration', type=number(above=0), metavar='S', help='length that is played, s')
     add('--loop', action='store_true', help='begin again at its end')
     add('--paused', action='store_true', help='begin paused')
     text = 'jump where nothing was recorded for more than a minute'
@@ -55,7 +55,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add('--no-clock', action='store_true', help='publish no /clock')
     text = 'TOPIC=COUNT: wait for so many subscribers; may be repeated'
     add('--expect', action='append', metavar='TOPIC=COUNT', help=text)
-    text = 'topic of wrenches: the next odometry waits for that with the stamp of the last'
+    text = 'lock-step: odometry waits for the wrench on this topic with the stamp of the last'
     add('--answers', metavar='TOPIC', help=text)
     add_domain(command)
     group = command.add_argument_group('what another law would have commanded, without nodes')
@@ -65,7 +65,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     group.add_argument(
         '--gain', type=_gain, action='append', default=[], metavar='NAME=VALUE', help=text
     )
-    group.add_argument('--vehicle', help='for bags that do not carry their own')
+    group.add_argument('--vehicle', help='vehicle file, for bags without their own')
 
 
 def _rate(text: str) -> float:
@@ -92,8 +92,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         if getattr(options, name):
             raise InputError(f'--{name}', '', '--law beside it', None)
     from auv_analysis.graph.domain import join_domain, place_of
+    from auv_analysis.output.keyboard import Keyboard
     from auv_analysis.output.progress import say, waiting
-    from auv_analysis.watch.terminal import Keyboard
 
     with ExitStack() as stack:
         keyboard = stack.enter_context(Keyboard())  # from here on Ctrl-C is an end like another

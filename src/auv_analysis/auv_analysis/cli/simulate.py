@@ -3,12 +3,11 @@
 import argparse
 from typing import Any
 
-from auv_analysis.cli.arguments import add_hold, add_no_report, add_results, add_scenario
+from auv_analysis.cli.arguments import add_hold, add_no_report, add_scenario
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Scenario, and how its law is evaluated."""
-    add_results(command)
     add_scenario(command)
     add_no_report(command)
     add_hold(command)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from auv_analysis.cli.arguments import (
     add_graph,
     add_hold,
-    add_results,
     add_scenario,
     number,
     whole,
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Scenario, windows of the energy, and how the sensitivity to the gains is estimated."""
-    add_results(command)
     add_scenario(command)
     add_hold(command)
     text = 'real nodes, recorded, in place of this process'
@@ -38,13 +36,13 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         '--window', nargs=2, action='append', type=float, metavar=('FROM', 'TO'), default=[],
         help='kinetic energy over this window as well, s; may be repeated',
     )  # fmt: skip
-    text = 'indices of the metrics with respect to the gains; default: sobol'
+    text = 'sensitivity indices of the metrics to the gains; default: sobol'
     command.add_argument('--sensitivity', choices=('sobol', 'morris', 'none'), help=text)
     text = 'base points of sobol, a power of two; trajectories of morris'
     command.add_argument('--samples', type=int, metavar='N', help=text)
     text = 'gains vary from 1/SPAN to SPAN times their value; default: 2'
     command.add_argument('--span', type=number(above=1, at_most=1e3), default=2.0, help=text)
-    command.add_argument('--seed', type=whole(0), default=0, help='of the samples; default: 0')
+    command.add_argument('--seed', type=whole(0), default=0, help='random seed; default: 0')
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:

@@ -23,24 +23,24 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Scenario, laws, what they are given alike, and the perturbations that compare them."""
     add_results(command)
     command.add_argument('scenario', help=SCENARIO)
-    text = 'controller to equal; default: the first under gvc'
+    text = 'controller that the laws are tuned to equal; default: the first of law gvc'
     command.add_argument('--reference', metavar='NAME', help=text)
     text = "only this one beside the reference's own; may be repeated; default: all shipped"
     command.add_argument('--law', action='append', choices=LAWS, help=text)
-    text = 'what the laws are given alike; default: effort'
+    text = 'what the tuned laws have in common with it; default: effort'
     command.add_argument('--equal', choices=('effort', 'error'), default='effort', help=text)
-    text = 'of the error: weighted by time, or the plain mean; default: time'
+    text = 'performance index: error weighted by time, or its mean; default: time'
     command.add_argument('--index', choices=tuple(INDICES), default='time', help=text)
     structures = ('best', 'scalar', 'mass', 'diagonal', 'inertia')
-    text = 'of gains: times I, M_ii, six numbers, times M; default: the better of the first two'
+    text = 'of gains: scalar, diag(M), diagonal, times M; default: the better of the first two'
     command.add_argument('--structure', choices=structures, default='best', help=text)
-    text = 'relative, of the equality; default: 0.001'
+    text = 'relative tolerance of the equality; default: 0.001'
     command.add_argument('--tolerance', type=number(above=0, below=0.1), default=0.001, help=text)
-    text = 'draws of the Monte Carlo; 0: none; default: 256'
+    text = 'Monte Carlo samples; 0: none; default: 256'
     command.add_argument('--samples', type=_samples, metavar='N', default=256, help=text)
-    text = 'how far draws go, such as damping=0.3 or current=0.1; may be repeated'
+    text = 'range of a perturbation, such as damping=0.3 or current=0.1; may be repeated'
     command.add_argument('--spread', action='append', metavar='NAME=VALUE', help=text)
-    text = 'of search and draws; default: 0'
+    text = 'random seed of search and samples; default: 0'
     command.add_argument('--seed', type=whole(0, 2**63 - 1), default=0, help=text)
     add_hold(command)
 

@@ -29,9 +29,10 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Live dashboard in the terminal; returns the last snapshot."""
     from auv_analysis.graph.domain import join_domain, place_of
+    from auv_analysis.output.keyboard import Keyboard
     from auv_analysis.output.progress import say
     from auv_analysis.watch.monitor import GraphMonitor
-    from auv_analysis.watch.terminal import Display, Keyboard, Session
+    from auv_analysis.watch.screen import Display, Session
     from auv_dynamics import load_vehicle
     from auv_dynamics.ros.interface import Frames
 

@@ -4,7 +4,7 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from auv_analysis.graph.node_parameters import (
     ANALYSIS,
@@ -19,6 +19,9 @@ from auv_analysis.graph.supervisor import NodeDiedError, Supervisor, TroubleErro
 from auv_analysis.scenario.scenario import Scenario, write_inputs
 from auv_dynamics.ros.security import enclave, loopback
 
+if TYPE_CHECKING:
+    from auv_dynamics.ros.participant import Watcher
+
 PACKAGES = {
     RECORDER: 'auv_analysis',
     PLANT: 'auv_dynamics',
@@ -30,20 +33,6 @@ OBSERVERS = (RECORDER, SETPOINT, ANALYSIS)  # nobody waits for an answer of thei
 COMPOSED = 'composed_graph'  # the executable that holds them all
 START_TIMEOUT = 60.0  # s until the start barrier must be down
 END_TIMEOUT = 30.0  # s for the recorder to close after the last step
-
-
-class Graph(Protocol):
-    """What an experiment sees of the node graph."""
-
-    complete_ns: int
-    running: bool
-    waits_for: str
-
-    def spin(self, seconds: float) -> None:
-        """Handle what comes in for so long."""
-
-    def ask_to_run(self) -> bool:
-        """Whether the plant has agreed to run."""
 
 
 def environment(domain: int) -> dict[str, str]:
@@ -62,7 +51,7 @@ def run_controller(
     controller: str,
     out: Path,
     domain: int,
-    graph: Graph,
+    graph: 'Watcher',
     progress: Callable[[int], None],
     *,
     composed: bool = False,
@@ -119,7 +108,7 @@ def run_controller(
     return bag
 
 
-def _start(supervisor: Supervisor, graph: Graph) -> None:
+def _start(supervisor: Supervisor, graph: 'Watcher') -> None:
     until = time.monotonic() + START_TIMEOUT
     while not graph.ask_to_run():
         graph.spin(0.05)
@@ -133,7 +122,7 @@ def _start(supervisor: Supervisor, graph: Graph) -> None:
 def _follow(
     supervisor: Supervisor,
     last: str,
-    graph: Graph,
+    graph: 'Watcher',
     scenario: Scenario,
     progress: Callable[[int], None],
 ) -> None:

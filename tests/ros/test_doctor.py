@@ -16,7 +16,7 @@ def test_a_foreign_node_in_the_domain_is_named(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
     peer = Peer(domain)
     try:
-        (finding,) = discovery.neighbours()
+        (finding,) = discovery.peers()
     finally:
         peer.close()
     assert finding.verdict == 'warning'

@@ -42,7 +42,16 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_gvc_controller.laws.law import refusal
 
     subject, paths = _subject(options.subject)
-    names = _controllers(subject, options.controller, paths[0])
+    names: list[str] = []
+    left_out: list[str] = []
+    if isinstance(subject, Scenario):
+        left_out = subject.sampled
+        names = list(dict.fromkeys(options.controller or subject.controllers))
+        for name in names:
+            subject.controller(name)
+    elif options.controller:
+        expected = 'a scenario, which has controllers'
+        raise InputError(paths[0], '--controller', expected, 'a vehicle')
     eta0 = None if options.attitude is None else [0.0, 0.0, 0.0, *options.attitude]
     try:
         with waiting('linearising'):
@@ -51,7 +60,6 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         raise InputError(paths[0], *refusal(error)) from None
     folder = f'linearize_{UNFIT.sub("_", subject.name)[:LONGEST]}'
     out = options.out or Path('runs') / folder
-    left_out = subject.sampled if isinstance(subject, Scenario) else ()
     document = document_of(subject.name, models, left_out)
     with results_folder(out, overwrite=options.overwrite, inputs=paths) as results:
         write_json(results.folder / DOCUMENT, document)
@@ -83,16 +91,3 @@ def _subject(given: str) -> tuple[Vehicle | Scenario, list[Path]]:
         return load_vehicle(path), [path]
     expected = 'a vehicle or scenario file, or the bare name of a shipped one'
     raise InputError(given, '', expected, 'no such file or name')
-
-
-def _controllers(subject: Vehicle | Scenario, asked: list[str] | None, path: Path) -> list[str]:
-    from auv_analysis.scenario.scenario import Scenario
-
-    if isinstance(subject, Scenario):
-        names = list(dict.fromkeys(asked or subject.controllers))
-        for name in names:
-            subject.controller(name)
-        return names
-    if asked:
-        raise InputError(path, '--controller', 'a scenario, which has controllers', 'a vehicle')
-    return []

@@ -40,7 +40,7 @@ print('ended', flush=True)
 DISTRO = 'jazzy'
 RMW = 'rmw_fastrtps_cpp'
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
-REACHES = ('LOCALHOST', 'SUBNET', 'SYSTEM_DEFAULT', 'OFF')
+RANGES = ('LOCALHOST', 'SUBNET', 'SYSTEM_DEFAULT', 'OFF')
 PATHS = ('AMENT_PREFIX_PATH', 'PYTHONPATH', 'LD_LIBRARY_PATH')
 OF_ROS = re.compile(r'(?:^|/)opt/ros/([a-z]+)(?:/|$)')
 OF_PYTHON = re.compile(r'/python(3\.\d+)/')
@@ -237,7 +237,7 @@ def middleware() -> Iterator[Finding]:
         yield Finding('middleware', 'warning', found, 'unset RMW_IMPLEMENTATION')
 
 
-def reach() -> Iterator[Finding]:
+def discovery_range() -> Iterator[Finding]:
     """How far nodes are heard."""
     value = os.environ.get(RANGE)
     if os.environ.get('ROS_LOCALHOST_ONLY', '0') not in ('', '0'):
@@ -248,13 +248,13 @@ def reach() -> Iterator[Finding]:
     elif value == 'OFF':
         found = f'{RANGE}=OFF: no node finds another'
         yield Finding('reach', 'broken', found, f'unset {RANGE}')
-    elif value in REACHES:
+    elif value in RANGES:
         found = f'{RANGE}={value}: everybody on the network hears the nodes and may command them'
         yield Finding('reach', 'warning', found, f'unset {RANGE} where no other machine takes part')
     else:
         from auv_dynamics.files.nearest import one_of
 
-        found = f'{RANGE}={value}: expected {one_of(value, REACHES)}'
+        found = f'{RANGE}={value}: expected {one_of(value, RANGES)}'
         yield Finding('reach', 'broken', found, f'unset {RANGE}')
 
 
@@ -357,7 +357,7 @@ def cores() -> Iterator[Finding]:
 
 
 def programs() -> Iterator[Finding]:
-    """Programs that some uses want."""
+    """Optional tools."""
     if not any(map(shutil.which, BROWSERS)):
         found = 'absent: reports open in any browser, only tests of reports are skipped'
         yield Finding('chromium', 'note', found)

@@ -65,7 +65,7 @@ def _what_to_do(why: str) -> str:
     return advice if flags & MULTICAST else f'{advice}; ip link set lo multicast on'
 
 
-def neighbours() -> Iterator[Finding]:
+def peers() -> Iterator[Finding]:
     """Who is in the domain that commands join here."""
     from auv_analysis.graph.domain import VARIABLE, joined_domain
     from auv_dynamics.files.errors import InputError
@@ -75,8 +75,8 @@ def neighbours() -> Iterator[Finding]:
         domain = joined_domain(None)
     except InputError:
         return  # said elsewhere
-    reach = {} if os.environ.get(RANGE) else loopback()
-    answer = _answer(_start(domain, LOOKING, '', LOOKS, reach))
+    local = {} if os.environ.get(RANGE) else loopback()
+    answer = _answer(_start(domain, LOOKING, '', LOOKS, local))
     if 'why' in answer:
         return  # said of discovery
     nodes = answer['seen']
@@ -92,12 +92,12 @@ def neighbours() -> Iterator[Finding]:
 
 
 def _start(
-    domain: int, name: str, other: str, seconds: float, reach: dict[str, str]
+    domain: int, name: str, other: str, seconds: float, local: dict[str, str]
 ) -> subprocess.Popen[str]:
     command = [sys.executable, '-m', 'auv_analysis.doctor.discovery']
     return subprocess.Popen(
         [*command, str(domain), name, other, str(seconds)],
-        env={**os.environ, **reach, 'ROS_DOMAIN_ID': str(domain)},
+        env={**os.environ, **local, 'ROS_DOMAIN_ID': str(domain)},
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors='replace',
     )  # fmt: skip
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from auv_analysis.bag import attachments
 from auv_analysis.bag.load import topics_of_one_graph
-from auv_analysis.bag.reading import Contents, Series, read_bag
+from auv_analysis.bag.reading import Series, read_bag
 from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.graph.node_parameters import CONTROLLER
 from auv_dynamics.files.errors import InputError
@@ -183,12 +183,6 @@ def recorded_loop(bag: str | Path, vehicle: str | Path | None = None) -> Recorde
     series = {role: contents.messages[topic] for role, topic in topics.items()}
     if interface.CMD_VEL not in series:
         raise NotOursError(bag, interface.CMD_VEL, 'messages', ', '.join(sorted(contents.types)))
-    return _loop(series, contents, bag, vehicle)
-
-
-def _loop(
-    series: dict[str, Series], contents: Contents, bag: Path, vehicle: str | Path | None
-) -> RecordedLoop:
     parameters = attachments.parameters_of(contents, bag)
     known, own = attachments.vehicle_of(contents, bag, vehicle), parameters.get(CONTROLLER, {})
     return RecordedLoop(

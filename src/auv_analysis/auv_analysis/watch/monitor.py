@@ -296,17 +296,18 @@ class LiveMotion:
 
     def delta_xi(self, now: float) -> Six | None:
         """Xi - nu, as published or else computed."""
-        found = self.published(now, interface.DELTA_XI)
-        if found is None and self._live is not None and self.nu is not None:
-            return tuple(self._live.delta_xi(self.nu).tolist())
-        return found
+        return self._coupling(now, interface.DELTA_XI, self.nu)
 
     def delta_pi(self, now: float) -> Six | None:
         """Pi - tau, as published or else computed."""
-        found = self.published(now, interface.DELTA_PI)
-        if found is None and self._live is not None and self.tau is not None:
-            return tuple(self._live.delta_pi(self.tau).tolist())
-        return found
+        return self._coupling(now, interface.DELTA_PI, self.tau)
+
+    def _coupling(self, now: float, topic: str, values: Six | None) -> Six | None:
+        found = self.published(now, topic)
+        if found is not None or self._live is None or values is None:
+            return found
+        of = self._live.delta_xi if topic == interface.DELTA_XI else self._live.delta_pi
+        return tuple(of(values).tolist())
 
     def lumped(self, now: float) -> Six | None:
         """W = f - F, as published or else computed."""

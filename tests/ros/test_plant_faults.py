@@ -109,7 +109,7 @@ def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
     ('entry', 'words'),
     [
         ({'kind': 'sensor_freeze'}, ('faults.a.kind', 'sensor_drop_out')),
-        ({'kind': 'sensor_bias'}, ('faults.a.velocity', 'attitude')),
+        ({'kind': 'sensor_bias'}, ('faults.a', 'velocity, attitude')),
         ({'kind': 'sensor_drop_out', '_from': 0.5, 'to': 0.2}, ('faults.a.to', 'after from')),
         ({'kind': 'actuator', 'axis': 'yaw'}, ('faults.a', 'efficiency or stuck')),
         ({'kind': 'thruster', 'thruster': 'one', 'stuck': 1.0}, ('faults.a.thruster', 'has none')),

@@ -390,7 +390,7 @@ def test_real_time_withholds_a_lost_sample() -> None:
 @pytest.mark.parametrize(
     ('extra', 'words'),
     [
-        ({'actuators__limit': '[1.0, 2.0]'}, ('actuators.limit', '1 or 6')),
+        ({'actuators__limit': '[1.0, 2.0]'}, ('actuators.limit', 'number or 6')),
         ({'actuators__rate': '[-1.0]'}, ('actuators.rate', 'positive')),
         ({'actuators__delay': 0.0123}, ('actuators.delay', 'multiple of step')),
         ({'actuators__thrusters': True}, ('actuators.thrusters', 'thrusters')),

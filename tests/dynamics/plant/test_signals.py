@@ -1,4 +1,4 @@
-"""Offsets and sinusoids: values, derivatives, and the round trip through ROS parameters."""
+"""Offsets and sinusoids: values and derivatives."""
 
 import herman_reference as reference
 import numpy as np
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from strategies import QUICK
 
-from auv_dynamics.plant.signals import Harmonics, harmonic_columns, harmonic_spec
+from auv_dynamics.plant.signals import Harmonics
 from auv_dynamics.vehicle import DOFS
 
 NUMBERS = st.floats(-5.0, 5.0, allow_subnormal=False)
@@ -58,40 +58,6 @@ def test_times_of_any_shape(shape):
         assert result.shape == (*shape, 6)
     one_by_one = [signal.value(moment) for moment in t.ravel()]
     assert_array_equal(signal.value(t).reshape(-1, 6), one_by_one)
-
-
-@QUICK
-@given(SPECS, st.floats(0.0, 100.0))
-def test_columns_lead_back_to_the_same_signal(spec, t):
-    columns = harmonic_columns(spec)
-    back = Harmonics.from_spec(harmonic_spec(columns))
-    assert_array_equal(back.value(t), Harmonics.from_spec(spec).value(t))
-    assert_array_equal(back.derivative(t), Harmonics.from_spec(spec).derivative(t))
-    assert harmonic_columns(harmonic_spec(columns)) == columns | {
-        f'{dof}.offset': columns.get(f'{dof}.offset', 0.0) for dof in DOFS
-    }
-
-
-def test_columns_of_a_worked_spec():
-    columns = harmonic_columns(WORKED)
-    assert columns == {
-        'surge.offset': 0.2, 'surge.amplitude': [1.0], 'surge.omega': [np.pi / 20],
-        'surge.phase': [0.0], 'heave.offset': 0.0, 'heave.amplitude': [1.5, -0.5],
-        'heave.omega': [0.4, 2.0], 'heave.phase': [np.pi / 2, 0.0], 'yaw.offset': -0.1,
-    }  # fmt: skip
-    assert all(type(n) is float for v in columns.values() for n in np.atleast_1d(v).tolist())
-
-
-def test_phase_may_be_absent_and_lengths_must_agree():
-    spec = harmonic_spec({'sway.amplitude': [1.0, 2.0], 'sway.omega': [3.0, 4.0]})
-    assert [term['phase'] for term in spec['sway']['terms']] == [0.0, 0.0]
-    for columns in (
-        {'sway.amplitude': [1.0, 2.0], 'sway.omega': [3.0]},
-        {'sway.amplitude': [1.0], 'sway.omega': [3.0], 'sway.phase': [0.0, 1.0]},
-        {'sway.phase': [1.0]},
-    ):
-        with pytest.raises(ValueError, match='sway: amplitude, omega and phase of equal length'):
-            harmonic_spec(columns)
 
 
 def test_a_part_of_many_is_what_they_are():

@@ -4,56 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 
 from auv_analysis.scenario.scenario import Scenario
-from auv_dynamics.files.yaml_files import matrix6
-from auv_dynamics.plant.current import AXES
-from auv_dynamics.plant.signals import harmonic_columns
+from auv_dynamics.plant.parameters import flattened, listed, numbers, part
 from auv_dynamics.ros import interface
 from auv_gvc_controller.control.settings import ControllerSettings
-
-
-def fault_values(scenario: Scenario) -> dict[str, Any]:
-    """Parameters of the faults of a scenario."""
-    parameters: dict[str, Any] = {}
-    names = []
-    for i, fault in enumerate(scenario.faults.entries, start=1):
-        names.append(f'f{i}_{fault.kind}')
-        parameters |= {f'faults.{names[-1]}.{key}': _value(v) for key, v in fault.spec.items()}
-    return {**parameters, 'faults.names': names}
-
-
-def _value(value: Any) -> str | float | list[float]:
-    if isinstance(value, str):
-        return value
-    return flat(value) if np.ndim(value) else float(value)
-
-
-def disturbance_values(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters of a disturbance, without what they begin with."""
-    values = {
-        'herman2018': {'exponent_sign': float(spec.get('exponent_sign', -1))},
-        'harmonic': harmonic_columns(spec),
-        'current': harmonic_columns(spec, tuple(AXES)),
-        'model_error': {},
-    }[spec['kind']]
-    for key in ('mass', 'added_mass', 'damping', 'buoyancy'):
-        if key in spec:
-            values[key] = float(spec[key])
-    for key in ('scale', 'dM', 'dD', 'velocity'):
-        if key in spec:
-            values[key] = flat(spec[key])
-    return {'kind': spec['kind'], **values}
-
-
-def flat(value: Any) -> list[float]:
-    """Shortest list of numbers that a parameter takes: as it is, 36 for a matrix."""
-    if np.ndim(value) < 2:
-        return [float(number) for number in np.atleast_1d(value)]
-    return matrix6(value).ravel().tolist()
-
 
 PLANT, SETPOINT, CONTROLLER = 'plant_node', 'setpoint_node', 'controller_node'
 ANALYSIS, RECORDER = 'analysis_node', interface.RECORDER
@@ -128,7 +84,7 @@ def node_parameters(
             **clock,
             **grid,
             'horizon': HORIZON if lockstep else 0,
-            **_setpoint(scenario),
+            **_of_key(scenario, 'setpoint'),
         },
         CONTROLLER: {**clock, **_controller(scenario, controller, vehicle, lockstep)},
     }
@@ -203,24 +159,15 @@ def _plant(scenario: Scenario, vehicle: str, nodes: list[str], lockstep: bool) -
         'start_after': others,
         'wrench_timeout': WRENCH_TIMEOUT if lockstep else TIMEOUT,
     }
-    names = []
-    for i, spec in enumerate(scenario.data['disturbance'], start=1):
-        names.append(f'd{i}_{spec["kind"]}')
-        values = disturbance_values(spec)
-        parameters.update({f'disturbance.{names[-1]}.{key}': v for key, v in values.items()})
-    for group in ('actuators', 'sensors'):
-        for key, value in scenario.data.get(group, {}).items():
-            listed = key in ('limit', 'rate', 'velocity_noise', 'attitude_noise')
-            kind = flat if listed else bool if key == 'thrusters' else float
-            parameters[f'{group}.{key}'] = kind(value)
-    return {**parameters, 'disturbance.names': names, **fault_values(scenario)}
+    parameters |= listed('disturbance', scenario.data['disturbance'])
+    parameters |= _of_key(scenario, 'actuators') | _of_key(scenario, 'sensors')
+    return parameters | listed('faults', [fault.spec for fault in scenario.faults.entries])
 
 
-def _setpoint(scenario: Scenario) -> dict[str, Any]:
-    spec = scenario.data['setpoint']
-    if 'file' in spec:
-        return {'setpoint.file': spec['file']}
-    return {f'setpoint.{key}': value for key, value in harmonic_columns(spec).items()}
+def _of_key(scenario: Scenario, key: str) -> dict[str, Any]:
+    """Parameters of a key of the scenario that is a mapping."""
+    flat = flattened(part(key), scenario.data.get(key, {}))
+    return {f'{key}.{name}': value for name, value in flat.items()}
 
 
 def _controller(
@@ -243,7 +190,7 @@ def _controller(
         'autostart': True,
     }
     gains = scenario.gain_values(controller)
-    return {**parameters, **{f'gains.{name}': flat(value) for name, value in gains.items()}}
+    return {**parameters, **{f'gains.{name}': numbers(value) for name, value in gains.items()}}
 
 
 def _anti_windup(scenario: Scenario, controller: str) -> dict[str, Any]:
@@ -251,7 +198,7 @@ def _anti_windup(scenario: Scenario, controller: str) -> dict[str, Any]:
     spec = scenario.data['actuators']
     told: dict[str, Any] = {'anti_windup': scenario.controller(controller).get('anti_windup', True)}
     if 'limit' in spec:
-        told['actuators.limit'] = flat(spec['limit'])
+        told['actuators.limit'] = numbers(spec['limit'])
     if spec.get('thrusters'):
         told['actuators.thrusters'] = True
     return told

@@ -28,7 +28,7 @@ TOP_SPEED = {
     'lrauv_tethys': '1.0 m/s (MBARI)',
 }
 COMMENT = """\
-# yaml-language-server: $schema=../../src/auv_analysis/auv_analysis/scenario/scenario.schema.json
+# yaml-language-server: $schema=../../src/auv_dynamics/auv_dynamics/plant/scenario.schema.json
 #
 # Case 1 of Herman 2018 on {name}: what do the paper's gains do on another vehicle?
 # Kept from case1: controllers with their gains, duration, step.

@@ -21,6 +21,7 @@ from auv_dynamics.files.yaml_files import check, read_text, read_yaml
 from auv_dynamics.plant.actuators import Actuators, make_actuators
 from auv_dynamics.plant.fault_rows import FaultRows
 from auv_dynamics.plant.faults import Faults, FaultSetting, make_faults
+from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.plant.sensors import SensorNoise
 from auv_dynamics.plant.uncertainty import Uncertainty, make_uncertainty
 from auv_dynamics.vehicle.allocation import Reach, make_reach
@@ -144,9 +145,6 @@ class Devices:
         if not self.faults.entries:
             return None
         return FaultRows(self.faults, self.data['seed'] if seed is None else seed)
-
-
-SCHEMA = Path(__file__).with_name('scenario.schema.json')
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -119,6 +119,7 @@ def _is_small(data: Any) -> bool:
 __all__ = [
     'InputError', 'check', 'dotted', 'first_line', 'matrix6', 'parse_any_yaml', 'parse_yaml',
     'read_text', 'read_yaml', 'reason', 'schema', 'shorten',
+    'validate',
 ]  # fmt: skip
 LARGEST = 1e100  # products of a few such numbers are still finite
 LARGEST_FILE = 1 << 28  # bytes of a text file
@@ -172,8 +173,12 @@ def check(data: dict[str, Any], schema_path: Path, file: object) -> None:
 
     Every node of our schemas has a `title` that says in words what is expected there.
     """
+    validate(data, schema(schema_path), file)
+
+
+def validate(data: dict[str, Any], root: dict[str, Any], file: object) -> None:
+    """`check` by a schema that has been read."""
     _check_finite(data, file)
-    root = schema(schema_path)
     validator = jsonschema.Draft202012Validator(root)
     errors = sorted(validator.iter_errors(data), key=_rank)
     if errors:

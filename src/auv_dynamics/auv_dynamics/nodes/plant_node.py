@@ -11,16 +11,10 @@ from std_srvs.srv import SetBool, Trigger
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.kernel.integrator import TABLEAUS
-from auv_dynamics.nodes.fault_parameters import fault_specs
-from auv_dynamics.nodes.plant_parameters import (
-    actuator_spec,
-    disturbance_prefixes,
-    disturbance_specs,
-    sensor_spec,
-)
 from auv_dynamics.nodes.stepping import LockStep, RealTime
 from auv_dynamics.plant.actuators import make_actuators
 from auv_dynamics.plant.faults import FaultSetting, make_faults
+from auv_dynamics.plant.parameters import part
 from auv_dynamics.plant.plant import Plant, initial_state
 from auv_dynamics.plant.sensors import SensorNoise
 from auv_dynamics.plant.uncertainty import make_uncertainty
@@ -29,7 +23,13 @@ from auv_dynamics.ros.endpoints import NAMELESS, full_name, other_publishers
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.ros.node_interface import NodeInterface, Peers, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
-from auv_dynamics.ros.parameters import declare, declare_grid, refuse_unknown
+from auv_dynamics.ros.parameters import (
+    declare,
+    declare_grid,
+    declare_spec,
+    declare_specs,
+    refuse_unknown,
+)
 
 MET = 0.5  # s after its birth in which those who are there already are met, before it starts
 NEW = 3.0  # s after its start in which it gives way to another clock, and may wait for its name
@@ -97,12 +97,15 @@ class PlantNode(BulkNode):
             's without a wrench: then zero wrench in real time; in lock-step the run fails',
             at_least=0.0,
         )  # fmt: skip
-        specs, actuators, sensors = disturbance_specs(self), actuator_spec(self), sensor_spec(self)
+        disturbances = declare_specs(self, 'disturbance')
+        actuators, sensors = (
+            declare_spec(self, key, part(key)) or None for key in ('actuators', 'sensors')
+        )
         name, vehicle = self.get_name(), load_vehicle(path)
         self.graph.hardware_id = vehicle.name
         allocated = bool((actuators or {}).get('thrusters', False))
         faults = make_faults(
-            *fault_specs(self),
+            *declare_specs(self, 'faults'),
             FaultSetting(
                 grid.step, grid.duration, vehicle.thrusters, allocated, vehicle.name, name
             ),
@@ -110,7 +113,7 @@ class PlantNode(BulkNode):
         self._acts = actuators is not None or faults.acting
         self._senses = sensors is not None or faults.sensing
         self.plant = Plant(
-            make_uncertainty(vehicle, specs, name, disturbance_prefixes(self)),
+            make_uncertainty(vehicle, disturbances[0], name, disturbances[1]),
             grid.step,
             integrator,
             initial_state(eta, nu),

@@ -1,14 +1,12 @@
 """Offsets plus sinusoids per degree of freedom: set-points and harmonic disturbances."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from auv_dynamics.vehicle import DOFS
-
-__all__ = ['DOFS', 'Harmonics', 'harmonic_columns', 'harmonic_spec']
 
 
 @dataclass(frozen=True)
@@ -63,39 +61,3 @@ class Harmonics:
     def part(self, keep: Any) -> 'Harmonics':
         """Those that an index of the first axis keeps."""
         return Harmonics(self.offset[keep], tuple(terms[keep] for terms in self.terms))
-
-
-def harmonic_columns(spec: Mapping[str, Any], axes: Sequence[str] = DOFS) -> dict[str, Any]:
-    """Flatten a harmonic mapping to ROS parameters: `surge.offset`, `surge.amplitude`, ..."""
-    flat: dict[str, Any] = {}
-    for dof in axes:
-        if dof not in spec:
-            continue
-        flat[f'{dof}.offset'] = float(spec[dof].get('offset', 0.0))
-        terms = spec[dof].get('terms', [])
-        if terms:
-            flat[f'{dof}.amplitude'] = [float(t['amplitude']) for t in terms]
-            flat[f'{dof}.omega'] = [float(t['omega']) for t in terms]
-            flat[f'{dof}.phase'] = [float(t.get('phase', 0.0)) for t in terms]
-    return flat
-
-
-def harmonic_spec(columns: Mapping[str, Any], axes: Sequence[str] = DOFS) -> dict[str, Any]:
-    """Invert `harmonic_columns`; ValueError when the lists of an axis differ in length."""
-    spec: dict[str, Any] = {}
-    for dof in axes:
-        lists = {
-            key: list(columns.get(f'{dof}.{key}', [])) for key in ('amplitude', 'omega', 'phase')
-        }
-        lengths = {key: len(values) for key, values in lists.items()}
-        lists['phase'] = lists['phase'] or [0.0] * lengths['amplitude']
-        if lengths['omega'] != lengths['amplitude'] or len(lists['phase']) != lengths['amplitude']:
-            raise ValueError(f'{dof}: amplitude, omega and phase of equal length, found {lengths}')
-        spec[dof] = {
-            'offset': float(columns.get(f'{dof}.offset', 0.0)),
-            'terms': [
-                {'amplitude': a, 'omega': w, 'phase': p}
-                for a, w, p in zip(lists['amplitude'], lists['omega'], lists['phase'], strict=True)
-            ],
-        }
-    return spec

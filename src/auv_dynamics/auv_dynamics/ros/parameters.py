@@ -1,37 +1,36 @@
 """ROS parameters: declared with description and range, read-only unless said, unknown refused."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter as RosParameter
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of as nearest_of
-from auv_dynamics.plant.signals import harmonic_spec
+from auv_dynamics.plant.parameters import Parameter, nested, parameters_of, part
 from auv_dynamics.ros.interface import NANOSECONDS
-from auv_dynamics.vehicle import DOFS
 
 LONGEST = 1e9  # s of a step or a run: stamps end in 2038
 KNOWN_TO_ALL = ('use_sim_time', 'start_type_description_service')
 TYPE_WORDS = {
-    Parameter.Type.BOOL: 'true or false',
-    Parameter.Type.INTEGER: 'a whole number',
-    Parameter.Type.DOUBLE: 'a number',
-    Parameter.Type.STRING: 'a word',
-    Parameter.Type.DOUBLE_ARRAY: 'a list of numbers',
-    Parameter.Type.STRING_ARRAY: 'a list of words',
+    RosParameter.Type.BOOL: 'true or false',
+    RosParameter.Type.INTEGER: 'a whole number',
+    RosParameter.Type.DOUBLE: 'a number',
+    RosParameter.Type.STRING: 'a word',
+    RosParameter.Type.DOUBLE_ARRAY: 'a list of numbers',
+    RosParameter.Type.STRING_ARRAY: 'a list of words',
 }
 TYPES = {
-    bool: Parameter.Type.BOOL,
-    int: Parameter.Type.INTEGER,
-    float: Parameter.Type.DOUBLE,
-    str: Parameter.Type.STRING,
-    list[float]: Parameter.Type.DOUBLE_ARRAY,
-    list[str]: Parameter.Type.STRING_ARRAY,
+    bool: RosParameter.Type.BOOL,
+    int: RosParameter.Type.INTEGER,
+    float: RosParameter.Type.DOUBLE,
+    str: RosParameter.Type.STRING,
+    list[float]: RosParameter.Type.DOUBLE_ARRAY,
+    list[str]: RosParameter.Type.STRING_ARRAY,
 }
 
 
@@ -81,7 +80,7 @@ def declare(
     if value is None and default is None:
         node.declare_parameter(name, TYPES[kind], descriptor, ignore_override=True)
         return None
-    if value is None or Parameter.Type.from_parameter_value(value) != TYPES[kind]:
+    if value is None or RosParameter.Type.from_parameter_value(value) != TYPES[kind]:
         raise InputError(node.get_name(), name, TYPE_WORDS[TYPES[kind]], value)
     try:
         node.declare_parameter(name, value, descriptor, ignore_override=True)
@@ -135,28 +134,39 @@ def declare_grid(node: Node) -> Grid:
     return Grid(step, step_ns, duration, last)
 
 
-def harmonic_parameters(
-    node: Node, prefix: str, unit: str, axes: tuple[str, ...] = DOFS
-) -> dict[str, Any]:
-    """Declare `<prefix><axis>.{offset, amplitude, omega, phase}` and return them as a mapping."""
-    columns: dict[str, Any] = {}
-    for axis in axes:
-        columns[f'{axis}.offset'] = declare(
-            node, f'{prefix}{axis}.offset', float, 0.0, f'constant part of {axis}, {unit}'
-        )
-        for key, what in (
-            ('amplitude', f'amplitude, {unit}'),
-            ('omega', 'angular frequency, rad/s'),
-            ('phase', 'phase, rad'),
-        ):
-            text = f'{what}, of each sinusoid of {axis}'
-            values = declare(node, f'{prefix}{axis}.{key}', list[float], None, text)
-            columns[f'{axis}.{key}'] = values or []
-    try:
-        spec = harmonic_spec(columns, axes)
-    except ValueError as error:
-        raise InputError(node.get_name(), prefix.rstrip('.'), str(error), 'other lengths') from None
-    return {axis: entry for axis, entry in spec.items() if entry['offset'] or entry['terms']}
+def declare_spec(node: Node, place: str, about: Mapping[str, Any]) -> dict[str, Any]:
+    """Declare the parameters of a mapping of the scenario's schema and return it, checked.
+
+    Parameters
+    ----------
+    node : that declares them
+    place : what their names begin with, without the dot
+    about : node of the schema, see `part`
+
+    Raises
+    ------
+    InputError : it is not what the schema describes
+
+    """
+    values: dict[str, Any] = {}
+    for one in parameters_of(about):
+        values[one.name] = _declared(node, place, one)
+    for one in parameters_of(about, values['kind']) if 'kind' in values else ():
+        if one.name not in values:
+            values[one.name] = _declared(node, place, one)
+    return nested(about, values, node.get_name(), place)
+
+
+def _declared(node: Node, place: str, one: Parameter) -> Any:
+    return declare(node, f'{place}.{one.name}', one.kind, None, one.text, **one.range)
+
+
+def declare_specs(node: Node, group: str) -> tuple[list[dict[str, Any]], list[str]]:
+    """Declare the entries that `<group>.names` lists; as a scenario has them, and their places."""
+    about = part(group)
+    names = declare(node, f'{group}.names', list[str], None, f'names; each is {about["title"]}')
+    places = [f'{group}.{name}' for name in names or []]
+    return [declare_spec(node, place, about) for place in places], places
 
 
 def _taken(value: Any, kind: Any) -> Any:

@@ -1,19 +1,18 @@
 """Set-points as a node: `cmd_vel` and `cmd_accel`, published ahead of the odometry."""
 
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.plant.parameters import part
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.endpoints import why_silent
 from auv_dynamics.ros.node_interface import OK, STALE, Health, NodeInterface, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
-from auv_dynamics.ros.parameters import declare, declare_grid, harmonic_parameters, refuse_unknown
+from auv_dynamics.ros.parameters import declare, declare_grid, declare_spec, refuse_unknown
 from auv_gvc_controller.control.odometry_guard import Limits, Now, OdometryGuard
-from auv_gvc_controller.control.setpoint import Setpoint, make_setpoint
+from auv_gvc_controller.control.setpoint import make_setpoint
 
 BLOCK = 256  # set-points that are evaluated at once
 PATIENCE = 0.3  # s without odometry after which stamps that have gone back are believed
@@ -34,7 +33,9 @@ class SetpointNode(BulkNode):
             at_least=0, at_most=topics.DEPTH - 1,
         )  # fmt: skip
         self._step_ns, self._last = grid.step_ns, grid.last
-        self._setpoint = self._declare_setpoint(grid.duration)
+        self._setpoint = make_setpoint(
+            declare_spec(self, 'setpoint', part('setpoint')), grid.duration
+        )
         refuse_unknown(self)
         self.graph.must_hold = self._horizon
         self._publish_velocity = self.graph.output(topics.CMD_VEL)
@@ -56,22 +57,6 @@ class SetpointNode(BulkNode):
         if self._guard.last is not None:
             return OK, ''
         return STALE, why_silent(self, topics.ODOM) or 'no odometry yet'
-
-    def _declare_setpoint(self, duration: float) -> Setpoint:
-        file = declare(
-            self,
-            'setpoint.file',
-            str,
-            '',
-            'CSV file of set-points with the columns t, surge, ..., yaw',
-        )
-        spec = harmonic_parameters(self, 'setpoint.', 'm/s, rad/s')
-        if file:
-            if spec:
-                key = f'setpoint.{next(iter(spec))}'
-                raise InputError(self.get_name(), key, 'setpoint.file alone', 'both')
-            return make_setpoint({'file': Path(file)}, duration)
-        return make_setpoint(spec, duration)
 
     def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
         restarts = self._guard.restarts

@@ -21,7 +21,7 @@ from loops import CONTROLLER
 from auv_analysis.graph.domain import chosen_domain
 from auv_analysis.graph.experiment import environment, run_controller
 from auv_analysis.scenario.scenario import load_scenario
-from auv_analysis.simulation.warm_up import warm_up
+from auv_analysis.simulation.simulate import warm_up
 from auv_dynamics.ros.security import loopback
 
 SETTLE = 1.0  # s of ping-pong before it is counted

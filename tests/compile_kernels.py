@@ -18,7 +18,7 @@ from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.rollouts import rollouts
-from auv_analysis.simulation.warm_up import warm_up
+from auv_analysis.simulation.simulate import warm_up
 from auv_analysis.studies.tune.cost import measured
 
 STEPS = 20

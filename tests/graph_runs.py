@@ -123,7 +123,7 @@ def plain(value: object) -> object:
 def main() -> None:
     """Record controllers of a scenario, all where none is named."""
     from auv_analysis.graph.experiment import run_controller
-    from auv_analysis.simulation.warm_up import warm_up
+    from auv_analysis.simulation.simulate import warm_up
     from auv_dynamics.ros.participant import Watcher
 
     path, out, *controllers = sys.argv[1:]

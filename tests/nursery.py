@@ -26,7 +26,7 @@ from setproctitle import setproctitle
 from auv_analysis import load_scenario
 from auv_analysis.graph import supervisor
 from auv_analysis.graph.experiment import COMPOSED, PACKAGES
-from auv_analysis.simulation.warm_up import warm_up
+from auv_analysis.simulation.simulate import warm_up
 from auv_dynamics.ros.interface import PARENT
 
 NODES = {  # and the package of each

@@ -62,7 +62,7 @@ FORMULAS = [
         check_J, 52,
     ),
     Formula(
-        'U', 'auv_gvc_controller.laws.decomposition', ['decompose', 'inverse_upper'], check_U, 7
+        'U', 'auv_gvc_controller.laws.model', ['decompose', 'inverse_upper'], check_U, 7
     ),
     Formula(
         'U x', 'auv_dynamics.kernel.six',
@@ -93,7 +93,7 @@ FORMULAS = [
         lambda m: check_other_law('smc', m.SMC), 23,
     ),
     Formula(
-        'F current', 'auv_dynamics.plant.current',
+        'F current', 'auv_dynamics.plant.uncertainty',
         ['make_current', 'to_body', 'acceleration_in_current'], check_current, 33,
     ),
     Formula(

@@ -18,9 +18,8 @@ ROOT = HERE.parents[1]
 MUTATED = tomllib.loads((HERE.parent / 'mutation/mutation.toml').read_text(encoding='utf-8'))
 KINDS = 'formulas', 'loops', 'figures'
 MORE = {  # mathematics whose mutants are not tried, and its tests
-    'auv_dynamics/auv_dynamics/plant/faulty_devices.py': ['analysis/test_simulate_faults.py'],
     'auv_dynamics/auv_dynamics/plant/devices.py': ['analysis/test_simulate_faults.py'],
-    'auv_dynamics/auv_dynamics/plant/fault_rows.py': ['dynamics/test_fault_rows.py'],
+    'auv_dynamics/auv_dynamics/plant/faults.py': ['dynamics/test_fault_rows.py'],
     'auv_dynamics/auv_dynamics/kernel/lanes.py': ['dynamics/test_lanes.py'],
     'auv_gvc_controller/auv_gvc_controller/control/controller.py': ['controller/test_hand_over.py'],
     'auv_gvc_controller/auv_gvc_controller/control/setpoint.py': ['controller/test_setpoint.py'],

@@ -111,7 +111,7 @@ def test_refuses_odometry_in_another_frame() -> None:
         (parameters(setpoint__warp__offset=1.0), 'setpoint.warp.offset', 'one of'),
         (['-p', 'setpoint.surge.amplitude:=[1.0]'], 'setpoint', 'of equal length'),
         (parameters(setpoint__file='none.csv'), 'none.csv', 'a CSV set-point file'),
-        (parameters(setpoint__file='none.csv', setpoint__yaw__offset=1.0), 'setpoint', 'yaw beside'),
+        (parameters(setpoint__file='none.csv', setpoint__yaw__offset=1.0), 'setpoint', 'alone'),
     ],
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:

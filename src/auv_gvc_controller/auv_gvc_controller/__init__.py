@@ -7,10 +7,10 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from auv_gvc_controller.laws.decomposition import decompose
+    from auv_gvc_controller.laws.model import decompose
 
 _HOME = {
-    'decompose': 'auv_gvc_controller.laws.decomposition',
+    'decompose': 'auv_gvc_controller.laws.model',
 }
 __all__ = ['decompose']
 

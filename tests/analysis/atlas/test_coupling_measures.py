@@ -17,7 +17,7 @@ from auv_analysis.studies.atlas.atlas import (
     velocity_shares,
 )
 from auv_dynamics import load_vehicle
-from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
+from auv_gvc_controller.laws.model import decompose, inverse_upper
 
 MEASURES = (inertial_correlation, velocity_shares, input_shares, coupling_strength)
 SCALES = arrays(float, 6, elements=st.floats(-3, 3)).map(lambda powers: 10.0**powers)

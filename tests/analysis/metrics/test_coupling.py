@@ -20,7 +20,7 @@ from auv_analysis.metrics.coupling import (
 from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
-from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
+from auv_gvc_controller.laws.model import decompose, inverse_upper
 
 SURGE, SWAY, HEAVE, ROLL, PITCH, YAW = DOFS
 NU = np.array([1.1, -0.7, 0.4, 0.9, -1.3, 0.6])

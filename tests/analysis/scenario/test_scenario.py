@@ -12,10 +12,11 @@ import pytest
 import yaml
 
 from auv_analysis import load_scenario
-from auv_analysis.scenario.scenario import SCHEMA, Scenario, write_inputs
+from auv_analysis.scenario.scenario import Scenario, write_inputs
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
+from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle import vehicle_file
 
 ROOT = Path(__file__).resolve().parents[3]

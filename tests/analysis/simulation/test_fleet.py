@@ -12,8 +12,7 @@ from numpy.testing import assert_array_equal
 from auv_analysis.simulation.variants import fleet, matrices, numbers
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
-from auv_gvc_controller.laws.decomposition import decompose
-from auv_gvc_controller.laws.model import control_model
+from auv_gvc_controller.laws.model import control_model, decompose
 
 FILES = {name: file_of(name) for name in ('rexrov', 'herman2018', 'lauv', 'lrauv_tethys')}
 PLACES = {

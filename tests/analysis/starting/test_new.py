@@ -12,10 +12,10 @@ import yaml
 
 from auv_analysis import load_scenario
 from auv_analysis.cli import main
-from auv_analysis.scenario.scenario import SCHEMA
 from auv_analysis.scenario.templates import STARTING, annotated
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.yaml_files import schema
+from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle.vehicle_file import SCHEMA as VEHICLE_SCHEMA
 
 OPTION = re.compile(r'^( *)#(?! \S|$)', re.M)

@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 
 from auv_analysis import load_scenario, simulate
 from auv_dynamics import load_vehicle
-from auv_dynamics.vehicle.allocation import make_reach
+from auv_dynamics.vehicle.thrusters import make_reach
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.control.sampled import SampledLaw, anti_windup
 from auv_gvc_controller.laws.law import make_gains
@@ -95,7 +95,7 @@ def test_rounding_of_an_allocation_within_its_limits_stops_nothing():
     values = {'k_D': 5.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 9.0}
     laws = [
         SampledLaw(make_gains('cl', values), control_model(vehicle), reach)
-        for reach in (make_reach(None, vehicle), None)
+        for reach in (make_reach(None, vehicle.thrusters), None)
     ]
     nu_d = (0.3, -0.2, 0.1, 0.05, -0.02, 0.1)
     for k in range(50):

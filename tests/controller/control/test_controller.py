@@ -9,9 +9,14 @@ from numpy.testing import assert_allclose
 from auv_dynamics import load_vehicle
 from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
 from auv_gvc_controller.control.odometry_guard import ZERO, Limits, Now, OdometryGuard
-from auv_gvc_controller.control.reference_filter import FilterSettings, ReferenceFilter
 from auv_gvc_controller.control.sampled import SampledLaw
-from auv_gvc_controller.control.setpoint_buffer import DIFFERENCE, SAME, SetpointBuffer
+from auv_gvc_controller.control.setpoint_buffer import (
+    DIFFERENCE,
+    SAME,
+    FilterSettings,
+    ReferenceFilter,
+    SetpointBuffer,
+)
 from auv_gvc_controller.laws.gvc import GVC
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model

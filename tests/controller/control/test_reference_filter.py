@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from auv_gvc_controller.control.odometry_guard import ZERO
-from auv_gvc_controller.control.reference_filter import FilterSettings, ReferenceFilter
+from auv_gvc_controller.control.setpoint_buffer import FilterSettings, ReferenceFilter
 
 FREE = (math.inf,) * 4
 LIMITED = FilterSettings(1.0, 1.0, 3.0, 1.0, 0.2, 0.1)

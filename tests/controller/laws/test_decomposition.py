@@ -13,8 +13,7 @@ from strategies import QUICK, positive_definite, vectors, vehicles
 from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller import decompose
-from auv_gvc_controller.laws.decomposition import inverse_upper
-from auv_gvc_controller.laws.model import control_model
+from auv_gvc_controller.laws.model import control_model, inverse_upper
 
 
 def check_form(Upsilon: np.ndarray, N: np.ndarray) -> None:

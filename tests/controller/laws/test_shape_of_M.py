@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from auv_gvc_controller.laws.decomposition import decompose
+from auv_gvc_controller.laws.model import decompose
 
 
 @pytest.mark.parametrize('shape', [(5, 5), (7, 7), (6, 7), (7, 6), (5, 6), (6, 5), (6,), (2, 5, 6)])

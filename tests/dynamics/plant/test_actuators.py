@@ -18,8 +18,7 @@ from auv_dynamics.plant.actuators import (
     make_actuators,
     memory,
 )
-from auv_dynamics.vehicle.allocation import make_reach, reachable
-from auv_dynamics.vehicle.thrusters import Thrusters
+from auv_dynamics.vehicle.thrusters import Thrusters, make_reach, reachable
 
 STEP = 0.01
 VEHICLE = load_vehicle('rexrov')
@@ -113,7 +112,7 @@ def eight_thrusters():
 @given(vectors(largest=200.0))
 def test_allocation_keeps_the_direction_and_the_thrusters_limits(tau):
     vehicle, T = eight_thrusters()
-    found = np.array(plain(reachable)(make_reach(None, vehicle), tuple(tau)))
+    found = np.array(plain(reachable)(make_reach(None, vehicle.thrusters), tuple(tau)))
     u = np.linalg.pinv(T) @ tau
     most = np.where(u > 0, 50.0, 40.0)
     share = min(1.0, (most / np.maximum(np.abs(u), 1e-12)).min())
@@ -124,7 +123,7 @@ def test_allocation_keeps_the_direction_and_the_thrusters_limits(tau):
 def test_axis_limits_come_after_the_allocation():
     vehicle, T = eight_thrusters()
     tau = tuple(T @ np.full(8, 10.0))
-    reach = make_reach([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], vehicle)
+    reach = make_reach([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], vehicle.thrusters)
     expected = np.clip(tau, -np.arange(1.0, 7.0), np.arange(1.0, 7.0))
     assert_allclose(plain(reachable)(reach, tau), expected, atol=1e-12)
 
@@ -135,7 +134,7 @@ def test_the_kernel_allocates_as_the_vehicle_says(name, size):
     vehicle = load_vehicle(name)
     tau = size * np.array([1.0, -0.8, 0.7, 0.1, -0.05, 0.2])
     _, delivered = vehicle.thrusters.allocate(tau)
-    found = plain(reachable)(make_reach(None, vehicle), tuple(tau))
+    found = plain(reachable)(make_reach(None, vehicle.thrusters), tuple(tau))
     assert_allclose(found, delivered, rtol=0, atol=1e-9 * size)
 
 

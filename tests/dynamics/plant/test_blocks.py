@@ -7,6 +7,7 @@ from plants import plant_of
 from auv_dynamics import load_vehicle
 from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
 from auv_dynamics.plant.actuators import fill_applied, make_actuators, memory
+from auv_dynamics.plant.devices import LOST, SensorNoise, fill_measured
 from auv_dynamics.plant.plant import (
     BLOCK,
     SIZE,
@@ -14,7 +15,6 @@ from auv_dynamics.plant.plant import (
     initial_state,
     lumped_uncertainty,
 )
-from auv_dynamics.plant.sensors import LOST, SensorNoise, fill_measured
 from auv_dynamics.plant.uncertainty import make_uncertainty
 
 VEHICLE = load_vehicle('rexrov')

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from auv_dynamics.plant.current import make_current, varies
+from auv_dynamics.plant.uncertainty import make_current, varies
 
 
 def term(amplitude, omega, **more):

@@ -8,7 +8,7 @@ from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.plant.actuators import fill_applied, make_actuators, memory
-from auv_dynamics.vehicle.allocation import (
+from auv_dynamics.vehicle.thrusters import (
     demanded,
     make_reach,
     reachable,
@@ -92,10 +92,10 @@ def test_without_bounds_everything_is_reached():
 
 
 def test_one_limit_holds_for_all_axes():
-    reach = make_reach(3.0, VEHICLE)
+    reach = make_reach(3.0, VEHICLE.thrusters)
     assert reach.bounded
     assert_array_equal(reach.limit, np.full(6, 3.0))
-    assert make_reach(None, load_vehicle('bluerov2')).bounded
+    assert make_reach(None, load_vehicle('bluerov2').thrusters).bounded
 
 
 def test_share_of_the_thrusts_that_is_within_limits():
@@ -135,7 +135,7 @@ def test_what_is_demanded_knows_no_limits(name):
     expected = T @ np.linalg.pinv(T, rcond=1e-9) @ tau
     if name == 'bluerov2':
         expected[4] = -50.0  # six thrusters: no pitch of its own, the command stands
-    reach = make_reach(None, vehicle)
+    reach = make_reach(None, vehicle.thrusters)
     assert_allclose(plain(demanded)(reach, tuple(tau)), expected, atol=1e-9)
     most = np.abs(plain(reachable)(reach, tuple(tau))).max()
     assert most < 0.5 * np.abs(expected).max()

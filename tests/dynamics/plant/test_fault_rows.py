@@ -8,18 +8,20 @@ from plants import plant_of, push
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.actuators import make_actuators
-from auv_dynamics.plant.fault_rows import FaultRows
-from auv_dynamics.plant.faults import Faults, FaultSetting, make_faults
-from auv_dynamics.plant.faulty_devices import (
+from auv_dynamics.plant.devices import LOST, SensorNoise
+from auv_dynamics.plant.faults import (
     AGE,
     AXES,
     HELD,
     THRUSTERS,
     WRENCH,
     ZEROED,
+    FaultRows,
+    Faults,
+    FaultSetting,
+    make_faults,
 )
 from auv_dynamics.plant.plant import initial_state
-from auv_dynamics.plant.sensors import LOST, SensorNoise
 
 H = 0.01
 HEAVY = load_vehicle('bluerov2_heavy')

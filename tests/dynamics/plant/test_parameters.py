@@ -8,8 +8,8 @@ from numpy.testing import assert_array_equal
 from strategies import QUICK
 
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.plant.parameters import flattened, listed, nested, parameters_of, part
-from auv_dynamics.plant.signals import Harmonics
 from auv_dynamics.vehicle import DOFS
 
 GOOD = {'amplitude': [1.0, 2.0], 'omega': [3.0, 4.0], 'phase': [0.5, 0.6]}

@@ -6,8 +6,8 @@ from numpy.testing import assert_array_equal
 from plants import plant_of
 
 from auv_dynamics import load_vehicle
+from auv_dynamics.plant.devices import WIDTH, SensorNoise
 from auv_dynamics.plant.plant import initial_state
-from auv_dynamics.plant.sensors import WIDTH, SensorNoise
 
 PERFECT = np.eye(WIDTH)[6]  # no noise, no rotation, nothing lost
 START = initial_state(np.zeros(6), np.array([0.3, 0.2, -0.1, 0, 0.1, 0.2]))

@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from plants import plant_of, push
 
 from auv_dynamics import load_vehicle
+from auv_dynamics.plant.devices import LOST, SensorNoise, fill_measured
 from auv_dynamics.plant.plant import initial_state
-from auv_dynamics.plant.sensors import LOST, SensorNoise, fill_measured
 from auv_dynamics.vehicle.kinematics import rotation
 
 SPEC = {

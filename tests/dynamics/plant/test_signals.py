@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from strategies import QUICK
 
-from auv_dynamics.plant.signals import Harmonics
+from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.vehicle import DOFS
 
 NUMBERS = st.floats(-5.0, 5.0, allow_subnormal=False)

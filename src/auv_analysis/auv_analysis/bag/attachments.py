@@ -6,9 +6,9 @@ from typing import Any
 
 from auv_analysis.bag.reading import Contents
 from auv_analysis.scenario.fault_words import Mark, marks_of
-from auv_analysis.scenario.scenario import SCHEMA
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import check, parse_yaml
+from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
 from auv_gvc_controller.laws.law import is_unasked, make_gains

@@ -32,7 +32,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Run a campaign, or what is left of it."""
     from auv_analysis.output.progress import say
-    from auv_analysis.simulation.warm_up import announce
+    from auv_analysis.simulation.simulate import announce
     from auv_analysis.studies.sweep.campaign import load_campaign
     from auv_analysis.studies.sweep.engine import opened
     from auv_analysis.studies.sweep.folder import sweep_folder

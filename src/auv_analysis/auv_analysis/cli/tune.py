@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import bar, count, say, waiting
     from auv_analysis.scenario.scenario import load_scenario
-    from auv_analysis.simulation.warm_up import announce
+    from auv_analysis.simulation.simulate import announce
     from auv_analysis.studies.tune.perturbations import Perturbations, spread_of
     from auv_analysis.studies.tune.pipeline import tune
 

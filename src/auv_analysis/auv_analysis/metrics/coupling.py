@@ -7,7 +7,7 @@ import numpy as np
 from auv_analysis.metrics.energy import kinetic_energy, shares
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
-from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
+from auv_gvc_controller.laws.model import decompose, inverse_upper
 
 NEGLIGIBLE = 1e-12  # an entry below this, relative to the largest, is a zero of the structure
 

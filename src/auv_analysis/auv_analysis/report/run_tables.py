@@ -13,8 +13,8 @@ from auv_analysis.report.results import Column, Table, make_table
 from auv_analysis.report.scenario_text import SetUp, gain_text
 from auv_analysis.runs.run import FOREIGN, Facts
 from auv_dynamics.vehicle import DOFS
-from auv_gvc_controller.laws.decomposition import inverse_upper
 from auv_gvc_controller.laws.law import SHIPPED
+from auv_gvc_controller.laws.model import inverse_upper
 
 Summaries = Mapping[str, Mapping[str, Any]]
 ORIGIN = {

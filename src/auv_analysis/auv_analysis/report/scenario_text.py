@@ -12,10 +12,10 @@ import yaml
 from auv_analysis.output.text import join, plain
 from auv_analysis.runs.run import FOREIGN, Facts
 from auv_analysis.scenario.fault_words import Mark, marks_of
-from auv_analysis.scenario.scenario import SCHEMA
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import check, matrix6, parse_yaml
 from auv_dynamics.plant.faults import ACTING, SENSING
+from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.control.gains import sampling_warning
 

@@ -7,7 +7,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 
-from auv_analysis.scenario.scenario import SCHEMA, Scenario, scenario_from, vehicle_path_of
+from auv_analysis.scenario.scenario import Scenario, scenario_from, vehicle_path_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of
 from auv_dynamics.files.yaml_files import (
@@ -16,6 +16,7 @@ from auv_dynamics.files.yaml_files import (
     read_yaml,
     schema,
 )
+from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle.vehicle_file import SCHEMA as VEHICLE_SCHEMA
 
 VEHICLE = 'vehicle'

@@ -19,12 +19,11 @@ from auv_dynamics.files.nearest import one_of
 from auv_dynamics.files.shipped import shipped, shipped_by_name
 from auv_dynamics.files.yaml_files import check, read_text, read_yaml
 from auv_dynamics.plant.actuators import Actuators, make_actuators
-from auv_dynamics.plant.fault_rows import FaultRows
-from auv_dynamics.plant.faults import Faults, FaultSetting, make_faults
+from auv_dynamics.plant.devices import SensorNoise
+from auv_dynamics.plant.faults import FaultRows, Faults, FaultSetting, make_faults
 from auv_dynamics.plant.parameters import SCHEMA
-from auv_dynamics.plant.sensors import SensorNoise
 from auv_dynamics.plant.uncertainty import Uncertainty, make_uncertainty
-from auv_dynamics.vehicle.allocation import Reach, make_reach
+from auv_dynamics.vehicle.thrusters import Reach, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.control.gains import body_gains, sampling_warning, state_warning

@@ -12,10 +12,10 @@ from typing import Any
 import yaml
 
 from auv_analysis.scenario.scaling import scale_lines, scaled_case1
-from auv_analysis.scenario.scenario import SCHEMA
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import read_text, read_yaml, schema
+from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle.vehicle_file import SCHEMA as VEHICLE_SCHEMA
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 

@@ -34,7 +34,7 @@ from auv_dynamics.kernel.lanes import (
     unpacked,
 )
 from auv_dynamics.plant.actuators import memory
-from auv_dynamics.plant.faulty_devices import history_shape
+from auv_dynamics.plant.devices import history_shape
 from auv_dynamics.plant.plant import SIZE
 from auv_gvc_controller.control.sampled import user_law
 from auv_gvc_controller.laws.law import SHIPPED

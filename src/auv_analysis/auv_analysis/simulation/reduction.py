@@ -7,7 +7,7 @@ import numpy as np
 from auv_analysis.metrics.energy import shares
 from auv_analysis.metrics.moments import signals
 from auv_analysis.metrics.summary import TRANSIENT, has_settled
-from auv_analysis.simulation.records import Sample
+from auv_analysis.simulation.closed_loop import Sample
 from auv_dynamics.files.yaml_files import LARGEST
 from auv_dynamics.kernel.compile import helper
 from auv_dynamics.kernel.lanes import Number, select

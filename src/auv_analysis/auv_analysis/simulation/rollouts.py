@@ -20,8 +20,8 @@ from auv_analysis.simulation.simulate import (
 )
 from auv_analysis.simulation.variants import Variants, in_columns, merged, packed_variants
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.plant.fault_rows import FaultRows
-from auv_dynamics.plant.sensors import SensorNoise
+from auv_dynamics.plant.devices import SensorNoise
+from auv_dynamics.plant.faults import FaultRows
 from auv_gvc_controller.control.setpoint import Setpoint
 
 BLOCK = 256  # steps whose set-points are looked at together for their peak

@@ -1,5 +1,7 @@
-"""In-process simulation of a scenario by the one kernel."""
+"""In-process simulation of a scenario by the one kernel, and the kernel made ready for it."""
 
+import sys
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,23 +13,22 @@ from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.closed_loop import (
     RUNS,
     Grid,
+    Log,
     Loop,
     Motion,
     Tables,
     Workspace,
 )
-from auv_analysis.simulation.records import Log
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import LARGEST
-from auv_dynamics.kernel.compile import plain
+from auv_dynamics.kernel.compile import JITTED, cache_folder, config, plain
 from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
 from auv_dynamics.kernel.lanes import with_batch_axis
 from auv_dynamics.plant.actuators import memory
-from auv_dynamics.plant.fault_rows import FaultRows
-from auv_dynamics.plant.faulty_devices import history_shape
-from auv_dynamics.plant.plant import SIZE, initial_state, unwrapped_eta
-from auv_dynamics.plant.sensors import WIDTH, SensorNoise
-from auv_gvc_controller.control.sampled import anti_windup, is_compiled, user_law
+from auv_dynamics.plant.devices import WIDTH, SensorNoise, history_shape
+from auv_dynamics.plant.faults import FaultRows
+from auv_dynamics.plant.plant import SIZE, Plant, initial_state, unwrapped_eta
+from auv_gvc_controller.control.sampled import SampledLaw, anti_windup, is_compiled, user_law
 from auv_gvc_controller.control.setpoint import Setpoint
 from auv_gvc_controller.laws.model import control_model
 
@@ -168,3 +169,39 @@ def _check_finite(log: Log, t: np.ndarray, scenario: Scenario, controller: str) 
         first = t[np.argmin(finite)]
         where = f'{scenario.name}, {controller}'
         raise DivergedError(f'{where}: the closed loop diverges, not finite from t = {first:g} s')
+
+
+NOTICE_AFTER = 1.0  # s: a cached kernel is loaded faster than that
+
+
+def announce(scenario: Scenario, controllers: list[str]) -> None:
+    """Say how the kernel runs where that costs time: not compiled, or to be compiled first."""
+    for name in controllers:
+        gains = scenario.gains(name)
+        if JITTED and not is_compiled(gains):
+            law = type(gains).__name__
+            print(f'{name}: the law {law} runs as plain Python', file=sys.stderr)
+    if not JITTED:
+        why = 'numba is switched off' if config else 'numba is not installed'
+        print(f'{why}: the kernel runs as plain Python, slower', file=sys.stderr)
+    elif not any(cache_folder().glob('**/*.nbi')):
+        print('compiling the kernel for this machine, once ...', file=sys.stderr, flush=True)
+
+
+def warm_up(scenario: Scenario, controllers: list[str]) -> None:
+    """Load or compile the kernel for one step of each law; say so when it takes time."""
+    announce(scenario, controllers)
+    if not JITTED:
+        return
+    begin = time.monotonic()
+    model = control_model(scenario.vehicle)
+    for name in controllers:
+        gains = scenario.gains(name)
+        if is_compiled(gains):
+            SampledLaw(gains, model, scenario.reach(name))
+    x = initial_state(np.zeros(6), np.zeros(6))
+    integrator = scenario.data['integrator']
+    devices = scenario.actuators, scenario.noise(), scenario.faults
+    Plant(scenario.uncertainty, scenario.step, integrator, x, *devices)
+    if time.monotonic() - begin > NOTICE_AFTER:
+        print(f'kernel ready after {time.monotonic() - begin:.1f} s', file=sys.stderr)

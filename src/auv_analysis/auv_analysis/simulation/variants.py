@@ -17,8 +17,8 @@ from auv_analysis.simulation.closed_loop import Loop
 from auv_analysis.simulation.simulate import loop_of
 from auv_dynamics.files.yaml_files import LARGEST
 from auv_dynamics.kernel.lanes import arrays, joined, take_rows, with_batch_axis
+from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.plant.plant import initial_state
-from auv_dynamics.plant.signals import Harmonics
 from auv_dynamics.plant.uncertainty import Truth, with_errors
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle, rigid_body_matrix, row_major

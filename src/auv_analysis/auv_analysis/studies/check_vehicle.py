@@ -18,7 +18,7 @@ from auv_dynamics.vehicle.thrusters import Thrusters
 from auv_dynamics.vehicle.vehicle import Vehicle, munk_terms
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 from auv_gvc_controller.control.gains import RINGS, UNSTABLE, sampled_rate
-from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
+from auv_gvc_controller.laws.model import decompose, inverse_upper
 
 K_D = 12.0  # k_D of the paper, (36)
 CRUISE = 1.0  # m/s, where the top speed of a vehicle is not known

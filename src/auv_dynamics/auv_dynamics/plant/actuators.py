@@ -16,7 +16,7 @@ from auv_dynamics.kernel.six import (
     fill_vector,
     vector,
 )
-from auv_dynamics.vehicle.allocation import (
+from auv_dynamics.vehicle.thrusters import (
     Reach,
     make_reach,
     reachable,
@@ -81,7 +81,7 @@ def make_actuators(
     lag = float(spec.get('lag', 0.0))
     return Actuators(
         False,
-        make_reach(spec.get('limit'), vehicle if use_thrusters else None),
+        make_reach(spec.get('limit'), vehicle.thrusters if use_thrusters else None),
         np.full(6, np.inf) if spec.get('rate') is None else six_numbers(spec['rate']) * step,
         np.full(6, 1.0 if lag == 0 else -np.expm1(-step / lag)),
         round(delay),

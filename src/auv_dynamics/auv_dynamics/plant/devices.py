@@ -1,18 +1,195 @@
-"""A plant's sensors and actuators with their faults, one step at a time."""
+"""Sensors and actuators with their faults: in the kernel, and one step at a time."""
+
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from auv_dynamics.plant.actuators import Actuators, fill_applied, memory
-from auv_dynamics.plant.faults import Faults
-from auv_dynamics.plant.faulty_devices import (
-    AGE,
-    SIZE,
-    WRENCH,
-    fill_arrived,
-    fill_faulty,
-    history_shape,
+from auv_dynamics.kernel.compile import compiled, helper
+from auv_dynamics.kernel.lanes import Number, anywhere, select
+from auv_dynamics.kernel.six import (
+    Numbers,
+    Six,
+    Vector,
+    clipped,
+    fill_vector,
 )
-from auv_dynamics.plant.sensors import LOST, SensorNoise, fill_measured
+from auv_dynamics.plant.actuators import Actuators, fill_applied, fill_slowed, memory, waited
+from auv_dynamics.plant.faults import (
+    AGE,
+    AXES,
+    HELD,
+    NONE,
+    THRUSTERS,
+    WRENCH,
+    Faults,
+    FaultShape,
+    MeasurementFaults,
+)
+from auv_dynamics.vehicle.thrusters import Reach, share_within, thrust
+
+WIDTH = 11  # columns of a row: velocity noise (6), rotation quaternion (4), whether it is lost
+LOST = WIDTH - 1
+
+
+class SensorNoise:
+    """Random numbers of a run, row by row, the same however many rows are asked for at once.
+
+    Parameters
+    ----------
+    spec : `velocity_noise` (1 or 6 standard deviations, m/s and rad/s), `attitude_noise` (1 or 3,
+        rad, about the body axes), `drop_out` (probability that a sample is lost)
+    seed : of the scenario; `SeedSequence(seed).spawn(2)` gives the streams of noise and of losses
+    faults : whose biases and drop-outs come on top
+
+    """
+
+    def __init__(self, spec: Mapping[str, Any], seed: int, faults: Faults = NONE):
+        self._noise, self._loss = (
+            np.random.Generator(np.random.PCG64(child))
+            for child in np.random.SeedSequence(seed).spawn(2)
+        )
+        velocity = np.broadcast_to(np.asarray(spec.get('velocity_noise', 0.0), float), 6)
+        attitude = np.broadcast_to(np.asarray(spec.get('attitude_noise', 0.0), float), 3)
+        self._deviation = np.concatenate([velocity, attitude])
+        self._drop_out = float(spec.get('drop_out', 0.0))
+        self._faults = MeasurementFaults(faults, seed) if faults.sensing else None
+        self._begun = False
+
+    def rows(self, count: int) -> np.ndarray:
+        """The next `count` rows (count, 11).
+
+        Noise of nu in m/s and rad/s; exp(noise / 2) of the attitude as a quaternion w, x, y, z; 1
+        where the sample is lost, which the first of a run never is. Noise includes biases.
+        """
+        noise = self._noise.standard_normal((count, 9)) * self._deviation
+        lost = self._loss.random(count) < self._drop_out
+        if self._faults is not None:
+            bias, dropped = self._faults.rows(count)
+            noise, lost = noise + bias, lost | dropped
+        half = 0.5 * noise[:, 6:]
+        angle = np.sqrt((half**2).sum(axis=1))
+        scale = np.divide(np.sin(angle), angle, out=np.ones(count), where=angle > 0)
+        if not self._begun:
+            lost[:1], self._begun = False, True
+        return np.column_stack([noise[:, :6], np.cos(angle), half * scale[:, None], lost])
+
+
+@compiled
+def fill_measured(noise: np.ndarray, x: np.ndarray, measured: np.ndarray) -> None:
+    """Write what is measured of the state x (13,); a lost sample changes nothing.
+
+    nu + noise; q * exp(noise / 2), a small rotation about the body axes; the position is true.
+    """
+    lost = noise[10] != 0.0
+    e0, e1, e2, e3 = noise[6], noise[7], noise[8], noise[9]
+    w, i, j, l = x[3], x[4], x[5], x[6]
+    for n in range(3):
+        measured[n] = select(lost, measured[n], x[n])
+    measured[3] = select(lost, measured[3], w * e0 - i * e1 - j * e2 - l * e3)
+    measured[4] = select(lost, measured[4], w * e1 + i * e0 + j * e3 - l * e2)
+    measured[5] = select(lost, measured[5], w * e2 - i * e3 + j * e0 + l * e1)
+    measured[6] = select(lost, measured[6], w * e3 + i * e2 - j * e1 + l * e0)
+    for n in range(6):
+        measured[7 + n] = select(lost, measured[7 + n], x[7 + n] + noise[n])
+
+
+SIZE = 13  # of a state
+
+
+def history_shape(faults: FaultShape) -> tuple[int, int]:
+    """Shape of the `history` of `fill_arrived`, with no rows where sensors are never late."""
+    return (faults.delay + 2 if faults.delay else 0, SIZE)
+
+
+@compiled
+def fill_arrived(fault: np.ndarray, k: int, history: np.ndarray, measured: np.ndarray) -> None:
+    """Write the newest measurement that has arrived at step k into `measured` (13,).
+
+    `history` (delay + 2, 13): a ring of the last measurements, then that of step k.
+    """
+    size = history.shape[0] - 1
+    for n in range(history.shape[1]):
+        history[k % size, n] = history[size, n]
+    for age in range(size):
+        wanted = fault[AGE] == age
+        if anywhere(wanted):
+            old = history[(k - age) % size]
+            for n in range(history.shape[1]):
+                measured[n] = select(wanted, old[n], measured[n])
+
+
+@helper
+def _kept_in(fault: np.ndarray, i: int, tau: Vector, held: np.ndarray) -> Number:
+    kept = select(fault[WRENCH] == HELD, held[i], 0.0 * tau[i])
+    return select(fault[WRENCH] == 0.0, tau[i], kept)
+
+
+@helper
+def fill_heard(fault: np.ndarray, tau: Vector, held: np.ndarray) -> Six:
+    """The command that the actuators hear; `held` (6,) is the last one, in place."""
+    heard = (
+        _kept_in(fault, 0, tau, held),
+        _kept_in(fault, 1, tau, held),
+        _kept_in(fault, 2, tau, held),
+        _kept_in(fault, 3, tau, held),
+        _kept_in(fault, 4, tau, held),
+        _kept_in(fault, 5, tau, held),
+    )
+    fill_vector(held, 0, heard)
+    return heard
+
+
+@helper
+def _left_in(reach: Reach, fault: np.ndarray, j: int, tau: Vector, share: Number) -> Number:
+    n = reach.T.shape[1]
+    total = 0.0 * tau[j]
+    for i in range(n):
+        u = thrust(reach, i, tau) * share
+        left = fault[THRUSTERS + i] * u + fault[THRUSTERS + n + i]
+        total = total + reach.T[j, i] * left
+    return total
+
+
+@helper
+def left_of_thrusters(reach: Reach, fault: np.ndarray, tau: Numbers) -> Numbers:
+    """T u', u' what the faults leave of the thrusts; the allocation does not know of them."""
+    if reach.T.shape[1] == 0:
+        return tau
+    share = share_within(reach, tau)
+    return (
+        _left_in(reach, fault, 0, tau, share),
+        _left_in(reach, fault, 1, tau, share),
+        _left_in(reach, fault, 2, tau, share),
+        _left_in(reach, fault, 3, tau, share),
+        _left_in(reach, fault, 4, tau, share),
+        _left_in(reach, fault, 5, tau, share),
+    )
+
+
+@helper
+def left_of_axes(fault: np.ndarray, c: Vector) -> Six:
+    """What the faults of whole axes leave of a wrench."""
+    return (
+        fault[AXES] * c[0] + fault[AXES + 6],
+        fault[AXES + 1] * c[1] + fault[AXES + 7],
+        fault[AXES + 2] * c[2] + fault[AXES + 8],
+        fault[AXES + 3] * c[3] + fault[AXES + 9],
+        fault[AXES + 4] * c[4] + fault[AXES + 10],
+        fault[AXES + 5] * c[5] + fault[AXES + 11],
+    )
+
+
+@compiled
+def fill_faulty(
+    actuators: Actuators, fault: np.ndarray, k: int, tau: Vector, state: np.ndarray
+) -> Numbers:
+    """`fill_applied` of actuators with faults; the last row of `state` is the last command."""
+    heard = fill_heard(fault, tau, state[state.shape[0] - 1])
+    command = waited(actuators, k, heard, state)
+    reach = actuators.reach
+    c = clipped(left_of_thrusters(reach, fault, command), reach.limit)
+    return fill_slowed(actuators, left_of_axes(fault, c), state[0])
 
 
 class Sensing:

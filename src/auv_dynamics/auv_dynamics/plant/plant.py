@@ -19,11 +19,8 @@ from auv_dynamics.kernel.six import (
     vector,
 )
 from auv_dynamics.plant.actuators import IDEAL, Actuators
-from auv_dynamics.plant.devices import Acting, Sensing
-from auv_dynamics.plant.fault_rows import FaultRows
-from auv_dynamics.plant.faults import NONE, Faults
-from auv_dynamics.plant.faulty_devices import WRENCH
-from auv_dynamics.plant.sensors import SensorNoise
+from auv_dynamics.plant.devices import Acting, Sensing, SensorNoise
+from auv_dynamics.plant.faults import NONE, WRENCH, FaultRows, Faults
 from auv_dynamics.plant.uncertainty import (
     Truth,
     Uncertainty,

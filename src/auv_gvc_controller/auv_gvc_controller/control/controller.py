@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 from auv_gvc_controller.control.odometry_guard import UNTIMED, ZERO, Now, OdometryGuard
-from auv_gvc_controller.control.reference_filter import ReferenceFilter
 from auv_gvc_controller.control.sampled import SampledLaw
-from auv_gvc_controller.control.setpoint_buffer import Reference, SetpointBuffer
+from auv_gvc_controller.control.setpoint_buffer import Reference, ReferenceFilter, SetpointBuffer
 
 FEWEST = 10  # answers over which a law takes over at least, however rare they are
 

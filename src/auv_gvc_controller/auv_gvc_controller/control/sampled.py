@@ -15,7 +15,7 @@ from auv_dynamics.kernel.compile import (
 )
 from auv_dynamics.kernel.lanes import anywhere, select
 from auv_dynamics.kernel.six import Numbers, Vector
-from auv_dynamics.vehicle.allocation import (
+from auv_dynamics.vehicle.thrusters import (
     Reach,
     demanded,
     make_reach,

@@ -10,7 +10,7 @@ import numpy as np
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.files.yaml_files import read_text
-from auv_dynamics.plant.signals import Harmonics
+from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.vehicle import DOFS
 
 COLUMNS = ('t', *DOFS)

@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.vehicle.allocation import Reach, make_reach
+from auv_dynamics.vehicle.thrusters import Reach, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
 from auv_gvc_controller.control.odometry_guard import AUTO, CLOCKS, Limits, OdometryGuard, StampAge
-from auv_gvc_controller.control.reference_filter import FilterSettings, ReferenceFilter
 from auv_gvc_controller.control.sampled import SampledLaw
 from auv_gvc_controller.control.setpoint_buffer import (
     DIFFERENCE,
     FILTER,
     NONE,
     SAME,
+    FilterSettings,
+    ReferenceFilter,
     SetpointBuffer,
 )
 from auv_gvc_controller.laws.model import control_model
@@ -227,7 +228,7 @@ class ControllerSettings:
             return make_reach(None, None)
         limits = [limit for limit in (self.limits_wrench, self.actuators_limit) if limit]
         smallest = [min(axis) for axis in zip(*limits, strict=True)]
-        return make_reach(smallest or None, vehicle if self.actuators_thrusters else None)
+        return make_reach(smallest or None, vehicle.thrusters if self.actuators_thrusters else None)
 
 
 def usual_acceleration(lockstep: bool) -> str:

@@ -26,7 +26,7 @@ from auv_analysis.studies.design.prediction import (
 from auv_analysis.studies.design.vehicle_file import changed_data
 from auv_dynamics.vehicle.kinematics import quaternion, rotation
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
-from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
+from auv_gvc_controller.laws.model import decompose, inverse_upper
 
 
 @pytest.fixture(scope='module', params=['rexrov', 'herman2018'])

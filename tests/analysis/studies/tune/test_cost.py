@@ -9,7 +9,7 @@ from auv_analysis import load_scenario, simulate
 from auv_analysis.metrics.quantities import COSTS
 from auv_analysis.metrics.summary import band_of
 from auv_analysis.scenario.changes import changed_scenario
-from auv_analysis.simulation.records import Sample
+from auv_analysis.simulation.closed_loop import Sample
 from auv_analysis.studies.tune.cost import (
     Cost,
     Measures,

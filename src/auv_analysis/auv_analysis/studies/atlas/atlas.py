@@ -23,7 +23,7 @@ from auv_dynamics.files.yaml_files import read_yaml
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
-from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
+from auv_gvc_controller.laws.model import decompose, inverse_upper
 
 
 def inertial_correlation(M: np.ndarray) -> np.ndarray:

@@ -15,8 +15,7 @@ from auv_analysis.output.folder import SWEEP
 from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.runs.samples import ENDING, load_samples
 from auv_analysis.scenario.scenario import Scenario, load_scenario
-from auv_analysis.simulation.simulate import simulate
-from auv_analysis.simulation.warm_up import announce
+from auv_analysis.simulation.simulate import announce, simulate
 from auv_dynamics.files.errors import InputError, reason
 from auv_dynamics.files.shipped import shipped_by_name
 from auv_dynamics.files.yaml_files import read_yaml

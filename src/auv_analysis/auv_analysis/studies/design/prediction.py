@@ -14,8 +14,7 @@ from auv_analysis.runs.run import Run
 from auv_analysis.studies.design.change import UPPER, WIDTH, ChangeEffect, ChangeSpace
 from auv_analysis.studies.design.couplings import COUPLINGS, Sizes, effort_of, shares_of
 from auv_dynamics.vehicle.kinematics import quaternion, rotation
-from auv_gvc_controller.laws.decomposition import inverse_upper
-from auv_gvc_controller.laws.model import control_model
+from auv_gvc_controller.laws.model import control_model, inverse_upper
 
 EVERY = tuple(range(len(COUPLINGS)))
 SAMPLES = 120  # that are spread over a run, denser where much happens

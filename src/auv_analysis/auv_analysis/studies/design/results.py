@@ -32,7 +32,7 @@ from auv_analysis.studies.design.vehicle_file import change_words
 from auv_dynamics.files.errors import first_line
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
-from auv_gvc_controller.laws.decomposition import decompose
+from auv_gvc_controller.laws.model import decompose
 
 AT_BOUND = 2e-3  # of a range: a value that is nearer to its end lies on it
 DESIGN, BEFORE, AFTER = 'design.json', 'summary_before.json', 'summary.json'

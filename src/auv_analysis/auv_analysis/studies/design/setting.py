@@ -10,13 +10,14 @@ import yaml
 
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scaling import REFERENCE, scaled_case1
-from auv_analysis.scenario.scenario import SCHEMA, Scenario, load_scenario, scenario_from
+from auv_analysis.scenario.scenario import Scenario, load_scenario, scenario_from
 from auv_analysis.simulation.simulate import simulate
 from auv_analysis.studies.design.change import ChangeSpace
 from auv_analysis.studies.design.couplings import Sizes, sizes_of
 from auv_analysis.studies.design.vehicle_file import change_words, changed_data, changed_text
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import check, read_text, read_yaml
+from auv_dynamics.plant.parameters import SCHEMA
 from auv_gvc_controller.control.sampled import is_compiled
 
 MANY_STEPS = 30_000

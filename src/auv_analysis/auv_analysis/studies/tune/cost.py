@@ -15,7 +15,7 @@ from auv_analysis.metrics.summary import TRANSIENT, has_settled, settling_time
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import run_batch
-from auv_analysis.simulation.records import Sample
+from auv_analysis.simulation.closed_loop import Sample
 from auv_analysis.simulation.reduction import at_start, keep_divergence, keep_last
 from auv_analysis.simulation.rollouts import batch_of
 from auv_analysis.simulation.variants import Variants, merged, packed_variants

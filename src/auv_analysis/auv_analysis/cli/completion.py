@@ -10,8 +10,8 @@ from argcomplete.completers import FilesCompleter
 from argcomplete.shell_integration import shellcode
 
 from auv_analysis.cli.arguments import Parser
-from auv_analysis.cli.tune import LAWS
 from auv_dynamics.files.shipped import shipped, shipped_names
+from auv_gvc_controller.laws import NAMES as LAWS
 
 Offer = Callable[..., Iterable[str]]
 YAML = FilesCompleter(('yaml', 'yml'))

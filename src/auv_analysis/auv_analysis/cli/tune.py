@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from auv_analysis.cli.arguments import SCENARIO, add_hold, add_results, number, refused, whole
 from auv_dynamics.files.errors import InputError
+from auv_gvc_controller.laws import NAMES as LAWS
 
 if TYPE_CHECKING:
     from auv_analysis.scenario.scenario import Scenario
     from auv_analysis.studies.tune.search import Request
 
-LAWS = ('gvc', 'cl', 'pid', 'smc')
 FEWEST, MOST = 10, 100_000  # draws: a test of fewer says nothing
 INDICES = {'time': 'weighted_error', 'mean': 'error'}
 

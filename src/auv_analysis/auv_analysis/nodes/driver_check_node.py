@@ -6,6 +6,7 @@ subscribes with best effort: nobody waits for it.
 
 import time
 from collections.abc import Iterable, Mapping
+from itertools import starmap
 from typing import Any
 
 from geometry_msgs.msg import WrenchStamped
@@ -16,19 +17,21 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.publisher import Publisher
 from rclpy.qos import (
     DurabilityPolicy,
-    HistoryPolicy,
     LivelinessPolicy,
-    QoSCompatibility,
     QoSProfile,
-    ReliabilityPolicy,
-    qos_check_compatible,
 )
 
 from auv_analysis.driver.evidence import Endpoint, GraphSnapshot
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.codec import Codec, first_stamp, message_of
-from auv_dynamics.ros.endpoints import acts, full_name, other_publishers, other_subscribers
+from auv_dynamics.ros.endpoints import (
+    acts,
+    full_name,
+    other_publishers,
+    other_subscribers,
+    qos_conflict,
+)
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.node_main import BulkNode
 from auv_dynamics.ros.participant import Participant
@@ -37,15 +40,6 @@ from auv_dynamics.ros.topics import type_name
 COMMANDER = 'auv_check_driver'  # its name when it commands: then it is no mere observer
 ACKNOWLEDGED = 0.5  # s that are waited for the last zero to arrive
 ODOMETRY, WRENCH = type_name(Odometry), type_name(WrenchStamped)
-
-
-def _sight() -> QoSProfile:
-    """Whatever there is, from whomever, without being waited for."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=topics.DEPTH,
-        reliability=ReliabilityPolicy.BEST_EFFORT,
-    )
 
 
 class CheckNode(BulkNode):
@@ -92,7 +86,9 @@ class CheckNode(BulkNode):
         hear: Any = take  # rclpy's types do not know that it may be told the way of a message
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
         self.add_data(
-            self.create_subscription(kind, topic, hear, _sight(), event_callbacks=events, raw=True)
+            self.create_subscription(
+                kind, topic, hear, topics.best_effort(), event_callbacks=events, raw=True
+            )
         )
 
     def _on_odometry(self, data: bytes, info: dict[str, Any]) -> None:
@@ -197,12 +193,7 @@ def _spelled(qos: QoSProfile) -> QoSProfile:
 
 def _conflict(pairs: Iterable[tuple[QoSProfile, QoSProfile]]) -> str:
     """Why a publisher and a subscription of some pairs do not match, or an empty text."""
-    for publisher, subscription in pairs:
-        verdict, reason = qos_check_compatible(publisher, subscription)
-        if verdict == QoSCompatibility.ERROR:
-            parts = reason.lower().replace('error:', '').split(';')
-            return ', '.join(part.strip() for part in parts if part.strip())
-    return ''
+    return next(filter(None, starmap(qos_conflict, pairs)), '')
 
 
 class RosDriverClient(Participant):

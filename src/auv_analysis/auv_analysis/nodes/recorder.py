@@ -14,10 +14,8 @@ from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
-    QoSCompatibility,
     QoSProfile,
     ReliabilityPolicy,
-    qos_check_compatible,
 )
 from rclpy.subscription import Subscription
 
@@ -36,9 +34,10 @@ from auv_dynamics.files.errors import InputError, first_line, reason
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.files.yaml_files import read_text
 from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.endpoints import qos_conflict
 from auv_dynamics.ros.interface import GLOBALS, NANOSECONDS
 from auv_dynamics.ros.node_main import BulkNode
-from auv_dynamics.ros.parameters import declare, refuse_unknown
+from auv_dynamics.ros.parameters import declare, declare_grid, refuse_unknown
 from auv_dynamics.ros.rclpy_internals import RCLError, raw_class
 from auv_dynamics.ros.topics import DEPTH, message_class
 
@@ -124,7 +123,7 @@ class OtherTopics:
     def _adapt(self, topic: str, publishers: list[Any]) -> None:
         """Ask for less where a publisher would not be heard, never for more."""
         asked = self._heard[topic].qos_profile
-        if all(_is_heard(asked, one.qos_profile) for one in publishers):
+        if not any(qos_conflict(one.qos_profile, asked) for one in publishers):
             return
         self._node.take_data()
         self._node.drop_data(self._heard.pop(topic))
@@ -177,10 +176,6 @@ def adapted(publishers: list[Any], asked: QoSProfile | None = None) -> QoSProfil
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
     )
-
-
-def _is_heard(asked: QoSProfile, offered: QoSProfile) -> bool:
-    return qos_check_compatible(offered, asked)[0] != QoSCompatibility.ERROR
 
 
 class GraphClock:
@@ -269,15 +264,7 @@ def recorder_parameters(node: Node) -> RecorderParameters:
     usual = list(interface.STEP_TOPICS)
     expected = declare(node, 'topics', list[str], usual, 'step topics that are expected')
     others = _others(node)
-    duration = declare(
-        node,
-        'duration',
-        float,
-        0.0,
-        'length of the recording, s; 0: until a signal ends it',
-        at_least=0.0,
-    )
-    step = declare(node, 'step', float, 0.01, 'time step, s', at_least=1e-9)
+    grid = declare_grid(node)
     every = declare(
         node, 'analysis_every', int, 0, 'steps between analysis samples, 0: not waited for',
         at_least=0,
@@ -300,8 +287,7 @@ def recorder_parameters(node: Node) -> RecorderParameters:
         attachments[label if equals else source.name] = read_text(source, 'attachment')
     attachments[RECORDING] = recording_text(strict, remapped(node), node.get_namespace())
     writer = _writer(name, Path(bag), attachments, storage)
-    last = round(duration / step) if duration else None
-    step_ns = round(step * interface.NANOSECONDS)
+    step_ns, last = grid.step_ns, grid.last
     due = last // every * every * step_ns if last is not None and every else None
     return RecorderParameters(
         Path(bag), writer, tuple(expected), others, step_ns, last, due, strict

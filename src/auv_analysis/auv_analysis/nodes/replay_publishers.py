@@ -1,6 +1,5 @@
 """Publishers of recorded topics, and the guard of those that a vehicle may act on."""
 
-import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -15,12 +14,10 @@ from auv_analysis.replay.played_bag import PlayedTopic
 from auv_analysis.replay.selection import Selection
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.codec import KINDS, message_of
-from auv_dynamics.ros.endpoints import NAMED, NAMELESS, acts, full_name, other_subscribers
+from auv_dynamics.ros.endpoints import NAMED, NAMELESS, acts, full_name, is_of, other_subscribers
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.node_interface import NodeInterface
 from auv_dynamics.ros.topics import DEPTH, Topic, message_class
-
-TYPE = re.compile(r'[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*', re.ASCII)
 
 
 def make_publishers(
@@ -56,20 +53,18 @@ def make_publishers(
 
 def _installed(name: str) -> type | None:
     """Class of a message type; what a bag names is imported only where it is a message package."""
-    if not TYPE.fullmatch(name):
-        return None
     try:
+        kind = message_class(name)
         definition(name)
-        return message_class(name)
     except (FileNotFoundError, ImportError, AttributeError):
         return None
+    return kind
 
 
 def _means_the_same(node: Any, publisher: Any, digest: str) -> bool:
     """Whether the installed type is the recorded one, as far as the bag says which it was."""
     for one in node.get_publishers_info_by_topic(publisher.topic_name):
-        ours = full_name(one) == node.get_fully_qualified_name()
-        if ours and digest.startswith('RIHS01_') and str(one.topic_type_hash) != digest:
+        if is_of(node, one) and digest.startswith('RIHS01_') and str(one.topic_type_hash) != digest:
             return False
     return True
 

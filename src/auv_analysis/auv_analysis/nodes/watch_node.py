@@ -12,7 +12,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.qos import HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSPolicyKind
 from rclpy.subscription import Subscription
 
 from auv_analysis.watch.monitor import HEARD, GraphMonitor
@@ -29,13 +29,6 @@ DEPTH = 256  # messages of a topic between two looks; of more, the oldest are dr
 LOOK = 0.5  # s between two looks at who is there
 SERVED = 2000  # callbacks at each look, at most; only a plain executor brings messages as well
 BRIEF = 0.001  # s: without any patience it brings one message of each topic, however many wait
-
-
-def _sight() -> QoSProfile:
-    """Whatever there is, the newest of it, from whomever."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST, depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT
-    )
 
 
 class WatchNode(BulkNode):
@@ -93,7 +86,7 @@ class WatchNode(BulkNode):
             topic.type,
             topic.name,
             self._guarded(topic),
-            _sight(),
+            topics.best_effort(DEPTH),
             event_callbacks=events,
             raw=True,
         )

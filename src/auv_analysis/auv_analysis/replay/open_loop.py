@@ -205,7 +205,7 @@ def open_loop(
     Parameters
     ----------
     recorded : what it is told
-    law : 'gvc', 'cl', 'pid', 'smc' or 'module:Class'
+    law : name of a shipped one, or 'module:Class'
     gains : its gains by name, 1, 6, 36 numbers or 6x6
     progress : told the number of odometry messages that have been answered
 

@@ -13,6 +13,7 @@ from auv_dynamics.files.nearest import one_of
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.ros.parameters import declare, refuse_unknown
+from auv_dynamics.ros.topics import is_name
 
 REPLAY = 'replay'  # namespace in which nothing of a vehicle listens
 DERIVED = (
@@ -25,7 +26,6 @@ WORDS = re.compile(
     '(^|[/_])(cmd|commands?|setpoints?|wrench|thrust|thrusters?|actuators?|servo|override)([/_]|$)'
 )
 UNWANTED = 'not asked for'
-NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def _against(topic: str, index: BagIndex, wish: Wish) -> str:
     about = index.topics[topic]
     if wish.topics and not any(_is_like(topic, pattern) for pattern in wish.topics):
         return UNWANTED
-    if not NAME.fullmatch(topic):
+    if not is_name(topic):
         return 'not a name of a ROS topic'
     if topic in index.clashes:
         return 'recorded with different types'
@@ -179,9 +179,6 @@ def _is(topic: str, name: str) -> bool:
 
 def _is_like(topic: str, pattern: str) -> bool:
     return fnmatchcase(f'/{topic.lstrip("/")}', f'/{pattern.lstrip("/")}')
-
-
-NAMESPACE = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*/?|/', re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -265,7 +262,7 @@ def replay_parameters(node: Any) -> ReplayParameters:
 
 def _wish(node: Any) -> Wish:
     namespace = declare(node, 'namespace', str, REPLAY, 'before the recorded names')
-    if not NAMESPACE.fullmatch(namespace):
+    if namespace != '/' and not is_name(namespace.removesuffix('/')):
         expected = 'a namespace such as replay or /auv1'
         raise InputError(node.get_name(), 'namespace', expected, namespace)
     original = declare(node, 'original_names', bool, False, 'no namespace: the recorded names')

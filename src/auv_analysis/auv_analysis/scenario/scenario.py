@@ -23,6 +23,7 @@ from auv_dynamics.plant.devices import SensorNoise
 from auv_dynamics.plant.faults import FaultRows, Faults, FaultSetting, make_faults
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.plant.uncertainty import Uncertainty, make_uncertainty
+from auv_dynamics.ros.interface import NANOSECONDS, time_grid
 from auv_dynamics.vehicle.thrusters import Reach, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
@@ -31,7 +32,6 @@ from auv_gvc_controller.control.setpoint import Setpoint, make_setpoint
 from auv_gvc_controller.laws.law import make_gains, refusal, try_law
 from auv_gvc_controller.laws.model import control_model
 
-NANOSECONDS = 10**9
 MOST_STEPS = 10_000_000  # some 10 GB of arrays
 
 
@@ -61,15 +61,9 @@ def check_names(data: dict[str, Any], path: Path) -> None:
 
 def check_time(data: dict[str, Any], path: Path) -> None:
     """Refuse a step that is no whole number of ns, and a duration that is no multiple of it."""
-    step_ns = data['step'] * NANOSECONDS
-    if round(step_ns) < 1 or abs(step_ns - round(step_ns)) > 1e-6 * max(1.0, step_ns * 1e-9):
-        raise InputError(path, 'step', 'a whole number of nanoseconds', f'{data["step"]!r} s')
-    steps = data['duration'] / data['step']
-    if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
-        expected = f'a multiple of step ({data["step"]:g} s)'
-        raise InputError(path, 'duration', expected, f'{data["duration"]!r} s')
+    steps = time_grid(data['step'], data['duration'], path).last or 0
     if steps > MOST_STEPS:
-        raise InputError(path, 'duration', f'at most {MOST_STEPS} steps', f'{steps:.0f}')
+        raise InputError(path, 'duration', f'at most {MOST_STEPS} steps', f'{steps}')
 
 
 def vehicle_path_of(vehicle: str, scenario: Path) -> Path:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.qos import QoSCompatibility, ReliabilityPolicy, qos_check_compatible
+from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check_compatible
 
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.topics import Topic, type_name
@@ -42,6 +42,11 @@ def full_name(endpoint: Any) -> str:
     return f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}'
 
 
+def is_of(node: Any, endpoint: Any) -> bool:
+    """Whether an endpoint is of a node, or of another one of its very name."""
+    return bool(full_name(endpoint) == node.get_fully_qualified_name())
+
+
 def other_publishers(node: Any, topic: str) -> list[Any]:
     """Publishers of a topic, by its full name, beside the node's own."""
     own = sum(one.topic_name == topic for one in node.publishers)
@@ -57,9 +62,9 @@ def other_subscribers(node: Any, topic: str) -> list[Any]:
 
 def _others(node: Any, found: list[Any], own: int) -> list[Any]:
     """Endpoints without so many of the node's own: another node may have its very name."""
-    others, name = [], node.get_fully_qualified_name()
+    others = []
     for endpoint in found:
-        if own and full_name(endpoint) == name:
+        if own and is_of(node, endpoint):
             own -= 1
         else:
             others.append(endpoint)
@@ -143,19 +148,20 @@ def has_conflict(node: Node, topic: Topic) -> bool:
         _conflict(topic, publisher, subscriber)
         for publisher in node.get_publishers_info_by_topic(name)
         for subscriber in subscribers
-        if _is_of(node, publisher) or _is_of(node, subscriber)
+        if is_of(node, publisher) or is_of(node, subscriber)
     )
 
 
-def _is_of(node: Node, endpoint: Any) -> bool:
-    own = node.get_name(), node.get_namespace()
-    return (endpoint.node_name, endpoint.node_namespace) == own
-
-
 def _conflict(topic: Topic, publisher: Any, subscriber: Any) -> str:
-    verdict, reason = qos_check_compatible(publisher.qos_profile, subscriber.qos_profile)
+    policies = qos_conflict(publisher.qos_profile, subscriber.qos_profile)
+    pair = f'{publisher.node_name} and {subscriber.node_name}'
+    return f'{topic.name}: incompatible QoS of {pair}: {policies}' if policies else ''
+
+
+def qos_conflict(offered: QoSProfile, asked: QoSProfile) -> str:
+    """Why a publisher and a subscription of these profiles do not match, or an empty text."""
+    verdict, reason = qos_check_compatible(offered, asked)
     if verdict != QoSCompatibility.ERROR:
         return ''
-    policy = reason.removeprefix('ERROR: ').rstrip('; ').lower()
-    pair = f'{publisher.node_name} and {subscriber.node_name}'
-    return f'{topic.name}: incompatible QoS of {pair}: {policy}'
+    parts = reason.lower().replace('error:', '').split(';')
+    return ', '.join(part.strip() for part in parts if part.strip())

@@ -6,8 +6,9 @@ from rclpy or from a bag.
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle import DOFS
 
 NANOSECONDS = 10**9
@@ -55,6 +56,36 @@ ROS_FRAMES = Frames('odom', 'base_link')  # of REP-105: here `odom` is ENU, `bas
 
 class BadMessageError(ValueError):
     """A message that must not be used; its text names topic, expected and found."""
+
+
+class TimeGrid(NamedTuple):
+    """The steps of a run.
+
+    Attributes
+    ----------
+    step : s
+    step_ns : the same in ns
+    duration : s, 0: no end
+    last : number of the last step, None: no end
+
+    """
+
+    step: float
+    step_ns: int
+    duration: float
+    last: int | None
+
+
+def time_grid(step: float, duration: float, file: object) -> TimeGrid:
+    """Steps of a whole number of ns, that fill a duration; InputError, which names `file`, else."""
+    step_ns = round(step * NANOSECONDS)
+    if step_ns < 1 or abs(step_ns - step * NANOSECONDS) > 1e-6 * max(1.0, step):
+        raise InputError(file, 'step', 'a whole number of nanoseconds', f'{step!r} s')
+    steps = duration / step
+    last = round(steps) if duration else None
+    if last is not None and (last < 1 or abs(steps - last) > 1e-9 * steps):
+        raise InputError(file, 'duration', f'a multiple of step ({step:g} s)', f'{duration!r} s')
+    return TimeGrid(step, step_ns, duration, last)
 
 
 def nanoseconds(time: Any) -> int:

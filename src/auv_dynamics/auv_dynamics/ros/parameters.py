@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import InvalidParameterValueException
@@ -12,7 +12,7 @@ from rclpy.parameter import Parameter as RosParameter
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of as nearest_of
 from auv_dynamics.plant.parameters import Parameter, nested, parameters_of, part
-from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.ros.interface import TimeGrid, time_grid
 
 LONGEST = 1e9  # s of a step or a run: stamps end in 2038
 KNOWN_TO_ALL = ('use_sim_time', 'start_type_description_service')
@@ -95,43 +95,12 @@ def declare(
     return value
 
 
-class Grid(NamedTuple):
-    """The steps of a run.
-
-    Attributes
-    ----------
-    step : s
-    step_ns : the same in ns
-    duration : s, 0: no end
-    last : number of the last step, None: no end
-
-    """
-
-    step: float
-    step_ns: int
-    duration: float
-    last: int | None
-
-
-def declare_grid(node: Node) -> Grid:
+def declare_grid(node: Node) -> TimeGrid:
     """Declare `step` and `duration`; InputError where they make no grid of whole nanoseconds."""
     step = declare(node, 'step', float, 0.01, 'time step, s', at_least=1e-9, at_most=LONGEST)
-    duration = declare(
-        node,
-        'duration',
-        float,
-        0.0,
-        'length of the run, s; 0: no end',
-        at_least=0.0,
-        at_most=LONGEST,
-    )
-    step_ns = round(step * NANOSECONDS)
-    if abs(step_ns - step * NANOSECONDS) > 1e-6 * max(1.0, step):
-        raise InputError(node.get_name(), 'step', 'a whole number of nanoseconds', step)
-    last = round(duration / step) if duration else None
-    if last is not None and abs(duration / step - last) > 1e-9 * last:
-        raise InputError(node.get_name(), 'duration', f'a multiple of step ({step} s)', duration)
-    return Grid(step, step_ns, duration, last)
+    text = 'length of the run, s; 0: no end'
+    duration = declare(node, 'duration', float, 0.0, text, at_least=0.0, at_most=LONGEST)
+    return time_grid(step, duration, node.get_name())
 
 
 def declare_spec(node: Node, place: str, about: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,7 +10,9 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.validate_full_topic_name import validate_full_topic_name
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -78,6 +80,21 @@ def newest_measurement(depth: int = 10) -> QoSProfile:
 def newest_command() -> QoSProfile:
     """Real time: the plant's wrench."""
     return _qos(ReliabilityPolicy.RELIABLE, 1)
+
+
+def is_name(name: str) -> bool:
+    """Whether a topic may have this name, relative or absolute; a namespace but / likewise."""
+    if not (name.isascii() and name.isprintable()):  # rclpy would see no more than is before a NUL
+        return False
+    try:
+        return bool(validate_full_topic_name(name if name.startswith('/') else f'/{name}'))
+    except InvalidTopicNameException:
+        return False
+
+
+def best_effort(depth: int = DEPTH) -> QoSProfile:
+    """Observers: whatever there is, from whomever, and nobody waits for them."""
+    return _qos(ReliabilityPolicy.BEST_EFFORT, depth)
 
 
 NAME = re.compile(r'([a-z]\w*)/msg/([A-Z]\w*)', re.ASCII)

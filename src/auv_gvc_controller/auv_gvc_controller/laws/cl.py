@@ -13,7 +13,7 @@ from auv_dynamics.kernel.six import (
     vector,
 )
 from auv_dynamics.vehicle.model import coriolis, damping, restoring
-from auv_gvc_controller.laws.model import ControlModel
+from auv_gvc_controller.laws.model import ControlModel, Range
 
 
 class CL(NamedTuple):
@@ -57,3 +57,12 @@ class CL(NamedTuple):
         """Twelve rates: z_dot = nu_err, then s = nu_err + Lambda z, which f integrates."""
         nu_err = sub(nu_d, nu)
         return nu_err + add(nu_err, matvec(gains.Lambda, vector(state, 0)))
+
+    @staticmethod
+    def search(step: float) -> dict[str, Range]:
+        """Bounds of each gain for a control period in s: no rate is searched above 1/step."""
+        fastest = 1 / step
+        return {
+            'k_D': Range(True, 0.05, fastest), 'k_I': Range(True, 1e-3, fastest**2),
+            'Lambda': Range(False, 0.01, fastest), 'Gamma': Range(True, 1e-3, fastest**2),
+        }  # fmt: skip

@@ -16,7 +16,7 @@ from auv_dynamics.kernel.six import (
     vector,
 )
 from auv_dynamics.vehicle.model import coriolis, damping, restoring
-from auv_gvc_controller.laws.model import ControlModel
+from auv_gvc_controller.laws.model import ControlModel, Range
 
 
 class GVC(NamedTuple):
@@ -92,3 +92,12 @@ class GVC(NamedTuple):
         U_inv, N = model.Upsilon_inv.reshape(6, 6), np.diag(model.N)
         k_D, Gamma = gains.k_D.reshape(6, 6), gains.Gamma.reshape(6, 6)
         return U_inv.T @ N @ k_D @ U_inv, U_inv.T @ N @ Gamma @ U_inv
+
+    @staticmethod
+    def search(step: float) -> dict[str, Range]:
+        """Bounds of each gain for a control period in s: no rate is searched above 1/step."""
+        fastest = 1 / step
+        return {
+            'k_D': Range(False, 0.05, fastest), 'k_I': Range(True, 1e-3, fastest**2),
+            'Lambda': Range(False, 0.01, fastest), 'Gamma': Range(False, 1e-3, fastest**2),
+        }  # fmt: skip

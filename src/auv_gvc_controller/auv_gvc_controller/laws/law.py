@@ -11,12 +11,11 @@ import numpy as np
 from auv_dynamics.files.errors import named_line
 from auv_dynamics.files.nearest import meant, one_of
 from auv_dynamics.files.yaml_files import matrix6
-from auv_gvc_controller.laws.cl import CL
-from auv_gvc_controller.laws.gvc import GVC
-from auv_gvc_controller.laws.pid import PID
-from auv_gvc_controller.laws.smc import SMC
+from auv_gvc_controller.laws import NAMES
 
-SHIPPED: dict[str, Any] = {'gvc': GVC, 'cl': CL, 'pid': PID, 'smc': SMC}
+SHIPPED: dict[str, Any] = {
+    name: getattr(importlib.import_module(f'{__package__}.{name}'), name.upper()) for name in NAMES
+}
 _asked: set[str] = set()  # own laws that somebody in this process has asked for by name
 
 
@@ -25,8 +24,8 @@ def law_class(name: str) -> Any:
 
     Parameters
     ----------
-    name : 'gvc', 'cl', 'pid', 'smc' or 'module:Class' of a user's own law, found on Python's path
-        or in the working directory
+    name : of a shipped law, or 'module:Class' of a user's own, found on Python's path or in the
+        working directory
 
     Returns
     -------

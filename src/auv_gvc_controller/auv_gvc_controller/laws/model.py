@@ -54,6 +54,14 @@ def inverse_upper(U: np.ndarray) -> np.ndarray:
     return inverse
 
 
+class Range(NamedTuple):
+    """Where a gain is searched: whether it is an inertia times what is bounded here, and how."""
+
+    inertial: bool
+    low: float
+    high: float
+
+
 class ControlModel(NamedTuple):
     """The `model` argument of a law: flat float64 arrays, row-major.
 

@@ -13,7 +13,7 @@ from auv_dynamics.kernel.six import (
     vector,
 )
 from auv_dynamics.vehicle.model import coriolis, damping, restoring
-from auv_gvc_controller.laws.model import ControlModel
+from auv_gvc_controller.laws.model import ControlModel, Range
 
 
 class PID(NamedTuple):
@@ -79,3 +79,12 @@ class PID(NamedTuple):
         if not smallest > 0:
             text = f'smallest real part of its eigenvalues {smallest:g}'
             raise ValueError(f'omega_f: expected a positive cut-off (rad/s), found {text}')
+
+    @staticmethod
+    def search(step: float) -> dict[str, Range]:
+        """Bounds of each gain for a control period in s: no rate is searched above 1/step."""
+        fastest = 1 / step
+        return {  # k_FF stays 1: the other laws have no share of the feed-forward to choose either
+            'k_P': Range(True, 0.05, fastest), 'k_I': Range(True, 1e-3, fastest**2),
+            'k_D': Range(True, 1e-3, 3.0), 'omega_f': Range(False, 0.01 * fastest, fastest),
+        }  # fmt: skip

@@ -16,7 +16,7 @@ from auv_dynamics.kernel.six import (
     vector,
 )
 from auv_dynamics.vehicle.model import coriolis, damping, restoring
-from auv_gvc_controller.laws.model import ControlModel
+from auv_gvc_controller.laws.model import ControlModel, Range
 
 
 class SMC(NamedTuple):
@@ -83,6 +83,16 @@ class SMC(NamedTuple):
                 else 'a full matrix'
             )
             raise ValueError(f'phi: expected a positive number or 6 of them, found {found}')
+
+    @staticmethod
+    def search(step: float) -> dict[str, Range]:
+        """Bounds of each gain for a control period in s: no rate is searched above 1/step."""
+        fastest = 1 / step
+        return {
+            'k_D': Range(True, 0.05, fastest), 'Lambda': Range(False, 0.01, fastest),
+            'Gamma': Range(True, 1e-3, fastest**2),
+            'k_S': Range(True, 1e-3, 10.0), 'phi': Range(False, 1e-3, 1.0),
+        }  # fmt: skip
 
 
 @helper

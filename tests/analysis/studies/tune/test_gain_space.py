@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 from strategies import QUICK
 
 from auv_analysis.studies.tune.cost import Measures
-from auv_analysis.studies.tune.gain_space import LAWS, STRUCTURES, GainSpace, make_space, starts_of
+from auv_analysis.studies.tune.gain_space import STRUCTURES, GainSpace, make_space, starts_of
 from auv_analysis.studies.tune.search import Optimum, TunedLaw
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 from auv_gvc_controller.control.gains import sampling_warning
+from auv_gvc_controller.laws import NAMES as LAWS
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
 

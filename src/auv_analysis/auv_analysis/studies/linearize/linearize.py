@@ -316,7 +316,7 @@ def linearize(
     vehicle : Vehicle, a vehicle file or the bare name of a shipped one; or a Scenario, whose
         model errors are the plant's and whose current must be none
     nu0 : (6,) m/s and rad/s, body frame; none: at rest
-    law : 'gvc', 'cl', 'pid', 'smc' or 'module:Class'; None: the vehicle alone, with input tau
+    law : name of a shipped one, or 'module:Class'; None: the vehicle alone, with input tau
     gains : of the law, each a number, 6 numbers or 6x6
     controller : of the scenario, in place of `law` and `gains`
     eta0 : (6,) m (NED) and rad; none: level

@@ -7,7 +7,7 @@ does not (CL's k_D, in N s/m). Which matrix, the structure says.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from auv_analysis.scenario.scenario import Scenario
 from auv_dynamics.files.yaml_files import matrix6
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.control.gains import body_gains, sampled_rate
-from auv_gvc_controller.laws.law import make_gains
+from auv_gvc_controller.laws.law import SHIPPED, make_gains
 from auv_gvc_controller.laws.model import ControlModel
 
 STRUCTURES = {
@@ -28,53 +28,13 @@ EDGE = 1e-3  # of the distance of two bounds: a value that is nearer to one lies
 BEST = 'best'  # the better of `scalar` and `mass`
 
 
-class Gain(NamedTuple):
-    """A gain of a law: whether it stands for an inertia times what is bounded here, and how."""
-
-    inertial: bool
-    low: float
-    high: float
-
-
-def searched(step: float) -> dict[str, dict[str, Gain]]:
-    """Law -> gain -> its bounds for a step in s: no rate is searched above 1/step.
-
-    k_FF of the PID stays 1: the other laws have no share of the feed-forward to choose either.
-    """
-    fastest = 1 / step
-    rate, slow_rate, filtering = (0.05, fastest), (0.01, fastest), (0.01 * fastest, fastest)
-    squared_rate = 1e-3, fastest**2
-    return {
-        'gvc': {
-            'k_D': Gain(False, *rate), 'k_I': Gain(True, *squared_rate),
-            'Lambda': Gain(False, *slow_rate), 'Gamma': Gain(False, *squared_rate),
-        },
-        'cl': {
-            'k_D': Gain(True, *rate), 'k_I': Gain(True, *squared_rate),
-            'Lambda': Gain(False, *slow_rate), 'Gamma': Gain(True, *squared_rate),
-        },
-        'pid': {
-            'k_P': Gain(True, *rate), 'k_I': Gain(True, *squared_rate),
-            'k_D': Gain(True, 1e-3, 3.0), 'omega_f': Gain(False, *filtering),
-        },
-        'smc': {
-            'k_D': Gain(True, *rate), 'Lambda': Gain(False, *slow_rate),
-            'Gamma': Gain(True, *squared_rate),
-            'k_S': Gain(True, 1e-3, 10.0), 'phi': Gain(False, 1e-3, 1.0),
-        },
-    }  # fmt: skip
-
-
-LAWS = tuple(searched(1.0))
-
-
 @dataclass(frozen=True, eq=False)
 class GainSpace:
     """Gains of one law in one structure, as n logarithms.
 
     Attributes
     ----------
-    law : one of `LAWS`
+    law : key of `SHIPPED`
     structure : a key of `STRUCTURES`
     names : of the n coordinates: a gain, or a gain and its degree of freedom
     low, high : (n,) bounds of the logarithms
@@ -153,7 +113,7 @@ def make_space(
 
     Parameters
     ----------
-    law : one of `LAWS`
+    law : key of `SHIPPED`
     structure : a key of `STRUCTURES`
     model : ControlModel of the vehicle
     step : s; no gain that is a rate is searched above 1/step
@@ -167,7 +127,7 @@ def make_space(
     M = np.reshape(model.dynamics.M, (6, 6))
     inertia = np.diagonal(M)
     names, low, high, basis = [], [], [], {}
-    for gain, about in searched(step)[law].items():
+    for gain, about in SHIPPED[law].search(step).items():
         matrix, smallest, largest = _scale(structure, M, inertial=about.inertial)
         basis[gain] = matrix
         if structure == 'diagonal':

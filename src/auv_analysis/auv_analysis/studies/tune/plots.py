@@ -25,10 +25,11 @@ from auv_analysis.report.plots import (
 from auv_analysis.studies.optimise import GRADIENT
 from auv_analysis.studies.pairs import KNOWN, log_ratios
 from auv_analysis.studies.tune.results import Tuning
+from auv_gvc_controller.laws import NAMES
 
 WIDEST = 2.0  # of the reference's effort, where the cloud is shown
 HEIGHTS = 0.05, 200.0  # of the reference's error
-LAWS = {'gvc': 0, 'cl': 1, 'pid': 2, 'smc': 3}  # colour of a law
+LAWS = {law: i for i, law in enumerate(NAMES)}  # colour of a law
 Drawn = tuple[Figure, str, str]
 
 

@@ -14,9 +14,10 @@ from auv_analysis.report.results import Results, known
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.studies.pairs import Pairs, holm, log_ratios, paired
 from auv_analysis.studies.tune.cost import Measures
-from auv_analysis.studies.tune.gain_space import STRUCTURES, searched
+from auv_analysis.studies.tune.gain_space import STRUCTURES
 from auv_analysis.studies.tune.perturbations import Spread, applicable
 from auv_analysis.studies.tune.search import Goal, Request, TunedLaw
+from auv_gvc_controller.laws.law import SHIPPED
 
 COMPARED = ('weighted_error', 'error', 'effort', 'late_error', 'settling')
 LEVEL = 0.05  # of Holm's p below which a difference is called one
@@ -196,7 +197,7 @@ class Tuning:
         }
 
     def _bounds(self, law: str) -> dict[str, Any]:
-        gains = searched(self.request.scenario.step)[law]
+        gains = SHIPPED[law].search(self.request.scenario.step)
         return {
             gain: {'low': about.low, 'high': about.high, 'times_inertia': about.inertial}
             for gain, about in gains.items()

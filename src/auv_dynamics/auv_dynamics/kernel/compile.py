@@ -24,7 +24,8 @@ from typing import Any, Protocol, TypeVar
 PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
 # a decorator of these, or a method that `specialised` compiles
 COMPILES = re.compile(
-    rb'^@(?:helper|once|of_numbers|compiled|uncached|specialised)\b|^    def (?:wrench|fill_\w+)\((?!self)',
+    rb'^@(?:helper|once|of_numbers|compiled|uncached|specialised)\b'
+    rb'|^    def (?:wrench|fill_\w+)\((?!self)',
     re.M,
 )
 IMPORT = re.compile(rb'^\s*(?:from|import)\s+(auv_[\w.]+)(?:\s+import\s+(\([^)]*\)|.*))?', re.M)

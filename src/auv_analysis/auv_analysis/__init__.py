@@ -10,8 +10,9 @@
 Many runs at once: `auv_analysis.simulation.rollouts`. On the command line: `auv --help`.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from auv_dynamics.files.lazy import lazy_names
 
 if TYPE_CHECKING:
     from auv_analysis.bag import load_run, open_bag
@@ -31,15 +32,4 @@ _HOME = {
     'summarize': 'auv_analysis.metrics.summary',
 }
 __all__ = ['Run', 'linearize', 'load_run', 'load_scenario', 'open_bag', 'simulate', 'summarize']
-
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first asked for: `auv --help` must not load numba."""
-    if name in _HOME:
-        return getattr(importlib.import_module(_HOME[name]), name)
-    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-
-
-def __dir__() -> list[str]:
-    """Public names as well, for `help` and the TAB key."""
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = lazy_names(__name__, _HOME)

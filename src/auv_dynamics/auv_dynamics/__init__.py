@@ -4,8 +4,9 @@
 - `InputError`: what is wrong with a file or an option: file, key, expected, found
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from auv_dynamics.files.lazy import lazy_names
 
 if TYPE_CHECKING:
     from auv_dynamics.files.errors import InputError
@@ -18,15 +19,4 @@ _HOME = {
     'load_vehicle': 'auv_dynamics.vehicle.vehicle_file',
 }
 __all__ = ['InputError', 'Vehicle', 'load_vehicle']
-
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first asked for: `auv --help` must not load numba."""
-    if name in _HOME:
-        return getattr(importlib.import_module(_HOME[name]), name)
-    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-
-
-def __dir__() -> list[str]:
-    """Public names as well, for `help` and the TAB key."""
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = lazy_names(__name__, _HOME)

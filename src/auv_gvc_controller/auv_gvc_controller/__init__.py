@@ -3,8 +3,9 @@
 - `decompose(M)`: Upsilon (6, 6) and N (6,) of an inertia matrix
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from auv_dynamics.files.lazy import lazy_names
 
 if TYPE_CHECKING:
     from auv_gvc_controller.laws.model import decompose
@@ -13,15 +14,4 @@ _HOME = {
     'decompose': 'auv_gvc_controller.laws.model',
 }
 __all__ = ['decompose']
-
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first asked for: `auv --help` must not load numba."""
-    if name in _HOME:
-        return getattr(importlib.import_module(_HOME[name]), name)
-    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-
-
-def __dir__() -> list[str]:
-    """Public names as well, for `help` and the TAB key."""
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = lazy_names(__name__, _HOME)

@@ -8,14 +8,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import convert, interface, topics
-from auv_dynamics.ros.codec import message_of
+from auv_dynamics.ros.codec import KINDS, message_of
 from auv_dynamics.ros.interface import ROS_FRAMES, BadMessageError, Frames, nanoseconds
 from auv_dynamics.ros.node_interface import NodeInterface, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
@@ -25,16 +24,6 @@ from auv_dynamics.vehicle import frames
 from auv_dynamics.vehicle.frames import swap_body, swap_body_matrix, swap_earth_matrix, swap_state
 
 CHILD, WORLD = 'child', 'world'  # frame in which an odometry's twist is written
-_MAKERS: dict[type, Callable[..., Any]] = {
-    TwistStamped: convert.twist,
-    AccelStamped: convert.accel,
-    WrenchStamped: convert.wrench,
-}
-_READERS: dict[type, Callable[..., Any]] = {
-    TwistStamped: interface.read_twist,
-    AccelStamped: interface.read_accel,
-    WrenchStamped: interface.read_wrench,
-}
 
 
 def mirrored(message: Any, here: Frames, there: Frames, topic: str) -> Any:
@@ -55,8 +44,9 @@ def mirrored(message: Any, here: Frames, there: Frames, topic: str) -> Any:
     BadMessageError : another frame id, or a number that is not finite
 
     """
-    ns, values = _READERS[type(message)](message, here, topic)
-    return _MAKERS[type(message)](ns, swap_body(values), there)
+    kind = KINDS[type(message)]
+    ns, values = kind.read(message, here, topic)  # type: ignore[misc]  # as each of these is
+    return kind.make(ns, swap_body(np.array(values)), there)
 
 
 def mirrored_odometry(

@@ -41,28 +41,28 @@ def _stamped(message: Any, ns: int, frames: Frames) -> Any:
     return message
 
 
+def _six(message: Any, parts: tuple[Any, Any], ns: int, values: Any, frames: Frames) -> Any:
+    _fill3(parts[0], *values[:3])
+    _fill3(parts[1], *values[3:])
+    return _stamped(message, ns, frames)
+
+
 def twist(ns: int, nu: Any, frames: Frames) -> TwistStamped:
     """TwistStamped of (6,) m/s, rad/s in the body frame."""
-    message = _stamped(TwistStamped(), ns, frames)
-    _fill3(message.twist.linear, *nu[:3])
-    _fill3(message.twist.angular, *nu[3:])
-    return message
+    message = TwistStamped()
+    return _six(message, (message.twist.linear, message.twist.angular), ns, nu, frames)
 
 
 def accel(ns: int, nu_dot: Any, frames: Frames) -> AccelStamped:
     """AccelStamped of (6,) m/s2, rad/s2 in the body frame."""
-    message = _stamped(AccelStamped(), ns, frames)
-    _fill3(message.accel.linear, *nu_dot[:3])
-    _fill3(message.accel.angular, *nu_dot[3:])
-    return message
+    message = AccelStamped()
+    return _six(message, (message.accel.linear, message.accel.angular), ns, nu_dot, frames)
 
 
 def wrench(ns: int, tau: Any, frames: Frames) -> WrenchStamped:
     """WrenchStamped of (6,) N, N m in the body frame."""
-    message = _stamped(WrenchStamped(), ns, frames)
-    _fill3(message.wrench.force, *tau[:3])
-    _fill3(message.wrench.torque, *tau[3:])
-    return message
+    message = WrenchStamped()
+    return _six(message, (message.wrench.force, message.wrench.torque), ns, tau, frames)
 
 
 def joint_state(ns: int, effort: Any, frames: Frames) -> JointState:

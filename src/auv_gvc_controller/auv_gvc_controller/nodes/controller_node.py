@@ -265,21 +265,22 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Leave the vehicle without a wrench."""
-        self._let_go()
-        self._active = False
+        self._leave()
         return super().on_deactivate(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Leave the vehicle without a wrench."""
-        self._let_go()
-        self._active = False
+        self._leave()
         return super().on_shutdown(state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Leave the vehicle without a wrench; success leads to unconfigured, and on from there."""
+        self._leave()
+        return super().on_error(state)
+
+    def _leave(self) -> None:
         self._let_go()
         self._active = False
-        return super().on_error(state)
 
     def _build(self) -> bool:
         try:

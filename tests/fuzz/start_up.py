@@ -16,7 +16,7 @@ from auv_analysis.nodes.analysis_node import AnalysisNode
 from auv_analysis.nodes.recorder_node import RecorderNode
 from auv_analysis.nodes.replay_node import ReplayNode
 from auv_analysis.scenario.scenario import load_scenario
-from auv_dynamics.files.ending import ENDING
+from auv_dynamics.files.errors import ENDING
 from auv_dynamics.nodes.frame_converter_node import FrameConverterNode
 from auv_dynamics.nodes.plant_node import PlantNode
 from auv_dynamics.ros import node_main

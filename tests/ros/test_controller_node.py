@@ -26,7 +26,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
-from auv_dynamics.files.ending import ENDING
+from auv_dynamics.files.errors import ENDING
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.node_interface import ERROR, WARN

@@ -23,7 +23,7 @@ from harness import auv, fresh_domain, installed_auv
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
 from auv_analysis.output.folder import results_folder
-from auv_dynamics.files.ending import ENDING
+from auv_dynamics.files.errors import ENDING
 from auv_dynamics.ros import interface
 from auv_dynamics.vehicle.kinematics import quaternion
 

@@ -36,7 +36,7 @@ from auv_analysis.bag import load_run
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.replay.compared import reproduction
 from auv_analysis.replay.open_loop import open_loop, recorded_loop
-from auv_dynamics.files.ending import ENDING
+from auv_dynamics.files.errors import ENDING
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.interface import nanoseconds
 

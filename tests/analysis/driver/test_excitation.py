@@ -15,7 +15,7 @@ from auv_analysis.driver.excitation import (
     carry_out,
     plan_of,
 )
-from auv_dynamics.files.ending import ENDING, on_signals
+from auv_dynamics.files.errors import ENDING, on_signals
 
 ZERO = (0.0,) * 6
 LAST = round(GOODBYE / PERIOD)

@@ -122,8 +122,7 @@ def _main(arguments: list[str] | None) -> None:
         from auv_analysis.cli.guide import print_guide
 
         return print_guide(Path())
-    from auv_dynamics.files.ending import ENDING
-    from auv_dynamics.files.errors import FailedError, InputError
+    from auv_dynamics.files.errors import ENDING, FailedError, InputError
 
     for number in ENDING:  # end in good order, as with Ctrl-C
         if signal.getsignal(number) == signal.SIG_DFL:

@@ -17,8 +17,7 @@ from typing import NamedTuple
 
 from auv_analysis.output.new_files import write
 from auv_analysis.output.progress import say
-from auv_dynamics.files.ending import on_signals
-from auv_dynamics.files.errors import FailedError, InputError, reason
+from auv_dynamics.files.errors import FailedError, InputError, on_signals, reason
 
 MANIFEST = 'manifest.json'
 Signature = tuple[int, int, int]  # of a file: inode, bytes, time of its last change in ns

@@ -8,7 +8,7 @@ import time
 import tty
 from contextlib import ExitStack, suppress
 
-from auv_dynamics.files.ending import on_signals
+from auv_dynamics.files.errors import on_signals
 
 
 class Keyboard:

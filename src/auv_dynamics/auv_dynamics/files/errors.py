@@ -1,7 +1,10 @@
-"""Errors that end a program in good order: wrong input as one line, and what else may fail."""
+"""What ends a program in good order: wrong input as one line, work that failed, signals."""
 
 import re
 import reprlib
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 from unicodedata import category
 
@@ -70,3 +73,27 @@ class FailedError(RuntimeError):
     def __init__(self, text: str, document: dict[str, Any] | None = None):
         super().__init__(text)
         self.document = document
+
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+
+
+def take_signals(handler: Any) -> dict[signal.Signals, Any]:
+    """Set the handler of all of them; the handlers before.
+
+    A SIGHUP that is ignored stays so: `nohup` was asked to let the program outlive its terminal.
+    """
+    kept = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    taken = [number for number in ENDING if not (kept and number == signal.SIGHUP)]
+    return {number: signal.signal(number, handler) for number in taken}
+
+
+@contextmanager
+def on_signals(callback: Callable[[], None]) -> Iterator[None]:
+    """Call back on any of them while this lasts."""
+    before = take_signals(lambda *_: callback())
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

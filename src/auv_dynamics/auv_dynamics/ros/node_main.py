@@ -26,8 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.utilities import try_shutdown
 
-from auv_dynamics.files.ending import take_signals
-from auv_dynamics.files.errors import InputError, first_line
+from auv_dynamics.files.errors import InputError, first_line, take_signals
 from auv_dynamics.ros.interface import NANOSECONDS, PARENT
 from auv_dynamics.ros.rclpy_internals import DataWait, RCLError, RMWError, has_data_path, taken
 from auv_dynamics.ros.security import asked

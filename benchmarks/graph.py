@@ -117,7 +117,7 @@ def graph_rate(steps: int, *, composed: bool = False) -> float:
     domain = chosen_domain(None)[0]
     os.environ.update(loopback())
     # the middleware reads its environment when it is loaded
-    from auv_analysis.graph.participant import Watcher
+    from auv_dynamics.ros.participant import Watcher
 
     progress: list[tuple[float, int]] = []
     with tempfile.TemporaryDirectory() as folder:

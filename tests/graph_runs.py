@@ -123,8 +123,8 @@ def plain(value: object) -> object:
 def main() -> None:
     """Record controllers of a scenario, all where none is named."""
     from auv_analysis.graph.experiment import run_controller
-    from auv_analysis.graph.participant import Watcher
     from auv_analysis.simulation.simulate import warm_up
+    from auv_dynamics.ros.participant import Watcher
 
     path, out, *controllers = sys.argv[1:]
     scenario, domain = load_scenario(path), int(os.environ['ROS_DOMAIN_ID'])

@@ -12,12 +12,12 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from auv_analysis.graph.participant import Watcher
 from auv_analysis.nodes.watch_node import Listener
 from auv_analysis.watch.monitor import GraphMonitor
 from auv_analysis.watch.snapshot import Snapshot, TopicState
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
+from auv_dynamics.ros.participant import Watcher
 
 FRAMES = Frames()
 STEP = 10_000_000

@@ -122,7 +122,7 @@ def main() -> None:
 
     Prints how long OTHER took to be found, and all that were; without one it looks for so long.
     """
-    from auv_analysis.graph.participant import Participant, bare_node
+    from auv_dynamics.ros.participant import Participant, bare_node
 
     domain, name, other, seconds = sys.argv[1:]
     participant = Participant(int(domain), bare_node(name))

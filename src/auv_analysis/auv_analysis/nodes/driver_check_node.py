@@ -23,7 +23,6 @@ from rclpy.qos import (
 
 from auv_analysis.driver.evidence import Endpoint, GraphSnapshot
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
-from auv_analysis.graph.participant import Participant
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.codec import Codec, first_stamp, message_of
 from auv_dynamics.ros.endpoints import (
@@ -35,6 +34,7 @@ from auv_dynamics.ros.endpoints import (
 )
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.node_main import BulkNode
+from auv_dynamics.ros.participant import Participant
 from auv_dynamics.ros.topics import type_name
 
 COMMANDER = 'auv_check_driver'  # its name when it commands: then it is no mere observer

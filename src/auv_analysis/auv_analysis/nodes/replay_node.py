@@ -11,7 +11,6 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
-from auv_analysis.graph.participant import Participant
 from auv_analysis.nodes.player import Player
 from auv_analysis.replay.selection import replay_parameters
 from auv_dynamics.files.errors import InputError
@@ -19,6 +18,7 @@ from auv_dynamics.ros import interface
 from auv_dynamics.ros.endpoints import NAMED, NAMELESS, full_name, other_publishers
 from auv_dynamics.ros.node_interface import NodeInterface, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
+from auv_dynamics.ros.participant import Participant
 
 NAME = 'replay_node'
 DISCOVERY = 1.0  # s in which those who are there already are met

@@ -15,7 +15,6 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSPolicyKind
 from rclpy.subscription import Subscription
 
-from auv_analysis.graph.participant import Participant
 from auv_analysis.watch.monitor import HEARD, GraphMonitor
 from auv_analysis.watch.snapshot import LEVELS, NodeState
 from auv_dynamics.ros import interface, topics
@@ -23,6 +22,7 @@ from auv_dynamics.ros.codec import KINDS, Codec, first_stamp, message_of
 from auv_dynamics.ros.endpoints import endpoints
 from auv_dynamics.ros.interface import BadMessageError, Frames
 from auv_dynamics.ros.node_main import BulkNode, serve
+from auv_dynamics.ros.participant import Participant
 from auv_dynamics.ros.rclpy_internals import has_data_path
 
 DEPTH = 256  # messages of a topic between two looks; of more, the oldest are dropped

@@ -116,11 +116,11 @@ def numbers(value: Any) -> list[float]:
 def listed(group: str, specs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Parameters of the entries of a list, with their names in `<group>.names`."""
     names = [f'{group[0]}{i}_{spec["kind"]}' for i, spec in enumerate(specs, start=1)]
-    flat: dict[str, Any] = {f'{group}.names': names}
+    flat: dict[str, Any] = {}
     for name, spec in zip(names, specs, strict=True):
         below = flattened(part(group), spec)
         flat |= {f'{group}.{name}.{key}': value for key, value in below.items()}
-    return flat
+    return {**flat, f'{group}.names': names}
 
 
 def nested(node: Node, values: Mapping[str, Any], source: object, place: str) -> dict[str, Any]:

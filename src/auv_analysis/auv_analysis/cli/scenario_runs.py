@@ -25,8 +25,7 @@ from auv_analysis.report.verdict import FAILED, verdict
 from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.runs.samples import ENDING, write_samples
 from auv_analysis.scenario.scenario import Scenario, load_scenario, write_inputs
-from auv_analysis.simulation.simulate import simulate
-from auv_analysis.simulation.warm_up import announce
+from auv_analysis.simulation.simulate import announce, simulate
 from auv_dynamics.files.errors import first_line
 from auv_dynamics.vehicle import DOFS
 

@@ -18,7 +18,7 @@ from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
 from auv_analysis.driver.response import Response, Wrench, fit_response, predicted
 from auv_analysis.output.progress import say
 from auv_analysis.output.text import join
-from auv_dynamics.files.ending import on_signals
+from auv_dynamics.files.errors import on_signals
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle

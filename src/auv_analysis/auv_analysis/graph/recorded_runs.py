@@ -18,7 +18,7 @@ from auv_analysis.output.folder import Results
 from auv_analysis.output.progress import Speed, bar, count, say, waiting
 from auv_analysis.runs.run import AnyRun
 from auv_analysis.scenario.scenario import Scenario
-from auv_analysis.simulation.warm_up import warm_up
+from auv_analysis.simulation.simulate import warm_up
 from auv_dynamics.files.errors import FailedError, InputError
 
 DISCOVERY = 3.0  # s: discovery may take so long

@@ -8,8 +8,8 @@ import numpy as np
 
 from auv_analysis.simulation.reduction import COLUMNS
 from auv_analysis.studies.sweep.analysis import Analysis
-from auv_analysis.studies.sweep.blocks import table_of
 from auv_analysis.studies.sweep.campaign import Campaign, load_campaign
+from auv_analysis.studies.sweep.engine import table_of
 from auv_analysis.studies.sweep.folder import sweep_folder
 
 Values = dict[str, np.ndarray]

@@ -83,7 +83,7 @@ def _window(scenario: Scenario, first: float, last: float) -> tuple[float, float
 
 def _check_samples(options: argparse.Namespace) -> None:
     """Refuse a number of samples that the method of the sensitivity does not take."""
-    from auv_analysis.studies.study.indices import Design
+    from auv_analysis.studies.sweep.indices import Design
 
     if options.samples is not None:
         method: Any = 'morris' if options.sensitivity == 'morris' else 'sobol'

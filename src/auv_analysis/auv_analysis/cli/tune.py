@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.scenario.scenario import load_scenario
     from auv_analysis.simulation.simulate import announce
     from auv_analysis.studies.tune.perturbations import Perturbations, spread_of
-    from auv_analysis.studies.tune.pipeline import tune
+    from auv_analysis.studies.tune.results import tune
 
     scenario = load_scenario(options.scenario)
     request = _request(options, scenario)

@@ -13,17 +13,19 @@ from auv_analysis import load_scenario, simulate
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.studies.design.change import NAMES, ChangeSpace, rounded
-from auv_analysis.studies.design.couplings import effort_of, shares_of, sizes_of
 from auv_analysis.studies.design.prediction import (
     Metrics,
     Motion,
     Objective,
     Prediction,
     acceleration,
+    effort_of,
     score,
+    shares_of,
+    sizes_of,
     smooth_peak,
 )
-from auv_analysis.studies.design.vehicle_file import changed_data
+from auv_analysis.studies.design.setting import changed_data
 from auv_dynamics.vehicle.kinematics import quaternion, rotation
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.laws.model import decompose, inverse_upper

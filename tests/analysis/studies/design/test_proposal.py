@@ -12,7 +12,7 @@ from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.output.folder import Results
 from auv_analysis.studies.design import search
 from auv_analysis.studies.design.change import NAMES, semi_axes
-from auv_analysis.studies.design.couplings import COUPLINGS, coupling_named
+from auv_analysis.studies.design.prediction import COUPLINGS, coupling_named
 from auv_analysis.studies.design.report import change, print_design, write_report
 from auv_analysis.studies.design.results import (
     bound_warnings,
@@ -23,8 +23,7 @@ from auv_analysis.studies.design.results import (
     write_results,
 )
 from auv_analysis.studies.design.search import propose
-from auv_analysis.studies.design.setting import open_setting
-from auv_analysis.studies.design.vehicle_file import change_words
+from auv_analysis.studies.design.setting import change_words, open_setting
 from auv_dynamics import InputError, load_vehicle
 from auv_dynamics.files.shipped import shipped
 

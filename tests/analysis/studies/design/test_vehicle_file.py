@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from strategies import QUICK, vectors, vehicles
 
 from auv_analysis.studies.design.change import NAMES, ChangeSpace, rounded
-from auv_analysis.studies.design.vehicle_file import changed_data, changed_text
+from auv_analysis.studies.design.setting import changed_data, changed_text
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import parse_yaml, read_yaml
 from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from strategies import QUICK
 
-from auv_analysis.studies.study.indices import Design, spreads
+from auv_analysis.studies.sweep.indices import Design, spreads
 
 A, B = 7.0, 0.1  # of Ishigami's function
 

@@ -10,9 +10,16 @@ from scipy.stats import f_oneway, spearmanr
 from strategies import QUICK
 
 from auv_analysis.report.plots import distribution, new_figure
-from auv_analysis.studies.sweep.analysis import Analysis, analysed
-from auv_analysis.studies.sweep.factors import by_group
-from auv_analysis.studies.sweep.statistics import explained, ordered, quantiles, spread, thinned
+from auv_analysis.studies.sweep.analysis import (
+    Analysis,
+    analysed,
+    explained,
+    ordered,
+    quantiles,
+    spread,
+    thinned,
+)
+from auv_analysis.studies.sweep.dataset import by_group
 
 
 def test_figures_that_never_differ_are_named_not_analysed(results: Analysis) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from auv_analysis.studies.sweep.factors import _labels
+from auv_analysis.studies.sweep.dataset import _labels
 
 
 def test_neighbours_have_names_of_their_own_however_near_they_are() -> None:

@@ -10,9 +10,9 @@ from sweeps import CAMPAIGN, ROLLOUTS, Counting, parts, rows, run, write_files
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.scenario.changes import changed_scenario
-from auv_analysis.studies.sweep import blocks as sweep_block
-from auv_analysis.studies.sweep.blocks import _column as column
+from auv_analysis.studies.sweep import engine as sweep_block
 from auv_analysis.studies.sweep.campaign import load_campaign
+from auv_analysis.studies.sweep.engine import _column as column
 from auv_dynamics.vehicle import DOFS
 
 

@@ -10,11 +10,9 @@ from pages import check_numbers
 from pyarrow import parquet
 
 from auv_analysis.cli import main as cli
-from auv_analysis.studies.sweep.analysis import Analysis, analysed, results_of
-from auv_analysis.studies.sweep.dataset import open_sweep
-from auv_analysis.studies.sweep.factors import factors_of
+from auv_analysis.studies.sweep.analysis import Analysis, analysed, merged, results_of
+from auv_analysis.studies.sweep.dataset import factors_of, open_sweep
 from auv_analysis.studies.sweep.plots import draw
-from auv_analysis.studies.sweep.statistics import merged
 from auv_dynamics.files.errors import InputError
 
 

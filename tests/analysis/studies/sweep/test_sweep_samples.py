@@ -11,8 +11,13 @@ from scipy import stats
 from scipy.stats import qmc
 from strategies import QUICK
 
-from auv_analysis.studies.distributions import axis_values, make_distribution
-from auv_analysis.studies.sweep.variation import MOST_AT_ONCE, make_design, make_group
+from auv_analysis.studies.sweep.variation import (
+    MOST_AT_ONCE,
+    axis_values,
+    make_design,
+    make_distribution,
+    make_group,
+)
 from auv_dynamics.files.errors import InputError
 
 SEED = 7

@@ -9,13 +9,20 @@ from auv_analysis.output.progress import TextConsole
 from auv_analysis.output.text import Maths, number, plain
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
-from auv_analysis.report.results import Column, Results, Table, terminal
+from auv_analysis.report.results import (
+    Column,
+    Results,
+    Shown,
+    Table,
+    document_table,
+    labelled,
+    terminal,
+)
 from auv_analysis.studies.design.change import part_words
 from auv_analysis.studies.design.plots import draw_design
 from auv_analysis.studies.design.prediction import AT_REST, OTHERS, SIZE
 from auv_analysis.studies.design.results import Design
 from auv_analysis.studies.design.search import HALF, PART
-from auv_analysis.studies.documents import Shown, document_table, labelled
 
 NEAR = 1e-9  # relative: no change
 PHASES = ('before', 'after')

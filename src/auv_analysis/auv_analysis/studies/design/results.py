@@ -25,10 +25,9 @@ from auv_analysis.studies.design.change import (
     semi_axes,
     values_of,
 )
-from auv_analysis.studies.design.couplings import COUPLINGS, KINDS, UNITS, present
+from auv_analysis.studies.design.prediction import COUPLINGS, KINDS, UNITS, present
 from auv_analysis.studies.design.search import HALF, Candidate, Proposal
-from auv_analysis.studies.design.setting import write_inputs
-from auv_analysis.studies.design.vehicle_file import change_words
+from auv_analysis.studies.design.setting import change_words, write_inputs
 from auv_dynamics.files.errors import first_line
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle

@@ -15,8 +15,18 @@ from auv_analysis.studies.design.change import (
     parts_of,
     rounded,
 )
-from auv_analysis.studies.design.couplings import COUPLINGS, REST, Sizes, coupling_named, present
-from auv_analysis.studies.design.prediction import Metrics, Motion, Objective, Prediction, score
+from auv_analysis.studies.design.prediction import (
+    COUPLINGS,
+    REST,
+    Metrics,
+    Motion,
+    Objective,
+    Prediction,
+    Sizes,
+    coupling_named,
+    present,
+    score,
+)
 from auv_analysis.studies.design.setting import Setting
 from auv_analysis.studies.optimise import Search, sobol_points
 from auv_dynamics.files.errors import InputError, first_line

@@ -1,5 +1,6 @@
 """The experiment by which a design is judged: a scenario with the vehicle in it."""
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,17 +9,166 @@ from typing import Any
 import numpy as np
 import yaml
 
+from auv_analysis.output.text import join, number, plain
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scaling import REFERENCE, scaled_case1
 from auv_analysis.scenario.scenario import Scenario, load_scenario, scenario_from
 from auv_analysis.simulation.simulate import simulate
-from auv_analysis.studies.design.change import ChangeSpace
-from auv_analysis.studies.design.couplings import Sizes, sizes_of
-from auv_analysis.studies.design.vehicle_file import change_words, changed_data, changed_text
+from auv_analysis.studies.design.change import ChangeSpace, disc_mass, normal_of, parts_of
+from auv_analysis.studies.design.prediction import Sizes, sizes_of
 from auv_dynamics.files.shipped import shipped
-from auv_dynamics.files.yaml_files import check, read_text, read_yaml
-from auv_dynamics.plant.parameters import SCHEMA
+from auv_dynamics.files.yaml_files import check, matrix6, read_text, read_yaml
 from auv_gvc_controller.control.sampled import is_compiled
+
+PREFIX = 'design_'  # of its name: nobody shall take it for the vehicle that it came from
+WAYS = (('forward', 'aft'), ('to starboard', 'to port'), ('down', 'up'))
+PLACES = (('forward', 'aft'), ('to starboard', 'to port'), ('below', 'above'))
+ORIGIN = 'the reference point'  # origin of the body frame
+ALIGNED = np.radians(0.5)  # less than this from an axis is along it
+NEAR = 5e-4  # of a unit vector: not worth a word
+
+
+def changed_data(space: ChangeSpace, x: np.ndarray, words: str = '') -> dict[str, Any]:
+    """Contents of the file of a changed vehicle.
+
+    Parameters
+    ----------
+    space : of the vehicle
+    x : (13,) real, within bounds
+    words : that tell the change, for `source`
+
+    Returns
+    -------
+    data : of a vehicle file; `vehicle_from_dict` makes of it the vehicle of `space.effect(x)`
+
+    """
+    data = copy.deepcopy(dict(space.data))
+    if not np.any(x[[0, 1, 2, 3, 7]]):
+        return data
+    data['name'] = f'{PREFIX}{data["name"]}'
+    parts = (data.get('source', ''), f'changed by auv design: {words or "see the parameters"}')
+    data['source'] = '; '.join(filter(None, parts))
+    _set_inertia(data, space, x)
+    _set_rigid_body(data, space, x)
+    _set_water(data, space, x)
+    return data
+
+
+def changed_text(data: dict[str, Any], about: str) -> str:
+    """Text of the file, every number in full; `about` lines stand in its comment."""
+    comment = ''.join(f'# {line}\n' for line in about.splitlines())
+    body = yaml.safe_dump(
+        data, sort_keys=False, default_flow_style=None, width=110, allow_unicode=True
+    )
+    return comment + body
+
+
+def _set_inertia(data: dict[str, Any], space: ChangeSpace, x: np.ndarray) -> None:
+    """M itself, or M_A of the file's sign convention where there is a disc."""
+    if 'inertia_matrix' in data:
+        data['inertia_matrix'] = (space.vehicle.M + space.effect(x).M).tolist()
+    elif x[7] > 0 and space.vehicle.M_A is not None:
+        alone = np.where(np.arange(len(x)) < 7, 0.0, x)
+        M_A = space.vehicle.M_A + space.effect(alone).M
+        data['added_mass'] = (_sign(data) * M_A).tolist()
+    if x[7] > 0:
+        quadratic = matrix6(data['damping']['quadratic'])
+        quadratic += _sign(data) * np.diag(space.effect(x).drag)
+        diagonal = np.ndim(data['damping']['quadratic']) == 1
+        data['damping']['quadratic'] = (np.diag(quadratic) if diagonal else quadratic).tolist()
+
+
+def _set_rigid_body(data: dict[str, Any], space: ChangeSpace, x: np.ndarray) -> None:
+    """Mass, its centre and the tensor about the point that the file gives it for."""
+    body = data['rigid_body']
+    mass, ballast, at, moved = space.mass, float(x[3]), x[4:7], space.vehicle.r_G + x[:3]
+    r_G = (mass * moved + ballast * at) / (mass + ballast)
+    if 'inertia' in body:
+        about_gravity = body['inertia_reference'] == 'cg'
+        tensor = np.array(body['inertia'], float)
+        tensor = (tensor + tensor.T) / 2
+        if about_gravity:
+            tensor += _spread(mass, moved - r_G) + _spread(ballast, at - r_G)
+        else:
+            added = _spread(mass, moved) - _spread(mass, space.vehicle.r_G)
+            tensor += added + _spread(ballast, at)
+        if ballast or not about_gravity:
+            body['inertia'] = tensor.tolist()
+    body['mass'], body['center_of_gravity'] = mass + ballast, r_G.tolist()
+
+
+def _set_water(data: dict[str, Any], space: ChangeSpace, x: np.ndarray) -> None:
+    """Foam at the ballast that carries its weight."""
+    if x[3] > 0:
+        water, foam = data['hydrostatics'], float(x[3]) / space.density
+        volume = water['volume'] + foam
+        r_B = (water['volume'] * space.vehicle.r_B + foam * x[4:7]) / volume
+        water['volume'], water['center_of_buoyancy'] = volume, r_B.tolist()
+
+
+def _spread(mass: float, r: np.ndarray) -> np.ndarray:
+    """Moment of inertia (3, 3) of a point mass about the origin of r."""
+    return mass * (r @ r * np.eye(3) - np.outer(r, r))
+
+
+def _sign(data: dict[str, Any]) -> float:
+    return -1.0 if data.get('sign') == 'sname' else 1.0
+
+
+def change_words(space: ChangeSpace, x: np.ndarray) -> list[str]:
+    """What to do to the vehicle, a phrase for each part; none where nothing is changed."""
+    phrases = {'shift': _shift, 'ballast': _ballast, 'disc': _disc}
+    return [phrases[part](space, x) for part in parts_of(x)]
+
+
+def _shift(_: ChangeSpace, x: np.ndarray) -> str:
+    ways = [
+        f'{plain(abs(d), 4)} m {names[d < 0]}'
+        for d, names in zip(x[:3].tolist(), WAYS, strict=True)
+        if d
+    ]
+    return f'move the centre of gravity {join(ways)}'
+
+
+def _ballast(_: ChangeSpace, x: np.ndarray) -> str:
+    return f'add {number(x[3])} kg of ballast {_place(x[4:7])}, trimmed by foam at the same place'
+
+
+def _disc(space: ChangeSpace, x: np.ndarray) -> str:
+    mass = float(disc_mass(x[7], space.density))
+    normal = normal_of(x[11], x[12])
+    normal = normal * np.sign(normal[int(np.argmax(np.abs(normal)))])  # a disc has two of them
+    return (
+        f'fit a thin circular plate of {number(2 * x[7])} m diameter, {_place(x[8:11])}, '
+        f'{_facing(normal)} ({number(mass)} kg of added mass)'
+    )
+
+
+def _place(r: np.ndarray) -> str:
+    """Where a part goes, seen from the reference point."""
+    ways = [
+        f'{plain(round(abs(float(v)), 3), 4)} m {names[int(v < 0)]}'
+        for v, names in zip(r, PLACES, strict=True)
+        if abs(v) >= NEAR
+    ]
+    return f'{join(ways)}, seen from {ORIGIN}' if ways else f'at {ORIGIN}'
+
+
+def _facing(normal: np.ndarray) -> str:
+    """Which way a plate faces: along the nearest axis, and how far it is turned from there."""
+    main = int(np.argmax(np.abs(normal)))
+    text = f'facing {WAYS[main][int(normal[main] < 0)]}'
+    angle = float(np.arccos(min(abs(normal[main]), 1.0)))
+    if angle < ALIGNED:
+        return text
+    ways = [
+        WAYS[i][int(normal[i] < 0)]
+        for i in range(3)
+        if i != main and abs(normal[i]) >= np.sin(ALIGNED)
+    ]
+    numbers = ', '.join('0' if abs(v) < NEAR else plain(round(float(v), 3), 3) for v in normal)
+    return f'{text}, turned {np.degrees(angle):.1f}° {join(ways)}, its normal ({numbers})'
+
 
 MANY_STEPS = 30_000
 LONGEST = 92  # of a scenario's name, with room for the word behind it

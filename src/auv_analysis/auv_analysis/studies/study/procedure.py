@@ -18,8 +18,7 @@ from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.plots import FigureRecord, Grid
 from auv_analysis.report.results import Column, Table, make_table
 from auv_analysis.runs.run import AnyRun, Run
-from auv_analysis.studies.study.kpis import Kpi
-from auv_analysis.studies.study.sensitivity import Row, Sensitivity
+from auv_analysis.studies.study.sensitivity import Kpi, Row, Sensitivity
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import ControlModel, control_model
 

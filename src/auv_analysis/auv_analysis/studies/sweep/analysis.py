@@ -1,27 +1,289 @@
-"""All that is computed of a sweep: rows of its tables, and the results that hold them."""
+"""All that is computed of a sweep: quantiles, what matters, pairs, the best rows, as results."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.stats import rankdata
 
-from auv_analysis.metrics.measures import BY_NAME, MEASURES, Measure
+from auv_analysis.metrics.measures import BY_NAME, FAMILIES, MEASURES, Measure, described
 from auv_analysis.output.progress import each
 from auv_analysis.output.text import join
 from auv_analysis.report.results import Results
-from auv_analysis.studies.sweep import statistics
-from auv_analysis.studies.sweep.dataset import STATUSES, Sweep
-from auv_analysis.studies.sweep.factors import Factor, factors_of
+from auv_analysis.studies.pairs import log_ratios, paired
+from auv_analysis.studies.sweep.dataset import STATUSES, Factor, Sweep, by_group, factors_of
 from auv_analysis.studies.sweep.indices import designed, failing, indices, omitted
 from auv_analysis.studies.sweep.variation import kind_of
+from auv_dynamics.vehicle import DOFS
+
+LEVELS = {'low': 0.05, 'quarter': 0.25, 'median': 0.5, 'three_quarters': 0.75, 'high': 0.95}
+Row = dict[str, Any]
+POINTS = 201  # of a distribution function as it is drawn
+FEWEST = 8  # rows that a correlation is worth computing of
+MOST_CELLS = 10  # groups of a path that a table of two has room for
+COUNT = 10  # best rows of each controller
+
+
+def ordered(values: np.ndarray, unit: str) -> np.ndarray:
+    """The same values; a time that does not exist is later than any other."""
+    return np.where(np.isnan(values), np.inf, values) if unit == 's' else values
+
+
+def quantiles(values: np.ndarray, levels: Iterable[float]) -> np.ndarray:
+    """Quantiles that are values themselves, so that one of them may be infinite."""
+    known = values[~np.isnan(values)]
+    levels = np.asarray(list(levels))
+    if len(known) == 0:
+        return np.full(len(levels), np.nan)
+    return np.quantile(known, levels, method='inverted_cdf')
+
+
+def finite(value: float) -> float | None:
+    """A number, None where it is not finite."""
+    return float(value) if np.isfinite(value) else None
+
+
+def spread(values: np.ndarray, unit: str) -> Row:
+    """Quantiles of a figure as columns; None: it does not exist there, such as a settling time.
+
+    `known` counts the values that exist; of a time, the quantiles count one that does not as late.
+    """
+    known = values[np.isfinite(values)]
+    at = quantiles(ordered(values, unit), LEVELS.values())
+    row: Row = {'rows': len(values), 'known': len(known)}
+    row |= {'smallest': finite(known.min()) if len(known) else None}
+    row |= {name: finite(value) for name, value in zip(LEVELS, at, strict=True)}
+    row |= {'largest': finite(known.max()) if len(known) else None}
+    return row | {'mean': finite(known.mean()) if len(known) else None}
+
+
+def figures_spread(sweep: Sweep) -> Iterator[Row]:
+    """Rows of `quantiles.parquet`: controller, figure, its unit and meaning, its quantiles."""
+    for measure in MEASURES:
+        yield from _of_column(sweep, measure.name, sweep.measure(measure))
+    for family in FAMILIES:
+        table = sweep.table([f'{family}.{dof}' for dof in DOFS])
+        for name in table.column_names:
+            yield from _of_column(sweep, name, table[name].to_numpy().astype(float))
+
+
+def _of_column(sweep: Sweep, name: str, values: np.ndarray) -> Iterator[Row]:
+    label, unit, meaning = described(name)
+    for i, controller in enumerate(sweep.controllers):
+        rows = (sweep.controller == i) & (sweep.status == 0)
+        names = {'controller': controller, 'figure': name, 'label': label}
+        yield names | {'unit': unit, 'meaning': meaning} | spread(values[rows], unit)
+
+
+def thinned(values: np.ndarray) -> np.ndarray:
+    """Values with the same quantiles, few enough to be drawn; NaN is left out."""
+    known = values[~np.isnan(values)]
+    if len(known) <= POINTS:
+        return known
+    return np.quantile(known, np.linspace(0.0, 1.0, POINTS), method='inverted_cdf')
+
+
+def varying(values: Sequence[np.ndarray], unit: str) -> bool:
+    """Whether there is more than one value; of a time, one that does not exist is one as well."""
+    whole = np.concatenate(values)
+    known = whole[np.isfinite(whole)]
+    if len(known) == 0:
+        return False
+    late = unit == 's' and len(known) < len(whole)
+    return late or bool(np.ptp(known) > 1e-12 * np.abs(known).max())
+
+
+def influence(ranks: np.ndarray, factor: Factor, rows: np.ndarray) -> Row | None:
+    """How much of the order of a figure a path explains.
+
+    Parameters
+    ----------
+    ranks : (m,) of the figure
+    factor : the path
+    rows : (m,) indices of these rows
+
+    Returns
+    -------
+    row : None where there is nothing to compare
+        spearman : rank correlation, None of words and lists
+        explained_percent : share of the variance of the ranks that lies between the groups of the
+            path (bins of numbers, or its values), corrected for their number; it also sees what
+            rises and falls again
+
+    """
+    codes = factor.codes[rows]
+    groups = len(np.unique(codes))
+    if len(ranks) < FEWEST or groups < 2 or np.ptp(ranks) == 0 or len(ranks) <= groups:
+        return None
+    spearman = None
+    if factor.numbers is not None:
+        others = rankdata(factor.numbers[rows])
+        spearman = float(np.corrcoef(ranks, others)[0, 1])
+    return {'spearman': spearman, 'explained_percent': 100 * explained(ranks, codes)}
+
+
+def explained(ranks: np.ndarray, codes: np.ndarray) -> float:
+    """Share of the variance between groups, less what chance alone would put there; not below 0."""
+    counts = np.bincount(codes)
+    sums = np.bincount(codes, ranks)
+    used = counts > 0
+    total = np.sum((ranks - ranks.mean()) ** 2)
+    between = np.sum(sums[used] ** 2 / counts[used]) - len(ranks) * ranks.mean() ** 2
+    n, k = len(ranks), int(used.sum())
+    within = (total - between) / (n - k) * (n - 1) / total
+    return float(np.clip(1.0 - within, 0.0, 1.0))
+
+
+def ranks_of(values: np.ndarray, measure: Measure) -> tuple[np.ndarray, np.ndarray]:
+    """Ranks of the values that exist, and which rows these are; a time that does not is late."""
+    at = ordered(values, measure.unit)
+    there = np.flatnonzero(~np.isnan(at))
+    return rankdata(at[there]), there
+
+
+def along(values: np.ndarray, rows: np.ndarray, factor: Factor, measure: Measure) -> Iterator[Row]:
+    """Quantiles of a figure in each group of a path.
+
+    Parameters
+    ----------
+    values : (n,) of all rows
+    rows : (m,) indices of the rows that count
+    factor : the path
+    measure : whose values they are
+
+    """
+    groups = by_group(values[rows], factor.codes[rows], len(factor.labels))
+    for i, (label, group) in enumerate(zip(factor.labels, groups, strict=True)):
+        row: Row = {'path': factor.path, 'figure': measure.name, 'unit': measure.unit}
+        row |= {'group': i, 'value': label, 'middle': finite(factor.middles[i])}
+        ends = (None, None) if factor.edges is None else map(float, factor.edges[i])
+        yield row | dict(zip(('from', 'to'), ends, strict=True)) | spread(group, measure.unit)
+
+
+def together(
+    values: np.ndarray, rows: np.ndarray, pair: Sequence[Factor], measure: Measure
+) -> Iterator[Row]:
+    """Median of a figure for each combination of the groups of two paths.
+
+    Parameters
+    ----------
+    values, rows, measure : as of `along`
+    pair : two paths; bins are merged until they are few
+
+    """
+    first, second = (merged(factor) for factor in pair)
+    width = len(second[1])
+    codes = first[0][rows] * width + second[0][rows]
+    groups = by_group(values[rows], codes, len(first[1]) * width)
+    for i, group in enumerate(groups):
+        at = quantiles(ordered(group, measure.unit), [0.5])[0]
+        names = {'figure': measure.name, 'unit': measure.unit}
+        names |= {'path': pair[0].path, 'value': first[1][i // width]}
+        names |= {'other_path': pair[1].path, 'other_value': second[1][i % width]}
+        known = int(np.isfinite(group).sum())
+        yield names | {'rows': len(group), 'known': known, 'median': finite(at)}
+
+
+def merged(factor: Factor) -> tuple[np.ndarray, list[str]]:
+    """Codes and labels of a path with neighbouring bins joined until they are few."""
+    labels = list(factor.labels)
+    if not factor.binned or len(labels) <= MOST_CELLS:
+        return factor.codes, labels
+    step = -(-len(labels) // MOST_CELLS)
+    starts = [label.split('–')[0] for label in labels[::step]]
+    ends = [labels[min(i + step, len(labels)) - 1] for i in range(0, len(labels), step)]
+    joined = [f'{a}–{b.split("–")[-1]}' for a, b in zip(starts, ends, strict=True)]
+    return factor.codes // step, joined
+
+
+def failures(factor: Factor, status: np.ndarray, rows: np.ndarray) -> Iterator[Row]:
+    """Shares of diverged and refused rows in each group of a path.
+
+    Parameters
+    ----------
+    factor : the path
+    status : (n,) places in `STATUSES`
+    rows : (m,) indices of the rows that count
+
+    """
+    groups = by_group(status[rows], factor.codes[rows], len(factor.labels))
+    for label, group in zip(factor.labels, groups, strict=True):
+        row: Row = {'path': factor.path, 'value': label, 'rows': len(group)}
+        for place, word in enumerate(STATUSES[1:], start=1):
+            count = int((group == place).sum())
+            share = 100.0 * count / len(group) if len(group) else None
+            row |= {word: count, f'{word}_percent': share}
+        yield row
+
+
+def pairs(sweep: Sweep, values: np.ndarray, measure: Measure) -> Iterator[Row]:
+    """For each two controllers, the ratio of their figures in the same rollouts, as `Pairs`.
+
+    Only rollouts that both finished count; a time that does not exist is later than any other.
+
+    Parameters
+    ----------
+    sweep : whose rows they are
+    values : (n,) of the measure in all rows
+    measure : what is compared
+
+    """
+    at = ordered(values, measure.unit)
+    usable = (sweep.status == 0) & ~np.isnan(at)
+    for first, second, mine, other in sweep.pairs:
+        both = usable[mine] & usable[other]
+        d = log_ratios(at[mine[both]], at[other[both]])
+        if len(d) == 0:
+            continue
+        found = paired(d)
+        low, high = found.interval or (None, None)
+        yield {
+            'figure': measure.name,
+            'label': measure.label,
+            'controller': sweep.controllers[first],
+            'other': sweep.controllers[second],
+            'rollouts': len(d),
+            'smaller_percent': 100 * found.smaller,
+            'equal_percent': float(100 * np.mean(d == 0)),
+            'larger_percent': 100 * found.larger,
+            'effect': found.effect,
+            'ratio': found.ratio,
+            'ratio_low': low,
+            'ratio_high': high,
+        }
+
+
+def best(
+    sweep: Sweep, figures: Mapping[str, np.ndarray], by: Measure, count: int = COUNT
+) -> list[Row]:
+    """Rows of each controller with the smallest values of a measure, with all that they have.
+
+    Parameters
+    ----------
+    sweep : whose rows they are
+    figures : measure -> (n,) of all rows
+    by : by which they are sorted
+    count : at most so many of a controller
+
+    """
+    values, found = figures[by.name], []
+    for i, controller in enumerate(sweep.controllers):
+        rows = np.flatnonzero((sweep.controller == i) & (sweep.status == 0) & np.isfinite(values))
+        places = rows[np.argsort(values[rows], kind='stable')[:count]]
+        table = sweep.table(['index', 'seed', *sweep.paths]).take(places).to_pylist()
+        for rank, (place, given) in enumerate(zip(places, table, strict=True), start=1):
+            row = {'by': by.name, 'controller': controller, 'rank': rank}
+            row |= {'rollout': given.pop('index'), **given}
+            found.append(row | {m.name: finite(figures[m.name][place]) for m in MEASURES})
+    return found
+
 
 TABLES = ('quantiles', 'influence', 'dependence', 'together', 'failures', 'paired', 'indices',
           'best')  # fmt: skip
 BEST_BY = 'overall.velocity_error.rms.linear'
 MOST_REASONS = 5
 SAMPLE = 600  # rows of a controller that are drawn as points
-Row = dict[str, Any]
 
 
 @dataclass(eq=False)
@@ -106,8 +368,8 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
     analysis.pair = analysis.most_influential()[:2]
     _pairs(analysis)
     _failures(analysis)
-    analysis.tables['best'] = statistics.best(sweep, analysis.values, BY_NAME[by])
-    analysis.tables['quantiles'] = list(statistics.figures_spread(sweep))
+    analysis.tables['best'] = best(sweep, analysis.values, BY_NAME[by])
+    analysis.tables['quantiles'] = list(figures_spread(sweep))
     return analysis
 
 
@@ -123,21 +385,21 @@ def _one_measure(analysis: Analysis, measure: Measure, groups: Sequence[Any]) ->
     sweep, tables = analysis.sweep, analysis.tables
     values = analysis.values[measure.name] = sweep.measure(measure)
     ok = [analysis.rows_of(name) for name in sweep.controllers]
-    if not statistics.varying([values[rows] for rows in ok], measure.unit):
+    if not varying([values[rows] for rows in ok], measure.unit):
         known = values[np.isfinite(values) & (sweep.status == 0)]
         analysis.fixed[measure.name] = float(known[0]) if len(known) else None
         return
     analysis.measures.append(measure)
-    tables['paired'] += statistics.pairs(sweep, values, measure)
+    tables['paired'] += pairs(sweep, values, measure)
     for controller, rows in zip(sweep.controllers, ok, strict=True):
-        ranks, there = statistics.ranks_of(values[rows], measure)
+        ranks, there = ranks_of(values[rows], measure)
         names = {'controller': controller, 'figure': measure.name}
         for factor in analysis.factors:
             if not (factor.differs and factor.concerns(controller)):
                 continue
-            for row in statistics.along(values, rows, factor, measure):
+            for row in along(values, rows, factor, measure):
                 tables['dependence'].append({'controller': controller} | row)
-            if found := statistics.influence(ranks, factor, rows[there]):
+            if found := influence(ranks, factor, rows[there]):
                 tables['influence'].append(names | {'path': factor.path} | found)
     for group in groups:
         tables['indices'] += indices(sweep, group, values, measure)
@@ -152,7 +414,7 @@ def _pairs(analysis: Analysis) -> None:
             if all(factor.concerns(controller) for factor in analysis.pair):
                 rows = analysis.rows_of(controller)
                 values = analysis.values[measure.name]
-                for row in statistics.together(values, rows, analysis.pair, measure):
+                for row in together(values, rows, analysis.pair, measure):
                     analysis.tables['together'].append({'controller': controller} | row)
 
 
@@ -164,7 +426,7 @@ def _failures(analysis: Analysis) -> None:
         rows = np.flatnonzero(sweep.controller == i)
         for factor in analysis.factors:
             if factor.differs and factor.concerns(controller):
-                for row in statistics.failures(factor, sweep.status, rows):
+                for row in failures(factor, sweep.status, rows):
                     analysis.tables['failures'].append({'controller': controller} | row)
 
 

@@ -17,8 +17,7 @@ from auv_analysis.scenario.changes import (
 )
 from auv_analysis.scenario.scenario import SAMPLED, Scenario, load_scenario
 from auv_analysis.simulation.simulate import check_hold
-from auv_analysis.studies.distributions import Values
-from auv_analysis.studies.sweep.variation import Group, kind_of, make_group
+from auv_analysis.studies.sweep.variation import Group, Values, kind_of, make_group
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant, one_of
 from auv_dynamics.files.shipped import shipped

@@ -6,8 +6,11 @@ flushed to the disk and then renamed. A process may therefore be killed at any t
 
 import json
 import platform
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import lru_cache
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +18,11 @@ import yaml
 
 from auv_analysis.output.folder import CAMPAIGN, PART, ROLLOUTS, SWEEP, Results, results_folder
 from auv_analysis.output.new_files import UNFINISHED, write
-from auv_analysis.studies.sweep.blocks import laws_of, versions
 from auv_analysis.studies.sweep.campaign import Campaign
+from auv_analysis.studies.sweep.variation import kind_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import dotted
+from auv_dynamics.kernel.compile import JITTED, sources_digest
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -134,10 +138,6 @@ def _manifest(campaign: Campaign) -> dict[str, Any]:
 
 def _sampling_versions(campaign: Campaign) -> dict[str, str]:
     """Versions of the libraries that drew the samples."""
-    from importlib import metadata
-
-    from auv_analysis.studies.sweep.variation import kind_of
-
     kinds = {kind_of(spec) for spec in campaign.data['vary']} - {'grid', 'zip'}
     packages = (['scipy'] if kinds else []) + (['SALib'] if 'morris' in kinds else [])
     return {package: metadata.version(package) for package in packages}
@@ -195,3 +195,24 @@ def _difference(
         if found := _difference(x, y, (*path, key)):
             return found
     return None
+
+
+@lru_cache
+def versions() -> dict[str, str]:
+    """What the last bit of a figure may depend on."""
+    found = {'sources': sources_digest(), 'python': '.'.join(map(str, sys.version_info[:2]))}
+    for package in ('numpy', 'numba') if JITTED else ('numpy',):
+        found[package] = metadata.version(package)
+    return found
+
+
+def laws_of(campaign: Campaign) -> dict[str, str]:
+    """Digest of the source file of each user's own law."""
+    import hashlib
+    import inspect
+
+    found = {}
+    for name, law in campaign.own_laws.items():
+        if file := inspect.getsourcefile(law):
+            found[name] = hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16]
+    return found

@@ -13,8 +13,7 @@ from auv_analysis.report.document import Block, Section, Sentence, write_documen
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.results import Column, Table, make_table, terminal
 from auv_analysis.studies.sweep.analysis import BEST_BY, Analysis, Row, analysed, results_of
-from auv_analysis.studies.sweep.dataset import STATUSES, open_sweep
-from auv_analysis.studies.sweep.factors import short_names
+from auv_analysis.studies.sweep.dataset import STATUSES, open_sweep, short_names
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.files.nearest import one_of
 

@@ -11,9 +11,16 @@ from auv_analysis.metrics.quantities import COSTS
 from auv_analysis.output.progress import console, say
 from auv_analysis.output.text import Maths, join, number, symbol
 from auv_analysis.report.document import Block, Section, Sentence, write_document
-from auv_analysis.report.results import Column, Results, Table, terminal
+from auv_analysis.report.results import (
+    Column,
+    Results,
+    Shown,
+    Table,
+    document_table,
+    labelled,
+    terminal,
+)
 from auv_analysis.report.scenario_text import gain_text
-from auv_analysis.studies.documents import Shown, document_table, labelled
 from auv_analysis.studies.tune.plots import draw_tuning
 from auv_analysis.studies.tune.results import LEVEL, Comparison, Tuning
 from auv_analysis.studies.tune.search import FINALISTS, LONG, POINTS, SHORT, STARTS

@@ -1,8 +1,9 @@
-"""Results of a tuning: tuned laws, Monte Carlo and paired comparisons, as JSON and Parquet."""
+"""A tuning from search to results: check against `simulate`, Monte Carlo, paired comparisons."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,15 @@ import pyarrow as pa
 from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.quantities import COSTS
 from auv_analysis.report.results import Results, known
-from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.scenario.scenario import Scenario, load_scenario, write_inputs
+from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.studies.pairs import Pairs, holm, log_ratios, paired
-from auv_analysis.studies.tune.cost import Measures
-from auv_analysis.studies.tune.gain_space import STRUCTURES
-from auv_analysis.studies.tune.perturbations import Spread, applicable
-from auv_analysis.studies.tune.search import Goal, Request, TunedLaw
-from auv_gvc_controller.laws.law import SHIPPED
+from auv_analysis.studies.tune.cost import Measures, measures_of_run, of_each
+from auv_analysis.studies.tune.gain_space import STRUCTURES, searched
+from auv_analysis.studies.tune.perturbations import Perturbations, Spread, applicable, monte_carlo
+from auv_analysis.studies.tune.search import Goal, Request, TunedLaw, structures_of, tuned
+from auv_dynamics.files.errors import FailedError
 
 COMPARED = ('weighted_error', 'error', 'effort', 'late_error', 'settling')
 LEVEL = 0.05  # of Holm's p below which a difference is called one
@@ -108,7 +111,7 @@ class Tuning:
     def retuned(self) -> str | None:
         """Name of the reference's own law with searched gains; None where it is no shipped law."""
         law = self.scenario.controller(self.request.reference)['law']
-        return next((name for name, tuned in self.laws.items() if tuned.law == law), None)
+        return next((name for name, one in self.laws.items() if one.law == law), None)
 
     @cached_property
     def comparisons(self) -> list[Comparison]:
@@ -176,14 +179,14 @@ class Tuning:
         }
         if name not in self.laws:
             return found
-        tuned = self.laws[name]
+        law = self.laws[name]
         return found | {
-            'structure': tuned.best.space.structure,
-            'structure_means': STRUCTURES[tuned.best.space.structure],
-            'at_bound': tuned.best.space.at_bound(tuned.best.x),
-            'reached': tuned.best.reached,
-            'price': tuned.best.price,
-            'evaluations': sum(len(s.points) for s in tuned.searches),
+            'structure': law.best.space.structure,
+            'structure_means': STRUCTURES[law.best.space.structure],
+            'at_bound': law.best.space.at_bound(law.best.x),
+            'reached': law.best.reached,
+            'price': law.best.price,
+            'evaluations': sum(len(s.points) for s in law.searches),
             'searches': [
                 {
                     'structure': s.space.structure,
@@ -192,7 +195,7 @@ class Tuning:
                     'searched': self._bounds(s.space.law),
                     'measures': _numbers(s.measures),
                 }
-                for s in tuned.searches
+                for s in law.searches
             ],
         }
 
@@ -230,9 +233,9 @@ def _evaluations(laws: Mapping[str, TunedLaw]) -> pa.Table:
     where the structure is a matrix times a number, that number.
     """
     tables = []
-    for name, tuned in laws.items():
-        for one in tuned.searches:
-            words = {'controller': name, 'law': tuned.law, 'structure': one.space.structure}
+    for name, law in laws.items():
+        for one in law.searches:
+            words = {'controller': name, 'law': law.law, 'structure': one.space.structure}
             gains = zip(one.space.names, np.exp(one.points.T), strict=True)
             tables.append(
                 pa.table({
@@ -266,3 +269,78 @@ def _columns(measures: Measures) -> dict[str, pa.Array]:
         name: pa.array(values, mask=~np.isfinite(values))
         for name, values in measures._asdict().items()
     }
+
+
+SAME = 1e-6  # relative: a batch and a single run differ by rounding alone
+LONGEST = 100  # characters of a scenario's name
+Progress = Callable[[str, int], Callable[[], None]]  # what is done, in how many parts -> a part is
+
+
+def tune(request: Request, asked: Perturbations, out: Path, progress: Progress) -> Tuning:
+    """Tune, check, perturb and compare; `scenario.yaml` with its files is written to `out` first.
+
+    Raises
+    ------
+    DivergedError : the reference's own loop
+    FailedError : single runs of the written scenario do not give what the search saw
+
+    """
+    goal = Goal.of(request)
+    laws: dict[str, TunedLaw] = {}
+    for law in request.laws:
+        advance = progress(f'tuning {law}', len(structures_of(request.structure)))
+        laws[_free(f'{law}_tuned', request.scenario)] = tuned(request, law, goal, advance)
+    written = write_inputs(_with(request.scenario, laws), out)
+    scenario = load_scenario(written['scenario.yaml'])
+    nominal = of_each(scenario, request.hold)
+    deviation, commands = _checked(scenario, request, nominal, progress)
+    draws: dict[str, Measures] = {}
+    if asked.samples:
+        advance = progress(f'{asked.samples} draws of model error and disturbance', asked.samples)
+        draws = monte_carlo(scenario, asked, request.hold, request.threads, advance)
+    return Tuning(request, goal, scenario, laws, nominal, deviation, commands, asked.spread, draws)
+
+
+def _free(name: str, scenario: Scenario) -> str:
+    """The name, longer where the scenario has a controller of that name."""
+    while name in scenario.controllers:
+        name += '_again'
+    return name
+
+
+def _with(scenario: Scenario, laws: Mapping[str, TunedLaw]) -> Scenario:
+    """The scenario with the tuned laws as further controllers, under a name of its own."""
+    entries: dict[str, Any] = {name: law.entry for name, law in laws.items()}
+    name = f'{scenario.name[: LONGEST - len("_tuned")]}_tuned'
+    values = {'name': name, 'controllers': {**scenario.controllers, **entries}}
+    changed = changed_scenario(scenario, values)
+    return replace(changed, attachments={**scenario.attachments, **changed.attachments})
+
+
+def _checked(
+    scenario: Scenario, request: Request, nominal: Mapping[str, Measures], progress: Progress
+) -> tuple[float, dict[str, np.ndarray]]:
+    """Largest relative deviation of single runs from the batch, and their largest commands (6,)."""
+    advance = progress('checking against single runs', len(nominal))
+    largest, commands = 0.0, {}
+    for name, expected in nominal.items():
+        try:
+            run = simulate(scenario, name, request.hold)
+        except DivergedError:
+            found = Measures(*(np.full(1, np.nan) for _ in Measures._fields))
+        else:
+            found, commands[name] = measures_of_run(run), np.abs(run.tau).max(axis=0)
+        deviations = [_deviation(a[0], b[0]) for a, b in zip(found, expected, strict=True)]
+        largest = max(largest, *deviations)
+        if largest > SAME:
+            worst = Measures._fields[int(np.argmax(deviations))]
+            text = f'expected what the batch gave, found {worst} apart by {largest:.2g}'
+            raise FailedError(f'{scenario.name}, {name}: {text} (relative)')
+        advance()
+    return largest, commands
+
+
+def _deviation(a: float, b: float) -> float:
+    if a == b or (np.isnan(a) and np.isnan(b)):
+        return 0.0
+    return float(abs(a - b) / max(abs(a), abs(b))) if np.isfinite(a) and np.isfinite(b) else np.inf

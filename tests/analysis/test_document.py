@@ -10,7 +10,8 @@ from pages import Page, check_numbers
 from auv_analysis.cli import main
 from auv_analysis.output.text import MISSING, Maths
 from auv_analysis.report import document
-from auv_analysis.report.document import Cell, Column, Section, Sentence, Table, cell
+from auv_analysis.report.document import Section, Sentence
+from auv_analysis.report.results import described, make_table
 
 
 @pytest.fixture(scope='module')
@@ -32,7 +33,7 @@ def test_every_number_of_the_tables_lies_beside_the_page_with_its_source(folder)
         (float(value), text.replace('\u00a0', ' '))
         for table in page.tables.values() for row in table for text, value in row if value
     ]  # fmt: skip
-    kept = [(row['value'], row['text']) for row in rows if not row['name']]
+    kept = [(row['value'], row['text']) for row in rows]
     assert sorted(value for value, _ in shown) == sorted(value for value, _ in kept)
     assert check_numbers(folder) > 250
 
@@ -51,9 +52,10 @@ def test_a_report_says_what_made_it(folder):
 
 
 def made(tmp_path: Path, **changes) -> str:
-    columns = Column('what', numeric=False), Column('x', 'm', 'how far <it> is', group='far')
-    rows = [[Cell('<a>'), cell(0.0)], [Cell('b'), cell(None)], [Cell('c'), cell(1234.5, 'here')]]
-    table = Table('t', Maths('A table of x_d.'), columns, rows)
+    rows = {'what': ['<a>', 'b', 'c'], 'x': [0.0, None, 1234.5]}
+    shown = {'what': 'what', 'x': described('x', 'how far <it> is', 'm', group='far')}
+    where = {'pointer': lambda row, column: ['', '', 'here'][row]}
+    table = make_table('t', Maths('A table of x_d.'), rows, shown, **where)
     blocks = ['A paragraph.', Sentence('It is 1.', 'table-t'), table]
     sections = [Section('s', 'First', blocks), Section('empty', 'Second', [])]
     arguments = {'title': 'T', 'about': 'a', 'findings': [Sentence('Found.', 's')]} | changes
@@ -77,11 +79,6 @@ def test_a_document_of_all_kinds_of_blocks(tmp_path):
     (zero, far) = parquet.read_table(tmp_path / document.NUMBERS).to_pylist()
     assert (zero['row'], zero['value']) == ('<a>', 0.0)
     assert far == {
-        'table': 't', 'row': 'c', 'column': 'far x', 'name': '', 'text': '1\u202f234',
+        'table': 't', 'row': 'c', 'column': 'far x', 'text': '1\u202f234',
         'value': 1234.5, 'unit': 'm', 'source': 'here',
     }  # fmt: skip
-
-
-def test_rows_that_do_not_fit_their_columns_are_refused():
-    with pytest.raises(ValueError, match='t: expected 1 cells, found 2'):
-        Table('t', '', [Column('a')], [[Cell('1'), Cell('2')]])

@@ -12,7 +12,7 @@ from pyarrow import parquet
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.cli import main
-from auv_analysis.studies.atlas.atlas import charts, document
+from auv_analysis.studies.atlas.atlas import charts, results_of
 from auv_analysis.studies.atlas.plots import coupled, uncoupled
 from auv_dynamics.files.shipped import shipped, shipped_names
 from auv_dynamics.vehicle import DOFS
@@ -43,7 +43,7 @@ def test_peaks_are_those_of_the_scaled_scenario(found) -> None:
 
 
 def test_a_document_has_no_nan(found) -> None:
-    whole = json.loads(json.dumps(document(found), allow_nan=False))
+    whole = json.loads(json.dumps(results_of(found).to_json(), allow_nan=False))
     assert list(whole['vehicles']) == [c.name for c in found]
     assert whole['vehicles']['bluerov2_heavy']['diagonal'] is True
 
@@ -84,7 +84,7 @@ def test_vehicles_without_coupling_alone_are_said_not_drawn(tmp_path: Path, caps
 
 def test_all_shipped_vehicles_are_taken() -> None:
     assert len(shipped_names('vehicles')) >= 8
-    assert len(DOFS) == np.array(document(charts(['lauv']))['vehicles']['lauv']['N']).size
+    assert len(DOFS) == np.array(results_of(charts(['lauv'])).facts['vehicles']['lauv']['N']).size
 
 
 def test_an_unknown_vehicle_is_refused_in_one_line(tmp_path: Path, capsys) -> None:

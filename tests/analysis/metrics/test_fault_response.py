@@ -1,5 +1,6 @@
 """What a fault does to a run, measured on runs whose errors are known."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -111,9 +112,9 @@ def test_every_number_of_the_tables_is_in_the_file(made, tmp_path):
     numbers = parquet.read_table(tmp_path / 'numbers.parquet').to_pylist()
     assert len(numbers) == 90
     for row in numbers:
-        file, _, column = row['source'].partition(':')
+        file, column, place = re.fullmatch(r'(.+):(.+)\[(\d+)\]', row['source']).groups()
         assert file == FILE
-        assert row['value'] in held.column(column).to_pylist()
+        assert row['value'] == held.column(column)[int(place)].as_py()
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     """Couplings of the shipped vehicles and of the given ones, or of these alone."""
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import say, waiting
-    from auv_analysis.studies.atlas.atlas import charts, write_atlas
+    from auv_analysis.studies.atlas.atlas import charts, results_of
     from auv_dynamics.files.shipped import shipped, shipped_names
 
     given = list(dict.fromkeys(options.vehicles))
@@ -33,7 +33,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     with results_folder(out, overwrite=options.overwrite, inputs=files) as results:
         with waiting(f'case 1 on {len(vehicles)} vehicles'):
             found = charts(vehicles)
-        document = write_atlas(found, results.folder)
+        atlas = results_of(found)
+        atlas.write(results.folder)
         from auv_analysis.studies.atlas.plots import draw  # with matplotlib, which loads slowly
         from auv_analysis.studies.atlas.report import findings, write_report
 
@@ -41,4 +42,4 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             write_report(results.folder, found, draw(found, results.folder / 'figures'))
         for sentence in findings(found):
             say(sentence.text)
-    return document
+    return atlas.to_json()

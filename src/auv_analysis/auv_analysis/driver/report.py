@@ -17,23 +17,22 @@ from auv_analysis.driver.odometry_checks import reference_ns
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.text import join
 from auv_analysis.report import plots
-from auv_analysis.report.document import (
-    Block,
-    Cell,
-    Column,
-    Section,
-    Sentence,
-    Table,
-    write_document,
-)
+from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import COLOURS, GREY, FigureRecord, save_figures
+from auv_analysis.report.results import Column, Shown, make_table
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS
 
 DOCUMENT, SAMPLES, WRENCHES = 'check.json', 'samples.parquet', 'wrenches.parquet'
 STATE = ('x', 'y', 'z', 'qw', 'qx', 'qy', 'qz', 'u', 'v', 'w', 'p', 'q', 'r')
 TAU = ('X', 'Y', 'Z', 'K', 'M', 'N')
-COLUMNS = [Column(name, numeric=False) for name in ('check', 'verdict', 'expected', 'found')]
+SHOWN: dict[str, Shown] = {
+    'id': 'check',
+    'verdict': Column('verdict', kind='look'),
+    'expected': 'expected',
+    'found': 'found',
+    'advice': 'what to do',
+}
 LOOKS = {PASS: 'good', FAIL: 'bad', NOT_CHECKED: ''}
 DRAWN = {'time': ('timing',), 'motion': ('linear', 'angular'), 'response': ('answers',)}
 MS = 1e3
@@ -60,8 +59,12 @@ def write_results(
     figures = draw(evidence, out / 'figures')
     sections = []
     for group, title in GROUPS.items():
-        rows = [_row(one) for one in findings if CHECKS[one.id].group == group]
-        table = Table(f'checks_{group}', f'{title}.', COLUMNS, rows)
+        rows = [
+            {key: getattr(one, key) for key in SHOWN} | {'look': LOOKS[one.verdict]}
+            for one in findings
+            if CHECKS[one.id].group == group
+        ]
+        table = make_table(f'checks_{group}', f'{title}.', rows, SHOWN, anchor='check')
         drawn: list[Block] = [figures[name] for name in DRAWN.get(group, ()) if name in figures]
         sections.append(Section(group, title, [table, *drawn]))
     graph = evidence.graph
@@ -75,15 +78,6 @@ def write_results(
         if (ids := [one.id for one in findings if one.verdict == verdict])
     ]
     return write_document(out, 'Check of a vehicle driver', about, sentences, sections)
-
-
-def _row(finding: Finding) -> tuple[Cell, ...]:
-    return (
-        Cell(finding.id, anchor=finding.id),
-        Cell(finding.verdict, kind=LOOKS[finding.verdict]),
-        Cell(finding.expected),
-        Cell(finding.found, figures=finding.measured, remark=finding.advice),
-    )
 
 
 def _write_samples(out: Path, evidence: Evidence) -> None:

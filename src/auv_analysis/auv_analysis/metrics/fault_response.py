@@ -1,7 +1,7 @@
 """What the faults of a run do to it: errors and effort before, during and after each."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -159,15 +159,20 @@ class _Tally:
         return round(float(self._outside[i] + self._run.step - self._mark.end), 9)
 
 
-def write_responses(folder: Path, found: Mapping[str, list[Response]]) -> Path:
+def write_responses(folder: Path, found: Mapping[str, Sequence[Response]]) -> Path:
     """Write `faults.parquet`, a row per fault, controller and degree of freedom."""
-    rows = [_row(name, response) for name, several in found.items() for response in several]
+    rows = fault_rows(found)
     return write_table(folder / FILE, {key: [row[key] for row in rows] for key in rows[0]})
 
 
-def _row(controller: str, response: Response) -> dict[str, str | int | float | None]:
+def fault_rows(found: Mapping[str, Sequence[Response]]) -> list[dict[str, Any]]:
+    """Rows of `faults.parquet`."""
+    return [_row(name, response) for name, several in found.items() for response in several]
+
+
+def _row(controller: str, response: Response) -> dict[str, Any]:
     mark, angular = response.mark, response.dof in DOFS[3:]
-    row: dict[str, str | int | float | None] = {
+    row: dict[str, Any] = {
         'fault': mark.number,
         'kind': mark.kind,
         'label': mark.label,

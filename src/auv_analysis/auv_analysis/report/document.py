@@ -22,77 +22,13 @@ from markupsafe import Markup
 from pyarrow import parquet
 
 from auv_analysis.metrics.quantities import SIGNALS
-from auv_analysis.output.text import MISSING, Maths, fixed, join, number, plain, tied
-from auv_analysis.report import results
+from auv_analysis.output.text import Maths, fixed, join, number, plain, tied
 from auv_analysis.report.panels import Interactive, PanelSet
 from auv_analysis.report.plots import FigureRecord
-from auv_analysis.report.results import numbers_of
+from auv_analysis.report.results import Table, numbers_of
 from auv_dynamics.kernel.compile import sources_digest
 
-Cell = results.Cell
 NUMBERS = 'numbers.parquet'  # beside the report: every number that its tables show
-
-
-@dataclass(frozen=True)
-class Column:
-    """Head of a column.
-
-    Attributes
-    ----------
-    label : short, indices with an underscore
-    unit : '' where there is none
-    meaning : one line for a reader without the paper
-    numeric : whether its cells are numbers, set right
-    group : columns with the same one stand under a common head
-
-    """
-
-    label: str
-    unit: str = ''
-    meaning: str = ''
-    numeric: bool = True
-    group: str = ''
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table that a reader can sort and download.
-
-    Attributes
-    ----------
-    name : its anchor, 'table-' before it, and the name of its CSV file
-    caption : what it shows, a sentence
-    columns : heads
-    rows : cells, as many as there are columns
-    stub : number of leading columns that name the row
-    note : below the table
-
-    """
-
-    name: str
-    caption: str
-    columns: Sequence[Column]
-    rows: Sequence[Sequence[Cell]]
-    stub: int = 1
-    note: str = ''
-
-    def __post_init__(self) -> None:
-        """Raise ValueError where a row has another number of cells than there are columns."""
-        for row in self.rows:
-            if len(row) != len(self.columns):
-                expected = f'{len(self.columns)} cells'
-                raise ValueError(f'{self.name}: expected {expected}, found {len(row)}')
-
-    @property
-    def heads(self) -> list[tuple[str, int]]:
-        """Common heads of columns, and how many columns each is above."""
-        runs = groupby(self.columns, key=lambda column: column.group)
-        return [(group, len(list(columns))) for group, columns in runs]
-
-    @property
-    def meanings(self) -> list[Column]:
-        """Columns whose meaning is said below the table."""
-        return [column for column in self.columns if column.meaning]
 
 
 @dataclass(frozen=True)
@@ -125,8 +61,7 @@ class Gallery:
     figures: Sequence[FigureRecord]
 
 
-AnyTable = Table | results.Table
-Block = str | Prose | Sentence | AnyTable | FigureRecord | Gallery
+Block = str | Prose | Sentence | Table | FigureRecord | Gallery
 
 
 @dataclass(frozen=True)
@@ -138,9 +73,9 @@ class Section:
     blocks: Sequence[Block]
 
     @property
-    def tables(self) -> list[AnyTable]:
+    def tables(self) -> list[Table]:
         """Its tables."""
-        return [block for block in self.blocks if isinstance(block, Table | results.Table)]
+        return [block for block in self.blocks if isinstance(block, Table)]
 
     @property
     def figures(self) -> list[FigureRecord]:
@@ -149,30 +84,16 @@ class Section:
         return [one for some in members for one in some if isinstance(one, FigureRecord)]
 
 
-def cell(value: float | None, source: str = '', *, digits: int = 3, kind: str = '') -> Cell:
-    """Cell of a number with so many significant digits, an en dash for None."""
-    if value is None:
-        return Cell(MISSING)
-    return Cell(number(value, digits), float(value), source, kind or ('zero' if value == 0 else ''))
-
-
-def percent(share: float | None, source: str, *, digits: int = 3, kind: str = '') -> Cell:
-    """Cell of a share, 0 to 1 where `source` has it, in a column whose unit is %."""
-    value = None if share is None else 100 * share
-    return cell(value, f'{source}*100', digits=digits, kind=kind)
-
-
-def write_numbers(path: Path, tables: Sequence[AnyTable]) -> None:
+def write_numbers(path: Path, tables: Sequence[Table]) -> None:
     """Write a row for every number that some tables show.
 
     Parameters
     ----------
-    path : of the Parquet file; columns table, row, column, name, text, value, unit, source, where
-        name is that of a figure in a cell with several, else ''
+    path : of the Parquet file; columns table, row, column, text, value, unit, source
     tables : of one report
 
     """
-    columns = ('table', 'row', 'column', 'name', 'text', 'value', 'unit', 'source')
+    columns = ('table', 'row', 'column', 'text', 'value', 'unit', 'source')
     types = [(column, pa.float64() if column == 'value' else pa.string()) for column in columns]
     rows = list(numbers_of(tables))
     parquet.write_table(pa.Table.from_pylist(rows, schema=pa.schema(types)), path)
@@ -182,7 +103,6 @@ HERE = Path(__file__).parent
 KINDS = {
     Prose: 'prose',
     Table: 'table',
-    results.Table: 'table',
     FigureRecord: 'picture',
     Gallery: 'gallery',
     Sentence: 'sentence',

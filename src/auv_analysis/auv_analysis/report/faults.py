@@ -15,16 +15,18 @@ from auv_analysis.metrics.fault_response import (
     PARTS,
     SHORTEST,
     Response,
+    fault_rows,
     responses,
     write_responses,
 )
-from auv_analysis.metrics.quantities import SIGNALS, WRENCH, mathtext
+from auv_analysis.metrics.quantities import SIGNALS, mathtext
 from auv_analysis.metrics.summary import BAND_TEXT, TRANSIENT
-from auv_analysis.output.text import MISSING, Maths, fixed, join, number
+from auv_analysis.output.text import Maths, join, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import Sketch, sketches
-from auv_analysis.report.document import Block, Cell, Column, Section, Sentence, Table, cell
+from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.plots import DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
+from auv_analysis.report.results import Shown, Table, described, view_of_file
 from auv_analysis.report.run_plots import common_bands, left_out
 from auv_analysis.runs.run import AnyRun
 from auv_dynamics.vehicle import DOFS
@@ -160,20 +162,26 @@ def _look(n: int) -> dict[str, Any]:
 
 
 ERROR, EFFORT = Maths('RMS of ν_d − ν'), 'RMS of τ'
-COLUMNS = (
-    Column('', meaning='degree of freedom', numeric=False),
-    Column('controller', meaning='name of the run', numeric=False),
-    Column('before', '', 'RMS of the velocity error before the fault; m/s, rad/s', group=ERROR),
-    Column('during', '', 'the same while it is there', group=ERROR),
-    Column('after', '', 'the same behind it', group=ERROR),
-    Column('max', '', Maths('largest |ν_d − ν| during the fault; m/s, rad/s')),
-    Column('band', '', f'of a settled error: {BAND_TEXT}; m/s, rad/s'),
-    Column('recovery', 's', 'time behind the end of the fault from which the error stays within'),
-    Column('before', '', 'RMS of the command before the fault; N, N m', group=EFFORT),
-    Column('during', '', 'the same while it is there', group=EFFORT),
-    Column('after', '', 'the same behind it', group=EFFORT),
-    Column('unit', numeric=False),
-)
+BEFORE, AFTER = 'before the fault', 'the same behind it'
+SHOWN: dict[str, Shown] = {
+    'dof': described('', 'degree of freedom'),
+    'controller': described('controller', 'name of the run'),
+    'rms_before': described(
+        'before', f'RMS of the velocity error {BEFORE}; m/s, rad/s', group=ERROR
+    ),
+    'rms_during': described('during', 'the same while it is there', group=ERROR),
+    'rms_after': described('after', AFTER, group=ERROR),
+    'max_during': described('max', Maths('largest |ν_d − ν| during the fault; m/s, rad/s')),
+    'band': described('band', f'of a settled error: {BAND_TEXT}; m/s, rad/s'),
+    'recovery': described(
+        'recovery', 'time behind the end of the fault from which the error stays within', 's',
+        decimals=2,
+    ),
+    'effort_before': described('before', f'RMS of the command {BEFORE}; N, N m', group=EFFORT),
+    'effort_during': described('during', 'the same while it is there', group=EFFORT),
+    'effort_after': described('after', AFTER, group=EFFORT),
+    'effort_unit': 'unit',
+}  # fmt: skip
 
 
 def fault_tables(found: Mapping[str, Sequence[Response]]) -> Iterator[Table]:
@@ -184,16 +192,14 @@ def fault_tables(found: Mapping[str, Sequence[Response]]) -> Iterator[Table]:
     found : controller -> `responses(run)`, of one scenario
 
     """
-    of_fault: dict[int, list[tuple[str, Response]]] = {}
-    for name, several in found.items():
-        for response in several:
-            of_fault.setdefault(response.mark.number, []).append((name, response))
-    for index, members in of_fault.items():
-        first = members[0][1]
-        members.sort(key=lambda pair: DOFS.index(pair[1].dof))
+    stored = list(enumerate(fault_rows(found)))
+    every = {one.mark.number: one for several in found.values() for one in several}
+    for index, first in every.items():
+        mine = [(i, row) for i, row in stored if row['fault'] == index]
+        mine.sort(key=lambda pair: DOFS.index(pair[1]['dof']))
         caption = f'Fault {index}: {first.mark.label}, {first.mark.times}. {_times(first)}'
-        rows = [_row(name, response) for name, response in members]
-        yield Table(f'faults_{index}', caption, COLUMNS, rows, stub=2)
+        places, rows = zip(*mine, strict=True)
+        yield view_of_file(f'faults_{index}', caption, rows, SHOWN, FILE, places, stub=2)
 
 
 def _times(response: Response) -> str:
@@ -206,23 +212,3 @@ def _times(response: Response) -> str:
     until = '' if response.until is None else f'; recovery is looked for up to {response.until:g} s'
     text = ', '.join(texts)
     return f'{text[0].upper()}{text[1:]} ({note}){until}.'
-
-
-def _row(name: str, response: Response) -> list[Cell]:
-    def three(values: Sequence[float | None], key: str) -> list[Cell]:
-        pairs = zip(values, PARTS, strict=True)
-        return [cell(value, f'{FILE}:{key}_{part}') for value, part in pairs]
-
-    recovery = response.recovery
-    return [
-        Cell(response.dof),
-        Cell(name),
-        *three(response.rms, 'rms'),
-        cell(response.peak[1], f'{FILE}:max_during'),
-        cell(response.band, f'{FILE}:band'),
-        Cell(MISSING)
-        if recovery is None
-        else Cell(fixed(recovery, 2), recovery, f'{FILE}:recovery'),
-        *three(response.effort, 'effort'),
-        Cell(WRENCH[DOFS.index(response.dof) // 3]),
-    ]

@@ -87,7 +87,6 @@ class Cell:
     source : where that number is stored: 'draws.parquet:effort[3]' or
         'summary.json:/gvc/effort/rms/0'; '*100' behind it where it is shown in %
     kind : of its look: 'zero', 'good', 'bad', 'badge'
-    figures : name -> number, of a text with several
     remark : below the text, smaller
     anchor : of a row's first cell: that of the row
 
@@ -97,7 +96,6 @@ class Cell:
     value: float | None = None
     source: str = ''
     kind: str = ''
-    figures: Mapping[str, float] = field(default_factory=dict)
     remark: str = ''
     anchor: str = ''
 
@@ -337,7 +335,7 @@ def known(value: Any) -> Any:
 
 
 def numbers_of(tables: Iterable[Any]) -> Iterator[dict[str, Any]]:
-    """Every number that some tables show: table, row, column, name, text, value, unit, source."""
+    """Every number that some tables show: table, row, column, text, value, unit, source."""
     for table in tables:
         heads = table.columns
         for row in table.rows:
@@ -350,9 +348,7 @@ def numbers_of(tables: Iterable[Any]) -> Iterator[dict[str, Any]]:
                 }
                 about = {'text': entry.text, 'unit': head.unit, 'source': entry.source}
                 if entry.value is not None:
-                    yield {**where, 'name': '', 'value': float(entry.value), **about}
-                for name, value in entry.figures.items():
-                    yield {**where, 'name': name, 'value': float(value), **about}
+                    yield {**where, 'value': float(entry.value), **about}
 
 
 def terminal(table: Table, *, title: bool = False) -> rich_table.Table:
@@ -400,6 +396,20 @@ Shown = Column | Quantity | str  # what a column of a table is
 Keys = tuple[str | int, ...]  # of a value in a document: a JSON pointer before it is spelled
 
 
+def view_of_file(
+    name: str,
+    caption: str,
+    rows: Rows,
+    shown: Mapping[str, Shown],
+    file: str,
+    places: Sequence[int],
+    **about: Any,
+) -> Table:
+    """Table of some rows of a Parquet file, which stand at these places in it."""
+    pointer = lambda row, column: f'{file}:{column}[{places[row]}]'  # noqa: E731
+    return make_table(name, caption, rows, shown, pointer=pointer, **about)
+
+
 def document_table(
     results: Results,
     name: str,
@@ -419,7 +429,8 @@ def document_table(
     about : note, stub and anchor of `Table`
 
     """
-    data = [{column: _value(results.facts, entry) for column, entry in row.items()} for row in rows]
+    facts = results.facts
+    data = [{column: _value(facts, row.get(column)) for column in {**shown, **row}} for row in rows]
 
     def pointer(i: int, column: str) -> str:
         entry = rows[i].get(column)
@@ -443,6 +454,6 @@ def _value(document: Mapping[str, Any], entry: Any) -> Any:
     return value
 
 
-def labelled(label: str, meaning: str = '', unit: str = '') -> Quantity:
-    """Quantity of a column that no registry has: head, one line of meaning, unit."""
-    return Quantity('', unit, label, '', meaning)
+def described(label: str, meaning: str = '', unit: str = '', **look: Any) -> Column:
+    """Column of what is no quantity of the registry: head, one line of meaning, unit, look."""
+    return Column(Quantity('', unit, label, '', meaning), **look)

@@ -9,7 +9,7 @@ from auv_analysis.metrics.coupling import input_deformation, velocity_deformatio
 from auv_analysis.metrics.quantities import METRICS, SIGNALS, VELOCITY, WRENCH, Quantity
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import join, number, plain
-from auv_analysis.report.results import Column, Table, make_table
+from auv_analysis.report.results import Column, Table, described, make_table
 from auv_analysis.report.scenario_text import SetUp, gain_text
 from auv_analysis.runs.run import FOREIGN, Facts
 from auv_dynamics.vehicle import DOFS
@@ -28,11 +28,6 @@ def pointer(*keys: object, file: str = 'summary.json') -> str:
     """Where a number stands in a JSON file: a JSON pointer behind the file's name."""
     parts = (str(key).replace('~', '~0').replace('/', '~1') for key in keys)
     return f'{file}:/{"/".join(parts)}'
-
-
-def described(label: str, meaning: str, unit: str = '', **look: Any) -> Column:
-    """Column of what is no quantity of the registry."""
-    return Column(Quantity('', unit, label, '', meaning), **look)
 
 
 def controllers_table(runs: Mapping[str, Facts]) -> Table:

@@ -1,6 +1,5 @@
 """How strongly the inertia of vehicles couples their degrees of freedom, without units."""
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -8,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-from pyarrow import parquet
 
 from auv_analysis.metrics.coupling import NEGLIGIBLE, structural_zeros
 from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.progress import each
+from auv_analysis.report.results import Results
 from auv_analysis.scenario.scaling import scaled_case1
 from auv_analysis.scenario.scenario import scenario_from
 from auv_analysis.simulation.simulate import simulate
@@ -246,7 +244,6 @@ def reached(vehicle: str | Path) -> dict[str, Any]:
     }
 
 
-TABLE, DOCUMENT = 'atlas.parquet', 'atlas.json'
 MATRICES = ('M', 'Upsilon', 'Upsilon_inv', 'correlation',
             'velocity_shares_percent', 'input_shares_percent')  # fmt: skip
 WHOLE = ('diagonal', 'strength_percent', 'largest_correlation_percent')
@@ -287,20 +284,13 @@ def charts(vehicles: Iterable[str]) -> list[Chart]:
     return sorted(found, key=lambda chart: (-chart.couplings.strength, chart.name))
 
 
-def document(found: Sequence[Chart]) -> dict[str, Any]:
-    """The atlas, ready for JSON: vehicle -> its numbers."""
+def results_of(found: Sequence[Chart]) -> Results:
+    """The atlas: vehicle -> its numbers, and a table with a row per vehicle and ordered pair."""
     vehicles = {chart.name: chart.couplings.as_dict() | {'case1': chart.reached} for chart in found}
-    return {'dofs': list(DOFS), 'vehicles': vehicles}
-
-
-def write_atlas(found: Sequence[Chart], out: Path) -> dict[str, Any]:
-    """Write atlas.json and atlas.parquet, a row per vehicle and ordered pair; returns the first."""
-    whole = document(found)
-    text = json.dumps(whole, indent=1, allow_nan=False)
-    (out / DOCUMENT).write_text(text + '\n', encoding='utf-8')
-    rows = [row for name, entry in whole['vehicles'].items() for row in _rows(name, entry)]
-    parquet.write_table(pa.Table.from_pylist(rows), out / TABLE)
-    return whole
+    results = Results('atlas', {'dofs': list(DOFS), 'vehicles': vehicles})
+    rows = [row for name, entry in vehicles.items() for row in _rows(name, entry)]
+    results.add('atlas', 'Couplings of ordered pairs of degrees of freedom', rows, {})
+    return results
 
 
 def _rows(name: str, entry: dict[str, Any]) -> Iterator[dict[str, Any]]:

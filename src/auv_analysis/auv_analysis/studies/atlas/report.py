@@ -2,20 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from auv_analysis.metrics.quantities import VELOCITY, WRENCH
 from auv_analysis.output.text import Maths, join, number
-from auv_analysis.report.document import (
-    Cell,
-    Column,
-    Section,
-    Sentence,
-    Table,
-    cell,
-    write_document,
-)
-from auv_analysis.report.plots import ALWAYS, FigureRecord
-from auv_analysis.report.tables.sources import VELOCITY, WRENCH, count, pointer
-from auv_analysis.studies.atlas.atlas import DOCUMENT, TABLE, Chart
+from auv_analysis.report.document import Section, Sentence, write_document
+from auv_analysis.report.plots import FigureRecord
+from auv_analysis.report.results import Results, Shown, Table, described, document_table
+from auv_analysis.studies.atlas.atlas import Chart, results_of
 from auv_analysis.studies.atlas.plots import uncoupled
 from auv_dynamics.vehicle import DOFS
 
@@ -47,17 +43,22 @@ def write_report(out: Path, charts: Sequence[Chart], figures: Mapping[str, Figur
     figures : of `draw`
 
     """
+    results = results_of(charts)
     sections = [
-        Section('strength', 'Strength', [MEASURE, ranking(charts), figures['strength'],
-                                         figures['correlation']]),
-        Section('structure', 'Which deforms which', [SHARES, figures['shares'], pairs(charts)]),
-        Section('case1', 'What case 1 reaches', [reached(charts, 'delta_xi'),
-                figures['case1_delta_xi'], reached(charts, 'delta_pi'),
-                figures['case1_delta_pi']]),
+        Section('strength', 'Strength', [
+            MEASURE, ranking(results, charts), figures['strength'], figures['correlation'],
+        ]),
+        Section('structure', 'Which deforms which', [
+            SHARES, figures['shares'], pairs(results, charts),
+        ]),
+        Section('case1', 'What case 1 reaches', [
+            block for kind in KINDS
+            for block in (reached(results, charts, kind), figures[f'case1_{kind}'])
+        ]),
     ]  # fmt: skip
     title = 'Coupling atlas'
     names = join([chart.name for chart in charts])
-    about = f'Couplings by inertia of {names}. All numbers: {TABLE} and {DOCUMENT}.'
+    about = f'Couplings by inertia of {names}. All numbers: atlas.parquet and atlas.json.'
     return write_document(out, title, about, findings(charts), sections)
 
 
@@ -97,95 +98,96 @@ def _largest(ran: Sequence[Chart], kind: str, symbol: str, units: Sequence[str])
     return [Sentence(text, f'table-case1_{kind}')]
 
 
-def ranking(charts: Sequence[Chart]) -> Table:
+def ranking(results: Results, charts: Sequence[Chart]) -> Table:
     """Vehicles by the strength of their coupling."""
-    columns = [
-        Column('vehicle', numeric=False),
-        Column('strength', '%', 'largest part of all cross terms, of the energy without them'),
-        Column('largest pair', '%', 'largest inertial correlation of two degrees of freedom'),
-        Column('between', '', 'the two that it couples', numeric=False),
-        Column('pairs', '', 'pairs that inertia couples, of 15'),
-        Column('Δξ always zero', '', 'velocities that no motion deforms', numeric=False),
-        Column('Δπ always zero', '', 'inputs that nothing deforms', numeric=False),
-        Column('damping couples', '', 'pairs that the damping of the file couples', numeric=False),
+    shown: dict[str, Shown] = {
+        'vehicle': 'vehicle',
+        'strength_percent': described(
+            'strength', 'largest part of all cross terms, of the energy without them', '%'
+        ),
+        'largest_correlation_percent': described(
+            'largest pair', 'largest inertial correlation of two degrees of freedom', '%'
+        ),
+        'between': described('between', 'the two that it couples'),
+        'pair_count': described('pairs', 'pairs that inertia couples, of 15'),
+        'delta_xi': described('Δξ always zero', 'velocities that no motion deforms'),
+        'delta_pi': described('Δπ always zero', 'inputs that nothing deforms'),
+        'damped': described('damping couples', 'pairs that the damping of the file couples'),
+    }
+    numbers = ('strength_percent', 'largest_correlation_percent', 'pair_count')
+    rows = [
+        {
+            'vehicle': chart.name,
+            **{key: ('vehicles', chart.name, key) for key in numbers},
+            'between': '–'.join(known.pairs[0]) if known.pairs else 'none',
+            **{kind: _words(known.zeros[kind]) for kind in KINDS},
+            'damped': ', '.join('–'.join(pair) for pair in known.damped) or 'none',
+        }
+        for chart in charts
+        for known in [chart.couplings]
     ]
-    rows = []
-    for chart in charts:
-        known, base = chart.couplings, pointer(DOCUMENT, 'vehicles', chart.name)
-        rows.append((
-            Cell(chart.name, remark='Upsilon = I' if known.is_diagonal else ''),
-            cell(PERCENT * known.strength, f'{base}/strength_percent'),
-            cell(PERCENT * known.largest, f'{base}/largest_correlation_percent'),
-            Cell('–'.join(known.pairs[0]) if known.pairs else 'none'),
-            count(len(known.pairs), f'{base}/pair_count'),
-            *(Cell(_words(known.zeros[kind])) for kind in KINDS),
-            Cell(', '.join('–'.join(pair) for pair in known.damped) or 'none'),
-        ))  # fmt: skip
-    return Table('ranking', 'Vehicles by the strength of inertial coupling.', columns, rows)
+    caption = 'Vehicles by the strength of inertial coupling.'
+    return document_table(results, 'ranking', caption, rows, shown)
 
 
 def _words(dofs: Sequence[str]) -> str:
     return 'all six' if len(dofs) == 6 else ', '.join(dofs)
 
 
-def pairs(charts: Sequence[Chart]) -> Table:
+def pairs(results: Results, charts: Sequence[Chart]) -> Table:
     """Every pair that inertia couples, of every vehicle, the strongest first."""
-    columns = [
-        Column('vehicle', numeric=False),
-        Column('deformed', '', 'the one whose velocity component is deformed', numeric=False),
-        Column('by', '', 'the one that deforms it', numeric=False),
-        Column('correlation', '', Maths('inertial correlation M_ij / sqrt(M_ii M_jj)')),
-        Column(
-            'Δξ per velocity',
-            '',
-            Maths('entry of Υ^-1: Δξ of the one per velocity of the other'),
+    shown: dict[str, Shown] = {
+        'vehicle': 'vehicle',
+        'deformed': described('deformed', 'the one whose velocity component is deformed'),
+        'by': described('by', 'the one that deforms it'),
+        'correlation': described(
+            'correlation', Maths('inertial correlation M_ij / sqrt(M_ii M_jj)')
         ),
-        Column('its unit', '', numeric=False),
-        Column('Δξ share', '%', 'of the energy of a motion of "by" alone, found in "deformed"'),
-        Column(
-            'Δπ share', '%', 'of the energy that an impulse in "deformed" alone leaves, in "by"'
+        'entry': described(
+            'Δξ per velocity', Maths('entry of Υ^-1: Δξ of the one per velocity of the other')
         ),
-    ]
+        'unit': 'its unit',
+        'velocity': described(
+            'Δξ share', 'of the energy of a motion of "by" alone, found in "deformed"', '%'
+        ),
+        'input': described(
+            'Δπ share', 'of the energy that an impulse in "deformed" alone leaves, in "by"', '%'
+        ),
+    }
     rows = []
     for chart in charts:
-        known, base = chart.couplings, pointer(DOCUMENT, 'vehicles', chart.name)
-        for first, second in known.pairs:
+        base = 'vehicles', chart.name
+        for first, second in chart.couplings.pairs:
             i, j = DOFS.index(first), DOFS.index(second)
-            rows.append((
-                Cell(chart.name), Cell(first), Cell(second),
-                cell(known.correlation[i, j], f'{base}/correlation/{i}/{j}'),
-                cell(known.Upsilon_inv[i, j], f'{base}/Upsilon_inv/{i}/{j}'),
-                Cell(f'{VELOCITY[i // 3]} per {VELOCITY[j // 3]}'),
-                cell(PERCENT * known.velocity_shares[i, j],
-                     f'{base}/velocity_shares_percent/{i}/{j}'),
-                cell(PERCENT * known.input_shares[j, i], f'{base}/input_shares_percent/{j}/{i}'),
-            ))  # fmt: skip
+            rows.append({
+                'vehicle': chart.name, 'deformed': first, 'by': second,
+                'correlation': (*base, 'correlation', i, j),
+                'entry': (*base, 'Upsilon_inv', i, j),
+                'unit': f'{VELOCITY[i // 3]} per {VELOCITY[j // 3]}',
+                'velocity': (*base, 'velocity_shares_percent', i, j),
+                'input': (*base, 'input_shares_percent', j, i),
+            })  # fmt: skip
     caption = 'Pairs that inertia couples, the strongest of each vehicle first.'
-    return Table('pairs', caption, columns, rows, stub=3)
+    return document_table(results, 'pairs', caption, rows, shown, stub=3)
 
 
-def reached(charts: Sequence[Chart], kind: str) -> Table:
+def reached(results: Results, charts: Sequence[Chart], kind: str) -> Table:
     """Peaks of a deformation in case 1 scaled to each vehicle."""
     symbol, units = KINDS[kind]
-    columns = [Column('vehicle', numeric=False)]
-    columns += [Column(dof, units[i // 3], group=symbol) for i, dof in enumerate(DOFS)]
+    shown: dict[str, Shown] = {'vehicle': 'vehicle'}
+    shown |= {dof: described(dof, '', units[i // 3], group=symbol) for i, dof in enumerate(DOFS)}
     if kind == 'delta_xi':
         meaning = 'largest 1/2 N_i Δξ_i^2 of the six at its peak, of the mean kinetic energy'
-        columns.append(Column('energy', '%', Maths(meaning)))
-    rows = [_peaks(chart, kind) for chart in charts if not chart.reached['failure']]
+        shown['energy'] = described('energy', Maths(meaning), '%')
+    rows: list[dict[str, Any]] = []
+    for chart in charts:
+        if chart.reached['failure']:
+            continue
+        base, always = ('vehicles', chart.name, 'case1'), chart.couplings.zeros[kind]
+        peaks = {d: (*base, f'{kind}_max', i) for i, d in enumerate(DOFS) if d not in always}
+        energy = int(np.argmax(chart.reached['delta_xi_energy_percent']))
+        most = {'energy': (*base, 'delta_xi_energy_percent', energy)}
+        rows.append({'vehicle': chart.name} | peaks | most)
     caption = f'Largest {symbol} in case 1 scaled to each vehicle, under GVC.'
-    note = f'{ALWAYS}: zero for every motion, by the structure of M.'
-    return Table(f'case1_{kind}', caption, columns, rows, note=note)
-
-
-def _peaks(chart: Chart, kind: str) -> tuple[Cell, ...]:
-    base, always = pointer(DOCUMENT, 'vehicles', chart.name, 'case1'), chart.couplings.zeros[kind]
-    cells = [Cell(chart.name)]
-    for i, dof in enumerate(DOFS):
-        value, source = chart.reached[f'{kind}_max'][i], f'{base}/{kind}_max/{i}'
-        cells.append(Cell(ALWAYS, 0.0, source, 'zero') if dof in always else cell(value, source))
-    if kind == 'delta_xi':
-        shares = chart.reached['delta_xi_energy_percent']
-        i = max(range(6), key=shares.__getitem__)
-        cells.append(cell(shares[i], f'{base}/delta_xi_energy_percent/{i}'))
-    return tuple(cells)
+    note = 'En dash: zero for every motion, by the structure of M.'
+    return document_table(results, f'case1_{kind}', caption, rows, shown, note=note)

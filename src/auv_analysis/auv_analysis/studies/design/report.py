@@ -14,8 +14,8 @@ from auv_analysis.report.results import (
     Results,
     Shown,
     Table,
+    described,
     document_table,
-    labelled,
     terminal,
 )
 from auv_analysis.studies.design.change import part_words
@@ -166,12 +166,11 @@ def measures_table(results: Results) -> Table:
     for row in rows:
         name = row['name']
         row['kind'] = 'bad' if name in worse else 'good' if name == target else ''
-    changed = labelled('change', '"=": none; "new": there was none before')
     shown: dict[str, Shown] = {
-        'name': Column(labelled('', 'metric of summary.json'), kind='kind'),
-        'before': labelled('before', 'with the vehicle as it is'),
-        'after': labelled('after', 'with the changed vehicle'),
-        'change': Column(changed, kind='kind'),
+        'name': described('', 'metric of summary.json', kind='kind'),
+        'before': described('before', 'with the vehicle as it is'),
+        'after': described('after', 'with the changed vehicle'),
+        'change': described('change', '"=": none; "new": there was none before', kind='kind'),
         'unit': 'unit',
     }
     caption = f'Metrics of the run under {document["controller"]} before and after the change.'
@@ -209,10 +208,10 @@ def ranking_table(results: Results) -> Table:
     )
     peak = 'largest magnitude over the run'
     shown: dict[str, Shown] = {
-        'coupling': labelled('', 'coupling'),
-        'share before': Column(labelled('before', share), 'share'),
+        'coupling': described('', 'coupling'),
+        'share before': described('before', share, group='share'),
         'share after': Column('after', 'share'),
-        'largest before': Column(labelled('before', peak), 'largest'),
+        'largest before': described('before', peak, group='largest'),
         'largest after': Column('after', 'largest'),
         'unit': 'unit',
     }
@@ -234,10 +233,10 @@ def matrix_table(results: Results) -> Table:
             row |= {part: ('alternatives', i, 'ratio')}
             row |= {f'kind {part}': 'good' if ratio <= HALF else ''}
     shown: dict[str, Shown] = {
-        'coupling': labelled('', 'coupling that the change was made for'),
+        'coupling': described('', 'coupling that the change was made for'),
         **{
-            part: Column(
-                labelled(part_words(part), 'of it left, largest magnitude; –: cannot be run'),
+            part: described(
+                part_words(part), 'of it left, largest magnitude; –: cannot be run',
                 decimals=1, scale=100.0, kind=f'kind {part}',
             )
             for part in parts
@@ -266,11 +265,11 @@ def alternatives_table(results: Results) -> Table:
     ]
     predicted = 'largest magnitude after by before, in an earlier run’s motion'
     shown: dict[str, Shown] = {
-        'part': labelled('', 'what may change'),
-        'predicted': labelled('predicted', predicted),
-        'ratio': labelled('simulated', 'the same, by the changed vehicle’s own run'),
-        'score': labelled('score', 'the objective function'),
-        'values': labelled('values', 'm, kg and deg'),
+        'part': described('', 'what may change'),
+        'predicted': described('predicted', predicted),
+        'ratio': described('simulated', 'the same, by the changed vehicle’s own run'),
+        'score': described('score', 'the objective function'),
+        'values': described('values', 'm, kg and deg'),
         'mark': '',
     }
     caption = f'Changes against {reduced} that were simulated.'
@@ -292,13 +291,13 @@ def parameters_table(results: Results) -> Table:
     ]
     unchanged = '– where that part of the vehicle is not changed'
     shown: dict[str, Shown] = {
-        'name': labelled('', 'parameter'),
-        'value': Column(labelled('value', unchanged), digits=4),
+        'name': described('', 'parameter'),
+        'value': described('value', unchanged, digits=4),
         'lower': Column('lower', digits=4),
         'upper': Column('upper', digits=4),
         'unit': 'unit',
-        'at': Column(labelled('at bound', 'the bound that the value lies on'), kind='kind'),
-        'reason': labelled('bounds', 'where they come from'),
+        'at': described('at bound', 'the bound that the value lies on', kind='kind'),
+        'reason': described('bounds', 'where they come from'),
     }
     caption = 'The change and the bounds that it was kept within.'
     return document_table(results, 'parameters', caption, rows, shown)

@@ -11,7 +11,7 @@ from auv_analysis.output.progress import console, say, waiting
 from auv_analysis.output.text import join, number
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
-from auv_analysis.report.results import Column, Table, make_table, terminal
+from auv_analysis.report.results import Column, Table, described, make_table, terminal, view_of_file
 from auv_analysis.studies.sweep.analysis import BEST_BY, Analysis, Row, analysed, results_of
 from auv_analysis.studies.sweep.dataset import STATUSES, open_sweep, short_names
 from auv_dynamics.files.errors import FailedError, InputError
@@ -26,65 +26,63 @@ MATTERS = 5.0  # %: less is not said
 Shown = dict[str, Column | Quantity | str]
 
 
-def _what(label: str, meaning: str = '', unit: str = '') -> Quantity:
-    return Quantity('', unit, label, '', meaning)
-
-
 QUANTILES: Shown = {
-    'smallest': _what('smallest'),
-    'low': _what('5 %', 'a twentieth of the rows is at or below'),
-    'quarter': _what('25 %'),
-    'median': _what(
+    'smallest': described('smallest'),
+    'low': described('5 %', 'a twentieth of the rows is at or below'),
+    'quarter': described('25 %'),
+    'median': described(
         'median', 'half of the rows are at or below; of a time that may not exist, of all'
     ),
-    'three_quarters': _what('75 %'),
-    'high': _what('95 %'),
-    'largest': _what('largest', 'of those that exist'),
+    'three_quarters': described('75 %'),
+    'high': described('95 %'),
+    'largest': described('largest', 'of those that exist'),
 }
 COUNTS: Shown = {
     'controller': 'controller',
     'rows': 'rows',
-    'ok': _what('ok', 'came to its end'),
-    'diverged': _what('diverged', 'left the finite numbers: a result'),
-    'refused': _what('refused', 'its values make no scenario'),
+    'ok': described('ok', 'came to its end'),
+    'diverged': described('diverged', 'left the finite numbers: a result'),
+    'refused': described('refused', 'its values make no scenario'),
 }
 PATHS: Shown = {
-    'path': _what('path', 'where the value stands: scenario, or vehicle file'),
+    'path': described('path', 'where the value stands: scenario, or vehicle file'),
     'unit': 'unit',
     'meaning': 'meaning',
-    'group': _what('group', 'how the campaign chooses its values'),
+    'group': described('group', 'how the campaign chooses its values'),
     'values': 'values',
-    'groups': _what('different', 'values or, of many numbers, bins that are told apart'),
+    'groups': described('different', 'values or, of many numbers, bins that are told apart'),
 }
 SPREADS: Shown = {
     'label': 'measure',
     'controller': 'controller',
     'unit': 'unit',
-    'known': _what('exists in', 'rows with such a value'),
+    'known': described('exists in', 'rows with such a value'),
     **QUANTILES,
 }
 PAIRED: Shown = {
     'label': 'measure',
-    'controller': _what('of', 'controller'),
-    'other': _what('against', 'another one in the same rollouts'),
-    'rollouts': _what('rollouts', 'that both came to the end of'),
-    'smaller_percent': _what('smaller in', 'rollouts where the first one’s value is smaller', '%'),
-    'equal_percent': _what('equal in', 'rollouts where both are equal', '%'),
-    'effect': _what(
+    'controller': described('of', 'controller'),
+    'other': described('against', 'another one in the same rollouts'),
+    'rollouts': described('rollouts', 'that both came to the end of'),
+    'smaller_percent': described(
+        'smaller in', 'rollouts where the first one’s value is smaller', '%'
+    ),
+    'equal_percent': described('equal in', 'rollouts where both are equal', '%'),
+    'effect': described(
         'effect', 'rank-biserial correlation: below 0 where the first one’s is smaller'
     ),
-    'ratio': _what('ratio', 'of the first to the second, after Hodges and Lehmann'),
-    'ratio_low': _what('from', '95 % interval of that ratio, by the signed-rank test'),
+    'ratio': described('ratio', 'of the first to the second, after Hodges and Lehmann'),
+    'ratio_low': described('from', '95 % interval of that ratio, by the signed-rank test'),
     'ratio_high': 'to',
 }
 INFLUENCE: Shown = {
     'figure': 'measure',
     'controller': 'controller',
     'path': 'path',
-    'explained_percent': _what(
+    'explained_percent': described(
         'explained', 'variance of the ranks between the groups of the path', '%'
     ),
-    'spearman': _what('Spearman', 'rank correlation with the path: its sign is the direction'),
+    'spearman': described('Spearman', 'rank correlation with the path: its sign is the direction'),
 }
 INDEX: Shown = {
     'figure': 'measure',
@@ -92,32 +90,32 @@ INDEX: Shown = {
     'path': 'path',
     'with': 'with',
     'case': 'case',
-    'points': _what('points', 'base points or trajectories that came to their end'),
+    'points': described('points', 'base points or trajectories that came to their end'),
 }
 HALF = 'half of the 95 % interval'
 SOBOL: Shown = {
-    'S1': _what('S_1', 'share of the variance by this path alone'),
-    'S1_conf': _what('±', f'{HALF} of S_1, by bootstrap'),
-    'ST': _what('S_T', 'share of the variance by this path with all its interactions'),
-    'ST_conf': _what('±', f'{HALF} of S_T'),
+    'S1': described('S_1', 'share of the variance by this path alone'),
+    'S1_conf': described('±', f'{HALF} of S_1, by bootstrap'),
+    'ST': described('S_T', 'share of the variance by this path with all its interactions'),
+    'ST_conf': described('±', f'{HALF} of S_T'),
 }
 INTERACTIONS: Shown = {
-    'S2': _what('S_2', 'share of the variance by both together alone'),
-    'S2_conf': _what('±', HALF),
+    'S2': described('S_2', 'share of the variance by both together alone'),
+    'S2_conf': described('±', HALF),
 }
 MORRIS: Shown = {
-    'mu_star': _what('μ*', 'mean size of the effect of going through the whole range'),
-    'mu_star_conf': _what('±', f'{HALF} of μ*'),
-    'mu': _what('μ', 'mean effect'),
-    'sigma': _what('σ', 'standard deviation of the effects: curvature and interactions'),
+    'mu_star': described('μ*', 'mean size of the effect of going through the whole range'),
+    'mu_star_conf': described('±', f'{HALF} of μ*'),
+    'mu': described('μ', 'mean effect'),
+    'sigma': described('σ', 'standard deviation of the effects: curvature and interactions'),
 }
 FAILURES: Shown = {
     'path': 'path',
     'value': 'value',
     'controller': 'controller',
     'rows': 'rows',
-    'diverged_percent': _what('diverged', '', '%'),
-    'refused_percent': _what('refused', '', '%'),
+    'diverged_percent': described('diverged', '', '%'),
+    'refused_percent': described('refused', '', '%'),
 }
 
 
@@ -221,18 +219,11 @@ def _listings(folder: Path) -> list[tuple[str, str]]:
 
 
 def _view(
-    name: str,
-    caption: str,
-    numbered: Any,
-    shown: Shown,
-    file: str = '',
-    **about: Any,
+    name: str, caption: str, numbered: Any, shown: Shown, file: str = '', **about: Any
 ) -> Table:
-    """Some rows of a Parquet file, with their places in it."""
+    """Some numbered rows of a Parquet file, of the table's name unless another is told."""
     places, rows = zip(*numbered, strict=True)
-    file = f'{file or name}.parquet'
-    pointer = lambda row, column: f'{file}:{column}[{places[row]}]'  # noqa: E731
-    return make_table(name, caption, rows, shown, pointer=pointer, **about)
+    return view_of_file(name, caption, rows, shown, f'{file or name}.parquet', places, **about)
 
 
 def _of_document(name: str, key: str, caption: str, rows: Sequence[Row], **about: Any) -> Table:
@@ -315,9 +306,9 @@ def _best(analysis: Analysis) -> Table:
     rows = analysis.tables['best']
     names = short_names(analysis.factors)
     shown: Shown = {key: key for key in ('controller', 'rank', 'rollout')}
-    shown |= {f.path: Column(_what(names[f.path], f.meaning, f.unit), digits=4)
+    shown |= {f.path: described(names[f.path], f.meaning, f.unit, digits=4)
               for f in analysis.factors}  # fmt: skip
-    shown |= {m.name: Column(_what(m.label, m.meaning, m.unit), digits=4)
+    shown |= {m.name: described(m.label, m.meaning, m.unit, digits=4)
               for m in analysis.measures}  # fmt: skip
     caption = f'Rollouts with the smallest {BY_NAME[rows[0]["by"]].label}, of each controller.'
     return _view('best', caption, enumerate(rows), shown)

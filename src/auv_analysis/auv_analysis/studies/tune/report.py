@@ -16,8 +16,8 @@ from auv_analysis.report.results import (
     Results,
     Shown,
     Table,
+    described,
     document_table,
-    labelled,
     terminal,
 )
 from auv_analysis.report.scenario_text import gain_text
@@ -48,7 +48,7 @@ SAME_LAW = (
     'With gains that are multiples of the full M (--structure inertia), CL and GVC are one and the '
     'same law: what tells them apart is the off-diagonal part of their gains alone.'
 )
-CONTROLLER = labelled('controller', 'as in scenario.yaml of this folder')
+CONTROLLER = described('controller', 'as in scenario.yaml of this folder')
 MULTIPLES = {
     'scalar': 'times the smallest to the largest M_ii: one number',
     'mass': 'times M_ii of each axis',
@@ -120,10 +120,10 @@ def print_tuning(tuning: Tuning) -> None:
     brief: dict[str, Shown] = {
         'controller': 'controller',
         'structure': 'structure',
-        tuning.request.index: labelled('error', unit='J'),
-        'effort': Column(labelled('effort', unit='J/s²'), digits=4),
+        tuning.request.index: described('error', unit='J'),
+        'effort': described('effort', unit='J/s²', digits=4),
         'equality': Column('equality', digits=2, scale=100.0),
-        'settling': labelled('settled', unit='s'),
+        'settling': described('settled', unit='s'),
         'ratio': 'draws',
     }
     shown = {n: c if isinstance(c, Column) else Column(c) for n, c in brief.items()}
@@ -159,14 +159,11 @@ def controllers_table(results: Results) -> Table:
     shown: dict[str, Shown] = {
         'controller': CONTROLLER,
         'law': 'law',
-        'structure': labelled('structure', 'what its gains multiply'),
+        'structure': described('structure', 'what its gains multiply'),
         **{name: Column(cost, digits=4) for name, cost in COSTS.items()},
-        'equality': Column(
-            labelled('from equality', distance),
-            digits=2, scale=100.0,
-        ),
-        'price': labelled('price', change),
-        'ratio': labelled('over draws', f'ratio of the {label} to the reference’s'),
+        'equality': described('from equality', distance, digits=2, scale=100.0),
+        'price': described('price', change),
+        'ratio': described('over draws', f'ratio of the {label} to the reference’s'),
     }  # fmt: skip
     caption = 'The scenario itself: what each controller costs and what it achieves.'
     return document_table(results, 'tuned', caption, rows, shown)
@@ -227,8 +224,8 @@ def _searched(results: Results) -> Table:
         'low': 'from',
         'high': 'to',
         'times': Column('stands for', look='maths'),
-        'evaluations': labelled('loops', 'closed loops that this search ran'),
-        'least': Column(labelled('least found', 'of the objective', cost.unit), digits=4),
+        'evaluations': described('loops', 'closed loops that this search ran'),
+        'least': described('least found', 'of the objective', cost.unit, digits=4),
     }
     caption = 'What was searched: bounds of each gain, in units of 1/s to the power it has.'
     return document_table(results, 'allowed', caption, rows, shown, stub=3)
@@ -250,11 +247,11 @@ def _draws(results: Results) -> Table:
     shown: dict[str, Shown] = {
         'controller': CONTROLLER,
         **{
-            f'{c} {q}': Column(labelled(quantiles[q], unit=COSTS[c].unit), COSTS[c].label)
+            f'{c} {q}': described(quantiles[q], unit=COSTS[c].unit, group=COSTS[c].label)
             for c, q in pairs
         },
-        'settled': Column(labelled('settled', inside), scale=100.0),
-        'diverged': Column(labelled('diverged', 'share of the draws'), scale=100.0),
+        'settled': described('settled', inside, scale=100.0),
+        'diverged': described('diverged', 'share of the draws', scale=100.0),
     }
     count = results.facts['monte_carlo']['samples']
     caption = f'Over {count} draws, the same for all.'
@@ -284,13 +281,13 @@ def _comparisons(results: Results) -> Table:
         'controller': CONTROLLER,
         'against': 'against',
         'measure': 'measure',
-        'ratio': labelled('ratio', ratio),
-        'low': labelled('from', '95 % interval of that ratio, by the test'),
+        'ratio': described('ratio', ratio),
+        'low': described('from', '95 % interval of that ratio, by the test'),
         'high': 'to',
-        'effect': labelled('effect', effect),
-        'smaller': Column(labelled('smaller', smaller), scale=100.0),
+        'effect': described('effect', effect),
+        'smaller': described('smaller', smaller, scale=100.0),
         'larger': Column('larger', scale=100.0),
-        'p_holm': Column(labelled('p', test), digits=2, kind='kind'),
+        'p_holm': described('p', test, digits=2, kind='kind'),
     }
     note = (
         f'The correction is for all {len(rows)} rows. Draws are made, not found: their number '

@@ -106,8 +106,7 @@ def _examine(
     from auv_analysis.herman2018.paper import CASES
     from auv_analysis.output.progress import waiting
     from auv_analysis.report.document import Section
-    from auv_analysis.studies.study.discussion import discussion
-    from auv_analysis.studies.study.procedure import sensitivity_section, write_samples
+    from auv_analysis.studies.study.procedure import discussion, sensitivity_section, write_samples
 
     for name, run in runs.items():
         with waiting(f'writing {name}.parquet'):

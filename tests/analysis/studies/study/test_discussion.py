@@ -5,12 +5,10 @@ from functools import cache
 
 import numpy as np
 import pyarrow.parquet as parquet
-import pytest
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.studies.study.discussion import discussion
-from auv_analysis.studies.study.procedure import write_samples
+from auv_analysis.studies.study.procedure import discussion, write_samples
 from auv_dynamics.vehicle import DOFS
 
 
@@ -37,23 +35,19 @@ def test_case1_as_the_paper_discusses_it():
         'velocity component of roll is deformed by up to 0.0514 rad/s',
         'the motion of yaw causes 100.0 % of it',
         'input of pitch is deformed by up to 840 N m',
-        'Structurally zero, for every motion and input, are Δξ of pitch and yaw and Δπ of surge, '
-        'sway and heave.',
     ):
         assert part in text, part
 
 
 def test_every_sentence_names_a_table():
-    anchors = {'table-key_figures', 'table-energy', 'table-terms', 'table-couplings'}
+    anchors = {'table-key_figures', 'table-energy', 'table-terms'}
     for name in ('case1', 'case1_rexrov'):
         assert {sentence.source for sentence in discussion(summaries(name), 'gvc')} == anchors
 
 
-def test_a_diagonal_vehicle_is_told_that_nothing_deforms():
+def test_nothing_deforms_a_diagonal_vehicle():
     text = said(summaries('case1_bluerov2_heavy'))
-    assert 'M is diagonal' in text
     assert 'deformed' not in text
-    assert 'Structurally' not in text
 
 
 def test_sentences_follow_the_numbers():
@@ -70,18 +64,6 @@ def test_sentences_follow_the_numbers():
         'Under gvc, sway does not settle within 30 s; of the others heave is last, after 3.00 s.'
         in said(found)
     )
-
-
-@pytest.mark.parametrize('factor', [1.9, 2.1])
-def test_errors_are_compared_only_where_they_differ_much(factor):
-    found = summaries()
-    mine = found['gvc']['velocity_error']['max_after_2s']
-    found['cl']['velocity_error']['max_after_2s'] = [factor * x for x in mine]
-    assert ('After 2 s the errors of cl exceed' in said(found)) == (factor > 2)
-    found['cl']['velocity_error']['max_after_2s'] = [x / factor for x in mine]
-    assert ('After 2 s the errors of gvc exceed' in said(found)) == (factor > 2)
-    found['cl']['velocity_error']['max_after_2s'] = None
-    assert 'After 2 s' not in said(found)
 
 
 def test_a_vehicle_at_rest_has_nothing_to_be_said_of_its_energy():

@@ -63,7 +63,7 @@ def write_report(out: Path, charts: Sequence[Chart], figures: Mapping[str, Figur
 
 
 def findings(charts: Sequence[Chart]) -> list[Sentence]:
-    """Sentences of the summary: strongest, without coupling, largest deformations, failures."""
+    """Sentences of the summary: strongest, without coupling, failures."""
     first = charts[0].couplings
     found = []
     if not first.is_diagonal:
@@ -74,28 +74,11 @@ def findings(charts: Sequence[Chart]) -> list[Sentence]:
             f'alone {number(PERCENT * first.largest)} %.'
         )
     sentences = [Sentence(text, 'table-ranking') for text in [*found, uncoupled(charts)] if text]
-    ran = [chart for chart in charts if not chart.reached['failure']]
-    for kind, (symbol, units) in KINDS.items():
-        sentences += _largest(ran, kind, symbol, units)
     failed = [chart.name for chart in charts if chart.reached['failure']]
     if failed:
         text = f'Case 1 diverges on {join(failed)}, which therefore have no peaks.'
         sentences.append(Sentence(text, 'case1'))
     return sentences
-
-
-def _largest(ran: Sequence[Chart], kind: str, symbol: str, units: Sequence[str]) -> list[Sentence]:
-    parts = []
-    for half, unit in zip((range(3), range(3, 6)), units, strict=True):
-        peaks = [(chart.reached[f'{kind}_max'][i], chart.name, DOFS[i])
-                 for chart in ran for i in half]  # fmt: skip
-        value, name, dof = max(peaks, default=(0.0, '', ''))
-        if value > 0:
-            parts.append(f'{number(value)} {unit} ({name}, {dof})')
-    if not parts:
-        return []
-    text = f'In case 1 scaled to each vehicle, {symbol} reaches at most {join(parts)}.'
-    return [Sentence(text, f'table-case1_{kind}')]
 
 
 def ranking(results: Results, charts: Sequence[Chart]) -> Table:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from auv_analysis.metrics.measures import BY_NAME, FAMILIES, MEASURES
+from auv_analysis.metrics.measures import FAMILIES, MEASURES
 from auv_analysis.metrics.quantities import Quantity, quantity
 from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.new_files import write_json
@@ -53,11 +53,6 @@ NAMED = {
 }
 SHARES = 'kinetic_energy.shares_percent'
 SETTLED = 'overall.velocity_error.settling_time'
-EXTREMES = {  # measures whose smallest and largest are said, and what they are called
-    'overall.velocity_error.rms.linear': 'rms linear velocity error',
-    'overall.velocity_error.rms.angular': 'rms angular velocity error',
-    'overall.effort.rms.linear': 'rms force',
-}
 RUNS = 'table-runs'
 MOST_NAMES = 6
 Rows = Sequence[Mapping[str, Any]]
@@ -195,7 +190,7 @@ def write_comparison(
         f'Every metric of every run: {TABLE} and {CSV}.'
     )
     title = f'Comparison of {len(entries)} runs'
-    said = findings(entries, table.to_pylist(), ranking)
+    said = findings(entries, table.to_pylist())
     return write_document(out, title, about, said, sections)
 
 
@@ -228,17 +223,16 @@ def _six_columns(family: str, group: str = '') -> dict[str, Any]:
     return {name: Column(replace(quantity(name), label=dof), group) for dof, name in names.items()}
 
 
-def findings(entries: Sequence[Entry], rows: Rows, ranking: Ranking) -> list[Sentence]:
-    """Sentences of the summary: what differs, who settles, the extremes, what cannot be compared.
+def findings(entries: Sequence[Entry], rows: Rows) -> list[Sentence]:
+    """Sentences of the summary: who settles, what differs, what cannot be compared.
 
     Parameters
     ----------
-    entries, rows, ranking : of the same runs
+    entries, rows : of the same runs
 
     """
     known = [row for row in rows if not row['failure']]
-    found = [_settled(known), *(_extremes(known, *which) for which in EXTREMES.items())]
-    found += [_uncoupled(entries), _differing(known), _diverged(rows)]
+    found = [_settled(known), _differing(known), _diverged(rows)]
     found += namesakes([entry.sketch for entry in entries if entry.sketch])
     return [Sentence(text, RUNS) for text in found if text]
 
@@ -256,32 +250,6 @@ def _settled(rows: Rows) -> str:
         return f'{text}: {first} after {number(settled[first])} s.'
     ends = f'{first} after {number(settled[first])} s, the last {last} after'
     return f'{text}, the first {ends} {number(settled[last])} s.'
-
-
-def _extremes(rows: Rows, name: str, word: str) -> str:
-    values = {row['run']: row[name] for row in rows if row[name] is not None}
-    if len(set(values.values())) < 2:
-        return ''
-    least, most = min(values, key=values.__getitem__), max(values, key=values.__getitem__)
-    unit = BY_NAME[name].unit
-    return (
-        f'The {word} goes from {number(values[least])} {unit} ({least}) to '
-        f'{number(values[most])} {unit} ({most}).'
-    )
-
-
-def _uncoupled(entries: Sequence[Entry]) -> str:
-    vehicles = dict.fromkeys(
-        entry.vehicle
-        for entry in entries
-        if entry.summary
-        and all(len(z) == 6 for z in entry.summary['coupling']['structural_zeros'].values())
-    )
-    if not vehicles:
-        return ''
-    verb = 'has' if len(vehicles) == 1 else 'have'
-    names = join(list(vehicles))
-    return f'{names} {verb} a diagonal M: Upsilon = I, nothing is coupled by inertia.'
 
 
 def _differing(rows: Rows) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.output.progress import TextConsole
-from auv_analysis.output.text import Maths, number, plain
+from auv_analysis.output.text import Maths, plain
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.results import (
@@ -91,20 +91,8 @@ def _findings(result: Design) -> Iterator[Sentence]:
     yield Sentence(document['statement'], source)
     if not document['measures']:
         return
-    first, *rest = document['ranking']
-    yield Sentence(_largest(first, rest), 'table-ranking')
     for warning in document['warnings']:
         yield Sentence(f'{warning[:1].upper()}{warning[1:]}.', 'proposal')
-
-
-def _largest(first: dict[str, Any], rest: Sequence[dict[str, Any]]) -> str:
-    share = number(100 * first['share']['before'], 2)
-    name = first['coupling']
-    text = f'The largest coupling of the vehicle as it was is {name}, {share} % of the motion'
-    if rest:
-        other = number(100 * rest[0]['share']['before'], 2)
-        text += f'; the next, {rest[0]["coupling"]}, {other} %'
-    return f'{text}.'
 
 
 def _sections(result: Design, figures: Mapping[str, FigureRecord]) -> list[Section]:

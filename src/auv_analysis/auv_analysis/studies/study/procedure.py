@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -10,9 +11,9 @@ from pyarrow import parquet
 
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.metrics.energy import kinetic_energy
-from auv_analysis.metrics.quantities import Quantity, gain_mathtext, quantity
+from auv_analysis.metrics.quantities import VELOCITY, WRENCH, Quantity, gain_mathtext, quantity
 from auv_analysis.output.new_files import write_table
-from auv_analysis.output.text import join, number, plain, symbol
+from auv_analysis.output.text import Maths, fixed, join, number, plain, symbol
 from auv_analysis.report import plots
 from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.plots import FigureRecord, Grid
@@ -28,8 +29,7 @@ COLUMNS = (
     'rank_low', 'rank_high', 'gain', 'elasticity', 'S1', 'S1_conf', 'ST', 'ST_conf', 'mu_star',
     'mu_star_conf', 'sigma', 'doubled', 'alike',
 )  # fmt: skip
-HEADLINES = ('velocity_error.rms', 'effort.rms')
-NOTHING = 0.01  # of the variance: a gain that never makes more decides nothing
+HEADLINE = 'velocity_error.rms'
 METHODS = {'sobol': 'Sobol’', 'morris': 'Morris'}
 WEIGHTS = {
     'sobol': (
@@ -164,17 +164,8 @@ def _sentences(of: Sensitivity) -> Iterator[tuple[str, str]]:
             f'{plain(span)}; its study takes a factor of {plain(of.span)}.',
             table,
         )
-    for name in HEADLINES:
-        for dof, rows in [*of.of(name).items()][:1]:
-            yield _headline(of, name, dof, rows[0]), table
-    idle = [gain for gain in of.gains if _share(of, gain) < NOTHING]
-    if idle and of.rows and of.method == 'sobol':
-        most = max(_share(of, gain) for gain in idle)
-        yield (
-            f'Under {of.controller}, {join(idle)} {"decides" if len(idle) == 1 else "decide"} '
-            f'nothing: at most {number(100 * most, 2)} % of the variance of any KPI.',
-            table,
-        )
+    for dof, rows in [*of.of(HEADLINE).items()][:1]:
+        yield _headline(of, HEADLINE, dof, rows[0]), table
 
 
 def _headline(of: Sensitivity, name: str, dof: str, main: Row) -> str:
@@ -192,11 +183,6 @@ def _headline(of: Sensitivity, name: str, dof: str, main: Row) -> str:
         f'{share if of.method == "sobol" else ""}'
         f'doubling {gain} changes it by about {sign}{number(abs(main["doubled"]), 2)} %.'
     )
-
-
-def _share(of: Sensitivity, gain: str) -> float:
-    """Largest total index of a gain over all KPIs; 0 of another method."""
-    return max((row.get('ST', 0.0) for row in of.rows if row['gain'] == gain), default=0.0)
 
 
 def sensitivity_plot(found: Sensitivity, folder: Path) -> FigureRecord:
@@ -331,3 +317,83 @@ def _table(run: Run, model: ControlModel) -> pa.Table:
     for name, values in signals.items():
         columns |= {f'{name}.{dof}': values[:, i] for i, dof in enumerate(DOFS)}
     return pa.table(columns)
+
+
+Summary = Mapping[str, Any]
+MOST = 95.0  # %: share that counts as nearly all
+SMALL = 0.01  # of a coupling relative to what it deforms: below it nothing is deformed
+DEFORMED = {  # kind of coupling -> what is deformed by what, its own metric, units
+    'delta_xi': ('velocity component', 'motion', 'velocity', VELOCITY),
+    'delta_pi': ('input', 'input', 'effort', WRENCH),
+}
+
+
+def discussion(summaries: Mapping[str, Summary], leading: str) -> list[Sentence]:
+    """Step 6: sentences on convergence, energy and deformation, in this order.
+
+    Parameters
+    ----------
+    summaries : name -> `summarize(run)`, of one scenario
+    leading : the run whose energy and couplings are discussed
+
+    Returns
+    -------
+    sentences : only those that the numbers carry
+
+    """
+    mine = summaries[leading]
+    found = [sentence for name, summary in summaries.items() for sentence in _pace(name, summary)]
+    found += _energy(leading, mine)
+    for kind in ('delta_xi', 'delta_pi'):
+        found += _deformed(kind, mine)
+    return found
+
+
+def _pace(name: str, summary: Summary) -> Iterator[Sentence]:
+    """Which velocities converge slowly, or not at all."""
+    times = summary['velocity_error']['settling_time']
+    never = [dof for dof, time in zip(DOFS, times, strict=True) if time is None]
+    rest = [(time, dof) for dof, time in zip(DOFS, times, strict=True) if time]
+    text = ''
+    if never:
+        text = f'Under {name}, {join(never)} {"does" if len(never) == 1 else "do"} not settle '
+        text += f'within {summary["duration"]:g} s'
+        text += (
+            f'; of the others {max(rest)[1]} is last, after {max(rest)[0]:.2f} s' if rest else ''
+        )
+    elif rest:
+        text = f'Under {name}, {max(rest)[1]} settles last, after {max(rest)[0]:.2f} s'
+    else:
+        text = f'Under {name} no error ever leaves the band within which it counts as settled'
+    yield Sentence(f'{text}.', 'table-key_figures')
+
+
+def _energy(name: str, summary: Summary) -> Iterator[Sentence]:
+    """Where the kinetic energy is."""
+    shares = summary['kinetic_energy']['shares_percent']
+    if shares is None or not any(shares):
+        return
+    order = np.argsort(shares)[::-1]
+    count = 1 + int(np.argmax(np.cumsum(np.array(shares)[order]) >= MOST))
+    parts = [f'ξ{i + 1} ({DOFS[i]}) has {fixed(shares[i], 2)} %' for i in order[:count]]
+    text = f'Of the kinetic energy of {{}} over the whole run, {join(parts)}'
+    rest = float(np.array(shares)[order[count:]].sum())
+    text += f'; the other {len(order) - count} have {fixed(rest, 2)} % together' if rest else ''
+    yield Sentence(Maths(f'{text}.', name), 'table-energy')
+
+
+def _deformed(kind: str, summary: Summary) -> Iterator[Sentence]:
+    """Which component is deformed most, by how much of itself, and by which other."""
+    what, cause, metric, units = DEFORMED[kind]
+    largest, own = summary['coupling'][f'{kind}_max'], summary[metric]['max']
+    terms = [term for term in summary['coupling_terms'][kind] if term['share_percent'] is not None]
+    ratios = [a / b if b > 0 else 0.0 for a, b in zip(largest, own, strict=True)]
+    i = int(np.argmax(ratios))
+    mine = [term for term in terms if term['to'] == DOFS[i]]
+    if not mine or ratios[i] < SMALL:
+        return
+    main = max(mine, key=lambda term: term['share_percent'])
+    text = f'The {what} of {DOFS[i]} is deformed by up to {number(largest[i])} {units[i // 3]}'
+    text += f', where it reaches {number(own[i])} {units[i // 3]} by itself'
+    text += f'; the {cause} of {main["from"]} causes {fixed(main["share_percent"], 1)} % of it'
+    yield Sentence(f'{text}.', 'table-terms')

@@ -20,9 +20,11 @@ from auv_dynamics.files.nearest import one_of
 LISTING = 'campaign.yaml'
 MOST_FAILURES = 20
 SETTLED = 'overall.velocity_error.settling_time'
-SAID = (SETTLED, 'overall.velocity_error.rms.linear')  # measures that sentences are about
-SHOWN = (*SAID, 'overall.effort.rms.linear')  # and those that a terminal shows
-MATTERS = 5.0  # %: less is not said
+SHOWN = (
+    SETTLED,
+    'overall.velocity_error.rms.linear',
+    'overall.effort.rms.linear',
+)  # and those that a terminal shows
 Shown = dict[str, Column | Quantity | str]
 
 
@@ -337,8 +339,8 @@ def _failures(analysis: Analysis) -> Iterator[Table]:
 
 
 def findings(analysis: Analysis) -> list[Sentence]:
-    """Sentences of the summary: what is missing, who settles, who wins, what matters, failures."""
-    parts = (_unfinished, _settled, _against, _matters, _failed)
+    """Sentences of the summary: what is missing, who settles, failures."""
+    parts = (_unfinished, _settled, _failed)
     found = [sentence for part in parts for sentence in part(analysis)]
     notes = (Sentence(f'{note[0].upper()}{note[1:]}.', 'campaign') for note in analysis.notes)
     return [*found, *notes]
@@ -360,35 +362,6 @@ def _settled(analysis: Analysis) -> Iterator[Sentence]:
             if row['median'] is not None:
                 text += f', in half of them within {number(row["median"])} s'
             yield Sentence(f'{text}.', 'table-quantiles')
-
-
-def _against(analysis: Analysis) -> Iterator[Sentence]:
-    for row in analysis.tables['paired']:
-        if row['figure'] in SAID:
-            what = 'time to settle' if row['figure'] == SETTLED else row['label']
-            text = (
-                f'The {what} of {row["controller"]} is smaller than that of {row["other"]} in '
-                f'{number(row["smaller_percent"])} % of {row["rollouts"]} rollouts'
-            )
-            if row['equal_percent']:
-                text += f', and in {number(row["equal_percent"])} % there is no difference'
-            yield Sentence(f'{text}.', 'table-paired')
-
-
-def _matters(analysis: Analysis) -> Iterator[Sentence]:
-    names = short_names(analysis.factors)
-    for name in SAID:
-        parts = []
-        for controller in analysis.sweep.controllers:
-            mine = [r for r in analysis.tables['influence']
-                    if (r['figure'], r['controller']) == (name, controller)]  # fmt: skip
-            row = max(mine, key=lambda r: r['explained_percent'], default=None)
-            if row and row['explained_percent'] >= MATTERS:
-                share = number(row['explained_percent'])
-                parts.append(f'{names[row["path"]]} under {controller} ({share} %)')
-        if parts:
-            text = f'The largest part of the order of {BY_NAME[name].label} is explained by '
-            yield Sentence(f'{text}{join(parts)}.', 'table-influence')
 
 
 def _failed(analysis: Analysis) -> Iterator[Sentence]:

@@ -5,8 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from auv_analysis.metrics.quantities import COSTS
 from auv_analysis.output.progress import console, say
 from auv_analysis.output.text import Maths, join, number, symbol
@@ -320,8 +318,6 @@ def findings(tuning: Tuning) -> Iterator[Sentence]:
     yield from _unreached(tuning)
     if tuning.draws:
         yield from _ranked(tuning)
-        yield from _diverged(tuning)
-    yield from _price(tuning)
     for name in tuning.scenario.controllers:
         for remark in tuning.remarks(name):
             yield Sentence(f'{name}: {remark}.', 'table-gains')
@@ -401,26 +397,6 @@ def _places(rows: list[Comparison], against: str) -> str:
         if names:
             parts.append(f'{join(names)} {"are" if len(names) > 1 else "is"} {place}')
     return '; '.join(parts)
-
-
-def _diverged(tuning: Tuning) -> Iterator[Sentence]:
-    counts = {name: int(np.isnan(m.error).sum()) for name, m in tuning.draws.items()}
-    some = [f'{count} of {name}' for name, count in counts.items() if count]
-    if some:
-        draws = len(tuning.draws[tuning.request.reference].error)
-        yield Sentence(f'Closed loops that diverged, of {draws} each: {join(some)}.', 'table-draws')
-
-
-def _price(tuning: Tuning) -> Iterator[Sentence]:
-    small, same = (COSTS[name].label for name in tuning.goal.names)
-    prices = {n: t.best.price for n, t in tuning.laws.items() if t.best.price is not None}
-    if prices:
-        said = join([f'{number(price, 2)} % for {name}' for name, price in prices.items()])
-        yield Sentence(
-            f'What equality is worth: with 1 % more {same}, the {small} changes by {said}; a '
-            f'difference between laws is to be read beside that.',
-            'table-tuned',
-        )
 
 
 def _percent(share: float) -> str:

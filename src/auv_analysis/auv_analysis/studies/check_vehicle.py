@@ -1,18 +1,26 @@
 """What a vehicle file says: inertia, couplings, hydrostatics, poles, thrusters, largest step."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from auv_analysis.metrics.coupling import NEGLIGIBLE, structural_zeros
 from auv_analysis.output.progress import TextConsole
+from auv_analysis.output.text import plain
+from auv_analysis.report.results import (
+    Column,
+    Rows,
+    Shown,
+    described,
+    make_table,
+    terminal,
+)
 from auv_analysis.scenario.scaling import TOP_SPEED
 from auv_analysis.studies.linearize.linearize import linearize
-from auv_analysis.studies.linearize.modes import modes
+from auv_analysis.studies.linearize.modes import FOUR, POLES, modes, pole_rows
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.thrusters import Thrusters
 from auv_dynamics.vehicle.vehicle import Vehicle, munk_terms
@@ -269,45 +277,39 @@ def _say(out: Console, text: str) -> None:
     out.print(text, markup=False, soft_wrap=True)
 
 
-def _print(
-    out: Console, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1
-) -> None:
-    """Table with `words` columns of text on the left and numbers on the right."""
-    table = Table(box=None, header_style='bold')
-    for i, column in enumerate(columns):
-        table.add_column(column, justify='left' if i < words else 'right', no_wrap=True)
-    for row in rows:
-        table.add_row(*row)
+def _print(out: Console, title: str, rows: Rows, shown: Mapping[str, Shown]) -> None:
     _say(out, f'\n{title}')
-    out.print(table)
+    out.print(terminal(make_table('', title, rows, shown)))
 
 
-def _number(value: float | None) -> str:
-    return 'none' if value is None else f'{value:.4g}'
+def _four(label: str, unit: str = '') -> Column:
+    """Column of numbers of at most four digits."""
+    return described(label, unit=unit, **FOUR)
+
+
+def _listed(values: Iterable[float]) -> str:
+    return ', '.join(plain(value) for value in values)
 
 
 def _inertia(document: dict[str, Any], out: Console) -> None:
     rows = [
-        (dof, *(_number(entry) for entry in row), _number(N))
+        {'': dof, **dict(zip(DOFS, row, strict=True)), 'N': N}
         for dof, row, N in zip(DOFS, document['M'], document['N'], strict=True)
     ]
-    _print(out, 'M and N, kg, kg m, kg m2', ('', *DOFS, 'N'), rows)
+    _print(out, 'M and N, kg, kg m, kg m2', rows, {'': ''} | {n: _four(n) for n in (*DOFS, 'N')})
     inertia = document['inertia']
-    values = ', '.join(_number(value) for value in inertia['eigenvalues'])
-    _say(out, f'eigenvalues {values}; condition number {inertia["condition_number"]:.4g}')
+    condition = plain(inertia['condition_number'])
+    _say(out, f'eigenvalues {_listed(inertia["eigenvalues"])}; condition number {condition}')
 
 
 def _couplings_table(document: dict[str, Any], out: Console) -> None:
     _say(out, f'\n{document["statement"]}')
+    shown: dict[str, Shown] = {'from': 'of', 'to': 'in', 'value': '', 'unit': 'unit'}
     for key in ('delta_xi', 'delta_pi'):
-        rows = [
-            (entry['from'], entry['to'], f'{entry[key]:+.4g}', entry['unit'])
-            for entry in document['couplings']
-            if key in entry
-        ]
+        entries = [entry for entry in document['couplings'] if key in entry]
+        rows = [entry | {'value': f'{entry[key]:+.4g}'} for entry in entries]
         if rows:
-            columns = ('of', 'in', key, 'unit')
-            _print(out, f'{key}: what one degree of freedom adds to another', columns, rows, 2)
+            _print(out, f'{key}: what one degree of freedom adds to another', rows, shown)
             zero = ', '.join(document['structural_zeros'][key]) or 'none'
             _say(out, f'zero in every motion: {zero}')
 
@@ -318,47 +320,37 @@ def _hydrostatics_table(found: dict[str, Any], out: Console) -> None:
         out,
         f'\nweight {found["weight"]:.1f} N, buoyancy {found["buoyancy"]:.1f} N: '
         f'{found["difference"]:+.2f} N ({percent:+.2f} %); '
-        f'metacentric height {found["metacentric_height"]:.4g} m',
+        f'metacentric height {plain(found["metacentric_height"])} m',
     )
     roll, pitch = found['moment_when_level']
     if roll or pitch:
-        _say(out, f'not level at rest: {roll:.4g} N m in roll, {pitch:.4g} N m in pitch')
-    rows = [
-        (
-            dof,
-            _number(mode['eigenvalue']),
-            _number(mode['natural_frequency']),
-            _number(mode['period']),
-        )
-        for dof, mode in found['modes'].items()
-    ]
-    columns = ('', 'eigenvalue, 1/s2', 'frequency, rad/s', 'period, s')
-    _print(out, 'restoring about level, without damping', columns, rows)
-    for dof, mode in found['modes'].items():
-        if mode['eigenvalue'] < 0:
-            _say(out, f'unstable in {dof}: the vehicle turns over')
+        _say(out, f'not level at rest: {plain(roll)} N m in roll, {plain(pitch)} N m in pitch')
+    rows = [{'dof': dof, **mode} for dof, mode in found['modes'].items()]
+    shown: dict[str, Shown] = {
+        'dof': '',
+        'eigenvalue': _four('eigenvalue', '1/s2'),
+        'natural_frequency': _four('frequency', 'rad/s'),
+        'period': _four('period', 's'),
+    }
+    _print(out, 'restoring about level, without damping', rows, shown)
+    for row in rows:
+        if row['eigenvalue'] < 0:
+            _say(out, f'unstable in {row["dof"]}: the vehicle turns over')
 
 
 def _damping_table(found: dict[str, Any], out: Console) -> None:
-    rows = [
-        (entry['mostly'], _number(entry['rate']), _number(entry['time_constant']))
-        for entry in found['time_constants']
-    ]
-    columns = ('mostly', 'rate, 1/s', 'time constant, s')
-    _print(out, 'open loop with linear damping alone', columns, rows)
-    values = ', '.join(_number(value) for value in found['linear_symmetric_eigenvalues'])
+    shown: dict[str, Shown] = {'mostly': 'mostly', 'rate': _four('rate', '1/s')}
+    shown['time_constant'] = POLES['time_constant']
+    _print(out, 'open loop with linear damping alone', found['time_constants'], shown)
+    values = _listed(found['linear_symmetric_eigenvalues'])
     _say(out, f'eigenvalues of the symmetric part of linear D: {values}')
 
 
 def _cruise_table(found: dict[str, Any], out: Console) -> None:
     why = {'given': '--speed', 'top speed': 'its top speed', 'assumed': 'assumed, see --speed'}
-    rows = []
-    for mode in found['modes']:
-        real, imaginary = mode['pole']
-        pole = f'{real:.4g} ± {imaginary:.4g}i' if imaginary else _number(real)
-        rows.append((mode['mostly'], pole, _number(mode['time_constant'])))
     title = f'poles straight ahead at {found["speed"]:g} m/s ({why[found["speed_source"]]})'
-    _print(out, title, ('mostly', 'pole, 1/s', 'time constant, s'), rows)
+    shown = {name: POLES[name] for name in ('mostly', 'pole', 'time_constant')}
+    _print(out, title, pole_rows(found['modes']), shown)
     said = {
         'unstable': 'it leaves straight motion',
         'marginal': 'no pole grows, one does not decay',
@@ -373,29 +365,26 @@ def _cruise_table(found: dict[str, Any], out: Console) -> None:
 
 def _thrusters_table(found: dict[str, Any], out: Console) -> None:
     rows = [
-        (dof, 'none', 'none') if pair is None else (dof, _number(pair[0]), _number(pair[1]))
+        {'dof': dof, **dict(zip(('backward', 'forward'), pair or (None, None), strict=True))}
         for dof, pair in found['largest'].items()
     ]
     title = f'{len(found["names"])} thrusters, T has rank {found["rank"]}: largest wrench, N, N m'
-    _print(out, title, ('', 'backward', 'forward'), rows)
+    names = {name: _four(name) for name in ('backward', 'forward')}
+    _print(out, title, rows, {'dof': ''} | names)
     for dof, others in found['unactuated'].items():
         apart = f' apart from {" and ".join(others)}' if others else ''
         _say(out, f'{dof} cannot be actuated{apart}')
 
 
 def _sampling_table(found: dict[str, dict[str, Any]], out: Console) -> None:
-    rows = [
-        (
-            law,
-            entry['mostly'],
-            _number(entry['k_D']),
-            _number(entry['rate']),
-            _number(entry['rings_above']),
-            _number(entry['unstable_above']),
-        )
-        for law, entry in found.items()
-    ]
-    columns = ('law', 'mostly', 'k_D', 'rate, 1/s', 'rings above, s', 'unstable above, s')
-    _print(
-        out, 'largest step of a sampled velocity loop, with the gain of the paper', columns, rows, 2
-    )
+    shown: dict[str, Shown] = {
+        'law': 'law',
+        'mostly': 'mostly',
+        'k_D': _four('k_D'),
+        'rate': _four('rate', '1/s'),
+        'rings_above': _four('rings above', 's'),
+        'unstable_above': _four('unstable above', 's'),
+    }
+    rows = [{'law': law, **entry} for law, entry in found.items()]
+    title = 'largest step of a sampled velocity loop, with the gain of the paper'
+    _print(out, title, rows, shown)

@@ -8,11 +8,11 @@ import numpy as np
 import scipy.linalg
 from matplotlib.axes import Axes
 from rich.console import Console
-from rich.table import Table
 
 from auv_analysis.output.progress import TextConsole
 from auv_analysis.report import plots
 from auv_analysis.report.plots import COLOURS, GREY, Drawn, FigureRecord, save_figures
+from auv_analysis.report.results import Shown, described, make_table, terminal
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.studies.linearize.linearize import Linearization, linearize
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -125,22 +125,34 @@ def _model(model: Linearization) -> dict[str, Any]:
     }
 
 
-COLUMNS = ('pole, 1/s', 'damping', 'frequency, rad/s', 'time constant, s', 'mostly', 'part')
+FOUR: dict[str, Any] = {'digits': 4, 'look': 'plain'}
+POLES: dict[str, Shown] = {
+    'pole': described('pole', unit='1/s'),
+    'damping_ratio': described('damping', **FOUR),
+    'natural_frequency': described('frequency', unit='rad/s', **FOUR),
+    'time_constant': described('time constant', unit='s', **FOUR),
+    'mostly': 'mostly',
+    'part': described('part', decimals=0, scale=100.0),
+}
 
 
 def print_poles(document: dict[str, Any], out: Console | None = None) -> None:
     """Print the poles of every model, the slowest first; default: on standard output."""
     out = out or TextConsole(highlight=False)
     for name, model in document['models'].items():
-        table = Table(box=None, header_style='bold')
-        for column in COLUMNS:
-            table.add_column(column, justify='left' if column == 'mostly' else 'right')
-        for mode in model['modes']:
-            table.add_row(*_row(mode))
         out.print(f'\n{name}: {_verdict(model)}')
-        out.print(table)
+        out.print(terminal(make_table(name, '', pole_rows(model['modes']), POLES)))
     if document['left_out']:
         out.print(f'\nnot in these models: {", ".join(document["left_out"])}')
+
+
+def pole_rows(found: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Modes with the text of each pole, a conjugate pair as one."""
+    return [{**mode, 'pole': _text(*mode['pole'])} for mode in found]
+
+
+def _text(real: float, imaginary: float) -> str:
+    return f'{real:.4g}' + (f' ± {imaginary:.4g}i' if imaginary else '')
 
 
 def _verdict(model: dict[str, Any]) -> str:
@@ -154,14 +166,6 @@ def _verdict(model: dict[str, Any]) -> str:
     if any(abs(rate) > 1e-9 for rate in model['drift']):
         text += '; the point moves: it turns while it is inclined'
     return text
-
-
-def _row(mode: dict[str, Any]) -> tuple[str, ...]:
-    real, imaginary = mode['pole']
-    pole = f'{real:.4g}' + (f' ± {imaginary:.4g}i' if imaginary else '')
-    keys = ('damping_ratio', 'natural_frequency', 'time_constant')
-    numbers = ('none' if mode[key] is None else f'{mode[key]:.4g}' for key in keys)
-    return pole, *numbers, mode['mostly'], f'{100 * mode["part"]:.0f} %'
 
 
 MARKS = ('o', 'x', '+', 's', '^', 'v')

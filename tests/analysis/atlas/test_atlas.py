@@ -71,7 +71,7 @@ def test_command_writes_table_and_report(tmp_path: Path, capsys) -> None:
 
 @pytest.mark.usefixtures('unrendered')
 def test_every_number_of_the_report_is_in_the_document(tmp_path: Path) -> None:
-    main.main(['atlas', 'bluerov2', '--only', '--out', str(tmp_path / 'out')])
+    main.main(['atlas', 'herman2018', '--only', '--out', str(tmp_path / 'out')])
     assert check_numbers(tmp_path / 'out') > 20
 
 

@@ -18,7 +18,7 @@ from auv_analysis.output.new_files import write_json
 from auv_analysis.output.text import join
 from auv_analysis.report import plots
 from auv_analysis.report.document import Block, Section, Sentence, write_document
-from auv_analysis.report.plots import COLOURS, GREY, FigureRecord, save_figures
+from auv_analysis.report.plots import COLOURS, GREY, Curve, FigureRecord, Panel, save_figures
 from auv_analysis.report.results import Column, Shown, make_table
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS
@@ -131,16 +131,17 @@ def _timing(evidence: Evidence) -> Drawn:
 
 def _motion(evidence: Evidence, word: str, half: slice, unit: str) -> Drawn:
     pair = evidence.rates[word.lower()]
-    figure = plots.new_figure(3.6)
-    panels = figure.subplots(3, 1, sharex=True)
-    colours = COLOURS[half]
-    for i, (axes, dof) in enumerate(zip(panels, DOFS[half], strict=True)):
-        axes.plot(pair.t, pair.path[:, i], color=GREY, linewidth=2.4, label='by the pose')
-        axes.plot(pair.t, pair.velocity[:, i], color=colours[i], label='twist')
-        axes.set_ylabel(f'{dof} ({unit})')
-        plots.letter(axes, i)
-    _legend(panels[0])
-    panels[-1].set_xlabel('$t$ (s)')
+    panels = [
+        Panel(
+            [
+                Curve(pair.t, pair.path[:, i], 'by the pose', {'color': GREY, 'linewidth': 2.4}),
+                Curve(pair.t, pair.velocity[:, i], 'twist', {'color': COLOURS[half][i]}),
+            ],
+            f'{dof} ({unit})',
+        )
+        for i, dof in enumerate(DOFS[half])
+    ]
+    figure = plots.time_panels(panels, height=1.1)
     title = f'{word} velocity by pose and twist'
     caption = (
         f'{title}: rates of the pose in body axes, and the twist, both through local polynomials '
@@ -150,29 +151,20 @@ def _motion(evidence: Evidence, word: str, half: slice, unit: str) -> Drawn:
 
 
 def _answers(trials: Sequence[MeasuredTrial]) -> Drawn:
-    across = 2 if len(trials) > 1 else 1
-    down = -(-len(trials) // across)
-    figure = plots.new_figure(0.4 + 1.7 * down)
-    panels = figure.subplots(down, across, squeeze=False).ravel()
-    for i, (axes, measured) in enumerate(zip(panels, trials, strict=False)):
+    panels = []
+    for measured in trials:
         trial, response = measured.trial, measured.response
         nu, model = measured.nu[:, trial.axis], response.model
-        axes.plot(measured.t, nu - nu[0], color=COLOURS[trial.axis], label='measured')
         late, added = model.t + response.delay, model.added[:, trial.axis]
-        axes.plot(late, added, color=GREY, linestyle='--', label='model')
-        axes.set_ylabel(f'{trial.dof} ({trial.speed_unit})')
-        axes.set_xlabel('$t$ (s)')
-        plots.letter(axes, i)
-    for axes in panels[len(trials) :]:
-        axes.set_axis_off()
-    _legend(panels[0])
+        curves = [
+            Curve(measured.t, nu - nu[0], 'measured', {'color': COLOURS[trial.axis]}),
+            Curve(late, added, 'model', {'color': GREY, 'linestyle': '--'}),
+        ]
+        panels.append(Panel(curves, f'{trial.dof} ({trial.speed_unit})'))
+    figure = plots.time_panels(panels, across=2)
     title = 'Answers to small wrenches'
     caption = (
         f'{title}: velocity since the beginning of each trial, and what the wrench adds to it by '
         'the model, shifted by the delay that was found; drift beside it is taken off by the fit.'
     )
     return figure, title, caption
-
-
-def _legend(axes: Any) -> None:
-    axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)

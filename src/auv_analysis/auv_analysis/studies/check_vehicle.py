@@ -8,6 +8,7 @@ import numpy as np
 from rich.console import Console
 
 from auv_analysis.metrics.coupling import NEGLIGIBLE, structural_zeros
+from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.output.progress import TextConsole
 from auv_analysis.output.text import plain
 from auv_analysis.report.results import (
@@ -30,8 +31,6 @@ from auv_gvc_controller.laws.model import decompose, inverse_upper
 
 K_D = 12.0  # k_D of the paper, (36)
 CRUISE = 1.0  # m/s, where the top speed of a vehicle is not known
-VELOCITY = ('m/s',) * 3 + ('rad/s',) * 3
-WRENCH = ('N',) * 3 + ('N m',) * 3
 
 
 def check_vehicle(name_or_path: str | Path, speed: float | None = None) -> dict[str, Any]:
@@ -83,9 +82,9 @@ def check_vehicle(name_or_path: str | Path, speed: float | None = None) -> dict[
 def _couplings(Upsilon: np.ndarray, inverse: np.ndarray) -> list[dict[str, Any]]:
     """Entries of (33) and (34): delta_xi_i by nu_j, j > i, and delta_pi_i by tau_j, j < i."""
     found: list[dict[str, Any]] = []
-    for key, weights, units in (
-        ('delta_xi', inverse, VELOCITY),
-        ('delta_pi', Upsilon.T, WRENCH),
+    for key, weights, unit in (
+        ('delta_xi', inverse, SIGNALS['nu'].unit_of),
+        ('delta_pi', Upsilon.T, SIGNALS['tau'].unit_of),
     ):
         for i, j in zip(*np.nonzero(np.abs(weights - np.eye(6)) > NEGLIGIBLE), strict=True):
             found.append(
@@ -93,7 +92,7 @@ def _couplings(Upsilon: np.ndarray, inverse: np.ndarray) -> list[dict[str, Any]]
                     'from': DOFS[j],
                     'to': DOFS[i],
                     key: float(weights[i, j]),
-                    'unit': f'{units[i]} per {units[j]}',
+                    'unit': f'{unit(int(i))} per {unit(int(j))}',
                 }
             )
     return found
@@ -370,7 +369,7 @@ def _thrusters_table(found: dict[str, Any], out: Console) -> None:
     ]
     title = f'{len(found["names"])} thrusters, T has rank {found["rank"]}: largest wrench, N, N m'
     names = {name: _four(name) for name in ('backward', 'forward')}
-    _print(out, title, rows, {'dof': ''} | names)
+    _print(out, title, rows, {'dof': '', **names})
     for dof, others in found['unactuated'].items():
         apart = f' apart from {" and ".join(others)}' if others else ''
         _say(out, f'{dof} cannot be actuated{apart}')

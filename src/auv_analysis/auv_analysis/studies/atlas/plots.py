@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
+from auv_analysis.metrics.quantities import VELOCITY, WRENCH
 from auv_analysis.output.text import Maths, join
 from auv_analysis.report import plots
 from auv_analysis.report.plots import (
@@ -25,8 +26,7 @@ from auv_dynamics.vehicle import DOFS
 
 ACROSS = 2  # panels in a row
 SMALLEST_SHARE = 0.001  # %, low end of the scale
-UNITS = {'delta_xi': ('m/s', 'rad/s'), 'delta_pi': ('N', 'N m')}
-SYMBOLS = {'delta_xi': 'Δξ', 'delta_pi': 'Δπ'}
+KINDS = {'delta_xi': ('Δξ', VELOCITY), 'delta_pi': ('Δπ', WRENCH)}
 Drawn = tuple[Figure | None, str, str]
 
 
@@ -120,18 +120,14 @@ def _panels(grids: dict[str, Grid]) -> Figure | None:
     """A square panel per grid, all on one scale."""
     if not grids:
         return None
-    down = -(-len(grids) // ACROSS)
-    figure = plots.new_figure(0.6 + 2.9 * down)
-    panels = figure.subplots(down, ACROSS, squeeze=False).ravel()
-    for axes, (name, grid) in zip(panels, grids.items(), strict=False):
+    figure, panels = plots.small_multiples(len(grids), ACROSS, 2.9)
+    for axes, (name, grid) in zip(panels, grids.items(), strict=True):
         draw_grid(axes, grid)
         axes.set_yticks(range(6), DOFS)
         axes.set_title(name, loc='left', fontweight='bold')
-    for axes in panels[len(grids) :]:
-        axes.set_axis_off()
     one = next(iter(grids.values()))
     place: dict[str, Any] = {'location': 'bottom', 'aspect': 60, 'fraction': 0.03}
-    scale_bar(figure, panels[0].images[0], one.label, ax=list(panels), **place)
+    scale_bar(figure, panels[0].images[0], one.label, ax=panels, **place)
     return figure
 
 
@@ -164,15 +160,16 @@ def _strength(charts: Sequence[Chart]) -> Drawn:
 def _reached(charts: Sequence[Chart], kind: str) -> Drawn:
     """Peaks of case 1 scaled to each vehicle, of those that are coupled and did not diverge."""
     shown = [c for c in charts if not c.couplings.is_diagonal and not c.reached['failure']]
-    title = f'{SYMBOLS[kind]} reached in case 1'
+    symbol, units = KINDS[kind]
+    title = f'{symbol} reached in case 1'
     if not shown:
         return None, title, f'{title}: {uncoupled(charts)}'
     values = np.array([chart.reached[f'{kind}_max'] for chart in shown])
     always = np.array([[dof in c.couplings.zeros[kind] for dof in DOFS] for c in shown])
     halves = slice(0, 3), slice(3, 6)
     grids = [
-        Grid(values[:, half], DOFS[half], f'{SYMBOLS[kind]} ({unit})', structural=always[:, half])
-        for half, unit in zip(halves, UNITS[kind], strict=True)
+        Grid(values[:, half], DOFS[half], f'{symbol} ({unit})', structural=always[:, half])
+        for half, unit in zip(halves, units, strict=True)
     ]
     caption = (
         f'{title}, scaled to each vehicle, under GVC: the largest magnitude of the run; {ALWAYS}: '

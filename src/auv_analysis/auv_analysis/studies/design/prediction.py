@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.metrics.coupling import delta_pi, delta_xi, structural_zeros
+from auv_analysis.metrics.quantities import METRICS
 from auv_analysis.runs.run import Run
 from auv_analysis.studies.design.change import UPPER, WIDTH, ChangeEffect, ChangeSpace
 from auv_dynamics.files.errors import InputError
@@ -22,7 +23,9 @@ from auv_gvc_controller.laws.model import control_model
 
 KINDS = ('delta_xi', 'delta_pi')
 COUPLINGS = tuple(f'{kind}.{dof}' for kind in KINDS for dof in DOFS)
-UNITS = dict(zip(COUPLINGS, ('m/s',) * 3 + ('rad/s',) * 3 + ('N',) * 3 + ('N m',) * 3, strict=True))
+UNITS = {
+    f'{kind}.{dof}': METRICS[f'coupling.{kind}_max'].unit_of(dof) for kind in KINDS for dof in DOFS
+}
 REST = 1e-12  # a share below this is rounding
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.authority import beyond_authority
+from auv_analysis.metrics.quantities import METRICS
 from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.folder import Results
 from auv_analysis.output.new_files import write_json
@@ -35,19 +36,11 @@ from auv_gvc_controller.laws.model import decompose
 
 AT_BOUND = 2e-3  # of a range: a value that is nearer to its end lies on it
 DESIGN, BEFORE, AFTER = 'design.json', 'summary_before.json', 'summary.json'
-VELOCITY = ('m/s',) * 3 + ('rad/s',) * 3
-WRENCH = ('N',) * 3 + ('N m',) * 3
-PERCENT = ('%',) * 6
-MEASURES = (  # name, where it stands in a summary, units
-    ('delta_xi_max', ('coupling', 'delta_xi_max'), VELOCITY),
-    ('delta_pi_max', ('coupling', 'delta_pi_max'), WRENCH),
-    ('kinetic_energy.shares_percent', ('kinetic_energy', 'shares_percent'), PERCENT),
-    ('effort.rms', ('effort', 'rms'), WRENCH),
-    ('effort.max', ('effort', 'max'), WRENCH),
-    ('velocity_error.rms', ('velocity_error', 'rms'), VELOCITY),
-    ('velocity_error.max_after_2s', ('velocity_error', 'max_after_2s'), VELOCITY),
-)
-ENERGY = ('kinetic_energy', 'mean')
+MEASURES = (  # keys of a summary
+    'coupling.delta_xi_max', 'coupling.delta_pi_max', 'kinetic_energy.shares_percent',
+    'effort.rms', 'effort.max', 'velocity_error.rms', 'velocity_error.max_after_2s',
+)  # fmt: skip
+ENERGY = 'kinetic_energy.mean'
 ASSUMPTIONS = (
     'The inertia about the centre of gravity stays as it is when the centre of gravity is moved.',
     'Ballast is a point mass; foam at its place carries its weight, so that W - B and the '
@@ -110,15 +103,18 @@ def measures(
 
     """
     rows = []
-    for name, keys, units in MEASURES:
+    for metric in MEASURES:
+        name, unit_of = metric.removeprefix('coupling.'), METRICS[metric].unit_of
         kind = name.removesuffix('_max')
         for i, dof in enumerate(DOFS):
             if kind in coupled and dof not in coupled[kind]:
                 continue
-            rows.append(_row(f'{name}.{dof}', units[i], _at(before, keys, i), _at(after, keys, i)))
+            rows.append(
+                _row(f'{name}.{dof}', unit_of(i), _at(before, metric, i), _at(after, metric, i))
+            )
         if kind == KINDS[-1]:
             energy = _at(before, ENERGY), _at(after, ENERGY)
-            rows.append(_row('.'.join(ENERGY), 'J', *energy))
+            rows.append(_row(ENERGY, METRICS[ENERGY].unit, *energy))
     return rows
 
 
@@ -132,8 +128,9 @@ def _row(name: str, unit: str, before: float | None, after: float | None) -> dic
     return {'name': name, 'unit': unit, 'before': before, 'after': after}
 
 
-def _at(summary: Mapping[str, Any], keys: tuple[str, str], i: int | None = None) -> float | None:
-    value = summary[keys[0]][keys[1]]
+def _at(summary: Mapping[str, Any], metric: str, i: int | None = None) -> float | None:
+    group, _, name = metric.partition('.')
+    value = summary[group][name]
     return value if value is None or i is None else value[i]
 
 

@@ -2,7 +2,6 @@
 
 import json
 import re
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -30,11 +29,6 @@ def rows(folder) -> list[dict]:
     return parquet.read_table(folder / NUMBERS).to_pylist()
 
 
-@cache
-def names_of(path: Path) -> set[str]:
-    return set(parquet.read_schema(path).names)
-
-
 def test_every_number_of_every_table_is_found_where_its_source_says(folder, rows):
     assert check_numbers(folder) > 100
     summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))
@@ -43,12 +37,10 @@ def test_every_number_of_every_table_is_found_where_its_source_says(folder, rows
         source, _, factor = row['source'].partition('*')
         file, _, place = source.partition(':')
         wanted = row['value'] / float(factor or 1.0)
-        if file == 'summary.json' and not row['name']:
+        if file == 'summary.json':
             assert at(summary, place) == pytest.approx(wanted, rel=1e-14), row
         elif file.endswith('.parquet'):
-            place = place.partition('[')[0]
-            # of a cell with several numbers, the name is that of the column
-            key = file, (row['name'] if row['name'] in names_of(folder / file) else place)
+            key = file, place.partition('[')[0]
             if key not in columns:
                 values = parquet.read_table(folder / file, columns=[key[1]]).column(0).to_pylist()
                 columns[key] = {float(value) for value in values if value is not None}
@@ -60,7 +52,7 @@ def test_every_number_of_every_table_is_found_where_its_source_says(folder, rows
 def test_every_cell_with_a_number_is_kept_and_is_what_it_shows(folder, rows):
     page = Page((folder / 'report.html').read_text(encoding='utf-8'))
     shown = [float(v) for table in page.tables.values() for r in table for _, v in r if v]
-    assert sorted(shown) == sorted(row['value'] for row in rows if not row['name'])
+    assert sorted(shown) == sorted(row['value'] for row in rows)
     cells: dict[tuple, list[float]] = {}
     for row in rows:
         cells.setdefault((row['table'], row['row'], row['column'], row['text']), []).append(

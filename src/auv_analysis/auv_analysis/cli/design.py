@@ -27,7 +27,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import bar, count, say, waiting
     from auv_analysis.scenario.scaling import UNFIT
-    from auv_analysis.simulation.warm_up import announce
+    from auv_analysis.simulation.simulate import announce
     from auv_analysis.studies.design.prediction import coupling_named, present
     from auv_analysis.studies.design.results import write_results
     from auv_analysis.studies.design.search import propose

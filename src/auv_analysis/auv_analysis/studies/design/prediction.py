@@ -18,8 +18,7 @@ from auv_dynamics.files.nearest import one_of
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.kinematics import quaternion, rotation
 from auv_dynamics.vehicle.vehicle import Vehicle
-from auv_gvc_controller.laws.decomposition import decompose, inverse_upper
-from auv_gvc_controller.laws.model import control_model
+from auv_gvc_controller.laws.model import control_model, decompose, inverse_upper
 
 KINDS = ('delta_xi', 'delta_pi')
 COUPLINGS = tuple(f'{kind}.{dof}' for kind in KINDS for dof in DOFS)

@@ -17,10 +17,11 @@ from auv_analysis.scenario.scenario import Scenario, load_scenario, write_inputs
 from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.studies.pairs import Pairs, holm, log_ratios, paired
 from auv_analysis.studies.tune.cost import Measures, measures_of_run, of_each
-from auv_analysis.studies.tune.gain_space import STRUCTURES, searched
+from auv_analysis.studies.tune.gain_space import STRUCTURES
 from auv_analysis.studies.tune.perturbations import Perturbations, Spread, applicable, monte_carlo
 from auv_analysis.studies.tune.search import Goal, Request, TunedLaw, structures_of, tuned
 from auv_dynamics.files.errors import FailedError
+from auv_gvc_controller.laws.law import SHIPPED
 
 COMPARED = ('weighted_error', 'error', 'effort', 'late_error', 'settling')
 LEVEL = 0.05  # of Holm's p below which a difference is called one

@@ -11,6 +11,7 @@ import yaml
 from rosbags.typesys import Stores, get_typestore
 
 from auv_analysis import load_scenario, simulate
+from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
@@ -74,7 +75,7 @@ def write_run(run: Run, scenario: Scenario, folder: Path, **how: Any) -> Path:
     writer = BagWriter(folder, texts, Storage(**how))
     for topic, (kind, _) in COLUMNS.items():
         text = TYPES.generate_msgdef(kind, ros_version=2)[0]
-        writer.add_channel(f'/{topic}', kind, text, [], TYPES.hash_rihs01(kind))
+        writer.add_channel(Definition(f'/{topic}', kind, digest=TYPES.hash_rihs01(kind)), text)
     stamps = np.round(run.t * NANOSECONDS).astype(np.int64)
     for first in range(0, len(stamps), BLOCK):
         part, ns = run.part(slice(first, first + BLOCK)), stamps[first : first + BLOCK]

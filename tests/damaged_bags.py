@@ -13,6 +13,7 @@ from mcap.records import Attachment, Channel, Chunk, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.highlevel import AnyReader
 
+from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.writer import BagWriter
 
@@ -39,7 +40,7 @@ def write_bag(folder: Path, steps: int = 30, first: int = 0, **storage: Any) -> 
         ('/remark', STRING),
     ):
         text = TYPES.generate_msgdef(kind, ros_version=2)[0]
-        writer.add_channel(topic, kind, text, QOS, TYPES.hash_rihs01(kind))
+        writer.add_channel(Definition(topic, kind, qos=QOS, digest=TYPES.hash_rihs01(kind)), text)
     for k in range(first, first + steps):
         odom, wrench = odometry(k * STEP, UPRIGHT), stamped('Wrench', k * STEP, [0.1 * k] * 6)
         writer.write('/odom', k * STEP, serialized(odom))

@@ -19,6 +19,7 @@ from made_messages import STRING, TYPES, serialized
 
 from auv_analysis.bag import output, read_bag
 from auv_analysis.bag import writer as writer_module
+from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.output import LEAST_SIZE, Storage
 from auv_analysis.bag.recover import recover
 from auv_analysis.bag.writer import BagWriter, RecordingError
@@ -30,7 +31,9 @@ def writer_of(folder: Path, **storage: object) -> BagWriter:
     writer = BagWriter(folder, ATTACHED, Storage(**storage))
     for topic in ('/a', '/b'):
         text = TYPES.generate_msgdef(STRING, ros_version=2)[0]
-        writer.add_channel(topic, STRING, text, QOS, TYPES.hash_rihs01(STRING))
+        writer.add_channel(
+            Definition(topic, STRING, qos=QOS, digest=TYPES.hash_rihs01(STRING)), text
+        )
     return writer
 
 

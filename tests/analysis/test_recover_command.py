@@ -27,6 +27,7 @@ from mcap.stream_reader import breakup_chunk
 
 from auv_analysis.bag import read_bag
 from auv_analysis.bag import recover as recovery
+from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.recover import recover
 from auv_analysis.bag.writer import BagWriter
@@ -416,7 +417,7 @@ def test_attachments_are_never_used_as_paths(tmp_path: Path) -> None:
 def test_memory_does_not_grow_with_the_bag(tmp_path: Path) -> None:
     text, payload = 'string data\n', b'\0\1\0\0' + bytes(100_000)
     writer = BagWriter(tmp_path / 'bag', {}, Storage('none'))
-    writer.add_channel('/blob', 'std_msgs/msg/String', text, [], '')
+    writer.add_channel(Definition('/blob', 'std_msgs/msg/String'), text)
     for k in range(400):
         writer.write('/blob', k, payload)
     writer.close()

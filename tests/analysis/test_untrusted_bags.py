@@ -20,6 +20,7 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Me
 from auv_analysis import load_scenario
 from auv_analysis.bag import attachments, limits, load_run, mcap_file, metadata, read_bag
 from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli.main import main
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
@@ -235,7 +236,7 @@ def hostile(folder: Path, *, scenario: str = 'case1', bag: str = 'gvc') -> Path:
         ('/odom', 'nav_msgs/msg/Odometry'), ('/wrench', 'geometry_msgs/msg/WrenchStamped'),
     ):  # fmt: skip
         text = TYPES.generate_msgdef(kind, ros_version=2)[0]
-        writer.add_channel(topic, kind, text, [], TYPES.hash_rihs01(kind))
+        writer.add_channel(Definition(topic, kind, digest=TYPES.hash_rihs01(kind)), text)
     for k in range(20):
         ns = k * 10_000_000
         writer.write('/odom', ns, serialized(odometry(ns, UPRIGHT)))

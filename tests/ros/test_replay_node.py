@@ -26,8 +26,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag import read_bag
 from auv_analysis.bag.step_topics import ODOMETRY
-from auv_analysis.nodes.flow_control import WINDOW
 from auv_analysis.nodes.replay_node import ReplayNode
+from auv_analysis.nodes.replay_publishers import WINDOW
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.interface import nanoseconds
@@ -183,7 +183,7 @@ def test_waits_for_answers_in_lock_step(tmp_path: Path) -> None:
 
 
 def test_names_the_answer_that_does_not_come(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr('auv_analysis.nodes.flow_control.PATIENCE', 0.5)
+    monkeypatch.setattr('auv_analysis.nodes.replay_publishers.PATIENCE', 0.5)
     with playing(made(tmp_path / 'bag'), rate=0.0, answers='other/wrench') as (peer, replay):
         assert ended(peer, replay) == 1
     assert replay.failure.startswith('no answer on other/wrench to the odometry of 0 s')
@@ -216,7 +216,7 @@ def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:
 
 
 def test_gives_up_a_subscriber_that_stays_silent(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr('auv_analysis.nodes.flow_control.PATIENCE', 0.5)
+    monkeypatch.setattr('auv_analysis.nodes.replay_publishers.PATIENCE', 0.5)
     domain = fresh_domain()
     recorder = start_node('recorder_node', domain, *parameters(bag=tmp_path / 'again'))
     values = {'original_names': True, 'expected_subscribers': ['odom=1'], 'start_paused': True}

@@ -21,6 +21,7 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 
 from auv_analysis import load_scenario
+from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import BagWriter
@@ -273,7 +274,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         odom.header.frame_id, wrench.header.frame_id = 'odom_ned', 'base_link_fsd'
         for topic, kind in (('/odom', 'nav_msgs/msg/Odometry'),
                             ('/wrench', 'geometry_msgs/msg/WrenchStamped')):  # fmt: skip
-            writer.add_channel(topic, kind, schema_text(kind), [], '')
+            writer.add_channel(Definition(topic, kind), schema_text(kind))
         for k in range(5):
             odom.header.stamp.nanosec = k * 10**7
             wrench.header.stamp = odom.header.stamp
@@ -410,7 +411,7 @@ def test_analyze_keeps_the_bags_that_it_reads(given, out, recording, folder) -> 
 def test_analyze_refuses_messages_that_cannot_be_decoded(cut, folder, capsys) -> None:
     writer = BagWriter(folder / 'taken' / 'gvc', {}, Storage('none'))
     kind = 'nav_msgs/msg/Odometry'
-    writer.add_channel('/odom', kind, schema_text(kind), [], '')
+    writer.add_channel(Definition('/odom', kind), schema_text(kind))
     writer.write('/odom', 0, serialize_message(Odometry())[:cut])
     writer.close()
     code = _exit_code('analyze', 'taken/gvc')
@@ -421,7 +422,7 @@ def test_analyze_refuses_messages_that_cannot_be_decoded(cut, folder, capsys) ->
 def test_analyze_refuses_a_topic_of_another_type(folder, capsys) -> None:
     writer = BagWriter(folder / 'taken' / 'gvc', {}, Storage('none'))
     kind = 'geometry_msgs/msg/WrenchStamped'
-    writer.add_channel('/odom', kind, schema_text(kind), [], '')
+    writer.add_channel(Definition('/odom', kind), schema_text(kind))
     writer.write('/odom', 0, serialize_message(WrenchStamped()))
     writer.close()
     code = _exit_code('analyze', 'taken/gvc')

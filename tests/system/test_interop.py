@@ -18,6 +18,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from auv_analysis.bag import bag_files, load_run, read_bag
+from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.writer import BagWriter
 from auv_dynamics.ros import interface
@@ -146,7 +147,9 @@ def written_again(bag: Path, folder: Path, storage: Storage) -> Path:
                 qos = yaml.safe_load(channel.metadata['offered_qos_profiles'])
                 digest = channel.metadata['topic_type_hash']
                 text = schema.data.decode()
-                writer.add_channel(channel.topic, schema.name, text, qos, digest)
+                writer.add_channel(
+                    Definition(channel.topic, schema.name, qos=qos, digest=digest), text
+                )
             writer.write(channel.topic, message.log_time, message.data)
     writer.close()
     return folder

@@ -4,7 +4,7 @@ import pytest
 from foreign_bags import UNNAMED, Maker, loaded, motion, simple, simulated, write, write_chunks
 
 from auv_analysis.bag.any_bag import survey
-from auv_analysis.bag.metadata import files_of, is_mcap
+from auv_analysis.bag.metadata import Definition, files_of, is_mcap
 from auv_analysis.bag.output import Storage
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.runs.run import Run
@@ -81,7 +81,7 @@ def test_a_damaged_chunk_ends_an_mcap(run, tmp_path) -> None:
 
 def test_a_type_without_a_package_is_named_and_nobodys(tmp_path) -> None:
     bag = BagWriter(tmp_path / 'bag', {}, Storage('none'))
-    bag.add_channel('/o', 'Odometry', 'float64 x', [], '')
+    bag.add_channel(Definition('/o', 'Odometry'), 'float64 x')
     bag.write('/o', 0, bytes(12))
     bag.close()
     path = tmp_path / 'bag' / 'bag_0.mcap'

@@ -2,7 +2,7 @@
 
 import pytest
 
-from auv_analysis.nodes.player import HELD, Playback
+from auv_analysis.nodes.replay_node import HELD, Playback
 
 SECOND = 10**9
 NOW = 50_000.0  # s, what a steady clock may say

@@ -43,9 +43,9 @@ class Definition:
 
 @dataclass
 class Extent:
-    """What lies in a file of a bag: messages per topic, first and last log time in ns."""
+    """What lies in a bag or a file of it: messages per topic, first and last log time in ns."""
 
-    name: str
+    name: str = ''
     counts: dict[str, int] = field(default_factory=dict)
     first: int | None = None
     last: int | None = None
@@ -53,6 +53,10 @@ class Extent:
     def add(self, topic: str, first: int, last: int, count: int = 1) -> None:
         """Count messages of a topic that were logged from `first` to `last`, ns."""
         self.counts[topic] = self.counts.get(topic, 0) + count
+        self.span(first, last)
+
+    def span(self, first: int, last: int) -> None:
+        """Note that there are messages logged from `first` to `last`, ns."""
         self.first = first if self.first is None else min(self.first, first)
         self.last = last if self.last is None else max(self.last, last)
 

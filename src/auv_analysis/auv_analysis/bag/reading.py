@@ -22,7 +22,7 @@ from mcap.records import Attachment, Channel, McapRecord, Metadata
 from auv_analysis.bag import limits
 from auv_analysis.bag.chunks import Table
 from auv_analysis.bag.mcap_file import McapFile
-from auv_analysis.bag.metadata import RECORDING, bag_files, read_recording
+from auv_analysis.bag.metadata import RECORDING, Extent, bag_files, read_recording
 from auv_analysis.bag.step_topics import (
     ODOMETRIES,
     READERS,
@@ -105,7 +105,7 @@ def slices(count: int, rows: int = 1 << 16) -> Iterator[slice]:
 
 
 @dataclass
-class Contents:
+class Contents(Extent):
     """What lies in a bag, before anything is made of it.
 
     Attributes
@@ -113,8 +113,6 @@ class Contents:
     attachments : name -> text
     metadata : name -> mapping
     types : topic -> message type
-    counts : topic -> number of messages
-    first, last : ns, None when the bag is empty
     messages : topic -> stamps (n,) in ns and values (n, 6) or (n, 13), of our topics
     notes : what is odd, one line each
     frames : namespace -> frames of its first odometry
@@ -128,9 +126,6 @@ class Contents:
     attachments: dict[str, str] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     types: dict[str, str] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)
-    first: int | None = None
-    last: int | None = None
     messages: dict[str, Series] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     frames: dict[str, Frames] = field(default_factory=dict)
@@ -138,11 +133,6 @@ class Contents:
     namespace: str | None = None
     asked: bool = False
     lenient: bool = False
-
-    def span(self, first: int, last: int) -> None:
-        """Note that there are messages logged from `first` to `last`, ns."""
-        self.first = first if self.first is None else min(self.first, first)
-        self.last = last if self.last is None else max(self.last, last)
 
 
 class Batch(NamedTuple):
@@ -232,11 +222,10 @@ class FileReader:
     def _table(self, table: Table) -> Iterator[Batch]:
         members = {}
         for channel, index in self._file.by_channel(table):
-            counts = self._contents.counts
-            counts[channel.topic] = counts.get(channel.topic, 0) + len(index)
+            logged = table.log_times[index]
+            self._contents.add(channel.topic, int(logged.min()), int(logged.max()), len(index))
             if channel.id in self._decoders:
                 members[channel.id] = index
-        self._contents.span(int(table.log_times.min()), int(table.log_times.max()))
         known = dict(self._frames)
         try:
             found = self._found(table, members)

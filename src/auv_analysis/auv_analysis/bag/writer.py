@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 from auv_analysis.bag.metadata import (
     METADATA,
@@ -191,21 +190,8 @@ class BagWriter:
         self._waits_since = None
         return file
 
-    def add_channel(
-        self, topic: str, kind: str, schema: str, qos: list[dict[str, Any]], digest: str
-    ) -> None:
-        """Register a topic; RecordingError when the bag takes no more.
-
-        Parameters
-        ----------
-        topic : full name
-        kind : message type, 'package/msg/Name'
-        schema : full ros2msg text
-        qos : offered profiles as rosbag2 writes them
-        digest : RIHS01 type hash
-
-        """
-        definition = Definition(topic, kind, qos=qos, digest=digest)
+    def add_channel(self, definition: Definition, schema: str) -> None:
+        """Register a topic with the ros2msg text of its type; RecordingError: no more is taken."""
         with self._lock:
             self._health.refuse_broken()
             try:
@@ -213,7 +199,7 @@ class BagWriter:
             except Exception as error:
                 self._health.fail(self._file, error)
                 self._health.refuse_broken()
-            self._definitions[topic] = definition, schema
+            self._definitions[definition.topic] = definition, schema
 
     def has_channel(self, topic: str) -> bool:
         """Whether a topic is registered."""

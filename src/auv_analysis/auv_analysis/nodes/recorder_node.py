@@ -7,6 +7,7 @@ from typing import Any
 from rclpy.duration import Duration
 from std_msgs.msg import Header
 
+from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import RecordingError
 from auv_analysis.nodes.recorder import GraphClock, OtherTopics, recorder_parameters
@@ -205,7 +206,9 @@ class RecorderNode(BulkNode):
         known = offered or self.get_subscriptions_info_by_topic(topic)
         digest = str(known[0].topic_type_hash) if known else ''
         try:
-            self._writer.add_channel(topic, kind, schema_text(kind), qos, digest)
+            self._writer.add_channel(
+                Definition(topic, kind, qos=qos, digest=digest), schema_text(kind)
+            )
         except RecordingError as error:
             self._end(1, str(error))
 

@@ -3,7 +3,8 @@
 import math
 import sys
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -11,14 +12,292 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
-from auv_analysis.nodes.player import Player
-from auv_analysis.replay.selection import replay_parameters
+from auv_analysis.bag.step_topics import ODOMETRY
+from auv_analysis.nodes.replay_publishers import (
+    Answers,
+    Commands,
+    Guard,
+    Receivers,
+    is_odometry,
+    make_publishers,
+)
+from auv_analysis.replay.played_bag import GAP, Logged, messages
+from auv_analysis.replay.selection import REPLAY, ReplayParameters, nothing_left, replay_parameters
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.ros import interface
-from auv_dynamics.ros.endpoints import NAMED, NAMELESS, full_name, other_publishers
+from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros.endpoints import NAMED, NAMELESS, full_name, onlookers, other_publishers
+from auv_dynamics.ros.interface import NANOSECONDS, BadMessageError
 from auv_dynamics.ros.node_interface import NodeInterface, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
 from auv_dynamics.ros.participant import Participant
+
+HELD = math.inf
+
+
+class Playback:
+    """Says when a message is due; times are s of the steady clock and ns of the bag.
+
+    Due times are counted from one place in the bag, not from message to message, so that nothing
+    drifts.
+
+    Parameters
+    ----------
+    rate : seconds of the bag per second; 0: as fast as possible
+    paused : whether it begins paused
+    skips_gaps : whether a message behind a gap is due at once
+
+    Attributes
+    ----------
+    rate, paused : as they are now
+
+    """
+
+    def __init__(self, rate: float, paused: bool = False, *, skips_gaps: bool = False):
+        self.rate, self.paused, self._skips_gaps = rate, paused, skips_gaps
+        self._place: tuple[float, int] | None = None  # a time of the clock, and of the bag then
+        self._reached = 0
+        self._until = -1  # ns up to which is played although it is paused
+
+    def restart(self) -> None:
+        """Forget the place in the bag: the next message is the first one."""
+        self._place, self._reached, self._until = None, 0, -1
+
+    def wait(self, now: float, ns: int) -> float:
+        """Seconds until a message of this log time is due; 0 or less: it is; HELD: paused."""
+        if self._place is None:
+            self._place, self._reached = (now, ns), ns
+        if self.paused:
+            return 0.0 if ns <= self._until else HELD
+        if self.rate == 0.0:
+            return 0.0
+        if self._skips_gaps and ns - self._reached > GAP:
+            self._place = now, ns
+        clock, place = self._place
+        return clock + (ns - place) / (self.rate * NANOSECONDS) - now
+
+    def played(self, ns: int) -> None:
+        """Note that a message of this log time was published."""
+        self._reached = max(self._reached, ns)
+
+    def pause(self, now: float, ns: int) -> None:
+        """Hold; `ns` is the log time of the next message."""
+        if not self.paused:
+            self._hold(now, ns)
+            self.paused = True
+
+    def run(self, now: float) -> None:
+        """Go on from where it was held."""
+        if self.paused:
+            self.paused = False
+            self._place = (now, self._reached) if self._place else None
+
+    def step(self, ns: int) -> None:
+        """Although paused, play everything up to the log time `ns`."""
+        self._until = ns
+
+    def change_rate(self, now: float, ns: int, rate: float) -> None:
+        """Go on from here at another rate; `ns` is the log time of the next message."""
+        if not self.paused:
+            self._hold(now, ns)
+        self.rate = rate
+
+    def _hold(self, now: float, ns: int) -> None:
+        """Begin to count from the present place: between two messages, never beyond the next."""
+        if self._place is None:
+            return
+        clock, place = self._place
+        here = place + round((now - clock) * self.rate * NANOSECONDS)
+        self._reached = max(self._reached, min(here, ns) if self.rate else self._reached)
+        self._place = now, self._reached
+
+
+BATCH = 0.01  # s of messages between two looks at services and signals
+SOON = 0.002  # s until it is asked again whether subscribers have room
+LONGEST = 0.01  # s between two looks at what is due: a timer that the data path is in time for
+
+
+class Player:
+    """Messages of a bag and the publishers that they go to.
+
+    Parameters
+    ----------
+    node : that publishes
+    settings : what is to be played, and how
+
+    Attributes
+    ----------
+    playback : time of the bag
+    guard : of the commands
+    published : recorded topic -> number of messages, over all loops
+    loops : how often the end was reached
+    now_ns : log time of the last message
+    ended : whether all has been played, and taken
+    failure : why it cannot go on; empty: it can
+
+    """
+
+    def __init__(self, node: Any, settings: ReplayParameters):
+        self._node, self._settings = node, settings
+        index, selection = settings.index, settings.selection
+        self._publishers = make_publishers(node.graph, index.topics, selection)
+        if not self._publishers:
+            raise nothing_left(index, selection)
+        guarded = {topic: self._publishers[topic] for topic in selection.guarded}
+        self.guard = Guard(node, guarded, settings.foreign, node.graph.complain)
+        self._commands = Commands(guarded, settings.foreign)
+        self._receivers = Receivers(node, self._publishers)
+        self._answers = Answers(node.graph, settings.answers) if settings.answers else None
+        self._publish_clock = node.graph.output(topics.CLOCK) if settings.clock else None
+        self.playback = Playback(
+            settings.rate, settings.start_paused, skips_gaps=settings.skip_gaps
+        )
+        self.published: Counter[str] = Counter()
+        self.loops, self.now_ns, self._clock_ns = 0, settings.begin, -1
+        self.ended, self.failure = False, ''
+        self._stream = self._rewound()
+        self._next: Logged | None = None
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Recorded topic -> full name under which it is published."""
+        return {topic: one.topic_name for topic, one in self._publishers.items()}
+
+    @property
+    def alone(self) -> dict[str, str]:
+        """Full names of what only one may publish -> the option that leaves it to others.
+
+        A second odometry beside that of a vehicle would be believed by its controller.
+        """
+        found = {interface.CLOCK: '--no-clock'} if self._publish_clock is not None else {}
+        for topic, name in self.names.items():
+            measured = self._settings.index.topics[topic].kind == ODOMETRY
+            if measured and REPLAY not in name.split('/'):
+                found[name] = '--topics, or under /replay'
+        return found
+
+    @property
+    def silent(self) -> list[str]:
+        """Subscribers that did not answer in time: of these nothing is known."""
+        return self._receivers.silent
+
+    def waits_for(self) -> str:
+        """Which of the expected subscribers are missing, or an empty text."""
+        for topic, count in self._settings.expected.items():
+            publisher = self._publishers[topic]
+            found = publisher.get_subscription_count()
+            found -= onlookers(self._node, publisher.topic_name) if found >= count else 0
+            if found < count:
+                return f'{topic}: expected {count} subscribers, found {found}'
+        return ''
+
+    def advance(self, now: float) -> float:
+        """Publish what is due; s until it is worth looking again."""
+        self._receivers.ask(always=self._peek() is None)
+        until = now + BATCH
+        while (message := self._peek()) is not None:
+            wait = self.playback.wait(now, message.ns)
+            if wait > 0.0:
+                return min(wait, LONGEST)
+            if now >= until:
+                return 0.0
+            if not self._goes_out(message, now):
+                return SOON
+            self._next = None
+            self.playback.played(message.ns)
+            now = time.monotonic()
+        self._end_of_bag()
+        return SOON
+
+    def meet(self) -> None:
+        """Look who can be asked what has arrived."""
+        self._receivers.find()
+
+    def look(self, now: float) -> None:
+        """Look who listens."""
+        self._receivers.find()
+        self.guard.look(now)
+        if self._answers and not self.playback.paused:
+            self.failure = self._answers.overdue()
+
+    def pause(self) -> None:
+        """Hold; a vehicle that hears the commands is left without a wrench."""
+        self.playback.pause(time.monotonic(), self._ahead())
+        self._commands.let_go()
+
+    def run(self) -> None:
+        """Go on from where it was held."""
+        self.playback.run(time.monotonic())
+
+    def step(self) -> int | None:
+        """Play the messages of the next log time, although paused; that time in ns."""
+        message = self._peek()
+        if message is None:
+            return None
+        self.playback.step(message.ns)
+        return message.ns
+
+    def change_rate(self, rate: float) -> None:
+        """Go on at another rate."""
+        self.playback.change_rate(time.monotonic(), self._ahead(), rate)
+
+    def let_go(self) -> None:
+        """Leave a vehicle that hears the commands without a wrench."""
+        self._commands.let_go()
+
+    def _peek(self) -> Logged | None:
+        if self._next is None:
+            self._next = next(self._stream, None)
+        return self._next
+
+    def _ahead(self) -> int:
+        message = self._peek()
+        return self.now_ns if message is None else message.ns
+
+    def _rewound(self) -> Iterator[Logged]:
+        p = self._settings
+        return messages(p.index, self._publishers, p.begin, p.end)
+
+    def _goes_out(self, message: Logged, now: float) -> bool:
+        """Publish a message that is due; False where it has to wait."""
+        topic = message.topic
+        kind = self._settings.index.topics[topic].kind
+        waits = self._answers is not None and not self._answers.are_complete()
+        if waits and is_odometry(topic, kind):
+            return False
+        allowed = self.guard.may(topic, now)
+        if allowed is None or not self._receivers.have_room(topic):
+            self._receivers.ask()
+            return False
+        if message.ns != self._clock_ns and self._publish_clock is not None:
+            self._publish_clock(message.ns, ())
+        self.now_ns = self._clock_ns = message.ns
+        if allowed:
+            self._publish(topic, kind, message.data)
+        return True
+
+    def _publish(self, topic: str, kind: str, data: bytes) -> None:
+        try:
+            self._commands.check(topic, data)
+        except BadMessageError as error:
+            self._node.graph.refuse(str(error))
+            return
+        self._publishers[topic].publish(data)
+        self._receivers.sent(topic)
+        self.published[topic] += 1
+        if self._answers is not None:
+            self._answers.sent(topic, kind, data)
+
+    def _end_of_bag(self) -> None:
+        """Wait until all has been taken; then end, or begin again."""
+        if not self._receivers.have_all() or (self._answers and not self._answers.are_complete()):
+            return
+        self.loops += 1
+        if self._settings.loop:
+            self.playback.restart()
+            self._stream, self._clock_ns = self._rewound(), -1
+        else:
+            self.ended = True
+
 
 NAME = 'replay_node'
 DISCOVERY = 1.0  # s in which those who are there already are met

@@ -12,10 +12,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.metrics.statistics import Statistics, followed, part_of
 from auv_analysis.report import plots
 from auv_analysis.report.digest import sketch
 from auv_analysis.report.run_report import write_report
-from auv_analysis.report.statistics import Statistics, followed, part_of
 from auv_analysis.report.traces import COLUMNS, FEW, Trace, thinned
 from auv_analysis.runs.run import Run
 

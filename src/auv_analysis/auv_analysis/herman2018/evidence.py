@@ -7,10 +7,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from auv_analysis.metrics.statistics import Part
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import MISSING, fixed, number
 from auv_analysis.report.digest import FOREVER, Sketch, last_third
-from auv_analysis.report.statistics import Part
 
 Text = Callable[[float], str]
 UNBOUNDED = 'unbounded'

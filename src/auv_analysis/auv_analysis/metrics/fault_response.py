@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.metrics.statistics import Part, Statistics
 from auv_analysis.metrics.summary import TRANSIENT, band_of, has_settled
 from auv_analysis.output.new_files import write_table
 from auv_analysis.runs.run import AnyRun, Facts
@@ -80,41 +81,58 @@ def responses(run: AnyRun) -> list[Response]:
     """Every fault of a run in every degree of freedom; none where no set-point is known."""
     if not run.faults or not run.knows_setpoint:
         return []
-    tallies = [_Tally(mark, run) for mark in run.faults]
-    peak = np.zeros(6)
+    tiny = 1e-6 * run.step
+    windows = {mark: windows_of(mark, run) for mark in run.faults}
+    cuts = [time - tiny for three in windows.values() for window in three for time in window]
+    statistics, peak = Statistics(cuts), np.zeros(6)
     for block in run.blocks():
+        statistics.add(block.t, np.concatenate([block.nu_d - block.nu, block.tau], axis=1))
         peak = np.maximum(peak, np.abs(block.nu_d).max(axis=0))
     band = band_of(peak)
+    recoveries = [_Recovery(mark, run) for mark in run.faults]
     for block in run.blocks():
         error = np.abs(block.nu_d - block.nu)
-        for tally in tallies:
-            tally.add(block.t, error, block.tau, band)
-    return [response for tally in tallies for response in tally.responses(band)]
+        for one in recoveries:
+            one.add(block.t, error, band)
+    found = []
+    for mark, recovery in zip(run.faults, recoveries, strict=True):
+        parts = [statistics.between(a - tiny, b - tiny) for a, b in windows[mark]]
+        for i, dof in enumerate(DOFS):
+            found.append(
+                Response(
+                    mark,
+                    run.controller,
+                    run.law,
+                    dof,
+                    windows[mark],
+                    _of(parts, 'rms', i),
+                    _of(parts, 'peak', i),
+                    float(band[i]),
+                    recovery.time(i),
+                    recovery.until,
+                    _of(parts, 'rms', 6 + i),
+                )
+            )
+    return found
 
 
-class _Tally:
-    """Sums over the windows of one fault, block by block."""
+def _of(parts: Sequence[Part | None], name: str, column: int) -> tuple[Any, ...]:
+    """A number of each part, None of one without samples."""
+    return tuple(None if part is None else float(getattr(part, name)[column]) for part in parts)
+
+
+class _Recovery:
+    """How long after the end of one fault the errors settle, block by block."""
 
     def __init__(self, mark: Mark, run: Facts):
         self._mark, self._run = mark, run
-        self._windows = windows_of(mark, run)
-        self._count = np.zeros(3, int)
-        self._error, self._effort = np.zeros((3, 6)), np.zeros((3, 6))  # sums of squares
-        self._peak = np.zeros((3, 6))
         self._until = next_change(mark, run)
         self._outside = np.full(6, -math.inf)  # time of the last sample outside the band
         self._seen, self._left = 0, np.full(6, -1)  # samples of recovery, and the last one outside
 
-    def add(self, t: np.ndarray, error: np.ndarray, tau: np.ndarray, band: np.ndarray) -> None:
-        """Take in consecutive samples."""
+    def add(self, t: np.ndarray, error: np.ndarray, band: np.ndarray) -> None:
+        """Take in consecutive samples of abs(nu_d - nu)."""
         tiny = 1e-6 * self._run.step
-        for i, (begin, end) in enumerate(self._windows):
-            inside = (t >= begin - tiny) & (t < end - tiny)
-            if inside.any():
-                self._count[i] += inside.sum()
-                self._error[i] += (error[inside] ** 2).sum(axis=0)
-                self._effort[i] += (tau[inside] ** 2).sum(axis=0)
-                self._peak[i] = np.maximum(self._peak[i], error[inside].max(axis=0))
         behind = np.flatnonzero((t >= self._mark.end - tiny) & (t < self._until - tiny))
         if len(behind):
             for i in range(6):
@@ -124,34 +142,14 @@ class _Tally:
                     self._outside[i] = t[behind[outside[-1]]]
             self._seen += len(behind)
 
-    def responses(self, band: np.ndarray) -> list[Response]:
-        """Of every degree of freedom."""
+    @property
+    def until(self) -> float | None:
+        """When the time that is looked at ends, s; None where the fault has no end."""
         run = self._run
-        return [
-            Response(
-                self._mark,
-                run.controller,
-                run.law,
-                dof,
-                self._windows,
-                self._roots(self._error, i),
-                self._of_parts(self._peak[:, i]),
-                float(band[i]),
-                self._recovery(i),
-                min(self._until, run.start + run.duration) if self._seen else None,
-                self._roots(self._effort, i),
-            )
-            for i, dof in enumerate(DOFS)
-        ]
+        return min(self._until, run.start + run.duration) if self._seen else None
 
-    def _roots(self, sums: np.ndarray, i: int) -> tuple[Any, ...]:
-        return self._of_parts(np.sqrt(sums[:, i] / np.maximum(self._count, 1)))
-
-    def _of_parts(self, values: np.ndarray) -> tuple[Any, ...]:
-        pairs = zip(values, self._count, strict=True)
-        return tuple(float(value) if count else None for value, count in pairs)
-
-    def _recovery(self, i: int) -> float | None:
+    def time(self, i: int) -> float | None:
+        """Seconds until one of them has settled; None: it has not."""
         if not self._seen or not has_settled(self._left[i], self._seen):
             return None
         if self._left[i] < 0:

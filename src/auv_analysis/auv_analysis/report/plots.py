@@ -24,10 +24,10 @@ from matplotlib.ticker import LogLocator, NullLocator
 from PIL import Image
 
 from auv_analysis.metrics.quantities import Quantity, mathtext
+from auv_analysis.metrics.statistics import Part
 from auv_analysis.output.progress import each
 from auv_analysis.output.text import fixed, number, plain, typeset
 from auv_analysis.report.digest import Sketch
-from auv_analysis.report.statistics import Part
 from auv_dynamics.vehicle import DOFS
 
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#D55E00', '#56B4E9')  # Okabe and Ito

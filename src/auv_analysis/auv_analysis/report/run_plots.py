@@ -15,13 +15,13 @@ from auv_analysis.metrics.coupling import structural_zeros
 from auv_analysis.metrics.energy import shares
 from auv_analysis.metrics.lyapunov import OF_THE_MOTION
 from auv_analysis.metrics.quantities import SIGNALS, VELOCITY, Quantity
+from auv_analysis.metrics.statistics import Part
 from auv_analysis.metrics.summary import BAND_TEXT, DWELL, TRANSIENT, band_of
 from auv_analysis.output.text import join, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import FOREVER, Sketch, alike, common_window, sketches
 from auv_analysis.report.panels import different_disturbances
 from auv_analysis.report.plots import COLOURS, DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
-from auv_analysis.report.statistics import Part
 from auv_analysis.report.wrench_plots import (
     applied_figure,
     certificate_figure,

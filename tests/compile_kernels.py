@@ -82,7 +82,7 @@ def main() -> None:
     if not sys.argv[1:]:
         print('compiling the kernels that the tests call ...', flush=True)
         started = [subprocess.Popen([sys.executable, __file__, *laws]) for laws in TOGETHER]
-        sys.exit(max(process.wait() for process in started))
+        sys.exit(max(abs(process.wait()) for process in started))  # negative: by a signal
 
 
 if __name__ == '__main__':

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pyarrow as pa
 
@@ -14,7 +14,7 @@ from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import each, say, waiting
 from auv_analysis.output.text import join, number
-from auv_analysis.report.digest import Sketch, sketch
+from auv_analysis.report.digest import sketch
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.results import Column, Table, make_table
@@ -33,7 +33,6 @@ from auv_analysis.studies.compare.ranking import (
 from auv_analysis.studies.compare.sources import Source, named, open_source
 from auv_dynamics.files.errors import FailedError, first_line
 from auv_dynamics.vehicle import DOFS
-from auv_dynamics.vehicle.vehicle import Vehicle
 
 SECTIONS = {  # section -> its title, and the plots in it
     'errors': ('Errors', ('rms_errors', 'late_errors', 'settling_times')),
@@ -58,22 +57,6 @@ MOST_NAMES = 6
 Rows = Sequence[Mapping[str, Any]]
 
 
-class _Plan(NamedTuple):
-    """Names of a run that diverged."""
-
-    scenario: str
-    controller: str
-    law: str
-    vehicle: Vehicle
-
-
-class _Found(NamedTuple):
-    source: Source
-    known: Sketch | _Plan
-    summary: dict[str, Any]
-    failure: str
-
-
 def entries_of(sources: Sequence[Source], vehicle: str | None = None) -> list[Entry]:
     """Read or simulate each source, keep its metrics and forget its samples.
 
@@ -92,40 +75,25 @@ def entries_of(sources: Sequence[Source], vehicle: str | None = None) -> list[En
     FailedError : every one diverged
 
     """
-    found = []
-    for source in each(sources, len(sources)):
-        try:
-            run = open_source(source, vehicle).run
-        except ArithmeticError as error:  # it diverges, or a user's own law fails
-            found.append(_Found(source, _plan(source), {}, first_line(error)))
-        else:
-            found.append(_Found(source, sketch(run), summarize(run), ''))
+    found = [_entry(source, vehicle) for source in each(sources, len(sources))]
     if all(entry.failure for entry in found):
         raise FailedError(f'all of {len(found)} runs failed, the first: {found[0].failure}')
-    names = named([(entry.source, entry.known) for entry in found])
-    return [_entry(*pair) for pair in zip(names, found, strict=True)]
+    names = named([*zip(sources, found, strict=True)])
+    return [replace(entry, name=name) for entry, name in zip(found, names, strict=True)]
 
 
-def _plan(source: Source) -> _Plan:
-    scenario = source.scenario
-    assert scenario is not None, 'only what is simulated diverges'
-    law = scenario.controller(source.controller)['law']
-    return _Plan(scenario.name, source.controller, law, scenario.vehicle)
-
-
-def _entry(name: str, found: _Found) -> Entry:
-    source, known = found.source, found.known
-    return Entry(
-        name=name,
-        scenario=known.scenario,
-        vehicle=known.vehicle.name,
-        controller=known.controller,
-        law=known.law,
-        origin='simulated now' if source.kind == 'scenario' else str(source.path),
-        summary=found.summary,
-        sketch=None if isinstance(known, _Plan) else known,
-        failure=found.failure,
-    )
+def _entry(source: Source, vehicle: str | None) -> Entry:
+    """Entry without a name."""
+    origin = 'simulated now' if source.kind == 'scenario' else str(source.path)
+    try:
+        run = open_source(source, vehicle).run
+    except ArithmeticError as error:  # it diverges, or a user's own law fails
+        one, name = source.scenario, source.controller
+        assert one is not None, 'only what is simulated diverges'
+        names = one.name, one.vehicle.name, name, one.controller(name)['law']
+        return Entry('', *names, origin, {}, None, first_line(error))
+    names = run.scenario, run.vehicle.name, run.controller, run.law
+    return Entry('', *names, origin, summarize(run), sketch(run))
 
 
 def conclude_comparison(

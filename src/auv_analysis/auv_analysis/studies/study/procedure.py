@@ -176,12 +176,13 @@ def _headline(of: Sensitivity, name: str, dof: str, main: Row) -> str:
         else f'place {main["rank_low"]} to {main["rank_high"]} of {main["alike"]}'
     )
     sign, gain = '−' if main['doubled'] < 0 else '+', main['gain']
-    share = f'{gain} makes {number(100 * main["ST"], 2)} % of its variance, and '
+    share = ''
+    if of.method == 'sobol':
+        share = f'{gain} makes {number(100 * main["ST"], 2)} % of its variance, and '
     return (
         f'Under {of.controller} the {quantity(name).label} that follows the gains most is that of '
         f'{dof} (spread {number(main["spread"], 2)}, {sure}): '
-        f'{share if of.method == "sobol" else ""}'
-        f'doubling {gain} changes it by about {sign}{number(abs(main["doubled"]), 2)} %.'
+        f'{share}doubling {gain} changes it by about {sign}{number(abs(main["doubled"]), 2)} %.'
     )
 
 

@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from auv_analysis.driver.checks import judge
-from auv_analysis.driver.evidence import Endpoint, Evidence, Finding, GraphSnapshot, Settings
+from auv_analysis.driver.evidence import (
+    CheckResult,
+    DriverRecord,
+    Endpoint,
+    GraphSnapshot,
+    Settings,
+)
 from auv_analysis.driver.odometry_log import OdometryLog
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.vehicle.frames import swap_state
@@ -91,9 +97,9 @@ def graph(**values: object) -> GraphSnapshot:
 
 def found_in(
     log: OdometryLog, *ids: str, seen: GraphSnapshot | None = None, **settings: object
-) -> dict[str, Finding]:
+) -> dict[str, CheckResult]:
     """Check -> what comes of it, of some checks of a driver that was listened to."""
-    evidence = Evidence(seen or graph(), log, Settings(**settings), passive='not asked for')
+    evidence = DriverRecord(seen or graph(), log, Settings(**settings), passive='not asked for')
     return {one.id: one for one in judge(evidence, ids)}
 
 

@@ -14,7 +14,7 @@ from mcap_ros2.decoder import DecoderFactory
 from zstandard import ZstdError
 
 from auv_analysis.bag.metadata import bag_files
-from auv_analysis.bag.reading import Contents
+from auv_analysis.bag.reading import BagContents
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface
 
@@ -38,9 +38,9 @@ READERS = {
 }
 
 
-def slow_read_bag(bag: str | Path) -> Contents:
+def slow_read_bag(bag: str | Path) -> BagContents:
     """What `read_bag` gives, with lists in place of arrays."""
-    contents = Contents()
+    contents = BagContents()
     frames: dict[str, interface.Frames] = {}
     for path in bag_files(bag):
         schemas: dict[int, Schema] = {}
@@ -185,7 +185,7 @@ def _refusal(path: Path, topic: str, expected: str, error: Exception) -> InputEr
     return InputError(path, topic, expected, (str(error) or repr(error)).splitlines()[0])
 
 
-def _keep(contents: Contents, path: Path, topic: str, message: Any, frames: dict) -> None:
+def _keep(contents: BagContents, path: Path, topic: str, message: Any, frames: dict) -> None:
     role = _role(topic)
     namespace = topic.removesuffix(role)
     try:

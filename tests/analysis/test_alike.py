@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.report.digest import alike, sketches
+from auv_analysis.report.digest import alike, digests
 from auv_analysis.report.run_plots import common_bands
-from auv_analysis.report.run_report import Contents, findings
+from auv_analysis.report.run_report import SectionInputs, findings
 from auv_analysis.report.scenario_text import set_up
 from auv_analysis.runs.run import Run
 
@@ -27,10 +27,10 @@ def other(run) -> Run:
 
 def said(runs: dict[str, Run]) -> str:
     runs = {name: replace(one, controller=name) for name, one in runs.items()}
-    drawn = sketches(runs)
+    drawn = digests(runs)
     summaries = {name: summarize(one) for name, one in runs.items()}
     scenes = {tuple(runs): set_up(drawn, summaries, '')}
-    sections = Contents(drawn, summaries, scenes, [], {}).sections()
+    sections = SectionInputs(drawn, summaries, scenes, [], {}).sections()
     experiment = ' '.join(str(block) for block in sections[0].blocks)
     return ' '.join([experiment, *(s.text for s in findings(drawn, summaries))])
 
@@ -56,23 +56,23 @@ def test_another_start_is_not_laid_to_the_laws(run) -> None:
 @pytest.mark.parametrize('every', [1, 2, 7])
 def test_set_points_are_held_against_each_other_over_the_time_that_runs_share(run, every) -> None:
     shorter = run.part(slice(0, 300, every))
-    a, b = sketches({'a': run, 'b': shorter}).values()
+    a, b = digests({'a': run, 'b': shorter}).values()
     assert alike([a, b], 'nu_d') is True
     late = replace(shorter, nu_d=shorter.nu_d + 0.1 * (shorter.t > 1.5)[:, None])
-    assert alike([a, *sketches({'b': late}).values()], 'nu_d') is False
+    assert alike([a, *digests({'b': late}).values()], 'nu_d') is False
 
 
 def test_what_is_not_known_is_neither_the_same_nor_another(run) -> None:
     blind = replace(run, disturbance=None)
     shifted = replace(run, t=run.t * 1.000123)
-    a, b, c = sketches({'a': run, 'b': blind, 'c': shifted}).values()
+    a, b, c = digests({'a': run, 'b': blind, 'c': shifted}).values()
     assert alike([a, b], 'F') is None
     assert alike([a, c], 'nu_d') is None
 
 
 def test_a_band_is_drawn_only_where_the_runs_share_it(run, other) -> None:
     changed = replace(run, nu_d=run.nu_d * [1.5, 1, 1, 1, 1, 1])
-    bands = common_bands(sketches({'a': run, 'b': changed}))
+    bands = common_bands(digests({'a': run, 'b': changed}))
     assert [band is None for band in bands] == [True, *5 * [False]]
 
 

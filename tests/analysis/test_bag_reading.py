@@ -21,7 +21,7 @@ from made_messages import (
 )
 from slow_bag import slow_read_bag
 
-from auv_analysis.bag import Contents, read_bag, step_topics
+from auv_analysis.bag import BagContents, read_bag, step_topics
 from auv_dynamics.files.errors import InputError
 
 STEP = 10_000_000
@@ -109,20 +109,20 @@ def bags(draw: st.DrawFn, odd: tuple[str, ...] = ODD) -> Any:
     return write
 
 
-def outcome(reader: Any, bag: Path) -> Contents | str:
+def outcome(reader: Any, bag: Path) -> BagContents | str:
     try:
         return reader(bag)
     except InputError as error:
         return str(error)
 
 
-def assert_equal_reading(bag: Path) -> Contents | str:
+def assert_equal_reading(bag: Path) -> BagContents | str:
     """Both readers agree; returns what they found."""
     expected, found = outcome(slow_read_bag, bag), outcome(read_bag, bag)
     if isinstance(expected, str):
         assert found == expected
         return found
-    assert isinstance(found, Contents), found
+    assert isinstance(found, BagContents), found
     for name in ('attachments', 'metadata', 'types', 'counts', 'first', 'last', 'notes'):
         assert getattr(found, name) == getattr(expected, name), name
     assert found.messages.keys() == expected.messages.keys()
@@ -136,7 +136,7 @@ def assert_equal_reading(bag: Path) -> Contents | str:
 @quick
 def test_usable_bags(write: Any) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        assert isinstance(assert_equal_reading(write(Path(folder))), Contents)
+        assert isinstance(assert_equal_reading(write(Path(folder))), BagContents)
 
 
 @given(bags())
@@ -217,7 +217,7 @@ def test_a_schema_with_its_fields_in_another_order_is_obeyed(tmp_path: Path) -> 
         kind, data = message('wrench', k)
         bag.add('/wrench', kind, k * STEP, data)
     found = assert_equal_reading(bag.close())
-    assert isinstance(found, Contents)
+    assert isinstance(found, BagContents)
     assert np.array_equal(found.messages['/wrench'][1][2], np.roll(row(2, 6), 3))
 
 
@@ -235,7 +235,7 @@ def test_an_index_that_lies_is_not_believed(tmp_path: Path) -> None:
         struct.pack_into('<Q', data, place + 8, lie)
         path.write_bytes(data)
         found = assert_equal_reading(path)
-        assert isinstance(found, Contents)
+        assert isinstance(found, BagContents)
         assert found.counts == {'/wrench': 20}
 
 

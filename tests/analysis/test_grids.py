@@ -6,10 +6,10 @@ from matplotlib.colors import LogNorm
 
 from auv_analysis.output.text import number, typeset
 from auv_analysis.report import plots
-from auv_analysis.report.plots import ALWAYS, Grid, draw_grid, heat_map
+from auv_analysis.report.plots import ALWAYS, HeatMap, draw_grid, heat_map
 
 
-def texts(grid: Grid) -> list[str]:
+def texts(grid: HeatMap) -> list[str]:
     axes = plots.new_figure(2.0).subplots()
     draw_grid(axes, grid)
     return [text.get_text() for text in axes.texts]
@@ -17,13 +17,13 @@ def texts(grid: Grid) -> list[str]:
 
 def test_scale_is_logarithmic_only_where_it_has_to_be() -> None:
     columns = ('a', 'b')
-    assert not isinstance(Grid(np.array([[1.0, 10.0]]), columns, '').norm(), LogNorm)
-    far = Grid(np.array([[1.0, 1e9]]), columns, '').norm()
+    assert not isinstance(HeatMap(np.array([[1.0, 10.0]]), columns, '').norm(), LogNorm)
+    far = HeatMap(np.array([[1.0, 1e9]]), columns, '').norm()
     assert isinstance(far, LogNorm)
     assert (far.vmin, far.vmax) == pytest.approx((1e5, 1e9)), 'four decades at most'
-    assert (Grid(np.array([[-1.0, 1e9]]), columns, '').norm().vmin) == -1.0
-    assert Grid(np.array([[np.nan, 0.0]]), columns, '').norm().vmax == 0.0
-    assert Grid(np.array([[np.nan]]), ('a',), '').norm().vmax == 1.0
+    assert (HeatMap(np.array([[-1.0, 1e9]]), columns, '').norm().vmin) == -1.0
+    assert HeatMap(np.array([[np.nan, 0.0]]), columns, '').norm().vmax == 0.0
+    assert HeatMap(np.array([[np.nan]]), ('a',), '').norm().vmax == 1.0
 
 
 def test_cells_say_zero_always_zero_and_nothing() -> None:
@@ -31,13 +31,13 @@ def test_cells_say_zero_always_zero_and_nothing() -> None:
         np.array([[0.0, 0.0, np.nan, 1.25e-7]]),
         np.array([[False, True, False, False]]),
     )
-    grid = Grid(values, 'abcd', '', structural=always)
+    grid = HeatMap(values, 'abcd', '', structural=always)
     assert texts(grid) == ['0', ALWAYS, r'$1.2\cdot10^{-7}$']
-    assert texts(Grid(np.array([[-0.04, 2.26]]), 'ab', '', decimals=1)) == ['0.0', '2.3']
+    assert texts(HeatMap(np.array([[-0.04, 2.26]]), 'ab', '', decimals=1)) == ['0.0', '2.3']
 
 
 def test_names_and_numbers_give_way_where_rows_are_many() -> None:
-    many = heat_map([f'run {i}' for i in range(150)], [Grid(np.ones((150, 3)), 'abc', 'x')])
+    many = heat_map([f'run {i}' for i in range(150)], [HeatMap(np.ones((150, 3)), 'abc', 'x')])
     axes = many.axes[0]
     assert [label.get_text() for label in axes.get_yticklabels()][:2] == ['run 0', 'run 3']
     assert len(axes.texts) == 0

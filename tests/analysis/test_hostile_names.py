@@ -16,7 +16,7 @@ from auv_analysis import load_run, load_scenario, simulate
 from auv_analysis.cli import main
 from auv_analysis.output.progress import TextConsole
 from auv_analysis.output.text import Maths, symbol
-from auv_analysis.report.digest import sketches
+from auv_analysis.report.digest import digests
 from auv_analysis.report.document import maths
 from auv_analysis.report.run_plots import settling
 from auv_dynamics import load_vehicle
@@ -130,7 +130,7 @@ def test_names_that_look_like_symbols_stay_as_they_are(tmp_path: Path, capsys) -
         assert name in shown or name.startswith(('w_X', 'seagull')), name
     assert '<sub>X</sub>.φ' not in page
     assert 'K<sub>D</sub>' in page  # ours is set
-    figure, _, caption = settling(sketches({n: simulate(load_scenario(path), n) for n in names}))
+    figure, _, caption = settling(digests({n: simulate(load_scenario(path), n) for n in names}))
     assert [text.get_text() for text in figure.legends[0].get_texts()] == list(names)
     assert all(f'{name} ' in caption for name in names)
 

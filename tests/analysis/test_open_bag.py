@@ -15,7 +15,7 @@ from made_messages import ODOMETRY, Bag, odometry, serialized, stamped
 
 from auv_analysis import load_scenario, summarize
 from auv_analysis.bag import load_run, open_bag
-from auv_analysis.report.digest import sketch
+from auv_analysis.report.digest import digest
 from auv_analysis.runs.run import Run, joined
 from auv_dynamics.files.errors import FailedError, InputError
 
@@ -165,7 +165,7 @@ def test_memory_does_not_grow_with_the_bag(tmp_path) -> None:
 
 def test_a_sketch_of_a_long_run_holds_few_points(tmp_path) -> None:
     bag = make_bag(tmp_path / 'bag', 20_000)
-    drawn = sketch(open_bag(bag, whole=10).run)
+    drawn = digest(open_bag(bag, whole=10).run)
     lines = [t.line()[0] for traces in drawn.traces.values() for t in traces]
     assert max(map(len, lines)) <= 4000
     assert max(map(len, lines)) > 2000

@@ -11,16 +11,16 @@ import pytest
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.report import panels as page
-from auv_analysis.report.digest import Sketch, sketches
+from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.panels import different_disturbances, interactive, panel_sets
 from auv_dynamics.vehicle import DOFS
 
 
 @pytest.fixture(scope='module')
-def case1() -> dict[str, Sketch]:
+def case1() -> dict[str, RunDigest]:
     scenario = load_scenario('case1')
     runs = {name: simulate(scenario, name) for name in scenario.controllers}
-    return sketches({name: run.part(run.t <= 5.0) for name, run in runs.items()})
+    return digests({name: run.part(run.t <= 5.0) for name, run in runs.items()})
 
 
 def test_all_figures_of_a_page_share_one_time_axis_and_cursor(case1):

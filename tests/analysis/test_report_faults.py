@@ -14,10 +14,10 @@ from pages import Page
 from auv_analysis import simulate, summarize
 from auv_analysis.cli import main
 from auv_analysis.report import plots
-from auv_analysis.report.digest import sketches
+from auv_analysis.report.digest import digests
 from auv_analysis.report.document import NUMBERS
 from auv_analysis.report.faults import fault_part
-from auv_analysis.report.panels import Curve, Panel, document, interactive
+from auv_analysis.report.panels import TimeCurve, TimePanel, document, interactive
 from auv_analysis.report.scenario_text import set_up
 from auv_analysis.runs.run import Run
 from auv_analysis.scenario.fault_words import Mark
@@ -76,11 +76,11 @@ def test_the_set_up_says_every_fault(runs):
 
 
 def test_spans_and_numbers_of_a_figure(runs):
-    sketch = sketches(runs)['gvc']
+    digest = digests(runs)['gvc']
     with plots.style():
         axes = plots.new_figure(2.0).subplots()
         axes.set_xlim(0.0, 2.2)
-        plots.shade(axes, sketch)
+        plots.shade(axes, digest)
     spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
     assert spans == [(1.0, 2.0), pytest.approx((1.5, 1.8))]
     assert [(text.get_text(), text.get_position()[0]) for text in axes.texts] == [
@@ -89,12 +89,12 @@ def test_spans_and_numbers_of_a_figure(runs):
     high = [text.get_position()[1] for text in axes.texts]
     assert high[1] < high[0], 'two at one time stand below each other'
     assert axes.get_xlim() == (0.0, 2.2)
-    sentence = plots.shade_sentence(sketch)
+    sentence = plots.shade_sentence(digest)
     assert sentence.startswith(' Shaded: 1 thruster T3 at 50 %, 1–2 s; 2 25 % of the meas')
 
 
 def test_panels_are_shaded_where_all_runs_have_the_same_faults(runs):
-    shown = sketches(runs)
+    shown = digests(runs)
     page = interactive(shown)
     assert page.faults.endswith('3 wrenches lost, from 2.5 s on')
     other = replace(shown['slow'], faults=())
@@ -104,7 +104,7 @@ def test_panels_are_shaded_where_all_runs_have_the_same_faults(runs):
 def test_a_panel_has_a_span_and_a_number_per_fault():
     marks = (Mark(1, 'x', 'x', 1.0, 2.0), Mark(2, 'x', 'x', 3.0, float('inf')))
     t = np.linspace(0.0, 4.0, 5)
-    panel = Panel('p', 'P', 'y (m)', (Curve('gvc', 'surge', '#000000', t, t),))
+    panel = TimePanel('p', 'P', 'y (m)', (TimeCurve('gvc', 'surge', '#000000', t, t),))
     (marked, _), (bare, _) = (document([panel], {'gvc': []}, m, (0.0, 4.0)) for m in (marks, ()))
     text = json.dumps(marked)
     left = re.findall(r'"name": "BoxAnnotation".{0,400}?"left": ([\d.]+)', text)

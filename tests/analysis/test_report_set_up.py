@@ -14,7 +14,7 @@ from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018.claims import judge_runs
 from auv_analysis.herman2018.paper import paper_figure
 from auv_analysis.report import plots, run_plots
-from auv_analysis.report.digest import sketch, sketches
+from auv_analysis.report.digest import digest, digests
 from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.run_tables import certificate_table, reasons
@@ -186,7 +186,7 @@ def test_a_law_that_estimates_nothing_has_no_estimation_error(rough, tmp_path, u
 def test_applied_and_commanded_wrench_are_both_drawn_with_their_limits(rough):
     run, limit = rough[0]['wound'], np.array(DATA['actuators']['limit'], float)
     with plots.style():
-        figure, _, caption = applied_figure(sketch(run), limit)
+        figure, _, caption = applied_figure(digest(run), limit)
     surge = figure.axes[0]
     lines = [np.asarray(line.get_ydata(), float) for line in surge.lines]
     drawn = [line for line in lines if len(line) == len(run.t)]
@@ -253,7 +253,7 @@ def test_certificate_figure_holds_the_measured_derivative_against_26_and_28(case
     run, summary = case1[0]['gvc'], case1[1]['gvc']
     found = certificate_of(run, control_model(run.vehicle))
     with plots.style():
-        figure, _, caption = certificate_figure(sketch(run), summary)
+        figure, _, caption = certificate_figure(digest(run), summary)
     energy, early, late = figure.axes
     assert energy.get_yscale() == 'log'
     assert early.get_yscale() == 'symlog'
@@ -268,7 +268,7 @@ def test_certificate_figure_holds_the_measured_derivative_against_26_and_28(case
     assert 'The certificate does not apply' not in caption
     with plots.style():
         sampled = replace(run, hold='zoh')
-        assert 'held between samples' in certificate_figure(sketch(sampled), summary)[2]
+        assert 'held between samples' in certificate_figure(digest(sampled), summary)[2]
 
 
 def test_certificate_is_drawn_where_26_holds_along_solutions_and_says_so(tmp_path, unrendered):
@@ -289,25 +289,25 @@ def test_certificate_is_drawn_where_26_holds_along_solutions_and_says_so(tmp_pat
 def test_certificate_figure_of_next_to_nothing(case1):
     run, summary = case1[0]['gvc'], case1[1]['gvc']
     two = run.part(run.t <= 0.015)
-    assert certificate_figure(sketch(two), summary)[0] is None
+    assert certificate_figure(digest(two), summary)[0] is None
 
 
 def test_axes_that_are_called_logarithmic_are(case1):
     runs = case1[0]
     with plots.style():
-        shares, _, caption = run_plots.energy_shares(sketches(runs))
+        shares, _, caption = run_plots.energy_shares(digests(runs))
         assert 'logarithmic axis' in caption
         assert shares.axes[0].get_xscale() == 'log'
         pushed = replace(runs['gvc'], tau=-np.abs(runs['gvc'].tau))
-        inputs, _, _ = run_plots.inputs(sketches({'gvc': pushed}))
+        inputs, _, _ = run_plots.inputs(digests({'gvc': pushed}))
         assert {axes.get_xscale() for axes in inputs.axes} == {'log'}
 
 
 def test_runs_that_are_far_apart_share_a_scale_on_which_both_show(case1):
     gvc, cl = case1[0]['gvc'], case1[0]['cl']
     with plots.style():
-        near, _, told = run_plots.inputs(sketches({'gvc': gvc, 'cl': gvc}))
-        apart = sketches({'gvc': gvc, 'cl': replace(cl, tau=1000.0 * cl.tau)})
+        near, _, told = run_plots.inputs(digests({'gvc': gvc, 'cl': gvc}))
+        apart = digests({'gvc': gvc, 'cl': replace(cl, tau=1000.0 * cl.tau)})
         far, _, told_far = run_plots.inputs(apart)
     assert {axes.get_yscale() for axes in near.axes} == {'linear'}
     assert far.axes[2].get_yscale() == 'symlog'
@@ -338,7 +338,7 @@ def test_restless_lines_lie_below_smooth_ones(case1):
     noise = np.random.default_rng(1).normal(size=run.tau.shape) * 100.0
     runs = {'smooth': run, 'noisy': replace(run, tau=run.tau + noise, measured=run.nu)}
     with plots.style():
-        figure, _, _ = run_plots.inputs(sketches(runs))
+        figure, _, _ = run_plots.inputs(digests(runs))
     for axes in figure.axes:
         smooth, noisy = axes.lines[:2]
         assert smooth.get_zorder() > noisy.get_zorder()

@@ -14,7 +14,7 @@ from PIL import Image
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics.statistics import Statistics, followed, part_of
 from auv_analysis.report import plots
-from auv_analysis.report.digest import sketch
+from auv_analysis.report.digest import digest
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.traces import COLUMNS, FEW, Trace, thinned
 from auv_analysis.runs.run import Run
@@ -82,7 +82,7 @@ def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
         long = repeated(quiet, n)
         long.nu_d[:, 2] += 1e-3 * np.sin(long.t)
         long.nu_d[long.t == 3210.0, 2] = spike
-        drawn = sketch(long)
+        drawn = digest(long)
         t, y = drawn.line('error', 2, 'late')
         assert (y == spike).sum() >= (spike > 0)
         assert len(t) <= 2 * COLUMNS
@@ -142,8 +142,8 @@ def test_statistics_between_cuts() -> None:
 
 
 def test_a_sketch_in_blocks_is_that_of_the_whole(run) -> None:
-    whole = sketch(run)
-    parts = sketch(in_blocks(run, 37))
+    whole = digest(run)
+    parts = digest(in_blocks(run, 37))
     assert whole.columns == parts.columns
     assert (whole.settled, whole.F_digest) == (parts.settled, parts.F_digest)
     for name in whole.columns:
@@ -168,7 +168,7 @@ def test_memory_does_not_grow_with_the_run(run) -> None:
         long = repeated(run, n)
         tracemalloc.start()
         summarize(long)
-        sketch(long)
+        digest(long)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.1 * peaks[0], peaks

@@ -12,17 +12,17 @@ from pages import tokens
 
 from auv_analysis import simulate, summarize
 from auv_analysis.cli import main
-from auv_analysis.report.digest import Sketch, sketches
+from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.verdict import FAILED, verdict
 
 CL = tunings.SAME_CL | {'k_D': 30.0}
-Runs = tuple[dict[str, Sketch], dict[str, Any]]
+Runs = tuple[dict[str, RunDigest], dict[str, Any]]
 
 
 def made(folder: Path, controllers: dict[str, Any], **changes: Any) -> Runs:
     scenario = tunings.scenario(folder, controllers, **changes)
     runs = {name: simulate(scenario, name) for name in controllers}
-    return sketches(runs), {name: summarize(run) for name, run in runs.items()}
+    return digests(runs), {name: summarize(run) for name, run in runs.items()}
 
 
 @pytest.fixture(scope='module')

@@ -12,7 +12,14 @@ from geometry_msgs.msg import WrenchStamped
 from harness import PATIENCE, Peer, environment, fresh_domain
 
 from auv_analysis.driver.checks import PASSIVE, judge, refusal
-from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Evidence, Finding, Settings
+from auv_analysis.driver.evidence import (
+    FAIL,
+    NOT_CHECKED,
+    PASS,
+    CheckResult,
+    DriverRecord,
+    Settings,
+)
 from auv_analysis.nodes.driver_check_node import COMMANDER, RosDriverClient
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.interface import Frames
@@ -40,7 +47,7 @@ def domain() -> Iterator[int]:
 
 
 @pytest.fixture(scope='module')
-def judged(domain: int) -> dict[str, dict[str, Finding]]:
+def judged(domain: int) -> dict[str, dict[str, CheckResult]]:
     """Driver -> check -> finding."""
     clients = {name: RosDriverClient(domain, f'/{name}', TOPICS, Frames()) for name in NAMES}
     found = {}
@@ -59,7 +66,7 @@ def judged(domain: int) -> dict[str, dict[str, Finding]]:
         }  # all at one time: judging takes a while, in which nobody listens
         for name, client in clients.items():
             settings = Settings() if name == 'slow' else PATIENT
-            listed = judge(Evidence(client.graph('the test'), logs[name], settings), PASSIVE)
+            listed = judge(DriverRecord(client.graph('the test'), logs[name], settings), PASSIVE)
             found[name] = {one.id: one for one in listed}
     finally:
         for client in clients.values():
@@ -67,7 +74,7 @@ def judged(domain: int) -> dict[str, dict[str, Finding]]:
     return found
 
 
-def failed(found: dict[str, Finding]) -> set[str]:
+def failed(found: dict[str, CheckResult]) -> set[str]:
     return {id for id, one in found.items() if one.verdict == FAIL}
 
 
@@ -121,7 +128,7 @@ def test_what_there_is_elsewhere_is_named(domain: int) -> None:
         ):
             assert time.monotonic() < limit
             client.listen(0.1)
-        found = judge(Evidence(client.graph('here'), client.log(0), Settings()), PASSIVE)
+        found = judge(DriverRecord(client.graph('here'), client.log(0), Settings()), PASSIVE)
     finally:
         client.close()
     assert found[0].verdict == FAIL
@@ -188,7 +195,7 @@ def test_with_another_commander_nothing_is_sent(domain: int) -> None:
     try:
         peer.until(lambda: client.listen(0.05) or (len(client.buffer) > 50 and client.others()))
         settings = Settings(timeout=4.0, actuates=True)
-        found = judge(Evidence(client.graph('here'), client.log(0), settings), PASSIVE)
+        found = judge(DriverRecord(client.graph('here'), client.log(0), settings), PASSIVE)
         assert client.others() == ['/test_peer']
         assert 'wrench_publishers' in refusal(found)  # and whatever a busy machine adds
     finally:

@@ -26,7 +26,7 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Header, String
 
 from auv_analysis.bag import read_bag
-from auv_analysis.bag.chunks import Table
+from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.mcap_file import McapFile
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import NANOSECONDS, Frames, nanoseconds
@@ -261,7 +261,7 @@ def whole(bag: Path) -> bytes:
         bytes(item.data)
         for path in bag.glob('*.mcap')
         for item in McapFile(path).records()
-        if isinstance(item, Table)
+        if isinstance(item, MessageTable)
     )
 
 

@@ -28,7 +28,7 @@ from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli import main
 from auv_analysis.cli.main import COMMANDS
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
-from auv_analysis.output.folder import SWEEP, digest, write_manifest
+from auv_analysis.output.folder import SWEEP, sha256_of, write_manifest
 from auv_dynamics.files.shipped import shipped
 
 AUV = Path(sys.executable).with_name('auv')
@@ -400,7 +400,7 @@ def test_analyze_writes_below_runs_whatever_a_bag_says(text, recording, folder, 
 def test_analyze_keeps_the_bags_that_it_reads(given, out, recording, folder) -> None:
     bag = shutil.copytree(recording(), folder / 'result' / 'gvc')
     (bag / 'params.yaml').write_text(_parameters())
-    files = {str(path.relative_to(folder / 'result')): digest(path) for path in bag.iterdir()}
+    files = {str(path.relative_to(folder / 'result')): sha256_of(path) for path in bag.iterdir()}
     write_manifest(folder / 'result', files)
     before = {path.name: path.read_bytes() for path in bag.iterdir()}
     assert _exit_code('analyze', given, '--out', out, '--overwrite') in (0, 2)

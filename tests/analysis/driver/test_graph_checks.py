@@ -5,12 +5,19 @@ import pytest
 from made_odometry import DRIVER, ODOMETRY, WRENCH, found_in, graph, healthy
 
 from auv_analysis.driver.checks import CHECKS
-from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Endpoint, Finding, GraphSnapshot
+from auv_analysis.driver.evidence import (
+    FAIL,
+    NOT_CHECKED,
+    PASS,
+    CheckResult,
+    Endpoint,
+    GraphSnapshot,
+)
 
 CONTROLLER = Endpoint('/controller_node', WRENCH)
 
 
-def seen_in(seen: GraphSnapshot, clocks: int = 0, **settings: object) -> dict[str, Finding]:
+def seen_in(seen: GraphSnapshot, clocks: int = 0, **settings: object) -> dict[str, CheckResult]:
     ids = [id for id, check in CHECKS.items() if check.group in ('endpoints', 'qos')]
     heard = healthy(clock_ns=np.zeros(clocks, int))
     return found_in(heard, *ids, seen=seen, **settings)

@@ -5,7 +5,7 @@ import pytest
 from made_odometry import found_in as found_by
 from made_odometry import healthy, motion, odometry_log
 
-from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Finding
+from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, CheckResult
 from auv_analysis.driver.odometry_log import OdometryLog
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.vehicle.frames import swap_state
@@ -13,7 +13,7 @@ from auv_dynamics.vehicle.frames import swap_state
 SPEEDS = 'speeds', 'jumps'
 
 
-def found_in(heard: OdometryLog, **settings: object) -> dict[str, Finding]:
+def found_in(heard: OdometryLog, **settings: object) -> dict[str, CheckResult]:
     ids = 'frames', 'finite', 'quaternion_norm', 'upright', 'depth'
     return found_by(heard, *ids, **settings)
 

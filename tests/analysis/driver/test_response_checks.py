@@ -11,8 +11,8 @@ from auv_analysis.driver.evidence import (
     FAIL,
     NOT_CHECKED,
     PASS,
-    Evidence,
-    Finding,
+    CheckResult,
+    DriverRecord,
     Settings,
 )
 from auv_analysis.driver.excitation import PULSE, Plan, carry_out, plan_of
@@ -36,11 +36,11 @@ def exchanged(one: str, other: str):
     return lambda tau: tau[order]
 
 
-def judge(driver: SimulatedDriver, *axes: str, vehicle: str = '') -> dict[str, Finding]:
+def judge(driver: SimulatedDriver, *axes: str, vehicle: str = '') -> dict[str, CheckResult]:
     model = load_vehicle(vehicle) if vehicle else driver.vehicle
     plan = plan_of(model, axes, 0.1, None, None)
     excitation = carry_out(driver, plan, 0.5, lambda: False, lambda _: None)
-    evidence = Evidence(graph(), driver.log(), Settings(), excitation)
+    evidence = DriverRecord(graph(), driver.log(), Settings(), excitation)
     ids = [id for id, check in CHECKS.items() if check.group == 'response']
     return {finding.id: finding for finding in judged(evidence, ids)}
 

@@ -21,26 +21,26 @@ from auv_analysis.driver.checks import (
     findings_table,
     judge,
 )
-from auv_analysis.driver.evidence import NOT_CHECKED, PASS, VERDICTS, Evidence, Settings
+from auv_analysis.driver.evidence import NOT_CHECKED, PASS, VERDICTS, DriverRecord, Settings
 from auv_analysis.driver.excitation import carry_out, plan_of
 from auv_analysis.driver.report import write_results
 
 ROOT = Path(__file__).parents[3]
 
 
-def listened(**fields: object) -> Evidence:
+def listened(**fields: object) -> DriverRecord:
     why = 'nothing is sent without --actuate'
-    return Evidence(graph(), healthy(**fields), Settings(), passive=why)
+    return DriverRecord(graph(), healthy(**fields), Settings(), passive=why)
 
 
-def commanded() -> Evidence:
+def commanded() -> DriverRecord:
     driver = SimulatedDriver(noise=1e-3)
     plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
     excitation = carry_out(driver, plan, 0.5, lambda: False, lambda _: None)
-    return Evidence(graph(), driver.log(), Settings(actuates=True), excitation)
+    return DriverRecord(graph(), driver.log(), Settings(actuates=True), excitation)
 
 
-def shown(evidence: Evidence) -> str:
+def shown(evidence: DriverRecord) -> str:
     out = io.StringIO()
     Console(file=out, width=80).print(findings_table(judge(evidence)))
     return out.getvalue()
@@ -105,7 +105,7 @@ def test_a_driver_that_is_not_there_leaves_a_report_as_well(tmp_path: Path) -> N
     heard = healthy()
     nothing = replace(heard, **{name: getattr(heard, name)[:0] for name in
                                 ('arrived_ns', 'stamp_ns', 'x')}, frames={})  # fmt: skip
-    evidence = Evidence(graph(odom_publishers=()), nothing, Settings(), passive='not asked for')
+    evidence = DriverRecord(graph(odom_publishers=()), nothing, Settings(), passive='not asked for')
     findings = judge(evidence)
     write_results(tmp_path, evidence, findings, document_of(evidence, findings))
     assert parquet.read_table(tmp_path / 'samples.parquet').num_rows == 0

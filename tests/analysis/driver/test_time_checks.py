@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from made_odometry import BEGAN, found_in, healthy, motion, odometry_log
 
-from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Finding
+from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, CheckResult
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
 
 SECOND = 10**9
 
 
-def timing_of(heard: OdometryLog, **settings: object) -> dict[str, Finding]:
+def timing_of(heard: OdometryLog, **settings: object) -> dict[str, CheckResult]:
     return found_in(heard, 'rate', 'gaps', 'stamps', 'age', 'drift', **settings)
 
 

@@ -8,7 +8,14 @@ from made_odometry import found_in as found_by
 from made_odometry import graph, motion, odometry_log
 
 from auv_analysis.driver.checks import CHECKS
-from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Evidence, Finding, Settings
+from auv_analysis.driver.evidence import (
+    FAIL,
+    NOT_CHECKED,
+    PASS,
+    CheckResult,
+    DriverRecord,
+    Settings,
+)
 from auv_analysis.metrics.pose_twist import ANGULAR, CHILD, LINEAR, fit_readings
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.frames import swap_attitude, swap_body, swap_position, swap_state
@@ -18,7 +25,7 @@ MOTION = [id for id, check in CHECKS.items() if check.group == 'motion']
 NOISES = (0.0, 0.01)  # m, rad, m/s, rad/s
 
 
-def found_in(x: np.ndarray, rate: float = 50.0) -> dict[str, Finding]:
+def found_in(x: np.ndarray, rate: float = 50.0) -> dict[str, CheckResult]:
     return found_by(odometry_log(x, rate), *MOTION)
 
 
@@ -217,7 +224,7 @@ def test_broken_messages_are_left_out_and_few_tell_nothing() -> None:
 
 def test_the_right_reading_fits_and_all_others_do_not() -> None:
     heard = odometry_log(motion(speed=3.0, noise=1e-3))
-    m = Evidence(graph(), heard, Settings()).motion
+    m = DriverRecord(graph(), heard, Settings()).motion
     for readings in (LINEAR, ANGULAR):
         fits = fit_readings(m, readings)
         assert fits.best == CHILD

@@ -24,7 +24,7 @@ from auv_analysis.cli.scenario_runs import summary_tables
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.output.text import number
 from auv_analysis.report import plots
-from auv_analysis.report.digest import sketch
+from auv_analysis.report.digest import digest
 from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.runs.run import Run
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -130,7 +130,7 @@ def test_no_certificate_across_gaps(run, tmp_path) -> None:
 
 def test_lines_break_and_the_gap_is_shaded(run, tmp_path, monkeypatch) -> None:
     found = holed(run, tmp_path, (1.0, 1.5), (9.0, 9.0))
-    drawn = sketch(found)
+    drawn = digest(found)
     t, y = drawn.drawn('tau', 0, 'late')
     assert not np.isnan(y).any(), 'the gap is before'
     t, y = drawn.drawn('delta_xi', 0)

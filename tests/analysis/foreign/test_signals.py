@@ -17,7 +17,7 @@ from foreign_bags import (
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.bag.foreign_messages import Recorded, longest_stretch, on_the_clock, ordered
-from auv_analysis.bag.foreign_topics import Source
+from auv_analysis.bag.foreign_topics import MappedTopic
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
 
@@ -33,7 +33,7 @@ def recorded(stamps, role: str = 'twist', log=None, *, stamped: bool = True) -> 
     stamps = np.array(stamps, np.int64)
     log = stamps if log is None else np.array(log, np.int64)
     rows = np.arange(len(stamps), dtype=float)[:, None]
-    return Recorded(Path('bag'), Source(role, f'/{role}'), '', '', log, stamps, stamped, rows)
+    return Recorded(Path('bag'), MappedTopic(role, f'/{role}'), '', '', log, stamps, stamped, rows)
 
 
 def test_late_messages_are_sorted_and_counted() -> None:

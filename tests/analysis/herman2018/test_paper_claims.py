@@ -12,7 +12,7 @@ from auv_analysis import load_scenario, simulate
 from auv_analysis.herman2018 import paper
 from auv_analysis.herman2018.cases import case_evidence, case_of, claims_sentences, paper_claims
 from auv_analysis.herman2018.claims import judged, write_claims
-from auv_analysis.herman2018.evidence import Quotes, Response
+from auv_analysis.herman2018.evidence import ErrorSensitivity, Quotes
 from auv_analysis.output.text import MISSING
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.studies.study.sensitivity import sensitivity
@@ -97,7 +97,7 @@ def test_every_number_of_the_texts_is_in_the_file(name, tmp_path):
 
 def responses(gains, others):
     """Both laws alike: spread of every error by the gains, and what the other set-points do."""
-    one = Response(np.array(gains, float), np.array(others, float))
+    one = ErrorSensitivity(np.array(gains, float), np.array(others, float))
     return {'gvc': one, 'cl': one}
 
 

@@ -12,7 +12,7 @@ from strategies import QUICK
 from auv_dynamics import InputError
 from auv_gvc_controller.control.setpoint import (
     COLUMNS,
-    Table,
+    SetpointTable,
     load_table,
     make_setpoint,
 )
@@ -21,7 +21,7 @@ HEADER = 't,surge,sway,heave,roll,pitch,yaw'
 T = np.array([0.0, 0.5, 0.6, 2.0])
 NU_D = np.array([[0, 0, 0, 0, 0, 0], [1, -1, 2, 0.1, -0.1, 0.2],
                  [1, -1, 3, 0.1, -0.1, 0.2], [0, 4, 3, 0.3, 0.2, -0.5]])  # fmt: skip
-TABLE = Table(T, NU_D)
+TABLE = SetpointTable(T, NU_D)
 
 
 def rows(t=T, nu_d=NU_D) -> str:
@@ -56,7 +56,7 @@ def test_slope_at_a_knot_is_that_of_the_segment_that_begins_there(k):
 
 def test_a_hair_of_rounding_does_not_choose_another_segment():
     t = np.arange(31) * 0.1
-    table = Table(t, np.stack([np.arange(31.0) ** 2 * 0.1] * 6, axis=1))
+    table = SetpointTable(t, np.stack([np.arange(31.0) ** 2 * 0.1] * 6, axis=1))
     for k in range(30):
         grid = 0.01 * (10 * k)  # the same moment as the run's grid has it
         assert_allclose(table.derivative(grid), 2 * k + 1, rtol=1e-9)

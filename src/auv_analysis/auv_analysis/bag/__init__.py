@@ -2,6 +2,6 @@
 
 from auv_analysis.bag.load import Recording, load_run, open_bag
 from auv_analysis.bag.metadata import bag_files
-from auv_analysis.bag.reading import Contents, batches, read_bag
+from auv_analysis.bag.reading import BagContents, batches, read_bag
 
-__all__ = ['Contents', 'Recording', 'bag_files', 'batches', 'load_run', 'open_bag', 'read_bag']
+__all__ = ['BagContents', 'Recording', 'bag_files', 'batches', 'load_run', 'open_bag', 'read_bag']

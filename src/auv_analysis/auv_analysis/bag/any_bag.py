@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import zstandard
 from mcap.records import Channel
 
-from auv_analysis.bag.chunks import Table
+from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.limits import LARGEST_PARSED, MOST_NAMED
 from auv_analysis.bag.mcap_file import McapFile
 from auv_analysis.bag.metadata import bag_files, check_regular, is_mcap
-from auv_analysis.bag.reading import Contents, read_bag
+from auv_analysis.bag.reading import BagContents, read_bag
 from auv_analysis.bag.step_topics import refusal
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import read_yaml
@@ -29,7 +29,7 @@ RULE = '=' * 80 + '\n'  # between the parts of a definition
 LANGUAGES = {'ros2msg': 'msg', 'ros1msg': 'msg', 'ros2idl': 'idl'}  # of MCAP's schemas
 
 
-class Logged(NamedTuple):
+class LoggedMessage(NamedTuple):
     """A message and when it was logged, ns."""
 
     topic: str
@@ -46,7 +46,7 @@ def type_name(name: str) -> str:
     return f'{package}/msg/{rest.rpartition("/")[2]}' if slash else name
 
 
-def survey(bag: Path) -> Contents:
+def survey(bag: Path) -> BagContents:
     """Topics, types, counts and span of a bag of any kind, without its messages."""
     if not is_mcap(bag):
         return _survey_of_rosbags(bag)
@@ -55,7 +55,7 @@ def survey(bag: Path) -> Contents:
     return contents
 
 
-def messages(bag: Path, topics: Collection[str], notes: list[str]) -> Iterator[Logged]:
+def messages(bag: Path, topics: Collection[str], notes: list[str]) -> Iterator[LoggedMessage]:
     """Messages of some topics in the order of the bag.
 
     Parameters
@@ -76,7 +76,7 @@ def messages(bag: Path, topics: Collection[str], notes: list[str]) -> Iterator[L
         yield from _messages_of_rosbags(bag, topics)
 
 
-def _of_mcap(path: Path, topics: Collection[str], notes: list[str]) -> Iterator[Logged]:
+def _of_mcap(path: Path, topics: Collection[str], notes: list[str]) -> Iterator[LoggedMessage]:
     file = McapFile(path, notes)
     wanted: dict[int, tuple[str, Decoder]] = {}
     for item in file.records():
@@ -87,17 +87,17 @@ def _of_mcap(path: Path, topics: Collection[str], notes: list[str]) -> Iterator[
             language = LANGUAGES.get(schema.encoding, schema.encoding) if schema else 'nothing'
             decode = decoder_of(path, item.topic, (name, text, language, item.message_encoding))
             wanted[item.id] = item.topic, decode
-        elif isinstance(item, Table):
+        elif isinstance(item, MessageTable):
             for i, channel in enumerate(item.channels.tolist()):
                 if channel in wanted:
                     topic, decode = wanted[channel]
                     message = decoded(path, topic, decode, item.payload(i))
-                    yield Logged(topic, int(item.log_times[i]), message)
+                    yield LoggedMessage(topic, int(item.log_times[i]), message)
 
 
-def _survey_of_rosbags(bag: Path) -> Contents:
+def _survey_of_rosbags(bag: Path) -> BagContents:
     """Topics, types, counts and span of a bag, without its messages."""
-    contents = Contents()
+    contents = BagContents()
     for part in _parts(bag):
         with _opened(part) as reader:
             for connection in reader.connections:
@@ -109,13 +109,13 @@ def _survey_of_rosbags(bag: Path) -> Contents:
     return contents
 
 
-def _messages_of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[Logged]:
+def _messages_of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[LoggedMessage]:
     """Messages of some topics, in the order of logging."""
     for part in _parts(bag):
         yield from _of_rosbags(part, topics)
 
 
-def _of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[Logged]:
+def _of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[LoggedMessage]:
     with _opened(bag) as reader:
         wanted = [c for c in reader.connections if c.topic in topics]
         if not wanted:
@@ -131,7 +131,7 @@ def _of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[Logged]:
                 raise refusal(bag, '', 'a bag that can be read to its end', error) from None
             topic = connection.topic
             message = decoded(bag, topic, decoders[connection.id], bytes(data))
-            yield Logged(topic, log_time, message)
+            yield LoggedMessage(topic, log_time, message)
 
 
 def _of_connection(bag: Path, connection: 'Connection') -> Decoder:

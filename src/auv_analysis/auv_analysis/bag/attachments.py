@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.bag.reading import Contents
+from auv_analysis.bag.reading import BagContents
 from auv_analysis.scenario.fault_words import Mark, marks_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import check, parse_yaml
@@ -19,7 +19,7 @@ UNFIT = re.compile('[^A-Za-z0-9_.+-]+')
 UNKNOWN = 'unknown'  # law of a bag without params.yaml
 
 
-def parameters_of(contents: Contents, bag: Path) -> dict[str, dict[str, Any]]:
+def parameters_of(contents: BagContents, bag: Path) -> dict[str, dict[str, Any]]:
     """Node name -> its parameters, from the attached parameter file."""
     text = contents.attachments.get('params.yaml')
     if text is None:
@@ -84,7 +84,7 @@ def notes_on(law: str) -> list[str]:
     return [f'gains of {law} not looked at: a bag brings no code; --law {law} imports its module']
 
 
-def vehicle_of(contents: Contents, bag: Path, vehicle: str | Path | None) -> Vehicle:
+def vehicle_of(contents: BagContents, bag: Path, vehicle: str | Path | None) -> Vehicle:
     """The given vehicle, else the one that the bag carries."""
     if vehicle is not None:
         return load_vehicle(vehicle)
@@ -95,7 +95,7 @@ def vehicle_of(contents: Contents, bag: Path, vehicle: str | Path | None) -> Veh
     return vehicle_from_dict(parse_yaml(text, file, 'vehicle'), file)
 
 
-def faults_of(contents: Contents, vehicle: Vehicle) -> tuple[Mark, ...]:
+def faults_of(contents: BagContents, vehicle: Vehicle) -> tuple[Mark, ...]:
     """Faults of the scenario that the bag carries, none where that is not one."""
     try:
         data = parse_yaml(
@@ -107,7 +107,7 @@ def faults_of(contents: Contents, vehicle: Vehicle) -> tuple[Mark, ...]:
     return marks_of(data.get('faults', []), vehicle)
 
 
-def kinds_of(contents: Contents, bag: Path) -> frozenset[str] | None:
+def kinds_of(contents: BagContents, bag: Path) -> frozenset[str] | None:
     """Kinds of the disturbances, None where the bag does not say."""
     text, file = contents.attachments.get('scenario.yaml'), f'{bag}: scenario.yaml'
     if text is None:
@@ -119,7 +119,7 @@ def kinds_of(contents: Contents, bag: Path) -> frozenset[str] | None:
     )
 
 
-def scenario_name(contents: Contents, bag: Path) -> str:
+def scenario_name(contents: BagContents, bag: Path) -> str:
     """Name of the scenario; without its file, that of the folder around the bag."""
     text, file = contents.attachments.get('scenario.yaml'), f'{bag}: scenario.yaml'
     if text is None:

@@ -36,7 +36,7 @@ class Body(ReadDataStream):
         return super().read(length)
 
 
-class Table(NamedTuple):
+class MessageTable(NamedTuple):
     """Messages that lie in one buffer, in the order of the file.
 
     Attributes
@@ -62,12 +62,12 @@ class Table(NamedTuple):
         return self.data[start : start + int(self.sizes[i])]
 
 
-def table_at(data: bytes, places: np.ndarray) -> Table:
+def table_at(data: bytes, places: np.ndarray) -> MessageTable:
     """Table of the whole message records of a buffer that begin at (n,) places."""
     head = gather(data, places, HEAD.itemsize).view(HEAD)[:, 0]
     sizes = head['length'].astype(np.int64) - (HEAD.itemsize - PREFIX.size)
     columns = (head[name] for name in ('channel', 'sequence', 'log_time', 'publish_time'))
-    return Table(data, places + HEAD.itemsize, sizes, *columns)
+    return MessageTable(data, places + HEAD.itemsize, sizes, *columns)
 
 
 def by_channel(channels: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
@@ -89,7 +89,7 @@ def gather(data: bytes, starts: np.ndarray, width: int) -> np.ndarray:
 
 def contents_of(
     data: bytes, counts: Counts, indexed: np.ndarray | None = None
-) -> list[Table | Schema | Channel]:
+) -> list[MessageTable | Schema | Channel]:
     """Messages, schemas and channels of a chunk, in their order.
 
     Parameters
@@ -114,7 +114,7 @@ def contents_of(
     counts.take(len(places), int((ends - places)[others].sum()))
     if np.any(is_message & (ends - places < HEAD.itemsize)):
         raise McapError('a message that is shorter than its fields')
-    found: list[Table | Schema | Channel] = []
+    found: list[MessageTable | Schema | Channel] = []
     done = 0
     for i in [*others.tolist(), len(places)]:
         if i > done:

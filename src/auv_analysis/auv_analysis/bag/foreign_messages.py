@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.bag.any_bag import messages, survey
-from auv_analysis.bag.foreign_topics import HELD, READERS, Reading, Source, TopicMap, are_usable
+from auv_analysis.bag.foreign_topics import (
+    HELD,
+    READERS,
+    MappedTopic,
+    Reading,
+    TopicMap,
+    are_usable,
+)
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -35,7 +42,7 @@ class Recorded:
     """
 
     bag: Path
-    source: Source
+    source: MappedTopic
     frame: str
     child: str
     log: np.ndarray
@@ -150,7 +157,7 @@ class _Messages:
 
     """
 
-    def __init__(self, bag: Path, source: Source, types: dict[str, str]):
+    def __init__(self, bag: Path, source: MappedTopic, types: dict[str, str]):
         self.source, self._bag = source, bag
         self._read = self._reader(types)
         self._waiting: list[tuple[int, Reading]] = []

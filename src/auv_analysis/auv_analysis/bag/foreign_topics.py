@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.bag.any_bag import survey
-from auv_analysis.bag.reading import Contents
+from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.step_topics import NotOursError
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import check, read_yaml
@@ -29,7 +29,7 @@ Numbers = tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class Source:
+class MappedTopic:
     """One mapped topic.
 
     Attributes
@@ -67,7 +67,7 @@ class TopicMap:
 
     """
 
-    sources: Mapping[str, Source]
+    sources: Mapping[str, MappedTopic]
     vehicle: str | Path | None = None
     name: str = ''
     step: float | None = None
@@ -112,12 +112,12 @@ def read_mapping(file: str | Path | None, options: Mapping[str, Any]) -> TopicMa
     )
 
 
-def _source(role: str, entry: Mapping[str, Any], shared: Mapping[str, Any]) -> Source:
+def _source(role: str, entry: Mapping[str, Any], shared: Mapping[str, Any]) -> MappedTopic:
     apart = {'gap'} if role == 'setpoint' else set()  # a set-point holds until the next
     apart |= set() if role in MOVING else {'twist_frame'}
     common = {key: value for key, value in shared.items() if key not in apart}
     between = {'between': 'hold'} if role in HELD else {}
-    return Source(role, **{**common, **between, **entry})
+    return MappedTopic(role, **{**common, **between, **entry})
 
 
 def _check_roles(data: Mapping[str, Any], origin: object) -> None:
@@ -222,7 +222,7 @@ def are_usable(rows: np.ndarray, role: str) -> np.ndarray:
     return finite & (np.abs(np.linalg.norm(rows[:, 3:7], axis=1) - 1.0) < UNIT)
 
 
-def candidates(contents: Contents) -> dict[str, list[str]]:
+def candidates(contents: BagContents) -> dict[str, list[str]]:
     """Role -> topics with messages of a type that fits, the likeliest first.
 
     An odometry is no candidate for pose and twist, and a velocity whose name says that it is asked

@@ -13,7 +13,7 @@ from auv_analysis.bag.foreign_messages import (
     on_the_clock,
     ordered,
 )
-from auv_analysis.bag.foreign_topics import Source, TopicMap
+from auv_analysis.bag.foreign_topics import MappedTopic, TopicMap
 from auv_analysis.metrics.local_polynomials import SMALLEST
 from auv_analysis.metrics.pose_twist import CONJUGATE, STILL, compare_rates, turn
 from auv_dynamics.files.errors import InputError
@@ -310,7 +310,7 @@ def _limit(one: Recorded) -> float:
     return np.inf if one.source.role == 'setpoint' else usual_limit(one.stamps)
 
 
-def _is_held(source: Source) -> bool:
+def _is_held(source: MappedTopic) -> bool:
     return source.between == 'hold'
 
 

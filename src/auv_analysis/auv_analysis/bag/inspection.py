@@ -11,9 +11,9 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema, Statistics
 
-from auv_analysis.bag.chunks import Table, by_channel
+from auv_analysis.bag.chunks import MessageTable, by_channel
 from auv_analysis.bag.mcap_file import Lost, McapFile, MessageIndex, Read
-from auv_analysis.bag.metadata import Definition, Extent
+from auv_analysis.bag.metadata import Definition, FileExtent
 from auv_analysis.bag.step_topics import role_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import parse_any_yaml
@@ -254,9 +254,9 @@ class Inspection:
             return self._orphans + unknown
         return None if self.lost else 0
 
-    def extent(self, name: str) -> Extent:
+    def extent(self, name: str) -> FileExtent:
         """What can be kept, as a file of some name."""
-        extent = Extent(name)
+        extent = FileExtent(name)
         for number, spacing in self.spacings.items():
             channel = self.definitions.channel(number)
             if channel is not None and spacing.earliest is not None and spacing.latest is not None:
@@ -269,7 +269,7 @@ class Inspection:
         in_chunk = item.opcode == Opcode.CHUNK
         trust = CHUNK if in_chunk else SUMMARY if self._data_end else BETWEEN
         for part in item.parts:
-            if isinstance(part, Table):
+            if isinstance(part, MessageTable):
                 for channel, index in by_channel(part.channels):
                     spacing = self.spacings.setdefault(channel, Spacing())
                     spacing.add(part.log_times[index].astype(np.int64))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.bag import attachments
-from auv_analysis.bag.reading import Contents, Series, gathered, read_bag, slices
+from auv_analysis.bag.reading import BagContents, Series, gathered, read_bag, slices
 from auv_analysis.bag.step_topics import READERS, NotOursError, namespace_of, role_of
 from auv_analysis.runs.run import Run, rows_of
 from auv_dynamics.files.errors import InputError
@@ -89,7 +89,7 @@ def open_bag(
 
 
 def _facts(
-    contents: Contents, bag: Path, vehicle: str | Path | None, ns: np.ndarray, notes: list[str]
+    contents: BagContents, bag: Path, vehicle: str | Path | None, ns: np.ndarray, notes: list[str]
 ) -> dict[str, Any]:
     """What a `Run` has beside its samples; stamps (n,) say the step if nothing else does."""
     parameters = attachments.parameters_of(contents, bag)
@@ -153,7 +153,7 @@ def _slopes(rows: np.ndarray, step: float) -> Iterator[np.ndarray]:
         yield slope[here.start - first :][: here.stop - here.start]
 
 
-def topics_of_one_graph(topics: Iterable[str], contents: Contents, bag: Path) -> dict[str, str]:
+def topics_of_one_graph(topics: Iterable[str], contents: BagContents, bag: Path) -> dict[str, str]:
     """Role -> topic, of the namespace that is read, or of the only one that is complete.
 
     Parameters
@@ -183,7 +183,7 @@ def topics_of_one_graph(topics: Iterable[str], contents: Contents, bag: Path) ->
     return ours
 
 
-def _namespace(topics: set[str], contents: Contents, bag: Path) -> str:
+def _namespace(topics: set[str], contents: BagContents, bag: Path) -> str:
     """Namespace that is read, as it stands before our names."""
     found = ', '.join(sorted(contents.types)) or 'no topics'
     spaces = sorted(namespace_of(t) for t in topics if role_of(t) == interface.ODOM)
@@ -269,7 +269,7 @@ def dropped(counts: dict[str, int], steps: int, bag: Path) -> list[str]:
     ]
 
 
-def holds(contents: Contents, controller: Mapping[str, object]) -> bool:
+def holds(contents: BagContents, controller: Mapping[str, object]) -> bool:
     """Whether the recorded controller held its set-points.
 
     Parameters

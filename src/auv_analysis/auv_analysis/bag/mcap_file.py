@@ -34,7 +34,15 @@ from mcap.records import (
 from zstandard import ZstdError
 
 from auv_analysis.bag import limits
-from auv_analysis.bag.chunks import HEAD, PREFIX, Body, Table, by_channel, contents_of, table_at
+from auv_analysis.bag.chunks import (
+    HEAD,
+    PREFIX,
+    Body,
+    MessageTable,
+    by_channel,
+    contents_of,
+    table_at,
+)
 from auv_analysis.bag.limits import Counts, TooLargeError, TooManyError, decompressed
 from auv_dynamics.files.errors import InputError, first_line
 
@@ -81,7 +89,7 @@ class LongAttachment(NamedTuple):
     size: int
 
 
-Part = McapRecord | MessageIndex | LongAttachment | Table
+Part = McapRecord | MessageIndex | LongAttachment | MessageTable
 
 
 class Frame(NamedTuple):
@@ -170,7 +178,7 @@ class McapFile:
         self._summary = 0  # where it begins; 0: the end of the data has not been read
         self._budget = BUDGET * self.size + WINDOW
 
-    def records(self) -> Iterator[McapRecord | Table]:
+    def records(self) -> Iterator[McapRecord | MessageTable]:
         """Records in order up to the first damage, messages in tables, each channel once.
 
         Raises
@@ -190,7 +198,7 @@ class McapFile:
                 if isinstance(part, LongAttachment):
                     about = f'attachment {part.name!r} of {part.size} bytes not read'
                     self._notes.append(f'{self.path.name}: {about}')
-                elif isinstance(part, McapRecord | Table) and self._is_new(part):
+                elif isinstance(part, McapRecord | MessageTable) and self._is_new(part):
                     yield part
         if not finished:
             about = 'was not finished, its writer was killed; read to the end'
@@ -202,7 +210,7 @@ class McapFile:
         about = f'damaged from byte {lost.start}, read up to there'
         self._notes.append(f'{self.path.name}: {about}')
 
-    def _is_new(self, part: McapRecord | Table) -> bool:
+    def _is_new(self, part: McapRecord | MessageTable) -> bool:
         """Whether it is not a channel that is known; keeps definitions."""
         if isinstance(part, Schema):
             self.schemas[part.id] = part
@@ -214,7 +222,7 @@ class McapFile:
         """Schema of a channel; None where it stands nowhere before."""
         return self.schemas.get(channel.schema_id)
 
-    def by_channel(self, table: Table) -> Iterator[tuple[Channel, np.ndarray]]:
+    def by_channel(self, table: MessageTable) -> Iterator[tuple[Channel, np.ndarray]]:
         """Each channel of a table and the numbers of its messages; InputError: an unknown one."""
         for number, index in by_channel(table.channels):
             if number not in self.channels:

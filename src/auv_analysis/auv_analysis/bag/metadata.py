@@ -42,7 +42,7 @@ class Definition:
 
 
 @dataclass
-class Extent:
+class FileExtent:
     """What lies in a bag or a file of it: messages per topic, first and last log time in ns."""
 
     name: str = ''
@@ -61,7 +61,7 @@ class Extent:
         self.last = last if self.last is None else max(self.last, last)
 
 
-def metadata(definitions: Iterable[Definition], extents: Sequence[Extent]) -> dict[str, Any]:
+def metadata(definitions: Iterable[Definition], extents: Sequence[FileExtent]) -> dict[str, Any]:
     """What stands below `rosbag2_bagfile_information`.
 
     Parameters

@@ -13,7 +13,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, McapRecord, Schema
 from mcap.writer import CompressionType, Writer
 
-from auv_analysis.bag.metadata import Definition, Extent, as_text, metadata, qos_text
+from auv_analysis.bag.metadata import Definition, FileExtent, as_text, metadata, qos_text
 from auv_analysis.output.new_files import NEW
 
 COMPRESSIONS = {
@@ -157,7 +157,7 @@ class BagFile:
     """
 
     def __init__(self, path: Path, attachments: Mapping[str, str], storage: Storage):
-        self.output, self.extent = Output(path), Extent(path.name)
+        self.output, self.extent = Output(path), FileExtent(path.name)
         self._storage, self._pending = storage, 0  # bytes of the chunk, not compressed
         self._since: dict[str, int] = {}  # topic -> its first log time
         self._pace, self._heard = storage.pace, time.monotonic()

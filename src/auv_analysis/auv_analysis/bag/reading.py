@@ -20,14 +20,14 @@ import numpy as np
 from mcap.records import Attachment, Channel, McapRecord, Metadata
 
 from auv_analysis.bag import limits
-from auv_analysis.bag.chunks import Table
+from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.mcap_file import McapFile
-from auv_analysis.bag.metadata import RECORDING, Extent, bag_files, read_recording
+from auv_analysis.bag.metadata import RECORDING, FileExtent, bag_files, read_recording
 from auv_analysis.bag.step_topics import (
     ODOMETRIES,
     READERS,
     Decoding,
-    Layout,
+    StepLayout,
     check_type,
     learned,
     namespace_of,
@@ -41,7 +41,7 @@ Series = tuple[np.ndarray, np.ndarray]  # stamps (n,) in ns, values (n, 6) or (n
 TOGETHER = 64  # chunks whose small arrays are joined at once: thousands of them scatter the memory
 
 
-class Column:
+class SpooledColumn:
     """Rows that come block by block: kept in memory up to a number of them, else in a file.
 
     The file has no name; it lies where temporary files do (`TMPDIR`) and is mapped for reading, see
@@ -93,7 +93,7 @@ class Column:
 
 def gathered(blocks: Iterable[np.ndarray], whole: float) -> np.ndarray:
     """All rows of blocks, in memory if they are at most `whole`."""
-    column = Column(whole)
+    column = SpooledColumn(whole)
     for block in blocks:
         column.append(block)
     return column.array()
@@ -105,7 +105,7 @@ def slices(count: int, rows: int = 1 << 16) -> Iterator[slice]:
 
 
 @dataclass
-class Contents(Extent):
+class BagContents(FileExtent):
     """What lies in a bag, before anything is made of it.
 
     Attributes
@@ -135,7 +135,7 @@ class Contents(Extent):
     lenient: bool = False
 
 
-class Batch(NamedTuple):
+class TopicBatch(NamedTuple):
     """Messages of one topic: stamps (n,) in ns, values (n, 6) or (n, 13)."""
 
     topic: str
@@ -154,21 +154,21 @@ class FileReader:
 
     """
 
-    def __init__(self, path: Path, contents: Contents, decode: bool):
+    def __init__(self, path: Path, contents: BagContents, decode: bool):
         self._path, self._contents, self._decode = path, contents, decode
         self._file = McapFile(path, contents.notes)
         self._frames = contents.frames
         self._decoders = Decoding(path)
-        self._layouts: dict[int, Layout] = {}
+        self._layouts: dict[int, StepLayout] = {}
         self._sizes = {name: len(text) for name, text in contents.attachments.items()}
         self._attached = sum(self._sizes.values())
         self._left_out: Counter[str] = Counter()
         self._reasons: dict[str, str] = {}  # topic -> why its first message was left out
 
-    def batches(self) -> Iterator[Batch]:
+    def batches(self) -> Iterator[TopicBatch]:
         """Messages of our topics, a table at a time; then note what was left out."""
         for item in self._file.records():
-            if isinstance(item, Table):
+            if isinstance(item, MessageTable):
                 yield from self._table(item)
             else:
                 self._record(item)
@@ -219,7 +219,7 @@ class FileReader:
             check_type(self._path, topic, kind)
             self._decoders.add(channel, schema)
 
-    def _table(self, table: Table) -> Iterator[Batch]:
+    def _table(self, table: MessageTable) -> Iterator[TopicBatch]:
         members = {}
         for channel, index in self._file.by_channel(table):
             logged = table.log_times[index]
@@ -236,12 +236,12 @@ class FileReader:
             if len(entries) > 1:  # several channels of one topic
                 order = np.argsort(np.concatenate([index for index, _ in entries]))
                 parts = zip(*(series for _, series in entries), strict=True)
-                yield Batch(topic, *(np.concatenate(part)[order] for part in parts))
+                yield TopicBatch(topic, *(np.concatenate(part)[order] for part in parts))
             else:
-                yield Batch(topic, *entries[0][1])
+                yield TopicBatch(topic, *entries[0][1])
 
     def _found(
-        self, table: Table, members: dict[int, np.ndarray]
+        self, table: MessageTable, members: dict[int, np.ndarray]
     ) -> dict[str, list[tuple[np.ndarray, Series]]]:
         """Numbers of messages and what is in them by topic, an entry per channel."""
         since = self._meet(table, members)
@@ -255,7 +255,7 @@ class FileReader:
                 found.setdefault(topic, []).append(entry)
         return found
 
-    def _meet(self, table: Table, members: dict[int, np.ndarray]) -> dict[str, int]:
+    def _meet(self, table: MessageTable, members: dict[int, np.ndarray]) -> dict[str, int]:
         """Namespace -> number of the message of the table from which its frames hold."""
         since = dict.fromkeys(self._frames, 0)
         met: dict[str, tuple[int, interface.Frames]] = {}
@@ -272,7 +272,7 @@ class FileReader:
         return since
 
     def _told(
-        self, table: Table, index: np.ndarray, channel: int
+        self, table: MessageTable, index: np.ndarray, channel: int
     ) -> tuple[int, interface.Frames] | None:
         """The first odometry that may be left in, and its frames."""
         known = self._decoders
@@ -287,7 +287,9 @@ class FileReader:
                 return i, frames
         return None
 
-    def _at_once(self, table: Table, channel: int, index: np.ndarray, first: int) -> Series | None:
+    def _at_once(
+        self, table: MessageTable, channel: int, index: np.ndarray, first: int
+    ) -> Series | None:
         """Stamps and rows of a channel; None where its messages must be looked at one by one."""
         topic, like = self._topic(channel), table.payload(index[0])
         layout = self._layouts.get(channel)
@@ -302,7 +304,7 @@ class FileReader:
         return None if strangers else layout.read(table.data, starts, sizes)
 
     def _one_by_one(
-        self, table: Table, channel: int, index: np.ndarray, first: int
+        self, table: MessageTable, channel: int, index: np.ndarray, first: int
     ) -> tuple[np.ndarray, Series]:
         """Numbers of the messages that are taken, stamps and rows, by the channel's decoder.
 
@@ -326,7 +328,7 @@ class FileReader:
                 rows.append(row)
         return np.array(taken, np.int64), (np.array(stamps, np.int64), np.array(rows, float))
 
-    def _in_order(self, table: Table, frames: dict[str, interface.Frames]) -> None:
+    def _in_order(self, table: MessageTable, frames: dict[str, interface.Frames]) -> None:
         """Refuse the first message of a table that must be refused."""
         for i, channel in enumerate(table.channels.tolist()):
             if channel in self._decoders:
@@ -337,7 +339,7 @@ class FileReader:
                 self._decoders.value(topic, message, frames.get(namespace))
 
 
-def batches(bag: str | Path, contents: Contents, *, decode: bool = True) -> Iterator[Batch]:
+def batches(bag: str | Path, contents: BagContents, *, decode: bool = True) -> Iterator[TopicBatch]:
     """Messages of our topics in the order of the bag, a chunk at a time.
 
     Parameters
@@ -357,7 +359,7 @@ def batches(bag: str | Path, contents: Contents, *, decode: bool = True) -> Iter
 
 def read_bag(
     bag: str | Path, namespace: str | None = None, *, decode: bool = True, whole: float = math.inf
-) -> Contents:
+) -> BagContents:
     """Read a bag.
 
     Parameters
@@ -365,17 +367,17 @@ def read_bag(
     bag : folder or .mcap file
     namespace : whose topics are ours; None: what the bag says, else any
     decode : read the messages of our topics; else only count
-    whole : messages of a topic up to which they are kept in memory, see `Column`
+    whole : messages of a topic up to which they are kept in memory, see `SpooledColumn`
 
     Raises
     ------
     InputError : not a bag, or a message that must not be used
 
     """
-    contents = Contents(namespace=namespace, asked=namespace is not None)
-    columns: dict[str, tuple[Column, Column]] = {}
+    contents = BagContents(namespace=namespace, asked=namespace is not None)
+    columns: dict[str, tuple[SpooledColumn, SpooledColumn]] = {}
     for topic, *series in batches(bag, contents, decode=decode):
-        pair = columns.setdefault(topic, (Column(whole), Column(whole)))
+        pair = columns.setdefault(topic, (SpooledColumn(whole), SpooledColumn(whole)))
         for column, rows in zip(pair, series, strict=True):
             column.append(rows)
     for topic in [*columns]:  # one topic after the other, so that little is held twice

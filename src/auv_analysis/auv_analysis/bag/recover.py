@@ -15,7 +15,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
 from mcap.writer import Writer
 
-from auv_analysis.bag.chunks import Table
+from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.inspection import PROFILE, ROSBAG2, FileReport, Inspection, Report
 from auv_analysis.bag.mcap_file import McapFile, Read
 from auv_analysis.bag.metadata import (
@@ -89,7 +89,7 @@ class Rewriter:
 
     def _take(self, item: Read) -> None:
         for part in item.parts:
-            if isinstance(part, Table):
+            if isinstance(part, MessageTable):
                 self._messages(part)
             elif isinstance(part, Attachment):
                 a = part
@@ -106,7 +106,7 @@ class Rewriter:
             self._metadata.add(key)
             self._writer.add_metadata(record.name, record.metadata)
 
-    def _messages(self, table: Table) -> None:
+    def _messages(self, table: MessageTable) -> None:
         rows = zip(*(column.tolist() for column in table[3:]), strict=True)
         for i, (number, sequence, log, publish) in enumerate(rows):
             channel = self._channel(number)

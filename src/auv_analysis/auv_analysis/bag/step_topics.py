@@ -17,7 +17,7 @@ import numpy as np
 from mcap.records import Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 
-from auv_analysis.bag.chunks import Table, gather
+from auv_analysis.bag.chunks import MessageTable, gather
 from auv_analysis.bag.limits import LARGEST_PARSED
 from auv_dynamics.files.errors import InputError, first_line
 from auv_dynamics.ros import interface
@@ -124,7 +124,7 @@ class Decoding:
     def __getitem__(self, channel: int) -> Decoder:
         return self._decoders[channel]
 
-    def message(self, table: Table, i: int, channel: int) -> Any:
+    def message(self, table: MessageTable, i: int, channel: int) -> Any:
         """Message number i of a table."""
         try:
             return self._decoders[channel](table.payload(i))
@@ -161,7 +161,7 @@ def refusal(path: Path, topic: str, expected: str, error: Exception) -> InputErr
 
 
 @dataclass(frozen=True)
-class Layout:
+class StepLayout:
     """Places in a serialized message, bytes from its beginning.
 
     Attributes
@@ -227,7 +227,7 @@ class Layout:
         return not np.any((heads ^ self.like) & self.shared)
 
 
-def learned(message: bytes, role: str, decoder: Callable[[bytes], Any]) -> Layout | None:
+def learned(message: bytes, role: str, decoder: Callable[[bytes], Any]) -> StepLayout | None:
     """Layout of messages with the strings of this one.
 
     Parameters
@@ -245,7 +245,7 @@ def learned(message: bytes, role: str, decoder: Callable[[bytes], Any]) -> Layou
     return layout and _proven(layout, message, role, decoder)
 
 
-def _layout(kind: str, message: bytes) -> Layout | None:
+def _layout(kind: str, message: bytes) -> StepLayout | None:
     """Layout by the definition of the type, not proven yet."""
     if len(message) < CDR or message[1] & 1 == 0:
         return None
@@ -270,12 +270,12 @@ def _layout(kind: str, message: bytes) -> Layout | None:
     like = np.frombuffer(message, np.uint8, strings)
     mask = np.zeros(strings, np.uint8)
     mask[shared] = 255
-    return Layout(size, strings, mask, like, runs, np.array(order), interface.Frames())
+    return StepLayout(size, strings, mask, like, runs, np.array(order), interface.Frames())
 
 
 def _proven(
-    layout: Layout, message: bytes, role: str, decoder: Callable[[bytes], Any]
-) -> Layout | None:
+    layout: StepLayout, message: bytes, role: str, decoder: Callable[[bytes], Any]
+) -> StepLayout | None:
     """The layout with its frames, when the decoder finds the same in a different number each."""
     values = np.arange(1.0, len(layout.order) + 1.0)
     if layout.is_state:

@@ -10,7 +10,7 @@ from pathlib import Path
 from auv_analysis.bag.metadata import (
     METADATA,
     Definition,
-    Extent,
+    FileExtent,
     as_text,
     metadata,
     write_metadata,
@@ -152,7 +152,7 @@ class BagWriter:
         self._attachments, self._storage = attachments, storage or Storage()
         self._health, self._closed = FileHealth(self._storage.free_space), False
         self._definitions: dict[str, tuple[Definition, str]] = {}
-        self._extents: list[Extent] = []
+        self._extents: list[FileExtent] = []
         self._full: list[BagFile] = []  # files that are to be finished, in their order
         self._lock = threading.Lock()
         self._waits_since: float | None = None  # the first message of the chunk

@@ -13,8 +13,8 @@ from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
     from auv_analysis.bag.foreign_topics import TopicMap
-    from auv_analysis.output.folder import Results
-    from auv_analysis.studies.compare.sources import Source
+    from auv_analysis.output.folder import ResultsFolder
+    from auv_analysis.studies.compare.sources import RunSource
 
 FEW = 3  # runs up to which the report shows every figure of each
 LONGEST = 80  # of a folder's name
@@ -80,7 +80,7 @@ def _mapping(options: argparse.Namespace) -> TopicMap | None:
     return read_mapping(options.map, given | {'vehicle': options.vehicle})
 
 
-def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
+def _few(sources: Sequence[RunSource], options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.cli.scenario_runs import conclude
     from auv_analysis.output.progress import waiting
     from auv_analysis.studies.compare.sources import named, open_source
@@ -99,7 +99,7 @@ def _few(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, An
         return conclude(results.folder, runs, scenario_texts, vehicle_texts, report=report)
 
 
-def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, Any]:
+def _many(sources: Sequence[RunSource], options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.cli.scenario_runs import comparison_table
     from auv_analysis.output.progress import console, waiting
     from auv_analysis.studies.compare.report import conclude_comparison, entries_of
@@ -114,8 +114,8 @@ def _many(sources: Sequence[Source], options: argparse.Namespace) -> dict[str, A
 
 
 def _folder(
-    scenarios: Sequence[str], sources: Sequence[Source], options: argparse.Namespace
-) -> AbstractContextManager[Results]:
+    scenarios: Sequence[str], sources: Sequence[RunSource], options: argparse.Namespace
+) -> AbstractContextManager[ResultsFolder]:
     """Folder of the results, only now that all has been read."""
     from auv_analysis.output.folder import results_folder
 

@@ -20,7 +20,7 @@ from auv_dynamics.ros import interface
 from auv_dynamics.vehicle import DOFS
 
 if TYPE_CHECKING:
-    from auv_analysis.driver.evidence import Evidence
+    from auv_analysis.driver.evidence import DriverRecord
     from auv_analysis.driver.excitation import Plan
 
 APPEARS = 5.0  # s within which discovery finds a driver that is there
@@ -61,7 +61,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Listen to a driver and judge it; FailedError where a check fails."""
     from auv_analysis.driver.checks import PASSIVE, judge, refusal
-    from auv_analysis.driver.evidence import Evidence, Settings
+    from auv_analysis.driver.evidence import DriverRecord, Settings
     from auv_analysis.driver.excitation import actuate
     from auv_analysis.graph.domain import join_domain, place_of
     from auv_analysis.output.folder import check_free
@@ -84,10 +84,10 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         graph = client.graph(place_of(domain, options.namespace, with_range=False))
         why, excitation = 'nothing is sent without --actuate', None
         if plan is not None:
-            why = refusal(judge(Evidence(graph, client.log(began), settings), PASSIVE))
+            why = refusal(judge(DriverRecord(graph, client.log(began), settings), PASSIVE))
             if not why:
                 excitation = actuate(client, plan, settings.timeout)
-        evidence = Evidence(graph, client.log(began), settings, excitation, why)
+        evidence = DriverRecord(graph, client.log(began), settings, excitation, why)
     return _conclude(options, evidence)
 
 
@@ -128,7 +128,7 @@ def _listen(client: Any, seconds: float) -> int:
     return began
 
 
-def _conclude(options: argparse.Namespace, evidence: Evidence) -> dict[str, Any]:
+def _conclude(options: argparse.Namespace, evidence: DriverRecord) -> dict[str, Any]:
     from auv_analysis.driver.checks import document_of, failure_of, findings_table, judge
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import TextConsole, waiting

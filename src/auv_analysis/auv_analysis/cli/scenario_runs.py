@@ -16,11 +16,11 @@ from rich.text import Text
 from auv_analysis.graph.supervisor import TroubleError
 from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.summary import Window, summarize
-from auv_analysis.output.folder import Results, results_folder
+from auv_analysis.output.folder import ResultsFolder, results_folder
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import console, say, share_bar, waiting
 from auv_analysis.output.text import MISSING, join, number, plain, residuals
-from auv_analysis.report.digest import Sketch, sketches
+from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.verdict import FAILED, verdict
 from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.runs.samples import ENDING, write_samples
@@ -49,7 +49,7 @@ def open_scenario(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
 @contextmanager
 def scenario_folder(
     options: argparse.Namespace, scenario: Scenario, names: Sequence[str], *own: str
-) -> Iterator[Results]:
+) -> Iterator[ResultsFolder]:
     """Folder of the results; warnings only now, so that a refusal is one line.
 
     Parameters
@@ -271,7 +271,7 @@ def conclude(
     """
     with waiting('computing the metrics of summary.json'):
         summaries = {name: summarize(run, windows=windows) for name, run in runs.items()}
-        shown = sketches(runs) if report or len(runs) > 1 else {}
+        shown = digests(runs) if report or len(runs) > 1 else {}
     write_json(out / 'summary.json', summaries)
     if report:
         added = examine(runs, summaries)
@@ -288,7 +288,7 @@ def conclude(
 def _report(
     out: Path,
     runs: Mapping[str, AnyRun],
-    shown: Mapping[str, Sketch],
+    shown: Mapping[str, RunDigest],
     summaries: dict[str, Any],
     texts: tuple[Any, Any],
     added: Mapping[str, Any],

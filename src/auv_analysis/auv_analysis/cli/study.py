@@ -83,12 +83,12 @@ def _window(scenario: Scenario, first: float, last: float) -> tuple[float, float
 
 def _check_samples(options: argparse.Namespace) -> None:
     """Refuse a number of samples that the method of the sensitivity does not take."""
-    from auv_analysis.studies.sweep.indices import Design
+    from auv_analysis.studies.sweep.indices import SensitivityPlan
 
     if options.samples is not None:
         method: Any = 'morris' if options.sensitivity == 'morris' else 'sobol'
         try:
-            Design(method, ('gain',), options.samples, 0)
+            SensitivityPlan(method, ('gain',), options.samples, 0)
         except ValueError as error:
             expected = str(error).partition('expected ')[2].partition(', found')[0]
             raise InputError('--samples', '', expected, str(options.samples)) from None

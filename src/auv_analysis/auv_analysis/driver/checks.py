@@ -19,9 +19,9 @@ from auv_analysis.driver.evidence import (
     FAIL,
     NOT_CHECKED,
     PASS,
+    CheckResult,
+    DriverRecord,
     Endpoint,
-    Evidence,
-    Finding,
     counts,
     judged,
     unchecked,
@@ -36,7 +36,7 @@ NAMED = 3  # topics of a like name
 DEPTH = 'depths are not told by discovery'
 
 
-def odom_publisher(evidence: Evidence) -> Finding:
+def odom_publisher(evidence: DriverRecord) -> CheckResult:
     """Publisher of odom."""
     graph = evidence.graph
     expected = f'one publisher of {graph.odom}, {graph.odom_type}'
@@ -53,7 +53,7 @@ def odom_publisher(evidence: Evidence) -> Finding:
     return judged(good, expected, _listed(ends), advice, publishers=len(ends))
 
 
-def wrench_subscriber(evidence: Evidence) -> Finding:
+def wrench_subscriber(evidence: DriverRecord) -> CheckResult:
     """Subscriber of wrench."""
     graph = evidence.graph
     expected = f'a subscriber of {graph.wrench}, {graph.wrench_type}'
@@ -76,7 +76,7 @@ def wrench_subscriber(evidence: Evidence) -> Finding:
     return judged(False, expected, found, advice, subscribers=len(ends))
 
 
-def wrench_publishers(evidence: Evidence) -> Finding:
+def wrench_publishers(evidence: DriverRecord) -> CheckResult:
     """Others that command."""
     graph, actuates = evidence.graph, evidence.settings.actuates
     ends, most = graph.wrench_publishers, 0 if actuates else 1
@@ -91,7 +91,7 @@ def wrench_publishers(evidence: Evidence) -> Finding:
     return judged(good, expected, _listed(ends), advice, publishers=len(ends))
 
 
-def clock(evidence: Evidence) -> Finding:
+def clock(evidence: DriverRecord) -> CheckResult:
     """Simulated time."""
     ends, heard = evidence.graph.clock_publishers, len(evidence.log.clock_ns)
     name = interface.CLOCK
@@ -124,14 +124,14 @@ def _instead(
     return f'; nearest names: {join(near)}' if near else f'; {kind} is on no topic there'
 
 
-def qos_controller(evidence: Evidence) -> Finding:
+def qos_controller(evidence: DriverRecord) -> CheckResult:
     """Quality of service from odom to the controller."""
     advice = 'publish with the default profile: reliable, volatile, keep last 10'
     expected = 'what a best-effort subscription of the controller can hear'
     return _matching(evidence, 'controller', expected, advice)
 
 
-def qos_recorder(evidence: Evidence) -> Finding:
+def qos_recorder(evidence: DriverRecord) -> CheckResult:
     """Quality of service from odom to the recorder."""
     override = f'qos_overrides.{evidence.graph.odom}.subscription.reliability: best_effort'
     advice = 'publish reliable, keep last 10 at least; else give the recorder '
@@ -140,14 +140,14 @@ def qos_recorder(evidence: Evidence) -> Finding:
     return _matching(evidence, 'recorder', expected, advice)
 
 
-def qos_wrench(evidence: Evidence) -> Finding:
+def qos_wrench(evidence: DriverRecord) -> CheckResult:
     """Quality of service from wrench to the driver."""
     advice = 'subscribe volatile, without a deadline, keep last 1: only the newest counts'
     expected = 'what a reliable, volatile publisher of the controller can feed'
     return _matching(evidence, 'wrench', expected, advice)
 
 
-def _matching(evidence: Evidence, key: str, expected: str, advice: str) -> Finding:
+def _matching(evidence: DriverRecord, key: str, expected: str, advice: str) -> CheckResult:
     graph = evidence.graph
     topic, ends = (graph.wrench, graph.takers) if key == 'wrench' else (graph.odom, graph.drivers)
     if not ends:
@@ -168,30 +168,30 @@ GROUPS = {
 }
 
 
-def nothing(_: Evidence) -> str:
+def nothing(_: DriverRecord) -> str:
     """Need of what can always be judged."""
     return ''
 
 
-def driver(evidence: Evidence) -> str:
+def driver(evidence: DriverRecord) -> str:
     """Need of a single publisher of odometry: why it is not there, or an empty text."""
     if len(evidence.graph.odom_publishers) > 1:
         return 'several publish odometry: their messages cannot be told apart'
     return '' if evidence.graph.drivers else 'no odometry'
 
 
-def odometry(evidence: Evidence) -> str:
+def odometry(evidence: DriverRecord) -> str:
     """Need of a message."""
     return driver(evidence) or ('' if len(evidence.log.arrived_ns) else odometry_checks.MUTE)
 
 
-def motion(evidence: Evidence) -> str:
+def motion(evidence: DriverRecord) -> str:
     """Need of messages that tell pose and twist."""
     few = 'too few messages with finite numbers and unit quaternions'
     return odometry(evidence) or ('' if evidence.has_motion else few)
 
 
-def wrenches(evidence: Evidence) -> str:
+def wrenches(evidence: DriverRecord) -> str:
     """Need of an excitation."""
     return '' if evidence.excitation else evidence.passive
 
@@ -212,10 +212,10 @@ class Check(NamedTuple):
     id: str
     group: str
     title: str
-    needs: Callable[[Evidence], str]
-    judge: Callable[[Evidence], Finding]
+    needs: Callable[[DriverRecord], str]
+    judge: Callable[[DriverRecord], CheckResult]
 
-    def finding(self, evidence: Evidence) -> Finding:
+    def finding(self, evidence: DriverRecord) -> CheckResult:
         """What comes of it."""
         why = self.needs(evidence)
         found = unchecked(self.title, why) if why else self.judge(evidence)
@@ -223,13 +223,15 @@ class Check(NamedTuple):
 
 
 def _check(
-    group: str, needs: Callable[[Evidence], str], judge: Callable[[Evidence], Finding]
+    group: str, needs: Callable[[DriverRecord], str], judge: Callable[[DriverRecord], CheckResult]
 ) -> Check:
     return Check(judge.__name__, group, _title(judge), needs, judge)
 
 
 def _per_dof(
-    group: str, needs: Callable[[Evidence], str], judge: Callable[[str, Evidence], Finding]
+    group: str,
+    needs: Callable[[DriverRecord], str],
+    judge: Callable[[str, DriverRecord], CheckResult],
 ) -> list[Check]:
     """A check for each degree of freedom."""
     name, title = judge.__name__, _title(judge)
@@ -238,7 +240,7 @@ def _per_dof(
     ]
 
 
-def _title(judge: Callable[..., Finding]) -> str:
+def _title(judge: Callable[..., CheckResult]) -> str:
     return (judge.__doc__ or '').removesuffix('.')
 
 
@@ -276,7 +278,7 @@ CHECKS = {
 PASSIVE = [id for id, check in CHECKS.items() if check.group != 'response']
 
 
-def judge(evidence: Evidence, ids: Iterable[str] = CHECKS) -> list[Finding]:
+def judge(evidence: DriverRecord, ids: Iterable[str] = CHECKS) -> list[CheckResult]:
     """Findings of some checks, by default of all."""
     return [CHECKS[id].finding(evidence) for id in ids]
 
@@ -288,7 +290,7 @@ NEEDED = (  # to pass before a wrench may be sent
 )
 
 
-def failure_of(findings: Sequence[Finding]) -> str:
+def failure_of(findings: Sequence[CheckResult]) -> str:
     """One line that names the checks that failed; empty where none did."""
     failed = [finding for finding in findings if finding.verdict == FAIL]
     if not failed:
@@ -300,13 +302,13 @@ def failure_of(findings: Sequence[Finding]) -> str:
     return f'{len(failed)} of {len(findings)} checks failed: {names}'
 
 
-def refusal(findings: Sequence[Finding]) -> str:
+def refusal(findings: Sequence[CheckResult]) -> str:
     """Why no wrench may be sent after the passive checks, or an empty text."""
     against = [one.id for one in findings if one.id in NEEDED and one.verdict != PASS]
     return f'nothing was sent, since {join(against)} did not pass' if against else ''
 
 
-def document_of(evidence: Evidence, findings: Sequence[Finding]) -> dict[str, Any]:
+def document_of(evidence: DriverRecord, findings: Sequence[CheckResult]) -> dict[str, Any]:
     """All that was found, ready for JSON."""
     graph, log = evidence.graph, evidence.log
     return {
@@ -321,7 +323,7 @@ def document_of(evidence: Evidence, findings: Sequence[Finding]) -> dict[str, An
     }
 
 
-def findings_table(findings: Sequence[Finding]) -> RenderableType:
+def findings_table(findings: Sequence[CheckResult]) -> RenderableType:
     """Findings by group, and at the end how many there are of each verdict.
 
     What passed is a line; the rest comes with what was expected and with advice.
@@ -347,7 +349,7 @@ def findings_table(findings: Sequence[Finding]) -> RenderableType:
     return Group(table, total)
 
 
-def _reason(finding: Finding) -> str:
+def _reason(finding: CheckResult) -> str:
     """What checks have in common that were not made and of which there is nothing else to say."""
     alone = finding.verdict != NOT_CHECKED or finding.advice
     return finding.id if alone else f' {finding.found}'

@@ -119,7 +119,7 @@ class GraphSnapshot:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class DriverRecord:
     """All that a driver is judged by.
 
     Attributes
@@ -196,7 +196,7 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckResult:
     """What was expected of a driver and what was found.
 
     Attributes
@@ -237,16 +237,18 @@ class Finding:
         }
 
 
-def judged(good: bool, expected: str, found: str, advice: str = '', **numbers: Number) -> Finding:
+def judged(
+    good: bool, expected: str, found: str, advice: str = '', **numbers: Number
+) -> CheckResult:
     """Finding that passes or fails; the advice is for the failure."""
-    return Finding(expected, found, PASS if good else FAIL, '' if good else advice, numbers)
+    return CheckResult(expected, found, PASS if good else FAIL, '' if good else advice, numbers)
 
 
-def unchecked(expected: str, why: str, advice: str = '', **numbers: Number) -> Finding:
+def unchecked(expected: str, why: str, advice: str = '', **numbers: Number) -> CheckResult:
     """Finding of a check that could not be made."""
-    return Finding(expected, why, NOT_CHECKED, advice, numbers)
+    return CheckResult(expected, why, NOT_CHECKED, advice, numbers)
 
 
-def counts(findings: Sequence[Finding]) -> dict[str, int]:
+def counts(findings: Sequence[CheckResult]) -> dict[str, int]:
     """How many findings there are of each verdict."""
     return {verdict: sum(f.verdict == verdict for f in findings) for verdict in VERDICTS}

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
-from auv_analysis.driver.response import Response, Wrench, fit_response, predicted
+from auv_analysis.driver.response import GainFit, Wrench, fit_response, predicted
 from auv_analysis.output.progress import say
 from auv_analysis.output.text import join
 from auv_dynamics.files.errors import on_signals
@@ -233,7 +233,7 @@ class StoppedError(RuntimeError):
     """The user wants an end."""
 
 
-class Guard:
+class MotionGuard:
     """Looks at the vehicle between two wrenches.
 
     Parameters
@@ -355,7 +355,7 @@ def carry_out(
     """
     done: list[Sent] = []
     try:
-        guard = Guard(client, plan.speed, timeout, stopped)
+        guard = MotionGuard(client, plan.speed, timeout, stopped)
         for trial in plan.trials:
             begins(trial)
             done.append(Sent(trial))
@@ -369,7 +369,7 @@ def carry_out(
     return Excitation(plan, done)
 
 
-def _send(client: DriverClient, guard: Guard, sent: Sent) -> None:
+def _send(client: DriverClient, guard: MotionGuard, sent: Sent) -> None:
     for tau, seconds in sent.trial.parts:
         for _ in range(round(seconds / PERIOD)):
             sent.steps.append((client.send(tau), tau))
@@ -409,11 +409,11 @@ class MeasuredTrial:
     silent_from: float
 
     @cached_property
-    def response(self) -> Response:
+    def response(self) -> GainFit:
         """Response to the wrenches as they were sent."""
         return self.response_to(self.held)
 
-    def response_to(self, held: Sequence[tuple[float, float, Wrench]]) -> Response:
+    def response_to(self, held: Sequence[tuple[float, float, Wrench]]) -> GainFit:
         """Response if these wrenches had acted."""
         model = predicted(self.vehicle, self.x, held)
         return fit_response(self.t, self.nu, model, self.trial.axis)

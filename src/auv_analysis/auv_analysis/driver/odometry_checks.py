@@ -6,7 +6,7 @@ of the controller; when messages come, and what their stamps say.
 
 import numpy as np
 
-from auv_analysis.driver.evidence import Evidence, Finding, judged, unchecked
+from auv_analysis.driver.evidence import CheckResult, DriverRecord, judged, unchecked
 from auv_analysis.metrics.pose_twist import w_first
 from auv_analysis.output.text import join, number
 from auv_dynamics.ros.interface import NANOSECONDS, ODOM, UNIT
@@ -26,7 +26,7 @@ PARTS = {  # columns of a state
 }
 
 
-def frames(evidence: Evidence) -> Finding:
+def frames(evidence: DriverRecord) -> CheckResult:
     """Frame ids."""
     expected_pair = (evidence.settings.frames.odom, evidence.settings.frames.base)
     expected = f'header.frame_id {expected_pair[0]}, child_frame_id {expected_pair[1]}'
@@ -47,7 +47,7 @@ def frames(evidence: Evidence) -> Finding:
     return judged(pairs == [expected_pair], expected, found, advice, pairs=len(pairs))
 
 
-def finite(evidence: Evidence) -> Finding:
+def finite(evidence: DriverRecord) -> CheckResult:
     """Finite numbers."""
     log = evidence.log
     bad, n = int((~log.finite).sum()), len(log.x)
@@ -62,7 +62,7 @@ def finite(evidence: Evidence) -> Finding:
     return judged(not bad, 'finite numbers in every message', found, advice, messages=bad)
 
 
-def quaternion_norm(evidence: Evidence) -> Finding:
+def quaternion_norm(evidence: DriverRecord) -> CheckResult:
     """Unit quaternion."""
     expected = f'a norm within {UNIT:g} of 1, as the controller requires'
     q = evidence.log.x[evidence.log.finite, 3:7]
@@ -77,7 +77,7 @@ def quaternion_norm(evidence: Evidence) -> Finding:
     return judged(not bad, expected, found, advice, largest_deviation=worst)
 
 
-def upright(evidence: Evidence) -> Finding:
+def upright(evidence: DriverRecord) -> CheckResult:
     """Attitude of a vehicle afloat."""
     expected = f'at most {FELL_OVER:g} deg from upright, by the median'
     q = evidence.log.x[evidence.log.finite, 3:7]
@@ -99,7 +99,7 @@ def _tilt(q: np.ndarray) -> float:
     return float(np.degrees(np.median(np.arccos(np.clip(rotation(q)[:, 2, 2], -1.0, 1.0)))))
 
 
-def depth(evidence: Evidence) -> Finding:
+def depth(evidence: DriverRecord) -> CheckResult:
     """Direction of z."""
     expected = 'z is down: not above its origin throughout'
     z = evidence.log.x[evidence.log.finite, 2]
@@ -114,7 +114,7 @@ def depth(evidence: Evidence) -> Finding:
     return judged(True, expected, found, lowest=low, highest=high)
 
 
-def speeds(evidence: Evidence) -> Finding:
+def speeds(evidence: DriverRecord) -> CheckResult:
     """Plausible speeds."""
     settings = evidence.settings
     linear, angular = _largest_halves(evidence.motion.nu)
@@ -128,7 +128,7 @@ def speeds(evidence: Evidence) -> Finding:
     )
 
 
-def jumps(evidence: Evidence) -> Finding:
+def jumps(evidence: DriverRecord) -> CheckResult:
     """Plausible steps between messages."""
     motion, settings = evidence.motion, evidence.settings
     speed, turning, acceleration = settings.speed, settings.turning, settings.acceleration
@@ -176,7 +176,7 @@ SPANS = 8  # parts of the time, for the drift
 MS = 1e3
 
 
-def rate(evidence: Evidence) -> Finding:
+def rate(evidence: DriverRecord) -> CheckResult:
     """Rate."""
     log, settings = evidence.log, evidence.settings
     least = ENOUGH / settings.timeout
@@ -207,7 +207,7 @@ def rate(evidence: Evidence) -> Finding:
     )  # fmt: skip
 
 
-def gaps(evidence: Evidence) -> Finding:
+def gaps(evidence: DriverRecord) -> CheckResult:
     """Longest silence."""
     log, settings = evidence.log, evidence.settings
     expected = f'never {settings.timeout:g} s without odometry (odometry_timeout)'
@@ -219,7 +219,7 @@ def gaps(evidence: Evidence) -> Finding:
                   lost=log.lost)  # fmt: skip
 
 
-def stamps(evidence: Evidence) -> Finding:
+def stamps(evidence: DriverRecord) -> CheckResult:
     """Order of the stamps."""
     log, settings = evidence.log, evidence.settings
     expected = f'rising from message to message, by {settings.gap:g} s at most, none zero'
@@ -245,7 +245,7 @@ def stamps(evidence: Evidence) -> Finding:
                   zero=zero, negative=negative)  # fmt: skip
 
 
-def reference_ns(evidence: Evidence) -> tuple[np.ndarray, float]:
+def reference_ns(evidence: DriverRecord) -> tuple[np.ndarray, float]:
     """Time (n,) in ns that our nodes' clock showed at each arrival, NaN before it began; its step.
 
     With simulated time the clock shows the last /clock that came before, a step of it in s.
@@ -262,7 +262,7 @@ def reference_ns(evidence: Evidence) -> tuple[np.ndarray, float]:
     return time, float(np.median(steps)) / NANOSECONDS if len(steps) else 0.0
 
 
-def age(evidence: Evidence) -> Finding:
+def age(evidence: DriverRecord) -> CheckResult:
     """Age of the stamps."""
     log, settings = evidence.log, evidence.settings
     most = FRESH * settings.timeout
@@ -293,7 +293,7 @@ def age(evidence: Evidence) -> Finding:
     return judged(high <= most and not ahead, expected, found, advice, **numbers)
 
 
-def drift(evidence: Evidence) -> Finding:
+def drift(evidence: DriverRecord) -> CheckResult:
     """Speed of their clock."""
     log, settings = evidence.log, evidence.settings
     clock = 'simulated time' if settings.sim_time else 'the time of arrival'

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from pyarrow import parquet
 
 from auv_analysis.driver.checks import CHECKS, GROUPS
-from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, Evidence, Finding
+from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, CheckResult, DriverRecord
 from auv_analysis.driver.excitation import MeasuredTrial
 from auv_analysis.driver.odometry_checks import reference_ns
 from auv_analysis.output.new_files import write_json
@@ -43,7 +43,7 @@ Drawn = tuple[Figure, str, str]  # with title and caption
 
 
 def write_results(
-    out: Path, evidence: Evidence, findings: Sequence[Finding], document: Mapping[str, Any]
+    out: Path, evidence: DriverRecord, findings: Sequence[CheckResult], document: Mapping[str, Any]
 ) -> Path:
     """Write check.json, Parquet files, figures and report.html; returns the path of the last.
 
@@ -80,7 +80,7 @@ def write_results(
     return write_document(out, 'Check of a vehicle driver', about, sentences, sections)
 
 
-def _write_samples(out: Path, evidence: Evidence) -> None:
+def _write_samples(out: Path, evidence: DriverRecord) -> None:
     log = evidence.log
     columns = {'arrived_ns': log.arrived_ns, 'stamp_ns': log.stamp_ns}
     columns |= dict(zip(STATE, log.x.T, strict=True))
@@ -93,7 +93,7 @@ def _write_samples(out: Path, evidence: Evidence) -> None:
     parquet.write_table(table, out / WRENCHES)
 
 
-def draw(evidence: Evidence, folder: Path) -> dict[str, FigureRecord]:
+def draw(evidence: DriverRecord, folder: Path) -> dict[str, FigureRecord]:
     """Draw what the evidence allows, as PNG and PDF: name -> figure."""
     drawn: dict[str, Callable[[], Drawn]] = {}
     if len(evidence.log.arrived_ns) >= FEW:
@@ -106,7 +106,7 @@ def draw(evidence: Evidence, folder: Path) -> dict[str, FigureRecord]:
     return save_figures(folder, drawn)
 
 
-def _timing(evidence: Evidence) -> Drawn:
+def _timing(evidence: DriverRecord) -> Drawn:
     log = evidence.log
     t = (log.arrived_ns - log.began_ns) / NANOSECONDS
     now, _ = reference_ns(evidence)
@@ -129,7 +129,7 @@ def _timing(evidence: Evidence) -> Drawn:
     return figure, title, caption
 
 
-def _motion(evidence: Evidence, word: str, half: slice, unit: str) -> Drawn:
+def _motion(evidence: DriverRecord, word: str, half: slice, unit: str) -> Drawn:
     pair = evidence.rates[word.lower()]
     panels = [
         Panel(

@@ -64,7 +64,7 @@ def _rate(vehicle: Vehicle, tau: np.ndarray, _: float, y: np.ndarray) -> np.ndar
 
 
 @dataclass(frozen=True)
-class Response:
+class GainFit:
     """A measured velocity as a multiple of a predicted one, beside a steady drift.
 
     Attributes
@@ -87,7 +87,7 @@ class Response:
     predicted: np.ndarray
 
 
-def fit_response(t: np.ndarray, nu: np.ndarray, model: Predicted, axis: int) -> Response:
+def fit_response(t: np.ndarray, nu: np.ndarray, model: Predicted, axis: int) -> GainFit:
     """Fit gain * added(t - delay) + c_0 + c_1 t + c_2 alone(t) to a velocity.
 
     The wrench acts one way and then the other, so that what it adds rises and falls. What is
@@ -112,7 +112,7 @@ def fit_response(t: np.ndarray, nu: np.ndarray, model: Predicted, axis: int) -> 
     peak = float(np.abs(model.added[:, axis]).max())
     squares = float(fits[axis][1][best[axis]])
     residual = float(np.sqrt(squares / len(t)))
-    return Response(
+    return GainFit(
         model,
         float(gains[axis]),
         float(delays[best[axis]]),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from auv_analysis.driver.evidence import PASS, Evidence, Finding, judged, unchecked
+from auv_analysis.driver.evidence import PASS, CheckResult, DriverRecord, judged, unchecked
 from auv_analysis.driver.excitation import MeasuredTrial
 from auv_analysis.driver.response import LATEST
 from auv_analysis.output.text import join, number
@@ -22,7 +22,7 @@ WATCHDOG = 'give the driver a watchdog: a wrench older than some 0.5 s is zero'
 TINY = float(np.finfo(float).tiny)
 
 
-def actuation(evidence: Evidence) -> Finding:
+def actuation(evidence: DriverRecord) -> CheckResult:
     """Wrenches that were sent."""
     excitation = evidence.sent
     expected = 'all wrenches of the plan, the last ones zero'
@@ -41,7 +41,7 @@ def actuation(evidence: Evidence) -> Finding:
     return judged(not excitation.aborted, expected, found, advice, **numbers)
 
 
-def response(dof: str, evidence: Evidence) -> Finding:
+def response(dof: str, evidence: DriverRecord) -> CheckResult:
     """Response to a wrench."""
     excitation = evidence.sent
     expected = f'a wrench in {dof} moves it by {GAINS[0]:g} to {GAINS[1]:g} times what the model '
@@ -88,7 +88,7 @@ def _elsewhere(measured: MeasuredTrial, speed: float) -> str:
     return DOFS[largest] if more[largest] > ELSEWHERE * speed else ''
 
 
-def response_delay(evidence: Evidence) -> Finding:
+def response_delay(evidence: DriverRecord) -> CheckResult:
     """Delay of the response."""
     expected = f'an answer within {PROMPT:g} s, to and fro'
     late = [
@@ -105,7 +105,7 @@ def response_delay(evidence: Evidence) -> Finding:
     return judged(middle <= PROMPT, expected, found, advice, **numbers)
 
 
-def silence(evidence: Evidence) -> Finding:
+def silence(evidence: DriverRecord) -> CheckResult:
     """Zero when commands cease."""
     expected = f'zero within {LONGEST:g} s of the last wrench'
     trial = next((one for one in evidence.trials if one.trial.silent), None)
@@ -116,7 +116,7 @@ def silence(evidence: Evidence) -> Finding:
     return _by_motion(trial, expected)
 
 
-def _by_actuators(trial: MeasuredTrial, expected: str) -> Finding:
+def _by_actuators(trial: MeasuredTrial, expected: str) -> CheckResult:
     t = trial.applied_t - trial.silent_from
     acts = np.abs(trial.applied).max(axis=1) > LITTLE * trial.trial.size
     if not acts[t <= 0].any():
@@ -128,7 +128,7 @@ def _by_actuators(trial: MeasuredTrial, expected: str) -> Finding:
     return judged(ceased <= LONGEST and not acts[-1], expected, found, WATCHDOG, **numbers)
 
 
-def _by_motion(trial: MeasuredTrial, expected: str) -> Finding:
+def _by_motion(trial: MeasuredTrial, expected: str) -> CheckResult:
     """By the velocity: which time of letting go explains it best, against never letting go."""
     end = float(trial.t[-1])
     watched = end - trial.silent_from

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from auv_analysis.driver.evidence import FAIL, PASS, Evidence, Finding, judged, unchecked
+from auv_analysis.driver.evidence import FAIL, PASS, CheckResult, DriverRecord, judged, unchecked
 from auv_analysis.metrics.pose_twist import (
     CHILD,
     FITS,
@@ -88,19 +88,19 @@ TWIST_READINGS = {  # half and reading -> what it says of the driver, how to men
 }
 
 
-def twist_frame(evidence: Evidence) -> Finding:
+def twist_frame(evidence: DriverRecord) -> CheckResult:
     """Axes of twist.linear."""
     expected = 'twist.linear in the axes of child_frame_id: R(q) v is the rate of the position'
     return _frame(evidence, 'linear', 'm/s', expected)
 
 
-def angular_frame(evidence: Evidence) -> Finding:
+def angular_frame(evidence: DriverRecord) -> CheckResult:
     """Axes of twist.angular."""
     expected = 'twist.angular in the axes of child_frame_id, in rad/s: the turning of the attitude'
     return _frame(evidence, 'angular', 'rad/s', expected)
 
 
-def _frame(evidence: Evidence, half: str, unit: str, expected: str) -> Finding:
+def _frame(evidence: DriverRecord, half: str, unit: str, expected: str) -> CheckResult:
     motion, fit = evidence.motion, evidence.twist_fits[half]
     numbers = {
         'speed_by_pose': fit.by_path,
@@ -120,14 +120,14 @@ def _frame(evidence: Evidence, half: str, unit: str, expected: str) -> Finding:
         by = ' (by the times of arrival, since the stamps do not rise)'
     if not fit.right:
         found, advice = _cause(fit, half, unit)
-        return Finding(expected, found + by, FAIL, advice, numbers)
+        return CheckResult(expected, found + by, FAIL, advice, numbers)
     found = f'they fit, off by {_percent(fit.off[CHILD])} of {number(fit.speed)} {unit}'
     if half == 'linear' and 'world' in fit.others:
         found += '; so do those of header.frame_id, from which the vehicle is not turned away'
         return unchecked(expected, found, TURN, **numbers)
     if fit.others:
         found += f'; not told apart by this motion: {join(fit.others)}'
-    return Finding(expected, found + by, PASS, '', numbers)
+    return CheckResult(expected, found + by, PASS, '', numbers)
 
 
 def _cause(fit: TwistFit, half: str, unit: str) -> tuple[str, str]:
@@ -170,7 +170,7 @@ def _percent(part: float) -> str:
     return f'{100 * part:.3g} %'
 
 
-def axis(dof: str, evidence: Evidence) -> Finding:
+def axis(dof: str, evidence: DriverRecord) -> CheckResult:
     """Twist and pose in one degree of freedom."""
     expected = f'{dof} by the twist is {dof} by the pose'
     i = DOFS.index(dof)

@@ -9,7 +9,7 @@ import yaml
 
 from auv_analysis.formats.derivatives import ASSIGNED, read_derivatives
 from auv_analysis.formats.gazebo import read_gazebo
-from auv_analysis.formats.imported import Choices, Draft
+from auv_analysis.formats.imported import Choices, ImportedVehicle
 from auv_analysis.formats.uuv import read_uuv, uuv_entries
 from auv_analysis.formats.xml_parts import parse_xml
 from auv_dynamics.files.errors import InputError, printable
@@ -18,7 +18,7 @@ from auv_dynamics.files.yaml_files import parse_yaml, read_text
 UUV = re.compile(r'hydrodynamic_model|quad_damping|quadratic_damping|^Ma\s*:', re.M)
 
 
-def read_vehicle(path: Path, format_: str, choices: Choices) -> tuple[str, Draft]:
+def read_vehicle(path: Path, format_: str, choices: Choices) -> tuple[str, ImportedVehicle]:
     """Format and draft of a file of another system.
 
     Parameters
@@ -67,7 +67,7 @@ SECTIONS = (
 UNFIT = re.compile(r'[^\w .-]+')
 
 
-def vehicle_text(draft: Draft, name: str, source: str) -> str:
+def vehicle_text(draft: ImportedVehicle, name: str, source: str) -> str:
     """Text of a vehicle file.
 
     Parameters
@@ -100,7 +100,7 @@ def _line(text: str) -> str:
     return ' '.join(printable(text).split())
 
 
-def _entry(draft: Draft, place: str, key: str, indent: str) -> list[str]:
+def _entry(draft: ImportedVehicle, place: str, key: str, indent: str) -> list[str]:
     value, comment = draft.values[place], draft.comments.get(place, '')
     said = f'  # {comment}' if comment else ''
     if isinstance(value, str):

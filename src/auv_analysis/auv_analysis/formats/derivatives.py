@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from auv_analysis.formats.imported import SNAME, Choices, Draft
+from auv_analysis.formats.imported import SNAME, Choices, ImportedVehicle
 from auv_dynamics.files.yaml_files import LARGEST
 from auv_dynamics.vehicle.vehicle import munk_terms
 
@@ -34,9 +34,9 @@ APART = 0.005  # relative, beyond which m g and W are two different numbers
 GRAVITY, FRESH = 9.81, 1000.0
 
 
-def read_derivatives(text: str, path: Path, choices: Choices) -> Draft:
-    """Draft of a list; InputError names file, key, expected and found."""
-    draft = Draft(path, choices, path.stem)
+def read_derivatives(text: str, path: Path, choices: Choices) -> ImportedVehicle:
+    """Vehicle of a list; InputError names file, key, expected and found."""
+    draft = ImportedVehicle(path, choices, path.stem)
     scalars: dict[str, float] = {}
     matrices = np.zeros((4, 6, 6))
     lifting: list[str] = []
@@ -71,7 +71,7 @@ def _is_by_u(plain: str) -> bool:
     return bool(match and match[3] and match[2] != match[3] and 'u' in (match[2], match[3]))
 
 
-def _lift(draft: Draft, derivatives: np.ndarray, names: list[str]) -> None:
+def _lift(draft: ImportedVehicle, derivatives: np.ndarray, names: list[str]) -> None:
     """Put the lift; combined derivatives without what C has of the added mass."""
     lift = draft.positive('lift', derivatives, SNAME, 'Yuv ... Nur')
     water = munk_terms(draft.values['added_mass']) * (derivatives != 0)
@@ -86,7 +86,7 @@ def _lift(draft: Draft, derivatives: np.ndarray, names: list[str]) -> None:
     draft.lift_by_abs_u([name for name in names if '|' not in name and 'abs' not in name])
 
 
-def _assignments(text: str, draft: Draft) -> list[tuple[str, float]]:
+def _assignments(text: str, draft: ImportedVehicle) -> list[tuple[str, float]]:
     found, seen = [], set()
     for line in text.splitlines():
         bare = BRACED.sub(lambda braced: braced[0].replace(' ', ''), COMMENT.sub('', line))
@@ -103,7 +103,9 @@ def _assignments(text: str, draft: Draft) -> list[tuple[str, float]]:
     return found
 
 
-def _placed(draft: Draft, matrices: np.ndarray, name: str, plain: str, value: float) -> bool:
+def _placed(
+    draft: ImportedVehicle, matrices: np.ndarray, name: str, plain: str, value: float
+) -> bool:
     """Put a coefficient in its matrix; False where its name is none."""
     added, linear, quadratic, lift = matrices
     if match := ADDED.fullmatch(plain):
@@ -131,7 +133,7 @@ def _placed(draft: Draft, matrices: np.ndarray, name: str, plain: str, value: fl
     return True
 
 
-def _body(draft: Draft, given: dict[str, float]) -> None:
+def _body(draft: ImportedVehicle, given: dict[str, float]) -> None:
     """Mass, tensor, centres, water: W = m g and B = rho g V tie them together."""
     choices = draft.choices
     for key in ('m', 'W'):
@@ -169,13 +171,13 @@ def _body(draft: Draft, given: dict[str, float]) -> None:
             draft.assumed.append('hydrostatics.center_of_buoyancy: the origin')
 
 
-def _needed(draft: Draft, given: dict[str, float], key: str) -> float:
+def _needed(draft: ImportedVehicle, given: dict[str, float], key: str) -> float:
     if key not in given:
         raise draft.refuse(key, 'a number', None)
     return given[key]
 
 
-def _check_weight(draft: Draft, given: dict[str, float], weight: float) -> None:
+def _check_weight(draft: ImportedVehicle, given: dict[str, float], weight: float) -> None:
     if 'W' not in given or abs(given['W'] - weight) <= APART * weight:
         return
     expected = f'm g = {weight:.6g} N'
@@ -184,7 +186,7 @@ def _check_weight(draft: Draft, given: dict[str, float], weight: float) -> None:
     raise draft.refuse('W', expected, given['W'])
 
 
-def _tensor(draft: Draft, given: dict[str, float], is_apart: bool) -> None:
+def _tensor(draft: ImportedVehicle, given: dict[str, float], is_apart: bool) -> None:
     Ix, Iy, Iz = (_needed(draft, given, f'I{axis}') for axis in 'xyz')
     xy, xz, yz = (given.get(f'I{pair}', 0.0) for pair in ('xy', 'xz', 'yz'))
     if xy or xz or yz:

@@ -15,7 +15,7 @@ from auv_analysis.formats.imported import (
     POSITIVE,
     SNAME,
     Choices,
-    Draft,
+    ImportedVehicle,
 )
 from auv_analysis.formats.xml_parts import displaced, link_inertia, numbers
 
@@ -29,9 +29,9 @@ OTHERS = {
 }  # fmt: skip
 
 
-def read_gazebo(root: Element, path: Path, choices: Choices) -> Draft:
-    """Draft of an SDF file; InputError names file, key, expected and found."""
-    draft = Draft(path, choices)
+def read_gazebo(root: Element, path: Path, choices: Choices) -> ImportedVehicle:
+    """Vehicle of an SDF file; InputError names file, key, expected and found."""
+    draft = ImportedVehicle(path, choices)
     plugin = _plugin(root, draft)
     name = (plugin.findtext('link_name') or '').strip()
     model, link = _link(root, name, draft)
@@ -54,7 +54,7 @@ def read_gazebo(root: Element, path: Path, choices: Choices) -> Draft:
     return draft
 
 
-def _plugin(root: Element, draft: Draft) -> Element:
+def _plugin(root: Element, draft: ImportedVehicle) -> Element:
     found = [
         plugin
         for plugin in root.iter('plugin')
@@ -66,7 +66,7 @@ def _plugin(root: Element, draft: Draft) -> Element:
     return found[0]
 
 
-def _link(root: Element, name: str, draft: Draft) -> tuple[Element, Element]:
+def _link(root: Element, name: str, draft: ImportedVehicle) -> tuple[Element, Element]:
     wanted = name.rpartition('::')[2]
     for model in (root, *root.iter('model')) if root.tag == 'model' else root.iter('model'):
         for link in model.findall('link'):
@@ -77,7 +77,7 @@ def _link(root: Element, name: str, draft: Draft) -> tuple[Element, Element]:
     )
 
 
-def _density(root: Element, plugin: Element, draft: Draft) -> tuple[float, str] | None:
+def _density(root: Element, plugin: Element, draft: ImportedVehicle) -> tuple[float, str] | None:
     for element, key in ((root.find('.//uniform_fluid_density'), 'uniform_fluid_density'),
                          (plugin.find('water_density'), 'water_density')):  # fmt: skip
         if element is not None:
@@ -85,7 +85,7 @@ def _density(root: Element, plugin: Element, draft: Draft) -> tuple[float, str] 
     return None
 
 
-def _gravity(root: Element, draft: Draft) -> tuple[float, str]:
+def _gravity(root: Element, draft: ImportedVehicle) -> tuple[float, str]:
     element = root.find('.//world/gravity') if root.tag != 'world' else root.find('gravity')
     if element is None:
         return 9.8, "assumed: SDF's default, as no world is given"
@@ -93,7 +93,7 @@ def _gravity(root: Element, draft: Draft) -> tuple[float, str]:
     return float(np.linalg.norm(vector)), '<gravity> of the world'
 
 
-def _coefficients(draft: Draft, plugin: Element, link: Element) -> None:
+def _coefficients(draft: ImportedVehicle, plugin: Element, link: Element) -> None:
     added, linear, quadratic, lift = np.zeros((4, 6, 6))
     by_u: list[str] = []
     for child in plugin:
@@ -135,7 +135,7 @@ def _coefficients(draft: Draft, plugin: Element, link: Element) -> None:
 
 
 def _quadratic(
-    draft: Draft, A: np.ndarray, tag: str, place: tuple[int, int, str, bool], value: float
+    draft: ImportedVehicle, A: np.ndarray, tag: str, place: tuple[int, int, str, bool], value: float
 ) -> None:
     i, j, other, is_abs = place
     if other != COLUMNS[j]:
@@ -150,7 +150,7 @@ def _quadratic(
 
 
 def _added_mass(
-    draft: Draft, plugin: Element, link: Element, added: np.ndarray
+    draft: ImportedVehicle, plugin: Element, link: Element, added: np.ndarray
 ) -> tuple[np.ndarray, str, str]:
     """Matrix as given, the sign convention that it follows, and where it stands."""
     is_off = (plugin.findtext('disable_added_mass') or '').strip() in ('true', '1')

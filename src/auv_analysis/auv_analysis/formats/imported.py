@@ -44,7 +44,7 @@ class Choices:
 
 
 @dataclass
-class Draft:
+class ImportedVehicle:
     """What an importer gathers.
 
     Attributes

@@ -11,7 +11,7 @@ from auv_analysis.formats.imported import (
     POSITIVE,
     SNAME,
     Choices,
-    Draft,
+    ImportedVehicle,
 )
 from auv_analysis.formats.xml_parts import ENTRIES, numbers, put_rigid_body
 from auv_dynamics.files.errors import InputError
@@ -29,9 +29,9 @@ NEUTRAL = {  # scalings and offsets that change nothing
 DENSITY, GRAVITY = 1028.0, 9.81  # its defaults
 
 
-def read_uuv(data: Mapping[str, Any], file: object, choices: Choices, name: str) -> Draft:
-    """Draft of the contents of a file; InputError names file, key, expected and found."""
-    draft = Draft(file, choices, str(data.get('model', data.get('model_name', name))))
+def read_uuv(data: Mapping[str, Any], file: object, choices: Choices, name: str) -> ImportedVehicle:
+    """Vehicle of the contents of a file; InputError names file, key, expected and found."""
+    draft = ImportedVehicle(file, choices, str(data.get('model', data.get('model_name', name))))
     given = _gathered(data, draft)
     mass = _numbers(draft, given, 'mass', 1)[0]
     tensor = given.get('inertial', {})
@@ -56,7 +56,7 @@ def read_uuv(data: Mapping[str, Any], file: object, choices: Choices, name: str)
     return draft
 
 
-def _gathered(data: Mapping[str, Any], draft: Draft) -> dict[str, Any]:
+def _gathered(data: Mapping[str, Any], draft: ImportedVehicle) -> dict[str, Any]:
     """Entries of the file and of its hydrodynamic_model by their names in URDF."""
     found: dict[str, Any] = {}
     for key, value in _entries(data):
@@ -95,7 +95,7 @@ def _flat(value: Any) -> list[str]:
 
 
 def _numbers(
-    draft: Draft, given: Mapping[str, Any], key: str, count: int, default: Any = None
+    draft: ImportedVehicle, given: Mapping[str, Any], key: str, count: int, default: Any = None
 ) -> list[float]:
     """So many numbers, from a list, nested lists or a text."""
     if key not in given and default is not None:
@@ -104,7 +104,7 @@ def _numbers(
     return numbers(text, count, draft.file, key)
 
 
-def _matrix(draft: Draft, given: Mapping[str, Any], key: str) -> np.ndarray:
+def _matrix(draft: ImportedVehicle, given: Mapping[str, Any], key: str) -> np.ndarray:
     if key not in given:
         return np.zeros((6, 6))
     if len(_flat(given[key])) == 6:
@@ -112,7 +112,9 @@ def _matrix(draft: Draft, given: Mapping[str, Any], key: str) -> np.ndarray:
     return np.array(_numbers(draft, given, key, 36)).reshape(6, 6)
 
 
-def _volume(draft: Draft, given: Mapping[str, Any], mass: float) -> tuple[float, str] | None:
+def _volume(
+    draft: ImportedVehicle, given: Mapping[str, Any], mass: float
+) -> tuple[float, str] | None:
     if str(given.get('neutrally_buoyant', 0)).strip().lower() in ('1', 'true'):
         density = draft.values['environment.water_density']
         draft.traps.append('neutrally_buoyant: the volume is that of W = B, not the one given')
@@ -122,7 +124,7 @@ def _volume(draft: Draft, given: Mapping[str, Any], mass: float) -> tuple[float,
     return _numbers(draft, given, 'volume', 1)[0], 'volume'
 
 
-def _matrices(draft: Draft, given: Mapping[str, Any]) -> None:
+def _matrices(draft: ImportedVehicle, given: Mapping[str, Any]) -> None:
     forward = 'linear_damping_forward_speed'
     if forward in given and np.any(A := _matrix(draft, given, forward)):
         draft.put('lift', draft.positive('lift', A, SNAME, forward), forward)

@@ -8,7 +8,7 @@ import defusedxml.ElementTree
 import numpy as np
 from defusedxml.common import DefusedXmlException
 
-from auv_analysis.formats.imported import Draft
+from auv_analysis.formats.imported import ImportedVehicle
 from auv_dynamics.files.errors import InputError, first_line
 from auv_dynamics.files.yaml_files import LARGEST, LONGEST_TEXT, MOST_ENTRIES
 from auv_dynamics.vehicle.kinematics import quaternion, rotation
@@ -162,7 +162,7 @@ ENTRIES = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
 
 def put_rigid_body(
-    draft: Draft, mass: float, r_G: np.ndarray, entries: list[float], said: str
+    draft: ImportedVehicle, mass: float, r_G: np.ndarray, entries: list[float], said: str
 ) -> None:
     """Put what is given in FLU: kg, (3,) m, ixx ixy ixz iyy iyz izz of the tensor about cg."""
     xx, xy, xz, yy, yz, zz = entries
@@ -179,7 +179,7 @@ def put_rigid_body(
     draft.values['rigid_body.inertia_reference'] = 'cg'
 
 
-def link_inertia(draft: Draft, link: Element, model: Element) -> None:
+def link_inertia(draft: ImportedVehicle, link: Element, model: Element) -> None:
     """Put mass, centre of gravity and tensor of a link of an SDF model."""
     inertial = link.find('inertial')
     if inertial is None or inertial.find('mass') is None:

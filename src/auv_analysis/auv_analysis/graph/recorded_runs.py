@@ -14,7 +14,7 @@ from auv_analysis.bag import open_bag
 from auv_analysis.graph.domain import VARIABLE, own_domain
 from auv_analysis.graph.experiment import environment, run_controller
 from auv_analysis.graph.supervisor import NodeDiedError, TroubleError
-from auv_analysis.output.folder import Results
+from auv_analysis.output.folder import ResultsFolder
 from auv_analysis.output.progress import Speed, bar, count, say, waiting
 from auv_analysis.runs.run import AnyRun
 from auv_analysis.scenario.scenario import Scenario
@@ -57,7 +57,7 @@ def free_graph(asked: int | None) -> Iterator[FreeGraph]:
 def recorded(
     scenario: Scenario,
     names: list[str],
-    results: Results,
+    results: ResultsFolder,
     graph: FreeGraph,
     *,
     composed: bool = False,
@@ -104,7 +104,7 @@ def recorded(
     return {name: open_bag(out / name).run for name in done}, failure
 
 
-def _move_paths(parameters: Path, results: Results) -> None:
+def _move_paths(parameters: Path, results: ResultsFolder) -> None:
     """Let a parameter file name the files of the run where they lie in the end."""
     text = parameters.read_text(encoding='utf-8')
     before, then = (str(path.resolve()) for path in results)

@@ -6,9 +6,9 @@ from typing import Any
 
 from auv_analysis.herman2018 import paper
 from auv_analysis.herman2018.claims import judged
-from auv_analysis.herman2018.evidence import BOTH, Claim, Evidence, Response, Signals
+from auv_analysis.herman2018.evidence import BOTH, Claim, ErrorSensitivity, Evidence, Signals
 from auv_analysis.herman2018.responses import response
-from auv_analysis.report.digest import Sketch, sketches
+from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.document import Sentence
 from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.scenario.changes import changed_scenario
@@ -40,7 +40,7 @@ class PaperClaims:
 
 def paper_claims(
     scenario: Scenario,
-    runs: Mapping[str, AnyRun | Sketch],
+    runs: Mapping[str, AnyRun | RunDigest],
     sensitivities: Mapping[str, Sensitivity] | None = None,
     *,
     hold: Hold = 'continuous',
@@ -54,7 +54,7 @@ def paper_claims(
     Parameters
     ----------
     scenario : of the study
-    runs : controller -> its run or sketch
+    runs : controller -> its run or digest
     sensitivities : controller -> how its figures follow its gains; what is missing is made
     hold : of the runs that are simulated
     threads : for the rollouts of a sensitivity
@@ -88,12 +88,14 @@ def case_of(scenario: Scenario, case: str) -> Scenario:
 
 
 def case_evidence(
-    case: Scenario, at_hand: Mapping[str, AnyRun | Sketch] | None = None, hold: Hold = 'continuous'
+    case: Scenario,
+    at_hand: Mapping[str, AnyRun | RunDigest] | None = None,
+    hold: Hold = 'continuous',
 ) -> Evidence:
     """Evidence of one of the paper's cases, from runs at hand where they have its gains."""
     found = {law: paper.paper_run(at_hand or {}, law) for law in BOTH}
     runs = {law: run or simulate(case, law, hold) for law, run in found.items()}
-    signals = {law: Signals(run) for law, run in sketches(runs).items()}
+    signals = {law: Signals(run) for law, run in digests(runs).items()}
     return Evidence(signals, tuple(control_model(case.vehicle).N.tolist()))
 
 
@@ -118,14 +120,14 @@ def _differences(path: str, ours: Any, theirs: Any) -> Iterator[tuple[str, Any, 
 
 def _responses(
     scenario: Scenario,
-    runs: Mapping[str, AnyRun | Sketch],
+    runs: Mapping[str, AnyRun | RunDigest],
     sensitivities: Mapping[str, Sensitivity],
     hold: Hold,
     threads: int,
-) -> dict[str, Response]:
+) -> dict[str, ErrorSensitivity]:
     """What the errors follow, by law; without a law whose loops do not all run."""
     case = case_of(scenario, SENSITIVE_CASE)
-    known: dict[str, Response] = {}
+    known: dict[str, ErrorSensitivity] = {}
     for law in BOTH:
         run = paper.paper_run(runs, law) if scenario.name == SENSITIVE_CASE else None
         found = sensitivities.get(run.controller) if run else None

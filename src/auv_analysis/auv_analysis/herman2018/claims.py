@@ -22,10 +22,10 @@ from auv_analysis.herman2018.evidence import (
 from auv_analysis.herman2018.paper import CASES, is_plain, paper_run
 from auv_analysis.metrics.quantities import Quantity
 from auv_analysis.output.text import MISSING, fixed, join
-from auv_analysis.report.digest import TINY, Sketch, sketches
+from auv_analysis.report.digest import TINY, RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence, prose
 from auv_analysis.report.results import Column, Table, make_table
-from auv_analysis.runs.run import AnyRun, Facts
+from auv_analysis.runs.run import AnyRun, RunInfo
 from auv_analysis.scenario.scenario import load_scenario
 from auv_dynamics.plant.disturbance import make_disturbance
 
@@ -219,7 +219,7 @@ GAINS = {
 
 
 def judge_runs(
-    runs: Mapping[str, AnyRun | Sketch], summaries: Mapping[str, Mapping[str, Any]]
+    runs: Mapping[str, AnyRun | RunDigest], summaries: Mapping[str, Mapping[str, Any]]
 ) -> list[Claim]:
     """The paper's claims, each with what these runs say of it.
 
@@ -241,7 +241,7 @@ def judge_runs(
         return []
     (scenario,) = scenarios
     found = {law: paper_run(runs, law) for law in BOTH}
-    known = sketches({law: run for law, run in found.items() if run is not None})
+    known = digests({law: run for law, run in found.items() if run is not None})
     if not all(_is_case(run) for run in known.values()):
         return []
     signals = {law: Signals(run) for law, run in known.items()}
@@ -249,7 +249,7 @@ def judge_runs(
     return judged({scenario: Evidence(signals, tuple(N))})
 
 
-def _is_case(run: Sketch) -> bool:
+def _is_case(run: RunDigest) -> bool:
     """Whether a run has the inertia, the set-point and the disturbance of the case it is named."""
     case, t = load_scenario(run.scenario), run.course['t']
     wanted = {'nu_d': case.setpoint.value(t)}
@@ -332,7 +332,7 @@ def claims_table(claims: Sequence[Claim]) -> Table:
     return make_table('claims', CAPTION, rows, COLUMNS, anchor='claim', stub=1)
 
 
-def claims_part(out: Path, claims: Sequence[Claim], runs: Mapping[str, Facts]) -> Part:
+def claims_part(out: Path, claims: Sequence[Claim], runs: Mapping[str, RunInfo]) -> Part:
     """Section and sentences of a report on the claims; writes `claims.parquet` where there are any.
 
     Parameters

@@ -10,7 +10,7 @@ import numpy as np
 from auv_analysis.metrics.statistics import Part
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import MISSING, fixed, number
-from auv_analysis.report.digest import FOREVER, Sketch, last_third
+from auv_analysis.report.digest import FOREVER, RunDigest, last_third
 
 Text = Callable[[float], str]
 UNBOUNDED = 'unbounded'
@@ -90,7 +90,7 @@ Verdict = Literal['reproduced', 'partly', 'not reproduced', 'other case', 'not e
 DECIDED: tuple[Verdict, ...] = ('reproduced', 'partly', 'not reproduced')
 
 
-class Finding(NamedTuple):
+class Judgement(NamedTuple):
     """What a judge says.
 
     Attributes
@@ -110,9 +110,9 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """A run and what the judges ask of its signals, which are named as in `Sketch`."""
+    """A run and what the judges ask of its signals, which are named as in `RunDigest`."""
 
-    run: Sketch
+    run: RunDigest
 
     def part(self, name: str, first: float = 0.0, last: float = FOREVER) -> Part:
         """Statistics of a signal in [first, last], s from the start."""
@@ -136,7 +136,7 @@ class Signals:
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class ErrorSensitivity:
     """How the RMS velocity errors under one law answer to what is changed.
 
     Attributes
@@ -165,7 +165,7 @@ class Evidence:
 
     signals: Mapping[str, Signals]
     N: tuple[float, ...]
-    responses: Mapping[str, Response] = field(default_factory=dict)
+    responses: Mapping[str, ErrorSensitivity] = field(default_factory=dict)
 
     @property
     def gvc(self) -> Signals:
@@ -194,7 +194,7 @@ def spell(*ends: tuple[float, float]) -> str:
     return '; '.join(f'{first:g}–{last:g} s' for first, last in dict.fromkeys(ends))
 
 
-def settled(quote: Quotes, law: str, run: Sketch, word: str = '') -> str:
+def settled(quote: Quotes, law: str, run: RunDigest, word: str = '') -> str:
     """'1.68 s' with a word before it, or that it did not happen in the run."""
     if run.settled < FOREVER:
         return f'{word}{quote(f"settled, {law}", run.settled, "s", decimals(2))} s'
@@ -224,7 +224,7 @@ class Row:
     claim: str
     paper: str
     criterion: str
-    judge: Callable[[Evidence], Finding]
+    judge: Callable[[Evidence], Judgement]
     laws: tuple[str, ...] = ('gvc',)
     cases: tuple[str, ...] = ('case1',)
     seconds: float = 0.0

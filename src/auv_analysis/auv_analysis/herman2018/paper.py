@@ -6,10 +6,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from auv_analysis.metrics import summary
-from auv_analysis.runs.run import Facts
+from auv_analysis.runs.run import RunInfo
 from auv_dynamics.files.yaml_files import matrix6
 
-AnyFacts = TypeVar('AnyFacts', bound=Facts)
+AnyFacts = TypeVar('AnyFacts', bound=RunInfo)
 CITATION = (
     'P. Herman, Velocity tracking controller for simulation analysis of underwater vehicle '
     'model, Journal of Marine Engineering & Technology, 2018'
@@ -43,7 +43,7 @@ FIGURES: dict[str, dict[tuple[str, str], str]] = {
 }
 
 
-def has_gains(run: Facts, gains: Mapping[str, float]) -> bool:
+def has_gains(run: RunInfo, gains: Mapping[str, float]) -> bool:
     """Whether a run's gains are these multiples of the identity."""
 
     def equal(value: Any, expected: float) -> bool:
@@ -52,7 +52,7 @@ def has_gains(run: Facts, gains: Mapping[str, float]) -> bool:
     return set(run.gains) == set(gains) and all(equal(run.gains[k], gains[k]) for k in gains)
 
 
-def is_plain(run: Facts) -> bool:
+def is_plain(run: RunInfo) -> bool:
     """Whether a run has nothing that the paper's have not: devices, model error or current."""
     plain = not (run.acting or run.sensing)
     return plain and run.kinds in (None, frozenset({'herman2018'}))
@@ -68,13 +68,13 @@ def paper_run(runs: Mapping[str, AnyFacts], law: str) -> AnyFacts | None:
     return None
 
 
-def paper_figure(run: Facts, kind: str) -> str | None:
+def paper_figure(run: RunInfo, kind: str) -> str | None:
     """Number of the paper's figure that a run's figure of this kind reproduces, or None."""
     number = FIGURES.get(run.scenario, {}).get((kind, run.law))
     return number if number and paper_run({run.controller: run}, run.law) else None
 
 
-def paper_figures(run: Facts) -> list[str]:
+def paper_figures(run: RunInfo) -> list[str]:
     """Which figures of a run show what a figure of the paper shows, in words."""
     found = {kind: paper_figure(run, kind) for kind in ('errors', 'lumped_error', 'inputs')}
     found |= {kind: paper_figure(run, kind) for kind in ('delta_xi', 'delta_pi')}

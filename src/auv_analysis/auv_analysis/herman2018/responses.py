@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from auv_analysis.herman2018.evidence import Response
+from auv_analysis.herman2018.evidence import ErrorSensitivity
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario
@@ -67,7 +67,7 @@ def rms_errors(run: Run) -> np.ndarray:
 
 def response(
     scenario: Scenario, controller: str, found: Sensitivity, hold: Hold = 'continuous'
-) -> Response | None:
+) -> ErrorSensitivity | None:
     """What the RMS errors of a controller follow; None where its loops do not all run.
 
     Parameters
@@ -88,4 +88,4 @@ def response(
     except DivergedError:
         return None
     errors = np.stack([rms_errors(run) for run in runs])
-    return Response(found.six(ERROR), followed(errors, moved_setpoints(scenario)))
+    return ErrorSensitivity(found.six(ERROR), followed(errors, moved_setpoints(scenario)))

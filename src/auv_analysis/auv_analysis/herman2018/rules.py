@@ -5,7 +5,7 @@ import numpy as np
 from auv_analysis.herman2018 import paper
 from auv_analysis.herman2018.evidence import (
     Evidence,
-    Finding,
+    Judgement,
     Quotes,
     Signals,
     Verdict,
@@ -27,7 +27,7 @@ ERRORS = ('Δu', 'Δv', 'Δw', 'Δp', 'Δq', 'Δr')
 LUMPED = ('w_X', 'w_Y', 'w_Z', 'w_K', 'w_M', 'w_N')
 
 
-def errors_vanish(of: Evidence) -> Finding:
+def errors_vanish(of: Evidence) -> Judgement:
     """Row 1: GVC errors near zero after 2 s."""
     gvc, quote = of.gvc, Quotes()
     late = gvc.late_peak('error')
@@ -35,10 +35,10 @@ def errors_vanish(of: Evidence) -> Finding:
     when = settled(quote, 'gvc', gvc.run, 'after ')
     most = quote('largest error after the transient, gvc', late.max(), 'm/s, rad/s', 2)
     text = f'within {within}: {when}; at most {most} after {_transient(quote)} s'
-    return Finding(text, grade([late.max() <= NEAR_ZERO]), quote.values, _late(of))
+    return Judgement(text, grade([late.max() <= NEAR_ZERO]), quote.values, _late(of))
 
 
-def linear_slow(of: Evidence) -> Finding:
+def linear_slow(of: Evidence) -> Judgement:
     """Row 2: du and dw of CL."""
     gvc, cl = (run.late_peak('error')[[U, W]] for run in of.both)
     quote = Quotes()
@@ -47,10 +47,10 @@ def linear_slow(of: Evidence) -> Finding:
         f'm/s (GVC {quote.listed(_of("gvc", ERRORS, U, W), gvc, "m/s", 2)})'
     )
     verdict = grade((cl > NEAR_ZERO) & (cl > FAR * gvc))
-    return Finding(text, verdict, quote.values, _late(of))
+    return Judgement(text, verdict, quote.values, _late(of))
 
 
-def pitch_slow(of: Evidence) -> Finding:
+def pitch_slow(of: Evidence) -> Judgement:
     """Row 3: dq of CL."""
     cl, quote = of.cl, Quotes()
     end = min(10.0, cl.run.duration)
@@ -66,10 +66,10 @@ def pitch_slow(of: Evidence) -> Finding:
         f'{quote("Δq, cl, in the last third", last, "rad/s", 2)} in the last third'
     )
     ends = (TRANSIENT, end), (TRANSIENT, cl.run.duration), (last_third(cl.run), cl.run.duration)
-    return Finding(text, grade([late > NEAR_ZERO, last > NEAR_ZERO]), quote.values, spell(*ends))
+    return Judgement(text, grade([late > NEAR_ZERO, last > NEAR_ZERO]), quote.values, spell(*ends))
 
 
-def largest_errors(of: Evidence) -> Finding:
+def largest_errors(of: Evidence) -> Judgement:
     """Row 4: which errors of GVC are largest."""
     peak, quote = of.gvc.peak('error'), Quotes()
     names = _of('gvc', ERRORS)
@@ -79,10 +79,10 @@ def largest_errors(of: Evidence) -> Finding:
     )
     linear = min(peak[U], peak[W]) > FAR * peak[V]
     verdict = grade([linear, peak[Q] > max(peak[P], peak[R]), peak[P] > 0.01 * peak[Q]])
-    return Finding(text, verdict, quote.values, _whole(of))
+    return Judgement(text, verdict, quote.values, _whole(of))
 
 
-def lumped_fast(of: Evidence) -> Finding:
+def lumped_fast(of: Evidence) -> Judgement:
     """Row 5: w of GVC becomes small and not zero."""
     gvc, quote = of.gvc, Quotes()
     ratio = gvc.late_peak('lumped_error') / gvc.peak('lumped_error')
@@ -96,10 +96,10 @@ def lumped_fast(of: Evidence) -> Finding:
     )
     ends = bool((np.abs(end) > 0.01 * F)[[U, W]].any())
     verdict = grade([ratio.max() < 1 / FAR, ends])
-    return Finding(text, verdict, quote.values, f'{_late(of)}; at {gvc.run.duration:g} s')
+    return Judgement(text, verdict, quote.values, f'{_late(of)}; at {gvc.run.duration:g} s')
 
 
-def lumped_slow(of: Evidence) -> Finding:
+def lumped_slow(of: Evidence) -> Judgement:
     """Row 6: w of CL stays large and moves on."""
     axes, quote = [U, W, Q], Quotes()
     gvc, cl = (run.late_peak('lumped_error')[axes] for run in of.both)
@@ -114,10 +114,10 @@ def lumped_slow(of: Evidence) -> Finding:
     )
     ends = (TRANSIENT, of.cl.run.duration), (last_third(of.cl.run), of.cl.run.duration)
     verdict = grade([*(cl > FAR * gvc), *(span > 0.5 * F_span)])
-    return Finding(text, verdict, quote.values, spell(*ends))
+    return Judgement(text, verdict, quote.values, spell(*ends))
 
 
-def lumped_first_phase(of: Evidence) -> Finding:
+def lumped_first_phase(of: Evidence) -> Judgement:
     """Row 7: w of GVC in the first phase."""
     gvc, quote = of.gvc, Quotes()
     first, late = gvc.peak('lumped_error', 0.0, TRANSIENT), gvc.late_peak('lumped_error')
@@ -130,10 +130,10 @@ def lumped_first_phase(of: Evidence) -> Finding:
     larger = [min(first[U], first[W]) > first[V], min(first[Q], first[R]) > first[P]]
     verdict = grade([*(first[named] > FAR * late[named]), *larger])
     window = spell((0.0, TRANSIENT), (TRANSIENT, gvc.run.duration))
-    return Finding(text, verdict, quote.values, window)
+    return Judgement(text, verdict, quote.values, window)
 
 
-def disturbance_sizes(of: Evidence) -> Finding:
+def disturbance_sizes(of: Evidence) -> Judgement:
     """Row 8: sizes of F."""
     F, quote, one = of.gvc.peak('F'), Quotes(), decimals(1)
     text = (
@@ -141,7 +141,7 @@ def disturbance_sizes(of: Evidence) -> Finding:
         f'F_M {quote("F_M", F[Q], "N m", one)}, F_N {quote("F_N", F[R], "N m", one)} N m'
     )
     verdict = grade([F[W] == max(F[:3]), F[Q] == max(F[3:]), F[R] < F[Q]])
-    return Finding(text, verdict, quote.values, _whole(of))
+    return Judgement(text, verdict, quote.values, _whole(of))
 
 
 def _of(law: str, names: tuple[str, ...], *axes: int) -> list[str]:
@@ -166,7 +166,7 @@ POINTS = 1.0  # percentage points of a share
 COMPONENTS = tuple(f'ξ{i}' for i in range(1, 7))
 
 
-def kinetic_energy_mean(of: Evidence) -> Finding:
+def kinetic_energy_mean(of: Evidence) -> Judgement:
     """Row 9: total kinetic energy, a mean over a window that the paper does not print."""
     windows, quote = _windows(of.gvc), Quotes()
     text = '; '.join(
@@ -176,13 +176,13 @@ def kinetic_energy_mean(of: Evidence) -> Finding:
     )
     named = spell(*((0.0, end) for end in windows))
     if of.gvc.run.duration < paper.ENERGY_WINDOW:
-        return Finding(text, 'not evaluated', quote.values, named)
+        return Judgement(text, 'not evaluated', quote.values, named)
     total = next(iter(windows.values())).sum()
     near = abs(total / paper.KINETIC_ENERGY - 1.0) <= WITHIN
-    return Finding(text, 'partly' if near else 'not reproduced', quote.values, named)
+    return Judgement(text, 'partly' if near else 'not reproduced', quote.values, named)
 
 
-def kinetic_energy_shares(of: Evidence) -> Finding:
+def kinetic_energy_shares(of: Evidence) -> Judgement:
     """Row 10: shares of the components."""
     windows = {end: shares(part) for end, part in _windows(of.gvc).items()}
     quote = Quotes()
@@ -192,12 +192,12 @@ def kinetic_energy_shares(of: Evidence) -> Finding:
         lines.append(f'{quote.listed(names, part, "%", decimals(2))} % ({_window(quote, end)})')
     named = spell(*((0.0, end) for end in windows))
     if of.gvc.run.duration < paper.ENERGY_WINDOW:
-        return Finding('; '.join(lines), 'not evaluated', quote.values, named)
+        return Judgement('; '.join(lines), 'not evaluated', quote.values, named)
     near = [np.abs(part - paper.SHARES).max() <= POINTS for part in windows.values()]
-    return Finding('; '.join(lines), grade(near), quote.values, named)
+    return Judgement('; '.join(lines), grade(near), quote.values, named)
 
 
-def energy_in_two(of: Evidence) -> Finding:
+def energy_in_two(of: Evidence) -> Judgement:
     """Row 16: energy mainly in xi_3 and xi_1."""
     part, quote = shares(of.gvc.part('energy').mean), Quotes()
     order = np.argsort(part)[::-1]
@@ -206,18 +206,18 @@ def energy_in_two(of: Evidence) -> Finding:
     together = quote('their share', float(part[order[:2]].sum()), '%', decimals(2))
     text = f'ξ{first} and ξ{second}, together {together} %'
     verdict = grade([tuple(order[:2]) == (2, 0), bool(part[[0, 2]].sum() > 99.0)])
-    return Finding(text, verdict, quote.values, _whole_run(of.gvc))
+    return Judgement(text, verdict, quote.values, _whole_run(of.gvc))
 
 
-def sway_deformed(of: Evidence) -> Finding:
+def sway_deformed(of: Evidence) -> Judgement:
     """Row 11: delta_xi of sway."""
     peak, quote = of.gvc.peak('delta_xi'), Quotes()
     text = f'{quote("Δξ2", peak[V], "m/s", 2)} m/s'
     verdict = grade([peak[V] == max(peak[:3]) and round(peak[V], 2) == paper.SWAY_DEFORMATION])
-    return Finding(text, verdict, quote.values, _whole_run(of.gvc))
+    return Judgement(text, verdict, quote.values, _whole_run(of.gvc))
 
 
-def roll_deformed(of: Evidence) -> Finding:
+def roll_deformed(of: Evidence) -> Judgement:
     """Row 12: delta_xi of roll."""
     peak, rate = of.gvc.peak('delta_xi'), of.gvc.peak('nu')[P]
     quote = Quotes()
@@ -226,10 +226,10 @@ def roll_deformed(of: Evidence) -> Finding:
         f'{quote("p", rate, "rad/s", 2)} rad/s'
     )
     verdict = grade([peak[P] == max(peak[3:]) and peak[P] > rate])
-    return Finding(text, verdict, quote.values, _whole_run(of.gvc))
+    return Judgement(text, verdict, quote.values, _whole_run(of.gvc))
 
 
-def pitch_input(of: Evidence) -> Finding:
+def pitch_input(of: Evidence) -> Judgement:
     """Row 13: delta_pi of pitch."""
     gvc, quote = of.gvc, Quotes()
     peak = gvc.peak('delta_pi')
@@ -241,10 +241,10 @@ def pitch_input(of: Evidence) -> Finding:
         f'; roll {quote("Δπ4", peak[3], "N m", 2)}, yaw {quote("Δπ6", peak[5], "N m", 2)} N m; '
         f'forces at most {quote("largest of Δπ1 to Δπ3", peak[:3].max(), "N", 2)} N'
     )
-    return Finding(text, grade([_only_pitch(gvc)]), quote.values, _whole_run(gvc))
+    return Judgement(text, grade([_only_pitch(gvc)]), quote.values, _whole_run(gvc))
 
 
-def pitch_sensitive(of: Evidence) -> Finding:
+def pitch_sensitive(of: Evidence) -> Judgement:
     """Row 15: whether pitch is coupled most, and follows the others and the gains most."""
     quote, parts, lines = Quotes(), [_only_pitch(of.gvc)], []
     for what, words in (('others', 'the other set-points'), ('gains', 'the gains')):
@@ -258,15 +258,15 @@ def pitch_sensitive(of: Evidence) -> Finding:
         f'{quote("largest other Δπ", np.delete(peak, Q).max(), "N, N m", 2)}'
     )
     text = '; '.join([coupled, *lines])
-    return Finding(text, grade(parts), quote.values, _whole_run(of.gvc))
+    return Judgement(text, grade(parts), quote.values, _whole_run(of.gvc))
 
 
-def decomposition(of: Evidence) -> Finding:
+def decomposition(of: Evidence) -> Judgement:
     """Row 21: N."""
     quote = Quotes()
     text = quote.listed([f'N{i}' for i in range(1, 7)], of.N, 'kg, kg m2', 6)
     verdict = grade([np.array_equal(np.round(of.N, 1), paper.N)])
-    return Finding(text, verdict, quote.values, 'no time in it')
+    return Judgement(text, verdict, quote.values, 'no time in it')
 
 
 def _only_pitch(gvc: Signals) -> bool:
@@ -305,29 +305,29 @@ COMPARABLE = 0.05  # of efforts that are 'comparable'
 INPUTS = ('τ_X', 'τ_Y', 'τ_Z', 'τ_K', 'τ_M', 'τ_N')
 
 
-def inputs_similar(of: Evidence) -> Finding:
+def inputs_similar(of: Evidence) -> Judgement:
     """Row 14: inputs of both laws with the same gains."""
     gvc, cl = (run.peak('tau') for run in of.both)
     change, quote = _rms_change(of), Quotes()
     text = f'peak {_pairs(quote, gvc[[U, W]], cl[[U, W]])}; {_changes(quote, change)}'
     window = spell((0.0, of.gvc.run.duration), (TRANSIENT, of.gvc.run.duration))
     if np.abs(change).max() > SLIGHTLY:
-        return Finding(text, 'not reproduced', quote.values, window)
+        return Judgement(text, 'not reproduced', quote.values, window)
     same_peak = np.abs(_change(gvc, cl)).max() <= SLIGHTLY
-    return Finding(text, 'reproduced' if same_peak else 'partly', quote.values, window)
+    return Judgement(text, 'reproduced' if same_peak else 'partly', quote.values, window)
 
 
-def earlier(of: Evidence) -> Finding:
+def earlier(of: Evidence) -> Judgement:
     """Row 17: time to the final errors."""
     times, quote = [run.run.settled for run in of.both], Quotes()
     both = zip(('gvc', 'cl'), of.both, strict=True)
     text = ' against '.join(settled(quote, law, run.run) for law, run in both)
     text += f' to {quote("near zero", NEAR_ZERO, "m/s, rad/s", short)}'
     window = spell((0.0, of.gvc.run.duration))
-    return Finding(text, grade([times[0] < times[1]]), quote.values, window)
+    return Judgement(text, grade([times[0] < times[1]]), quote.values, window)
 
 
-def oscillates(of: Evidence) -> Finding:
+def oscillates(of: Evidence) -> Judgement:
     """Row 18: total variation of the errors."""
     gvc, cl = (run.part('error').path for run in of.both)
     seen = np.maximum(*(run.peak('error') for run in of.both)) > NEAR_ZERO
@@ -339,10 +339,10 @@ def oscillates(of: Evidence) -> Finding:
     )
     text = f'total variation, CL against GVC: {text}'
     window = spell((0.0, of.gvc.run.duration))
-    return Finding(text, grade(cl[seen] > gvc[seen]), quote.values, window)
+    return Judgement(text, grade(cl[seen] > gvc[seen]), quote.values, window)
 
 
-def efforts_comparable(of: Evidence) -> Finding:
+def efforts_comparable(of: Evidence) -> Judgement:
     """Row 19: RMS of the inputs after 2 s, per axis."""
     change, quote = _rms_change(of), Quotes()
     near = np.abs(change) <= COMPARABLE
@@ -354,15 +354,15 @@ def efforts_comparable(of: Evidence) -> Finding:
     verdict: Verdict = (
         'reproduced' if near.all() else 'partly' if near.sum() >= 4 else 'not reproduced'
     )
-    return Finding(text, verdict, quote.values, spell((TRANSIENT, of.gvc.run.duration)))
+    return Judgement(text, verdict, quote.values, spell((TRANSIENT, of.gvc.run.duration)))
 
 
-def larger_start(of: Evidence) -> Finding:
+def larger_start(of: Evidence) -> Judgement:
     """Row 20: inputs of the first instants."""
     gvc, cl = (run.peak('tau', 0.0, TRANSIENT)[[U, W]] for run in of.both)
     quote = Quotes()
     text, window = _pairs(quote, gvc, cl), spell((0.0, min(TRANSIENT, of.gvc.run.duration)))
-    return Finding(text, grade(gvc > cl), quote.values, window)
+    return Judgement(text, grade(gvc > cl), quote.values, window)
 
 
 def _pairs(quote: Quotes, gvc: np.ndarray, cl: np.ndarray) -> str:

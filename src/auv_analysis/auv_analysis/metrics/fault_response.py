@@ -11,7 +11,7 @@ import numpy as np
 from auv_analysis.metrics.statistics import Part, Statistics
 from auv_analysis.metrics.summary import TRANSIENT, band_of, has_settled
 from auv_analysis.output.new_files import write_table
-from auv_analysis.runs.run import AnyRun, Facts
+from auv_analysis.runs.run import AnyRun, RunInfo
 from auv_analysis.scenario.fault_words import Mark
 from auv_dynamics.vehicle import DOFS
 
@@ -22,7 +22,7 @@ Window = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Response:
+class FaultResponse:
     """A fault in one degree of freedom of one run; None is what does not exist.
 
     Attributes
@@ -53,7 +53,7 @@ class Response:
     effort: tuple[float | None, float | None, float | None]
 
 
-def windows_of(mark: Mark, run: Facts) -> tuple[Window, Window, Window]:
+def windows_of(mark: Mark, run: RunInfo) -> tuple[Window, Window, Window]:
     """Times [from, to) before, during and after a fault, s; empty where there is none.
 
     Before and after are as long as the fault, `SHORTEST` at least, and end where another fault
@@ -70,14 +70,14 @@ def windows_of(mark: Mark, run: Facts) -> tuple[Window, Window, Window]:
     return (before, start), (start, end), (end, min(end + length, next_change(mark, run)))
 
 
-def next_change(mark: Mark, run: Facts) -> float:
+def next_change(mark: Mark, run: RunInfo) -> float:
     """Time of the first begin or end of another fault behind the end of this one, or of the end."""
     last = run.start + run.duration + run.step / 2
     others = [time for other in run.faults if other != mark for time in (other.start, other.end)]
     return min([last, *(time for time in others if time > mark.end)])
 
 
-def responses(run: AnyRun) -> list[Response]:
+def responses(run: AnyRun) -> list[FaultResponse]:
     """Every fault of a run in every degree of freedom; none where no set-point is known."""
     if not run.faults or not run.knows_setpoint:
         return []
@@ -99,7 +99,7 @@ def responses(run: AnyRun) -> list[Response]:
         parts = [statistics.between(a - tiny, b - tiny) for a, b in windows[mark]]
         for i, dof in enumerate(DOFS):
             found.append(
-                Response(
+                FaultResponse(
                     mark,
                     run.controller,
                     run.law,
@@ -124,7 +124,7 @@ def _of(parts: Sequence[Part | None], name: str, column: int) -> tuple[Any, ...]
 class _Recovery:
     """How long after the end of one fault the errors settle, block by block."""
 
-    def __init__(self, mark: Mark, run: Facts):
+    def __init__(self, mark: Mark, run: RunInfo):
         self._mark, self._run = mark, run
         self._until = next_change(mark, run)
         self._outside = np.full(6, -math.inf)  # time of the last sample outside the band
@@ -157,18 +157,18 @@ class _Recovery:
         return round(float(self._outside[i] + self._run.step - self._mark.end), 9)
 
 
-def write_responses(folder: Path, found: Mapping[str, Sequence[Response]]) -> Path:
+def write_responses(folder: Path, found: Mapping[str, Sequence[FaultResponse]]) -> Path:
     """Write `faults.parquet`, a row per fault, controller and degree of freedom."""
     rows = fault_rows(found)
     return write_table(folder / FILE, {key: [row[key] for row in rows] for key in rows[0]})
 
 
-def fault_rows(found: Mapping[str, Sequence[Response]]) -> list[dict[str, Any]]:
+def fault_rows(found: Mapping[str, Sequence[FaultResponse]]) -> list[dict[str, Any]]:
     """Rows of `faults.parquet`."""
     return [_row(name, response) for name, several in found.items() for response in several]
 
 
-def _row(controller: str, response: Response) -> dict[str, Any]:
+def _row(controller: str, response: FaultResponse) -> dict[str, Any]:
     mark, angular = response.mark, response.dof in DOFS[3:]
     row: dict[str, Any] = {
         'fault': mark.number,

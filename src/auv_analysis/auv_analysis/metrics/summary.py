@@ -18,7 +18,7 @@ from auv_analysis.metrics.coupling import (
 from auv_analysis.metrics.energy import shares
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.metrics.moments import Moments, Tally, maps_of
-from auv_analysis.runs.run import AnyRun, Facts, Run
+from auv_analysis.runs.run import AnyRun, Run, RunInfo
 from auv_gvc_controller.control.gains import body_gains
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
@@ -240,7 +240,7 @@ def _peak(part: Moments, signal: int) -> list[float] | None:
     return part.peak(signal) if part.count else None
 
 
-def gap_figures(run: Facts) -> dict[str, Any]:
+def gap_figures(run: RunInfo) -> dict[str, Any]:
     """Share of the run's length that has samples, and where there are none."""
     spans = [{'window': list(span)} for span in run.gaps]
     return {'valid_share': run.valid_share, 'spans': spans}

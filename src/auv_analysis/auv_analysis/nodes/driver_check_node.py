@@ -54,7 +54,7 @@ class CheckNode(BulkNode):
 
     """
 
-    prompt = True
+    latency_critical = True
 
     def __init__(self, context: Context, namespace: str, names: Mapping[str, str], commands: bool):
         super().__init__(

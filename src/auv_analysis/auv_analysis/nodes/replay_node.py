@@ -15,13 +15,13 @@ from std_srvs.srv import SetBool, Trigger
 from auv_analysis.bag.step_topics import ODOMETRY
 from auv_analysis.nodes.replay_publishers import (
     Answers,
+    CommandGuard,
     Commands,
-    Guard,
     Receivers,
     is_odometry,
     make_publishers,
 )
-from auv_analysis.replay.played_bag import GAP, Logged, messages
+from auv_analysis.replay.played_bag import GAP, PlayedMessage, messages
 from auv_analysis.replay.selection import REPLAY, ReplayParameters, nothing_left, replay_parameters
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface, topics
@@ -143,7 +143,7 @@ class Player:
         if not self._publishers:
             raise nothing_left(index, selection)
         guarded = {topic: self._publishers[topic] for topic in selection.guarded}
-        self.guard = Guard(node, guarded, settings.foreign, node.graph.complain)
+        self.guard = CommandGuard(node, guarded, settings.foreign, node.graph.complain)
         self._commands = Commands(guarded, settings.foreign)
         self._receivers = Receivers(node, self._publishers)
         self._answers = Answers(node.graph, settings.answers) if settings.answers else None
@@ -155,7 +155,7 @@ class Player:
         self.loops, self.now_ns, self._clock_ns = 0, settings.begin, -1
         self.ended, self.failure = False, ''
         self._stream = self._rewound()
-        self._next: Logged | None = None
+        self._next: PlayedMessage | None = None
 
     @property
     def names(self) -> dict[str, str]:
@@ -244,7 +244,7 @@ class Player:
         """Leave a vehicle that hears the commands without a wrench."""
         self._commands.let_go()
 
-    def _peek(self) -> Logged | None:
+    def _peek(self) -> PlayedMessage | None:
         if self._next is None:
             self._next = next(self._stream, None)
         return self._next
@@ -253,11 +253,11 @@ class Player:
         message = self._peek()
         return self.now_ns if message is None else message.ns
 
-    def _rewound(self) -> Iterator[Logged]:
+    def _rewound(self) -> Iterator[PlayedMessage]:
         p = self._settings
         return messages(p.index, self._publishers, p.begin, p.end)
 
-    def _goes_out(self, message: Logged, now: float) -> bool:
+    def _goes_out(self, message: PlayedMessage, now: float) -> bool:
         """Publish a message that is due; False where it has to wait."""
         topic = message.topic
         kind = self._settings.index.topics[topic].kind

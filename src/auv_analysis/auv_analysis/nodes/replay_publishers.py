@@ -156,7 +156,7 @@ class Commands:
         self._last.clear()
 
 
-class Guard:
+class CommandGuard:
     """Watches who subscribes to the commands of a replay.
 
     Parameters

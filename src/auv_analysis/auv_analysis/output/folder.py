@@ -34,7 +34,7 @@ def listed_in(folder: Path) -> dict[str, str] | None:
         )  # fmt: skip
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
-    return {**files, MANIFEST: digest(folder / MANIFEST)} if ours else None
+    return {**files, MANIFEST: sha256_of(folder / MANIFEST)} if ours else None
 
 
 def paths_in(folder: Path) -> Iterator[str]:
@@ -51,7 +51,7 @@ def has_links(folder: Path, name: str) -> bool:
     return any((folder / Path(*parts[: i + 1])).is_symlink() for i in range(len(parts)))
 
 
-def digest(path: Path) -> str:
+def sha256_of(path: Path) -> str:
     """SHA-256 of a file, in hexadecimal digits."""
     with path.open('rb') as file:
         return hashlib.file_digest(file, 'sha256').hexdigest()
@@ -73,7 +73,7 @@ def discard(left: Path) -> None:
     """Remove what a command that failed has left, where a manifest lists it and it is the same."""
     listed = listed_in(left) or {}
     with suppress(OSError):
-        if all(not has_links(left, n) and digest(left / n) == listed[n] for n in listed):
+        if all(not has_links(left, n) and sha256_of(left / n) == listed[n] for n in listed):
             remove(left, listed)
 
 
@@ -108,7 +108,7 @@ NAMES = (
 )  # fmt: skip
 
 
-class Results(NamedTuple):
+class ResultsFolder(NamedTuple):
     """Where results go.
 
     Attributes
@@ -130,7 +130,7 @@ def results_folder(
     own: Sequence[str] = (),
     inputs: Iterable[Path] = (),
     begun: bool = False,
-) -> Iterator[Results]:
+) -> Iterator[ResultsFolder]:
     """Folder for results, locked, with a manifest at the end.
 
     New results are written in place. Those that replace others are written into a folder beside
@@ -160,8 +160,8 @@ def results_folder(
             raise
         folder = _staging(out) if old else out
         try:
-            yield Results(folder, out)
-            files = {path: digest(folder / path) for path in _written(folder, out, own)}
+            yield ResultsFolder(folder, out)
+            files = {path: sha256_of(folder / path) for path in _written(folder, out, own)}
             if folder != out:
                 _swap(folder, out, old, files)
             else:
@@ -231,7 +231,7 @@ def _replaceable(
         path = out / name
         if not os.path.lexists(path):
             continue
-        if has_links(out, name) or not path.is_file() or digest(path) != known:
+        if has_links(out, name) or not path.is_file() or sha256_of(path) != known:
             raise InputError(path, '--out', 'the file as it was written', 'one that has changed')
         for given in read:
             if path.resolve().is_relative_to(given):
@@ -310,7 +310,7 @@ def _give_up(folder: Path, out: Path, own: Sequence[str], error: BaseException) 
         shutil.rmtree(folder)
         return
     if files := _written(folder, out, own):
-        write_manifest(folder, {name: digest(folder / name) for name in files})
+        write_manifest(folder, {name: sha256_of(folder / name) for name in files})
         _say_where(folder)
     if folder != out:
         say(f'{out}: the earlier results stay; what there is of the new ones: {folder}')

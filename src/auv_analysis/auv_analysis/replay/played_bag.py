@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from mcap.records import Channel
 
-from auv_analysis.bag.chunks import Table
+from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.mcap_file import McapFile
 from auv_analysis.bag.metadata import bag_files
 from auv_dynamics.files.errors import InputError
@@ -122,7 +122,7 @@ def index_bag(bag: str | Path) -> BagIndex:
 def _indexed(path: Path, index: BagIndex) -> PlayedFile:
     file, earliest = McapFile(path, index.notes), list[int]()
     for item in file.records():
-        if isinstance(item, Table):
+        if isinstance(item, MessageTable):
             _count(item, file, index)
             earliest.append(int(item.log_times.min()))
         elif isinstance(item, Channel):
@@ -144,7 +144,7 @@ def _meet(channel: Channel, file: McapFile, index: BagIndex) -> None:
         index.clashes.add(channel.topic)
 
 
-def _count(table: Table, file: McapFile, index: BagIndex) -> None:
+def _count(table: MessageTable, file: McapFile, index: BagIndex) -> None:
     for channel, messages in file.by_channel(table):
         topic = channel.topic
         index.counts[topic] = index.counts.get(topic, 0) + len(messages)
@@ -168,7 +168,7 @@ def _span(spans: list[Span], times: np.ndarray) -> None:
             spans.append((first, last))
 
 
-class Logged(NamedTuple):
+class PlayedMessage(NamedTuple):
     """A recorded message: log time in ns, recorded name of its topic, serialized bytes."""
 
     ns: int
@@ -178,7 +178,7 @@ class Logged(NamedTuple):
 
 def messages(
     index: BagIndex, topics: Collection[str], begin: int = 0, end: int = NEVER
-) -> Iterator[Logged]:
+) -> Iterator[PlayedMessage]:
     """Messages by log time; those of one log time as they stand in the bag.
 
     What is held at a time is what the bag has out of order, and a file is opened only when its
@@ -191,8 +191,8 @@ def messages(
     begin, end : first and last log time, ns
 
     """
-    heap: list[tuple[int, int, Logged | None]] = []
-    sources: dict[int, Iterator[Logged]] = {}
+    heap: list[tuple[int, int, PlayedMessage | None]] = []
+    sources: dict[int, Iterator[PlayedMessage]] = {}
     for number, file in enumerate(index.files):
         if file.least and file.least[0] <= end:
             sources[number] = _of_file(file, topics, begin, end)
@@ -209,18 +209,20 @@ def messages(
             heapq.heapreplace(heap, (following.ns, number, following))
 
 
-def _of_file(file: PlayedFile, topics: Collection[str], begin: int, end: int) -> Iterator[Logged]:
-    waiting: list[tuple[int, int, Logged]] = []
+def _of_file(
+    file: PlayedFile, topics: Collection[str], begin: int, end: int
+) -> Iterator[PlayedMessage]:
+    waiting: list[tuple[int, int, PlayedMessage]] = []
     opened = McapFile(file.path)
     tables, order = 0, itertools.count()
     for item in opened.records():
-        if not isinstance(item, Table):
+        if not isinstance(item, MessageTable):
             continue
         tables += 1
         for i in _inside(item, begin, end):
             topic = opened.channels[int(item.channels[i])].topic
             if topic in topics:
-                message = Logged(int(item.log_times[i]), topic, item.payload(i))
+                message = PlayedMessage(int(item.log_times[i]), topic, item.payload(i))
                 heapq.heappush(waiting, (message.ns, next(order), message))
         sure = file.least[tables] if tables < len(file.least) else math.inf
         while waiting and waiting[0][0] <= sure:
@@ -229,6 +231,6 @@ def _of_file(file: PlayedFile, topics: Collection[str], begin: int, end: int) ->
             break  # also where the file has grown since it was indexed
 
 
-def _inside(table: Table, begin: int, end: int) -> list[int]:
+def _inside(table: MessageTable, begin: int, end: int) -> list[int]:
     times = table.log_times
     return np.flatnonzero((times >= begin) & (times <= min(end, NEVER - 1))).tolist()

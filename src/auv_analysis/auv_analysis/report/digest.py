@@ -12,7 +12,7 @@ from auv_analysis.metrics.energy import kinetic_energy, shares
 from auv_analysis.metrics.statistics import Part, Statistics
 from auv_analysis.metrics.summary import ENERGY_WINDOW, TRANSIENT, has_settled
 from auv_analysis.report.traces import Line, Trace, broken
-from auv_analysis.runs.run import AnyRun, Extent, Facts, Run
+from auv_analysis.runs.run import AnyRun, Extent, Run, RunInfo
 from auv_gvc_controller.laws.model import ControlModel, control_model
 
 FOREVER = float('inf')
@@ -21,7 +21,7 @@ ROUNDING, TINY = 1e-6, 1e-9  # of the peak, and in the unit of a signal: apart b
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Sketch(Facts):
+class RunDigest(RunInfo):
     """A run as the report sees it: never more than some thousand points of each signal.
 
     Signals of six columns: `nu`, `tau`, `delta_xi`, `delta_pi`, `energy`, and where they are there
@@ -103,7 +103,7 @@ class Sketch(Facts):
         return found.of(self.columns[name])
 
 
-def alike(runs: Sequence[Sketch], signal: str) -> bool | None:
+def alike(runs: Sequence[RunDigest], signal: str) -> bool | None:
     """Whether a signal has the same course in all runs, over the time that they share.
 
     Parameters
@@ -129,17 +129,17 @@ def alike(runs: Sequence[Sketch], signal: str) -> bool | None:
     return True
 
 
-def cut_before(run: Facts, time: float) -> float:
+def cut_before(run: RunInfo, time: float) -> float:
     """Cut before the sample nearest to a time, s from the start."""
     return run.start + time - 0.5 * run.step
 
 
-def cut_behind(run: Facts, time: float) -> float:
+def cut_behind(run: RunInfo, time: float) -> float:
     """Cut behind the sample nearest to a time, s from the start."""
     return float(np.nextafter(run.start + time + 0.5 * run.step, np.inf))
 
 
-def last_third(run: Facts) -> float:
+def last_third(run: RunInfo) -> float:
     """Time from which the last third of a run counts, s from the start."""
     return 2.0 / 3.0 * run.duration
 
@@ -153,19 +153,21 @@ SHARE_COLUMNS = 600  # of the stacked shares
 COURSE = 1000  # samples, at most, by which runs are compared
 
 
-def sketches(runs: Mapping[str, AnyRun | Sketch]) -> dict[str, Sketch]:
-    """Sketch of each of the runs that are shown together; what is one already stays as it is."""
+def digests(runs: Mapping[str, AnyRun | RunDigest]) -> dict[str, RunDigest]:
+    """Digest of each of the runs that are shown together; what is one already stays as it is."""
     window = common_window(runs)
-    return {n: run if isinstance(run, Sketch) else sketch(run, window) for n, run in runs.items()}
+    return {
+        n: run if isinstance(run, RunDigest) else digest(run, window) for n, run in runs.items()
+    }
 
 
-def common_window(runs: Mapping[str, Facts]) -> float:
+def common_window(runs: Mapping[str, RunInfo]) -> float:
     """Time over which the energies of runs are held together, s from the start."""
     return min([ENERGY_WINDOW, *(run.duration for run in runs.values())])
 
 
-def sketch(run: AnyRun, window: float = ENERGY_WINDOW) -> Sketch:
-    """Sketch of a run.
+def digest(run: AnyRun, window: float = ENERGY_WINDOW) -> RunDigest:
+    """Digest of a run.
 
     Parameters
     ----------
@@ -183,7 +185,7 @@ def sketch(run: AnyRun, window: float = ENERGY_WINDOW) -> Sketch:
 
 
 def signals(run: Run, model: ControlModel) -> dict[str, np.ndarray]:
-    """The signals of a block as `Sketch` names them, (n, 6) or (n, 1) each."""
+    """The signals of a block as `RunDigest` names them, (n, 6) or (n, 1) each."""
     Upsilon, Upsilon_inv = (m.reshape(6, 6) for m in (model.Upsilon, model.Upsilon_inv))
     energy = kinetic_energy(Upsilon_inv, model.N, run.nu)
     found = {
@@ -209,7 +211,7 @@ def signals(run: Run, model: ControlModel) -> dict[str, np.ndarray]:
     return found
 
 
-def is_split(run: AnyRun | Sketch) -> bool:
+def is_split(run: AnyRun | RunDigest) -> bool:
     """Whether the first phase of a run is drawn apart."""
     return run.duration > 2.0 * TRANSIENT
 
@@ -329,10 +331,10 @@ class _Builder:
         moving = parts.sum(axis=1) > 0
         return means[moving, 0], parts[moving]
 
-    def built(self) -> Sketch:
-        """The sketch of the blocks."""
+    def built(self) -> RunDigest:
+        """The digest of the blocks."""
         run = self._run
-        return Sketch(
+        return RunDigest(
             **run.facts(),
             known_extent=run.extent,
             columns=self._columns,

@@ -14,7 +14,7 @@ from auv_analysis.metrics.fault_response import (
     FILE,
     PARTS,
     SHORTEST,
-    Response,
+    FaultResponse,
     fault_rows,
     responses,
     write_responses,
@@ -23,7 +23,7 @@ from auv_analysis.metrics.quantities import SIGNALS, mathtext
 from auv_analysis.metrics.summary import BAND_TEXT, TRANSIENT
 from auv_analysis.output.text import Maths, join, number
 from auv_analysis.report import plots
-from auv_analysis.report.digest import Sketch, sketches
+from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.plots import DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
 from auv_analysis.report.results import Shown, Table, described, view_of_file
@@ -55,16 +55,16 @@ def fault_part(out: Path, runs: Mapping[str, AnyRun]) -> tuple[Section, list[Sen
     """
     if len({run.faults for run in runs.values()}) != 1 or not next(iter(runs.values())).faults:
         return None
-    found: dict[str, list[Response]] = {name: responses(run) for name, run in runs.items()}
+    found: dict[str, list[FaultResponse]] = {name: responses(run) for name, run in runs.items()}
     if not all(found.values()):
         return Section('faults', TITLE, [NO_ERROR]), []
     write_responses(out, found)
-    figure = fault_figure(sketches(runs), out / 'figures')
+    figure = fault_figure(digests(runs), out / 'figures')
     blocks: list[Block] = [ABOUT, figure, *fault_tables(found)]
     return Section('faults', TITLE, blocks), [*fault_overview(found)]
 
 
-Found = Mapping[str, Sequence[Response]]
+Found = Mapping[str, Sequence[FaultResponse]]
 
 
 def fault_overview(found: Found) -> Iterator[Sentence]:
@@ -86,11 +86,11 @@ def fault_overview(found: Found) -> Iterator[Sentence]:
         yield Sentence(f'{text}.', 'faults')
 
 
-def _unit(response: Response) -> str:
+def _unit(response: FaultResponse) -> str:
     return 'rad/s' if response.dof in DOFS[3:] else 'm/s'
 
 
-def _rise(response: Response) -> float:
+def _rise(response: FaultResponse) -> float:
     """How much the error grows, in settling bands."""
     before, during, _ = response.rms
     return ((during or 0.0) - (before or 0.0)) / response.band
@@ -99,7 +99,7 @@ def _rise(response: Response) -> float:
 ROOM = 1.3  # of the axis above what it shows, for the numbers of the faults
 
 
-def fault_figure(runs: Mapping[str, Sketch], folder: Path) -> FigureRecord:
+def fault_figure(runs: Mapping[str, RunDigest], folder: Path) -> FigureRecord:
     """Draw and save `faults.png` and `.pdf`.
 
     Parameters
@@ -111,7 +111,7 @@ def fault_figure(runs: Mapping[str, Sketch], folder: Path) -> FigureRecord:
     return save_figures(folder, {'faults': lambda: _drawn(runs)})['faults']
 
 
-def _drawn(runs: Mapping[str, Sketch]) -> Drawn:
+def _drawn(runs: Mapping[str, RunDigest]) -> Drawn:
     figure: Figure = plots.new_figure(7.2)
     panels = figure.subplots(6, 1, sharex=True)
     first = next(iter(runs.values()))
@@ -136,7 +136,7 @@ def _drawn(runs: Mapping[str, Sketch]) -> Drawn:
     return figure, title, caption
 
 
-def _panel(axes: Axes, runs: Mapping[str, Sketch], i: int, band: float | None) -> None:
+def _panel(axes: Axes, runs: Mapping[str, RunDigest], i: int, band: float | None) -> None:
     low, high = 0.0, 0.0
     for n, run in enumerate(runs.values()):
         split = ('error', 'early') in run.traces
@@ -184,7 +184,7 @@ SHOWN: dict[str, Shown] = {
 }  # fmt: skip
 
 
-def fault_tables(found: Mapping[str, Sequence[Response]]) -> Iterator[Table]:
+def fault_tables(found: Mapping[str, Sequence[FaultResponse]]) -> Iterator[Table]:
     """A table per fault: a row per degree of freedom and controller.
 
     Parameters
@@ -202,7 +202,7 @@ def fault_tables(found: Mapping[str, Sequence[Response]]) -> Iterator[Table]:
         yield view_of_file(f'faults_{index}', caption, rows, SHOWN, FILE, places, stub=2)
 
 
-def _times(response: Response) -> str:
+def _times(response: FaultResponse) -> str:
     texts = [
         f'{part} is {begin:g}–{end:.6g} s' if end > begin else f'there is no time {part}'
         for part, (begin, end) in zip(PARTS, response.windows, strict=True)

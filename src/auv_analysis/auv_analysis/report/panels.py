@@ -13,7 +13,7 @@ import numpy as np
 
 from auv_analysis.metrics.quantities import SIGNALS, Quantity
 from auv_analysis.metrics.summary import TRANSIENT
-from auv_analysis.report.digest import Sketch
+from auv_analysis.report.digest import RunDigest
 from auv_analysis.report.plots import COLOURS, GREY, moving
 from auv_analysis.report.traces import broken, thinned
 from auv_analysis.scenario.fault_words import Mark
@@ -39,7 +39,7 @@ SECTIONS = {  # part of the report -> its signals, beginnings of the figures its
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class TimeCurve:
     """A line of a run: its degree of freedom or what it is, colour, times and values (n,).
 
     It breaks at gaps, from and to in s, of a run with samples a step apart.
@@ -61,13 +61,13 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Panel:
+class TimePanel:
     """One pair of axes over time: 'line', 'log' with a logarithmic vertical axis, or 'stack'."""
 
     name: str
     title: str
     label: str
-    curves: tuple[Curve, ...]
+    curves: tuple[TimeCurve, ...]
     kind: Literal['line', 'log', 'stack'] = 'line'
 
 
@@ -75,7 +75,7 @@ class Panel:
 class PanelSet:
     """Panels of a part of the report, in the place of some figures."""
 
-    panels: tuple[Panel, ...]
+    panels: tuple[TimePanel, ...]
     figures: tuple[str, ...]
 
     def stands_for(self, figure: str) -> bool:
@@ -111,7 +111,7 @@ class Interactive:
     transient: float = TRANSIENT
 
 
-def interactive(runs: Mapping[str, Sketch]) -> Interactive:
+def interactive(runs: Mapping[str, RunDigest]) -> Interactive:
     """Panels of some runs with all that a page needs to show them; one run at least."""
     from bokeh.resources import Resources  # loads slowly
 
@@ -138,14 +138,14 @@ def packed(text: str) -> str:
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode('ascii')
 
 
-def _marks(runs: Mapping[str, Sketch]) -> tuple[Mark, ...]:
+def _marks(runs: Mapping[str, RunDigest]) -> tuple[Mark, ...]:
     """Faults that all runs have."""
     of_each = {run.faults for run in runs.values()}
     return next(iter(of_each)) if len(of_each) == 1 else ()
 
 
 def document(
-    panels: Sequence[Panel],
+    panels: Sequence[TimePanel],
     dashes: Mapping[str, list[int]],
     faults: Sequence[Mark],
     ends: tuple[float, float],
@@ -169,14 +169,14 @@ def document(
     return [found.to_json(deferred=False), roots]
 
 
-def _columns(panels: Sequence[Panel]) -> int:
+def _columns(panels: Sequence[TimePanel]) -> int:
     """Columns of pixels in which lines are thinned, so that all of them stay within `POINTS`."""
     points = sum(len(curve.t) for panel in panels for curve in panel.curves)
     longest = max((len(curve.t) for panel in panels for curve in panel.curves), default=0)
     return longest if points <= POINTS else max(FEWEST, longest // 2 * POINTS // points)
 
 
-def _figure(panel: Panel, dashes: Mapping[str, list[int]], columns: int, time: Any) -> Any:
+def _figure(panel: TimePanel, dashes: Mapping[str, list[int]], columns: int, time: Any) -> Any:
     from bokeh.models import HoverTool
     from bokeh.models.annotations import Legend
     from bokeh.plotting import figure
@@ -207,7 +207,7 @@ def _figure(panel: Panel, dashes: Mapping[str, list[int]], columns: int, time: A
     return plot
 
 
-def _draw(plot: Any, panel: Panel, dashes: Mapping[str, list[int]], columns: int) -> None:
+def _draw(plot: Any, panel: TimePanel, dashes: Mapping[str, list[int]], columns: int) -> None:
     from bokeh.models import ColumnDataSource
 
     sources: dict[bytes, Any] = {}
@@ -247,7 +247,7 @@ def _shade(plot: Any, mark: Mark, faults: Sequence[Mark]) -> None:
     plot.add_layout(Label(x=mark.start, y=120 - 13 * (row % 4), y_units='screen', **number))
 
 
-def panel_sets(runs: Mapping[str, Sketch]) -> dict[str, PanelSet]:
+def panel_sets(runs: Mapping[str, RunDigest]) -> dict[str, PanelSet]:
     """Panels of all runs by part of the report; no set is without panels."""
     sets = {}
     for name, (signals, figures) in SECTIONS.items():
@@ -261,7 +261,7 @@ def panel_sets(runs: Mapping[str, Sketch]) -> dict[str, PanelSet]:
     return sets
 
 
-def different_disturbances(runs: Mapping[str, Sketch]) -> dict[str, Sketch]:
+def different_disturbances(runs: Mapping[str, RunDigest]) -> dict[str, RunDigest]:
     """Runs with a known F that no run before them has."""
     kept: dict[bytes, str] = {}
     for name, run in runs.items():
@@ -270,7 +270,7 @@ def different_disturbances(runs: Mapping[str, Sketch]) -> dict[str, Sketch]:
     return {name: runs[name] for name in kept.values()}
 
 
-def _with(signal: str, runs: Mapping[str, Sketch]) -> Mapping[str, Sketch]:
+def _with(signal: str, runs: Mapping[str, RunDigest]) -> Mapping[str, RunDigest]:
     """Runs that have a signal worth a line."""
     if signal == 'F':
         return different_disturbances(runs)
@@ -280,7 +280,7 @@ def _with(signal: str, runs: Mapping[str, Sketch]) -> Mapping[str, Sketch]:
     return there
 
 
-def _six_signals(signal: str, runs: Mapping[str, Sketch]) -> Iterator[Panel]:
+def _six_signals(signal: str, runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:
     quantity, there = SIGNALS[signal], _with(signal, runs)
     moved = {i for run in there.values() for i in moving(run.part(signal))}
     for group, members in GROUPS.items():
@@ -293,19 +293,19 @@ def _six_signals(signal: str, runs: Mapping[str, Sketch]) -> Iterator[Panel]:
         if curves:
             title = f'{quantity.label.capitalize()}, {group}'
             label = _label(quantity, members[0])
-            yield Panel(f'{signal}-{group}', title, label, tuple(curves))
+            yield TimePanel(f'{signal}-{group}', title, label, tuple(curves))
 
 
 def _label(quantity: Quantity, component: int) -> str:
     return f'{quantity.label} ({quantity.unit_of(component)})'
 
 
-def _certificates(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
+def _certificates(runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:
     there = {n: r for n, r in runs.items() if ('L', 'whole') in r.traces and len(r.line('L')[0])}
     if not there:
         return
     lines = tuple(_curve(name, run, 'L', INK, 'L') for name, run in there.items())
-    yield Panel('L', 'Lyapunov function, (23)', 'L (J)', lines, 'log')
+    yield TimePanel('L', 'Lyapunov function, (23)', 'L (J)', lines, 'log')
     looks = {
         'bound': ('bound (28)', BOUND, 1.6),
         'identity': ('identity (26)', IDENTITY, 3.0),
@@ -316,10 +316,10 @@ def _certificates(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
             _curve(name, run, key, colour, signal, width=width)
             for signal, (key, colour, width) in looks.items()
         )
-        yield Panel(f'rates-{name}', f'Derivative of L, {name}', 'dL/dt (W)', curves)
+        yield TimePanel(f'rates-{name}', f'Derivative of L, {name}', 'dL/dt (W)', curves)
 
 
-def _kinetic(runs: Mapping[str, Sketch]) -> Panel:
+def _kinetic(runs: Mapping[str, RunDigest]) -> TimePanel:
     looks = {'wanted': ('of the set-point', GREY, 3.0), 'kinetic': ('of the run', INK, 1.6)}
     curves = tuple(
         _curve(name, run, key, colour, signal, width=width)
@@ -327,29 +327,29 @@ def _kinetic(runs: Mapping[str, Sketch]) -> Panel:
         for signal, (key, colour, width) in looks.items()
         if (signal, 'whole') in run.traces
     )
-    return Panel('kinetic', 'Kinetic energy', 'kinetic energy (J)', curves)
+    return TimePanel('kinetic', 'Kinetic energy', 'kinetic energy (J)', curves)
 
 
-def _shares(runs: Mapping[str, Sketch]) -> Iterator[Panel]:
+def _shares(runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:
     for name, run in runs.items():
         t, parts = run.shares()
         if len(t):
-            curves = tuple(Curve(name, DOFS[i], COLOURS[i], t, parts[:, i]) for i in range(6))
+            curves = tuple(TimeCurve(name, DOFS[i], COLOURS[i], t, parts[:, i]) for i in range(6))
             title = f'Shares of ξ1 to ξ6 in the kinetic energy, {name}'
-            yield Panel(f'shares-{name}', title, 'share (%)', curves, 'stack')
+            yield TimePanel(f'shares-{name}', title, 'share (%)', curves, 'stack')
 
 
 def _curve(
     name: str,
-    run: Sketch,
+    run: RunDigest,
     key: str,
     colour: str,
     signal: str,
     column: int = 0,
     width: float = 1.6,
-) -> Curve:
+) -> TimeCurve:
     """Line over the whole run, of its phases where it is drawn in two."""
     parts = ('whole',) if (signal, 'whole') in run.traces else ('early', 'late')
     lines = [run.line(signal, column, part) for part in parts]
     t, y = (np.concatenate(values) for values in zip(*lines, strict=True))
-    return Curve(name, key, colour, t, y, width, run.gaps, run.step)
+    return TimeCurve(name, key, colour, t, y, width, run.gaps, run.step)

@@ -27,7 +27,7 @@ from auv_analysis.metrics.quantities import Quantity, mathtext
 from auv_analysis.metrics.statistics import Part
 from auv_analysis.output.progress import each
 from auv_analysis.output.text import fixed, number, plain, typeset
-from auv_analysis.report.digest import Sketch
+from auv_analysis.report.digest import RunDigest
 from auv_dynamics.vehicle import DOFS
 
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#D55E00', '#56B4E9')  # Okabe and Ito
@@ -264,7 +264,7 @@ def groups(columns: Sequence[int]) -> list[list[int]]:
     return [members for members in split if members]
 
 
-def draw_lines(axes: Axes, run: Sketch, signal: str, part: str, columns: Sequence[int]) -> None:
+def draw_lines(axes: Axes, run: RunDigest, signal: str, part: str, columns: Sequence[int]) -> None:
     """Lines of some columns of a signal over a part of the time, in their colours."""
     ends = []
     for i in columns:
@@ -275,7 +275,7 @@ def draw_lines(axes: Axes, run: Sketch, signal: str, part: str, columns: Sequenc
     shade(axes, run)
 
 
-def shade(axes: Axes, run: Sketch) -> None:
+def shade(axes: Axes, run: RunDigest) -> None:
     """Grey where a run has no samples, over whatever is drawn there; the limits stay.
 
     Under it, in another colour and with its number, every fault.
@@ -299,7 +299,7 @@ def shade(axes: Axes, run: Sketch) -> None:
     axes.set_xlim(limits)
 
 
-def shade_sentence(run: Sketch) -> str:
+def shade_sentence(run: RunDigest) -> str:
     """What the spans that `shade` draws are, to be added to a caption."""
     listed = '; '.join(f'{mark.number} {mark.label}, {mark.times}' for mark in run.faults)
     text = ' Grey spans: no samples.' if run.gaps else ''
@@ -367,7 +367,7 @@ def letter(axes: Axes, index: int, text: str = '') -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class HeatMap:
     """Cells of one scale.
 
     Attributes
@@ -404,7 +404,7 @@ class Grid:
         return Normalize(0.0, high)
 
 
-def heat_map(rows: Sequence[str], grids: Sequence[Grid], width: float = WIDTH) -> Figure:
+def heat_map(rows: Sequence[str], grids: Sequence[HeatMap], width: float = WIDTH) -> Figure:
     """Grids that share their rows, side by side.
 
     Parameters
@@ -427,7 +427,7 @@ def heat_map(rows: Sequence[str], grids: Sequence[Grid], width: float = WIDTH) -
     return figure
 
 
-def small_heads(figure: Figure, grids: Sequence[Grid]) -> None:
+def small_heads(figure: Figure, grids: Sequence[HeatMap]) -> None:
     """Heads that are paths: small, and upright where there are more than two."""
     for axes, grid in zip(figure.axes, grids, strict=False):
         angle = 90 if len(grid.columns) > 2 else 0
@@ -454,7 +454,7 @@ def name_rows(axes: Axes, rows: Sequence[str], count: int) -> None:
     axes.set_yticks(range(0, count, step), rows[::step])
 
 
-def draw_grid(axes: Axes, grid: Grid, size: float = 7.0) -> None:
+def draw_grid(axes: Axes, grid: HeatMap, size: float = 7.0) -> None:
     """Cells with their numbers; what is zero is pale, what is unknown is crossed out.
 
     Parameters
@@ -485,7 +485,7 @@ def draw_grid(axes: Axes, grid: Grid, size: float = 7.0) -> None:
                           color=GREY if value == 0 else _ink(colours(norm(value))))  # fmt: skip
 
 
-def _text(value: float, grid: Grid) -> str:
+def _text(value: float, grid: HeatMap) -> str:
     if value == 0.0:
         return '0'
     if grid.decimals is not None:

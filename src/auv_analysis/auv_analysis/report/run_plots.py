@@ -19,7 +19,7 @@ from auv_analysis.metrics.statistics import Part
 from auv_analysis.metrics.summary import BAND_TEXT, DWELL, TRANSIENT, band_of
 from auv_analysis.output.text import join, number
 from auv_analysis.report import plots
-from auv_analysis.report.digest import FOREVER, Sketch, alike, common_window, sketches
+from auv_analysis.report.digest import FOREVER, RunDigest, alike, common_window, digests
 from auv_analysis.report.panels import different_disturbances
 from auv_analysis.report.plots import COLOURS, DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
 from auv_analysis.report.wrench_plots import (
@@ -32,7 +32,7 @@ from auv_analysis.runs.run import AnyRun
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import control_model
 
-DRAWN = {  # kind of figure -> signal of `Sketch`
+DRAWN = {  # kind of figure -> signal of `RunDigest`
     'errors': 'error',
     'lumped_error': 'lumped_error',
     'uncertainty': 'F',
@@ -44,7 +44,7 @@ SYMBOLS = {'delta_xi': 'Δξ', 'delta_pi': 'Δπ'}
 
 
 def draw_figures(
-    runs: Mapping[str, AnyRun | Sketch],
+    runs: Mapping[str, AnyRun | RunDigest],
     folder: Path,
     summaries: Mapping[str, Mapping[str, Any]] | None = None,
     limits: Mapping[str, np.ndarray | None] | None = None,
@@ -63,7 +63,7 @@ def draw_figures(
     figures : in the order of the report; lumped errors only where F is known and estimated
 
     """
-    drawn = {name: replace(run, controller=name) for name, run in sketches(runs).items()}
+    drawn = {name: replace(run, controller=name) for name, run in digests(runs).items()}
     made: dict[str, Callable[[], Drawn]] = {}
     for run in drawn.values():
         made[f'errors_{run.controller}'] = partial(_errors, run)
@@ -91,12 +91,12 @@ def draw_figures(
     return list(save_figures(folder, made).values())
 
 
-def reference(runs: Mapping[str, Sketch]) -> Sketch:
+def reference(runs: Mapping[str, RunDigest]) -> RunDigest:
     """The run whose energy and couplings are drawn: the first under GVC, else the first."""
     return min(runs.values(), key=lambda run: run.law != 'gvc')
 
 
-def six_signals(kind: str, run: Sketch, quantity: Quantity, zeros: Sequence[str] = ()) -> Drawn:
+def six_signals(kind: str, run: RunDigest, quantity: Quantity, zeros: Sequence[str] = ()) -> Drawn:
     """Linear and angular signals of a run, the first phase apart where it dwarfs the rest.
 
     Parameters
@@ -141,14 +141,14 @@ def structure_sentence(kind: str, zeros: Sequence[str]) -> str:
     return f'Zero for every motion by the structure of M and not drawn: {join(zeros)}.'
 
 
-def _errors(run: Sketch) -> Drawn:
+def _errors(run: RunDigest) -> Drawn:
     figure, title, caption = six_signals('errors', run, SIGNALS['error'])
     if run.sensing:
         caption += ' The law saw measured velocities; these errors are those of the true ones.'
     return figure, title, caption
 
 
-def _lumped(run: Sketch) -> Drawn:
+def _lumped(run: RunDigest) -> Drawn:
     if not run.estimates:
         title = f'Lumped estimation error, {run.controller}'
         text = 'the law estimates nothing; w is −F, no error of an estimate, and not drawn.'
@@ -156,7 +156,7 @@ def _lumped(run: Sketch) -> Drawn:
     return six_signals('lumped_error', run, SIGNALS['lumped_error'])
 
 
-def _uncertainty(run: Sketch) -> Drawn:
+def _uncertainty(run: RunDigest) -> Drawn:
     figure, title, caption = six_signals('uncertainty', run, SIGNALS['F'])
     kinds = [kind.replace('_', ' ') for kind in OF_THE_MOTION if kind in (run.kinds or ())]
     if kinds:
@@ -164,13 +164,13 @@ def _uncertainty(run: Sketch) -> Drawn:
     return figure, title, caption
 
 
-def _inputs(run: Sketch, limit: np.ndarray | None) -> Drawn:
+def _inputs(run: RunDigest, limit: np.ndarray | None) -> Drawn:
     if run.acting and np.any(run.part('tau').peak):
         return applied_figure(run, limit)
     return six_signals('inputs', run, SIGNALS['tau'])
 
 
-def _deformation(kind: str, run: Sketch) -> Drawn:
+def _deformation(kind: str, run: RunDigest) -> Drawn:
     model = control_model(run.vehicle)
     Upsilon, Upsilon_inv = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
     zeros = structural_zeros(Upsilon, Upsilon_inv)[kind]
@@ -189,7 +189,7 @@ def _peaks(part: Part, quantity: Quantity, drawn: Sequence[int]) -> str:
     return f'Largest: {join(parts)}.'
 
 
-def _split_panels(run: Sketch, signal: str, quantity: Quantity, drawn: Sequence[int]) -> Figure:
+def _split_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequence[int]) -> Figure:
     groups = plots.groups(drawn)
     figure = plots.new_figure(2.15 * len(groups) + 0.25)
     grid = figure.subplots(len(groups), 2, squeeze=False, width_ratios=(1, 1.9))
@@ -205,7 +205,7 @@ def _split_panels(run: Sketch, signal: str, quantity: Quantity, drawn: Sequence[
     return figure
 
 
-def _whole_panels(run: Sketch, signal: str, quantity: Quantity, drawn: Sequence[int]) -> Figure:
+def _whole_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequence[int]) -> Figure:
     groups = plots.groups(drawn)
     figure = plots.new_figure(2.0 * len(groups) + 0.25)
     grid = figure.subplots(len(groups), 1, squeeze=False, sharex=True)[:, 0]
@@ -225,7 +225,7 @@ APART = 20.0  # ratio of peaks from which runs share no linear scale
 XI = tuple(rf'$\xi_{i}$' for i in range(1, 7))
 
 
-def settling(runs: Mapping[str, Sketch]) -> tuple[Figure | None, str, str]:
+def settling(runs: Mapping[str, RunDigest]) -> tuple[Figure | None, str, str]:
     """The largest error still to come, per degree of freedom and controller.
 
     The envelope max of abs(nu_err) over [t, end] falls monotonically: where it crosses the band
@@ -258,7 +258,7 @@ def settling(runs: Mapping[str, Sketch]) -> tuple[Figure | None, str, str]:
     return figure, title, caption
 
 
-def common_bands(runs: Mapping[str, Sketch]) -> list[float | None]:
+def common_bands(runs: Mapping[str, RunDigest]) -> list[float | None]:
     """Band of a settled error per degree of freedom; None where the runs do not share it."""
     bands = np.array([band_of(run.part('nu_d').peak) for run in runs.values()])
     return [
@@ -272,7 +272,7 @@ def left_out(bands: Sequence[float | None]) -> str:
     return '; not drawn where the set-points of the runs differ' if None in bands else ''
 
 
-def inputs(runs: Mapping[str, Sketch]) -> tuple[Figure, str, str]:
+def inputs(runs: Mapping[str, RunDigest]) -> tuple[Figure, str, str]:
     """Inputs of all controllers over logarithmic time. Returns figure, title and caption."""
     figure, panels = _six_panels(runs)
     apart = False
@@ -301,7 +301,7 @@ def inputs(runs: Mapping[str, Sketch]) -> tuple[Figure, str, str]:
     return figure, title, caption
 
 
-def energy(runs: Mapping[str, Sketch], leading: Sketch) -> tuple[Figure, str, str]:
+def energy(runs: Mapping[str, RunDigest], leading: RunDigest) -> tuple[Figure, str, str]:
     """Kinetic energy over time and its shares. Returns figure, title and caption."""
     figure = plots.new_figure(2.7)
     left, right = figure.subplots(1, 2)
@@ -337,7 +337,7 @@ def energy(runs: Mapping[str, Sketch], leading: Sketch) -> tuple[Figure, str, st
     return figure, title, caption
 
 
-def energy_shares(runs: Mapping[str, Sketch]) -> tuple[Figure, str, str]:
+def energy_shares(runs: Mapping[str, RunDigest]) -> tuple[Figure, str, str]:
     """Shares of the mean kinetic energy on a logarithmic axis."""
     figure = plots.new_figure(2.9)
     axes = figure.subplots()
@@ -372,7 +372,7 @@ def _mark(marker: str, label: str, colour: str = 'black') -> Line2D:
     return Line2D([], [], linestyle='', marker=marker, color=colour, markersize=5, label=label)
 
 
-def _stack(axes: Axes, run: Sketch) -> None:
+def _stack(axes: Axes, run: RunDigest) -> None:
     """Shares (30) over time, stacked; long runs as means over columns of samples."""
     t, part = run.shares()
     axes.stackplot(t, part.T, colors=COLOURS, linewidth=0)
@@ -386,7 +386,7 @@ def _stack(axes: Axes, run: Sketch) -> None:
     axes.grid(False)
 
 
-def _looks(runs: Mapping[str, Sketch], colour: str = 'black') -> list[dict[str, Any]]:
+def _looks(runs: Mapping[str, RunDigest], colour: str = 'black') -> list[dict[str, Any]]:
     """Dashes per run; of three runs and more, or noisy ones, a colour per run for the given one."""
     many = len(runs) > 2 or any(run.sensing for run in runs.values())
     return [
@@ -404,12 +404,12 @@ def _symmetric(axes: Axes, peaks: list[float]) -> bool:
     return True
 
 
-def _named_dashes(runs: Mapping[str, Sketch]) -> str:
+def _named_dashes(runs: Mapping[str, RunDigest]) -> str:
     words = ('solid', 'dashed', 'dotted', 'dash-dotted', 'long-dashed', 'dash-dot-dotted')
     return join([f'{name} {words[i % len(words)]}' for i, name in enumerate(runs)])
 
 
-def _six_panels(runs: Mapping[str, Sketch]) -> tuple[Figure, list[Axes]]:
+def _six_panels(runs: Mapping[str, RunDigest]) -> tuple[Figure, list[Axes]]:
     figure = plots.new_figure(4.1)
     panels = list(figure.subplots(2, 3, sharex=True).ravel())
     for i, axes in enumerate(panels):

@@ -11,7 +11,7 @@ from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.summary import band_of
 from auv_analysis.output.text import fixed, join, number, plain, residuals
 from auv_analysis.report import run_tables as tables
-from auv_analysis.report.digest import TINY, Sketch, alike, last_third, sketches
+from auv_analysis.report.digest import TINY, RunDigest, alike, digests, last_third
 from auv_analysis.report.document import Block, Gallery, Section, Sentence, prose, write_document
 from auv_analysis.report.panels import PanelSet, interactive
 from auv_analysis.report.plots import FigureRecord
@@ -40,7 +40,7 @@ _SEVERAL = 'do', 'their errors reach'
 
 def write_report(
     out: Path,
-    runs: Mapping[str, AnyRun | Sketch],
+    runs: Mapping[str, AnyRun | RunDigest],
     summaries: Mapping[str, dict[str, Any]],
     scenario_text: Texts,
     vehicle_text: Texts,
@@ -67,7 +67,7 @@ def write_report(
     """
     if not runs:
         raise ValueError('runs: expected at least one run, found none')
-    shown = {name: replace(run, controller=name) for name, run in sketches(runs).items()}
+    shown = {name: replace(run, controller=name) for name, run in digests(runs).items()}
     scenes = {
         names: set_up({name: shown[name] for name in names}, summaries, text)
         for names, text in _shared_by(shown, scenario_text)
@@ -75,7 +75,7 @@ def write_report(
     limits = {name: scene.limit for names, scene in scenes.items() for name in names}
     figures = draw_figures(shown, out / 'figures', summaries, limits)
     panels = interactive(shown)
-    sections = Contents(shown, summaries, scenes, figures, panels.sets).sections()
+    sections = SectionInputs(shown, summaries, scenes, figures, panels.sets).sections()
     scenarios = list(dict.fromkeys(run.scenario for run in shown.values()))
     vehicles = list(dict.fromkeys(run.vehicle.name for run in shown.values()))
     return write_document(
@@ -92,7 +92,7 @@ def write_report(
     )
 
 
-def _shared_by(runs: Mapping[str, Sketch], texts: Texts) -> list[tuple[tuple[str, ...], str]]:
+def _shared_by(runs: Mapping[str, RunDigest], texts: Texts) -> list[tuple[tuple[str, ...], str]]:
     """Names of the runs that share a text, and that text."""
     if isinstance(texts, str):
         return [(tuple(runs), texts)]
@@ -102,7 +102,7 @@ def _shared_by(runs: Mapping[str, Sketch], texts: Texts) -> list[tuple[tuple[str
     return [(tuple(members), text) for text, members in names.items()]
 
 
-def _listings(runs: Mapping[str, Sketch], what: str, texts: Texts) -> list[tuple[str, str]]:
+def _listings(runs: Mapping[str, RunDigest], what: str, texts: Texts) -> list[tuple[str, str]]:
     """Texts that are not empty, each with the runs that it is of where there are several."""
     shared = _shared_by(runs, texts)
     return [
@@ -113,7 +113,7 @@ def _listings(runs: Mapping[str, Sketch], what: str, texts: Texts) -> list[tuple
 
 
 @dataclass(frozen=True)
-class Contents:
+class SectionInputs:
     """What the sections are made of.
 
     Attributes
@@ -125,7 +125,7 @@ class Contents:
 
     """
 
-    runs: Mapping[str, Sketch]
+    runs: Mapping[str, RunDigest]
     summaries: Mapping[str, Mapping[str, Any]]
     scenes: Mapping[tuple[str, ...], SetUp]
     figures: Sequence[FigureRecord]
@@ -183,7 +183,7 @@ class Contents:
         same = [word for word, is_same in alike_in.items() if is_same]
         return same, [word for word, is_same in alike_in.items() if is_same is False]
 
-    def _share_disturbances(self, runs: Sequence[Sketch]) -> bool:
+    def _share_disturbances(self, runs: Sequence[RunDigest]) -> bool:
         """Whether the scenarios describe the same disturbances and faults of the same vehicle."""
         wanted = [(s.data.get('disturbance'), s.data.get('faults')) for s in self.scenes.values()]
         known = all(scene.data for scene in self.scenes.values())
@@ -248,7 +248,7 @@ def _sampled(summaries: Mapping[str, Mapping[str, Any]]) -> list[str]:
     ]
 
 
-def _apart(runs: Mapping[str, Sketch]) -> float | None:
+def _apart(runs: Mapping[str, RunDigest]) -> float | None:
     """Largest distance of the final positions of runs alike, m; None for one run and for others.
 
     Alike are runs of equal length with the same start and the same set-point.
@@ -261,7 +261,7 @@ def _apart(runs: Mapping[str, Sketch]) -> float | None:
     return max(float(np.linalg.norm(a - b)) for a in ends for b in ends)
 
 
-def findings(runs: Mapping[str, Sketch], summaries: Summaries) -> list[Sentence]:
+def findings(runs: Mapping[str, RunDigest], summaries: Summaries) -> list[Sentence]:
     """Sentences of the summary, each with a number that decides something.
 
     Parameters
@@ -297,9 +297,9 @@ def findings(runs: Mapping[str, Sketch], summaries: Summaries) -> list[Sentence]
     return [sentence for sentence in found if sentence.text]
 
 
-def namesakes(runs: Sequence[Sketch]) -> list[str]:
+def namesakes(runs: Sequence[RunDigest]) -> list[str]:
     """What has to be said of runs whose scenarios have one name and other set-points."""
-    groups: dict[str, list[Sketch]] = {}
+    groups: dict[str, list[RunDigest]] = {}
     for run in runs:
         groups.setdefault(run.scenario, []).append(run)
     return [
@@ -309,7 +309,7 @@ def namesakes(runs: Sequence[Sketch]) -> list[str]:
     ]
 
 
-def _settling(name: str, run: Sketch, summary: Mapping[str, Any]) -> str:
+def _settling(name: str, run: RunDigest, summary: Mapping[str, Any]) -> str:
     times = summary['velocity_error']['settling_time']
     if times is None:
         return f'Of {name} no set-point is known, and so no error.'
@@ -334,7 +334,7 @@ def _settling(name: str, run: Sketch, summary: Mapping[str, Any]) -> str:
     return f'Under {name}, {"; ".join(parts)}.'
 
 
-def _is_noise(run: Sketch, i: int) -> bool:
+def _is_noise(run: RunDigest, i: int) -> bool:
     """Whether a measured error fluctuates about a mean that lies in the band."""
     late, band = run.part('error', last_third(run)), band_of(run.part('nu_d').peak)
     measured = run.sensing or run.acceleration is not None
@@ -366,7 +366,7 @@ def _inputs(summaries: Summaries) -> str:
     return f'The largest commands are {"; ".join(parts)}.'
 
 
-def _applied(runs: Mapping[str, Sketch]) -> str:
+def _applied(runs: Mapping[str, RunDigest]) -> str:
     """What the actuators left of the commands, of the runs that have any."""
     parts = []
     for name, run in runs.items():
@@ -377,7 +377,7 @@ def _applied(runs: Mapping[str, Sketch]) -> str:
     return f'The actuators deliver at most {"; ".join(parts)}.' if parts else ''
 
 
-def _energy(leading: Sketch, summary: Mapping[str, Any]) -> str:
+def _energy(leading: RunDigest, summary: Mapping[str, Any]) -> str:
     entries = summary['kinetic_energy_windows'][:2]
     means = [
         f'{fixed(entry["mean"], 2)} J over {entry["window"][0]:g}–{entry["window"][1]:g} s'
@@ -387,7 +387,7 @@ def _energy(leading: Sketch, summary: Mapping[str, Any]) -> str:
     return f'The mean kinetic energy of {leading.controller} is {join(means)}.' if means else ''
 
 
-def _couplings(summary: Mapping[str, Any], leading: Sketch) -> str:
+def _couplings(summary: Mapping[str, Any], leading: RunDigest) -> str:
     coupling = summary['coupling']
     if all(len(zeros) == 6 for zeros in coupling['structural_zeros'].values()):
         return 'M is diagonal: no degree of freedom is coupled to another by inertia.'

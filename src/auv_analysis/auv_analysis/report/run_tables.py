@@ -11,7 +11,7 @@ from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import join, number, plain
 from auv_analysis.report.results import Column, Table, described, make_table
 from auv_analysis.report.scenario_text import SetUp, gain_text
-from auv_analysis.runs.run import FOREIGN, Facts
+from auv_analysis.runs.run import FOREIGN, RunInfo
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.law import SHIPPED
 from auv_gvc_controller.laws.model import inverse_upper
@@ -30,7 +30,7 @@ def pointer(*keys: object, file: str = 'summary.json') -> str:
     return f'{file}:/{"/".join(parts)}'
 
 
-def controllers_table(runs: Mapping[str, Facts]) -> Table:
+def controllers_table(runs: Mapping[str, RunInfo]) -> Table:
     """Name, law, gains and origin of each run; a gain left to its default says so."""
     rows = [
         {
@@ -59,7 +59,7 @@ def controllers_table(runs: Mapping[str, Facts]) -> Table:
     return make_table('controllers', caption, rows, shown, pointer=where)
 
 
-def _gains(run: Facts) -> str:
+def _gains(run: RunInfo) -> str:
     defaults = getattr(SHIPPED.get(run.law), '_field_defaults', {}) if run.gains else {}
     texts = [f'{gain} = {gain_text(value)}' for gain, value in run.gains.items()]
     texts += [
@@ -87,7 +87,7 @@ def set_up_table(name: str, scene: SetUp, runs: Sequence[str], *, several: bool)
     return make_table(name, caption, rows, {'what': 'what', 'how': 'how'})
 
 
-def gains_tables(runs: Mapping[str, Facts], summaries: Summaries) -> Iterator[Table]:
+def gains_tables(runs: Mapping[str, RunInfo], summaries: Summaries) -> Iterator[Table]:
     """Upsilon and N of each vehicle that differs, then K_D and K_f that are no multiples of I."""
     vehicles = decompositions(runs, summaries)
     for index, (names, parts) in enumerate(vehicles, start=1):
@@ -124,7 +124,7 @@ def _matrix(name: str, caption: str, values: Any, *where: str, digits: int = 4) 
 
 
 def decompositions(
-    runs: Mapping[str, Facts], summaries: Summaries
+    runs: Mapping[str, RunInfo], summaries: Summaries
 ) -> list[tuple[list[str], Mapping[str, Any]]]:
     """Runs that share a decomposition, and that decomposition."""
     found: list[tuple[list[str], Mapping[str, Any]]] = []
@@ -430,7 +430,7 @@ def _linear(row: np.ndarray, signals: list[str]) -> str:
     return (text.removeprefix('+ ') if text[:1] == '+' else text.replace('− ', '−', 1)) or '0'
 
 
-def notes(runs: Mapping[str, Facts]) -> list[str]:
+def notes(runs: Mapping[str, RunInfo]) -> list[str]:
     """Notes of the runs, each once."""
     return list(
         dict.fromkeys(f'{name}: {note}' for name, run in runs.items() for note in run.notes)

@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 
 from auv_analysis.output.text import join, plain
-from auv_analysis.runs.run import FOREIGN, Facts
+from auv_analysis.runs.run import FOREIGN, RunInfo
 from auv_analysis.scenario.fault_words import Mark, marks_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import check, matrix6, parse_yaml
@@ -45,7 +45,7 @@ class SetUp:
     data: Mapping[str, Any] = field(default_factory=dict)
 
 
-def set_up(runs: Mapping[str, Facts], summaries: Mapping[str, Any], scenario_text: str) -> SetUp:
+def set_up(runs: Mapping[str, RunInfo], summaries: Mapping[str, Any], scenario_text: str) -> SetUp:
     """What the report says of the scenario of some runs.
 
     Parameters
@@ -88,7 +88,7 @@ def scenario_data(text: str) -> dict[str, Any] | None:
     return data
 
 
-def sampling_warnings(runs: Mapping[str, Facts], summaries: Mapping[str, Any]) -> list[str]:
+def sampling_warnings(runs: Mapping[str, RunInfo], summaries: Mapping[str, Any]) -> list[str]:
     """Runs whose velocity gain is too fast for their control period, in words."""
     found = []
     for name, run in runs.items():
@@ -99,7 +99,7 @@ def sampling_warnings(runs: Mapping[str, Facts], summaries: Mapping[str, Any]) -
     return found
 
 
-def _of_the_runs(runs: Mapping[str, Facts]) -> list[tuple[str, list[str]]]:
+def _of_the_runs(runs: Mapping[str, RunInfo]) -> list[tuple[str, list[str]]]:
     """What the runs themselves say where their scenario is not at hand."""
     rows = []
     for name, run in runs.items():
@@ -112,7 +112,7 @@ def _of_the_runs(runs: Mapping[str, Facts]) -> list[tuple[str, list[str]]]:
 
 
 def _shared(
-    runs: Mapping[str, Facts], summaries: Mapping[str, Any], integrator: str = ''
+    runs: Mapping[str, RunInfo], summaries: Mapping[str, Any], integrator: str = ''
 ) -> list[tuple[str, list[str]]]:
     """How the law is run, and what is odd about it."""
     words = {
@@ -155,7 +155,7 @@ def _but(marks: Sequence[Mark], kinds: Sequence[str]) -> str:
     return '; but for the faults' if any(mark.kind in kinds for mark in marks) else ''
 
 
-def _anti_windup(controllers: Mapping[str, Any], runs: Mapping[str, Facts]) -> str:
+def _anti_windup(controllers: Mapping[str, Any], runs: Mapping[str, RunInfo]) -> str:
     off = [name for name in runs if not controllers.get(name, {}).get('anti_windup', True)]
     on = [name for name in runs if name not in off]
     parts = [f'on for {join(on)}'] if on else []

@@ -8,7 +8,7 @@ import numpy as np
 from auv_analysis.metrics.lyapunov import OF_THE_MOTION
 from auv_analysis.metrics.summary import SMALLEST_BAND
 from auv_analysis.output.text import Maths, join, number
-from auv_analysis.report.digest import Sketch, alike
+from auv_analysis.report.digest import RunDigest, alike
 from auv_dynamics.files.shipped import shipped_names
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.law import SHIPPED
@@ -21,7 +21,7 @@ GAIN, SAME = 'velocity gain K_D', 'the same'
 GROUPS = {'translation': slice(0, 3), 'rotation': slice(3, 6)}
 
 
-def verdict(runs: Mapping[str, Sketch], summaries: Mapping[str, Summary]) -> list[str]:
+def verdict(runs: Mapping[str, RunDigest], summaries: Mapping[str, Summary]) -> list[str]:
     """Sentences of the verdict; none for a single run, or without set-points.
 
     Parameters
@@ -58,7 +58,7 @@ def verdict(runs: Mapping[str, Sketch], summaries: Mapping[str, Summary]) -> lis
     return sentences
 
 
-def _tune(best: str, runs: Sequence[Sketch]) -> str:
+def _tune(best: str, runs: Sequence[RunDigest]) -> str:
     """Command that tunes the laws of some runs."""
     scenario = runs[0].scenario
     words = ['auv tune', scenario if scenario in shipped_names('scenarios') else 'SCENARIO']
@@ -73,7 +73,7 @@ def _errors(summary: Summary) -> np.ndarray | None:
     return None if rms is None else np.array([np.linalg.norm(rms[g]) for g in GROUPS.values()])
 
 
-def _differing(runs: Sequence[Sketch]) -> list[str]:
+def _differing(runs: Sequence[RunDigest]) -> list[str]:
     """What the runs would need in common and do not have; where they start counts for nothing."""
     M, begin, length = runs[0].vehicle.M, runs[0].begin, runs[0].duration
     depends = any(kind in OF_THE_MOTION for run in runs for kind in run.kinds or ())

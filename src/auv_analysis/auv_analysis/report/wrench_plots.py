@@ -13,7 +13,7 @@ from auv_analysis.metrics.quantities import SIGNALS, WRENCH, mathtext
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import join, number
 from auv_analysis.report import plots
-from auv_analysis.report.digest import Sketch
+from auv_analysis.report.digest import RunDigest
 from auv_analysis.report.plots import COLOURS, GREY
 from auv_dynamics.vehicle import DOFS
 
@@ -23,7 +23,7 @@ COMMAND: dict[str, Any] = {'color': '#8a8a8a', 'linewidth': 0.8, 'linestyle': '-
 LIMIT: dict[str, Any] = {'color': 'black', 'linewidth': 0.9, 'linestyle': (0, (1, 1.6))}
 
 
-def applied_figure(run: Sketch, limit: np.ndarray | None) -> tuple[Figure, str, str]:
+def applied_figure(run: RunDigest, limit: np.ndarray | None) -> tuple[Figure, str, str]:
     """Commanded and applied wrench, a panel per degree of freedom.
 
     Parameters
@@ -55,7 +55,7 @@ def applied_figure(run: Sketch, limit: np.ndarray | None) -> tuple[Figure, str, 
     return figure, title, _applied_caption(title, run, limit, cut, missed)
 
 
-def _panel(axes: Axes, run: Sketch, i: int, bound: float | None) -> bool:
+def _panel(axes: Axes, run: RunDigest, i: int, bound: float | None) -> bool:
     """Draw one degree of freedom; whether its command was cut off by the axis."""
     command = run.part('tau')
     axes.plot(*run.drawn('tau', i), **COMMAND)
@@ -87,7 +87,7 @@ def _applied_key(limit: np.ndarray | None) -> tuple[list[Line2D], list[str]]:
 
 
 def _applied_caption(
-    title: str, run: Sketch, limit: np.ndarray | None, cut: list[str], missed: list[str]
+    title: str, run: RunDigest, limit: np.ndarray | None, cut: list[str], missed: list[str]
 ) -> str:
     parts = [
         f'{title}: commanded τ (thin, grey) and the wrench that the actuators applied (thick, in '
@@ -117,7 +117,9 @@ def is_drawn(summary: Mapping[str, Any]) -> bool:
     return summary['lyapunov'].get('share_of_time_increasing') is not None
 
 
-def certificate_figure(run: Sketch, summary: Mapping[str, Any]) -> tuple[Figure | None, str, str]:
+def certificate_figure(
+    run: RunDigest, summary: Mapping[str, Any]
+) -> tuple[Figure | None, str, str]:
     """L, and its measured derivative against (26) and (28). Returns figure, title and caption."""
     title = f'Certificate, {run.controller}'
     if run.samples < 3 or ('L', 'whole') not in run.traces or not len(run.line('L')[0]):
@@ -144,7 +146,7 @@ def certificate_figure(run: Sketch, summary: Mapping[str, Any]) -> tuple[Figure 
 
 
 def _certificate_caption(
-    run: Sketch, lyapunov: Mapping[str, Any], title: str, *, split: bool, partly: bool
+    run: RunDigest, lyapunov: Mapping[str, Any], title: str, *, split: bool, partly: bool
 ) -> str:
     parts = [f'{title}: (a) L of (23) on a logarithmic axis; (b) its derivative, measured from L']
     parts[0] += ', against the identity (26) and the bound (28)'
@@ -160,7 +162,7 @@ def _certificate_caption(
     return ' '.join(parts)
 
 
-def _energy(axes: Axes, run: Sketch, parts: Iterable[str]) -> None:
+def _energy(axes: Axes, run: RunDigest, parts: Iterable[str]) -> None:
     t, L = run.line('L')
     axes.plot(t, L, color=MEASURED)
     for part in parts:
@@ -173,7 +175,7 @@ def _energy(axes: Axes, run: Sketch, parts: Iterable[str]) -> None:
     plots.letter(axes, 0)
 
 
-def _rates(axes: Axes, run: Sketch, part: str) -> bool:
+def _rates(axes: Axes, run: RunDigest, part: str) -> bool:
     """Lines of (28), (26), the measured derivative; whether the axis is partly logarithmic."""
     axes.axhline(0.0, color=plots.GREY, linewidth=0.6)
     for name, look in zip(('bound', 'identity', 'L_dot'), _rate_looks(), strict=True):
@@ -194,7 +196,7 @@ def _rates(axes: Axes, run: Sketch, part: str) -> bool:
     return False
 
 
-def _increasing(axes: Axes, run: Sketch, part: str) -> None:
+def _increasing(axes: Axes, run: RunDigest, part: str) -> None:
     """Grey bands where (26) is positive, each sample as wide as it is from its neighbours."""
     t, increasing = run.line('increasing', 0, part)
     axes.fill_between(
@@ -227,7 +229,7 @@ BAND = 0.3  # opacity
 TAU: dict[str, Any] = {'color': '#a9a9a9', 'linewidth': 0.8}
 
 
-def unexplained_figure(run: Sketch) -> tuple[Figure, str, str]:
+def unexplained_figure(run: RunDigest) -> tuple[Figure, str, str]:
     """F of (1) as estimated, two standard errors about it, and the wrench; a panel per axis."""
     title = f'Unexplained wrench, {run.controller}'
     figure = plots.new_figure(5.6)
@@ -278,7 +280,7 @@ def unexplained_finding(name: str, summary: Mapping[str, Any]) -> str:
     return f'Of {name} the model leaves at most {" and ".join(parts)} unexplained, RMS.'
 
 
-def _cut(axes: Axes, run: Sketch, acted: str, i: int) -> None:
+def _cut(axes: Axes, run: RunDigest, acted: str, i: int) -> None:
     """Give the axis to F where the wrench is far larger, and write down how large that is."""
     seen = max(run.part(name).peak[i] for name in ('least', 'most'))
     wrench = run.part(acted)

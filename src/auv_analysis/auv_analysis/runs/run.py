@@ -23,7 +23,7 @@ BLOCK = 8192  # samples that are worked on together: their arrays fit into a pro
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Facts(ABC):
+class RunInfo(ABC):
     """What is known of a run beside its samples.
 
     Attributes
@@ -114,7 +114,7 @@ class Facts(ABC):
 
     def facts(self) -> dict[str, Any]:
         """Name -> value of what every kind of run has, for building another one."""
-        return {entry.name: getattr(self, entry.name) for entry in fields(Facts)}
+        return {entry.name: getattr(self, entry.name) for entry in fields(RunInfo)}
 
 
 class Extent(NamedTuple):
@@ -130,7 +130,7 @@ class Extent(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Run(Facts):
+class Run(RunInfo):
     """One closed loop from start to end, n + 1 samples.
 
     Attributes
@@ -148,7 +148,7 @@ class Run(Facts):
     unexplained, unexplained_error : (n + 1, 6) F of (1) as estimated from measurements, and its
         standard error; None: not estimated
 
-    The other attributes are those of `Facts`.
+    The other attributes are those of `RunInfo`.
 
     """
 

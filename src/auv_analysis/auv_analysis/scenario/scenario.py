@@ -24,7 +24,7 @@ from auv_dynamics.plant.faults import FaultRows, Faults, FaultSetting, make_faul
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.plant.uncertainty import Uncertainty, make_uncertainty
 from auv_dynamics.ros.interface import NANOSECONDS, time_grid
-from auv_dynamics.vehicle.thrusters import Reach, make_reach
+from auv_dynamics.vehicle.thrusters import AttainableWrench, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.control.gains import body_gains, sampling_warning, state_warning
@@ -218,7 +218,7 @@ class Scenario(Devices):
         """Gains of one controller as the kernel takes them."""
         return make_gains(self.controller(name)['law'], self.gain_values(name))
 
-    def reach(self, name: str) -> Reach:
+    def reach(self, name: str) -> AttainableWrench:
         """What one controller knows of the actuators, for its anti-windup."""
         if self.controller(name).get('anti_windup', True):
             return self.actuators.reach

@@ -15,9 +15,9 @@ import numpy as np
 from auv_analysis.output.progress import each, say
 from auv_analysis.simulation.closed_loop import (
     RUNS,
-    Grid,
     Loop,
-    Motion,
+    LoopState,
+    StepBlock,
     Tables,
     Workspace,
 )
@@ -165,7 +165,7 @@ class _Job(NamedTuple):
     kernel: Kernel
     loop: Loop
     record: Any
-    tables: Sequence[tuple[Grid, Tables]] | None
+    tables: Sequence[tuple[StepBlock, Tables]] | None
 
 
 def kernel_of(batch: Batch) -> Kernel:
@@ -244,27 +244,27 @@ def _parts(count: int, lanes: int | None, threads: int, *, own: bool) -> list[ra
     return [range(first, min(first + size, count)) for first in range(0, count, size)]
 
 
-def _grids(batch: Batch, size: int) -> Iterator[Grid]:
+def _grids(batch: Batch, size: int) -> Iterator[StepBlock]:
     tableau, count = TABLEAUS[batch.integrator], batch.steps + 1
     for first in range(0, count, size):
         t = stage_times(tableau, batch.step, first, min(size, count - first))
-        yield Grid(t, batch.step, first, batch.steps)
+        yield StepBlock(t, batch.step, first, batch.steps)
 
 
-def _listed(batch: Batch, lanes: int | None) -> Sequence[tuple[Grid, Tables]] | None:
+def _listed(batch: Batch, lanes: int | None) -> Sequence[tuple[StepBlock, Tables]] | None:
     """Shared tables of the whole run where they are few; else each part makes them anew."""
     if batch.shared is None or batch.steps > LISTED * SHARED_STEPS:
         return None
     return list(_shared(batch, lanes))
 
 
-def _shared(batch: Batch, lanes: int | None) -> Iterator[tuple[Grid, Tables]]:
+def _shared(batch: Batch, lanes: int | None) -> Iterator[tuple[StepBlock, Tables]]:
     assert batch.shared is not None
     for grid in _grids(batch, SHARED_STEPS):
         yield grid, Tables(*(packed(table[None], lanes) for table in batch.shared(grid.t)))
 
 
-def _own(batch: Batch, lanes: int | None, blocks: range) -> Iterator[tuple[Grid, Tables]]:
+def _own(batch: Batch, lanes: int | None, blocks: range) -> Iterator[tuple[StepBlock, Tables]]:
     assert batch.own is not None
     wide = lanes or 1
     known = batch.own(range(blocks.start * wide, min(blocks.stop * wide, len(batch))))
@@ -280,7 +280,7 @@ def _run_part(job: _Job, blocks: range, *, trial: bool = False) -> None:
     count, faults = len(x), job.loop.faults
     held, history = memory(job.loop.actuators, faults=faults.any).shape, history_shape(faults)
     zeros = partial(_full, count, lanes, value=0.0)
-    motion = Motion(x, x[:, :SIZE].copy(), zeros(size - SIZE), zeros(held), zeros(history))
+    motion = LoopState(x, x[:, :SIZE].copy(), zeros(size - SIZE), zeros(held), zeros(history))
     work = Workspace(_full(1, lanes, (len(tableau.b), size), 0.0), _full(1, lanes, size, 0.0))
     here = slice(blocks.start, blocks.stop)
     loop, record = take_rows(job.loop, here), take_rows(job.record, here)

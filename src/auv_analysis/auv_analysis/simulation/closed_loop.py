@@ -21,7 +21,7 @@ from auv_dynamics.plant.plant import (
     fill_plant_rate,
     fill_unit_attitude,
 )
-from auv_dynamics.plant.uncertainty import Truth, lumped
+from auv_dynamics.plant.uncertainty import PlantModel, lumped
 from auv_gvc_controller.control.sampled import (
     AntiWindup,
     fill_sample,
@@ -111,7 +111,7 @@ class Loop(NamedTuple):
 
     """
 
-    truth: Truth
+    truth: PlantModel
     actuators: Actuators
     gains: Any
     model: ControlModel
@@ -160,7 +160,7 @@ class LawInside(NamedTuple):
             rate[SIZE + i] = change[i]
 
 
-class Grid(NamedTuple):
+class StepBlock(NamedTuple):
     """A block of consecutive steps: T samples, the first of which is sample `first` of the run.
 
     Attributes
@@ -197,7 +197,7 @@ class Tables(NamedTuple):
     faults: np.ndarray
 
 
-class Motion(NamedTuple):
+class LoopState(NamedTuple):
     """What goes on from one block of steps to the next.
 
     Attributes
@@ -226,8 +226,8 @@ class Workspace(NamedTuple):
 
 @once
 def fill_continuous(
-    loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
-    record: Any,
+    loop: Loop, tables: Tables, grid: StepBlock, tableau: Tableau, motion: LoopState,
+    work: Workspace, record: Any,
 ) -> None:  # fmt: skip
     """Take a block of steps with the law inside every stage."""
     x, stages, step, every = motion.x, work.stages, grid.step, tableau.b.shape[0]
@@ -244,8 +244,8 @@ def fill_continuous(
 
 @once
 def fill_held(
-    loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
-    record: Any,
+    loop: Loop, tables: Tables, grid: StepBlock, tableau: Tableau, motion: LoopState,
+    work: Workspace, record: Any,
 ) -> None:  # fmt: skip
     """Take a block of steps with the law at the samples, the wrench held between."""
     truth, x, measured = loop.truth, motion.x, motion.measured
@@ -282,8 +282,8 @@ def fill_held(
 
 @compiled
 def run_continuous(
-    loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
-    record: Any, first: int, last: int, lanes: int | None,
+    loop: Loop, tables: Tables, grid: StepBlock, tableau: Tableau, motion: LoopState,
+    work: Workspace, record: Any, first: int, last: int, lanes: int | None,
 ) -> None:  # fmt: skip
     """`fill_continuous` for the blocks of vehicles from `first` to before `last`.
 
@@ -301,8 +301,8 @@ def run_continuous(
 
 @compiled
 def run_held(
-    loop: Loop, tables: Tables, grid: Grid, tableau: Tableau, motion: Motion, work: Workspace,
-    record: Any, first: int, last: int, lanes: int | None,
+    loop: Loop, tables: Tables, grid: StepBlock, tableau: Tableau, motion: LoopState,
+    work: Workspace, record: Any, first: int, last: int, lanes: int | None,
 ) -> None:  # fmt: skip
     """`fill_held` for the same."""
     align_stack(lanes)

@@ -12,10 +12,10 @@ from auv_analysis.runs.run import HOLDS, Hold, Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.closed_loop import (
     RUNS,
-    Grid,
     Log,
     Loop,
-    Motion,
+    LoopState,
+    StepBlock,
     Tables,
     Workspace,
 )
@@ -100,13 +100,13 @@ def check_hold(scenario: Scenario, hold: Hold) -> None:
         raise InputError(scenario.path, scenario.sampled[0], expected, "hold 'continuous'")
 
 
-def blocks(scenario: Scenario) -> Iterator[tuple[Grid, Tables]]:
+def blocks(scenario: Scenario) -> Iterator[tuple[StepBlock, Tables]]:
     """What is known of a run before it starts, a block of steps at a time."""
     tableau, count = TABLEAUS[scenario.data['integrator']], scenario.steps + 1
     noise, faults = scenario.noise(), scenario.fault_rows()
     for first in range(0, count, BLOCK):
         t = stage_times(tableau, scenario.step, first, min(BLOCK, count - first))
-        yield Grid(t, scenario.step, first, count - 1), tables(scenario, t, noise, faults)
+        yield StepBlock(t, scenario.step, first, count - 1), tables(scenario, t, noise, faults)
 
 
 def tables(
@@ -152,14 +152,14 @@ def loop_of(scenario: Scenario, controller: str) -> Loop:
     return Loop(scenario.uncertainty.truth, actuators, gains, model, guard, scenario.faults.shape)
 
 
-def at_start(scenario: Scenario, loop: Loop) -> tuple[Motion, Workspace]:
+def at_start(scenario: Scenario, loop: Loop) -> tuple[LoopState, Workspace]:
     """Where a run begins, and room for its stages."""
     states = type(loop.gains).STATES
     x = np.concatenate([initial_state(*scenario.initial), np.zeros(states)])
     stages = len(TABLEAUS[scenario.data['integrator']].b)
     faults = loop.faults
     held, history = memory(loop.actuators, faults=faults.any), np.zeros(history_shape(faults))
-    motion = Motion(x, x[:SIZE].copy(), np.zeros(states), held, history)
+    motion = LoopState(x, x[:SIZE].copy(), np.zeros(states), held, history)
     return motion, Workspace(np.zeros((stages, len(x))), np.zeros(len(x)))
 
 

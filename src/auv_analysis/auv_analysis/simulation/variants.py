@@ -19,7 +19,7 @@ from auv_dynamics.files.yaml_files import LARGEST
 from auv_dynamics.kernel.lanes import arrays, joined, take_rows, with_batch_axis
 from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.plant.plant import initial_state
-from auv_dynamics.plant.uncertainty import Truth, with_errors
+from auv_dynamics.plant.uncertainty import PlantModel, with_errors
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle, rigid_body_matrix, row_major
 from auv_dynamics.vehicle.vehicle_file import (
@@ -311,7 +311,7 @@ def _definite(vehicle: Vehicle, good: np.ndarray) -> dict[str, np.ndarray]:
 
 def _truth(
     scenario: Scenario, vehicle: Vehicle, columns: Mapping[Keys, np.ndarray], good: np.ndarray
-) -> Truth:
+) -> PlantModel:
     specs = [dict(spec) for spec in scenario.data['disturbance']]
     for keys, values in columns.items():
         if keys[0] == 'disturbance':
@@ -327,7 +327,7 @@ def _truth(
     exact = scenario.uncertainty.truth.exact
     known = vehicle.model
     model = known if plant is vehicle else plant.changed(M=M).model
-    return Truth(
+    return PlantModel(
         with_batch_axis(model, 2),
         with_batch_axis(row_major(M_RB), 2),
         with_batch_axis(known, 2),

@@ -101,7 +101,7 @@ ENU_FLU = 'enu_flu'  # what the driver's topics begin with
 class FrameConverterNode(BulkNode):
     """Converts odometry and set-points to NED and FSD, the wrench to FLU: never a silent flip."""
 
-    prompt = True
+    latency_critical = True
 
     def __init__(self, **options: Any):
         super().__init__('frame_converter_node', **options)

@@ -251,7 +251,7 @@ NEW = 3.0  # s after its start in which it gives way to another clock, and may w
 class PlantNode(BulkNode):
     """A 6-DOF vehicle: integrates equations (1) and (2) between two wrenches."""
 
-    prompt = True
+    latency_critical = True
 
     def __init__(self, **options: Any):
         super().__init__('plant_node', **options)

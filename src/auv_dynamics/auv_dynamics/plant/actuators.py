@@ -17,7 +17,7 @@ from auv_dynamics.kernel.six import (
     vector,
 )
 from auv_dynamics.vehicle.thrusters import (
-    Reach,
+    AttainableWrench,
     make_reach,
     reachable,
     six_numbers,
@@ -42,7 +42,7 @@ class Actuators(NamedTuple):
     """
 
     ideal: bool
-    reach: Reach
+    reach: AttainableWrench
     slew: np.ndarray
     follow: np.ndarray
     delay: int

@@ -26,7 +26,7 @@ from auv_dynamics.plant.faults import (
     FaultShape,
     MeasurementFaults,
 )
-from auv_dynamics.vehicle.thrusters import Reach, share_within, thrust
+from auv_dynamics.vehicle.thrusters import AttainableWrench, share_within, thrust
 
 WIDTH = 11  # columns of a row: velocity noise (6), rotation quaternion (4), whether it is lost
 LOST = WIDTH - 1
@@ -141,7 +141,9 @@ def fill_heard(fault: np.ndarray, tau: Vector, held: np.ndarray) -> Six:
 
 
 @helper
-def _left_in(reach: Reach, fault: np.ndarray, j: int, tau: Vector, share: Number) -> Number:
+def _left_in(
+    reach: AttainableWrench, fault: np.ndarray, j: int, tau: Vector, share: Number
+) -> Number:
     n = reach.T.shape[1]
     total = 0.0 * tau[j]
     for i in range(n):
@@ -152,7 +154,7 @@ def _left_in(reach: Reach, fault: np.ndarray, j: int, tau: Vector, share: Number
 
 
 @helper
-def left_of_thrusters(reach: Reach, fault: np.ndarray, tau: Numbers) -> Numbers:
+def left_of_thrusters(reach: AttainableWrench, fault: np.ndarray, tau: Numbers) -> Numbers:
     """T u', u' what the faults leave of the thrusts; the allocation does not know of them."""
     if reach.T.shape[1] == 0:
         return tau

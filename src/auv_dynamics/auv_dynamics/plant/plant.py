@@ -22,7 +22,7 @@ from auv_dynamics.plant.actuators import IDEAL, Actuators
 from auv_dynamics.plant.devices import Acting, Sensing, SensorNoise
 from auv_dynamics.plant.faults import NONE, WRENCH, FaultRows, Faults
 from auv_dynamics.plant.uncertainty import (
-    Truth,
+    PlantModel,
     Uncertainty,
     lumped,
     true_acceleration,
@@ -48,7 +48,7 @@ def attitude_of(x: np.ndarray) -> tuple[Number, Number, Number, Number]:
 
 @compiled
 def fill_plant_rate(
-    truth: Truth, x: np.ndarray, tau: Vector, F: Vector, current: np.ndarray, stage: int,
+    truth: PlantModel, x: np.ndarray, tau: Vector, F: Vector, current: np.ndarray, stage: int,
     rate: np.ndarray,
 ) -> None:  # fmt: skip
     """Write (2) and (1) at state x, under wrench tau and external disturbance F, into `rate`."""
@@ -71,7 +71,7 @@ def fill_unit_attitude(x: np.ndarray) -> None:
 class HeldWrench(NamedTuple):
     """The plant over one step with tau held: `F`, `current` (s, 6) at the stages of this step."""
 
-    truth: Truth
+    truth: PlantModel
     tau: Vector
     F: np.ndarray
     current: np.ndarray
@@ -85,7 +85,7 @@ class HeldWrench(NamedTuple):
 
 @compiled
 def fill_plant_step(
-    truth: Truth, x: np.ndarray, tau: Vector, F: np.ndarray, current: np.ndarray, step: float,
+    truth: PlantModel, x: np.ndarray, tau: Vector, F: np.ndarray, current: np.ndarray, step: float,
     tableau: Tableau, stages: np.ndarray, trial: np.ndarray,
 ) -> None:  # fmt: skip
     """Advance the plant's state x (13,) in place by one step under a held wrench."""
@@ -95,7 +95,7 @@ def fill_plant_step(
 
 @compiled
 def lumped_uncertainty(
-    truth: Truth, x: np.ndarray, tau: Vector, F: np.ndarray, current: np.ndarray
+    truth: PlantModel, x: np.ndarray, tau: Vector, F: np.ndarray, current: np.ndarray
 ) -> Numbers:
     """F of (1) and (3) at the state x under the applied wrench tau, see `lumped`."""
     return lumped(truth, attitude_of(x), vector(x, 7), tau, vector(F[0], 0), current)

@@ -122,7 +122,7 @@ def acceleration_in_current(
 APART = ('mass', 'added_mass', 'damping')  # relative errors, for M_RB and M_A given apart
 
 
-class Truth(NamedTuple):
+class PlantModel(NamedTuple):
     """The plant's coefficients beside those of the vehicle file.
 
     Attributes
@@ -152,7 +152,7 @@ class Uncertainty:
 
     """
 
-    truth: Truth
+    truth: PlantModel
     F: Disturbance
     current: Current | None
 
@@ -191,7 +191,7 @@ def make_uncertainty(
         raise InputError(file, place, 'a positive definite M + dM', found)
     current = make_current(of_kind['current'])
     exact = current is None and not of_kind['model_error']
-    truth = Truth(plant.model, row_major(M_RB), vehicle.model, exact)
+    truth = PlantModel(plant.model, row_major(M_RB), vehicle.model, exact)
     return Uncertainty(truth, make_disturbance(specs), current)
 
 
@@ -271,7 +271,7 @@ def _sum(errors: Sequence[Mapping[str, Any]], key: str) -> Any:
 
 @helper
 def true_acceleration(
-    truth: Truth,
+    truth: PlantModel,
     attitude: Vector,
     nu: Vector,
     tau: Vector,
@@ -288,7 +288,7 @@ def true_acceleration(
 
 @compiled
 def lumped(
-    truth: Truth, attitude: Vector, nu: Vector, tau: Vector, F: Numbers, current: np.ndarray
+    truth: PlantModel, attitude: Vector, nu: Vector, tau: Vector, F: Numbers, current: np.ndarray
 ) -> Numbers:
     """F := tau - [M nu_dot + C nu + D nu + g] with the vehicle file's coefficients, (1), (3).
 

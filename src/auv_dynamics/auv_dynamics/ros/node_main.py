@@ -39,8 +39,8 @@ class BulkMixin:
     """What a node needs to run as a process, and in a data path; stands before `Node`.
 
     By itself it is an ordinary node: any executor serves its subscriptions. `DataPath` takes them
-    over in lock-step. A node that must answer at once is `prompt`: its data is waited for there. At
-    others one looks now and then: the longer the naps, the more there is to be taken at once.
+    over in lock-step. The data of a `latency_critical` node is waited for there. At other nodes one
+    looks now and then: the longer the naps, the more there is to be taken at once.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class BulkMixin:
 
     """
 
-    prompt = False
+    latency_critical = False
     bulk = False
     lockstep = False
     exit_code: int | None = None
@@ -160,8 +160,8 @@ class DataPath:
     def __init__(self, nodes: Sequence[Any]):
         for node in nodes:
             node.bulk = True
-        self._prompt = [node for node in nodes if node.prompt]
-        self._observers = [node for node in nodes if not node.prompt]
+        self._prompt = [node for node in nodes if node.latency_critical]
+        self._observers = [node for node in nodes if not node.latency_critical]
         self._wait = DataWait(nodes[0].context)
         self._look_at = 0.0
 

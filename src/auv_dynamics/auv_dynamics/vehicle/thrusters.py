@@ -152,7 +152,7 @@ def _without(dof: str, others: tuple[str, ...]) -> str:
     return f'{dof} cannot be actuated apart from {" and ".join(others)}'
 
 
-class Reach(NamedTuple):
+class AttainableWrench(NamedTuple):
     """The wrenches that can be had: what a law may know of its actuators.
 
     Attributes
@@ -174,13 +174,15 @@ class Reach(NamedTuple):
     own: np.ndarray
 
 
-def make_reach(limit: Any, thrusters: Thrusters | None) -> Reach:
-    """Reach of axis limits (1 or 6 numbers, N and N m; None: none) and of thrusters."""
+def make_reach(limit: Any, thrusters: Thrusters | None) -> AttainableWrench:
+    """Attainable wrench of axis limits (1 or 6 numbers, N and N m; None: none) and of thrusters."""
     bounds = np.full(6, np.inf) if limit is None else six_numbers(limit)
     if thrusters is None:
         no, every = np.zeros(0), np.ones(6)
-        return Reach(limit is not None, bounds, np.zeros((0, 6)), np.zeros((6, 0)), no, no, every)
-    return Reach(
+        return AttainableWrench(
+            limit is not None, bounds, np.zeros((0, 6)), np.zeros((6, 0)), no, no, every
+        )
+    return AttainableWrench(
         True,
         bounds,
         np.ascontiguousarray(thrusters.inverse),
@@ -197,7 +199,7 @@ def six_numbers(value: Any) -> np.ndarray:
 
 
 @helper
-def thrust(reach: Reach, i: int, tau: Vector) -> Number:
+def thrust(reach: AttainableWrench, i: int, tau: Vector) -> Number:
     """u_i of u = T^+ tau in N, without limits."""
     T_inv = reach.T_inv
     return (
@@ -211,7 +213,7 @@ def thrust(reach: Reach, i: int, tau: Vector) -> Number:
 
 
 @helper
-def share_within(reach: Reach, tau: Vector) -> Number:
+def share_within(reach: AttainableWrench, tau: Vector) -> Number:
     """Largest share of the thrusts T^+ tau, at most 1, that is within every thruster's limits."""
     share = 1.0
     for i in range(reach.T.shape[1]):
@@ -223,7 +225,7 @@ def share_within(reach: Reach, tau: Vector) -> Number:
 
 
 @helper
-def _delivered_in(reach: Reach, j: int, tau: Vector, share: Number) -> Number:
+def _delivered_in(reach: AttainableWrench, j: int, tau: Vector, share: Number) -> Number:
     total = 0.0 * tau[j]
     for i in range(reach.T.shape[1]):
         total = total + reach.T[j, i] * thrust(reach, i, tau) * share
@@ -231,7 +233,7 @@ def _delivered_in(reach: Reach, j: int, tau: Vector, share: Number) -> Number:
 
 
 @helper
-def delivered(reach: Reach, tau: Vector, share: Number) -> Six:
+def delivered(reach: AttainableWrench, tau: Vector, share: Number) -> Six:
     """T u with u a share of T^+ tau: six floats, N and N m."""
     return (
         _delivered_in(reach, 0, tau, share),
@@ -244,7 +246,7 @@ def delivered(reach: Reach, tau: Vector, share: Number) -> Six:
 
 
 @helper
-def demanded(reach: Reach, tau: Numbers) -> Numbers:
+def demanded(reach: AttainableWrench, tau: Numbers) -> Numbers:
     """What the command asks of the actuators: T T^+ tau, had the thrusters no limits.
 
     A degree of freedom without a wrench of its own keeps its command: it is never delivered.
@@ -263,7 +265,7 @@ def demanded(reach: Reach, tau: Numbers) -> Numbers:
 
 
 @helper
-def allocated(reach: Reach, tau: Numbers) -> Numbers:
+def allocated(reach: AttainableWrench, tau: Numbers) -> Numbers:
     """T u with u = T^+ tau, scaled down together until every thrust is within its limits."""
     if reach.T.shape[1] == 0:
         return tau
@@ -271,6 +273,6 @@ def allocated(reach: Reach, tau: Numbers) -> Numbers:
 
 
 @helper
-def reachable(reach: Reach, tau: Numbers) -> Six:
+def reachable(reach: AttainableWrench, tau: Numbers) -> Six:
     """The wrench that is had for the command tau: thruster allocation, then the axis limits."""
     return clipped(allocated(reach, tau), reach.limit)

@@ -16,7 +16,7 @@ from auv_dynamics.kernel.compile import (
 from auv_dynamics.kernel.lanes import anywhere, select
 from auv_dynamics.kernel.six import Numbers, Vector
 from auv_dynamics.vehicle.thrusters import (
-    Reach,
+    AttainableWrench,
     demanded,
     make_reach,
     reachable,
@@ -58,10 +58,10 @@ class AntiWindup(NamedTuple):
     """
 
     integrals: int
-    reach: Reach
+    reach: AttainableWrench
 
 
-def anti_windup(gains: Any, reach: Reach | None) -> AntiWindup:
+def anti_windup(gains: Any, reach: AttainableWrench | None) -> AntiWindup:
     """Anti-windup of a law whose actuators are known; None: off.
 
     A law says how many of its states are integrals in `INTEGRALS`; without it all are, where
@@ -169,7 +169,7 @@ class SampledLaw:
 
     """
 
-    def __init__(self, gains: Any, model: ControlModel, reach: Reach | None = None):
+    def __init__(self, gains: Any, model: ControlModel, reach: AttainableWrench | None = None):
         self._gains, self._model = gains, model
         self._guard = anti_windup(gains, reach)
         self._sample = compiled_sample if is_compiled(gains) else fill_sample

@@ -28,7 +28,7 @@ class Setpoint(Protocol):
         """nu_d_dot at t (...,) s: (..., 6) in m/s2 and rad/s2."""
 
 
-class Table:
+class SetpointTable:
     """Set-points of a CSV file, linear between rows.
 
     Parameters
@@ -59,7 +59,7 @@ class Table:
         return np.where(held[..., None], 0.0, self._slope[self._segment(t)])
 
 
-def load_table(path: Path, duration: float, text: str | None = None) -> Table:
+def load_table(path: Path, duration: float, text: str | None = None) -> SetpointTable:
     """Set-points of a CSV file with the columns t, surge, sway, heave, roll, pitch, yaw.
 
     Parameters
@@ -100,7 +100,7 @@ def load_table(path: Path, duration: float, text: str | None = None) -> Table:
     if not duration and stopping > 0.0:
         t = np.append(t, t[-1] + stopping + np.array([0.0, 1.0]))
         nu_d = np.vstack([nu_d, np.zeros((2, 6))])
-    return Table(t, nu_d)
+    return SetpointTable(t, nu_d)
 
 
 def _rows(path: Path, text: str | None) -> tuple[list[int], list[list[str]]]:

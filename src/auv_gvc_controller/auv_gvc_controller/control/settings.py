@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.vehicle.thrusters import Reach, make_reach
+from auv_dynamics.vehicle.thrusters import AttainableWrench, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
 from auv_gvc_controller.control.odometry_guard import AUTO, CLOCKS, Limits, OdometryGuard, StampAge
@@ -219,7 +219,7 @@ class ControllerSettings:
         believable = np.abs(vehicle.M).sum(axis=1) * self.limits_acceleration
         return self.limits_wrench or tuple(believable.tolist())
 
-    def _reach(self, vehicle: Vehicle) -> Reach:
+    def _reach(self, vehicle: Vehicle) -> AttainableWrench:
         """What anti-windup knows of the wrenches that can be had."""
         if self.actuators_thrusters and vehicle.thrusters is None:
             expected = f'a vehicle with thrusters, not {vehicle.name}'

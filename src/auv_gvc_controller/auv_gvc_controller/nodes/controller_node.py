@@ -208,7 +208,7 @@ SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FA
 class ControllerNode(BulkMixin, LifecycleNode):
     """Tracks `cmd_vel` with a law that is named by a parameter."""
 
-    prompt = True
+    latency_critical = True
 
     def __init__(self, **options: Any):
         super().__init__('controller_node', **options)

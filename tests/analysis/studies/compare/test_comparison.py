@@ -8,7 +8,7 @@ import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics.summary import band_of
-from auv_analysis.report.digest import sketch
+from auv_analysis.report.digest import digest
 from auv_analysis.studies.compare import plots
 from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank
 
@@ -20,7 +20,7 @@ SHORT = replace(SCENARIO, data=SCENARIO.data | {'duration': 6.0})
 def entry(name: str, scenario, controller: str) -> Entry:
     run = simulate(scenario, controller)
     names = run.scenario, run.vehicle.name, controller, run.law
-    return Entry(name, *names, 'simulated now', summarize(run), sketch(run))
+    return Entry(name, *names, 'simulated now', summarize(run), digest(run))
 
 
 @pytest.fixture(scope='module')
@@ -85,7 +85,7 @@ def test_error_still_to_come_is_the_largest_ratio_from_then_on(entries) -> None:
     band = band_of(np.abs(run.nu_d).max(axis=0))
     ratio = (np.abs(run.nu_d - run.nu) / band).max(axis=1)
     rest = np.maximum.accumulate(ratio[::-1])[::-1]
-    t, drawn = plots.still_to_come(entries[1].sketch)
+    t, drawn = plots.still_to_come(entries[1].digest)
     assert np.all(np.diff(drawn) <= 0)
     inside = t > 0
     exact = rest[np.searchsorted(run.t, t[inside] - 1e-9)]
@@ -94,7 +94,7 @@ def test_error_still_to_come_is_the_largest_ratio_from_then_on(entries) -> None:
 
 def test_it_falls_below_one_where_the_run_settles(entries) -> None:
     for known in (entries[0], entries[2]):
-        t, ratio = plots.still_to_come(known.sketch)
+        t, ratio = plots.still_to_come(known.digest)
         settled = max(known.summary['velocity_error']['settling_time'])
         first = t[np.argmax(ratio <= 1.0)]
         assert first == pytest.approx(settled, abs=0.05)

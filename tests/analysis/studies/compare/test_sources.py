@@ -10,7 +10,7 @@ import pytest
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.runs.samples import load_samples, write_samples
 from auv_analysis.scenario.scenario import write_inputs
-from auv_analysis.studies.compare.sources import Source, is_sweep, named, open_source, sources_of
+from auv_analysis.studies.compare.sources import RunSource, is_sweep, named, open_source, sources_of
 from auv_dynamics import InputError
 
 ROOT = Path(__file__).parents[4]
@@ -147,7 +147,7 @@ def test_what_is_nothing_is_refused(folder: Path, results: Path, argument, words
 
 def _names(*runs: tuple[str, str, str], join: str = '/') -> list[str]:
     pairs = [
-        (Source('bag', Path(path)), SimpleNamespace(scenario=scenario, controller=controller))
+        (RunSource('bag', Path(path)), SimpleNamespace(scenario=scenario, controller=controller))
         for path, scenario, controller in runs
     ]
     return named(pairs, join)

@@ -15,9 +15,9 @@ from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.studies.design.change import NAMES, ChangeSpace, rounded
 from auv_analysis.studies.design.prediction import (
     Metrics,
-    Motion,
     Objective,
     Prediction,
+    RecordedMotion,
     acceleration,
     effort_of,
     score,
@@ -39,7 +39,7 @@ def prediction(request):
     run = simulate(scenario, 'gvc')
     row = space.effect(space.unchanged).row
     before = sizes_of(run, np.linalg.inv(space.vehicle.M))
-    return Prediction(space, Motion.of(run, row), before), run
+    return Prediction(space, RecordedMotion.of(run, row), before), run
 
 
 def place(space, unit):
@@ -62,7 +62,7 @@ def test_the_input_is_that_of_inverse_dynamics(prediction, unit):
     part = run.part(where)
     down = rotation(quaternion(part.eta[:, 3:]))[:, 2]
     nu_dot = acceleration(part, down)
-    motion = Motion.of(part, np.zeros_like(predicted.motion.row))
+    motion = RecordedMotion.of(part, np.zeros_like(predicted.motion.row))
     assert len(motion.nu) == len(where)
     expected = [
         vehicle.inverse_dynamics(*sample)

@@ -9,7 +9,7 @@ import yaml
 from pages import check_numbers
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.output.folder import Results
+from auv_analysis.output.folder import ResultsFolder
 from auv_analysis.studies.design import search
 from auv_analysis.studies.design.change import NAMES, semi_axes
 from auv_analysis.studies.design.prediction import COUPLINGS, coupling_named
@@ -61,7 +61,7 @@ def designed(vehicle, tmp_path, scenario=None, reduce=None, own=()):
     out = tmp_path / 'out'
     out.mkdir()
     found = propose(open_setting(vehicle, scenario, own), reduce)
-    return write_results(found, Results(out, out)), out
+    return write_results(found, ResultsFolder(out, out)), out
 
 
 def by_name(document):

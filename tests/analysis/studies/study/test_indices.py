@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from strategies import QUICK
 
-from auv_analysis.studies.sweep.indices import Design, spreads
+from auv_analysis.studies.sweep.indices import SensitivityPlan, spreads
 
 A, B = 7.0, 0.1  # of Ishigami's function
 
@@ -26,7 +26,7 @@ def known_indices() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_indices_of_ishigami() -> None:
-    design = Design('sobol', ('a', 'b', 'c'), 2048, 0)
+    design = SensitivityPlan('sobol', ('a', 'b', 'c'), 2048, 0)
     found = design.indices(ishigami(design.points))
     for name, expected in zip(('S1', 'ST'), known_indices(), strict=True):
         assert_allclose(found[name], expected, atol=0.02)
@@ -36,7 +36,7 @@ def test_indices_of_ishigami() -> None:
 @given(st.lists(st.floats(-3, 3), min_size=3, max_size=3).filter(lambda c: max(map(abs, c)) > 0.5))
 @QUICK
 def test_a_linear_function_has_the_squares_of_its_slopes(slopes: list[float]) -> None:
-    design = Design('sobol', ('a', 'b', 'c'), 512, 3)
+    design = SensitivityPlan('sobol', ('a', 'b', 'c'), 512, 3)
     found = design.indices(design.points @ slopes)
     shares = np.square(slopes) / np.square(slopes).sum()
     assert_allclose(found['ST'], shares, atol=0.02)
@@ -45,7 +45,7 @@ def test_a_linear_function_has_the_squares_of_its_slopes(slopes: list[float]) ->
 
 
 def test_morris_of_a_linear_function() -> None:
-    design = Design('morris', ('a', 'b', 'c'), 8, 0)
+    design = SensitivityPlan('morris', ('a', 'b', 'c'), 8, 0)
     found = design.indices(design.points @ [1.0, -2.0, 0.0] + 5.0)
     assert_allclose(found['mu_star'], [2.0, 4.0, 0.0], atol=1e-12)  # from -1 to 1
     assert_allclose(found['sigma'], 0.0, atol=1e-12)
@@ -55,12 +55,14 @@ def test_morris_of_a_linear_function() -> None:
 @pytest.mark.parametrize('method', ['sobol', 'morris'])
 @pytest.mark.parametrize('seed', [0, 5])
 def test_a_seed_gives_the_same_points_and_intervals(method, seed) -> None:
-    first, again = (Design(method, ('a', 'b', 'c'), 16, seed) for _ in range(2))
+    first, again = (SensitivityPlan(method, ('a', 'b', 'c'), 16, seed) for _ in range(2))
     assert_array_equal(first.points, again.points)
     y = ishigami(first.points)
     for name, values in first.indices(y).items():
         assert_array_equal(values, again.indices(y)[name])
-    assert not np.array_equal(first.points, Design(method, first.names, 16, seed + 1).points)
+    assert not np.array_equal(
+        first.points, SensitivityPlan(method, first.names, 16, seed + 1).points
+    )
 
 
 @pytest.mark.parametrize(
@@ -75,12 +77,12 @@ def test_a_seed_gives_the_same_points_and_intervals(method, seed) -> None:
 )
 def test_a_design_that_says_nothing_is_refused(values, words) -> None:
     with pytest.raises(ValueError, match=words):
-        Design(*values)
+        SensitivityPlan(*values)
 
 
 @pytest.mark.parametrize('method', ['sobol', 'morris'])
 def test_spreads_are_standard_deviations(method) -> None:
-    design = Design(method, ('a', 'b'), 256, 1)
+    design = SensitivityPlan(method, ('a', 'b'), 256, 1)
     answers = design.points @ np.array([[1.0, 0.5, 0.0], [0.0, 0.5, 0.1]])
     found = spreads(design, answers)
     one = np.sqrt(1 / 3) if method == 'sobol' else np.sqrt((1 + 1 / 9) / 2)
@@ -95,7 +97,7 @@ def test_spreads_are_standard_deviations(method) -> None:
 def test_the_interval_of_a_spread_holds_it_as_often_as_it_says() -> None:
     true, inside = np.sqrt(1 / 3), 0
     for seed in range(60):
-        design = Design('sobol', ('a',), 32, seed)
+        design = SensitivityPlan('sobol', ('a',), 32, seed)
         design.__dict__['points'] = np.random.default_rng(seed).uniform(-1, 1, (96, 1))
         found = spreads(design, design.points)
         inside += bool(found['spread_low'][0] <= true <= found['spread_high'][0])
@@ -104,7 +106,7 @@ def test_the_interval_of_a_spread_holds_it_as_often_as_it_says() -> None:
 
 def test_places_are_paired() -> None:
     """An answer that is always a little more than another one is first for sure."""
-    design = Design('sobol', ('a', 'b'), 64, 2)
+    design = SensitivityPlan('sobol', ('a', 'b'), 64, 2)
     y = design.points @ [1.0, 1.0]
     found = spreads(design, np.column_stack([y, 1.02 * y, design.points[:, 0] * 1.41]))
     assert found['spread_low'][1] < found['spread_high'][0]  # their intervals overlap

@@ -15,7 +15,7 @@ from auv_analysis.report.plots import (
     ALWAYS,
     COLOURS,
     FigureRecord,
-    Grid,
+    HeatMap,
     draw_grid,
     heat_map,
     save_figures,
@@ -76,7 +76,7 @@ def uncoupled(charts: Sequence[Chart]) -> str:
 def _correlation(charts: Sequence[Chart]) -> Drawn:
     end = max([chart.couplings.largest for chart in charts])
     grids = {
-        name: Grid(
+        name: HeatMap(
             np.where(np.eye(6), np.nan, chart.couplings.correlation),
             DOFS,
             'inertial correlation',
@@ -103,7 +103,7 @@ def _shares(charts: Sequence[Chart]) -> Drawn:
     largest = max((np.nanmax(cells) for cells in values.values()), default=1.0)
     scale = LogNorm(SMALLEST_SHARE, max(largest, 10 * SMALLEST_SHARE), clip=True)
     grids = {
-        name: Grid(cells, DOFS, 'share of energy (%)', 'cividis_r', scale)
+        name: HeatMap(cells, DOFS, 'share of energy (%)', 'cividis_r', scale)
         for name, cells in values.items()
     }
     title = 'Which degree of freedom deforms which'
@@ -116,7 +116,7 @@ def _shares(charts: Sequence[Chart]) -> Drawn:
     return _panels(grids), title, caption + uncoupled(charts)
 
 
-def _panels(grids: dict[str, Grid]) -> Figure | None:
+def _panels(grids: dict[str, HeatMap]) -> Figure | None:
     """A square panel per grid, all on one scale."""
     if not grids:
         return None
@@ -168,7 +168,7 @@ def _reached(charts: Sequence[Chart], kind: str) -> Drawn:
     always = np.array([[dof in c.couplings.zeros[kind] for dof in DOFS] for c in shown])
     halves = slice(0, 3), slice(3, 6)
     grids = [
-        Grid(values[:, half], DOFS[half], f'{symbol} ({unit})', structural=always[:, half])
+        HeatMap(values[:, half], DOFS[half], f'{symbol} ({unit})', structural=always[:, half])
         for half, unit in zip(halves, units, strict=True)
     ]
     caption = (

@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from auv_analysis.metrics.measures import FAMILIES
 from auv_analysis.metrics.summary import BAND_TEXT, DWELL, band_of
 from auv_analysis.report import plots
-from auv_analysis.report.digest import Sketch
-from auv_analysis.report.plots import ALWAYS, COLOURS, GREY, MOST_LINES, FigureRecord, Grid, look
+from auv_analysis.report.digest import RunDigest
+from auv_analysis.report.plots import ALWAYS, COLOURS, GREY, MOST_LINES, FigureRecord, HeatMap, look
 from auv_analysis.report.run_plots import XI
 from auv_analysis.studies.compare.ranking import Entry, Ranking
 from auv_dynamics.vehicle import DOFS
@@ -76,7 +76,7 @@ def _six(name: str, table: pa.Table) -> Drawn:
     halves = [slice(0, 6)] if entry.units[0] == entry.units[1] else [slice(0, 3), slice(3, 6)]
     zeros = structural(table, family)
     grids = [
-        Grid(values[:, half], DOFS[half], f'{entry.label} ({unit})', structural=zeros[:, half])
+        HeatMap(values[:, half], DOFS[half], f'{entry.label} ({unit})', structural=zeros[:, half])
         for half, unit in zip(halves, entry.units, strict=False)
     ]
     always = f', {ALWAYS}: for every motion by the structure of M' if zeros.any() else ''
@@ -131,7 +131,7 @@ def _ranking(ranking: Ranking) -> Drawn:
         return _parallel(ranking, labels), title, caption + 'Equal values share a rank.'
     widest = float(np.nanmax(np.abs(ranking.ratios), initial=1.0))
     end = min(np.ceil(widest), 4.0)
-    grid = Grid(
+    grid = HeatMap(
         np.where(np.isfinite(ranking.ratios), ranking.ratios + 0.0, np.nan),
         labels,
         'log2 of value / median of the runs',
@@ -165,7 +165,7 @@ def _parallel(ranking: Ranking, labels: Sequence[str]) -> Figure:
     return figure
 
 
-def still_to_come(run: Sketch) -> tuple[np.ndarray, np.ndarray]:
+def still_to_come(run: RunDigest) -> tuple[np.ndarray, np.ndarray]:
     """Largest error from each time on, as a multiple of the band in which it counts as settled.
 
     Returns
@@ -202,21 +202,21 @@ def errors(entries: Sequence[Entry]) -> Drawn:
         figure = _panels(groups, labels)
     else:
         caption += f'Each row is a run; it has settled where its colours end{ENDS}. '
-        figure = _rows([e for e in entries if e.sketch and e.sketch.knows_setpoint])
+        figure = _rows([e for e in entries if e.digest and e.digest.knows_setpoint])
     return figure, title, caption + 'Time is logarithmic.'
 
 
-def _groups(entries: Sequence[Entry]) -> dict[str, dict[str, Sketch]]:
+def _groups(entries: Sequence[Entry]) -> dict[str, dict[str, RunDigest]]:
     """Scenario -> label in its panel -> run."""
-    groups: dict[str, dict[str, Sketch]] = {}
+    groups: dict[str, dict[str, RunDigest]] = {}
     for entry in entries:
-        if entry.sketch is not None and entry.sketch.knows_setpoint:
+        if entry.digest is not None and entry.digest.knows_setpoint:
             label = entry.name.removeprefix(f'{entry.scenario}/')
-            groups.setdefault(entry.scenario, {})[label] = entry.sketch
+            groups.setdefault(entry.scenario, {})[label] = entry.digest
     return groups
 
 
-def _panels(groups: Mapping[str, Mapping[str, Sketch]], labels: Sequence[str]) -> Figure:
+def _panels(groups: Mapping[str, Mapping[str, RunDigest]], labels: Sequence[str]) -> Figure:
     across = -(-len(groups) // -(-len(groups) // ACROSS))
     figure, panels = plots.small_multiples(len(groups), across, 1.75, sharex=True, sharey=True)
     for axes, (scenario, runs) in zip(panels, groups.items(), strict=True):
@@ -236,7 +236,7 @@ def _panels(groups: Mapping[str, Mapping[str, Sketch]], labels: Sequence[str]) -
 
 
 def _rows(entries: Sequence[Entry]) -> Figure:
-    lines = [still_to_come(entry.sketch) for entry in entries if entry.sketch]
+    lines = [still_to_come(entry.digest) for entry in entries if entry.digest]
     first = min(t[t > 0].min() for t, _ in lines)
     times = np.geomspace(first, max(t[-1] for t, _ in lines), TIMES)
     values = np.full((len(lines), TIMES), np.nan)

@@ -11,7 +11,7 @@ from pyarrow import csv, parquet
 from scipy.stats import rankdata
 
 from auv_analysis.metrics.measures import MEASURES, Measure, flat
-from auv_analysis.report.digest import Sketch
+from auv_analysis.report.digest import RunDigest
 from auv_analysis.report.results import array_of
 
 ERRORS = 'overall.velocity_error.rms.linear'
@@ -104,7 +104,7 @@ class Entry:
     scenario, vehicle, controller, law : names
     origin : where it was read from, or that it was simulated for the comparison
     summary : of `summarize`; empty where the run diverged
-    sketch : of the run, None where it diverged
+    digest : of the run, None where it diverged
     failure : why there are no figures, '' where there are some
 
     """
@@ -116,14 +116,14 @@ class Entry:
     law: str
     origin: str
     summary: dict[str, Any]
-    sketch: Sketch | None
+    digest: RunDigest | None
     failure: str = ''
 
     @property
     def row(self) -> dict[str, Any]:
         """Columns of the table: names, then the figures."""
         found = {'run': self.name} | {name: getattr(self, name) for name in NAMES}
-        found['hold'] = self.sketch.hold if self.sketch else None
+        found['hold'] = self.digest.hold if self.digest else None
         found['failure'] = self.failure or None
         return found | {k: v for k, v in flat(self.summary).items() if k not in found}
 

@@ -14,7 +14,7 @@ from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import each, say, waiting
 from auv_analysis.output.text import join, number
-from auv_analysis.report.digest import sketch
+from auv_analysis.report.digest import digest
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.results import Column, Table, make_table
@@ -30,7 +30,7 @@ from auv_analysis.studies.compare.ranking import (
     rank,
     write_table,
 )
-from auv_analysis.studies.compare.sources import Source, named, open_source
+from auv_analysis.studies.compare.sources import RunSource, named, open_source
 from auv_dynamics.files.errors import FailedError, first_line
 from auv_dynamics.vehicle import DOFS
 
@@ -57,7 +57,7 @@ MOST_NAMES = 6
 Rows = Sequence[Mapping[str, Any]]
 
 
-def entries_of(sources: Sequence[Source], vehicle: str | None = None) -> list[Entry]:
+def entries_of(sources: Sequence[RunSource], vehicle: str | None = None) -> list[Entry]:
     """Read or simulate each source, keep its metrics and forget its samples.
 
     Parameters
@@ -82,7 +82,7 @@ def entries_of(sources: Sequence[Source], vehicle: str | None = None) -> list[En
     return [replace(entry, name=name) for entry, name in zip(found, names, strict=True)]
 
 
-def _entry(source: Source, vehicle: str | None) -> Entry:
+def _entry(source: RunSource, vehicle: str | None) -> Entry:
     """Entry without a name."""
     origin = 'simulated now' if source.kind == 'scenario' else str(source.path)
     try:
@@ -93,7 +93,7 @@ def _entry(source: Source, vehicle: str | None) -> Entry:
         names = one.name, one.vehicle.name, name, one.controller(name)['law']
         return Entry('', *names, origin, {}, None, first_line(error))
     names = run.scenario, run.vehicle.name, run.controller, run.law
-    return Entry('', *names, origin, summarize(run), sketch(run))
+    return Entry('', *names, origin, summarize(run), digest(run))
 
 
 def conclude_comparison(
@@ -201,7 +201,7 @@ def findings(entries: Sequence[Entry], rows: Rows) -> list[Sentence]:
     """
     known = [row for row in rows if not row['failure']]
     found = [_settled(known), _differing(known), _diverged(rows)]
-    found += namesakes([entry.sketch for entry in entries if entry.sketch])
+    found += namesakes([entry.digest for entry in entries if entry.digest])
     return [Sentence(text, RUNS) for text in found if text]
 
 

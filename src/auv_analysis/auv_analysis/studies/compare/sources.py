@@ -26,7 +26,7 @@ YAML = ('.yaml', '.yml')
 
 
 @dataclass(frozen=True)
-class Source:
+class RunSource:
     """Where one run comes from.
 
     Attributes
@@ -66,7 +66,7 @@ def is_sweep(argument: str) -> bool:
 
 def sources_of(
     arguments: Sequence[str], mapping: TopicMap | None = None, namespace: str | None = None
-) -> list[Source]:
+) -> list[RunSource]:
     """The runs that arguments stand for, in their order.
 
     Parameters
@@ -89,7 +89,7 @@ def sources_of(
     ]
 
 
-def _sources(argument: str) -> list[Source]:
+def _sources(argument: str) -> list[RunSource]:
     path = Path(argument)
     if os.path.isdir(path):
         _refuse_two_meanings(argument, path)
@@ -103,15 +103,15 @@ def _sources(argument: str) -> list[Source]:
     raise InputError(path, '', EXPECTED, 'no such file or folder')
 
 
-def _of_file(argument: str, path: Path) -> list[Source]:
+def _of_file(argument: str, path: Path) -> list[RunSource]:
     if path.suffix in YAML:
         return _simulated(load_scenario(path))
     if path.suffix == ENDING:
         scenario = _scenario_beside(path)
         scenario.controller(path.stem)
-        return [Source('samples', path, path.stem, scenario)]
+        return [RunSource('samples', path, path.stem, scenario)]
     _refuse_two_meanings(argument, path)
-    return [Source('bag', path)]
+    return [RunSource('bag', path)]
 
 
 def _scenario_beside(samples: Path) -> Scenario:
@@ -154,14 +154,14 @@ def _shipped(name: str) -> Path:
         raise InputError(name, '', f'{EXPECTED}, shipped: {names}', found) from None
 
 
-def _of_folder(folder: Path) -> list[Source]:
+def _of_folder(folder: Path) -> list[RunSource]:
     """Runs of a folder: a bag is one, results are as many as lie in them."""
     try:
         entries = sorted(folder.iterdir())
     except OSError as error:
         raise InputError(folder, '', EXPECTED, reason(error)) from None
     if any(entry.suffix in ('.mcap', OTHERS[0]) for entry in entries):
-        return [Source('bag', folder)]
+        return [RunSource('bag', folder)]
     names = _controllers(folder)
     bags = [e for e in entries if e.is_dir() and any(e.glob('*.mcap'))]
     samples = [folder / f'{name}{ENDING}' for name in names]
@@ -171,12 +171,12 @@ def _of_folder(folder: Path) -> list[Source]:
         raise InputError(folder, '', 'bags or samples in a folder, or name one of them', found)
     if samples:
         scenario = _brought(folder / 'scenario.yaml')
-        return [Source('samples', path, path.stem, scenario) for path in samples]
+        return [RunSource('samples', path, path.stem, scenario) for path in samples]
     if not bags:
         raise InputError(folder, '', EXPECTED, 'a folder without .mcap files or samples')
     order = {name: i for i, name in enumerate(names)}
     bags.sort(key=lambda bag: order.get(bag.name, len(order)))
-    return [Source('bag', bag) for bag in bags]
+    return [RunSource('bag', bag) for bag in bags]
 
 
 def _controllers(folder: Path) -> list[str]:
@@ -188,8 +188,8 @@ def _controllers(folder: Path) -> list[str]:
         return []
 
 
-def _simulated(scenario: Scenario) -> list[Source]:
-    return [Source('scenario', scenario.path, name, scenario) for name in scenario.controllers]
+def _simulated(scenario: Scenario) -> list[RunSource]:
+    return [RunSource('scenario', scenario.path, name, scenario) for name in scenario.controllers]
 
 
 DEEPEST = 4  # folders of a path in a name
@@ -215,7 +215,7 @@ class Opened(NamedTuple):
     vehicle_text: str
 
 
-def open_source(source: Source, vehicle: str | None = None) -> Opened:
+def open_source(source: RunSource, vehicle: str | None = None) -> Opened:
     """Run of a source.
 
     Parameters
@@ -242,7 +242,7 @@ def open_source(source: Source, vehicle: str | None = None) -> Opened:
     return Opened(run, texts.get('scenario.yaml', ''), texts.get('vehicle.yaml', ''))
 
 
-def _open_bag(source: Source, vehicle: str | None) -> Recording:
+def _open_bag(source: RunSource, vehicle: str | None) -> Recording:
     bag = source.path
     if source.mapping is not None:
         from auv_analysis.bag.foreign_run import load_foreign
@@ -256,7 +256,7 @@ def _open_bag(source: Source, vehicle: str | None) -> Recording:
         raise with_candidates(error) from None
 
 
-def named(runs: Sequence[tuple[Source, Named]], join: str = '/') -> list[str]:
+def named(runs: Sequence[tuple[RunSource, Named]], join: str = '/') -> list[str]:
     """Names that tell runs apart, as short as that allows.
 
     The controller alone where that is enough, else `scenario/controller`; runs of equal names are
@@ -280,7 +280,7 @@ def named(runs: Sequence[tuple[Source, Named]], join: str = '/') -> list[str]:
     return numbered(names)
 
 
-def _by_folder(sources: Sequence[Source]) -> list[tuple[str, ...]]:
+def _by_folder(sources: Sequence[RunSource]) -> list[tuple[str, ...]]:
     """Folders that tell sources apart, as few as do; none where they are all the same."""
     options = [[_folders(source, depth) for source in sources] for depth in range(1, DEEPEST + 1)]
     apart = [len(set(parts)) for parts in options]
@@ -288,7 +288,7 @@ def _by_folder(sources: Sequence[Source]) -> list[tuple[str, ...]]:
     return options[apart.index(best)] if best > 1 else [()] * len(sources)
 
 
-def _folders(source: Source, depth: int) -> tuple[str, ...]:
+def _folders(source: RunSource, depth: int) -> tuple[str, ...]:
     """Last folders of the path that a run was read from, without the part that names the run."""
     if source.kind == 'scenario':
         return ('simulated', source.path.stem)

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import Maths
 from auv_analysis.report import plots as plotting
-from auv_analysis.report.digest import sketches
+from auv_analysis.report.digest import digests
 from auv_analysis.report.plots import Drawn, FigureRecord, before_after, save_figures
-from auv_analysis.studies.design.results import Design
+from auv_analysis.studies.design.results import DesignStudy
 from auv_dynamics.vehicle import DOFS
 
 WAS, IS = plotting.GREY, plotting.COLOURS[0]
@@ -22,7 +22,7 @@ Picture = tuple[Callable[[], Figure], str]  # what draws it, and its caption
 SYMBOLS = {'delta_xi': r'\Delta\xi', 'delta_pi': r'\Delta\pi'}
 
 
-def draw_design(result: Design, folder: Path) -> dict[str, FigureRecord]:
+def draw_design(result: DesignStudy, folder: Path) -> dict[str, FigureRecord]:
     """Draw a design as PNG and PDF; nothing where there was nothing to reduce.
 
     Parameters
@@ -74,13 +74,13 @@ def _couplings(document: Mapping[str, Any]) -> Picture:
     return draw, caption
 
 
-def _reduced(result: Design) -> Picture:
+def _reduced(result: DesignStudy) -> Picture:
     assert result.before is not None
     assert result.after is not None
     document = result.document
     main, (kind, dof) = document['controller'], document['reduce'].split('.')
     pair = {'before': result.before.runs[main], 'after': result.after.runs[main]}
-    column, lines = DOFS.index(dof), sketches(pair)
+    column, lines = DOFS.index(dof), digests(pair)
     split = all((kind, 'early') in run.traces for run in lines.values())
     parts = ('early', 'late') if split else ('whole',)
     unit = next(row['unit'] for row in document['measures'] if row['name'] == f'{kind}_max.{dof}')
@@ -105,7 +105,7 @@ def _reduced(result: Design) -> Picture:
     return draw, caption
 
 
-def _upsilon(result: Design) -> Picture:
+def _upsilon(result: DesignStudy) -> Picture:
     document = result.document
     M = result.proposal.setting.space.vehicle.M
     weight = np.sqrt(np.diag(M)[:, None] / np.diag(M))

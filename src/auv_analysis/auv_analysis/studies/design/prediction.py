@@ -134,7 +134,7 @@ IMPOSSIBLE = 1e6  # objective of a change whose M is not positive definite
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RecordedMotion:
     """Samples of a run, and what its input would be for another vehicle.
 
     Attributes
@@ -153,7 +153,7 @@ class Motion:
     weights: np.ndarray
 
     @classmethod
-    def of(cls, run: Run, row: np.ndarray) -> 'Motion':
+    def of(cls, run: Run, row: np.ndarray) -> 'RecordedMotion':
         """Motion of a run; `row` is the effect that its vehicle already has."""
         where = _samples(run)
         part = run.part(where)
@@ -264,7 +264,7 @@ class Metrics(NamedTuple):
     definite: Any
 
 
-class Signals(NamedTuple):
+class CouplingSignals(NamedTuple):
     """Of changed vehicles: delta_xi beside delta_pi (..., n, 12), xi, pi, tau (..., n, 6), N."""
 
     deformed: np.ndarray
@@ -287,7 +287,11 @@ class Prediction:
     """
 
     def __init__(
-        self, space: ChangeSpace, motion: Motion, before: Sizes, smooth: np.ndarray | None = None
+        self,
+        space: ChangeSpace,
+        motion: RecordedMotion,
+        before: Sizes,
+        smooth: np.ndarray | None = None,
     ):
         self.space, self.motion, self.before = space, motion, before
         self._M_inv = np.linalg.inv(space.vehicle.M)  # weighs the effort
@@ -313,13 +317,13 @@ class Prediction:
         peaks = np.abs(self.signals(x).deformed).max(axis=-2)
         return peaks / np.where(self.before.peaks > 0, self.before.peaks, np.inf)
 
-    def signals(self, x: np.ndarray) -> Signals:
+    def signals(self, x: np.ndarray) -> CouplingSignals:
         """Signals of changes (..., 13) at the samples of the motion."""
         change = self.space.effect(x)
         Upsilon, inverse, N = decomposed(self.space.vehicle.M + change.M)
         tau, nu = self.motion.inputs(change.row), self.motion.nu
         xi, pi = nu @ np.swapaxes(inverse, -2, -1), tau @ Upsilon
-        return Signals(np.concatenate([xi - nu, pi - tau], axis=-1), xi, pi, tau, N)
+        return CouplingSignals(np.concatenate([xi - nu, pi - tau], axis=-1), xi, pi, tau, N)
 
 
 def smooth_peak(signals: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ from auv_analysis.report.results import (
 from auv_analysis.studies.design.change import part_words
 from auv_analysis.studies.design.plots import draw_design
 from auv_analysis.studies.design.prediction import AT_REST, OTHERS, SIZE
-from auv_analysis.studies.design.results import Design
+from auv_analysis.studies.design.results import DesignStudy
 from auv_analysis.studies.design.search import HALF, PART
 
 NEAR = 1e-9  # relative: no change
@@ -60,7 +60,7 @@ METHOD = tuple(
 )
 
 
-def write_report(result: Design, out: Path) -> Path:
+def write_report(result: DesignStudy, out: Path) -> Path:
     """Write report.html with its figures and numbers.parquet; returns the report's path.
 
     Parameters
@@ -85,7 +85,7 @@ def write_report(result: Design, out: Path) -> Path:
     )
 
 
-def _findings(result: Design) -> Iterator[Sentence]:
+def _findings(result: DesignStudy) -> Iterator[Sentence]:
     document = result.document
     source = 'table-measures' if document['measures'] else ''
     yield Sentence(document['statement'], source)
@@ -95,7 +95,7 @@ def _findings(result: Design) -> Iterator[Sentence]:
         yield Sentence(f'{warning[:1].upper()}{warning[1:]}.', 'proposal')
 
 
-def _sections(result: Design, figures: Mapping[str, FigureRecord]) -> list[Section]:
+def _sections(result: DesignStudy, figures: Mapping[str, FigureRecord]) -> list[Section]:
     document = result.document
     if not document['measures']:
         return []

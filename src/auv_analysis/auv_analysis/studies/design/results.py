@@ -10,7 +10,7 @@ import numpy as np
 from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.quantities import METRICS
 from auv_analysis.metrics.summary import summarize
-from auv_analysis.output.folder import Results
+from auv_analysis.output.folder import ResultsFolder
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.text import join, number, plain
 from auv_analysis.runs.run import Hold, Run
@@ -135,7 +135,7 @@ def _at(summary: Mapping[str, Any], metric: str, i: int | None = None) -> float 
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class DesignStudy:
     """A design with its runs.
 
     Attributes
@@ -152,7 +152,7 @@ class Design:
     after: Simulated | None = None
 
 
-def write_results(found: Proposal, results: Results) -> Design:
+def write_results(found: Proposal, results: ResultsFolder) -> DesignStudy:
     """Write the changed vehicle and its scenario, run both vehicles, write the figures.
 
     Parameters
@@ -174,14 +174,14 @@ def write_results(found: Proposal, results: Results) -> Design:
         name = setting.space.vehicle.name
         document['statement'] = nothing_statement(name, found.asked, found.there)
         write_json(out / DESIGN, document)
-        return Design(found, document)
+        return DesignStudy(found, document)
     before = Simulated.of(setting.scenario, setting.hold)
     after = Simulated.of(scenario, setting.hold)
     write_json(out / BEFORE, before.summaries)
     write_json(out / AFTER, after.summaries)
     document |= _body(found, scenario.vehicle, before, after)
     write_json(out / DESIGN, document)
-    return Design(found, document, before, after)
+    return DesignStudy(found, document, before, after)
 
 
 def _head(found: Proposal, out: Path) -> dict[str, Any]:

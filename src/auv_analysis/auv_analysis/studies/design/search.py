@@ -19,9 +19,9 @@ from auv_analysis.studies.design.prediction import (
     COUPLINGS,
     REST,
     Metrics,
-    Motion,
     Objective,
     Prediction,
+    RecordedMotion,
     Sizes,
     coupling_named,
     present,
@@ -173,7 +173,7 @@ class Remedies:
 
     def __init__(self, setting: Setting, run: Run, before: Sizes):
         self.setting, self.before = setting, before
-        motion = Motion.of(run, setting.space.effect(setting.space.unchanged).row)
+        motion = RecordedMotion.of(run, setting.space.effect(setting.space.unchanged).row)
         self.prediction = Prediction(setting.space, motion, before)
         self._surveys = {part: Survey.of(self.prediction, part) for part in (*PARTS, ALL)}
 
@@ -217,7 +217,7 @@ class Remedies:
             if abs(best.ratio - best.predicted) <= AGREES:
                 break
             space = self.setting.space
-            motion = Motion.of(best.run, space.effect(best.x).row)
+            motion = RecordedMotion.of(best.run, space.effect(best.x).row)
             prediction = Prediction(space, motion, self.before, self.prediction.smooth)
             objective = Objective(prediction, best.target)
             x = search(objective, self._surveys[best.part], [best.x])

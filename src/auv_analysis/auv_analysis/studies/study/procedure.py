@@ -16,7 +16,7 @@ from auv_analysis.output.new_files import write_table
 from auv_analysis.output.text import Maths, fixed, join, number, plain, symbol
 from auv_analysis.report import plots
 from auv_analysis.report.document import Block, Section, Sentence
-from auv_analysis.report.plots import FigureRecord, Grid
+from auv_analysis.report.plots import FigureRecord, HeatMap
 from auv_analysis.report.results import Column, Table, make_table
 from auv_analysis.runs.run import AnyRun, Run
 from auv_analysis.studies.study.sensitivity import Kpi, Row, Sensitivity
@@ -201,7 +201,7 @@ def sensitivity_plot(found: Sensitivity, folder: Path) -> FigureRecord:
             for rows in shown.values()
         ])  # fmt: skip
         heads = [gain_mathtext(gain) for gain in found.gains]
-        plots.draw_grid(right, Grid(weights, heads, '', 'Blues', decimals=2), 7.5)
+        plots.draw_grid(right, HeatMap(weights, heads, '', 'Blues', decimals=2), 7.5)
         _bars(left, shown)
         plots.letter(left, 0, 'spread, 95 % interval')
         plots.letter(right, 1, 'total index $S_T$' if sobol else r'$\mu^*$')

@@ -18,7 +18,7 @@ from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import IN_PYTHON, kernel_of
 from auv_analysis.simulation.rollouts import batch_of, rollouts
 from auv_analysis.simulation.variants import packed_variants
-from auv_analysis.studies.sweep.indices import Design, Method, spreads
+from auv_analysis.studies.sweep.indices import Method, SensitivityPlan, spreads
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.laws.law import SHIPPED
@@ -151,8 +151,8 @@ class Sensitivity:
             this KPI, 1 the largest, with its 95 % interval
         gain, elasticity : relative change of the KPI per relative change of the gain, by least
             squares; doubled : change in % when the gain is doubled, by that
-        S1, ST, mu_star, sigma : indices of ln(KPI), see `Design.indices`; '_conf' is half of the
-            95 % interval; absent what the method does not give
+        S1, ST, mu_star, sigma : indices of ln(KPI), see `SensitivityPlan.indices`; '_conf' is
+            half of the 95 % interval; absent what the method does not give
     excluded : KPIs that have no spread, and why
     refusal : why there are no rows; empty where there are
 
@@ -316,7 +316,7 @@ def sensitivity(
     )
     if not factors.names:
         return replace(result, refusal='the law has no gain that is not zero')
-    design = Design(method, factors.names, count, seed)
+    design = SensitivityPlan(method, factors.names, count, seed)
     for used in (span ** (0.5**i) for i in range(SHRINKS)):
         found = _rollouts(factors, used**design.points, hold, threads)
         failed = int(np.sum(found['status'] != 'ok'))
@@ -361,7 +361,10 @@ def _refusal(result: Sensitivity, found: Mapping[str, np.ndarray]) -> str:
 
 
 def _judged(
-    result: Sensitivity, design: Design, found: Mapping[str, np.ndarray], factors: GainFactors
+    result: Sensitivity,
+    design: SensitivityPlan,
+    found: Mapping[str, np.ndarray],
+    factors: GainFactors,
 ) -> Sensitivity:
     kpis, excluded = sort_out({k: v[1:] for k, v in found.items()}, factors.scenario.vehicle)
     rows: list[Row] = []

@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from auv_analysis.output.folder import CAMPAIGN, PART, ROLLOUTS, SWEEP, Results, results_folder
+from auv_analysis.output.folder import (
+    CAMPAIGN,
+    PART,
+    ROLLOUTS,
+    SWEEP,
+    ResultsFolder,
+    results_folder,
+)
 from auv_analysis.output.new_files import UNFINISHED, write
 from auv_analysis.studies.sweep.campaign import Campaign
 from auv_analysis.studies.sweep.variation import kind_of
@@ -66,7 +73,7 @@ class SweepFolder:
 
     """
 
-    def __init__(self, results: Results, campaign: Campaign):
+    def __init__(self, results: ResultsFolder, campaign: Campaign):
         self.folder, self.out = results
         self.data = self.folder / ROLLOUTS
         manifest, stored = _manifest(campaign), _stored(self.folder)

@@ -267,7 +267,7 @@ NAMES = {
 
 
 @dataclass(frozen=True)
-class Design:
+class SensitivityPlan:
     """Points at which k factors are tried.
 
     Attributes
@@ -349,7 +349,7 @@ class Design:
         return first + np.array(inside)
 
 
-def spreads(design: Design, answers: np.ndarray) -> dict[str, np.ndarray]:
+def spreads(design: SensitivityPlan, answers: np.ndarray) -> dict[str, np.ndarray]:
     """Standard deviations of several answers, their intervals by a bootstrap that pairs answers.
 
     Parameters

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from auv_analysis.metrics.measures import BY_NAME, Measure
 from auv_analysis.output.text import join, plain, typeset
 from auv_analysis.report import plots
-from auv_analysis.report.plots import COLOURS, GREY, FigureRecord, Grid, heat_map, look
+from auv_analysis.report.plots import COLOURS, GREY, FigureRecord, HeatMap, heat_map, look
 from auv_analysis.studies.sweep.analysis import SAMPLE, Analysis, Row, ordered, thinned
 from auv_analysis.studies.sweep.dataset import Factor, cut, short_names, with_unit
 
@@ -139,13 +139,13 @@ def _shares(
     key: str,
     label: str,
     whole: float = 1.0,
-) -> Grid:
+) -> HeatMap:
     """Heat map of shares: measures by paths."""
     names = short_names(analysis.factors)
     cells = {(row['figure'], row['path']): row[key] for row in rows}
     values = np.array([[cells.get((m, path)) for path in paths] for m in measures], float)
     heads, scale = [names[path] for path in paths], Normalize(0.0, whole)
-    return Grid(values, heads, label, 'Blues', scale, decimals=0 if whole > 1 else 2)
+    return HeatMap(values, heads, label, 'Blues', scale, decimals=0 if whole > 1 else 2)
 
 
 def _total_indices(analysis: Analysis) -> Drawn:
@@ -306,7 +306,7 @@ def _together(analysis: Analysis, measures: Sequence[Measure]) -> Drawn:
     names = short_names(analysis.factors)
     for i, measure in enumerate(measures):
         mine = [row for row in rows if row['figure'] == measure.name]
-        scale = Grid(_array(mine, 'median'), (), '').norm()
+        scale = HeatMap(_array(mine, 'median'), (), '').norm()
         for controller, axes in zip(controllers, panels[i * across :], strict=False):
             cells = [cell for cell in mine if cell['controller'] == controller]
             _one_pair(axes, cells, measure.label, scale)
@@ -329,7 +329,7 @@ def _one_pair(axes: Axes, cells: Sequence[Row], label: str, scale: Normalize) ->
     across = list(dict.fromkeys(cell['other_value'] for cell in cells))
     values = _array(cells, 'median').reshape(len(down), len(across))
     heads = [typeset(cut(word)) for word in across]
-    plots.draw_grid(axes, Grid(values, heads, label, scale=scale), 6.0)
+    plots.draw_grid(axes, HeatMap(values, heads, label, scale=scale), 6.0)
     axes.set_yticks(range(len(down)), [typeset(cut(word)) for word in down])
     axes.tick_params(labelsize=7)
     if len(across) > 4:

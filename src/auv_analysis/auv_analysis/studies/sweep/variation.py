@@ -174,7 +174,7 @@ MOST_AT_ONCE = 10_000_000  # numbers of a design that is made as a whole: 80 MB
 Seed = np.random.SeedSequence | int
 
 
-class Design(Protocol):
+class SamplingPlan(Protocol):
     """Points of the unit cube."""
 
     size: int  # number of points
@@ -183,7 +183,9 @@ class Design(Protocol):
         """Points (n, k) at positions (n,) below `size`."""
 
 
-def make_design(kind: str, paths: list[str], spec: dict[str, Any], seed: int, group: int) -> Design:
+def make_design(
+    kind: str, paths: list[str], spec: dict[str, Any], seed: int, group: int
+) -> SamplingPlan:
     """Design of a checked group of a campaign.
 
     Parameters
@@ -216,7 +218,7 @@ class Random:
         self._key = seed.generate_state(2, np.uint64)
 
     def at(self, positions: np.ndarray) -> np.ndarray:
-        """See `Design`."""
+        """See `SamplingPlan`."""
         return _in_runs(positions, self._draw)
 
     def _draw(self, first: int, count: int) -> np.ndarray:
@@ -241,7 +243,7 @@ class Sobol:
         self._sequence = qmc.Sobol(width, rng=np.random.default_rng(seed))
 
     def at(self, positions: np.ndarray) -> np.ndarray:
-        """See `Design`; going forward costs least."""
+        """See `SamplingPlan`; going forward costs least."""
         return _in_runs(positions, self._draw)
 
     def _draw(self, first: int, count: int) -> np.ndarray:
@@ -266,7 +268,7 @@ class Saltelli:
         self.size = spec['count'] * self._rows
 
     def at(self, positions: np.ndarray) -> np.ndarray:
-        """See `Design`."""
+        """See `SamplingPlan`."""
         k = self._width
         point, row = np.divmod(positions, self._rows)
         A, B = np.split(self._base.at(point), 2, axis=1)
@@ -287,18 +289,18 @@ class AtOnce:
         self.size, self._points = size, make()
 
     def at(self, positions: np.ndarray) -> np.ndarray:
-        """See `Design`."""
+        """See `SamplingPlan`."""
         return self._points[positions]
 
 
-def _latin_hypercube(paths: list[str], spec: dict[str, Any], seed: Seed) -> Design:
+def _latin_hypercube(paths: list[str], spec: dict[str, Any], seed: Seed) -> SamplingPlan:
     from scipy.stats import qmc
 
     sampler = qmc.LatinHypercube(len(paths), rng=np.random.default_rng(seed))
     return AtOnce(spec['count'], len(paths), lambda: sampler.random(spec['count']))
 
 
-def morris(paths: Sequence[str], spec: dict[str, Any], seed: Seed) -> Design:
+def morris(paths: Sequence[str], spec: dict[str, Any], seed: Seed) -> SamplingPlan:
     """Trajectories of Morris on a grid: k + 1 points, one coordinate changed at each step."""
     from SALib.sample import morris
 
@@ -316,7 +318,7 @@ def cube(names: Sequence[str]) -> dict[str, Any]:
     return {'num_vars': len(names), 'names': list(names), 'bounds': [[0.0, 1.0]] * len(names)}
 
 
-DESIGNS: dict[str, Callable[[list[str], dict[str, Any], np.random.SeedSequence], Design]] = {
+DESIGNS: dict[str, Callable[[list[str], dict[str, Any], np.random.SeedSequence], SamplingPlan]] = {
     'random': Random,
     'sobol': Sobol,
     'saltelli': Saltelli,
@@ -334,7 +336,7 @@ class Group(Protocol):
         """Path -> n values at positions (n,) below `size`."""
 
 
-class Grid:
+class FullFactorial:
     """Every combination of listed values; the last path runs fastest."""
 
     def __init__(self, axes: dict[str, Values]):
@@ -369,7 +371,9 @@ class Zip:
 class Drawn:
     """Distributions along the coordinates of a design of the unit cube."""
 
-    def __init__(self, quantiles: Mapping[str, Callable[[np.ndarray], Values]], design: Design):
+    def __init__(
+        self, quantiles: Mapping[str, Callable[[np.ndarray], Values]], design: SamplingPlan
+    ):
         self._quantiles, self._design, self.size = quantiles, design, design.size
 
     def at(self, positions: np.ndarray) -> dict[str, Values]:
@@ -402,7 +406,7 @@ def make_group(spec: Mapping[str, Any], seed: int, number: int, file: object) ->
     try:
         if kind in ('grid', 'zip'):
             axes = _each(spec[kind], axis_values, place, file)
-            return Grid(axes) if kind == 'grid' else Zip(axes)
+            return FullFactorial(axes) if kind == 'grid' else Zip(axes)
         drawn = _each(spec[kind], make_distribution, place, file)
         if kind == 'morris':
             _check_bounded(drawn, place, file)

@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     document = document_of(subject.name, models, left_out)
     with results_folder(out, overwrite=options.overwrite, inputs=paths) as results:
         write_json(results.folder / DOCUMENT, document)
-        from auv_analysis.studies.linearize.modes import draw  # with matplotlib, which loads slowly
+        from auv_analysis.studies.linearize.plots import draw  # with matplotlib, which loads slowly
 
         with waiting('drawing the pole map'):
             draw(models, results.folder / 'figures')

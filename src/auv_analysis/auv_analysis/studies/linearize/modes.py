@@ -1,17 +1,13 @@
-"""The poles of linear models: damping, frequency, where each one lives; document, table and map."""
+"""The poles of linear models: damping, frequency, where each one lives; document and table."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.linalg
-from matplotlib.axes import Axes
 from rich.console import Console
 
 from auv_analysis.output.progress import TextConsole
-from auv_analysis.report import plots
-from auv_analysis.report.plots import COLOURS, GREY, Drawn, FigureRecord, save_figures
 from auv_analysis.report.results import Shown, described, make_table, terminal
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.studies.linearize.linearize import Linearization, linearize
@@ -166,58 +162,3 @@ def _verdict(model: dict[str, Any]) -> str:
     if any(abs(rate) > 1e-9 for rate in model['drift']):
         text += '; the point moves: it turns while it is inclined'
     return text
-
-
-MARKS = ('o', 'x', '+', 's', '^', 'v')
-DAMPING = (0.2, 0.4, 0.6, 0.8)  # lines of constant damping ratio
-SLOW = 1.5  # the second panel ends at so many times the median size of the poles
-
-
-def draw(models: Mapping[str, Linearization], folder: Path) -> dict[str, FigureRecord]:
-    """Draw the pole map as PNG and PDF: name -> figure; `folder` is made where it is not there."""
-    return save_figures(folder, {'poles': lambda: _pole_map(models)})
-
-
-def _pole_map(models: Mapping[str, Linearization]) -> Drawn:
-    poles = {name: np.linalg.eigvals(model.A) for name, model in models.items()}
-    every = np.concatenate(list(poles.values()))
-    sizes = np.abs(every)[np.abs(every) > 1e-9]
-    near = SLOW * float(np.median(sizes)) if len(sizes) else 1.0
-    figure = plots.new_figure(3.1)
-    panels = figure.subplots(1, 2)
-    for index, (axes, limit) in enumerate(zip(panels, (np.abs(every).max(), near), strict=True)):
-        _panel(axes, poles, max(float(limit), 1e-9))
-        plots.letter(axes, index, ('all poles', 'the slow ones')[index])
-    panels[0].set_ylabel('imaginary part (rad/s)')
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc='outside lower center', ncols=min(len(labels), 4))
-    title = 'Poles'
-    ratios = ', '.join(f'{ratio:g}' for ratio in DAMPING)
-    caption = (
-        f'{title} of {", ".join(models)}. Left of the dark line a motion decays. Grey rays: '
-        f'damping ratios {ratios}, the steepest the least damped.'
-    )
-    return figure, title, caption
-
-
-def _panel(axes: Axes, poles: Mapping[str, np.ndarray], limit: float) -> None:
-    """Poles within +-limit, with the rays of constant damping; both axes of one scale."""
-    reach = 1.1 * limit
-    for ratio in DAMPING:
-        height = reach * np.sqrt(1 - ratio**2) / ratio
-        ray = ([-reach, 0, -reach], [height, 0, -height])
-        axes.plot(*ray, color=GREY, linewidth=0.4, alpha=0.7)
-    axes.axvline(0.0, color='black', linewidth=0.7)
-    right = 0.08 * reach
-    for index, (name, values) in enumerate(poles.items()):
-        shown = values[np.abs(values) <= limit * (1 + 1e-9)]
-        right = max(right, 1.1 * shown.real.max(initial=0.0))
-        colour, mark = COLOURS[index % len(COLOURS)], MARKS[index % len(MARKS)]
-        face = colour if mark in 'x+' else 'none'
-        style: dict[str, Any] = {'color': colour, 'facecolors': face, 's': 22, 'linewidths': 0.9}
-        axes.scatter(shown.real, shown.imag, marker=mark, label=name, zorder=3, **style)
-    axes.set_xlim(-reach, right)
-    largest = max(float(np.abs(v[np.abs(v) <= limit * (1 + 1e-9)].imag).max(initial=0.0))
-                  for v in poles.values())  # fmt: skip
-    axes.set_ylim(-max(1.15 * largest, 0.3 * reach), max(1.15 * largest, 0.3 * reach))
-    axes.set_xlabel('real part (1/s)')

@@ -159,12 +159,13 @@ def document(
     cursor = CrosshairTool(overlay=Span(dimension='height', line_dash=[3, 3], line_color=GREY))
     found = Document()
     columns = _columns(panels)
-    for panel in panels:
-        plot = _figure(panel, dashes, columns, time)
-        plot.add_tools(cursor)
-        for mark in faults:
-            _shade(plot, mark, faults)
-        found.add_root(plot)
+    with found.models.freeze():  # else all models are collected anew at every figure
+        for panel in panels:
+            plot = _figure(panel, dashes, columns, time)
+            plot.add_tools(cursor)
+            for mark in faults:
+                _shade(plot, mark, faults)
+            found.add_root(plot)
     roots = {str(plot.name): plot.id for plot in found.roots}
     return [found.to_json(deferred=False), roots]
 

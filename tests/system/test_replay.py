@@ -339,5 +339,5 @@ def test_the_law_of_a_bag_in_real_time_is_reproduced(tmp_path: Path) -> None:
     answers = open_loop(loop, loop.controller.law, loop.controller.gains)
     found = reproduction(loop, answers)
     assert found.holds, found.sentence()
-    assert answers.ns[0] > loop.series[interface.ODOM][0][50], 'not before its activation'
+    assert answers.ns[0] > loop.series[interface.ODOM][0][20], 'not before its activation'
     assert any('was not in charge' in note for note in answers.notes)

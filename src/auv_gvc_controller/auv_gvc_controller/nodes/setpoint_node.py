@@ -46,7 +46,7 @@ class SetpointNode(BulkNode):
         gap = max(interface.NANOSECONDS, (10 + self._horizon) * self._step_ns)
         self._guard = OdometryGuard(gap, Limits(), lockstep=False, patience=PATIENCE)
         self._newest = -1
-        self._stride = 1  # steps from one odometry to the next
+        self._gap = self._stride = 1  # steps from one odometry to the next; the usual number
         self._next = 0
         self._first, self._rows = 0, np.zeros((0, 12))
         steady_timer(self, 0.02, self._publish)
@@ -67,7 +67,8 @@ class SetpointNode(BulkNode):
             return
         newest = (ns - self._guard.origin) // self._step_ns
         if elapsed:
-            self._stride = max(1, newest - self._newest)
+            gap = max(1, newest - self._newest)
+            self._gap, self._stride = gap, min(gap, self._gap)  # a single delay is not the usual
         elif self._guard.restarts > restarts:  # what was published has stamps of the old time
             self._next = newest
         else:  # the first one, or the clock has jumped forward: no step is published twice

@@ -18,7 +18,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """A vehicle as an SDF model for Gazebo."""
-    from auv_analysis.formats.sdf import notes, sdf_text
+    from auv_analysis.formats.sdf_export import notes, sdf_text
     from auv_analysis.output.new_files import write_text
     from auv_analysis.output.progress import say
     from auv_dynamics.files.shipped import shipped

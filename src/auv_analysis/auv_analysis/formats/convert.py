@@ -8,9 +8,9 @@ import numpy as np
 import yaml
 
 from auv_analysis.formats.derivatives import ASSIGNED, read_derivatives
-from auv_analysis.formats.gazebo import read_gazebo
 from auv_analysis.formats.imported import Choices, ImportedVehicle
-from auv_analysis.formats.uuv import read_uuv, uuv_entries
+from auv_analysis.formats.sdf_import import read_gazebo
+from auv_analysis.formats.uuv_urdf import read_uuv, uuv_entries
 from auv_analysis.formats.xml_parts import parse_xml
 from auv_dynamics.files.errors import InputError, printable
 from auv_dynamics.files.yaml_files import parse_yaml, read_text

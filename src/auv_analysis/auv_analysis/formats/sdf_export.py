@@ -5,7 +5,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from auv_analysis.formats.gazebo import COLUMNS, FLUID, ROWS
+from auv_analysis.formats.sdf_import import COLUMNS, FLUID, ROWS
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.frames import swap_body_matrix, swap_inertia
 from auv_dynamics.vehicle.vehicle import Vehicle, skew

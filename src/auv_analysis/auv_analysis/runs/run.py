@@ -24,7 +24,7 @@ BLOCK = 8192  # samples that are worked on together: their arrays fit into a pro
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class RunInfo(ABC):
-    """What is known of a run beside its samples.
+    """Run metadata, beside the samples.
 
     Attributes
     ----------

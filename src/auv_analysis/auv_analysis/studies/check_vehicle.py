@@ -352,7 +352,7 @@ def _cruise_table(found: dict[str, Any], out: Console) -> None:
     _print(out, title, pole_rows(found['modes']), shown)
     said = {
         'unstable': 'it leaves straight motion',
-        'marginal': 'no pole grows, one does not decay',
+        'marginal': 'no unstable pole, one does not decay',
     }
     text = f'{found["verdict"]} at {found["speed"]:g} m/s without control'
     if found['verdict'] in said:

@@ -39,7 +39,7 @@ BUCKET, BUCKETS = 0.5, 20  # s, and how many of them errors are shown of
 
 
 class Stream:
-    """What is known of one topic.
+    """State of one topic.
 
     Messages that are not heard, because nobody listened, are counted by the numbers that the
     middleware gives them; stamps are judged between messages that follow each other.

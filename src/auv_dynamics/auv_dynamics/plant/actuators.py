@@ -34,7 +34,7 @@ class Actuators(NamedTuple):
     Attributes
     ----------
     ideal : the command is applied as it is
-    reach : which wrenches can be had
+    reach : attainable wrench set
     slew : (6,) largest change per step, N and N m
     follow : (6,) share of the remaining way that the first-order lag covers in a step
     delay : steps

@@ -153,7 +153,7 @@ def _without(dof: str, others: tuple[str, ...]) -> str:
 
 
 class AttainableWrench(NamedTuple):
-    """The wrenches that can be had: what a law may know of its actuators.
+    """Attainable wrench set: what a law may know of its actuators.
 
     Attributes
     ----------

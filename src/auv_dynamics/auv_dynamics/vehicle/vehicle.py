@@ -71,7 +71,7 @@ def row_major(A: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Vehicle:
-    """What is known of a vehicle, body frame forward-starboard-down, SI units.
+    """A vehicle: parameters in the body frame forward-starboard-down, SI units.
 
     Of many vehicles, see `fleet`, every number has a leading axis.
 

@@ -53,7 +53,7 @@ class AntiWindup(NamedTuple):
     ----------
     integrals : how many of the law's states, the first ones, are integrals: blocks of six, one
         per axis; 0: nothing is stopped
-    reach : which wrenches can be had
+    reach : attainable wrench set
 
     """
 

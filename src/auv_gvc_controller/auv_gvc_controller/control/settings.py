@@ -220,7 +220,7 @@ class ControllerSettings:
         return self.limits_wrench or tuple(believable.tolist())
 
     def _reach(self, vehicle: Vehicle) -> AttainableWrench:
-        """What anti-windup knows of the wrenches that can be had."""
+        """The attainable wrench set, for anti-windup."""
         if self.actuators_thrusters and vehicle.thrusters is None:
             expected = f'a vehicle with thrusters, not {vehicle.name}'
             raise InputError(self.source, 'actuators.thrusters', expected, 'true')

@@ -257,7 +257,7 @@ class Factor:
         return len(self.labels) > 1
 
     def concerns(self, controller: str) -> bool:
-        """Whether it has a say in the loop of a controller."""
+        """Whether it affects this controller."""
         parts = split(self.path)
         return parts[0] != 'controllers' or parts[1] in ('*', controller)
 

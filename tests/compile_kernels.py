@@ -24,6 +24,7 @@ from auv_analysis.studies.tune.cost import measured
 STEPS = 20
 SHARED, OWN = 'controllers.{}.k_D', 'setpoint.surge.offset'  # set-points that are shared, or not
 HOLDS: tuple[Hold, ...] = ('continuous', 'zoh')
+LIFT = 'case1_lauv'  # a vehicle with a lift matrix has kernels of its own
 
 
 class Called(NamedTuple):
@@ -32,11 +33,12 @@ class Called(NamedTuple):
     scenario: str
     batches: Sequence[tuple[str, Hold]] = ()
     is_tuned: bool = False
+    with_lift: str = ''
 
 
 LAWS = {
-    'gvc': Called('case1', [(path, hold) for path in (SHARED, OWN) for hold in HOLDS], True),
-    'cl': Called('case1', [(SHARED, 'continuous'), (OWN, 'continuous')], True),
+    'gvc': Called('case1', [(path, hold) for path in (SHARED, OWN) for hold in HOLDS], True, LIFT),
+    'cl': Called('case1', [(SHARED, 'continuous'), (OWN, 'continuous')], True, LIFT),
     'pid': Called('faults_bluerov2_heavy'),
     'smc': Called('faults_bluerov2_heavy'),
 }
@@ -71,6 +73,8 @@ def compile_all(law: str) -> None:
         simulate(scenario, law, 'continuous')
         for path, hold in called.batches:
             rollouts(scenario, law, {path.format(law): [0.1, 0.2]}, hold=hold)
+        for hold in HOLDS if called.with_lift else ():
+            simulate(shortened(called.with_lift, Path(folder)), law, hold)
         if called.is_tuned:
             measured(scenario, law, {'k_D': np.array([0.1, 0.2])}, 'continuous', 1)
 

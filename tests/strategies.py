@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from auv_dynamics.files.yaml_files import matrix6
+from auv_dynamics.vehicle import DOFS
 
 QUICK = settings(max_examples=int(os.environ.get('AUV_GVC_EXAMPLES', '25')))  # `make properties`
 
@@ -119,3 +120,20 @@ def gains(draw: st.DrawFn) -> dict[str, Any]:
 def full(value: Any) -> np.ndarray:
     """(6, 6) of a gain or coefficient as a file gives it."""
     return matrix6(value)
+
+
+# harmonic signals as a scenario has them, and an example
+NUMBERS = st.floats(-5.0, 5.0, allow_subnormal=False)
+TERMS = st.fixed_dictionaries(
+    {'amplitude': NUMBERS, 'omega': NUMBERS}, optional={'phase': NUMBERS}
+)  # fmt: skip
+ENTRIES = st.fixed_dictionaries(
+    {}, optional={'offset': NUMBERS, 'terms': st.lists(TERMS, max_size=3)}
+)
+SPECS = st.dictionaries(st.sampled_from(DOFS), ENTRIES)
+WORKED = {
+    'surge': {'offset': 0.2, 'terms': [{'amplitude': 1.0, 'omega': np.pi / 20}]},
+    'heave': {'terms': [{'amplitude': 1.5, 'omega': 0.4, 'phase': np.pi / 2},
+                        {'amplitude': -0.5, 'omega': 2.0}]},
+    'yaw': {'offset': -0.1},
+}  # fmt: skip

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from strategies import QUICK
+from strategies import QUICK, SPECS, WORKED
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.disturbance import Harmonics
@@ -13,20 +13,6 @@ from auv_dynamics.plant.parameters import flattened, listed, nested, parameters_
 from auv_dynamics.vehicle import DOFS
 
 GOOD = {'amplitude': [1.0, 2.0], 'omega': [3.0, 4.0], 'phase': [0.5, 0.6]}
-NUMBERS = st.floats(-5.0, 5.0, allow_subnormal=False)
-TERMS = st.fixed_dictionaries(
-    {'amplitude': NUMBERS, 'omega': NUMBERS}, optional={'phase': NUMBERS}
-)  # fmt: skip
-ENTRIES = st.fixed_dictionaries(
-    {}, optional={'offset': NUMBERS, 'terms': st.lists(TERMS, max_size=3)}
-)
-SPECS = st.dictionaries(st.sampled_from(DOFS), ENTRIES)
-WORKED = {
-    'surge': {'offset': 0.2, 'terms': [{'amplitude': 1.0, 'omega': np.pi / 20}]},
-    'heave': {'terms': [{'amplitude': 1.5, 'omega': 0.4, 'phase': np.pi / 2},
-                        {'amplitude': -0.5, 'omega': 2.0}]},
-    'yaw': {'offset': -0.1},
-}  # fmt: skip
 MATRIX = [[float(i == j) + 0.1 * (i + j) for j in range(6)] for i in range(6)]
 WAVE = {'offset': 0.5, 'terms': [{'amplitude': 1.0, 'omega': 2.0, 'phase': 0.1}]}
 WRITTEN = [  # key of a scenario, entry as it comes back: one of each kind

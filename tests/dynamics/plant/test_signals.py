@@ -6,25 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK
+from strategies import QUICK, SPECS, WORKED
 
 from auv_dynamics.plant.disturbance import Harmonics
-from auv_dynamics.vehicle import DOFS
-
-NUMBERS = st.floats(-5.0, 5.0, allow_subnormal=False)
-TERMS = st.fixed_dictionaries(
-    {'amplitude': NUMBERS, 'omega': NUMBERS}, optional={'phase': NUMBERS}
-)  # fmt: skip
-ENTRIES = st.fixed_dictionaries(
-    {}, optional={'offset': NUMBERS, 'terms': st.lists(TERMS, max_size=3)}
-)
-SPECS = st.dictionaries(st.sampled_from(DOFS), ENTRIES)
-WORKED = {
-    'surge': {'offset': 0.2, 'terms': [{'amplitude': 1.0, 'omega': np.pi / 20}]},
-    'heave': {'terms': [{'amplitude': 1.5, 'omega': 0.4, 'phase': np.pi / 2},
-                        {'amplitude': -0.5, 'omega': 2.0}]},
-    'yaw': {'offset': -0.1},
-}  # fmt: skip
 
 
 @QUICK

@@ -41,7 +41,7 @@ GROUPS = {
     },
     'Vehicles and laws compared': {
         'check-vehicle': 'inertia, couplings and limits of a vehicle',
-        'design': 'which change of a vehicle removes which coupling, simulated',
+        'design': 'suggest and simulate a hull change that removes a coupling',
         'linearize': 'poles and matrices of a vehicle or of its closed loops',
         'import-vehicle': 'a vehicle file from that of another system',
         'export-vehicle': 'a vehicle as an SDF model for Gazebo',

@@ -15,7 +15,7 @@ from auv_dynamics.files.shipped import shipped
 from auv_dynamics.plant.plant import initial_state
 
 BOOLE = np.array([14.0, 32.0, 12.0, 32.0]) * 2 / 45  # of order 6, one above ode5
-STEP, STEPS = 0.005, 200
+STEP, STEPS = 0.00125, 800  # the stiffest of vehicles() loses spin in some 20 ms
 
 
 def swell(mass: float) -> tuple[list[dict], Callable]:

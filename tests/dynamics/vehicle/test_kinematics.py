@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from physics import R_ANGLES, R, T, body, drive, vehicle_of
+from scipy.integrate import solve_ivp
 from strategies import QUICK, attitudes, vectors, vehicles
 
 from auv_dynamics.kernel.compile import plain
@@ -174,14 +175,17 @@ def test_velocity_is_in_the_body_frame_with_yaw():
     assert_allclose(x[-1, 7:10], [1.0, 0.5, 0.0], atol=1e-12)
 
 
-def runge_kutta(rate, y: np.ndarray, step: float, steps: int) -> np.ndarray:
-    """Classical fourth-order method, the test's own."""
-    for _ in range(steps):
-        a = rate(y)
-        b = rate(y + step / 2 * a)
-        c = rate(y + step / 2 * b)
-        y = y + step / 6 * (a + 2 * b + 2 * c + rate(y + step * c))
-    return y
+STEP, STEPS = (
+    0.0005,
+    200,
+)  # short enough for the stiffest of vehicles(), and for no Euler singularity
+
+
+def after(rate, y: np.ndarray) -> np.ndarray:
+    """State at the end of the run that `drive` makes, by SciPy's own method."""
+    return solve_ivp(
+        lambda _, y: rate(y), (0, STEP * STEPS), y, method='DOP853', rtol=1e-11, atol=1e-11
+    ).y[:, -1]
 
 
 def acceleration(m: dict, nu: np.ndarray, g: np.ndarray, tau: np.ndarray) -> np.ndarray:
@@ -190,18 +194,18 @@ def acceleration(m: dict, nu: np.ndarray, g: np.ndarray, tau: np.ndarray) -> np.
 
 
 def in_euler_angles(data: dict, eta: np.ndarray, nu: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """Eta and nu (12,) after 0.25 s by (2) in its Euler form."""
+    """Eta and nu (12,) at the end by (2) in its Euler form."""
     m = reference.vehicle_matrices(data)
 
     def rate(y: np.ndarray) -> np.ndarray:
         nu_dot = acceleration(m, y[6:], reference.restoring(m, y[:6]), tau)
         return np.concatenate([reference.jacobian(y[:6]) @ y[6:], nu_dot])
 
-    return runge_kutta(rate, np.concatenate([eta, nu]), 0.0025, 100)
+    return after(rate, np.concatenate([eta, nu]))
 
 
 def in_rotation_matrices(data: dict, x: np.ndarray, tau: np.ndarray) -> tuple:
-    """Position, R and nu after 0.25 s by R_dot = R S(omega), which has no singularity."""
+    """Position, R and nu at the end by R_dot = R S(omega), which has no singularity."""
     m = reference.vehicle_matrices(data)
     couple = m['W'] * m['r_G'] - m['B'] * m['r_B']
 
@@ -214,18 +218,18 @@ def in_rotation_matrices(data: dict, x: np.ndarray, tau: np.ndarray) -> tuple:
     w, v = x[3], x[4:7]  # R = 1 + 2 w S(v) + 2 S(v)^2
     S = reference.skew(v)
     start = np.eye(3) + 2 * w * S + 2 * S @ S
-    y = runge_kutta(rate, np.concatenate([x[:3], start.ravel(), x[7:]]), 0.0025, 100)
+    y = after(rate, np.concatenate([x[:3], start.ravel(), x[7:]]))
     return y[:3], y[3:12].reshape(3, 3), y[12:]
 
 
 @QUICK
-@given(vehicles(), attitudes(0.8), vectors(largest=1.0), vectors(largest=1.0))
+@given(vehicles(), attitudes(0.5), vectors(largest=1.0), vectors(largest=1.0))
 def test_a_run_is_the_same_in_quaternions_and_in_euler_angles(data, eta, nu, push):
     data['damping']['quadratic'] = [0.0] * 6  # a kink in abs(nu) would lower either's order
     data.pop('lift', None)
     tau = data['rigid_body']['mass'] * push
     expected = in_euler_angles(data, eta, nu, tau)
-    x = drive(vehicle_of(data), initial_state(eta, nu), tau=tau, step=0.0025, steps=100)
+    x = drive(vehicle_of(data), initial_state(eta, nu), tau=tau, step=STEP, steps=STEPS)
     scale = 1.0 + np.abs(expected[6:]).max()
     found = eta_of(x[-1])
     assert_allclose(found[:3], expected[:3], rtol=0, atol=1e-7 * scale)
@@ -242,7 +246,7 @@ def test_a_run_from_the_singularity_itself_is_right(side, data, phi, psi, nu, pu
     tau = data['rigid_body']['mass'] * push
     start = initial_state(np.array([1.0, -2.0, 3.0, phi, side * np.pi / 2, psi]), nu)
     p, attitude, velocity = in_rotation_matrices(data, start, tau)
-    x = drive(vehicle_of(data), start, tau=tau, step=0.0025, steps=100)
+    x = drive(vehicle_of(data), start, tau=tau, step=STEP, steps=STEPS)
     scale = 1.0 + np.abs(velocity).max()
     assert np.isfinite(x).all()
     assert np.isfinite(eta_of(x)).all()

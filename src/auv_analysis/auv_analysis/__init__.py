@@ -5,6 +5,7 @@
 - `load_run(bag)`, `open_bag(bag)`: the same `Run` of a recorded bag; with its attachments
 - `Run`: the samples of a closed loop, as arrays or, by `to_pandas()`, as a data frame
 - `summarize(run)`: its figures as plain data, as in summary.json
+- `open_loop(model, commands, start, step)`: the plant alone under recorded commands, many variants
 - `linearize(vehicle or scenario)`: the linear model of a vehicle or of a closed loop
 
 Many runs at once: `auv_analysis.simulation.rollouts`. On the command line: `auv --help`.
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from auv_analysis.metrics.summary import summarize
     from auv_analysis.runs.run import Run
     from auv_analysis.scenario.scenario import load_scenario
+    from auv_analysis.simulation.open_loop import open_loop
     from auv_analysis.simulation.simulate import simulate
     from auv_analysis.studies.linearize.linearize import linearize
 
@@ -28,8 +30,18 @@ _HOME = {
     'open_bag': 'auv_analysis.bag',
     'Run': 'auv_analysis.runs.run',
     'load_scenario': 'auv_analysis.scenario.scenario',
+    'open_loop': 'auv_analysis.simulation.open_loop',
     'simulate': 'auv_analysis.simulation.simulate',
     'summarize': 'auv_analysis.metrics.summary',
 }
-__all__ = ['Run', 'linearize', 'load_run', 'load_scenario', 'open_bag', 'simulate', 'summarize']
+__all__ = [
+    'Run',
+    'linearize',
+    'load_run',
+    'load_scenario',
+    'open_bag',
+    'open_loop',
+    'simulate',
+    'summarize',
+]
 __getattr__, __dir__ = lazy_names(__name__, _HOME)

@@ -69,6 +69,33 @@ def row_major(A: np.ndarray) -> np.ndarray:
     return np.array(A, float).reshape(*np.shape(A)[:-2], 36)
 
 
+def make_model(
+    M: np.ndarray,
+    D_linear: np.ndarray,
+    D_quadratic: np.ndarray,
+    hydrostatics: np.ndarray,
+    lift: np.ndarray | None = None,
+) -> Model:
+    """Coefficients as the kernel takes them, with any number of leading axes.
+
+    Parameters
+    ----------
+    M : (..., 6, 6) inertia with added mass, symmetric positive definite
+    D_linear, D_quadratic : (..., 6, 6) positive damping; column j multiplies 1, abs(nu_j)
+    hydrostatics : (..., 4) W - B in N, then W r_G - B r_B in N m
+    lift : (..., 6, 6) positive lift of body and fins, which multiplies abs(u); None: none
+
+    """
+    return Model(
+        M=row_major(M),
+        M_inv=row_major(np.linalg.inv(M)),
+        D_linear=row_major(D_linear),
+        D_quadratic=row_major(D_quadratic),
+        hydrostatics=np.array(hydrostatics, float),
+        lift=None if lift is None else row_major(lift),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Vehicle:
     """A vehicle: parameters in the body frame forward-starboard-down, SI units.
@@ -110,14 +137,8 @@ class Vehicle:
         weight, buoyancy = (np.asarray(force)[..., None] for force in (self.weight, self.buoyancy))
         couple = weight * self.r_G - buoyancy * self.r_B
         heavy = np.broadcast_to(weight - buoyancy, (*couple.shape[:-1], 1))
-        return Model(
-            M=row_major(self.M),
-            M_inv=row_major(np.linalg.inv(self.M)),
-            D_linear=row_major(self.D_linear),
-            D_quadratic=row_major(self.D_quadratic),
-            hydrostatics=np.concatenate([heavy, couple], axis=-1),
-            lift=None if self.lift is None else row_major(self.lift),
-        )
+        hydrostatics = np.concatenate([heavy, couple], axis=-1)
+        return make_model(self.M, self.D_linear, self.D_quadratic, hydrostatics, self.lift)
 
     def changed(self, **values: Any) -> 'Vehicle':
         """Vehicle with some attributes replaced; M_RB and M_A are dropped unless given."""

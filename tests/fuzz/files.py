@@ -18,7 +18,7 @@ from auv_analysis.cli import main
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.replay.open_loop import open_loop, recorded_loop
 from auv_analysis.replay.played_bag import LATEST, index_bag, messages
-from auv_analysis.replay.selection import Wish, select
+from auv_analysis.replay.selection import ReplaySettings, select
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
@@ -158,7 +158,7 @@ def try_costly_bag(data: bytes) -> str:
 def try_replay(bag: Path) -> None:
     """Read what a replay would publish, and let a law answer what was recorded."""
     index = index_bag(bag)
-    selection = select(index, Wish(), lambda name: name)
+    selection = select(index, ReplaySettings(), lambda name: name)
     for message in messages(index, selection.names, 0, LATEST):
         if not 0 <= message.ns <= LATEST:
             raise CrashError(f'a message at {message.ns} ns')

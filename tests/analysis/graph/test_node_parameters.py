@@ -37,7 +37,7 @@ CONTRACT = {  # every name of the contract's table that is not optional
 }  # fmt: skip
 WORDS = {
     'vehicle', 'integrator', 'law', 'setpoint_pairing', 'setpoint_acceleration', 'bag',
-    'odom_frame', 'base_frame', 'storage.compression', 'kind', 'stamp_clock',
+    'odom_frame', 'base_frame', 'storage.compression', 'kind', 'stamp_clock', 'exclude',
 }  # fmt: skip
 WHOLE = {
     'storage.max_size',
@@ -101,7 +101,7 @@ def _entries(parameters: dict[str, dict[str, Any]]) -> Iterator[tuple[str, Any]]
 
 
 def _expected_type(name: str) -> type | tuple[type, type]:
-    last = name.rpartition('.')[2]
+    last = '' if name.startswith('setpoint_filter.') else name.rpartition('.')[2]
     for names, kind in (
         (WORDS, str), (WHOLE, int), (SWITCHES, bool), (LISTS_OF_WORDS, (list, str)),
         (LISTS, (list, float)),

@@ -6,7 +6,7 @@ import pytest
 
 from auv_analysis.bag.step_topics import ODOMETRY, TWIST, WRENCH
 from auv_analysis.replay.played_bag import BagIndex, PlayedTopic
-from auv_analysis.replay.selection import Wish, is_command, select
+from auv_analysis.replay.selection import ReplaySettings, is_command, select
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface
 
@@ -43,42 +43,44 @@ def resolved(name: str) -> str:
 
 
 def test_everything_but_what_is_derived_comes_under_replay() -> None:
-    found = select(index(), Wish(), resolved)
+    found = select(index(), ReplaySettings(), resolved)
     assert found.names == {t: f'replay{t}' for t in KINDS if t not in DERIVED}
     assert found.left_out.keys() == DERIVED
     assert not found.guarded
 
 
 def test_all_is_all() -> None:
-    found = select(index(), Wish(everything=True), resolved)
+    found = select(index(), ReplaySettings(everything=True), resolved)
     assert found.names.keys() == KINDS.keys()
 
 
 @pytest.mark.parametrize('names', [{'original_names': True}, {'namespace': '/auv1'}])
 def test_outside_of_replay_commands_are_left_out(names: dict) -> None:
     root = '' if 'original_names' in names else '/auv1'
-    found = select(index(), Wish(**names), resolved)
+    found = select(index(), ReplaySettings(**names), resolved)
     assert found.names == {t: f'{root}{t}' for t in KINDS if t not in DERIVED | COMMANDS}
     assert found.left_out.keys() == DERIVED | COMMANDS
-    told = select(index(), Wish(**names, commands=True), resolved)
+    told = select(index(), ReplaySettings(**names, commands=True), resolved)
     assert told.guarded == COMMANDS
     assert told.left_out.keys() == DERIVED
 
 
 def test_there_is_one_clock_whatever_is_asked_for() -> None:
-    wish = Wish(original_names=True, everything=True, commands=True)
+    wish = ReplaySettings(original_names=True, everything=True, commands=True)
     found = select(index(), wish, resolved)
     assert found.left_out == {'/clock': 'the time of the replay stands there'}
 
 
 def test_a_name_counts_after_remapping() -> None:
     remaps = {'replay/wrench': '/wrench', 'replay/cmd_vel': '/other/replay/cmd_vel'}
-    found = select(index(), Wish(), lambda name: remaps.get(name, resolved(name)))
+    found = select(index(), ReplaySettings(), lambda name: remaps.get(name, resolved(name)))
     assert found.left_out.keys() == DERIVED | {'/wrench'}
 
 
 def test_patterns_choose_topics() -> None:
-    found = select(index(), Wish(topics=('odom', '/dist*', 'analysis/delta_xi')), resolved)
+    found = select(
+        index(), ReplaySettings(topics=('odom', '/dist*', 'analysis/delta_xi')), resolved
+    )
     assert found.names.keys() == {
         '/odom', '/disturbance', '/disturbance_estimate', '/analysis/delta_xi'
     }  # fmt: skip
@@ -88,7 +90,7 @@ def test_patterns_choose_topics() -> None:
 def test_a_vehicle_in_a_namespace_has_the_same_topics() -> None:
     spaced = {f'/auv1{topic}' if topic not in ('/clock', '/diagnostics') else topic: kind
               for topic, kind in KINDS.items()}  # fmt: skip
-    found = select(index(spaced), Wish(original_names=True), resolved)
+    found = select(index(spaced), ReplaySettings(original_names=True), resolved)
     left = {t if t in ('/clock', '/diagnostics') else f'/auv1{t}' for t in DERIVED | COMMANDS}
     assert found.left_out.keys() == left
 
@@ -116,15 +118,19 @@ def test_what_a_command_is(topic: str, kind: str, expected: bool) -> None:
 @pytest.mark.parametrize(
     ('wish', 'bag', 'words'),
     [
-        (Wish(topics=('sonar',)), index(), 'topics: expected one of .* found sonar'),
-        (Wish(topics=('clock',), original_names=True), index(), 'the time of the replay'),
-        (Wish(original_names=True), index({'/wrench': WRENCH}), '--commands publishes it'),
-        (Wish(), index({}), 'expected a topic that can be played'),
-        (Wish(), index(encoding='ros1'), 'its messages are ros1, not cdr'),
-        (Wish(), index({'/a-b': STRING}), 'not a name of a ROS topic'),
-        (Wish(), index({'//a': STRING}), 'not a name of a ROS topic'),
+        (ReplaySettings(topics=('sonar',)), index(), 'topics: expected one of .* found sonar'),
+        (ReplaySettings(topics=('clock',), original_names=True), index(), 'the time of the replay'),
+        (
+            ReplaySettings(original_names=True),
+            index({'/wrench': WRENCH}),
+            '--commands publishes it',
+        ),
+        (ReplaySettings(), index({}), 'expected a topic that can be played'),
+        (ReplaySettings(), index(encoding='ros1'), 'its messages are ros1, not cdr'),
+        (ReplaySettings(), index({'/a-b': STRING}), 'not a name of a ROS topic'),
+        (ReplaySettings(), index({'//a': STRING}), 'not a name of a ROS topic'),
     ],
 )
-def test_refuses_to_play_nothing(wish: Wish, bag: BagIndex, words: str) -> None:
+def test_refuses_to_play_nothing(wish: ReplaySettings, bag: BagIndex, words: str) -> None:
     with pytest.raises(InputError, match=words):
         select(bag, wish, resolved)

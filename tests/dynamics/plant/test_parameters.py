@@ -9,7 +9,8 @@ from strategies import QUICK, SPECS, WORKED
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.disturbance import Harmonics
-from auv_dynamics.plant.parameters import flattened, listed, nested, parameters_of, part
+from auv_dynamics.plant.parameters import flattened, nested, parameters_of, part
+from auv_dynamics.ros.settings import PlantSettings, as_parameters, entries, read_settings
 from auv_dynamics.vehicle import DOFS
 
 GOOD = {'amplitude': [1.0, 2.0], 'omega': [3.0, 4.0], 'phase': [0.5, 0.6]}
@@ -67,10 +68,30 @@ def test_columns_of_a_worked_setpoint():
     }  # fmt: skip
 
 
-def test_entries_of_a_list_have_names():
-    flat = listed('faults', [spec for key, spec in WRITTEN if key == 'faults'][:2])
+def test_settings_come_back_from_their_parameters():
+    faults = [spec for key, spec in WRITTEN if key == 'faults'][:2]
+    settings = PlantSettings(
+        vehicle='rexrov',
+        recorder_window=7,
+        initial_nu=(0.1,) * 6,
+        actuators={'limit': 5.0, 'thrusters': True},
+        disturbance=entries('disturbance', [{'kind': 'harmonic', 'sway': WAVE}]),
+        faults=entries('faults', faults),
+    )
+    flat = as_parameters(settings)
     assert flat['faults.names'] == ['f1_sensor_drop_out', 'f2_sensor_delay']
     assert flat['faults.f2_sensor_delay.delay'] == 0.1
+    assert 'start_after' not in flat  # an empty list has no type
+    assert read_settings(PlantSettings, reader_of(flat), 'file') == settings
+
+
+def test_settings_that_are_needed_are_named():
+    with pytest.raises(InputError, match='node: vehicle: expected a vehicle file, found nothing'):
+        read_settings(PlantSettings, reader_of({}), 'node')
+
+
+def reader_of(values):
+    return lambda name, kind, default, text, **accepted: values.get(name, default)
 
 
 @pytest.mark.parametrize('dof', DOFS)

@@ -142,7 +142,7 @@ def _play(running: Any, keyboard: Keyboard) -> None:
     from auv_analysis.output.progress import bar, say
 
     node = running.node
-    player, p = node.player, node.settings
+    player, p = node.player, node.plan
     if keyboard.there:
         say(KEYS)
     with bar(TextColumn('{task.completed:.2f} of {task.total:.2f} s')) as shown:
@@ -178,7 +178,7 @@ def _obey(player: Any, keys: bytes) -> None:
 
 
 def _document(node: Any, keyboard: Keyboard, elapsed: float) -> dict[str, Any]:
-    player, p = node.player, node.settings
+    player, p = node.player, node.plan
     topics = {
         topic: {
             'published_as': name,

@@ -1,15 +1,20 @@
 """A scenario as ROS parameters: one file per controller, for `auv run`, launch and `ros2 run`."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from auv_analysis.graph.node_settings import AnalysisSettings, RecorderSettings
 from auv_analysis.scenario.scenario import Scenario
-from auv_dynamics.plant.parameters import flattened, listed, numbers, part
+from auv_dynamics.plant.parameters import numbers
 from auv_dynamics.ros import interface
-from auv_gvc_controller.control.settings import ControllerSettings
+from auv_dynamics.ros.settings import GraphSettings, PlantSettings, as_parameters, entries
+from auv_gvc_controller.control.setpoint import SetpointSettings
+from auv_gvc_controller.control.setpoint_buffer import SAME
+from auv_gvc_controller.control.settings import EXACT, LATEST, ControllerSettings
 
 PLANT, SETPOINT, CONTROLLER = 'plant_node', 'setpoint_node', 'controller_node'
 ANALYSIS, RECORDER = 'analysis_node', interface.RECORDER
@@ -76,54 +81,46 @@ def node_parameters(
     nodes = [PLANT] * plant + [SETPOINT, CONTROLLER]
     nodes += [ANALYSIS] * analysis + [RECORDER] * (bag is not None)
     vehicle = vehicle or str(scenario.vehicle_path.resolve())
-    clock = {'use_sim_time': use_sim_time}
-    grid = {'step': scenario.step, 'duration': scenario.duration}
-    parameters: dict[str, dict[str, Any]] = {
-        PLANT: {'use_sim_time': False, **_plant(scenario, vehicle, nodes, lockstep)},
-        SETPOINT: {
-            **clock,
-            **grid,
-            'horizon': HORIZON if lockstep else 0,
-            **_of_key(scenario, 'setpoint'),
-        },
-        CONTROLLER: {**clock, **_controller(scenario, controller, vehicle, lockstep)},
-    }
-    sensing = plant and scenario.senses
-    if analysis:
-        parameters[ANALYSIS] = {
-            **clock, 'vehicle': vehicle, 'every': EVERY, 'ground_truth': sensing
-        }  # fmt: skip
-    if not plant:
-        del parameters[PLANT]
-    published = _published(scenario)
-    for publisher, values in parameters.items():
-        counts = {
-            topic: sum(_listens(node, topic, sensing) for node in who if node in nodes)
-            for topic, who in SUBSCRIBERS[publisher].items()
-            if topic in published
-        }
-        listed = [f'{topic}={count}' for topic, count in counts.items() if count]
-        values.update(_frames(), lockstep=lockstep, expected_subscribers=listed)
-    if bag is not None:
-        parameters[RECORDER] = {
-            **clock,
-            **grid,
-            'bag': str(bag),
-            'topics': [
+    grid = scenario.step, scenario.duration
+    sensing, published = plant and scenario.senses, _published(scenario)
+    horizon, attached = HORIZON if lockstep else 0, (attachments or {}).items()
+    known, gains = scenario.controller(controller), scenario.gain_values(controller)
+    law = {'law': known['law'], 'vehicle': vehicle, 'autostart': True}
+    law |= {f'gains.{name}': numbers(value) for name, value in gains.items()}
+    settings: dict[str, Any] = {
+        PLANT: _plant(scenario, vehicle, nodes, lockstep),
+        SETPOINT: SetpointSettings(*grid, horizon, scenario.data['setpoint']),
+        CONTROLLER: _controller(scenario, known.get('anti_windup', True), lockstep),
+        ANALYSIS: AnalysisSettings(vehicle, EVERY, sensing),
+        RECORDER: RecorderSettings(
+            *grid,
+            str(bag),
+            tuple(
                 topic
                 for topic in (*interface.STEP_TOPICS, *interface.OPTIONAL_STEP_TOPICS)
                 if topic in published and (plant or topic not in OF_PLANT_ALONE)
-            ],
-            'strict': lockstep,
-            'analysis_every': EVERY if analysis and plant else 0,
-            'storage.compression': 'zstd',
-            'storage.chunk_size': 1 << 20,
-            'storage.max_size': 0,
-            'storage.max_duration': 0.0,
-            'storage.free_space': 1 << 25,
-            'attachments': [f'{name}={path}' for name, path in (attachments or {}).items()],
+            ),
+            strict=lockstep,
+            analysis_every=EVERY if analysis and plant else 0,
+            attachments=tuple(f'{name}={path}' for name, path in attached),
+        ),
+    }
+    parameters: dict[str, dict[str, Any]] = {}
+    for node in nodes:
+        counts = {
+            topic: sum(_listens(other, topic, sensing) for other in who if other in nodes)
+            for topic, who in SUBSCRIBERS.get(node, {}).items()
+            if topic in published
         }
-    return {node: _without_empty_lists(values) for node, values in parameters.items()}
+        expected = tuple(f'{topic}={count}' for topic, count in counts.items() if count)
+        common = GraphSettings(lockstep, expected_subscribers=expected)
+        parameters[node] = {
+            'use_sim_time': use_sim_time and node != PLANT,
+            **(law if node == CONTROLLER else {}),
+            **as_parameters(settings[node]),
+            **(as_parameters(common) if node != RECORDER else {}),
+        }
+    return parameters
 
 
 def _published(scenario: Scenario) -> list[str]:
@@ -139,91 +136,52 @@ def _listens(node: str, topic: str, sensing: bool) -> bool:
     return node != ANALYSIS or topic != unused
 
 
-def _frames() -> dict[str, str]:
-    return {'odom_frame': 'odom_ned', 'base_frame': 'base_link_fsd'}
+def _plant(scenario: Scenario, vehicle: str, nodes: list[str], lockstep: bool) -> PlantSettings:
+    data = scenario.data
+    return PlantSettings(
+        scenario.step,
+        scenario.duration,
+        vehicle,
+        recorder_window=WINDOW if RECORDER in nodes and lockstep else 0,
+        integrator=data['integrator'],
+        seed=data['seed'],
+        initial_eta=data['initial']['eta'],
+        initial_nu=data['initial']['nu'],
+        start_after=tuple(node for node in nodes if node != PLANT),
+        wrench_timeout=WRENCH_TIMEOUT if lockstep else TIMEOUT,
+        disturbance=entries('disturbance', data['disturbance']),
+        actuators=data.get('actuators', {}),
+        sensors=data.get('sensors', {}),
+        faults=entries('faults', [fault.spec for fault in scenario.faults.entries]),
+    )
 
 
-def _plant(scenario: Scenario, vehicle: str, nodes: list[str], lockstep: bool) -> dict[str, Any]:
-    others = [node for node in nodes if node != PLANT]
-    parameters: dict[str, Any] = {
-        'vehicle': vehicle,
-        'step': scenario.step,
-        'duration': scenario.duration,
-        'start_paused': False,
-        'publish_clock': True,
-        'recorder_window': WINDOW if RECORDER in nodes and lockstep else 0,
-        'integrator': scenario.data['integrator'],
-        'seed': scenario.data['seed'],
-        'initial.eta': scenario.data['initial']['eta'],
-        'initial.nu': scenario.data['initial']['nu'],
-        'start_after': others,
-        'wrench_timeout': WRENCH_TIMEOUT if lockstep else TIMEOUT,
-    }
-    parameters |= listed('disturbance', scenario.data['disturbance'])
-    parameters |= _of_key(scenario, 'actuators') | _of_key(scenario, 'sensors')
-    return parameters | listed('faults', [fault.spec for fault in scenario.faults.entries])
+def _controller(scenario: Scenario, anti_windup: bool, lockstep: bool) -> ControllerSettings:
+    """Settings of a controller, with what it is told of the actuators.
 
-
-def _of_key(scenario: Scenario, key: str) -> dict[str, Any]:
-    """Parameters of a key of the scenario that is a mapping."""
-    flat = flattened(part(key), scenario.data.get(key, {}))
-    return {f'{key}.{name}': value for name, value in flat.items()}
-
-
-def _controller(
-    scenario: Scenario, controller: str, vehicle: str, lockstep: bool
-) -> dict[str, Any]:
-    known = {'law': scenario.controller(controller)['law']}
-    if 'actuators' in scenario.data:
-        known.update(_anti_windup(scenario, controller))
-    parameters = {
-        **known,
-        'vehicle': vehicle,
-        'setpoint_pairing': 'exact' if lockstep else 'latest',
-        'setpoint_acceleration': 'topic',
-        'setpoint_timeout': TIMEOUT,
-        'odometry_timeout': TIMEOUT,
-        'ramp': ControllerSettings.ramp,
-        'stamp_clock': ControllerSettings.stamp_clock,
-        'limits.gap': max(ControllerSettings.limits_gap, 10 * scenario.step),
-        **{f'limits.{name}': value for name, value in _limits(scenario, lockstep).items()},
-        'autostart': True,
-    }
-    gains = scenario.gain_values(controller)
-    return {**parameters, **{f'gains.{name}': numbers(value) for name, value in gains.items()}}
-
-
-def _anti_windup(scenario: Scenario, controller: str) -> dict[str, Any]:
-    """What the controller is told of the actuators."""
-    spec = scenario.data['actuators']
-    told: dict[str, Any] = {'anti_windup': scenario.controller(controller).get('anti_windup', True)}
-    if 'limit' in spec:
-        told['actuators.limit'] = numbers(spec['limit'])
-    if spec.get('thrusters'):
-        told['actuators.thrusters'] = True
-    return told
-
-
-def _limits(scenario: Scenario, lockstep: bool) -> dict[str, Any]:
-    """What the controller believes; in lock-step more than the plant, which ends at 100 m/s.
-
-    Beside a vehicle, also the largest wrench of its thrusters, where they are known.
+    In lock-step it believes more than the plant, which ends at 100 m/s. Beside a vehicle it is told
+    the largest wrench of the thrusters, where they are known.
     """
+    actuators, thrusters = scenario.data.get('actuators', {}), scenario.vehicle.thrusters
+    settings = ControllerSettings(
+        lockstep,
+        LATEST,
+        SAME,
+        limits_gap=max(ControllerSettings.limits_gap, 10 * scenario.step),
+        actuators_limit=tuple(numbers(actuators.get('limit', []))),
+        actuators_thrusters=bool(actuators.get('thrusters')),
+        anti_windup=anti_windup,
+    )
     if lockstep:
-        return {'speed': 120.0, 'rate': 120.0, 'acceleration': 1e5}
-    usual = ControllerSettings
-    believed = {
-        'speed': usual.limits_speed,
-        'rate': usual.limits_rate,
-        'acceleration': usual.limits_acceleration,
-    }
-    thrusters = scenario.vehicle.thrusters
-    return believed if thrusters is None else {**believed, 'wrench': thrusters.largest().tolist()}
-
-
-def _without_empty_lists(parameters: dict[str, Any]) -> dict[str, Any]:
-    # an empty list has no type in a ROS parameter file
-    return {name: value for name, value in parameters.items() if value != []}
+        return replace(
+            settings,
+            setpoint_pairing=EXACT,
+            limits_speed=120.0,
+            limits_rate=120.0,
+            limits_acceleration=1e5,
+        )
+    largest = thrusters.largest().tolist() if thrusters is not None else ()
+    return replace(settings, limits_wrench=tuple(largest))
 
 
 def parameter_file(parameters: Mapping[str, Mapping[str, Any]], comment: str) -> str:

@@ -5,17 +5,17 @@ from typing import Any
 
 import numpy as np
 
+from auv_analysis.graph.node_settings import AnalysisSettings
 from auv_analysis.metrics.coupling import LiveAnalysis
 from auv_dynamics import load_vehicle
-from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.endpoints import why_silent
 from auv_dynamics.ros.node_interface import OK, STALE, Health, NodeInterface
 from auv_dynamics.ros.node_main import BulkNode, main_of
-from auv_dynamics.ros.parameters import declare, refuse_unknown
+from auv_dynamics.ros.parameters import declare_settings
 
-CAPACITY = 2 * topics.DEPTH  # messages per topic that wait for their odometry
+CAPACITY = 2 * interface.DEPTH  # messages per topic that wait for their odometry
 HEARD = (
     topics.ODOM, topics.CMD_VEL, topics.WRENCH, topics.DISTURBANCE, topics.DISTURBANCE_ESTIMATE
 )  # fmt: skip
@@ -27,16 +27,10 @@ class AnalysisNode(BulkNode):
     def __init__(self, **options: Any):
         super().__init__('analysis_node', **options)
         self.graph = NodeInterface(self)
-        vehicle = declare(self, 'vehicle', str, '', 'vehicle file, or shipped bare name')
-        self._every = declare(self, 'every', int, 10, 'steps between samples', at_least=1)
-        truth = declare(
-            self, 'ground_truth', bool, False, 'look at ground_truth/odom in place of odom'
-        )
-        refuse_unknown(self)
-        self._odometry = topics.GROUND_TRUTH if truth else topics.ODOM
-        if not vehicle:
-            raise InputError(self.get_name(), 'vehicle', 'a vehicle file', None)
-        known = load_vehicle(vehicle)
+        p = declare_settings(self, AnalysisSettings)
+        self._every = p.every
+        self._odometry = topics.GROUND_TRUTH if p.ground_truth else topics.ODOM
+        known = load_vehicle(p.vehicle)
         self.graph.hardware_id = known.name
         self._live = LiveAnalysis(known)
         self._k = 0  # odometry messages so far

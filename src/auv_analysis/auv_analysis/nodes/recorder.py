@@ -20,28 +20,20 @@ from rclpy.qos import (
 from rclpy.subscription import Subscription
 
 from auv_analysis.bag.metadata import RECORDING, recording_text
-from auv_analysis.bag.output import (
-    COMPRESSIONS,
-    FREE_SPACE,
-    LARGEST_CHUNK,
-    LEAST_DURATION,
-    LEAST_SIZE,
-    Storage,
-)
+from auv_analysis.bag.output import LEAST_DURATION, LEAST_SIZE, Storage
 from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import BagWriter
+from auv_analysis.graph.node_settings import ALL, RecorderSettings
 from auv_dynamics.files.errors import InputError, first_line, reason
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.files.yaml_files import read_text
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.endpoints import qos_conflict
-from auv_dynamics.ros.interface import GLOBALS, NANOSECONDS
+from auv_dynamics.ros.interface import DEPTH, GLOBALS, NANOSECONDS
 from auv_dynamics.ros.node_main import BulkNode
-from auv_dynamics.ros.parameters import declare, declare_grid, refuse_unknown
 from auv_dynamics.ros.rclpy_internals import RCLError, raw_class
-from auv_dynamics.ros.topics import DEPTH, message_class
+from auv_dynamics.ros.topics import message_class
 
-ALL = 'all'
 UNRECORDED = ('/rosout', '/parameter_events')  # unless they are asked for by name
 Take = Callable[[str, str, bytes, dict[str, Any]], None]  # topic, type, message, what is known
 EPOCH = 86_400 * NANOSECONDS  # ns between two clocks, from which they have different epochs
@@ -229,89 +221,36 @@ class GraphClock:
         return waiting
 
 
-@dataclass(frozen=True)
-class RecorderParameters:
-    """What the recorder was asked for.
-
-    Attributes
-    ----------
-    bag : its folder
-    writer : of the bag, open
-    topics : step topics that are expected, each step of each
-    others : which other topics are recorded
-    step_ns : ns between steps
-    last : index of the last step, None: until SIGTERM
-    last_due : stamp in ns of analysis' last sample, None: not waited for
-    strict : every step once and in order, as in lock-step; else gaps are only counted
-
-    """
-
-    bag: Path
-    writer: BagWriter
-    topics: tuple[str, ...]
-    others: Wanted
-    step_ns: int
-    last: int | None
-    last_due: int | None
-    strict: bool
-
-
-def recorder_parameters(node: Node) -> RecorderParameters:
-    """Declare and check the parameters, open the bag; InputError when something is wrong."""
-    name = node.get_name()
-    known = [topic.name for topic in topics.STEP_TOPICS]
-    bag = declare(node, 'bag', str, '', 'folder of the bag')
-    usual = list(interface.STEP_TOPICS)
-    expected = declare(node, 'topics', list[str], usual, 'step topics that are expected')
-    others = _others(node)
-    grid = declare_grid(node)
-    every = declare(
-        node, 'analysis_every', int, 0, 'steps between analysis samples, 0: not waited for',
-        at_least=0,
-    )  # fmt: skip
-    strict = declare(node, 'strict', bool, True, 'a lost or doubled step ends the recording')
-    pace = node.resolve_topic_name(expected[0]) if expected else ''
-    storage = _storage(node, pace)
-    files = declare(node, 'attachments', list[str], None, 'name=path of files kept in the bag')
-    refuse_unknown(node)
-    unknown = [topic for topic in expected if topic not in known]
+def make_writer(node: Node, p: RecorderSettings) -> BagWriter:
+    """Open the bag, once the settings are checked; InputError when something is wrong."""
+    name, known = node.get_name(), [topic.name for topic in topics.STEP_TOPICS]
+    unknown = [topic for topic in p.topics if topic not in known]
     if unknown:
         listed = f'step topics: {", ".join(known)}{meant(unknown[0], known)}'
         raise InputError(name, 'topics', listed, unknown[0])
-    if not bag:
-        raise InputError(name, 'bag', 'the folder of the bag', None)
     attachments = {}
-    for entry in files or []:
+    for entry in p.attachments:
         label, equals, path = entry.partition('=')
         source = Path(path if equals else label)
         attachments[label if equals else source.name] = read_text(source, 'attachment')
-    attachments[RECORDING] = recording_text(strict, remapped(node), node.get_namespace())
-    writer = _writer(name, Path(bag), attachments, storage)
-    step_ns, last = grid.step_ns, grid.last
-    due = last // every * every * step_ns if last is not None and every else None
-    return RecorderParameters(
-        Path(bag), writer, tuple(expected), others, step_ns, last, due, strict
-    )
+    attachments[RECORDING] = recording_text(p.strict, remapped(node), node.get_namespace())
+    pace = node.resolve_topic_name(p.topics[0]) if p.topics else ''
+    return _writer(name, Path(p.bag), attachments, _storage(name, p, pace))
 
 
-def _others(node: Node) -> Wanted:
+def make_wanted(node: Node, p: RecorderSettings) -> Wanted:
     """Topics beside those of the graph."""
-    name = node.get_name()
-    text = f'topics outside of the namespace that are recorded as well, or {ALL}'
-    listed = declare(node, 'extra_topics', list[str], None, text) or []
-    text = 'regular expression: topics in whose names it is found are not recorded, but for ours'
-    exclude = declare(node, 'exclude', str, '', text)
-    extra = []
-    for topic in listed:
+    name, extra = node.get_name(), []
+    for topic in p.extra_topics:
         try:
             extra.append(topic if topic == ALL else node.resolve_topic_name(topic))
         except (RCLError, ValueError):
             expected = f'names of topics, or {ALL}'
             raise InputError(name, 'extra_topics', expected, topic) from None
     try:
-        pattern = re.compile(exclude) if exclude else None
+        pattern = re.compile(p.exclude) if p.exclude else None
     except (re.error, RecursionError, OverflowError) as error:
-        raise InputError(name, 'exclude', f'a regular expression ({error})', exclude) from None
+        raise InputError(name, 'exclude', f'a regular expression ({error})', p.exclude) from None
     return Wanted(node.get_namespace(), tuple(extra), pattern)
 
 
@@ -326,32 +265,12 @@ def remapped(node: Node) -> dict[str, str]:
     return names
 
 
-def _storage(node: Node, pace: str) -> Storage:
-    compression = declare(
-        node, 'storage.compression', str, 'zstd', 'compression of chunks', one_of=list(COMPRESSIONS)
-    )
-    chunk_size = declare(
-        node,
-        'storage.chunk_size',
-        int,
-        1 << 20,
-        'bytes of a chunk',
-        at_least=1024,
-        at_most=LARGEST_CHUNK,
-    )
-    text = 'most bytes of a file; 0: one file'
-    max_size = declare(node, 'storage.max_size', int, 0, text, at_least=0)
-    text = 'most log time in a file, s; 0: one file'
-    max_duration = declare(
-        node, 'storage.max_duration', float, 0.0, text, at_least=0.0, at_most=1e9
-    )
-    text = 'bytes that stay free on the file system: with less, the recording ends'
-    free_space = declare(node, 'storage.free_space', int, FREE_SPACE, text, at_least=0)
-    if 0 < max_duration < LEAST_DURATION:
+def _storage(name: str, p: RecorderSettings, pace: str) -> Storage:
+    if 0 < p.max_duration < LEAST_DURATION:
         expected = f'0 for one file, or at least {LEAST_DURATION:g} s'
-        raise InputError(node.get_name(), 'storage.max_duration', expected, max_duration)
-    longest = round(max_duration * interface.NANOSECONDS)
-    return Storage(compression, chunk_size, max_size, longest, pace, free_space)
+        raise InputError(name, 'storage.max_duration', expected, p.max_duration)
+    longest = round(p.max_duration * interface.NANOSECONDS)
+    return Storage(p.compression, p.chunk_size, p.max_size, longest, pace, p.free_space)
 
 
 def _writer(name: str, bag: Path, attachments: dict[str, str], storage: Storage) -> BagWriter:

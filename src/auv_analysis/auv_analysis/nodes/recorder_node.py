@@ -10,12 +10,14 @@ from std_msgs.msg import Header
 from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import RecordingError
-from auv_analysis.nodes.recorder import GraphClock, OtherTopics, recorder_parameters
+from auv_analysis.graph.node_settings import RecorderSettings
+from auv_analysis.nodes.recorder import GraphClock, OtherTopics, make_wanted, make_writer
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.interface import RECORDER, BadMessageError
 from auv_dynamics.ros.node_interface import NodeInterface, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
+from auv_dynamics.ros.parameters import declare_settings
 from auv_dynamics.ros.topics import qos_entry, type_name
 
 
@@ -113,12 +115,16 @@ class RecorderNode(BulkNode):
 
     def __init__(self, **options: Any):
         super().__init__(RECORDER, **options)
-        self._settings = p = recorder_parameters(self)
-        self._writer = p.writer
+        self._settings = p = declare_settings(self, RecorderSettings)
+        grid, wanted = p.grid(RECORDER), make_wanted(self, p)
+        self._last, self._last_due = grid.last, None
+        if grid.last is not None and p.analysis_every:
+            self._last_due = grid.last // p.analysis_every * p.analysis_every * grid.step_ns
+        self._writer = make_writer(self, p)
         # in real time set-points lie on a grid of their own, ahead of the odometry
         ahead = () if p.strict else (topics.CMD_VEL.name, topics.CMD_ACCEL.name)
         self._counted = [topic for topic in p.topics if topic not in ahead] or list(p.topics)
-        self._ledger = StepLedger(self._counted, p.step_ns, p.strict)
+        self._ledger = StepLedger(self._counted, grid.step_ns, p.strict)
         self._publications = PublicationLedger(p.strict)
         self._time = GraphClock(self, p.strict)
         self._newest = {topics.LUMPED_ERROR.name: -1, topics.CLOCK.name: -1}  # stamps, ns
@@ -128,12 +134,12 @@ class RecorderNode(BulkNode):
         self.graph = NodeInterface(self, barrier=False, lockstep=p.strict)
         self._progress = self.graph.publisher(topics.PROGRESS, topics.one_at_a_time())
         self._ours = {self._record(topic) for topic in topics.TOPICS}
-        self._others = OtherTopics(self, p.others, self._take)
+        self._others = OtherTopics(self, wanted, self._take)
         steady_timer(self, 0.02, self._report)
         steady_timer(self, 0.2, self._keep)
         steady_timer(self, 0.5, lambda: self._others.look(self._ours))
         expected = ', '.join(p.topics)
-        self.begin(f'records {p.others.namespace} into {p.bag}, expects {expected}')
+        self.begin(f'records {wanted.namespace} into {p.bag}, expects {expected}')
 
     def _record(self, topic: topics.Topic) -> str:
         """Subscribe to a topic of the graph; its full name."""
@@ -228,9 +234,9 @@ class RecorderNode(BulkNode):
         if complete > self._reported:
             self._reported = complete
             self._say_progress()
-        p = self._settings
-        analysed = p.last_due is None or self._newest[topics.LUMPED_ERROR.name] >= p.last_due
-        if p.last is not None and complete >= p.last and analysed and self._clock_is_whole():
+        last, due = self._last, self._last_due
+        analysed = due is None or self._newest[topics.LUMPED_ERROR.name] >= due
+        if last is not None and complete >= last and analysed and self._clock_is_whole():
             self._end(0)
 
     def _clock_is_whole(self) -> bool:

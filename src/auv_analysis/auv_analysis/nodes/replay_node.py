@@ -22,7 +22,7 @@ from auv_analysis.nodes.replay_publishers import (
     make_publishers,
 )
 from auv_analysis.replay.played_bag import GAP, PlayedMessage, messages
-from auv_analysis.replay.selection import REPLAY, ReplayParameters, nothing_left, replay_parameters
+from auv_analysis.replay.selection import REPLAY, ReplayPlan, make_plan, nothing_left
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.endpoints import NAMED, NAMELESS, full_name, onlookers, other_publishers
@@ -136,15 +136,16 @@ class Player:
 
     """
 
-    def __init__(self, node: Any, settings: ReplayParameters):
-        self._node, self._settings = node, settings
-        index, selection = settings.index, settings.selection
+    def __init__(self, node: Any, plan: ReplayPlan):
+        self._node, self._plan = node, plan
+        index, selection, settings = plan.index, plan.selection, plan.settings
         self._publishers = make_publishers(node.graph, index.topics, selection)
         if not self._publishers:
             raise nothing_left(index, selection)
+        foreign = settings.allow_commands_to_foreign
         guarded = {topic: self._publishers[topic] for topic in selection.guarded}
-        self.guard = CommandGuard(node, guarded, settings.foreign, node.graph.complain)
-        self._commands = Commands(guarded, settings.foreign)
+        self.guard = CommandGuard(node, guarded, foreign, node.graph.complain)
+        self._commands = Commands(guarded, foreign)
         self._receivers = Receivers(node, self._publishers)
         self._answers = Answers(node.graph, settings.answers) if settings.answers else None
         self._publish_clock = node.graph.output(topics.CLOCK) if settings.clock else None
@@ -152,7 +153,7 @@ class Player:
             settings.rate, settings.start_paused, skips_gaps=settings.skip_gaps
         )
         self.published: Counter[str] = Counter()
-        self.loops, self.now_ns, self._clock_ns = 0, settings.begin, -1
+        self.loops, self.now_ns, self._clock_ns = 0, plan.begin, -1
         self.ended, self.failure = False, ''
         self._stream = self._rewound()
         self._next: PlayedMessage | None = None
@@ -170,7 +171,7 @@ class Player:
         """
         found = {interface.CLOCK: '--no-clock'} if self._publish_clock is not None else {}
         for topic, name in self.names.items():
-            measured = self._settings.index.topics[topic].kind == ODOMETRY
+            measured = self._plan.index.topics[topic].kind == ODOMETRY
             if measured and REPLAY not in name.split('/'):
                 found[name] = '--topics, or under /replay'
         return found
@@ -182,7 +183,7 @@ class Player:
 
     def waits_for(self) -> str:
         """Which of the expected subscribers are missing, or an empty text."""
-        for topic, count in self._settings.expected.items():
+        for topic, count in self._plan.expected.items():
             publisher = self._publishers[topic]
             found = publisher.get_subscription_count()
             found -= onlookers(self._node, publisher.topic_name) if found >= count else 0
@@ -254,13 +255,13 @@ class Player:
         return self.now_ns if message is None else message.ns
 
     def _rewound(self) -> Iterator[PlayedMessage]:
-        p = self._settings
+        p = self._plan
         return messages(p.index, self._publishers, p.begin, p.end)
 
     def _goes_out(self, message: PlayedMessage, now: float) -> bool:
         """Publish a message that is due; False where it has to wait."""
         topic = message.topic
-        kind = self._settings.index.topics[topic].kind
+        kind = self._plan.index.topics[topic].kind
         waits = self._answers is not None and not self._answers.are_complete()
         if waits and is_odometry(topic, kind):
             return False
@@ -292,7 +293,7 @@ class Player:
         if not self._receivers.have_all() or (self._answers and not self._answers.are_complete()):
             return
         self.loops += 1
-        if self._settings.loop:
+        if self._plan.settings.loop:
             self.playback.restart()
             self._stream, self._clock_ns = self._rewound(), -1
         else:
@@ -307,14 +308,14 @@ SHOWN = 5  # gaps that are named, the longest ones
 
 
 class ReplayNode(BulkNode):
-    """Publishes the messages of a bag; see `replay_parameters` for what it is told."""
+    """Publishes the messages of a bag; see `ReplaySettings` for what it is told."""
 
     def __init__(self, **options: Any):
         super().__init__(NAME, **options)
         self.graph = NodeInterface(self, barrier=False)
-        self.settings = p = replay_parameters(self)
+        self.plan = p = make_plan(self)
         self.player = Player(self, p)
-        careful = p.selection.guarded and not p.foreign
+        careful = p.selection.guarded and not p.settings.allow_commands_to_foreign
         self._until = time.monotonic() + (CAREFUL if careful else DISCOVERY)
         self._phase: Callable[[float], float] = self._meet
         self.graph.also_ready_when(self.player.waits_for)
@@ -328,9 +329,9 @@ class ReplayNode(BulkNode):
 
     def remarks(self) -> list[str]:
         """What is odd about the bag, and what of it is not played."""
-        p = self.settings
+        p = self.plan
         longest = sorted(p.gaps, key=lambda gap: gap[0] - gap[1])[:SHOWN]
-        then = 'jumped over' if p.skip_gaps else '--skip-gaps jumps over it'
+        then = 'jumped over' if p.settings.skip_gaps else '--skip-gaps jumps over it'
         gaps = [f'nothing from {a:g} to {b:g} s of the bag: {then}' for a, b in sorted(longest)]
         return [*p.index.notes, *p.selection.remarks(), *gaps]
 
@@ -357,7 +358,7 @@ class ReplayNode(BulkNode):
             if met and not self.player.waits_for():
                 self._phase = self._play
                 if self.aloud:
-                    self.begin(f'plays {self.settings.index.bag}')
+                    self.begin(f'plays {self.plan.index.bag}')
         return LOOK
 
     def _play(self, now: float) -> float:
@@ -395,7 +396,7 @@ class ReplayNode(BulkNode):
         return None
 
     def _facts(self) -> dict[str, Any]:
-        player, p = self.player, self.settings
+        player, p = self.player, self.plan
         return {
             'time': (player.now_ns - p.index.first) / interface.NANOSECONDS,
             'rate': player.playback.rate,
@@ -418,7 +419,7 @@ class ReplayNode(BulkNode):
         ns = self.player.step() if paused else None
         response.success = ns is not None
         if ns is not None:
-            seconds = (ns - self.settings.index.first) / interface.NANOSECONDS
+            seconds = (ns - self.plan.index.first) / interface.NANOSECONDS
             response.message = f'to {seconds:g} s of the bag'
         else:
             response.message = 'at the end of the bag' if paused else 'not paused'

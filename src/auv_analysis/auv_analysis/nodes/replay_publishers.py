@@ -26,9 +26,9 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.codec import KINDS, first_stamp, message_of
 from auv_dynamics.ros.endpoints import NAMED, NAMELESS, acts, full_name, is_of, other_subscribers
-from auv_dynamics.ros.interface import NANOSECONDS, Frames
+from auv_dynamics.ros.interface import DEPTH, NANOSECONDS, Frames
 from auv_dynamics.ros.node_interface import ASK_AGAIN, NodeInterface
-from auv_dynamics.ros.topics import DEPTH, Topic, message_class
+from auv_dynamics.ros.topics import Topic, message_class
 
 
 def make_publishers(

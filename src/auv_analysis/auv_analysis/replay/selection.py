@@ -1,7 +1,7 @@
 """What of a bag is replayed and how, as the ROS parameters ask for it."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any
@@ -12,7 +12,8 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.interface import NANOSECONDS
-from auv_dynamics.ros.parameters import declare, refuse_unknown
+from auv_dynamics.ros.parameters import declare_settings
+from auv_dynamics.ros.settings import setting
 from auv_dynamics.ros.topics import is_name
 
 REPLAY = 'replay'  # namespace in which nothing of a vehicle listens
@@ -29,26 +30,38 @@ UNWANTED = 'not asked for'
 
 
 @dataclass(frozen=True)
-class Wish:
-    """What is asked for.
+class ReplaySettings:
+    """Settings of the replay node: what of a bag is played, and how."""
 
-    Attributes
-    ----------
-    namespace : before the recorded names
-    original_names : no namespace, the recorded names
-    commands : also the commands, where a vehicle may listen
-    everything : also what other nodes would derive anew: analysis, diagnostics, progress, clock
-    topics : recorded names or patterns; empty: all
-    command_topics : recorded names that are commands as well
-
-    """
-
-    namespace: str = REPLAY
-    original_names: bool = False
-    commands: bool = False
-    everything: bool = False
-    topics: tuple[str, ...] = ()
-    command_topics: tuple[str, ...] = ()
+    bag: str = setting('', 'folder or .mcap file', needed='a bag folder or an .mcap file')
+    namespace: str = setting(REPLAY, 'before the recorded names')
+    original_names: bool = setting(False, 'no namespace: the recorded names')
+    commands: bool = setting(False, f'commands also outside of /{REPLAY}')
+    everything: bool = setting(
+        False, 'also analysis, diagnostics, progress and clock as recorded', 'all'
+    )
+    topics: tuple[str, ...] = setting((), 'recorded names or patterns, none: all')
+    command_topics: tuple[str, ...] = setting(
+        (), 'recorded names that are commands although neither name nor type shows it'
+    )
+    start: float = setting(0.0, 's from the beginning of the bag', at_least=0.0)
+    duration: float = setting(0.0, 's of the bag, 0: to its end', at_least=0.0)
+    rate: float = setting(
+        1.0, 's of the bag per s, 0: as fast as possible without loss', at_least=0.0, writable=True
+    )
+    loop: bool = setting(False, 'begin again at the end')
+    start_paused: bool = setting(False, 'wait for ~/run')
+    skip_gaps: bool = setting(False, 'jump where nothing was recorded for a minute')
+    clock: bool = setting(True, 'publish /clock')
+    allow_commands_to_foreign: bool = setting(
+        False, 'publish commands also where a node that is not ours acts on them'
+    )
+    expected_subscribers: tuple[str, ...] = setting(
+        (), 'topic=count, topics as recorded: nothing is published until so many have matched'
+    )
+    answers: str = setting(
+        '', 'topic of wrenches: the next odometry waits for the one with the stamp of the last'
+    )
 
 
 @dataclass
@@ -94,7 +107,7 @@ def is_command(topic: str, kind: str, named: Iterable[str] = ()) -> bool:
     return ours or kind in FORCES or WORDS.search(topic.lower()) is not None
 
 
-def select(index: BagIndex, wish: Wish, resolve: Callable[[str], str]) -> Selection:
+def select(index: BagIndex, wish: ReplaySettings, resolve: Callable[[str], str]) -> Selection:
     """Choose the topics of a bag.
 
     Parameters
@@ -134,14 +147,14 @@ def nothing_left(index: BagIndex, found: Selection) -> InputError:
     return InputError(index.bag, '', 'a topic that can be played', reasons)
 
 
-def _published(topic: str, wish: Wish) -> str:
+def _published(topic: str, wish: ReplaySettings) -> str:
     absolute = f'/{topic.lstrip("/")}'
     if wish.original_names:
         return absolute
     return f'{wish.namespace.rstrip("/")}{absolute}'
 
 
-def _against(topic: str, index: BagIndex, wish: Wish) -> str:
+def _against(topic: str, index: BagIndex, wish: ReplaySettings) -> str:
     """Why a topic is not played whatever its new name, or an empty text."""
     about = index.topics[topic]
     if wish.topics and not any(_is_like(topic, pattern) for pattern in wish.topics):
@@ -158,7 +171,7 @@ def _against(topic: str, index: BagIndex, wish: Wish) -> str:
     return ''
 
 
-def _against_name(topic: str, kind: str, full: str, wish: Wish, found: Selection) -> str:
+def _against_name(topic: str, kind: str, full: str, wish: ReplaySettings, found: Selection) -> str:
     """Why a topic is not played under a name; notes whether a vehicle may hear its commands."""
     if full == interface.CLOCK:
         return 'the time of the replay stands there'
@@ -182,36 +195,25 @@ def _is_like(topic: str, pattern: str) -> bool:
 
 
 @dataclass(frozen=True)
-class ReplayParameters:
-    """What is to be played, and how.
+class ReplayPlan:
+    """A bag, and what of it is played.
 
     Attributes
     ----------
+    settings : how
     index : of the bag
     selection : of its topics
     begin, end : first and last log time, ns
-    rate : seconds of the bag per second, 0: as fast as possible
-    loop, start_paused : begin again at the end; wait for `~/run` at the beginning
-    skip_gaps : do not wait where nothing was recorded for more than a minute
-    clock : publish the time of the bag
-    foreign : publish commands also where a foreign node acts on them
     expected : recorded topic -> subscribers that are waited for
-    answers : topic whose stamps answer the odometry, empty: nothing is waited for
 
     """
 
+    settings: ReplaySettings
     index: BagIndex
     selection: Selection
     begin: int
     end: int
-    rate: float
-    loop: bool
-    start_paused: bool
-    skip_gaps: bool
-    clock: bool
-    foreign: bool
     expected: dict[str, int]
-    answers: str
 
     @property
     def gaps(self) -> list[tuple[float, float]]:
@@ -221,62 +223,23 @@ class ReplayParameters:
         return [((a - first) / NANOSECONDS, (b - first) / NANOSECONDS) for a, b in found]
 
 
-def replay_parameters(node: Any) -> ReplayParameters:
+def make_plan(node: Any) -> ReplayPlan:
     """Declare and check the parameters, look through the bag; InputError: something is wrong."""
-    bag = declare(node, 'bag', str, '', 'folder or .mcap file')
-    wish = _wish(node)
-    start = declare(node, 'start', float, 0.0, 's from the beginning of the bag', at_least=0.0)
-    duration = declare(node, 'duration', float, 0.0, 's of the bag, 0: to its end', at_least=0.0)
-    rate = declare(
-        node, 'rate', float, 1.0, 's of the bag per s, 0: as fast as possible without loss',
-        at_least=0.0, writable=True,
-    )  # fmt: skip
-    loop = declare(node, 'loop', bool, False, 'begin again at the end')
-    paused = declare(node, 'start_paused', bool, False, 'wait for ~/run')
-    skips = declare(node, 'skip_gaps', bool, False, 'jump where nothing was recorded for a minute')
-    clock = declare(node, 'clock', bool, True, 'publish /clock')
-    foreign = declare(
-        node, 'allow_commands_to_foreign', bool, False,
-        'publish commands also where a node that is not ours acts on them',
-    )  # fmt: skip
-    text = 'topic=count, topics as recorded: nothing is published until so many have matched'
-    listed = declare(node, 'expected_subscribers', list[str], None, text) or []
-    text = 'topic of wrenches: the next odometry waits for the one with the stamp of the last'
-    answers = declare(node, 'answers', str, '', text)
-    refuse_unknown(node)
-    name = node.get_name()
-    if not bag:
-        raise InputError(name, 'bag', 'a bag folder or an .mcap file', None)
-    index = index_bag(bag)
-    selection = select(index, wish, node.resolve_topic_name)
+    name, p = node.get_name(), declare_settings(node, ReplaySettings)
+    if p.namespace != '/' and not is_name(p.namespace.removesuffix('/')):
+        raise InputError(name, 'namespace', 'a namespace such as replay or /auv1', p.namespace)
+    index = index_bag(p.bag)
+    selection = select(index, p, node.resolve_topic_name)
     span = (index.last - index.first) / NANOSECONDS
-    if start > span:
-        raise InputError(name, 'start', f'at most {span:g} s, the length of the bag', start)
-    begin = index.first + round(start * NANOSECONDS)
-    end = begin + round(duration * NANOSECONDS) if duration else index.last
-    expected = _counts(name, listed, selection)
-    return ReplayParameters(
-        index, selection, begin, end, rate, loop, paused, skips, clock, foreign, expected, answers
-    )  # fmt: skip
+    if p.start > span:
+        raise InputError(name, 'start', f'at most {span:g} s, the length of the bag', p.start)
+    begin = index.first + round(p.start * NANOSECONDS)
+    end = begin + round(p.duration * NANOSECONDS) if p.duration else index.last
+    expected = _counts(name, p.expected_subscribers, selection)
+    return ReplayPlan(p, index, selection, begin, end, expected)
 
 
-def _wish(node: Any) -> Wish:
-    namespace = declare(node, 'namespace', str, REPLAY, 'before the recorded names')
-    if namespace != '/' and not is_name(namespace.removesuffix('/')):
-        expected = 'a namespace such as replay or /auv1'
-        raise InputError(node.get_name(), 'namespace', expected, namespace)
-    original = declare(node, 'original_names', bool, False, 'no namespace: the recorded names')
-    commands = declare(node, 'commands', bool, False, f'commands also outside of /{REPLAY}')
-    everything = declare(
-        node, 'all', bool, False, 'also analysis, diagnostics, progress and clock as recorded'
-    )
-    topics = declare(node, 'topics', list[str], None, 'recorded names or patterns, none: all')
-    text = 'recorded names that are commands although neither name nor type shows it'
-    more = declare(node, 'command_topics', list[str], None, text)
-    return Wish(namespace, original, commands, everything, tuple(topics or ()), tuple(more or ()))
-
-
-def _counts(node: str, listed: list[str], selection: Selection) -> dict[str, int]:
+def _counts(node: str, listed: Sequence[str], selection: Selection) -> dict[str, int]:
     counts = {}
     for entry in listed:
         topic, _, count = entry.partition('=')

@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -18,7 +18,8 @@ from auv_dynamics.ros.codec import KINDS, message_of
 from auv_dynamics.ros.interface import ROS_FRAMES, BadMessageError, Frames, nanoseconds
 from auv_dynamics.ros.node_interface import NodeInterface, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
-from auv_dynamics.ros.parameters import declare, refuse_unknown
+from auv_dynamics.ros.parameters import declare_settings
+from auv_dynamics.ros.settings import setting
 from auv_dynamics.ros.topics import Topic
 from auv_dynamics.vehicle import frames
 from auv_dynamics.vehicle.frames import swap_body, swap_body_matrix, swap_earth_matrix, swap_state
@@ -98,6 +99,17 @@ def _covariance(values: Sequence[float], what: str) -> np.ndarray:
 ENU_FLU = 'enu_flu'  # what the driver's topics begin with
 
 
+@dataclass(frozen=True)
+class ConverterSettings:
+    """Settings of the frame converter."""
+
+    enu_frame: str = setting(ROS_FRAMES.odom, "frame id of the driver's poses: east-north-up")
+    flu_frame: str = setting(ROS_FRAMES.base, "frame id of the driver's body: forward-left-up")
+    twist_frame: str = setting(
+        CHILD, "frame of the twist in the driver's odometry", one_of=(CHILD, WORLD)
+    )
+
+
 class FrameConverterNode(BulkNode):
     """Converts odometry and set-points to NED and FSD, the wrench to FLU: never a silent flip."""
 
@@ -107,29 +119,10 @@ class FrameConverterNode(BulkNode):
         super().__init__('frame_converter_node', **options)
         self.graph = NodeInterface(self)
         ours = self.graph.frames
-        theirs = Frames(
-            declare(
-                self,
-                'enu_frame',
-                str,
-                ROS_FRAMES.odom,
-                "frame id of the driver's poses: east-north-up",
-            ),
-            declare(
-                self,
-                'flu_frame',
-                str,
-                ROS_FRAMES.base,
-                "frame id of the driver's body: forward-left-up",
-            ),
-        )
-        self._twist_frame = declare(
-            self, 'twist_frame', str, CHILD, "frame of the twist in the driver's odometry",
-            one_of=(CHILD, WORLD),
-        )  # fmt: skip
-        refuse_unknown(self)
+        p = declare_settings(self, ConverterSettings)
+        theirs, self._twist_frame = Frames(p.enu_frame, p.flu_frame), p.twist_frame
         self._check_axes(ours, theirs)
-        self._held: deque[tuple[Publisher, Any]] = deque(maxlen=topics.DEPTH)
+        self._held: deque[tuple[Publisher, Any]] = deque(maxlen=interface.DEPTH)
         inward = partial(mirrored, here=theirs, there=ours)
         outward = partial(mirrored, here=ours, there=theirs)
         lockstep, every = topics.one_at_a_time(), topics.every_step()

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,9 @@ from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.kernel.integrator import TABLEAUS
 from auv_dynamics.plant.actuators import make_actuators
 from auv_dynamics.plant.devices import SensorNoise
 from auv_dynamics.plant.faults import FaultSetting, make_faults
-from auv_dynamics.plant.parameters import part
 from auv_dynamics.plant.plant import Plant, initial_state
 from auv_dynamics.plant.uncertainty import make_uncertainty
 from auv_dynamics.ros import interface, topics
@@ -23,13 +22,8 @@ from auv_dynamics.ros.endpoints import NAMELESS, UNNAMED, full_name, other_publi
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.ros.node_interface import OK, STALE, Health, NodeInterface, Peers, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
-from auv_dynamics.ros.parameters import (
-    declare,
-    declare_grid,
-    declare_spec,
-    declare_specs,
-    refuse_unknown,
-)
+from auv_dynamics.ros.parameters import declare_settings
+from auv_dynamics.ros.settings import PlantSettings
 
 WATCH = 0.2  # s between two looks at the silence
 CATCH_UP = 0.5  # s that a plant in real time may be late: beyond, its time goes on from there
@@ -257,89 +251,63 @@ class PlantNode(BulkNode):
         super().__init__('plant_node', **options)
         self._born, self._rivals_since = time.monotonic(), 0.0
         self.graph = NodeInterface(self)
-        self._declare()
-        refuse_unknown(self)
+        timeout = 30.0 if self.lockstep else 0.5
+        p = declare_settings(self, PlantSettings, wrench_timeout=timeout)
+        self.plant = self._make_plant(p)
         self.graph.must_hold = self.window
         self._publish_odometry = self.graph.output(topics.ODOM)
-        self._publish_clock = self.graph.output(topics.CLOCK) if self._offers_clock else None
+        self._publish_clock = self.graph.output(topics.CLOCK) if p.publish_clock else None
         self._publish_twist = self.graph.output(topics.TWIST)
         self._publish_disturbance = self.graph.output(topics.DISTURBANCE)
         self._publish_applied = self.graph.output(topics.WRENCH_APPLIED) if self._acts else None
         self._publish_truth = self.graph.output(topics.GROUND_TRUTH) if self._senses else None
-        self.peers = Peers(self, self._start_after)
+        self.peers = Peers(self, [*p.start_after])
         self.graph.also_ready_when(self.peers.not_ready)
         self.pace = LockStep(self) if self.lockstep else RealTime(self)
         qos = topics.one_at_a_time() if self.lockstep else topics.newest_command()
         self.graph.listen(topics.WRENCH, self.pace.wrench, qos)
         self.create_service(SetBool, '~/run', self._on_run)
         self.create_service(Trigger, '~/reset', self._on_reset)
-        self.paused = self._start_paused
+        self.paused = p.start_paused
         self._started: float | None = None
         steady_timer(self, 0.05, self._start)
 
-    def _declare(self) -> None:
-        path = declare(self, 'vehicle', str, '', 'vehicle file, or bare name of a shipped one')
-        if not path:
-            raise InputError(self.get_name(), 'vehicle', 'a vehicle file', None)
-        grid = declare_grid(self)
+    def _make_plant(self, p: PlantSettings) -> Plant:
+        grid = p.grid(self.get_name())
         self.step_ns, self.last = grid.step_ns, grid.last
-        self._start_paused = declare(
-            self, 'start_paused', bool, False, 'wait for ~/run before step 0'
-        )
-        self._offers_clock = declare(
-            self, 'publish_clock', bool, True, 'publish /clock; false beside another that does'
-        )
-        self.window = declare(
-            self, 'recorder_window', int, 0, 'most steps ahead of recorder/progress; 0: any',
-            at_least=0, at_most=topics.DEPTH - 1,
-        )  # fmt: skip
-        integrator = declare(
-            self, 'integrator', str, 'ode5', 'integration method', one_of=list(TABLEAUS)
-        )
-        seed = declare(
-            self, 'seed', int, 0, 'seed of the random numbers of sensors and faults', at_least=0
-        )
-        eta = self._six('initial.eta', 'position, m, and Euler angles, rad, NED')
-        nu = self._six('initial.nu', 'velocity, m/s and rad/s, body frame')
-        self._start_after = (
-            declare(self, 'start_after', list[str], None, 'nodes whose ~/ready is awaited') or []
-        )
-        default = 30.0 if self.lockstep else 0.5
-        self.wrench_timeout = declare(
-            self, 'wrench_timeout', float, default,
-            's without a wrench: then zero wrench in real time; in lock-step the run fails',
-            at_least=0.0,
-        )  # fmt: skip
-        disturbances = declare_specs(self, 'disturbance')
-        actuators, sensors = (
-            declare_spec(self, key, part(key)) or None for key in ('actuators', 'sensors')
-        )
-        name, vehicle = self.get_name(), load_vehicle(path)
+        self.window, self.wrench_timeout = p.recorder_window, p.wrench_timeout
+        name, vehicle = self.get_name(), load_vehicle(p.vehicle)
         self.graph.hardware_id = vehicle.name
-        allocated = bool((actuators or {}).get('thrusters', False))
         faults = make_faults(
-            *declare_specs(self, 'faults'),
+            [*p.faults.values()],
+            [f'faults.{key}' for key in p.faults],
             FaultSetting(
-                grid.step, grid.duration, vehicle.thrusters, allocated, vehicle.name, name
+                grid.step,
+                grid.duration,
+                vehicle.thrusters,
+                bool(p.actuators.get('thrusters', False)),
+                vehicle.name,
+                name,
             ),
         )
-        self._acts = actuators is not None or faults.acting
-        self._senses = sensors is not None or faults.sensing
-        self.plant = Plant(
-            make_uncertainty(vehicle, disturbances[0], name, disturbances[1]),
+        self._acts = bool(p.actuators) or faults.acting
+        self._senses = bool(p.sensors) or faults.sensing
+        places = [f'disturbance.{key}' for key in p.disturbance]
+        state = (self._six(key, getattr(p, f'initial_{key}')) for key in ('eta', 'nu'))
+        return Plant(
+            make_uncertainty(vehicle, [*p.disturbance.values()], name, places),
             grid.step,
-            integrator,
-            initial_state(eta, nu),
-            make_actuators(actuators, vehicle, grid.step, name),
-            SensorNoise(sensors or {}, seed, faults) if self._senses else None,
+            p.integrator,
+            initial_state(*state),
+            make_actuators(p.actuators or None, vehicle, grid.step, name),
+            SensorNoise(p.sensors, p.seed, faults) if self._senses else None,
             faults,
-            seed,
+            p.seed,
         )
 
-    def _six(self, name: str, text: str) -> np.ndarray:
-        values = declare(self, name, list[float], [0.0] * 6, f'initial {text}')
-        if len(values) != 6 or not np.all(np.isfinite(values)):
-            raise InputError(self.get_name(), name, '6 finite numbers', values)
+    def _six(self, key: str, values: Sequence[float]) -> np.ndarray:
+        if len(values) != 6:
+            raise InputError(self.get_name(), f'initial.{key}', '6 finite numbers', [*values])
         return np.array(values)
 
     def _start(self) -> None:

@@ -4,7 +4,7 @@ A key of a mapping within a mapping is joined by a dot, a matrix is its 36 numbe
 mappings, the terms of a harmonic, becomes one list of numbers for each key of theirs.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -111,16 +111,6 @@ def flattened(node: Node, spec: Mapping[str, Any]) -> dict[str, Any]:
 def numbers(value: Any) -> list[float]:
     """A number, a list or a matrix as a list: of one, as it is, row by row."""
     return [float(number) for number in np.ravel(value)]
-
-
-def listed(group: str, specs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Parameters of the entries of a list, with their names in `<group>.names`."""
-    names = [f'{group[0]}{i}_{spec["kind"]}' for i, spec in enumerate(specs, start=1)]
-    flat: dict[str, Any] = {}
-    for name, spec in zip(names, specs, strict=True):
-        below = flattened(part(group), spec)
-        flat |= {f'{group}.{name}.{key}': value for key, value in below.items()}
-    return {**flat, f'{group}.names': names}
 
 
 def nested(node: Node, values: Mapping[str, Any], source: object, place: str) -> dict[str, Any]:

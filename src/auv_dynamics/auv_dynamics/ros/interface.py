@@ -12,6 +12,7 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle import DOFS
 
 NANOSECONDS = 10**9
+DEPTH = 3000  # of step topics: above every recorder_window and horizon that is accepted
 UNIT = 1e-3  # deviation of a quaternion's norm from 1 that is accepted
 LARGEST = 1e30  # of numbers in a message: energies and their squares are still finite
 NOT_FINITE = 'not finite: expected finite numbers'

@@ -4,7 +4,8 @@ import math
 import re
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -29,6 +30,7 @@ from auv_dynamics.ros.endpoints import crowds, has_conflict, onlookers
 from auv_dynamics.ros.interface import BadMessageError, Frames
 from auv_dynamics.ros.parameters import declare
 from auv_dynamics.ros.rclpy_internals import has_data_path
+from auv_dynamics.ros.settings import GraphSettings, read_settings
 from auv_dynamics.ros.topics import (
     ANALYSIS_TOPICS,
     CLOCK,
@@ -131,23 +133,10 @@ class NodeInterface:
         self.frames = Frames()
         self.must_hold = 0  # messages: a publisher of step topics needs a greater depth
         if barrier:
-            text = 'each step waits for its wrench, all nodes alike; else real time'
-            lockstep = declare(node, 'lockstep', bool, False, text)
-            self.frames = Frames(
-                declare(node, 'odom_frame', str, 'odom_ned', 'frame id of poses: north-east-down'),
-                declare(
-                    node,
-                    'base_frame',
-                    str,
-                    'base_link_fsd',
-                    'frame id of the body: forward-starboard-down',
-                ),
-            )
-            listed = declare(
-                node, 'expected_subscribers', list[str], None,
-                'topic=count: subscriptions that must match before step topics are published',
-            )  # fmt: skip
-            self._expected = self._counts(listed or [])
+            common = read_settings(GraphSettings, partial(declare, node), node.get_name())
+            lockstep = common.lockstep
+            self.frames = Frames(common.odom_frame, common.base_frame)
+            self._expected = self._counts(common.expected_subscribers)
         node.lockstep = lockstep
         self._diagnostics = node.create_publisher(
             DIAGNOSTICS.type, DIAGNOSTICS.name, one_at_a_time()
@@ -282,7 +271,7 @@ class NodeInterface:
             raise InputError(self.node.get_name(), name, expected, qos.depth)
         return SetParametersResult(successful=True)
 
-    def _counts(self, listed: list[str]) -> dict[str, int]:
+    def _counts(self, listed: Sequence[str]) -> dict[str, int]:
         known = [topic.name for topic in (*STEP_TOPICS, *ANALYSIS_TOPICS)]
         counts = {}
         for entry in listed:

@@ -27,10 +27,10 @@ from rclpy.subscription import Subscription
 from rclpy.utilities import try_shutdown
 
 from auv_dynamics.files.errors import InputError, first_line, take_signals
-from auv_dynamics.ros.interface import NANOSECONDS, PARENT
+from auv_dynamics.ros.interface import DEPTH, NANOSECONDS, PARENT
 from auv_dynamics.ros.rclpy_internals import DataWait, RCLError, RMWError, has_data_path, taken
 from auv_dynamics.ros.security import asked
-from auv_dynamics.ros.topics import CLOCK, DEPTH
+from auv_dynamics.ros.topics import CLOCK
 
 NAP = 0.005  # s between two looks at an observer's data
 

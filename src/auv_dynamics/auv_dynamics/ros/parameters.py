@@ -1,20 +1,18 @@
 """ROS parameters: declared with description and range, read-only unless said, unknown refused."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import InvalidParameterValueException
-from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of as nearest_of
-from auv_dynamics.plant.parameters import Parameter, nested, parameters_of, part
-from auv_dynamics.ros.interface import TimeGrid, time_grid
+from auv_dynamics.ros.settings import Settings, read_settings
 
-LONGEST = 1e9  # s of a step or a run: stamps end in 2038
 KNOWN_TO_ALL = ('use_sim_time', 'start_type_description_service')
 TYPE_WORDS = {
     RosParameter.Type.BOOL: 'true or false',
@@ -95,47 +93,23 @@ def declare(
     return value
 
 
-def declare_grid(node: Node) -> TimeGrid:
-    """Declare `step` and `duration`; InputError where they make no grid of whole nanoseconds."""
-    step = declare(node, 'step', float, 0.01, 'time step, s', at_least=1e-9, at_most=LONGEST)
-    text = 'length of the run, s; 0: no end'
-    duration = declare(node, 'duration', float, 0.0, text, at_least=0.0, at_most=LONGEST)
-    return time_grid(step, duration, node.get_name())
-
-
-def declare_spec(node: Node, place: str, about: Mapping[str, Any]) -> dict[str, Any]:
-    """Declare the parameters of a mapping of the scenario's schema and return it, checked.
+def declare_settings(node: Any, kind: type[Settings], **usual: Any) -> Settings:
+    """Declare the parameters of a class of settings as the last ones of a node.
 
     Parameters
     ----------
     node : that declares them
-    place : what their names begin with, without the dot
-    about : node of the schema, see `part`
+    kind : class of the settings
+    usual : field -> default that depends on the circumstances
 
     Raises
     ------
-    InputError : it is not what the schema describes
+    InputError : a parameter that is refused, or one that the node does not know
 
     """
-    values: dict[str, Any] = {}
-    for one in parameters_of(about):
-        values[one.name] = _declared(node, place, one)
-    for one in parameters_of(about, values['kind']) if 'kind' in values else ():
-        if one.name not in values:
-            values[one.name] = _declared(node, place, one)
-    return nested(about, values, node.get_name(), place)
-
-
-def _declared(node: Node, place: str, one: Parameter) -> Any:
-    return declare(node, f'{place}.{one.name}', one.kind, None, one.text, **one.range)
-
-
-def declare_specs(node: Node, group: str) -> tuple[list[dict[str, Any]], list[str]]:
-    """Declare the entries that `<group>.names` lists; as a scenario has them, and their places."""
-    about = part(group)
-    names = declare(node, f'{group}.names', list[str], None, f'names; each is {about["title"]}')
-    places = [f'{group}.{name}' for name in names or []]
-    return [declare_spec(node, place, about) for place in places], places
+    settings = read_settings(kind, partial(declare, node), node.get_name(), **usual)
+    refuse_unknown(node)
+    return settings
 
 
 def _taken(value: Any, kind: Any) -> Any:

@@ -19,8 +19,6 @@ from std_msgs.msg import Header
 
 from auv_dynamics.ros import interface
 
-DEPTH = 3000  # of step topics: above every recorder_window and horizon that is accepted
-
 
 @dataclass(frozen=True)
 class Topic:
@@ -64,7 +62,7 @@ def _qos(reliability: ReliabilityPolicy, depth: int) -> QoSProfile:
 
 def every_step() -> QoSProfile:
     """Nothing may be lost: publishers of step topics, the recorder, analysis, exact pairing."""
-    return _qos(ReliabilityPolicy.RELIABLE, DEPTH)
+    return _qos(ReliabilityPolicy.RELIABLE, interface.DEPTH)
 
 
 def one_at_a_time() -> QoSProfile:
@@ -92,7 +90,7 @@ def is_name(name: str) -> bool:
         return False
 
 
-def best_effort(depth: int = DEPTH) -> QoSProfile:
+def best_effort(depth: int = interface.DEPTH) -> QoSProfile:
     """Observers: whatever there is, from whomever, and nobody waits for them."""
     return _qos(ReliabilityPolicy.BEST_EFFORT, depth)
 

@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -11,6 +12,8 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.files.yaml_files import read_text
 from auv_dynamics.plant.disturbance import Harmonics
+from auv_dynamics.ros.interface import DEPTH
+from auv_dynamics.ros.settings import KEY, GridSettings, Spec, setting
 from auv_dynamics.vehicle import DOFS
 
 COLUMNS = ('t', *DOFS)
@@ -143,3 +146,13 @@ def make_setpoint(spec: Mapping[str, Any], duration: float, text: str | None = N
     if 'file' in spec:
         return load_table(Path(spec['file']), duration, text)
     return Harmonics.from_spec(spec)
+
+
+@dataclass(frozen=True)
+class SetpointSettings(GridSettings):
+    """Settings of the set-point node."""
+
+    horizon: int = setting(
+        0, 'steps ahead of odom, those until the next one at least', at_least=0, at_most=DEPTH - 1
+    )
+    setpoint: Spec = field(default_factory=dict, metadata=KEY)

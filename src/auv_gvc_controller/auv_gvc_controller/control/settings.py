@@ -1,14 +1,15 @@
 """Everything that makes a controller but law, gains and vehicle: defaults, ranges, construction."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros.settings import Reader, name_of, read_settings, setting
 from auv_dynamics.vehicle.thrusters import AttainableWrench, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
@@ -26,16 +27,11 @@ from auv_gvc_controller.control.setpoint_buffer import (
 from auv_gvc_controller.laws.model import control_model
 
 LATEST, EXACT = 'latest', 'exact'
-Reader = Callable[..., Any]  # name, type, default, description, range -> value
+_number = partial(setting, at_least=0.0)
 
 
-def _setting(default: Any, name: str, description: str, **accepted: Any) -> Any:
-    told = {'name': name, 'description': description, 'accepted': accepted}
-    return field(default=default, metadata=told)
-
-
-_number = partial(_setting, at_least=0.0)
-_six = partial(_setting, ())
+def _six(text: str, name: str) -> Any:
+    return setting((), f'1 or 6 numbers, N, N m, {text}; none: off', name)
 
 
 @dataclass(frozen=True)
@@ -43,76 +39,62 @@ class ControllerSettings:
     """Settings of a controller, by the names of its parameters with `_` for a dot.
 
     Times in s; `()` stands for six numbers that are not given.
-
-    Attributes
-    ----------
-    source : node or file that they come from, for refusals
-
     """
 
-    source: str
-    lockstep: bool = _setting(False, 'lockstep', 'answer every odometry, in its time')
-    setpoint_pairing: str = _setting(
+    lockstep: bool = setting(False, 'answer every odometry, in its time')
+    setpoint_pairing: str = setting(
         LATEST,
-        'setpoint_pairing',
         'set-point of the same stamp as odom (exact), or the newest at or before it (latest)',
         one_of=(EXACT, LATEST),
     )
-    setpoint_acceleration: str = _setting(
+    setpoint_acceleration: str = setting(
         FILTER,
-        'setpoint_acceleration',
         'where nu_d_dot comes from: cmd_accel of the same stamp (topic), a reference filter that '
         'smooths nu_d as well (filter; usual in real time), nowhere, zero (none), or the '
         'difference of two set-points (difference; usual in lock-step)',
         one_of=(SAME, FILTER, NONE, DIFFERENCE),
     )
-    filter_omega: float = _setting(
-        1.0, 'setpoint_filter.omega', 'rad/s, natural frequency', at_least=0.01, at_most=20.0
+    filter_omega: float = setting(
+        1.0, 'rad/s, natural frequency', 'setpoint_filter.omega', at_least=0.01, at_most=20.0
     )
-    filter_zeta: float = _setting(
-        1.0, 'setpoint_filter.zeta', 'damping ratio', at_least=0.5, at_most=5.0
+    filter_zeta: float = setting(
+        1.0, 'damping ratio', 'setpoint_filter.zeta', at_least=0.5, at_most=5.0
     )
-    filter_speed: float = _number(3.0, 'setpoint_filter.speed', 'm/s, largest nu_d of an axis')
-    filter_rate: float = _number(1.0, 'setpoint_filter.rate', 'rad/s, largest nu_d of an axis')
+    filter_speed: float = _number(3.0, 'm/s, largest nu_d of an axis', 'setpoint_filter.speed')
+    filter_rate: float = _number(1.0, 'rad/s, largest nu_d of an axis', 'setpoint_filter.rate')
     filter_acceleration: float = _number(
-        0.2, 'setpoint_filter.acceleration', 'm/s2, largest of an axis; of the difference as well'
+        0.2, 'm/s2, largest of an axis; of the difference as well', 'setpoint_filter.acceleration'
     )
     filter_angular_acceleration: float = _number(
-        0.2, 'setpoint_filter.angular_acceleration', 'rad/s2, the same of roll, pitch and yaw'
+        0.2, 'rad/s2, the same of roll, pitch and yaw', 'setpoint_filter.angular_acceleration'
     )
-    odometry_timeout: float = _number(
-        0.5, 'odometry_timeout', 's, silence or age of the stamp: zero wrench'
-    )
-    setpoint_timeout: float = _number(
-        0.5, 'setpoint_timeout', 's, silence or age of the stamp: zero wrench'
-    )
-    limits_gap: float = _number(1.0, 'limits.gap', 's, longest step of time that is integrated')
-    limits_speed: float = _number(20.0, 'limits.speed', 'm/s; more is refused')
-    limits_rate: float = _number(20.0, 'limits.rate', 'rad/s; more is refused')
+    odometry_timeout: float = _number(0.5, 's, silence or age of the stamp: zero wrench')
+    setpoint_timeout: float = _number(0.5, 's, silence or age of the stamp: zero wrench')
+    limits_gap: float = _number(1.0, 's, longest step of time that is integrated', 'limits.gap')
+    limits_speed: float = _number(20.0, 'm/s; more is refused', 'limits.speed')
+    limits_rate: float = _number(20.0, 'rad/s; more is refused', 'limits.rate')
     limits_acceleration: float = _number(
-        100.0, 'limits.acceleration', 'm/s2, rad/s2; more is refused'
+        100.0, 'm/s2, rad/s2; more is refused', 'limits.acceleration'
     )
     limits_wrench: tuple[float, ...] = _six(
-        'limits.wrench', 'largest wrench; must be known in real time'
+        'largest wrench; must be known in real time', 'limits.wrench'
     )
-    limits_wrench_rate: tuple[float, ...] = _six('limits.wrench_rate', 'per s, its fastest change')
-    ramp: float = _number(0.2, 'ramp', 's, real time: over which a law takes over and lets go')
-    stamp_clock: str = _setting(
+    limits_wrench_rate: tuple[float, ...] = _six('per s, its fastest change', 'limits.wrench_rate')
+    ramp: float = _number(0.2, 's, real time: over which a law takes over and lets go')
+    stamp_clock: str = setting(
         AUTO,
-        'stamp_clock',
         "that odometry is stamped with: the node's own (ros), a free-running one (own), "
         'or auto: ros if they count from the same beginning, else own',
         one_of=CLOCKS,
     )
     actuators_limit: tuple[float, ...] = _six(
-        'actuators.limit', 'largest wrench of the actuators, for anti-windup'
+        'largest wrench of the actuators, for anti-windup', 'actuators.limit'
     )
-    actuators_thrusters: bool = _setting(
-        False, 'actuators.thrusters', "anti-windup knows the vehicle's thrusters"
+    actuators_thrusters: bool = setting(
+        False, "anti-windup knows the vehicle's thrusters", 'actuators.thrusters'
     )
-    anti_windup: bool = _setting(
-        True, 'anti_windup', 'stop integrating what pushes beyond these limits'
-    )
+    anti_windup: bool = setting(True, 'stop integrating what pushes beyond these limits')
+    source: str = ''  # node or file that they come from, for refusals
 
     @classmethod
     def read(cls, reader: Reader, source: str) -> 'ControllerSettings':
@@ -128,20 +110,14 @@ class ControllerSettings:
         InputError : what the reader refuses, or six numbers that are none
 
         """
-        values: dict[str, Any] = {}
-        for entry in fields(cls)[1:]:
-            name, text = entry.metadata['name'], entry.metadata['description']
-            if entry.type == tuple[float, ...]:
-                text = f'1 or 6 numbers, N, N m, {text}; none: off'
-                found = reader(name, list[float], None, text)
-                values[entry.name] = _six_numbers(found or [], source, name)
-            else:
-                own = name == 'setpoint_acceleration'
-                default = usual_acceleration(values['lockstep']) if own else entry.default
-                values[entry.name] = reader(
-                    name, entry.type, default, text, **entry.metadata['accepted']
-                )
-        return cls(source, **values)
+        usual = usual_acceleration(reader('lockstep', bool, False, ''))
+        read = read_settings(cls, reader, source, setpoint_acceleration=usual)
+        six: dict[str, Any] = {
+            entry.name: _six_numbers(getattr(read, entry.name), source, name_of(entry))
+            for entry in fields(cls)
+            if entry.type == tuple[float, ...]
+        }
+        return replace(read, source=source, **six)
 
     def setpoints(self) -> SetpointBuffer:
         """What keeps set-points until their odometry comes."""
@@ -236,12 +212,12 @@ def usual_acceleration(lockstep: bool) -> str:
     return DIFFERENCE if lockstep else FILTER
 
 
-def _six_numbers(values: list[Any], source: str, name: str) -> tuple[float, ...]:
+def _six_numbers(values: Sequence[Any], source: str, name: str) -> tuple[float, ...]:
     """Six numbers of one or six, zero for an axis without actuators; none of none."""
-    listed = values * 6 if len(values) == 1 else values
+    listed = [*values] * (6 if len(values) == 1 else 1)
     good = all(
         isinstance(v, int | float) and not isinstance(v, bool) and 0 <= v < math.inf for v in listed
     )
     if len(listed) not in (0, 6) or not good or (listed and not any(listed)):
-        raise InputError(source, name, '1 or 6 numbers of at least 0, one above it', values)
+        raise InputError(source, name, '1 or 6 numbers of at least 0, one above it', [*values])
     return tuple(map(float, listed))

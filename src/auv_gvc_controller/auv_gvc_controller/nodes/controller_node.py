@@ -30,6 +30,7 @@ from auv_dynamics.ros.node_interface import (
 )
 from auv_dynamics.ros.node_main import BulkMixin, main_of
 from auv_dynamics.ros.parameters import declare, given, refuse_unknown
+from auv_dynamics.ros.settings import name_of
 from auv_gvc_controller.control.controller import Answer, VelocityController
 from auv_gvc_controller.control.odometry_guard import UNTIMED, Now
 from auv_gvc_controller.control.setpoint_buffer import SAME
@@ -39,7 +40,7 @@ from auv_gvc_controller.laws.model import control_model
 
 GAINS = {gain for law in SHIPPED.values() for gain in law._fields}
 WRITABLE = 'gains.'
-SETTINGS = {entry.metadata['name'] for entry in fields(ControllerSettings)[1:]}
+SETTINGS = {name_of(entry) for entry in fields(ControllerSettings) if entry.metadata}
 FIXED = ('setpoint_pairing', 'setpoint_acceleration')  # which decide what is heard
 LAWS = f'{", ".join(SHIPPED)} or module:Class of your own'
 

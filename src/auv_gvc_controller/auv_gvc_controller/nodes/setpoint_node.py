@@ -5,14 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from auv_dynamics.plant.parameters import part
 from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.endpoints import why_silent
 from auv_dynamics.ros.node_interface import OK, STALE, Health, NodeInterface, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
-from auv_dynamics.ros.parameters import declare, declare_grid, declare_spec, refuse_unknown
+from auv_dynamics.ros.parameters import declare_settings
 from auv_gvc_controller.control.odometry_guard import Limits, Now, OdometryGuard
-from auv_gvc_controller.control.setpoint import make_setpoint
+from auv_gvc_controller.control.setpoint import SetpointSettings, make_setpoint
 
 BLOCK = 256  # set-points that are evaluated at once
 PATIENCE = 0.3  # s without odometry after which stamps that have gone back are believed
@@ -27,16 +26,10 @@ class SetpointNode(BulkNode):
     def __init__(self, **options: Any):
         super().__init__('setpoint_node', **options)
         self.graph = NodeInterface(self)
-        grid = declare_grid(self)
-        self._horizon = declare(
-            self, 'horizon', int, 0, 'steps ahead of odom, those until the next one at least',
-            at_least=0, at_most=topics.DEPTH - 1,
-        )  # fmt: skip
+        p = declare_settings(self, SetpointSettings)
+        grid, self._horizon = p.grid(self.get_name()), p.horizon
         self._step_ns, self._last = grid.step_ns, grid.last
-        self._setpoint = make_setpoint(
-            declare_spec(self, 'setpoint', part('setpoint')), grid.duration
-        )
-        refuse_unknown(self)
+        self._setpoint = make_setpoint(p.setpoint, grid.duration)
         self.graph.must_hold = self._horizon
         self._publish_velocity = self.graph.output(topics.CMD_VEL)
         self._publish_acceleration = self.graph.output(topics.CMD_ACCEL)

@@ -1,4 +1,4 @@
-"""Rollouts of Case 1: against scalar C, on two threads, growing, and against other simulators."""
+"""Case 1 and the plant alone against scalar C; rollouts on threads, growing, against peers."""
 
 import subprocess
 import sys
@@ -9,10 +9,10 @@ from typing import Any
 import c_reference
 import numpy as np
 import peers
-from loops import CONTROLLER, case1, in_c, prepared, varied
+from loops import CONTROLLER, case1, in_c, open_plants, prepared, varied
 from measure import Measured, cost, interleaved, speed
 
-from auv_analysis import simulate
+from auv_analysis import open_loop, simulate
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.batch import run_batch
 from auv_analysis.simulation.rollouts import rollouts
@@ -59,6 +59,23 @@ def check_figures(ours: dict[str, np.ndarray], theirs: np.ndarray) -> None:
                 ours[f'{name}.{dof}'], theirs[:, i, j], rtol=SAME, atol=0, equal_nan=True
             ):
                 raise ArithmeticError(f'{name}.{dof}: expected the same as in C, found another')
+
+
+def open_loop_against_c() -> dict[str, Measured]:
+    """Plants that differ, under the same recorded commands: all states of each."""
+    library, (given, in_c_form) = c_reference.library(), open_plants(BATCH)
+    start, commands, step = given['start'][0, 0], given['commands'], given['step']
+
+    def ours() -> np.ndarray:
+        return open_loop(**given, threads=1)
+
+    def theirs() -> np.ndarray:
+        return c_reference.open_loop(library, in_c_form, start, commands, step)
+
+    if not np.allclose(ours(), theirs(), rtol=SAME, atol=SAME):
+        raise ArithmeticError('openloop_vs_c: expected the same states as in C, found others')
+    count = BATCH * len(commands)
+    return interleaved({'openloop_vs_c': cost(ours, count)}, cost(theirs, count), 's')
 
 
 def threads() -> dict[str, Measured]:

@@ -18,6 +18,7 @@ from auv_analysis.metrics.summary import BAND, SMALLEST_BAND, TRANSIENT
 from auv_analysis.scenario.scenario import Scenario
 from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
 from auv_dynamics.plant.plant import initial_state
+from auv_dynamics.vehicle.model import Model
 from auv_gvc_controller.laws.model import control_model
 
 SOURCE = Path(__file__).with_name('reference.c')
@@ -104,6 +105,35 @@ def log(library: Any, loops: Loops) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return rows[:, :STATES], rows[:, STATES:-6], rows[:, -6:]
 
 
+def open_loop(
+    library: Any, plants: np.ndarray, start: np.ndarray, commands: np.ndarray, step: float
+) -> np.ndarray:
+    """States (V, S, n, 13) of plants after each step by rk4, one plant after the other.
+
+    Parameters
+    ----------
+    library : of `library`
+    plants : (V, 160) of `plants`
+    start : (13,) position, quaternion, nu, of every segment
+    commands : (S, n, 6) held over each step; the applied wrench begins at the first one
+    step : s
+
+    """
+    states = np.empty((len(plants), *commands.shape[:2], len(start)))
+    library.open_loops(
+        *(plants.ctypes, len(plants), start.ctypes, commands.ctypes),
+        *(*commands.shape[:2], step, states.ctypes),
+    )
+    return states
+
+
+def plants(model: Model, follow: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """Plants as `open_loop` takes them: of a `Model` with arrays (V, ...), and (V, 6) each."""
+    if model.lift is not None:
+        raise ValueError('reference.c knows no lift')
+    return np.concatenate([*model[:-1], follow, bias], axis=1)
+
+
 def _call(library: Any, loops: Loops, figures: np.ndarray, rows: np.ndarray | None) -> None:
     library.rollouts(
         *(loops.parameters.ctypes, len(loops.parameters), loops.start.ctypes, loops.grid.ctypes),
@@ -146,5 +176,9 @@ def library(flags: tuple[str, ...] = PLAIN) -> Any:
         *(whole, real, whole, pointer),
         *(pointer, pointer),
     ]
-    loaded.rollouts.restype = None
+    loaded.open_loops.argtypes = [
+        *(pointer, whole, pointer, pointer),
+        *(whole, whole, real, pointer),
+    ]
+    loaded.rollouts.restype = loaded.open_loops.restype = None
     return loaded

@@ -82,6 +82,12 @@ KEYS = (
         'scalar C', 'cost',
     ),
     Key(
+        'openloop_vs_c', 'the plant alone, 10 s of commands: one of 96 variants, every state',
+        'scalar C', 'cost', 0.6, 0.25,
+        'an eighth of the time is packing the variants and writing every state. Fewer passes '
+        "of the integrator's sums through memory were tried and gained nothing.",
+    ),
+    Key(
         'threads_2_vs_1', 'a batch of 2 048 on two threads', 'one thread', 'gain', 1.6, 1.95,
         'packing the vehicles into lanes and unpacking their figures, 1 % of the work, is done by '
         'one thread; the rest is what else runs on two cores.',
@@ -142,6 +148,7 @@ BY_NAME = {key.name: key for key in KEYS}
 # measured together: module:function, which gives a Measured by key
 GROUPS = {
     'bench_rollouts:against_c': ('rollout_vs_c', 'single_vs_c', 'native_c_vs_c'),
+    'bench_rollouts:open_loop_against_c': ('openloop_vs_c',),
     'bench_rollouts:threads': ('threads_2_vs_1',),
     'bench_rollouts:growth': ('growth_batch', 'growth_horizon'),
     'bench_rollouts:against_scipy': ('rollout_vs_solve_ivp',),

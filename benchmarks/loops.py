@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from c_reference import Loops, loops
+from c_reference import Loops, loops, plants
 
 from auv_analysis import load_scenario
 from auv_analysis.metrics.summary import band_of
@@ -22,8 +22,11 @@ from auv_analysis.simulation.simulate import (
     tables,
 )
 from auv_analysis.simulation.variants import packed_variants
+from auv_dynamics import load_vehicle
 from auv_dynamics.kernel.integrator import TABLEAUS
 from auv_dynamics.kernel.lanes import with_batch_axis
+from auv_dynamics.plant.plant import initial_state
+from auv_dynamics.vehicle.vehicle import make_model
 
 CONTROLLER = 'gvc'
 VARIED = (
@@ -33,6 +36,7 @@ VARIED = (
 )  # fmt: skip
 SPREAD = 0.05  # relative, to either side
 SEED = 0
+SEGMENTS = 2  # of a recording, 10 s each
 
 
 def case1(duration: float) -> Scenario:
@@ -95,6 +99,25 @@ def single(scenario: Scenario) -> Callable[[], Figures]:
         return figures
 
     return run
+
+
+def open_plants(count: int) -> tuple[dict[str, Any], np.ndarray]:
+    """Plants like RexROV under recorded commands: arguments of `open_loop`, the same in C."""
+    vehicle, draw = load_vehicle('rexrov'), np.random.default_rng(SEED)
+    M, D_linear, D_quadratic = (
+        A * draw.uniform(1 - SPREAD, 1 + SPREAD, (count, 1, 1))
+        for A in (vehicle.M, vehicle.D_linear, vehicle.D_quadratic)
+    )
+    hydrostatics = np.tile(vehicle.model.hydrostatics, (count, 1))
+    model = make_model(M, D_linear, D_quadratic, hydrostatics)
+    follow, bias = draw.uniform(0.1, 0.2, (count, 6)), draw.normal(size=(count, 6))
+    commands = draw.normal(scale=5.0, size=(SEGMENTS, 1000, 6)).cumsum(axis=1)
+    start = initial_state(np.zeros(6), np.zeros(6))
+    given = {
+        'model': model, 'commands': commands, 'start': np.tile(start, (1, SEGMENTS, 1)),
+        'step': 0.01, 'follow': follow, 'bias': bias,
+    }  # fmt: skip
+    return given, plants(model, follow, bias)
 
 
 def in_c(scenario: Scenario, changes: dict[str, np.ndarray]) -> Loops:

@@ -1,8 +1,9 @@
-/* The closed loop in scalar C: what the rollouts are measured against.
+/* The closed loop, and the plant alone, in scalar C: what the rollouts are measured against.
  *
  * The same mathematics as the project's kernel and nothing left out: plant (1), (2) with full 6x6
  * matrices and a unit quaternion, the GVC law (16) to (21) inside every stage, ode5, set-points and
  * disturbance tabulated on the stage grid, and the figures of summary.json reduced in the loop.
+ * The plant alone has a lag before it and is taken by rk4, every state is kept.
  * Equations: Herman 2018. SI units, body frame forward-starboard-down, 6x6 matrices row-major.
  */
 #include <math.h>
@@ -12,6 +13,7 @@
 #define LARGEST 1e100 /* beyond it a run counts as diverged */
 
 enum { STAGES = 6, POSITION = 0, ATTITUDE = 3, NU = 7, Z = 13, S = 19, STATES = 25 };
+enum { PLANT = 13 }; /* states of the plant alone */
 
 typedef struct {
     double M[36], M_inv[36], D_linear[36], D_quadratic[36];
@@ -24,6 +26,12 @@ typedef struct {
     double N[6];                            /* (9) */
     double k_D[36], k_I[36], Lambda[36], Gamma[36];
 } Loop;
+
+typedef struct {
+    Model plant;
+    double follow[6]; /* share of the way to the command that the lag covers per step */
+    double bias[6];   /* constant wrench */
+} Variant;
 
 typedef struct {
     double nu_d[6], nu_d_dot[6], F[6];
@@ -142,14 +150,13 @@ static inline void law(const Loop *restrict loop, const double *restrict x, cons
     upper_T(loop->Upsilon_inv, f_xi, f);
 }
 
-static inline void rates(const Loop *restrict loop, const double *restrict x, const Input *restrict in,
-                         double *restrict rate, double *restrict tau, double *restrict f)
+/* (2), and (1) under a wrench tau - F */
+static inline void motion(const Model *restrict plant, const double *restrict x, const double *restrict down,
+                          const double *restrict wrench, double *restrict rate)
 {
     const double *q = x + ATTITUDE, *nu = x + NU;
     const double w = q[0], a = q[1], b = q[2], c = q[3];
-    double down[3], body[6], net[6];
-    gravity(q, down);
-    law(loop, x, down, in, tau, f, rate + Z, rate + S);
+    double body[6], net[6];
     rate[0] = (1 - 2 * (b * b + c * c)) * nu[0] + 2 * (a * b - w * c) * nu[1] + 2 * (a * c + w * b) * nu[2];
     rate[1] = 2 * (a * b + w * c) * nu[0] + (1 - 2 * (a * a + c * c)) * nu[1] + 2 * (b * c - w * a) * nu[2];
     rate[2] = down[0] * nu[0] + down[1] * nu[1] + down[2] * nu[2];
@@ -157,10 +164,28 @@ static inline void rates(const Loop *restrict loop, const double *restrict x, co
     rate[4] = 0.5 * (w * nu[3] + b * nu[5] - c * nu[4]);
     rate[5] = 0.5 * (w * nu[4] + c * nu[3] - a * nu[5]);
     rate[6] = 0.5 * (w * nu[5] + a * nu[4] - b * nu[3]);
-    terms(&loop->plant, nu, nu, down, body);
+    terms(plant, nu, nu, down, body);
     for (int i = 0; i < 6; i++)
-        net[i] = tau[i] - body[i] - in->F[i];
-    mul(loop->plant.M_inv, net, rate + NU); /* (1) */
+        net[i] = wrench[i] - body[i];
+    mul(plant->M_inv, net, rate + NU);
+}
+
+static inline void rates(const Loop *restrict loop, const double *restrict x, const Input *restrict in,
+                         double *restrict rate, double *restrict tau, double *restrict f)
+{
+    double down[3], wrench[6];
+    gravity(x + ATTITUDE, down);
+    law(loop, x, down, in, tau, f, rate + Z, rate + S);
+    for (int i = 0; i < 6; i++)
+        wrench[i] = tau[i] - in->F[i];
+    motion(&loop->plant, x, down, wrench, rate);
+}
+
+static inline void normalise(double *q)
+{
+    const double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (int i = 0; i < 4; i++)
+        q[i] /= norm;
 }
 
 /* Whether every number is one and of a size that a run may have */
@@ -247,10 +272,7 @@ static void rollout(const Loop *restrict loop, const double *restrict start,
         }
         for (int i = 0; i < STATES; i++)
             x[i] += step * (B[0] * k[0][i] + B[2] * k[2][i] + B[3] * k[3][i] + B[4] * k[4][i] + B[5] * k[5][i]);
-        double *q = x + ATTITUDE;
-        const double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-        for (int i = 0; i < 4; i++)
-            q[i] /= norm;
+        normalise(x + ATTITUDE);
     }
     finish(loop, last, step, figures);
 }
@@ -263,4 +285,42 @@ void rollouts(const Loop *loops, long count, const double *start, const Input (*
 {
     for (long i = 0; i < count; i++)
         rollout(loops + i, start, grid, last, step, transient, band, figures + i, log);
+}
+
+static void alone(const Variant *restrict variant, const double *restrict start,
+                  const double (*restrict commands)[6], long steps, double step,
+                  double (*restrict states)[PLANT])
+{
+    static const double NODE[4] = {0, 0.5, 0.5, 1}; /* rk4: stage s begins with the rate of s - 1 */
+    double x[PLANT], trial[PLANT], k[4][PLANT], applied[6], wrench[6], down[3];
+    memcpy(x, start, sizeof x);
+    memcpy(applied, commands[0], sizeof applied);
+    for (long n = 0; n < steps; n++) {
+        for (int i = 0; i < 6; i++) {
+            applied[i] += variant->follow[i] * (commands[n][i] - applied[i]);
+            wrench[i] = applied[i] + variant->bias[i];
+        }
+        gravity(x + ATTITUDE, down);
+        motion(&variant->plant, x, down, wrench, k[0]);
+        for (int s = 1; s < 4; s++) {
+            for (int i = 0; i < PLANT; i++)
+                trial[i] = x[i] + step * NODE[s] * k[s - 1][i];
+            gravity(trial + ATTITUDE, down);
+            motion(&variant->plant, trial, down, wrench, k[s]);
+        }
+        for (int i = 0; i < PLANT; i++)
+            x[i] += step / 6 * (k[0][i] + 2 * (k[1][i] + k[2][i]) + k[3][i]);
+        normalise(x + ATTITUDE);
+        memcpy(states[n], x, sizeof x);
+    }
+}
+
+/* `count` plants under the commands of each of some segments, one after the other. start (PLANT,),
+ * commands (segments, steps), held over each step; states (count, segments, steps). */
+void open_loops(const Variant *variants, long count, const double *start, const double (*commands)[6],
+                long segments, long steps, double step, double (*states)[PLANT])
+{
+    for (long i = 0; i < count; i++)
+        for (long s = 0; s < segments; s++, states += steps)
+            alone(variants + i, start, commands + s * steps, steps, step, states);
 }

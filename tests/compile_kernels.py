@@ -14,12 +14,14 @@ from typing import NamedTuple
 import numpy as np
 import yaml
 
-from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis import load_scenario, open_loop, simulate, summarize
 from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.rollouts import rollouts
 from auv_analysis.simulation.simulate import warm_up
 from auv_analysis.studies.tune.cost import measured
+from auv_dynamics import load_vehicle
+from auv_dynamics.plant.plant import initial_state
 
 STEPS = 20
 SHARED, OWN = 'controllers.{}.k_D', 'setpoint.surge.offset'  # set-points that are shared, or not
@@ -42,7 +44,8 @@ LAWS = {
     'pid': Called('faults_bluerov2_heavy'),
     'smc': Called('faults_bluerov2_heavy'),
 }
-TOGETHER = (('gvc',), ('cl', 'pid', 'smc'))
+OPEN_LOOP = 'open_loop'  # of a vehicle without lift, and of one with it
+TOGETHER = (('gvc', OPEN_LOOP), ('cl', 'pid', 'smc'))
 
 
 def shortened(name: str, folder: Path) -> Scenario:
@@ -79,10 +82,17 @@ def compile_all(law: str) -> None:
             measured(scenario, law, {'k_D': np.array([0.1, 0.2])}, 'continuous', 1)
 
 
+def compile_open_loop() -> None:
+    """The plant alone, which knows no law."""
+    start = initial_state(np.zeros((1, 1, 6)), np.zeros((1, 1, 6)))
+    for vehicle in ('rexrov', 'lauv'):
+        open_loop(load_vehicle(vehicle), np.zeros((1, 1, 6)), start, 0.01)
+
+
 def main() -> None:
     """Compile for the laws that are named, or for all in processes of their own."""
-    for law in sys.argv[1:]:
-        compile_all(law)
+    for name in sys.argv[1:]:
+        compile_open_loop() if name == OPEN_LOOP else compile_all(name)
     if not sys.argv[1:]:
         print('compiling the kernels that the tests call ...', flush=True)
         started = [subprocess.Popen([sys.executable, __file__, *laws]) for laws in TOGETHER]

@@ -7,9 +7,10 @@ import c_reference
 import numpy as np
 import pytest
 from closed_loops import FULL, SIX, TURNED, file_of
+from loops import open_plants
 from numpy.testing import assert_allclose
 
-from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis import load_scenario, open_loop, simulate, summarize
 from auv_analysis.simulation.simulate import DivergedError
 from auv_dynamics.plant.plant import unwrapped_eta
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
@@ -84,6 +85,16 @@ def test_each_loop_of_a_batch_is_itself(library):
     for scenario, figures in zip(scenarios, together, strict=True):
         [alone], _ = c_reference.rollouts(library, c_reference.loops([scenario], 'gvc'))
         np.testing.assert_array_equal(figures, alone)
+
+
+def test_states_of_the_plant_alone_are_the_kernels(library):
+    given, plants = open_plants(5)
+    start, commands, step = given['start'][0, 0], given['commands'], given['step']
+    expected = open_loop(**given)
+    assert np.abs(expected[:, :, -1, 7:]).max() > 0.1
+    found = c_reference.open_loop(library, plants, start, commands, step)
+    assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    assert len(np.unique(found[:, :, -1, 7])) == found.shape[0] * found.shape[1]
 
 
 def test_it_says_from_when_on_a_run_is_not_finite(library):

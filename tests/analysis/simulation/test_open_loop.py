@@ -223,6 +223,30 @@ def test_several_vehicles_one_of_which_has_lift():
         assert_allclose(states, alone, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.skipif(not JITTED, reason='nothing is compiled')
+def test_nothing_is_compiled_anew_for_arrays_of_another_kind():
+    vehicle = load_vehicle('rexrov')
+    commands, start = recorded(vehicle, 2), in_segments(START, 2)
+    expected = open_loop(vehicle, commands, start, STEP)
+    known = list(module.run_open.signatures)
+    for array in (commands, start):
+        array.flags.writeable = False
+    assert_array_equal(open_loop(vehicle, commands, start, STEP), expected)
+    turned = np.asfortranarray(commands)
+    assert_array_equal(open_loop(vehicle, turned, start.tolist(), STEP, threads=2), expected)
+    ones = {'follow': np.ones((1, 6)), 'bias': np.zeros((1, 6), int), 'every': np.int64(1)}
+    assert_array_equal(open_loop(vehicle, commands, start, STEP, **ones), expected)
+    assert module.run_open.signatures == known
+
+
+def test_of_no_segments_or_no_whole_row_nothing_comes():
+    vehicle = load_vehicle('rexrov')
+    none = open_loop([vehicle] * 2, np.zeros((0, 5, 6)), np.zeros((1, 0, 13)), STEP)
+    assert none.shape == (2, 0, 5, 13)
+    short = open_loop(vehicle, np.zeros((1, 5, 6)), in_segments(START), STEP, every=6)
+    assert short.shape == (1, 1, 0, 13)
+
+
 class TestObserver:
     vehicle = load_vehicle('rexrov')
     commands = recorded(vehicle)

@@ -21,11 +21,10 @@ from auv_dynamics.kernel.lanes import (
     with_batch_axis,
 )
 from auv_dynamics.kernel.six import fill_vector, vector
-from auv_dynamics.plant.actuators import Actuators, fill_slowed
+from auv_dynamics.plant.actuators import fill_slowed
 from auv_dynamics.plant.plant import SIZE, fill_plant_step, fill_unit_attitude
 from auv_dynamics.plant.uncertainty import PlantModel
 from auv_dynamics.vehicle.model import Model
-from auv_dynamics.vehicle.thrusters import make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 PARTS = 4  # per thread, so that a slow one is made up for
@@ -38,16 +37,16 @@ class Variant(NamedTuple):
     Attributes
     ----------
     truth : coefficients
-    actuators : lag between the wrench of a command and the applied one
     allocation : (6, m) wrench of a command; (6, 0): the command is the wrench
+    follow : (6,) share of the remaining way that the first-order lag covers in a step
     F : (s, 6) external disturbance at the stages of every step
     current : (s, 6) at the stages of every step; (0, 6) in still water
 
     """
 
     truth: PlantModel
-    actuators: Actuators
     allocation: np.ndarray
+    follow: np.ndarray
     F: np.ndarray
     current: np.ndarray
 
@@ -82,6 +81,8 @@ class Settings(NamedTuple):
     step : s
     every : steps from one row of the result to the next
     settled : the applied wrench begins at that of the first command
+    slew : (6,) largest change of the wrench per step: none, in memory lest the compiler, which
+        would know it, fused the lag's product with its sum where the plant's step does not
     observer : (10,) gains
 
     """
@@ -89,6 +90,7 @@ class Settings(NamedTuple):
     step: float
     every: int
     settled: bool
+    slew: np.ndarray
     observer: np.ndarray
 
 
@@ -137,7 +139,7 @@ def fill_segment(
         fill_command(variant.allocation, segment.commands[k], command)
         if settings.settled and k == 0:
             fill_vector(applied, 0, vector(command, 0))
-        tau = fill_slowed(variant.actuators, vector(command, 0), applied)
+        tau = fill_slowed(variant.follow, settings.slew, vector(command, 0), applied)
         fill_plant_step(
             variant.truth, x, tau, variant.F, variant.current, settings.step, tableau,
             work.stages, work.trial,
@@ -254,7 +256,7 @@ def open_loop(
     rows = 0 if measured is None else n
     segments = Segment(u, _shaped('measured', measured, S, rows, MEASURED))
     gains = _shaped('observer', observer, MEASURED)
-    settings = Settings(float(step), int(every), applied is None, gains)
+    settings = Settings(float(step), int(every), applied is None, np.full(6, np.inf), gains)
     variants = _packed_variants(plants, **of_variants, stages=stages)
     states = OpenState(_by_block(x, V), _by_block(held, V))
     result = np.empty((V, S, n // every, SIZE))
@@ -267,13 +269,15 @@ def open_loop(
                 blocks.start, blocks.stop, LANES,
             )  # fmt: skip
 
-    seen = states.x.reshape(len(states.x), SIZE, -1)
+    seen = states.x.reshape(len(states.x), SIZE, LANES or 1)
     _spread(run, len(seen), threads or len(os.sched_getaffinity(0)))
     return result
 
 
 def stacked(model: Model | Vehicle | Sequence[Vehicle]) -> Model:
-    """Coefficients with a leading axis of one or several vehicles; no lift is lift zero beside one.
+    """Coefficients with a leading axis of one or several vehicles.
+
+    Where some have lift, it is zero for the others, whose last bits may then be others.
 
     Raises
     ------
@@ -300,7 +304,7 @@ def _shaped(name: str, value: Any, *shape: int | None, default: float = 0.0) -> 
     """
     if value is None:
         return np.full([size if size is not None else 1 for size in shape], default)
-    array = np.ascontiguousarray(value, float)
+    array = np.require(value, float, ('C', 'A', 'W'))  # another kind would be compiled for
     fits = [size in (None, found) for size, found in zip(shape, array.shape, strict=False)]
     if array.ndim != len(shape) or not all(fits):
         expected = ', '.join('any' if size is None else str(size) for size in shape)
@@ -328,12 +332,10 @@ def _packed_variants(
     """Blocks of variants, of which each argument has a row or one for all."""
     model = _packed(plants)
     truth = PlantModel(model, _packed(np.zeros((1, 36))), model, exact=False)
-    free = with_batch_axis(make_reach(None, None))
-    lag = Actuators(ideal=False, reach=free, slew=np.full((1, 6), np.inf), follow=follow, delay=0)
     F = np.repeat(0.0 - bias[:, None], stages, axis=1)  # which opposes tau
-    constant = np.pad(current, ((0, 0), (0, 6 - current.shape[1])))
-    flow = np.repeat(constant[:, None], stages if current.shape[1] else 0, axis=1)
-    return Variant(truth, *map(_packed, (lag, allocation, F, flow)))
+    flow = np.zeros((len(current), stages if current.shape[1] else 0, 6))
+    flow[:, :, : current.shape[1]] = current[:, None]
+    return Variant(truth, *map(_packed, (allocation, follow, F, flow)))
 
 
 def _by_block(values: np.ndarray, count: int) -> np.ndarray:
@@ -344,7 +346,7 @@ def _by_block(values: np.ndarray, count: int) -> np.ndarray:
 
 def _spread(run: Callable[[range], None], count: int, threads: int) -> None:
     """Run blocks 0 ... count in pieces that threads work on."""
-    size = max(1, -(-count // (PARTS * threads))) if threads > 1 else count
+    size = max(1, -(-count // (PARTS * threads)) if threads > 1 else count)
     parts = [range(first, min(first + size, count)) for first in range(0, count, size)]
     if len(parts) < 2:
         list(map(run, parts))

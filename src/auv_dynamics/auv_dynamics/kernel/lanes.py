@@ -8,6 +8,7 @@ element of which is W numbers that are added and multiplied together.
 What the vehicles may decide differently cannot be an `if`: it is a `select`.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -94,9 +95,11 @@ def packed(values: np.ndarray, lanes: int | None) -> np.ndarray:
     if lanes is None:
         return np.array(values, order='C')
     count = block_count(len(values), lanes)
-    rows = np.minimum(np.arange(count * lanes), len(values) - 1)
+    if count * lanes != len(values):
+        values = values[np.minimum(np.arange(count * lanes), len(values) - 1)]
+    rows = values.reshape(count, lanes, *values.shape[1:])
     blocks = empty((count, *values.shape[1:], lanes))
-    blocks[...] = np.moveaxis(values[rows].reshape(count, lanes, *values.shape[1:]), 1, -1)
+    blocks[...] = rows.transpose(0, *range(2, rows.ndim), 1)
     return blocks
 
 
@@ -115,9 +118,9 @@ def block_count(count: int, lanes: int | None) -> int:
 
 def empty(shape: tuple[int, ...]) -> np.ndarray:
     """Uninitialised float64 array that begins at a cache line."""
-    size = int(np.prod(shape)) * 8
+    size = math.prod(shape) * 8
     memory = np.empty(size + ALIGNMENT, np.uint8)
-    start = -memory.ctypes.data % ALIGNMENT
+    start = -memory.__array_interface__['data'][0] % ALIGNMENT  # sooner there than `ctypes.data`
     return memory[start : start + size].view(float).reshape(shape)
 
 

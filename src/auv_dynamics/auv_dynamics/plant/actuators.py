@@ -119,9 +119,8 @@ def waited(actuators: Actuators, k: int, tau: Numbers, state: np.ndarray) -> Num
 
 
 @helper
-def fill_slowed(actuators: Actuators, c: Vector, a: np.ndarray) -> Six:
+def fill_slowed(follow: Vector, slew: Vector, c: Vector, a: np.ndarray) -> Six:
     """The wrench c behind lag and slew limit; the applied wrench `a` (6,) in place."""
-    follow, slew = actuators.follow, actuators.slew
     applied = (
         _servo(a[0], c[0], follow[0], slew[0]),
         _servo(a[1], c[1], follow[1], slew[1]),
@@ -140,4 +139,4 @@ def fill_applied(actuators: Actuators, k: int, tau: Numbers, state: np.ndarray) 
     if actuators.ideal:
         return tau
     c = reachable(actuators.reach, waited(actuators, k, tau, state))
-    return fill_slowed(actuators, c, state[0])
+    return fill_slowed(actuators.follow, actuators.slew, c, state[0])

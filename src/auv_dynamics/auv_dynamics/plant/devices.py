@@ -191,7 +191,7 @@ def fill_faulty(
     command = waited(actuators, k, heard, state)
     reach = actuators.reach
     c = clipped(left_of_thrusters(reach, fault, command), reach.limit)
-    return fill_slowed(actuators, left_of_axes(fault, c), state[0])
+    return fill_slowed(actuators.follow, actuators.slew, left_of_axes(fault, c), state[0])
 
 
 class Sensing:

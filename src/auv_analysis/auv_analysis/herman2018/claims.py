@@ -320,16 +320,25 @@ COLUMNS: dict[str, Column | Quantity | str] = {
     'case': WORDS,
 }
 CAPTION = (
-    'Claims of the paper. Each verdict follows from the numbers beside it by the criterion in its '
-    'row; an en dash (–) stands for what is missing.'
+    'All claims of the paper. Each verdict follows from the numbers beside it by the criterion in '
+    'its row; an en dash (–) stands for what is missing.'
 )
 TITLE = 'What the paper reports, and what these runs give'
 
 
 def claims_table(claims: Sequence[Claim]) -> Table:
     """The paper's claims with our numbers and verdicts."""
-    rows = [{name: getattr(claim, name) for name in FACTS} for claim in claims]
-    return make_table('claims', CAPTION, rows, COLUMNS, anchor='claim', stub=1)
+    return make_table('claims', CAPTION, _rows(claims), COLUMNS, anchor='claim', folded=True)
+
+
+def _rows(claims: Sequence[Claim]) -> list[dict[str, Any]]:
+    return [{name: getattr(claim, name) for name in FACTS} for claim in claims]
+
+
+def _deviations(claims: Sequence[Claim]) -> Iterator[Table]:
+    """The claims that these runs do not wholly reproduce."""
+    if rows := _rows([claim for claim in claims if claim.verdict in DECIDED[1:]]):
+        yield make_table('deviations', 'Claims that are not wholly reproduced.', rows, COLUMNS)
 
 
 def claims_part(out: Path, claims: Sequence[Claim], runs: Mapping[str, RunInfo]) -> Part:
@@ -345,7 +354,8 @@ def claims_part(out: Path, claims: Sequence[Claim], runs: Mapping[str, RunInfo])
     sections = []
     if claims:
         write_claims(out, claims)
-        blocks: list[Block] = [prose('claims', folder=HERE), claims_table(claims)]
+        blocks: list[Block] = [prose('claims', folder=HERE), *_deviations(claims)]
+        blocks.append(claims_table(claims))
         drawn = {name: paper.paper_figures(run) for name, run in runs.items()}
         blocks += [f'{name}: {join(parts)}.' for name, parts in drawn.items() if parts]
         sections.append(Section('claims', TITLE, blocks))

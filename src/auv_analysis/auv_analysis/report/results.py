@@ -116,6 +116,7 @@ class Table:
     pointer : row and column of `data` -> where the number is stored, for a table that is a view of
         a JSON document; default: the cell of `file`
     anchor : anchor of a row: this word, a hyphen and the text of its first cell
+    folded : whether a page shows its caption first, and the rest when asked for
 
     """
 
@@ -128,6 +129,7 @@ class Table:
     file: str = ''
     pointer: Pointer | None = None
     anchor: str = ''
+    folded: bool = False
 
     @cached_property
     def _numeric(self) -> dict[str, bool]:
@@ -226,7 +228,7 @@ def make_table(
     name, caption : as of `Table`
     rows : mappings, one per row; or column -> values; or an Arrow table; NaN and None are unknown
     shown : column -> what it is; names alone: each is looked up in the registry of quantities
-    about : note, stub, file, pointer, anchor of `Table`
+    about : note, stub, file, pointer, anchor, folded of `Table`
 
     """
     if not isinstance(shown, Mapping):

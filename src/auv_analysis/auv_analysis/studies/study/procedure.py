@@ -122,7 +122,7 @@ def sensitivity_table(found: Sequence[Sensitivity], controller: str) -> Table:
         f'{of.rollouts} runs, indices after {METHODS[of.method]}.'
     )
     name = f'sensitivity_{controller}'
-    return make_table(name, caption, rows, HEADS | gains, pointer=pointer)
+    return make_table(name, caption, rows, HEADS | gains, pointer=pointer, folded=True)
 
 
 def left_out_table(found: Sequence[Sensitivity]) -> Table | None:
@@ -135,7 +135,8 @@ def left_out_table(found: Sequence[Sensitivity]) -> Table | None:
     ]
     caption = 'What is left out of the study of gains: its logarithm does not exist or never moves.'
     shown = {name: name for name in heads}
-    return make_table('sensitivity_left_out', caption, rows, shown, stub=2) if rows else None
+    name = 'sensitivity_left_out'
+    return make_table(name, caption, rows, shown, stub=2, folded=True) if rows else None
 
 
 def _left_out(of: Sensitivity) -> Iterator[tuple[str, str]]:
@@ -269,10 +270,9 @@ def sensitivity_section(out: Path, found: Sequence[Sensitivity]) -> Part:
 
 
 def _of_controllers(out: Path, found: Sequence[Sensitivity]) -> Iterator[Block]:
-    for of in found:
-        if not of.refusal:
-            yield sensitivity_plot(of, out / 'figures')
-            yield sensitivity_table(found, of.controller)
+    known = [of for of in found if not of.refusal]
+    yield from (sensitivity_plot(of, out / 'figures') for of in known)
+    yield from (sensitivity_table(found, of.controller) for of in known)
     left_out = left_out_table(found)
     if left_out is not None:
         yield left_out

@@ -13,10 +13,10 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 ifeq ($(ROS_DISTRO),jazzy)
 VENV_OPTIONS := --system-site-packages
-REQUIREMENTS := requirements.txt requirements-apt.txt requirements-dev.txt
+REQUIREMENTS := requirements.txt requirements-apt.txt requirements-mesh.txt requirements-dev.txt
 else
 VENV_OPTIONS :=
-REQUIREMENTS := requirements.txt requirements-ros.txt requirements-dev.txt
+REQUIREMENTS := requirements.txt requirements-ros.txt requirements-mesh.txt requirements-dev.txt
 endif
 
 COUNT ?= 10

@@ -82,6 +82,13 @@ setup(
         'test': ['pytest', 'pillow'],
         'dask': ['distributed>=2024.8'],
         'rerun': ['rerun-sdk>=0.41,<1'],
+        'mesh': [
+            'capytaine>=3,<4',
+            'trimesh>=5,<6',
+            'manifold3d>=3,<4',
+            'fast-simplification>=0.1.12,<1',
+            'networkx>=3,<4',
+        ],
     },
     zip_safe=False,
     entry_points={

@@ -36,10 +36,12 @@ KEYS = {  # of rosdep, for imports of another name
 NAMES = {  # on PyPI
     'SALib': 'SALib', 'PIL': 'Pillow', 'jinja2': 'Jinja2', 'markupsafe': 'Jinja2',
     'mcap_ros2': 'mcap-ros2-support', 'yaml': 'PyYAML', 'rerun': 'rerun-sdk', 'llvmlite': 'numba',
+    'fast_simplification': 'fast-simplification',
 }  # fmt: skip
 FROM_PYPI = {'SALib', 'bokeh', 'lz4', 'mcap', 'mcap_ros2', 'pyarrow', 'rosbags', 'scipy',
              'zstandard'}  # fmt: skip
-OPTIONAL = {'numba', 'llvmlite', 'distributed', 'pandas', 'rerun'}
+OPTIONAL = {'numba', 'llvmlite', 'distributed', 'pandas', 'rerun', 'capytaine', 'trimesh',
+            'manifold3d', 'fast_simplification', 'networkx'}  # fmt: skip
 
 
 @cache

@@ -188,7 +188,7 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'a file from elsewhere': (
         'a.sdf', '<!DOCTYPE x SYSTEM "file:///etc/passwd"><sdf/>', [], 'document type'),
     'no XML': ('a.sdf', '<sdf><', [], 'valid XML'),
-    'nothing known': ('a.txt', 'hello', [], '--format uuv, gazebo or mss'),
+    'nothing known': ('a.txt', 'hello', [], '--format uuv, gazebo, mss or mesh'),
     'no plugin': ('a.sdf', '<sdf><model name="m"/></sdf>', [], 'one plugin'),
     'no volume': ('a.sdf', sdf().replace('box', 'mesh'), [], '--volume'),
     'no density': (

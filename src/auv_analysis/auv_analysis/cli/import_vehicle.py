@@ -1,27 +1,31 @@
-"""`auv import-vehicle`: a vehicle file from that of another system."""
+"""`auv import-vehicle`: a vehicle file from that of another system, or from a hull's mesh."""
 
 import argparse
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.cli.arguments import TO_FILE, add_results
+from auv_analysis.cli.arguments import TO_FILE, add_results, number, whole
 
-NAMES = {'uuv': 'uuv_simulator', 'gazebo': 'Gazebo', 'mss': 'a list of derivatives'}
+NAMES = {
+    'uuv': 'uuv_simulator', 'gazebo': 'Gazebo', 'mss': 'a list of derivatives', 'mesh': 'a mesh',
+}  # fmt: skip
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """File, format, and what the file cannot say for itself."""
     add_results(command, TO_FILE)
-    command.add_argument('file', type=Path, metavar='FILE', help='of the other system')
-    formats = ('auto', 'uuv', 'gazebo', 'mss')
-    text = 'uuv_simulator, Gazebo, a list of derivatives; default: by its contents'
+    command.add_argument(
+        'file', type=Path, metavar='FILE', help='of the other system; STL, OBJ, PLY'
+    )
+    formats = ('auto', 'uuv', 'gazebo', 'mss', 'mesh')
+    text = 'uuv_simulator, Gazebo, a list of derivatives, a mesh; default: by its contents'
     command.add_argument('--format', choices=formats, default='auto', help=text)
     command.add_argument('--source', help='citation for the vehicle file')
     text = 'sign convention of damping, lift, added mass, where not the usual one of the format'
     command.add_argument('--sign', choices=('sname', 'positive'), help=text)
-    text = 'products of inertia Ixy, Ixz, Iyz of a list: integrals of x y dm, or tensor entries'
+    text = 'Ixy, Ixz, Iyz of a list or of --inertia: integrals of x y dm, or entries of the tensor'
     command.add_argument('--products', choices=('integral', 'tensor'), help=text)
-    text = 'reference point of the inertia tensor of a list'
+    text = 'reference point of the inertia tensor of a list or of --inertia (default there: cg)'
     command.add_argument('--inertia-reference', choices=('cg', 'co'), help=text)
     text = 'what Yuv, Nuv, Muw ... of a list are: of body and fins, or with the terms of added mass'
     command.add_argument('--lift', choices=('alone', 'combined'), help=text)
@@ -36,6 +40,28 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     point = ('X', 'Y', 'Z')
     text = 'm, forward-starboard-down'
     command.add_argument('--center-of-buoyancy', nargs=3, type=float, metavar=point, help=text)
+    _add_mesh(command, point)
+
+
+def _add_mesh(command: argparse.ArgumentParser, point: tuple[str, ...]) -> None:
+    """What a mesh cannot say; see docs/vehicle-formats.md."""
+    mesh = command.add_argument_group('a mesh', 'needs pip install -r requirements-mesh.txt')
+    positive = number(above=0)
+    text = 'kg, with the water inside a flooded hull'
+    mesh.add_argument('--mass', type=positive, metavar='VALUE', help=text)
+    mesh.add_argument('--units', choices=('mm', 'cm', 'm', 'in'), help='of its coordinates')
+    text = 'directions of its x, y, z: front, back, left, right, up, down; flu: as in ROS'
+    mesh.add_argument('--axes', metavar='LETTERS', help=text)
+    text = "the body's origin in the mesh's axes and units; default: its own"
+    mesh.add_argument('--origin', nargs=3, type=float, metavar=point, help=text)
+    text = 'm, forward-starboard-down; default: the centre of buoyancy'
+    mesh.add_argument('--center-of-gravity', '--cog', nargs=3, type=float, metavar=point, help=text)
+    text = 'Ixx Iyy Izz, and perhaps Ixy Ixz Iyz, kg m2; default: uniform density'
+    mesh.add_argument('--inertia', nargs='+', type=float, metavar='VALUE', help=text)
+    text = 'relative error of the added mass that ends the refinement; default: 0.02'
+    mesh.add_argument('--tolerance', type=number(above=0, below=1), metavar='VALUE', help=text)
+    text = 'at most so many (48 bytes for each pair of them); default: 5500'
+    mesh.add_argument('--panels', type=whole(2000, 30000), metavar='COUNT', help=text)
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:

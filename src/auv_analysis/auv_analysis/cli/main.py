@@ -43,7 +43,7 @@ GROUPS = {
         'check-vehicle': 'inertia, couplings and limits of a vehicle',
         'design': 'suggest and simulate a hull change that removes a coupling',
         'linearize': 'poles and matrices of a vehicle or of its closed loops',
-        'import-vehicle': 'a vehicle file from that of another system',
+        'import-vehicle': "a vehicle file from that of another system, or a hull's mesh",
         'export-vehicle': 'a vehicle as an SDF model for Gazebo',
         'atlas': 'inertial couplings of the shipped vehicles, side by side',
         'tune': 'laws tuned to equal effort or error, and compared over draws',

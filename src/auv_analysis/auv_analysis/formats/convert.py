@@ -9,12 +9,16 @@ import yaml
 
 from auv_analysis.formats.derivatives import ASSIGNED, read_derivatives
 from auv_analysis.formats.imported import Choices, ImportedVehicle
+from auv_analysis.formats.mesh_import import SUFFIXES, read_mesh
 from auv_analysis.formats.sdf_import import read_gazebo
 from auv_analysis.formats.uuv_urdf import read_uuv, uuv_entries
 from auv_analysis.formats.xml_parts import parse_xml
 from auv_dynamics.files.errors import InputError, printable
 from auv_dynamics.files.yaml_files import parse_yaml, read_text
 
+OF_A_MESH = (
+    'mass', 'center_of_gravity', 'inertia', 'units', 'axes', 'origin', 'tolerance', 'panels',
+)  # fmt: skip
 UUV = re.compile(r'hydrodynamic_model|quad_damping|quadratic_damping|^Ma\s*:', re.M)
 
 
@@ -24,7 +28,7 @@ def read_vehicle(path: Path, format_: str, choices: Choices) -> tuple[str, Impor
     Parameters
     ----------
     path : of the file
-    format_ : 'uuv', 'gazebo', 'mss', or 'auto' to tell by its contents
+    format_ : 'uuv', 'gazebo', 'mss', 'mesh', or 'auto' to tell by its suffix and contents
     choices : what the user says of it
 
     Raises
@@ -32,6 +36,12 @@ def read_vehicle(path: Path, format_: str, choices: Choices) -> tuple[str, Impor
     InputError : naming file, key, expected and found
 
     """
+    if format_ == 'mesh' or (format_ == 'auto' and path.suffix.lower() in SUFFIXES):
+        return 'mesh', read_mesh(path, choices)
+    for name in OF_A_MESH:
+        if getattr(choices, name) is not None:
+            option = f'--{name.replace("_", "-")}'
+            raise InputError(path, option, 'a mesh, or no such option', f'{path.suffix or path}')
     text = read_text(path, 'vehicle')
     found = _told(text, path) if format_ == 'auto' else format_
     is_xml = text.lstrip().startswith('<')
@@ -54,7 +64,7 @@ def _told(text: str, path: Path) -> str:
     if any(match[2] for match in ASSIGNED.finditer(text)):
         return 'mss'
     raise InputError(
-        path, '', 'a file of a known format, or --format uuv, gazebo or mss', 'neither'
+        path, '', 'a file of a known format, or --format uuv, gazebo, mss or mesh', 'neither'
     )
 
 

@@ -27,6 +27,11 @@ class Choices:
     leave_out : what a vehicle file cannot hold is left out and reported, not refused
     water_density, gravity, volume : kg/m3, m/s2, m3
     center_of_buoyancy : (3,) FSD, m
+    mass, center_of_gravity, inertia : of a mesh's vehicle: kg, (3,) FSD, m, three moments and
+        perhaps the three products, kg m2
+    units, axes : of a mesh, such as 'mm', 'flu'
+    origin : (3,) of the body frame, in the axes and units of a mesh
+    tolerance, panels : where the refinement of a mesh ends: relative error, number of panels
 
     """
 
@@ -41,6 +46,14 @@ class Choices:
     gravity: float | None = None
     volume: float | None = None
     center_of_buoyancy: Sequence[float] | None = None
+    mass: float | None = None
+    center_of_gravity: Sequence[float] | None = None
+    inertia: Sequence[float] | None = None
+    units: str | None = None
+    axes: str | None = None
+    origin: Sequence[float] | None = None
+    tolerance: float | None = None
+    panels: int | None = None
 
 
 @dataclass

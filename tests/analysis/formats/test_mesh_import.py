@@ -1,6 +1,7 @@
 """Hulls of meshes: added mass against exact values, frames and units, and what is refused."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -98,9 +99,13 @@ def test_ellipsoid_agrees_with_lamb(imported):
     axes = (3.0, 1.0, 0.5)
     exact = ellipsoid_added_mass(axes)
     hull = sphere(4).apply_transform(np.diag([*axes, 1.0]))
-    vehicle, _ = imported(hull)
+    vehicle, document = imported(hull)
     assert_within(vehicle.M_A, np.diag(exact), hull, ERROR)
     assert_allclose(np.diagonal(vehicle.M_A), exact, rtol=0.05)
+    [said] = [text for text in document['traps'] if text.startswith('added_mass')]
+    stated = np.array([float(bound) for bound in re.findall(r'[XYZKMN] \S+ ± ([^ ,;]+)', said)])
+    assert np.all(np.abs(np.diagonal(vehicle.M_A) - exact) <= stated)
+    assert np.all(stated < 0.05 * exact)
 
 
 def sources_added_mass(centres, radius):

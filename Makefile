@@ -25,9 +25,10 @@ STEPS ?= 1000000
 KILLS ?= 200
 DAY ?= 86400
 EXAMPLES ?= 500
+SEEDS ?= 10
 MUTANTS ?= 500
 
-.PHONY: help setup case1 case2 test quick coverage soak fuzz properties mutation audit bench bench-growth build colcon-test wheels
+.PHONY: help setup case1 case2 test quick coverage soak fuzz identify-study properties mutation audit bench bench-growth build colcon-test wheels
 .PHONY: lint format hooks interop docs docs-links docs-test docs-tools clean
 
 help:  ## this list
@@ -64,6 +65,9 @@ coverage: setup  ## lines and branches that the tests see: all of the mathematic
 soak: setup docs-tools  ## COUNT random runs by SEED, KILLS of nodes, a run of STEPS, one of DAY s, what else takes long
 	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) AUV_GVC_STEPS=$(STEPS) AUV_GVC_KILLS=$(KILLS) \
 	  AUV_GVC_DAY=$(DAY) $(BIN)/python -m pytest -m long tests
+
+identify-study: setup  ## how often the intervals of auv identify cover the truth, over SEEDS noise seeds
+	cd tests && $(abspath $(BIN))/python identify_study.py $(SEEDS)
 
 # COUNT is that of soak's runs unless it is given
 fuzz: setup  ## broken files, messages and bags: COUNT inputs (100000) drawn by SEED

@@ -42,6 +42,8 @@ GROUPS = {
     'Vehicles and laws compared': {
         'check-vehicle': 'inertia, couplings and limits of a vehicle',
         'design': 'suggest and simulate a hull change that removes a coupling',
+        'identify': 'a model with its uncertainty from a recording',
+        'predict': 'how well a vehicle file predicts a recording',
         'linearize': 'poles and matrices of a vehicle or of its closed loops',
         'import-vehicle': "a vehicle file from that of another system, or a hull's mesh",
         'export-vehicle': 'a vehicle as an SDF model for Gazebo',

@@ -104,7 +104,9 @@ NAMES = (
     'failures.parquet', 'paired.parquet', 'indices.parquet', 'best.parquet', 'design.json',
     'summary_before.json', 'vehicle_before.yaml', 'tune.json', 'search.parquet',
     'monte_carlo.parquet', 'open_loop.json', 'check.json', 'samples.parquet',
-    'wrenches.parquet', 'faults.parquet', 'linearization.json', SWEEP, CAMPAIGN,
+    'wrenches.parquet', 'faults.parquet', 'linearization.json', SWEEP, CAMPAIGN, 'identify.json',
+    'predict.json', 'coefficients.parquet', 'predictions.parquet', 'inertia.parquet',
+    'deformation.parquet', 'shares.parquet',
 )  # fmt: skip
 
 

@@ -1,0 +1,172 @@
+"""`auv identify`: a model with its uncertainty from recordings, and a vehicle file."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from auv_analysis.cli.arguments import VEHICLE, add_no_report, add_results, number, refused
+from auv_dynamics.files.errors import InputError
+
+if TYPE_CHECKING:
+    from auv_analysis.bag.foreign_topics import TopicMap
+    from auv_analysis.studies.identify.record import Record
+    from auv_dynamics.vehicle.vehicle import Vehicle
+
+
+def add_bags(command: argparse.ArgumentParser) -> None:
+    """Recordings, and what their topics hold."""
+    command.add_argument('bags', nargs='+', type=Path, metavar='BAG', help='one or several')
+    text = f'{VEHICLE}: where the search begins, and what is kept where the data are silent'
+    command.add_argument('--vehicle', required=True, help=text)
+    text = 'only this part of each bag, s from its start; may be repeated'
+    command.add_argument('--part', type=_span, action='append', default=[], metavar='FROM:TO',
+                         help=text)  # fmt: skip
+    text = 'the wrench that acted (wrench_applied) in place of the command'
+    command.add_argument('--applied', action='store_true', help=text)
+    text = 'what the model does not see: a share of the recordings, their last part, or a bag; '
+    command.add_argument('--holdout', default='0.25', metavar='SHARE_OR_BAG',
+                         help=f'{text}default: 0.25')  # fmt: skip
+    group = command.add_argument_group('bags of other systems')
+    group.add_argument('--map', metavar='FILE', help='mapping file; options replace its keys')
+    group.add_argument('--odom', dest='odometry', metavar='TOPIC', help='nav_msgs/Odometry')
+    group.add_argument('--wrench', metavar='TOPIC', help='the commanded WrenchStamped or Wrench')
+    group.add_argument('--frames', choices=('ned_fsd', 'enu_flu'), help='axes of all topics')
+    text = 'axes in which the odometry writes the velocity, default: child'
+    group.add_argument('--twist-frame', choices=('child', 'world'), help=text)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Recordings, what is free, and what somebody knows."""
+    add_results(command)
+    add_bags(command)
+    text = 'what is searched beside or in place of the usual: M, M.diagonal, M.pitch.surge, '
+    text += 'D_linear, D_linear.full, D_quadratic, restoring, lag, delay, gain, bias, current'
+    command.add_argument('--free', action='append', metavar='NAME', help=text)
+    text = 'what keeps the value of the vehicle file; may be repeated'
+    command.add_argument('--fixed', action='append', default=[], metavar='NAME', help=text)
+    text = 'YAML file: coefficient to {value, deviation} of what is known beforehand'
+    command.add_argument('--prior', metavar='FILE', help=text)
+    text = 'length of the segments, s; default: by the instability of the vehicle'
+    command.add_argument('--segment', type=number(above=0.0), metavar='S', help=text)
+    text = 'write the vehicle file even where the recording contradicts the prior'
+    command.add_argument('--accept', action='store_true', help=text)
+    add_no_report(command)
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
+    """A model with its uncertainty from recordings, and a vehicle file."""
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
+    from auv_analysis.output.folder import results_folder
+    from auv_analysis.output.progress import say, waiting
+    from auv_analysis.scenario.scaling import UNFIT
+    from auv_analysis.studies.identify.identify import Settings, identify
+    from auv_analysis.studies.identify.report import print_results, results_of, write_report
+    from auv_analysis.studies.identify.unknowns import DEFAULT
+    from auv_analysis.studies.identify.vehicle_text import vehicle_text
+    from auv_dynamics.files.errors import FailedError
+    from auv_dynamics.files.shipped import shipped
+    from auv_dynamics.files.yaml_files import read_yaml
+    from auv_dynamics.vehicle.vehicle_file import load_vehicle
+
+    vehicle = load_vehicle(options.vehicle)
+    notes: list[str] = []
+    with waiting('reading'):
+        training, held = read(options, vehicle, notes)
+    applied = ['lag', 'delay'] if options.applied else []  # nothing is between it and the vehicle
+    settings = Settings(
+        free=(*DEFAULT, *(options.free or ())), fixed=[*options.fixed, *applied],
+        believed=_believed(options.prior), segment=options.segment,
+        origin=options.prior or 'options',
+    )  # fmt: skip
+    inputs = [*options.bags, shipped('vehicles', options.vehicle)]
+    out = options.out or Path('runs') / f'identify_{UNFIT.sub("_", vehicle.name)[:90]}'
+    with results_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
+        found = identify(training, held, vehicle, settings, lambda text: say(f'  {text}'))
+        results = results_of(found, notes, accepted=options.accept)
+        if results.facts['file']:
+            data = read_yaml(inputs[-1], 'vehicle')
+            source = f'identified from {", ".join(bag.name for bag in options.bags)}; prior: '
+            source += str(data.get('source') or vehicle.name)
+            name = f'{vehicle.name}_identified'
+            text = vehicle_text(found, data, name, source)
+            (folder.folder / results.facts['file']).write_text(text, 'utf-8')
+        results.write(folder.folder)
+        if not options.no_report:
+            with waiting('drawing plots, writing the report'):
+                write_report(found, results, folder.folder)
+        if not options.json:
+            print_results(results, out)
+    if not results.facts['file']:
+        raise FailedError(results.facts['verdict'])
+    return results.to_json()
+
+
+def read(
+    options: argparse.Namespace, vehicle: Vehicle, notes: list[str]
+) -> tuple[list[Record], list[Record]]:
+    """Recordings to learn from, and those held out."""
+    from auv_analysis.studies.identify.bags import on_one_step, parts, read_records
+    from auv_analysis.studies.identify.identify import split
+    from auv_analysis.studies.identify.plausibility import check_rates
+
+    mapping = _mapping(options)
+
+    def records(bag: Path) -> list[Record]:
+        found = read_records(bag, vehicle, mapping, applied=options.applied, notes=notes)
+        for record in found:
+            check_rates(record)
+        return found
+
+    every = [one for bag in options.bags for one in parts(records(bag), options.part)]
+    other = records(Path(options.holdout)) if Path(options.holdout).exists() else None
+    if other is None:
+        share = number(at_least=0.0, at_most=0.9, words=' or a bag')
+        try:
+            every, other = split(on_one_step(every), share(options.holdout))
+        except argparse.ArgumentTypeError as error:
+            expected, _, text = str(error).removeprefix('expected ').rpartition(', found ')
+            raise InputError('--holdout', '', expected, text) from None
+        return every, other
+    both = on_one_step([*every, *other])
+    return both[: len(every)], both[len(every) :]
+
+
+def _mapping(options: argparse.Namespace) -> TopicMap | None:
+    from auv_analysis.bag.foreign_topics import read_mapping
+
+    keys = ('odometry', 'wrench', 'frames', 'twist_frame')
+    given = {key: getattr(options, key) for key in keys}
+    if options.map is None and all(value is None for value in given.values()):
+        return None
+    return read_mapping(options.map, given)
+
+
+def _believed(file: str | None) -> dict[str, tuple[float, float]]:
+    """Coefficients that somebody knows: name -> value and standard deviation."""
+    if file is None:
+        return {}
+    from auv_dynamics.files.yaml_files import read_yaml
+
+    found = {}
+    for name, entry in read_yaml(Path(file), 'prior').items():
+        known = isinstance(entry, dict) and set(entry) == {'value', 'deviation'}
+        values = [entry[k] for k in ('value', 'deviation')] if known else []
+        if not all(isinstance(v, int | float) for v in values) or not values or values[1] <= 0:
+            expected = 'a mapping with value and a positive deviation'
+            raise InputError(file, str(name), expected, entry)
+        found[str(name)] = float(values[0]), float(values[1])
+    return found
+
+
+def _span(text: str) -> tuple[float, float]:
+    first, _, last = text.partition(':')
+    try:
+        begin, end = float(first or 0.0), float(last or 'inf')
+    except ValueError:
+        begin, end = 1.0, 0.0
+    if not begin < end:
+        raise refused('FROM:TO in s, such as 20:95', text)
+    return begin, end

@@ -1,0 +1,50 @@
+"""`auv predict`: how well a vehicle file predicts a recording that it has not seen."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+from auv_analysis.cli.arguments import add_results
+from auv_analysis.cli.identify import add_bags, read
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Recordings and a vehicle."""
+    add_results(command)
+    add_bags(command)
+
+
+def run(options: argparse.Namespace) -> dict[str, Any]:
+    """How well a vehicle file predicts a recording, beside persistence and a black box."""
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
+    from auv_analysis.output.folder import results_folder
+    from auv_analysis.output.progress import TextConsole, waiting
+    from auv_analysis.report.plots import save_figures
+    from auv_analysis.report.results import terminal
+    from auv_analysis.scenario.scaling import UNFIT
+    from auv_analysis.studies.identify.identify import test_of
+    from auv_analysis.studies.identify.plots import prediction
+    from auv_analysis.studies.identify.report import prediction_results
+    from auv_dynamics.files.shipped import shipped
+    from auv_dynamics.vehicle.vehicle_file import load_vehicle
+
+    vehicle = load_vehicle(options.vehicle)
+    notes: list[str] = []
+    with waiting('reading'):
+        training, held = read(options, vehicle, notes)
+    inputs = [*options.bags, shipped('vehicles', options.vehicle)]
+    out = options.out or Path('runs') / f'predict_{UNFIT.sub("_", vehicle.name)[:90]}'
+    with results_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
+        with waiting('predicting'):
+            rows = test_of(vehicle, training, held)
+        results = prediction_results(vehicle.name, held, rows, notes)
+        results.write(folder.folder)
+        save_figures(folder.folder / 'figures', {'prediction': lambda: prediction(rows)})
+        if not options.json:
+            console = TextConsole(highlight=False)
+            console.print(terminal(results.tables['predictions'], title=True))
+            console.print(f'\n{results.facts["verdict"]}\nfolder: {out}', markup=False)
+    return results.to_json()

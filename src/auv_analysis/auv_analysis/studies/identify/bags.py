@@ -1,0 +1,83 @@
+"""Records of bags: of ours without a word, of others with a mapping."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.foreign_messages import read_sources
+from auv_analysis.bag.foreign_topics import TopicMap, read_mapping
+from auv_analysis.bag.foreign_tracks import tracks_of
+from auv_analysis.studies.identify.record import Record, of_tracks
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.vehicle import Vehicle
+
+OURS = {'odometry': 'odom', 'wrench': 'wrench'}
+APPLIED = 'wrench_applied'
+
+
+def read_records(
+    bag: Path, vehicle: Vehicle, mapping: TopicMap | None, *, applied: bool, notes: list[str]
+) -> list[Record]:
+    """Stretches of a bag with attitude, velocity and wrench.
+
+    Parameters
+    ----------
+    bag : folder or file of any kind
+    vehicle : the prior
+    mapping : which topics hold what; None: those of our nodes
+    applied : the wrench that acted, where the bag has it, in place of the command
+    notes : gets what is worth saying
+
+    Raises
+    ------
+    InputError : naming file, key, expected and found
+
+    """
+    mapping = _ours(bag, applied=applied) if mapping is None else mapping
+    tracks = tracks_of(read_sources(bag, mapping, notes), mapping, vehicle, notes)
+    records = of_tracks(bag.name, tracks, applied=applied)
+    if not records:
+        raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', 'none')
+    return records
+
+
+def _ours(bag: Path, *, applied: bool) -> TopicMap:
+    topics = survey(bag).types
+    found = {}
+    for role, name in {**OURS, **({APPLIED: APPLIED} if applied else {})}.items():
+        some = [topic for topic in topics if topic.rpartition('/')[2] == name
+                and 'ground_truth' not in topic]  # fmt: skip
+        if len(some) != 1:
+            text = f'one topic {name}, or --odom, --wrench and --frames, or --map'
+            raise InputError(bag, role, text, ', '.join(some) or 'none')
+        found[role] = some[0]
+    return read_mapping(None, found)
+
+
+def parts(records: Sequence[Record], spans: Sequence[tuple[float, float]]) -> list[Record]:
+    """The parts of records within spans of time, s; none given: all of them."""
+    if not spans:
+        return list(records)
+    found = [
+        record.part(max(begin, record.start), min(end, record.end))
+        for record in records for begin, end in spans
+        if begin < record.end and end > record.start
+    ]  # fmt: skip
+    if not found:
+        raise InputError('--part', '', f'a time up to {records[-1].end:g} s', str(spans))
+    return found
+
+
+def on_one_step(records: Sequence[Record]) -> list[Record]:
+    """Records whose commands have the same step: those of the finest are repeated in the others."""
+    step = min(record.step for record in records)
+    return [record if record.step == step else _finer(record, step) for record in records]
+
+
+def _finer(record: Record, step: float) -> Record:
+    count = int((record.end - record.start) / step)
+    rows = ((np.arange(count) + 0.5) * step / record.step).astype(int)
+    return replace(record, step=step, command=record.command[rows])

@@ -1,0 +1,489 @@
+"""The procedure: recordings and a prior in, a model with its uncertainty out."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.output.text import join
+from auv_analysis.studies.identify.output_error import Fit, OutputError
+from auv_analysis.studies.identify.prediction import (
+    BlackBox,
+    Held,
+    compare,
+    held_of,
+    persistence,
+    predict,
+)
+from auv_analysis.studies.identify.record import Record, segments_of
+from auv_analysis.studies.identify.start import least_squares_start, reversed_axes
+from auv_analysis.studies.identify.unknowns import DEFAULT, Coefficients, Entry, Unknowns, unknowns
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.vehicle import Vehicle
+
+SHORT, LONG = 1.25, 10.0  # s, of segments of the first fit, and at most
+GROWTH = 10.0  # of a start's error, up to which a segment goes on
+FEWEST = 4  # segments
+HISTORY = 0.6  # s of commands before a segment
+KNOWN = 0.3  # of the prior's deviation: a coefficient is identified where less is left of it
+WIDER = 10.0  # times the prior's deviation: what that changes comes from the prior
+MIXED = 0.5  # a direction in which more is left is one that the data cannot tell
+PLAUSIBLE = 9.0  # more cost: a delay is not worth a thought
+NEARBY = 30.0  # more cost: no better delay lies in that direction
+NAMED = 0.35  # of a direction's largest part: smaller ones are not named
+MOVING = 2.0  # times the noise: a degree of freedom that moves less tells little
+SEEN = 2.0  # deviations: a difference between fits that is no chance
+STILL = 5.0  # times the noise: a vehicle that moves less is at rest
+HELD_OUT = 0.25  # of the recording
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a model is identified.
+
+    Attributes
+    ----------
+    free, fixed : as of `unknowns`
+    believed : name -> (value, standard deviation)
+    holdout : share of the recordings, their last part, that the model does not see
+    segment : s, None: by the instability of the vehicle
+    origin : of `believed`, named in errors
+
+    """
+
+    free: Sequence[str] = DEFAULT
+    fixed: Sequence[str] = ()
+    believed: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    holdout: float = HELD_OUT
+    segment: float | None = None
+    origin: object = 'options'
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """A model with its uncertainty.
+
+    Attributes
+    ----------
+    vehicle : the prior
+    training, held : recordings that it was fitted to, and moments of those that it was not
+    problem, fit : the segments, and the minimum
+    covariance : (n, n) of theta
+    predictions : rows of `compare`
+    zeros : damping that is held at zero, with the upper end of its interval
+    still : what was free and was not searched, as its degree of freedom hardly moves
+
+    """
+
+    vehicle: Vehicle
+    training: Sequence[Record]
+    held: Held
+    problem: OutputError
+    fit: Fit
+    covariance: np.ndarray
+    predictions: list[dict[str, Any]]
+    zeros: Mapping[Entry, float]
+    still: Sequence[Entry]
+
+    @property
+    def found(self) -> Coefficients:
+        """The coefficients, those that were not free included."""
+        return self.fit.unknowns.coefficients(self.fit.theta)
+
+    def coefficients(self) -> list[dict[str, Any]]:
+        """Rows: name, unit, prior, value, deviation, low, high, left, status.
+
+        `left` is the standard deviation by the data alone, by that of the prior; `status` is
+        'identified', 'prior' where too much is left, then there is no interval, or 'at zero':
+        damping that would feed energy otherwise.
+        """
+        u = self.fit.unknowns
+        J = u.gradient(self.fit.theta)
+        P, _ = u.precision(self.fit.theta)
+        before, after, alone = (np.sqrt(np.einsum('ij,jk,ik->i', J, C, J))
+                         for C in (np.linalg.inv(P), self.covariance, self._by_data()))  # fmt: skip
+        values, prior = u.values(self.fit.theta), u.values(np.zeros(len(u.entries)))
+        half = self.fit.quantile * after
+        rows = []
+        for k, entry in enumerate(u.entries):
+            left = float(alone[k] / before[k])
+            is_known = left < KNOWN
+            interval = (values[k] - half[k], values[k] + half[k]) if is_known else (None, None)
+            rows.append(
+                {
+                    'name': entry.name,
+                    'unit': entry.si,
+                    'prior': float(prior[k]),
+                    'value': float(values[k]),
+                    'deviation': float(after[k]) if is_known else None,
+                    'low': interval[0],
+                    'high': interval[1],
+                    'left': left,
+                    'status': 'identified' if is_known else 'prior',
+                }
+            )
+        rows += [
+            {'name': entry.name, 'unit': entry.si, 'value': 0.0, 'deviation': None, 'low': 0.0,
+             'prior': float(getattr(u.prior, entry.group)[entry.index]), 'high': high,
+             'left': None, 'status': 'at zero'}
+            for entry, high in self.zeros.items()
+        ]  # fmt: skip
+        rows += [
+            {'name': entry.name, 'unit': entry.si, 'prior': value, 'value': value, 'left': 1.0,
+             'deviation': None, 'low': None, 'high': None, 'status': 'prior'}
+            for entry in self.still
+            for value in [float(getattr(self.found, entry.group)[entry.index])]
+        ]  # fmt: skip
+        if u.is_delay_free:
+            rows.append(self._delay())
+        return rows
+
+    def _delay(self) -> dict[str, Any]:
+        """The delay, found in whole steps; with the lag it is sharper than alone."""
+        value = float(self.fit.unknowns.prior.delay)
+        step = self.problem.step
+        return {
+            'name': 'delay', 'unit': 's', 'prior': 0.0, 'value': value, 'deviation': None,
+            'low': max(value - 2 * step, 0.0), 'high': value + 2 * step, 'left': None,
+            'status': 'identified',
+        }  # fmt: skip
+
+    def combinations(self) -> list[dict[str, Any]]:
+        """What the data cannot tell: `left` of the prior's deviation, and in words which."""
+        values, vectors = self._directions()
+        names, found = self.fit.unknowns.names, []
+        for value, vector in sorted(zip(values, vectors.T, strict=True), key=lambda p: -p[0]):
+            left = float(np.sqrt(max(value, 0.0)))
+            if left < MIXED:
+                break
+            part = vector / vector[np.argmax(np.abs(vector))]
+            some = [k for k in np.argsort(-np.abs(part)) if abs(part[k]) >= NAMED]
+            words = _words(names, part, some)
+            found.append({'left': left, 'names': [names[k] for k in some],
+                          'parts': part[some].tolist(), 'words': words})  # fmt: skip
+        return found
+
+    def _by_data(self) -> np.ndarray:
+        """(n, n) the covariance if the prior were far wider.
+
+        What many priors say together is known to the covariance, and is no finding.
+        """
+        S, (P, _) = self.fit.information, self.fit.unknowns.precision(self.fit.theta)
+        return self.covariance + np.linalg.inv(S + P / WIDER**2) - np.linalg.inv(S + P)
+
+    def _directions(self) -> tuple[np.ndarray, np.ndarray]:
+        """Variances (n,) in those of the prior, and orthogonal directions (n, n) of theta."""
+        P, _ = self.fit.unknowns.precision(self.fit.theta)
+        root = np.linalg.cholesky(P)
+        return np.linalg.eigh(root.T @ self._by_data() @ root)
+
+    def draws(self, count: int, seed: int = 0) -> Coefficients:
+        """Models (count,) drawn from the uncertainty."""
+        rng = np.random.default_rng(seed)
+        scale = self.fit.quantile / 1.959964  # few segments: as wide as the intervals
+        root = np.linalg.cholesky(self.covariance + 1e-14 * np.eye(len(self.covariance)))
+        theta = self.fit.theta + scale * rng.standard_normal((count, len(root))) @ root.T
+        return self.fit.unknowns.coefficients(theta)
+
+
+def _words(names: Sequence[str], part: np.ndarray, some: Sequence[int]) -> str:
+    """A direction that the data leave open, in words."""
+    gains = {k for k, name in enumerate(names) if name.startswith('gain.')}
+    if gains and gains <= set(map(int, some)):
+        return 'the scale of the wrench cannot be told from that of all of M, D and g together'
+    up = [names[k] for k in some if part[k] > 0]
+    against = [names[k] for k in some if part[k] < 0]
+    if len(some) == 1:
+        return f'nothing is known of {names[some[0]]}'
+    if not against:
+        return f'only the difference of {join(up)} is known, not all of them together'
+    return f'{join(up)} may grow if {join(against)} becomes less'
+
+
+def split(records: Sequence[Record], share: float) -> tuple[list[Record], list[Record]]:
+    """Recordings before a moment and behind it, which leaves a share of their length."""
+    total = sum(record.end - record.start for record in records)
+    left, first, last = total * (1.0 - share), [], []
+    for record in records:
+        length = record.end - record.start
+        if length <= left:
+            first.append(record)
+        elif left <= 0:
+            last.append(record)
+        else:
+            first.append(record.part(record.start, record.start + left))
+            last.append(record.part(record.start + left, record.end))
+        left -= length
+    return first, last
+
+
+def identify(
+    training: Sequence[Record],
+    held: Sequence[Record],
+    vehicle: Vehicle,
+    settings: Settings | None = None,
+    say: Say = lambda text: None,
+) -> Identified:
+    """Identify a model.
+
+    Parameters
+    ----------
+    training, held : recordings with the same commands; those held out are predicted only
+    vehicle : the prior
+    settings : None: the usual ones
+    say : told what is being done
+
+    Raises
+    ------
+    InputError : recordings from which nothing can be learned
+
+    """
+    settings = settings or Settings()
+    step = training[0].step
+    noise = np.sqrt(np.nanmean([record.noise() ** 2 for record in training], axis=0))
+    check_motion(training, noise)
+    u = unknowns(
+        vehicle, settings.free, settings.fixed,
+        speeds=np.maximum(_rms([np.nan_to_num(r.velocity) for r in training]), 1e-3),
+        wrenches=_rms([record.wrench for record in training]),
+        channels=training[0].channels, believed=settings.believed, origin=settings.origin,
+    )  # fmt: skip
+    still = _still(training, noise, u)
+    every, u = u, u.without([entry.name for entry in still])
+    say('least squares')
+    if wrong := reversed_axes(training, u):
+        expected = 'a wrench that accelerates the vehicle its own way (axes FLU in place of FSD?)'
+        raise InputError(training[0].name, 'wrench', expected, f'the opposite in {join(wrong)}')
+    theta, late = least_squares_start(training, u)
+
+    def problem(length: float) -> OutputError:
+        segments = [s for record in training for s in segments_of(record, length, HISTORY)]
+        return OutputError(vehicle, segments, step, noise, training[0].allocation)
+
+    longest = min(sum(record.end - record.start for record in training) / FEWEST, LONG)
+    short = min(SHORT, longest)
+    first = _with_best_delay(problem(short), u, theta, late, NEARBY)[0]
+    u, theta = first.unknowns, first.theta
+    length = settings.segment or _length(problem(longest), u, theta)
+    say(f'output error over segments of {length:.3g} s')
+    final = problem(length)
+    late = float(u.coefficients(theta).lag + u.prior.delay)
+    tried = _with_best_delay(final, u, theta, late, PLAUSIBLE)
+    whole = final.fit(tried[0].unknowns, tried[0].theta, tried[0].starts)
+    covariance = whole.covariance() + _between(tried) + _bias(whole, problem(length / 2))
+    covariance += _of_still(final, whole, every)
+    fit, zeros = _dissipative(final, whole, covariance)
+    kept = [whole.unknowns.names.index(name) for name in fit.unknowns.names]
+    say('prediction of what was held out')
+    moments = held_of(held, HISTORY)
+    rows = compared(training, moments, vehicle, (fit.unknowns, fit.theta))
+    return Identified(
+        vehicle, training, moments, final, fit, covariance[np.ix_(kept, kept)], rows, zeros, still
+    )
+
+
+def test_of(
+    vehicle: Vehicle, training: Sequence[Record], held: Sequence[Record]
+) -> list[dict[str, Any]]:
+    """How well a vehicle as filed predicts recordings, beside persistence and a black box.
+
+    Parameters
+    ----------
+    vehicle : whose errors the others' are compared with
+    training, held : what the black box learns from, and what is predicted
+
+    Returns
+    -------
+    rows : of `prediction.compare`
+
+    """
+    return compared(training, held_of(held, HISTORY), vehicle, None)
+
+
+def compared(
+    training: Sequence[Record],
+    moments: Held,
+    vehicle: Vehicle,
+    model: tuple[Unknowns, np.ndarray] | None,
+) -> list[dict[str, Any]]:
+    """Rows of `compare`: the new model, where there is one, the vehicle as filed, the others."""
+    if not moments.count:
+        return []
+    predictors = [predict('new', moments, vehicle, *model)] if model else []
+    predictors += [
+        predict('prior' if model else vehicle.name, moments, vehicle,
+                *as_filed(vehicle, training[0].channels)),
+        persistence(moments),
+        BlackBox(training).predict(moments),
+    ]  # fmt: skip
+    return compare(predictors, moments, vehicle.M)
+
+
+def as_filed(vehicle: Vehicle, channels: Sequence[str] = ()) -> tuple[Unknowns, np.ndarray]:
+    """A vehicle with nothing free, for its prediction."""
+    one = np.ones(6)
+    return unknowns(vehicle, (), speeds=one, wrenches=one, channels=channels), np.zeros(0)
+
+
+def check_motion(records: Sequence[Record], noise: np.ndarray) -> None:
+    """Refuse recordings of a vehicle at rest, or without a command."""
+    name = records[0].name
+    moved = np.array([
+        np.sqrt(np.nanmean([np.nanvar(r.velocity[:, i]) for r in records]))
+        if any(r.known[i] for r in records) else 0.0 for i in range(6)
+    ])  # fmt: skip
+    if np.all(moved < STILL * np.nan_to_num(noise[:6], nan=np.inf)):
+        raise InputError(name, '', f'velocities that change by more than {STILL:g} times their '
+                         'noise', 'a vehicle at rest')  # fmt: skip
+    if all(np.ptp(record.wrench, axis=0).max() == 0.0 for record in records):
+        raise InputError(name, 'wrench', 'a command that changes', 'a constant one')
+
+
+def _still(records: Sequence[Record], noise: np.ndarray, u: Unknowns) -> list[Entry]:
+    """Unknowns of degrees of freedom that move by hardly more than the noise of their velocity.
+
+    What moves them then is the noise itself, through the controller: fits to that are biased.
+    """
+    moved = _rms([_centred(record) for record in records])
+    known = np.any([record.known for record in records], axis=0)
+    still = known & (moved < MOVING * np.nan_to_num(noise[:6]))
+    inertial = ('M', 'D_linear', 'D_quadratic')
+    return [e for e in u.entries if e.group in inertial and all(still[i] for i in e.index)]
+
+
+def _of_still(problem: OutputError, fit: Fit, every: Unknowns) -> np.ndarray:
+    """(n, n) what theta is unsure by, as unknowns that were not searched keep their prior."""
+    every = every.with_delay(float(fit.unknowns.prior.delay))
+    names = fit.unknowns.names
+    kept = [every.names.index(name) for name in names]
+    rest = [k for k, name in enumerate(every.names) if name not in names]
+    theta = np.zeros(len(every.entries))
+    theta[kept] = fit.theta
+    S = np.sum([part.A for part in problem.normal(every, theta, fit.starts)], axis=0)
+    P, _ = every.precision(theta)
+    moved = np.linalg.solve((S + P)[np.ix_(kept, kept)], S[np.ix_(kept, rest)])
+    return moved @ np.linalg.inv(P[np.ix_(rest, rest)]) @ moved.T
+
+
+def _centred(record: Record) -> np.ndarray:
+    nu = np.nan_to_num(record.states(np.arange(record.start, record.end, 0.1))[:, 4:])
+    return nu - nu.mean(axis=0)
+
+
+def _rms(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    return np.sqrt(np.mean(np.concatenate(arrays) ** 2, axis=0))
+
+
+def _with_best_delay(
+    problem: OutputError, u: Unknowns, theta: np.ndarray, late: float, nearby: float
+) -> list[Fit]:
+    """Fits with delays in whole steps, between which the cost has kinks; the best one first.
+
+    Parameters
+    ----------
+    problem, u, theta : segments, unknowns and where to begin
+    late : s, lag and delay together
+    nearby : how much the cost may rise on the way to a better delay
+
+    """
+    names = u.names
+
+    def attempt(steps: int, theta: np.ndarray) -> Fit:
+        return problem.fit(u.with_delay(steps * problem.step), theta, most=25, tolerance=1e-5)
+
+    def with_lag(theta: np.ndarray, lag: float) -> np.ndarray:
+        theta = theta.copy()
+        if 'lag' in names:
+            k = names.index('lag')
+            theta[k] = np.log(max(lag, 0.005) / float(u.prior.lag)) / u.entries[k].unit
+        return theta
+
+    if not u.is_delay_free:
+        lag = late - float(u.prior.delay)
+        return [problem.fit(u, with_lag(theta, lag), most=25, tolerance=1e-5)]
+    k = round(float(u.prior.delay) / problem.step)
+    if not k:
+        k = round(late / problem.step / (2 if 'lag' in names else 1))
+    tried = {k: attempt(k, with_lag(theta, late - k * problem.step))}
+    for way in (-1, 1):
+        j = k
+        while j + way >= 0 and j + way not in tried:
+            lag = float(u.coefficients(tried[j].theta).lag) - way * problem.step
+            tried[j + way] = attempt(j + way, with_lag(tried[j].theta, lag))
+            if tried[j + way].cost > tried[j].cost + nearby:
+                break
+            j += way
+    return sorted(tried.values(), key=lambda fit: fit.cost)
+
+
+def _between(tried: Sequence[Fit]) -> np.ndarray:
+    """(n, n) what theta is unsure by, as the delay is: fits weighted by their likelihood."""
+    weights = np.exp([(tried[0].cost - fit.cost) / 2 for fit in tried])
+    apart = np.array([fit.theta - tried[0].theta for fit in tried])
+    return np.einsum('f,fi,fj->ij', weights / weights.sum(), apart, apart)
+
+
+def _bias(fit: Fit, halves: OutputError) -> np.ndarray:
+    """(n, n) what the bias of a fit with free starts may be, squared; zero where none is seen.
+
+    Where the motion is hardly more than what the noise makes the controller do, starts fitted to
+    that noise bias the rest, by twice as much over segments of half the length (Dhaene and
+    Jochmans, 2015).
+    """
+    other = halves.fit(fit.unknowns, fit.theta, most=15, tolerance=1e-5)
+    moved = fit.theta - other.theta
+    seen = np.abs(moved) > SEEN * np.sqrt(np.diag(other.covariance()))
+    return np.outer(moved, moved) if seen.any() else np.zeros((len(moved), len(moved)))
+
+
+def _length(problem: OutputError, u: Unknowns, theta: np.ndarray) -> float:
+    """Length of a segment, s: until an error of its start has grown tenfold."""
+    grown = np.flatnonzero(problem.growth(u, theta) > GROWTH)
+    steps = int(grown[0]) if len(grown) else len(problem.segments[0].command)
+    return max(steps * problem.step, SHORT)
+
+
+def _dissipative(
+    problem: OutputError, fit: Fit, covariance: np.ndarray
+) -> tuple[Fit, dict[Entry, float]]:
+    """The fit without damping that feeds energy: what came out negative is held at zero.
+
+    Returns
+    -------
+    fit : without it
+    zeros : what is held, with the upper end of its interval, by the covariance (n, n)
+
+    """
+    half = fit.quantile * np.sqrt(np.diag(covariance))
+    found = fit.unknowns.coefficients(fit.theta)
+    changed: dict[str, np.ndarray] = {}
+    zeros: dict[Entry, float] = {}
+    for k, entry in enumerate(fit.unknowns.entries):
+        if entry.group.startswith('D_') and len(set(entry.index)) == 1:
+            matrix = getattr(found, entry.group)
+            if matrix[entry.index] < 0.0:
+                high = float(matrix[entry.index] + half[k] * entry.unit)
+                zeros[entry] = max(high, 0.0)
+                held = changed.setdefault(
+                    entry.group, getattr(fit.unknowns.prior, entry.group).copy()
+                )
+                held[entry.index] = 0.0
+    if not zeros:
+        return fit, {}
+    names = [entry.name for entry in zeros]
+    fewer = fit.unknowns.without(names, **changed)
+    kept = [k for k, name in enumerate(fit.unknowns.names) if name not in names]
+    fitted = problem.fit(fewer, fit.theta[kept], fit.starts)
+    again, more = _dissipative(problem, fitted, covariance[np.ix_(kept, kept)])
+    return again, {**zeros, **more}
+
+
+def with_vehicle(vehicle: Vehicle, found: Coefficients) -> Vehicle:
+    """The vehicle with identified coefficients: M_RB as it was, the rest is added mass."""
+    couple = found.hydrostatics[1:]
+    buoyancy = float(vehicle.weight) - float(found.hydrostatics[0])
+    r_B = (float(vehicle.weight) * vehicle.r_G - couple) / buoyancy
+    return replace(vehicle, M=found.M, D_linear=found.D_linear, D_quadratic=found.D_quadratic,
+                   buoyancy=buoyancy, r_B=r_B, M_RB=None, M_A=None)  # fmt: skip

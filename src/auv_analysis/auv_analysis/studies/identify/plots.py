@@ -1,0 +1,147 @@
+"""Figures of an identification."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.signal import welch
+
+from auv_analysis.metrics.quantities import SIGNALS
+from auv_analysis.report import plots
+from auv_analysis.report.plots import (
+    COLOURS,
+    GREY,
+    Curve,
+    Drawn,
+    FigureRecord,
+    Panel,
+    save_figures,
+    small_multiples,
+    time_panels,
+)
+from auv_analysis.studies.identify.identify import Identified
+from auv_analysis.studies.identify.prediction import by_name
+from auv_dynamics.vehicle import DOFS
+
+LOOKS: dict[str, dict[str, Any]] = {
+    'new': {'color': COLOURS[0], 'marker': 'D'},
+    'prior': {'color': COLOURS[1], 'marker': 'o', 'linestyle': '--'},
+    'persistence': {'color': GREY, 'marker': 's', 'linestyle': ':'},
+    'black box': {'color': COLOURS[2], 'marker': '^', 'linestyle': '-.'},
+}
+
+
+def draw(
+    found: Identified, tables: Mapping[str, Sequence[Any]], folder: Path
+) -> dict[str, FigureRecord]:
+    """Draw the figures as PNG and PDF: name -> figure."""
+    return save_figures(
+        folder,
+        {
+            'prediction': lambda: prediction(found.predictions),
+            'trace': lambda: _trace(found),
+            'inertia': lambda: _inertia(tables['inertia']),
+            'residuals': lambda: _residuals(found),
+        },
+    )
+
+
+def prediction(rows: Sequence[Mapping[str, Any]]) -> Drawn:
+    """Errors over the horizon."""
+    figure = plots.new_figure(2.9)
+    axes = figure.subplots()
+    for name in dict.fromkeys(row['predictor'] for row in rows):
+        some = by_name(rows, name)
+        x, y = ([row[key] for row in some] for key in ('horizon', 'error'))
+        axes.plot(x, y, label=name, markersize=4, **LOOKS.get(name, {}))
+    plots.logarithmic(axes, 'x', 'y')
+    axes.set_xlabel('horizon (s)')
+    axes.set_ylabel('velocity error (m/s)')
+    axes.legend()
+    caption = (
+        'Open-loop prediction of what was held out: root mean square of the velocity error, by '
+        'kinetic energy, over how far ahead is predicted.'
+    )
+    return figure, 'Prediction', caption
+
+
+def _trace(found: Identified) -> Drawn:
+    """Measured and simulated velocity of the segments around the middle."""
+    pairs = list(found.problem.misfit(found.fit))
+    middle = len(pairs) // 2
+    some = pairs[max(middle - 3, 0) : middle + 3]
+    panels = []
+    for i, dof in enumerate(DOFS):
+        curves = []
+        for k, (segment, e) in enumerate(some):
+            t = segment.begin + found.problem.step * segment.at
+            nu = segment.nu[:, i]
+            there = np.isfinite(nu)
+            simulated = nu - e[:, i] * found.problem.noise[i]
+            first = k == 0
+            curves += [
+                Curve(t[there], nu[there], 'measured' if first else '',
+                      {'color': GREY, 'linewidth': 0.8}),
+                Curve(t[there], simulated[there], 'simulated' if first else '',
+                      {'color': COLOURS[0], 'linewidth': 1.2}),
+            ]  # fmt: skip
+        unit = SIGNALS['nu'].unit_of(i)
+        panels.append(Panel(curves, f'{unit}', dof))
+    figure = time_panels(panels, across=2, height=1.35)
+    caption = (
+        'Velocity as measured, and as the identified model has it along segments that each start '
+        'anew, in the middle of the recording.'
+    )
+    return figure, 'Fit', caption
+
+
+def _inertia(rows: Sequence[Mapping[str, Any]]) -> Drawn:
+    """Off-diagonal inertia before and after, with intervals."""
+    figure, panels = small_multiples(3, 3, 2.6)
+    units = dict.fromkeys(row['unit'] for row in rows)
+    for axes, unit in zip(panels, units, strict=False):
+        some = [row for row in rows if row['unit'] == unit]
+        y = np.arange(len(some))
+        value, low, high = (np.array([row[k] for row in some]) for k in ('M', 'M_low', 'M_high'))
+        known = [row['verdict'] != 'not known' for row in some]
+        spread = np.where(known, [value - low, high - value], 0.0)
+        axes.errorbar(value, y, xerr=np.maximum(spread, 0.0), fmt='D', color=COLOURS[0],
+                      markersize=4, capsize=2, label='identified')  # fmt: skip
+        axes.plot([row['M_prior'] for row in some], y, 'o', mfc='none', color=GREY, label='prior')
+        axes.axvline(0.0, color='black', linewidth=0.6)
+        axes.set_yticks(y, [row['pair'] for row in some])
+        axes.invert_yaxis()
+        axes.set_xlabel(unit)
+    plots.shared_legend(figure)
+    caption = 'Couplings in M with their 95 % intervals, and those of the prior.'
+    return figure, 'Couplings', caption
+
+
+def _residuals(found: Identified) -> Drawn:
+    """Spectra of the residuals: white ones are flat, at one."""
+    pairs = list(found.problem.misfit(found.fit))
+    figure, panels = small_multiples(6, 3, 1.7, sharex=True, sharey=True)
+    rate = 1.0 / found.problem.step
+    for i, (axes, dof) in enumerate(zip(panels, DOFS, strict=True)):
+        spectra = []
+        for segment, e in pairs:
+            there = np.isfinite(segment.nu[:, i])
+            if there.sum() > 16 and np.ptp(np.diff(segment.at[there])) < 1e-6:
+                own = rate / float(np.diff(segment.at[there])[0])
+                f, p = welch(e[there, i], own, nperseg=int(there.sum()))
+                spectra.append(p * own / 2)
+        if spectra:
+            shortest = min(map(len, spectra))
+            mean = np.mean([p[:shortest] for p in spectra], axis=0)
+            axes.plot(f[1:shortest], mean[1:], color=COLOURS[0], linewidth=0.9)
+            axes.axhline(1.0, color='black', linewidth=0.6)
+            plots.logarithmic(axes, 'x', 'y')
+        plots.letter(axes, i, dof)
+    for axes in panels[3:]:
+        axes.set_xlabel('frequency (Hz)')
+    caption = (
+        'Spectra of the velocity residuals, in those of the measured noise: flat at one where the '
+        'model explains all but noise; above one at frequencies that it misses.'
+    )
+    return figure, 'Residuals', caption

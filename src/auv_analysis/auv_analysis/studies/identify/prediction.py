@@ -1,0 +1,260 @@
+"""The honest test of a model: open-loop prediction of what it has not seen.
+
+From many moments of a recording the model is simulated ahead under the recorded command, and its
+velocity compared with the measured one after some times. Beside it stand persistence (the velocity
+stays as it is) and a linear black box (no structure, only the recording that the model had too).
+An error is measured by kinetic energy, sqrt(e^T M e / m) with M of the prior and m its surge
+inertia, m/s: one number for metres and radians.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.studies.identify.output_error import OutputError
+from auv_analysis.studies.identify.record import Record, Segment, down_of
+from auv_analysis.studies.identify.unknowns import Unknowns
+from auv_dynamics.vehicle.vehicle import Vehicle
+
+HORIZONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # s
+APART = 0.25  # s, between starts at least
+MOST = 400  # starts
+DIVERGED = 1e3  # m/s, rad/s: what an error is at most
+DRAWS = 1000  # of the bootstrap
+BLOCK = 5.0  # s, of a block of starts that are drawn together
+LAGS = (0.0, 0.1, 0.2)  # s, of the command in the black box
+BOX_STEP = 0.1  # s
+RIDGE = 1e-3
+SEED = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Errors of one predictor.
+
+    Attributes
+    ----------
+    name : 'new', 'prior', 'persistence', 'black box'
+    errors : (starts, horizons, 6) predicted less measured velocity, m/s and rad/s; NaN: unknown
+
+    """
+
+    name: str
+    errors: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Moments of recordings from which predictions start.
+
+    Attributes
+    ----------
+    record, segments : of each stretch: the segments begin at its moments
+    horizons : (h,) s
+    blocks : (starts,) number of the block of each moment
+
+    """
+
+    record: Sequence[Record]
+    segments: Sequence[list[Segment]]
+    horizons: np.ndarray
+    blocks: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Number of moments."""
+        return len(self.blocks)
+
+
+def held_of(records: Sequence[Record], history: float, longest: float = HORIZONS[-1]) -> Held:
+    """Moments of recordings, and horizons up to a longest one in s.
+
+    A horizon longer than a fifth of all that is held out is left out.
+    """
+    total = sum(record.end - record.start for record in records)
+    horizons = np.array([h for h in HORIZONS if h <= min(longest, max(total / 5, HORIZONS[0]))])
+    reach = float(horizons[-1])
+    spacing = max(APART, total / MOST)
+    found, blocks, offset = [], [], 0
+    for record in records:
+        before = int(np.ceil(history / record.step))
+        n = max(round(reach / record.step), 1)
+        firsts = np.arange(before, len(record.command) - n, max(round(spacing / record.step), 1))
+        begins = record.start + record.step * firsts
+        starts = record.states(begins) if len(firsts) else np.zeros((0, 10))
+        some = []
+        for first, begin, state in zip(firsts.tolist(), begins, starts, strict=True):
+            command = record.command[first : first + n]
+            times = horizons / record.step
+            nan = np.full((len(horizons), 6), np.nan)
+            some.append(
+                Segment(record.command[first - before : first], command, times, nan,
+                        np.full((len(horizons), 4), np.nan), np.where(np.isfinite(state), state, 0),
+                        float(begin))
+            )  # fmt: skip
+        found.append(some)
+        number = ((begins - record.start) / BLOCK).astype(int) + offset
+        blocks.append(number)
+        offset = int(number.max(initial=offset)) + 1
+    return Held(records, found, horizons, np.concatenate(blocks) if blocks else np.zeros(0, int))
+
+
+def measured(held: Held) -> np.ndarray:
+    """Velocities (starts, horizons, 6) at the horizons, by local polynomials; NaN: unknown."""
+    found = []
+    for record, segments in zip(held.record, held.segments, strict=True):
+        if segments:
+            at = np.array([one.begin for one in segments])[:, None] + held.horizons
+            nu = record.states(at.ravel())[:, 4:]
+            found.append(nu.reshape(*at.shape, 6))
+    return np.concatenate(found)
+
+
+def predict(
+    name: str, held: Held, vehicle: Vehicle, unknowns: Unknowns, theta: np.ndarray
+) -> Prediction:
+    """Prediction by a model."""
+    found = []
+    for record, segments in zip(held.record, held.segments, strict=True):
+        if segments:
+            model = OutputError(vehicle, segments, record.step, np.full(9, np.nan),
+                                record.allocation)  # fmt: skip
+            states = [
+                model.simulate(unknowns, theta[None], model.starts(_none(part), which)[None], which)
+                for which in model.slices(1)
+                for part in [segments[which]]
+            ]
+            every = np.concatenate([s[0] for s in states])
+            steps = np.rint(held.horizons / record.step).astype(int)
+            found.append(np.nan_to_num(every[:, steps, 4:], nan=DIVERGED))
+    return Prediction(name, np.concatenate(found) - measured(held))
+
+
+def _none(segments: Sequence[Segment]) -> np.ndarray:
+    return np.zeros((len(segments), 9))
+
+
+def persistence(held: Held) -> Prediction:
+    """The velocity stays as it is."""
+    starts = np.concatenate([[one.start[4:] for one in some] for some in held.segments if some])
+    return Prediction('persistence', starts[:, None] - measured(held))
+
+
+class BlackBox:
+    """x(t + h) = A x(t) + B u: velocity and direction of gravity, the command now and before."""
+
+    def __init__(self, records: Sequence[Record]):
+        pairs = [self._pairs(record) for record in records]
+        X = np.concatenate([pair[0] for pair in pairs])
+        Y = np.concatenate([pair[1] for pair in pairs])
+        self.scale = np.maximum(X.std(axis=0), 1e-9)
+        self.scale[-1] = 1.0
+        Z = X / self.scale
+        ridge = RIDGE * len(Z) * np.eye(Z.shape[1])
+        self.A = np.linalg.solve(Z.T @ Z + ridge, Z.T @ (Y - X[:, :9]))
+
+    def _pairs(self, record: Record) -> tuple[np.ndarray, np.ndarray]:
+        t = np.arange(record.start + LAGS[-1], record.end - BOX_STEP, BOX_STEP)
+        state = self._state(record, np.append(t, t[-1] + BOX_STEP))
+        return self._row(state[:-1], record, t), state[1:]
+
+    def _state(self, record: Record, t: np.ndarray) -> np.ndarray:
+        states = record.states(t)
+        return np.concatenate([np.nan_to_num(states[:, 4:]), down_of(states[:, :4])], axis=1)
+
+    def _row(self, state: np.ndarray, record: Record, t: np.ndarray) -> np.ndarray:
+        middles = record.start + record.step * (np.arange(len(record.command)) + 0.5)
+        inputs = [smoothed_command(middles, record.wrench, t - lag) for lag in LAGS]
+        return np.concatenate([state, *inputs, np.ones((len(t), 1))], axis=1)
+
+    def predict(self, held: Held) -> Prediction:
+        """Its prediction of what was held out."""
+        found = []
+        for record, segments in zip(held.record, held.segments, strict=True):
+            if not segments:
+                continue
+            t = np.array([one.begin for one in segments])
+            x, steps = self._state(record, t), round(float(held.horizons[-1]) / BOX_STEP)
+            path = [x]
+            for k in range(steps):
+                x = x + self._row(x, record, t + k * BOX_STEP) / self.scale @ self.A
+                x = np.clip(x, -1e6, 1e6)
+                path.append(x)
+            at = held.horizons / BOX_STEP
+            first = np.minimum(at.astype(int), steps - 1)
+            share = (at - first)[:, None, None]
+            rows = np.array(path)
+            mixed = rows[first] * (1 - share) + rows[first + 1] * share
+            found.append(mixed[..., :6].swapaxes(0, 1))
+        return Prediction('black box', np.concatenate(found) - measured(held))
+
+
+def smoothed_command(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Commands (k, 6) at some times, the mean over a step of the black box."""
+    area = np.concatenate([np.zeros((1, 6)), np.cumsum(rows, axis=0)]) * (t[1] - t[0])
+    edges = np.append(t - (t[1] - t[0]) / 2, t[-1] + (t[1] - t[0]) / 2)
+    ahead, behind = (
+        np.stack([np.interp(at + shift, edges, column) for column in area.T], axis=1)
+        for shift in (BOX_STEP, 0.0)
+    )
+    return (ahead - behind) / BOX_STEP
+
+
+def sizes(prediction: Prediction, M: np.ndarray) -> np.ndarray:
+    """Squared error (starts, horizons) by kinetic energy, (m/s)2; unknown velocities count not."""
+    e = np.nan_to_num(np.clip(prediction.errors, -DIVERGED, DIVERGED), nan=0.0)
+    return np.einsum('shi,ij,shj->sh', e, M, e) / M[0, 0]
+
+
+def compare(predictions: Sequence[Prediction], held: Held, M: np.ndarray) -> list[dict[str, Any]]:
+    """Root mean square errors by horizon, and how the first differs from each of the others.
+
+    Returns
+    -------
+    rows : `predictor`, `horizon` in s, `error` in m/s, `linear` in m/s and `angular` in rad/s,
+        and of the others than the first `ratio`, the first's error by theirs, with `ratio_low` and
+        `ratio_high`, its 95 % interval by a bootstrap over blocks of time
+
+    """
+    rng = np.random.default_rng(SEED)
+    numbers, index = np.unique(held.blocks, return_inverse=True)
+    picks = rng.integers(len(numbers), size=(DRAWS, len(numbers)))
+    counts = np.stack([np.bincount(pick, minlength=len(numbers)) for pick in picks])
+    sums = {
+        p.name: np.stack([np.bincount(index, column) for column in sizes(p, M).T]).T
+        for p in predictions
+    }
+    first, rows = predictions[0], []
+    for p in predictions:
+        with np.errstate(all='ignore'):
+            e = p.errors
+            drawn = counts @ sums[first.name] / np.maximum(counts @ sums[p.name], 1e-300)
+        for h, horizon in enumerate(held.horizons):
+            low, high = np.sqrt(np.quantile(drawn[:, h], [0.025, 0.975]))
+            other = p is not first
+            ratio = np.sqrt(sums[first.name][:, h].sum() / max(sums[p.name][:, h].sum(), 1e-300))
+            rows.append(
+                {
+                    'predictor': p.name,
+                    'horizon': float(horizon),
+                    'error': float(np.sqrt(sums[p.name][:, h].sum() / held.count)),
+                    'linear': _rms(e[:, h, :3]),
+                    'angular': _rms(e[:, h, 3:]),
+                    'ratio': float(ratio) if other else None,
+                    'ratio_low': float(low) if other else None,
+                    'ratio_high': float(high) if other else None,
+                }
+            )
+    return rows
+
+
+def _rms(e: np.ndarray) -> float | None:
+    known = np.clip(e[np.isfinite(e)], -DIVERGED, DIVERGED)
+    return float(np.sqrt((known**2).mean() * 3)) if len(known) else None
+
+
+def by_name(rows: Sequence[Mapping[str, Any]], predictor: str) -> list[Mapping[str, Any]]:
+    """Rows of one predictor, by rising horizon."""
+    return [row for row in rows if row['predictor'] == predictor]

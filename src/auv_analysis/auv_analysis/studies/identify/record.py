@@ -1,0 +1,301 @@
+"""Measured motion and command of a vehicle, each at its own times, and segments of them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.bag.foreign_tracks import Track, integral
+from auv_analysis.metrics.local_polynomials import (
+    ORDER,
+    SMALLEST,
+    nearest,
+    variance,
+    weights,
+)
+from auv_analysis.runs.run import Run
+from auv_dynamics.kernel.compile import plain
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle.kinematics import quaternion
+from auv_dynamics.vehicle.model import down
+
+LONGEST_STEP, SHORTEST_STEP = 0.05, 0.002  # s, of the grid on which commands are held
+SMOOTHING = 0.4  # s, window of the local polynomials from which states are read off
+PAUSE = 0.5  # s without a measurement of something that end a stretch
+WHOLE = np.s_[:]
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """What was measured and commanded, without gaps longer than `PAUSE`.
+
+    Attributes
+    ----------
+    name : for people
+    attitude_t, attitude : (a,) s, rising, and (a, 4) quaternions w, x, y, z from FSD to NED
+    velocity_t, velocity : (v,) s and (v, 6) body velocity, m/s and rad/s; NaN: not measured
+    step : s between commands
+    command : (n, m) held from start + k step to start + (k + 1) step
+    start : s, of the first command
+    allocation : (6, m) wrench in N and N m by command; None: the command is the wrench
+    channels : names of the m commands
+
+    """
+
+    name: str
+    attitude_t: np.ndarray
+    attitude: np.ndarray
+    velocity_t: np.ndarray
+    velocity: np.ndarray
+    step: float
+    command: np.ndarray
+    start: float
+    allocation: np.ndarray | None = None
+    channels: tuple[str, ...] = ()
+
+    @property
+    def end(self) -> float:
+        """When the last command ends, s."""
+        return self.start + self.step * len(self.command)
+
+    @property
+    def known(self) -> np.ndarray:
+        """(6,) whether a velocity is ever measured."""
+        return np.isfinite(self.velocity).any(axis=0)
+
+    @property
+    def wrench(self) -> np.ndarray:
+        """(n, 6) commanded wrench, N and N m, body frame."""
+        return self.command if self.allocation is None else self.command @ self.allocation.T
+
+    def part(self, begin: float, end: float) -> 'Record':
+        """The part from one time to another, s; commands keep their grid."""
+        first, last = (round((t - self.start) / self.step) for t in (begin, end))
+        first, last = max(first, 0), min(last, len(self.command))
+        keep = [(t >= begin) & (t <= end) for t in (self.attitude_t, self.velocity_t)]
+        return Record(
+            self.name, self.attitude_t[keep[0]], self.attitude[keep[0]],
+            self.velocity_t[keep[1]], self.velocity[keep[1]], self.step,
+            self.command[first:last], self.start + first * self.step,
+            self.allocation, self.channels,
+        )  # fmt: skip
+
+    def states(self, t: np.ndarray) -> np.ndarray:
+        """Attitude and velocity (k, 10) at some times by local polynomials; NaN: not measured."""
+        q = smoothed(self.attitude_t, continuous(self.attitude), t)
+        nu = np.full((len(t), 6), np.nan)
+        for i in np.flatnonzero(self.known):
+            there = np.isfinite(self.velocity[:, i])
+            nu[:, i] = smoothed(self.velocity_t[there], self.velocity[there, i : i + 1], t)[:, 0]
+        return np.concatenate([q / np.linalg.norm(q, axis=1, keepdims=True), nu], axis=1)
+
+    def noise(self) -> np.ndarray:
+        """(9,) standard deviation of white noise: velocity, then attitude in rad; NaN: unknown."""
+        found = np.full(9, np.nan)
+        for i in np.flatnonzero(self.known):
+            there = np.isfinite(self.velocity[:, i])
+            if there.sum() > SMALLEST:
+                rows = self.velocity_t[there], self.velocity[there, i : i + 1]
+                found[i] = np.sqrt(variance([rows])[0])
+        turned = small_rotation(self.states(self.attitude_t)[:, :4], self.attitude)
+        found[6:] = np.sqrt(variance([(self.attitude_t, turned)]))
+        return found
+
+
+def of_run(run: Run, *, applied: bool = False, attitude: np.ndarray | None = None) -> Record:
+    """Record of a simulated run or of a bag of ours, with the velocity that the law saw.
+
+    Parameters
+    ----------
+    run : without gaps
+    applied : take the wrench that the actuators delivered in place of the command
+    attitude : (n + 1, 4) measured quaternions; None: those of the run
+
+    """
+    q = quaternion(run.eta[:, 3:]) if attitude is None else attitude
+    tau = run.applied if applied and run.applied is not None else run.tau
+    return Record(run.scenario, run.t, q, run.t, run.nu_measured, run.step, tau[:-1], run.start)
+
+
+def of_tracks(name: str, tracks: Mapping[str, Track], *, applied: bool = False) -> list[Record]:
+    """Records of the stretches of a bag that have attitude, velocity and command.
+
+    Parameters
+    ----------
+    name : of the bag
+    tracks : role -> signal in NED and FSD, as of `tracks_of`
+    applied : take the wrench that acted where there is one
+
+    """
+    pose, twist = tracks['pose'], tracks['twist']
+    command = tracks.get('wrench_applied') if applied else None
+    command = tracks['wrench'] if command is None else command
+    origin = int(min(track.ns[0] for track in (pose, twist, command)))
+    period = min(command.period, twist.period) / NANOSECONDS
+    step = float(f'{np.clip(period, SHORTEST_STEP, LONGEST_STEP):.2g}')
+    seconds = [(track.ns - origin) / NANOSECONDS for track in (pose, twist, command)]
+    found = []
+    for begin, end in stretches(seconds):
+        ns = origin + np.round(np.arange(begin, end + step / 2, step) * NANOSECONDS).astype(
+            np.int64
+        )
+        if len(ns) < 2 * SMALLEST:
+            continue
+        mean = np.diff(integral(command, ns), axis=0) / step
+        inside = [(t >= begin) & (t <= end) for t in seconds[:2]]
+        found.append(
+            Record(
+                name, seconds[0][inside[0]], pose.rows[inside[0], 3:], seconds[1][inside[1]],
+                twist.rows[inside[1]], step, mean, begin,
+            )
+        )  # fmt: skip
+    return found
+
+
+def stretches(times: Sequence[np.ndarray]) -> list[tuple[float, float]]:
+    """Begin and end, s, of the times at which no signal pauses for longer than `PAUSE`."""
+    begin, end = max(t[0] for t in times), min(t[-1] for t in times)
+    pauses = []
+    for t in times:
+        long = np.flatnonzero(np.diff(t) > max(PAUSE, 5.0 * float(np.median(np.diff(t)))))
+        pauses += [(float(t[i]), float(t[i + 1])) for i in long]
+    found, at = [], begin
+    for first, last in sorted(pauses):
+        if first > at:
+            found.append((at, min(first, end)))
+        at = max(at, last)
+    if end > at:
+        found.append((at, end))
+    return found
+
+
+def continuous(q: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4) of the same attitudes whose signs do not jump."""
+    flips = np.where((q[1:] * q[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+    return q * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
+
+
+def smoothed(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Values (m, k) of local polynomials through (n, k) at rising times, at other times."""
+    count = int(np.clip(SMOOTHING / max(np.median(np.diff(t)), 1e-9), SMALLEST, len(t)))
+    if len(t) < SMALLEST:
+        return np.stack([np.interp(at, t, column) for column in rows.T], axis=1)
+    first = nearest(t, at, count)
+    w = weights(t, at, first, count, ORDER, rate=False)
+    return np.einsum('mc,mck->mk', w, rows[first[:, None] + np.arange(count)])
+
+
+def small_rotation(q: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Rotation (..., 3) in rad that leads from attitudes q (..., 4) to nearby p, body axes."""
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    a, b, c, d = np.moveaxis(p, -1, 0)
+    sign = 2.0 * np.sign(w * a + x * b + y * c + z * d)
+    turned = (
+        w * b - x * a - y * d + z * c,
+        w * c - y * a - z * b + x * d,
+        w * d - z * a - x * c + y * b,
+    )
+    return np.stack([sign * part for part in turned], axis=-1)
+
+
+def rotated(q: np.ndarray, by: np.ndarray) -> np.ndarray:
+    """Attitudes (..., 4) turned by small rotations (..., 3) in rad, body axes."""
+    half = by / 2.0
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    b, c, d = np.moveaxis(half, -1, 0)
+    turned = np.stack(
+        [
+            w - x * b - y * c - z * d,
+            x + w * b + y * d - z * c,
+            y + w * c + z * b - x * d,
+            z + w * d + x * c - y * b,
+        ],
+        axis=-1,
+    )
+    return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+
+
+def down_of(q: np.ndarray) -> np.ndarray:
+    """Direction of gravity (..., 3) in the body frame."""
+    return np.stack(plain(down)(tuple(np.moveaxis(q, -1, 0))), axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A stretch that is simulated from a start of its own.
+
+    Attributes
+    ----------
+    before : (p, m) commands before it, for lag and delay
+    command : (n, m) commands, each held over a step
+    at : (r,) times of the measurements in steps from the start
+    nu, q : (r, 6) and (r, 4) measured; NaN: not measured then
+    start : (10,) first guess of attitude and velocity there
+    begin : s, of the record
+
+    """
+
+    before: np.ndarray
+    command: np.ndarray
+    at: np.ndarray
+    nu: np.ndarray
+    q: np.ndarray
+    start: np.ndarray
+    begin: float
+
+
+def segments_of(record: Record, length: float, history: float) -> list[Segment]:
+    """Segments of equal length, one after the other; what is left at the end joins none.
+
+    Parameters
+    ----------
+    record : of a stretch
+    length : s, of each
+    history : s of commands before the first one
+
+    """
+    n = max(round(length / record.step), 2)
+    before = int(np.ceil(history / record.step))
+    firsts = np.arange(before, len(record.command) - n + 1, n)
+    if not len(firsts):
+        return []
+    starts = record.states(record.start + record.step * firsts)
+    starts = np.where(np.isfinite(starts), starts, 0.0)
+    found = []
+    for first, state in zip(firsts.tolist(), starts, strict=True):
+        begin = record.start + first * record.step
+        at, nu, q = _measured(record, begin, begin + n * record.step)
+        if len(at):
+            command = record.command[first : first + n]
+            found.append(
+                Segment(record.command[first - before : first], command,
+                        (at - begin) / record.step, nu, q, state, begin)
+            )  # fmt: skip
+    return found
+
+
+def _measured(record: Record, begin: float, end: float) -> tuple[np.ndarray, ...]:
+    """Times, velocities and attitudes in (begin, end]; NaN where only the other one is there."""
+    keep = [(t > begin) & (t <= end + 1e-9) for t in (record.velocity_t, record.attitude_t)]
+    t = np.union1d(record.velocity_t[keep[0]], record.attitude_t[keep[1]])
+    nu, q = np.full((len(t), 6), np.nan), np.full((len(t), 4), np.nan)
+    nu[np.searchsorted(t, record.velocity_t[keep[0]])] = record.velocity[keep[0]]
+    q[np.searchsorted(t, record.attitude_t[keep[1]])] = record.attitude[keep[1]]
+    return t, nu, q
+
+
+def described(record: Record) -> dict[str, Any]:
+    """Length, rates and size of what was measured, for `identify.json`."""
+    nu = record.velocity
+    known = record.known
+    return {
+        'name': record.name,
+        'duration': record.end - record.start,
+        'velocity_rate': (len(record.velocity_t) - 1) / float(np.ptp(record.velocity_t)),
+        'attitude_rate': (len(record.attitude_t) - 1) / float(np.ptp(record.attitude_t)),
+        'velocity_rms': [
+            float(np.sqrt(np.nanmean(nu[:, i] ** 2))) if known[i] else None for i in range(6)
+        ],
+        'wrench_rms': np.sqrt((record.wrench**2).mean(axis=0)).tolist(),
+    }

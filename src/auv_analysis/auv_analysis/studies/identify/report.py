@@ -1,0 +1,245 @@
+"""What an identification came to: tables, verdict, terminal, page and files."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from auv_analysis.output.progress import TextConsole
+from auv_analysis.output.text import join, number
+from auv_analysis.report.document import Block, Section, Sentence, write_document
+from auv_analysis.report.results import Column, Results, Shown, described, terminal
+from auv_analysis.studies.identify.couplings import couplings
+from auv_analysis.studies.identify.identify import Identified
+from auv_analysis.studies.identify.plausibility import contradictions, excitation
+from auv_analysis.studies.identify.prediction import by_name
+from auv_analysis.studies.identify.record import Record
+from auv_analysis.studies.identify.record import described as of_record
+
+VEHICLE, NAME = 'vehicle.yaml', 'identify'
+NARROW: Mapping[str, tuple[str, ...]] = {  # tables in a terminal, and what they leave out there
+    'coefficients': ('left', 'status'),
+    'inertia': tuple(f'Upsilon{k}' for k in ('', '_prior', '_low', '_high')),
+    'predictions': ('linear', 'angular'),
+}
+JUDGED = 0.5  # s: shorter horizons tell of noise rather than of the model
+METHOD = (
+    'The start is a weighted linear least squares fit of (1) on local polynomials. Output error '
+    'refines it: the model alone is simulated along segments under the recorded command, each from '
+    'a start of its own, and the misfit of velocity and attitude is made small. No acceleration is '
+    'measured or needed. Inertia stays positive definite (by its Cholesky factor), damping takes '
+    'energy.',
+    'Intervals are those of a jackknife over segments, a sandwich covariance without its bias: '
+    'what disturbs a segment may be correlated inside it. A coefficient of which more than 30 % of '
+    'the prior’s own uncertainty is left counts as prior and has no interval.',
+    'Errors of predictions are measured by kinetic energy, so that metres and radians add: '
+    'sqrt(e^T M e / M_11) with M of the prior.',
+)
+
+
+def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = False) -> Results:
+    """All numbers of an identification, and what they say.
+
+    Parameters
+    ----------
+    found : the result
+    notes : what was worth saying about the recordings
+    accepted : whether there is a vehicle file even if something contradicts it
+
+    """
+    rows, tables = found.coefficients(), couplings(found)
+    wrong = contradictions(found)
+    identified = [row['name'] for row in rows if row['status'] == 'identified']
+    results = Results(
+        NAME,
+        {
+            'vehicle': found.vehicle.name,
+            'records': [of_record(record) for record in found.training],
+            'held_out': [of_record(record) for record in found.held.record],
+            'segments': len(found.fit.parts),
+            'segment_length': len(found.problem.segments[0].command) * found.problem.step,
+            'residual_rms': float((found.fit.cost / found.fit.rows) ** 0.5),
+            'noise': found.problem.noise.tolist(),
+            'identified': identified,
+            'not_identified': [row['name'] for row in rows if row['status'] != 'identified'],
+            'hardly_moving': [entry.name for entry in found.still],
+            'combinations': found.combinations(),
+            'contradictions': wrong,
+            'excitation': excitation(found.training),
+            'verdict': verdict(found.predictions, [] if accepted else wrong),
+            'file': '' if wrong and not accepted else VEHICLE,
+            'notes': list(notes),
+        },
+    )
+    known: Mapping[str, Shown] = {
+        'name': described('', 'coefficient'),
+        'prior': Column('prior', digits=4),
+        'value': described('identified', 'or what is left of the prior', digits=4),
+        'low': described('low', '95 % interval', digits=4),
+        'high': Column('high', digits=4),
+        'unit': 'unit',
+        'left': described('left', 'of the prior’s uncertainty', decimals=1, scale=100.0),
+        'status': described('', 'whether the recording tells it', look='badge'),
+    }
+    results.add('coefficients', 'Coefficients of (1), lag, delay and gains.', rows, known)
+    add_predictions(results, found.predictions)
+    pairs: Mapping[str, Shown] = {
+        'pair': described('pair', 'degrees of freedom'),
+        'M_prior': Column('prior'),
+        'M': Column('identified'),
+        'M_low': described('low', '95 % interval'),
+        'M_high': Column('high'),
+        'unit': 'unit',
+        'Upsilon_prior': Column('prior', group='Υ'),
+        'Upsilon': Column('identified', group='Υ'),
+        'Upsilon_low': Column('low', group='Υ'),
+        'Upsilon_high': Column('high', group='Υ'),
+        'verdict': described('', 'whether the interval of M excludes zero', look='badge'),
+    }
+    results.add('inertia', 'Couplings in M and in Υ of (4).', tables['inertia'], pairs)
+    for name, symbols, caption in (
+        ('deformation', ('delta_xi', 'delta_pi'),
+         'Root mean squares of Δξ (33) and Δπ (34) in the motion of the recording.'),
+        ('shares', ('N', 'share'), 'N of (4), and shares of the mean kinetic energy (12).'),
+    ):  # fmt: skip
+        shown: dict[str, Shown] = {'dof': described('', 'degree of freedom')}
+        for symbol in symbols:
+            for key, label in (('_prior', 'prior'), ('', 'identified'), ('_low', 'low'),
+                               ('_high', 'high')):  # fmt: skip
+                shown[f'{symbol}{key}'] = Column(label, group=symbol, scale=1.0)
+        results.add(name, caption, tables[name], shown)
+    return results
+
+
+def add_predictions(results: Results, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Add the table of predictions."""
+    shown: Mapping[str, Shown] = {
+        'predictor': 'predictor',
+        'horizon': described('horizon, s', 'how far ahead', look='plain'),
+        'error': described('error, m/s', 'velocity error by kinetic energy, root mean square'),
+        'linear': Column('linear, m/s'),
+        'angular': Column('angular, rad/s'),
+        'ratio': described('new by this', 'error of the new model by that of this predictor'),
+        'ratio_low': described('low', '95 % interval by a bootstrap over blocks of time'),
+        'ratio_high': Column('high'),
+    }  # fmt: skip
+    results.add('predictions', 'Open-loop prediction of what was held out.', rows,
+                shown, stub=2)  # fmt: skip
+
+
+def prediction_results(
+    vehicle: str, held: Sequence[Record], rows: Sequence[Mapping[str, Any]], notes: Sequence[str]
+) -> Results:
+    """Results of a vehicle that only predicts."""
+    results = Results(
+        'predict',
+        {'vehicle': vehicle, 'held_out': [of_record(record) for record in held],
+         'verdict': verdict_alone(vehicle, rows), 'notes': list(notes)},
+    )  # fmt: skip
+    add_predictions(results, rows)
+    return results
+
+
+def verdict_alone(vehicle: str, rows: Sequence[Mapping[str, Any]]) -> str:
+    """Whether a vehicle predicts better than what knows nothing of it, in a sentence."""
+    said = []
+    for name in ('persistence', 'black box'):
+        some = [r for r in by_name(rows, name) if r['horizon'] >= JUDGED] or by_name(rows, name)
+        better = [r for r in some if r['ratio_high'] < 1.0]
+        worse = [r for r in some if r['ratio_low'] > 1.0]
+        if len(better) == len(some):
+            said.append(f'better than {name}')
+        elif worse:
+            at = join([f'{r["horizon"]:g}' for r in worse])
+            said.append(f'worse than {name} at {at} s')
+        else:
+            said.append(f'not clearly better than {name}')
+    return f'{vehicle} predicts {join(said)}.' if rows else 'Nothing was held out.'
+
+
+def verdict(rows: Sequence[Mapping[str, Any]], contradicted: Sequence[str]) -> str:
+    """Whether the new model is better than the old, in a sentence."""
+    if contradicted:
+        return f'No vehicle file: {contradicted[0]}.'
+    if not rows:
+        return 'Nothing was held out: how good the model is has not been tried.'
+    first = [row for row in by_name(rows, 'prior') if row['horizon'] >= JUDGED] or by_name(
+        rows, 'prior'
+    )
+    better = [row for row in first if row['ratio_high'] < 1.0]
+    worse = [row for row in first if row['ratio_low'] > 1.0]
+    row = (better or first)[-1]
+    found = (
+        f'{number(row["ratio"], 2)} times its error at {row["horizon"]:g} s '
+        f'({number(row["ratio_low"], 2)} to {number(row["ratio_high"], 2)})'
+    )
+    if better and not worse:
+        text = f'The new model predicts what it has not seen better than the prior: {found}'
+    elif worse:
+        text = f'The new model is not better than the prior: {found}'
+    else:
+        text = f'The new model cannot be told from the prior on what was held out: {found}'
+    rivals = [
+        name for name in ('persistence', 'black box')
+        if any(r['ratio_high'] >= 1.0 for r in by_name(rows, name) if r['horizon'] >= JUDGED)
+    ]  # fmt: skip
+    return f'{text}; not clearly better than {join(rivals)}.' if rivals else f'{text}.'
+
+
+def sentences(results: Results) -> list[str]:
+    """The result in sentences, the most important first."""
+    facts = results.facts
+    count = len(facts['identified'])
+    wrong = facts['contradictions'][0 if facts['file'] else 1 :]
+    said = [facts['verdict'], *(f'{text[:1].upper()}{text[1:]}.' for text in wrong)]
+    every = count + len(facts['not_identified'])
+    said.append(f'{count} of {every} coefficients are identified.')
+    real = [row for row in results.tables['inertia'].records() if row['verdict'] == 'real']
+    for row in sorted(real, key=lambda r: -abs(r['Upsilon']))[:4]:
+        half = (row['M_high'] - row['M_low']) / 2
+        said.append(f'The coupling of {row["pair"].replace(", ", " with ")} is real: '
+                    f'{number(row["M"])} ± {number(half, 2)} {row["unit"]}.')  # fmt: skip
+    if facts['hardly_moving']:
+        said.append(f'Not searched, as it hardly moves: {join(facts["hardly_moving"])}.')
+    said += [f'Open: {one["words"]}.' for one in facts['combinations'][:4]]
+    return said + [f'{text[:1].upper()}{text[1:]}.' for text in facts['excitation']]
+
+
+def print_results(results: Results, folder: Path) -> None:
+    """Print tables and verdict."""
+    out = TextConsole(highlight=False)
+    for name, left_out in NARROW.items():
+        table = results.tables[name]
+        shown = {key: column for key, column in table.shown.items() if key not in left_out}
+        out.print(terminal(replace(table, shown=shown), title=True))
+        out.print('')
+    for text in [*sentences(results), f'folder: {folder}']:
+        out.print(text, markup=False, soft_wrap=True)
+
+
+def write_report(found: Identified, results: Results, out: Path) -> Path:
+    """Write report.html with its figures; returns its path."""
+    from auv_analysis.studies.identify.plots import draw
+
+    tables = {name: table.records() for name, table in results.tables.items()}
+    figures = draw(found, tables, out / 'figures')
+    facts, t = results.facts, results.tables
+    told = [Sentence(text, 'predictions' if i == 0 else '')
+            for i, text in enumerate(sentences(results))]  # fmt: skip
+    open_: list[Block] = [f'{one["words"][:1].upper()}{one["words"][1:]}: {100 * one["left"]:.0f} '
+                          'percent of the prior’s uncertainty are left.'
+                          for one in facts['combinations']]  # fmt: skip
+    sections = [
+        Section('predictions', 'Judged on what it has not seen',
+                [figures['prediction'], t['predictions']]),
+        Section('couplings', 'Couplings before and after',
+                [figures['inertia'], t['inertia'], t['deformation'], t['shares']]),
+        Section('coefficients', 'What was identified', [t['coefficients']]),
+        Section('open', 'What the data cannot tell', open_),
+        Section('fit', 'Predicted against recorded', [figures['trace'], figures['residuals']]),
+        Section('method', 'How it was found', [*METHOD, *facts['notes']]),
+    ]  # fmt: skip
+    listings = [(VEHICLE, (out / VEHICLE).read_text('utf-8'))] if (out / VEHICLE).exists() else []
+    names = join([record['name'] for record in facts['records']])
+    title = f'Identification of {facts["vehicle"]}'
+    return write_document(out, title, f'from {names}', told, sections, listings)

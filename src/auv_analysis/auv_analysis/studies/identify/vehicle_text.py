@@ -1,0 +1,99 @@
+"""The identified vehicle as a file: the prior's, with what was identified in its place."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import yaml
+
+from auv_analysis.output.text import number
+from auv_analysis.studies.identify.identify import Identified, with_vehicle
+from auv_dynamics.files.errors import printable
+from auv_dynamics.vehicle.vehicle_file import is_semidefinite
+
+WIDTH = 96  # of comments
+DIGITS = 7
+SECTIONS = {
+    'inertia_matrix': 'M.', 'added_mass': 'M.', 'damping': 'D_', 'hydrostatics': 'restoring.',
+}  # fmt: skip
+
+
+def vehicle_text(found: Identified, data: Mapping[str, Any], name: str, source: str) -> str:
+    """Text of the vehicle file, every section with the provenance of its numbers in comments.
+
+    Parameters
+    ----------
+    found : the result
+    data : contents of the prior's file
+    name, source : of the new one
+
+    """
+    prior, rows = found.vehicle, found.coefficients()
+    new = with_vehicle(prior, found.found)
+    contents = {**data, 'name': name, 'source': source, 'sign': 'positive'}
+    contents['damping'] = {'linear': _six(new.D_linear), 'quadratic': _six(new.D_quadratic)}
+    if prior.lift is not None:
+        contents['lift'] = _six(prior.lift)
+    environment = data['environment']
+    contents['hydrostatics'] = {
+        'volume': _rounded(float(new.buoyancy) / environment['water_density']
+                           / environment['gravity']),
+        'center_of_buoyancy': _rounded(new.r_B),
+    }  # fmt: skip
+    M_A = None if prior.M_RB is None else new.M - prior.M_RB
+    if M_A is not None and is_semidefinite(np.array(_six(_symmetric(M_A), whole=True))):
+        contents['added_mass'] = _six(_symmetric(M_A))
+        contents.pop('inertia_matrix', None)
+    else:
+        contents['inertia_matrix'] = _six(_symmetric(new.M), whole=True)
+        contents.pop('added_mass', None)
+        body = dict(contents['rigid_body'])
+        body.pop('inertia', None)
+        body.pop('inertia_reference', None)
+        contents['rigid_body'] = body
+    lines = ['# Identified by auv identify; comments say what each number is: identified with its',
+             '# 95 % interval, or the prior, of which the recording says too little.']  # fmt: skip
+    other = [row for row in rows if not row['name'].startswith(('M.', 'D_', 'restoring.'))]
+    lines += _said(other, 'beside this file')
+    for key, value in contents.items():
+        start = SECTIONS.get(key)
+        if start:
+            lines += _said([row for row in rows if row['name'].startswith(start)], key)
+        flow = None if isinstance(value, dict | list) else False  # lists of numbers in a line
+        text = yaml.safe_dump({key: value}, sort_keys=False, default_flow_style=flow, width=WIDTH)
+        lines += text.rstrip().splitlines()
+    return '\n'.join(lines) + '\n'
+
+
+def _said(rows: Sequence[Mapping[str, Any]], key: str) -> list[str]:
+    """Comment lines: a coefficient each."""
+    if not rows:
+        return []
+    lines = [f'# {key}:']
+    for row in rows:
+        unit = f' {row["unit"]}' if row['unit'] else ''
+        if row['status'] == 'at zero':
+            text = f'at its bound 0{unit}, at most {number(row["high"], 5)}{unit}'
+        elif row['low'] is not None:
+            within = f'{number(row["low"], 5)} to {number(row["high"], 5)}{unit}'
+            text = f'identified {number(row["value"], 5)}{unit}, within {within}'
+        else:
+            text = f'prior {number(row["prior"], 5)}{unit}, not identified by itself'
+        lines.append(printable(f'#   {row["name"]}: {text}'))
+    return lines
+
+
+def _symmetric(A: np.ndarray) -> np.ndarray:
+    return (A + A.T) / 2
+
+
+def _six(A: np.ndarray, *, whole: bool = False) -> list[Any]:
+    """Six numbers of a diagonal matrix, else rows."""
+    is_diagonal = not whole and not np.any(A - np.diag(np.diag(A)))
+    return _rounded(np.diag(A) if is_diagonal else A)
+
+
+def _rounded(value: Any) -> Any:
+    if np.ndim(value):
+        return [_rounded(entry) for entry in value]
+    return float(f'{float(value):.{DIGITS}g}') + 0.0

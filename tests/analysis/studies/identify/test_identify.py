@@ -1,0 +1,194 @@
+"""`auv identify` recovers what was simulated, says what it cannot, and refuses what is wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import least_squares
+from trials import DELAY, trial, truth, wrong_prior
+
+from auv_analysis.studies.identify.couplings import couplings
+from auv_analysis.studies.identify.identify import Settings, identify, split
+from auv_analysis.studies.identify.output_error import OutputError
+from auv_analysis.studies.identify.plausibility import check_rates, contradictions, excitation
+from auv_analysis.studies.identify.record import segments_of, stretches
+from auv_analysis.studies.identify.unknowns import unknowns
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.frames import swap_attitude, swap_body
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
+
+REST = {dof: {} for dof in DOFS}
+SINE = {'surge': {'terms': [{'amplitude': 0.3, 'omega': 0.5}]}}
+
+
+@pytest.fixture(scope='module')
+def herman(tmp_path_factory):
+    return trial(tmp_path_factory.mktemp('herman'), 'herman2018', 3, duration=60.0)
+
+
+@pytest.fixture(scope='module')
+def found(herman):
+    training, held = split([herman[0]], 0.25)
+    return identify(training, held, wrong_prior(load_vehicle('herman2018'), 3))
+
+
+def test_the_truth_is_recovered_and_covered(found):
+    true = truth(found.fit.unknowns, load_vehicle('herman2018'))
+    rows = {row['name']: row for row in found.coefficients()}
+    for dof in DOFS:
+        name = f'M.{dof}.{dof}'
+        assert rows[name]['value'] == pytest.approx(true[name], rel=0.01)
+    assert rows['M.pitch.heave']['value'] == pytest.approx(-37.5, rel=0.03)
+    assert rows['lag']['value'] + rows['delay']['value'] == pytest.approx(0.12, abs=0.004)
+    known = [row for row in rows.values() if row['status'] == 'identified']
+    assert len(known) >= 35
+    inside = [row['low'] <= true[row['name']] <= row['high'] for row in known]
+    assert np.mean(inside) >= 0.85, [
+        r['name'] for r, ok in zip(known, inside, strict=True) if not ok
+    ]
+
+
+def test_what_was_held_out_is_predicted_better_than_by_others(found):
+    rows = [row for row in found.predictions if row['horizon'] >= 0.5]
+    for other in ('prior', 'persistence', 'black box'):
+        assert all(row['ratio_high'] < 0.5 for row in rows if row['predictor'] == other)
+    assert not contradictions(found)
+
+
+def test_couplings_have_intervals(found):
+    vehicle, tables = load_vehicle('herman2018'), couplings(found)
+    for row in tables['inertia']:
+        i, j = (DOFS.index(dof) for dof in row['pair'].split(', '))
+        if abs(vehicle.M[i, j]) > 1.0:
+            assert row['verdict'] == 'real'
+            assert row['M'] == pytest.approx(vehicle.M[i, j], rel=0.05)
+            assert row['M_low'] < row['M'] < row['M_high']
+    shares = [row['share'] for row in tables['shares']]
+    assert sum(shares) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ('wrong', 'said'),
+    [
+        (lambda r: replace(r, command=10.0 * r.command), 'too large'),
+        (lambda r: replace(r, command=0.1 * r.command), 'too small'),
+        (
+            lambda r: replace(r, attitude=swap_attitude(r.attitude),
+                              velocity=swap_body(r.velocity), command=swap_body(r.command)),
+            'ENU and FLU',
+        ),
+    ],
+)  # fmt: skip
+def test_a_wrong_reading_is_told(herman, wrong, said):
+    training, held = split([wrong(herman[0])], 0.25)
+    result = identify(training, held, wrong_prior(load_vehicle('herman2018'), 3))
+    assert said in contradictions(result)[0]
+
+
+def test_another_vehicle_is_told(herman):
+    training, held = split([herman[0]], 0.25)
+    assert (
+        'another vehicle'
+        in contradictions(identify(training, held, load_vehicle('bluerov2_heavy')))[0]
+    )
+
+
+def test_angular_velocity_in_other_axes_than_the_attitude_is_refused(herman):
+    check_rates(herman[0])
+    with pytest.raises(InputError, match=r'pitch .* and yaw'):
+        check_rates(replace(herman[0], velocity=swap_body(herman[0].velocity)))
+
+
+def test_a_wrench_in_other_axes_is_refused(tmp_path):
+    record, _ = trial(tmp_path, 'bluerov2_heavy', duration=60.0)
+    training, held = split([replace(record, command=swap_body(record.command))], 0.25)
+    with pytest.raises(InputError, match='axes FLU'):
+        identify(training, held, load_vehicle('bluerov2_heavy'))
+
+
+def test_a_recording_at_rest_is_refused(tmp_path):
+    record, _ = trial(tmp_path, 'herman2018', duration=30.0, setpoint=REST)
+    with pytest.raises(InputError, match='at rest'):
+        identify([record], [record], load_vehicle('herman2018'))
+
+
+def test_a_single_sine_leaves_open_what_it_does_not_move(tmp_path):
+    vehicle = load_vehicle('rexrov')
+    record, _ = trial(tmp_path, 'rexrov', duration=60.0, setpoint=SINE)
+    assert 'one frequency' in excitation([record])[0]
+    training, held = split([record], 0.25)
+    result = identify(training, held, wrong_prior(vehicle, 1))
+    true, rows = truth(result.fit.unknowns, vehicle), result.coefficients()
+    open_ = [row for row in rows if row['status'] == 'prior']
+    assert len(open_) >= 5
+    assert all(row['low'] is None for row in open_)
+    assert result.combinations()
+    known = [row for row in rows if row['status'] == 'identified']
+    outside = [r['name'] for r in known if not r['low'] <= true[r['name']] <= r['high']]
+    assert len(outside) <= 0.1 * len(known) + 1, outside
+
+
+def test_gains_of_the_wrench_cannot_be_told_from_all_inertia(herman):
+    training, held = split([herman[0]], 0.25)
+    free = ('M', 'D_linear', 'D_quadratic', 'restoring', 'lag', 'delay', 'gain')
+    result = identify(training, held, load_vehicle('herman2018'), Settings(free))
+    rows = {row['name']: row for row in result.coefficients()}
+    assert rows['gain.surge']['status'] == 'prior'
+    M = rows['M.surge.surge']
+    assert M['value'] == pytest.approx(300.0, rel=0.1), 'stays near the prior'
+    assert M['high'] is None or M['high'] - M['low'] > 0.5 * M['value'], 'as unsure as the gain'
+    widest = result.combinations()[0]
+    assert widest['left'] > 0.5
+    assert 'scale of the wrench' in widest['words']
+
+
+def test_a_velocity_that_is_not_measured_is_found_where_the_model_shows_it(herman):
+    velocity = herman[0].velocity.copy()
+    velocity[:, 2] = np.nan
+    training, held = split([replace(herman[0], velocity=velocity)], 0.25)
+    vehicle = load_vehicle('herman2018')
+    result = identify(training, held, vehicle)
+    true = truth(result.fit.unknowns, vehicle)
+    rows = {row['name']: row for row in result.coefficients()}
+    assert rows['M.surge.surge']['value'] == pytest.approx(300.0, rel=0.02)
+    outside = [name for name, row in rows.items() if row['status'] == 'identified'
+               and not row['low'] <= true[name] <= row['high']]  # fmt: skip
+    assert len(outside) <= 0.15 * len(rows), outside
+
+
+def test_what_somebody_knows_is_kept(herman):
+    training, held = split([herman[0]], 0.25)
+    believed = {'M.surge.surge': (280.0, 1e-3)}
+    result = identify(training, held, load_vehicle('herman2018'), Settings(believed=believed))
+    rows = {row['name']: row for row in result.coefficients()}
+    assert rows['M.surge.surge']['value'] == pytest.approx(280.0, abs=0.01)
+    assert rows['M.surge.surge']['status'] == 'prior', 'the recording adds nothing to it'
+
+
+def test_the_minimum_is_that_of_scipy(herman):
+    vehicle, record = load_vehicle('herman2018'), herman[0].part(5.0, 15.0)
+    u = unknowns(vehicle, ('D_linear', 'M.diagonal'), speeds=np.full(6, 0.2),
+                 wrenches=np.full(6, 50.0), lag=0.08).with_delay(DELAY)  # fmt: skip
+    problem = OutputError(vehicle, segments_of(record, 2.0, 0.6), record.step,
+                          np.r_[np.full(6, 0.005), np.full(3, 0.003)])  # fmt: skip
+    n, count = len(u.entries), len(problem.segments)
+
+    def residuals(p):
+        theta, z = p[:n], p[n:].reshape(count, 9)
+        which = slice(0, count)
+        states = problem.simulate(u, theta[None], problem.starts(z)[None], which)
+        rows = [e.ravel() for e in problem.residuals(which, states)]
+        return np.concatenate([*rows, (z / 10.0).ravel(), theta])
+
+    ours = problem.fit(u, np.zeros(n), tolerance=1e-12)
+    theirs = least_squares(residuals, np.zeros(n + 9 * count), method='lm', xtol=1e-12)
+    assert ours.cost == pytest.approx(2.0 * theirs.cost, rel=1e-7)
+    assert_allclose(ours.theta, theirs.x[:n], atol=2e-5)
+
+
+def test_a_recording_is_split_at_pauses():
+    t = np.arange(0.0, 10.0, 0.1)
+    first, last = stretches([t, t[(t < 4.0) | (t > 5.0)]])
+    assert_allclose([*first, *last], [0.0, 3.9, 5.1, 9.9])

@@ -1,0 +1,78 @@
+"""Parametrisation: any theta is a physical vehicle, and back; small rotations; names."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from numpy.testing import assert_allclose
+from strategies import QUICK, attitudes, vectors, vehicles
+
+from auv_analysis.studies.identify.record import continuous, rotated, small_rotation
+from auv_analysis.studies.identify.unknowns import DEFAULT, GROUPS, unknowns
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.kinematics import quaternion
+from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
+
+EVERY = (*GROUPS, 'D_linear.full', 'D_quadratic.full')
+
+
+def made(vehicle, free=EVERY, fixed=(), **others):
+    return unknowns(
+        vehicle, free, fixed, speeds=np.full(6, 0.3), wrenches=np.full(6, 20.0), **others
+    )
+
+
+@QUICK
+@given(vehicles(), vectors(120, largest=2.0))
+def test_theta_is_a_vehicle_and_back(data, numbers):
+    u = made(vehicle_from_dict(data, 'drawn'), lag=0.1)
+    theta = numbers[: len(u.entries)]
+    found = u.coefficients(theta)
+    assert_allclose(found.M, found.M.T, rtol=1e-14, atol=1e-12 * np.abs(found.M).max())
+    assert np.linalg.eigvalsh(found.M)[0] > 0
+    assert found.lag > 0
+    assert np.all(found.gain > 0)
+    assert_allclose(u.theta(found), theta, atol=1e-6)
+
+
+def test_theta_zero_is_the_prior():
+    vehicle = load_vehicle('herman2018')
+    found = made(vehicle).coefficients(np.zeros(len(made(vehicle).entries)))
+    assert_allclose(found.M, vehicle.M, atol=1e-9)
+    assert_allclose(found.D_quadratic, vehicle.D_quadratic)
+    assert_allclose(found.hydrostatics, vehicle.model.hydrostatics)
+
+
+@QUICK
+@given(attitudes(), vectors(3, largest=0.02))
+def test_a_small_rotation_leads_from_one_attitude_to_the_other(eta, by):
+    q = quaternion(eta[3:])
+    assert_allclose(small_rotation(q, rotated(q, by)), by, atol=1e-5)
+    assert_allclose(small_rotation(q, -rotated(q, by)), by, atol=1e-5)
+
+
+def test_quaternions_whose_signs_jump_are_made_continuous():
+    q = quaternion(np.stack([np.zeros(50), np.zeros(50), np.linspace(0, 9, 50)], axis=1))
+    jumping = q * np.where(np.arange(50) % 3, 1.0, -1.0)[:, None]
+    assert np.abs(np.diff(continuous(jumping), axis=0)).max() < 0.2
+
+
+@pytest.mark.parametrize(
+    ('free', 'fixed', 'expected'),
+    [
+        (('M.diagonal',), (), 6),
+        (('M',), ('M.diagonal',), 15),
+        (('M.heave.pitch', 'M.pitch.heave'), (), 1),
+        (('D_linear',), (), 6),
+        (('D_linear.full',), (), 36),
+        (DEFAULT, (), 21 + 12 + 4 + 1),
+        (DEFAULT, ('restoring', 'lag'), 21 + 12),
+        (('current', 'bias', 'gain'), (), 15),
+    ],
+)
+def test_names_choose_what_is_free(free, fixed, expected):
+    assert len(made(load_vehicle('rexrov'), free, fixed).entries) == expected
+
+
+def test_a_wrong_name_is_refused_with_the_nearest():
+    with pytest.raises(InputError, match='nearest: restoring'):
+        made(load_vehicle('rexrov'), ('restorin',))

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.cli.arguments import add_results
+from auv_analysis.cli.arguments import add_results, number
 from auv_analysis.cli.identify import add_bags, read
 
 
@@ -15,6 +15,10 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Recordings and a vehicle."""
     add_results(command)
     add_bags(command)
+    text = 'lag of the actuators, s, which a vehicle file does not hold; default: none'
+    command.add_argument('--lag', type=number(at_least=0.0), default=0.0, metavar='S', help=text)
+    text = 'their delay, s; default: none'
+    command.add_argument('--delay', type=number(at_least=0.0), default=0.0, metavar='S', help=text)
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
@@ -23,11 +27,10 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import TextConsole, waiting
     from auv_analysis.report.plots import save_figures
-    from auv_analysis.report.results import terminal
     from auv_analysis.scenario.scaling import UNFIT
-    from auv_analysis.studies.identify.identify import test_of
+    from auv_analysis.studies.identify.identify import judged
     from auv_analysis.studies.identify.plots import prediction
-    from auv_analysis.studies.identify.report import prediction_results
+    from auv_analysis.studies.identify.report import narrow, prediction_results
     from auv_dynamics.files.shipped import shipped
     from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
@@ -39,12 +42,12 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     out = options.out or Path('runs') / f'predict_{UNFIT.sub("_", vehicle.name)[:90]}'
     with results_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with waiting('predicting'):
-            rows = test_of(vehicle, training, held)
+            rows = judged(vehicle, training, held, options.lag, options.delay)
         results = prediction_results(vehicle.name, held, rows, notes)
         results.write(folder.folder)
         save_figures(folder.folder / 'figures', {'prediction': lambda: prediction(rows)})
         if not options.json:
             console = TextConsole(highlight=False)
-            console.print(terminal(results.tables['predictions'], title=True))
+            console.print(narrow(results, 'predictions'))
             console.print(f'\n{results.facts["verdict"]}\nfolder: {out}', markup=False)
     return results.to_json()

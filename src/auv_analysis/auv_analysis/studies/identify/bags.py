@@ -12,10 +12,10 @@ from auv_analysis.bag.foreign_topics import TopicMap, read_mapping
 from auv_analysis.bag.foreign_tracks import tracks_of
 from auv_analysis.studies.identify.record import Record, of_tracks
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros.interface import GROUND_TRUTH, ODOM, WRENCH, WRENCH_APPLIED
 from auv_dynamics.vehicle.vehicle import Vehicle
 
-OURS = {'odometry': 'odom', 'wrench': 'wrench'}
-APPLIED = 'wrench_applied'
+OURS = {'odometry': ODOM, 'wrench': WRENCH}
 
 
 def read_records(
@@ -47,9 +47,9 @@ def read_records(
 def _ours(bag: Path, *, applied: bool) -> TopicMap:
     topics = survey(bag).types
     found = {}
-    for role, name in {**OURS, **({APPLIED: APPLIED} if applied else {})}.items():
+    for role, name in {**OURS, **({WRENCH_APPLIED: WRENCH_APPLIED} if applied else {})}.items():
         some = [topic for topic in topics if topic.rpartition('/')[2] == name
-                and 'ground_truth' not in topic]  # fmt: skip
+                and not topic.endswith(GROUND_TRUTH)]  # fmt: skip
         if len(some) != 1:
             text = f'one topic {name}, or --odom, --wrench and --frames, or --map'
             raise InputError(bag, role, text, ', '.join(some) or 'none')

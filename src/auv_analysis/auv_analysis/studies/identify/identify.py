@@ -284,8 +284,12 @@ def identify(
     )
 
 
-def test_of(
-    vehicle: Vehicle, training: Sequence[Record], held: Sequence[Record]
+def judged(
+    vehicle: Vehicle,
+    training: Sequence[Record],
+    held: Sequence[Record],
+    lag: float = 0.0,
+    delay: float = 0.0,
 ) -> list[dict[str, Any]]:
     """How well a vehicle as filed predicts recordings, beside persistence and a black box.
 
@@ -293,13 +297,14 @@ def test_of(
     ----------
     vehicle : whose errors the others' are compared with
     training, held : what the black box learns from, and what is predicted
+    lag, delay : of the actuators, s
 
     Returns
     -------
     rows : of `prediction.compare`
 
     """
-    return compared(training, held_of(held, HISTORY), vehicle, None)
+    return compared(training, held_of(held, HISTORY), vehicle, None, lag, delay)
 
 
 def compared(
@@ -307,6 +312,8 @@ def compared(
     moments: Held,
     vehicle: Vehicle,
     model: tuple[Unknowns, np.ndarray] | None,
+    lag: float = 0.0,
+    delay: float = 0.0,
 ) -> list[dict[str, Any]]:
     """Rows of `compare`: the new model, where there is one, the vehicle as filed, the others."""
     if not moments.count:
@@ -314,17 +321,20 @@ def compared(
     predictors = [predict('new', moments, vehicle, *model)] if model else []
     predictors += [
         predict('prior' if model else vehicle.name, moments, vehicle,
-                *as_filed(vehicle, training[0].channels)),
+                *as_filed(vehicle, training[0].channels, lag, delay)),
         persistence(moments),
         BlackBox(training).predict(moments),
     ]  # fmt: skip
     return compare(predictors, moments, vehicle.M)
 
 
-def as_filed(vehicle: Vehicle, channels: Sequence[str] = ()) -> tuple[Unknowns, np.ndarray]:
+def as_filed(
+    vehicle: Vehicle, channels: Sequence[str] = (), lag: float = 0.0, delay: float = 0.0
+) -> tuple[Unknowns, np.ndarray]:
     """A vehicle with nothing free, for its prediction."""
     one = np.ones(6)
-    return unknowns(vehicle, (), speeds=one, wrenches=one, channels=channels), np.zeros(0)
+    found = unknowns(vehicle, (), speeds=one, wrenches=one, channels=channels, lag=lag)
+    return found.with_delay(delay), np.zeros(0)
 
 
 def check_motion(records: Sequence[Record], noise: np.ndarray) -> None:

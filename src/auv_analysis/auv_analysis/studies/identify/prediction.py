@@ -23,7 +23,7 @@ APART = 0.25  # s, between starts at least
 MOST = 400  # starts
 DIVERGED = 1e3  # m/s, rad/s: what an error is at most
 DRAWS = 1000  # of the bootstrap
-BLOCK = 5.0  # s, of a block of starts that are drawn together
+BLOCK, FEWEST = 5.0, 8  # s, of a block of starts that are drawn together; least number of them
 LAGS = (0.0, 0.1, 0.2)  # s, of the command in the black box
 BOX_STEP = 0.1  # s
 RIDGE = 1e-3
@@ -95,7 +95,7 @@ def held_of(records: Sequence[Record], history: float, longest: float = HORIZONS
                         float(begin))
             )  # fmt: skip
         found.append(some)
-        number = ((begins - record.start) / BLOCK).astype(int) + offset
+        number = ((begins - record.start) / min(BLOCK, total / FEWEST)).astype(int) + offset
         blocks.append(number)
         offset = int(number.max(initial=offset)) + 1
     return Held(records, found, horizons, np.concatenate(blocks) if blocks else np.zeros(0, int))

@@ -119,7 +119,7 @@ def add_predictions(results: Results, rows: Sequence[Mapping[str, Any]]) -> None
         'error': described('error, m/s', 'velocity error by kinetic energy, root mean square'),
         'linear': Column('linear, m/s'),
         'angular': Column('angular, rad/s'),
-        'ratio': described('new by this', 'error of the new model by that of this predictor'),
+        'ratio': described('ratio', 'error of the first predictor by that of this one'),
         'ratio_low': described('low', '95 % interval by a bootstrap over blocks of time'),
         'ratio_high': Column('high'),
     }  # fmt: skip
@@ -205,13 +205,18 @@ def sentences(results: Results) -> list[str]:
     return said + [f'{text[:1].upper()}{text[1:]}.' for text in facts['excitation']]
 
 
+def narrow(results: Results, name: str) -> Any:
+    """A table for a terminal, without the columns that do not fit there."""
+    table = results.tables[name]
+    shown = {key: column for key, column in table.shown.items() if key not in NARROW[name]}
+    return terminal(replace(table, shown=shown), title=True)
+
+
 def print_results(results: Results, folder: Path) -> None:
     """Print tables and verdict."""
     out = TextConsole(highlight=False)
-    for name, left_out in NARROW.items():
-        table = results.tables[name]
-        shown = {key: column for key, column in table.shown.items() if key not in left_out}
-        out.print(terminal(replace(table, shown=shown), title=True))
+    for name in NARROW:
+        out.print(narrow(results, name))
         out.print('')
     for text in [*sentences(results), f'folder: {folder}']:
         out.print(text, markup=False, soft_wrap=True)

@@ -1,0 +1,107 @@
+"""`auv identify` and `auv predict` on bags: our own and others', with their refusals."""
+
+import json
+
+import numpy as np
+import pytest
+import trials
+from foreign_bags import Maker, motion, simple, write
+from pyarrow import parquet
+
+from auv_analysis.cli.main import main
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
+
+
+def auv(capsys, *arguments: object) -> tuple[int, str]:
+    """Exit code and standard error of a command."""
+    code = 0
+    try:
+        main([str(argument) for argument in arguments])
+    except SystemExit as ended:
+        code = ended.code
+    return code, capsys.readouterr().err
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    """A trial as our nodes would record it: odometry with noise, commanded wrench."""
+    folder = tmp_path_factory.mktemp('trial')
+    record, run = trials.trial(folder, 'herman2018', 5, duration=60.0)
+    part = motion(run, enu=False)
+    noisy = part._replace(attitude=record.attitude[:, [1, 2, 3, 0]], twist=record.velocity)
+    frames = 'odom_ned', 'base_link_fsd'
+    return write(folder / 'bag', simple(noisy, Maker(), '/odom', '/wrench', frames), Maker())
+
+
+@pytest.fixture(scope='module')
+def identified(bag, tmp_path_factory):
+    out = tmp_path_factory.mktemp('found') / 'identified'
+    main(['identify', str(bag), '--vehicle', 'herman2018', '--out', str(out)])
+    return out
+
+
+def test_a_bag_becomes_a_vehicle_file(identified):
+    vehicle = load_vehicle(identified / 'vehicle.yaml')
+    truth = load_vehicle('herman2018')
+    assert np.diag(vehicle.M) == pytest.approx(np.diag(truth.M), rel=0.01)
+    assert vehicle.M[4, 2] == pytest.approx(truth.M[4, 2], rel=0.05)
+    text = (identified / 'vehicle.yaml').read_text(encoding='utf-8')
+    assert 'M.surge.surge: identified' in text
+    document = json.loads((identified / 'identify.json').read_text(encoding='utf-8'))
+    assert document['file'] == 'vehicle.yaml'
+    rows = parquet.read_table(identified / 'coefficients.parquet').to_pylist()
+    surge = next(row for row in rows if row['name'] == 'M.surge.surge')
+    assert surge['low'] < vehicle.M[0, 0] < surge['high']
+    for name in ('predictions', 'inertia', 'deformation', 'shares'):
+        assert (identified / f'{name}.parquet').exists()
+    page = (identified / 'report.html').read_text(encoding='utf-8')
+    assert 'What was identified' in page
+
+
+def test_the_file_predicts_the_recording(bag, identified, tmp_path, capsys):
+    vehicle = identified / 'vehicle.yaml'
+    lag = ('--lag', trials.LAG, '--delay', trials.DELAY)
+    code, _ = auv(capsys, 'predict', bag, '--vehicle', vehicle, '--out', tmp_path / 'p', *lag)
+    assert code == 0
+    document = json.loads((tmp_path / 'p' / 'predict.json').read_text(encoding='utf-8'))
+    assert 'better than persistence and better than black box' in document['verdict']
+
+
+def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, capsys):
+    out = tmp_path / 'other'
+    given = ('identify', bag, '--vehicle', 'rexrov', '--out', out, '--no-report')
+    code, said = auv(capsys, *given)
+    assert code == 1
+    assert 'another vehicle' in said
+    assert (out / 'identify.json').exists()
+    assert not (out / 'vehicle.yaml').exists()
+    code, _ = auv(capsys, *given, '--accept', '--overwrite')
+    assert code == 0
+    assert (out / 'vehicle.yaml').exists()
+
+
+@pytest.mark.parametrize(
+    ('extra', 'said'),
+    [
+        (('--free', 'D_lin'), 'nearest: D_linear'),
+        (('--holdout', '2'), '--holdout: expected a number'),
+        (('--part', '100:200'), '--part: expected a time up to'),
+        (('--part', '5:2'), 'argument --part'),
+        (('--odom', '/odom', '--wrench', '/no'), '/no'),
+    ],
+)
+def test_refusals(bag, extra, said, tmp_path, capsys):
+    given = ('identify', bag, '--vehicle', 'herman2018', '--out', tmp_path / 'x')
+    code, error = auv(capsys, *given, *extra)
+    assert code == 2
+    assert said in error
+    assert not (tmp_path / 'x').exists()
+
+
+def test_a_prior_file_needs_values_and_deviations(bag, tmp_path, capsys):
+    file = tmp_path / 'prior.yaml'
+    file.write_text('M.surge.surge: 300\n', encoding='utf-8')
+    code, said = auv(capsys, 'identify', bag, '--vehicle', 'herman2018', '--prior', file,
+                     '--out', tmp_path / 'x')  # fmt: skip
+    assert code == 2
+    assert 'a mapping with value and a positive deviation' in said

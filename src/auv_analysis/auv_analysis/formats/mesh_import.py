@@ -37,6 +37,7 @@ REFINED = {3: ((4 / 3, 2.0), 0.1), 2: ((1.6,), 0.5)}
 SMALLEST_BASE = 80  # triangles
 DETAIL = 0.7  # of a base's triangles are the simplified hull's, the rest is to halve the longest
 SHRUNK = 0.1  # relative change of volume by simplification beyond which a base is no hull
+LAST = 0.8  # of the largest base, what the last one aims at, as triangles are halved together
 SAFETY = 2.0  # error estimate in differences between two levels
 NOISE = 0.1  # of two errors of the diagonal, the least that the entry of both has
 PANELS, TOLERANCE = 5500, 0.02
@@ -298,7 +299,7 @@ def converged(
         last = M_A
     if not worst <= WORST:
         expected = f'two levels that agree to {WORST:g} at least: more --panels, a simpler mesh'
-        said = f'{worst:.2g} at {panels} panels' if panels else f'none within {limit} panels'
+        said = f'{worst:.2g} at {panels}' if np.isfinite(worst) else f'not two in {limit} panels'
         raise draft.refuse('added_mass', expected, said)
     draft.traps.append(
         f'added_mass: its levels agree to {worst:.2g}, not to {tolerance:g}: give more --panels'
@@ -331,7 +332,8 @@ def _bases(hull: Any, limit: int) -> Iterator[np.ndarray]:
                 return
             yield triangles
             wanted = len(triangles)
-        wanted *= 2
+        last = int(LAST * limit)
+        wanted = last if wanted < LAST * last < last < 2 * wanted else 2 * wanted
 
 
 def _simplified(hull: Any, count: int) -> Any:

@@ -213,7 +213,7 @@ class _Messages:
         times, rows = (np.concatenate(part) for part in zip(*self._parts, strict=True))
         self._parts.clear()
         log, stamps = times.T
-        stamped = self._stamped and self.source.stamps == 'header'
+        stamped = self._stamped and self.source.stamps != 'log'
         if stamped and not stamps.any():
             notes.append(f'{topic}: every stamp is zero, so the time of logging is taken')
             stamped = False

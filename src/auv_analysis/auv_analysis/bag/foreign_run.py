@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from auv_analysis.bag.foreign_checks import contradictions
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import TopicMap
 from auv_analysis.bag.foreign_tracks import (
@@ -187,7 +188,8 @@ def load_foreign(bag: str | Path, mapping: TopicMap) -> Recording:
         raise InputError(mapping.origin, 'vehicle (--vehicle)', expected, None)
     vehicle = load_vehicle(mapping.vehicle)
     text = read_text(shipped('vehicles', mapping.vehicle), 'vehicle')
-    tracks = tracks_of(read_sources(bag, mapping, notes), mapping, vehicle, notes)
+    tracks, otherwise = tracks_of(read_sources(bag, mapping, notes), mapping, vehicle, notes)
+    notes += contradictions(tracks, otherwise, mapping)
     step = round((mapping.step or 0.0) * NANOSECONDS) or sensible_step(tracks['twist'].period)
     base = time_base([*tracks.values()], tracks['twist'], step)
     if len(base.ns) < 2:
@@ -280,7 +282,8 @@ def _notes_on_estimate(found: Unexplained) -> list[str]:
     return [
         f'F by (1) is estimated, not known: rate of impulse less momentum by {FILTER}; windows '
         f'{windows}. Its error counts white noise of the velocity and the bias of the filter, '
-        'neither noise that is correlated over the window nor a wrench that acted at another time'
+        'neither noise that is correlated over the window, nor a wrench that acted at another '
+        'time, nor an error of the model: M, D and g are taken as the vehicle file has them'
     ]
 
 

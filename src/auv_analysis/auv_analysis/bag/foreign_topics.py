@@ -1,6 +1,7 @@
 """Topics of other systems: a mapping to what they hold, and which ones a bag offers for it."""
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,6 +24,9 @@ OPTIONS = ('odometry', 'wrench', 'setpoint', 'frames', 'twist_frame', 'step', 'g
 HELD = ('wrench', 'wrench_applied', 'thrusters', 'setpoint')  # commands
 CANDIDATES = ('odometry', 'pose', 'twist', 'wrench', 'setpoint', 'thrusters')
 ASKED = ('cmd', 'command', 'desired', 'goal', 'ref', 'reference', 'setpoint', 'target')
+THRUSTING = ('actuator', 'actuators', 'esc', 'motor', 'motors', 'propeller', 'propellers', 'pwm',
+             'servo', 'servos', 'thrust', 'thruster', 'thrusters', 'thrusts')  # fmt: skip
+FROM_ATTITUDE = 'from attitude'
 SHOWN = 6  # topics of a role in one line
 UNIT = 1e-2  # of the norm of a quaternion: what rounding to single precision leaves, and more
 Numbers = tuple[float, ...]
@@ -38,9 +42,10 @@ class MappedTopic:
     topic : its name in the bag
     frames : 'ned_fsd' or 'enu_flu', None where nothing was said
     gap : s, None: by its intervals, and of a set-point none
-    stamps : 'header' or 'log'
+    stamps : 'header', 'log' or 'uniform': those of the header, spread evenly
     twist_frame : 'child' or 'world'
     between : 'hold' or 'linear'
+    delay : s, by which a measurement is older than its stamp, or a command acts behind it
 
     """
 
@@ -51,6 +56,7 @@ class MappedTopic:
     stamps: str = 'header'
     twist_frame: str = 'child'
     between: str = 'linear'
+    delay: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,7 @@ class TopicMap:
     vehicle : file or shipped bare name
     name : of the run, '': that of the bag
     step, window : s, None: chosen by the data
+    rates : 'from attitude', or '': the angular velocity is the one recorded
     origin : named in errors: the file, or 'options'
 
     """
@@ -72,6 +79,7 @@ class TopicMap:
     name: str = ''
     step: float | None = None
     window: float | None = None
+    rates: str = ''
     origin: object = field(default='options')
 
 
@@ -108,6 +116,7 @@ def read_mapping(file: str | Path | None, options: Mapping[str, Any]) -> TopicMa
         name=data.get('name', ''),
         step=data.get('step'),
         window=data.get('window'),
+        rates=data.get('rates', ''),
         origin=origin,
     )
 
@@ -225,8 +234,9 @@ def are_usable(rows: np.ndarray, role: str) -> np.ndarray:
 def candidates(contents: BagContents) -> dict[str, list[str]]:
     """Role -> topics with messages of a type that fits, the likeliest first.
 
-    An odometry is no candidate for pose and twist, and a velocity whose name says that it is asked
-    for is one for the set-point alone.
+    An odometry is no candidate for pose and twist, a velocity whose name says that it is asked
+    for is one for the set-point alone, and an array holds thrusts only where its name says so:
+    states of filters come in arrays as well.
     """
     types = {topic: kind for topic, kind in contents.types.items() if contents.counts.get(topic)}
     found = {role: _fitting(types, role) for role in CANDIDATES}
@@ -235,6 +245,7 @@ def candidates(contents: BagContents) -> dict[str, list[str]]:
         found[role] = [topic for topic in found[role] if topic not in whole]
     found['setpoint'] = [topic for topic in found['setpoint'] if _is_asked(topic)]
     found['twist'] = [topic for topic in found['twist'] if not _is_asked(topic)]
+    found['thrusters'] = [topic for topic in found['thrusters'] if _has_word(topic, THRUSTING)]
     return {
         role: sorted(topics, key=lambda topic: (-contents.counts[topic], topic))
         for role, topics in found.items()
@@ -246,8 +257,11 @@ def _fitting(types: Mapping[str, str], role: str) -> list[str]:
 
 
 def _is_asked(topic: str) -> bool:
-    words = topic.lower().replace('/', '_').split('_')
-    return any(word in ASKED for word in words)
+    return _has_word(topic, ASKED)
+
+
+def _has_word(topic: str, words: Collection[str]) -> bool:
+    return any(word in words for word in re.split(r'[\W\d_]+', topic.lower()))
 
 
 def with_candidates(error: NotOursError) -> InputError:

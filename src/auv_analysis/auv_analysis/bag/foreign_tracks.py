@@ -1,7 +1,7 @@
 """Signals of another system in NED and FSD, over one clock, and their common time base."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -13,9 +13,9 @@ from auv_analysis.bag.foreign_messages import (
     on_the_clock,
     ordered,
 )
-from auv_analysis.bag.foreign_topics import MappedTopic, TopicMap
-from auv_analysis.metrics.local_polynomials import SMALLEST
-from auv_analysis.metrics.pose_twist import CONJUGATE, STILL, compare_rates, turn
+from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, HELD, MappedTopic, TopicMap
+from auv_analysis.metrics.local_polynomials import SMALLEST, rates
+from auv_analysis.metrics.pose_twist import CONJUGATE, turn, turned
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle.frames import (
@@ -35,7 +35,7 @@ GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in
 USUAL = 90.0  # percentile
 AVERAGED = 1.5  # periods per step of the time base from which a signal is averaged over the step
 ENOUGH = 12  # velocity samples of a stretch, fewer are left out: no rate could be estimated
-WORSE = 2.0  # times: from here on the other reading fits clearly better
+BURST, BURSTS = 0.2, 0.2  # of the mean interval; share of intervals below it that makes bursts
 _SWAPS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     'pose': lambda x: np.concatenate([swap_position(x[:, :3]), swap_attitude(x[:, 3:])], axis=1),
     'twist': swap_body,
@@ -191,7 +191,7 @@ def time_base(tracks: Sequence[Track], velocity: Track, step: int) -> TimeBase:
     begin = max(int(track.ns[0]) for track in tracks)
     ends = [int(track.ns[-1]) for track in tracks if np.isfinite(track.limit)]
     stretches, left_out = [], 0
-    for first, last in _between_gaps(begin, min(ends), tracks):
+    for first, last in between_gaps(begin, min(ends), tracks):
         inside = np.searchsorted(velocity.ns, [first, last + 1])
         if inside[1] - inside[0] >= ENOUGH:
             stretches.append((first, last))
@@ -212,7 +212,7 @@ def time_base(tracks: Sequence[Track], velocity: Track, step: int) -> TimeBase:
     return TimeBase(ns, step, kept, owner, left_out)
 
 
-def _between_gaps(begin: int, end: int, tracks: Sequence[Track]) -> list[tuple[int, int]]:
+def between_gaps(begin: int, end: int, tracks: Sequence[Track]) -> list[tuple[int, int]]:
     """Parts of a span, ns, that no gap of any signal overlaps."""
     gaps = np.concatenate([track.gaps() for track in tracks])
     gaps = gaps[np.argsort(gaps[:, 0])]
@@ -228,8 +228,8 @@ def _between_gaps(begin: int, end: int, tracks: Sequence[Track]) -> list[tuple[i
 
 def tracks_of(
     found: dict[str, Recorded], mapping: TopicMap, vehicle: Vehicle, notes: list[str]
-) -> dict[str, Track]:
-    """Signals of the mapped topics.
+) -> tuple[dict[str, Track], Track]:
+    """Signals of the mapped topics, and the velocity if its twist_frame were the other one.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def tracks_of(
     InputError : axes that nobody told, thrusts that do not fit the vehicle
 
     """
-    found = _on_one_clock(found, notes)
+    found = {role: _retimed(one, notes) for role, one in _on_one_clock(found, notes).items()}
     axes = {role: axes_of(one, notes) for role, one in found.items()}
     notes.append(_said(axes, found))
     if 'odometry' in found:
@@ -260,14 +260,14 @@ def tracks_of(
     twist, instead = (
         _velocity(found['twist'], axes['twist'], tracks['pose'], frame) for frame in (told, other)
     )
-    tracks['twist'] = twist
-    notes += of_the_motion(tracks['pose'], twist, instead, told)
+    from_attitude = mapping.rates == FROM_ATTITUDE
+    tracks['twist'] = with_rates(twist, tracks['pose'], notes) if from_attitude else twist
     for role, one in found.items():
         if role == 'thrusters':
             tracks['wrench'] = _of_thrusters(one, vehicle, mapping)
         elif role not in tracks:
             tracks[role] = _track(role, one, axes[role])
-    return tracks
+    return tracks, instead
 
 
 def _on_one_clock(found: Mapping[str, Recorded], notes: list[str]) -> dict[str, Recorded]:
@@ -281,6 +281,48 @@ def _on_one_clock(found: Mapping[str, Recorded], notes: list[str]) -> dict[str, 
             for role, one in timed.items()
         }
     return {role: ordered(longest_stretch(one, notes), notes) for role, one in timed.items()}
+
+
+def _retimed(one: Recorded, notes: list[str]) -> Recorded:
+    """The same with stamps spread evenly where that was told, and without the delay that was told.
+
+    A measurement was taken before its stamp by its delay, a command acts as much behind it.
+    """
+    stamps, source = one.stamps, one.source
+    if source.stamps == 'uniform' and len(stamps) > 1:
+        even = _evenly(stamps, _limit(one))
+        moved = np.abs(even - stamps).max() / NANOSECONDS
+        notes.append(
+            f'{source.topic}: stamps spread evenly, as told; they move by up to {moved:.3g} s'
+        )
+        stamps = even
+    elif len(stamps) > ENOUGH:
+        apart = np.diff(stamps)
+        share = float(np.mean(apart < BURST * apart.mean()))
+        if share > BURSTS:
+            notes.append(
+                f'{source.topic}: its stamps come in bursts, {100 * share:.0f} % of the intervals '
+                f'are below a fifth of the mean of {apart.mean() / NANOSECONDS:.3g} s; '
+                'stamps: uniform in the map spreads them evenly'
+            )
+    if source.delay:
+        sign = 1 if source.role in HELD else -1
+        stamps = stamps + sign * round(source.delay * NANOSECONDS)
+        which = 'acts {} s behind its stamps' if sign > 0 else 'was measured {} s before its stamps'
+        notes.append(f'{source.topic}: {source.role} {which.format(source.delay)}, as told')
+    return replace(one, stamps=stamps)
+
+
+def _evenly(stamps: np.ndarray, limit: float) -> np.ndarray:
+    """Rising stamps (n,), ns, by a straight line over their numbers in every part without a gap."""
+    parts = np.split(stamps, np.flatnonzero(np.diff(stamps) > limit) + 1)
+    spread = []
+    for part in parts:
+        k = np.arange(len(part))
+        since = (part - part[0]).astype(float)
+        line = np.polyval(np.polyfit(k, since, 1), k) if len(part) > 2 else since
+        spread.append(part[0] + np.round(line).astype(np.int64))
+    return np.maximum.accumulate(np.concatenate(spread))
 
 
 def _said(axes: Mapping[str, str], found: Mapping[str, Recorded]) -> str:
@@ -321,6 +363,34 @@ def _velocity(one: Recorded, axes: str, pose: Track, frame: str) -> Track:
     earth = swap_earth(one.rows) if axes == ENU_FLU else one.rows
     inside = np.clip(one.stamps, pose.ns[0], pose.ns[-1])
     return _track('twist', one, axes, from_earth(earth, at_times(pose, inside)[:, 3:]))
+
+
+def with_rates(twist: Track, pose: Track, notes: list[str]) -> Track:
+    """The velocity with the rate of the attitude in the place of its angular half.
+
+    Samples at whose stamp the attitude has no rate are left out.
+
+    Parameters
+    ----------
+    twist, pose : in NED and FSD
+    notes : gets a line
+
+    """
+    angular = np.full((len(twist.ns), 3), np.nan)
+    for first, last in between_gaps(int(pose.ns[0]), int(pose.ns[-1]), (pose,)):
+        inside = slice(*np.searchsorted(pose.ns, [first, last + 1]))
+        asked = slice(*np.searchsorted(twist.ns, [first, last + 1]))
+        ns = pose.ns[inside]
+        if len(ns) >= SMALLEST:
+            t, at = (_seconds(times, ns[0]) for times in (ns, twist.ns[asked]))
+            angular[asked] = rates(t, turned(pose.rows[inside, 3:]), at, SMALLEST).rate
+    known = ~np.isnan(angular[:, 0])
+    notes.append(
+        f'{pose.topic}: the angular velocity is the rate of its attitude, as told, by cubics over '
+        f'{SMALLEST} samples, so that its noise is correlated over them'
+    )
+    rows = np.concatenate([twist.rows[:, :3], angular], axis=1)
+    return replace(twist, ns=twist.ns[known], rows=rows[known])
 
 
 def _of_thrusters(one: Recorded, vehicle: Vehicle, mapping: TopicMap) -> Track:
@@ -389,48 +459,3 @@ def from_earth(twist: np.ndarray, attitude: np.ndarray) -> np.ndarray:
 def swap_earth(twist: np.ndarray) -> np.ndarray:
     """Velocity (n, 6) in ENU axes to NED axes, or back."""
     return np.concatenate([swap_position(twist[:, :3]), swap_position(twist[:, 3:])], axis=1)
-
-
-def of_the_motion(pose: Track, twist: Track, other: Track, frame: str) -> list[str]:
-    """Notes where the motion contradicts what was told of it.
-
-    Parameters
-    ----------
-    pose, twist : in NED and FSD, as told
-    other : the velocity if its twist_frame were the other one
-    frame : the twist_frame as told
-
-    """
-    notes = []
-    if np.all(pose.rows[:, 2] < 0):
-        low, high = -pose.rows[:, 2].max(), -pose.rows[:, 2].min()
-        notes.append(
-            f'{pose.topic}: the position is {low:.3g} to {high:.3g} m above its origin throughout; '
-            'if the vehicle was below it, the earth axes are not those that were told'
-        )
-    speed, told, otherwise = _misfits(pose, twist, other)
-    if speed > STILL and told > WORSE * otherwise:
-        right = 'world' if frame == 'child' else 'child'
-        notes.append(
-            f'{twist.topic}: with twist_frame {frame} the velocity differs from the rate of the '
-            f'position by {told:.2g} m/s (RMS), with twist_frame {right} by {otherwise:.2g}: '
-            f'{right} fits better'
-        )
-    return notes
-
-
-def _misfits(pose: Track, *velocities: Track) -> tuple[float, ...]:
-    """Speed by the position, and its difference from each velocity: RMS in m/s, noise taken off.
-
-    Over the longest stretch without a gap; zeros where that is too short.
-    """
-    first = velocities[0]
-    span = max(pose.ns[0], first.ns[0]), min(pose.ns[-1], first.ns[-1])
-    begin, end = max(_between_gaps(*span, (pose, first)), key=np.ptp, default=span)
-    ns = pose.ns[(pose.ns >= begin) & (pose.ns <= end)]
-    if len(ns) < SMALLEST:
-        return (0.0,) * (1 + len(velocities))
-    at, t = at_times(pose, ns), _seconds(ns, ns[0])
-    moved = (turn(at[:, 3:], at_times(velocity, ns)[:, :3]) for velocity in velocities)
-    pairs = [compare_rates(t, at[:, :3], velocity) for velocity in moved]
-    return pairs[0].sizes[0], *(pair.sizes[2] for pair in pairs)

@@ -1,0 +1,274 @@
+"""What a recording contradicts itself in: axes, rates, delays, a wrench that is not there."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, TopicMap
+from auv_analysis.bag.foreign_tracks import Track, at_times, between_gaps, integral
+from auv_analysis.metrics.local_polynomials import SMALLEST, rates
+from auv_analysis.metrics.pose_twist import (
+    FITS,
+    STILL,
+    RatePair,
+    compare_rates,
+    turn,
+    turned,
+)
+from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.vehicle import DOFS
+
+WORSE = 2.0  # times: from here on the other reading fits clearly better
+SMOOTH = 0.3  # s over which rates are fitted that are held against each other in time
+FARTHEST, FINE = 1.0, 0.01  # s: delays that are tried, and between them
+MOST = 8000  # samples that are looked at
+PARTS = 20  # of the samples, by whose scatter the error of a delay is known
+CLEAR = 3.0  # standard errors: a delay that is no chance
+SHARP = 0.05  # s: standard error above which nothing is said
+
+
+def contradictions(tracks: Mapping[str, Track], otherwise: Track, mapping: TopicMap) -> list[str]:
+    """All notes on what a recording contradicts itself in, or what was told of it.
+
+    Parameters
+    ----------
+    tracks : role -> signal in NED and FSD
+    otherwise : the velocity if its twist_frame were the other one
+    mapping : what was told
+
+    """
+    sources = mapping.sources
+    frame = sources['odometry' if 'odometry' in sources else 'twist'].twist_frame
+    pose, twist = tracks['pose'], tracks['twist']
+    notes = doubts_of_motion(pose, twist, otherwise, frame)
+    if mapping.rates != FROM_ATTITUDE:
+        notes += doubts_of_rates(pose, twist)
+    return [*notes, *doubts_of_wrench(tracks), *delays(tracks)]
+
+
+def doubts_of_motion(pose: Track, twist: Track, other: Track, frame: str) -> list[str]:
+    """Notes where the motion contradicts what was told of it.
+
+    Parameters
+    ----------
+    pose, twist : in NED and FSD, as told
+    other : the velocity if its twist_frame were the other one
+    frame : the twist_frame as told
+
+    """
+    notes = []
+    if np.all(pose.rows[:, 2] < 0):
+        low, high = -pose.rows[:, 2].max(), -pose.rows[:, 2].min()
+        notes.append(
+            f'{pose.topic}: the position is {low:.3g} to {high:.3g} m above its origin throughout; '
+            'if the vehicle was below it, the earth axes are not those that were told'
+        )
+    speed, told, otherwise = _misfits(pose, twist, other)
+    if speed > STILL and told > WORSE * otherwise:
+        right = 'world' if frame == 'child' else 'child'
+        notes.append(
+            f'{twist.topic}: with twist_frame {frame} the velocity differs from the rate of the '
+            f'position by {told:.2g} m/s (RMS), with twist_frame {right} by {otherwise:.2g}: '
+            f'{right} fits better'
+        )
+    return notes
+
+
+def _misfits(pose: Track, *velocities: Track) -> tuple[float, ...]:
+    """Speed by the position, and its difference from each velocity: RMS in m/s, noise taken off.
+
+    Over the longest stretch without a gap; zeros where that is too short.
+    """
+    first = velocities[0]
+    span = max(pose.ns[0], first.ns[0]), min(pose.ns[-1], first.ns[-1])
+    begin, end = max(between_gaps(*span, (pose, first)), key=np.ptp, default=span)
+    ns = pose.ns[(pose.ns >= begin) & (pose.ns <= end)]
+    if len(ns) < SMALLEST:
+        return (0.0,) * (1 + len(velocities))
+    at, t = at_times(pose, ns), (ns - ns[0]) / NANOSECONDS
+    moved = (turn(at[:, 3:], at_times(velocity, ns)[:, :3]) for velocity in velocities)
+    pairs = [compare_rates(t, at[:, :3], velocity) for velocity in moved]
+    return pairs[0].sizes[0], *(pair.sizes[2] for pair in pairs)
+
+
+def doubts_of_rates(pose: Track, twist: Track) -> list[str]:
+    """A note where the angular velocity is not the rate of the attitude; per axis."""
+    ns = _together(pose, twist)
+    if len(ns) < SMALLEST:
+        return []
+    t, at = (ns - ns[0]) / NANOSECONDS, at_times(pose, ns)
+    pair = compare_rates(t, turned(at[:, 3:]), at_times(twist, ns)[:, 3:])
+    wrong = [_misread(pair, i) for i in range(3)]
+    said = [f'{DOFS[3 + i]} {text}' for i, text in enumerate(wrong) if text]
+    if not said:
+        return []
+    return [
+        f'{twist.topic}: the angular velocity is not the rate of the attitude of {pose.topic}, '
+        f'RMS: {"; ".join(said)}; rates: from attitude in the map takes it from there'
+    ]
+
+
+def _misread(pair: RatePair, i: int) -> str:
+    """What the two say of an axis where they differ; '' where they do not."""
+    one = RatePair(pair.t, *(part[..., i : i + 1] for part in pair[1:]))
+    by_path, by_twist, apart = one.sizes
+    size = max(by_path, by_twist)
+    if size <= max(STILL, one.noise) or apart <= FITS * size:
+        return ''
+    zero = '0 throughout' if not pair.velocity[:, i].any() else f'{by_twist:.2g}'
+    return f'{zero} in place of {by_path:.2g} rad/s'
+
+
+class Delay(NamedTuple):
+    """Time, s, by which one signal is behind another, and its standard error."""
+
+    value: float
+    error: float
+
+    def __str__(self) -> str:
+        """As a note shows it."""
+        return f'{self.value:.2f} ± {self.error:.2f} s'
+
+
+def delays(tracks: Mapping[str, Track]) -> list[str]:
+    """Notes on signals that are late, as far as the recording itself tells.
+
+    Velocity against position, angular velocity against attitude; the wrench against the
+    acceleration, by a regression that knows nothing of the vehicle.
+
+    Parameters
+    ----------
+    tracks : 'pose', 'twist' and 'wrench', and 'wrench_applied' where it is
+
+    """
+    pose, twist = tracks['pose'], tracks['twist']
+    notes = []
+    ns = _together(pose, twist)[:MOST]
+    if len(ns) >= SMALLEST:
+        t, at, nu = (ns - ns[0]) / NANOSECONDS, at_times(pose, ns), at_times(twist, ns)
+        signals = {
+            ('velocity', 'position'): (at[:, :3], turn(at[:, 3:], nu[:, :3])),
+            ('angular velocity', 'attitude'): (turned(at[:, 3:]), nu[:, 3:]),
+        }
+        for (late, early), (path, velocity) in signals.items():
+            found = behind(t, path, velocity)
+            if found:
+                notes.append(
+                    f'{twist.topic}: the {late} is {found} behind the {early} of {pose.topic}; '
+                    'delay: in the map takes it off'
+                )
+    for role in ('wrench_applied', 'wrench'):
+        if role in tracks:
+            found = acts_behind(twist, tracks[role])
+            if found:
+                notes.append(
+                    f'{tracks[role].topic}: the wrench acts {found} behind its stamps, delay and '
+                    'lag together; delay: in the map takes it off'
+                )
+            break
+    return notes
+
+
+def behind(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Delay | None:
+    """How far a velocity (n, 3) is behind the rate of its path (n, 3); None where that is not told.
+
+    Both pass one filter; the delay is the one that leaves least of their difference.
+    """
+    if np.sqrt((velocity**2).sum(axis=1).mean()) < STILL:
+        return None
+    whole = cumulative_trapezoid(velocity, t, axis=0, initial=0.0)
+    early, late = (rates(t, signal, t, _count(t)).rate for signal in (path, whole))
+    inside = (t > t[0] + FARTHEST) & (t < t[-1] - FARTHEST)
+    tried = np.arange(-FARTHEST, FARTHEST + FINE / 2, FINE)
+    if inside.sum() < PARTS:
+        return None
+    left = np.empty((PARTS, len(tried)))
+    for k, delay in enumerate(tried):
+        moved = np.stack([np.interp(t[inside] + delay, t, column) for column in late.T], axis=1)
+        left[:, k] = _sums(((early[inside] - moved) ** 2).sum(axis=1))
+    return _least(tried, left)
+
+
+def acts_behind(twist: Track, wrench: Track) -> Delay | None:
+    """How far a wrench acts behind its stamps; None where that is not told.
+
+    The acceleration is regressed on the wrench of an earlier time and on what may resist,
+    velocities and their squares with sign, all through one filter: no number of the vehicle is
+    needed.
+    """
+    ns = _together(twist, wrench)[:MOST]
+    if len(ns) < 10 * PARTS:
+        return None
+    t, nu = (ns - ns[0]) / NANOSECONDS, at_times(twist, ns)
+    count = _count(t)
+    area = integral(wrench, ns)
+    resisting = np.concatenate([nu, nu * np.abs(nu)], axis=1)
+    whole = cumulative_trapezoid(resisting, t, axis=0, initial=0.0)
+    nu_dot, tau, known = (rates(t, signal, t, count).rate for signal in (nu, area, whole))
+    inside = (t > t[0] + FARTHEST) & (t < t[-1] - FARTHEST)
+    moving = tau.std(axis=0) > 0
+    if inside.sum() < 10 * PARTS or not moving.any():
+        return None
+    scale = nu_dot[inside].std(axis=0)
+    y = nu_dot[inside] / np.where(scale > 0, scale, 1.0)
+    tried = np.arange(-FARTHEST / 2, FARTHEST + FINE / 2, FINE)
+    left = np.empty((PARTS, len(tried)))
+    for k, delay in enumerate(tried):
+        moved = [np.interp(t[inside] - delay, t, column) for column in tau[:, moving].T]
+        X = np.column_stack([*moved, known[inside], np.ones(inside.sum())])
+        X = X / np.maximum(np.abs(X).max(axis=0), np.finfo(float).tiny)
+        left[:, k] = _sums(((y - X @ np.linalg.lstsq(X, y, rcond=None)[0]) ** 2).sum(axis=1))
+    return _least(tried, left)
+
+
+def _count(t: np.ndarray) -> int:
+    return max(2 * round(SMOOTH / float(np.median(np.diff(t))) / 2) + 1, SMALLEST)
+
+
+def _sums(squares: np.ndarray) -> np.ndarray:
+    """Sums (PARTS,) of squares (n,) over parts of the time."""
+    return np.array([part.sum() for part in np.array_split(squares, PARTS)])
+
+
+def _least(tried: np.ndarray, left: np.ndarray) -> Delay | None:
+    """The delay that leaves least, where it is clear and sharp.
+
+    Its error is that of an M-estimate, by the scatter of the parts' derivatives.
+
+    Parameters
+    ----------
+    tried : (m,) delays, s, equally far apart
+    left : (PARTS, m) what each leaves in each part
+
+    """
+    total = left.sum(axis=0)
+    k = int(np.argmin(total))
+    if not 0 < k < len(tried) - 1:
+        return None
+    low, middle, high = total[k - 1 : k + 2]
+    curvature = (low - 2.0 * middle + high) / FINE**2
+    value = float(tried[k] + 0.5 * FINE * (low - high) / max(low - 2.0 * middle + high, 1e-300))
+    slopes = (left[:, k + 1] - left[:, k - 1]) / (2.0 * FINE)
+    slopes = slopes - slopes.mean()
+    error = float(np.sqrt((slopes**2).sum()) / max(curvature, 1e-300))
+    clear = abs(value) > max(CLEAR * error, 2.0 * FINE) and error < SHARP
+    return Delay(value, error) if clear else None
+
+
+def doubts_of_wrench(tracks: Mapping[str, Track]) -> list[str]:
+    """A note on every wrench that is zero throughout."""
+    return [
+        f'{track.topic}: every {role.replace("_", " ")} is zero, so that all of the motion is left '
+        'unexplained'
+        for role, track in tracks.items()
+        if role in ('wrench', 'wrench_applied') and not track.rows.any()
+    ]
+
+
+def _together(one: Track, other: Track) -> np.ndarray:
+    """Stamps (n,) of one signal in the longest time without a gap of either, ns."""
+    span = max(one.ns[0], other.ns[0]), min(one.ns[-1], other.ns[-1])
+    begin, end = max(between_gaps(*span, (one, other)), key=np.ptp, default=span)
+    return one.ns[(one.ns >= begin) & (one.ns <= end)]

@@ -8,6 +8,8 @@ import os
 import signal
 from pathlib import Path
 
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # before NumPy: the workers share the cores
+
 import pytest
 from hypothesis import settings
 

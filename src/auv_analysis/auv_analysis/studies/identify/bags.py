@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.foreign_checks import contradictions
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import TopicMap, read_mapping
 from auv_analysis.bag.foreign_tracks import tracks_of
@@ -37,7 +38,8 @@ def read_records(
 
     """
     mapping = _ours(bag, applied=applied) if mapping is None else mapping
-    tracks = tracks_of(read_sources(bag, mapping, notes), mapping, vehicle, notes)
+    tracks, otherwise = tracks_of(read_sources(bag, mapping, notes), mapping, vehicle, notes)
+    notes += contradictions(tracks, otherwise, mapping)
     records = of_tracks(bag.name, tracks, applied=applied)
     if not records:
         raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', 'none')

@@ -242,7 +242,7 @@ def identify(
     """
     settings = settings or Settings()
     step = training[0].step
-    noise = np.sqrt(np.nanmean([record.noise() ** 2 for record in training], axis=0))
+    noise = _noise(training)
     check_motion(training, noise)
     u = unknowns(
         vehicle, settings.free, settings.fixed,
@@ -349,6 +349,15 @@ def check_motion(records: Sequence[Record], noise: np.ndarray) -> None:
                          'noise', 'a vehicle at rest')  # fmt: skip
     if all(np.ptp(record.wrench, axis=0).max() == 0.0 for record in records):
         raise InputError(name, 'wrench', 'a command that changes', 'a constant one')
+
+
+def _noise(records: Sequence[Record]) -> np.ndarray:
+    """(9,) as of `Record.noise`, of all recordings together."""
+    found = np.array([record.noise() for record in records])
+    known = np.isfinite(found)
+    squares = np.where(known, found, 0.0) ** 2
+    mean = squares.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    return np.where(known.any(axis=0), np.sqrt(mean), np.nan)
 
 
 def _still(records: Sequence[Record], noise: np.ndarray, u: Unknowns) -> list[Entry]:

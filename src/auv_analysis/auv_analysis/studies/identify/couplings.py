@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
-from auv_analysis.studies.identify.identify import Identified
+from auv_analysis.studies.identify.identified import Identified
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import decompose, inverse_upper
 

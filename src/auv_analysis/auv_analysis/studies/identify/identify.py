@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.output.text import join
+from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.output_error import Fit, OutputError
 from auv_analysis.studies.identify.prediction import (
     BlackBox,
@@ -26,12 +27,8 @@ SHORT, LONG = 1.25, 10.0  # s, of segments of the first fit, and at most
 GROWTH = 10.0  # of a start's error, up to which a segment goes on
 FEWEST = 4  # segments
 HISTORY = 0.6  # s of commands before a segment
-KNOWN = 0.3  # of the prior's deviation: a coefficient is identified where less is left of it
-WIDER = 10.0  # times the prior's deviation: what that changes comes from the prior
-MIXED = 0.5  # a direction in which more is left is one that the data cannot tell
 PLAUSIBLE = 9.0  # more cost: a delay is not worth a thought
 NEARBY = 30.0  # more cost: no better delay lies in that direction
-NAMED = 0.35  # of a direction's largest part: smaller ones are not named
 MOVING = 2.0  # times the noise: a degree of freedom that moves less tells little
 SEEN = 2.0  # deviations: a difference between fits that is no chance
 STILL = 5.0  # times the noise: a vehicle that moves less is at rest
@@ -59,147 +56,6 @@ class Settings:
     holdout: float = HELD_OUT
     segment: float | None = None
     origin: object = 'options'
-
-
-@dataclass(frozen=True, eq=False)
-class Identified:
-    """A model with its uncertainty.
-
-    Attributes
-    ----------
-    vehicle : the prior
-    training, held : recordings that it was fitted to, and moments of those that it was not
-    problem, fit : the segments, and the minimum
-    covariance : (n, n) of theta
-    predictions : rows of `compare`
-    zeros : damping that is held at zero, with the upper end of its interval
-    still : what was free and was not searched, as its degree of freedom hardly moves
-
-    """
-
-    vehicle: Vehicle
-    training: Sequence[Record]
-    held: Held
-    problem: OutputError
-    fit: Fit
-    covariance: np.ndarray
-    predictions: list[dict[str, Any]]
-    zeros: Mapping[Entry, float]
-    still: Sequence[Entry]
-
-    @property
-    def found(self) -> Coefficients:
-        """The coefficients, those that were not free included."""
-        return self.fit.unknowns.coefficients(self.fit.theta)
-
-    def coefficients(self) -> list[dict[str, Any]]:
-        """Rows: name, unit, prior, value, deviation, low, high, left, status.
-
-        `left` is the standard deviation by the data alone, by that of the prior; `status` is
-        'identified', 'prior' where too much is left, then there is no interval, or 'at zero':
-        damping that would feed energy otherwise.
-        """
-        u = self.fit.unknowns
-        J = u.gradient(self.fit.theta)
-        P, _ = u.precision(self.fit.theta)
-        before, after, alone = (np.sqrt(np.einsum('ij,jk,ik->i', J, C, J))
-                         for C in (np.linalg.inv(P), self.covariance, self._by_data()))  # fmt: skip
-        values, prior = u.values(self.fit.theta), u.values(np.zeros(len(u.entries)))
-        half = self.fit.quantile * after
-        rows = []
-        for k, entry in enumerate(u.entries):
-            left = float(alone[k] / before[k])
-            is_known = left < KNOWN
-            interval = (values[k] - half[k], values[k] + half[k]) if is_known else (None, None)
-            rows.append(
-                {
-                    'name': entry.name,
-                    'unit': entry.si,
-                    'prior': float(prior[k]),
-                    'value': float(values[k]),
-                    'deviation': float(after[k]) if is_known else None,
-                    'low': interval[0],
-                    'high': interval[1],
-                    'left': left,
-                    'status': 'identified' if is_known else 'prior',
-                }
-            )
-        rows += [
-            {'name': entry.name, 'unit': entry.si, 'value': 0.0, 'deviation': None, 'low': 0.0,
-             'prior': float(getattr(u.prior, entry.group)[entry.index]), 'high': high,
-             'left': None, 'status': 'at zero'}
-            for entry, high in self.zeros.items()
-        ]  # fmt: skip
-        rows += [
-            {'name': entry.name, 'unit': entry.si, 'prior': value, 'value': value, 'left': 1.0,
-             'deviation': None, 'low': None, 'high': None, 'status': 'prior'}
-            for entry in self.still
-            for value in [float(getattr(self.found, entry.group)[entry.index])]
-        ]  # fmt: skip
-        if u.is_delay_free:
-            rows.append(self._delay())
-        return rows
-
-    def _delay(self) -> dict[str, Any]:
-        """The delay, found in whole steps; with the lag it is sharper than alone."""
-        value = float(self.fit.unknowns.prior.delay)
-        step = self.problem.step
-        return {
-            'name': 'delay', 'unit': 's', 'prior': 0.0, 'value': value, 'deviation': None,
-            'low': max(value - 2 * step, 0.0), 'high': value + 2 * step, 'left': None,
-            'status': 'identified',
-        }  # fmt: skip
-
-    def combinations(self) -> list[dict[str, Any]]:
-        """What the data cannot tell: `left` of the prior's deviation, and in words which."""
-        values, vectors = self._directions()
-        names, found = self.fit.unknowns.names, []
-        for value, vector in sorted(zip(values, vectors.T, strict=True), key=lambda p: -p[0]):
-            left = float(np.sqrt(max(value, 0.0)))
-            if left < MIXED:
-                break
-            part = vector / vector[np.argmax(np.abs(vector))]
-            some = [k for k in np.argsort(-np.abs(part)) if abs(part[k]) >= NAMED]
-            words = _words(names, part, some)
-            found.append({'left': left, 'names': [names[k] for k in some],
-                          'parts': part[some].tolist(), 'words': words})  # fmt: skip
-        return found
-
-    def _by_data(self) -> np.ndarray:
-        """(n, n) the covariance if the prior were far wider.
-
-        What many priors say together is known to the covariance, and is no finding.
-        """
-        S, (P, _) = self.fit.information, self.fit.unknowns.precision(self.fit.theta)
-        return self.covariance + np.linalg.inv(S + P / WIDER**2) - np.linalg.inv(S + P)
-
-    def _directions(self) -> tuple[np.ndarray, np.ndarray]:
-        """Variances (n,) in those of the prior, and orthogonal directions (n, n) of theta."""
-        P, _ = self.fit.unknowns.precision(self.fit.theta)
-        root = np.linalg.cholesky(P)
-        return np.linalg.eigh(root.T @ self._by_data() @ root)
-
-    def draws(self, count: int, seed: int = 0) -> Coefficients:
-        """Models (count,) drawn from the uncertainty."""
-        rng = np.random.default_rng(seed)
-        scale = self.fit.quantile / 1.959964  # few segments: as wide as the intervals
-        root = np.linalg.cholesky(self.covariance + 1e-14 * np.eye(len(self.covariance)))
-        theta = self.fit.theta + scale * rng.standard_normal((count, len(root))) @ root.T
-        return self.fit.unknowns.coefficients(theta)
-
-
-def _words(names: Sequence[str], part: np.ndarray, some: Sequence[int]) -> str:
-    """A direction that the data leave open, in words."""
-    gains = {k for k, name in enumerate(names) if name.startswith('gain.')}
-    if gains and gains <= set(map(int, some)):
-        return 'the scale of the wrench cannot be told from that of all of M, D and g together'
-    up = [names[k] for k in some if part[k] > 0]
-    against = [names[k] for k in some if part[k] < 0]
-    if len(some) == 1:
-        return f'nothing is known of {names[some[0]]}'
-    if not against:
-        return f'only the difference of {join(up)} is known, not all of them together'
-    return f'{join(up)} may grow if {join(against)} becomes less'
 
 
 def split(records: Sequence[Record], share: float) -> tuple[list[Record], list[Record]]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from auv_analysis.output.text import join, number
-from auv_analysis.studies.identify.identify import Identified
+from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.record import Record, small_rotation
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle import DOFS

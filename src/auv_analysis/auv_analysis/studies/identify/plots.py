@@ -20,7 +20,7 @@ from auv_analysis.report.plots import (
     small_multiples,
     time_panels,
 )
-from auv_analysis.studies.identify.identify import Identified
+from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.prediction import by_name
 from auv_dynamics.vehicle import DOFS
 

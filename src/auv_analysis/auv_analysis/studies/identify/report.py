@@ -10,7 +10,7 @@ from auv_analysis.output.text import join, number
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.results import Column, Results, Shown, described, terminal
 from auv_analysis.studies.identify.couplings import couplings
-from auv_analysis.studies.identify.identify import Identified
+from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.plausibility import contradictions, excitation
 from auv_analysis.studies.identify.prediction import by_name
 from auv_analysis.studies.identify.record import Record

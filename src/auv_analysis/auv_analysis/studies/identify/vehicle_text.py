@@ -7,7 +7,8 @@ import numpy as np
 import yaml
 
 from auv_analysis.output.text import number
-from auv_analysis.studies.identify.identify import Identified, with_vehicle
+from auv_analysis.studies.identify.identified import Identified
+from auv_analysis.studies.identify.identify import with_vehicle
 from auv_dynamics.files.errors import printable
 from auv_dynamics.vehicle.vehicle_file import is_semidefinite
 

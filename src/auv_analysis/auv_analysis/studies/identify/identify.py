@@ -266,7 +266,8 @@ def _with_best_delay(
     names = u.names
 
     def attempt(steps: int, theta: np.ndarray) -> Fit:
-        return problem.fit(u.with_delay(steps * problem.step), theta, most=25, tolerance=1e-5)
+        fit = problem.fit(u.with_delay(steps * problem.step), theta, most=25, tolerance=1e-5)
+        return replace(fit, parts=[])  # which are large, and not asked for
 
     def with_lag(theta: np.ndarray, lag: float) -> np.ndarray:
         theta = theta.copy()

@@ -8,6 +8,7 @@ import numpy as np
 
 from auv_analysis.bag.foreign_tracks import Track, integral
 from auv_analysis.metrics.local_polynomials import (
+    AT_ONCE,
     ORDER,
     SMALLEST,
     nearest,
@@ -181,9 +182,15 @@ def smoothed(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
     count = int(np.clip(SMOOTHING / max(np.median(np.diff(t)), 1e-9), SMALLEST, len(t)))
     if len(t) < SMALLEST:
         return np.stack([np.interp(at, t, column) for column in rows.T], axis=1)
-    first = nearest(t, at, count)
-    w = weights(t, at, first, count, ORDER, rate=False)
-    return np.einsum('mc,mck->mk', w, rows[first[:, None] + np.arange(count)])
+    found = np.empty((len(at), rows.shape[1]))
+    most = max(AT_ONCE // count, 1)
+    for i in range(0, len(at), most):
+        here = at[i : i + most]
+        first = nearest(t, here, count)
+        w = weights(t, here, first, count, ORDER, rate=False)
+        window = rows[first[:, None] + np.arange(count)]
+        found[i : i + most] = np.einsum('mc,mck->mk', w, window)
+    return found
 
 
 def small_rotation(q: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from auv_analysis.studies.identify.prediction import (
     predict,
 )
 from auv_analysis.studies.identify.record import Record, segments_of
-from auv_analysis.studies.identify.start import least_squares_start, reversed_axes
+from auv_analysis.studies.identify.start import least_squares_start
 from auv_analysis.studies.identify.unknowns import DEFAULT, Coefficients, Entry, Unknowns, unknowns
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -32,7 +32,6 @@ NEARBY = 30.0  # more cost: no better delay lies in that direction
 MOVING = 2.0  # times the noise: a degree of freedom that moves less tells little
 SEEN = 2.0  # deviations: a difference between fits that is no chance
 STILL = 5.0  # times the noise: a vehicle that moves less is at rest
-HELD_OUT = 0.25  # of the recording
 Say = Callable[[str], None]
 
 
@@ -44,7 +43,6 @@ class Settings:
     ----------
     free, fixed : as of `unknowns`
     believed : name -> (value, standard deviation)
-    holdout : share of the recordings, their last part, that the model does not see
     segment : s, None: by the instability of the vehicle
     origin : of `believed`, named in errors
 
@@ -53,7 +51,6 @@ class Settings:
     free: Sequence[str] = DEFAULT
     fixed: Sequence[str] = ()
     believed: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    holdout: float = HELD_OUT
     segment: float | None = None
     origin: object = 'options'
 
@@ -109,10 +106,10 @@ def identify(
     still = _still(training, noise, u)
     every, u = u, u.without([entry.name for entry in still])
     say('least squares')
-    if wrong := reversed_axes(training, u):
+    theta, late, wrong = least_squares_start(training, u)
+    if wrong:
         expected = 'a wrench that accelerates the vehicle its own way (axes FLU in place of FSD?)'
         raise InputError(training[0].name, 'wrench', expected, f'the opposite in {join(wrong)}')
-    theta, late = least_squares_start(training, u)
 
     def problem(length: float) -> OutputError:
         segments = [s for record in training for s in segments_of(record, length, HISTORY)]
@@ -361,5 +358,5 @@ def with_vehicle(vehicle: Vehicle, found: Coefficients) -> Vehicle:
     couple = found.hydrostatics[1:]
     buoyancy = float(vehicle.weight) - float(found.hydrostatics[0])
     r_B = (float(vehicle.weight) * vehicle.r_G - couple) / buoyancy
-    return replace(vehicle, M=found.M, D_linear=found.D_linear, D_quadratic=found.D_quadratic,
-                   buoyancy=buoyancy, r_B=r_B, M_RB=None, M_A=None)  # fmt: skip
+    return vehicle.changed(M=found.M, D_linear=found.D_linear, D_quadratic=found.D_quadratic,
+                           buoyancy=buoyancy, r_B=r_B)  # fmt: skip

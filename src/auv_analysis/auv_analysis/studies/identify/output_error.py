@@ -6,7 +6,7 @@ grow with the recording. Levenberg and Marquardt's method on them takes the plac
 `scipy.optimize.least_squares`, which needs the whole Jacobian at once; both find the same minimum.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,7 +25,6 @@ BYTES = 1 << 27  # of states that are held at once
 LARGEST = 1.5  # step of theta
 BLOCKS = 24  # of all segments, at least, that the jackknife leaves out one by one
 LEVEL = 0.95  # of intervals
-Watch = Callable[[int, float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +57,6 @@ class Fit:
     cost : sum of squares, the prior's included
     parts : normal equations by segment
     rows : number of measurements
-    iterations : until nothing changed
 
     """
 
@@ -68,7 +66,6 @@ class Fit:
     cost: float
     parts: list[Normal]
     rows: int
-    iterations: int
 
     @property
     def information(self) -> np.ndarray:
@@ -88,12 +85,6 @@ class Fit:
         B = (count - 1) / count * np.sum([np.outer(m, m) for m in moves], axis=0)
         inverse = np.linalg.inv(S)
         return B + inverse @ P @ inverse
-
-    def white(self) -> np.ndarray:
-        """(n, n) covariance of theta if the residuals were white."""
-        P, _ = self.unknowns.precision(self.theta)
-        scale = max(self.cost / max(self.rows - len(P) - self.starts.size, 1), 1.0)
-        return np.linalg.inv(self.information / scale + P)
 
     @property
     def quantile(self) -> float:
@@ -230,7 +221,6 @@ class OutputError:
         *,
         most: int = 40,
         tolerance: float = 1e-7,
-        watch: Watch | None = None,
     ) -> Fit:
         """Minimum from a start by Levenberg and Marquardt's method.
 
@@ -241,13 +231,12 @@ class OutputError:
         z : (S, 9) of the segments' starts; None: as measured
         most : iterations
         tolerance : relative change of the cost that ends it
-        watch : told of each iteration and its cost
 
         """
         z = np.zeros((len(self.segments), 9)) if z is None else z
-        cost, small, damping, iteration = self.cost(unknowns, theta, z), 0, 1e-3, 0
+        cost, small, damping = self.cost(unknowns, theta, z), 0, 1e-3
         parts = self.normal(unknowns, theta, z)
-        for iteration in range(1, most + 1):
+        for _iteration in range(most):
             for _ in range(14):
                 move, moves = _step(unknowns, theta, parts, damping)
                 new, new_z = theta + move, z + moves
@@ -260,15 +249,13 @@ class OutputError:
             gain = (cost - new_cost) / cost
             theta, z, cost, damping = new, new_z, new_cost, max(damping / 8.0, 1e-12)
             parts = self.normal(unknowns, theta, z)
-            if watch:
-                watch(iteration, cost)
             small = small + 1 if gain < tolerance else 0
             if small >= 2 or gain < tolerance / 100:
                 break
         rows = sum(
             int(np.isfinite(s.nu).sum() + 3 * np.isfinite(s.q[:, 0]).sum()) for s in self.segments
         )
-        return Fit(unknowns, theta, z, cost, parts, rows, iteration)
+        return Fit(unknowns, theta, z, cost, parts, rows)
 
     def misfit(self, fit: Fit) -> Iterator[tuple[Segment, np.ndarray]]:
         """Segments with their residuals (r, 9), in deviations of the noise; 0: not measured."""

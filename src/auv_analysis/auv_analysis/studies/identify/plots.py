@@ -22,6 +22,7 @@ from auv_analysis.report.plots import (
 )
 from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.prediction import by_name
+from auv_analysis.studies.identify.record import Segment
 from auv_dynamics.vehicle import DOFS
 
 LOOKS: dict[str, dict[str, Any]] = {
@@ -31,18 +32,21 @@ LOOKS: dict[str, dict[str, Any]] = {
     'black box': {'color': COLOURS[2], 'marker': '^', 'linestyle': '-.'},
 }
 
+Pairs = Sequence[tuple[Segment, np.ndarray]]  # segments with their residuals
+
 
 def draw(
     found: Identified, tables: Mapping[str, Sequence[Any]], folder: Path
 ) -> dict[str, FigureRecord]:
     """Draw the figures as PNG and PDF: name -> figure."""
+    pairs = list(found.problem.misfit(found.fit))
     return save_figures(
         folder,
         {
             'prediction': lambda: prediction(found.predictions),
-            'trace': lambda: _trace(found),
+            'trace': lambda: _trace(found, pairs),
             'inertia': lambda: _inertia(tables['inertia']),
-            'residuals': lambda: _residuals(found),
+            'residuals': lambda: _residuals(found, pairs),
         },
     )
 
@@ -66,9 +70,8 @@ def prediction(rows: Sequence[Mapping[str, Any]]) -> Drawn:
     return figure, 'Prediction', caption
 
 
-def _trace(found: Identified) -> Drawn:
+def _trace(found: Identified, pairs: Pairs) -> Drawn:
     """Measured and simulated velocity of the segments around the middle."""
-    pairs = list(found.problem.misfit(found.fit))
     middle = len(pairs) // 2
     some = pairs[max(middle - 3, 0) : middle + 3]
     panels = []
@@ -118,9 +121,8 @@ def _inertia(rows: Sequence[Mapping[str, Any]]) -> Drawn:
     return figure, 'Couplings', caption
 
 
-def _residuals(found: Identified) -> Drawn:
+def _residuals(found: Identified, pairs: Pairs) -> Drawn:
     """Spectra of the residuals: white ones are flat, at one."""
-    pairs = list(found.problem.misfit(found.fit))
     figure, panels = small_multiples(6, 3, 1.7, sharex=True, sharey=True)
     rate = 1.0 / found.problem.step
     for i, (axes, dof) in enumerate(zip(panels, DOFS, strict=True)):

@@ -53,6 +53,7 @@ class Held:
     ----------
     record, segments : of each stretch: the segments begin at its moments
     horizons : (h,) s
+    measured : (starts, horizons, 6) velocities then, by local polynomials; NaN: unknown
     blocks : (starts,) number of the block of each moment
 
     """
@@ -60,6 +61,7 @@ class Held:
     record: Sequence[Record]
     segments: Sequence[list[Segment]]
     horizons: np.ndarray
+    measured: np.ndarray
     blocks: np.ndarray
 
     @property
@@ -77,7 +79,7 @@ def held_of(records: Sequence[Record], history: float, longest: float = HORIZONS
     horizons = np.array([h for h in HORIZONS if h <= min(longest, max(total / 5, HORIZONS[0]))])
     reach = float(horizons[-1])
     spacing = max(APART, total / MOST)
-    found, blocks, offset = [], [], 0
+    found, measured, blocks, offset = [], [], [], 0
     for record in records:
         before = int(np.ceil(history / record.step))
         n = max(round(reach / record.step), 1)
@@ -95,21 +97,14 @@ def held_of(records: Sequence[Record], history: float, longest: float = HORIZONS
                         float(begin))
             )  # fmt: skip
         found.append(some)
+        nu = record.states((begins[:, None] + horizons).ravel())[:, 4:] if some else np.zeros(0)
+        measured.append(nu.reshape(len(some), len(horizons), 6))
         number = ((begins - record.start) / min(BLOCK, total / FEWEST)).astype(int) + offset
         blocks.append(number)
         offset = int(number.max(initial=offset)) + 1
-    return Held(records, found, horizons, np.concatenate(blocks) if blocks else np.zeros(0, int))
-
-
-def measured(held: Held) -> np.ndarray:
-    """Velocities (starts, horizons, 6) at the horizons, by local polynomials; NaN: unknown."""
-    found = []
-    for record, segments in zip(held.record, held.segments, strict=True):
-        if segments:
-            at = np.array([one.begin for one in segments])[:, None] + held.horizons
-            nu = record.states(at.ravel())[:, 4:]
-            found.append(nu.reshape(*at.shape, 6))
-    return np.concatenate(found)
+    if not records:
+        return Held((), (), horizons, np.zeros((0, len(horizons), 6)), np.zeros(0, int))
+    return Held(records, found, horizons, np.concatenate(measured), np.concatenate(blocks))
 
 
 def predict(
@@ -121,25 +116,21 @@ def predict(
         if segments:
             model = OutputError(vehicle, segments, record.step, np.full(9, np.nan),
                                 record.allocation)  # fmt: skip
+            starts = np.stack([one.start for one in segments])[None]
             states = [
-                model.simulate(unknowns, theta[None], model.starts(_none(part), which)[None], which)
+                model.simulate(unknowns, theta[None], starts[:, which], which)[0]
                 for which in model.slices(1)
-                for part in [segments[which]]
             ]
-            every = np.concatenate([s[0] for s in states])
+            every = np.concatenate(states)
             steps = np.rint(held.horizons / record.step).astype(int)
             found.append(np.nan_to_num(every[:, steps, 4:], nan=DIVERGED))
-    return Prediction(name, np.concatenate(found) - measured(held))
-
-
-def _none(segments: Sequence[Segment]) -> np.ndarray:
-    return np.zeros((len(segments), 9))
+    return Prediction(name, np.concatenate(found) - held.measured)
 
 
 def persistence(held: Held) -> Prediction:
     """The velocity stays as it is."""
     starts = np.concatenate([[one.start[4:] for one in some] for some in held.segments if some])
-    return Prediction('persistence', starts[:, None] - measured(held))
+    return Prediction('persistence', starts[:, None] - held.measured)
 
 
 class BlackBox:
@@ -188,7 +179,7 @@ class BlackBox:
             rows = np.array(path)
             mixed = rows[first] * (1 - share) + rows[first + 1] * share
             found.append(mixed[..., :6].swapaxes(0, 1))
-        return Prediction('black box', np.concatenate(found) - measured(held))
+        return Prediction('black box', np.concatenate(found) - held.measured)
 
 
 def smoothed_command(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:

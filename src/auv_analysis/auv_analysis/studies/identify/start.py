@@ -25,8 +25,10 @@ REVERSED = 0.3  # of the prior's inertia: what comes out more negative is no noi
 FLOOR = 0.02  # of the largest eigenvalue of the scaled M: below it, a direction is not believed
 
 
-def least_squares_start(records: Sequence[Record], unknowns: Unknowns) -> tuple[np.ndarray, float]:
-    """Theta (n,) and the sum of lag and delay in s.
+def least_squares_start(
+    records: Sequence[Record], unknowns: Unknowns
+) -> tuple[np.ndarray, float, list[str]]:
+    """Theta (n,), the sum of lag and delay in s, degrees of freedom whose command is reversed.
 
     Where a velocity is never measured, or the recording is too short for windows, the prior is the
     start. Coefficients that are not free keep the prior.
@@ -35,29 +37,28 @@ def least_squares_start(records: Sequence[Record], unknowns: Unknowns) -> tuple[
     rows = [row for row in every if row is not None]
     theta, prior = np.zeros(len(unknowns.entries)), unknowns.prior
     if not rows:
-        return theta, float(prior.lag + prior.delay)
-    delays = DELAYS if unknowns.is_delay_free else [float(prior.lag + prior.delay)]
+        return theta, float(prior.lag + prior.delay), []
     normal = _Normal(rows, unknowns)
-    fits = [normal.solve(delay) for delay in delays]
+    fits = [normal.solve(delay) for delay in DELAYS]
     best = int(np.argmin([cost for cost, _ in fits]))
-    found = fits[best][1]
+    late, found = float(DELAYS[best]), fits[best][1]
+    reversed_ = _reversed(found, unknowns)
+    if not unknowns.is_delay_free:
+        late = float(prior.lag + prior.delay)
+        found = normal.solve(late)[1]
     usual = {'lag': np.maximum(prior.lag, 1e-3), 'delay': prior.delay, 'gain': prior.gain,
              'bias': prior.bias, 'current': prior.current}  # fmt: skip
     wanted = Coefficients(**{k: found[k] for k in FITTED}, **usual)
     theta = np.clip(unknowns.theta(wanted), -6.0, 6.0)
-    return theta, float(delays[best])
+    return theta, late, reversed_
 
 
-def reversed_axes(records: Sequence[Record], unknowns: Unknowns) -> list[str]:
+def _reversed(found: dict[str, np.ndarray], unknowns: Unknowns) -> list[str]:
     """Degrees of freedom in which the command pushes against the acceleration that it makes."""
-    every = [_regressors(record) for record in records if record.known.all()]
-    rows = [row for row in every if row is not None]
-    if not rows or not all(entry in _places(unknowns) for entry in [('M', ij) for ij in LOWER]):
+    if not all(('M', ij) in _places(unknowns) for ij in LOWER):
         return []
-    normal = _Normal(rows, unknowns)
-    best = min((normal.solve(delay) for delay in DELAYS), key=lambda found: found[0])
-    diagonal, prior = np.diag(best[1]['raw']), np.diag(unknowns.prior.M)
-    wrong = (diagonal < -REVERSED * prior) & (best[1]['explained'] > 0.5)
+    diagonal, prior = np.diag(found['raw']), np.diag(unknowns.prior.M)
+    wrong = (diagonal < -REVERSED * prior) & (found['explained'] > 0.5)
     return [DOFS[i] for i in np.flatnonzero(wrong)]
 
 

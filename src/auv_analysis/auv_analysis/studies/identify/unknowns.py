@@ -17,7 +17,7 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.model import Model
-from auv_dynamics.vehicle.vehicle import Vehicle, row_major
+from auv_dynamics.vehicle.vehicle import Vehicle, make_model
 
 LOWER = [(i, j) for i in range(6) for j in range(i + 1)]
 RESTORING = ('force', 'couple_x', 'couple_y', 'couple_z')
@@ -57,11 +57,8 @@ class Coefficients:
 
     def model(self, lift: np.ndarray | None) -> Model:
         """The same for the kernel, one leading axis; lift (6, 6) is that of all."""
-        flat = None if lift is None else np.broadcast_to(row_major(lift), (len(self.M), 36)).copy()
-        return Model(
-            row_major(self.M), row_major(np.linalg.inv(self.M)), row_major(self.D_linear),
-            row_major(self.D_quadratic), np.ascontiguousarray(self.hydrostatics, float), flat,
-        )  # fmt: skip
+        lifts = None if lift is None else np.broadcast_to(lift, self.M.shape)
+        return make_model(self.M, self.D_linear, self.D_quadratic, self.hydrostatics, lifts)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ SOURCES := $(foreach p,$(PACKAGES),src/$(p)/setup.py src/$(p)/setup.cfg src/$(p)
 
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PYTHONDONTWRITEBYTECODE :=  # else each node and each worker compiles all modules anew
 
 ifeq ($(ROS_DISTRO),jazzy)
 VENV_OPTIONS := --system-site-packages

@@ -26,7 +26,9 @@ setup(
     maintainer='auv_gvc developers',
     maintainer_email='auv-gvc@users.noreply.github.com',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', '*/*.json', '*/*/*.json', 'ros/*.xml']},
+    package_data={
+        NAME: ['py.typed', '*/*.json', '*/*/*.json', 'ros/*.xml', 'vehicle/curves/*.csv']
+    },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

@@ -22,7 +22,9 @@ from foreign_bags import (
 from numpy.testing import assert_allclose
 
 from auv_analysis.runs.run import Run
+from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.thruster_curves import load_curve
 
 Layout = tuple[list[Message], dict[str, Any]]
 
@@ -161,35 +163,74 @@ def test_mcap_of_ros_1(run, tmp_path) -> None:
     assert_allclose(found.nu, run.nu, atol=1e-7)
 
 
-@pytest.mark.parametrize('name', ['Float64MultiArray', 'Float32MultiArray', 'JointState'])
-def test_thrusts_become_the_wrench_of_the_vehicle_file(name, run, tmp_path) -> None:
-    from auv_dynamics import load_vehicle
-
-    vehicle = load_vehicle('bluerov2_heavy')
-    assert vehicle.thrusters is not None
+def numbers_on_a_topic(run: Run, numbers: np.ndarray, name: str = 'Float64MultiArray'):
+    """Odometry of a run on /o, and an array on /thrusts."""
     maker, m = Maker(), motion(run, enu=False)
-    u = np.random.default_rng(0).uniform(-20.0, 20.0, (run.samples, len(vehicle.thrusters.names)))
     messages = [
         message for message in simple(m, maker, '/o', '/w', ('odom_ned', 'base_frd'))
         if message[0] == '/o'
     ]  # fmt: skip
-    for i, ns in enumerate(nanoseconds(m.t).tolist()):
+    for ns, row in zip(nanoseconds(m.t).tolist(), numbers, strict=True):
         if name == 'JointState':
             none = np.zeros(0)
             message = maker.new(
-                'sensor_msgs/msg/JointState', maker.header(ns, ''), [], none, none, u[i]
+                'sensor_msgs/msg/JointState', maker.header(ns, ''), [], none, none, row
             )
         else:
             layout = maker.new('std_msgs/msg/MultiArrayLayout', [], 0)
-            numbers = u[i].astype(np.float32 if '32' in name else float)
-            message = maker.new(f'std_msgs/msg/{name}', layout, numbers)
+            data = row.astype(np.float32 if '32' in name else float)
+            message = maker.new(f'std_msgs/msg/{name}', layout, data)
         messages.append(('/thrusts', ns, message))
-    bag = write(tmp_path / 'other', messages, maker)
+    return messages, maker
+
+
+@pytest.mark.parametrize('name', ['Float64MultiArray', 'Float32MultiArray', 'JointState'])
+def test_thrusts_become_the_wrench_of_the_vehicle_file(name, run, tmp_path) -> None:
+    vehicle = load_vehicle('bluerov2_heavy')
+    assert vehicle.thrusters is not None
+    u = np.random.default_rng(0).uniform(-20.0, 20.0, (run.samples, len(vehicle.thrusters.names)))
+    bag = write(tmp_path / 'other', *numbers_on_a_topic(run, u, name))
     keys = {'odometry': '/o', 'thrusters': '/thrusts', 'step': 0.01}
     found = loaded(bag, **keys, vehicle='bluerov2_heavy')
     assert_allclose(found.tau, u @ vehicle.thrusters.matrix.T, rtol=1e-5, atol=1e-4)
     with pytest.raises(InputError, match=r'thrusters: expected the thrusters.*found nothing'):
         loaded(bag, **keys)
+
+
+def test_pulse_widths_become_a_wrench_by_a_curve(run, tmp_path) -> None:
+    vehicle, curve = load_vehicle('bluerov2_heavy'), load_curve('t200_16v')
+    assert vehicle.thrusters is not None
+    mirrored = np.isin(np.arange(8), [2, 4])
+    u = np.random.default_rng(0).uniform(-30.0, 30.0, (run.samples, 8))
+    bag = write(tmp_path / 'other', *numbers_on_a_topic(run, curve.command(u, mirrored)))
+
+    def read(**entry: Any) -> Run:
+        entry = {'topic': '/thrusts', 'curve': 't200_16v', 'reversed': ['T3', 5]} | entry
+        return loaded(bag, odometry='/o', thrusters=entry, step=0.01, vehicle='bluerov2_heavy')
+
+    found = read()
+    assert_allclose(found.tau, u @ vehicle.thrusters.matrix.T, atol=1e-9)
+    assert any('pwm_us into N by t200_16v, a steady curve' in note for note in found.notes)
+    wrong = read(reversed=[]).tau - found.tau
+    assert np.abs(wrong).max() > 10.0
+    for entry, expected in (
+        ({'curve': 't100'}, 'curve: expected a .csv file, or one of t200_10v'),
+        ({'reversed': ['T9']}, 'thrusters.reversed: expected one of T1, .*, or 1 to 8, found T9'),
+        ({'curve': ''}, 'thrusters.curve: expected a shipped thruster curve'),
+    ):
+        with pytest.raises(InputError, match=expected):
+            read(**entry)
+
+
+def test_a_curve_lies_beside_its_mapping_file(run, tmp_path) -> None:
+    u = np.full((run.samples, 8), 50.0)
+    bag = write(tmp_path / 'other', *numbers_on_a_topic(run, u))
+    (tmp_path / 'bench.csv').write_text('percent,thrust_n\n-100,-30\n-5,0\n5,0\n100,38\n')
+    (tmp_path / 'map.yaml').write_text(
+        'odometry: /o\nthrusters: {topic: /thrusts, curve: bench.csv}\nvehicle: bluerov2_heavy\n'
+    )
+    found = loaded(bag, tmp_path / 'map.yaml')
+    assert_allclose(found.tau[:, 2], 4 * 18.0, rtol=1e-12)  # four of eight push down
 
 
 def test_the_wrench_that_was_applied_explains_the_motion(run, tmp_path) -> None:

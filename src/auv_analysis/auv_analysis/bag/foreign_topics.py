@@ -1,7 +1,7 @@
 """Topics of other systems: a mapping to what they hold, and which ones a bag offers for it."""
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -46,6 +46,8 @@ class MappedTopic:
     twist_frame : 'child' or 'world'
     between : 'hold' or 'linear'
     delay : s, by which a measurement is older than its stamp, or a command acts behind it
+    curve : of thrusters: name or file of the curve that turns their commands into N, '': they are N
+    reversed : of thrusters: names, or numbers from 1, of those whose command is mirrored
 
     """
 
@@ -57,6 +59,8 @@ class MappedTopic:
     twist_frame: str = 'child'
     between: str = 'linear'
     delay: float = 0.0
+    curve: str = ''
+    reversed: Sequence[str | int] = ()
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -17,6 +18,7 @@ from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, HELD, MappedTopic, To
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.metrics.pose_twist import CONJUGATE, turn, turned
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import one_of
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle.frames import (
     ENU_FLU,
@@ -26,6 +28,7 @@ from auv_dynamics.vehicle.frames import (
     swap_body,
     swap_position,
 )
+from auv_dynamics.vehicle.thruster_curves import ThrusterCurve, load_curve
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 FRAMES = ('child', 'world')  # in which a velocity may be written
@@ -264,7 +267,7 @@ def tracks_of(
     tracks['twist'] = with_rates(twist, tracks['pose'], notes) if from_attitude else twist
     for role, one in found.items():
         if role == 'thrusters':
-            tracks['wrench'] = _of_thrusters(one, vehicle, mapping)
+            tracks['wrench'] = _of_thrusters(one, vehicle, mapping, notes)
         elif role not in tracks:
             tracks[role] = _track(role, one, axes[role])
     return tracks, instead
@@ -393,15 +396,49 @@ def with_rates(twist: Track, pose: Track, notes: list[str]) -> Track:
     return replace(twist, ns=twist.ns[known], rows=rows[known])
 
 
-def _of_thrusters(one: Recorded, vehicle: Vehicle, mapping: TopicMap) -> Track:
-    """The wrench T u of thrusts u; the vehicle file gives T in FSD."""
+def _of_thrusters(one: Recorded, vehicle: Vehicle, mapping: TopicMap, notes: list[str]) -> Track:
+    """The wrench T u of thrusts u, of commands by their curve; the vehicle file gives T in FSD."""
     thrusters = vehicle.thrusters
     if thrusters is None:
         raise InputError(mapping.vehicle, 'thrusters', 'the thrusters of the mapped topic', None)
     if one.rows.shape[1] != len(thrusters.names):
         expected = f'{len(thrusters.names)} numbers, one per thruster of {vehicle.name}'
         raise InputError(one.bag, one.source.topic, expected, f'{one.rows.shape[1]}')
-    return _track('wrench', one, '', one.rows @ thrusters.matrix.T)
+    source, thrusts = one.source, one.rows
+    if source.curve:
+        curve = load_curve(source.curve, Path(str(mapping.origin)).parent)
+        mirrored = _reversed(source.reversed, thrusters.names, mapping.origin)
+        thrusts = curve.thrust(one.rows, mirrored)
+        notes.append(_said_of_curve(curve, one.rows, mirrored, source.topic))
+    elif source.reversed:
+        raise InputError(
+            mapping.origin, 'thrusters.curve', 'a curve whose commands to mirror', None
+        )
+    return _track('wrench', one, '', thrusts @ thrusters.matrix.T)
+
+
+def _reversed(told: Sequence[str | int], names: Sequence[str], origin: object) -> np.ndarray:
+    """Whether each thruster is among those that were told, by name or number from 1."""
+    known: dict[str | int, int] = {name: i for i, name in enumerate(names)}
+    known |= {i + 1: i for i in range(len(names))}
+    unknown = [one for one in told if one not in known]
+    if unknown:
+        expected = f'{one_of(unknown[0], names)}, or 1 to {len(names)}'
+        raise InputError(origin, 'thrusters.reversed', expected, unknown[0])
+    return np.isin(np.arange(len(names)), [known[one] for one in told])
+
+
+def _said_of_curve(
+    curve: ThrusterCurve, commands: np.ndarray, mirrored: np.ndarray, topic: str
+) -> str:
+    """Which curve was taken, how much of the time it was dead or at its end."""
+    thrusts = curve.thrust(commands, mirrored)
+    ends = np.isin(thrusts, [curve.thrusts[0], curve.thrusts[-1]]).mean()
+    still = (thrusts == 0.0).mean()
+    return (
+        f'{topic}: {curve.unit} into N by {curve.name}, a steady curve of a thruster at rest; '
+        f'{100 * still:.3g} % of the commands without thrust, {100 * ends:.3g} % at its ends'
+    )
 
 
 def axes_of(found: Recorded, notes: list[str]) -> str:

@@ -1,0 +1,164 @@
+"""Thruster curves: the thrust of a command and the command of a thrust, from measured tables."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from auv_dynamics.files.errors import InputError, shorten
+from auv_dynamics.files.nearest import one_of
+from auv_dynamics.files.yaml_files import read_text
+
+SHIPPED = Path(__file__).with_name('curves')
+NEUTRAL = {'pwm_us': 1500.0, 'percent': 0.0, 'command': 0.0}  # what asks for no thrust
+THRUSTS = {'thrust_n': 1.0, 'thrust_kgf': 9.80665}  # N of one
+ROUGH = 0.02  # of the range of a curve: what measurement alone makes it fall, more is refused
+
+
+@dataclass(frozen=True, eq=False)
+class ThrusterCurve:
+    """Steady thrust of a thruster at rest in the water, linear between the rows of a table.
+
+    Attributes
+    ----------
+    name : of the shipped curve, or its file
+    unit : of the command, a key of `NEUTRAL`
+    commands : (n,) rising
+    thrusts : (n,) N, never falling; zero over the dead band
+
+    """
+
+    name: str
+    unit: str
+    commands: np.ndarray
+    thrusts: np.ndarray
+
+    @property
+    def dead_band(self) -> tuple[float, float]:
+        """Lowest and highest command without thrust; both where the line crosses zero."""
+        still = self.commands[self.thrusts == 0.0]
+        if len(still):
+            return float(still[0]), float(still[-1])
+        crossing = float(np.interp(0.0, self.thrusts, self.commands))
+        return crossing, crossing
+
+    def thrust(self, commands: np.ndarray, reversed_: np.ndarray | bool = False) -> np.ndarray:
+        """Thrust in N of commands (...); beyond the table, that of its end.
+
+        A pulse width of zero is no pulse, and no thrust.
+
+        Parameters
+        ----------
+        commands : (...) in the curve's unit
+        reversed_ : (...) of thrusters that turn the other way round: their command is mirrored
+            about neutral
+
+        """
+        commands = np.asarray(commands, float)
+        neutral = NEUTRAL[self.unit]
+        mirrored = np.where(reversed_, 2.0 * neutral - commands, commands)
+        thrusts = np.interp(mirrored, self.commands, self.thrusts)
+        silent = (self.unit == 'pwm_us') & (commands == 0.0)
+        return np.where(silent, 0.0, thrusts)
+
+    def command(self, thrusts: np.ndarray, reversed_: np.ndarray | bool = False) -> np.ndarray:
+        """Command of thrusts (...) in N; beyond the table, that of its end; of zero, neutral.
+
+        Neutral is the middle of the dead band where that does not hold the nominal one.
+        """
+        thrusts = np.asarray(thrusts, float)
+        low, high = self.dead_band
+        neutral = NEUTRAL[self.unit]
+        rest = neutral if low <= neutral <= high else (low + high) / 2.0
+        astern, ahead = self.thrusts < 0.0, self.thrusts > 0.0
+        below = np.interp(
+            thrusts, np.append(self.thrusts[astern], 0.0), np.append(self.commands[astern], low)
+        )
+        above = np.interp(
+            thrusts,
+            np.insert(self.thrusts[ahead], 0, 0.0),
+            np.insert(self.commands[ahead], 0, high),
+        )
+        found = np.select([thrusts < 0.0, thrusts > 0.0], [below, above], rest)
+        return np.where(reversed_, 2.0 * neutral - found, found)
+
+
+def shipped_curves() -> list[str]:
+    """Names of the curves that come along."""
+    return sorted(path.stem for path in SHIPPED.glob('*.csv'))
+
+
+def load_curve(curve: str | Path, beside: Path | None = None) -> ThrusterCurve:
+    """Curve of a CSV file, or a shipped one by its name.
+
+    Parameters
+    ----------
+    curve : file with a column pwm_us, percent or command (-1 to 1), rising, and a column thrust_n
+        or thrust_kgf; lines that begin with # are comments. Or a name such as 't200_16v'
+    beside : folder that a relative path may start from
+
+    Raises
+    ------
+    InputError : naming file, line, expected and found
+
+    """
+    path = Path(curve)
+    if path.suffix != '.csv':
+        if str(curve) not in shipped_curves():
+            raise InputError(
+                'curve', '', f'a .csv file, or {one_of(curve, shipped_curves())}', curve
+            )
+        path = SHIPPED / f'{curve}.csv'
+    elif beside is not None and (beside / path).is_file():
+        path = beside / path
+    return _parsed(read_text(path, 'thruster curve'), path, str(curve))
+
+
+def _parsed(text: str, path: Path, name: str) -> ThrusterCurve:
+    lines = [
+        (number, line) for number, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith('#')
+    ]  # fmt: skip
+    try:
+        rows = list(csv.reader(line for _, line in lines))
+    except csv.Error as error:
+        raise InputError(path, '', 'a CSV table', str(error)) from None
+    header = [cell.strip() for cell in rows[0]] if rows else []
+    columns = []
+    for names in (NEUTRAL, THRUSTS):
+        known = [cell for cell in header if cell in names]
+        if len(known) != 1:
+            expected = f'one column {" or ".join(names)}'
+            raise InputError(path, 'first line', expected, ','.join(header) or None)
+        columns.append(header.index(known[0]))
+    unit, force = (header[column] for column in columns)
+    table = []
+    for (number, _), row in zip(lines[1:], rows[1:], strict=True):
+        try:
+            table.append([float(row[column]) for column in columns])
+        except (ValueError, IndexError):
+            raise InputError(path, f'line {number}', 'two numbers', ','.join(row)) from None
+    values = np.array(table).reshape(-1, 2)
+    _check(values, path)
+    commands, thrusts = values[:, 0], values[:, 1] * THRUSTS[force]
+    # sorted, measured values of a rising curve are never farther off than as they came
+    return ThrusterCurve(name, unit, commands, np.sort(thrusts))
+
+
+def _check(values: np.ndarray, path: Path) -> None:
+    """Refuse what is no curve: not finite, commands that do not rise, thrust that falls."""
+    commands, thrusts = values.T
+    if len(values) < 2 or not np.all(np.isfinite(values)):
+        raise InputError(path, '', 'two and more rows of finite numbers', f'{len(values)} rows')
+    if np.any(np.diff(commands) <= 0.0):
+        k = int(np.argmax(np.diff(commands) <= 0.0))
+        raise InputError(
+            path, '', 'commands that rise', f'{commands[k + 1]:g} after {commands[k]:g}'
+        )
+    fall = float(np.max(np.maximum.accumulate(thrusts) - thrusts))
+    if not thrusts[0] <= 0.0 <= thrusts[-1] or np.ptp(thrusts) == 0.0:
+        ends = shorten([float(thrusts[0]), float(thrusts[-1])])
+        raise InputError(path, '', 'thrust that rises from astern or zero to ahead', ends)
+    if fall > ROUGH * float(np.ptp(thrusts)):
+        raise InputError(path, '', 'thrust that rises with the command', f'a fall of {fall:.3g}')

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, TopicMap
+from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, MOVING, TopicMap
 from auv_analysis.bag.foreign_tracks import Track, at_times, between_gaps, integral
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.metrics.pose_twist import (
@@ -39,8 +39,7 @@ def contradictions(tracks: Mapping[str, Track], otherwise: Track, mapping: Topic
     mapping : what was told
 
     """
-    sources = mapping.sources
-    frame = sources['odometry' if 'odometry' in sources else 'twist'].twist_frame
+    frame = next(one.twist_frame for one in mapping.sources.values() if one.role in MOVING)
     pose, twist = tracks['pose'], tracks['twist']
     notes = doubts_of_motion(pose, twist, otherwise, frame)
     if mapping.rates != FROM_ATTITUDE:

@@ -1,6 +1,5 @@
 """Mapped topics of a bag as arrays: which numbers a message holds, stamps put in order."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -8,14 +7,15 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.bag.any_bag import messages, survey
-from auv_analysis.bag.foreign_topics import (
-    HELD,
-    READERS,
-    MappedTopic,
+from auv_analysis.bag.foreign_fields import (
+    FieldError,
+    MessageReader,
     Reading,
-    TopicMap,
     are_usable,
+    is_number,
+    presets,
 )
+from auv_analysis.bag.foreign_topics import HELD, MappedTopic, TopicMap
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -37,7 +37,7 @@ class Recorded:
     log : (n,) times of logging, ns
     stamps : (n,) stamps in ns; those of logging where the messages have none
     stamped : whether the stamps are those of headers
-    rows : (n, k) numbers
+    rows : (n, k) numbers, NaN in columns that the topic does not have
 
     """
 
@@ -122,7 +122,7 @@ def ordered(of: Recorded, notes: list[str]) -> Recorded:
 
 
 def read_sources(bag: Path, mapping: TopicMap, notes: list[str]) -> dict[str, Recorded]:
-    """Role -> its messages, in their order in the bag.
+    """Key of the mapping -> its messages, in their order in the bag.
 
     Parameters
     ----------
@@ -136,14 +136,14 @@ def read_sources(bag: Path, mapping: TopicMap, notes: list[str]) -> dict[str, Re
 
     """
     types = survey(bag).types
-    found = {role: _Messages(bag, source, types) for role, source in mapping.sources.items()}
+    found = {key: _Messages(bag, key, one, types) for key, one in mapping.sources.items()}
     by_topic: dict[str, list[_Messages]] = {}
     for one in found.values():
         by_topic.setdefault(one.source.topic, []).append(one)
     for topic, log, message in messages(bag, by_topic.keys(), notes):
         for one in by_topic[topic]:
             one.add(log, message)
-    return {role: one.recorded(notes) for role, one in found.items()}
+    return {key: one.recorded(notes) for key, one in found.items()}
 
 
 class _Messages:
@@ -151,37 +151,43 @@ class _Messages:
 
     Parameters
     ----------
-    bag : for refusals
+    bag, key : for refusals
     source : the topic
     types : topic -> type, of the bag
 
     """
 
-    def __init__(self, bag: Path, source: MappedTopic, types: dict[str, str]):
-        self.source, self._bag = source, bag
+    def __init__(self, bag: Path, key: str, source: MappedTopic, types: dict[str, str]):
+        self.source, self._bag, self._key = source, bag, key
         self._read = self._reader(types)
         self._waiting: list[tuple[int, Reading]] = []
         self._parts: list[tuple[np.ndarray, np.ndarray]] = []
         self._frames: set[tuple[str, str]] = set()
         self._width, self._stamped = 0, False
 
-    def _reader(self, types: dict[str, str]) -> Callable[[Any], Reading]:
-        readers, topic = READERS[self.source.role], self.source.topic
-        kind = types.get(topic)
+    def _reader(self, types: dict[str, str]) -> MessageReader:
+        source, known = self.source, presets(self.source.role)
+        kind = types.get(source.topic)
         if kind is None:
-            fitting = [name for name in sorted(types) if types[name] in readers]
-            listed = f': {", ".join(fitting)}{meant(topic, fitting)}' if fitting else ''
-            expected = f'a topic of the bag{listed}'
-            raise InputError(self._bag, self.source.role, expected, topic)
-        if kind not in readers:
-            raise InputError(self._bag, topic, ' or '.join(readers), kind)
-        return readers[kind]
+            fitting = [name for name in sorted(types) if source.fields or types[name] in known]
+            listed = f': {", ".join(fitting)}{meant(source.topic, fitting)}' if fitting else ''
+            raise InputError(self._bag, self._key, f'a topic of the bag{listed}', source.topic)
+        paths = known.get(kind) if source.fields is None else source.fields
+        if paths is None:
+            raise self._refusal(' or '.join(known), f'{kind}, of which fields: may name paths')
+        return MessageReader(source.role, paths, source.units, source.stamp)
 
     def add(self, log: int, message: Any) -> None:
         """Take the next message, logged at a time in ns."""
         try:
             reading = self._read(message)
-        except (AttributeError, TypeError, ValueError) as error:  # other fields than its type has
+        except FieldError as error:
+            if self.source.fields is None and not error.key.startswith('stamp'):
+                raise self._refusal('messages of its type', error.found) from None
+            key = f'{self._key}.{error.key}'
+            raise InputError(self._bag, key, error.expected, error.found) from None
+        except (LookupError, AttributeError, TypeError, ValueError) as error:
+            # other fields than its type has, or a shorter array
             raise self._refusal('messages of its type', str(error)) from None
         self._width = self._width or len(reading.row)
         if len(reading.row) != self._width:
@@ -199,8 +205,13 @@ class _Messages:
     def _settle(self) -> None:
         """Turn what waits into arrays."""
         times = [(log, log if one.stamp is None else one.stamp) for log, one in self._waiting]
-        rows = np.array([one.row for _, one in self._waiting], float)
-        self._parts.append((np.array(times, np.int64), rows))
+        try:
+            rows = np.array([one.row for _, one in self._waiting], float)
+        except (TypeError, ValueError):  # a text among numbers
+            every = (value for _, one in self._waiting for value in one.row)
+            found = next((value for value in every if not is_number(value)), 'none')
+            raise self._refusal('a number in every message', str(found)) from None
+        self._parts.append((np.array(times, np.int64), self._read.rows(rows)))
         self._waiting.clear()
 
     def recorded(self, notes: list[str]) -> Recorded:
@@ -219,6 +230,8 @@ class _Messages:
             stamped = False
         elif not self._stamped:
             notes.append(f'{topic}: messages without stamp, so the time of logging is taken')
+        if self._read.converted:
+            notes.append(f'{topic}: {self._read.converted}')
         usable = are_usable(rows, self.source.role)
         if not usable.any():
             raise self._refusal('finite numbers and unit quaternions', 'none')

@@ -1,19 +1,17 @@
 """Topics of other systems: a mapping to what they hold, and which ones a bag offers for it."""
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.foreign_fields import Paths, Units, check_fields, presets
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.step_topics import NotOursError
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import check, read_yaml
-from auv_dynamics.ros.interface import LARGEST, nanoseconds
 
 SCHEMA = Path(__file__).with_name('mapping.schema.json')
 MEASURED = ('odometry', 'pose', 'twist')
@@ -28,8 +26,6 @@ THRUSTING = ('actuator', 'actuators', 'esc', 'motor', 'motors', 'propeller', 'pr
              'servo', 'servos', 'thrust', 'thruster', 'thrusters', 'thrusts')  # fmt: skip
 FROM_ATTITUDE = 'from attitude'
 SHOWN = 6  # topics of a role in one line
-UNIT = 1e-2  # of the norm of a quaternion: what rounding to single precision leaves, and more
-Numbers = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -48,6 +44,9 @@ class MappedTopic:
     delay : s, by which a measurement is older than its stamp, or a command acts behind it
     curve : of thrusters: name or file of the curve that turns their commands into N, '': they are N
     reversed : of thrusters: names, or numbers from 1, of those whose command is mirrored
+    fields : paths to its numbers, None: those of its message type
+    units : of these numbers, '': SI
+    stamp : path to its stamp and the unit of that, None: the stamp of the header
 
     """
 
@@ -61,6 +60,9 @@ class MappedTopic:
     delay: float = 0.0
     curve: str = ''
     reversed: Sequence[str | int] = ()
+    fields: Paths | None = None
+    units: Units = ''
+    stamp: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class TopicMap:
 
     Attributes
     ----------
-    sources : role -> its topic
+    sources : role -> its topic, or role[0], role[1], ... -> those that make it together
     vehicle : file or shipped bare name
     name : of the run, '': that of the bag
     step, window : s, None: chosen by the data
@@ -107,15 +109,13 @@ def read_mapping(file: str | Path | None, options: Mapping[str, Any]) -> TopicMa
         beside = Path(file).parent / data['vehicle']
         data = data | {'vehicle': str(beside) if beside.is_file() else data['vehicle']}
     data = data | given
-    roles = {key: {'topic': data[key]} for key in ROLES if isinstance(data.get(key), str)}
-    check(data | roles, SCHEMA, origin)
-    data |= roles
+    data |= {role: _entry(data[role]) for role in ROLES if role in data}
+    check(data, SCHEMA, origin)
     _check_roles(data, origin)
-    shared: dict[str, Any] = {
-        key: data[key] for key in ('frames', 'gap', 'twist_frame') if key in data
-    }
+    keys = ('frames', 'gap', 'twist_frame', 'stamp')
+    shared: dict[str, Any] = {key: data[key] for key in keys if key in data}
     return TopicMap(
-        sources={role: _source(role, data[role], shared) for role in ROLES if role in data},
+        sources=dict(_sources(data, shared, origin)),
         vehicle=data.get('vehicle'),
         name=data.get('name', ''),
         step=data.get('step'),
@@ -125,12 +125,42 @@ def read_mapping(file: str | Path | None, options: Mapping[str, Any]) -> TopicMa
     )
 
 
-def _source(role: str, entry: Mapping[str, Any], shared: Mapping[str, Any]) -> MappedTopic:
+def _entry(told: Any) -> Any:
+    """What a mapping says of a role, a name written as a mapping with `topic`."""
+    if isinstance(told, list):
+        return [_entry(part) for part in told]
+    return {'topic': told} if isinstance(told, str) else told
+
+
+def _sources(
+    data: Mapping[str, Any], shared: Mapping[str, Any], origin: object
+) -> Iterator[tuple[str, MappedTopic]]:
+    """Key and topic of all entries of the roles."""
+    for role in ROLES:
+        told = data.get(role, ())
+        if isinstance(told, dict):
+            yield role, _source(role, told, shared, (role, origin))
+            continue
+        for i, entry in enumerate(told):
+            key = f'{role}[{i}]'
+            yield key, _source(role, entry, shared, (key, origin))
+
+
+def _source(
+    role: str, entry: Mapping[str, Any], shared: Mapping[str, Any], named: tuple[str, object]
+) -> MappedTopic:
     apart = {'gap'} if role == 'setpoint' else set()  # a set-point holds until the next
     apart |= set() if role in MOVING else {'twist_frame'}
     common = {key: value for key, value in shared.items() if key not in apart}
     between = {'between': 'hold'} if role in HELD else {}
-    return MappedTopic(role, **{**common, **between, **entry})
+    told = {**common, **between, **entry}
+    stamp = told.get('stamp')
+    if isinstance(stamp, str):
+        told['stamp'] = stamp, 's'
+    elif stamp:
+        told['stamp'] = stamp['field'], stamp.get('units', 's')
+    check_fields(role, told.get('fields'), told.get('units', ''), *named)
+    return MappedTopic(role, **told)
 
 
 def _check_roles(data: Mapping[str, Any], origin: object) -> None:
@@ -144,95 +174,9 @@ def _check_roles(data: Mapping[str, Any], origin: object) -> None:
     if len(forces) != 1:
         expected = 'one of wrench (--wrench) and thrusters'
         raise InputError(origin, 'wrench', expected, ' and '.join(forces) or None)
-    topics = [data[key]['topic'] for key in ('wrench', 'wrench_applied') if key in data]
-    if len(set(topics)) < len(topics):
-        raise InputError(origin, 'wrench_applied', 'another topic than wrench', topics[0])
-
-
-class Reading(NamedTuple):
-    """What one message says.
-
-    Attributes
-    ----------
-    stamp : ns, None of a message without header
-    frame, child : frame ids, '' where the message has none
-    row : its numbers
-
-    """
-
-    stamp: int | None
-    frame: str
-    child: str
-    row: Numbers
-
-
-def _vector(v: Any) -> Numbers:
-    return v.x, v.y, v.z
-
-
-def _pose(pose: Any) -> Numbers:
-    q = pose.orientation
-    return *_vector(pose.position), q.w, q.x, q.y, q.z
-
-
-def _twist(twist: Any) -> Numbers:
-    return *_vector(twist.linear), *_vector(twist.angular)
-
-
-def _wrench(wrench: Any) -> Numbers:
-    return *_vector(wrench.force), *_vector(wrench.torque)
-
-
-def _stamped(take: Callable[[Any], Numbers]) -> Callable[[Any], Reading]:
-    def read(message: Any) -> Reading:
-        header = message.header
-        child = getattr(message, 'child_frame_id', '')
-        return Reading(nanoseconds(header.stamp), header.frame_id, child, take(message))
-
-    return read
-
-
-def _bare(take: Callable[[Any], Numbers]) -> Callable[[Any], Reading]:
-    return lambda message: Reading(None, '', '', take(message))
-
-
-# roles: 'odometry' 13 numbers (position, quaternion w x y z, twist), 'pose' the first 7 of them,
-# 'twist' and 'wrench' 6, 'thrusters' one per thruster
-READERS: dict[str, dict[str, Callable[[Any], Reading]]] = {
-    'odometry': {
-        'nav_msgs/msg/Odometry': _stamped(lambda m: (*_pose(m.pose.pose), *_twist(m.twist.twist))),
-    },
-    'pose': {
-        'geometry_msgs/msg/PoseStamped': _stamped(lambda m: _pose(m.pose)),
-        'geometry_msgs/msg/PoseWithCovarianceStamped': _stamped(lambda m: _pose(m.pose.pose)),
-        'nav_msgs/msg/Odometry': _stamped(lambda m: _pose(m.pose.pose)),
-    },
-    'twist': {
-        'geometry_msgs/msg/TwistStamped': _stamped(lambda m: _twist(m.twist)),
-        'geometry_msgs/msg/TwistWithCovarianceStamped': _stamped(lambda m: _twist(m.twist.twist)),
-        'geometry_msgs/msg/Twist': _bare(_twist),
-        'nav_msgs/msg/Odometry': _stamped(lambda m: _twist(m.twist.twist)),
-    },
-    'wrench': {
-        'geometry_msgs/msg/WrenchStamped': _stamped(lambda m: _wrench(m.wrench)),
-        'geometry_msgs/msg/Wrench': _bare(_wrench),
-    },
-    'thrusters': {
-        'std_msgs/msg/Float64MultiArray': _bare(lambda m: tuple(map(float, m.data))),
-        'std_msgs/msg/Float32MultiArray': _bare(lambda m: tuple(map(float, m.data))),
-        'sensor_msgs/msg/JointState': _stamped(lambda m: tuple(map(float, m.effort))),
-    },
-}
-READERS['wrench_applied'] = READERS['wrench']
-READERS['setpoint'] = READERS['twist']
-
-
-def are_usable(rows: np.ndarray, role: str) -> np.ndarray:
-    """Whether each row (n, k) can be used: finite, not absurd, and poses with unit quaternions."""
-    finite = np.all(np.abs(rows) < LARGEST, axis=1)  # NaN: false
-    if role not in ('odometry', 'pose'):
-        return finite
-    return finite & (np.abs(np.linalg.norm(rows[:, 3:7], axis=1) - 1.0) < UNIT)
+    if 'wrench_applied' in data and data['wrench_applied'] == data.get('wrench'):
+        topic = data['wrench'].get('topic') if isinstance(data['wrench'], dict) else data['wrench']
+        raise InputError(origin, 'wrench_applied', 'another topic than wrench', topic)
 
 
 def candidates(contents: BagContents) -> dict[str, list[str]]:
@@ -257,7 +201,7 @@ def candidates(contents: BagContents) -> dict[str, list[str]]:
 
 
 def _fitting(types: Mapping[str, str], role: str) -> list[str]:
-    return [topic for topic, kind in types.items() if kind in READERS[role]]
+    return [topic for topic, kind in types.items() if kind in presets(role)]
 
 
 def _is_asked(topic: str) -> bool:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from auv_analysis.bag.foreign_fields import COMPONENTS, EULER, QUATERNION
 from auv_analysis.bag.foreign_messages import (
     Recorded,
     logged_with,
@@ -14,7 +15,7 @@ from auv_analysis.bag.foreign_messages import (
     on_the_clock,
     ordered,
 )
-from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, HELD, MappedTopic, TopicMap
+from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, HELD, MOVING, MappedTopic, TopicMap
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.metrics.pose_twist import CONJUGATE, turn, turned
 from auv_dynamics.files.errors import InputError
@@ -59,6 +60,7 @@ class Track:
     rows : (n, k) numbers
     limit : ns, longest pause that is no gap; inf: there are none
     held : whether a sample holds until the next; else a straight line leads there
+    parts : signals of the topics that it is made of, NaN in columns that these do not have
 
     """
 
@@ -68,6 +70,12 @@ class Track:
     rows: np.ndarray
     limit: float
     held: bool
+    parts: tuple['Track', ...] = ()
+
+    @property
+    def given(self) -> np.ndarray:
+        """(k,) whether there are numbers in a column."""
+        return ~np.isnan(self.rows).all(axis=0)
 
     @property
     def period(self) -> float:
@@ -75,7 +83,9 @@ class Track:
         return float(np.median(np.diff(self.ns))) if len(self.ns) > 1 else np.inf
 
     def gaps(self) -> np.ndarray:
-        """Begin and end of each gap, (g, 2) ns."""
+        """Begin and end of each gap, of any of its topics, (g, 2) ns."""
+        if self.parts:
+            return np.concatenate([part.gaps() for part in self.parts])
         where = np.flatnonzero(np.diff(self.ns) > self.limit)
         return np.stack([self.ns[where], self.ns[where + 1]], axis=1)
 
@@ -101,7 +111,7 @@ def at_times(track: Track, ns: np.ndarray) -> np.ndarray:
     seconds, at = (_seconds(times, track.ns[0]) for times in (track.ns, ns))
     if track.held:
         return track.rows[np.clip(np.searchsorted(track.ns, ns, 'right') - 1, 0, None)]
-    if track.role != 'pose':
+    if track.role != 'pose' or not track.given[-1]:
         return _lines(seconds, track.rows, at)
     at = np.clip(at, seconds[0], seconds[-1])
     w, *xyz = track.rows[:, 3:].T
@@ -250,32 +260,114 @@ def tracks_of(
     InputError : axes that nobody told, thrusts that do not fit the vehicle
 
     """
-    found = {role: _retimed(one, notes) for role, one in _on_one_clock(found, notes).items()}
-    axes = {role: axes_of(one, notes) for role, one in found.items()}
+    found = {key: _retimed(one, notes) for key, one in _on_one_clock(found, notes).items()}
+    axes = {key: axes_of(one, notes) for key, one in found.items()}
     notes.append(_said(axes, found))
-    if 'odometry' in found:
-        both, told = found.pop('odometry'), axes.pop('odometry')
-        for role, columns in (('pose', POSE), ('twist', TWIST)):
-            found[role] = both.part(slice(None), columns)
-            axes[role] = told
-    tracks = {'pose': _track('pose', found['pose'], axes['pose'])}
-    told, other = FRAMES if found['twist'].source.twist_frame == 'child' else FRAMES[::-1]
-    twist, instead = (
-        _velocity(found['twist'], axes['twist'], tracks['pose'], frame) for frame in (told, other)
-    )
-    from_attitude = mapping.rates == FROM_ATTITUDE
-    tracks['twist'] = with_rates(twist, tracks['pose'], notes) if from_attitude else twist
-    for role, one in found.items():
+    bag, by_role = next(iter(found.values())).bag, _by_role(found, axes)
+    pose = assembled([_track('pose', *one) for one in by_role.pop('pose')], bag)
+    moving = [(*one, pose, one[0].source.twist_frame) for one in by_role.pop('twist')]
+    twists = [_velocity(*one) for one in moving]
+    instead = [_without_rates(_velocity(*one[:3], _other(one[3]))) for one in moving]
+    if mapping.rates == FROM_ATTITUDE:
+        others = [_without_rates(one) for one in twists[1:] if one.given[:3].any()]
+        twists = [with_rates(twists[0], pose, notes), *others]
+    tracks = {'pose': pose, 'twist': assembled(twists, bag)}
+    for role, every in by_role.items():
         if role == 'thrusters':
-            tracks['wrench'] = _of_thrusters(one, vehicle, mapping, notes)
-        elif role not in tracks:
-            tracks[role] = _track(role, one, axes[role])
-    return tracks, instead
+            tracks['wrench'] = _of_thrusters([one for one, _ in every], vehicle, mapping, notes)
+        else:
+            tracks[role] = assembled([_track(role, *one) for one in every], bag)
+    for role, track in tracks.items():
+        _check_whole(role, track, bag)
+    return tracks, assembled(instead, bag)
+
+
+def _by_role(
+    found: Mapping[str, Recorded], axes: Mapping[str, str]
+) -> dict[str, list[tuple[Recorded, str]]]:
+    """Role -> its topics with their axes; an odometry is a pose and a twist."""
+    by_role: dict[str, list[tuple[Recorded, str]]] = {}
+    for key, one in found.items():
+        halves = {one.source.role: slice(None)}
+        if one.source.role == 'odometry':
+            halves = {role: columns for role, columns in (('pose', POSE), ('twist', TWIST))
+                      if not np.isnan(one.rows[:, columns]).all()}  # fmt: skip
+        for role, columns in halves.items():
+            by_role.setdefault(role, []).append((one.part(slice(None), columns), axes[key]))
+    return by_role
+
+
+def _check_whole(role: str, track: Track, bag: Path) -> None:
+    """Refuse a signal of which a component is in none of its topics."""
+    lost = [name for name, given in zip(COMPONENTS[role], track.given, strict=True) if not given]
+    if lost:
+        names = [name for name in lost if name not in QUATERNION] + [*EULER] * ('qw' in lost)
+        expected = 'topics of the map that together have each of its components'
+        raise InputError(bag, role, expected, f'none with {", ".join(names)}')
+
+
+def _other(frame: str) -> str:
+    return FRAMES[1 - FRAMES.index(frame)]
+
+
+def _without_rates(twist: Track) -> Track:
+    return replace(twist, rows=np.where(np.arange(6) < 3, twist.rows, np.nan))
+
+
+def assembled(parts: Sequence[Track], bag: Path) -> Track:
+    """One signal of a role out of several topics, each of which has some of its columns.
+
+    Commands have the stamps of all of them; measurements those of the topic with the longest
+    period (a pose those of its attitude), over which the others are averaged.
+
+    Parameters
+    ----------
+    parts : in our axes; a single one is returned as it is
+    bag : for refusals
+
+    Raises
+    ------
+    InputError : two topics with the same column
+
+    """
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    for i, part in enumerate(parts):
+        for other in parts[:i]:
+            both = np.flatnonzero(part.given & other.given)
+            if len(both):
+                name = COMPONENTS[part.role][both[0]]
+                found = f'{name} in {other.topic} and in {part.topic}'
+                raise InputError(bag, part.role, 'each component from one topic', found)
+    topics = ' and '.join(dict.fromkeys(part.topic for part in parts))
+    with_attitude = [part for part in parts if part.role == 'pose' and part.given[-1]]
+    base = max(with_attitude or parts, key=lambda part: part.period)
+    ns = np.unique(np.concatenate([part.ns for part in parts])) if first.held else base.ns
+    step = 0 if first.held else round(base.period)
+    begin = max(int(part.ns[0]) + (step // 2) * part.is_averaged(step) for part in parts)
+    ends = [
+        int(part.ns[-1]) - (step // 2) * part.is_averaged(step)
+        for part in parts if np.isfinite(part.limit)
+    ]  # fmt: skip
+    ns = ns[(ns >= begin) & (ns <= min(ends, default=ns[-1]))]
+    if not len(ns):
+        expected = f'a time with {topics}'
+        raise InputError(bag, first.role, expected, 'none')
+    rows = np.full((len(ns), first.rows.shape[1]), np.nan)
+    for part in parts:
+        if part.is_averaged(step) and part is not base:
+            values = means_over(part, ns - step // 2, ns + step // 2)
+        else:
+            values = at_times(part, ns)
+        rows[:, part.given] = values[:, part.given]
+    return Track(first.role, topics, ns, rows, base.limit, first.held, tuple(parts))
 
 
 def _on_one_clock(found: Mapping[str, Recorded], notes: list[str]) -> dict[str, Recorded]:
     """The same with rising stamps of one clock that does not start anew."""
-    clock = found['odometry' if 'odometry' in found else 'twist']
+    moving = [one for one in found.values() if one.source.role in MOVING]
+    clock = next((one for one in moving if one.stamped), moving[0])
     kept = longest_stretch(clock, [])
     timed = {role: on_the_clock(one, clock, notes) for role, one in found.items()}
     if len(kept.log) < len(clock.log):
@@ -396,25 +488,42 @@ def with_rates(twist: Track, pose: Track, notes: list[str]) -> Track:
     return replace(twist, ns=twist.ns[known], rows=rows[known])
 
 
-def _of_thrusters(one: Recorded, vehicle: Vehicle, mapping: TopicMap, notes: list[str]) -> Track:
+def _of_thrusters(
+    every: Sequence[Recorded], vehicle: Vehicle, mapping: TopicMap, notes: list[str]
+) -> Track:
     """The wrench T u of thrusts u, of commands by their curve; the vehicle file gives T in FSD."""
     thrusters = vehicle.thrusters
     if thrusters is None:
         raise InputError(mapping.vehicle, 'thrusters', 'the thrusters of the mapped topic', None)
-    if one.rows.shape[1] != len(thrusters.names):
+    count = sum(one.rows.shape[1] for one in every)
+    if count != len(thrusters.names):
         expected = f'{len(thrusters.names)} numbers, one per thruster of {vehicle.name}'
-        raise InputError(one.bag, one.source.topic, expected, f'{one.rows.shape[1]}')
-    source, thrusts = one.source, one.rows
-    if source.curve:
-        curve = load_curve(source.curve, Path(str(mapping.origin)).parent)
-        mirrored = _reversed(source.reversed, thrusters.names, mapping.origin)
-        thrusts = curve.thrust(one.rows, mirrored)
-        notes.append(_said_of_curve(curve, one.rows, mirrored, source.topic))
-    elif source.reversed:
-        raise InputError(
-            mapping.origin, 'thrusters.curve', 'a curve whose commands to mirror', None
-        )
-    return _track('wrench', one, '', thrusts @ thrusters.matrix.T)
+        topics = ' and '.join(one.source.topic for one in every)
+        raise InputError(every[0].bag, topics, expected, f'{count}')
+    parts, last = [], 0
+    for one in every:
+        first, last = last, last + one.rows.shape[1]
+        rows = np.full((len(one.rows), count), np.nan)
+        rows[:, first:last] = _thrusts(one, thrusters.names, slice(first, last), mapping, notes)
+        parts.append(_track('wrench', one, '', rows))
+    whole = assembled(parts, every[0].bag)
+    return replace(whole, rows=whole.rows @ thrusters.matrix.T)
+
+
+def _thrusts(
+    one: Recorded, names: Sequence[str], own: slice, mapping: TopicMap, notes: list[str]
+) -> np.ndarray:
+    """Thrusts (n, k) in N of a topic with those of some thrusters."""
+    source = one.source
+    if not source.curve:
+        if source.reversed:
+            expected = 'a curve whose commands to mirror'
+            raise InputError(mapping.origin, 'thrusters.curve', expected, None)
+        return one.rows
+    curve = load_curve(source.curve, Path(str(mapping.origin)).parent)
+    mirrored = _reversed(source.reversed, names, mapping.origin)[own]
+    notes.append(_said_of_curve(curve, one.rows, mirrored, source.topic))
+    return curve.thrust(one.rows, mirrored)
 
 
 def _reversed(told: Sequence[str | int], names: Sequence[str], origin: object) -> np.ndarray:

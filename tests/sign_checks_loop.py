@@ -98,6 +98,22 @@ def check_other_law(name: str, law: Any) -> None:
         assert_allclose(f, theirs[2], rtol=1e-10)
 
 
+def check_multisine(law: Any) -> None:
+    """The wrench by its sum, at any state and with a state that stays."""
+    rows = np.array([drawn(36), drawn(36), drawn(36)]).reshape(3, 6, 6)
+    offset, t = drawn(6), 0.7
+    values = dict(zip(('amplitude', 'omega', 'phase'), rows.tolist(), strict=True))
+    gains = make_gains('multisine', values | {'offset': offset.tolist()})
+    expected = offset + (rows[0] * np.sin(rows[1] * t + rows[2])).sum(axis=1)
+    for nu in (NU, 0.0 * NU):
+        arguments = (t, tuple(nu), tuple(attitude_of(ETA[3:])), tuple(NU_D), tuple(NU_D_DOT),
+                     STATE[:6], gains, control_model(VEHICLE))  # fmt: skip
+        tau, f = law.wrench(*arguments)
+        assert_allclose(tau, expected, rtol=1e-12)
+        assert not any(f)
+        assert not any(law.state_rate(*arguments))
+
+
 def check_current(module: Any) -> None:
     """Acceleration in a current that varies, by Newton for the body and Kirchhoff for the water."""
     t, vehicle = 0.7, VEHICLE

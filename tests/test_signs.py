@@ -24,7 +24,13 @@ from sign_checks import (
     check_U,
     published_vehicle,
 )
-from sign_checks_loop import check_current, check_law, check_other_law, check_uncertainty
+from sign_checks_loop import (
+    check_current,
+    check_law,
+    check_multisine,
+    check_other_law,
+    check_uncertainty,
+)
 
 from auv_dynamics.kernel.compile import plain
 from auv_gvc_controller.laws.law import SHIPPED
@@ -91,6 +97,10 @@ FORMULAS = [
         'f smc', 'auv_gvc_controller.laws.smc',
         ['SMC.wrench', 'SMC.state_rate', 'manifold', 'saturated'],
         lambda m: check_other_law('smc', m.SMC), 23,
+    ),
+    Formula(
+        'f multisine', 'auv_gvc_controller.laws.multisine', ['_axis', 'MULTISINE.wrench'],
+        lambda m: check_multisine(m.MULTISINE), 3,
     ),
     Formula(
         'F current', 'auv_dynamics.plant.uncertainty',

@@ -435,3 +435,25 @@ def test_the_wrench_changes_no_faster_than_its_limit() -> None:
             peer.until(lambda k=k: len(peer.heard['wrench']) > k, f'wrench {k}')
         forces = [message.wrench.force.x for message in peer.heard['wrench']]
         np.testing.assert_allclose(forces, 1.0 * np.arange(20), atol=1e-9)
+
+
+OPEN_LOOP = parameters(
+    law='multisine', vehicle='herman2018', limits__wrench='[60.0]', odometry_timeout=0.3,
+    setpoint_timeout=0.3, ramp=1.0, gains__offset='[50.0, 0.0, 0.0, 0.0, 0.0, 0.0]',
+    gains__amplitude='[20.0, 0.0, 0.0, 0.0, 0.0, 0.0]', gains__omega='[8.0]', gains__phase='[0.0]',
+)  # fmt: skip
+
+
+def test_an_open_loop_keeps_every_guard_of_a_controller() -> None:
+    """Limit, watchdogs, the operator's stop: whoever publishes set-points holds the switch."""
+    with graph(('controller_node', OPEN_LOOP)) as (peer, _):
+        driver = Driver(peer)
+        for silent in ('setpoints', 'odometry'):
+            driver.until(lambda: 60.0 in driver.surge[-50:], 'a wrench at its limit')
+            assert max(driver.surge) == 60.0, '70 N are asked for'
+            setattr(driver, silent, False)
+            assert_ramp(driver.lets_go())
+            setattr(driver, silent, True)
+        driver.works()
+        assert change(peer, Transition.TRANSITION_DEACTIVATE)
+        peer.until(lambda: driver.surge[-1] == 0.0, 'a zero wrench')

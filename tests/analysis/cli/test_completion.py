@@ -10,6 +10,7 @@ import pytest
 
 from auv_analysis.cli import main
 from auv_analysis.cli.tune import LAWS
+from auv_gvc_controller.laws import OPEN_LOOP
 from auv_gvc_controller.laws.law import SHIPPED
 
 AUV = Path(sys.executable).with_name('auv')
@@ -51,8 +52,8 @@ def test_without_a_readable_scenario_no_controller_is_offered(tmp_path: Path) ->
     assert _offered('auv run gone.yaml --controller ', tmp_path) in ([], [''])
 
 
-def test_laws_on_the_command_line_are_those_that_are_shipped() -> None:
-    assert tuple(SHIPPED) == LAWS
+def test_laws_on_the_command_line_are_those_that_track() -> None:
+    assert tuple(SHIPPED) == (*LAWS, OPEN_LOOP)
 
 
 @pytest.mark.parametrize('shell', ['bash', 'zsh', 'fish'])

@@ -159,7 +159,7 @@ def test_modes_of_a_pendulum():
 @pytest.mark.parametrize(
     ('changes', 'match'),
     [
-        ({'law': 'pdi'}, 'expected gvc, cl, pid, smc or module:Class'),
+        ({'law': 'pdi'}, 'expected gvc, cl, pid, smc, multisine or module:Class'),
         ({'law': 'gvc'}, 'k_D: expected .* found nothing'),
         ({'controller': 'gvc'}, 'controller: expected a scenario beside it'),
         ({'nu0': [1.0]}, 'nu0: expected 6 finite numbers'),

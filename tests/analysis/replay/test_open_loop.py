@@ -226,7 +226,7 @@ def test_wrenches_are_compared_where_there_are_both(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ('law', 'gains', 'words'),
     [
-        ('warp', GAINS, '--law: expected gvc, cl, pid, smc or module:Class'),
+        ('warp', GAINS, '--law: expected gvc, cl, pid, smc, multisine or module:Class'),
         ('cl', {'k_D': 1.0}, '--gain: k_I: expected .* found nothing'),
         ('cl', {**GAINS, 'k_P': 1.0}, '--gain: k_P: expected one of'),
         ('cl', {**GAINS, 'k_D': [1.0, 2.0]}, '--gain: k_D: expected'),

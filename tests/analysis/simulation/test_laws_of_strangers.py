@@ -122,4 +122,6 @@ def test_a_law_that_cannot_be_imported_is_refused_in_one_line(tmp_path, capsys) 
     with pytest.raises(SystemExit) as ended:
         main.main(['analyze', bag, '--law', 'no_such_module:Law'])
     assert ended.value.code == 2
-    assert capsys.readouterr().err.startswith('--law: expected gvc, cl, pid, smc or module:Class')
+    assert capsys.readouterr().err.startswith(
+        '--law: expected gvc, cl, pid, smc, multisine or module:Class'
+    )

@@ -19,7 +19,7 @@ from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.control.gains import sampling_warning
 
-VELOCITY = 'm/s', 'rad/s'
+VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
 IDEAL = 'ideal: the commanded wrench is the applied one'
 PERFECT = 'perfect: the law sees the true state'
 FOLDERS = re.compile(r'^.*?(?=[^/\s]+\.ya?ml: )')  # before a file's name: a report is passed on
@@ -60,6 +60,8 @@ def set_up(runs: Mapping[str, RunInfo], summaries: Mapping[str, Any], scenario_t
     mine = {name: run for name, run in runs.items() if run.scenario == data['name']}
     actuators, sensors = data.get('actuators'), data.get('sensors')
     rows = [('set-point', [_setpoint(data['setpoint'])])]
+    if 'excitation' in data:
+        rows += [('open-loop wrench', [harmonics(data['excitation'], DOFS, WRENCH) or 'zero'])]
     rows += [('start', [_entries(data['initial'])])] if data.get('initial') else []
     rows += [('disturbances', _disturbances(data.get('disturbance', [])))]
     faults = data.get('faults', [])

@@ -29,9 +29,12 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.control.gains import body_gains, sampling_warning, state_warning
 from auv_gvc_controller.control.setpoint import Setpoint, make_setpoint
+from auv_gvc_controller.laws import OPEN_LOOP
 from auv_gvc_controller.laws.law import make_gains, refusal, try_law
 from auv_gvc_controller.laws.model import control_model
+from auv_gvc_controller.laws.multisine import MOST, multisine_gains
 
+SETTINGS = ('law', 'anti_windup')  # of a controller, which are no gains
 MOST_STEPS = 10_000_000  # some 10 GB of arrays
 
 
@@ -64,6 +67,25 @@ def check_time(data: dict[str, Any], path: Path) -> None:
     steps = time_grid(data['step'], data['duration'], path).last or 0
     if steps > MOST_STEPS:
         raise InputError(path, 'duration', f'at most {MOST_STEPS} steps', f'{steps}')
+
+
+def check_excitation(data: dict[str, Any], path: Path) -> None:
+    """Refuse an open loop without its wrench or with gains, and a wrench that no law follows."""
+    followers = [name for name, entry in data['controllers'].items() if entry['law'] == OPEN_LOOP]
+    if followers and 'excitation' not in data:
+        expected = f'a mapping of degrees of freedom, the wrench of the law {OPEN_LOOP}'
+        raise InputError(path, 'excitation', expected, None)
+    for name in followers:
+        for key in set(data['controllers'][name]) - set(SETTINGS):
+            expected = 'no gains beside the law: excitation is its wrench'
+            raise InputError(path, f'controllers.{name}', expected, key)
+    if 'excitation' in data and not followers:
+        expected = f'one of law {OPEN_LOOP}, which follows excitation'
+        raise InputError(path, 'controllers', expected, ', '.join(data['controllers']))
+    for dof, entry in data.get('excitation', {}).items():
+        count = len(entry.get('terms', ()))
+        if count > MOST:
+            raise InputError(path, f'excitation.{dof}.terms', f'at most {MOST} terms', f'{count}')
 
 
 def vehicle_path_of(vehicle: str, scenario: Path) -> Path:
@@ -211,8 +233,9 @@ class Scenario(Devices):
 
     def gain_values(self, name: str) -> dict[str, Any]:
         """Gains of one controller as the file gives them."""
-        settings = ('law', 'anti_windup')
-        return {k: v for k, v in self.controller(name).items() if k not in settings}
+        if self.controller(name)['law'] == OPEN_LOOP:
+            return multisine_gains(self.data['excitation'])
+        return {k: v for k, v in self.controller(name).items() if k not in SETTINGS}
 
     def gains(self, name: str) -> Any:
         """Gains of one controller as the kernel takes them."""
@@ -336,6 +359,7 @@ def scenario_from(
     data = resolved(data)
     check_names(data, path)
     check_time(data, path)
+    check_excitation(data, path)
     vehicle = vehicle_from_dict(vehicle_data, vehicle_path)
     result = Scenario(path, vehicle_path, vehicle, vehicle_data, data, attachments)
     # made and checked now, so that errors come first

@@ -44,6 +44,12 @@ def sqrt(x: Number) -> Number:
     return np.sqrt(x)
 
 
+@of_numbers
+def sin(x: Number) -> Number:
+    """Sine of an angle in rad."""
+    return np.sin(x)
+
+
 def align_stack(lanes: int | None) -> None:
     """Let a kernel put the lanes that find no register at the borders of cache lines.
 

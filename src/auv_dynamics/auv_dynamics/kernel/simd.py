@@ -134,6 +134,7 @@ _lower(operator.ne, Choice, (Lane, Lane), lambda builder, a, b: builder.fcmp_uno
 _lower(operator.neg, Lane, (Lane,), lambda builder, a: builder.fneg(a))
 _lower(abs, Lane, (Lane,), _intrinsic('fabs'))
 _lower(lanes.sqrt, Lane, (Lane,), _intrinsic('sqrt'))
+_lower(lanes.sin, Lane, (Lane,), _intrinsic('sin'))
 _lower(lanes.anywhere, types.boolean, (Choice,), _any)
 _lower(lanes.select, Lane, (Choice, Lane, Lane), lambda builder, c, a, b: builder.select(c, a, b))
 

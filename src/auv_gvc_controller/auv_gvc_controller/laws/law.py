@@ -11,10 +11,11 @@ import numpy as np
 from auv_dynamics.files.errors import named_line
 from auv_dynamics.files.nearest import meant, one_of
 from auv_dynamics.files.yaml_files import matrix6
-from auv_gvc_controller.laws import NAMES
+from auv_gvc_controller.laws import NAMES, OPEN_LOOP
 
 SHIPPED: dict[str, Any] = {
-    name: getattr(importlib.import_module(f'{__package__}.{name}'), name.upper()) for name in NAMES
+    name: getattr(importlib.import_module(f'{__package__}.{name}'), name.upper())
+    for name in (*NAMES, OPEN_LOOP)
 }
 _asked: set[str] = set()  # own laws that somebody in this process has asked for by name
 

@@ -1,4 +1,4 @@
-"""The messages of any bag, decoded: MCAP by our own reader, others by the rosbags library."""
+"""The messages of any bag, decoded: MCAP and CSV by our own readers, others by rosbags."""
 
 import shutil
 import tempfile
@@ -12,9 +12,10 @@ import zstandard
 from mcap.records import Channel
 
 from auv_analysis.bag.chunks import MessageTable
+from auv_analysis.bag.csv_logs import rows_of_csv, survey_of_csv
 from auv_analysis.bag.limits import LARGEST_PARSED, MOST_NAMED
 from auv_analysis.bag.mcap_file import McapFile
-from auv_analysis.bag.metadata import bag_files, check_regular, is_mcap
+from auv_analysis.bag.metadata import bag_files, check_regular, is_csv, is_mcap
 from auv_analysis.bag.reading import BagContents, read_bag
 from auv_analysis.bag.step_topics import refusal
 from auv_dynamics.files.errors import InputError
@@ -48,6 +49,8 @@ def type_name(name: str) -> str:
 
 def survey(bag: Path) -> BagContents:
     """Topics, types, counts and span of a bag of any kind, without its messages."""
+    if is_csv(bag):
+        return survey_of_csv(bag)
     if not is_mcap(bag):
         return _survey_of_rosbags(bag)
     contents = read_bag(bag, decode=False)
@@ -69,7 +72,9 @@ def messages(bag: Path, topics: Collection[str], notes: list[str]) -> Iterator[L
     InputError : not a bag, or messages that cannot be decoded
 
     """
-    if is_mcap(bag):
+    if is_csv(bag):
+        yield from (LoggedMessage(*found) for found in rows_of_csv(bag, topics, notes))
+    elif is_mcap(bag):
         for path in bag_files(bag):
             yield from _of_mcap(path, topics, notes)
     else:

@@ -356,7 +356,10 @@ def _scaled(value: Any, ns: int) -> float:
     """A time in ns: whole numbers exactly; NaN where there is none."""
     if isinstance(value, int | np.integer):
         return int(value) * ns
-    return round(value * ns) if abs(value) < LARGEST else math.nan
+    if not abs(value) < LARGEST:
+        return math.nan
+    whole = math.floor(value)
+    return whole * ns + round((value - whole) * ns)
 
 
 def are_usable(rows: np.ndarray, role: str) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.bag.any_bag import messages, survey
+from auv_analysis.bag.csv_logs import CSV
 from auv_analysis.bag.foreign_fields import (
     FieldError,
     MessageReader,
@@ -175,6 +176,10 @@ class _Messages:
         paths = known.get(kind) if source.fields is None else source.fields
         if paths is None:
             raise self._refusal(' or '.join(known), f'{kind}, of which fields: may name paths')
+        self._has_log = kind != CSV
+        if source.stamp is None and not self._has_log:
+            expected = 'the column with the time, which a CSV file needs'
+            raise InputError(self._bag, f'{self._key}.stamp', expected, None)
         return MessageReader(source.role, paths, source.units, source.stamp)
 
     def add(self, log: int, message: Any) -> None:
@@ -186,6 +191,8 @@ class _Messages:
                 raise self._refusal('messages of its type', error.found) from None
             key = f'{self._key}.{error.key}'
             raise InputError(self._bag, key, error.expected, error.found) from None
+        except InputError:
+            raise
         except (LookupError, AttributeError, TypeError, ValueError) as error:
             # other fields than its type has, or a shorter array
             raise self._refusal('messages of its type', str(error)) from None
@@ -223,7 +230,7 @@ class _Messages:
             raise self._refusal('messages', 'none')
         times, rows = (np.concatenate(part) for part in zip(*self._parts, strict=True))
         self._parts.clear()
-        log, stamps = times.T
+        log, stamps = times.T if self._has_log else (times[:, 1], times[:, 1])
         stamped = self._stamped and self.source.stamps != 'log'
         if stamped and not stamps.any():
             notes.append(f'{topic}: every stamp is zero, so the time of logging is taken')

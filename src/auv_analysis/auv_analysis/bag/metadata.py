@@ -13,8 +13,9 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import parse_yaml
 
 DISTRO = 'jazzy'
-BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file'
-OTHERS = ('.db3', '.bag')  # endings of files that rosbags reads
+BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file, or a .csv file'
+TABLES = ('.csv', '.tsv')
+OTHERS = ('.db3', '.bag', *TABLES)  # endings of files that McapFile does not read
 METADATA = 'metadata.yaml'
 RECORDING = 'recording.yaml'
 ROOT = 'rosbag2_bagfile_information'
@@ -137,8 +138,18 @@ def write_metadata(folder: Path, text: str) -> None:
         file.write(text.encode())
 
 
+def is_csv(bag: Path) -> bool:
+    """Whether this is a file of named columns, or a folder that has such and no bag."""
+    if not os.path.isdir(bag):
+        return bag.suffix.lower() in TABLES
+    endings = {entry.suffix.lower() for entry in bag.iterdir()}
+    return not endings.isdisjoint(TABLES) and endings.isdisjoint(('.mcap', '.db3', '.zstd'))
+
+
 def is_mcap(bag: Path) -> bool:
     """Whether our own reader reads this bag; InputError when there is no bag at all."""
+    if is_csv(bag) and os.path.exists(bag):
+        return False
     if os.path.isdir(bag):
         if any(bag.glob('*.mcap')):
             return True

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, Protocol
 from auv_analysis.bag import open_bag
 from auv_analysis.bag.foreign_topics import TopicMap, with_candidates
 from auv_analysis.bag.load import Recording
-from auv_analysis.bag.metadata import OTHERS, files_of, is_mcap
+from auv_analysis.bag.metadata import OTHERS, files_of, is_csv, is_mcap
 from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.output.folder import SWEEP
 from auv_analysis.runs.run import AnyRun, Hold
@@ -172,6 +172,8 @@ def _of_folder(folder: Path) -> list[RunSource]:
     if samples:
         scenario = _brought(folder / 'scenario.yaml')
         return [RunSource('samples', path, path.stem, scenario) for path in samples]
+    if not bags and is_csv(folder):
+        return [RunSource('bag', folder)]
     if not bags:
         raise InputError(folder, '', EXPECTED, 'a folder without .mcap files or samples')
     order = {name: i for i, name in enumerate(names)}

@@ -18,7 +18,7 @@ from scipy.ndimage import uniform_filter1d
 
 ORDER = 3  # of the polynomials
 SMALLEST = 9  # samples of a window
-AT_ONCE = 1 << 20  # samples of windows that are worked on together
+AT_ONCE = 1 << 17  # samples of windows that are worked on together
 
 
 class Rates(NamedTuple):

@@ -1,5 +1,6 @@
 """`auv identify` recovers what was simulated, says what it cannot, and refuses what is wrong."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -177,6 +178,26 @@ def test_the_minimum_is_that_of_scipy(herman):
     theirs = least_squares(residuals, np.zeros(n + 9 * count), method='lm', xtol=1e-12)
     assert ours.cost == pytest.approx(2.0 * theirs.cost, rel=1e-7)
     assert_allclose(ours.theta, theirs.x[:n], atol=2e-5)
+
+
+def test_normal_equations_of_a_longer_recording_take_no_more_memory(herman):
+    vehicle = load_vehicle('herman2018')
+    u = unknowns(vehicle, speeds=np.full(6, 0.2), wrenches=np.full(6, 50.0), lag=0.08)
+    noise = np.r_[np.full(6, 0.005), np.full(3, 0.003)]
+    theta, some = np.zeros(len(u.entries)), segments_of(herman[0], 1.25, 0.6)
+
+    def normal(segments):
+        problem = OutputError(vehicle, segments, herman[0].step, noise)
+        tracemalloc.start()
+        found = problem.normal(u, theta, np.zeros((len(segments), 9)))
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found.eliminated()[0], peak
+
+    once, peak = normal(4 * some)
+    repeated, more = normal(16 * some)
+    assert_allclose(repeated, 4.0 * once, rtol=1e-9, atol=1e-9 * np.abs(once).max())
+    assert more < 1.2 * peak
 
 
 def test_a_recording_is_split_at_pauses():

@@ -1,7 +1,7 @@
 """The procedure: recordings and a prior in, a model with its uncertainty out."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 SHORT, LONG = 1.25, 10.0  # s, of segments of the first fit, and at most
 GROWTH = 10.0  # of a start's error, up to which a segment goes on
 FEWEST = 4  # segments
+FIRST = 240  # segments, evenly chosen, that are enough for the first fit
 HISTORY = 0.6  # s of commands before a segment
 PLAUSIBLE = 9.0  # more cost: a delay is not worth a thought
 NEARBY = 30.0  # more cost: no better delay lies in that direction
@@ -111,13 +112,14 @@ def identify(
         expected = 'a wrench that accelerates the vehicle its own way (axes FLU in place of FSD?)'
         raise InputError(training[0].name, 'wrench', expected, f'the opposite in {join(wrong)}')
 
-    def problem(length: float) -> OutputError:
+    def problem(length: float, most: int | None = None) -> OutputError:
         segments = [s for record in training for s in segments_of(record, length, HISTORY)]
-        return OutputError(vehicle, segments, step, noise, training[0].allocation)
+        every = -(-len(segments) // most) if most else 1
+        return OutputError(vehicle, segments[::every], step, noise, training[0].allocation)
 
     longest = min(sum(record.end - record.start for record in training) / FEWEST, LONG)
     short = min(SHORT, longest)
-    first = _with_best_delay(problem(short), u, theta, late, NEARBY)[0]
+    first = _with_best_delay(problem(short, FIRST), u, theta, late, NEARBY)[0]
     u, theta = first.unknowns, first.theta
     length = settings.segment or _length(problem(longest), u, theta)
     say(f'output error over segments of {length:.3g} s')
@@ -125,7 +127,7 @@ def identify(
     late = float(u.coefficients(theta).lag + u.prior.delay)
     tried = _with_best_delay(final, u, theta, late, PLAUSIBLE)
     whole = final.fit(tried[0].unknowns, tried[0].theta, tried[0].starts)
-    covariance = whole.covariance() + _between(tried) + _bias(whole, problem(length / 2))
+    covariance = final.covariance(whole) + _between(tried) + _bias(whole, problem(length / 2))
     covariance += _of_still(final, whole, every)
     fit, zeros = _dissipative(final, whole, covariance)
     kept = [whole.unknowns.names.index(name) for name in fit.unknowns.names]
@@ -233,7 +235,7 @@ def _of_still(problem: OutputError, fit: Fit, every: Unknowns) -> np.ndarray:
     rest = [k for k, name in enumerate(every.names) if name not in names]
     theta = np.zeros(len(every.entries))
     theta[kept] = fit.theta
-    S = np.sum([part.A for part in problem.normal(every, theta, fit.starts)], axis=0)
+    S = problem.normal(every, theta, fit.starts).eliminated()[0]
     P, _ = every.precision(theta)
     moved = np.linalg.solve((S + P)[np.ix_(kept, kept)], S[np.ix_(kept, rest)])
     return moved @ np.linalg.inv(P[np.ix_(rest, rest)]) @ moved.T
@@ -263,8 +265,7 @@ def _with_best_delay(
     names = u.names
 
     def attempt(steps: int, theta: np.ndarray) -> Fit:
-        fit = problem.fit(u.with_delay(steps * problem.step), theta, most=25, tolerance=1e-5)
-        return replace(fit, parts=[])  # which are large, and not asked for
+        return problem.fit(u.with_delay(steps * problem.step), theta, most=25, tolerance=1e-5)
 
     def with_lag(theta: np.ndarray, lag: float) -> np.ndarray:
         theta = theta.copy()
@@ -307,7 +308,7 @@ def _bias(fit: Fit, halves: OutputError) -> np.ndarray:
     """
     other = halves.fit(fit.unknowns, fit.theta, most=15, tolerance=1e-5)
     moved = fit.theta - other.theta
-    seen = np.abs(moved) > SEEN * np.sqrt(np.diag(other.covariance()))
+    seen = np.abs(moved) > SEEN * np.sqrt(np.diag(halves.covariance(other)))
     return np.outer(moved, moved) if seen.any() else np.zeros((len(moved), len(moved)))
 
 

@@ -1,9 +1,10 @@
 """Output error: the model alone is simulated along segments, and its misfit made small.
 
-Each segment has a start of its own, nine unknowns that only it depends on (multiple shooting), so
-that the normal equations are built and its start eliminated segment by segment: memory does not
-grow with the recording. Levenberg and Marquardt's method on them takes the place of
-`scipy.optimize.least_squares`, which needs the whole Jacobian at once; both find the same minimum.
+Each segment has a start of its own, nine unknowns that only it depends on (multiple shooting).
+Segments are simulated in batches and added up to normal equations of theta; of each one there
+remain only those of its start, four kilobytes: memory hardly grows with the recording. Levenberg
+and Marquardt's method on them takes the place of `scipy.optimize.least_squares`, which needs the
+whole Jacobian at once; both find the same minimum.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,30 +20,60 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 
 STEP = 3e-7  # of theta, for derivatives: as much truncated as rounded
 CERTAIN, UNSEEN = 10.0, 0.3  # of starts: deviations of the noise; m/s, rad/s where not measured
-BEYOND = 1e9  # what stands for a state that is not finite
+ON_STEP = 1e-6  # steps, by which a measurement may miss one
 FARTHEST = 1e3  # deviations of the noise: a residual beyond it has diverged
-BYTES = 1 << 27  # of states that are held at once
+BYTES = 1 << 24  # of states that are held at once
 LARGEST = 1.5  # step of theta
-BLOCKS = 24  # of all segments, at least, that the jackknife leaves out one by one
+BLOCKS, MOST_BLOCKS = 24, 400  # of time, of which the jackknife leaves out one after the other
 LEVEL = 0.95  # of intervals
 
 
 @dataclass(frozen=True, eq=False)
 class Normal:
-    """Normal equations of one segment, its start eliminated.
+    """Normal equations of all segments: J^T J and J^T r of theta, and of each segment's start.
 
     Attributes
     ----------
-    A, g : (n, n) and (n,) of theta
-    full : (n + 9, n + 9) and (n + 9,) of theta and start
-    blocks : A and g of parts of it, one after the other, which add up to those above
+    A, g : (n, n) and (n,) of theta, summed over segments
+    cross : (S, 9, n) of starts and theta
+    inner, right : (S, 9, 9) and (S, 9) of starts
 
     """
 
     A: np.ndarray
     g: np.ndarray
-    full: tuple[np.ndarray, np.ndarray]
-    blocks: list[tuple[np.ndarray, np.ndarray]]
+    cross: np.ndarray
+    inner: np.ndarray
+    right: np.ndarray
+
+    def eliminated(self, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A (n, n) and g (n,) without the starts, and (S, 9, n + 1) what they answer to theta."""
+        damped = self.inner * (1.0 + damping * np.eye(9))
+        back = np.linalg.solve(damped, np.concatenate([self.cross, self.right[..., None]], axis=2))
+        taken = np.tensordot(self.cross, back, ([0, 1], [0, 1]))
+        return self.A - taken[:, :-1], self.g - taken[:, -1], back
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Normal equations by blocks of time, starts eliminated: A (B, n, n) and g (B, n) of theta.
+
+    A block is a segment, a part of one where they are few, or several where they are many.
+    """
+
+    A: np.ndarray
+    g: np.ndarray
+
+    def covariance(self, P: np.ndarray) -> np.ndarray:
+        """(n, n) of theta by the jackknife (the sandwich, without its bias), for a prior P.
+
+        A block counts as one observation, whatever its residuals are correlated with inside. What
+        the prior says is as uncertain as it says itself.
+        """
+        S, count = self.A.sum(axis=0) + P, len(self.g)
+        moves = np.linalg.solve(S - self.A, self.g[..., None])[..., 0]
+        inverse = np.linalg.inv(S)
+        return (count - 1) / count * moves.T @ moves + inverse @ P @ inverse
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +86,9 @@ class Fit:
     theta : (n,)
     starts : (S, 9) of the segments, in deviations of the noise
     cost : sum of squares, the prior's included
-    parts : normal equations by segment
+    information : (n, n) Fisher information of theta by the data alone, for noise as assumed
     rows : number of measurements
+    blocks : of time, on which intervals rest
 
     """
 
@@ -64,34 +96,14 @@ class Fit:
     theta: np.ndarray
     starts: np.ndarray
     cost: float
-    parts: list[Normal]
+    information: np.ndarray
     rows: int
-
-    @property
-    def information(self) -> np.ndarray:
-        """(n, n) Fisher information of theta by the data alone, for noise as assumed."""
-        return np.sum([part.A for part in self.parts], axis=0)
-
-    def covariance(self) -> np.ndarray:
-        """(n, n) of theta by the jackknife over blocks of time (the sandwich, without its bias).
-
-        A block, a segment or part of one, counts as one observation, whatever its residuals are
-        correlated with inside. What the prior says is as uncertain as it says itself.
-        """
-        P, _ = self.unknowns.precision(self.theta)
-        S = self.information + P
-        moves = [np.linalg.solve(S - A, g) for part in self.parts for A, g in part.blocks]
-        count = len(moves)
-        B = (count - 1) / count * np.sum([np.outer(m, m) for m in moves], axis=0)
-        inverse = np.linalg.inv(S)
-        return B + inverse @ P @ inverse
+    blocks: int
 
     @property
     def quantile(self) -> float:
         """Deviations on either side of a 95 % interval."""
-        return float(
-            student.ppf((1 + LEVEL) / 2, max(sum(len(p.blocks) for p in self.parts) - 1, 1))
-        )
+        return float(student.ppf((1 + LEVEL) / 2, max(self.blocks - 1, 1)))
 
 
 @dataclass(eq=False)
@@ -106,6 +118,8 @@ class OutputError:
     noise : (9,) standard deviations of velocity and attitude measurements; NaN: not measured
     allocation : (6, m) wrench by command; None: the command is a wrench
     integrator : of the simulation
+    observer : gain by which the state follows the measurements; 0: it does not. What is measured
+        less simulated is the error of its prediction then
 
     """
 
@@ -115,13 +129,12 @@ class OutputError:
     noise: np.ndarray
     allocation: np.ndarray | None = None
     integrator: str = 'rk4'
+    observer: float = 0.0
     _deviation: np.ndarray = field(init=False)
     _certain: np.ndarray = field(init=False)
-    _blocks: int = field(init=False)
 
     def __post_init__(self) -> None:
         self._deviation = np.where(np.isfinite(self.noise), self.noise, UNSEEN)
-        self._blocks = -(-BLOCKS // max(len(self.segments), 1))
         self._certain = np.where(np.isfinite(self.noise), CERTAIN, 1.0)
 
     def simulate(
@@ -140,10 +153,12 @@ class OutputError:
         applied = _lagged(np.einsum('vim,spm->vspi', allocation, past), follow)
         x0 = np.zeros((*starts.shape[:2], 13))
         x0[..., 3:] = starts
+        seen = np.stack([on_steps(one) for one in segments]) if self.observer else None
         found_states = open_loop(
             found.model(self.vehicle.lift), np.stack([command for _, command in late]), x0,
             self.step, allocation=allocation, follow=follow, applied=applied, bias=found.bias,
-            current=found.current, integrator=self.integrator,
+            current=found.current, integrator=self.integrator, measured=seen,
+            observer=np.full(10, self.observer) if self.observer else None,
         )  # fmt: skip
         return np.concatenate([starts[:, :, None], found_states[..., 3:]], axis=2)
 
@@ -156,17 +171,20 @@ class OutputError:
 
     def residuals(self, which: slice, states: np.ndarray) -> Iterator[np.ndarray]:
         """Of each segment (V, r, 9): measured less simulated in deviations; 0: not measured."""
+        scale = self._deviation * (1.0 - self.observer)  # states are those behind a correction
         for i, segment in enumerate(self.segments[which]):
-            bounded = np.nan_to_num(states[:, i], nan=BEYOND, posinf=BEYOND, neginf=-BEYOND)
-            simulated = at_times(bounded, segment.at)
+            simulated = at_times(states[:, i], segment.at)
             e = np.empty((*simulated.shape[:2], 9))
-            e[..., :6] = segment.nu - simulated[..., 4:]
-            e[..., 6:] = small_rotation(simulated[..., :4], segment.q)
-            e /= self._deviation
+            with np.errstate(all='ignore'):  # states may be what is left of a divergence
+                np.subtract(segment.nu, simulated[..., 4:], out=e[..., :6])
+                e[..., 6:] = small_rotation(simulated[..., :4], segment.q)
+                e /= scale
+            np.fmin(np.fmax(e, -FARTHEST, out=e), FARTHEST, out=e)  # no number: farthest
             known = np.isfinite(segment.nu)
             known = np.concatenate([known, np.repeat(np.isfinite(segment.q[:, :1]), 3, 1)], axis=1)
-            e = np.clip(np.nan_to_num(e, nan=FARTHEST), -FARTHEST, FARTHEST)
-            yield np.where(known, e, 0.0)
+            if not known.all():
+                e[:, ~known] = 0.0
+            yield e
 
     def slices(self, variants: int) -> Iterator[slice]:
         """Segments that are simulated together, so that so many variants of them fit."""
@@ -183,35 +201,53 @@ class OutputError:
             total += sum(float((e**2).sum()) for e in self.residuals(which, states))
         return total
 
-    def normal(self, unknowns: Unknowns, theta: np.ndarray, z: np.ndarray) -> list[Normal]:
-        """Normal equations of every segment."""
+    def _jacobians(
+        self, unknowns: Unknowns, theta: np.ndarray, z: np.ndarray
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Of each segment its residuals (r,) and their derivatives (n + 9, r)."""
         n = len(theta)
         thetas = np.concatenate([theta[None], theta + STEP * np.eye(n), np.tile(theta, (9, 1))])
-        parts = []
         for which in self.slices(len(thetas)):
-            here = z[which]
-            starts = np.repeat(self.starts(here, which)[None], len(thetas), axis=0)
+            starts = np.repeat(self.starts(z[which], which)[None], len(thetas), axis=0)
             for k in range(9):
-                starts[1 + n + k] = self.starts(here + STEP * np.eye(9)[k], which)
+                starts[1 + n + k] = self.starts(z[which] + STEP * np.eye(9)[k], which)
             states = self.simulate(unknowns, thetas, starts, which)
-            for e, own in zip(self.residuals(which, states), here, strict=True):
+            for e in self.residuals(which, states):
                 flat = e.reshape(len(thetas), -1)
-                r, J = flat[0], (flat[1:] - flat[0]) / STEP
-                J = np.where(np.abs(J).max(axis=0) < FARTHEST / STEP, J, 0.0)
-                A, g = J @ J.T, J @ r
-                A[n:, n:] += np.diag(1.0 / self._certain**2)
-                g[n:] += own / self._certain**2
-                inner = np.linalg.solve(A[n:, n:], np.column_stack([A[n:, :n], g[n:]]))
-                alone = J[:n] - inner[:, :n].T @ J[n:]  # what no start can imitate
-                blocks = [
-                    (alone[:, rows] @ alone[:, rows].T, alone[:, rows] @ r[rows])
-                    for rows in np.array_split(np.arange(len(r)), self._blocks)
-                ]
-                parts.append(
-                    Normal(A[:n, :n] - A[:n, n:] @ inner[:, :n], g[:n] - A[:n, n:] @ inner[:, n],
-                           (A, g), blocks)
-                )  # fmt: skip
-        return parts
+                J = (flat[1:] - flat[0]) / STEP
+                J[:, np.abs(J).max(axis=0) >= FARTHEST / STEP] = 0.0
+                yield flat[0], J
+
+    def normal(self, unknowns: Unknowns, theta: np.ndarray, z: np.ndarray) -> Normal:
+        """Normal equations."""
+        n, S = len(theta), len(self.segments)
+        A, g = np.zeros((n, n)), np.zeros(n)
+        cross, inner, right = np.empty((S, 9, n)), np.empty((S, 9, 9)), np.empty((S, 9))
+        for s, (r, J) in enumerate(self._jacobians(unknowns, theta, z)):
+            full, of_full = J @ J.T, J @ r
+            A += full[:n, :n]
+            g += of_full[:n]
+            cross[s], inner[s], right[s] = full[n:, :n], full[n:, n:], of_full[n:]
+        own = 1.0 / self._certain**2
+        return Normal(A, g, cross, inner + np.diag(own), right + z * own)
+
+    def blocks(self, fit: Fit) -> Blocks:
+        """Normal equations by blocks of time."""
+        n, S = len(fit.theta), len(self.segments)
+        parts, together = -(-BLOCKS // S), -(-S // MOST_BLOCKS)
+        A, g = np.zeros((fit.blocks, n, n)), np.zeros((fit.blocks, n))
+        for s, (r, J) in enumerate(self._jacobians(fit.unknowns, fit.theta, fit.starts)):
+            inner = J[n:] @ J[n:].T + np.diag(1.0 / self._certain**2)
+            alone = J[:n] - np.linalg.solve(inner, J[n:] @ J[:n].T).T @ J[n:]  # by no start
+            for k, rows in enumerate(np.array_split(np.arange(len(r)), parts)):
+                b = (s * parts + k) // together
+                A[b] += alone[:, rows] @ alone[:, rows].T
+                g[b] += alone[:, rows] @ r[rows]
+        return Blocks(A, g)
+
+    def covariance(self, fit: Fit) -> np.ndarray:
+        """(n, n) of theta, by blocks of time."""
+        return self.blocks(fit).covariance(fit.unknowns.precision(fit.theta)[0])
 
     def fit(
         self,
@@ -235,10 +271,10 @@ class OutputError:
         """
         z = np.zeros((len(self.segments), 9)) if z is None else z
         cost, small, damping = self.cost(unknowns, theta, z), 0, 1e-3
-        parts = self.normal(unknowns, theta, z)
+        normal = self.normal(unknowns, theta, z)
         for _iteration in range(most):
             for _ in range(14):
-                move, moves = _step(unknowns, theta, parts, damping)
+                move, moves = _step(unknowns, theta, normal, damping)
                 new, new_z = theta + move, z + moves
                 new_cost = self.cost(unknowns, new, new_z)
                 if new_cost < cost:
@@ -248,14 +284,16 @@ class OutputError:
                 break
             gain = (cost - new_cost) / cost
             theta, z, cost, damping = new, new_z, new_cost, max(damping / 8.0, 1e-12)
-            parts = self.normal(unknowns, theta, z)
+            normal = self.normal(unknowns, theta, z)
             small = small + 1 if gain < tolerance else 0
             if small >= 2 or gain < tolerance / 100:
                 break
         rows = sum(
             int(np.isfinite(s.nu).sum() + 3 * np.isfinite(s.q[:, 0]).sum()) for s in self.segments
         )
-        return Fit(unknowns, theta, z, cost, parts, rows)
+        S = len(self.segments)
+        blocks = -(-S // -(-S // MOST_BLOCKS)) * -(-BLOCKS // S)
+        return Fit(unknowns, theta, z, cost, normal.eliminated()[0], rows, blocks)
 
     def misfit(self, fit: Fit) -> Iterator[tuple[Segment, np.ndarray]]:
         """Segments with their residuals (r, 9), in deviations of the noise; 0: not measured."""
@@ -282,30 +320,32 @@ class OutputError:
 
 
 def _step(
-    unknowns: Unknowns, theta: np.ndarray, parts: Sequence[Normal], damping: float
+    unknowns: Unknowns, theta: np.ndarray, normal: Normal, damping: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Steps (n,) of theta and (S, 9) of the starts."""
-    n = len(theta)
     P, p = unknowns.precision(theta)
-    A, g, inner = P.copy(), p.copy(), []
-    scale = damping * np.diag(P + np.sum([part.full[0][:n, :n] for part in parts], axis=0))
-    for part in parts:
-        full, right = part.full
-        block = full[n:, n:] + damping * np.diag(np.diag(full)[n:])
-        back = np.linalg.solve(block, np.column_stack([full[n:, :n], right[n:]]))
-        A += full[:n, :n] - full[:n, n:] @ back[:, :n]
-        g += right[:n] - full[:n, n:] @ back[:, n]
-        inner.append(back)
-    move = -np.linalg.solve(A + np.diag(scale), g)
+    A, g, back = normal.eliminated(damping)
+    move = -np.linalg.solve(A + P + damping * np.diag(np.diag(P + normal.A)), g + p)
     move *= min(1.0, LARGEST / max(np.abs(move).max(initial=0.0), 1e-300))
-    return move, np.array([-back[:, n] - back[:, :n] @ move for back in inner])
+    return move, -back[..., -1] - back[..., :-1] @ move
 
 
 def at_times(states: np.ndarray, at: np.ndarray) -> np.ndarray:
     """States (V, r, 10) at some times in steps, by straight lines through (V, n + 1, 10)."""
+    nearest = np.rint(at).astype(int)
+    if np.abs(at - nearest).max() < ON_STEP:
+        return states[:, nearest]
     first = np.minimum(at.astype(int), states.shape[1] - 2)
     share = (at - first)[:, None]
     return states[:, first] * (1.0 - share) + states[:, first + 1] * share
+
+
+def on_steps(segment: Segment) -> np.ndarray:
+    """Measured attitude and velocity (n, 10) after the steps next to them; NaN: none."""
+    found = np.full((len(segment.command), 10), np.nan)
+    after = np.clip(np.rint(segment.at).astype(int) - 1, 0, len(found) - 1)
+    found[after] = np.concatenate([segment.q, segment.nu], axis=1)
+    return found
 
 
 def delayed(segment: Segment, steps: float) -> tuple[np.ndarray, np.ndarray]:

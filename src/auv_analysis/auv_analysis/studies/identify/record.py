@@ -284,7 +284,9 @@ def segments_of(record: Record, length: float, history: float) -> list[Segment]:
 
 def _measured(record: Record, begin: float, end: float) -> tuple[np.ndarray, ...]:
     """Times, velocities and attitudes in (begin, end]; NaN where only the other one is there."""
-    keep = [(t > begin) & (t <= end + 1e-9) for t in (record.velocity_t, record.attitude_t)]
+    edges = [begin, end + 1e-9]
+    keep = [slice(*np.searchsorted(t, edges, side='right').tolist())
+            for t in (record.velocity_t, record.attitude_t)]  # fmt: skip
     t = np.union1d(record.velocity_t[keep[0]], record.attitude_t[keep[1]])
     nu, q = np.full((len(t), 6), np.nan), np.full((len(t), 4), np.nan)
     nu[np.searchsorted(t, record.velocity_t[keep[0]])] = record.velocity[keep[0]]

@@ -56,7 +56,7 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
             'vehicle': found.vehicle.name,
             'records': [of_record(record) for record in found.training],
             'held_out': [of_record(record) for record in found.held.record],
-            'segments': len(found.fit.parts),
+            'segments': len(found.problem.segments),
             'segment_length': len(found.problem.segments[0].command) * found.problem.step,
             'residual_rms': float((found.fit.cost / found.fit.rows) ** 0.5),
             'noise': found.problem.noise.tolist(),

@@ -19,7 +19,7 @@ from auv_dynamics.vehicle.model import coriolis
 DELAYS = np.arange(0.0, 0.43, 0.03)  # s
 WINDOW = 0.5  # s
 FITTED = ('M', 'D_linear', 'D_quadratic', 'hydrostatics')
-MOST = 20_000  # samples that are used
+MOST = 8000  # samples that are used
 REWEIGHTED = 4
 REVERSED = 0.3  # of the prior's inertia: what comes out more negative is no noise
 FLOOR = 0.02  # of the largest eigenvalue of the scaled M: below it, a direction is not believed
@@ -102,7 +102,8 @@ class _Normal:
              np.diag(prior.D_quadratic), prior.hydrostatics]
         )  # fmt: skip
         Y = np.concatenate([row[2] for row in rows])
-        self.rows, self.prior, self.free = rows, prior, free
+        self.prior, self.free = prior, free
+        self.rows = [row[:2] for row in rows]
         self.fixed = Y[:, :, ~free] @ self.known[~free]
         self.Y = np.ascontiguousarray(Y[:, :, free].swapaxes(0, 1))  # (6, k, n)
         self.gram = self.Y.swapaxes(1, 2) @ self.Y
@@ -111,7 +112,7 @@ class _Normal:
 
     def solve(self, delay: float) -> tuple[float, dict[str, np.ndarray]]:
         """Logarithm of the residuals, and coefficients, for one delay of the command."""
-        U = np.concatenate([_command(record, at - delay) for record, at, _ in self.rows])
+        U = np.concatenate([_command(record, at - delay) for record, at in self.rows])
         rest = (U - self.fixed).T
         right = np.einsum('ikn,ik->in', self.Y, rest, optimize=True)
         known, w = self.known.copy(), np.ones(6)

@@ -9,7 +9,7 @@ from auv_dynamics.files.errors import InputError
 
 GOOD = 'odometry: /o\nwrench: /w\n'
 WRONG = {  # what is in the file -> what the one line says
-    'odometry: /o\n': 'wrench: expected one of wrench',
+    'odometry: /o\nwrench_applied: /w\n': 'wrench: expected one of wrench',
     'wrench: /w\n': 'odometry: expected odometry (--odom), or both pose and twist, found nothing',
     'pose: /p\nwrench: /w\n': 'pose: expected odometry (--odom), or both pose and twist',
     f'{GOOD}twist: /t\n': 'found odometry and twist',

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, MOVING, TopicMap
-from auv_analysis.bag.foreign_tracks import Track, at_times, between_gaps, integral
+from auv_analysis.bag.foreign_tracks import Track, at_times, between_gaps, integral, unknown_angles
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.metrics.pose_twist import (
     FITS,
@@ -39,12 +39,14 @@ def contradictions(tracks: Mapping[str, Track], otherwise: Track, mapping: Topic
     mapping : what was told
 
     """
-    frame = next(one.twist_frame for one in mapping.sources.values() if one.role in MOVING)
+    moving = (one.twist_frame for one in mapping.sources.values() if one.role in MOVING)
     pose, twist = tracks['pose'], tracks['twist']
-    notes = doubts_of_motion(pose, twist, otherwise, frame)
-    if mapping.rates != FROM_ATTITUDE:
-        notes += doubts_of_rates(pose, twist)
-    return [*notes, *doubts_of_wrench(tracks), *delays(tracks)]
+    notes = doubts_of_wrench(tracks)
+    if not unknown_angles(pose, mapping):
+        if mapping.rates != FROM_ATTITUDE:
+            notes = doubts_of_rates(pose, twist) + notes
+        notes = [*doubts_of_motion(pose, twist, otherwise, next(moving, 'child')), *notes, *delays(tracks)]
+    return notes
 
 
 def doubts_of_motion(pose: Track, twist: Track, other: Track, frame: str) -> list[str]:
@@ -87,8 +89,11 @@ def _misfits(pose: Track, *velocities: Track) -> tuple[float, ...]:
     if len(ns) < SMALLEST:
         return (0.0,) * (1 + len(velocities))
     at, t = at_times(pose, ns), (ns - ns[0]) / NANOSECONDS
-    moved = (turn(at[:, 3:], at_times(velocity, ns)[:, :3]) for velocity in velocities)
-    pairs = [compare_rates(t, at[:, :3], velocity) for velocity in moved]
+    moved = [turn(at[:, 3:], at_times(velocity, ns)[:, :3]) for velocity in velocities]
+    known = _measured(at[:, :3], *moved)
+    if not known.any():
+        return (0.0,) * (1 + len(velocities))
+    pairs = [compare_rates(t, at[:, :3][:, known], velocity[:, known]) for velocity in moved]
     return pairs[0].sizes[0], *(pair.sizes[2] for pair in pairs)
 
 
@@ -98,9 +103,7 @@ def doubts_of_rates(pose: Track, twist: Track) -> list[str]:
     if len(ns) < SMALLEST:
         return []
     t, at = (ns - ns[0]) / NANOSECONDS, at_times(pose, ns)
-    pair = compare_rates(t, turned(at[:, 3:]), at_times(twist, ns)[:, 3:])
-    wrong = [_misread(pair, i) for i in range(3)]
-    said = [f'{DOFS[3 + i]} {text}' for i, text in enumerate(wrong) if text]
+    said = misread_rates(t, at[:, 3:], at_times(twist, ns)[:, 3:])
     if not said:
         return []
     return [
@@ -109,12 +112,35 @@ def doubts_of_rates(pose: Track, twist: Track) -> list[str]:
     ]
 
 
-def _misread(pair: RatePair, i: int) -> str:
+def misread_rates(
+    t: np.ndarray, attitude: np.ndarray, rates: np.ndarray, fits: float = FITS
+) -> list[str]:
+    """Axes in which an angular velocity is not the rate of the attitude, with both RMS.
+
+    Parameters
+    ----------
+    t : (n,) s, rising, n at least `SMALLEST`
+    attitude : (n, 4) quaternions w, x, y, z, FSD to NED
+    rates : (n, 3) rad/s, body axes; NaN throughout in an axis: not measured
+    fits : of the larger RMS: by how much the two may differ
+
+    """
+    pair = compare_rates(t, turned(attitude), rates)
+    axes = np.flatnonzero(_measured(rates)).tolist()
+    return [f'{DOFS[3 + i]} {text}' for i in axes if (text := _misread(pair, i, fits))]
+
+
+def _measured(*rows: np.ndarray) -> np.ndarray:
+    """Columns (k,) of signals (n, k) that none of them lacks."""
+    return ~np.any([np.isnan(values).any(axis=0) for values in rows], axis=0)
+
+
+def _misread(pair: RatePair, i: int, fits: float) -> str:
     """What the two say of an axis where they differ; '' where they do not."""
     one = RatePair(pair.t, *(part[..., i : i + 1] for part in pair[1:]))
     by_path, by_twist, apart = one.sizes
     size = max(by_path, by_twist)
-    if size <= max(STILL, one.noise) or apart <= FITS * size:
+    if size <= max(STILL, one.noise) or apart <= fits * size:
         return ''
     zero = '0 throughout' if not pair.velocity[:, i].any() else f'{by_twist:.2g}'
     return f'{zero} in place of {by_path:.2g} rad/s'
@@ -139,7 +165,7 @@ def delays(tracks: Mapping[str, Track]) -> list[str]:
 
     Parameters
     ----------
-    tracks : 'pose', 'twist' and 'wrench', and 'wrench_applied' where it is
+    tracks : 'pose' and 'twist', and 'wrench' and 'wrench_applied' where they are
 
     """
     pose, twist = tracks['pose'], tracks['twist']
@@ -152,7 +178,8 @@ def delays(tracks: Mapping[str, Track]) -> list[str]:
             ('angular velocity', 'attitude'): (turned(at[:, 3:]), nu[:, 3:]),
         }
         for (late, early), (path, velocity) in signals.items():
-            found = behind(t, path, velocity)
+            known = _measured(path, velocity)
+            found = behind(t, path[:, known], velocity[:, known])
             if found:
                 notes.append(
                     f'{twist.topic}: the {late} is {found} behind the {early} of {pose.topic}; '
@@ -175,7 +202,7 @@ def behind(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Delay | Non
 
     Both pass one filter; the delay is the one that leaves least of their difference.
     """
-    if np.sqrt((velocity**2).sum(axis=1).mean()) < STILL:
+    if np.sqrt((velocity**2).sum(axis=1).mean()) < STILL:  # or nothing measured
         return None
     whole = cumulative_trapezoid(velocity, t, axis=0, initial=0.0)
     early, late = (rates(t, signal, t, _count(t)).rate for signal in (path, whole))
@@ -201,6 +228,7 @@ def acts_behind(twist: Track, wrench: Track) -> Delay | None:
     if len(ns) < 10 * PARTS:
         return None
     t, nu = (ns - ns[0]) / NANOSECONDS, at_times(twist, ns)
+    nu = nu[:, _measured(nu)]
     count = _count(t)
     area = integral(wrench, ns)
     resisting = np.concatenate([nu, nu * np.abs(nu)], axis=1)
@@ -208,7 +236,7 @@ def acts_behind(twist: Track, wrench: Track) -> Delay | None:
     nu_dot, tau, known = (rates(t, signal, t, count).rate for signal in (nu, area, whole))
     inside = (t > t[0] + FARTHEST) & (t < t[-1] - FARTHEST)
     moving = tau.std(axis=0) > 0
-    if inside.sum() < 10 * PARTS or not moving.any():
+    if inside.sum() < 10 * PARTS or not moving.any() or not nu.size:
         return None
     scale = nu_dot[inside].std(axis=0)
     y = nu_dot[inside] / np.where(scale > 0, scale, 1.0)

@@ -125,7 +125,7 @@ def check_fields(role: str, fields: Paths | None, units: Units, key: str, origin
         if name not in known:
             raise InputError(origin, f'{key}.fields.{name}', one_of(name, known), 'an unknown key')
     turning = [name for name in fields or () if name in EULER + QUATERNION]
-    if turning and tuple(sorted(turning)) not in (tuple(sorted(EULER)), tuple(sorted(QUATERNION))):
+    if not set(turning) <= set(EULER) and set(turning) != set(QUATERNION):
         expected = f'{", ".join(EULER)}, or {", ".join(QUATERNION)}: an attitude from one topic'
         raise InputError(origin, f'{key}.fields', expected, ', '.join(turning))
     if isinstance(units, Mapping):
@@ -284,8 +284,9 @@ class MessageReader:
         order = COMPONENTS[self.role]
         found = np.full((len(taken), len(order)), np.nan)
         by_name = dict(zip(self.names, taken.T, strict=True))
-        if 'phi' in by_name:
-            turned = quaternion(np.stack([by_name.pop(name) for name in EULER], axis=1))
+        if not by_name.keys().isdisjoint(EULER):  # of one that is not told any value does
+            none = np.zeros(len(taken))
+            turned = quaternion(np.stack([by_name.pop(name, none) for name in EULER], axis=1))
             by_name |= dict(zip(QUATERNION, turned.T, strict=True))
         for name, column in by_name.items():
             found[:, order.index(name)] = column

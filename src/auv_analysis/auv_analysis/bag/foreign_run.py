@@ -5,21 +5,29 @@ From (1), F is the rate of the impulse less the momentum,
     F = d/dt [ integral of (tau - C nu - D nu - g) dt - M nu ],
 
 so that the only rate to be estimated is that of a signal that stays smooth where tau and nu_dot
-jump: a rate of nu alone would smear a step of tau into F.
+jump: a rate of nu alone would smear a step of tau into F. Where no wrench was recorded, -F of
+tau = 0 is the wrench that the motion needed: M nu_dot + C nu + D nu + g.
 """
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.foreign_checks import contradictions
+from auv_analysis.bag.foreign_fields import EULER, FORCE, TORQUE
 from auv_analysis.bag.foreign_messages import read_sources
-from auv_analysis.bag.foreign_topics import TopicMap
+from auv_analysis.bag.foreign_topics import (
+    MOTION,
+    SHOWN,
+    TopicMap,
+    candidates,
+)
 from auv_analysis.bag.foreign_tracks import (
     TimeBase,
     Track,
@@ -29,8 +37,10 @@ from auv_analysis.bag.foreign_tracks import (
     sensible_step,
     time_base,
     tracks_of,
+    unknown_angles,
 )
 from auv_analysis.bag.load import Recording
+from auv_analysis.metrics.energy import depends_on_known
 from auv_analysis.metrics.local_polynomials import (
     ORDER,
     Stretch,
@@ -47,11 +57,15 @@ from auv_dynamics.kernel.compile import plain
 from auv_dynamics.plant.plant import unwrapped_eta
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.kinematics import quaternion
 from auv_dynamics.vehicle.model import coriolis, damping, restoring
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 FILTER = 'local polynomials of order 3 (Savitzky-Golay for uneven stamps)'
+PROBES = 20  # motions by which is found what a wrench depends on
+SAME = 1e-12  # of the largest wrench
+LEVEL = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # pose, of an attitude that is not known
 SMALL = 1e-6  # m/s, rad/s: step of the differences that tell how resistance depends on nu
 
 
@@ -87,18 +101,31 @@ class Unexplained:
 
 
 def unexplained(
-    vehicle: Vehicle, base: TimeBase, pose: Track, twist: Track, tau: Track, window: float | None
+    vehicle: Vehicle,
+    base: TimeBase,
+    pose: Track,
+    twist: Track,
+    tau: Track | None,
+    window: float | None,
+    unknown: Collection[str] = (),
 ) -> Unexplained:
-    """Estimate F of (1) at the samples of a time base.
+    """Estimate F of (1) at the samples of a time base; NaN where it needs what was not recorded.
 
     Parameters
     ----------
     vehicle : the model
     base : whose samples are asked for
-    pose, twist, tau : motion and the wrench that acted
+    pose, twist, tau : motion and the wrench that acted; None: the one that would be needed is -F
     window : s, None: by its error, per degree of freedom
+    unknown : angles that were not recorded, of phi, theta and psi
 
     """
+    moved = ~np.isnan(twist.rows[0])
+    known = told_by(vehicle, moved, [angle not in unknown for angle in EULER])
+    if not moved.all():
+        twist = replace(twist, rows=np.where(moved, twist.rows, 0.0))
+    if len(unknown) == len(EULER):
+        pose = replace(pose, rows=np.tile(LEVEL, (len(pose.ns), 1)))
     velocities = [_velocities(base, twist, i) for i in range(len(base.stretches))]
     seconds = [(ns - base.ns[0]) / NANOSECONDS for ns, _ in velocities]
     noise = variance(zip(seconds, (nu for _, nu in velocities), strict=True))
@@ -108,10 +135,38 @@ def unexplained(
     ]
     period = twist.period / NANOSECONDS
     counts = given_window(window, period) if window else narrow_window(stretches)
-    F, error = filtered(stretches, counts, base.step / NANOSECONDS)
+    F, error = (
+        np.where(known, part, np.nan)
+        for part in filtered(stretches, counts, base.step / NANOSECONDS)
+    )
     inverse = np.linalg.inv(vehicle.M)
     nu_dot_error = np.sqrt((error**2 @ (inverse**2).T).mean(axis=0))
-    return Unexplained(F, error, counts * period, nu_dot_error, np.sqrt(noise))
+    windows = np.where(known, counts * period, np.nan)
+    noise = np.where(moved, noise, np.nan)
+    return Unexplained(F, error, windows, nu_dot_error, np.sqrt(noise))
+
+
+def told_by(vehicle: Vehicle, velocity: np.ndarray, angles: Sequence[bool]) -> np.ndarray:
+    """Whether each row of M nu_dot + C nu + D nu + g can be told by the structure of the model.
+
+    Parameters
+    ----------
+    vehicle : the model
+    velocity : (6,) which velocities are known
+    angles : (3,) which of phi, theta and psi are
+
+    Returns
+    -------
+    told : (6,) rows whose value needs none of the others
+
+    """
+    if velocity.all() and np.all(angles):
+        return np.ones(6, bool)
+    one, other = np.random.default_rng(0).uniform(-1.0, 1.0, (2, PROBES, 9))
+    other = np.where([*velocity, *angles], one, other)
+    wrench, moved = (resistance(vehicle, x[:, :6], quaternion(x[:, 6:])) for x in (one, other))
+    same = np.abs(moved - wrench).max(axis=0) <= SAME * np.abs(wrench).max()
+    return same & depends_on_known(vehicle.M, velocity)
 
 
 def _velocities(base: TimeBase, twist: Track, i: int) -> tuple[np.ndarray, np.ndarray]:
@@ -124,7 +179,7 @@ def _velocities(base: TimeBase, twist: Track, i: int) -> tuple[np.ndarray, np.nd
 def _stretch(
     vehicle: Vehicle,
     pose: Track,
-    tau: Track,
+    tau: Track | None,
     samples: tuple[np.ndarray, np.ndarray, np.ndarray],
     at: np.ndarray,
     noise: np.ndarray,
@@ -136,7 +191,7 @@ def _stretch(
     fine = cumulative_trapezoid(resisted, t, axis=0, initial=0.0)
     coarse = cumulative_trapezoid(resisted[::2], t[::2], axis=0, initial=0.0)
     apart = (fine[::2] - coarse) / 3.0  # Richardson: the error of the finer one is of order 2
-    y = integral(tau, ns) - fine - nu @ vehicle.M.T
+    y = (0.0 if tau is None else integral(tau, ns)) - fine - nu @ vehicle.M.T
     spread = np.zeros(nu.shape)  # of the resistance by noise of the velocity
     for i in range(6):
         moved = resistance(vehicle, nu + SMALL * np.eye(6)[i], attitude)
@@ -187,6 +242,7 @@ def load_foreign(bag: str | Path, mapping: TopicMap) -> Recording:
         expected = 'a vehicle file or a shipped bare name: M, D and g of the analysis'
         raise InputError(mapping.origin, 'vehicle (--vehicle)', expected, None)
     vehicle = load_vehicle(mapping.vehicle)
+    notes += _notes_on_missing(bag, mapping)
     text = read_text(shipped('vehicles', mapping.vehicle), 'vehicle')
     tracks, otherwise = tracks_of(read_sources(bag, mapping, notes), mapping, vehicle, notes)
     notes += contradictions(tracks, otherwise, mapping)
@@ -207,11 +263,19 @@ def _run(
     tracks: Mapping[str, Track],
     notes: list[str],
 ) -> Run:
-    acted = tracks.get('wrench_applied', tracks['wrench'])
-    estimate = unexplained(vehicle, base, tracks['pose'], tracks['twist'], acted, mapping.window)
+    acted = tracks.get('wrench_applied', tracks.get('wrench'))
+    lacking = unknown_angles(tracks['pose'], mapping)
+    estimate = unexplained(
+        vehicle, base, tracks['pose'], tracks['twist'], acted, mapping.window, lacking
+    )
+    found: dict[str, Any] = {'unexplained': estimate.F, 'unexplained_error': estimate.error}
+    if acted is None:
+        found = {'required_wrench': -estimate.F, 'required_wrench_error': estimate.error}
     rows = {role: _sampled(track, base) for role, track in tracks.items()}
     unknown = np.full((len(base.ns), 6), np.nan)
     state = np.concatenate([rows['pose'], rows['twist']], axis=1)
+    eta = unwrapped_eta(state)
+    eta[:, 3:][:, [angle in lacking for angle in EULER]] = np.nan
     name = mapping.name or _name_of(bag.resolve())
     return Run(
         vehicle=vehicle,
@@ -221,20 +285,19 @@ def _run(
         gains={},
         step=base.step / NANOSECONDS,
         source=FOREIGN,
-        notes=(*notes, *_notes_on_estimate(estimate)),
+        notes=(*notes, *_notes_on_run(eta, rows['twist']), *_notes_on_estimate(estimate, acted)),
         gaps=base.spans(),
         acceleration=estimate.figures(),
         t=base.t,
-        eta=unwrapped_eta(state),
+        eta=eta,
         nu=rows['twist'],
         nu_d=rows.get('setpoint', unknown),
         nu_d_dot=unknown,
-        tau=rows['wrench'],
+        tau=rows.get('wrench', unknown),
         disturbance=None,
         disturbance_estimate=np.zeros((len(base.ns), 6)),
         applied=rows.get('wrench_applied'),
-        unexplained=estimate.F,
-        unexplained_error=estimate.error,
+        **found,
     )
 
 
@@ -276,14 +339,41 @@ def _notes_on_time_base(base: TimeBase, tracks: Mapping[str, Track]) -> list[str
     return notes
 
 
-def _notes_on_estimate(found: Unexplained) -> list[str]:
-    """Filter of the unexplained wrench, and what its error does not hold."""
-    windows = ', '.join(f'{dof} {time:.3g} s' for dof, time in zip(DOFS, found.window, strict=True))
+def _notes_on_missing(bag: Path, mapping: TopicMap) -> list[str]:
+    """That no wrench was mapped, and which topics might have been."""
+    if mapping.knows_wrench:
+        return []
+    found = candidates(survey(bag))
+    there = [topic for role in ('wrench', 'thrusters') for topic in found[role]]
+    hint = f'; {", ".join(there[:SHOWN])} of the bag may be one' if there else ''
     return [
-        f'F by (1) is estimated, not known: rate of impulse less momentum by {FILTER}; windows '
-        f'{windows}. Its error counts white noise of the velocity and the bias of the filter, '
-        'neither noise that is correlated over the window, nor a wrench that acted at another '
-        'time, nor an error of the model: M, D and g are taken as the vehicle file has them'
+        'no wrench was mapped: F, the input and what rests on them are not known; the wrench that '
+        f'the motion needed is estimated in their place{hint}'
+    ]
+
+
+def _notes_on_run(eta: np.ndarray, nu: np.ndarray) -> list[str]:
+    """Which components of the motion are not known."""
+    rows = np.concatenate([eta[0], nu[0]])
+    lacking = [name for name, x in zip(MOTION, rows, strict=True) if np.isnan(x)]
+    if not lacking:
+        return []
+    return [f'not recorded: {", ".join(lacking)}; what depends on them is left out, never zero']
+
+
+def _notes_on_estimate(found: Unexplained, acted: Track | None) -> list[str]:
+    """Filter of the estimated wrench, and what its error does not hold."""
+    what = 'F by (1)' if acted else 'the wrench that the motion needed'
+    windows = {dof: w for dof, w in zip(DOFS, found.window, strict=True) if not np.isnan(w)}
+    if not windows:
+        return [f'{what} is not estimated: every row of (1) needs what was not recorded']
+    listed = ', '.join(f'{dof} {time:.3g} s' for dof, time in windows.items())
+    late = 'nor a wrench that acted at another time, ' if acted else ''
+    return [
+        f'{what} is estimated, not known: rate of impulse less momentum by {FILTER}; windows '
+        f'{listed}. Its error counts white noise of the velocity and the bias of the filter, '
+        f'neither noise that is correlated over the window, {late}nor an error of the model: M, D '
+        'and g are taken as the vehicle file has them'
     ]
 
 

@@ -7,7 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.bag.any_bag import survey
-from auv_analysis.bag.foreign_fields import Paths, Units, check_fields, presets
+from auv_analysis.bag.foreign_fields import (
+    EULER,
+    POSITION,
+    RATES,
+    VELOCITY,
+    Paths,
+    Units,
+    check_fields,
+    presets,
+)
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.step_topics import NotOursError
 from auv_dynamics.files.errors import InputError
@@ -26,6 +35,7 @@ THRUSTING = ('actuator', 'actuators', 'esc', 'motor', 'motors', 'propeller', 'pr
              'servo', 'servos', 'thrust', 'thruster', 'thrusters', 'thrusts')  # fmt: skip
 FROM_ATTITUDE = 'from attitude'
 SHOWN = 6  # topics of a role in one line
+MOTION = (*POSITION, *EULER, *VELOCITY, *RATES)  # components of it
 
 
 @dataclass(frozen=True)
@@ -76,6 +86,7 @@ class TopicMap:
     name : of the run, '': that of the bag
     step, window : s, None: chosen by the data
     rates : 'from attitude', or '': the angular velocity is the one recorded
+    unknown : of `MOTION` in NED and FSD, those whose numbers are no measurement
     origin : named in errors: the file, or 'options'
 
     """
@@ -86,7 +97,13 @@ class TopicMap:
     step: float | None = None
     window: float | None = None
     rates: str = ''
+    unknown: frozenset[str] = frozenset()
     origin: object = field(default='options')
+
+    @property
+    def knows_wrench(self) -> bool:
+        """Whether a wrench was mapped, or the thrusts that make it."""
+        return any(one.role in FORCES for one in self.sources.values())
 
 
 def read_mapping(file: str | Path | None, options: Mapping[str, Any]) -> TopicMap:
@@ -121,8 +138,17 @@ def read_mapping(file: str | Path | None, options: Mapping[str, Any]) -> TopicMa
         step=data.get('step'),
         window=data.get('window'),
         rates=data.get('rates', ''),
+        unknown=frozenset(data.get('unknown', ())) | _untold_angles(data),
         origin=origin,
     )
+
+
+def _untold_angles(data: Mapping[str, Any]) -> set[str]:
+    """Angles of an attitude that is mapped by some of them."""
+    told = [data[role] for role in ('odometry', 'pose') if role in data]
+    entries = [entry for one in told for entry in (one if isinstance(one, list) else [one])]
+    paths = [set(EULER).intersection(entry.get('fields', ())) for entry in entries]
+    return set().union(*(set(EULER) - some for some in paths if some))
 
 
 def _entry(told: Any) -> Any:
@@ -166,12 +192,13 @@ def _source(
 def _check_roles(data: Mapping[str, Any], origin: object) -> None:
     """Refuse what does not make a motion and a force, or makes them twice."""
     motion = [key for key in MEASURED if key in data]
-    if motion not in (['odometry'], ['pose', 'twist']):
+    turning = ['pose'] if data.get('rates') == FROM_ATTITUDE else ['pose', 'twist']
+    if motion not in (['odometry'], ['twist'], ['pose', 'twist'], turning):
         key = 'odometry' if not motion else motion[-1]
         found = ' and '.join(motion) or None
         raise InputError(origin, key, 'odometry (--odom), or both pose and twist', found)
     forces = [key for key in ('wrench', 'thrusters') if key in data]
-    if len(forces) != 1:
+    if len(forces) > 1 or ('wrench_applied' in data and not forces):
         expected = 'one of wrench (--wrench) and thrusters'
         raise InputError(origin, 'wrench', expected, ' and '.join(forces) or None)
     if 'wrench_applied' in data and data['wrench_applied'] == data.get('wrench'):

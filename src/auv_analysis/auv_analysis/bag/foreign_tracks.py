@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from auv_analysis.bag.foreign_fields import COMPONENTS, EULER, QUATERNION
+from auv_analysis.bag.foreign_fields import COMPONENTS, EULER, POSITION, RATES, VELOCITY
 from auv_analysis.bag.foreign_messages import (
     Recorded,
     logged_with,
@@ -253,7 +253,8 @@ def tracks_of(
 
     Returns
     -------
-    tracks : 'pose', 'twist' and 'wrench', and 'wrench_applied' and 'setpoint' where mapped
+    tracks : 'pose' and 'twist', and 'wrench', 'wrench_applied' and 'setpoint' where mapped; a
+        component that was not measured is NaN throughout
 
     Raises
     ------
@@ -265,6 +266,11 @@ def tracks_of(
     notes.append(_said(axes, found))
     bag, by_role = next(iter(found.values())).bag, _by_role(found, axes)
     pose = assembled([_track('pose', *one) for one in by_role.pop('pose')], bag)
+    lacking = unknown_angles(pose, mapping)
+    by_attitude = [one for one, _ in by_role['twist'] if one.source.twist_frame == 'world']
+    if lacking and (by_attitude or mapping.rates == FROM_ATTITUDE):
+        expected = 'all three angles, since rates: or twist_frame: world need them'
+        raise InputError(bag, 'pose', expected, f'none for {", ".join(lacking)}')
     moving = [(*one, pose, one[0].source.twist_frame) for one in by_role.pop('twist')]
     twists = [_velocity(*one) for one in moving]
     instead = [_without_rates(_velocity(*one[:3], _other(one[3]))) for one in moving]
@@ -277,9 +283,17 @@ def tracks_of(
             tracks['wrench'] = _of_thrusters([one for one, _ in every], vehicle, mapping, notes)
         else:
             tracks[role] = assembled([_track(role, *one) for one in every], bag)
-    for role, track in tracks.items():
-        _check_whole(role, track, bag)
+    for role, names in (('pose', POSITION), ('twist', (*VELOCITY, *RATES))):
+        unknown = [i for i, name in enumerate(names) if name in mapping.unknown]
+        rows = tracks[role].rows.copy()
+        rows[:, unknown] = np.nan
+        tracks[role] = replace(tracks[role], rows=rows)
     return tracks, assembled(instead, bag)
+
+
+def unknown_angles(pose: Track, mapping: TopicMap) -> tuple[str, ...]:
+    """Which of phi, theta and psi were not measured."""
+    return tuple(name for name in EULER if name in mapping.unknown or not pose.given[-1])
 
 
 def _by_role(
@@ -294,16 +308,12 @@ def _by_role(
                       if not np.isnan(one.rows[:, columns]).all()}  # fmt: skip
         for role, columns in halves.items():
             by_role.setdefault(role, []).append((one.part(slice(None), columns), axes[key]))
+    for role, other in (('pose', 'twist'), ('twist', 'pose')):
+        if role not in by_role:  # nothing of it was measured
+            one, told = by_role[other][0]
+            rows = np.full((len(one.rows), len(COMPONENTS[role])), np.nan)
+            by_role[role] = [(replace(one, rows=rows), told)]
     return by_role
-
-
-def _check_whole(role: str, track: Track, bag: Path) -> None:
-    """Refuse a signal of which a component is in none of its topics."""
-    lost = [name for name, given in zip(COMPONENTS[role], track.given, strict=True) if not given]
-    if lost:
-        names = [name for name in lost if name not in QUATERNION] + [*EULER] * ('qw' in lost)
-        expected = 'topics of the map that together have each of its components'
-        raise InputError(bag, role, expected, f'none with {", ".join(names)}')
 
 
 def _other(frame: str) -> str:
@@ -367,6 +377,7 @@ def assembled(parts: Sequence[Track], bag: Path) -> Track:
 def _on_one_clock(found: Mapping[str, Recorded], notes: list[str]) -> dict[str, Recorded]:
     """The same with rising stamps of one clock that does not start anew."""
     moving = [one for one in found.values() if one.source.role in MOVING]
+    moving = moving or [one for one in found.values() if one.source.role == 'pose']
     clock = next((one for one in moving if one.stamped), moving[0])
     kept = longest_stretch(clock, [])
     timed = {role: on_the_clock(one, clock, notes) for role, one in found.items()}

@@ -8,7 +8,6 @@ from glob import escape
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -19,7 +18,7 @@ from auv_analysis.metrics.summary import Window, summarize
 from auv_analysis.output.folder import ResultsFolder, results_folder
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import console, say, share_bar, waiting
-from auv_analysis.output.text import MISSING, join, number, plain, residuals
+from auv_analysis.output.text import MISSING, join, largest, number, plain, residuals
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.verdict import FAILED, verdict
 from auv_analysis.runs.run import AnyRun, Hold
@@ -110,7 +109,7 @@ def _one(name: str, summary: Mapping[str, Any]) -> list[RenderableType]:
     facts = f': law {law}, {duration} s in steps of {step} s, by {summary["source"]}'
     title = Text(name, 'bold').append(facts, 'not bold')
     parts: list[RenderableType] = [title, _tracking(summary), _couplings(summary)]
-    parts += [_unexplained(summary)] if summary.get('unexplained') else []
+    parts += [_estimate(summary, kind) for kind in HEADS if summary.get(kind)]
     parts += [Text(line, 'dim') for line in _remarks(summary)]
     parts += [Text(f'note: {note}', 'yellow') for note in summary['notes']]
     return parts
@@ -143,12 +142,15 @@ def _couplings(summary: Mapping[str, Any]) -> Table:
     )
 
 
-def _unexplained(summary: Mapping[str, Any]) -> Table:
-    """F by (1) of a recorded motion with its error, a line per degree of freedom."""
+HEADS = {'unexplained': 'F by (1)', 'required_wrench': 'required'}
+
+
+def _estimate(summary: Mapping[str, Any], kind: str) -> Table:
+    """F by (1) of a recorded motion, or the wrench that it needed, with its error, by axis."""
     heads = {'mean': 'mean', 'rms': 'rms', 'max': 'max', 'error_rms': 'error'}
     return _table(
         *(
-            (f'F by (1)\n{head}\n{WRENCH}', _numbers(summary['unexplained'][key]))
+            (f'{HEADS[kind]}\n{head}\n{WRENCH}', _numbers(summary[kind][key]))
             for key, head in heads.items()
         )
     )
@@ -166,7 +168,8 @@ def _remarks(summary: Mapping[str, Any]) -> Iterable[str]:
     if named:
         yield f'{ZERO} in every motion: {"; ".join(named)}'
     times = summary['velocity_error']['settling_time']
-    late = [i for i, time in enumerate(times or ()) if time is None]
+    left = (summary['settling'] or {}).get('residual', ())
+    late = [i for i, error in enumerate(left) if error is not None and times[i] is None]
     if late:
         reached, last = residuals(summary), plain(summary['settling']['dwell'])
         listed = join([f'{DOFS[i]} ({reached[i]})' for i in late])
@@ -188,10 +191,10 @@ def comparison_table(summaries: Mapping[str, Mapping[str, Any]]) -> Table:
     return table
 
 
-def _worst(errors: Sequence[float] | None) -> tuple[str, str]:
-    if errors is None:
+def _worst(errors: Sequence[float | None] | None) -> tuple[str, str]:
+    i = None if errors is None else largest(errors)
+    if errors is None or i is None:
         return MISSING, ''
-    i = int(np.argmax(errors))
     return f'{number(errors[i])} {"m/s" if i < 3 else "rad/s"}', DOFS[i]
 
 

@@ -30,9 +30,10 @@ def beyond_authority(vehicle: Vehicle, largest: Sequence[float]) -> list[str]:
     Parameters
     ----------
     vehicle : whose weight and thrusters are known, the latter where its file gives them
-    largest : (6,) magnitudes of the command, N and N m
+    largest : (6,) magnitudes of the command, N and N m; None: not recorded
 
     """
+    largest = [0.0 if value is None else value for value in largest]
     found = list(_above_weight(float(vehicle.weight), largest))
     if vehicle.thrusters is not None:
         found += _without_actuators(vehicle.thrusters, largest)

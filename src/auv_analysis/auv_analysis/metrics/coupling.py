@@ -4,12 +4,16 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.metrics.energy import kinetic_energy, shares
+from auv_analysis.metrics.energy import (
+    NEGLIGIBLE,
+    depends_on_known,
+    kinetic_energy,
+    mapped,
+    shares,
+)
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.laws.model import decompose, inverse_upper
-
-NEGLIGIBLE = 1e-12  # an entry below this, relative to the largest, is a zero of the structure
 
 
 def velocity_deformation(Upsilon_inv: np.ndarray) -> np.ndarray:
@@ -24,12 +28,12 @@ def input_deformation(Upsilon: np.ndarray) -> np.ndarray:
 
 def delta_xi(Upsilon_inv: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """Xi - nu, (33): nu (..., 6) in m/s, rad/s to (..., 6) in the same units."""
-    return nu @ velocity_deformation(Upsilon_inv).T
+    return mapped(velocity_deformation(Upsilon_inv), nu)
 
 
 def delta_pi(Upsilon: np.ndarray, tau: np.ndarray) -> np.ndarray:
     """Pi - tau with pi = Upsilon^T tau, (34): tau (..., 6) in N, N m to (..., 6)."""
-    return tau @ input_deformation(Upsilon).T
+    return mapped(input_deformation(Upsilon), tau)
 
 
 def structural_zeros(Upsilon: np.ndarray, Upsilon_inv: np.ndarray) -> dict[str, list[str]]:
@@ -49,16 +53,25 @@ def structural_zeros(Upsilon: np.ndarray, Upsilon_inv: np.ndarray) -> dict[str, 
 
 
 class Products:
-    """Sums of products of six signals, gathered over blocks of samples."""
+    """Sums of products of six signals, gathered over blocks of samples.
+
+    Attributes
+    ----------
+    known : (6,) whether each signal is known; one that is NaN throughout is not
+
+    """
 
     def __init__(self) -> None:
         self.count = 0
+        self.known = np.ones(6, bool)
         self.sums = np.zeros((6, 6))
         self.peaks = np.zeros(6)
 
     def add(self, signals: np.ndarray) -> None:
         """Add the next samples (n, 6)."""
         self.count += len(signals)
+        self.known = ~np.isnan(signals[:1]).any(axis=0)
+        signals = signals if self.known.all() else np.where(self.known, signals, 0.0)
         self.sums += signals.T @ signals
         np.maximum(self.peaks, np.abs(signals).max(axis=0, initial=0.0), out=self.peaks)
 
@@ -70,7 +83,12 @@ class Products:
     @property
     def rms(self) -> list[float]:
         """Root mean squares of the six signals."""
-        return np.sqrt(np.diagonal(self.means)).tolist()
+        return np.where(self.known, np.sqrt(np.diagonal(self.means)), np.nan).tolist()
+
+    @property
+    def largest(self) -> list[float]:
+        """Largest magnitudes of the six signals."""
+        return np.where(self.known, self.peaks, np.nan).tolist()
 
 
 def pieces(weights: np.ndarray, signals: np.ndarray) -> np.ndarray:
@@ -103,10 +121,12 @@ def coupling_terms(weights: np.ndarray, products: Products) -> list[dict[str, An
     terms : a dict for each entry that is no structural zero: `to` and `from`, the `coefficient`,
         the `rms` and `max` of the piece in the unit of the component `to`, and `share_percent`,
         its part of the mean square of the deformation. The shares of one component add to 100 %;
-        one is negative where the piece takes away from what the others add. None: nothing moves.
+        one is negative where the piece takes away from what the others add. None: nothing moves,
+        or a signal that it needs is not known.
 
     """
-    mean = products.means
+    mean, rms, largest = products.means, products.rms, products.largest
+    whole = depends_on_known(weights, products.known)
     along = weights @ mean  # (6, 6): mean of deformation i times signal j
     squares = (along * weights).sum(axis=1)
     found = []
@@ -117,9 +137,11 @@ def coupling_terms(weights: np.ndarray, products: Products) -> list[dict[str, An
                 'to': DOFS[i],
                 'from': DOFS[j],
                 'coefficient': float(weight),
-                'rms': float(abs(weight) * np.sqrt(mean[j, j])),
-                'max': float(abs(weight) * products.peaks[j]),
-                'share_percent': float(100.0 * part / squares[i]) if squares[i] > 0 else None,
+                'rms': float(abs(weight) * rms[j]),
+                'max': float(abs(weight) * largest[j]),
+                'share_percent': (
+                    float(100.0 * part / squares[i]) if whole[i] and squares[i] > 0 else None
+                ),
             }
         )
     return found

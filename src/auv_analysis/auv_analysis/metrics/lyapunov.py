@@ -102,6 +102,7 @@ def lyapunov(run: AnyRun, model: ControlModel) -> dict[str, Any]:
         actuators=run.acting,
         sampled=run.hold == 'zoh',
         gaps=len(run.gaps),
+        whole=run.knows_wrench and not run.unknown,
     )
 
 
@@ -118,6 +119,7 @@ def summary_of(
     actuators: bool,
     sampled: bool,
     gaps: int = 0,
+    whole: bool = True,
 ) -> dict[str, Any]:
     """The same from the certificates of consecutive blocks, and what is known of their run.
 
@@ -130,18 +132,20 @@ def summary_of(
     sensors, actuators : the law does not see the true velocity; its wrench is not the one applied
     sampled : zero-order hold
     gaps : number of times without samples
+    whole : whether all velocities and the wrench were recorded
 
     """
     reasons = [
         applicability(law, gains, model),
         _against_15(knows_F, kinds),
         'the law does not see the true velocity, so that (26) is not L_dot' if sensors else '',
+        '' if whole else 'not all velocities and the wrench were recorded',
         'the run has gaps, across which nothing has a rate' if gaps else '',
         'the wrench applied is not that of the law, so that (26) is not L_dot' if actuators else '',
     ]
     reason = '; '.join(filter(None, reasons))
     summary = {'applicable': not reason, 'reason': reason, **dict.fromkeys(FIGURES)}
-    if law in LAWS and gains is not None and not gaps:
+    if law in LAWS and gains is not None and not gaps and whole:
         summary |= as_figures(found, start)
         if sensors or actuators or _no_identity(form_of(law, gains, model)):
             summary |= dict.fromkeys(SHARES)

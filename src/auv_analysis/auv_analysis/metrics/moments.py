@@ -165,6 +165,12 @@ def add_columns(
             peaks[s, i] = max(peaks[s, i], np.abs(values).max(initial=0.0))
 
 
+def known_or_zero(values: np.ndarray) -> np.ndarray:
+    """The same (n, 6) with zeros for what was not recorded, so that it spoils nothing else."""
+    unknown = np.isnan(values[:1]).any(axis=0)
+    return np.where(unknown, 0.0, values) if unknown.any() else values
+
+
 def _zeros() -> np.ndarray:
     return np.zeros((len(NAMES), 6))
 
@@ -192,7 +198,9 @@ class Moments:
         """Add the samples of a block, (n, 6) each."""
         known = run.disturbance_estimate if run.disturbance is None else run.disturbance
         values = run.nu, run.nu_d, run.tau, run.disturbance_estimate, known
-        nu, nu_d, tau, f, F = (np.ascontiguousarray(value, float).ravel() for value in values)
+        nu, nu_d, tau, f, F = (
+            np.ascontiguousarray(known_or_zero(v), float).ravel() for v in values
+        )
         self.count += len(run.t)
         self.first, self.last = min(self.first, run.t[0]), max(self.last, run.t[-1])
         add = add_compiled if LANES else add_columns

@@ -109,6 +109,9 @@ SIGNALS = {
         _six('F_', _AXES),
     ),
     'unexplained': Quantity('F', _WRENCH, 'unexplained wrench', '(1)', 'F by inverse dynamics'),
+    'required_wrench': Quantity(
+        'τ', _WRENCH, 'required wrench', '(1)', 'M ν̇ + C ν + D ν + g, τ − F of the motion',
+    ),
     'f': Quantity('f', _WRENCH, 'estimate of F', '(21)', 'estimate of F by the adaptive term'),
     'lumped_error': Quantity(
         'w', _WRENCH, 'lumped estimation error', 'w = f − F, (22)', 'estimation error of F',

@@ -15,7 +15,7 @@ from auv_analysis.metrics.coupling import (
     structural_zeros,
     velocity_deformation,
 )
-from auv_analysis.metrics.energy import shares
+from auv_analysis.metrics.energy import depends_on_known, shares
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.metrics.moments import Moments, Tally, maps_of
 from auv_analysis.runs.run import AnyRun, Run, RunInfo
@@ -73,7 +73,11 @@ def summarize(
         velocities.add(block.nu)
         inputs.add(block.tau)
     whole, after = tally.between(), tally.between(late)
-    energies = {w: _energy(tallies[w].between(*cuts[w]), w) for w in cuts}
+    moved, commanded = velocities.known, inputs.known
+    by_xi = depends_on_known(Upsilon_inv, moved)
+    energies = {w: _energy(tallies[w].between(*cuts[w]), w, by_xi) for w in cuts}
+    deformed = depends_on_known(velocity_deformation(Upsilon_inv), moved)
+    input_deformed = depends_on_known(input_deformation(Upsilon), commanded)
     listed = dict.fromkeys([*usual, *windows])
     figures = {
         'scenario': run.scenario,
@@ -84,31 +88,40 @@ def summarize(
         'samples': run.samples,
         'kinetic_energy': energies[chosen],
         'kinetic_energy_windows': [energies[entry] for entry in listed],
-        'velocity': {'rms': velocities.rms, 'max': velocities.peaks.tolist()},
-        **_errors(run, whole, after),
+        'velocity': {'rms': velocities.rms, 'max': velocities.largest},
+        **_errors(run, whole, after, moved),
         'lumped_error': {
             'rms': whole.rms(moments.LUMPED) if run.knows_disturbance else None,
             'max_after_2s': _peak(after, moments.LUMPED) if run.knows_disturbance else None,
         },
         'coupling': {
-            'delta_xi_max': whole.peak(moments.DELTA_XI),
-            'delta_pi_max': whole.peak(moments.DELTA_PI),
+            'delta_xi_max': if_known(deformed, whole.peak(moments.DELTA_XI)),
+            'delta_pi_max': if_known(input_deformed, whole.peak(moments.DELTA_PI)),
             'structural_zeros': structural_zeros(Upsilon, Upsilon_inv),
         },
         'coupling_terms': {
             'delta_xi': coupling_terms(velocity_deformation(Upsilon_inv), velocities),
             'delta_pi': coupling_terms(input_deformation(Upsilon), inputs),
         },
-        'effort': {'rms': whole.rms(moments.TAU), 'max': whole.peak(moments.TAU)},
+        'effort': {
+            'rms': if_known(commanded, whole.rms(moments.TAU)),
+            'max': if_known(commanded, whole.peak(moments.TAU)),
+        },
         'gains': {'K_D': gains[0], 'K_f': gains[1]},
         'decomposition': {'Upsilon': Upsilon.tolist(), 'N': model.N.tolist()},
         'lyapunov': lyapunov(run, model),
         'acceleration': run.acceleration,
-        'unexplained': unexplained_figures(run),
+        'unexplained': estimate_figures(run.unexplained, run.unexplained_error),
+        'required_wrench': estimate_figures(run.required_wrench, run.required_wrench_error),
         'gaps': gap_figures(run),
         'notes': list(run.notes),
     }
     return _known(figures)
+
+
+def if_known(known: np.ndarray, values: Sequence[float | None]) -> list[float | None]:
+    """Figures of six degrees of freedom, None where they rest on what was not recorded."""
+    return [value if there else None for there, value in zip(known, values, strict=True)]
 
 
 def _known(value: Any) -> Any:
@@ -198,28 +211,31 @@ def _cuts(run: AnyRun, window: Window) -> Window:
     return first - run.step / 2, float(np.nextafter(last + run.step / 2, np.inf))
 
 
-def _errors(run: AnyRun, whole: Moments, after: Moments) -> dict[str, Any]:
+def _errors(run: AnyRun, whole: Moments, after: Moments, known: np.ndarray) -> dict[str, Any]:
     if not run.knows_setpoint:
         none = dict.fromkeys(('rms', 'max_after_2s', 'settling_time'))
         return {'velocity_error': none, 'settling': None}
+    asked = ~np.isnan(run.nu_d[0])
+    known = known & asked
     band = band_of(whole.peaks[moments.SETPOINT])
     blocks = ((block.t, block.nu_d - block.nu) for block in run.blocks())
     times, residual = _settling(blocks, run.samples, band)
+    late = _peak(after, moments.ERROR)
     return {
         'velocity_error': {
-            'rms': whole.rms(moments.ERROR),
-            'max_after_2s': _peak(after, moments.ERROR),
-            'settling_time': times,
+            'rms': if_known(known, whole.rms(moments.ERROR)),
+            'max_after_2s': late and if_known(known, late),
+            'settling_time': if_known(known, times),
         },
         'settling': {
-            'band': band.tolist(),
+            'band': if_known(asked, band.tolist()),
             'dwell': dwell(run.samples) * run.step,
-            'residual': residual,
+            'residual': if_known(known, residual),
         },
     }
 
 
-def _energy(inside: Moments, window: tuple[float, float]) -> dict[str, Any]:
+def _energy(inside: Moments, window: tuple[float, float], known: np.ndarray) -> dict[str, Any]:
     if inside.count < 2:
         return {
             'mean': None,
@@ -227,11 +243,11 @@ def _energy(inside: Moments, window: tuple[float, float]) -> dict[str, Any]:
             'shares_percent': None,
             'window': list(window),
         }
-    components = inside.mean(moments.ENERGY)
+    components = np.where(known, inside.mean(moments.ENERGY), np.nan)
     return {
         'mean': float(components.sum()),
         'mean_by_component': components.tolist(),
-        'shares_percent': shares(components).tolist(),
+        'shares_percent': shares(components).tolist() if known.all() else None,
         'window': [float(inside.first), float(inside.last)],
     }
 
@@ -246,15 +262,16 @@ def gap_figures(run: RunInfo) -> dict[str, Any]:
     return {'valid_share': run.valid_share, 'spans': spans}
 
 
-def unexplained_figures(run: AnyRun) -> dict[str, list[float]] | None:
-    """Figures of F as estimated from measurements, N and N m; None where it is not."""
-    if run.unexplained is None or run.unexplained_error is None:
+def estimate_figures(
+    wrench: np.ndarray | None, error: np.ndarray | None
+) -> dict[str, list[float]] | None:
+    """Figures of a wrench (n, 6) that was estimated, and of its error; None: it is not."""
+    if wrench is None or error is None or np.isnan(wrench[0]).all():
         return None
-    F, error = run.unexplained, run.unexplained_error
     found = {
-        'mean': F.mean(axis=0),
-        'rms': np.sqrt((F**2).mean(axis=0)),
-        'max': np.abs(F).max(axis=0),
+        'mean': wrench.mean(axis=0),
+        'rms': np.sqrt((wrench**2).mean(axis=0)),
+        'max': np.abs(wrench).max(axis=0),
         'error_rms': np.sqrt((error**2).mean(axis=0)),
     }
     return {name: values.tolist() for name, values in found.items()}

@@ -1,7 +1,8 @@
 """Text of numbers, lists and symbols: rounded, grouped, with a true minus, indices lowered."""
 
+import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, zip_longest
 from typing import Any
 
@@ -19,12 +20,12 @@ _NUMBERED = re.compile(r'(?<=[ξπ])([1-6])\b')
 
 
 def number(value: Any, digits: int = 3) -> str:
-    """Text of a number with that many significant digits; an en dash for None.
+    """Text of a number with that many significant digits; an en dash for None and NaN.
 
     Whole digits are never rounded away: 11479.1 with 3 digits is 11 479.
 
     """
-    if value is None:
+    if value is None or math.isnan(value):
         return MISSING
     value = float(value)
     if value == 0.0:
@@ -46,8 +47,8 @@ def plain(value: float, digits: int = 4) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Text of a number with that many decimals; an en dash for None."""
-    if value is None:
+    """Text of a number with that many decimals; an en dash for None and NaN."""
+    if value is None or math.isnan(value):
         return MISSING
     return f'{value:,.{decimals}f}'.replace(',', '\u202f').replace('-', '−')
 
@@ -66,6 +67,12 @@ def tied(text: str) -> str:
     """The same text, whose numbers do not part from their units at the end of a line."""
     text = re.sub(r'(?<=\d) (?=(J|N|N m|m|s|%|m/s|rad/s|kg)\b|%)', '\u00a0', text)
     return re.sub(r'\bN m\b', 'N\u00a0m', text)
+
+
+def largest(values: Sequence[float | None], members: Iterable[int] = range(6)) -> int | None:
+    """Index of the largest of some values, None where none of them is known."""
+    known = {i: x for i in members if (x := values[i]) is not None and not math.isnan(x)}
+    return max(known, key=known.__getitem__, default=None)
 
 
 def join(words: Sequence[str]) -> str:

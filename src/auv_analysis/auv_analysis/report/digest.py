@@ -26,7 +26,8 @@ class RunDigest(RunInfo):
 
     Signals of six columns: `nu`, `tau`, `delta_xi`, `delta_pi`, `energy`, and where they are there
     `error`, `nu_d`, `F`, `lumped_error`, `applied` and, of an F that was estimated, `unexplained`
-    with `least` and `most`, two standard errors around it. Of one column: `kinetic` and `wanted`,
+    or, without a recorded wrench, `required_wrench`, with `least` and `most`, two standard errors
+    around it. What was not recorded is NaN throughout. Of one column: `kinetic` and `wanted`,
     the energies of the run and of its set-point, if there is one, and of a certificate `L`,
     `L_dot`, `identity`, `bound` and `increasing`, 1 where the identity is positive, else 0.
 
@@ -144,9 +145,11 @@ def last_third(run: RunInfo) -> float:
     return 2.0 / 3.0 * run.duration
 
 
+ESTIMATES = ('unexplained', 'required_wrench')  # wrenches that are estimated with their error
 SPLIT = ('error', 'lumped_error', 'tau', 'delta_pi')  # begin with a peak that dwarfs the rest
 WHOLE = (
-    'F', 'delta_xi', 'applied', 'kinetic', 'wanted', 'energy', 'unexplained', 'least', 'most',
+    'F', 'delta_xi', 'applied', 'kinetic', 'wanted', 'energy', 'unexplained', 'required_wrench',
+    'least', 'most',
 )  # fmt: skip
 NEAR_ZERO = 0.005  # m/s, rad/s: what counts as a settled error
 SHARE_COLUMNS = 600  # of the stacked shares
@@ -179,7 +182,8 @@ def digest(run: AnyRun, window: float = ENERGY_WINDOW) -> RunDigest:
     for block in run.blocks():
         builder.add(block)
     true = run.knows_disturbance and not (run.sensing or run.acting)
-    if true and run.law in LAWS and run.gains:
+    whole = run.knows_wrench and not run.unknown
+    if true and whole and run.law in LAWS and run.gains:
         builder.add_certificate()
     return builder.built()
 
@@ -200,10 +204,10 @@ def signals(run: Run, model: ControlModel) -> dict[str, np.ndarray]:
         wanted = kinetic_energy(Upsilon_inv, model.N, run.nu_d)
         found |= {'error': run.nu_d - run.nu, 'nu_d': run.nu_d}
         found['wanted'] = wanted.sum(axis=1, keepdims=True)
-    if run.unexplained is not None and run.unexplained_error is not None:
-        apart = 2.0 * run.unexplained_error
-        found['unexplained'] = run.unexplained
-        found |= {'least': run.unexplained - apart, 'most': run.unexplained + apart}
+    for name in ESTIMATES:
+        wrench, error = getattr(run, name), getattr(run, f'{name}_error')
+        if wrench is not None and error is not None:
+            found |= {name: wrench, 'least': wrench - 2.0 * error, 'most': wrench + 2.0 * error}
     if run.applied is not None:
         found['applied'] = run.applied
     if run.disturbance is not None:
@@ -255,12 +259,13 @@ class _Builder:
             self._course.setdefault(name, []).append(values[kept].copy())
         self._add_shares(block.t, found['energy'])
         error = found.get('error', np.zeros((1, 6)))
-        far = np.flatnonzero(np.abs(error).max(axis=1) > NEAR_ZERO)
+        far = np.flatnonzero(np.any(np.abs(error) > NEAR_ZERO, axis=1))
         if len(far):
             self._outside = float(block.t[far[-1]] - self._run.start)
             self._left = self._seen - len(error) + int(far[-1])
         self._estimates |= bool(np.any(block.disturbance_estimate != 0.0))
-        self._missed |= np.any(block.tau != block.tau_applied, axis=0)
+        if block.applied is not None:
+            self._missed |= np.any(block.tau != block.applied, axis=0)
         if block.disturbance is not None:
             self._digest.update(np.ascontiguousarray(block.disturbance).tobytes())
         self._end = block.eta[-1]

@@ -13,8 +13,8 @@ import numpy as np
 
 from auv_analysis.metrics.quantities import SIGNALS, Quantity
 from auv_analysis.metrics.summary import TRANSIENT
-from auv_analysis.report.digest import RunDigest
-from auv_analysis.report.plots import COLOURS, GREY, moving
+from auv_analysis.report.digest import ESTIMATES, RunDigest
+from auv_analysis.report.plots import COLOURS, GREY, moving, unrecorded
 from auv_analysis.report.traces import broken, thinned
 from auv_analysis.scenario.fault_words import Mark
 from auv_dynamics.vehicle import DOFS
@@ -30,7 +30,7 @@ HERE = Path(__file__).parent
 GROUPS = {'linear': range(3), 'angular': range(3, 6)}
 SECTIONS = {  # part of the report -> its signals, beginnings of the figures its panels stand for
     'errors': (('error',), ('errors_',)),
-    'estimates': (('lumped_error', 'F', 'unexplained'), ('lumped_error_', 'uncertainty_')),
+    'estimates': (('lumped_error', 'F', *ESTIMATES), ('lumped_error_', 'uncertainty_')),
     'inputs': (('tau', 'applied'), ('inputs_',)),
     'certificates': ((), ('certificate_',)),
     'energy': (('energy',), ('kinetic_energy',)),
@@ -256,7 +256,7 @@ def panel_sets(runs: Mapping[str, RunDigest]) -> dict[str, PanelSet]:
         if name == 'certificates':
             panels = list(_certificates(runs))
         elif name == 'energy':
-            panels = [_kinetic(runs), *_shares(runs), *panels]
+            panels = [*_kinetic(runs), *_shares(runs), *panels]
         if panels:
             sets[name] = PanelSet(tuple(panels), figures)
     return sets
@@ -289,7 +289,7 @@ def _six_signals(signal: str, runs: Mapping[str, RunDigest]) -> Iterator[TimePan
             _curve(name, run, DOFS[i], COLOURS[i], signal, i)
             for name, run in there.items()
             for i in members
-            if i in moved
+            if i in moved and DOFS[i] not in unrecorded(run.part(signal))
         ]
         if curves:
             title = f'{quantity.label.capitalize()}, {group}'
@@ -320,15 +320,16 @@ def _certificates(runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:
         yield TimePanel(f'rates-{name}', f'Derivative of L, {name}', 'dL/dt (W)', curves)
 
 
-def _kinetic(runs: Mapping[str, RunDigest]) -> TimePanel:
+def _kinetic(runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:
     looks = {'wanted': ('of the set-point', GREY, 3.0), 'kinetic': ('of the run', INK, 1.6)}
     curves = tuple(
         _curve(name, run, key, colour, signal, width=width)
         for name, run in runs.items()
         for signal, (key, colour, width) in looks.items()
-        if (signal, 'whole') in run.traces
+        if (signal, 'whole') in run.traces and not np.isnan(run.part(signal).peak[0])
     )
-    return TimePanel('kinetic', 'Kinetic energy', 'kinetic energy (J)', curves)
+    if curves:
+        yield TimePanel('kinetic', 'Kinetic energy', 'kinetic energy (J)', curves)
 
 
 def _shares(runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:

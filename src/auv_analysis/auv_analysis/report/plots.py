@@ -254,8 +254,19 @@ def before_after(
 
 
 def moving(part: Part, skip: Sequence[str] = ()) -> list[int]:
-    """Indices of the columns that are drawn: not in `skip` and not zero throughout."""
-    return [i for i in range(6) if DOFS[i] not in skip and part.peak[i] != 0.0]
+    """Indices of the columns that are drawn: not in `skip`, recorded and not zero throughout."""
+    return [i for i in range(6) if DOFS[i] not in skip and part.peak[i] > 0.0]
+
+
+def unrecorded(part: Part, skip: Sequence[str] = ()) -> list[str]:
+    """Degrees of freedom not in `skip` of which nothing was recorded."""
+    return [dof for dof, x in zip(DOFS, part.peak, strict=True) if np.isnan(x) and dof not in skip]
+
+
+def leave_out(axes: Axes) -> None:
+    """Say in a panel that what it would show was not recorded."""
+    axes.text(0.5, 0.5, 'not recorded', transform=axes.transAxes, ha='center', color=GREY)
+    axes.set_yticks([])
 
 
 def groups(columns: Sequence[int]) -> list[list[int]]:

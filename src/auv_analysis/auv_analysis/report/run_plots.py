@@ -19,14 +19,14 @@ from auv_analysis.metrics.statistics import Part
 from auv_analysis.metrics.summary import BAND_TEXT, DWELL, TRANSIENT, band_of
 from auv_analysis.output.text import join, number
 from auv_analysis.report import plots
-from auv_analysis.report.digest import FOREVER, RunDigest, alike, common_window, digests
+from auv_analysis.report.digest import ESTIMATES, FOREVER, RunDigest, alike, common_window, digests
 from auv_analysis.report.panels import different_disturbances
 from auv_analysis.report.plots import COLOURS, DASHES, GREY, RUNS, Drawn, FigureRecord, save_figures
 from auv_analysis.report.wrench_plots import (
     applied_figure,
     certificate_figure,
+    estimate_figure,
     is_drawn,
-    unexplained_figure,
 )
 from auv_analysis.runs.run import AnyRun
 from auv_dynamics.vehicle import DOFS
@@ -72,8 +72,9 @@ def draw_figures(
         if run.knows_disturbance:
             made[f'lumped_error_{run.controller}'] = partial(_lumped, run)
     for name, run in drawn.items():
-        if 'unexplained' in run.columns:
-            made[f'unexplained_{name}'] = partial(unexplained_figure, run)
+        for kind in ESTIMATES:
+            if kind in run.columns:
+                made[f'{kind}_{name}'] = partial(estimate_figure, run, kind)
     for run in different_disturbances(drawn).values():
         made[f'uncertainty_{run.controller}'] = partial(_uncertainty, run)
     for name, run in drawn.items():
@@ -117,16 +118,20 @@ def six_signals(kind: str, run: RunDigest, quantity: Quantity, zeros: Sequence[s
         return None, title, f'{title}: without a set-point there is none.'
     drawn = plots.moving(run.part(signal), zeros)
     structure = structure_sentence(kind, zeros)
+    lacking = plots.unrecorded(run.part(signal), zeros)
+    without = f'Not recorded, or resting on what was not: {join(lacking)}.' if lacking else ''
     if not drawn:
-        return None, title, structure if len(zeros) == 6 else f'{title}: zero throughout.'
+        nothing = without or f'{title}: zero throughout.'
+        return None, title, structure if len(zeros) == 6 else nothing
     split = (signal, 'early') in run.traces
     caption = [f'{title}.']
     if split:
         caption.append(f'Left the first {TRANSIENT:g} s, right the rest on a scale of its own.')
     caption += [_peaks(run.part(signal), quantity, drawn), structure]
-    still = [dof for i, dof in enumerate(DOFS) if i not in drawn and dof not in zeros]
+    still = [d for i, d in enumerate(DOFS) if i not in drawn and d not in (*zeros, *lacking)]
     if still:
         caption.append(f'Zero throughout this run and not drawn: {join(still)}.')
+    caption.append(without)
     caption.append(plots.shade_sentence(run).strip())
     figure = (_split_panels if split else _whole_panels)(run, signal, quantity, drawn)
     return figure, title, ' '.join(filter(None, caption))
@@ -218,6 +223,7 @@ def _whole_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequen
     return figure
 
 
+NO_TOTAL = 'not all velocities were recorded, so neither the total nor its shares are known.'
 GREY_LINE = ', and in grey that of a vehicle that moves exactly as the set-point{} asks'
 MARKERS = 'os^vPX'
 SMALLEST_SHARE = 1e-6  # %, left end of the logarithmic axis
@@ -244,6 +250,9 @@ def settling(runs: Mapping[str, RunDigest]) -> tuple[Figure | None, str, str]:
             t, error = run.line('error', i, 'log')
             rest = np.maximum.accumulate(error[::-1])[::-1]
             axes.plot(t[rest > 0], rest[rest > 0], **look)
+        if all(np.isnan(run.part('error').peak[i]) for run in runs.values()):
+            plots.leave_out(axes)
+            continue
         if (band := bands[i]) is not None:
             axes.axhline(band, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
         plots.logarithmic(axes, 'x', 'y')
@@ -262,7 +271,7 @@ def common_bands(runs: Mapping[str, RunDigest]) -> list[float | None]:
     """Band of a settled error per degree of freedom; None where the runs do not share it."""
     bands = np.array([band_of(run.part('nu_d').peak) for run in runs.values()])
     return [
-        float(band[0]) if np.allclose(band, band[0], rtol=1e-6, atol=0.0) else None
+        float(band[0]) if np.allclose(band, band[0], rtol=1e-6, atol=0.0, equal_nan=True) else None
         for band in bands.T
     ]
 
@@ -278,6 +287,9 @@ def inputs(runs: Mapping[str, RunDigest]) -> tuple[Figure, str, str]:
     apart = False
     for i, axes in enumerate(panels):
         path = [run.part('tau').path[i] for run in runs.values()]
+        if np.isnan(path).all():
+            plots.leave_out(axes)
+            continue
         above = 3.0 - np.argsort(np.argsort(path)) / len(runs)  # smooth lines over restless ones
         for look, run, order in zip(_looks(runs, COLOURS[i]), runs.values(), above, strict=True):
             axes.plot(*run.drawn('tau', i, 'log'), zorder=order, **look)
@@ -301,8 +313,10 @@ def inputs(runs: Mapping[str, RunDigest]) -> tuple[Figure, str, str]:
     return figure, title, caption
 
 
-def energy(runs: Mapping[str, RunDigest], leading: RunDigest) -> tuple[Figure, str, str]:
+def energy(runs: Mapping[str, RunDigest], leading: RunDigest) -> Drawn:
     """Kinetic energy over time and its shares. Returns figure, title and caption."""
+    if leading.unknown:
+        return None, 'Kinetic energy', f'Kinetic energy: {NO_TOTAL}'
     figure = plots.new_figure(2.7)
     left, right = figure.subplots(1, 2)
     handles, wanted = [], []
@@ -337,8 +351,11 @@ def energy(runs: Mapping[str, RunDigest], leading: RunDigest) -> tuple[Figure, s
     return figure, title, caption
 
 
-def energy_shares(runs: Mapping[str, RunDigest]) -> tuple[Figure, str, str]:
+def energy_shares(runs: Mapping[str, RunDigest]) -> Drawn:
     """Shares of the mean kinetic energy on a logarithmic axis."""
+    runs = {name: run for name, run in runs.items() if not run.unknown}
+    if not runs:
+        return None, 'Shares of kinetic energy', f'Shares of kinetic energy: {NO_TOTAL}'
     figure = plots.new_figure(2.9)
     axes = figure.subplots()
     end = common_window(runs)

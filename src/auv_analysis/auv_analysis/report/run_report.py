@@ -8,17 +8,18 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.authority import beyond_authority
+from auv_analysis.metrics.quantities import VELOCITY, WRENCH
 from auv_analysis.metrics.summary import band_of
-from auv_analysis.output.text import fixed, join, number, plain, residuals
+from auv_analysis.output.text import fixed, join, largest, number, plain, residuals
 from auv_analysis.report import run_tables as tables
-from auv_analysis.report.digest import TINY, RunDigest, alike, digests, last_third
+from auv_analysis.report.digest import ESTIMATES, TINY, RunDigest, alike, digests, last_third
 from auv_analysis.report.document import Block, Gallery, Section, Sentence, prose, write_document
 from auv_analysis.report.panels import PanelSet, interactive
-from auv_analysis.report.plots import FigureRecord
+from auv_analysis.report.plots import GROUPS, FigureRecord
 from auv_analysis.report.run_plots import draw_figures, reference
 from auv_analysis.report.scenario_text import SetUp, set_up
 from auv_analysis.report.verdict import verdict
-from auv_analysis.report.wrench_plots import unexplained_finding
+from auv_analysis.report.wrench_plots import estimate_finding
 from auv_analysis.runs.run import FOREIGN, AnyRun
 from auv_dynamics.vehicle import DOFS
 
@@ -26,7 +27,7 @@ Texts = str | Mapping[str, str]
 Summaries = Mapping[str, Mapping[str, Any]]
 FIGURES = {  # part of the report -> beginnings of the names of its figures
     'errors': ('errors_', 'settling'),
-    'estimates': ('lumped_error_', 'uncertainty_', 'unexplained_'),
+    'estimates': ('lumped_error_', 'uncertainty_', *(f'{kind}_' for kind in ESTIMATES)),
     'inputs': ('inputs_',),
     'certificates': ('certificate_',),
     'energy': ('kinetic_energy', 'energy_shares'),
@@ -167,7 +168,7 @@ class SectionInputs:
             yield tables.set_up_table(name, scene, names, several=several)
         if not several and scene.name and len(scenarios) > 1:
             yield 'The other scenarios’ files are not shown.'
-        ends = {name: run.end[:3] for name, run in self.runs.items()}
+        ends = {n: run.end[:3] for n, run in self.runs.items() if not np.isnan(run.end[:3]).all()}
         yield prose('position', ends=ends, ends_apart=_apart(self.runs))
 
     def _shared(self) -> tuple[list[str], list[str]]:
@@ -203,9 +204,8 @@ class SectionInputs:
         yield from self._shown('errors')
         if not known:
             yield NO_F
-        unexplained = tables.unexplained_table(self.summaries)
-        if unexplained is not None:
-            yield unexplained
+        estimates = (tables.estimate_table(self.summaries, kind) for kind in ESTIMATES)
+        yield from (table for table in estimates if table is not None)
         yield from self._shown('estimates')
         yield from self._shown('inputs')
         yield prose('certificate', sampled=_sampled(self.summaries))
@@ -255,7 +255,7 @@ def _apart(runs: Mapping[str, RunDigest]) -> float | None:
     """
     ends = [run.end[:3] for run in runs.values()]
     lengths = [run.duration for run in runs.values()]
-    moved = np.ptp([run.begin for run in runs.values()], axis=0).max() > TINY
+    moved = not np.ptp([run.begin for run in runs.values()], axis=0).max() <= TINY  # or unknown
     if len(ends) < 2 or np.ptp(lengths) > TINY or moved or not alike([*runs.values()], 'nu_d'):
         return None
     return max(float(np.linalg.norm(a - b)) for a in ends for b in ends)
@@ -290,7 +290,8 @@ def findings(runs: Mapping[str, RunDigest], summaries: Summaries) -> list[Senten
     ]
     found += [Sentence(_applied(runs), 'inputs_compared')]
     found += [
-        Sentence(unexplained_finding(n, s), 'table-unexplained') for n, s in summaries.items()
+        Sentence(estimate_finding(n, s), f'table-{ESTIMATES[s["unexplained"] is None]}')
+        for n, s in summaries.items()
     ]
     found += [Sentence(_energy(leading, mine), 'table-energy')]
     found += [Sentence(_couplings(mine, leading), 'table-couplings')]
@@ -313,9 +314,13 @@ def _settling(name: str, run: RunDigest, summary: Mapping[str, Any]) -> str:
     times = summary['velocity_error']['settling_time']
     if times is None:
         return f'Of {name} no set-point is known, and so no error.'
-    missing = [i for i, time in enumerate(times) if time is None]
+    known = [i for i, x in enumerate(summary['settling']['residual']) if x is not None]
+    missing = [i for i in known if times[i] is None]
+    if not known:
+        return f'Of {name} no axis has both a set-point and a velocity, and so no error is known.'
     if not missing:
-        return f'Under {name} every velocity error has settled after {max(times):.2f} s.'
+        every = 'every velocity error' if len(known) == 6 else 'every velocity error that is known'
+        return f'Under {name} {every} has settled after {max(times[i] for i in known):.2f} s.'
     noisy = [i for i in missing if _is_noise(run, i)]
     reached = residuals(summary)
     parts = []
@@ -345,25 +350,27 @@ def _late_errors(summaries: Summaries) -> str:
     parts = []
     for name, summary in summaries.items():
         late = summary['velocity_error']['max_after_2s']
-        if late is not None:
-            linear, angular = int(np.argmax(late[:3])), 3 + int(np.argmax(late[3:]))
-            parts.append(
-                f'{number(late[linear], 2)} m/s ({DOFS[linear]}) and '
-                f'{number(late[angular], 2)} rad/s ({DOFS[angular]}) under {name}'
-            )
+        reached = _halves(late or [None] * 6, VELOCITY, 2)
+        if reached:
+            parts.append(f'{reached} under {name}')
     return f'After 2 s the errors reach at most {"; ".join(parts)}.' if parts else ''
 
 
 def _inputs(summaries: Summaries) -> str:
     parts = []
     for name, summary in summaries.items():
-        largest = summary['effort']['max']
-        force, moment = int(np.argmax(largest[:3])), 3 + int(np.argmax(largest[3:]))
-        parts.append(
-            f'{number(largest[force])} N ({DOFS[force]}) and '
-            f'{number(largest[moment])} N m ({DOFS[moment]}) under {name}'
-        )
-    return f'The largest commands are {"; ".join(parts)}.'
+        reached = _halves(summary['effort']['max'], WRENCH, 3)
+        if reached:
+            parts.append(f'{reached} under {name}')
+    return f'The largest commands are {"; ".join(parts)}.' if parts else ''
+
+
+def _halves(values: Sequence[float | None], units: Sequence[str], digits: int) -> str:
+    """Largest of the linear and of the angular values with its axis, as far as they are known."""
+    found = (largest(values, members) for members in GROUPS)
+    return join(
+        [f'{number(values[i], digits)} {units[i // 3]} ({DOFS[i]})' for i in found if i is not None]
+    )
 
 
 def _applied(runs: Mapping[str, RunDigest]) -> str:
@@ -400,7 +407,7 @@ def _couplings(summary: Mapping[str, Any], leading: RunDigest) -> str:
             ('the input', pi, 'N', range(3)),
             ('the input', pi, 'N m', range(3, 6)),
         )
-        for i in [max(members, key=values.__getitem__)]
-        if values[i] > 0
+        for i in [largest(values, members)]
+        if i is not None and values[i] > 0
     ]
     return f'Inertial coupling deforms, under {leading.controller}, {join(parts)}.' if parts else ''

@@ -231,20 +231,45 @@ def _by_dof(
     return make_table(name, caption, rows, shown, pointer=at, stub=2, **about)
 
 
-def unexplained_table(summaries: Summaries) -> Table | None:
-    """F by inverse dynamics of the runs whose F was estimated; None where there is none."""
-    there = {n: s for n, s in summaries.items() if s['unexplained'] is not None}
+ESTIMATED = {  # key of the summary -> head, symbol, caption, note
+    'unexplained': (
+        'F by (1)', 'F',
+        'Unexplained wrench: F of (1) from measured motion and wrench.',
+        ' The law’s own estimate f is not recorded, so there is no w.',
+    ),
+    'required_wrench': (
+        'required wrench', 'it',
+        'Required wrench: M ν̇ + C ν + D ν + g of the measured motion, τ − F of (1).',
+        ' No wrench was recorded, so F, the inputs and Δπ are not known.',
+    ),
+}  # fmt: skip
+
+
+def estimate_table(summaries: Summaries, kind: str) -> Table | None:
+    """A wrench by inverse dynamics of the runs of which it was estimated; None: of none.
+
+    Parameters
+    ----------
+    summaries : name -> `summarize(run)`
+    kind : of `ESTIMATED`
+
+    """
+    there = {n: s for n, s in summaries.items() if s[kind] is not None}
     if not there:
         return None
-    group = 'F by (1)'
+    group, symbol, caption, remark = ESTIMATED[kind]
     shown: dict[str, Column | Quantity | str] = {
         'controller': 'controller',
         'dof': '',
-        'unexplained.mean': described('mean', 'mean of F over the samples', group=group),
-        'unexplained.rms': described('RMS', 'root mean square of F', group=group),
-        'unexplained.max': described('max', 'largest magnitude of F', group=group),
-        'unexplained.error_rms': described('error', 'RMS of its standard error', group=group),
-        'effort.rms': described('RMS of τ', 'root mean square of the recorded command'),
+        f'{kind}.mean': described('mean', f'mean of {symbol} over the samples', group=group),
+        f'{kind}.rms': described('RMS', f'root mean square of {symbol}', group=group),
+        f'{kind}.max': described('max', f'largest magnitude of {symbol}', group=group),
+        f'{kind}.error_rms': described('error', 'RMS of its standard error', group=group),
+    }
+    if kind == 'unexplained':
+        meaning = 'root mean square of the recorded command'
+        shown['effort.rms'] = described('RMS of τ', meaning)
+    shown |= {
         'acceleration.window': described('window', 'of the rate filter', 's', group='rates'),
         'acceleration.error_rms': described(
             'error', 'RMS of the standard error of ν̇; m/s², rad/s²', group='rates'
@@ -256,9 +281,8 @@ def unexplained_table(summaries: Summaries) -> Table | None:
         f'samples, rates by {s["acceleration"]["filter"]}'
         for name, s in there.items()
     ]
-    note = f'F {"; ".join(parts)}. The law’s own estimate f is not recorded, so there is no w.'
-    caption = 'Unexplained wrench: F of (1) from measured motion and wrench.'
-    return _by_dof('unexplained', caption, there, shown, note=note)
+    note = f'{"; ".join(parts).capitalize()}.{remark}'
+    return _by_dof(kind, caption, there, shown, note=note)
 
 
 CERTIFICATE = (  # label, unit, key of summary.json, factor

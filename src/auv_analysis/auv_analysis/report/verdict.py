@@ -68,9 +68,10 @@ def _tune(best: str, runs: Sequence[RunDigest]) -> str:
 
 
 def _errors(summary: Summary) -> np.ndarray | None:
-    """RMS velocity error in translation, m/s, and rotation, rad/s."""
+    """RMS velocity error in translation, m/s, and rotation, rad/s; None where not all is known."""
     rms = summary['velocity_error']['rms']
-    return None if rms is None else np.array([np.linalg.norm(rms[g]) for g in GROUPS.values()])
+    unknown = rms is None or None in rms or None in summary['effort']['max']
+    return None if unknown else np.array([np.linalg.norm(rms[g]) for g in GROUPS.values()])
 
 
 def _differing(runs: Sequence[RunDigest]) -> list[str]:
@@ -80,7 +81,7 @@ def _differing(runs: Sequence[RunDigest]) -> list[str]:
     same = {
         'vehicle': all(np.array_equal(run.vehicle.M, M) for run in runs),
         'length': all(abs(run.duration - length) <= EQUAL * length for run in runs),
-        'start': all(np.all(np.abs(run.begin - begin)[3:] <= SMALLEST_BAND) for run in runs),
+        'start': not any(np.any(np.abs(run.begin - begin)[3:] > SMALLEST_BAND) for run in runs),
         'set-point': alike(runs, 'nu_d'),
         'disturbance': depends or alike(runs, 'F'),
     }

@@ -11,10 +11,10 @@ from matplotlib.patches import Patch
 
 from auv_analysis.metrics.quantities import SIGNALS, WRENCH, mathtext
 from auv_analysis.metrics.summary import TRANSIENT
-from auv_analysis.output.text import join, number
+from auv_analysis.output.text import join, largest, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import RunDigest
-from auv_analysis.report.plots import COLOURS, GREY
+from auv_analysis.report.plots import COLOURS, GREY, Drawn
 from auv_dynamics.vehicle import DOFS
 
 BEYOND = 3.0  # times what else is to be seen: a command that is cut off and told in the panel
@@ -229,54 +229,85 @@ BAND = 0.3  # opacity
 TAU: dict[str, Any] = {'color': '#a9a9a9', 'linewidth': 0.8}
 
 
-def unexplained_figure(run: RunDigest) -> tuple[Figure, str, str]:
-    """F of (1) as estimated, two standard errors about it, and the wrench; a panel per axis."""
-    title = f'Unexplained wrench, {run.controller}'
+def estimate_figure(run: RunDigest, kind: str) -> Drawn:
+    """F of (1) or the required wrench as estimated, with two standard errors; a panel per axis.
+
+    Parameters
+    ----------
+    run : with `least` and `most`
+    kind : 'unexplained', beside the wrench that acted, or 'required_wrench'
+
+    """
+    quantity = SIGNALS['F' if kind == 'unexplained' else 'tau']
+    title = f'{SIGNALS[kind].label.capitalize()}, {run.controller}'
+    if len(plots.unrecorded(run.part(kind))) == 6:
+        return None, title, f'{title}: every row of (1) needs what was not recorded.'
     figure = plots.new_figure(5.6)
     panels = figure.subplots(3, 2, sharex=True)
-    acted = 'applied' if run.acting else 'tau'
+    acted = '' if kind == 'required_wrench' else 'applied' if run.acting else 'tau'
     for i, dof in enumerate(DOFS):
         axes = panels[i % 3, i // 3]
-        axes.plot(*run.drawn(acted, i), **TAU)
+        plots.letter(axes, i, dof)
+        if dof in plots.unrecorded(run.part(kind)):
+            plots.leave_out(axes)
+            continue
+        if acted:
+            axes.plot(*run.drawn(acted, i), **TAU)
         t, low = run.drawn('least', i)
         axes.fill_between(t, low, _at(t, *run.drawn('most', i)), color=COLOURS[i], alpha=BAND, lw=0)
-        axes.plot(*run.drawn('unexplained', i), color=COLOURS[i])
+        axes.plot(*run.drawn(kind, i), color=COLOURS[i])
         axes.set_xlim(run.start, run.start + run.duration)
         plots.shade(axes, run)
-        _cut(axes, run, acted, i)
-        axes.set_ylabel(f'{mathtext(SIGNALS["F"].components[i])} ({SIGNALS["F"].unit_of(i)})')
-        plots.letter(axes, i, dof)
+        if acted:
+            _cut(axes, run, acted, i)
+        axes.set_ylabel(f'{mathtext(quantity.components[i])} ({quantity.unit_of(i)})')
     for axes in panels[-1]:
         axes.set_xlabel('$t$ (s)')
-    handles = [Line2D([], [], color='black'), Patch(color=GREY, alpha=BAND), Line2D([], [], **TAU)]
-    labels = [
-        'F, estimated',
-        'two standard errors',
-        f'{"applied" if run.acting else "commanded"} τ',
-    ]
-    figure.legend(handles, labels, loc='outside upper right', ncols=3)
-    caption = (
-        f'{title}: F of (1) by inverse dynamics (thick, in colour) with two standard errors of the '
+    handles = {
+        f'{quantity.symbol}, estimated': Line2D([], [], color='black'),
+        'two standard errors': Patch(color=GREY, alpha=BAND),
+    }
+    if acted:
+        handles[f'{"applied" if run.acting else "commanded"} τ'] = Line2D([], [], **TAU)
+    figure.legend([*handles.values()], [*handles], loc='outside upper right', ncols=3)
+    return figure, title, f'{title}: {ABOUT[kind]}{plots.shade_sentence(run)}'
+
+
+ABOUT = {
+    'unexplained': (
+        'F of (1) by inverse dynamics (thick, in colour) with two standard errors of the '
         'estimate about it, beside the wrench (thin, grey). It is what the vehicle file does not '
         'explain of the recorded motion: errors of the model, disturbances, and a wrench that was '
         'not the one recorded. Positive F opposes τ, which is cut off and told above the panel '
-        f'where it is far larger.{plots.shade_sentence(run)}'
-    )
-    return figure, title, caption
+        'where it is far larger.'
+    ),
+    'required_wrench': (
+        'M ν̇ + C ν + D ν + g of the recorded motion by the model of the vehicle file (thick, in '
+        'colour) with two standard errors of the estimate about it. No wrench was recorded: this '
+        'is τ − F, what actuators and disturbances must have exerted together.'
+    ),
+}
 
 
-def unexplained_finding(name: str, summary: Mapping[str, Any]) -> str:
-    """How much of the wrench the model leaves unexplained, in a sentence; '' where not known."""
-    found = summary['unexplained']
+def estimate_finding(name: str, summary: Mapping[str, Any]) -> str:
+    """How large the unexplained or required wrench is, in a sentence; '' where not known."""
+    kind = 'unexplained' if summary['unexplained'] else 'required_wrench'
+    found = summary[kind]
     if found is None:
         return ''
     parts = []
     for members, unit in ((range(3), 'N'), (range(3, 6), 'N m')):
-        i = max(members, key=found['rms'].__getitem__)
-        parts.append(
-            f'{number(found["rms"][i])} ± {number(found["error_rms"][i], 2)} {unit} ({DOFS[i]}; '
-            f'the wrench has {number(summary["effort"]["rms"][i])} {unit})'
-        )
+        i = largest(found['rms'], members)
+        if i is not None:
+            beside = f'; the wrench has {number(summary["effort"]["rms"][i])} {unit}'
+            parts.append(
+                f'{number(found["rms"][i])} ± {number(found["error_rms"][i], 2)} {unit} '
+                f'({DOFS[i]}{beside if kind == "unexplained" else ""})'
+            )
+    if not parts:
+        return ''
+    if kind == 'required_wrench':
+        return f'The motion of {name} needed at most {" and ".join(parts)}, RMS.'
     return f'Of {name} the model leaves at most {" and ".join(parts)} unexplained, RMS.'
 
 

@@ -112,6 +112,16 @@ class RunInfo(ABC):
         """Whether there is a set-point, and errors with it."""
         return self.extent.knows_setpoint
 
+    @property
+    def knows_wrench(self) -> bool:
+        """Whether any component of the wrench was recorded."""
+        return self.extent.knows_wrench
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """Degrees of freedom whose velocity was not recorded."""
+        return self.extent.unknown
+
     def facts(self) -> dict[str, Any]:
         """Name -> value of what every kind of run has, for building another one."""
         return {entry.name: getattr(self, entry.name) for entry in fields(RunInfo)}
@@ -127,11 +137,15 @@ class Extent(NamedTuple):
     acting: bool
     knows_disturbance: bool
     knows_setpoint: bool = True
+    knows_wrench: bool = True
+    unknown: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Run(RunInfo):
     """One closed loop from start to end, n + 1 samples.
+
+    A component of eta, nu or tau that was not recorded is NaN throughout.
 
     Attributes
     ----------
@@ -147,6 +161,8 @@ class Run(RunInfo):
     law_state : (n + 1, m) the law's integrals, None where they are not known
     unexplained, unexplained_error : (n + 1, 6) F of (1) as estimated from measurements, and its
         standard error; None: not estimated
+    required_wrench, required_wrench_error : (n + 1, 6) M nu_dot + C nu + D nu + g as estimated, the
+        wrench that the motion needs, and its standard error, where no wrench was recorded
 
     The other attributes are those of `RunInfo`.
 
@@ -165,6 +181,8 @@ class Run(RunInfo):
     law_state: np.ndarray | None = None
     unexplained: np.ndarray | None = None
     unexplained_error: np.ndarray | None = None
+    required_wrench: np.ndarray | None = None
+    required_wrench_error: np.ndarray | None = None
 
     def part(self, keep: Any) -> 'Run':
         """Run of the samples that an index, slice or mask of samples keeps."""
@@ -219,10 +237,18 @@ class Run(RunInfo):
     @property
     def extent(self) -> Extent:
         """Length and optional signals, from the arrays."""
-        signals = self.measured, self.applied, self.disturbance
-        known = [signal is not None for signal in signals]
-        known.append(not np.isnan(self.nu_d[0, 0]))
-        return Extent(len(self.t), float(self.t[0]), float(self.t[-1]), *known)
+        unknown = (dof for dof, x in zip(DOFS, self.nu[0], strict=True) if np.isnan(x))
+        return Extent(
+            len(self.t),
+            float(self.t[0]),
+            float(self.t[-1]),
+            sensing=self.measured is not None,
+            acting=self.applied is not None,
+            knows_disturbance=self.disturbance is not None,
+            knows_setpoint=not np.isnan(self.nu_d[0]).all(),
+            knows_wrench=not np.isnan(self.tau[0]).all(),
+            unknown=tuple(unknown),
+        )
 
     @property
     def nu_measured(self) -> np.ndarray:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from auv_analysis.metrics.coupling import NEGLIGIBLE, structural_zeros
+from auv_analysis.metrics.coupling import structural_zeros
+from auv_analysis.metrics.energy import NEGLIGIBLE
 from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.output.progress import TextConsole
 from auv_analysis.output.text import plain

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.metrics.coupling import NEGLIGIBLE, structural_zeros
+from auv_analysis.metrics.coupling import structural_zeros
+from auv_analysis.metrics.energy import NEGLIGIBLE
 from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.progress import each
 from auv_analysis.report.results import Results

@@ -10,7 +10,7 @@ from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.foreign_checks import contradictions
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import TopicMap, read_mapping
-from auv_analysis.bag.foreign_tracks import tracks_of
+from auv_analysis.bag.foreign_tracks import tracks_of, unknown_angles
 from auv_analysis.studies.identify.record import Record, of_tracks
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import GROUND_TRUTH, ODOM, WRENCH, WRENCH_APPLIED
@@ -38,7 +38,16 @@ def read_records(
 
     """
     mapping = _ours(bag, applied=applied) if mapping is None else mapping
+    if not mapping.knows_wrench:
+        expected = 'wrench (--wrench) or thrusters: motion alone tells no M, D and g'
+        raise InputError(mapping.origin, 'wrench', expected, None)
     tracks, otherwise = tracks_of(read_sources(bag, mapping, notes), mapping, vehicle, notes)
+    lacking = unknown_angles(tracks['pose'], mapping)
+    if lacking:
+        found = f'nothing for {", ".join(lacking)}'
+        raise InputError(bag, 'pose', 'phi, theta and psi: the model turns with them', found)
+    if not tracks['wrench'].given.all():
+        raise InputError(bag, 'wrench', 'all six components', 'some that no topic has')
     notes += contradictions(tracks, otherwise, mapping)
     records = of_tracks(bag.name, tracks, applied=applied)
     if not records:

@@ -9,9 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from auv_analysis.bag.foreign_checks import misread_rates
 from auv_analysis.output.text import join, number
 from auv_analysis.studies.identify.identified import Identified
-from auv_analysis.studies.identify.record import Record, small_rotation
+from auv_analysis.studies.identify.record import Record
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle import DOFS
 
@@ -22,8 +23,7 @@ CLEARLY = 10.0  # times nearer to the prior
 TRIM = 1e-3  # of the weight: what W - B and W r_G - B r_B are not known better than, N, N m
 ASYMMETRIC = 0.02  # of the diagonal: what a mirror would change
 ALONE = 0.9  # of the power of the command within one line of its spectrum
-TURNING = 0.7  # correlation of the angular velocity with the attitude's rate
-SLOPE = (0.5, 2.0)
+CLEARLY_OFF = 0.6  # of the angular velocity: more than a delay would explain
 
 
 def check_rates(record: Record) -> None:
@@ -34,21 +34,14 @@ def check_rates(record: Record) -> None:
     InputError : naming the degrees of freedom
 
     """
-    t = np.arange(record.start + 0.5, record.end - 0.5, 0.1)
-    if len(t) < 20 or not record.known[3:].all():
+    t = record.attitude_t
+    if len(t) < 20:
         return
-    states = record.states(t)
-    turned = small_rotation(states[:-1, :4], states[1:, :4]) / 0.1
-    rate = (states[1:, 7:] + states[:-1, 7:]) / 2
-    wrong = []
-    for i in range(3):
-        a, b = turned[:, i], rate[:, i]
-        if a.std() < 0.02 and b.std() < 0.02:
-            continue
-        slope = float(a @ b / max(a @ a, 1e-12))
-        fit = float(a @ b / np.sqrt(max((a @ a) * (b @ b), 1e-12)))
-        if fit < TURNING or not SLOPE[0] < slope < SLOPE[1]:
-            wrong.append(f'{DOFS[3 + i]} {number(slope)} times')
+    rates = np.full((len(t), 3), np.nan)
+    for i in np.flatnonzero(record.known[3:]):
+        there = np.isfinite(record.velocity[:, 3 + i])
+        rates[:, i] = np.interp(t, record.velocity_t[there], record.velocity[there, 3 + i])
+    wrong = misread_rates(t - t[0], record.attitude, rates, CLEARLY_OFF)
     if wrong:
         expected = 'an angular velocity that is the rate of the attitude (frames? rad/s?)'
         raise InputError(record.name, 'angular velocity', expected, join(wrong))

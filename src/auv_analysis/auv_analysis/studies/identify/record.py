@@ -1,12 +1,12 @@
 """Measured motion and command of a vehicle, each at its own times, and segments of them."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from auv_analysis.bag.foreign_tracks import Track, integral
+from auv_analysis.bag.foreign_tracks import Track, between_gaps, integral
 from auv_analysis.metrics.local_polynomials import (
     AT_ONCE,
     ORDER,
@@ -23,7 +23,7 @@ from auv_dynamics.vehicle.model import down
 
 LONGEST_STEP, SHORTEST_STEP = 0.05, 0.002  # s, of the grid on which commands are held
 SMOOTHING = 0.4  # s, window of the local polynomials from which states are read off
-PAUSE = 0.5  # s without a measurement of something that end a stretch
+PAUSE = 0.5  # s without a measurement of something that may end a stretch
 WHOLE = np.s_[:]
 
 
@@ -135,9 +135,15 @@ def of_tracks(name: str, tracks: Mapping[str, Track], *, applied: bool = False) 
     origin = int(min(track.ns[0] for track in (pose, twist, command)))
     period = min(command.period, twist.period) / NANOSECONDS
     step = float(f'{np.clip(period, SHORTEST_STEP, LONGEST_STEP):.2g}')
-    seconds = [(track.ns - origin) / NANOSECONDS for track in (pose, twist, command)]
+    signals = [
+        replace(track, limit=max(track.limit, PAUSE * NANOSECONDS))
+        for track in (pose, twist, command)
+    ]
+    seconds = [(track.ns - origin) / NANOSECONDS for track in signals]
+    span = (max(int(track.ns[0]) for track in signals), min(int(track.ns[-1]) for track in signals))
     found = []
-    for begin, end in stretches(seconds):
+    for first, last in between_gaps(*span, signals):
+        begin, end = ((ns - origin) / NANOSECONDS for ns in (first, last))
         ns = origin + np.round(np.arange(begin, end + step / 2, step) * NANOSECONDS).astype(
             np.int64
         )
@@ -151,23 +157,6 @@ def of_tracks(name: str, tracks: Mapping[str, Track], *, applied: bool = False) 
                 twist.rows[inside[1]], step, mean, begin,
             )
         )  # fmt: skip
-    return found
-
-
-def stretches(times: Sequence[np.ndarray]) -> list[tuple[float, float]]:
-    """Begin and end, s, of the times at which no signal pauses for longer than `PAUSE`."""
-    begin, end = max(t[0] for t in times), min(t[-1] for t in times)
-    pauses = []
-    for t in times:
-        long = np.flatnonzero(np.diff(t) > max(PAUSE, 5.0 * float(np.median(np.diff(t)))))
-        pauses += [(float(t[i]), float(t[i + 1])) for i in long]
-    found, at = [], begin
-    for first, last in sorted(pauses):
-        if first > at:
-            found.append((at, min(first, end)))
-        at = max(at, last)
-    if end > at:
-        found.append((at, end))
     return found
 
 

@@ -185,7 +185,8 @@ DVL = MAP['twist'][0]
 
 
 @pytest.mark.parametrize(('keys', 'line'), [
-    ({'twist': [DVL]}, r'twist: expected topics of the map .*, found none with p, q, r$'),
+    ({'twist': [DVL | {'twist_frame': 'world'}], 'pose': MAP['pose'][1]},
+     r'pose: expected all three angles.*found none for phi, theta, psi$'),
     ({'twist': [DVL | {'fields': {'u': 'velocity.q'}}, MAP['twist'][1]]},
      r'twist\[0\].fields.u: expected a path in its messages: header.*velocity.x.*found velocity.q'),
     ({'twist': [DVL | {'fields': {'u': 'velocity'}}, MAP['twist'][1]]},
@@ -197,7 +198,7 @@ DVL = MAP['twist'][0]
      r'pose\[0\].stamp: expected a path in its messages: time_us.*: time_us\), found time_ns'),
     ({'wrench': '/force'}, r'/force: expected geometry_msgs.*found rov_msgs/msg/Force, of which'),
     ({'wrench': MAP['wrench'] | {'topic': '/force2'}}, r'wrench: expected a topic.*: /force'),
-    ({'rates': 'from attitude', 'twist': [MAP['twist'][1]]}, 'found none with u, v, w'),
+    ({'rates': 'from attitude', 'pose': MAP['pose'][1]}, 'found none for phi, theta, psi'),
 ])  # fmt: skip
 def test_paths_that_lead_nowhere_are_refused_in_one_line(keys, line, run, tmp_path) -> None:
     make = maker()
@@ -239,7 +240,7 @@ def test_a_wrong_entry_is_refused_in_one_line(entry, line, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(('entry', 'line'), [
-    ('pose: {topic: /x, fields: {phi: a, theta: b}}', 'pose.fields: expected phi, theta, psi, or'),
+    ('pose: {topic: /x, fields: {qw: a, qx: b}}', 'pose.fields: expected phi, theta, psi, or'),
     ('pose: {topic: /x, fields: {phi: a, qw: b}}', 'an attitude from one topic, found phi, qw'),
 ])  # fmt: skip
 def test_half_an_attitude_is_refused(entry, line, tmp_path) -> None:
@@ -247,3 +248,38 @@ def test_half_an_attitude_is_refused(entry, line, tmp_path) -> None:
     file.write_text(f'{entry}\nwrench: /w\ntwist: /t\n')
     with pytest.raises(InputError, match=line):
         read_mapping(file, {})
+
+
+TILT, DEPTH, FIX = MAP['pose']
+
+
+@pytest.mark.parametrize(('keys', 'lacking'), [
+    ({'twist': DVL}, ['p', 'q', 'r']),
+    ({'twist': MAP['twist'][1]}, ['u', 'v', 'w']),
+    ({'twist': MAP['twist'][1], 'rates': 'from attitude'}, ['u', 'v', 'w']),
+    ({'pose': [TILT, DEPTH]}, ['x', 'y']),
+    ({'pose': DEPTH}, ['x', 'y', 'phi', 'theta', 'psi']),
+    ({'pose': None}, ['x', 'y', 'z', 'phi', 'theta', 'psi']),
+    ({'twist': None, 'rates': 'from attitude'}, ['u', 'v', 'w']),
+    ({'pose': [TILT | {'fields': {k: TILT['fields'][k] for k in ('phi', 'theta')}}, DEPTH, FIX]},
+     ['psi']),
+    ({'wrench': MAP['wrench'] | {'fields': {'Z': MAP['wrench']['fields']['Z']}}},
+     ['tau_X', 'tau_Y', 'tau_K', 'tau_M', 'tau_N']),
+])  # fmt: skip
+def test_what_no_topic_gives_is_unknown(keys, lacking, run, tmp_path) -> None:
+    make = maker()
+    bag = write(tmp_path / 'dive', every(run, make), make)
+    told = {key: value for key, value in (MAP | keys).items() if value is not None}
+    found = loaded(bag, written(told, tmp_path))
+    wrench = [f'tau_{axis}' for axis in 'XYZKMN']
+    values = np.concatenate([found.eta, found.nu, found.tau], axis=1)
+    names = ['x', 'y', 'z', 'phi', 'theta', 'psi', *'uvwpqr', *wrench]
+    unknown = np.array([name in lacking for name in names])
+    assert np.isnan(values[:, unknown]).all()
+    inner = slice(5, -5)  # `rates` of the attitude are estimates
+    truth = np.concatenate([run.eta, run.nu, run.tau], axis=1)
+    k = np.searchsorted(run.t, found.t + 1e-9, 'right') - 1
+    tolerance = 2e-3 if 'rates' in keys else 1e-9
+    apart = np.abs(values[inner] - truth[k][inner])[:, ~unknown]
+    assert np.all(apart <= tolerance * np.maximum(np.abs(truth).max(axis=0)[~unknown], 1.0))
+    assert any(f'not recorded: {", ".join(lacking)}; ' in note for note in found.notes)

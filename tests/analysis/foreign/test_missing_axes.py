@@ -162,7 +162,7 @@ def test_report_and_tables_cope_with_what_is_missing(several, bag, tmp_path, cap
     main.main(['analyze', *bags, '--map', str(tmp_path / 'map.yaml'), '--out', str(tmp_path / 'o')])
     report = (tmp_path / 'o' / 'report.html').read_text(encoding='utf-8')
     assert 'not all velocities were recorded' in report
-    assert 'No wrench was recorded' in report
+    assert 'no wrench was mapped' in report
     assert 'every row of (1) needs what was not recorded' in report
     assert 'NaN' not in (tmp_path / 'o' / 'summary.json').read_text()
     assert ' nan' not in capsys.readouterr().out.lower()
@@ -173,5 +173,5 @@ def test_report_and_tables_cope_with_what_is_missing(several, bag, tmp_path, cap
     'more', [{'twist_frame': 'world'}, {'rates': 'from attitude'}], ids=['world', 'rates']
 )
 def test_an_unknown_angle_cannot_turn_velocities(more, bag):
-    with pytest.raises(InputError, match='unknown: expected all three angles'):
+    with pytest.raises(InputError, match='pose: expected all three angles'):
         loaded(bag, **KEYS, **WRENCH, unknown=['psi'], **more)

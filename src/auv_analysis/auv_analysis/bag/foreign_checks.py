@@ -45,7 +45,11 @@ def contradictions(tracks: Mapping[str, Track], otherwise: Track, mapping: Topic
     if not unknown_angles(pose, mapping):
         if mapping.rates != FROM_ATTITUDE:
             notes = doubts_of_rates(pose, twist) + notes
-        notes = [*doubts_of_motion(pose, twist, otherwise, next(moving, 'child')), *notes, *delays(tracks)]
+        notes = [
+            *doubts_of_motion(pose, twist, otherwise, next(moving, 'child')),
+            *notes,
+            *delays(tracks),
+        ]
     return notes
 
 

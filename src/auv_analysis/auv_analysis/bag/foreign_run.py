@@ -276,6 +276,7 @@ def _run(
     state = np.concatenate([rows['pose'], rows['twist']], axis=1)
     eta = unwrapped_eta(state)
     eta[:, 3:][:, [angle in lacking for angle in EULER]] = np.nan
+    tau = rows.get('wrench', unknown)
     name = mapping.name or _name_of(bag.resolve())
     return Run(
         vehicle=vehicle,
@@ -285,7 +286,11 @@ def _run(
         gains={},
         step=base.step / NANOSECONDS,
         source=FOREIGN,
-        notes=(*notes, *_notes_on_run(eta, rows['twist']), *_notes_on_estimate(estimate, acted)),
+        notes=(
+            *notes,
+            *_notes_on_run(eta, rows['twist'], tau),
+            *_notes_on_estimate(estimate, acted),
+        ),
         gaps=base.spans(),
         acceleration=estimate.figures(),
         t=base.t,
@@ -293,7 +298,7 @@ def _run(
         nu=rows['twist'],
         nu_d=rows.get('setpoint', unknown),
         nu_d_dot=unknown,
-        tau=rows.get('wrench', unknown),
+        tau=tau,
         disturbance=None,
         disturbance_estimate=np.zeros((len(base.ns), 6)),
         applied=rows.get('wrench_applied'),
@@ -352,10 +357,11 @@ def _notes_on_missing(bag: Path, mapping: TopicMap) -> list[str]:
     ]
 
 
-def _notes_on_run(eta: np.ndarray, nu: np.ndarray) -> list[str]:
-    """Which components of the motion are not known."""
-    rows = np.concatenate([eta[0], nu[0]])
-    lacking = [name for name, x in zip(MOTION, rows, strict=True) if np.isnan(x)]
+def _notes_on_run(eta: np.ndarray, nu: np.ndarray, tau: np.ndarray) -> list[str]:
+    """Which components of the motion and of a recorded wrench are not known."""
+    rows = np.concatenate([eta[0], nu[0], [] if np.isnan(tau[0]).all() else tau[0]])
+    names = (*MOTION, *(f'tau_{axis}' for axis in FORCE + TORQUE))
+    lacking = [name for name, x in zip(names, rows, strict=False) if np.isnan(x)]
     if not lacking:
         return []
     return [f'not recorded: {", ".join(lacking)}; what depends on them is left out, never zero']

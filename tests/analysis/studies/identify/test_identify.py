@@ -9,11 +9,12 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 from trials import DELAY, trial, truth, wrong_prior
 
+from auv_analysis.bag.foreign_tracks import Track
 from auv_analysis.studies.identify.couplings import couplings
 from auv_analysis.studies.identify.identify import Settings, identify, split
 from auv_analysis.studies.identify.output_error import OutputError
 from auv_analysis.studies.identify.plausibility import check_rates, contradictions, excitation
-from auv_analysis.studies.identify.record import segments_of, stretches
+from auv_analysis.studies.identify.record import of_tracks, segments_of
 from auv_analysis.studies.identify.unknowns import unknowns
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle import DOFS
@@ -201,6 +202,16 @@ def test_normal_equations_of_a_longer_recording_take_no_more_memory(herman):
 
 
 def test_a_recording_is_split_at_pauses():
-    t = np.arange(0.0, 10.0, 0.1)
-    first, last = stretches([t, t[(t < 4.0) | (t > 5.0)]])
-    assert_allclose([*first, *last], [0.0, 3.9, 5.1, 9.9])
+    ns = 10**8 * np.arange(100)
+    kept = {
+        'pose': ns,
+        'twist': ns[(ns < 4e9) | (ns > 5e9)],
+        'wrench': ns[(ns < 7e9) | (ns > 7.2e9)],
+    }
+    rows = {'pose': [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 'twist': [0.0] * 6, 'wrench': [0.0] * 6}
+    tracks = {
+        role: Track(role, f'/{role}', t, np.tile(rows[role], (len(t), 1)), 2e8, role == 'wrench')
+        for role, t in kept.items()
+    }
+    first, last = of_tracks('x', tracks)  # 0.4 s are no pause
+    assert_allclose([first.start, first.end, last.start, last.end], [0.0, 3.9, 5.1, 9.9])

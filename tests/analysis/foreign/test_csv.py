@@ -1,15 +1,14 @@
 """CSV files with named columns, read as bags are."""
 
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from foreign_bags import SECOND, loaded, motion, simulated
+from foreign_bags import SECOND, loaded, simulated
+from foreign_logs import HEAD, HEADS, columns, text_of
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.spatial.transform import Rotation
 
 from auv_analysis.bag.any_bag import messages, survey
 from auv_analysis.bag.csv_logs import Span, column_spans
@@ -19,7 +18,6 @@ from auv_analysis.bag.metadata import files_of
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
 
-HEAD = ['t [ms]', 'x', 'y', 'z', 'roll', 'pitch', 'yaw', *'uvwpqrXYZKMN']
 ANGLES = dict(zip(('phi', 'theta', 'psi'), ('roll', 'pitch', 'yaw'), strict=True))
 MAP: dict[str, Any] = {
     'frames': 'ned_fsd', 'stamp': {'field': 't [ms]', 'units': 'ms'}, 'vehicle': 'rexrov',
@@ -34,32 +32,10 @@ def run() -> Run:
     return simulated(duration=1.0)
 
 
-def columns(run: Run) -> np.ndarray:
-    m = motion(run, enu=False)
-    angles = np.degrees(Rotation.from_quat(m.attitude).as_euler('ZYX')[:, ::-1])
-    return np.column_stack([1e3 * run.t + 5e3, m.position, angles, run.nu, run.tau])
-
-
-def text_of(rows: np.ndarray, separator: str = ',', end: str = '\n') -> str:
-    stream = io.StringIO()
-    np.savetxt(stream, rows, fmt='%.17g', delimiter=separator, newline=end)
-    return stream.getvalue()
-
-
 def mapped(keys: dict[str, Any], folder: Path) -> Path:
     file = folder / 'map.yaml'
     file.write_text(yaml.safe_dump(keys))
     return file
-
-
-HEADS = {  # how such files begin: text before the numbers, separator, line ends
-    'plain': (','.join(HEAD) + '\n', ',', '\n'),
-    'semicolons': ('﻿' + ';'.join(HEAD) + '\r\n', ';', '\r\n'),
-    'tabs and comments': ('# dive 7, tank\n\n' + '\t'.join(HEAD) + '\n', '\t', '\n'),
-    'units below': (','.join(HEAD) + '\n' + ','.join(['ms', *['m'] * 18]) + '\n', ',', '\n'),
-    'names in a comment': ('# made by savetxt\n# ' + ','.join(HEAD) + '\n', ',', '\n'),
-    'separators at the end': (', '.join(HEAD) + ',\n', ',', ',\n'),
-}
 
 
 @pytest.mark.parametrize('head', HEADS)

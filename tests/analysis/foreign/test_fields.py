@@ -6,21 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from foreign_bags import (
-    SECOND,
-    Maker,
-    Message,
-    Motion,
-    loaded,
-    motion,
-    nanoseconds,
-    simulated,
-    write,
-    write_chunks,
-)
+from foreign_bags import SECOND, loaded, nanoseconds, simulated, write, write_chunks
+from foreign_logs import SENSORS, every, maker
 from numpy.testing import assert_allclose
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from scipy.spatial.transform import Rotation
 
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import read_mapping
@@ -28,74 +16,6 @@ from auv_analysis.bag.foreign_tracks import tracks_of
 from auv_analysis.runs.run import Run
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
-
-TYPES = {
-    'rov_msgs/msg/Dvl': 'std_msgs/Header header\ngeometry_msgs/Vector3 velocity\nstring mode\n',
-    'rov_msgs/msg/Tilt': 'uint64 time_us\nfloat64[] deg\n',
-    'rov_msgs/msg/Depth': 'std_msgs/Header header\nfloat64 depth_mm\n',
-    'rov_msgs/msg/Motor': 'float64 thrust\n',
-    'rov_msgs/msg/Motors': 'std_msgs/Header header\nrov_msgs/Motor[] motors\n',
-    'rov_msgs/msg/Force': 'std_msgs/Header header\nfloat64[6] data\n',
-}
-IMU = 'sensor_msgs/msg/Imu'
-MAP: dict[str, Any] = {  # of what `every` writes
-    'frames': 'ned_fsd',
-    'pose': [
-        {'topic': '/tilt', 'stamp': {'field': 'time_us', 'units': 'us'}, 'units': 'deg',
-         'fields': {'phi': 'deg[0]', 'theta': 'deg[1]', 'psi': '-deg[2]'}},
-        {'topic': '/depth', 'fields': {'z': 'depth_mm'}, 'units': 'mm'},
-        {'topic': '/fix', 'fields': {'x': 'point.x', 'y': 'point.y'}, 'frames': 'enu_flu'},
-    ],
-    'twist': [
-        {'topic': '/dvl', 'fields': {'u': 'velocity.x', 'v': '-velocity.y', 'w': '-velocity.z'}},
-        {'topic': '/imu', 'units': 'deg/s', 'frames': 'enu_flu'},
-    ],
-    'wrench': {'topic': '/force', 'units': {'X': 'kN', 'Y': 1e3, 'Z': 1e3},
-               'fields': {c: f'data[{i}]' for i, c in enumerate('XYZKMN')}},
-    'vehicle': 'rexrov', 'step': 0.01,
-}  # fmt: skip
-
-
-def maker(*, ros1: bool = False) -> Maker:
-    """One that knows types that nobody else has."""
-    made = Maker(ros1=ros1)
-    made.store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-    for name, text in TYPES.items():
-        made.store.register(get_types_from_msg(text, name))
-    return made
-
-
-def every(run: Run, make: Maker, apart: dict[str, int] | None = None) -> list[Message]:
-    """The sensors of a run: tilt in degrees without header, a DVL in FLU, an Imu with stamps of
-    zero and rates in degrees, depth in mm, position in ENU, forces in kN.
-
-    `apart` says which topics have only every so manieth message.
-    """  # fmt: skip
-    ned, enu = motion(run, enu=False), motion(run, enu=True)
-    angles = np.degrees(Rotation.from_quat(ned.attitude).as_euler('ZYX')[:, ::-1]) * [1, 1, -1]
-    found: list[Message] = []
-    for i, ns in enumerate(nanoseconds(run.t).tolist()):
-        header = make.header(ns, '')
-        x, y, z = enu.position[i]
-        found += [
-            ('/tilt', ns, make.new('rov_msgs/msg/Tilt', ns // 1000, angles[i])),
-            ('/depth', ns, make.new('rov_msgs/msg/Depth', header, -1e3 * z)),
-            ('/fix', ns, make.geometry('PointStamped', header, make.geometry('Point', x, y, 0.0))),
-            ('/dvl', ns, make.new('rov_msgs/msg/Dvl', header,
-                                  make.geometry('Vector3', *enu.twist[i, :3]), 'bottom')),
-            ('/imu', ns, imu(make, enu, i)),
-            ('/force', ns, make.new('rov_msgs/msg/Force', header,
-                                    ned.tau[i] * [1e-3, 1e-3, 1e-3, 1, 1, 1])),
-        ]  # fmt: skip
-    return [entry for k, entry in enumerate(found) if k // 6 % (apart or {}).get(entry[0], 1) == 0]
-
-
-def imu(make: Maker, m: Motion, i: int) -> Any:
-    """A real one: stamps of zero, degrees per second."""
-    rates = make.geometry('Vector3', *np.degrees(m.twist[i, 3:]))
-    none, zeros = make.geometry('Vector3', 0.0, 0.0, 0.0), np.zeros(9)
-    turned = make.geometry('Quaternion', *m.attitude[i])
-    return make.new(IMU, make.header(0, 'imu_link'), turned, zeros, rates, zeros, none, zeros)
 
 
 def written(keys: dict[str, Any], folder: Path) -> Path:
@@ -117,7 +37,7 @@ def test_a_motion_out_of_five_topics_of_nobodys_types(kind, run, tmp_path) -> No
         bag = write_chunks(tmp_path / 'dive.mcap', messages, make)
     else:
         bag = write(tmp_path / 'dive', messages, make, kind=kind)
-    found = loaded(bag, written(MAP, tmp_path))
+    found = loaded(bag, written(SENSORS, tmp_path))
     assert_allclose(found.t, run.t, atol=1e-9)
     assert_allclose(found.nu, run.nu, atol=1e-12)
     assert_allclose(found.eta, run.eta, atol=1e-12)
@@ -131,7 +51,7 @@ def test_an_imu_is_known_without_paths(run, tmp_path) -> None:
     make = maker()
     bag = write(tmp_path / 'dive', every(run, make), make)
     attitude = {'topic': '/imu', 'frames': 'enu_flu'}
-    found = loaded(bag, written(MAP | {'pose': [attitude, *MAP['pose'][1:]]}, tmp_path))
+    found = loaded(bag, written(SENSORS | {'pose': [attitude, *SENSORS['pose'][1:]]}, tmp_path))
     assert_allclose(found.eta, run.eta, atol=1e-12)
 
 
@@ -139,7 +59,7 @@ def test_topics_have_their_own_rates(run, tmp_path) -> None:
     """The velocity has the stamps of the slower DVL, and the means of the rates about them."""
     make = maker()
     messages = every(run, make, {'/dvl': 10, '/depth': 4, '/fix': 20, '/force': 2})
-    bag, mapping = write(tmp_path / 'dive', messages, make), read_mapping(None, MAP)
+    bag, mapping = write(tmp_path / 'dive', messages, make), read_mapping(None, SENSORS)
     tracks, _ = tracks_of(read_sources(bag, mapping, []), mapping, load_vehicle('rexrov'), [])
     twist, pose = tracks['twist'], tracks['pose']
     assert len(pose.ns) == 101
@@ -154,7 +74,7 @@ def test_a_pause_of_one_topic_is_a_pause_of_what_it_is_part_of(run, tmp_path) ->
     make = maker()
     ns = nanoseconds(run.t)
     messages = [m for m in every(run, make) if not (m[0] == '/dvl' and ns[30] < m[1] < ns[70])]
-    found = loaded(write(tmp_path / 'dive', messages, make), written(MAP, tmp_path))
+    found = loaded(write(tmp_path / 'dive', messages, make), written(SENSORS, tmp_path))
     ((begin, end),) = found.gaps
     assert (begin, end) == pytest.approx((0.3, 0.7), abs=1e-6)
 
@@ -172,7 +92,7 @@ def test_thrusts_of_several_topics_in_their_order(run, tmp_path) -> None:
         )
         tilt = make.new('rov_msgs/msg/Tilt', ns // 1000, -u[i, 6:])
         messages.append(('/vertical', ns, tilt))
-    keys = {key: value for key, value in MAP.items() if key != 'wrench'}
+    keys = {key: value for key, value in SENSORS.items() if key != 'wrench'}
     keys |= {'vehicle': 'bluerov2_heavy', 'thrusters': [
         {'topic': '/motors', 'fields': [f'motors[{i}].thrust' for i in range(6)], 'units': 'kgf'},
         {'topic': '/vertical', 'fields': '-deg'},
@@ -181,37 +101,37 @@ def test_thrusts_of_several_topics_in_their_order(run, tmp_path) -> None:
     assert_allclose(found.tau, u @ vehicle.thrusters.matrix.T, rtol=1e-12, atol=1e-12)
 
 
-DVL = MAP['twist'][0]
+DVL = SENSORS['twist'][0]
 
 
 @pytest.mark.parametrize(('keys', 'line'), [
-    ({'twist': [DVL | {'twist_frame': 'world'}], 'pose': MAP['pose'][1]},
+    ({'twist': [DVL | {'twist_frame': 'world'}], 'pose': SENSORS['pose'][1]},
      r'pose: expected all three angles.*found none for phi, theta, psi$'),
-    ({'twist': [DVL | {'fields': {'u': 'velocity.q'}}, MAP['twist'][1]]},
+    ({'twist': [DVL | {'fields': {'u': 'velocity.q'}}, SENSORS['twist'][1]]},
      r'twist\[0\].fields.u: expected a path in its messages: header.*velocity.x.*found velocity.q'),
-    ({'twist': [DVL | {'fields': {'u': 'velocity'}}, MAP['twist'][1]]},
+    ({'twist': [DVL | {'fields': {'u': 'velocity'}}, SENSORS['twist'][1]]},
      r'fields.u: expected a path to a number: velocity.x, velocity.y, velocity.z, found velo'),
-    ({'twist': [DVL | {'fields': {'u': 'mode'}}, MAP['twist'][1]]},
+    ({'twist': [DVL | {'fields': {'u': 'mode'}}, SENSORS['twist'][1]]},
      r'fields.u: expected a path to a number.*found mode, which is str'),
-    ({'twist': [DVL, MAP['twist'][1], DVL]}, 'each component from one topic, found u in /dvl and'),
-    ({'pose': [MAP['pose'][0] | {'stamp': 'time_ns'}, *MAP['pose'][1:]]},
+    ({'twist': [DVL, SENSORS['twist'][1], DVL]}, 'each component from one topic, found u in /dvl'),
+    ({'pose': [SENSORS['pose'][0] | {'stamp': 'time_ns'}, *SENSORS['pose'][1:]]},
      r'pose\[0\].stamp: expected a path in its messages: time_us.*: time_us\), found time_ns'),
     ({'wrench': '/force'}, r'/force: expected geometry_msgs.*found rov_msgs/msg/Force, of which'),
-    ({'wrench': MAP['wrench'] | {'topic': '/force2'}}, r'wrench: expected a topic.*: /force'),
-    ({'rates': 'from attitude', 'pose': MAP['pose'][1]}, 'found none for phi, theta, psi'),
+    ({'wrench': SENSORS['wrench'] | {'topic': '/force2'}}, r'wrench: expected a topic.*: /force'),
+    ({'rates': 'from attitude', 'pose': SENSORS['pose'][1]}, 'found none for phi, theta, psi'),
 ])  # fmt: skip
 def test_paths_that_lead_nowhere_are_refused_in_one_line(keys, line, run, tmp_path) -> None:
     make = maker()
     bag = write(tmp_path / 'dive', every(run.part(slice(30)), make), make)
     with pytest.raises(InputError, match=line) as refusal:
-        loaded(bag, written(MAP | keys, tmp_path))
+        loaded(bag, written(SENSORS | keys, tmp_path))
     assert str(refusal.value).startswith(str(bag))
 
 
 def test_without_angular_velocity_the_attitude_has_it(run, tmp_path) -> None:
     make = maker()
     bag = write(tmp_path / 'dive', every(run, make), make)
-    keys = MAP | {'twist': DVL, 'rates': 'from attitude'}
+    keys = SENSORS | {'twist': DVL, 'rates': 'from attitude'}
     found = loaded(bag, written(keys, tmp_path))
     inner = slice(5, -5)
     assert_allclose(found.nu[inner, :3], run.nu[inner, :3], atol=1e-12)
@@ -250,26 +170,26 @@ def test_half_an_attitude_is_refused(entry, line, tmp_path) -> None:
         read_mapping(file, {})
 
 
-TILT, DEPTH, FIX = MAP['pose']
+TILT, DEPTH, FIX = SENSORS['pose']
 
 
 @pytest.mark.parametrize(('keys', 'lacking'), [
     ({'twist': DVL}, ['p', 'q', 'r']),
-    ({'twist': MAP['twist'][1]}, ['u', 'v', 'w']),
-    ({'twist': MAP['twist'][1], 'rates': 'from attitude'}, ['u', 'v', 'w']),
+    ({'twist': SENSORS['twist'][1]}, ['u', 'v', 'w']),
+    ({'twist': SENSORS['twist'][1], 'rates': 'from attitude'}, ['u', 'v', 'w']),
     ({'pose': [TILT, DEPTH]}, ['x', 'y']),
     ({'pose': DEPTH}, ['x', 'y', 'phi', 'theta', 'psi']),
     ({'pose': None}, ['x', 'y', 'z', 'phi', 'theta', 'psi']),
     ({'twist': None, 'rates': 'from attitude'}, ['u', 'v', 'w']),
     ({'pose': [TILT | {'fields': {k: TILT['fields'][k] for k in ('phi', 'theta')}}, DEPTH, FIX]},
      ['psi']),
-    ({'wrench': MAP['wrench'] | {'fields': {'Z': MAP['wrench']['fields']['Z']}}},
+    ({'wrench': SENSORS['wrench'] | {'fields': {'Z': SENSORS['wrench']['fields']['Z']}}},
      ['tau_X', 'tau_Y', 'tau_K', 'tau_M', 'tau_N']),
 ])  # fmt: skip
 def test_what_no_topic_gives_is_unknown(keys, lacking, run, tmp_path) -> None:
     make = maker()
     bag = write(tmp_path / 'dive', every(run, make), make)
-    told = {key: value for key, value in (MAP | keys).items() if value is not None}
+    told = {key: value for key, value in (SENSORS | keys).items() if value is not None}
     found = loaded(bag, written(told, tmp_path))
     wrench = [f'tau_{axis}' for axis in 'XYZKMN']
     values = np.concatenate([found.eta, found.nu, found.tau], axis=1)

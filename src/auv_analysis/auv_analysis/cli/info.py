@@ -17,14 +17,18 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.bag.any_bag import survey
     from auv_analysis.bag.foreign_topics import candidates
     from auv_analysis.bag.metadata import files_of
+    from auv_analysis.bag.proposal import looked_through, proposal
 
     contents = survey(options.bag)
     first, last = contents.first, contents.last
     span = None if first is None or last is None else (last - first) / 1e9
+    ours = PARAMETERS in contents.attachments  # whose recorder says of the topics what they are
+    looked = {} if ours else looked_through(options.bag, contents)
+    by_stamps = [one.duration for one in looked.values() if one.duration is not None]
     document = {
         'bag': str(options.bag),
         'files': [path.name for path in files_of(options.bag)],
-        'duration': span,
+        'duration': max(by_stamps, default=None) if span is None else span,
         'messages': sum(contents.counts.values()),
         'topics': {
             topic: {'type': kind, 'messages': contents.counts.get(topic, 0)}
@@ -32,8 +36,9 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         },
         'namespace': contents.namespace,
         'attachments': sorted(contents.attachments),
-        # what our recorder has attached says of the topics what they are
-        'candidates': {} if PARAMETERS in contents.attachments else candidates(contents),
+        'candidates': {} if ours else candidates(contents),
+        'fields': {topic: one.table for topic, one in looked.items() if one.table},
+        'mapping': '' if ours else proposal(options.bag, contents, looked),
         'notes': contents.notes,
     }
     if not options.json:
@@ -59,5 +64,15 @@ def _print_info(document: dict[str, Any]) -> None:
     for role, topics in document['candidates'].items():
         if topics:
             out.print(f'could be mapped as {role}: {", ".join(topics)}')
+    fields = Table('topic', 'field', 'values', 'least', 'largest', box=None, header_style='bold')
+    for topic, paths in document['fields'].items():
+        for path, span in paths.items():
+            ends = ('' if span[end] is None else f'{span[end]:.6g}' for end in ('least', 'largest'))
+            fields.add_row(topic, path, str(span['values']), *ends)
+    if fields.rows:
+        out.print(fields)
+    if document['mapping']:
+        out.print('a mapping file to begin with, for --map:\n')
+        out.print(document['mapping'], soft_wrap=True, markup=False)
     for note in document['notes']:
         out.print(f'note: {note}')

@@ -84,7 +84,7 @@ def _widen(spans: dict[str, Span], table: 'Table', waiting: list[list[str]]) -> 
         if name not in spans:
             continue
         try:
-            values = np.array([table.number(cell) for cell in column])
+            values = table.numbers(column)
         except ValueError:
             del spans[name]
             continue
@@ -232,6 +232,13 @@ class Table:
             if self._separator == ';':  # beside which decimals may have a comma
                 return float(cell.replace(',', '.'))
             raise
+
+    def numbers(self, cells: Sequence[str]) -> np.ndarray:
+        """Numbers (n,) of cells as `number` reads them."""
+        try:
+            return np.array(cells, float)
+        except ValueError:  # an empty one among them
+            return np.array([self.number(cell) for cell in cells])
 
     def is_number(self, cell: str) -> bool:
         """Whether a cell has a number."""

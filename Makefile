@@ -14,10 +14,10 @@ export PYTHONDONTWRITEBYTECODE :=  # else each node and each worker compiles all
 
 ifeq ($(ROS_DISTRO),jazzy)
 VENV_OPTIONS := --system-site-packages
-REQUIREMENTS := requirements.txt requirements-apt.txt requirements-mesh.txt requirements-dev.txt
+REQUIREMENTS := requirements.txt requirements-apt.txt requirements-mesh.txt requirements-mavlink.txt requirements-dev.txt
 else
 VENV_OPTIONS :=
-REQUIREMENTS := requirements.txt requirements-ros.txt requirements-mesh.txt requirements-dev.txt
+REQUIREMENTS := requirements.txt requirements-ros.txt requirements-mesh.txt requirements-mavlink.txt requirements-dev.txt
 endif
 
 COUNT ?= 10

@@ -82,6 +82,7 @@ setup(
         'test': ['pytest', 'pillow'],
         'dask': ['distributed>=2024.8'],
         'rerun': ['rerun-sdk>=0.41,<1'],
+        'mavlink': ['pymavlink>=2.4.40,<3'],
         'mesh': [
             'capytaine>=3,<4',
             'trimesh>=5,<6',

@@ -41,7 +41,7 @@ NAMES = {  # on PyPI
 FROM_PYPI = {'SALib', 'bokeh', 'lz4', 'mcap', 'mcap_ros2', 'pyarrow', 'rosbags', 'scipy',
              'zstandard'}  # fmt: skip
 OPTIONAL = {'numba', 'llvmlite', 'distributed', 'pandas', 'rerun', 'capytaine', 'trimesh',
-            'manifold3d', 'fast_simplification', 'networkx'}  # fmt: skip
+            'manifold3d', 'fast_simplification', 'networkx', 'pymavlink'}  # fmt: skip
 
 
 @cache

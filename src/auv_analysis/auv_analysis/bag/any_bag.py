@@ -1,4 +1,4 @@
-"""The messages of any bag, decoded: MCAP and CSV by our own readers, others by rosbags."""
+"""The messages of any bag or log, decoded: by our own readers, or by the rosbags library."""
 
 import shutil
 import tempfile
@@ -14,8 +14,9 @@ from mcap.records import Channel
 from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.csv_logs import rows_of_csv, survey_of_csv
 from auv_analysis.bag.limits import LARGEST_PARSED, MOST_NAMED
+from auv_analysis.bag.mavlink_logs import messages_of_log, survey_of_log
 from auv_analysis.bag.mcap_file import McapFile
-from auv_analysis.bag.metadata import bag_files, check_regular, is_csv, is_mcap
+from auv_analysis.bag.metadata import bag_files, check_regular, is_csv, is_log, is_mcap
 from auv_analysis.bag.reading import BagContents, read_bag
 from auv_analysis.bag.step_topics import refusal
 from auv_dynamics.files.errors import InputError
@@ -51,6 +52,8 @@ def survey(bag: Path) -> BagContents:
     """Topics, types, counts and span of a bag of any kind, without its messages."""
     if is_csv(bag):
         return survey_of_csv(bag)
+    if is_log(bag):
+        return survey_of_log(bag)
     if not is_mcap(bag):
         return _survey_of_rosbags(bag)
     contents = read_bag(bag, decode=False)
@@ -74,6 +77,8 @@ def messages(bag: Path, topics: Collection[str], notes: list[str]) -> Iterator[L
     """
     if is_csv(bag):
         yield from (LoggedMessage(*found) for found in rows_of_csv(bag, topics, notes))
+    elif is_log(bag):
+        yield from (LoggedMessage(*found) for found in messages_of_log(bag, topics, notes))
     elif is_mcap(bag):
         for path in bag_files(bag):
             yield from _of_mcap(path, topics, notes)

@@ -17,6 +17,7 @@ from auv_analysis.bag.foreign_fields import (
     check_fields,
     presets,
 )
+from auv_analysis.bag.metadata import is_log
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.step_topics import NotOursError
 from auv_dynamics.files.errors import InputError
@@ -248,9 +249,14 @@ def with_candidates(error: NotOursError) -> InputError:
 
     """
     try:
-        found = candidates(survey(Path(error.file)))
-    except InputError:
-        return error
+        contents = survey(Path(error.file))
+    except InputError as refused:
+        return refused if is_log(Path(error.file)) else error
+    if is_log(Path(error.file)):
+        return InputError(
+            error.file, '', f'--map FILE: auv info {error.file} proposes one', 'a log'
+        )
+    found = candidates(contents)
     options = [
         f'{option} {" or ".join(found[role][:SHOWN])}'
         for role, option in (('odometry', '--odom'), ('wrench', '--wrench'))

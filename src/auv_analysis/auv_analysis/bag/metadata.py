@@ -13,9 +13,9 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import parse_yaml
 
 DISTRO = 'jazzy'
-BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file, or a .csv file'
-TABLES = ('.csv', '.tsv')
-OTHERS = ('.db3', '.bag', *TABLES)  # endings of files that McapFile does not read
+BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file, or a .csv, .tlog or .BIN file'
+TABLES, LOGS = ('.csv', '.tsv'), ('.tlog', '.bin')
+OTHERS = ('.db3', '.bag', *TABLES, *LOGS)  # endings of files that McapFile does not read
 METADATA = 'metadata.yaml'
 RECORDING = 'recording.yaml'
 ROOT = 'rosbag2_bagfile_information'
@@ -60,6 +60,25 @@ class FileExtent:
         """Note that there are messages logged from `first` to `last`, ns."""
         self.first = first if self.first is None else min(self.first, first)
         self.last = last if self.last is None else max(self.last, last)
+
+
+@dataclass
+class TopicExtent:
+    """How many messages a topic has, and first and last time of logging, ns."""
+
+    first: int
+    last: int = 0
+    count: int = 0
+
+    def add(self, stamp: int) -> None:
+        """Count a message."""
+        self.first, self.last = min(self.first, stamp), max(self.last, stamp)
+        self.count += 1
+
+    @property
+    def rate(self) -> float:
+        """Messages per second; 0 of a single one."""
+        return (self.count - 1) / max(self.last - self.first, 1) * 1e9
 
 
 def metadata(definitions: Iterable[Definition], extents: Sequence[FileExtent]) -> dict[str, Any]:
@@ -146,6 +165,11 @@ def is_csv(bag: Path) -> bool:
     return not endings.isdisjoint(TABLES) and endings.isdisjoint(('.mcap', '.db3', '.zstd'))
 
 
+def is_log(bag: Path) -> bool:
+    """Whether this is a log of ArduPilot, by its ending in any case."""
+    return bag.suffix.lower() in LOGS
+
+
 def is_mcap(bag: Path) -> bool:
     """Whether our own reader reads this bag; InputError when there is no bag at all."""
     if is_csv(bag) and os.path.exists(bag):
@@ -158,7 +182,7 @@ def is_mcap(bag: Path) -> bool:
         return False
     if not os.path.isfile(bag):
         raise InputError(bag, '', BAG, 'no such file or folder')
-    return bag.suffix not in OTHERS
+    return bag.suffix.lower() not in OTHERS
 
 
 def files_of(bag: Path) -> list[Path]:

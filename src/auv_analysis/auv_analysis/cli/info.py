@@ -16,6 +16,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     """What lies in a bag."""
     from auv_analysis.bag.any_bag import survey
     from auv_analysis.bag.foreign_topics import candidates
+    from auv_analysis.bag.mavlink_presets import preset
     from auv_analysis.bag.metadata import files_of
     from auv_analysis.bag.proposal import looked_through, proposal
 
@@ -23,7 +24,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     first, last = contents.first, contents.last
     span = None if first is None or last is None else (last - first) / 1e9
     ours = PARAMETERS in contents.attachments  # whose recorder says of the topics what they are
-    looked = {} if ours else looked_through(options.bag, contents)
+    known = preset(contents)
+    looked = {} if ours or known else looked_through(options.bag, contents)
     by_stamps = [one.duration for one in looked.values() if one.duration is not None]
     document = {
         'bag': str(options.bag),
@@ -38,7 +40,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         'attachments': sorted(contents.attachments),
         'candidates': {} if ours else candidates(contents),
         'fields': {topic: one.table for topic, one in looked.items() if one.table},
-        'mapping': '' if ours else proposal(options.bag, contents, looked),
+        'mapping': known or ('' if ours else proposal(options.bag, contents, looked)),
         'notes': contents.notes,
     }
     if not options.json:

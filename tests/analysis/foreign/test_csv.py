@@ -160,3 +160,20 @@ def test_stamps_may_be_fractions_of_seconds_since_an_epoch(tmp_path) -> None:
     read = read_sources(path, read_mapping(None, keys), [])['twist']
     assert_array_equal(read.stamps, [1700000000 * SECOND + k * SECOND // 4 for k in (1, 2)])
     assert_array_equal(read.rows[:, 0], [1.0, 3.0])
+
+
+def test_a_long_table_is_read_in_parts_and_its_lines_are_known(tmp_path) -> None:
+    """Parts of numbers alone, with an empty cell and with a text."""
+    path, t = tmp_path / 'x.csv', np.arange(30_000)
+    lines = [f'{i},{i / 8},run' if i % 7000 else f'{i},,"run, again"' for i in t]
+    path.write_text('\n'.join(['t,u,mode', *lines, '']))
+    read = [(m.message.t, m.message.u) for m in messages(path, ['x'], [])]
+    truth = np.where(t % 7000, t / 8, np.nan)
+    assert_array_equal(np.array(read), np.stack([t, truth], axis=1))
+    assert column_spans(path, []) == {
+        't': Span(30_000, 0, 29_999),
+        'u': Span(29_995, 0.125, 3749.875),
+    }
+    path.write_text('\n'.join(['t,u,mode', *lines[:20_000], '5,1e,run', *lines[20_000:], '']))
+    with pytest.raises(InputError, match=r'line 20002, column u: expected a number, or nothing, f'):
+        [message.message.u for message in messages(path, ['x'], [])]

@@ -1,10 +1,11 @@
 """CSV files with named columns as messages of topics: a file is a topic, a line a message."""
 
+import contextlib
 import csv
 import math
 import os
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -46,15 +47,24 @@ def survey_of_csv(path: Path) -> BagContents:
     return contents
 
 
+def blocks_of_csv(
+    path: Path, topics: Collection[str], notes: list[str]
+) -> Iterator[tuple[str, 'Block']]:
+    """Topic and lines of some files, many at once."""
+    for topic, file in csv_files(path).items():
+        if topic in topics:
+            with Table(file) as table:
+                for block in table.blocks(notes):
+                    yield topic, block
+
+
 def rows_of_csv(
     path: Path, topics: Collection[str], notes: list[str]
 ) -> Iterator[tuple[str, int, 'Row']]:
     """Topic, 0 in the place of a time of logging, and message of every line of some files."""
-    for topic, file in csv_files(path).items():
-        if topic in topics:
-            with Table(file) as table:
-                for line, cells in table.rows(notes):
-                    yield topic, 0, Row(table, line, cells)
+    for topic, block in blocks_of_csv(path, topics, notes):
+        for i in range(len(block.lines)):
+            yield topic, 0, Row(block, i)
 
 
 class Span(NamedTuple):
@@ -69,31 +79,21 @@ def column_spans(file: Path, notes: list[str]) -> dict[str, Span]:
     """Column -> its numbers; columns of text are left out."""
     with Table(file) as table:
         spans = dict.fromkeys(table.columns, Span(0, np.inf, -np.inf))
-        waiting: list[list[str]] = []
-        for _, cells in table.rows(notes):
-            waiting.append(cells)
-            if len(waiting) == TOGETHER:
-                _widen(spans, table, waiting)
-        _widen(spans, table, waiting)
+        for block in table.blocks(notes):
+            for name, span in list(spans.items()):
+                try:
+                    values = block.column(name)
+                except InputError:
+                    del spans[name]
+                    continue
+                known = values[np.isfinite(values)]
+                if len(known):
+                    low, high = (
+                        min(span.low, float(known.min())),
+                        max(span.high, float(known.max())),
+                    )
+                    spans[name] = Span(span.filled + len(known), low, high)
     return {name: span for name, span in spans.items() if span.filled}
-
-
-def _widen(spans: dict[str, Span], table: 'Table', waiting: list[list[str]]) -> None:
-    """Take lines into the spans; columns with a text are given up."""
-    for name, column in zip(table.columns, zip(*waiting, strict=True), strict=False):
-        if name not in spans:
-            continue
-        try:
-            values = table.numbers(column)
-        except ValueError:
-            del spans[name]
-            continue
-        known = values[np.isfinite(values)]
-        if len(known):
-            count, low, high = spans[name]
-            low, high = min(low, float(known.min())), max(high, float(known.max()))
-            spans[name] = Span(count + len(known), low, high)
-    waiting.clear()
 
 
 class Table:
@@ -114,9 +114,9 @@ class Table:
         self.file = file
         self.columns: tuple[str, ...] = ()
         self.units: dict[str, str] = {}
+        self.places: dict[str, int] = {}  # column -> its place in a line
         self._number = 0  # of the line that was read
         self._first: list[str] = []  # line of numbers that was read with the head
-        self._is_whole = True  # whether the line that was read has an end
         try:
             self._stream = file.open(encoding='utf-8-sig', errors='replace', newline='')
         except OSError as error:
@@ -153,7 +153,7 @@ class Table:
             cells.pop()  # lines that end with a separator
         self._check_names(cells, line)
         self.columns = tuple(cells)
-        self._places = {name: i for i, name in enumerate(cells)}
+        self.places = {name: i for i, name in enumerate(cells)}
         if not self._first:
             self._first = [line for line in [next(self.lines(), '')] if line]
             told = self._split(self._first[0])[: len(cells)] if self._first else []
@@ -182,10 +182,11 @@ class Table:
             yield line
 
     def _split(self, line: str) -> list[str]:
-        return [cell.strip() for cell in next(self._cells([line]), [])]
+        cells = self._cells(self._reader([line]), [self._number])
+        return [cell.strip() for cell in next(cells, [])]
 
-    def rows(self, notes: list[str]) -> Iterator[tuple[int, list[str]]]:
-        """Number and cells of every line that is no comment.
+    def blocks(self, notes: list[str]) -> Iterator['Block']:
+        """Lines that are no comments, many at once.
 
         Parameters
         ----------
@@ -196,30 +197,62 @@ class Table:
         InputError : a line has another number of cells than there are names
 
         """
-        width = len(self.columns)
-        for cells in self._cells(self.data()):
+        lines = self.data()
+        while True:
+            found = [(self._number, line) for line in islice(lines, TOGETHER)]
+            if not found:
+                return
+            numbers, texts = (list(part) for part in zip(*found, strict=True))
+            cells = self._numbers_alone(texts)
+            if cells is None:
+                numbers, parsed = self._parsed(numbers, texts, notes)
+                if numbers:
+                    yield Block(self, numbers, parsed)
+            else:
+                yield Block(self, numbers, cells)
+
+    def _numbers_alone(self, texts: list[str]) -> np.ndarray | None:
+        """Numbers (n, k) of lines; None where a cell is none, or a line has others."""
+        try:
+            values = np.loadtxt(texts, delimiter=self._separator, comments=None, ndmin=2)
+        except ValueError:  # empty cells, texts, decimals with a comma
+            return None
+        return values if values.shape[1] == len(self.columns) else None
+
+    def _parsed(
+        self, numbers: list[int], texts: list[str], notes: list[str]
+    ) -> tuple[list[int], list[list[str]]]:
+        """Numbers and cells of lines that are not numbers alone."""
+        width, reader = len(self.columns), self._reader(texts)
+        found: list[tuple[int, list[str]]] = []
+        for cells in self._cells(reader, numbers):
+            line = numbers[reader.line_num - 1]
             if len(cells) == width + 1 and not cells[-1]:
                 cells.pop()
             if len(cells) != width:
-                if not self._is_whole:
+                if not texts[-1].endswith(('\n', '\r')) and line == numbers[-1]:
                     notes.append(f'{self.file.name}: its last line is cut off, and left out')
-                    return
+                    break
                 expected = f'{width} cells, one per column'
-                raise InputError(self.file, f'line {self._number}', expected, str(len(cells)))
-            yield self._number, cells
+                raise InputError(self.file, f'line {line}', expected, str(len(cells)))
+            found.append((line, cells))
+        return [line for line, _ in found], [cells for _, cells in found]
 
-    def _cells(self, lines: Iterable[str]) -> Iterator[list[str]]:
-        cells = csv.reader(lines, delimiter=self._separator, skipinitialspace=True)
+    def _reader(self, lines: Iterable[str]) -> Any:
+        return csv.reader(lines, delimiter=self._separator, skipinitialspace=True)
+
+    def _cells(self, reader: Any, numbers: Sequence[int]) -> Iterator[list[str]]:
+        """Cells of lines; InputError, which names the line, where they are none."""
         try:
-            yield from cells
+            yield from reader
         except csv.Error as error:
-            raise InputError(self.file, f'line {self._number}', 'cells', str(error)) from None
+            where = f'line {numbers[reader.line_num - 1]}'
+            raise InputError(self.file, where, 'cells', str(error)) from None
 
     def data(self) -> Iterator[str]:
         """Lines that are no comments, from the first with numbers."""
         for line in chain(self._first, self.lines()):
             if not _is_comment(line):
-                self._is_whole = line.endswith(('\n', '\r'))
                 yield line
 
     def number(self, cell: str) -> float:
@@ -240,6 +273,10 @@ class Table:
         except ValueError:  # an empty one among them
             return np.array([self.number(cell) for cell in cells])
 
+    def is_cell(self, cell: str) -> bool:
+        """Whether a cell has a number or nothing."""
+        return _is_nothing(cell) or self.is_number(cell)
+
     def is_number(self, cell: str) -> bool:
         """Whether a cell has a number."""
         try:
@@ -247,36 +284,64 @@ class Table:
         except ValueError:
             return False
 
-    def value(self, line: int, cells: Sequence[str], name: str) -> float:
-        """Number of a column in a line; AttributeError without the column, InputError of a text."""
-        place = self._places.get(name)
+
+class Block:
+    """Lines of a table.
+
+    Parameters
+    ----------
+    table : whose
+    lines : number of each line in the file
+    cells : (n, k) numbers, or the texts of the cells of each line
+
+    """
+
+    def __init__(self, table: Table, lines: list[int], cells: np.ndarray | list[list[str]]):
+        self.table, self.lines, self._cells = table, lines, cells
+        self._columns: dict[str, np.ndarray] = {}
+
+    def column(self, name: str) -> np.ndarray:
+        """Numbers (n,); AttributeError without such a column, InputError of a text."""
+        if name in self._columns:
+            return self._columns[name]
+        place = self.table.places.get(name)
         if place is None:
             raise AttributeError(name)
-        try:
-            return self.number(cells[place])
-        except ValueError:
-            where = f'line {line}, column {name}'
-            raise InputError(self.file, where, 'a number, or nothing', cells[place]) from None
+        if isinstance(self._cells, np.ndarray):
+            found = self._cells[:, place]
+        else:
+            texts = [cells[place] for cells in self._cells]
+            try:
+                found = self.table.numbers(texts)
+            except ValueError:
+                i = next(i for i, text in enumerate(texts) if not self.table.is_cell(text))
+                where = f'line {self.lines[i]}, column {name}'
+                expected = 'a number, or nothing'
+                raise InputError(self.table.file, where, expected, texts[i]) from None
+        self._columns[name] = found
+        return found
 
 
 class Row:
     """A line as a message whose fields are the columns, read when they are asked for."""
 
-    __slots__ = ('_cells', '_line', '_table')
+    __slots__ = ('_block', '_i')
     header, child_frame_id = None, ''
 
-    def __init__(self, table: Table, line: int, cells: Sequence[str]):
-        self._table, self._line, self._cells = table, line, cells
+    def __init__(self, block: Block, i: int):
+        self._block, self._i = block, i
 
     def __getattr__(self, name: str) -> float:
         """Return the number of a column."""
-        return self._table.value(self._line, self._cells, name)
+        return float(self._block.column(name)[self._i])
 
     @property
-    def __dict__(self) -> dict[str, Any]:  # type: ignore[override]
-        pairs = zip(self._table.columns, self._cells, strict=True)
-        return {name: self._table.number(cell) for name, cell in pairs
-                if _is_nothing(cell) or self._table.is_number(cell)}  # fmt: skip
+    def __dict__(self) -> dict[str, float]:  # type: ignore[override]
+        found = {}
+        for name in self._block.table.columns:
+            with contextlib.suppress(InputError):
+                found[name] = float(self._block.column(name)[self._i])
+        return found
 
 
 def _is_nothing(cell: str) -> bool:

@@ -251,11 +251,34 @@ class MessageReader:
             elif not np.iterable(value) or isinstance(value, str):
                 raise FieldError('fields', f'a path to an array{_listed(message, path)}', path)
             getters.append(get)
-            if '[' not in path and not hasattr(message, path) and '.' in path:
+            if '.' not in path if hasattr(message, path) else '[' not in path:
                 plain.append(path)
         if len(plain) == len(self._paths) > 1:
             return attrgetter(*plain)
         return lambda m: tuple([get(m) for get in getters])
+
+    def block(
+        self, column: Callable[[str], np.ndarray], count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Stamps (n,) in ns and rows (n, k) of many lines of a table, NaN without a stamp.
+
+        Parameters
+        ----------
+        column : gives the numbers of a column
+        count : n
+
+        """
+        path, unit = self._stamp or ('', 's')
+        seconds = column(path)
+        known = np.abs(seconds) < LARGEST
+        whole = np.floor(np.where(known, seconds, 0.0))
+        part = np.where(known, seconds, 0.0) - whole
+        stamps = whole.astype(np.int64) * TIMES[unit] + np.rint(part * TIMES[unit]).astype(np.int64)
+        taken = [
+            column(path.removeprefix('-')) if isinstance(path, str) else np.full(count, path)
+            for path in self._paths
+        ]
+        return stamps, np.where(known[:, None], self.rows(np.stack(taken, axis=1)), np.nan)
 
     @property
     def converted(self) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.bag.any_bag import messages, survey
-from auv_analysis.bag.csv_logs import CSV
+from auv_analysis.bag.csv_logs import CSV, Block, Row, blocks_of_csv
 from auv_analysis.bag.foreign_fields import (
     FieldError,
     MessageReader,
@@ -17,6 +17,7 @@ from auv_analysis.bag.foreign_fields import (
     presets,
 )
 from auv_analysis.bag.foreign_topics import HELD, MappedTopic, TopicMap
+from auv_analysis.bag.metadata import is_csv
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -141,6 +142,11 @@ def read_sources(bag: Path, mapping: TopicMap, notes: list[str]) -> dict[str, Re
     by_topic: dict[str, list[_Messages]] = {}
     for one in found.values():
         by_topic.setdefault(one.source.topic, []).append(one)
+    if is_csv(bag):
+        for topic, block in blocks_of_csv(bag, by_topic.keys(), notes):
+            for one in by_topic[topic]:
+                one.add_block(block)
+        return {key: one.recorded(notes) for key, one in found.items()}
     for topic, log, message in messages(bag, by_topic.keys(), notes):
         for one in by_topic[topic]:
             one.add(log, message)
@@ -181,6 +187,14 @@ class _Messages:
             expected = 'the column with the time, which a CSV file needs'
             raise InputError(self._bag, f'{self._key}.stamp', expected, None)
         return MessageReader(source.role, paths, source.units, source.stamp)
+
+    def add_block(self, block: Block) -> None:
+        """Take the next lines of a table."""
+        if not self._frames:
+            self.add(0, Row(block, 0))  # refuses wrong paths
+            self._waiting.clear()
+        stamps, rows = self._read.block(block.column, len(block.lines))
+        self._parts.append((np.stack([stamps, stamps], axis=1), rows))
 
     def add(self, log: int, message: Any) -> None:
         """Take the next message, logged at a time in ns."""
@@ -252,7 +266,7 @@ class _Messages:
         found = Recorded(
             self._bag, self.source, frame, child, log, stamps if stamped else log, stamped, rows
         )
-        return found.part(usable)
+        return found if usable.all() else found.part(usable)
 
     def _refusal(self, expected: str, found: str) -> InputError:
         return InputError(self._bag, self.source.topic, expected, found)

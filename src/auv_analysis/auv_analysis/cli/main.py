@@ -42,6 +42,7 @@ GROUPS = {
     'Vehicles and laws compared': {
         'check-vehicle': 'inertia, couplings and limits of a vehicle',
         'design': 'suggest and simulate a hull change that removes a coupling',
+        'excite': 'what to drive to identify a model, and the intervals to expect',
         'identify': 'a model with its uncertainty from a recording',
         'predict': 'how well a vehicle file predicts a recording',
         'linearize': 'poles and matrices of a vehicle or of its closed loops',

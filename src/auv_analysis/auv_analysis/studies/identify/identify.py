@@ -121,7 +121,7 @@ def identify(
     short = min(SHORT, longest)
     first = _with_best_delay(problem(short, FIRST), u, theta, late, NEARBY)[0]
     u, theta = first.unknowns, first.theta
-    length = settings.segment or _length(problem(longest), u, theta)
+    length = settings.segment or segment_length(problem(longest), u, theta)
     say(f'output error over segments of {length:.3g} s')
     final = problem(length)
     late = float(u.coefficients(theta).lag + u.prior.delay)
@@ -312,7 +312,7 @@ def _bias(fit: Fit, halves: OutputError) -> np.ndarray:
     return np.outer(moved, moved) if seen.any() else np.zeros((len(moved), len(moved)))
 
 
-def _length(problem: OutputError, u: Unknowns, theta: np.ndarray) -> float:
+def segment_length(problem: OutputError, u: Unknowns, theta: np.ndarray) -> float:
     """Length of a segment, s: until an error of its start has grown tenfold."""
     grown = np.flatnonzero(problem.growth(u, theta) > GROWTH)
     steps = int(grown[0]) if len(grown) else len(problem.segments[0].command)

@@ -1,0 +1,317 @@
+"""Multisines of wrench or of set-points, the motion that they make, and how far it goes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.runs.run import Run
+from auv_analysis.scenario.scaling import UNFIT
+from auv_analysis.scenario.scenario import Scenario, scenario_from
+from auv_analysis.simulation.open_loop import open_loop
+from auv_analysis.simulation.simulate import DivergedError, simulate
+from auv_analysis.studies.identify.unknowns import DEFAULT
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.files.yaml_files import read_yaml
+from auv_dynamics.plant.disturbance import Harmonics
+from auv_dynamics.plant.plant import initial_state
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.kinematics import quaternion
+from auv_dynamics.vehicle.model import Model
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
+from auv_gvc_controller.laws import OPEN_LOOP
+from auv_gvc_controller.laws.multisine import MOST
+
+PERIODS, FASTEST = 3.0, 3.0  # of the slowest sine in the recording; rad/s of the fastest one
+LOOP = {'law': 'gvc', 'k_D': 3.0, 'k_I': 0.5, 'Lambda': 0.5, 'Gamma': 1.0}
+CONTROLLER = {False: 'open_loop', True: 'gvc'}  # by whether the loop is closed
+LEAST = 0.02  # of the largest wrench or set-point: the smallest that is tried
+STEEPEST = 1.5  # exponent of the frequency, by which amplitudes may fall or rise
+BEYOND = 1e3  # what stands for a motion that is not finite
+WORDS = ('wrench', 'speed', 'angular rate', 'tilt', 'room')
+LONGEST = 80  # of the vehicle's name in that of the scenario
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """What an excitation must stay within.
+
+    Attributes
+    ----------
+    wrench : (6,) N and N m; 0: an axis without actuators
+    speed, rate, tilt : m/s, rad/s, and rad between the body's vertical and the world's
+    room : (3,) m that there are in all along north, east and down, the start in their middle
+
+    """
+
+    wrench: np.ndarray
+    speed: float
+    rate: float
+    tilt: float
+    room: np.ndarray
+
+    def used(self, motion: 'Motion') -> np.ndarray:
+        """(V, B, 5) share of each bound that motions use, in the order of `WORDS`."""
+        x = np.nan_to_num(motion.states, nan=BEYOND, posinf=BEYOND, neginf=-BEYOND)
+        x = np.clip(x, -BEYOND, BEYOND)
+        upright = np.clip(1.0 - 2.0 * (x[..., 4] ** 2 + x[..., 5] ** 2), -1.0, 1.0)
+        force = np.abs(motion.commands) / np.where(self.wrench > 0.0, self.wrench, np.inf)
+        shares = (
+            force.max(axis=(2, 3)),
+            np.linalg.norm(x[..., 7:10], axis=-1).max(axis=2) / self.speed,
+            np.linalg.norm(x[..., 10:], axis=-1).max(axis=2) / self.rate,
+            np.arccos(upright).max(axis=2) / self.tilt,
+            (2.0 * np.abs(x[..., :3]).max(axis=2) / self.room).max(axis=-1),
+        )
+        return np.stack(np.broadcast_arrays(*shares), axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What is asked for.
+
+    Attributes
+    ----------
+    given : vehicle file or shipped bare name, the prior
+    bounds : as above
+    duration, step : s
+    free, fixed : as of `unknowns`
+    lag : s, of the actuators, as far as it is known
+    velocity_noise, attitude_noise : standard deviations, m/s and rad/s, and rad
+    spread : of the prior's standard deviations, by which vehicles differ that must stay within
+        the bounds as well
+    closed : whether set-points are driven, by GVC, in place of the wrench
+    seed : of phases and draws
+
+    """
+
+    given: str
+    bounds: Bounds
+    duration: float
+    step: float
+    free: Sequence[str] = DEFAULT
+    fixed: Sequence[str] = ()
+    lag: float = 0.1
+    velocity_noise: float = 0.005
+    attitude_noise: float = 0.003
+    spread: float = 0.1
+    closed: bool = False
+    seed: int = 0
+
+    @cached_property
+    def path(self) -> Path:
+        """Of the vehicle file."""
+        return Path(shipped('vehicles', self.given))
+
+    @cached_property
+    def vehicle_data(self) -> dict[str, Any]:
+        """Contents of the vehicle file."""
+        return read_yaml(self.path, 'vehicle')
+
+    @cached_property
+    def vehicle(self) -> Vehicle:
+        """The prior."""
+        return vehicle_from_dict(self.vehicle_data, self.path)
+
+    @property
+    def noise(self) -> np.ndarray:
+        """(9,) as of `OutputError`."""
+        return np.repeat([self.velocity_noise, self.attitude_noise], (6, 3))
+
+    @property
+    def steps(self) -> int:
+        """Number of commands."""
+        return round(self.duration / self.step)
+
+    @property
+    def follow(self) -> np.ndarray:
+        """(1, 6) share of the way that the lag covers in a step."""
+        return np.full((1, 6), -np.expm1(-self.step / max(self.lag, 1e-9)))
+
+    @property
+    def hold(self) -> np.ndarray:
+        """(6,) wrench that holds the prior level and at rest, N and N m."""
+        return self.vehicle.g(np.zeros(6))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Commands (B, n, 6), the same for all vehicles or (V, B, n, 6), and states (V, B, n + 1, 13).
+
+    A state has position, quaternion and velocity.
+    """
+
+    commands: np.ndarray
+    states: np.ndarray
+
+    def __post_init__(self) -> None:
+        if self.commands.ndim == 3:
+            object.__setattr__(self, 'commands', self.commands[None])
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Multisines of the same frequencies and phases.
+
+    Every sine has a frequency of its own, so that no degree of freedom repeats another. A point x
+    (2 m,) has the logarithm of the share of the bound that the peak of each of m driven degrees of
+    freedom takes, then the exponent of the frequency by which its amplitudes go.
+
+    Attributes
+    ----------
+    most : (6,) peak, beside the offset; 0: not driven
+    offset : (6,)
+    phase : (6, 6) rad, a row per degree of freedom
+    t : (n,) s at which the peak is looked for
+
+    """
+
+    most: np.ndarray
+    offset: np.ndarray
+    phase: np.ndarray
+    t: np.ndarray
+
+    @classmethod
+    def of(cls, request: Request, rng: np.random.Generator) -> 'Family':
+        """A family with random phases."""
+        bounds, t = request.bounds, np.arange(request.steps) * request.step
+        phase = rng.uniform(0.0, 2.0 * np.pi, (6, MOST))
+        if request.closed:
+            phase = np.where(phase < np.pi, 0.0, np.pi)  # no jump from rest at the start
+            most = np.repeat([bounds.speed, bounds.rate], 3) * (bounds.wrench > 0.0)
+            return cls(most, np.zeros(6), phase, t)
+        driven = bounds.wrench > 0.0
+        offset = np.where(driven, request.hold, 0.0)
+        return cls(np.maximum(bounds.wrench - np.abs(offset), 0.0), offset, phase, t)
+
+    @cached_property
+    def driven(self) -> np.ndarray:
+        """(m,) indices of the degrees of freedom that are driven."""
+        return np.flatnonzero(self.most > 0.0)
+
+    @cached_property
+    def omega(self) -> np.ndarray:
+        """(6, 6) rad/s, a row per degree of freedom."""
+        slowest = 2.0 * np.pi * PERIODS / (self.t[-1] + self.t[1])
+        return np.geomspace(min(slowest, FASTEST / 10.0), FASTEST, 6 * MOST).reshape(MOST, 6).T
+
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the points."""
+        m = len(self.driven)
+        low = np.repeat([np.log(LEAST), -STEEPEST], m)
+        return low, np.repeat([0.0, STEEPEST], m)
+
+    def waves(self, x: np.ndarray) -> Harmonics:
+        """Multisines of points (B, 2 m)."""
+        count, m = len(x), len(self.driven)
+        omega, phase = self.omega[self.driven], self.phase[self.driven]
+        shape = (omega / np.sqrt(omega[:, :1] * omega[:, -1:])) ** x[:, m:, None]  # (B, m, 6)
+        sines = np.sin(omega[..., None] * self.t + phase[..., None])  # (m, 6, n)
+        peak = np.abs(np.einsum('bml,mln->bmn', shape, sines)).max(axis=-1)
+        amplitude = shape * (np.exp(x[:, :m]) * self.most[self.driven] / peak)[..., None]
+        terms = np.zeros((6, count, MOST, 3))
+        for k, i in enumerate(self.driven):
+            terms[i, ..., 0] = amplitude[:, k]
+            terms[i, ..., 1], terms[i, ..., 2] = omega[k], phase[k]
+        return Harmonics(np.repeat(self.offset[None], count, axis=0), tuple(terms))
+
+
+def spec_of(wave: Harmonics) -> dict[str, Any]:
+    """One multisine as a scenario has it."""
+    found: dict[str, Any] = {}
+    for i, dof in enumerate(DOFS):
+        terms = [
+            dict(zip(('amplitude', 'omega', 'phase'), map(_short, row), strict=True))
+            for row in wave.terms[i].tolist() if row[0] != 0.0
+        ]  # fmt: skip
+        entry = {'offset': _short(wave.offset[i])} if wave.offset[i] else {}
+        if entry or terms:
+            found[dof] = {**entry, **({'terms': terms} if terms else {})}
+    return found
+
+
+def _short(value: float) -> float:
+    return float(f'{value:.6g}')
+
+
+def scenario_of(request: Request, wave: Harmonics) -> dict[str, Any]:
+    """Contents of the scenario that drives one multisine, sensors and lag as assumed."""
+    bare = request.path != Path(request.given)
+    data: dict[str, Any] = {
+        'format': 1,
+        'name': f'excite_{UNFIT.sub("_", request.vehicle.name)[:LONGEST]}',
+        'vehicle': request.given if bare else str(request.path.resolve()),
+        'duration': request.duration,
+        'step': request.step,
+        'seed': request.seed,
+    }
+    if request.closed:
+        data |= {'controllers': {CONTROLLER[True]: dict(LOOP)}, 'setpoint': spec_of(wave)}
+    else:
+        data |= {'controllers': {CONTROLLER[False]: {'law': OPEN_LOOP}}, 'setpoint': {}}
+        data['excitation'] = spec_of(wave)
+    limit = np.where(request.bounds.wrench > 0.0, request.bounds.wrench, 1e-6).tolist()
+    data['actuators'] = {'limit': limit, **({'lag': request.lag} if request.lag else {})}
+    noise = {'velocity_noise': request.velocity_noise, 'attitude_noise': request.attitude_noise}
+    return data | {'sensors': noise}
+
+
+def motion_of(
+    request: Request, waves: Harmonics, models: Model, errors: Sequence[dict[str, Any]]
+) -> Motion:
+    """Motions (V, B) of vehicles under multisines.
+
+    Parameters
+    ----------
+    request : open or closed loop
+    waves : (B,) multisines
+    models : (V,) vehicles of the open loop, the prior first
+    errors : of the closed loop, disturbances of kind model_error; {}: none
+
+    """
+    if request.closed:
+        return _closed(request, waves, errors)
+    commands = waves.value(np.arange(request.steps) * request.step)
+    start = initial_state(np.zeros((1, len(commands), 6)), np.zeros((1, len(commands), 6)))
+    states = open_loop(
+        models, commands, start, request.step, follow=request.follow,
+        applied=np.zeros((1, len(commands), 6)),
+    )  # fmt: skip
+    first = np.broadcast_to(start[:, :, None], (*states.shape[:2], 1, 13))
+    return Motion(commands, np.concatenate([first, states], axis=2))
+
+
+def _closed(request: Request, waves: Harmonics, errors: Sequence[dict[str, Any]]) -> Motion:
+    """Motions of closed loops, without noise: that of the sensors is no part of the plan."""
+    commands, states = [], []
+    for error in errors:
+        for b in range(len(waves.offset)):
+            data = scenario_of(request, waves.part(b))
+            del data['sensors']
+            data['disturbance'] = [error] if error else []
+            command, state = recorded(scenario_in_memory(request, data), CONTROLLER[True])
+            commands.append(command)
+            states.append(state)
+    shape = len(errors), len(waves.offset)
+    return Motion(*(np.reshape(part, (*shape, *part[0].shape)) for part in (commands, states)))
+
+
+def scenario_in_memory(request: Request, data: dict[str, Any]) -> Scenario:
+    """Scenario of contents that no file has."""
+    return scenario_from(data, request.vehicle_data, Path('excite.yaml'), request.path, {})
+
+
+def recorded(scenario: Scenario, controller: str) -> tuple[np.ndarray, np.ndarray]:
+    """Commands (n, 6) and states (n + 1, 13) of a simulated run; NaN where it diverges."""
+    try:
+        run: Run = simulate(scenario, controller, 'zoh')
+    except DivergedError:
+        n = scenario.steps
+        return np.full((n, 6), np.nan), np.full((n + 1, 13), np.nan)
+    q = quaternion(run.eta[:, 3:])
+    return run.tau[:-1], np.concatenate([run.eta[:, :3], q, run.nu], axis=1)

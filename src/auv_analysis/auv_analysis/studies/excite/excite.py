@@ -1,0 +1,303 @@
+"""The search for the excitation of most information, and the intervals that it promises.
+
+The information is Fisher's, of the normal equations that `auv identify` would build from the
+recording: of segments with starts of their own, for white noise of the sensors. What is made large
+is the logarithm of det(1 + A), A that of theta in the prior's standard deviations (D-optimality):
+the knowledge gained over the prior, whatever the units, in which no single coefficient that nothing
+can tell outweighs all others, as it would in a sum of variances (A-optimality).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from auv_analysis.scenario.scaling import scaled_case1
+from auv_analysis.studies.excite.drive import (
+    LEAST,
+    LOOP,
+    WORDS,
+    Family,
+    Motion,
+    Request,
+    motion_of,
+    recorded,
+    scenario_in_memory,
+    scenario_of,
+)
+from auv_analysis.studies.identify.identified import Identified
+from auv_analysis.studies.identify.identify import FEWEST, HISTORY, LONG, segment_length
+from auv_analysis.studies.identify.output_error import Fit, OutputError
+from auv_analysis.studies.identify.prediction import held_of
+from auv_analysis.studies.identify.record import Segment
+from auv_analysis.studies.identify.unknowns import Unknowns, unknowns
+from auv_analysis.studies.optimise import Search, sobol_points
+from auv_dynamics.files.errors import FailedError, InputError
+from auv_dynamics.plant.disturbance import Harmonics
+from auv_dynamics.vehicle.model import Model
+from auv_dynamics.vehicle.vehicle import make_model
+
+PHASES, STARTS = 8, 8  # of random phases, and points of the search with the best of them
+ROUNDS = {False: ((1, 8),), True: ((1, 4),)}  # by whether the loop is closed
+DRAWS, CHECKED = {False: 15, True: 2}, {False: 63, True: 8}  # vehicles beside the prior
+RESERVE = 0.95  # of the bounds: what the search may use, as the check draws other vehicles
+TOLERANCE, APART = 1e-3, 0.1
+HALVINGS = 7  # of the interval in which an amplitude is looked for that stays within the bounds
+LIGHT, CORRELATED = 0.02, 0.5  # of the weight, of off-diagonal inertia: what a spread of 1 is
+Tick = Callable[[str, float], None]
+Fleet = tuple[Model, list[dict[str, Any]]]  # of the open loop, and errors of the closed one's plant
+
+
+@dataclass(frozen=True, eq=False)
+class Excited:
+    """An excitation and what it promises.
+
+    Attributes
+    ----------
+    request : what was asked for
+    wave : the multisine, of wrench or of set-points
+    scenario : contents of its file
+    motion : of the prior, then of vehicles drawn around it
+    used : (V, 5) share of each bound that they use
+    predicted : intervals of a recording of it
+    case1 : those of case 1 of the same length, scaled to the vehicle; None: it diverges
+    count : evaluations of the search
+
+    """
+
+    request: Request
+    wave: Harmonics
+    scenario: dict[str, Any]
+    motion: Motion
+    used: np.ndarray
+    predicted: Identified
+    case1: Identified | None
+    count: int
+
+
+def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
+    """Find an excitation.
+
+    Parameters
+    ----------
+    request : what is asked for
+    tick : told what is being done, and how much of it is done
+
+    Raises
+    ------
+    InputError : nothing to drive, or nothing free
+    FailedError : the motion leaves its bounds, whatever is driven
+
+    """
+    rng = np.random.default_rng(request.seed)
+    families = [Family.of(request, rng) for _ in range(PHASES)]
+    if not len(families[0].driven):
+        found = ', '.join(f'{value:g}' for value in request.hold)
+        expected = 'more than what holds the vehicle still, in some degree of freedom'
+        raise InputError('--limit', '', expected, f'still with {found} N, N m')
+    u = _reference(request)
+    if not u.entries:
+        raise InputError('--free', '', 'a coefficient that is free', 'none')
+    fleet = _fleet(request, rng, DRAWS[request.closed])
+
+    def evaluated(family: Family, x: np.ndarray) -> np.ndarray:
+        motion = motion_of(request, family.waves(x), *fleet)
+        used = np.maximum(request.bounds.used(motion).max(axis=0), 1e-3)
+        return np.concatenate([-_gained(request, u, motion)[None], np.log(RESERVE / used.T)])
+
+    low, high = families[0].box
+    middle = np.zeros((1, len(low)))
+    gained = []
+    for k, family in enumerate(families):
+        tick('phases', k / PHASES)
+        gained.append(evaluated(family, within(request, family, middle, fleet, RESERVE))[0, 0])
+    family, rounds, count = families[int(np.argmin(gained))], ROUNDS[request.closed], 0
+    total = STARTS + (2 * len(low) + 1) * sum(n * gradients for n, gradients in rounds)
+
+    def counted(x: np.ndarray) -> np.ndarray:
+        nonlocal count
+        count += len(x)
+        tick('amplitudes', min(count / total, 1.0))
+        return evaluated(family, x)
+
+    search = Search(counted, low, high, ['ineq'] * len(WORDS), TOLERANCE, APART)
+    starts = np.vstack([middle, sobol_points(low, high, STARTS, request.seed)[1:]])
+    best = search.run(within(request, family, starts, fleet, RESERVE), rounds)[None]
+    tick('checking', 0.0)
+    fleet = _fleet(request, rng, CHECKED[request.closed])
+    wave = family.waves(within(request, family, best, fleet, 1.0))
+    motion = motion_of(request, wave, *fleet)
+    used = request.bounds.used(motion)[:, 0]
+    _check(request, used)
+    predicted = prediction(request, motion.commands[0, 0], motion.states[0, 0])
+    data = scenario_of(request, wave.part(0))
+    return Excited(
+        request, wave.part(0), data, motion, used, predicted, of_case1(request), PHASES + count
+    )
+
+
+def within(
+    request: Request, family: Family, x: np.ndarray, fleet: Fleet, most: float
+) -> np.ndarray:
+    """Points (B, 2 m) with all amplitudes of each made less until its motions use `most`."""
+    m = len(family.driven)
+
+    def moved(shift: np.ndarray) -> np.ndarray:
+        less = np.maximum(x[:, :m] + shift[:, None], np.log(LEAST))
+        return np.concatenate([less, x[:, m:]], axis=1)
+
+    def fits(shift: np.ndarray) -> np.ndarray:
+        motion = motion_of(request, family.waves(moved(shift)), *fleet)
+        return request.bounds.used(motion).max(axis=(0, 2)) <= most
+
+    low, high = np.full(len(x), np.log(LEAST)), np.zeros(len(x))
+    low = np.where(fits(high), high, low)
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        good = fits(middle)
+        low, high = np.where(good, middle, low), np.where(good, high, middle)
+    return moved(low)
+
+
+def _reference(request: Request) -> Unknowns:
+    """Unknowns in units that all candidates have in common."""
+    bounds = request.bounds
+    speeds = np.repeat([bounds.speed, bounds.rate], 3) / 3.0
+    return _unknowns(request, speeds, bounds.wrench / 3.0)
+
+
+def _unknowns(request: Request, speeds: np.ndarray, wrenches: np.ndarray) -> Unknowns:
+    return unknowns(
+        request.vehicle, request.free, request.fixed, speeds=np.maximum(speeds, 1e-3),
+        wrenches=wrenches, lag=request.lag,
+    )  # fmt: skip
+
+
+def _fleet(request: Request, rng: np.random.Generator, count: int) -> Fleet:
+    """The prior and vehicles around it: of the open loop, and of the closed one."""
+    vehicle, spread = request.vehicle, request.spread
+    one = np.ones(6)
+    u = unknowns(vehicle, ('M',), speeds=one, wrenches=one)
+    theta = rng.standard_normal((count + 1, len(u.entries))) * [
+        spread * (1.0 if len(set(entry.index)) == 1 else CORRELATED) / entry.unit
+        for entry in u.entries
+    ]
+    off = rng.standard_normal((2, count + 1, 1, 6))
+    couple = float(np.abs(vehicle.model.hydrostatics[1:]).max())
+    size = np.array([LIGHT * float(vehicle.weight), couple, couple, couple])
+    light = rng.standard_normal((count + 1, 4)) * spread * size
+    theta[0], off[:, 0], light[0] = 0.0, 0.0, 0.0
+    found = u.coefficients(theta)
+    models = make_model(
+        found.M, vehicle.D_linear * np.exp(spread * off[0]),
+        vehicle.D_quadratic * np.exp(spread * off[1]), found.hydrostatics + light,
+        None if vehicle.lift is None else np.broadcast_to(vehicle.lift, found.M.shape),
+    )  # fmt: skip
+    errors: list[dict[str, Any]] = [{}]
+    for k in range(count):
+        a, b = spread * (np.array([1.0, -1.0]) if k < 2 else rng.uniform(-1.0, 1.0, 2))
+        a, b = (-a, -b) if k == 1 else (a, b)
+        dM, dD = (a * vehicle.M).tolist(), (b * np.diag(vehicle.D_linear)).tolist()
+        errors.append({'kind': 'model_error', 'dM': dM, 'dD': dD})
+    return models, errors
+
+
+def _gained(request: Request, u: Unknowns, motion: Motion) -> np.ndarray:
+    """(B,) knowledge gained per coefficient by recordings of the prior's motions, nats."""
+    commands, states = motion.commands[0], motion.states[0]
+    finite = np.isfinite(states).all(axis=(1, 2)) & np.isfinite(commands).all(axis=(1, 2))
+    states = np.where(finite[:, None, None], states, states[:, :1])
+    commands = np.where(finite[:, None, None], commands, 0.0)
+    parts = [
+        segments(request, *pair, _usual(request)) for pair in zip(commands, states, strict=True)
+    ]
+    problem = OutputError(
+        request.vehicle, [one for part in parts for one in part], request.step, request.noise
+    )
+    n, each = len(u.entries), len(parts[0])
+    normal = problem.normal(u, np.zeros(n), np.zeros((each * len(parts), 9)))
+    A = np.array([part.A for part in normal]).reshape(len(parts), each, n, n).sum(axis=1)
+    gained = np.linalg.slogdet(np.eye(n) + A)[1] / (2 * n)
+    return np.where(finite, gained, 0.0)
+
+
+def _usual(request: Request) -> float:
+    """Length of segments before the instability is known, s."""
+    return min(LONG, (request.duration - HISTORY) / FEWEST)
+
+
+def segments(
+    request: Request, commands: np.ndarray, states: np.ndarray, length: float
+) -> list[Segment]:
+    """Segments of what would be recorded, as `segments_of` has them, without noise.
+
+    Parameters
+    ----------
+    request : step
+    commands, states : (n, 6) and (n + 1, 13)
+    length : s
+
+    """
+    before = int(np.ceil(HISTORY / request.step))
+    n = max(round(length / request.step), 2)
+    return [
+        Segment(
+            commands[first - before : first], commands[first : first + n], np.arange(1.0, n + 1.0),
+            states[first + 1 : first + n + 1, 7:], states[first + 1 : first + n + 1, 3:7],
+            states[first, 3:], first * request.step,
+        )
+        for first in range(before, len(commands) - n + 1, n)
+    ]  # fmt: skip
+
+
+def prediction(request: Request, commands: np.ndarray, states: np.ndarray) -> Identified:
+    """What `auv identify` would say of a recording if the prior were the vehicle.
+
+    Parameters
+    ----------
+    request : what is free, noise, step
+    commands, states : (n, 6) and (n + 1, 13) of the recording
+
+    """
+    u = _unknowns(request, *(np.sqrt((a**2).mean(axis=0)) for a in (states[:, 7:], commands)))
+    theta = np.zeros(len(u.entries))
+
+    def problem(length: float) -> OutputError:
+        some = segments(request, commands, states, length)
+        return OutputError(request.vehicle, some, request.step, request.noise)
+
+    final = problem(segment_length(problem(_usual(request)), u, theta))
+    starts = np.zeros((len(final.segments), 9))
+    rows = 9 * sum(len(one.at) for one in final.segments)
+    fit = Fit(u, theta, starts, 0.0, final.normal(u, theta, starts), rows)
+    covariance = np.linalg.inv(fit.information + np.eye(len(theta)))
+    return Identified(request.vehicle, [], held_of([], HISTORY), final, fit, covariance, [], {}, ())
+
+
+def of_case1(request: Request) -> Identified | None:
+    """The same for case 1 of the paper, scaled to the vehicle, of the same length."""
+    data = scaled_case1(request.given)
+    keys = ('format', 'name', 'vehicle', 'setpoint')
+    data = {key: data[key] for key in keys if key in data}
+    data |= {'controllers': {'gvc': dict(LOOP)}, 'duration': request.duration, 'step': request.step}
+    data['actuators'] = {'lag': request.lag}
+    commands, states = recorded(scenario_in_memory(request, data), 'gvc')
+    if not np.isfinite(states).all():
+        return None
+    return prediction(request, commands, states)
+
+
+def _check(request: Request, used: np.ndarray) -> None:
+    """Raise FailedError where a vehicle leaves the bounds."""
+    worst = used.max(axis=0)
+    if np.all(worst <= 1.0):
+        return
+    k = int(np.argmax(worst))
+    whose = 'the vehicle' if used[0, k] > 1.0 else 'a vehicle near the prior'
+    loop = 'closed' if request.closed else 'open'
+    way = 'wider bounds or a smaller --spread' + ('' if request.closed else ', or --closed-loop')
+    raise FailedError(
+        f'{request.vehicle.name}: the {loop} loop leaves its bounds: {whose} takes '
+        f'{worst[k]:.3g} times the {WORDS[k]} that is allowed: {way}'
+    )

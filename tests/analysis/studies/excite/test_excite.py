@@ -1,0 +1,111 @@
+"""`auv excite` keeps its bounds, and the recording tells what it promised."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from auv_analysis import load_scenario, simulate
+from auv_analysis.cli import main
+from auv_analysis.studies.excite.drive import Bounds, Family, Request, scenario_in_memory
+from auv_analysis.studies.excite.excite import excite
+from auv_analysis.studies.excite.report import results_of, scenario_text
+from auv_analysis.studies.identify.identify import identify
+from auv_analysis.studies.identify.record import of_run, rotated
+from auv_dynamics.files.errors import FailedError
+from auv_dynamics.vehicle.kinematics import quaternion
+from auv_dynamics.vehicle.vehicle_file import load_vehicle
+
+TANK = (12.0, 12.0, 6.0)
+VEHICLE = 'bluerov2_heavy'
+
+
+def request_of(vehicle: str = VEHICLE, room: tuple[float, ...] = TANK, **changes) -> Request:
+    wrench = np.array([15.0, 15.0, 15.0, 2.0, 2.0, 2.0])
+    bounds = Bounds(wrench, 0.5, 1.0, 0.8, np.array(room))
+    return replace(Request(vehicle, bounds, 40.0, 0.05), **changes)
+
+
+@pytest.fixture(scope='module')
+def excited():
+    return excite(request_of())
+
+
+def halves(found) -> dict[str, float]:
+    return {row['name']: (row['high'] - row['low']) / 2 for row in found.coefficients()
+            if row['low'] is not None and row['name'] != 'delay'}  # fmt: skip
+
+
+def test_the_recording_tells_what_was_promised(excited, tmp_path: Path) -> None:
+    """Within a factor of three for nine of ten coefficients, in the median within two."""
+    path = tmp_path / 'scenario.yaml'
+    path.write_text(scenario_text(excited))
+    scenario = load_scenario(path)
+    run = simulate(scenario, 'open_loop', 'zoh')
+    turns = 0.003 * np.random.default_rng(1).normal(size=(len(run.t), 3))
+    record = of_run(run, attitude=rotated(quaternion(run.eta[:, 3:]), turns))
+    found = identify([record], [], load_vehicle(VEHICLE))
+    mine, promised = halves(found), halves(excited.predicted)
+    at_zero = {entry.name for entry in found.zeros}  # damping that would feed energy
+    ratios = np.array([mine[name] / promised[name] for name in mine if name not in at_zero])
+    assert len(ratios) >= 30
+    assert 0.5 < np.median(ratios) < 2.0
+    assert np.mean((ratios > 1 / 3) & (ratios < 3.0)) >= 0.9, sorted(ratios)
+
+
+def test_it_tells_more_than_case_1(excited) -> None:
+    mine, case1 = halves(excited.predicted), halves(excited.case1)
+    assert len(mine) > len(case1)
+    assert np.median([mine[name] / case1[name] for name in case1]) < 0.5
+    rows = results_of(excited).tables['intervals'].records()
+    assert {row['name'] for row in rows if row['half_case1'] is None} >= set(mine) - set(case1)
+
+
+def test_every_vehicle_around_the_prior_stays_inside(excited) -> None:
+    """Also the simulation itself, whose integrator is another one."""
+    assert excited.used.max() <= 1.0
+    assert excited.used.max() > 0.8, 'what is allowed is used'
+    run = simulate(scenario_in_memory(excited.request, excited.scenario), 'open_loop', 'zoh')
+    assert np.all(2.0 * np.abs(run.eta[:, :3]).max(axis=0) < TANK)
+    assert np.linalg.norm(run.nu[:, :3], axis=1).max() < 0.5
+    assert np.all(np.abs(run.tau).max(axis=0) <= excited.request.bounds.wrench)
+    np.testing.assert_allclose(run.nu, excited.motion.states[0, 0, :, 7:], atol=1e-4)
+
+
+def test_no_two_sines_share_a_frequency_and_peaks_are_as_asked() -> None:
+    request = request_of()
+    family = Family.of(request, np.random.default_rng(0))
+    assert len(set(family.omega.ravel())) == 36
+    x = np.r_[np.log([1.0, 0.5, 0.1, 1.0, 1.0, 0.2]), -1.0, 0.0, 1.0, 0.5, 0.0, 0.0][None]
+    tau = family.waves(x).value(family.t)[0] - family.offset
+    peaks = np.abs(tau).max(axis=0)
+    np.testing.assert_allclose(peaks, np.exp(x[0, :6]) * family.most, rtol=1e-9)
+    np.testing.assert_allclose(family.offset, request.hold)
+
+
+def test_a_vehicle_that_sinks_must_close_its_loop() -> None:
+    bounds = Bounds(np.array([500.0, 500.0, 1500.0, 150.0, 600.0, 200.0]), 0.4, 0.8, 0.8,
+                    np.array([np.inf, np.inf, 10.0]))  # fmt: skip
+    heavy = request_of('herman2018', duration=20.0, step=0.1, bounds=bounds)
+    with pytest.raises(FailedError, match=r'the open loop leaves its bounds: .* --closed-loop'):
+        excite(heavy)
+    found = excite(replace(heavy, closed=True))
+    assert found.used.max() <= 1.0
+    assert set(found.scenario['controllers']) == {'gvc'}
+    assert len(halves(found.predicted)) >= 30
+
+
+@pytest.mark.parametrize(
+    ('options', 'said'),
+    [
+        (['--limit', '1', '2'], '--limit: expected 1 or 6 numbers, found 2 numbers'),
+        (['--limit', '0'], '--limit: expected more than what holds the vehicle still'),
+        (['--free', 'wind'], 'expected one of M, D_linear'),
+    ],
+)
+def test_what_cannot_be_driven_is_refused(options, said, tmp_path, capsys) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main.main(['excite', VEHICLE, *options, '--out', str(tmp_path / 'out')])
+    assert ended.value.code == 2
+    assert said in capsys.readouterr().err

@@ -20,13 +20,14 @@ VEHICLE, GROUND = (1, 1), (255, 190)
 Sent = tuple[int, tuple[int, int], Any]  # us since 1970, sender, message
 
 
-def write_tlog(path: Path, sent: Iterable[Sent]) -> Path:
-    """Write messages as a ground station does, in their order."""
+def write_tlog(path: Path, sent: Iterable[Sent], version: int = 2) -> Path:
+    """Write messages as a ground station does, in their order, by a version of MAVLink."""
     writers: dict[tuple[int, int], Any] = {}
     with path.open('wb') as file:
         for time, sender, message in sent:
             writer = writers.setdefault(sender, mavlink.MAVLink(None, *sender))
-            file.write(struct.pack('>Q', time) + message.pack(writer))
+            packed = message.pack(writer, force_mavlink1=version == 1)
+            file.write(struct.pack('>Q', time) + packed)
             writer.seq = (writer.seq + 1) % 256
     return path
 

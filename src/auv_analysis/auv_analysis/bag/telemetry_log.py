@@ -114,7 +114,7 @@ class TelemetryLog:
         others = [sender for sender in senders if sender != vehicle]
         if others:
             left = sum(tally.count for key, tally in found.items() if key[:2] != vehicle)
-            also = f', of {len(heard)} autopilots that heard most' if len(heard) > 1 else ''
+            also = f', the most heard of {len(heard)} autopilots' if len(heard) > 1 else ''
             notes.append(
                 f'{self._path.name}: read system {vehicle[0]}, component {vehicle[1]}{also}; left '
                 f'{left} messages of {len(others)} other senders'

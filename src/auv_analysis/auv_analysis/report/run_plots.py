@@ -121,8 +121,8 @@ def six_signals(kind: str, run: RunDigest, quantity: Quantity, zeros: Sequence[s
     lacking = plots.unrecorded(run.part(signal), zeros)
     without = f'Not recorded, or resting on what was not: {join(lacking)}.' if lacking else ''
     if not drawn:
-        nothing = without or f'{title}: zero throughout.'
-        return None, title, structure if len(zeros) == 6 else nothing
+        nothing = 'not recorded, or resting on what was not' if lacking else 'zero throughout'
+        return None, title, structure if len(zeros) == 6 else f'{title}: {nothing}.'
     split = (signal, 'early') in run.traces
     caption = [f'{title}.']
     if split:

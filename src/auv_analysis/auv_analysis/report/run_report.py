@@ -220,6 +220,9 @@ class SectionInputs:
     def _energy(self) -> Iterator[Block]:
         yield prose('energy')
         yield tables.energy_table(self.summaries)
+        components = tables.components_table(self.summaries)
+        if components is not None:
+            yield components
         yield from self._shown('energy')
 
     def _couplings(self) -> Iterator[Block]:
@@ -385,6 +388,12 @@ def _applied(runs: Mapping[str, RunDigest]) -> str:
 
 
 def _energy(leading: RunDigest, summary: Mapping[str, Any]) -> str:
+    if leading.unknown:
+        lacking = join(leading.unknown)
+        return (
+            f'Of {leading.controller} no velocity in {lacking} was recorded: what rests on it, the '
+            'total kinetic energy before all, is not known.'
+        )
     entries = summary['kinetic_energy_windows'][:2]
     means = [
         f'{fixed(entry["mean"], 2)} J over {entry["window"][0]:g}–{entry["window"][1]:g} s'

@@ -281,7 +281,7 @@ def estimate_table(summaries: Summaries, kind: str) -> Table | None:
         f'samples, rates by {s["acceleration"]["filter"]}'
         for name, s in there.items()
     ]
-    note = f'{"; ".join(parts).capitalize()}.{remark}'
+    note = f'O{"; ".join(parts)[1:]}.{remark}'
     return _by_dof(kind, caption, there, shown, note=note)
 
 
@@ -363,6 +363,22 @@ def energy_table(summaries: Summaries) -> Table:
 
     caption = 'Mean kinetic energy and the shares of its components, by window.'
     return make_table('energy', caption, rows, shown, pointer=at)
+
+
+def components_table(summaries: Summaries) -> Table | None:
+    """Mean energies of the components that are known where the total is not; None: of no run."""
+    of_runs = {n: s for n, s in summaries.items() if s['kinetic_energy']['mean'] is None}
+    there = {n: s for n, s in of_runs.items() if s['kinetic_energy']['mean_by_component']}
+    if not there:
+        return None
+    metric = 'kinetic_energy.mean_by_component'
+    shown: dict[str, Column | Quantity | str] = {
+        'controller': 'controller',
+        'dof': '',
+        metric: described('mean', METRICS[metric].meaning, 'J'),
+    }
+    caption = 'Mean kinetic energy of the components of runs in which not every velocity is known.'
+    return _by_dof('energy_components', caption, there, shown)
 
 
 KINDS: dict[str, tuple[str, tuple[str, str], list[str], Callable[[np.ndarray], np.ndarray]]] = {

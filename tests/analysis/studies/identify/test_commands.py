@@ -5,10 +5,12 @@ import json
 import numpy as np
 import pytest
 import trials
+import yaml
 from foreign_bags import Maker, motion, simple, write
 from pyarrow import parquet
 
 from auv_analysis.cli.main import main
+from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 
@@ -105,3 +107,43 @@ def test_a_prior_file_needs_values_and_deviations(bag, tmp_path, capsys):
                      '--out', tmp_path / 'x')  # fmt: skip
     assert code == 2
     assert 'a mapping with value and a positive deviation' in said
+
+
+def test_rotations_alone_tell_the_rotational_block(bag, tmp_path):
+    """An Imu's log: what linear motion would tell stays open, or has an interval with the truth."""
+    told = {'odometry': '/odom', 'wrench': '/wrench', 'unknown': ['x', 'y', 'z', 'u', 'v', 'w']}
+    (tmp_path / 'map.yaml').write_text(yaml.safe_dump(told))
+    main(['identify', str(bag), '--map', str(tmp_path / 'map.yaml'), '--vehicle', 'herman2018',
+          '--out', str(tmp_path / 'out')])  # fmt: skip
+    rows = parquet.read_table(tmp_path / 'out' / 'coefficients.parquet').to_pylist()
+    found = {row['name']: row for row in rows if row['name'].startswith('M.')}
+    truth = load_vehicle('herman2018')
+    for i, dof in enumerate(DOFS):
+        row = found[f'M.{dof}.{dof}']
+        if i < 3:
+            assert row['left'] > 0.2, 'little is known of it beyond the prior'
+        else:
+            assert row['value'] == pytest.approx(truth.M[i, i], rel=0.01)
+            assert row['high'] - row['low'] < 0.05 * truth.M[i, i]
+    for i, j in np.ndindex(6, 6):
+        row = found.get(f'M.{DOFS[i]}.{DOFS[j]}')
+        if row and row['low'] is not None:
+            assert row['low'] <= truth.M[i, j] <= row['high'], row['name']
+    assert {row['status'] for row in found.values()} == {'identified', 'prior'}
+
+
+@pytest.mark.parametrize('command', ['identify', 'predict'])
+@pytest.mark.parametrize(('told', 'line'), [
+    ({}, 'wrench: expected wrench (--wrench) or thrusters: motion alone tells no M, D and g'),
+    ({'wrench': '/wrench', 'unknown': ['psi']}, 'pose: expected phi, theta and psi'),
+    ({'wrench': {'topic': '/wrench', 'fields': {'X': 'wrench.force.x'}}}, 'all six components'),
+])  # fmt: skip
+def test_without_wrench_or_attitude_nothing_is_identified(
+    command, told, line, bag, tmp_path, capsys
+):
+    (tmp_path / 'map.yaml').write_text(yaml.safe_dump({'odometry': '/odom', **told}))
+    code, said = auv(capsys, command, bag, '--map', tmp_path / 'map.yaml', '--vehicle',
+                     'herman2018', '--out', tmp_path / 'out')  # fmt: skip
+    assert code == 2
+    assert line in said
+    assert len(said.strip().splitlines()) == 1

@@ -1,14 +1,14 @@
 """The procedure: recordings and a prior in, a model with its uncertainty out."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from auv_analysis.output.text import join
 from auv_analysis.studies.identify.identified import Identified
-from auv_analysis.studies.identify.output_error import Fit, OutputError
+from auv_analysis.studies.identify.output_error import UNSEEN, Fit, OutputError
 from auv_analysis.studies.identify.prediction import (
     BlackBox,
     Held,
@@ -32,6 +32,7 @@ PLAUSIBLE = 9.0  # more cost: a delay is not worth a thought
 NEARBY = 30.0  # more cost: no better delay lies in that direction
 MOVING = 2.0  # times the noise: a degree of freedom that moves less tells little
 SEEN = 2.0  # deviations: a difference between fits that is no chance
+TRUSTED = 0.3  # of the wide prior deviation, of what an axis would tell that nobody measured
 STILL = 5.0  # times the noise: a vehicle that moves less is at rest
 Say = Callable[[str], None]
 
@@ -100,10 +101,11 @@ def identify(
     check_motion(training, noise)
     u = unknowns(
         vehicle, settings.free, settings.fixed,
-        speeds=np.maximum(_rms([np.nan_to_num(r.velocity) for r in training]), 1e-3),
+        speeds=_speeds(training),
         wrenches=_rms([record.wrench for record in training]),
         channels=training[0].channels, believed=settings.believed, origin=settings.origin,
     )  # fmt: skip
+    u = _trusting(u, ~np.isnan(noise[:6]))
     still = _still(training, noise, u)
     every, u = u, u.without([entry.name for entry in still])
     say('least squares')
@@ -239,6 +241,27 @@ def _of_still(problem: OutputError, fit: Fit, every: Unknowns) -> np.ndarray:
     P, _ = every.precision(theta)
     moved = np.linalg.solve((S + P)[np.ix_(kept, kept)], S[np.ix_(kept, rest)])
     return moved @ np.linalg.inv(P[np.ix_(rest, rest)]) @ moved.T
+
+
+def _speeds(records: Sequence[Record]) -> np.ndarray:
+    """(6,) root mean squares of the velocities, a usual size where none was measured."""
+    known = np.any([record.known for record in records], axis=0)
+    moved = _rms([np.nan_to_num(record.velocity) for record in records])
+    return np.where(known, np.maximum(moved, 1e-3), UNSEEN)
+
+
+def _trusting(u: Unknowns, known: np.ndarray) -> Unknowns:
+    """The same with less doubt in the prior of what an axis would tell that nobody measured.
+
+    Its wide default would let a velocity that is not known take up what else the model is wrong in.
+    """
+    inertial = ('M', 'D_linear', 'D_quadratic')
+    entries = (
+        replace(e, unit=TRUSTED * e.unit)
+        if e.group in inertial and not known[[*e.index]].all() else e
+        for e in u.entries
+    )  # fmt: skip
+    return replace(u, entries=tuple(entries))
 
 
 def _centred(record: Record) -> np.ndarray:

@@ -4,9 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
-from foreign_bags import Maker, motion, nanoseconds, simple, simulated, write
+from foreign_bags import NAMED, Maker, motion, nanoseconds, simple, simulated, write
 from harness import auv
 
 from auv_analysis.cli import main
@@ -103,3 +104,39 @@ def test_a_bag_with_our_names_in_axes_that_nobody_told_is_refused(tmp_path, caps
     line = refused(['analyze', str(bag), '--vehicle', 'rexrov'], capsys)
     assert '/rexrov/odom: frame_id: expected frames whose names say that they are NED' in line
     assert '--odom /rexrov/odom, --wrench /rexrov/wrench' in line
+
+
+@pytest.mark.parametrize('command', ['analyze', 'predict'])
+@pytest.mark.parametrize(('content', 'words'), [
+    ('zeros', 'zero'), ('no attitude', 'quaternion'), ('no velocity', 'finite'),
+])  # fmt: skip
+def test_an_odometry_with_our_name_that_holds_nothing_is_refused_for_another(
+    content, words, command, tmp_path, capsys
+) -> None:
+    maker, run = Maker(), simulated(duration=0.3)
+    m = motion(run, enu=False)
+    still = m._replace(twist=0.0 * m.twist, position=0.0 * m.position)
+    dead = {
+        'zeros': still._replace(attitude=0.0 * m.attitude + [0.0, 0.0, 0.0, 1.0]),
+        'no attitude': still._replace(attitude=0.0 * m.attitude),
+        'no velocity': m._replace(twist=np.nan * m.twist),
+    }[content]
+    messages = simple(dead, maker, '/rov/odom', '/rov/wrench', NAMED, m)
+    for i, ns in enumerate(nanoseconds(m.t).tolist()):
+        messages.append(('/nav/state', ns, maker.odometry(ns, NAMED, m, i)))
+    bag = write(tmp_path / 'other', messages, maker)
+    line = refused([command, str(bag), '--vehicle', 'rexrov'], capsys)
+    assert '/rov/odom: expected' in line
+    assert 'another odometry: --odom /nav/state' in line
+    if command == 'analyze':
+        assert words in line
+
+
+def test_nothing_is_predicted_of_a_velocity_that_nobody_measured(tmp_path, capsys) -> None:
+    maker, m = Maker(), motion(simulated(duration=2.0), enu=False)
+    dead = m._replace(twist=np.nan * m.twist)
+    bag = write(
+        tmp_path / 'other', simple(dead, maker, '/rov/odom', '/rov/wrench', NAMED, m), maker
+    )
+    line = refused(['predict', str(bag), '--vehicle', 'rexrov'], capsys)
+    assert 'a second and more with attitude, velocity and wrench' in line

@@ -16,7 +16,7 @@ from auv_analysis.bag.foreign_fields import (
     is_number,
     presets,
 )
-from auv_analysis.bag.foreign_topics import HELD, MappedTopic, TopicMap
+from auv_analysis.bag.foreign_topics import HELD, MappedTopic, TopicMap, other_odometries
 from auv_analysis.bag.metadata import is_csv
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
@@ -166,6 +166,8 @@ class _Messages:
 
     def __init__(self, bag: Path, key: str, source: MappedTopic, types: dict[str, str]):
         self.source, self._bag, self._key = source, bag, key
+        is_odometry = source.role == 'odometry'
+        self._others = other_odometries(types, source.topic) if is_odometry else ''
         self._read = self._reader(types)
         self._waiting: list[tuple[int, Reading]] = []
         self._parts: list[tuple[np.ndarray, np.ndarray]] = []
@@ -255,7 +257,9 @@ class _Messages:
             notes.append(f'{topic}: {self._read.converted}')
         usable = are_usable(rows, self.source.role)
         if not usable.any():
-            raise self._refusal('finite numbers and unit quaternions', 'none')
+            raise self._refusal(f'finite numbers and unit quaternions{self._others}', 'none')
+        if self.source.role == 'odometry' and self.source.fields is None:
+            self._check_moving(rows[usable], notes)
         if not usable.all():
             lost = np.count_nonzero(~usable)
             notes.append(
@@ -267,6 +271,15 @@ class _Messages:
             self._bag, self.source, frame, child, log, stamps if stamped else log, stamped, rows
         )
         return found if usable.all() else found.part(usable)
+
+    def _check_moving(self, rows: np.ndarray, notes: list[str]) -> None:
+        """Refuse an odometry without velocities, or of zeros, where there is another one."""
+        if self._others and np.isnan(rows[:, 7:]).all():
+            raise self._refusal(f'velocities{self._others}', 'none that is a number')
+        if not np.nan_to_num(rows[:, [0, 1, 2, *range(7, 13)]]).any():
+            if self._others:
+                raise self._refusal(f'a motion{self._others}', 'position and velocity all zero')
+            notes.append(f'{self.source.topic}: position and velocity are zero throughout')
 
     def _refusal(self, expected: str, found: str) -> InputError:
         return InputError(self._bag, self.source.topic, expected, found)

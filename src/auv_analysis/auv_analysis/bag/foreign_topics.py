@@ -22,6 +22,7 @@ from auv_analysis.bag.reading import BagContents
 from auv_analysis.bag.step_topics import NotOursError
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import check, read_yaml
+from auv_dynamics.ros.interface import GROUND_TRUTH
 
 SCHEMA = Path(__file__).with_name('mapping.schema.json')
 MEASURED = ('odometry', 'pose', 'twist')
@@ -238,6 +239,13 @@ def _is_asked(topic: str) -> bool:
 
 def _has_word(topic: str, words: Collection[str]) -> bool:
     return any(word in words for word in re.split(r'[\W\d_]+', topic.lower()))
+
+
+def other_odometries(types: Mapping[str, str], topic: str) -> str:
+    """How an expectation ends that an odometry disappoints: which others a bag has; '' of none."""
+    found = [other for other in _fitting(types, 'odometry')
+             if other != topic and not other.endswith(GROUND_TRUTH)]  # fmt: skip
+    return f', or another odometry: --odom {" or ".join(found[:SHOWN])}' if found else ''
 
 
 def with_candidates(error: NotOursError) -> InputError:

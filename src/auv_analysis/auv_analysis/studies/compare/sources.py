@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
 from auv_analysis.bag import open_bag
-from auv_analysis.bag.foreign_topics import TopicMap, with_candidates
+from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.foreign_topics import TopicMap, other_odometries, with_candidates
 from auv_analysis.bag.load import Recording
 from auv_analysis.bag.metadata import OTHERS, files_of, is_csv, is_mcap
 from auv_analysis.bag.step_topics import NotOursError
@@ -19,6 +20,7 @@ from auv_analysis.simulation.simulate import announce, simulate
 from auv_dynamics.files.errors import InputError, reason
 from auv_dynamics.files.shipped import shipped_by_name
 from auv_dynamics.files.yaml_files import read_yaml
+from auv_dynamics.ros.interface import ODOM
 from auv_gvc_controller.laws.law import is_unasked
 
 EXPECTED = 'a bag, a folder of results or of a sweep, or a scenario'
@@ -253,9 +255,32 @@ def _open_bag(source: RunSource, vehicle: str | None) -> Recording:
     try:
         if not is_mcap(bag):
             raise NotOursError(bag, '', 'an MCAP bag of our nodes', 'a bag of another kind')
-        return open_bag(bag, vehicle, namespace=source.namespace)
+        recording = open_bag(bag, vehicle, namespace=source.namespace)
+        _check_moving(bag, recording)
+        return recording
     except NotOursError as error:
         raise with_candidates(error) from None
+    except InputError as error:
+        raise _with_others(bag, error) from None
+
+
+def _check_moving(bag: Path, recording: Recording) -> None:
+    """Refuse an odometry of zeros where there is another one."""
+    if recording.run.nu.any() or recording.run.eta[:, :3].any():
+        return
+    types = survey(bag).types
+    topic = next((name for name in types if name.endswith(f'/{ODOM}')), ODOM)
+    others = other_odometries(types, topic)
+    if others:
+        raise InputError(bag, topic, f'a motion{others}', 'position and velocity all zero')
+
+
+def _with_others(bag: Path, error: InputError) -> InputError:
+    """The refusal of an odometry, with others that the bag has."""
+    if error.key.rpartition('/')[2] != ODOM:
+        return error
+    others = other_odometries(survey(bag).types, error.key)
+    return InputError(error.file, error.key, f'{error.expected}{others}', error.found)
 
 
 def named(runs: Sequence[tuple[RunSource, Named]], join: str = '/') -> list[str]:

@@ -50,7 +50,7 @@ def read_records(
         raise InputError(bag, 'wrench', 'all six components', 'some that no topic has')
     notes += contradictions(tracks, otherwise, mapping)
     records = of_tracks(bag.name, tracks, applied=applied)
-    if not records:
+    if not any(record.known.any() for record in records):
         raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', 'none')
     return records
 

@@ -11,7 +11,7 @@ from rich.console import Console
 from scipy.integrate import trapezoid
 
 from auv_analysis import summarize
-from auv_analysis.bag.foreign_tracks import (
+from auv_analysis.bag.tracks import (
     Track,
     at_times,
     integral,

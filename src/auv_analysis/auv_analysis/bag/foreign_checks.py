@@ -7,7 +7,8 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, MOVING, TopicMap
-from auv_analysis.bag.foreign_tracks import Track, at_times, between_gaps, integral, unknown_angles
+from auv_analysis.bag.foreign_tracks import unknown_angles
+from auv_analysis.bag.tracks import Track, at_times, between_gaps, integral
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.metrics.pose_twist import (
     FITS,

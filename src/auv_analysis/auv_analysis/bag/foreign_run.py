@@ -28,7 +28,9 @@ from auv_analysis.bag.foreign_topics import (
     TopicMap,
     candidates,
 )
-from auv_analysis.bag.foreign_tracks import (
+from auv_analysis.bag.foreign_tracks import tracks_of, unknown_angles
+from auv_analysis.bag.load import Recording
+from auv_analysis.bag.tracks import (
     TimeBase,
     Track,
     at_times,
@@ -36,10 +38,7 @@ from auv_analysis.bag.foreign_tracks import (
     means_over,
     sensible_step,
     time_base,
-    tracks_of,
-    unknown_angles,
 )
-from auv_analysis.bag.load import Recording
 from auv_analysis.metrics.energy import depends_on_known
 from auv_analysis.metrics.local_polynomials import (
     ORDER,

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 from trials import DELAY, trial, truth, wrong_prior
 
-from auv_analysis.bag.foreign_tracks import Track
+from auv_analysis.bag.tracks import Track
 from auv_analysis.studies.identify.couplings import couplings
 from auv_analysis.studies.identify.identify import Settings, identify, split
 from auv_analysis.studies.identify.output_error import OutputError

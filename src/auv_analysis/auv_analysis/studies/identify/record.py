@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.bag.foreign_tracks import Track, between_gaps, integral
+from auv_analysis.bag.tracks import Track, between_gaps, integral
 from auv_analysis.metrics.local_polynomials import (
     AT_ONCE,
     ORDER,

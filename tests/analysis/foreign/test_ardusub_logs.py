@@ -240,6 +240,7 @@ def hostile() -> dict[str, bytes]:
         'v2.tlog': b'\xfd' * 300_000, 'noise': rng.bytes(200_000),
         'loop.BIN': head + empty + b'\xa3\x95\x07' * 1000, 'format.BIN': head + unknown * 50,
         'itself.BIN': head + itself + head, 'late.BIN': head + late * 20, 'names.BIN': names,
+        'short.tlog': bytes(8) + b'\xfe\x00\x00\x01\x01\x00\xff\xff',
         'heads.BIN': b'\xa3\x95' * 50_000,
         'instance.BIN': head + logs.record(logs.FMTU, 0, 0x85, '#' * 16, '') * 9 + itself,
     }  # fmt: skip

@@ -20,7 +20,7 @@ LATEST = 1 << 52  # us: beyond, a stamp is damage
 V1, V2, SIGNED = 0xFE, 0xFD, 0x01
 MARKER = re.compile(b'[\xfd\xfe]')
 HEARTBEAT, ATTITUDE, SERVOS = 0, 30, 36  # ids
-NO_AUTOPILOT = 8
+NO_AUTOPILOT = b'\x08'
 WRAP = 1 << 32  # us: servo outputs tell the lower 32 bits of their time
 TRIES = 10_000  # checksums that are worked out to find the next message behind damage
 
@@ -82,8 +82,8 @@ class TelemetryLog:
             if frame.number == ATTITUDE:
                 self._note_boot(frame)
             elif frame.number == HEARTBEAT:
-                message = self._decoded(frame)
-                if message is not None and message.autopilot != NO_AUTOPILOT:
+                autopilot = self._data[frame.payload + 5 : frame.payload + 6]
+                if autopilot != NO_AUTOPILOT and self._decoded(frame) is not None:
                     heard[frame.system, frame.component] += 1
             elif frame.number == parameters:
                 self._note_parameter(frame)

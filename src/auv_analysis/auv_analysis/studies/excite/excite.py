@@ -28,7 +28,7 @@ from auv_analysis.studies.excite.drive import (
 )
 from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.identify import FEWEST, HISTORY, LONG, segment_length
-from auv_analysis.studies.identify.output_error import Fit, OutputError
+from auv_analysis.studies.identify.output_error import BLOCKS, Fit, OutputError
 from auv_analysis.studies.identify.prediction import held_of
 from auv_analysis.studies.identify.record import Segment
 from auv_analysis.studies.identify.unknowns import Unknowns, unknowns
@@ -209,16 +209,12 @@ def _gained(request: Request, u: Unknowns, motion: Motion) -> np.ndarray:
     finite = np.isfinite(states).all(axis=(1, 2)) & np.isfinite(commands).all(axis=(1, 2))
     states = np.where(finite[:, None, None], states, states[:, :1])
     commands = np.where(finite[:, None, None], commands, 0.0)
-    parts = [
-        segments(request, *pair, _usual(request)) for pair in zip(commands, states, strict=True)
-    ]
-    problem = OutputError(
-        request.vehicle, [one for part in parts for one in part], request.step, request.noise
-    )
-    n, each = len(u.entries), len(parts[0])
-    normal = problem.normal(u, np.zeros(n), np.zeros((each * len(parts), 9)))
-    A = np.array([part.A for part in normal]).reshape(len(parts), each, n, n).sum(axis=1)
-    gained = np.linalg.slogdet(np.eye(n) + A)[1] / (2 * n)
+    n, length, gained = len(u.entries), _usual(request), []
+    for pair in zip(commands, states, strict=True):
+        some = segments(request, *pair, length)
+        problem = OutputError(request.vehicle, some, request.step, request.noise)
+        A, _, _ = problem.normal(u, np.zeros(n), np.zeros((len(some), 9))).eliminated()
+        gained.append(np.linalg.slogdet(np.eye(n) + A)[1] / (2 * n))
     return np.where(finite, gained, 0.0)
 
 
@@ -270,8 +266,9 @@ def prediction(request: Request, commands: np.ndarray, states: np.ndarray) -> Id
     final = problem(segment_length(problem(_usual(request)), u, theta))
     starts = np.zeros((len(final.segments), 9))
     rows = 9 * sum(len(one.at) for one in final.segments)
-    fit = Fit(u, theta, starts, 0.0, final.normal(u, theta, starts), rows)
-    covariance = np.linalg.inv(fit.information + np.eye(len(theta)))
+    information, _, _ = final.normal(u, theta, starts).eliminated()
+    fit = Fit(u, theta, starts, 0.0, information, rows, max(BLOCKS, len(starts)))
+    covariance = np.linalg.inv(information + np.eye(len(theta)))
     return Identified(request.vehicle, [], held_of([], HISTORY), final, fit, covariance, [], {}, ())
 
 

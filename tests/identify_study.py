@@ -1,28 +1,36 @@
 """How often the intervals of `auv identify` cover the truth: `make identify-study`.
 
 Usage: identify_study.py [SEEDS] [VEHICLE ...]
+
+First of trials whose only error is noise, then of such with a slow disturbance that the model
+lacks, for intervals of several kinds.
 """
 
 import os
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import numpy as np
 import yaml
-from trials import SWINGS, skewed, trial, truth, wrong_prior
+from trials import SWINGS, gauss_markov, skewed, trial, truth, wrong_prior
 
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.studies.identify.couplings import couplings, signals_of
-from auv_analysis.studies.identify.identify import identify, split
+from auv_analysis.studies.identify.identified import Identified
+from auv_analysis.studies.identify.identify import Settings, identify, split
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 from auv_gvc_controller.laws.model import decompose, inverse_upper
 
 SKEWED = 'skewed'
+SHARE = 0.1  # of inertia times swing per s2: standard deviation of the disturbance
+DRAWS = 60  # of the bootstrap
 
 
 def vehicle_of(name: str, folder: Path) -> tuple[Vehicle, str]:
@@ -71,6 +79,40 @@ def one(name: str, seed: int, folder: Path) -> tuple[list[bool], list[bool], flo
     return covered, both, worst, ratios[-1]
 
 
+def white(found: Identified, row: Mapping[str, Any]) -> tuple[float, float]:
+    """The interval as if residuals were white noise."""
+    u, fit = found.fit.unknowns, found.fit
+    J = u.gradient(fit.theta)[u.names.index(row['name'])]
+    P, _ = u.precision(fit.theta)
+    half = 1.96 * float(np.sqrt(J @ np.linalg.solve(fit.information + P, J)))
+    return row['value'] - half, row['value'] + half
+
+
+def disturbed(name: str, seed: int, folder: Path) -> tuple[dict[str, list[bool]], float]:
+    """Whether intervals of several kinds cover, under a disturbance, and the observer's gain."""
+    vehicle, file = vehicle_of(name, folder)
+    moves_like = 'herman2018' if name == SKEWED else name
+    deviations = SHARE * np.diag(vehicle.M) * np.array(SWINGS[moves_like][0])
+    record, _ = trial(folder, moves_like, seed, vehicle=file,
+                      disturbance=gauss_markov(deviations, seed))  # fmt: skip
+    training, held = split([record], 0.25)
+    covered: dict[str, list[bool]] = {}
+    for kind, gain in (('', 0.0), (' and observer', None)):
+        settings = Settings(observer=gain, bootstrap=DRAWS)
+        found = identify(training, held, wrong_prior(vehicle, seed), settings)
+        true = truth(found.fit.unknowns, vehicle)
+        for row in found.coefficients():
+            if row['status'] == 'identified' and row['name'] in found.fit.unknowns.names:
+                for said, (low, high) in {
+                    'white': white(found, row),
+                    'sandwich': (row['low'], row['high']),
+                    'bootstrap': (row['bootstrap_low'], row['bootstrap_high']),
+                }.items():
+                    inside = covered.setdefault(said + kind, [])
+                    inside.append(low <= true[row['name']] <= high)
+    return covered, found.problem.observer
+
+
 def main() -> None:
     """Print coverage by vehicle."""
     seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
@@ -89,6 +131,17 @@ def main() -> None:
                 f'prior; {(time.perf_counter() - begun) / seeds:.1f} s each',
                 flush=True,
             )  # fmt: skip
+        print(f'with a disturbance that the model lacks ({SHARE:g} of inertia times swing, 5 s)')
+        for name in names:
+            each = [disturbed(name, seed, Path(folder)) for seed in range(seeds)]
+            told = [
+                f'{kind} {100 * np.mean([value for c, _ in each for value in c[kind]]):.1f} %'
+                for kind in each[0][0]
+            ]
+            gains = ', '.join(f'{gain:g}' for gain in sorted({gain for _, gain in each}))
+            print(
+                f'{name}: 95 % intervals cover by {", by ".join(told)}; gains {gains}', flush=True
+            )
 
 
 if __name__ == '__main__':

@@ -55,6 +55,31 @@ def trial_scenario(folder: Path, name: str, vehicle: str = '', **entries: Any) -
     return path
 
 
+def gauss_markov(
+    deviations: np.ndarray, seed: int, time_constant: float = 5.0, duration: float = 120.0
+) -> dict[str, Any]:
+    """A disturbance that no model has: first-order Gauss-Markov, as sines of random phase.
+
+    Parameters
+    ----------
+    deviations : (6,) standard deviations, N and N m
+    seed : of the phases
+    time_constant, duration : s
+
+    """
+    rng = np.random.default_rng(seed + 20_000)
+    edges = np.geomspace(np.pi / duration, 20.0 / time_constant, 41)
+    covered = np.diff(np.arctan(edges * time_constant)) * 2.0 / np.pi  # of the variance
+    found: dict[str, Any] = {'kind': 'harmonic'}
+    for dof, deviation in zip(DOFS, deviations, strict=True):
+        omegas = edges[:-1] + rng.uniform(size=40) * np.diff(edges)
+        amplitudes = deviation * np.sqrt(2.0 * covered / covered.sum())
+        phases = rng.uniform(0.0, 2.0 * np.pi, 40)
+        rows = zip(amplitudes.tolist(), omegas.tolist(), phases.tolist(), strict=True)
+        found[dof] = {'terms': [{'amplitude': a, 'omega': w, 'phase': p} for a, w, p in rows]}
+    return found
+
+
 def trial(folder: Path, name: str, seed: int = 0, **entries: Any) -> tuple[Record, Run]:
     """What is recorded of a trial, and the run with its truth."""
     scenario = load_scenario(trial_scenario(folder, name, seed=seed, **entries))

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from auv_analysis.cli.arguments import VEHICLE, add_no_report, add_results, number, refused
+from auv_analysis.cli.arguments import VEHICLE, add_no_report, add_results, number, refused, whole
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -51,6 +51,16 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument('--prior', metavar='FILE', help=text)
     text = 'length of the segments, s; default: by the instability of the vehicle'
     command.add_argument('--segment', type=number(above=0.0), metavar='S', help=text)
+    text = (
+        'gain from 0 to below 1, or auto: along segments the state follows the measurements by it; '
+    )
+    text += 'for recordings with a disturbance that the model lacks; default: 0'
+    command.add_argument('--observer', type=_gain, default=0.0, metavar='GAIN', help=text)
+    text = 'intervals by N refits to blocks of time drawn anew, beside the usual ones'
+    command.add_argument('--bootstrap', type=whole(at_least=40), default=0, metavar='N', help=text)
+    text = 'profile likelihood of these coefficients, as of --free, with commas between; auto: of '
+    text += 'those whose cost is far from a parabola'
+    command.add_argument('--profile', metavar='NAMES', help=text)
     text = 'write the vehicle file even where the recording contradicts the prior'
     command.add_argument('--accept', action='store_true', help=text)
     add_no_report(command)
@@ -79,7 +89,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     settings = Settings(
         free=(*DEFAULT, *(options.free or ())), fixed=[*options.fixed, *applied],
         believed=_believed(options.prior), segment=options.segment,
-        origin=options.prior or 'options',
+        origin=options.prior or 'options', observer=options.observer, bootstrap=options.bootstrap,
+        profile=[name.strip() for name in options.profile.split(',')] if options.profile else (),
     )  # fmt: skip
     inputs = [*options.bags, shipped('vehicles', options.vehicle)]
     out = options.out or Path('runs') / f'identify_{UNFIT.sub("_", vehicle.name)[:90]}'
@@ -159,6 +170,13 @@ def _believed(file: str | None) -> dict[str, tuple[float, float]]:
             raise InputError(file, str(name), expected, entry)
         found[str(name)] = float(values[0]), float(values[1])
     return found
+
+
+def _gain(text: str) -> float | None:
+    """Gain of the observer; None: found by `identify`."""
+    if text == 'auto':
+        return None
+    return number(at_least=0.0, below=1.0, words=' or auto')(text)
 
 
 def _span(text: str) -> tuple[float, float]:

@@ -106,7 +106,7 @@ NAMES = (
     'monte_carlo.parquet', 'open_loop.json', 'check.json', 'samples.parquet',
     'wrenches.parquet', 'faults.parquet', 'linearization.json', SWEEP, CAMPAIGN, 'identify.json',
     'predict.json', 'coefficients.parquet', 'predictions.parquet', 'inertia.parquet',
-    'deformation.parquet', 'shares.parquet',
+    'deformation.parquet', 'shares.parquet', 'whiteness.parquet', 'profiles.parquet',
 )  # fmt: skip
 
 

@@ -54,10 +54,25 @@ def test_a_bag_becomes_a_vehicle_file(identified):
     rows = parquet.read_table(identified / 'coefficients.parquet').to_pylist()
     surge = next(row for row in rows if row['name'] == 'M.surge.surge')
     assert surge['low'] < vehicle.M[0, 0] < surge['high']
-    for name in ('predictions', 'inertia', 'deformation', 'shares'):
+    for name in ('predictions', 'inertia', 'deformation', 'shares', 'whiteness'):
         assert (identified / f'{name}.parquet').exists()
     page = (identified / 'report.html').read_text(encoding='utf-8')
     assert 'What was identified' in page
+    assert 'residuals are white' in document['residuals']
+
+
+def test_intervals_on_request_stand_beside_the_others(bag, tmp_path):
+    out = tmp_path / 'asked'
+    fewer = ('--fixed', 'M', '--fixed', 'D_quadratic')
+    asked = ('--bootstrap', 40, '--profile', 'lag')
+    given = ('identify', bag, '--vehicle', 'herman2018', '--out', out)
+    main([str(argument) for argument in (*given, *fewer, *asked)])
+    rows = parquet.read_table(out / 'coefficients.parquet').to_pylist()
+    lag = next(row for row in rows if row['name'] == 'lag')
+    assert lag['bootstrap_low'] < lag['value'] < lag['bootstrap_high']
+    assert lag['profile_low'] < lag['value'] < lag['profile_high']
+    assert parquet.read_table(out / 'profiles.parquet').num_rows >= 5
+    assert (out / 'figures' / 'profiles.png').exists()
 
 
 def test_the_file_predicts_the_recording(bag, identified, tmp_path, capsys):
@@ -77,8 +92,8 @@ def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, cap
     assert 'another vehicle' in said
     assert (out / 'identify.json').exists()
     assert not (out / 'vehicle.yaml').exists()
-    code, _ = auv(capsys, *given, '--accept', '--overwrite')
-    assert code == 0
+    code, said = auv(capsys, *given, '--accept', '--overwrite')
+    assert code == 0, said
     assert (out / 'vehicle.yaml').exists()
 
 
@@ -89,6 +104,9 @@ def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, cap
         (('--holdout', '2'), '--holdout: expected a number'),
         (('--part', '100:200'), '--part: expected a time up to'),
         (('--part', '5:2'), 'argument --part'),
+        (('--observer', '1'), 'argument --observer: expected'),
+        (('--bootstrap', '5'), 'argument --bootstrap: expected'),
+        (('--profile', 'mass'), '--profile: expected one of'),
         (('--odom', '/odom', '--wrench', '/no'), '/no'),
     ],
 )

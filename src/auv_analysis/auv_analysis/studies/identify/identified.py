@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.output.text import join
+from auv_analysis.studies.identify.intervals import Profile
 from auv_analysis.studies.identify.output_error import Fit, OutputError
 from auv_analysis.studies.identify.prediction import Held
 from auv_analysis.studies.identify.record import Record
@@ -16,6 +17,7 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 KNOWN = 0.3  # of the prior's deviation: a coefficient is identified where less is left of it
 WIDER = 10.0  # times the prior's deviation: what that changes comes from the prior
 MIXED = 0.5  # a direction in which more is left is one that the data cannot tell
+BAND, NORMAL = (0.025, 0.975), 1.959964  # of 95 %
 NAMED = 0.35  # of a direction's largest part: smaller ones are not named
 
 
@@ -32,6 +34,8 @@ class Identified:
     predictions : rows of `compare`
     zeros : damping that is held at zero, with the upper end of its interval
     still : what was free and was not searched, as its degree of freedom hardly moves
+    resampled : (k, n) theta of the bootstrap; k = 0: not asked for
+    profiles : profile likelihoods, as far as they were asked for
 
     """
 
@@ -44,6 +48,8 @@ class Identified:
     predictions: list[dict[str, Any]]
     zeros: Mapping[Entry, float]
     still: Sequence[Entry]
+    resampled: np.ndarray
+    profiles: Sequence[Profile] = ()
 
     @property
     def found(self) -> Coefficients:
@@ -55,7 +61,8 @@ class Identified:
 
         `left` is the standard deviation by the data alone, by that of the prior; `status` is
         'identified', 'prior' where too much is left, then there is no interval, or 'at zero':
-        damping that would feed energy otherwise.
+        damping that would feed energy otherwise. `bootstrap_low`, `bootstrap_high` and
+        `profile_low`, `profile_high` are there where they were asked for.
         """
         u = self.fit.unknowns
         J = u.gradient(self.fit.theta)
@@ -96,7 +103,27 @@ class Identified:
         ]  # fmt: skip
         if u.is_delay_free:
             rows.append(self._delay())
+        for row in rows:
+            row.update(self._other_intervals(row))
         return rows
+
+    def _other_intervals(self, row: Mapping[str, Any]) -> dict[str, float | None]:
+        """Of the bootstrap and of the profile likelihood, as far as they were asked for."""
+        found: dict[str, float | None] = {}
+        names, is_known = self.fit.unknowns.names, row['low'] is not None
+        if len(self.resampled):
+            found = dict.fromkeys(('bootstrap_low', 'bootstrap_high'))
+            if is_known and row['name'] in names:
+                values = self.fit.unknowns.values(self.resampled)[:, names.index(row['name'])]
+                scale = self.fit.quantile / NORMAL  # few blocks: as wide as the other intervals
+                for key, q in zip(found, np.quantile(values, BAND), strict=True):
+                    found[key] = float(row['value'] + scale * (q - row['value']))
+        if self.profiles:
+            own = next((p for p in self.profiles if p.name == row['name']), None)
+            found['profile_low'], found['profile_high'] = (
+                (own.low, own.high) if own else (None,) * 2
+            )
+        return found
 
     def _delay(self) -> dict[str, Any]:
         """The delay, found in whole steps; with the lag it is sharper than alone."""
@@ -140,7 +167,7 @@ class Identified:
     def draws(self, count: int, seed: int = 0) -> Coefficients:
         """Models (count,) drawn from the uncertainty."""
         rng = np.random.default_rng(seed)
-        scale = self.fit.quantile / 1.959964  # few segments: as wide as the intervals
+        scale = self.fit.quantile / NORMAL  # few segments: as wide as the intervals
         root = np.linalg.cholesky(self.covariance + 1e-14 * np.eye(len(self.covariance)))
         theta = self.fit.theta + scale * rng.standard_normal((count, len(root))) @ root.T
         return self.fit.unknowns.coefficients(theta)

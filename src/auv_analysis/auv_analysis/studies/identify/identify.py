@@ -8,6 +8,12 @@ import numpy as np
 
 from auv_analysis.output.text import join
 from auv_analysis.studies.identify.identified import Identified
+from auv_analysis.studies.identify.intervals import (
+    Profile,
+    bootstrap,
+    far_from_quadratic,
+    profile,
+)
 from auv_analysis.studies.identify.output_error import UNSEEN, Fit, OutputError
 from auv_analysis.studies.identify.prediction import (
     BlackBox,
@@ -19,7 +25,14 @@ from auv_analysis.studies.identify.prediction import (
 )
 from auv_analysis.studies.identify.record import Record, segments_of
 from auv_analysis.studies.identify.start import least_squares_start
-from auv_analysis.studies.identify.unknowns import DEFAULT, Coefficients, Entry, Unknowns, unknowns
+from auv_analysis.studies.identify.unknowns import (
+    DEFAULT,
+    Coefficients,
+    Entry,
+    Unknowns,
+    named,
+    unknowns,
+)
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle import Vehicle
 
@@ -33,6 +46,8 @@ NEARBY = 30.0  # more cost: no better delay lies in that direction
 MOVING = 2.0  # times the noise: a degree of freedom that moves less tells little
 SEEN = 2.0  # deviations: a difference between fits that is no chance
 TRUSTED = 0.3  # of the wide prior deviation, of what an axis would tell that nobody measured
+GAINS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5)  # of the observer
+AUTO = 'auto'
 STILL = 5.0  # times the noise: a vehicle that moves less is at rest
 Say = Callable[[str], None]
 
@@ -46,6 +61,10 @@ class Settings:
     free, fixed : as of `unknowns`
     believed : name -> (value, standard deviation)
     segment : s, None: by the instability of the vehicle
+    observer : gain by which the simulated state follows the measurements, from 0 to below 1; None:
+        the one of `GAINS` with the least error of prediction
+    bootstrap : number of recordings that are drawn from blocks of time; 0: none
+    profile : names whose profile likelihood is taken; 'auto': where the cost is no parabola
     origin : of `believed`, named in errors
 
     """
@@ -54,6 +73,9 @@ class Settings:
     fixed: Sequence[str] = ()
     believed: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     segment: float | None = None
+    observer: float | None = 0.0
+    bootstrap: int = 0
+    profile: Sequence[str] = ()
     origin: object = 'options'
 
 
@@ -106,6 +128,7 @@ def identify(
         channels=training[0].channels, believed=settings.believed, origin=settings.origin,
     )  # fmt: skip
     u = _trusting(u, ~np.isnan(noise[:6]))
+    asked = named([n for n in settings.profile if n != AUTO], u.entries, '--profile', 'options')
     still = _still(training, noise, u)
     every, u = u, u.without([entry.name for entry in still])
     say('least squares')
@@ -114,30 +137,45 @@ def identify(
         expected = 'a wrench that accelerates the vehicle its own way (axes FLU in place of FSD?)'
         raise InputError(training[0].name, 'wrench', expected, f'the opposite in {join(wrong)}')
 
-    def problem(length: float, most: int | None = None) -> OutputError:
+    def problem(length: float, gain: float = 0.0, most: int | None = None) -> OutputError:
         segments = [s for record in training for s in segments_of(record, length, HISTORY)]
         every = -(-len(segments) // most) if most else 1
-        return OutputError(vehicle, segments[::every], step, noise, training[0].allocation)
+        return OutputError(vehicle, segments[::every], step, noise, training[0].allocation,
+                           observer=gain)  # fmt: skip
 
     longest = min(sum(record.end - record.start for record in training) / FEWEST, LONG)
     short = min(SHORT, longest)
-    first = _with_best_delay(problem(short, FIRST), u, theta, late, NEARBY)[0]
+    first = _with_best_delay(problem(short, most=FIRST), u, theta, late, NEARBY)[0]
     u, theta = first.unknowns, first.theta
     length = settings.segment or segment_length(problem(longest), u, theta)
+    gain = settings.observer
+    if gain is None:
+        gain = _best_observer(problem(length), u, theta)
+    if gain:
+        length = settings.segment or segment_length(problem(longest, gain), u, theta)
     say(f'output error over segments of {length:.3g} s')
-    final = problem(length)
+    final = problem(length, gain)
     late = float(u.coefficients(theta).lag + u.prior.delay)
     tried = _with_best_delay(final, u, theta, late, PLAUSIBLE)
     whole = final.fit(tried[0].unknowns, tried[0].theta, tried[0].starts)
-    covariance = final.covariance(whole) + _between(tried) + _bias(whole, problem(length / 2))
-    covariance += _of_still(final, whole, every)
+    beside = _between(tried) + _bias(whole, problem(length / 2, gain))
+    beside += _of_still(final, whole, every)
+    covariance = final.covariance(whole) + beside
     fit, zeros = _dissipative(final, whole, covariance)
     kept = [whole.unknowns.names.index(name) for name in fit.unknowns.names]
+    covariance, beside = covariance[np.ix_(kept, kept)], beside[np.ix_(kept, kept)]
+    draws = np.zeros((0, len(kept)))
+    if settings.bootstrap:
+        say(f'{settings.bootstrap} refits to blocks of time drawn anew')
+        draws = bootstrap(final, fit, settings.bootstrap, beside)
+    if AUTO in settings.profile:
+        asked |= set(far_from_quadratic(final, fit, covariance))
+    profiles = _profiles(final, fit, covariance, asked, say)
     say('prediction of what was held out')
     moments = held_of(held, HISTORY)
     rows = compared(training, moments, vehicle, (fit.unknowns, fit.theta))
     return Identified(
-        vehicle, training, moments, final, fit, covariance[np.ix_(kept, kept)], rows, zeros, still
+        vehicle, training, moments, final, fit, covariance, rows, zeros, still, draws, profiles
     )
 
 
@@ -313,6 +351,25 @@ def _with_best_delay(
                 break
             j += way
     return sorted(tried.values(), key=lambda fit: fit.cost)
+
+
+def _profiles(
+    problem: OutputError, fit: Fit, covariance: np.ndarray, asked: set[str], say: Say
+) -> list[Profile]:
+    """Profile likelihoods of those coefficients that are asked for and free."""
+    names = [name for name in fit.unknowns.names if name in asked]
+    if names:
+        say(f'profile likelihood of {join(names)}')
+    return [profile(problem, fit, covariance, name) for name in names]
+
+
+def _best_observer(problem: OutputError, u: Unknowns, theta: np.ndarray) -> float:
+    """The gain of the observer with the least error of prediction; 0 where none is clearly less."""
+    begun = problem.fit(u, theta, most=10, tolerance=1e-4)
+    costs = {gain: replace(problem, observer=gain).cost(u, begun.theta, begun.starts)
+             for gain in GAINS}  # fmt: skip
+    best = min(GAINS, key=lambda gain: costs[gain])
+    return best if costs[best] < begun.cost - PLAUSIBLE else 0.0
 
 
 def _between(tried: Sequence[Fit]) -> np.ndarray:

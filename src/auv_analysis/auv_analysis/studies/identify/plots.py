@@ -40,15 +40,15 @@ def draw(
 ) -> dict[str, FigureRecord]:
     """Draw the figures as PNG and PDF: name -> figure."""
     pairs = list(found.problem.misfit(found.fit))
-    return save_figures(
-        folder,
-        {
-            'prediction': lambda: prediction(found.predictions),
-            'trace': lambda: _trace(found, pairs),
-            'inertia': lambda: _inertia(tables['inertia']),
-            'residuals': lambda: _residuals(found, pairs),
-        },
-    )
+    figures = {
+        'prediction': lambda: prediction(found.predictions),
+        'trace': lambda: _trace(found, pairs),
+        'inertia': lambda: _inertia(tables['inertia']),
+        'residuals': lambda: _residuals(found, pairs),
+    }
+    if found.profiles:
+        figures['profiles'] = lambda: _profiles(found)
+    return save_figures(folder, figures)
 
 
 def prediction(rows: Sequence[Mapping[str, Any]]) -> Drawn:
@@ -119,6 +119,26 @@ def _inertia(rows: Sequence[Mapping[str, Any]]) -> Drawn:
     plots.shared_legend(figure)
     caption = 'Couplings in M with their 95 % intervals, and those of the prior.'
     return figure, 'Couplings', caption
+
+
+def _profiles(found: Identified) -> Drawn:
+    """Rise of the cost over each coefficient that was held, and the parabola of its interval."""
+    count = len(found.profiles)
+    figure, panels = small_multiples(count, min(count, 3), 1.9)
+    border = found.fit.quantile**2
+    for axes, one in zip(panels, found.profiles, strict=False):
+        x = np.linspace(one.values[0], one.values[-1], 101)
+        axes.plot(x, ((x - one.value) / one.deviation) ** 2, '--', color=GREY, label='parabola')
+        axes.plot(one.values, one.rise, 'D-', color=COLOURS[0], markersize=3, label='profile')
+        axes.axhline(border, color='black', linewidth=0.6)
+        axes.set_ylim(0.0, 2.0 * border)
+        axes.set_xlabel(f'{one.name} ({one.unit})' if one.unit else one.name)
+    plots.shared_legend(figure)
+    caption = (
+        'Profile likelihoods: rise of the cost where a coefficient is held and all others are '
+        'refitted; the line is where a 95 % interval ends.'
+    )
+    return figure, 'Profiles', caption
 
 
 def _residuals(found: Identified, pairs: Pairs) -> Drawn:

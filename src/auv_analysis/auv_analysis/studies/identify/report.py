@@ -15,6 +15,7 @@ from auv_analysis.studies.identify.plausibility import contradictions, excitatio
 from auv_analysis.studies.identify.prediction import by_name
 from auv_analysis.studies.identify.record import Record
 from auv_analysis.studies.identify.record import described as of_record
+from auv_analysis.studies.identify.whiteness import told, whiteness
 
 VEHICLE, NAME = 'vehicle.yaml', 'identify'
 NARROW: Mapping[str, tuple[str, ...]] = {  # tables in a terminal, and what they leave out there
@@ -23,6 +24,11 @@ NARROW: Mapping[str, tuple[str, ...]] = {  # tables in a terminal, and what they
     'predictions': ('linear', 'angular'),
 }
 JUDGED = 0.5  # s: shorter horizons tell of noise rather than of the model
+PROFILED = (
+    'Profile likelihoods: the rise of the cost where a coefficient is held and all others are '
+    'refitted, in the scale of the sandwich. The parabola that an interval takes for granted has '
+    'the square of the deviations.'
+)
 METHOD = (
     'The start is a weighted linear least squares fit of (1) on local polynomials. Output error '
     'refines it: the model alone is simulated along segments under the recorded command, each from '
@@ -49,6 +55,7 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
     """
     rows, tables = found.coefficients(), couplings(found)
     wrong = contradictions(found)
+    white = whiteness(list(found.problem.misfit(found.fit)), found.problem.step)
     identified = [row['name'] for row in rows if row['status'] == 'identified']
     results = Results(
         NAME,
@@ -58,7 +65,9 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
             'held_out': [of_record(record) for record in found.held.record],
             'segments': len(found.problem.segments),
             'segment_length': len(found.problem.segments[0].command) * found.problem.step,
+            'observer': found.problem.observer,
             'residual_rms': float((found.fit.cost / found.fit.rows) ** 0.5),
+            'residuals': told(white),
             'noise': found.problem.noise.tolist(),
             'identified': identified,
             'not_identified': [row['name'] for row in rows if row['status'] != 'identified'],
@@ -81,8 +90,24 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
         'left': described('left', 'of the prior’s uncertainty', decimals=1, scale=100.0),
         'status': described('', 'whether the recording tells it', look='badge'),
     }
+    asked = {'bootstrap': len(found.resampled), 'profile': len(found.profiles)}
+    for kind in [kind for kind, count in asked.items() if count]:
+        known = {**known, f'{kind}_low': Column('low', group=kind, digits=4),
+                 f'{kind}_high': Column('high', group=kind, digits=4)}  # fmt: skip
     results.add('coefficients', 'Coefficients of (1), lag, delay and gains.', rows, known)
     add_predictions(results, found.predictions)
+    _add_whiteness(results, white)
+    if found.profiles:
+        points = [
+            {'name': p.name, 'unit': p.unit, 'value': x, 'rise': y,
+             'deviations': (x - p.value) / p.deviation}
+            for p in found.profiles for x, y in zip(p.values.tolist(), p.rise.tolist(), strict=True)
+        ]  # fmt: skip
+        results.add('profiles', PROFILED, points, {
+            'name': described('', 'coefficient'), 'value': Column('held at', digits=4),
+            'unit': 'unit', 'rise': described('rise', 'of the cost; a 95 % interval ends at 3.84'),
+            'deviations': described('deviations', 'by the sandwich, from the minimum'),
+        })  # fmt: skip
     pairs: Mapping[str, Shown] = {
         'pair': described('pair', 'degrees of freedom'),
         'M_prior': Column('prior'),
@@ -109,6 +134,22 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
                 shown[f'{symbol}{key}'] = Column(label, group=symbol, scale=1.0)
         results.add(name, caption, tables[name], shown)
     return results
+
+
+def _add_whiteness(results: Results, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Add the table of the residuals of velocities."""
+    if rows:
+        shown: Mapping[str, Shown] = {
+            'dof': described('', 'degree of freedom'),
+            'rms': described('rms', 'in standard deviations of the noise'),
+            'ljung_box': described('Ljung-Box', 'sum over 20 lags, about 20 if white'),
+            'p': described('p', 'how probable that is for white noise'),
+            'largest': described('largest', 'autocorrelation'),
+            'slow': described('below 1 Hz', 'share of the power', decimals=1, scale=100.0),
+            'slow_if_white': described('if white', decimals=1, scale=100.0),
+            'verdict': described('', 'whether the model explains all but noise', look='badge'),
+        }
+        results.add('whiteness', 'Residuals of the velocities: are they white?', rows, shown)
 
 
 def add_predictions(results: Results, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -201,6 +242,7 @@ def sentences(results: Results) -> list[str]:
                     f'{number(row["M"])} ± {number(half, 2)} {row["unit"]}.')  # fmt: skip
     if facts['hardly_moving']:
         said.append(f'Not searched, as it hardly moves: {join(facts["hardly_moving"])}.')
+    said.append(f'{facts["residuals"]}.')
     said += [f'Open: {one["words"]}.' for one in facts['combinations'][:4]]
     return said + [f'{text[:1].upper()}{text[1:]}.' for text in facts['excitation']]
 
@@ -222,6 +264,19 @@ def print_results(results: Results, folder: Path) -> None:
         out.print(text, markup=False, soft_wrap=True)
 
 
+def _asked(found: Identified) -> list[str]:
+    """How what was asked for was done."""
+    gain, count = found.problem.observer, len(found.resampled)
+    said = [
+        f'Along segments the simulated state follows the measurements by a gain of {gain:g} a '
+        'step; residuals are errors of prediction, which a slow disturbance makes less wrong.'
+    ] if gain else []  # fmt: skip
+    if count:
+        said.append(f'The bootstrap has {count} draws of blocks of time, each refitted by two '
+                    'Gauss-Newton steps, the second one simulated anew.')  # fmt: skip
+    return said
+
+
 def write_report(found: Identified, results: Results, out: Path) -> Path:
     """Write report.html with its figures; returns its path."""
     from auv_analysis.studies.identify.plots import draw
@@ -239,10 +294,12 @@ def write_report(found: Identified, results: Results, out: Path) -> Path:
                 [figures['prediction'], t['predictions']]),
         Section('couplings', 'Couplings before and after',
                 [figures['inertia'], t['inertia'], t['deformation'], t['shares']]),
-        Section('coefficients', 'What was identified', [t['coefficients']]),
+        Section('coefficients', 'What was identified',
+                [t['coefficients'], *(x['profiles'] for x in (figures, t) if 'profiles' in x)]),
         Section('open', 'What the data cannot tell', open_),
-        Section('fit', 'Predicted against recorded', [figures['trace'], figures['residuals']]),
-        Section('method', 'How it was found', [*METHOD, *facts['notes']]),
+        Section('fit', 'Predicted against recorded', [figures['trace'], figures['residuals'],
+                 *([t['whiteness']] if 'whiteness' in t else [])]),
+        Section('method', 'How it was found', [*METHOD, *_asked(found), *facts['notes']]),
     ]  # fmt: skip
     listings = [(VEHICLE, (out / VEHICLE).read_text('utf-8'))] if (out / VEHICLE).exists() else []
     names = join([record['name'] for record in facts['records']])

@@ -222,7 +222,7 @@ def unknowns(
         np.array(lag), np.array(0.0), np.ones(count), np.zeros(6), np.zeros(3),
     )  # fmt: skip
     every = _every(vehicle, prior, speeds, wrenches, tuple(channels) or DOFS)
-    kept = _named(free, every, '--free', origin) - _named(fixed, every, '--fixed', origin)
+    kept = named(free, every, '--free', origin) - named(fixed, every, '--fixed', origin)
     entries = tuple(e for e in every if e.name in kept and e.group != 'delay')
     if any(entry.group == 'lag' for entry in entries) and lag < SHORTEST_LAG:
         prior = replace(prior, lag=np.array(SHORTEST_LAG))
@@ -279,7 +279,14 @@ def _resistance(vehicle: Vehicle, speeds: np.ndarray, wrenches: np.ndarray) -> n
     return np.maximum(D * speeds, least)
 
 
-def _named(patterns: Sequence[str], every: Sequence[Entry], key: str, origin: object) -> set[str]:
+def named(patterns: Sequence[str], every: Sequence[Entry], key: str, origin: object) -> set[str]:
+    """Names of the unknowns that patterns such as 'M', 'M.diagonal', 'M.pitch.surge' mean.
+
+    Raises
+    ------
+    InputError : naming the key, a pattern that means none of them
+
+    """
     found: set[str] = set()
     for pattern in patterns:
         some = {entry.name for entry in every if _matches(pattern, entry)}

@@ -78,6 +78,8 @@ def _said(rows: Sequence[Mapping[str, Any]], key: str) -> list[str]:
         elif row['low'] is not None:
             within = f'{number(row["low"], 5)} to {number(row["high"], 5)}{unit}'
             text = f'identified {number(row["value"], 5)}{unit}, within {within}'
+            if row['low'] <= 0.0 <= row['high']:
+                text += '; no more than its uncertainty'
         else:
             text = f'prior {number(row["prior"], 5)}{unit}, not identified by itself'
         lines.append(printable(f'#   {row["name"]}: {text}'))

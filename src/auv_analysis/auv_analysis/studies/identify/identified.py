@@ -1,7 +1,7 @@
 """A model with its uncertainty: its coefficients, and what the data cannot tell."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,7 @@ class Identified:
     predictions: list[dict[str, Any]]
     zeros: Mapping[Entry, float]
     still: Sequence[Entry]
-    resampled: np.ndarray
+    resampled: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     profiles: Sequence[Profile] = ()
 
     @property

@@ -263,18 +263,6 @@ def unrecorded(part: Part, skip: Sequence[str] = ()) -> list[str]:
     return [dof for dof, x in zip(DOFS, part.peak, strict=True) if np.isnan(x) and dof not in skip]
 
 
-def leave_out(axes: Axes) -> None:
-    """Say in a panel that what it would show was not recorded."""
-    axes.text(0.5, 0.5, 'not recorded', transform=axes.transAxes, ha='center', color=GREY)
-    axes.set_yticks([])
-
-
-def groups(columns: Sequence[int]) -> list[list[int]]:
-    """Those columns that are linear, then those that are angular; no group is empty."""
-    split = ([i for i in columns if i in members] for members in GROUPS)
-    return [members for members in split if members]
-
-
 def draw_lines(axes: Axes, run: RunDigest, signal: str, part: str, columns: Sequence[int]) -> None:
     """Lines of some columns of a signal over a part of the time, in their colours."""
     ends = []

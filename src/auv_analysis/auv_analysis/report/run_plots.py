@@ -27,6 +27,7 @@ from auv_analysis.report.wrench_plots import (
     certificate_figure,
     estimate_figure,
     is_drawn,
+    leave_out,
 )
 from auv_analysis.runs.run import AnyRun
 from auv_dynamics.vehicle import DOFS
@@ -188,14 +189,20 @@ def _deformation(kind: str, run: RunDigest) -> Drawn:
 
 def _peaks(part: Part, quantity: Quantity, drawn: Sequence[int]) -> str:
     parts = []
-    for columns in plots.groups(drawn):
+    for columns in _groups(drawn):
         peak, i = max((part.peak[i], i) for i in columns)
         parts.append(f'{number(peak)} {quantity.unit_of(i)} in {DOFS[i]} at {part.at[i]:.2f} s')
     return f'Largest: {join(parts)}.'
 
 
+def _groups(columns: Sequence[int]) -> list[list[int]]:
+    """Those columns that are linear, then those that are angular; no group is empty."""
+    split = ([i for i in columns if i in members] for members in plots.GROUPS)
+    return [members for members in split if members]
+
+
 def _split_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequence[int]) -> Figure:
-    groups = plots.groups(drawn)
+    groups = _groups(drawn)
     figure = plots.new_figure(2.15 * len(groups) + 0.25)
     grid = figure.subplots(len(groups), 2, squeeze=False, width_ratios=(1, 1.9))
     for row, columns in enumerate(groups):
@@ -211,7 +218,7 @@ def _split_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequen
 
 
 def _whole_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequence[int]) -> Figure:
-    groups = plots.groups(drawn)
+    groups = _groups(drawn)
     figure = plots.new_figure(2.0 * len(groups) + 0.25)
     grid = figure.subplots(len(groups), 1, squeeze=False, sharex=True)[:, 0]
     for row, columns in enumerate(groups):
@@ -251,7 +258,7 @@ def settling(runs: Mapping[str, RunDigest]) -> tuple[Figure | None, str, str]:
             rest = np.maximum.accumulate(error[::-1])[::-1]
             axes.plot(t[rest > 0], rest[rest > 0], **look)
         if all(np.isnan(run.part('error').peak[i]) for run in runs.values()):
-            plots.leave_out(axes)
+            leave_out(axes)
             continue
         if (band := bands[i]) is not None:
             axes.axhline(band, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
@@ -288,7 +295,7 @@ def inputs(runs: Mapping[str, RunDigest]) -> tuple[Figure, str, str]:
     for i, axes in enumerate(panels):
         path = [run.part('tau').path[i] for run in runs.values()]
         if np.isnan(path).all():
-            plots.leave_out(axes)
+            leave_out(axes)
             continue
         above = 3.0 - np.argsort(np.argsort(path)) / len(runs)  # smooth lines over restless ones
         for look, run, order in zip(_looks(runs, COLOURS[i]), runs.values(), above, strict=True):

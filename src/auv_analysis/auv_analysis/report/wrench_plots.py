@@ -23,6 +23,12 @@ COMMAND: dict[str, Any] = {'color': '#8a8a8a', 'linewidth': 0.8, 'linestyle': '-
 LIMIT: dict[str, Any] = {'color': 'black', 'linewidth': 0.9, 'linestyle': (0, (1, 1.6))}
 
 
+def leave_out(axes: Axes) -> None:
+    """Say in a panel that what it would show was not recorded."""
+    axes.text(0.5, 0.5, 'not recorded', transform=axes.transAxes, ha='center', color=GREY)
+    axes.set_yticks([])
+
+
 def applied_figure(run: RunDigest, limit: np.ndarray | None) -> tuple[Figure, str, str]:
     """Commanded and applied wrench, a panel per degree of freedom.
 
@@ -249,7 +255,7 @@ def estimate_figure(run: RunDigest, kind: str) -> Drawn:
         axes = panels[i % 3, i // 3]
         plots.letter(axes, i, dof)
         if dof in plots.unrecorded(run.part(kind)):
-            plots.leave_out(axes)
+            leave_out(axes)
             continue
         if acted:
             axes.plot(*run.drawn(acted, i), **TAU)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trials
 from foreign_bags import (
     SECOND,
     UNNAMED,
@@ -19,9 +20,12 @@ from foreign_bags import (
 from numpy.testing import assert_allclose
 
 from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.foreign_checks import acts_behind
 from auv_analysis.bag.foreign_topics import candidates
+from auv_analysis.bag.tracks import Track
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.kinematics import quaternion
 
 KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
 TERMS = {  # two incommensurable sines per axis: motion enough for a delay to show
@@ -122,6 +126,25 @@ def test_a_wrench_that_acts_behind_its_stamps_is_told_and_taken_off(later, run, 
     sizes = [np.sqrt((one.unexplained**2).mean(axis=0)) for one in (found, mended)]
     assert np.all(sizes[1] <= sizes[0])
     assert np.any(sizes[1] < 0.5 * sizes[0])
+
+
+@pytest.mark.parametrize('late', [0.0, 0.12, 0.3])
+def test_a_delay_is_found_beside_couplings_and_noise_and_none_where_there_is_none(
+    late, tmp_path
+) -> None:
+    """Munk moments and restoring are larger than what the wrench changes, and noise is fed back."""
+    actuators = {'lag': 0.08, 'delay': late - 0.08} if late else {'lag': 0.001}
+    _, run = trials.trial(tmp_path, 'bluerov2_heavy', duration=60.0, actuators=actuators)
+    ns = np.round(run.t * SECOND).astype(np.int64)
+    eta = np.concatenate([run.eta[:, :3], quaternion(run.eta[:, 3:])], axis=1)
+    pose, twist = (Track(role, '', ns, rows, np.inf, held=False)
+                   for role, rows in (('pose', eta), ('twist', run.nu)))  # fmt: skip
+    found = acts_behind(pose, twist, Track('wrench', '', ns, run.tau, np.inf, held=True))
+    if late:
+        assert found is not None
+        assert found.value == pytest.approx(late, abs=0.025)
+    else:
+        assert found is None
 
 
 def test_a_wrench_of_zeros_is_named(run, tmp_path) -> None:

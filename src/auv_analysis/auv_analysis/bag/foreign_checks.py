@@ -20,13 +20,17 @@ from auv_analysis.metrics.pose_twist import (
 )
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.kinematics import rotation
 
 WORSE = 2.0  # times: from here on the other reading fits clearly better
 SMOOTH = 0.3  # s over which rates are fitted that are held against each other in time
+SMOOTHER = 0.6, 1.0  # s, the same of a wrench: noise that the controller answers brings it forward
+TOLD = 0.9  # of the acceleration that nothing else explains: what a wrench must explain of it
 FARTHEST, FINE = 1.0, 0.01  # s: delays that are tried, and between them
 MOST = 8000  # samples that are looked at
 PARTS = 20  # of the samples, by whose scatter the error of a delay is known
 CLEAR = 3.0  # standard errors: a delay that is no chance
+TINY = 1e-300
 SHARP = 0.05  # s: standard error above which nothing is said
 
 
@@ -192,7 +196,7 @@ def delays(tracks: Mapping[str, Track]) -> list[str]:
                 )
     for role in ('wrench_applied', 'wrench'):
         if role in tracks:
-            found = acts_behind(twist, tracks[role])
+            found = acts_behind(pose, twist, tracks[role])
             if found:
                 notes.append(
                     f'{tracks[role].topic}: the wrench acts {found} behind its stamps, delay and '
@@ -210,7 +214,7 @@ def behind(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Delay | Non
     if np.sqrt((velocity**2).sum(axis=1).mean()) < STILL:  # or nothing measured
         return None
     whole = cumulative_trapezoid(velocity, t, axis=0, initial=0.0)
-    early, late = (rates(t, signal, t, _count(t)).rate for signal in (path, whole))
+    early, late = (rates(t, signal, t, _count(t, SMOOTH)).rate for signal in (path, whole))
     inside = (t > t[0] + FARTHEST) & (t < t[-1] - FARTHEST)
     tried = np.arange(-FARTHEST, FARTHEST + FINE / 2, FINE)
     if inside.sum() < PARTS:
@@ -219,44 +223,65 @@ def behind(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Delay | Non
     for k, delay in enumerate(tried):
         moved = np.stack([np.interp(t[inside] + delay, t, column) for column in late.T], axis=1)
         left[:, k] = _sums(((early[inside] - moved) ** 2).sum(axis=1))
-    return _least(tried, left)
+    return _clear(_least(tried, left))
 
 
-def acts_behind(twist: Track, wrench: Track) -> Delay | None:
+def acts_behind(pose: Track, twist: Track, wrench: Track) -> Delay | None:
     """How far a wrench acts behind its stamps; None where that is not told.
 
-    The acceleration is regressed on the wrench of an earlier time and on what may resist,
-    velocities and their squares with sign, all through one filter: no number of the vehicle is
-    needed.
+    The acceleration is regressed on the wrench of an earlier time and on all that (1) has beside
+    it: velocities, their products and squares with sign, and the direction of gravity, all
+    through one filter. No number of the vehicle is needed. The error holds what another filter
+    changes: a controller that answers noise brings the wrench forward, a shorter one more so.
     """
     ns = _together(twist, wrench)[:MOST]
     if len(ns) < 10 * PARTS:
         return None
     t, nu = (ns - ns[0]) / NANOSECONDS, at_times(twist, ns)
     nu = nu[:, _measured(nu)]
-    count = _count(t)
-    area = integral(wrench, ns)
-    resisting = np.concatenate([nu, nu * np.abs(nu)], axis=1)
-    whole = cumulative_trapezoid(resisting, t, axis=0, initial=0.0)
-    nu_dot, tau, known = (rates(t, signal, t, count).rate for signal in (nu, area, whole))
+    tau, force = integral(wrench, ns), at_times(wrench, ns)
+    tau = tau[:, force.std(axis=0) > 0]
+    if not (tau.size and nu.size):
+        return None
+    down = rotation(at_times(pose, ns)[:, 3:])[:, 2]
+    i, j = np.triu_indices(nu.shape[1])
+    beside = np.concatenate([nu, nu * np.abs(nu), nu[:, i] * nu[:, j], down], axis=1)
+    whole = cumulative_trapezoid(beside, t, axis=0, initial=0.0)
+    first, second = (_acts_behind(t, nu, tau, whole, seconds) for seconds in SMOOTHER)
+    if first is None or second is None:
+        return None
+    return _clear(Delay(first.value, float(np.hypot(first.error, second.value - first.value))))
+
+
+def _acts_behind(
+    t: np.ndarray, nu: np.ndarray, tau: np.ndarray, whole: np.ndarray, seconds: float
+) -> Delay | None:
+    """By one filter, in s: velocities (n, k), integrals of the wrench and of what is beside it."""
+    nu_dot, tau, beside = (rates(t, x, t, _count(t, seconds)).rate for x in (nu, tau, whole))
     inside = (t > t[0] + FARTHEST) & (t < t[-1] - FARTHEST)
-    moving = tau.std(axis=0) > 0
-    if inside.sum() < 10 * PARTS or not moving.any() or not nu.size:
+    if inside.sum() < 10 * PARTS:
         return None
     scale = nu_dot[inside].std(axis=0)
-    y = nu_dot[inside] / np.where(scale > 0, scale, 1.0)
+    known = np.column_stack([beside[inside], np.ones(inside.sum())])
+    Q = np.linalg.svd(known / np.maximum(np.abs(known).max(axis=0), TINY), full_matrices=False)[0]
+
+    def rest(values: np.ndarray) -> np.ndarray:
+        return values - Q @ (Q.T @ values)
+
+    y = rest(nu_dot[inside] / np.where(scale > 0, scale, 1.0))
     tried = np.arange(-FARTHEST / 2, FARTHEST + FINE / 2, FINE)
     left = np.empty((PARTS, len(tried)))
     for k, delay in enumerate(tried):
-        moved = [np.interp(t[inside] - delay, t, column) for column in tau[:, moving].T]
-        X = np.column_stack([*moved, known[inside], np.ones(inside.sum())])
-        X = X / np.maximum(np.abs(X).max(axis=0), np.finfo(float).tiny)
+        X = rest(np.stack([np.interp(t[inside] - delay, t, column) for column in tau.T], axis=1))
+        X = X / np.maximum(np.abs(X).max(axis=0), TINY)
         left[:, k] = _sums(((y - X @ np.linalg.lstsq(X, y, rcond=None)[0]) ** 2).sum(axis=1))
+    if left.sum(axis=0).min() > (1.0 - TOLD) * (y**2).sum():
+        return None
     return _least(tried, left)
 
 
-def _count(t: np.ndarray) -> int:
-    return max(2 * round(SMOOTH / float(np.median(np.diff(t))) / 2) + 1, SMALLEST)
+def _count(t: np.ndarray, seconds: float) -> int:
+    return max(2 * round(seconds / float(np.median(np.diff(t))) / 2) + 1, SMALLEST)
 
 
 def _sums(squares: np.ndarray) -> np.ndarray:
@@ -265,7 +290,7 @@ def _sums(squares: np.ndarray) -> np.ndarray:
 
 
 def _least(tried: np.ndarray, left: np.ndarray) -> Delay | None:
-    """The delay that leaves least, where it is clear and sharp.
+    """The delay that leaves least; None at the edge of those that are tried.
 
     Its error is that of an M-estimate, by the scatter of the parts' derivatives.
 
@@ -281,12 +306,19 @@ def _least(tried: np.ndarray, left: np.ndarray) -> Delay | None:
         return None
     low, middle, high = total[k - 1 : k + 2]
     curvature = (low - 2.0 * middle + high) / FINE**2
-    value = float(tried[k] + 0.5 * FINE * (low - high) / max(low - 2.0 * middle + high, 1e-300))
+    value = float(tried[k] + 0.5 * FINE * (low - high) / max(low - 2.0 * middle + high, TINY))
     slopes = (left[:, k + 1] - left[:, k - 1]) / (2.0 * FINE)
     slopes = slopes - slopes.mean()
-    error = float(np.sqrt((slopes**2).sum()) / max(curvature, 1e-300))
-    clear = abs(value) > max(CLEAR * error, 2.0 * FINE) and error < SHARP
-    return Delay(value, error) if clear else None
+    error = float(np.sqrt((slopes**2).sum()) / max(curvature, TINY))
+    return Delay(value, error)
+
+
+def _clear(delay: Delay | None) -> Delay | None:
+    """A delay that is no chance and sharp enough to be told."""
+    if delay is None:
+        return None
+    told = abs(delay.value) > max(CLEAR * delay.error, 2.0 * FINE) and delay.error < SHARP
+    return delay if told else None
 
 
 def doubts_of_wrench(tracks: Mapping[str, Track]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from auv_analysis.cli.arguments import VEHICLE, add_no_report, add_results, number, refused, whole
 from auv_dynamics.files.errors import InputError
@@ -14,6 +14,27 @@ if TYPE_CHECKING:
     from auv_analysis.bag.foreign_topics import TopicMap
     from auv_analysis.studies.identify.record import Record
     from auv_dynamics.vehicle.vehicle import Vehicle
+
+
+class Trial(NamedTuple):
+    """What both commands are given: a vehicle, and recordings to learn from and held out.
+
+    Attributes
+    ----------
+    vehicle : as filed
+    training, held : recordings
+    notes : what is odd about them
+    inputs : files that no result may replace
+    out : folder of the results
+
+    """
+
+    vehicle: Vehicle
+    training: list[Record]
+    held: list[Record]
+    notes: list[str]
+    inputs: list[Path]
+    out: Path
 
 
 def add_bags(command: argparse.ArgumentParser) -> None:
@@ -68,23 +89,17 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """A model with its uncertainty from recordings, and a vehicle file."""
-    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import say, waiting
-    from auv_analysis.scenario.scaling import UNFIT
     from auv_analysis.studies.identify.identify import Settings, identify
     from auv_analysis.studies.identify.report import print_results, results_of, write_report
     from auv_analysis.studies.identify.unknowns import DEFAULT
     from auv_analysis.studies.identify.vehicle_text import vehicle_text
     from auv_dynamics.files.errors import FailedError
-    from auv_dynamics.files.shipped import shipped
     from auv_dynamics.files.yaml_files import read_yaml
-    from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
-    vehicle = load_vehicle(options.vehicle)
-    notes: list[str] = []
-    with waiting('reading'):
-        training, held = read(options, vehicle, notes)
+    trial = read(options, 'identify')
+    vehicle = trial.vehicle
     applied = ['lag', 'delay'] if options.applied else []  # nothing is between it and the vehicle
     settings = Settings(
         free=(*DEFAULT, *(options.free or ())), fixed=[*options.fixed, *applied],
@@ -92,13 +107,11 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         origin=options.prior or 'options', observer=options.observer, bootstrap=options.bootstrap,
         profile=[name.strip() for name in options.profile.split(',')] if options.profile else (),
     )  # fmt: skip
-    inputs = [*options.bags, shipped('vehicles', options.vehicle)]
-    out = options.out or Path('runs') / f'identify_{UNFIT.sub("_", vehicle.name)[:90]}'
-    with results_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
-        found = identify(training, held, vehicle, settings, lambda text: say(f'  {text}'))
-        results = results_of(found, notes, accepted=options.accept)
+    with results_folder(trial.out, overwrite=options.overwrite, inputs=trial.inputs) as folder:
+        found = identify(trial.training, trial.held, vehicle, settings, lambda t: say(f'  {t}'))
+        results = results_of(found, trial.notes, accepted=options.accept)
         if results.facts['file']:
-            data = read_yaml(inputs[-1], 'vehicle')
+            data = read_yaml(trial.inputs[-1], 'vehicle')
             source = f'identified from {", ".join(bag.name for bag in options.bags)}; prior: '
             source += str(data.get('source') or vehicle.name)
             name = f'{vehicle.name}_identified'
@@ -109,13 +122,30 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             with waiting('drawing plots, writing the report'):
                 write_report(found, results, folder.folder)
         if not options.json:
-            print_results(results, out)
+            print_results(results, trial.out)
     if not results.facts['file']:
         raise FailedError(results.facts['verdict'])
     return results.to_json()
 
 
-def read(
+def read(options: argparse.Namespace, command: str) -> Trial:
+    """Vehicle and recordings that a command is given."""
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
+    from auv_analysis.output.progress import waiting
+    from auv_analysis.scenario.scaling import UNFIT
+    from auv_dynamics.files.shipped import shipped
+    from auv_dynamics.vehicle.vehicle_file import load_vehicle
+
+    vehicle = load_vehicle(options.vehicle)
+    notes: list[str] = []
+    with waiting('reading'):
+        training, held = _recordings(options, vehicle, notes)
+    inputs = [*options.bags, shipped('vehicles', options.vehicle)]
+    out = options.out or Path('runs') / f'{command}_{UNFIT.sub("_", vehicle.name)[:90]}'
+    return Trial(vehicle, training, held, notes, inputs, out)
+
+
+def _recordings(
     options: argparse.Namespace, vehicle: Vehicle, notes: list[str]
 ) -> tuple[list[Record], list[Record]]:
     """Recordings to learn from, and those held out."""

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
-from pathlib import Path
 from typing import Any
 
 from auv_analysis.cli.arguments import add_results, number
@@ -23,23 +21,14 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """How well a vehicle file predicts a recording, beside persistence and a black box."""
-    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices: threads only wait
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import TextConsole, waiting
     from auv_analysis.report.plots import save_figures
-    from auv_analysis.scenario.scaling import UNFIT
     from auv_analysis.studies.identify.identify import judged
     from auv_analysis.studies.identify.plots import prediction
     from auv_analysis.studies.identify.report import narrow, prediction_results
-    from auv_dynamics.files.shipped import shipped
-    from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
-    vehicle = load_vehicle(options.vehicle)
-    notes: list[str] = []
-    with waiting('reading'):
-        training, held = read(options, vehicle, notes)
-    inputs = [*options.bags, shipped('vehicles', options.vehicle)]
-    out = options.out or Path('runs') / f'predict_{UNFIT.sub("_", vehicle.name)[:90]}'
+    vehicle, training, held, notes, inputs, out = read(options, 'predict')
     with results_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with waiting('predicting'):
             rows = judged(vehicle, training, held, options.lag, options.delay)

@@ -144,22 +144,9 @@ def identify(
                            observer=gain)  # fmt: skip
 
     longest = min(sum(record.end - record.start for record in training) / FEWEST, LONG)
-    short = min(SHORT, longest)
-    first = _with_best_delay(problem(short, most=FIRST), u, theta, late, NEARBY)[0]
-    u, theta = first.unknowns, first.theta
-    length = settings.segment or segment_length(problem(longest), u, theta)
-    gain = settings.observer
-    if gain is None:
-        gain = _best_observer(problem(length), u, theta)
-    if gain:
-        length = settings.segment or segment_length(problem(longest, gain), u, theta)
-    say(f'output error over segments of {length:.3g} s')
-    final = problem(length, gain)
-    late = float(u.coefficients(theta).lag + u.prior.delay)
-    tried = _with_best_delay(final, u, theta, late, PLAUSIBLE)
+    final, halves, tried = _search(problem, (u, theta, late), longest, settings, say)
     whole = final.fit(tried[0].unknowns, tried[0].theta, tried[0].starts)
-    beside = _between(tried) + _bias(whole, problem(length / 2, gain))
-    beside += _of_still(final, whole, every)
+    beside = _between(tried) + _bias(whole, halves) + _of_still(final, whole, every)
     covariance = final.covariance(whole) + beside
     fit, zeros = _dissipative(final, whole, covariance)
     kept = [whole.unknowns.names.index(name) for name in fit.unknowns.names]
@@ -177,6 +164,47 @@ def identify(
     return Identified(
         vehicle, training, moments, final, fit, covariance, rows, zeros, still, draws, profiles
     )
+
+
+def _search(
+    problem: Callable[..., OutputError],
+    begun: tuple[Unknowns, np.ndarray, float],
+    longest: float,
+    settings: Settings,
+    say: Say,
+) -> tuple[OutputError, OutputError, list[Fit]]:
+    """Fit over segments as long as the vehicle's instability allows.
+
+    Parameters
+    ----------
+    problem : segments of a length in s, with the gain of the observer, and at most so many
+    begun : unknowns, where to begin, and lag and delay together, s
+    longest : s, of segments
+    settings : of which segment and observer count
+    say : told what is being done
+
+    Returns
+    -------
+    problem, halves : the segments, and segments of half their length
+    tried : fits with neighbouring delays, the best one first
+
+    """
+    u, theta, late = begun
+    first = _with_best_delay(problem(min(SHORT, longest), most=FIRST), u, theta, late, NEARBY)[0]
+    u, theta = first.unknowns, first.theta
+
+    def suited(gain: float) -> float:
+        return settings.segment or segment_length(problem(longest, gain), u, theta)
+
+    length, gain = suited(0.0), settings.observer
+    if gain is None:
+        gain = _best_observer(problem(length), u, theta)
+    if gain:
+        length = suited(gain)
+    say(f'output error over segments of {length:.3g} s')
+    final = problem(length, gain)
+    late = float(u.coefficients(theta).lag + u.prior.delay)
+    return final, problem(length / 2, gain), _with_best_delay(final, u, theta, late, PLAUSIBLE)
 
 
 def judged(

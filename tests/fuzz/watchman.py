@@ -14,6 +14,7 @@ PATIENCE = 20  # s of CPU for an input, six times that by the clock; 0: another 
 CLOCKS = {signal.ITIMER_PROF: signal.SIGPROF, signal.ITIMER_REAL: signal.SIGALRM}
 MEMORY = 1 << 29  # bytes that an input may need beside what there was before
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+sys.dont_write_bytecode = True  # a module that is compiled while an input is tried is no stray file
 CHANGES = {'os.mkdir', 'os.rename', 'os.remove', 'os.rmdir', 'os.link', 'os.symlink', 'os.truncate'}
 
 

@@ -439,7 +439,7 @@ def test_the_wrench_changes_no_faster_than_its_limit() -> None:
 
 OPEN_LOOP = parameters(
     law='multisine', vehicle='herman2018', limits__wrench='[60.0]', odometry_timeout=0.3,
-    setpoint_timeout=0.3, ramp=1.0, gains__offset='[50.0, 0.0, 0.0, 0.0, 0.0, 0.0]',
+    setpoint_timeout=0.3, ramp=SLOW, gains__offset='[50.0, 0.0, 0.0, 0.0, 0.0, 0.0]',
     gains__amplitude='[20.0, 0.0, 0.0, 0.0, 0.0, 0.0]', gains__omega='[8.0]', gains__phase='[0.0]',
 )  # fmt: skip
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 import yaml
 from graph_runs import assert_same, both, recorded
 
@@ -25,6 +26,7 @@ OPEN = {
 }
 
 
+@pytest.mark.long
 def test_the_graph_equals_the_simulation(tmp_path: Path) -> None:
     path = tmp_path / 'open.yaml'
     path.write_text(yaml.safe_dump(OPEN))

@@ -4,7 +4,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 Result = TypeVar('Result')
 Decoder = Callable[[bytes], Any]
+MOST_KEPT = 64  # decoders: channels of one type share theirs
 RULE = '=' * 80 + '\n'  # between the parts of a definition
 LANGUAGES = {'ros2msg': 'msg', 'ros1msg': 'msg', 'ros2idl': 'idl'}  # of MCAP's schemas
 
@@ -220,6 +221,7 @@ def _opened(bag: Path) -> Iterator[Any]:
         reader.close()
 
 
+@lru_cache(MOST_KEPT)
 def decoder(name: str, definition: str, language: str, encoding: str) -> Decoder:
     """Decoder of one type.
 

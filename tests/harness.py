@@ -14,6 +14,7 @@ from typing import Any
 
 import rclpy
 from nursery import Nursery, Process
+from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
@@ -126,9 +127,29 @@ class Peer:
             )
         output = self._outputs[topic.name]
         self.until(lambda: output.get_subscription_count() >= subscribers, f'match {topic.name}')
-        if is_new:  # the other end may match later, and a best-effort one misses what came before
-            self.spin(0.2)
+        if is_new:
+            self._matched_by_all(topic)
         output.publish(message)
+
+    def _matched_by_all(self, topic: topics.Topic) -> None:
+        """Wait until nodes know of a new publisher: a best-effort end misses what comes before.
+
+        Publishers are told in the order of their making: whoever answers a request has been told
+        of the client's, which was made later.
+        """
+
+        def nodes() -> set[str]:
+            found = self.node.get_subscriptions_info_by_topic(topic.name)
+            return {f'{one.node_namespace.rstrip("/")}/{one.node_name}' for one in found}
+
+        def asked() -> set[str]:
+            services = dict(self.node.get_service_names_and_types())
+            return {node for node in nodes() if f'{node}/get_parameters' in services}
+
+        limit = time.monotonic() + 1.0  # a tool has no parameters, and answers nothing
+        self.until(lambda: asked() == nodes() or time.monotonic() > limit)
+        for node in asked():
+            self.call(GetParameters, f'{node}/get_parameters')
 
     def until(
         self, done: Callable[[], Any], what: str = 'condition', patience: float = PATIENCE

@@ -107,6 +107,8 @@ def test_a_full_disk(tmp_path: Path) -> None:
         shutil.copytree(bag, tmp_path / 'copy')
     document = recover(tmp_path / 'copy').document()
     counts = {topic: entry['messages'] for topic, entry in document['topics'].items()}
+    if not counts.get('/diagnostics', 1):
+        del counts['/diagnostics']  # the disk was full between the topic and its first message
     assert counts == read_bag(tmp_path / 'copy').counts
     assert document['topics']['/odom']['spacing']['gaps'] == 0
 

@@ -287,10 +287,16 @@ def test_a_foreign_listener_is_named_by_the_command(tmp_path: Path) -> None:
     assert peer.heard == {'wrench': [], 'odom': []}
 
 
-def in_real_time(folder: Path) -> Path:
+def in_real_time(folder: Path) -> tuple[Path, float]:
     """A run that is not in lock-step: activated late, and without set-points for a while.
 
     At 20 Hz, so that other tests on the machine do not make every second set-point late.
+
+    Returns
+    -------
+    bag : of the run
+    pause : longest time without odometry, s: of the machine, as the plant makes none
+
     """
     path = folder / 'played.yaml'
     text = yaml.safe_dump({**SCENARIO, 'duration': 600.0, 'step': 0.05})
@@ -316,6 +322,13 @@ def in_real_time(folder: Path) -> Path:
         peer, processes = found
         peer.listen(topics.ODOM, topics.WRENCH)
         odometry, wrenches = peer.heard[topics.ODOM.name], peer.heard[topics.WRENCH.name]
+        arrivals: list[float] = []
+        peer.node.create_subscription(
+            topics.ODOM.type,
+            topics.ODOM.name,
+            lambda _: arrivals.append(time.monotonic()),
+            topics.every_step(),
+        )
         peer.until(lambda: len(odometry) > 20, 'odometry')
         for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
             request = ChangeState.Request(transition=Transition(id=transition))
@@ -331,13 +344,20 @@ def in_real_time(folder: Path) -> Path:
         peer.until(lambda: acts(140), 'wrenches again')
         code, _ = stop(processes['recorder_node'], signal.SIGINT)
         assert code == 0
-    return bag
+    return bag, float(np.max(np.diff(arrivals)))
 
 
 def test_the_law_of_a_bag_in_real_time_is_reproduced(tmp_path: Path) -> None:
-    loop = recorded_loop(in_real_time(tmp_path))
-    answers = open_loop(loop, loop.controller.law, loop.controller.gains)
-    found = reproduction(loop, answers)
+    for attempt in range(3):
+        folder = tmp_path / str(attempt)
+        folder.mkdir()
+        bag, pause = in_real_time(folder)
+        loop = recorded_loop(bag)
+        answers = open_loop(loop, loop.controller.law, loop.controller.gains)
+        found = reproduction(loop, answers)
+        # in a pause a set-point comes too late for the controller, which the bag does not tell
+        if found.holds or pause < 0.1:
+            break
     assert found.holds, found.sentence()
     assert answers.ns[0] > loop.series[interface.ODOM][0][20], 'not before its activation'
     assert any('was not in charge' in note for note in answers.notes)

@@ -11,7 +11,7 @@ from foreign_logs import HEAD, HEADS, columns, text_of
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.bag.any_bag import messages, survey
-from auv_analysis.bag.csv_logs import Span, column_spans
+from auv_analysis.bag.csv_logs import Span, Table, column_spans
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import read_mapping
 from auv_analysis.bag.metadata import files_of
@@ -105,7 +105,8 @@ def test_columns_have_counts_and_ranges(tmp_path) -> None:
     path = tmp_path / 'x.csv'
     path.write_text('t,mode,u,v\n0,auto,,1\n1,auto,3,inf\n# end\n2,hold,-4,2\n')
     notes: list[str] = []
-    spans = column_spans(path, notes)
+    with Table(path) as table:
+        spans = column_spans(table, notes)
     assert spans == {'t': Span(3, 0, 2), 'u': Span(2, -4, 3), 'v': Span(2, 1, 2)}
     assert survey(path).counts == {'x': 3}
 
@@ -170,10 +171,11 @@ def test_a_long_table_is_read_in_parts_and_its_lines_are_known(tmp_path) -> None
     read = [(m.message.t, m.message.u) for m in messages(path, ['x'], [])]
     truth = np.where(t % 7000, t / 8, np.nan)
     assert_array_equal(np.array(read), np.stack([t, truth], axis=1))
-    assert column_spans(path, []) == {
-        't': Span(30_000, 0, 29_999),
-        'u': Span(29_995, 0.125, 3749.875),
-    }
+    with Table(path) as table:
+        assert column_spans(table, []) == {
+            't': Span(30_000, 0, 29_999),
+            'u': Span(29_995, 0.125, 3749.875),
+        }
     path.write_text('\n'.join(['t,u,mode', *lines[:20_000], '5,1e,run', *lines[20_000:], '']))
     with pytest.raises(InputError, match=r'line 20002, column u: expected a number, or nothing, f'):
         [message.message.u for message in messages(path, ['x'], [])]

@@ -75,24 +75,20 @@ class Span(NamedTuple):
     high: float
 
 
-def column_spans(file: Path, notes: list[str]) -> dict[str, Span]:
+def column_spans(table: 'Table', notes: list[str]) -> dict[str, Span]:
     """Column -> its numbers; columns of text are left out."""
-    with Table(file) as table:
-        spans = dict.fromkeys(table.columns, Span(0, np.inf, -np.inf))
-        for block in table.blocks(notes):
-            for name, span in list(spans.items()):
-                try:
-                    values = block.column(name)
-                except InputError:
-                    del spans[name]
-                    continue
-                known = values[np.isfinite(values)]
-                if len(known):
-                    low, high = (
-                        min(span.low, float(known.min())),
-                        max(span.high, float(known.max())),
-                    )
-                    spans[name] = Span(span.filled + len(known), low, high)
+    spans = dict.fromkeys(table.columns, Span(0, np.inf, -np.inf))
+    for block in table.blocks(notes):
+        for name, span in list(spans.items()):
+            try:
+                values = block.column(name)
+            except InputError:
+                del spans[name]
+                continue
+            known = values[np.isfinite(values)]
+            if len(known):
+                low, high = min(span.low, known.min()), max(span.high, known.max())
+                spans[name] = Span(span.filled + len(known), float(low), float(high))
     return {name: span for name, span in spans.items() if span.filled}
 
 

@@ -12,7 +12,7 @@ from auv_analysis.bag.reading import BagContents
 MOTOR = 33  # SERVOn_FUNCTION of motor 1
 MOTORS = {'0': 6, '1': 6, '2': 8, '3': 8, '4': 3, '5': 4, '6': 5}  # by FRAME_CONFIG
 EIGHT = 8
-CURVE = 't200_16v'
+CURVE = 't200_16v'  # of a thruster that many have
 ESTIMATORS = ('XKF1[0]', 'XKF1', 'NKF1[0]', 'NKF1')  # newest first; of several cores the first
 GYROS = ('IMU[0]', 'IMU')
 

@@ -13,11 +13,9 @@ from typing import Any
 
 from auv_analysis.bag.limits import MOST_NAMED
 from auv_analysis.bag.metadata import TopicExtent
+from auv_analysis.bag.telemetry_log import LATEST, US, Message, count
 from auv_dynamics.files.errors import InputError
 
-Message = tuple[str, int, Any]  # topic, time of logging in ns, message
-US = 1000  # ns
-LATEST = 1 << 52  # us: beyond, a stamp is damage
 GPS_EPOCH, WEEK = 315_964_800 - 18, 604_800  # s since 1970 less leap seconds, s
 HEAD = b'\xa3\x95'
 FMT, FMT_LENGTH = 0x80, 89
@@ -101,13 +99,7 @@ class OnboardLog:
                 self._note_parameter(record)
             elif kind.name == 'GPS' and not self._epoch:
                 self._note_epoch(record)
-            topic = self._topic(record)
-            if topic not in found:
-                found[topic] = TopicExtent(record.time)
-                if len(found) > MOST_NAMED:
-                    expected = f'at most {MOST_NAMED} kinds of messages'
-                    raise InputError(self.path, '', expected, 'more')
-            found[topic].add(record.time)
+            count(found, self._topic(record), record.time, self.path)
         if not found:
             raise InputError(self.path, '', 'records of an on-board log of ArduPilot', 'none')
         begin = min((tally.first for tally in found.values() if tally.first), default=0)

@@ -27,6 +27,7 @@ from auv_analysis.bag.foreign_fields import (
     presets,
 )
 from auv_analysis.bag.foreign_topics import ASKED, THRUSTING, candidates
+from auv_analysis.bag.mavlink_presets import CURVE
 from auv_analysis.bag.reading import BagContents
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -58,7 +59,7 @@ JOINED = {  # words that are two
     **{f'{turn}{rate}': (turn, rate) for turn in TURNS for rate in ('rate', 'speed')},
     'qw': ('q', 'w'), 'angvel': ('angular', 'vel'),
 }  # fmt: skip
-PULSES, CURVE = (800.0, 2200.0), 't200_16v'  # us, of servos; of a thruster that many have
+PULSES = (800.0, 2200.0)  # us, of servos
 NOT_MEASURED = {'cov', 'covariance', 'std', 'stddev', 'var', 'variance', 'err', 'error', 'sigma'}
 NAMED = {'degs': 'deg/s', 'dps': 'deg/s', 'degrees': 'deg', 'rads': 'rad/s', 'mms': 'mm/s'}
 STAMP_UNITS = {'ms': 'ms', 'us': 'us', 'usec': 'us', 'ns': 'ns', 'nsec': 'ns', 's': 's', 'sec': 's'}
@@ -150,10 +151,10 @@ def looked_through(bag: Path, contents: BagContents) -> dict[str, Looked]:
     found = {topic: Looked(kind) for topic, kind in contents.types.items()}
     if CSV in contents.types.values():
         for topic, file in csv_files(bag).items():
-            found[topic].spans = column_spans(file, contents.notes)
             found[topic].count = contents.counts[topic]
             with Table(file) as table:
                 found[topic].units = table.units
+                found[topic].spans = column_spans(table, contents.notes)
         return found
     left = {topic for topic, kind in contents.types.items() if not kind.endswith(HEAVY)}
     while left:

@@ -37,6 +37,15 @@ class Frame(NamedTuple):
     payload: int
 
 
+def count(found: dict[Any, TopicExtent], kind: Any, time: int, path: Path) -> None:
+    """Count a message of a kind; InputError where there are more kinds than a log has."""
+    if kind not in found:
+        if len(found) >= MOST_NAMED:
+            raise InputError(path, '', f'at most {MOST_NAMED} kinds of messages', 'more')
+        found[kind] = TopicExtent(time)
+    found[kind].add(time)
+
+
 class TelemetryLog:
     """A .tlog: what a ground station received, each message behind its time in us.
 
@@ -73,12 +82,7 @@ class TelemetryLog:
         parameters = self._number('PARAM_VALUE')
         for frame in self._frames():
             key = frame.system, frame.component, frame.number
-            if key not in found:
-                found[key] = TopicExtent(frame.stamp * US)
-                if len(found) > MOST_NAMED:
-                    expected = f'at most {MOST_NAMED} kinds of messages'
-                    raise InputError(self._path, '', expected, 'more')
-            found[key].add(frame.stamp * US)
+            count(found, key, frame.stamp * US, self._path)
             if frame.number == ATTITUDE:
                 self._note_boot(frame)
             elif frame.number == HEARTBEAT:

@@ -17,7 +17,7 @@ from auv_analysis.scenario.fault_words import Mark, marks_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of
 from auv_dynamics.files.shipped import shipped, shipped_by_name
-from auv_dynamics.files.yaml_files import check, read_text, read_yaml
+from auv_dynamics.files.yaml_files import check, parse_yaml, read_text
 from auv_dynamics.plant.actuators import Actuators, make_actuators
 from auv_dynamics.plant.devices import SensorNoise
 from auv_dynamics.plant.faults import FaultRows, Faults, FaultSetting, make_faults
@@ -315,14 +315,12 @@ def load_scenario(scenario: str | Path) -> Scenario:
 
     """
     path = shipped('scenarios', scenario)
-    data = read_yaml(path, 'scenario')
+    texts = {'scenario.yaml': read_text(path, 'scenario')}
+    data = parse_yaml(texts['scenario.yaml'], path, 'scenario')
     check(data, SCHEMA, path)
     vehicle_path = vehicle_path_of(data['vehicle'], path)
-    vehicle_data = read_yaml(vehicle_path, 'vehicle')
-    texts = {
-        'scenario.yaml': read_text(path, 'scenario'),
-        'vehicle.yaml': read_text(vehicle_path, 'vehicle'),
-    }
+    texts['vehicle.yaml'] = read_text(vehicle_path, 'vehicle')
+    vehicle_data = parse_yaml(texts['vehicle.yaml'], vehicle_path, 'vehicle')
     if 'file' in data['setpoint']:
         csv = path.parent / data['setpoint']['file']
         texts['setpoint.csv'] = read_text(csv, 'CSV set-point')

@@ -287,7 +287,7 @@ def test_a_foreign_listener_is_named_by_the_command(tmp_path: Path) -> None:
     assert peer.heard == {'wrench': [], 'odom': []}
 
 
-def in_real_time(folder: Path) -> tuple[Path, float]:
+def in_real_time(folder: Path) -> tuple[Path, bool]:
     """A run that is not in lock-step: activated late, and without set-points for a while.
 
     At 20 Hz, so that other tests on the machine do not make every second set-point late.
@@ -295,7 +295,8 @@ def in_real_time(folder: Path) -> tuple[Path, float]:
     Returns
     -------
     bag : of the run
-    pause : longest time without odometry, s: of the machine, as the plant makes none
+    late : whether a set-point came so late that the controller may have missed it, which the bag
+        does not tell: on a busy machine
 
     """
     path = folder / 'played.yaml'
@@ -322,13 +323,15 @@ def in_real_time(folder: Path) -> tuple[Path, float]:
         peer, processes = found
         peer.listen(topics.ODOM, topics.WRENCH)
         odometry, wrenches = peer.heard[topics.ODOM.name], peer.heard[topics.WRENCH.name]
-        arrivals: list[float] = []
-        peer.node.create_subscription(
-            topics.ODOM.type,
-            topics.ODOM.name,
-            lambda _: arrivals.append(time.monotonic()),
-            topics.every_step(),
-        )
+        came: dict[str, dict[int, float]] = {}  # topic -> stamp -> when it came
+        for topic in (topics.ODOM, topics.CMD_VEL):
+            at = came[topic.name] = {}
+            peer.node.create_subscription(
+                topic.type,
+                topic.name,
+                lambda m, at=at: at.setdefault(nanoseconds(m.header.stamp), time.monotonic()),
+                topics.every_step(),
+            )
         peer.until(lambda: len(odometry) > 20, 'odometry')
         for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
             request = ChangeState.Request(transition=Transition(id=transition))
@@ -338,25 +341,29 @@ def in_real_time(folder: Path) -> tuple[Path, float]:
             return sum(message.wrench.force.x != 0.0 for message in wrenches) > number
 
         peer.until(lambda: acts(60), 'wrenches')
+        began, stopped = (nanoseconds(odometry[i].header.stamp) for i in (20, -1))
         processes['setpoint_node'].send_signal(signal.SIGSTOP)
         peer.until(lambda: wrenches[-1].wrench.force.x == 0.0, 'watchdog')
         processes['setpoint_node'].send_signal(signal.SIGCONT)
+        again = nanoseconds(odometry[-1].header.stamp)
         peer.until(lambda: acts(140), 'wrenches again')
         code, _ = stop(processes['recorder_node'], signal.SIGINT)
         assert code == 0
-    return bag, float(np.max(np.diff(arrivals)))
+    measured, wanted = came[topics.ODOM.name], came[topics.CMD_VEL.name]
+    steps = [ns for ns in measured if began < ns < stopped or ns > again + 300_000_000]
+    ahead = [measured[ns] - wanted.get(ns, np.inf) for ns in steps]
+    return bag, min(ahead) < 0.02  # usually a step
 
 
 def test_the_law_of_a_bag_in_real_time_is_reproduced(tmp_path: Path) -> None:
-    for attempt in range(3):
+    for attempt in range(5):
         folder = tmp_path / str(attempt)
         folder.mkdir()
-        bag, pause = in_real_time(folder)
+        bag, late = in_real_time(folder)
         loop = recorded_loop(bag)
         answers = open_loop(loop, loop.controller.law, loop.controller.gains)
         found = reproduction(loop, answers)
-        # in a pause a set-point comes too late for the controller, which the bag does not tell
-        if found.holds or pause < 0.1:
+        if found.holds or not late:
             break
     assert found.holds, found.sentence()
     assert answers.ns[0] > loop.series[interface.ODOM][0][20], 'not before its activation'

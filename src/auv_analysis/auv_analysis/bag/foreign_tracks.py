@@ -268,7 +268,7 @@ def _of_thrusters(
     """The wrench T u of thrusts u, of commands by their curve; the vehicle file gives T in FSD."""
     thrusters = vehicle.thrusters
     if thrusters is None:
-        raise InputError(mapping.vehicle, 'thrusters', 'the thrusters of the mapped topic', None)
+        raise InputError(vehicle.name, 'thrusters', 'the thrusters of the mapped topic', None)
     count = sum(one.rows.shape[1] for one in every)
     if count != len(thrusters.names):
         expected = f'{len(thrusters.names)} numbers, one per thruster of {vehicle.name}'

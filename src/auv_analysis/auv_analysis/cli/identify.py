@@ -140,7 +140,9 @@ def read(options: argparse.Namespace, command: str) -> Trial:
     notes: list[str] = []
     with waiting('reading'):
         training, held = _recordings(options, vehicle, notes)
-    inputs = [*options.bags, shipped('vehicles', options.vehicle)]
+    others = [getattr(options, name, None) for name in ('map', 'prior', 'holdout')]
+    inputs = [*options.bags, *(Path(one) for one in others if one and Path(one).exists())]
+    inputs.append(shipped('vehicles', options.vehicle))
     out = options.out or Path('runs') / f'{command}_{UNFIT.sub("_", vehicle.name)[:90]}'
     return Trial(vehicle, training, held, notes, inputs, out)
 

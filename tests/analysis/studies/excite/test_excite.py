@@ -8,6 +8,7 @@ import pytest
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main
+from auv_analysis.output.folder import listed_in, results_folder
 from auv_analysis.studies.excite.drive import Bounds, Family, Request, scenario_in_memory
 from auv_analysis.studies.excite.excite import excite
 from auv_analysis.studies.excite.report import results_of, scenario_text
@@ -52,6 +53,14 @@ def test_the_recording_tells_what_was_promised(excited, tmp_path: Path) -> None:
     assert len(ratios) >= 30
     assert 0.5 < np.median(ratios) < 2.0
     assert np.mean((ratios > 1 / 3) & (ratios < 3.0)) >= 0.9, sorted(ratios)
+
+
+def test_results_take_the_place_of_earlier_ones(excited, tmp_path: Path) -> None:
+    for _ in range(2):
+        with results_folder(tmp_path / 'plan', overwrite=True) as (folder, out):
+            files = {path.name for path in results_of(excited).write(folder)}
+    assert 'excite.json' in files
+    assert files <= listed_in(out).keys()
 
 
 def test_it_tells_more_than_case_1(excited) -> None:

@@ -54,6 +54,20 @@ def test_a_bag_becomes_a_vehicle_file(identified):
     rows = parquet.read_table(identified / 'coefficients.parquet').to_pylist()
     surge = next(row for row in rows if row['name'] == 'M.surge.surge')
     assert surge['low'] < vehicle.M[0, 0] < surge['high']
+    listed = {row['name']: row for row in document['parameters']}
+    assert listed['M[0][0]'] == {
+        'name': 'M[0][0]', 'unit': 'kg', 'identifiable': True,
+        **{key: surge[key] for key in ('value', 'low', 'high', 'prior')},
+        'std': surge['deviation'],
+    }  # fmt: skip
+    assert {'M[4][2]', 'D_linear[5][5]', 'D_quadratic[0][0]', 'lag', 'delay'} <= listed.keys()
+    for row in document['prediction']:
+        assert 0.0 < row['model'] < row['persistence']
+        assert row.keys() == {'horizon', 'model', 'prior', 'persistence', 'black_box'}
+    found = {row['name']: row for row in document['couplings']}
+    pitch = found['delta_pi_max.pitch']
+    assert pitch['low'] < pitch['value'] < pitch['high']
+    assert {'delta_xi_max.sway', 'N.yaw', 'share.surge', 'Upsilon.pitch.heave'} <= found.keys()
     for name in ('predictions', 'inertia', 'deformation', 'shares', 'whiteness'):
         assert (identified / f'{name}.parquet').exists()
     page = (identified / 'report.html').read_text(encoding='utf-8')

@@ -22,7 +22,8 @@ def couplings(found: Identified) -> dict[str, list[dict[str, Any]]]:
     inertia : per pair of degrees of freedom its entry of M with interval, that of the prior, the
         entry of Upsilon with interval, and whether it is 'real' (the interval of M excludes
         zero), 'uncertain' or, where the data do not know it, 'not known'
-    deformation : per degree of freedom root mean squares of delta_xi and delta_pi, (33) and (34)
+    deformation : per degree of freedom root mean squares of delta_xi and delta_pi, (33) and (34),
+        and their largest magnitudes, `delta_xi_max` and `delta_pi_max`
     shares : per component its share in the mean kinetic energy, (12)
 
     """
@@ -33,7 +34,7 @@ def couplings(found: Identified) -> dict[str, list[dict[str, Any]]]:
     Upsilon, N = decompose((M + M.swapaxes(1, 2)) / 2)
     inverse = inverse_upper(Upsilon)
     xi, pi = (
-        np.stack([np.sqrt((f(A, x) ** 2).mean(axis=0)) for A in of])
+        np.stack([_sizes(f(A, x)) for A in of], axis=1)
         for f, of, x in ((delta_xi, inverse, nu), (delta_pi, Upsilon, tau))
     )
     energy = N * np.stack([((nu @ A.T) ** 2).mean(axis=0) for A in inverse])
@@ -52,14 +53,20 @@ def couplings(found: Identified) -> dict[str, list[dict[str, Any]]]:
             row['unit'] = ('kg', 'kg m', 'kg m²')[(i > 2) + (j > 2)]
             inertia.append(row)
     apart = [_excludes_zero(A[2:]) for A in (inverse, Upsilon)]
-    deformation = [
-        {'dof': dof, **_told('delta_xi', xi[:, i], certain=bool(apart[0][i].any())),
-         **_told('delta_pi', pi[:, i], certain=bool(apart[1][:, i].any()))}
-        for i, dof in enumerate(DOFS)
-    ]  # fmt: skip
+    deformation: list[dict[str, Any]] = []
+    for i, dof in enumerate(DOFS):
+        deformation.append({'dof': dof})
+        for name, sizes, of in (('delta_xi', xi, apart[0][i]), ('delta_pi', pi, apart[1][:, i])):
+            for key, size in zip((name, f'{name}_max'), sizes[:, :, i], strict=True):
+                deformation[i] |= _told(key, size, certain=bool(of.any()))
     shares = [{'dof': dof, **_told('N', N[:, i]), **_told('share', share[:, i])}
               for i, dof in enumerate(DOFS)]  # fmt: skip
     return {'inertia': inertia, 'deformation': deformation, 'shares': shares}
+
+
+def _sizes(deformation: np.ndarray) -> np.ndarray:
+    """(2, 6) root mean squares and largest magnitudes of (k, 6)."""
+    return np.stack([np.sqrt((deformation**2).mean(axis=0)), np.abs(deformation).max(axis=0)])
 
 
 def _excludes_zero(draws: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from auv_analysis.studies.identify.prediction import by_name
 from auv_analysis.studies.identify.record import Record
 from auv_analysis.studies.identify.record import described as of_record
 from auv_analysis.studies.identify.whiteness import told, whiteness
+from auv_dynamics.vehicle import DOFS
 
 VEHICLE, NAME = 'vehicle.yaml', 'identify'
 NARROW: Mapping[str, tuple[str, ...]] = {  # tables in a terminal, and what they leave out there
@@ -78,6 +79,7 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
             'verdict': verdict(found.predictions, [] if accepted else wrong),
             'file': '' if wrong and not accepted else VEHICLE,
             'notes': list(notes),
+            **_listed(rows, found.predictions, tables),
         },
     )
     known: Mapping[str, Shown] = {
@@ -103,9 +105,10 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
              'deviations': (x - p.value) / p.deviation}
             for p in found.profiles for x, y in zip(p.values.tolist(), p.rise.tolist(), strict=True)
         ]  # fmt: skip
+        rise = f'of the cost; a 95 % interval ends at {found.fit.quantile**2:.3g}'
         results.add('profiles', PROFILED, points, {
             'name': described('', 'coefficient'), 'value': Column('held at', digits=4),
-            'unit': 'unit', 'rise': described('rise', 'of the cost; a 95 % interval ends at 3.84'),
+            'unit': 'unit', 'rise': described('rise', rise),
             'deviations': described('deviations', 'by the sandwich, from the minimum'),
         })  # fmt: skip
     pairs: Mapping[str, Shown] = {
@@ -134,6 +137,54 @@ def results_of(found: Identified, notes: Sequence[str], *, accepted: bool = Fals
                 shown[f'{symbol}{key}'] = Column(label, group=symbol, scale=1.0)
         results.add(name, caption, tables[name], shown)
     return results
+
+
+def _listed(
+    rows: Sequence[Mapping[str, Any]],
+    predictions: Sequence[Mapping[str, Any]],
+    tables: Mapping[str, Sequence[Mapping[str, Any]]],
+) -> dict[str, list[dict[str, Any]]]:
+    """Parameters, predictions and couplings as programs ask for them, without a reader of Parquet.
+
+    Entries of matrices are named by their indices, from 0.
+    """
+    predicted: dict[float, dict[str, Any]] = {}
+    for row in predictions:
+        predictor = 'model' if row['predictor'] == 'new' else row['predictor'].replace(' ', '_')
+        predicted.setdefault(row['horizon'], {})[predictor] = row['error']
+    sizes = [(symbol, 'dof', row) for row in tables['deformation']
+             for symbol in ('delta_xi_max', 'delta_pi_max')]  # fmt: skip
+    sizes += [(symbol, 'dof', row) for row in tables['shares'] for symbol in ('N', 'share')]
+    sizes += [('Upsilon', 'pair', row) for row in tables['inertia']]
+    return {
+        'parameters': [
+            {
+                'name': _indexed(row['name']),
+                **{'unit': row['unit'], 'value': row['value'], 'std': row['deviation']},
+                **{'low': row['low'], 'high': row['high'], 'prior': row['prior']},
+                'identifiable': row['status'] == 'identified',
+            }
+            for row in rows
+        ],
+        'prediction': [{'horizon': horizon, **found} for horizon, found in predicted.items()],
+        'couplings': [
+            {
+                'name': f'{symbol}.{row[key].replace(", ", ".")}',
+                **{'value': row[symbol], 'prior': row[f'{symbol}_prior']},
+                **{'low': row[f'{symbol}_low'], 'high': row[f'{symbol}_high']},
+            }
+            for symbol, key, row in sizes
+        ],
+    }
+
+
+def _indexed(name: str) -> str:
+    """M.pitch.surge as M[4][0], D_linear.roll as D_linear[3][3]; other names as they are."""
+    group, *axes = name.split('.')
+    if group not in ('M', 'D_linear', 'D_quadratic'):
+        return name
+    row, column = axes[0], axes[-1]
+    return f'{group}[{DOFS.index(row)}][{DOFS.index(column)}]'
 
 
 def _add_whiteness(results: Results, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -209,7 +260,7 @@ def verdict(rows: Sequence[Mapping[str, Any]], contradicted: Sequence[str]) -> s
     )
     better = [row for row in first if row['ratio_high'] < 1.0]
     worse = [row for row in first if row['ratio_low'] > 1.0]
-    row = (better or first)[-1]
+    row = (worse or better or first)[-1]
     found = (
         f'{number(row["ratio"], 2)} times its error at {row["horizon"]:g} s '
         f'({number(row["ratio_low"], 2)} to {number(row["ratio_high"], 2)})'

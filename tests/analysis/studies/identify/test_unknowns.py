@@ -73,6 +73,34 @@ def test_names_choose_what_is_free(free, fixed, expected):
     assert len(made(load_vehicle('rexrov'), free, fixed).entries) == expected
 
 
+def test_what_somebody_knows_is_the_prior_also_of_what_is_not_searched():
+    believed = {'M.heave.heave': (300.0, 5.0), 'D_linear.yaw': (20.0, 1.0)}
+    every = made(load_vehicle('herman2018'), DEFAULT, believed=believed)
+    assert every.prior_cost(np.zeros(len(every.entries))) == pytest.approx(0.0)
+    fewer = every.without(list(believed))
+    n = len(fewer.entries)
+    assert n == len(every.entries) - 2
+    found = fewer.coefficients(np.zeros(n))
+    assert found.M[2, 2] == pytest.approx(300.0)
+    assert found.D_linear[5, 5] == 20.0
+    assert np.linalg.eigvalsh(found.M)[0] > 0
+    assert fewer.prior_cost(np.ones(n)) == pytest.approx(n)
+    assert_allclose(fewer.precision(np.zeros(n))[0], np.eye(n))
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'said'),
+    [
+        ('delay', 0.1, r'restoring\.force, found delay'),
+        ('lag', 0.0, 'lag: expected a positive value, found 0'),
+        ('M.pitch.surge', 1e4, 'M: expected values with which it is positive definite'),
+    ],
+)
+def test_a_value_that_no_vehicle_has_is_not_believed(name, value, said):
+    with pytest.raises(InputError, match=said):
+        made(load_vehicle('rexrov'), DEFAULT, believed={name: (value, 0.01)})
+
+
 def test_a_wrong_name_is_refused_with_the_nearest():
     with pytest.raises(InputError, match='nearest: restoring'):
         made(load_vehicle('rexrov'), ('restorin',))

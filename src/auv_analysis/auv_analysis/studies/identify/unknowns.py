@@ -18,6 +18,7 @@ from auv_dynamics.files.nearest import one_of
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.model import Model
 from auv_dynamics.vehicle.vehicle import Vehicle, make_model
+from auv_dynamics.vehicle.vehicle_file import is_definite
 
 LOWER = [(i, j) for i in range(6) for j in range(i + 1)]
 RESTORING = ('force', 'couple_x', 'couple_y', 'couple_z')
@@ -71,6 +72,13 @@ class Entry:
     unit: float  # of theta, in that of the coefficient; of logarithms without one
     si: str  # unit of the coefficient
 
+    @property
+    def is_log(self) -> bool:
+        """Whether theta moves its logarithm."""
+        return self.group in ('lag', 'gain') or (
+            self.group == 'M' and self.index[0] == self.index[1]
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
@@ -82,7 +90,8 @@ class Unknowns:
     entries : the free ones, in the order of theta
     lift : (6, 6) of the vehicle, not free; None: it has none
     is_delay_free : whether the delay is searched, which is no part of theta
-    believed : name -> (value, standard deviation) of the coefficients that somebody knows
+    believed : name -> (value, standard deviation) of the coefficients that somebody knows; the
+        values are those of `prior`
 
     """
 
@@ -135,10 +144,7 @@ class Unknowns:
                 new, old = R[entry.index], R0[entry.index]
             else:
                 new, old = (getattr(c, entry.group)[entry.index] for c in (wanted, self.prior))
-            is_log = entry.group in ('lag', 'gain') or (
-                entry.group == 'M' and len(set(entry.index)) == 1
-            )
-            found[k] = (np.log(new / old) if is_log else new - old) / entry.unit
+            found[k] = (np.log(new / old) if entry.is_log else new - old) / entry.unit
         return found
 
     def values(self, theta: np.ndarray) -> np.ndarray:
@@ -183,7 +189,9 @@ class Unknowns:
     def without(self, names: Sequence[str], **values: np.ndarray) -> 'Unknowns':
         """Fewer unknowns; the prior takes other values."""
         entries = tuple(entry for entry in self.entries if entry.name not in names)
-        return replace(self, entries=entries, prior=replace(self.prior, **values))
+        believed = {name: self.believed[name] for name in self.believed if name not in names}
+        prior = replace(self.prior, **values)
+        return replace(self, entries=entries, prior=prior, believed=believed)
 
 
 def unknowns(
@@ -208,12 +216,12 @@ def unknowns(
     speeds, wrenches : (6,) root mean squares in the recording, which give scales
     channels : names of the commands, for gains
     lag : s, of the prior
-    believed : as of `Unknowns`
+    believed : name -> (value, standard deviation); the value takes the place of the vehicle's
     origin : named in errors
 
     Raises
     ------
-    InputError : no such name
+    InputError : no such name, or a value that no vehicle has
 
     """
     count = len(channels) or 6
@@ -227,10 +235,37 @@ def unknowns(
     if any(entry.group == 'lag' for entry in entries) and lag < SHORTEST_LAG:
         prior = replace(prior, lag=np.array(SHORTEST_LAG))
     believed = dict(believed or {})
+    names = sorted(entry.name for entry in entries)
     for name in believed:
-        if name not in [entry.name for entry in entries]:
-            raise InputError(origin, '', one_of(name, sorted(kept)), name)
+        if name not in names:
+            raise InputError(origin, '', one_of(name, names), name)
+    prior = _with_believed(prior, [e for e in entries if e.name in believed], believed, origin)
     return Unknowns(prior, entries, vehicle.lift, 'delay' in kept, believed)
+
+
+def _with_believed(
+    prior: Coefficients,
+    entries: Sequence[Entry],
+    believed: Mapping[str, tuple[float, float]],
+    origin: object,
+) -> Coefficients:
+    """The prior with what somebody knows in it; a diagonal entry of M keeps its correlations."""
+    own = {name: np.array(value) for name, value in vars(prior).items()}
+    for entry in sorted(entries, key=lambda e: len(set(e.index))):  # diagonals first
+        value, at = believed[entry.name][0], entry.index
+        if entry.is_log and not value > 0.0:
+            raise InputError(origin, entry.name, 'a positive value', value)
+        if entry.group == 'M' and entry.is_log:
+            scale = np.ones(6)
+            scale[at[0]] = np.sqrt(value / own['M'][at])
+            own['M'] *= np.outer(scale, scale)
+        elif entry.group == 'M':
+            own['M'][at[::-1]] = value
+        own[entry.group][at] = value
+    if not is_definite(own['M']):
+        found = f'smallest eigenvalue {np.linalg.eigvalsh(own["M"])[0]:.4g}'
+        raise InputError(origin, 'M', 'values with which it is positive definite', found)
+    return Coefficients(**own)
 
 
 def _every(

@@ -11,7 +11,7 @@ from auv_analysis.bag.foreign_checks import contradictions
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import TopicMap, read_mapping
 from auv_analysis.bag.foreign_tracks import tracks_of, unknown_angles
-from auv_analysis.studies.identify.record import Record, of_tracks
+from auv_analysis.studies.identify.record import Record, long_enough, of_tracks
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import GROUND_TRUTH, ODOM, WRENCH, WRENCH_APPLIED
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -72,13 +72,14 @@ def parts(records: Sequence[Record], spans: Sequence[tuple[float, float]]) -> li
     """The parts of records within spans of time, s; none given: all of them."""
     if not spans:
         return list(records)
-    found = [
+    found = long_enough([
         record.part(max(begin, record.start), min(end, record.end))
         for record in records for begin, end in spans
         if begin < record.end and end > record.start
-    ]  # fmt: skip
+    ])  # fmt: skip
     if not found:
-        raise InputError('--part', '', f'a time up to {records[-1].end:g} s', str(spans))
+        expected = f'a time up to {records[-1].end:g} s, for a second and more'
+        raise InputError('--part', '', expected, str(spans))
     return found
 
 

@@ -23,7 +23,7 @@ from auv_analysis.studies.identify.prediction import (
     persistence,
     predict,
 )
-from auv_analysis.studies.identify.record import Record, segments_of
+from auv_analysis.studies.identify.record import Record, long_enough, segments_of
 from auv_analysis.studies.identify.start import least_squares_start
 from auv_analysis.studies.identify.unknowns import (
     DEFAULT,
@@ -80,7 +80,13 @@ class Settings:
 
 
 def split(records: Sequence[Record], share: float) -> tuple[list[Record], list[Record]]:
-    """Recordings before a moment and behind it, which leaves a share of their length."""
+    """Recordings before a moment and behind it, which leaves a share of their length.
+
+    Raises
+    ------
+    InputError : less than a second before it
+
+    """
     total = sum(record.end - record.start for record in records)
     left, first, last = total * (1.0 - share), [], []
     for record in records:
@@ -93,6 +99,10 @@ def split(records: Sequence[Record], share: float) -> tuple[list[Record], list[R
             first.append(record.part(record.start, record.start + left))
             last.append(record.part(record.start + left, record.end))
         left -= length
+    first, last = long_enough(first), long_enough(last)
+    if not first:
+        expected = 'a share that leaves a second and more to learn from'
+        raise InputError('--holdout', '', expected, f'{share:g} of {total:.3g} s')
     return first, last
 
 
@@ -139,11 +149,18 @@ def identify(
 
     def problem(length: float, gain: float = 0.0, most: int | None = None) -> OutputError:
         segments = [s for record in training for s in segments_of(record, length, HISTORY)]
+        if not segments:
+            raise InputError(
+                training[0].name, '--segment', f'at most {room:.3g} s', f'{length:g} s'
+            )
         every = -(-len(segments) // most) if most else 1
         return OutputError(vehicle, segments[::every], step, noise, training[0].allocation,
                            observer=gain)  # fmt: skip
 
-    longest = min(sum(record.end - record.start for record in training) / FEWEST, LONG)
+    room = step * (max(len(r.command) for r in training) - int(np.ceil(HISTORY / step)))
+    longest = min(sum(r.end - r.start for r in training) / FEWEST, LONG, room)
+    if settings.segment:
+        problem(settings.segment)  # refused before anything is fitted
     final, halves, tried = _search(problem, (u, theta, late), longest, settings, say)
     whole = final.fit(tried[0].unknowns, tried[0].theta, tried[0].starts)
     beside = _between(tried) + _bias(whole, halves) + _of_still(final, whole, every)
@@ -194,7 +211,7 @@ def _search(
     u, theta = first.unknowns, first.theta
 
     def suited(gain: float) -> float:
-        return settings.segment or segment_length(problem(longest, gain), u, theta)
+        return settings.segment or min(segment_length(problem(longest, gain), u, theta), longest)
 
     length, gain = suited(0.0), settings.observer
     if gain is None:

@@ -1,6 +1,6 @@
 """Measured motion and command of a vehicle, each at its own times, and segments of them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,6 +24,7 @@ from auv_dynamics.vehicle.model import down
 LONGEST_STEP, SHORTEST_STEP = 0.05, 0.002  # s, of the grid on which commands are held
 SMOOTHING = 0.4  # s, window of the local polynomials from which states are read off
 PAUSE = 0.5  # s without a measurement of something that may end a stretch
+SHORTEST = 1.0  # s of a record
 WHOLE = np.s_[:]
 
 
@@ -147,8 +148,6 @@ def of_tracks(name: str, tracks: Mapping[str, Track], *, applied: bool = False) 
         ns = origin + np.round(np.arange(begin, end + step / 2, step) * NANOSECONDS).astype(
             np.int64
         )
-        if len(ns) < 2 * SMALLEST:
-            continue
         mean = np.diff(integral(command, ns), axis=0) / step
         inside = [(t >= begin) & (t <= end) for t in seconds[:2]]
         found.append(
@@ -157,7 +156,16 @@ def of_tracks(name: str, tracks: Mapping[str, Track], *, applied: bool = False) 
                 twist.rows[inside[1]], step, mean, begin,
             )
         )  # fmt: skip
-    return found
+    return long_enough(found)
+
+
+def long_enough(records: Sequence[Record]) -> list[Record]:
+    """Those of a second and more, with samples enough for local polynomials."""
+    return [
+        record for record in records
+        if record.step * (len(record.command) + 0.5) > SHORTEST
+        and min(len(record.attitude_t), len(record.velocity_t)) >= SMALLEST
+    ]  # fmt: skip
 
 
 def continuous(q: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main
 from auv_analysis.output.folder import listed_in, results_folder
 from auv_analysis.studies.excite.drive import Bounds, Family, Request, scenario_in_memory
-from auv_analysis.studies.excite.excite import excite
+from auv_analysis.studies.excite.excite import _fleet, excite
 from auv_analysis.studies.excite.report import results_of, scenario_text
 from auv_analysis.studies.identify.identify import identify
 from auv_analysis.studies.identify.record import of_run, rotated
@@ -80,6 +80,14 @@ def test_every_vehicle_around_the_prior_stays_inside(excited) -> None:
     assert np.linalg.norm(run.nu[:, :3], axis=1).max() < 0.5
     assert np.all(np.abs(run.tau).max(axis=0) <= excited.request.bounds.wrench)
     np.testing.assert_allclose(run.nu, excited.motion.states[0, 0, :, 7:], atol=1e-4)
+
+
+def test_a_spread_of_a_tenth_is_ten_percent_of_inertia_and_damping() -> None:
+    model, _ = _fleet(request_of(spread=0.1), np.random.default_rng(0), 2000)
+    for A in (model.M, model.D_linear, model.D_quadratic):
+        some = A.reshape(-1, 6, 6)[:, range(6), range(6)]
+        off = np.log(some[1:, some[0] > 0] / some[0, some[0] > 0])
+        np.testing.assert_allclose(off.std(axis=0), 0.1, rtol=0.1)
 
 
 def test_no_two_sines_share_a_frequency_and_peaks_are_as_asked() -> None:

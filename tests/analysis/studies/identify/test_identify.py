@@ -117,7 +117,7 @@ def test_a_single_sine_leaves_open_what_it_does_not_move(tmp_path):
     open_ = [row for row in rows if row['status'] == 'prior']
     assert len(open_) >= 5
     assert all(row['low'] is None for row in open_)
-    assert result.combinations()
+    assert 'lag' in [row['name'] for row in open_], 'one frequency tells little of it'
     known = [row for row in rows if row['status'] == 'identified']
     outside = [r['name'] for r in known if not r['low'] <= true[r['name']] <= r['high']]
     assert len(outside) <= 0.1 * len(known) + 1, outside

@@ -73,6 +73,12 @@ def test_names_choose_what_is_free(free, fixed, expected):
     assert len(made(load_vehicle('rexrov'), free, fixed).entries) == expected
 
 
+def test_a_deviation_of_theta_is_a_factor_of_two_in_inertia():
+    u = made(load_vehicle('bluerov2_heavy'), ('M.diagonal', 'lag'), lag=0.1)
+    ratios = u.values(np.eye(7)).diagonal() / u.values(np.zeros(7))
+    assert_allclose(ratios, [*[2.0] * 6, 4.0], rtol=0.03)
+
+
 def test_what_somebody_knows_is_the_prior_also_of_what_is_not_searched():
     believed = {'M.heave.heave': (300.0, 5.0), 'D_linear.yaw': (20.0, 1.0)}
     every = made(load_vehicle('herman2018'), DEFAULT, believed=believed)

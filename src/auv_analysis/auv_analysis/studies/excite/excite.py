@@ -180,9 +180,8 @@ def _fleet(request: Request, rng: np.random.Generator, count: int) -> Fleet:
     one = np.ones(6)
     u = unknowns(vehicle, ('M',), speeds=one, wrenches=one)
     theta = rng.standard_normal((count + 1, len(u.entries))) * [
-        spread * (1.0 if len(set(entry.index)) == 1 else CORRELATED) / entry.unit
-        for entry in u.entries
-    ]
+        spread * (0.5 if entry.is_log else CORRELATED) / entry.unit for entry in u.entries
+    ]  # a diagonal entry of M goes as the square of what theta moves
     off = rng.standard_normal((2, count + 1, 1, 6))
     couple = float(np.abs(vehicle.model.hydrostatics[1:]).max())
     size = np.array([LIGHT * float(vehicle.weight), couple, couple, couple])

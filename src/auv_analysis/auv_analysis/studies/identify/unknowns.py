@@ -278,7 +278,7 @@ def _every(
     """All that may be free, in the order of reports."""
     made = []
     for i, j in LOWER:
-        unit = UNFAMILIAR if i == j else CORRELATION
+        unit = UNFAMILIAR / 2 if i == j else CORRELATION  # M goes as the square of R
         si = ('kg', 'kg m', 'kg m2')[(i > 2) + (j > 2)]
         made.append(Entry('M', (i, j), f'M.{DOFS[i]}.{DOFS[j]}', unit, si))
     drag = _resistance(vehicle, speeds, wrenches)

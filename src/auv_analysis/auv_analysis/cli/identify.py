@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.studies.identify.identify import Settings, identify
     from auv_analysis.studies.identify.report import print_results, results_of, write_report
     from auv_analysis.studies.identify.unknowns import DEFAULT
-    from auv_analysis.studies.identify.vehicle_text import vehicle_text
+    from auv_analysis.studies.identify.vehicle_text import vehicle_text, write_vehicle
     from auv_dynamics.files.errors import FailedError
     from auv_dynamics.files.yaml_files import read_yaml
 
@@ -116,7 +116,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             source += str(data.get('source') or vehicle.name)
             name = f'{vehicle.name}_identified'
             text = vehicle_text(found, data, name, source)
-            (folder.folder / results.facts['file']).write_text(text, 'utf-8')
+            write_vehicle(text, results, folder.folder)
         results.write(folder.folder)
         if not options.no_report:
             with waiting('drawing plots, writing the report'):

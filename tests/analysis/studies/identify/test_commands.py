@@ -10,6 +10,9 @@ from foreign_bags import Maker, motion, simple, write
 from pyarrow import parquet
 
 from auv_analysis.cli.main import main
+from auv_analysis.report.results import Results
+from auv_analysis.studies.identify.vehicle_text import write_vehicle
+from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
@@ -109,6 +112,20 @@ def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, cap
     code, said = auv(capsys, *given, '--accept', '--overwrite')
     assert code == 0, said
     assert (out / 'vehicle.yaml').exists()
+
+
+def test_a_vehicle_that_no_command_takes_gives_no_file(tmp_path):
+    data = yaml.safe_load(shipped('vehicles', 'lauv').read_text(encoding='utf-8'))
+    results = Results('identify', {'file': 'vehicle.yaml', 'contradictions': [], 'verdict': ''})
+    write_vehicle(yaml.safe_dump(data), results, tmp_path)
+    assert load_vehicle(tmp_path / 'vehicle.yaml').name == 'lauv'
+    (tmp_path / 'vehicle.yaml').unlink()
+    data['damping']['linear'][5][5] = 0.0
+    write_vehicle(yaml.safe_dump(data), results, tmp_path)
+    assert not (tmp_path / 'vehicle.yaml').exists()
+    assert results.facts['file'] == ''
+    assert 'No vehicle file: ' in results.facts['verdict']
+    assert 'damping.linear: expected a positive semidefinite' in results.facts['verdict']
 
 
 @pytest.mark.parametrize(

@@ -5,21 +5,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 from trials import DELAY, trial, truth, wrong_prior
 
 from auv_analysis.bag.tracks import Track
 from auv_analysis.studies.identify.couplings import couplings
-from auv_analysis.studies.identify.identify import Settings, identify, split
+from auv_analysis.studies.identify.identified import Identified
+from auv_analysis.studies.identify.identify import Settings, _dissipative, feeding, identify, split
 from auv_analysis.studies.identify.output_error import OutputError
 from auv_analysis.studies.identify.plausibility import check_rates, contradictions, excitation
-from auv_analysis.studies.identify.record import of_tracks, segments_of
+from auv_analysis.studies.identify.prediction import held_of
+from auv_analysis.studies.identify.record import Record, of_tracks, segments_of
 from auv_analysis.studies.identify.unknowns import unknowns
+from auv_analysis.studies.identify.vehicle_text import vehicle_text
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.frames import swap_attitude, swap_body
-from auv_dynamics.vehicle.vehicle_file import load_vehicle
+from auv_dynamics.vehicle.kinematics import quaternion
+from auv_dynamics.vehicle.vehicle_file import is_semidefinite, load_vehicle, vehicle_from_dict
 
 REST = {dof: {} for dof in DOFS}
 SINE = {'surge': {'terms': [{'amplitude': 0.3, 'omega': 0.5}]}}
@@ -199,6 +205,39 @@ def test_normal_equations_of_a_longer_recording_take_no_more_memory(herman):
     repeated, more = normal(16 * some)
     assert_allclose(repeated, 4.0 * once, rtol=1e-9, atol=1e-9 * np.abs(once).max())
     assert more < 1.2 * peak
+
+
+def test_damping_of_a_vehicle_that_gains_speed_is_held_where_it_takes_energy():
+    """Yaw grows by itself: its damping is held at zero, and lauv's couplings with sway too."""
+    t, vehicle, still = np.arange(0.0, 10.0, 0.05), load_vehicle('lauv'), np.zeros((200, 6))
+    nu, eta = still.copy(), still.copy()
+    nu[:, 5] = 0.02 * np.exp(0.2 * t)
+    eta[:, 5] = nu[:, 5] / 0.2
+    record = Record('growing', t, quaternion(eta[:, 3:]), t, nu, 0.05, still, 0.0)
+    u = unknowns(vehicle, ('D_linear',), speeds=np.full(6, 0.1), wrenches=np.ones(6))
+    problem = OutputError(vehicle, segments_of(record, 2.0, 0.6), 0.05, np.full(9, 0.003))
+    fit = problem.fit(u, np.zeros(6), most=10)
+    assert fit.unknowns.coefficients(fit.theta).D_linear[5, 5] < 0.0
+    after, zeros = _dissipative(problem, fit, problem.covariance(fit))
+    found = Identified(vehicle, [], held_of([], 0.6), problem, after, problem.covariance(after), [],
+                       zeros, ())  # fmt: skip
+    text = vehicle_text(found, yaml.safe_load(shipped('vehicles', 'lauv').read_text()), 'x', '')
+    D = vehicle_from_dict(yaml.safe_load(text), 'written').D_linear
+    assert D[2, 4] == vehicle.D_linear[2, 4], 'what takes energy stays'
+    assert 'D_linear.sway.yaw: held at 0, as it would feed energy' in text
+    assert [e.name for e in zeros] == ['D_linear.yaw', 'D_linear.sway.yaw', 'D_linear.yaw.sway']
+    assert all(D[entry.index] == 0.0 for entry in zeros)
+
+
+def test_couplings_of_damping_are_held_until_none_feeds_energy():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        D = rng.normal(size=(6, 6))
+        D[np.diag_indices(6)] = rng.uniform(0.0, 2.0, 6) * (rng.uniform(size=6) > 0.2)
+        while pair := feeding(D):
+            assert D[pair] + D[pair[::-1]] != 0.0
+            D[pair] = D[pair[::-1]] = 0.0
+        assert is_semidefinite((D + D.T) / 2)
 
 
 def test_a_recording_is_split_at_pauses():

@@ -32,7 +32,7 @@ class Identified:
     problem, fit : the segments, and the minimum
     covariance : (n, n) of theta
     predictions : rows of `compare`
-    zeros : damping that is held at zero, with the upper end of its interval
+    zeros : damping that is held at zero, with the upper end of its interval; None: a coupling
     still : what was free and was not searched, as its degree of freedom hardly moves
     resampled : (k, n) theta of the bootstrap; k = 0: not asked for
     profiles : profile likelihoods, as far as they were asked for
@@ -46,7 +46,7 @@ class Identified:
     fit: Fit
     covariance: np.ndarray
     predictions: list[dict[str, Any]]
-    zeros: Mapping[Entry, float]
+    zeros: Mapping[Entry, float | None]
     still: Sequence[Entry]
     resampled: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     profiles: Sequence[Profile] = ()
@@ -90,9 +90,9 @@ class Identified:
                 }
             )
         rows += [
-            {'name': entry.name, 'unit': entry.si, 'value': 0.0, 'deviation': None, 'low': 0.0,
-             'prior': float(getattr(u.prior, entry.group)[entry.index]), 'high': high,
-             'left': None, 'status': 'at zero'}
+            {'name': entry.name, 'unit': entry.si, 'value': 0.0, 'deviation': None,
+             'low': None if high is None else 0.0, 'high': high, 'left': None, 'status': 'at zero',
+             'prior': float(getattr(self.vehicle, entry.group)[entry.index])}
             for entry, high in self.zeros.items()
         ]  # fmt: skip
         rows += [

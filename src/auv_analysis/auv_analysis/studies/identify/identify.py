@@ -35,6 +35,7 @@ from auv_analysis.studies.identify.unknowns import (
 )
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_dynamics.vehicle.vehicle_file import is_semidefinite
 
 SHORT, LONG = 1.25, 10.0  # s, of segments of the first fit, and at most
 GROWTH = 10.0  # of a start's error, up to which a segment goes on
@@ -446,37 +447,54 @@ def segment_length(problem: OutputError, u: Unknowns, theta: np.ndarray) -> floa
 
 def _dissipative(
     problem: OutputError, fit: Fit, covariance: np.ndarray
-) -> tuple[Fit, dict[Entry, float]]:
+) -> tuple[Fit, dict[Entry, float | None]]:
     """The fit without damping that feeds energy: what came out negative is held at zero.
+
+    So are couplings with which linear damping is not positive semidefinite, free or not.
 
     Returns
     -------
     fit : without it
-    zeros : what is held, with the upper end of its interval, by the covariance (n, n)
+    zeros : what is held, with the upper end of its interval, by the covariance (n, n); of a
+        coupling None
 
     """
     half = fit.quantile * np.sqrt(np.diag(covariance))
     found = fit.unknowns.coefficients(fit.theta)
     changed: dict[str, np.ndarray] = {}
-    zeros: dict[Entry, float] = {}
+    zeros: dict[Entry, float | None] = {}
     for k, entry in enumerate(fit.unknowns.entries):
         if entry.group.startswith('D_') and len(set(entry.index)) == 1:
             matrix = getattr(found, entry.group)
             if matrix[entry.index] < 0.0:
                 high = float(matrix[entry.index] + half[k] * entry.unit)
                 zeros[entry] = max(high, 0.0)
-                held = changed.setdefault(
-                    entry.group, getattr(fit.unknowns.prior, entry.group).copy()
-                )
-                held[entry.index] = 0.0
+    pair = () if zeros else feeding(found.D_linear)
+    if pair:
+        one = np.ones(6)
+        every = unknowns(problem.vehicle, ('D_linear.full',), speeds=one, wrenches=one).entries
+        zeros = dict.fromkeys(e for e in every if set(e.index) == set(pair))
     if not zeros:
         return fit, {}
+    for entry in zeros:
+        held = changed.setdefault(entry.group, getattr(fit.unknowns.prior, entry.group).copy())
+        held[entry.index] = 0.0
     names = [entry.name for entry in zeros]
     fewer = fit.unknowns.without(names, **changed)
     kept = [k for k, name in enumerate(fit.unknowns.names) if name not in names]
     fitted = problem.fit(fewer, fit.theta[kept], fit.starts)
     again, more = _dissipative(problem, fitted, covariance[np.ix_(kept, kept)])
     return again, {**zeros, **more}
+
+
+def feeding(D: np.ndarray) -> tuple[int, ...]:
+    """The pair whose coupling in D (6, 6), diagonal >= 0, feeds most energy; () where none does."""
+    S = (D + D.T) / 2
+    if is_semidefinite(S):
+        return ()
+    v = np.linalg.eigh(S)[1][:, 0]
+    power = np.tril(S * np.outer(v, v), -1)
+    return tuple(int(i) for i in np.unravel_index(np.argmin(power), power.shape))
 
 
 def with_vehicle(vehicle: Vehicle, found: Coefficients) -> Vehicle:

@@ -1,16 +1,19 @@
 """The identified vehicle as a file: the prior's, with what was identified in its place."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
 from auv_analysis.output.text import number
+from auv_analysis.report.results import Results
 from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.identify import with_vehicle
-from auv_dynamics.files.errors import printable
-from auv_dynamics.vehicle.vehicle_file import is_semidefinite
+from auv_analysis.studies.identify.report import verdict
+from auv_dynamics.files.errors import InputError, printable
+from auv_dynamics.vehicle.vehicle_file import is_semidefinite, vehicle_from_dict
 
 WIDTH = 96  # of comments
 DIGITS = 7
@@ -66,6 +69,18 @@ def vehicle_text(found: Identified, data: Mapping[str, Any], name: str, source: 
     return '\n'.join(lines) + '\n'
 
 
+def write_vehicle(text: str, results: Results, folder: Path) -> None:
+    """Write a vehicle file; one that no command would take is a contradiction, and none."""
+    file, told = results.facts['file'], results.facts['contradictions']
+    try:
+        vehicle_from_dict(yaml.safe_load(text), file)
+    except InputError as error:
+        wrong = [f'no command would take it, {error}', *told]
+        results.facts.update(file='', contradictions=wrong, verdict=verdict([], wrong))
+    else:
+        (folder / file).write_text(text, 'utf-8')
+
+
 def _said(rows: Sequence[Mapping[str, Any]], key: str) -> list[str]:
     """Comment lines: a coefficient each."""
     if not rows:
@@ -73,7 +88,9 @@ def _said(rows: Sequence[Mapping[str, Any]], key: str) -> list[str]:
     lines = [f'# {key}:']
     for row in rows:
         unit = f' {row["unit"]}' if row['unit'] else ''
-        if row['status'] == 'at zero':
+        if row['status'] == 'at zero' and row['high'] is None:
+            text = 'held at 0, as it would feed energy beside what was identified'
+        elif row['status'] == 'at zero':
             text = f'at its bound 0{unit}, at most {number(row["high"], 5)}{unit}'
         elif row['low'] is not None:
             within = f'{number(row["low"], 5)} to {number(row["high"], 5)}{unit}'

@@ -1,13 +1,18 @@
 """Recordings that are short, slow, or in part no measurement, become records or one line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from trials import trial
+from numpy.testing import assert_allclose
+from trials import DELAY, LAG, trial, wrong_prior
 
 from auv_analysis.bag.tracks import Track
 from auv_analysis.studies.identify.bags import parts
 from auv_analysis.studies.identify.identify import Settings, identify, split
 from auv_analysis.studies.identify.record import Record, of_tracks
+from auv_analysis.studies.identify.start import least_squares_start
+from auv_analysis.studies.identify.unknowns import unknowns
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
@@ -76,3 +81,16 @@ def test_many_short_stretches_are_enough(herman):
     few = Settings(('M.diagonal',))
     found = identify(stretches, [], load_vehicle('herman2018'), few)
     assert len(found.problem.segments) == 20
+
+
+@pytest.mark.parametrize('rate', [5.0, 9.5, 10.0, 10.4, 12.0])
+def test_a_start_is_found_from_a_slow_velocity(herman, rate):
+    """As a Doppler log gives it; the prior is 25 % off."""
+    rows = np.rint(np.arange(0.0, herman.end, 1.0 / rate) / herman.step).astype(int)
+    slow = replace(herman, velocity_t=herman.velocity_t[rows], velocity=herman.velocity[rows])
+    vehicle = load_vehicle('herman2018')
+    speeds, wrenches = (np.sqrt((x**2).mean(axis=0)) for x in (slow.velocity, slow.wrench))
+    u = unknowns(wrong_prior(vehicle, 3), speeds=speeds, wrenches=wrenches)
+    theta, late, _ = least_squares_start([slow], u)
+    assert_allclose(np.diag(u.coefficients(theta).M), np.diag(vehicle.M), rtol=0.1)
+    assert late == pytest.approx(LAG + DELAY, abs=0.03)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from auv_analysis.metrics.local_polynomials import rates
+from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.studies.identify.record import Record, continuous, down_of, smoothed
 from auv_analysis.studies.identify.unknowns import LOWER, Coefficients, Unknowns
 from auv_dynamics.kernel.compile import plain
@@ -17,7 +17,7 @@ from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.model import coriolis
 
 DELAYS = np.arange(0.0, 0.43, 0.03)  # s
-WINDOW = 0.5  # s
+WINDOW, WIDEST = 0.5, 2.0  # s, and at most, of few samples
 FITTED = ('M', 'D_linear', 'D_quadratic', 'hydrostatics')
 MOST = 8000  # samples that are used
 REWEIGHTED = 4
@@ -66,11 +66,12 @@ def _regressors(record: Record) -> tuple[Record, np.ndarray, np.ndarray] | None:
     """Times (k,) and Y (k, 6, 21 + 6 + 6 + 4): tau = Y [M, D_linear, D_quadratic, hydrostatics]."""
     there = np.isfinite(record.velocity).all(axis=1)
     t, nu = record.velocity_t[there], record.velocity[there]
-    count = round(WINDOW / float(np.median(np.diff(t))))
+    period = float(np.median(np.diff(t))) if len(t) > 1 else np.inf
     inside = (t > record.start + WINDOW + DELAYS[-1]) & (t < record.end - WINDOW)
     at = t[inside][:: max(int(inside.sum() / MOST), 1)]
-    if count < 5 or len(at) < 60:
+    if SMALLEST * period > WIDEST or len(at) < 60:
         return None
+    count = max(round(WINDOW / period), SMALLEST)
     smooth, rate = smoothed(t, nu, at), rates(t, nu, at, count).rate
     q = smoothed(record.attitude_t, continuous(record.attitude), at)
     return record, at, _linear(smooth, rate, down_of(q / np.linalg.norm(q, axis=1)[:, None]))

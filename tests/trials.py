@@ -8,7 +8,7 @@ import numpy as np
 import yaml
 
 from auv_analysis import Run, load_scenario, simulate
-from auv_analysis.studies.identify.record import Record, of_run, rotated
+from auv_analysis.studies.identify.record import Record, rotated
 from auv_analysis.studies.identify.unknowns import Unknowns
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.kinematics import quaternion
@@ -85,8 +85,14 @@ def trial(folder: Path, name: str, seed: int = 0, **entries: Any) -> tuple[Recor
     scenario = load_scenario(trial_scenario(folder, name, seed=seed, **entries))
     run = simulate(scenario, 'gvc', 'zoh')
     noise = scenario.data['sensors']['attitude_noise']
-    turns = noise * np.random.default_rng(seed + 10_000).normal(size=(len(run.t), 3))
-    return of_run(run, attitude=rotated(quaternion(run.eta[:, 3:]), turns)), run
+    return recorded(run, noise, seed + 10_000), run
+
+
+def recorded(run: Run, noise: float, seed: int) -> Record:
+    """Record of a simulated run, with noise on the attitude in rad."""
+    turns = noise * np.random.default_rng(seed).normal(size=(len(run.t), 3))
+    q = rotated(quaternion(run.eta[:, 3:]), turns)
+    return Record(run.scenario, run.t, q, run.t, run.nu_measured, run.step, run.tau[:-1], run.start)
 
 
 def wrong_prior(vehicle: Vehicle, seed: int) -> Vehicle:

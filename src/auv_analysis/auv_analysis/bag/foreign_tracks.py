@@ -212,7 +212,9 @@ def _track(role: str, one: Recorded, axes: str, rows: np.ndarray | None = None) 
     if len(one.stamps) < least:
         expected = f'at least {least} messages on the clock of the velocity'
         raise InputError(one.bag, one.source.topic, expected, len(one.stamps) or 'none')
-    return Track(role, one.source.topic, one.stamps, rows, _limit(one), _is_held(one.source))
+    told = one.source.gap is not None
+    return Track(role, one.source.topic, one.stamps, rows, _limit(one), _is_held(one.source),
+                 told=told)  # fmt: skip
 
 
 def _limit(one: Recorded) -> float:

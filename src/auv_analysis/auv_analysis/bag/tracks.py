@@ -1,7 +1,7 @@
 """Signals over time with gaps, their values at any times, and a common time base."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,7 @@ class Track:
     limit : ns, longest pause that is no gap; inf: there are none
     held : whether a sample holds until the next; else a straight line leads there
     parts : signals of the topics that it is made of, NaN in columns that these do not have
+    told : whether the limit was told rather than found
 
     """
 
@@ -40,6 +41,7 @@ class Track:
     limit: float
     held: bool
     parts: tuple['Track', ...] = ()
+    told: bool = False
 
     @property
     def given(self) -> np.ndarray:
@@ -57,6 +59,11 @@ class Track:
             return np.concatenate([part.gaps() for part in self.parts])
         where = np.flatnonzero(np.diff(self.ns) > self.limit)
         return np.stack([self.ns[where], self.ns[where + 1]], axis=1)
+
+    def tolerant(self, pause: float) -> 'Track':
+        """The same with no gap up to a pause, ns, in topics whose limit nobody told."""
+        limit = self.limit if self.told else max(self.limit, pause)
+        return replace(self, limit=limit, parts=tuple(one.tolerant(pause) for one in self.parts))
 
     def is_averaged(self, step: int) -> bool:
         """Whether several samples fall into one step, ns, so that single ones would alias."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from trials import recorded
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main
@@ -13,9 +14,7 @@ from auv_analysis.studies.excite.drive import Bounds, Family, Request, scenario_
 from auv_analysis.studies.excite.excite import _fleet, excite
 from auv_analysis.studies.excite.report import results_of, scenario_text
 from auv_analysis.studies.identify.identify import identify
-from auv_analysis.studies.identify.record import of_run, rotated
 from auv_dynamics.files.errors import FailedError
-from auv_dynamics.vehicle.kinematics import quaternion
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 TANK = (12.0, 12.0, 6.0)
@@ -44,9 +43,7 @@ def test_the_recording_tells_what_was_promised(excited, tmp_path: Path) -> None:
     path.write_text(scenario_text(excited))
     scenario = load_scenario(path)
     run = simulate(scenario, 'open_loop', 'zoh')
-    turns = 0.003 * np.random.default_rng(1).normal(size=(len(run.t), 3))
-    record = of_run(run, attitude=rotated(quaternion(run.eta[:, 3:]), turns))
-    found = identify([record], [], load_vehicle(VEHICLE))
+    found = identify([recorded(run, 0.003, 1)], [], load_vehicle(VEHICLE))
     mine, promised = halves(found), halves(excited.predicted)
     at_zero = {entry.name for entry in found.zeros}  # damping that would feed energy
     ratios = np.array([mine[name] / promised[name] for name in mine if name not in at_zero])

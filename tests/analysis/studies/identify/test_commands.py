@@ -139,6 +139,7 @@ def test_a_vehicle_that_no_command_takes_gives_no_file(tmp_path):
         (('--bootstrap', '5'), 'argument --bootstrap: expected'),
         (('--profile', 'mass'), '--profile: expected one of'),
         (('--odom', '/odom', '--wrench', '/no'), '/no'),
+        (('--odom', '/odom', '--wrench', '/wrench', '--applied'), 'options: wrench_applied'),
     ],
 )
 def test_refusals(bag, extra, said, tmp_path, capsys):

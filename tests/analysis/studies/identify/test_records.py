@@ -1,16 +1,19 @@
 """Recordings that are short, slow, or in part no measurement, become records or one line."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from trials import DELAY, LAG, trial, wrong_prior
 
-from auv_analysis.bag.tracks import Track
-from auv_analysis.studies.identify.bags import parts
-from auv_analysis.studies.identify.identify import Settings, identify, split
-from auv_analysis.studies.identify.record import Record, of_tracks
+from auv_analysis.bag.tracks import Track, assembled
+from auv_analysis.studies.identify.bags import parts, without_constants
+from auv_analysis.studies.identify.identify import Settings, as_filed, identify, split
+from auv_analysis.studies.identify.output_error import on_steps
+from auv_analysis.studies.identify.prediction import held_of, predict
+from auv_analysis.studies.identify.record import Record, of_tracks, segments_of
 from auv_analysis.studies.identify.start import least_squares_start
 from auv_analysis.studies.identify.unknowns import unknowns
 from auv_dynamics.files.errors import InputError
@@ -59,15 +62,7 @@ def test_nothing_to_learn_from_is_told():
 def test_between_two_pauses_close_together_there_is_no_record():
     t = np.arange(0.0, 10.0, 0.02)
     ns = (1e9 * t[(t < 4) | ((t > 5) & (t < 5.9)) | (t > 7)]).astype(np.int64)
-    tracks = {
-        role: Track(role, '/x', ns, np.tile(row, (len(ns), 1)), 2e8, role == 'wrench')
-        for role, row in (
-            ('pose', [0.0] * 3 + [*AHEAD]),
-            ('twist', [0.0] * 6),
-            ('wrench', [0.0] * 6),
-        )
-    }
-    assert [round(one.end) for one in of_tracks('x', tracks)] == [4, 10]
+    assert [round(one.end) for one in of_tracks('x', tracks(dict.fromkeys(ROWS, ns)))] == [4, 10]
 
 
 def test_a_segment_fits_into_a_record(herman):
@@ -94,3 +89,58 @@ def test_a_start_is_found_from_a_slow_velocity(herman, rate):
     theta, late, _ = least_squares_start([slow], u)
     assert_allclose(np.diag(u.coefficients(theta).M), np.diag(vehicle.M), rtol=0.1)
     assert late == pytest.approx(LAG + DELAY, abs=0.03)
+
+
+def test_pauses_of_several_topics_end_a_stretch_as_those_of_one_do_and_a_told_gap_as_told():
+    ns = 10**8 * np.arange(100)
+    paused = {'pose': ns, 'twist': ns[(ns < 4e9) | (ns > 4.2e9)], 'wrench': ns}
+    one = tracks(paused)
+    half = one['twist'].rows.copy()
+    half[:, 3:] = np.nan
+    both = (replace(one['twist'], rows=half), replace(one['twist'], rows=half[:, ::-1]))
+    for gap, told in ((2e8, False), (2e8, True), (5e8, True)):
+        parts = tuple(replace(part, limit=gap, told=told) for part in both)
+        for twist in (parts[0], assembled(parts, Path('x'))):
+            found = of_tracks('x', one | {'twist': twist})
+            assert len(found) == (2 if told and gap < 4e8 else 1)
+
+
+def test_a_component_that_never_changes_is_no_measurement():
+    rows = np.random.default_rng(0).normal(size=(50, 6))
+    rows[:, 2], rows[:, 4] = 0.0, np.nan
+    notes = []
+    found = without_constants(Track('twist', '/v', np.arange(50), rows, np.inf, held=False), notes)
+    assert_array_equal(found.given, [True, True, False, True, False, True])
+    assert notes == ['/v: w is constant, taken as not measured']
+
+
+def test_what_stands_still_tells_no_noise():
+    """Residuals in deviations of a noise of zero would all be as large as can be."""
+    still = record(10.0)
+    velocity = still.velocity.copy()
+    velocity[:, 2] = 0.1
+    found = replace(still, velocity=velocity).noise()
+    assert_array_equal(np.isnan(found), np.isin(np.arange(9), [2, 6, 7, 8]))
+    assert_allclose(found[[0, 1, 3, 4, 5]], 1.0, rtol=0.1)
+
+
+def test_the_observer_sees_velocity_and_attitude_with_stamps_of_their_own():
+    one = record(2.0)
+    later = replace(one, attitude_t=one.attitude_t + 1e-3, velocity_t=one.velocity_t - 1e-3)
+    expected, found = (on_steps(segments_of(r, 1.0, 0.6)[0]) for r in (one, later))
+    assert np.isfinite(expected).all()
+    assert_array_equal(found[:-1], expected[:-1])  # the last attitude is behind the end
+
+
+def test_a_prediction_is_compared_at_the_time_of_the_measurement():
+    """At 25 Hz 0.1 s lie between two steps."""
+    vehicle, push = load_vehicle('bluerov2_heavy'), [20.0, 10.0, 10.0, 0.5, 0.5, 0.5]
+
+    def predicted(step):
+        n = round(20.0 / step)
+        t, q, rest = step * np.arange(n + 1), np.tile(AHEAD, (n + 1, 1)), np.zeros((n + 1, 6))
+        held = held_of([Record('x', t, q, t, rest, step, np.tile(push, (n, 1)), 0.0)], 0.6)
+        assert held.horizons[0] == 0.1
+        return predict('x', held, vehicle, *as_filed(vehicle)).errors[0]
+
+    assert_allclose(predicted(0.04), predicted(0.02), rtol=0.02)

@@ -8,9 +8,11 @@ import numpy as np
 
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.foreign_checks import contradictions
+from auv_analysis.bag.foreign_fields import COMPONENTS
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import TopicMap, read_mapping
 from auv_analysis.bag.foreign_tracks import tracks_of, unknown_angles
+from auv_analysis.bag.tracks import Track
 from auv_analysis.studies.identify.record import Record, long_enough, of_tracks
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import GROUND_TRUTH, ODOM, WRENCH, WRENCH_APPLIED
@@ -29,7 +31,7 @@ def read_records(
     bag : folder or file of any kind
     vehicle : the prior
     mapping : which topics hold what; None: those of our nodes
-    applied : the wrench that acted, where the bag has it, in place of the command
+    applied : the wrench that acted in place of the command
     notes : gets what is worth saying
 
     Raises
@@ -41,18 +43,31 @@ def read_records(
     if not mapping.knows_wrench:
         expected = 'wrench (--wrench) or thrusters: motion alone tells no M, D and g'
         raise InputError(mapping.origin, 'wrench', expected, None)
+    if applied and not any(one.role == WRENCH_APPLIED for one in mapping.sources.values()):
+        expected = 'a topic, since --applied asks for it'
+        raise InputError(mapping.origin, WRENCH_APPLIED, expected, None)
     tracks, otherwise = tracks_of(read_sources(bag, mapping, notes), mapping, vehicle, notes)
+    tracks['twist'] = without_constants(tracks['twist'], notes)
     lacking = unknown_angles(tracks['pose'], mapping)
     if lacking:
         found = f'nothing for {", ".join(lacking)}'
         raise InputError(bag, 'pose', 'phi, theta and psi: the model turns with them', found)
-    if not tracks['wrench'].given.all():
-        raise InputError(bag, 'wrench', 'all six components', 'some that no topic has')
+    command = WRENCH_APPLIED if applied else WRENCH
+    if not tracks[command].given.all():
+        raise InputError(bag, command, 'all six components', 'some that no topic has')
     notes += contradictions(tracks, otherwise, mapping)
     records = of_tracks(bag.name, tracks, applied=applied)
     if not any(record.known.any() for record in records):
         raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', 'none')
     return records
+
+
+def without_constants(twist: Track, notes: list[str]) -> Track:
+    """The velocity without components that never change, which no sensor gives."""
+    constant = (twist.rows == twist.rows[0]).all(axis=0)
+    for name in np.array(COMPONENTS['twist'])[constant].tolist():
+        notes.append(f'{twist.topic}: {name} is constant, taken as not measured')
+    return replace(twist, rows=np.where(constant, np.nan, twist.rows))
 
 
 def _ours(bag: Path, *, applied: bool) -> TopicMap:

@@ -117,7 +117,6 @@ class OutputError:
     step : s
     noise : (9,) standard deviations of velocity and attitude measurements; NaN: not measured
     allocation : (6, m) wrench by command; None: the command is a wrench
-    integrator : of the simulation
     observer : gain by which the state follows the measurements; 0: it does not. What is measured
         less simulated is the error of its prediction then
 
@@ -128,7 +127,6 @@ class OutputError:
     step: float
     noise: np.ndarray
     allocation: np.ndarray | None = None
-    integrator: str = 'rk4'
     observer: float = 0.0
     _deviation: np.ndarray = field(init=False)
     _certain: np.ndarray = field(init=False)
@@ -157,7 +155,7 @@ class OutputError:
         found_states = open_loop(
             found.model(self.vehicle.lift), np.stack([command for _, command in late]), x0,
             self.step, allocation=allocation, follow=follow, applied=applied, bias=found.bias,
-            current=found.current, integrator=self.integrator, measured=seen,
+            current=found.current, measured=seen,
             observer=np.full(10, self.observer) if self.observer else None,
         )  # fmt: skip
         return np.concatenate([starts[:, :, None], found_states[..., 3:]], axis=2)
@@ -344,7 +342,9 @@ def on_steps(segment: Segment) -> np.ndarray:
     """Measured attitude and velocity (n, 10) after the steps next to them; NaN: none."""
     found = np.full((len(segment.command), 10), np.nan)
     after = np.clip(np.rint(segment.at).astype(int) - 1, 0, len(found) - 1)
-    found[after] = np.concatenate([segment.q, segment.nu], axis=1)
+    rows = np.concatenate([segment.q, segment.nu], axis=1)
+    row, column = np.nonzero(np.isfinite(rows))  # in the order of time: the last one stays
+    found[after[row], column] = rows[row, column]
     return found
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.studies.identify.output_error import OutputError
+from auv_analysis.studies.identify.output_error import ON_STEP, OutputError, at_times
 from auv_analysis.studies.identify.record import Record, Segment, down_of
 from auv_analysis.studies.identify.unknowns import Unknowns
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -70,19 +70,19 @@ class Held:
         return len(self.blocks)
 
 
-def held_of(records: Sequence[Record], history: float, longest: float = HORIZONS[-1]) -> Held:
-    """Moments of recordings, and horizons up to a longest one in s.
+def held_of(records: Sequence[Record], history: float) -> Held:
+    """Moments of recordings, and horizons.
 
     A horizon longer than a fifth of all that is held out is left out.
     """
     total = sum(record.end - record.start for record in records)
-    horizons = np.array([h for h in HORIZONS if h <= min(longest, max(total / 5, HORIZONS[0]))])
+    horizons = np.array([h for h in HORIZONS if h <= max(total / 5, HORIZONS[0])])
     reach = float(horizons[-1])
     spacing = max(APART, total / MOST)
     found, measured, blocks, offset = [], [], [], 0
     for record in records:
         before = int(np.ceil(history / record.step))
-        n = max(round(reach / record.step), 1)
+        n = int(np.ceil(reach / record.step - ON_STEP))
         firsts = np.arange(before, len(record.command) - n, max(round(spacing / record.step), 1))
         begins = record.start + record.step * firsts
         starts = record.states(begins) if len(firsts) else np.zeros((0, 10))
@@ -122,8 +122,8 @@ def predict(
                 for which in model.slices(1)
             ]
             every = np.concatenate(states)
-            steps = np.rint(held.horizons / record.step).astype(int)
-            found.append(np.nan_to_num(every[:, steps, 4:], nan=DIVERGED))
+            nu = np.nan_to_num(every[..., 4:], nan=DIVERGED)
+            found.append(at_times(nu, held.horizons / record.step))
     return Prediction(name, np.concatenate(found) - held.measured)
 
 

@@ -1,7 +1,7 @@
 """Measured motion and command of a vehicle, each at its own times, and segments of them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,17 +15,15 @@ from auv_analysis.metrics.local_polynomials import (
     variance,
     weights,
 )
-from auv_analysis.runs.run import Run
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.ros.interface import NANOSECONDS
-from auv_dynamics.vehicle.kinematics import quaternion
 from auv_dynamics.vehicle.model import down
 
 LONGEST_STEP, SHORTEST_STEP = 0.05, 0.002  # s, of the grid on which commands are held
 SMOOTHING = 0.4  # s, window of the local polynomials from which states are read off
-PAUSE = 0.5  # s without a measurement of something that may end a stretch
+PAUSE = 0.5  # s without a measurement of something that end no stretch where no gap was told
 SHORTEST = 1.0  # s of a record
-WHOLE = np.s_[:]
+ROUNDED = 1e-12  # m/s, rad/s, rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,22 +100,7 @@ class Record:
                 found[i] = np.sqrt(variance([rows])[0])
         turned = small_rotation(self.states(self.attitude_t)[:, :4], self.attitude)
         found[6:] = np.sqrt(variance([(self.attitude_t, turned)]))
-        return found
-
-
-def of_run(run: Run, *, applied: bool = False, attitude: np.ndarray | None = None) -> Record:
-    """Record of a simulated run or of a bag of ours, with the velocity that the law saw.
-
-    Parameters
-    ----------
-    run : without gaps
-    applied : take the wrench that the actuators delivered in place of the command
-    attitude : (n + 1, 4) measured quaternions; None: those of the run
-
-    """
-    q = quaternion(run.eta[:, 3:]) if attitude is None else attitude
-    tau = run.applied if applied and run.applied is not None else run.tau
-    return Record(run.scenario, run.t, q, run.t, run.nu_measured, run.step, tau[:-1], run.start)
+        return np.where(found > ROUNDED, found, np.nan)  # what stands still tells no noise
 
 
 def of_tracks(name: str, tracks: Mapping[str, Track], *, applied: bool = False) -> list[Record]:
@@ -127,19 +110,15 @@ def of_tracks(name: str, tracks: Mapping[str, Track], *, applied: bool = False) 
     ----------
     name : of the bag
     tracks : role -> signal in NED and FSD, as of `tracks_of`
-    applied : take the wrench that acted where there is one
+    applied : take the wrench that acted, 'wrench_applied'
 
     """
     pose, twist = tracks['pose'], tracks['twist']
-    command = tracks.get('wrench_applied') if applied else None
-    command = tracks['wrench'] if command is None else command
+    command = tracks['wrench_applied' if applied else 'wrench']
     origin = int(min(track.ns[0] for track in (pose, twist, command)))
     period = min(command.period, twist.period) / NANOSECONDS
     step = float(f'{np.clip(period, SHORTEST_STEP, LONGEST_STEP):.2g}')
-    signals = [
-        replace(track, limit=max(track.limit, PAUSE * NANOSECONDS))
-        for track in (pose, twist, command)
-    ]
+    signals = [track.tolerant(PAUSE * NANOSECONDS) for track in (pose, twist, command)]
     seconds = [(track.ns - origin) / NANOSECONDS for track in signals]
     span = (max(int(track.ns[0]) for track in signals), min(int(track.ns[-1]) for track in signals))
     found = []

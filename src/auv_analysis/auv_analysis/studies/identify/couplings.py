@@ -94,5 +94,5 @@ def signals_of(found: Identified) -> tuple[np.ndarray, np.ndarray]:
         rows = np.arange(0, len(record.command), every)
         states = record.states(record.start + record.step * (rows + 0.5))
         nu.append(np.nan_to_num(states[:, 4:]))
-        tau.append(record.wrench[rows])
+        tau.append(record.command[rows])
     return np.concatenate(nu), np.concatenate(tau)

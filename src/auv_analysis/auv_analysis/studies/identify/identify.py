@@ -135,8 +135,8 @@ def identify(
     u = unknowns(
         vehicle, settings.free, settings.fixed,
         speeds=_speeds(training),
-        wrenches=_rms([record.wrench for record in training]),
-        channels=training[0].channels, believed=settings.believed, origin=settings.origin,
+        wrenches=_rms([record.command for record in training]),
+        believed=settings.believed, origin=settings.origin,
     )  # fmt: skip
     u = _trusting(u, ~np.isnan(noise[:6]))
     asked = named([n for n in settings.profile if n != AUTO], u.entries, '--profile', 'options')
@@ -155,8 +155,7 @@ def identify(
                 training[0].name, '--segment', f'at most {room:.3g} s', f'{length:g} s'
             )
         every = -(-len(segments) // most) if most else 1
-        return OutputError(vehicle, segments[::every], step, noise, training[0].allocation,
-                           observer=gain)  # fmt: skip
+        return OutputError(vehicle, segments[::every], step, noise, observer=gain)
 
     room = step * (max(len(r.command) for r in training) - int(np.ceil(HISTORY / step)))
     longest = min(sum(r.end - r.start for r in training) / FEWEST, LONG, room)
@@ -262,19 +261,17 @@ def compared(
     predictors = [predict('new', moments, vehicle, *model)] if model else []
     predictors += [
         predict('prior' if model else vehicle.name, moments, vehicle,
-                *as_filed(vehicle, training[0].channels, lag, delay)),
+                *as_filed(vehicle, lag, delay)),
         persistence(moments),
         BlackBox(training).predict(moments),
     ]  # fmt: skip
     return compare(predictors, moments, vehicle.M)
 
 
-def as_filed(
-    vehicle: Vehicle, channels: Sequence[str] = (), lag: float = 0.0, delay: float = 0.0
-) -> tuple[Unknowns, np.ndarray]:
+def as_filed(vehicle: Vehicle, lag: float = 0.0, delay: float = 0.0) -> tuple[Unknowns, np.ndarray]:
     """A vehicle with nothing free, for its prediction."""
     one = np.ones(6)
-    found = unknowns(vehicle, (), speeds=one, wrenches=one, channels=channels, lag=lag)
+    found = unknowns(vehicle, (), speeds=one, wrenches=one, lag=lag)
     return found.with_delay(delay), np.zeros(0)
 
 
@@ -288,7 +285,7 @@ def check_motion(records: Sequence[Record], noise: np.ndarray) -> None:
     if np.all(moved < STILL * np.nan_to_num(noise[:6], nan=np.inf)):
         raise InputError(name, '', f'velocities that change by more than {STILL:g} times their '
                          'noise', 'a vehicle at rest')  # fmt: skip
-    if all(np.ptp(record.wrench, axis=0).max() == 0.0 for record in records):
+    if all(np.ptp(record.command, axis=0).max() == 0.0 for record in records):
         raise InputError(name, 'wrench', 'a command that changes', 'a constant one')
 
 

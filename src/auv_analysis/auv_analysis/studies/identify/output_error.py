@@ -116,7 +116,6 @@ class OutputError:
     segments : all of the same number of steps
     step : s
     noise : (9,) standard deviations of velocity and attitude measurements; NaN: not measured
-    allocation : (6, m) wrench by command; None: the command is a wrench
     observer : gain by which the state follows the measurements; 0: it does not. What is measured
         less simulated is the error of its prediction then
 
@@ -126,7 +125,6 @@ class OutputError:
     segments: Sequence[Segment]
     step: float
     noise: np.ndarray
-    allocation: np.ndarray | None = None
     observer: float = 0.0
     _deviation: np.ndarray = field(init=False)
     _certain: np.ndarray = field(init=False)
@@ -143,11 +141,10 @@ class OutputError:
         found = unknowns.coefficients(thetas)
         lag = np.maximum(found.lag, 1e-9)
         follow = np.repeat(-np.expm1(-self.step / lag)[:, None], 6, axis=1)
-        base = np.eye(6) if self.allocation is None else self.allocation
-        allocation = base * found.gain[:, None, :]
+        allocation = np.eye(6) * found.gain[:, None, :]
         delay = float(unknowns.prior.delay) / self.step
         late = [delayed(one, delay) for one in segments]
-        past = np.stack([before for before, _ in late])  # (S, p, m)
+        past = np.stack([before for before, _ in late])  # (S, p, 6)
         applied = _lagged(np.einsum('vim,spm->vspi', allocation, past), follow)
         x0 = np.zeros((*starts.shape[:2], 13))
         x0[..., 3:] = starts
@@ -349,7 +346,7 @@ def on_steps(segment: Segment) -> np.ndarray:
 
 
 def delayed(segment: Segment, steps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Commands before (p, m) and along (n, m) a segment, later by a number of steps."""
+    """Commands before (p, 6) and along (n, 6) a segment, later by a number of steps."""
     whole = int(np.floor(steps))
     share = steps - whole
     every = np.concatenate([segment.before, segment.command])

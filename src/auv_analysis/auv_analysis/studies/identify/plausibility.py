@@ -52,7 +52,7 @@ def excitation(records: Sequence[Record]) -> list[str]:
     shares = [
         _in_one_line(signal)
         for record in records
-        for signal in (record.wrench, np.nan_to_num(_evenly(record)))
+        for signal in (record.command, np.nan_to_num(_evenly(record)))
     ]
     if max(shares, default=0.0) > ALONE:
         return [f'{100 * max(shares):.0f} % of the power of the motion lie at one frequency: drag '

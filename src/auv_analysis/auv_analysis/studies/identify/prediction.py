@@ -114,8 +114,7 @@ def predict(
     found = []
     for record, segments in zip(held.record, held.segments, strict=True):
         if segments:
-            model = OutputError(vehicle, segments, record.step, np.full(9, np.nan),
-                                record.allocation)  # fmt: skip
+            model = OutputError(vehicle, segments, record.step, np.full(9, np.nan))
             starts = np.stack([one.start for one in segments])[None]
             states = [
                 model.simulate(unknowns, theta[None], starts[:, which], which)[0]
@@ -157,7 +156,7 @@ class BlackBox:
 
     def _row(self, state: np.ndarray, record: Record, t: np.ndarray) -> np.ndarray:
         middles = record.start + record.step * (np.arange(len(record.command)) + 0.5)
-        inputs = [smoothed_command(middles, record.wrench, t - lag) for lag in LAGS]
+        inputs = [smoothed_command(middles, record.command, t - lag) for lag in LAGS]
         return np.concatenate([state, *inputs, np.ones((len(t), 1))], axis=1)
 
     def predict(self, held: Held) -> Prediction:

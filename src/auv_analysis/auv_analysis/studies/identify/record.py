@@ -36,10 +36,8 @@ class Record:
     attitude_t, attitude : (a,) s, rising, and (a, 4) quaternions w, x, y, z from FSD to NED
     velocity_t, velocity : (v,) s and (v, 6) body velocity, m/s and rad/s; NaN: not measured
     step : s between commands
-    command : (n, m) held from start + k step to start + (k + 1) step
+    command : (n, 6) wrench, N and N m, body frame, held from start + k step to start + (k + 1) step
     start : s, of the first command
-    allocation : (6, m) wrench in N and N m by command; None: the command is the wrench
-    channels : names of the m commands
 
     """
 
@@ -51,8 +49,6 @@ class Record:
     step: float
     command: np.ndarray
     start: float
-    allocation: np.ndarray | None = None
-    channels: tuple[str, ...] = ()
 
     @property
     def end(self) -> float:
@@ -64,11 +60,6 @@ class Record:
         """(6,) whether a velocity is ever measured."""
         return np.isfinite(self.velocity).any(axis=0)
 
-    @property
-    def wrench(self) -> np.ndarray:
-        """(n, 6) commanded wrench, N and N m, body frame."""
-        return self.command if self.allocation is None else self.command @ self.allocation.T
-
     def part(self, begin: float, end: float) -> 'Record':
         """The part from one time to another, s; commands keep their grid."""
         first, last = (round((t - self.start) / self.step) for t in (begin, end))
@@ -78,7 +69,6 @@ class Record:
             self.name, self.attitude_t[keep[0]], self.attitude[keep[0]],
             self.velocity_t[keep[1]], self.velocity[keep[1]], self.step,
             self.command[first:last], self.start + first * self.step,
-            self.allocation, self.channels,
         )  # fmt: skip
 
     def states(self, t: np.ndarray) -> np.ndarray:
@@ -210,8 +200,8 @@ class Segment:
 
     Attributes
     ----------
-    before : (p, m) commands before it, for lag and delay
-    command : (n, m) commands, each held over a step
+    before : (p, 6) commands before it, for lag and delay
+    command : (n, 6) commands, each held over a step
     at : (r,) times of the measurements in steps from the start
     nu, q : (r, 6) and (r, 4) measured; NaN: not measured then
     start : (10,) first guess of attitude and velocity there
@@ -282,5 +272,5 @@ def described(record: Record) -> dict[str, Any]:
         'velocity_rms': [
             float(np.sqrt(np.nanmean(nu[:, i] ** 2))) if known[i] else None for i in range(6)
         ],
-        'wrench_rms': np.sqrt((record.wrench**2).mean(axis=0)).tolist(),
+        'wrench_rms': np.sqrt((record.command**2).mean(axis=0)).tolist(),
     }

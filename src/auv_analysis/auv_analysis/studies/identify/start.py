@@ -151,7 +151,7 @@ def _places(unknowns: Unknowns) -> set[tuple[str, tuple[int, ...]]]:
 def _command(record: Record, at: np.ndarray) -> np.ndarray:
     """Wrench (k, 6) at some times, smoothed as velocities are."""
     middles = record.start + record.step * (np.arange(len(record.command)) + 0.5)
-    return smoothed(middles, record.wrench, at)
+    return smoothed(middles, record.command, at)
 
 
 def _definite(M: np.ndarray, prior: np.ndarray) -> np.ndarray:

@@ -40,7 +40,7 @@ class Coefficients:
     M, D_linear, D_quadratic : (..., 6, 6) of (1), body frame, SI, damping positive
     hydrostatics : (..., 4) W - B in N, then W r_G - B r_B in N m
     lag, delay : (...,) s, of the actuators
-    gain : (..., m) by which each command is multiplied
+    gain : (..., 6) by which the wrench commanded is multiplied
     bias : (..., 6) constant wrench, N and N m, body frame
     current : (..., 3) constant velocity of the water, m/s, NED
 
@@ -88,7 +88,6 @@ class Unknowns:
     ----------
     prior : their values at theta = 0, without leading axes
     entries : the free ones, in the order of theta
-    lift : (6, 6) of the vehicle, not free; None: it has none
     is_delay_free : whether the delay is searched, which is no part of theta
     believed : name -> (value, standard deviation) of the coefficients that somebody knows; the
         values are those of `prior`
@@ -97,7 +96,6 @@ class Unknowns:
 
     prior: Coefficients
     entries: tuple[Entry, ...]
-    lift: np.ndarray | None = None
     is_delay_free: bool = False
     believed: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -201,7 +199,6 @@ def unknowns(
     *,
     speeds: np.ndarray,
     wrenches: np.ndarray,
-    channels: Sequence[str] = (),
     lag: float = 0.0,
     believed: Mapping[str, tuple[float, float]] | None = None,
     origin: object = 'options',
@@ -214,7 +211,6 @@ def unknowns(
     free, fixed : names such as 'M', 'M.diagonal', 'M.pitch.surge', 'D_linear', 'D_linear.full',
         'D_quadratic.sway', 'restoring', 'lag', 'gain', 'bias', 'current'; fixed ones win
     speeds, wrenches : (6,) root mean squares in the recording, which give scales
-    channels : names of the commands, for gains
     lag : s, of the prior
     believed : name -> (value, standard deviation); the value takes the place of the vehicle's
     origin : named in errors
@@ -224,12 +220,11 @@ def unknowns(
     InputError : no such name, or a value that no vehicle has
 
     """
-    count = len(channels) or 6
     prior = Coefficients(
         vehicle.M, vehicle.D_linear, vehicle.D_quadratic, vehicle.model.hydrostatics,
-        np.array(lag), np.array(0.0), np.ones(count), np.zeros(6), np.zeros(3),
+        np.array(lag), np.array(0.0), np.ones(6), np.zeros(6), np.zeros(3),
     )  # fmt: skip
-    every = _every(vehicle, prior, speeds, wrenches, tuple(channels) or DOFS)
+    every = _every(vehicle, prior, speeds, wrenches)
     kept = named(free, every, '--free', origin) - named(fixed, every, '--fixed', origin)
     entries = tuple(e for e in every if e.name in kept and e.group != 'delay')
     if any(entry.group == 'lag' for entry in entries) and lag < SHORTEST_LAG:
@@ -240,7 +235,7 @@ def unknowns(
         if name not in names:
             raise InputError(origin, '', one_of(name, names), name)
     prior = _with_believed(prior, [e for e in entries if e.name in believed], believed, origin)
-    return Unknowns(prior, entries, vehicle.lift, 'delay' in kept, believed)
+    return Unknowns(prior, entries, 'delay' in kept, believed)
 
 
 def _with_believed(
@@ -269,11 +264,7 @@ def _with_believed(
 
 
 def _every(
-    vehicle: Vehicle,
-    prior: Coefficients,
-    speeds: np.ndarray,
-    wrenches: np.ndarray,
-    channels: Sequence[str],
+    vehicle: Vehicle, prior: Coefficients, speeds: np.ndarray, wrenches: np.ndarray
 ) -> list[Entry]:
     """All that may be free, in the order of reports."""
     made = []
@@ -298,7 +289,7 @@ def _every(
         )
     made.append(Entry('lag', (), 'lag', 2 * UNFAMILIAR, 's'))
     made.append(Entry('delay', (), 'delay', 0.1, 's'))
-    made += [Entry('gain', (i,), f'gain.{n}', GAIN_UNFAMILIAR, '') for i, n in enumerate(channels)]
+    made += [Entry('gain', (i,), f'gain.{n}', GAIN_UNFAMILIAR, '') for i, n in enumerate(DOFS)]
     for i, dof in enumerate(DOFS):
         unit = max(wrenches[i], 1e-3 * weight * (1.0 if i < 3 else 0.1))
         made.append(Entry('bias', (i,), f'bias.{dof}', unit, 'N' if i < 3 else 'N m'))

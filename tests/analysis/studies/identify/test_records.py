@@ -84,7 +84,7 @@ def test_a_start_is_found_from_a_slow_velocity(herman, rate):
     rows = np.rint(np.arange(0.0, herman.end, 1.0 / rate) / herman.step).astype(int)
     slow = replace(herman, velocity_t=herman.velocity_t[rows], velocity=herman.velocity[rows])
     vehicle = load_vehicle('herman2018')
-    speeds, wrenches = (np.sqrt((x**2).mean(axis=0)) for x in (slow.velocity, slow.wrench))
+    speeds, wrenches = (np.sqrt((x**2).mean(axis=0)) for x in (slow.velocity, slow.command))
     u = unknowns(wrong_prior(vehicle, 3), speeds=speeds, wrenches=wrenches)
     theta, late, _ = least_squares_start([slow], u)
     assert_allclose(np.diag(u.coefficients(theta).M), np.diag(vehicle.M), rtol=0.1)

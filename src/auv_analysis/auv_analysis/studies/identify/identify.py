@@ -27,7 +27,6 @@ from auv_analysis.studies.identify.record import Record, long_enough, segments_o
 from auv_analysis.studies.identify.start import least_squares_start
 from auv_analysis.studies.identify.unknowns import (
     DEFAULT,
-    Coefficients,
     Entry,
     Unknowns,
     named,
@@ -492,12 +491,3 @@ def feeding(D: np.ndarray) -> tuple[int, ...]:
     v = np.linalg.eigh(S)[1][:, 0]
     power = np.tril(S * np.outer(v, v), -1)
     return tuple(int(i) for i in np.unravel_index(np.argmin(power), power.shape))
-
-
-def with_vehicle(vehicle: Vehicle, found: Coefficients) -> Vehicle:
-    """The vehicle with identified coefficients: M_RB as it was, the rest is added mass."""
-    couple = found.hydrostatics[1:]
-    buoyancy = float(vehicle.weight) - float(found.hydrostatics[0])
-    r_B = (float(vehicle.weight) * vehicle.r_G - couple) / buoyancy
-    return vehicle.changed(M=found.M, D_linear=found.D_linear, D_quadratic=found.D_quadratic,
-                           buoyancy=buoyancy, r_B=r_B)  # fmt: skip

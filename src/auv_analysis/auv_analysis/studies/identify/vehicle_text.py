@@ -10,9 +10,10 @@ import yaml
 from auv_analysis.output.text import number
 from auv_analysis.report.results import Results
 from auv_analysis.studies.identify.identified import Identified
-from auv_analysis.studies.identify.identify import with_vehicle
 from auv_analysis.studies.identify.report import verdict
+from auv_analysis.studies.identify.unknowns import Coefficients
 from auv_dynamics.files.errors import InputError, printable
+from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import is_semidefinite, vehicle_from_dict
 
 WIDTH = 96  # of comments
@@ -67,6 +68,15 @@ def vehicle_text(found: Identified, data: Mapping[str, Any], name: str, source: 
         text = yaml.safe_dump({key: value}, sort_keys=False, default_flow_style=flow, width=WIDTH)
         lines += text.rstrip().splitlines()
     return '\n'.join(lines) + '\n'
+
+
+def with_vehicle(vehicle: Vehicle, found: Coefficients) -> Vehicle:
+    """The vehicle with identified coefficients: M_RB as it was, the rest is added mass."""
+    couple = found.hydrostatics[1:]
+    buoyancy = float(vehicle.weight) - float(found.hydrostatics[0])
+    r_B = (float(vehicle.weight) * vehicle.r_G - couple) / buoyancy
+    return vehicle.changed(M=found.M, D_linear=found.D_linear, D_quadratic=found.D_quadratic,
+                           buoyancy=buoyancy, r_B=r_B)  # fmt: skip
 
 
 def write_vehicle(text: str, results: Results, folder: Path) -> None:

@@ -52,11 +52,11 @@ def read_records(
     if lacking:
         found = f'nothing for {", ".join(lacking)}'
         raise InputError(bag, 'pose', 'phi, theta and psi: the model turns with them', found)
-    command = WRENCH_APPLIED if applied else WRENCH
-    if not tracks[command].given.all():
-        raise InputError(bag, command, 'all six components', 'some that no topic has')
+    role = WRENCH_APPLIED if applied else WRENCH
+    if not tracks[role].given.all():
+        raise InputError(bag, role, 'all six components', 'some that no topic has')
     notes += contradictions(tracks, otherwise, mapping)
-    records = of_tracks(bag.name, tracks, applied=applied)
+    records = of_tracks(bag.name, tracks, role)
     if not any(record.known.any() for record in records):
         raise InputError(bag, '', 'a second and more with attitude, velocity and wrench', 'none')
     return records

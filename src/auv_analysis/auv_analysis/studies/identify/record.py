@@ -16,7 +16,7 @@ from auv_analysis.metrics.local_polynomials import (
     weights,
 )
 from auv_dynamics.kernel.compile import plain
-from auv_dynamics.ros.interface import NANOSECONDS
+from auv_dynamics.ros.interface import NANOSECONDS, WRENCH
 from auv_dynamics.vehicle.model import down
 
 LONGEST_STEP, SHORTEST_STEP = 0.05, 0.002  # s, of the grid on which commands are held
@@ -93,18 +93,17 @@ class Record:
         return np.where(found > ROUNDED, found, np.nan)  # what stands still tells no noise
 
 
-def of_tracks(name: str, tracks: Mapping[str, Track], *, applied: bool = False) -> list[Record]:
+def of_tracks(name: str, tracks: Mapping[str, Track], role: str = WRENCH) -> list[Record]:
     """Records of the stretches of a bag that have attitude, velocity and command.
 
     Parameters
     ----------
     name : of the bag
     tracks : role -> signal in NED and FSD, as of `tracks_of`
-    applied : take the wrench that acted, 'wrench_applied'
+    role : of the wrench, which was commanded or acted
 
     """
-    pose, twist = tracks['pose'], tracks['twist']
-    command = tracks['wrench_applied' if applied else 'wrench']
+    pose, twist, command = tracks['pose'], tracks['twist'], tracks[role]
     origin = int(min(track.ns[0] for track in (pose, twist, command)))
     period = min(command.period, twist.period) / NANOSECONDS
     step = float(f'{np.clip(period, SHORTEST_STEP, LONGEST_STEP):.2g}')

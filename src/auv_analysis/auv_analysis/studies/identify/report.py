@@ -152,30 +152,25 @@ def _listed(
     for row in predictions:
         predictor = 'model' if row['predictor'] == 'new' else row['predictor'].replace(' ', '_')
         predicted.setdefault(row['horizon'], {})[predictor] = row['error']
-    sizes = [(symbol, 'dof', row) for row in tables['deformation']
-             for symbol in ('delta_xi_max', 'delta_pi_max')]  # fmt: skip
-    sizes += [(symbol, 'dof', row) for row in tables['shares'] for symbol in ('N', 'share')]
-    sizes += [('Upsilon', 'pair', row) for row in tables['inertia']]
+    sizes = (
+        ('deformation', 'dof', ('delta_xi_max', 'delta_pi_max')),
+        ('shares', 'dof', ('N', 'share')),
+        ('inertia', 'pair', ('Upsilon',)),
+    )
     return {
         'parameters': [
-            {
-                'name': _indexed(row['name']),
-                **{'unit': row['unit'], 'value': row['value'], 'std': row['deviation']},
-                **{'low': row['low'], 'high': row['high'], 'prior': row['prior']},
-                'identifiable': row['status'] == 'identified',
-            }
+            {'name': _indexed(row['name']), 'std': row['deviation'],
+             'identifiable': row['status'] == 'identified',
+             **{key: row[key] for key in ('unit', 'value', 'low', 'high', 'prior')}}
             for row in rows
         ],
         'prediction': [{'horizon': horizon, **found} for horizon, found in predicted.items()],
         'couplings': [
-            {
-                'name': f'{symbol}.{row[key].replace(", ", ".")}',
-                **{'value': row[symbol], 'prior': row[f'{symbol}_prior']},
-                **{'low': row[f'{symbol}_low'], 'high': row[f'{symbol}_high']},
-            }
-            for symbol, key, row in sizes
+            {'name': f'{symbol}.{row[key].replace(", ", ".")}', 'value': row[symbol],
+             **{part: row[f'{symbol}_{part}'] for part in ('prior', 'low', 'high')}}
+            for table, key, symbols in sizes for row in tables[table] for symbol in symbols
         ],
-    }
+    }  # fmt: skip
 
 
 def _indexed(name: str) -> str:

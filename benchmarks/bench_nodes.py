@@ -63,6 +63,8 @@ def _echoing(count: int) -> Iterator[None]:
     if not count:
         yield
         return
+    from graph import end
+
     command = [sys.executable, str(ECHO), str(count)]
     environ = environment(int(os.environ[VARIABLE]))
     with subprocess.Popen(command, env=environ, stdout=subprocess.PIPE) as echo:
@@ -71,4 +73,4 @@ def _echoing(count: int) -> Iterator[None]:
             echo.stdout.readline()  # it is there
             yield
         finally:
-            echo.terminate()
+            end(echo)

@@ -15,6 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import psutil
 import yaml
 from loops import CONTROLLER
 
@@ -29,6 +30,13 @@ PATIENCE = 30.0  # s for the other end to appear
 STEADY = (0.1, 0.9)  # part of a run that is counted
 
 
+def end(process: subprocess.Popen) -> None:
+    """SIGTERM until it has ended: rclpy's wait does not wake at each of them."""
+    while process.poll() is None:
+        process.terminate()
+        psutil.wait_procs([process], timeout=1.0)
+
+
 def pingpong(seconds: float) -> float:
     """Round trips per second of a bare rclpy ping-pong between two processes."""
     environ = environment(chosen_domain(None)[0])
@@ -40,8 +48,7 @@ def pingpong(seconds: float) -> float:
             [*command, '--seconds', str(seconds)], env=environ, stdout=subprocess.PIPE, check=True
         )
     finally:
-        pong.terminate()
-        pong.wait()
+        end(pong)
     return float(ping.stdout)
 
 

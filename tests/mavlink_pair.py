@@ -1,21 +1,22 @@
 """The driver's link and the simulated autopilot, joined by bytes, in a time of the test's own."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 from ardusub_autopilot import Autopilot, Settings
 from navigation import Sample
-from pilot_messages import FOUR, MANUAL_CONTROL
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from udp import UdpPort
 from vehicle_link import LinkSettings, VehicleLink
-from wrench_mapping import WrenchMapping
+from wrench_mapping import FOUR, MANUAL_CONTROL, WrenchMapping
 
 from auv_dynamics import load_vehicle
 
 PERIOD = 4_000_000  # ns
 SECOND = 1_000_000_000
+Booted = partial(Settings, position_after=0.0, ready_after=0.0)  # in the time of a test
 
 
 class Wire:
@@ -41,7 +42,7 @@ class Pair:
 
     def __init__(self, settings: Settings | None = None, link: LinkSettings | None = None):
         self.now = 5_000 * SECOND  # steady clock of this side
-        self.settings = settings or Settings()
+        self.settings = settings or Booted()
         link = link or LinkSettings()
         self._ups, self._downs = Wire(255, 0), Wire(1, 1)
         self.up: Callable[[bytes], bytes] = bytes
@@ -50,6 +51,7 @@ class Pair:
         self.sent: list[Any] = []
         self.samples: list[Sample] = []
         self.share = 1.0
+        self.tau: Any = None  # of the last run
         self.link = VehicleLink(link, self._ups.send, self.said.append)
         dofs = FOUR if link.how == MANUAL_CONTROL else tuple(range(6))
         vehicle = load_vehicle(self.settings.vehicle)
@@ -68,6 +70,7 @@ class Pair:
 
     def run(self, seconds: float, tau: Any = None) -> None:
         """Let time pass; each sample is answered with the wrench tau."""
+        self.tau = tau
         for _ in range(round(seconds * SECOND / PERIOD)):
             self.now += PERIOD
             for message in self._over(self._ups, self.up):
@@ -83,6 +86,22 @@ class Pair:
                     axes, self.share = self.mapping.axes(np.array(tau), self.link.gain or 1.0)
                     self.link.command(axes, self.now)
             self.link.tick(self.now)
+
+    def stand_still(self, seconds: float) -> None:
+        """Stop the autopilot, its clock as well, and then let it go on."""
+        ways, self.up, self.down = (self.up, self.down), nothing, nothing
+        self.booted += round(seconds * SECOND)
+        self.run(seconds)
+        self.up, self.down = ways
+
+    def steer(self, seconds: float, x: int = 600) -> None:
+        """Let somebody else's joystick say something 25 times a second."""
+        message = mavlink.MAVLink_manual_control_message(1, x, 0, 500, 0, 0)
+        joystick = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+        for _ in range(round(seconds / 0.04)):
+            data = message.pack(joystick)
+            self.autopilot.receive(*self._port.parse(data), self.now - self.booted)
+            self.run(0.04, self.tau)
 
     def flown(self, tau: Any = None) -> 'Pair':
         """The pair once wrenches reach the motors."""

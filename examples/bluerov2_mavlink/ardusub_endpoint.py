@@ -24,6 +24,12 @@ def main() -> None:
     parser.add_argument('--voltage', type=float, default=16.0)
     parser.add_argument('--gain', type=float, default=0.5, help='pilot gain of MANUAL_CONTROL')
     parser.add_argument('--mode', choices=MODES.values(), default='MANUAL', help='at boot')
+    parser.add_argument('--firmware', default='4.5.0', help='version that it behaves like')
+    parser.add_argument('--position-after', type=float, default=50.0, help='s from boot')
+    parser.add_argument('--ready-after', type=float, default=10.0, help='s from boot, to arm')
+    parser.add_argument(
+        '--velocity-bias', type=float, nargs=3, default=[0.0] * 3, help='of the estimator, m/s'
+    )
     parser.add_argument('--eta', type=float, nargs=6, default=[0.0] * 6, help='NED, rad')
     parser.add_argument('--seconds', type=float, default=float('inf'))
     options = parser.parse_args()
@@ -31,6 +37,8 @@ def main() -> None:
     settings = Settings(
         options.vehicle, tuple(options.eta), (0.0,) * 6,
         options.thrusters, options.voltage, options.gain, mode,
+        tuple(int(number) for number in options.firmware.split('.')),
+        options.position_after, options.ready_after, tuple(options.velocity_bias),
     )  # fmt: skip
     port = UdpPort(options.connection, options.system, 1)
     autopilot = Autopilot(settings, port.send)
@@ -47,7 +55,7 @@ def main() -> None:
         select.select([port], [], [], PERIOD)
     port.close()
     state = 'armed' if autopilot.armed else 'disarmed'
-    print(f'{state}, motors {autopilot.pulses}', flush=True)
+    print(f'{state}, motors {autopilot.pulses}, inputs {autopilot.channels}', flush=True)
 
 
 if __name__ == '__main__':

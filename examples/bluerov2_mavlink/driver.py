@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 from pilot import Timeouts
-from pilot_messages import FOUR, MANUAL_CONTROL, OVERRIDE
 from std_srvs.srv import SetBool
 from udp import UdpPort
 from vehicle_link import LinkSettings, VehicleLink
-from wrench_mapping import WrenchMapping
+from wrench_mapping import FOUR, MANUAL_CONTROL, OVERRIDE, WrenchMapping
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
@@ -23,9 +22,10 @@ from auv_dynamics.ros.interface import BadMessageError
 from auv_dynamics.ros.node_interface import ERROR, NodeInterface, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
 from auv_dynamics.ros.parameters import declare, refuse_unknown
+from auv_dynamics.vehicle.vehicle import Vehicle
 
 POLL = 0.004  # s between two looks at the socket
-LAST_WORDS = 0.05  # s that they need to leave
+LAST_WORDS = 1.5  # s for letting go at the end, at most
 
 
 class Driver(BulkNode):
@@ -36,32 +36,30 @@ class Driver(BulkNode):
     def __init__(self) -> None:
         super().__init__('bluerov2_driver')
         self.graph = NodeInterface(self)
-        settings = self._settings()
-        how, voltage = settings.how, self._number('supply_voltage', 16.0, 'V at the thrusters')
         connection = declare(
             self, 'connection', str, 'udpin:127.0.0.1:14550', 'udpin or udpout:HOST:PORT'
         )
-        system = declare(
-            self, 'system', int, 255, "own MAVLink id; the vehicle's SYSID_MYGCS",
-            at_least=1, at_most=255,
-        )  # fmt: skip
-        vehicle = declare(self, 'vehicle', str, 'bluerov2_heavy', 'vehicle file, or bare name')
+        name = declare(self, 'vehicle', str, 'bluerov2_heavy', 'vehicle file, or bare name')
+        voltage = self._number('supply_voltage', 16.0, 'V at the thrusters')
         autoarm = declare(self, 'autoarm', bool, False, 'arm without being asked by ~/arm')
+        vehicle = load_vehicle(name)
+        settings = self._settings(vehicle)
         refuse_unknown(self)
-        dofs = FOUR if how == MANUAL_CONTROL else tuple(range(6))
-        self._mapping = WrenchMapping(load_vehicle(vehicle), dofs, voltage)
+        dofs = FOUR if settings.how == MANUAL_CONTROL else tuple(range(6))
+        self._mapping = WrenchMapping(vehicle, dofs, voltage)
         try:
-            self._port = UdpPort(connection, system, 0)
+            self._port = UdpPort(connection, settings.station, 0)
         except (ValueError, OSError) as error:
             raise InputError(self.get_name(), 'connection', 'a free UDP port', error) from None
         self._link = VehicleLink(settings, self._port.send, self.graph.complain)
+        self._waits: list[str] = []
         self._stale = settings.wrench.neutral
         # stamps follow the steady clock: a step of the system's clock does not reach them
         self._epoch = self.get_clock().now().nanoseconds - time.monotonic_ns()
         self._say_odometry = self.graph.output(topics.ODOM)
         self.graph.listen(topics.WRENCH, self._on_wrench, topics.newest_command())
         self.create_service(SetBool, '~/arm', self._on_arm)
-        self.graph.in_trouble_while(lambda: (ERROR, self._not_commanded()))
+        self.graph.in_trouble_while(lambda: (ERROR, self._waiting()))
         if autoarm:
             self._link.pilot.want(True, time.monotonic_ns())
         steady_timer(self, POLL, self._poll)
@@ -70,12 +68,17 @@ class Driver(BulkNode):
     def _number(self, name: str, default: float, text: str) -> float:
         return declare(self, name, float, default, text, at_least=0.001)
 
-    def _settings(self) -> LinkSettings:
+    def _settings(self, vehicle: Vehicle) -> LinkSettings:
         neutral = self._number('wrench_timeout', 0.5, 's without a wrench: neutral')
         disarm = self._number('disarm_timeout', 3.0, 's without a wrench: disarmed')
         silence = self._number('link_timeout', 1.0, 's without a position: neutral')
         return LinkSettings(
             system=declare(self, 'vehicle_system', int, 1, "the vehicle's MAVLink id", at_least=1),
+            station=declare(
+                self, 'system', int, 255, "own MAVLink id; the vehicle's SYSID_MYGCS",
+                at_least=1, at_most=255,
+            ),
+            thrusters=vehicle.thrusters.matrix.shape[1] if vehicle.thrusters else 0,
             rate=self._number('rate', 50.0, 'Hz, of the odometry'),
             timeout=round(silence * 1e9),
             how=declare(
@@ -121,35 +124,43 @@ class Driver(BulkNode):
         return response
 
     def _report(self) -> None:
-        """Keep what the diagnostics say; what is not right is said again."""
+        """Keep what the diagnostics say; what is waited for is said as soon as it changes."""
         link = self._link
-        uncertainty = link.clock.uncertainty
+        uncertainty, profile = link.clock.uncertainty, link.profile
         self.graph.facts.update(
             {
                 'vehicle heard': link.hears(),
+                'firmware': profile.firmware,
+                'differs': '; '.join(link.differences),
                 'armed': link.pilot.armed,
                 'commanded': link.pilot.commands,
                 'mode': link.pilot.mode,
+                'pilot gain': f'{link.gain} {link.gain_from}'.strip(),
                 'MAVLink refused': link.refused,
                 'MAVLink broken': self._port.broken,
                 'time uncertain by (s)': uncertainty and round(uncertainty, 6),
                 'battery (V)': link.voltage,
             }
         )
+        waits = link.waits_for(time.monotonic_ns())
+        if waits == self._waits:
+            return
+        if new := [what for what in waits if what not in self._waits]:
+            self.get_logger().info(f'waits for {", ".join(new)}')
+        self._waits = waits
+        self.graph.publish_diagnostics()
 
-    def _not_commanded(self) -> str:
-        """Why wrenches do not reach the motors, as long as they do not."""
-        link = self._link
-        if not link.hears():
-            return 'vehicle not heard'
-        if not link.pilot.wanted:
-            return f'not commanded: {link.pilot.why}'
-        return '' if link.pilot.commands else 'not armed'
+    def _waiting(self) -> str:
+        return f'waits for {", ".join(self._waits)}' if self._waits else ''
 
     def close(self) -> None:
-        """Leave the vehicle neutral and disarmed."""
-        self._link.leave()
-        time.sleep(LAST_WORDS)  # the socket's buffer goes with the process
+        """Leave the vehicle neutral and disarmed, and wait until it shows that."""
+        pilot, until = self._link.pilot, time.monotonic() + LAST_WORDS
+        if pilot.wanted:
+            pilot.want(False, time.monotonic_ns())
+        while pilot.letting_go and time.monotonic() < until:
+            self._poll()
+            time.sleep(POLL)
         self._port.close()
 
 

@@ -7,7 +7,10 @@ from wrench_mapping import NEUTRAL, PilotAxes
 
 MANUAL = 19  # ArduSub's mode in which the pilot's axes go to the motors
 AGAIN = 1_000_000_000  # ns between two requests of a kind
-KEEP_ALIVE = 100_000_000  # ns between two neutral inputs
+DISARM_AGAIN = 200_000_000
+KEEP_ALIVE = 100_000_000  # ns between two neutral inputs while the vehicle is in hand
+LETTING_GO = 50_000_000  # ns between two neutral inputs of letting go
+LEAST, MOST = 5, 20  # of these: always; until the motors are seen at rest
 ON_ITS_WAY = 300_000_000  # ns in which a heartbeat may be older than an acknowledgement
 
 
@@ -34,6 +37,10 @@ class Pilot:
     It never takes back what somebody else has taken: after a disarming, a change of mode or a
     restart that it did not ask for, it wants to be asked again.
 
+    ArduSub keeps the last input that it was given, in every mode, and heartbeats are all that its
+    failsafe wants. So letting go is an act: neutral inputs, `LEAST` of them where somebody else has
+    taken the vehicle and must not be hindered, otherwise until the motors are at rest or `MOST`.
+
     Parameters
     ----------
     timeouts : of the wrench
@@ -48,15 +55,18 @@ class Pilot:
         self._axes = NEUTRAL
         self._heard: int | None = None  # ns of the last command
         self._disarming = self._had_mode = self._lost = False
+        self._holds = False  # whether an input of this hand stands in the vehicle
+        self._given = self._limit = 0  # neutral inputs of letting go
         self._asked: dict[str, int] = {}
         self._sent = self._since = 0
         self._acknowledged = -ON_ITS_WAY
 
     def want(self, on: bool, now: int) -> None:
-        """Take the vehicle, or let it go: neutral, then disarmed."""
-        self._disarming = not on and self.armed
+        """Take the vehicle, or let it go: neutral and disarmed."""
+        arming = now - self._asked.get('arm', -AGAIN) < AGAIN
+        self._disarming = not on and (self.armed or (self.wanted and arming))
+        self._end(0 if on else MOST)
         self.wanted, self.why = on, '' if on else 'asked to disarm'
-        self._had_mode, self._axes = False, NEUTRAL
         self._since, self._heard = now, None
 
     def acknowledged(self, now: int) -> None:
@@ -81,10 +91,16 @@ class Pilot:
         self._had_mode = self._had_mode or (self.wanted and mode == MANUAL)
         return ''
 
+    def motors(self, at_rest: bool) -> None:
+        """Take whether the outputs of all motors are neutral."""
+        if at_rest and self._given >= LEAST:
+            self._limit = 0
+
     def let_go(self, why: str) -> str:
-        """Send nothing more until asked again."""
-        self.wanted = self._disarming = self._had_mode = False
-        self._axes, self.why = NEUTRAL, why
+        """Leave the vehicle to somebody else; nothing more is sent until asked again."""
+        self._end(LEAST)
+        self.wanted = self._disarming = False
+        self.why = why
         return f'{why}: not commanded until ~/arm is called'
 
     def command(self, axes: PilotAxes, now: int) -> None:
@@ -100,30 +116,61 @@ class Pilot:
         """Whether wrenches reach the motors."""
         return self.wanted and self.armed and self.mode == MANUAL and not self._disarming
 
-    def due(self, now: int, *, fresh: bool = False) -> Deed:
-        """What to send at a time in ns; `fresh` at once, because a command has just come."""
-        if not (self.wanted or self._disarming):
-            return Deed()
-        heard = self._heard is not None and now - self._heard <= self._timeouts.neutral
+    @property
+    def letting_go(self) -> bool:
+        """Whether something is still to be sent before the vehicle is left alone."""
+        return not self.wanted and (self._disarming or self._given < self._limit)
+
+    def is_fed(self, now: int) -> bool:
+        """Whether wrenches come."""
+        return self._heard is not None and now - self._heard <= self._timeouts.neutral
+
+    def due(self, now: int, ready: bool, *, fresh: bool = False) -> Deed:
+        """What to send at a time in ns.
+
+        Parameters
+        ----------
+        now : ns
+        ready : whether the vehicle may be taken
+        fresh : a command has just come, which is sent at once
+
+        """
+        if not self.wanted:
+            return self._farewell(now)
+        fed = self.is_fed(now)
         silence = now - (self._since if self._heard is None else self._heard)
-        if self.armed and self.wanted and silence > self._timeouts.disarm:
+        if self.armed and silence > self._timeouts.disarm:
             self._disarming = True
-        elif heard and self.wanted:
+        elif fed:
             self._disarming = False
-        arm = None
+        manual, arm = self.mode == MANUAL, None
         if self._disarming and self.armed:
-            arm = False if self._may_ask('disarm', now) else None
-        elif heard and not self.armed and self.mode == MANUAL and self._may_ask('arm', now):
+            arm = False if self._may_ask('disarm', now, DISARM_AGAIN) else None
+        elif fed and ready and not self.armed and manual and self._may_ask('arm', now):
             arm = True
-        mode = self.wanted and self.mode != MANUAL and self._may_ask('mode', now)
-        axes, flows = None, self.commands and heard
-        if (fresh and flows) or now - self._sent >= KEEP_ALIVE:
-            self._sent = now
+        mode = ready and not manual and self._may_ask('mode', now)
+        axes, flows = None, self.commands and fed
+        is_time = (fresh and flows) or now - self._sent >= KEEP_ALIVE
+        if is_time and manual and (ready or self._holds):
+            self._sent, self._holds = now, True
             axes = self._axes if flows else NEUTRAL
         return Deed(arm, mode, axes)
 
-    def _may_ask(self, what: str, now: int) -> bool:
-        if now - self._asked.get(what, -AGAIN) < AGAIN:
+    def _farewell(self, now: int) -> Deed:
+        arm = axes = None
+        if self._disarming and self._may_ask('disarm', now, DISARM_AGAIN):
+            arm = False
+        if self.letting_go and now - self._sent >= LETTING_GO:
+            self._sent, self._given, axes = now, self._given + 1, NEUTRAL
+        return Deed(arm, axes=axes)
+
+    def _end(self, limit: int) -> None:
+        """Forget the command; what this hand has left in the vehicle is made neutral."""
+        self._given, self._limit = 0, limit if self._holds else 0
+        self._axes, self._had_mode, self._holds = NEUTRAL, False, False
+
+    def _may_ask(self, what: str, now: int, again: int = AGAIN) -> bool:
+        if now - self._asked.get(what, -again) < again:
             return False
         self._asked[what] = now
         return True

@@ -1,21 +1,43 @@
 """An ArduSub vehicle over MAVLink, as a ground station has it; no socket, no ROS, no clock."""
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from boot_clock import BootClock, Exchange
-from navigation import Navigation, RestartedError, Sample
+from navigation import BootClock, Exchange, Navigation, RestartedError, Sample
 from pilot import MANUAL, Pilot, Timeouts
-from pilot_messages import MANUAL_CONTROL, OVERRIDE, manual_control, rc_override
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from wrench_mapping import PilotAxes
+from vehicle_checks import NAMED_FLOAT, SECOND, Profile, Telemetry
+from wrench_mapping import (
+    MANUAL_CONTROL,
+    NEUTRAL_PWM,
+    OVERRIDE,
+    PilotAxes,
+    manual_control,
+    rc_override,
+)
 
-SECOND = 1_000_000_000  # ns
 QUICK = SECOND // 10  # between two TIMESYNC requests until the clock is known
-DISARM_NOW = 3  # requests at the end, when no answer is waited for
+HEARTBEATS = 200_000  # us, of the vehicle; 1 s without being asked
+GONE = 3 * SECOND  # without a heartbeat
+SAY_AGAIN = 10 * SECOND  # the same text
+FRESH = 5 * SECOND  # of a refusal to arm
 WARNING = mavlink.MAV_SEVERITY_WARNING
-GAIN = 'PilotGain'  # NAMED_VALUE_FLOAT that ArduSub sends by itself
+GAIN = 'PilotGain'  # NAMED_VALUE_FLOAT of ArduSub's
+AT_REST = 5  # us about neutral
+SENT = 2 * SECOND  # for which inputs are kept, to know them when the vehicle reports them
+FOLLOWED, STRANGE = 5, 6  # reports of inputs: known ones before strange ones count, and how many
+
+# message id -> rate in Hz (0: that of the odometry), and the stream that has it
+MESSAGES = {
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: (0, mavlink.MAV_DATA_STREAM_EXTRA1),
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: (0, mavlink.MAV_DATA_STREAM_POSITION),
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: (20, mavlink.MAV_DATA_STREAM_RC_CHANNELS),
+    mavlink.MAVLINK_MSG_ID_RC_CHANNELS: (20, mavlink.MAV_DATA_STREAM_RC_CHANNELS),
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: (2, mavlink.MAV_DATA_STREAM_EXTENDED_STATUS),
+}
+ODOMETRY = ('ATTITUDE', 'LOCAL_POSITION_NED')
 
 
 @dataclass(frozen=True)
@@ -25,6 +47,8 @@ class LinkSettings:
     Attributes
     ----------
     system, component : MAVLink ids of the autopilot
+    station : of this side
+    thrusters : how many the vehicle file has
     rate : of attitude and position, Hz
     timeout : silence of the position after which the vehicle is not heard, ns
     how : 'rc_override' (six axes) or 'manual_control' (four)
@@ -34,6 +58,8 @@ class LinkSettings:
 
     system: int = 1
     component: int = mavlink.MAV_COMP_ID_AUTOPILOT1
+    station: int = 255
+    thrusters: int = 8
     rate: float = 50.0
     timeout: int = SECOND
     how: str = OVERRIDE
@@ -54,30 +80,40 @@ class VehicleLink:
     def __init__(
         self, settings: LinkSettings, send: Callable[[Any], None], say: Callable[[str], None]
     ):
-        self._settings, self._send, self._say = settings, send, say
+        self._settings, self._send, self._tell = settings, send, say
         self.pilot = Pilot(settings.wrench)
         self.clock = BootClock()
+        self.profile = Profile(self._order, self._read_parameter)
         self.gain: float | None = 1.0 if settings.how == OVERRIDE else None
+        self.gain_from = ''
         self.voltage: float | None = None
         self.refused = 0
         self._navigation = Navigation(self.clock)
         self._heard: dict[int, int] = {}  # message id -> ns
         self._sampled: int | None = None  # ns of the last sample
         self._last_ns = -1  # stamp of the last sample
-        self._due: dict[str, int] = {}
-        every = round(1e6 / settings.rate)
-        self._intervals = {
-            mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: every,
-            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: every,
-            mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1_000_000,
-        }
+        self._done: dict[str, int] = {}
+        self._said: dict[str, int] = {}
+        self._refusals: dict[str, int] = {}  # to arm: text -> ns
+        self._compared = False
+        self.differences: list[str] = []  # of the vehicle's parameters, and what to do
+        self._serious: list[str] = []  # differences with which the vehicle is not taken
+        self._inputs: deque[tuple[int, tuple[int, ...]]] = deque()  # sent: ns, pulses
+        self._own: tuple[int, ...] = ()  # the last of them that the vehicle reported
+        self._followed = self._strange = 0
+        self._now = 0
+        self._telemetry = Telemetry(self._wanted_messages(), self._order, self._request_stream)
         self._takers: dict[str, Callable[[Any, int], Sample | None]] = {
             'HEARTBEAT': self._heartbeat,
             'TIMESYNC': self._timesync,
-            'ATTITUDE_QUATERNION': lambda m, _: self._navigation.attitude(m),
+            'ATTITUDE': lambda m, _: self._navigation.attitude(m),
             'LOCAL_POSITION_NED': self._position,
             'SYS_STATUS': self._status,
+            'SERVO_OUTPUT_RAW': self._motors,
+            'RC_CHANNELS': self._channels,
             'NAMED_VALUE_FLOAT': self._named,
+            'AUTOPILOT_VERSION': lambda m, _: self.profile.take_version(m),
+            'PARAM_VALUE': lambda m, _: self.profile.take_parameter(m),
             'COMMAND_ACK': self._answer,
             'STATUSTEXT': self._text,
         }
@@ -92,6 +128,7 @@ class VehicleLink:
 
         What others send, and what must not be used, is dropped and counted in `refused`.
         """
+        self._now = now
         if not self.is_vehicle(message):
             self.refused += 1
             return None
@@ -118,57 +155,119 @@ class VehicleLink:
 
     def tick(self, now: int) -> None:
         """Send what is due at `now` in ns; to be called often."""
+        self._now = now
         if self._sampled is not None and now - self._sampled > self._settings.timeout:
             self._sampled = None
             self.pilot.silence()
             self._say('vehicle not heard: neutral')
         if self._is_due('heartbeat', now, SECOND):
             self._send(ground_station_heartbeat())
-        if self._is_due('timesync', now, SECOND if self.clock.local(0) is not None else QUICK):
+        if self._is_due('timesync', now, SECOND if self.clock.settled else QUICK):
             self._send(mavlink.MAVLink_timesync_message(0, now))
-        if self._is_due('telemetry', now, SECOND):
-            for message_id, interval in self._intervals.items():
-                if now - self._heard.get(message_id, -SECOND) >= SECOND:
-                    self._order(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, interval)
+        self._telemetry.tick(self._heard, now)
+        if self._has(mavlink.MAVLINK_MSG_ID_HEARTBEAT, now, GONE):
+            self.profile.tick(now)
+        if self.profile.complete and not self._compared:
+            self._compare()
         self._steer(now)
 
     def hears(self) -> bool:
         """Whether samples come."""
         return self._sampled is not None
 
-    def leave(self) -> None:
-        """Last words: neutral and disarmed, if the vehicle is in this hand."""
-        if self.pilot.wanted and self.pilot.armed:
-            self._send(rc_override(PilotAxes(), *self._target))
-            for _ in range(DISARM_NOW):  # any of them may be lost
-                self._order(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0)
+    def waits_for(self, now: int) -> list[str]:
+        """What is missing before wrenches reach the motors, all of it; empty when they do."""
+        if not self._has(mavlink.MAVLINK_MSG_ID_HEARTBEAT, now, GONE):
+            return [f'a heartbeat of system {self._settings.system}']
+        waits = [] if self.profile.complete else self.profile.missing()
+        for name in ODOMETRY:
+            if not self._has(getattr(mavlink, f'MAVLINK_MSG_ID_{name}'), now, SECOND):
+                waits.append(name)
+        if self.clock.local(0) is None:
+            waits.append('TIMESYNC')
+        if self.gain is None:
+            waits.append(f'the pilot gain ({GAIN} or JS_GAIN_DEFAULT)')
+        pilot = self.pilot
+        if not pilot.wanted:
+            return [*waits, *self._serious, f'~/arm ({pilot.why})']
+        fed = pilot.is_fed(now)
+        if not fed:
+            waits.append('a wrench')
+        if pilot.mode != MANUAL:
+            waits.append(f'mode MANUAL (it is in {pilot.mode})')
+        elif fed and not pilot.armed:
+            waits.append(': '.join(['the vehicle to arm', *_younger(self._refusals, now - FRESH)]))
+        return [*waits, *self._serious]
 
     @property
     def _target(self) -> tuple[int, int]:
         return self._settings.system, self._settings.component
 
+    def _wanted_messages(self) -> dict[int, tuple[int, int]]:
+        rates = dict(MESSAGES)
+        if self._settings.how == MANUAL_CONTROL:
+            rates[NAMED_FLOAT] = 2, mavlink.MAV_DATA_STREAM_EXTENDED_STATUS
+        return {
+            message_id: (round(1e6 / (rate or self._settings.rate)), stream)
+            for message_id, (rate, stream) in rates.items()
+        }
+
+    def _has(self, message_id: int, now: int, within: int) -> bool:
+        return now - self._heard.get(message_id, -within - 1) <= within
+
     def _is_due(self, what: str, now: int, period: int) -> bool:
-        if now < self._due.get(what, now):
+        if now - self._done.get(what, -period) < period:
             return False
-        self._due[what] = now + period
+        self._done[what] = now
         return True
+
+    def _say(self, text: str) -> None:
+        """Say a line; the same one again after a while only."""
+        self._said = _younger(self._said, self._now - SAY_AGAIN)
+        if text not in self._said:
+            self._said[text] = self._now
+            self._tell(text)
 
     def _order(self, command: int, *parameters: float) -> None:
         padded = [*parameters, *[0.0] * (7 - len(parameters))]
         self._send(mavlink.MAVLink_command_long_message(*self._target, command, 0, *padded))
 
+    def _request_stream(self, stream: int, rate: int) -> None:
+        self._send(mavlink.MAVLink_request_data_stream_message(*self._target, stream, rate, 1))
+
+    def _read_parameter(self, name: str) -> None:
+        self._send(mavlink.MAVLink_param_request_read_message(*self._target, name.encode(), -1))
+
+    def _compare(self) -> None:
+        """Say what of the vehicle's parameters is not as it should be, once they are known."""
+        self._compared, settings = True, self._settings
+        heartbeat = mavlink.MAVLINK_MSG_ID_HEARTBEAT  # what a pilot changes is seen the sooner
+        self._order(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, heartbeat, HEARTBEATS)
+        found = [*self.profile.differences(settings.station, settings.thrusters, settings.how)]
+        self._serious = [difference.text for difference in found if difference.serious]
+        self.differences = [difference.text for difference in found]
+        for text in self.differences:
+            self._say(text)
+        if self.gain is None and (gain := self.profile.gain()) is not None:
+            self.gain, self.gain_from = gain, 'JS_GAIN_DEFAULT'
+
+    def _is_ready(self) -> bool:
+        known = self.gain is not None and self._compared
+        return known and self._sampled is not None and not self._serious
+
     def _steer(self, now: int, *, fresh: bool = False) -> None:
-        deed = self.pilot.due(now, fresh=fresh)
+        deed = self.pilot.due(now, self._is_ready(), fresh=fresh)
         if deed.mode:
             flag = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
             self._order(mavlink.MAV_CMD_DO_SET_MODE, flag, MANUAL)
         if deed.arm is not None:
             self._order(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, float(deed.arm))
-        if deed.axes is None or self.gain is None:
+        if deed.axes is None:
             return
         if self._settings.how == MANUAL_CONTROL:
-            self._send(manual_control(deed.axes, self._settings.system, self.gain))
+            self._send(manual_control(deed.axes, self._settings.system, self.gain or 1.0))
         else:
+            self._inputs.append((now, deed.axes.pulses()))
             self._send(rc_override(deed.axes, *self._target))
 
     def _heartbeat(self, message: Any, now: int) -> None:
@@ -182,45 +281,65 @@ class VehicleLink:
     def _timesync(self, message: Any, now: int) -> None:
         if message.tc1 == 0 or not 0 <= now - message.ts1 < SECOND:
             return  # a request of the vehicle, or the answer to somebody else
-        if not self.clock.add(Exchange(message.ts1, message.tc1, now)):
-            self._restarted('boot time jumped')
+        self.clock.add(Exchange(message.ts1, message.tc1, now))
 
     def _position(self, message: Any, now: int) -> Sample | None:
         sample = self._navigation.position(message)
         if sample is None or sample.ns <= self._last_ns:
             return None
-        if self._sampled is None:
-            self._say_once_heard()
+        if self._sampled is None and self._last_ns >= 0:
+            self._say('vehicle heard again')
         self._sampled, self._last_ns = now, sample.ns
         return sample
-
-    def _say_once_heard(self) -> None:
-        if self._last_ns >= 0:
-            self._say('vehicle heard again')
 
     def _status(self, message: Any, _: int) -> None:
         known = message.voltage_battery != 65535
         self.voltage = message.voltage_battery / 1000.0 if known else None
 
+    def _motors(self, message: Any, _: int) -> None:
+        outputs = [getattr(message, f'servo{i + 1}_raw') for i in range(self._settings.thrusters)]
+        self.pilot.motors(all(not out or abs(out - NEUTRAL_PWM) <= AT_REST for out in outputs))
+
+    def _channels(self, message: Any, now: int) -> None:
+        """Notice another pilot: inputs that this one has not sent, after they were its own.
+
+        Two of them would take turns: the newest input counts. The driver is the one that yields.
+        """
+        while self._inputs and now - self._inputs[0][0] > SENT:
+            self._inputs.popleft()
+        if not self.pilot.commands:
+            self._followed = self._strange = 0
+            return
+        found = tuple(getattr(message, f'chan{i}_raw') for i in range(1, 7))
+        if found == self._own or any(found == pulses for _, pulses in self._inputs):
+            self._own = found
+            self._followed, self._strange = self._followed + 1, max(0, self._strange - 1)
+        elif self._followed >= FOLLOWED:
+            self._strange += 2
+        if self._strange >= STRANGE:
+            self._say(self.pilot.let_go(f'another pilot steers, inputs {found}'))
+
     def _named(self, message: Any, _: int) -> None:
         if message.name == GAIN and self._settings.how == MANUAL_CONTROL:
             if not 0.0 < message.value <= 1.0:
                 raise ValueError(f'{GAIN}: expected a number from 0 to 1, found {message.value}')
-            self.gain = message.value
+            self.gain, self.gain_from = message.value, GAIN
 
     def _answer(self, message: Any, now: int) -> None:
         accepted = message.result == mavlink.MAV_RESULT_ACCEPTED
-        if accepted and message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+        orders = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_DO_SET_MODE
+        if message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
+            self._telemetry.answered(accepted)
+        if accepted and message.command == orders[0]:
             self.pilot.acknowledged(now)
-        if message.result not in (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS):
-            names = mavlink.enums['MAV_CMD'], mavlink.enums['MAV_RESULT']
-            command, result = (
-                table[number].name if number in table else str(number)
-                for table, number in zip(names, (message.command, message.result), strict=True)
-            )
-            self._say(f'{command}: {result}')
+        if message.command in orders and not accepted:
+            names = mavlink.enums['MAV_RESULT']
+            result = names[message.result].name if message.result in names else message.result
+            self._say(f'{mavlink.enums["MAV_CMD"][message.command].name}: {result}')
 
-    def _text(self, message: Any, _: int) -> None:
+    def _text(self, message: Any, now: int) -> None:
+        if message.text.startswith(('PreArm', 'Arm:')):
+            self._refusals = {**_younger(self._refusals, now - FRESH), message.text: now}
         if message.severity <= WARNING:
             self._say(f'vehicle: {message.text}')
 
@@ -228,8 +347,17 @@ class VehicleLink:
         self._say(self.pilot.let_go(f'vehicle restarted ({why})'))
         self.pilot.armed, self._sampled = False, None
         self._heard.clear()
+        self._refusals.clear()
         self.clock.reset()
+        self.profile.reset()
+        self._compared, self._serious = False, []
+        if self._settings.how == MANUAL_CONTROL:
+            self.gain = None
         self._navigation.reset()
+
+
+def _younger(texts: dict[str, int], than: int) -> dict[str, int]:
+    return {text: at for text, at in texts.items() if at > than}
 
 
 def ground_station_heartbeat() -> Any:

@@ -1,16 +1,16 @@
-"""From a wrench to the six axes that a pilot of ArduSub has, by the vehicle file's thrusters.
+"""From a wrench to the pilot's input that ArduSub takes, by the vehicle file's thrusters.
 
-ArduSub adds the axes up in the command of each thruster, with factors of +-1, and thrust goes with
-the square of the command. Both are undone here: the thrusts that give the wrench have a part that
-gives none, and there is one choice of it whose commands are a sum of axes. Where that is beyond
-what the axes or the thrusters reach, the whole wrench is scaled: its direction stays.
+ArduSub adds the six axes up in the command of each thruster, with factors of +-1, and thrust goes
+with the square of the command. Both are undone here: the thrusts that give the wrench have a part
+that gives none, and there is one choice of it whose commands are a sum of axes. Where that is
+beyond what the axes or the thrusters reach, the whole wrench is scaled: its direction stays.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from t200 import command_of, supply_factors, thrust_of
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -18,6 +18,17 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 BISECTIONS = 60
 ALIKE = 1e-9
 VERTICAL, HORIZONTAL = (2, 3, 4), (0, 1, 5)  # degrees of freedom by group of thrusters
+
+# T200: full thrust by supply, Blue Robotics, bollard pull
+VOLTS = (12.0, 16.0, 20.0)
+FORWARD, REVERSE = (3.71, 5.25, 6.7), (2.92, 4.1, 5.05)  # kgf
+NOMINAL = 16.0  # V, to which the limits of the vehicle files belong
+
+OVERRIDE, MANUAL_CONTROL = 'rc_override', 'manual_control'
+NEUTRAL_PWM, HALF = 1500, 400  # microseconds
+KEEP = 65535  # a channel that is left as it is
+FULL, MIDDLE = 1000, 500  # of MANUAL_CONTROL; its z runs from 0 to 1000 in ArduSub
+FOUR = (0, 1, 2, 5)  # surge, sway, heave, yaw: what MANUAL_CONTROL has for all versions
 
 
 class PilotAxes(NamedTuple):
@@ -29,6 +40,11 @@ class PilotAxes(NamedTuple):
     roll: float = 0.0
     pitch: float = 0.0
     yaw: float = 0.0
+
+    def pulses(self) -> tuple[int, ...]:
+        """Input channels 1 to 6: pitch, roll, throttle, yaw, forward, lateral; microseconds."""
+        axes = self.pitch, self.roll, self.throttle, self.yaw, self.forward, self.lateral
+        return tuple(NEUTRAL_PWM + round(HALF * axis) for axis in axes)
 
 
 NEUTRAL = PilotAxes()
@@ -160,3 +176,43 @@ def _commands(
         p = command_of(thrust + middle * group.idle, reverse, forward)
         low, high = (middle, high) if group.odd @ p < 0 else (low, middle)
     return p
+
+
+def supply_factors(voltage: float) -> tuple[float, float]:
+    """Full thrust at a supply voltage over that at 16 V: reverse and forward.
+
+    Parameters
+    ----------
+    voltage : at the speed controllers, V; taken as 12 to 20, beyond which nothing is published
+
+    """
+    kgf = (np.interp(voltage, VOLTS, table) for table in (REVERSE, FORWARD))
+    full = (np.interp(NOMINAL, VOLTS, table) for table in (REVERSE, FORWARD))
+    reverse, forward = (float(a / b) for a, b in zip(kgf, full, strict=True))
+    return reverse, forward
+
+
+def command_of(thrust: np.ndarray, reverse: np.ndarray, forward: np.ndarray) -> np.ndarray:
+    """Commands (n,), 1 for full, of thrusts (n,) in N with full thrusts (n,) each way, N."""
+    return np.sign(thrust) * np.sqrt(np.abs(thrust) / np.where(thrust < 0, reverse, forward))
+
+
+def thrust_of(command: np.ndarray, reverse: np.ndarray, forward: np.ndarray) -> np.ndarray:
+    """Thrusts (n,) in N of commands (n,); the inverse of `command_of`."""
+    return command * np.abs(command) * np.where(command < 0, reverse, forward)
+
+
+def rc_override(axes: PilotAxes, system: int, component: int) -> Any:
+    """RC_CHANNELS_OVERRIDE of channels 1 to 6."""
+    return mavlink.MAVLink_rc_channels_override_message(
+        system, component, *axes.pulses(), KEEP, KEEP
+    )
+
+
+def manual_control(axes: PilotAxes, system: int, gain: float) -> Any:
+    """MANUAL_CONTROL of four axes; ArduSub multiplies what it gets by the pilot gain."""
+    x, y, z, r = (
+        max(-FULL, min(FULL, round(FULL * axis / gain)))
+        for axis in (axes.forward, axes.lateral, axes.throttle, axes.yaw)
+    )
+    return mavlink.MAVLink_manual_control_message(system, x, y, MIDDLE + round(z / 2), r, 0)

@@ -1,5 +1,6 @@
 """The driver as a process, with a simulated vehicle on the other side of a wire."""
 
+import signal
 import socket
 import time
 from itertools import pairwise
@@ -15,6 +16,8 @@ from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import NANOSECONDS, Frames
 
 FRAMES = Frames()
+SOON = ('--position-after', '0.5', '--ready-after', '1')  # after boot, for a test
+AT_REST = f'disarmed, motors {[1500] * 8}, inputs {[1500] * 6}'
 PUSH = (12.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -45,6 +48,7 @@ class Sea:
             self.domain,
             '--connection',
             f'udpout:127.0.0.1:{self.relay.port}',
+            *SOON,
         )
 
     def say(self, tau: tuple, ns: int) -> None:
@@ -96,7 +100,7 @@ def running():
         assert stop(sea.driver)[0] == 0
         code, output = stop(sea.vehicle)
         assert code == 0
-        assert 'disarmed, motors [1500' in output, 'the driver leaves no vehicle behind that runs'
+        assert AT_REST in output, 'the driver leaves no vehicle behind that runs'
     finally:
         sea.close()
 
@@ -107,7 +111,7 @@ def sea(running):
     running.tau = PUSH
 
     def ahead() -> bool:
-        if 'not commanded' in running.facts().get('', ''):
+        if '~/arm (' in running.facts().get('', ''):
             running.peer.heard['/diagnostics'].clear()
             running.peer.call(SetBool, 'bluerov2_driver/arm', SetBool.Request(data=True))
         return running.surge > 0.2
@@ -136,7 +140,7 @@ def test_a_wrench_that_falls_silent_is_let_go_and_taken_up_again(sea) -> None:
 def test_a_cut_link_gives_no_odometry_and_says_so_until_it_is_back(sea) -> None:
     sea.relay.cut = True
     try:
-        sea.until(lambda: sea.facts().get('') == 'vehicle not heard', 'the report')
+        sea.until(lambda: 'waits for ATTITUDE, LOCAL_POSITION' in sea.facts().get('', ''), 'it')
         before = len(sea.odometry)
         sea.peer.spin(0.3)
         assert len(sea.odometry) == before, 'nothing old is repeated'
@@ -151,7 +155,7 @@ def test_a_vehicle_that_is_started_anew_is_not_armed_unasked(sea) -> None:
     sea.vehicle.kill()
     sea.vehicle.communicate(timeout=PATIENCE)
     sea.vehicle = sea.launch()
-    sea.until(lambda: 'not commanded: vehicle restarted' in sea.facts().get('', ''), 'the report')
+    sea.until(lambda: '~/arm (vehicle restarted' in sea.facts().get('', ''), 'the report')
     sea.more()
     assert sea.odometry[-1][0] > last
     assert sea.surge == 0.0
@@ -194,3 +198,17 @@ def test_a_wrench_that_must_not_be_used_is_refused(sea, kind, tau, age) -> None:
         sea.peer.spin(0.2)
     sea.more()
     assert np.isfinite(sea.odometry[-1][1]).all()
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGHUP], ids=['SIGINT', 'SIGHUP'])
+def test_a_signal_leaves_the_vehicle_disarmed_its_inputs_neutral(number) -> None:
+    sea = Sea()
+    try:
+        sea.tau = PUSH
+        sea.until(lambda: sea.surge > 0.2, 'the vehicle to go ahead')
+        code, output = stop(sea.driver, number)
+        assert code == 0
+        assert AT_REST in stop(sea.vehicle)[1]
+        assert 'waits for' in output, 'what it waited for stands in the log'
+    finally:
+        sea.close()

@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
-from ardusub_autopilot import Settings
 from ardusub_mixer import VECTORED_6DOF, motor_pulses, thrust
 from hypothesis import given
-from mavlink_pair import Pair
+from mavlink_pair import Booted, Pair
 from numpy.testing import assert_allclose
-from pilot_messages import FOUR, rc_override
 from strategies import QUICK, vectors
-from wrench_mapping import SIGNS, PilotAxes, WrenchMapping
+from wrench_mapping import FOUR, SIGNS, PilotAxes, WrenchMapping, rc_override
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
@@ -114,6 +112,6 @@ def test_other_thrusters_are_refused() -> None:
 
 
 def test_neutral_stays_where_it_is() -> None:
-    pair = Pair(Settings()).flown()
+    pair = Pair(Booted()).flown()
     pair.run(1.0, tau=np.zeros(6))
     assert pair.autopilot.pulses == [1500] * 8

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from ardusub_mixer import thrust
 from mavlink_relay import EXAMPLE
-from pilot_messages import FOUR
-from t200 import command_of
-from wrench_mapping import WrenchMapping
+from wrench_mapping import FOUR, WrenchMapping, command_of
 
 from auv_dynamics import load_vehicle
 

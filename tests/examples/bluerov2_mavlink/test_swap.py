@@ -54,6 +54,7 @@ def dive(tmp_path_factory):
         )  # fmt: skip
         started['vehicle'] = start_program(
             'ardusub_endpoint.py', domain, '--connection', f'udpout:127.0.0.1:{port}',
+            '--position-after', '0.5', '--ready-after', '1',
             '--thrusters', 'measured', '--eta', '0', '0', '2', '0.1', '-0.1', '1.5',
         )  # fmt: skip
         for process in started.values():

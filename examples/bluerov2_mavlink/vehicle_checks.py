@@ -1,0 +1,191 @@
+"""What an ArduSub vehicle is asked for when it is met: messages, version, parameters."""
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from wrench_mapping import MANUAL_CONTROL
+
+SECOND = 1_000_000_000  # ns
+TURN = SECOND // 10  # between two requests for messages
+AGAIN, TRIES = SECOND // 2, 4  # of a question that has no answer
+NAMED_FLOAT = mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT
+LEAST_VERSION = (4, 0, 0)
+SEES_OVERRIDES = (4, 5, 0)  # from here on ArduSub's pilot-input failsafe
+DISARM = 2  # of FS_PILOT_INPUT and FS_GCS_ENABLE
+FRAMES = {6: 1, 8: 2}  # thrusters -> FRAME_CONFIG: vectored, vectored with 6 DOF
+STATION = ('SYSID_MYGCS', 'MAV_GCS_SYSID')  # 4.7 has renamed it
+PILOT = ('FS_PILOT_INPUT', 'FS_PILOT_TIMEOUT')
+GAINS = ('JS_GAIN_DEFAULT', 'JS_GAIN_MIN', 'JS_GAIN_MAX', 'JS_THR_GAIN')
+PARAMETERS = (*STATION, 'FRAME_CONFIG', 'FS_GCS_ENABLE', *PILOT, *GAINS)
+Order = Callable[..., None]  # a command and its parameters
+
+
+class Telemetry:
+    """Asks for messages that do not come: each for itself, or by its older stream if refused.
+
+    Parameters
+    ----------
+    wanted : message id -> period in us, and the stream that has the message
+    order : sends a command
+    request : sends a REQUEST_DATA_STREAM of a stream and a rate in Hz
+
+    """
+
+    def __init__(
+        self, wanted: dict[int, tuple[int, int]], order: Order, request: Callable[[int, int], None]
+    ):
+        self._wanted, self._order, self._request = wanted, order, request
+        self._last: dict[int, int] = {}  # ns of a request
+        self._due = 0
+        self._unanswered: int | None = None
+
+    def answered(self, accepted: bool) -> None:
+        """Take the answer to the request that was sent last."""
+        if accepted:
+            self._unanswered = None
+
+    def tick(self, heard: dict[int, int], now: int) -> None:
+        """Ask for one that was not heard for a second; each once a second."""
+        if now < self._due:
+            return
+        self._due = now + TURN
+        if self._unanswered is not None:
+            self._stream(self._unanswered)
+            self._unanswered = None
+        for message_id, (period, _) in self._wanted.items():
+            past = max(heard.get(message_id, -SECOND), self._last.get(message_id, -SECOND))
+            if now - past < SECOND:
+                continue
+            self._last[message_id] = now
+            if message_id == NAMED_FLOAT:  # refused by all versions when asked for by itself
+                self._stream(message_id)
+            else:
+                self._unanswered = message_id
+                self._order(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, period)
+            return
+
+    def _stream(self, message_id: int) -> None:
+        period, stream = self._wanted[message_id]
+        self._request(stream, max(1, round(1e6 / period)))
+
+
+class Difference(NamedTuple):
+    """What is not as this driver needs it, and what to do; whether it must not arm so."""
+
+    text: str
+    serious: bool
+
+
+class Profile:
+    """Version and parameters of the vehicle, asked for until they are known or given up.
+
+    Parameters
+    ----------
+    order : sends a command
+    read : sends a PARAM_REQUEST_READ of a name
+
+    """
+
+    def __init__(self, order: Order, read: Callable[[str], None]):
+        self._order, self._read = order, read
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the vehicle: it may be another one, or have other parameters."""
+        self.version: tuple[int, int, int] | None = None
+        self.kind = ''
+        self.values: dict[str, float] = {}
+        self._tries, self._due = 0, 0
+
+    def tick(self, now: int) -> None:
+        """Ask for what is missing."""
+        if self.complete or now < self._due:
+            return
+        self._due, self._tries = now + AGAIN, self._tries + 1
+        if self.version is None:  # the first is known since 4.0, the second until 4.5
+            wanted = mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+            self._order(mavlink.MAV_CMD_REQUEST_MESSAGE, wanted)
+            self._order(mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, 1)
+        for name in self._unknown():
+            self._read(name)
+
+    def take_version(self, message: Any) -> None:
+        """Take an AUTOPILOT_VERSION."""
+        major, minor, patch, kind = message.flight_sw_version.to_bytes(4, 'big')
+        self.version = major, minor, patch
+        self.kind = {0: 'dev', 64: 'alpha', 128: 'beta', 192: 'rc', 255: ''}.get(kind, '')
+
+    def take_parameter(self, message: Any) -> None:
+        """Take a PARAM_VALUE."""
+        if message.param_id in PARAMETERS:
+            self.values[message.param_id] = message.param_value
+
+    @property
+    def complete(self) -> bool:
+        """Whether everything is known, or has been asked for often enough."""
+        return self._tries > TRIES or not self.missing()
+
+    @property
+    def firmware(self) -> str:
+        """Version as a text."""
+        numbers = '.'.join(map(str, self.version)) if self.version else 'unknown'
+        return f'ArduSub {numbers} {self.kind}'.strip()
+
+    def missing(self) -> list[str]:
+        """What is not known yet."""
+        return ['AUTOPILOT_VERSION'] * (self.version is None) + self._unknown()
+
+    def _unknown(self) -> list[str]:
+        known = {*self.values} | ({*STATION} if {*STATION} & {*self.values} else set())
+        return [name for name in PARAMETERS if name not in known]
+
+    def gain(self) -> float | None:
+        """Pilot gain at boot, if that is within its limits; a button may have changed it since."""
+        default, least, most = (self.values.get(name, 0.0) for name in GAINS[:3])
+        return default if 0.1 <= least <= default <= most <= 1.0 else None
+
+    def differences(self, station: int, thrusters: int, how: str) -> Iterable[Difference]:
+        """What is not as it should be, once complete.
+
+        Parameters
+        ----------
+        station : MAVLink id of this driver
+        thrusters : how many the vehicle file has
+        how : 'rc_override' or 'manual_control'
+
+        """
+        if missing := self.missing():
+            yield Difference(f'no answer about {", ".join(missing)}: not checked', False)
+        if self.version and self.version < LEAST_VERSION:
+            yield Difference(f'{self.firmware} is older than 4.0: nobody has tried it', False)
+        obeys = f'it obeys that one only: start with -p system:={{:g}} or set {station}'
+        other = f'the vehicle file has {thrusters} thrusters: set it, or give the right -p vehicle'
+        serious = [(name, station, obeys) for name in STATION]
+        for name, expected, advice in [*serious, ('FRAME_CONFIG', FRAMES[thrusters], other)]:
+            found = self.values.get(name, expected)
+            if found != expected:
+                text = f'{name} is {found:g}, expected {expected}: {advice.format(found)}'
+                yield Difference(text, True)
+        yield from (Difference(text, False) for text in self._failsafes(how))
+
+    def _failsafes(self, how: str) -> Iterable[str]:
+        value = self.values.get
+        if (found := value('FS_GCS_ENABLE', DISARM)) != DISARM:
+            yield (
+                f'FS_GCS_ENABLE is {found:g}, expected 2: when this driver is killed the motors '
+                'go on as last told; set 2'
+            )
+        action, timeout = value(PILOT[0], DISARM), value(PILOT[1], 3.0)
+        blind = how != MANUAL_CONTROL and (self.version or LEAST_VERSION) < SEES_OVERRIDES
+        if blind and action == DISARM:
+            yield (
+                f'FS_PILOT_INPUT is 2 and {self.firmware} counts joysticks only: one that was used '
+                'since boot disarms this driver after FS_PILOT_TIMEOUT; boot again without it'
+            )
+        elif not blind and action != DISARM:
+            yield f'FS_PILOT_INPUT is {action:g}, expected 2: a driver that hangs is not noticed'
+        if not 0.5 <= timeout <= 3.0:
+            yield f'FS_PILOT_TIMEOUT is {timeout:g} s, expected 0.5 to 3: set 3'
+        if how == MANUAL_CONTROL and (found := value('JS_THR_GAIN', 1.0)) != 1.0:
+            yield f'JS_THR_GAIN is {found:g}, expected 1: heave is so much stronger; set 1'

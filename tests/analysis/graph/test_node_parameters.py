@@ -36,6 +36,7 @@ CONTRACT = {  # every name of the contract's table that is not optional
     },
 }  # fmt: skip
 WORDS = {
+    'saturation',
     'vehicle', 'integrator', 'law', 'setpoint_pairing', 'setpoint_acceleration', 'bag',
     'odom_frame', 'base_frame', 'storage.compression', 'kind', 'stamp_clock', 'exclude',
 }  # fmt: skip

@@ -12,6 +12,7 @@ from auv_analysis.scenario.scenario import Scenario
 from auv_dynamics.plant.parameters import numbers
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.settings import GraphSettings, PlantSettings, as_parameters, entries
+from auv_dynamics.vehicle.thrusters import SCALED
 from auv_gvc_controller.control.setpoint import SetpointSettings
 from auv_gvc_controller.control.setpoint_buffer import SAME
 from auv_gvc_controller.control.settings import EXACT, LATEST, ControllerSettings
@@ -170,6 +171,7 @@ def _controller(scenario: Scenario, anti_windup: bool, lockstep: bool) -> Contro
         limits_gap=max(ControllerSettings.limits_gap, 10 * scenario.step),
         actuators_limit=tuple(numbers(actuators.get('limit', []))),
         actuators_thrusters=bool(actuators.get('thrusters')),
+        actuators_saturation=actuators.get('saturation', SCALED),
         anti_windup=anti_windup,
     )
     if lockstep:

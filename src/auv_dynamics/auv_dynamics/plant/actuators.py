@@ -1,4 +1,4 @@
-"""From the commanded wrench to the one that is applied: delay, limits, slew rate and lag."""
+"""From the commanded wrench to the one that is applied: delay, limits, rotors, slew rate, lag."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -12,14 +12,17 @@ from auv_dynamics.kernel.six import (
     Numbers,
     Six,
     Vector,
+    clipped,
     copied,
     fill_vector,
     vector,
 )
+from auv_dynamics.plant.rotors import KEYS, PER_ROW, Rotors, fill_delivered, make_rotors
 from auv_dynamics.vehicle.thrusters import (
+    SCALED,
     AttainableWrench,
+    allocated,
     make_reach,
-    reachable,
     six_numbers,
 )
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -38,6 +41,7 @@ class Actuators(NamedTuple):
     slew : (6,) largest change per step, N and N m
     follow : (6,) share of the remaining way that the first-order lag covers in a step
     delay : steps
+    rotors : of the thrusters; None: these deliver each thrust at once
 
     """
 
@@ -46,6 +50,7 @@ class Actuators(NamedTuple):
     slew: np.ndarray
     follow: np.ndarray
     delay: int
+    rotors: Rotors | None = None
 
 
 def make_actuators(
@@ -55,14 +60,16 @@ def make_actuators(
 
     Parameters
     ----------
-    spec : `limit` (N, N m), `rate` (N/s, N m/s), `lag`, `delay` (s), `thrusters`; None: ideal
+    spec : `limit` (N, N m), `rate` (N/s, N m/s), `lag`, `delay` (s), `thrusters`, `saturation` and
+        what `make_rotors` takes; None: ideal
     vehicle : whose thrusters are used where `thrusters` is true
     step : control period, s
     file : named in errors
 
     Raises
     ------
-    InputError : a delay that is no multiple of the step, thrusters of a vehicle without any
+    InputError : a delay that is no multiple of the step, thrusters of a vehicle without any, what
+        is asked of thrusters that are not used
 
     """
     if spec is None:
@@ -78,13 +85,19 @@ def make_actuators(
     if use_thrusters and vehicle.thrusters is None:
         expected = f'a vehicle with thrusters, {vehicle.name} has none'
         raise InputError(file, 'actuators.thrusters', expected, 'true')
+    for key in ('saturation', *KEYS):
+        if not use_thrusters and spec.get(key) not in (None, False):
+            raise InputError(file, f'actuators.{key}', 'thrusters: true beside it', None)
+    thrusters = vehicle.thrusters if use_thrusters else None
+    rotors = None if thrusters is None else make_rotors(spec, thrusters, vehicle.name, step, file)
     lag = float(spec.get('lag', 0.0))
     return Actuators(
         False,
-        make_reach(spec.get('limit'), vehicle.thrusters if use_thrusters else None),
+        make_reach(spec.get('limit'), thrusters, spec.get('saturation', SCALED)),
         np.full(6, np.inf) if spec.get('rate') is None else six_numbers(spec['rate']) * step,
         np.full(6, 1.0 if lag == 0 else -np.expm1(-step / lag)),
         round(delay),
+        rotors,
     )
 
 
@@ -94,9 +107,11 @@ IDEAL = Actuators(True, make_reach(None, None), np.full(6, np.inf), np.ones(6), 
 def memory(actuators: Actuators, *, faults: bool = False) -> np.ndarray:
     """State (1 + delay, 6) at the start: the applied wrench, then the commands under way.
 
-    With faults it has one more row: the last command that arrived.
+    With rotors that do not follow at once it has more rows: their speeds; with faults one more: the
+    last command that arrived.
     """
-    return np.zeros((1 + actuators.delay + faults, 6))
+    turning = actuators.rotors.turning if actuators.rotors else 0
+    return np.zeros((1 + actuators.delay - (-turning // PER_ROW) + faults, 6))
 
 
 @helper
@@ -133,10 +148,25 @@ def fill_slowed(follow: Vector, slew: Vector, c: Vector, a: np.ndarray) -> Six:
     return applied
 
 
+@helper
+def fill_allocated(
+    rotors: Rotors | None, actuators: Actuators, k: int, tau: Numbers, state: np.ndarray
+) -> Numbers:
+    """Wrench of the thrusters for the command tau; `rotors` are those of the actuators.
+
+    Without rotors the branch is none when compiled.
+    """
+    if rotors is None:
+        return allocated(actuators.reach, tau)
+    return fill_delivered(rotors, actuators.reach, None, k, tau, state[1 + actuators.delay :])
+
+
 @compiled
 def fill_applied(actuators: Actuators, k: int, tau: Numbers, state: np.ndarray) -> Numbers:
     """Wrench applied from sample k on for the command tau; `state` of `memory` in place."""
     if actuators.ideal:
         return tau
-    c = reachable(actuators.reach, waited(actuators, k, tau, state))
+    command = waited(actuators, k, tau, state)
+    c = fill_allocated(actuators.rotors, actuators, k, command, state)
+    c = clipped(c, actuators.reach.limit)
     return fill_slowed(actuators.follow, actuators.slew, c, state[0])

@@ -26,7 +26,8 @@ from auv_dynamics.plant.faults import (
     FaultShape,
     MeasurementFaults,
 )
-from auv_dynamics.vehicle.thrusters import AttainableWrench, share_within, thrust
+from auv_dynamics.plant.rotors import Rotors, fill_delivered
+from auv_dynamics.vehicle.thrusters import AttainableWrench, shaped, thrust
 
 WIDTH = 11  # columns of a row: velocity noise (6), rotation quaternion (4), whether it is lost
 LOST = WIDTH - 1
@@ -158,15 +159,27 @@ def left_of_thrusters(reach: AttainableWrench, fault: np.ndarray, tau: Numbers) 
     """T u', u' what the faults leave of the thrusts; the allocation does not know of them."""
     if reach.T.shape[1] == 0:
         return tau
-    share = share_within(reach, tau)
+    command, share = shaped(reach.first, reach, tau)
     return (
-        _left_in(reach, fault, 0, tau, share),
-        _left_in(reach, fault, 1, tau, share),
-        _left_in(reach, fault, 2, tau, share),
-        _left_in(reach, fault, 3, tau, share),
-        _left_in(reach, fault, 4, tau, share),
-        _left_in(reach, fault, 5, tau, share),
+        _left_in(reach, fault, 0, command, share),
+        _left_in(reach, fault, 1, command, share),
+        _left_in(reach, fault, 2, command, share),
+        _left_in(reach, fault, 3, command, share),
+        _left_in(reach, fault, 4, command, share),
+        _left_in(reach, fault, 5, command, share),
     )
+
+
+@helper
+def fill_left(
+    rotors: Rotors | None, actuators: Actuators, fault: np.ndarray, k: int, tau: Numbers,
+    state: np.ndarray,
+) -> Numbers:  # fmt: skip
+    """`fill_allocated` of actuators with faults; `rotors` are theirs."""
+    if rotors is None:
+        return left_of_thrusters(actuators.reach, fault, tau)
+    speeds = state[1 + actuators.delay :]
+    return fill_delivered(rotors, actuators.reach, fault[THRUSTERS:], k, tau, speeds)
 
 
 @helper
@@ -189,8 +202,8 @@ def fill_faulty(
     """`fill_applied` of actuators with faults; the last row of `state` is the last command."""
     heard = fill_heard(fault, tau, state[state.shape[0] - 1])
     command = waited(actuators, k, heard, state)
-    reach = actuators.reach
-    c = clipped(left_of_thrusters(reach, fault, command), reach.limit)
+    c = fill_left(actuators.rotors, actuators, fault, k, command, state)
+    c = clipped(c, actuators.reach.limit)
     return fill_slowed(actuators.follow, actuators.slew, left_of_axes(fault, c), state[0])
 
 

@@ -1,8 +1,11 @@
 """Thruster curves: the thrust of a command and the command of a thrust, from measured tables."""
 
 import csv
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +16,7 @@ from auv_dynamics.files.yaml_files import read_text
 SHIPPED = Path(__file__).with_name('curves')
 NEUTRAL = {'pwm_us': 1500.0, 'percent': 0.0, 'command': 0.0}  # what asks for no thrust
 THRUSTS = {'thrust_n': 1.0, 'thrust_kgf': 9.80665}  # N of one
+TABULATED = re.compile(r'(?P<family>.+)_(?P<voltage>\d+)v')  # names of the shipped curves
 ROUGH = 0.02  # of the range of a curve: what measurement alone makes it fall, more is refused
 
 
@@ -33,6 +37,12 @@ class ThrusterCurve:
     unit: str
     commands: np.ndarray
     thrusts: np.ndarray
+
+    @property
+    def voltage(self) -> float | None:
+        """Voltage in V at which a shipped curve was measured; None of any other."""
+        found = TABULATED.fullmatch(self.name)
+        return float(found['voltage']) if found and self.name in shipped_curves() else None
 
     @property
     def dead_band(self) -> tuple[float, float]:
@@ -89,6 +99,79 @@ def shipped_curves() -> list[str]:
     return sorted(path.stem for path in SHIPPED.glob('*.csv'))
 
 
+def at_voltage(curve: ThrusterCurve, nominal: float, voltage: float) -> ThrusterCurve:
+    """Curve of the same thruster at another voltage.
+
+    At each command thrust is linear between the voltages of a shipped family of curves. Beyond
+    them, and for a curve that stands alone, it goes by the square of the voltage: the speed of the
+    rotor goes by the voltage, and thrust by the square of the speed (Fossen 2021, section 9.3).
+
+    Parameters
+    ----------
+    curve : at the nominal voltage
+    nominal, voltage : V
+
+    """
+    found = TABULATED.fullmatch(curve.name) if curve.voltage is not None else None
+    if found is None:
+        return replace(curve, thrusts=curve.thrusts * (voltage / nominal) ** 2)
+    family = [
+        load_curve(name) for name in shipped_curves() if name.startswith(f'{found["family"]}_')
+    ]
+    family.sort(key=lambda one: one.voltage or 0.0)
+    known = np.array([one.voltage for one in family], float)
+    within = float(np.clip(voltage, known[0], known[-1]))
+    above = int(np.clip(np.searchsorted(known, within), 1, len(known) - 1))
+    low, high = (family[i].thrust(curve.commands) for i in (above - 1, above))
+    share = (within - known[above - 1]) / (known[above] - known[above - 1])
+    thrusts = (low + share * (high - low)) * (voltage / within) ** 2
+    return replace(curve, name=f'{curve.name} at {voltage:g} V', thrusts=thrusts)
+
+
+def curve_of(given: str | Mapping[str, Any], file: object, key: str) -> ThrusterCurve:
+    """Curve that a vehicle file gives: the name of a shipped one, or a table of two columns.
+
+    Parameters
+    ----------
+    given : name, or a mapping of a list pwm_us, percent or command and a list thrust_n or
+        thrust_kgf, as in the files of `load_curve`
+    file, key : named in errors
+
+    Raises
+    ------
+    InputError : naming file, key, expected and found
+
+    """
+    if isinstance(given, str):
+        if given not in shipped_curves():
+            expected = f'a table, or {one_of(given, shipped_curves())}'
+            raise InputError(file, key, expected, given)
+        return load_curve(given)
+    try:
+        unit, force = _columns([*given])
+        commands, thrusts = (np.array(given[name], float) for name in (unit, force))
+        if len(commands) != len(thrusts):
+            expected = f'{unit} and {force} of equal length'
+            raise InputError('', '', expected, f'{len(commands)} and {len(thrusts)}')
+        values = np.stack([commands, thrusts], axis=1)
+        _check(values, file)
+    except InputError as error:
+        raise InputError(file, key, error.expected, error.found) from None
+    return ThrusterCurve('', unit, commands, np.sort(thrusts) * THRUSTS[force])
+
+
+def _columns(header: list[str]) -> tuple[str, str]:
+    """Names of the command and of the thrust among those of all columns."""
+    found = []
+    for names in (NEUTRAL, THRUSTS):
+        known = [cell for cell in header if cell in names]
+        if len(known) != 1:
+            expected = f'one column {" or ".join(names)}'
+            raise InputError('', '', expected, ','.join(header) or None)
+        found.append(known[0])
+    return found[0], found[1]
+
+
 def load_curve(curve: str | Path, beside: Path | None = None) -> ThrusterCurve:
     """Curve of a CSV file, or a shipped one by its name.
 
@@ -125,14 +208,11 @@ def _parsed(text: str, path: Path, name: str) -> ThrusterCurve:
     except csv.Error as error:
         raise InputError(path, '', 'a CSV table', str(error)) from None
     header = [cell.strip() for cell in rows[0]] if rows else []
-    columns = []
-    for names in (NEUTRAL, THRUSTS):
-        known = [cell for cell in header if cell in names]
-        if len(known) != 1:
-            expected = f'one column {" or ".join(names)}'
-            raise InputError(path, 'first line', expected, ','.join(header) or None)
-        columns.append(header.index(known[0]))
-    unit, force = (header[column] for column in columns)
+    try:
+        unit, force = _columns(header)
+    except InputError as error:
+        raise InputError(path, 'first line', error.expected, error.found) from None
+    columns = [header.index(name) for name in (unit, force)]
     table = []
     for (number, _), row in zip(lines[1:], rows[1:], strict=True):
         try:
@@ -146,7 +226,7 @@ def _parsed(text: str, path: Path, name: str) -> ThrusterCurve:
     return ThrusterCurve(name, unit, commands, np.sort(thrusts))
 
 
-def _check(values: np.ndarray, path: Path) -> None:
+def _check(values: np.ndarray, path: object) -> None:
     """Refuse what is no curve: not finite, commands that do not rise, thrust that falls."""
     commands, thrusts = values.T
     if len(values) < 2 or not np.all(np.isfinite(values)):

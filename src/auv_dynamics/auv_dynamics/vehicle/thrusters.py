@@ -10,19 +10,48 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import InputError, shorten
 from auv_dynamics.kernel.compile import helper
 from auv_dynamics.kernel.lanes import Number, select
 from auv_dynamics.kernel.six import (
     Numbers,
     Six,
     Vector,
+    add,
     clipped,
+    scale,
+    sub,
 )
 from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.thruster_curves import ThrusterCurve, curve_of
 
 DEPENDENT = 1e-9  # a singular value or a row below this, relative to the largest, counts as zero
 UNIT = 0.01  # deviation of the norm of a direction from 1 that is worth a warning
+SCALED, PRIORITY = SATURATIONS = ('scaled', 'priority')
+FIRST = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0])  # heave and attitude before surge and sway
+BEYOND = 0.02  # of the thrust at the end of a curve: how far a limit may be beyond it
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """What turns a thruster, steady and in time; by default it delivers each thrust at once.
+
+    Attributes
+    ----------
+    curve : steady thrust of its commands at the nominal voltage; None: the square law
+    voltage : nominal, V; None: unknown
+    dead_band : thrusts in N, reverse and forward, below which it does not turn
+    lag : s, time constant of the rotor's speed; 0: none
+    omega, zeta : rad/s and damping ratio of a second-order response of it; omega = 0: none
+
+    """
+
+    curve: ThrusterCurve | None = None
+    voltage: float | None = None
+    dead_band: tuple[float, float] = (0.0, 0.0)
+    lag: float = 0.0
+    omega: float = 0.0
+    zeta: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +63,7 @@ class Thrusters:
     names : n words
     matrix : (6, n) T of tau = T u, u in N; N and N m per N
     reverse, forward : (n,) largest thrusts against and along each direction, N, both positive
+    rotors : what turns each of them; none: all deliver each thrust at once
     inverse : (n, 6) T^+, the pseudo-inverse of T: least squares, and of these the smallest u
 
     """
@@ -42,6 +72,7 @@ class Thrusters:
     matrix: np.ndarray
     reverse: np.ndarray
     forward: np.ndarray
+    rotors: tuple[Rotor, ...] = ()
     inverse: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -110,7 +141,7 @@ def thrusters_of(
     Parameters
     ----------
     entries : mappings with name, position (3,) in m, direction (3,) and limit: a number, or
-        reverse and forward, in N
+        reverse and forward, in N; and what is known of its rotor
     file : named in errors
 
     Returns
@@ -120,7 +151,7 @@ def thrusters_of(
 
     Raises
     ------
-    InputError : a name that stands twice, a direction of length zero
+    InputError : a name that stands twice, a direction of length zero, a rotor that cannot be
 
     """
     warnings: list[tuple[str, str]] = []
@@ -138,12 +169,43 @@ def thrusters_of(
             warnings.append((f'{key}.direction', f'its length is {length:.4g}: normalised'))
         columns.append(np.concatenate([e / length, np.cross(r, e / length)]))
     limits = np.array([np.broadcast_to(entry['limit'], 2) for entry in entries], float)
-    thrusters = Thrusters(tuple(names), np.array(columns).T, limits[:, 0], limits[:, 1])
+    rotors: tuple[Rotor, ...] = ()
+    if any('rotor' in entry for entry in entries):
+        rotors = tuple(_rotor(entry, f'thrusters[{i}]', file) for i, entry in enumerate(entries))
+    thrusters = Thrusters(tuple(names), np.array(columns).T, limits[:, 0], limits[:, 1], rotors)
     lost = thrusters.unactuated()
     if lost:
         axes = '; '.join(_without(dof, others) for dof, others in lost.items())
         warnings.append(('thrusters', f'T has rank {thrusters.rank} of 6: {axes}'))
     return thrusters, warnings
+
+
+def _rotor(entry: Mapping[str, Any], place: str, file: object) -> Rotor:
+    """Rotor of an entry, against which the limits and each other its numbers are checked."""
+    spec, key = entry.get('rotor', {}), f'{place}.rotor'
+    curve = curve_of(spec['curve'], file, f'{key}.curve') if 'curve' in spec else None
+    voltage = spec.get('voltage')
+    if curve is not None and curve.voltage is not None:
+        if voltage not in (None, curve.voltage):
+            expected = f'that of {curve.name}, {curve.voltage:g} V'
+            raise InputError(file, f'{key}.voltage', expected, f'{voltage:g} V')
+        voltage = curve.voltage
+    reverse, forward = (float(limit) for limit in np.broadcast_to(entry['limit'], 2))
+    if curve is not None:
+        for limit, end in ((reverse, -curve.thrusts[0]), (forward, curve.thrusts[-1])):
+            if limit > (1 + BEYOND) * end:
+                expected = f'at most what the curve of its rotor gives, {end:.4g} N'
+                raise InputError(file, f'{place}.limit', expected, f'{limit:g} N')
+    band = tuple(float(least) for least in np.broadcast_to(spec.get('dead_band', 0.0), 2))
+    if band[0] >= reverse or band[1] >= forward:
+        expected = f'less than the limits, {reverse:g} and {forward:g} N'
+        raise InputError(file, f'{key}.dead_band', expected, shorten(spec['dead_band']))
+    if 'lag' in spec and 'omega' in spec:
+        raise InputError(file, f'{key}.omega', 'one of lag and omega', 'both of them')
+    if 'zeta' in spec and 'omega' not in spec:
+        raise InputError(file, f'{key}.zeta', 'omega beside it', None)
+    numbers = {name: float(spec[name]) for name in ('lag', 'omega', 'zeta') if name in spec}
+    return Rotor(curve, voltage, (band[0], band[1]), **numbers)
 
 
 def _without(dof: str, others: tuple[str, ...]) -> str:
@@ -162,6 +224,8 @@ class AttainableWrench(NamedTuple):
     T_inv, T : (n, 6) pseudo-inverse and (6, n) configuration of the thrusters, n = 0 for none
     reverse, forward : (n,) largest thrust each way, N
     own : (6,) 1 for a degree of freedom that the thrusters give a wrench of its own, else 0
+    first : (6,) 1 for a degree of freedom that is served before those of 0; None: all are scaled
+        down together
 
     """
 
@@ -172,10 +236,21 @@ class AttainableWrench(NamedTuple):
     reverse: np.ndarray
     forward: np.ndarray
     own: np.ndarray
+    first: np.ndarray | None = None
 
 
-def make_reach(limit: Any, thrusters: Thrusters | None) -> AttainableWrench:
-    """Attainable wrench of axis limits (1 or 6 numbers, N and N m; None: none) and of thrusters."""
+def make_reach(
+    limit: Any, thrusters: Thrusters | None, saturation: str = SCALED
+) -> AttainableWrench:
+    """Attainable wrench of axis limits and of thrusters.
+
+    Parameters
+    ----------
+    limit : 1 or 6 numbers, N and N m; None: none
+    thrusters : None: the wrench is not allocated
+    saturation : of `SATURATIONS`, what happens to thrusts beyond their limits
+
+    """
     bounds = np.full(6, np.inf) if limit is None else six_numbers(limit)
     if thrusters is None:
         no, every = np.zeros(0), np.ones(6)
@@ -190,6 +265,7 @@ def make_reach(limit: Any, thrusters: Thrusters | None) -> AttainableWrench:
         thrusters.reverse.astype(float),
         thrusters.forward.astype(float),
         np.array([float(dof not in thrusters.unactuated()) for dof in DOFS]),
+        FIRST.copy() if saturation == PRIORITY else None,
     )
 
 
@@ -222,6 +298,44 @@ def share_within(reach: AttainableWrench, tau: Vector) -> Number:
         over = abs(u) * share > most
         share = select(over, most / select(over, abs(u), 1.0), share)
     return share
+
+
+@helper
+def share_beside(reach: AttainableWrench, kept: Vector, tau: Vector) -> Number:
+    """Largest share of the thrusts T^+ tau, at most 1, for which there is room beside T^+ kept."""
+    share = 1.0
+    for i in range(reach.T.shape[1]):
+        there, u = thrust(reach, i, kept), thrust(reach, i, tau)
+        room = select(u > 0.0, reach.forward[i] - there, reach.reverse[i] + there)
+        room = select(room > 0.0, room, 0.0)
+        over = abs(u) * share > room
+        share = select(over, room / select(over, abs(u), 1.0), share)
+    return share
+
+
+@helper
+def shaped(first: np.ndarray | None, reach: AttainableWrench, tau: Numbers) -> tuple[Any, Number]:
+    """Wrench, and the share of its thrusts, that brings every thrust within its limits.
+
+    Without priority it is tau and one share. With it, what comes first is scaled down by itself,
+    then the rest to the room that is left. `first` is that of reach: without priority the branch
+    is none when compiled.
+    """
+    if first is None:
+        return tau, share_within(reach, tau)
+    kept = scale(first, tau)
+    rest = sub(tau, kept)
+    share = share_within(reach, kept)
+    kept = scale((share, share, share, share, share, share), kept)
+    left = share_beside(reach, kept, rest)
+    return add(kept, scale((left, left, left, left, left, left), rest)), 1.0
+
+
+@helper
+def column(reach: AttainableWrench, i: int, u: Number) -> Six:
+    """Wrench of the thrust u in N of thruster i."""
+    T = reach.T
+    return (T[0, i] * u, T[1, i] * u, T[2, i] * u, T[3, i] * u, T[4, i] * u, T[5, i] * u)
 
 
 @helper
@@ -266,10 +380,11 @@ def demanded(reach: AttainableWrench, tau: Numbers) -> Numbers:
 
 @helper
 def allocated(reach: AttainableWrench, tau: Numbers) -> Numbers:
-    """T u with u = T^+ tau, scaled down together until every thrust is within its limits."""
+    """T u with u = T^+ tau, scaled down until every thrust is within its limits."""
     if reach.T.shape[1] == 0:
         return tau
-    return delivered(reach, tau, share_within(reach, tau))
+    command, share = shaped(reach.first, reach, tau)
+    return delivered(reach, command, share)
 
 
 @helper

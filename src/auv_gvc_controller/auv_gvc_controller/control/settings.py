@@ -10,7 +10,7 @@ import numpy as np
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.settings import Reader, name_of, read_settings, setting
-from auv_dynamics.vehicle.thrusters import AttainableWrench, make_reach
+from auv_dynamics.vehicle.thrusters import SATURATIONS, SCALED, AttainableWrench, make_reach
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.control.controller import OutputStage, Timeouts, VelocityController
 from auv_gvc_controller.control.odometry_guard import AUTO, CLOCKS, Limits, OdometryGuard, StampAge
@@ -92,6 +92,12 @@ class ControllerSettings:
     )
     actuators_thrusters: bool = setting(
         False, "anti-windup knows the vehicle's thrusters", 'actuators.thrusters'
+    )
+    actuators_saturation: str = setting(
+        SCALED,
+        'of thrusts beyond their limits: all together (scaled), or surge and sway first (priority)',
+        'actuators.saturation',
+        one_of=SATURATIONS,
     )
     anti_windup: bool = setting(True, 'stop integrating what pushes beyond these limits')
     source: str = ''  # node or file that they come from, for refusals
@@ -204,7 +210,8 @@ class ControllerSettings:
             return make_reach(None, None)
         limits = [limit for limit in (self.limits_wrench, self.actuators_limit) if limit]
         smallest = [min(axis) for axis in zip(*limits, strict=True)]
-        return make_reach(smallest or None, vehicle.thrusters if self.actuators_thrusters else None)
+        thrusters = vehicle.thrusters if self.actuators_thrusters else None
+        return make_reach(smallest or None, thrusters, self.actuators_saturation)
 
 
 def usual_acceleration(lockstep: bool) -> str:

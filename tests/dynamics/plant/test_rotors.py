@@ -1,0 +1,183 @@
+"""Thrusters as they are: each part of what happens to a thrust, against its formula."""
+
+import copy
+import re
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import solve_ivp
+from strategies import QUICK, vectors
+
+from auv_dynamics import InputError, load_vehicle
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.kernel.compile import plain
+from auv_dynamics.plant.actuators import fill_applied, make_actuators, memory
+from auv_dynamics.vehicle.thruster_curves import load_curve
+from auv_dynamics.vehicle.thrusters import make_reach, reachable
+from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
+
+STEP = 0.01
+HEAVY = load_vehicle('bluerov2_heavy')
+T, INVERSE = HEAVY.thrusters.matrix, HEAVY.thrusters.inverse
+DATA = yaml.safe_load(shipped('vehicles', 'bluerov2_heavy').read_text(encoding='utf-8'))
+TAU = np.array([12.0, -7.0, 15.0, 1.5, -1.0, 2.0])
+
+
+def vehicle_with(rotor):
+    """The heavy BlueROV2 with this rotor at every thruster."""
+    data = copy.deepcopy(DATA)
+    for one in data['thrusters']:
+        one['rotor'] = rotor
+    return vehicle_from_dict(data, 'v')
+
+
+def without_rotors():
+    """The same with none."""
+    data = copy.deepcopy(DATA)
+    for one in data['thrusters']:
+        del one['rotor']
+    return vehicle_from_dict(data, 'v')
+
+
+def chain(spec, commands, vehicle=HEAVY, step=STEP):
+    """Applied wrenches of a series of commands."""
+    actuators = make_actuators({'thrusters': True, **spec}, vehicle, step, 'f')
+    state = memory(actuators)
+    fill = plain(fill_applied)
+    return np.array([fill(actuators, k, tuple(c), state) for k, c in enumerate(commands)])
+
+
+def steady(spec, tau, vehicle=HEAVY):
+    return chain(spec, [tau], vehicle)[0]
+
+
+def test_a_rotor_in_the_vehicle_file_acts_only_where_a_scenario_asks_for_it():
+    expected = chain({}, [TAU] * 5, without_rotors())
+    assert_array_equal(chain({}, [TAU] * 5), expected)
+    assert np.abs(chain({'rotors': True}, [TAU] * 5) - expected).max() > 1.0
+
+
+def test_a_thrust_below_the_dead_band_is_swallowed():
+    u = INVERSE @ TAU
+    band = np.median(np.abs(u))
+    assert (u < -band).any()
+    assert (u > band).any()
+    expected = T @ np.where(np.abs(u) < band, 0.0, u)
+    assert_allclose(steady({'dead_band': float(band)}, TAU), expected, atol=1e-12)
+    ahead = T @ np.where((u > 0) & (u < band), 0.0, u)
+    assert_allclose(steady({'dead_band': [0.0, float(band)]}, TAU), ahead, atol=1e-12)
+    own = vehicle_with({'dead_band': float(band)})
+    assert_allclose(steady({'rotors': True}, TAU, own), expected, atol=1e-12)
+
+
+def test_a_first_order_rotor_approaches_its_speed_exponentially():
+    u, lag = INVERSE @ TAU, 0.15
+    found = chain({'rotor_lag': lag}, [TAU] * 60)
+    share = 1.0 - np.exp(-STEP * np.arange(1, 61) / lag)
+    # n from rest: n_d times the share, and thrust its square
+    assert_allclose(found, share[:, None] ** 2 * (T @ u), rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize('zeta', [0.3, 1.0, 1.7])
+def test_a_second_order_rotor_solves_its_equation(zeta):
+    omega, commands = 14.0, [TAU] * 40 + [-0.5 * TAU] * 40
+    found = chain({'rotors': True}, commands, vehicle_with({'omega': omega, 'zeta': zeta}))
+    expected, u = np.zeros((80, 6)), INVERSE @ TAU
+    for i in range(8):
+        n, rate = 0.0, 0.0
+        for k, way in enumerate([1.0] * 40 + [-0.5] * 40):
+            n_d = np.sign(way * u[i]) * np.sqrt(abs(way * u[i]))
+            flow = solve_ivp(
+                lambda _, y, n_d=n_d: [y[1], omega**2 * (n_d - y[0]) - 2 * zeta * omega * y[1]],
+                (0, STEP), [n, rate], rtol=1e-11, atol=1e-12,
+            )  # fmt: skip
+            n, rate = flow.y[:, -1]
+            expected[k] += T[:, i] * n * abs(n)
+    assert_allclose(found, expected, atol=1e-7)
+
+
+def test_thrust_goes_through_zero_where_the_rotor_turns_round():
+    one = chain({'rotor_lag': 0.1}, [TAU] * 100 + [-TAU] * 100)
+    assert_allclose(one[99], TAU, rtol=1e-3, atol=1e-2)
+    assert_allclose(one[199], -TAU, rtol=1e-3, atol=1e-2)
+    along = one[100:] @ TAU / (TAU @ TAU)
+    assert np.all(np.diff(along) <= 0.0)
+    assert along[0] < 1.0
+    assert along.min() > -1.0
+
+
+@pytest.mark.parametrize('voltage', [10.0, 13.3, 16.0, 19.0])
+def test_the_command_of_a_thrust_gives_another_one_at_another_voltage(voltage):
+    """At the rows of the table: pulse width of the thrust at 16 V, thrust of it at the voltage."""
+    known = [10, 12, 14, 16, 18, 20]
+    nominal = load_curve('t200_16v')
+    at = np.flatnonzero(nominal.thrusts)[[3, 40, 80, -60, -20, -2]]
+    table = np.array([load_curve(f't200_{v}v').thrusts[at] for v in known])
+    expected = [np.interp(voltage, known, column) for column in table.T]
+    for u, given_ in zip(nominal.thrusts[at], expected, strict=True):
+        tau = T @ np.full(8, u)  # heave alone: all four vertical ones push the same
+        share = (INVERSE @ tau)[4] / u
+        assert share == pytest.approx(1.0)
+        found = steady({'voltage': voltage}, tau)
+        assert found[2] == pytest.approx(4 * given_, rel=1e-9)
+
+
+def test_the_square_law_goes_by_the_square_of_the_voltage():
+    plainly = vehicle_with({'voltage': 15.0})
+    assert_allclose(steady({'voltage': 12.0}, TAU, plainly), 0.64 * TAU, atol=1e-9)
+
+
+def test_a_battery_that_runs_down_is_linear_in_time_and_stays():
+    plainly = vehicle_with({'voltage': 15.0})
+    found = chain({'voltage': [15.0, 12.0, 0.1]}, [TAU] * 15, plainly)
+    share = 1.0 - 0.36 * np.minimum(np.arange(15) / 10.0, 1.0)
+    assert_allclose(found, share[:, None] * TAU, rtol=1e-9, atol=1e-9)
+
+
+def test_heave_and_attitude_come_before_surge_and_sway():
+    tau = np.array([150.0, 0.0, 40.0, 0.0, 0.0, 15.0])
+    together, first = (steady({'saturation': word}, tau) for word in ('scaled', 'priority'))
+    assert together[5] < 13.0
+    assert together[2] < 36.0
+    assert_allclose(first[1:], tau[1:], atol=1e-9)
+    assert 0.0 < first[0] < together[0] < tau[0]
+
+
+@QUICK
+@given(vectors(largest=300.0), st.booleans())
+def test_priority_keeps_every_limit_and_uses_them_up(tau, compare):
+    reach = make_reach(None, HEAVY.thrusters, 'priority')
+    found = np.array(plain(reachable)(reach, tuple(tau)))
+    u, limits = INVERSE @ found, HEAVY.thrusters
+    assert (u <= limits.forward * (1 + 1e-9)).all()
+    assert (u >= -limits.reverse * (1 + 1e-9)).all()
+    served = np.array([0, 0, 1, 1, 1, 1.0]) * tau
+    alone = HEAVY.thrusters.allocate(served)[1]
+    assert_allclose(found[2:], alone[2:], atol=1e-9)
+    left = np.where(np.abs(tau[:2]) > 0, found[:2] / np.where(tau[:2] == 0, 1, tau[:2]), 0.0)
+    if compare and 1e-6 < left.max() < 1 - 1e-9:  # of the rest as much as fits
+        most = np.maximum(u / limits.forward, -u / limits.reverse).max()
+        assert most == pytest.approx(1.0, rel=1e-9)
+
+
+REFUSED = {
+    'rotors of thrusters that are not used': (
+        {'thrusters': False, 'rotors': True}, HEAVY, 'actuators.rotors', 'thrusters: true beside'),
+    'priority of nothing': (
+        {'thrusters': False, 'saturation': 'priority'}, HEAVY, 'actuators.saturation', 'thrusters'),
+    'no rotors': (
+        {'rotors': True}, without_rotors(), 'actuators.rotors', 'those of bluerov2_heavy'),
+    'no nominal voltage': (
+        {'voltage': 12.0}, without_rotors(), 'actuators.voltage', 'a nominal voltage'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('case', REFUSED)
+def test_what_does_not_go_together_is_refused_in_a_line(case):
+    spec, vehicle, key, expected = REFUSED[case]
+    with pytest.raises(InputError, match=rf'^f: {re.escape(key)}: expected .*{expected}'):
+        make_actuators({'thrusters': True, **spec}, vehicle, STEP, 'f')

@@ -9,7 +9,6 @@ from wrench_mapping import MANUAL_CONTROL
 SECOND = 1_000_000_000  # ns
 TURN = SECOND // 10  # between two requests for messages
 AGAIN, TRIES = SECOND // 2, 4  # of a question that has no answer
-NAMED_FLOAT = mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT
 LEAST_VERSION = (4, 0, 0)
 SEES_OVERRIDES = (4, 5, 0)  # from here on ArduSub's pilot-input failsafe
 DISARM = 2  # of FS_PILOT_INPUT and FS_GCS_ENABLE
@@ -51,23 +50,17 @@ class Telemetry:
             return
         self._due = now + TURN
         if self._unanswered is not None:
-            self._stream(self._unanswered)
+            period, stream = self._wanted[self._unanswered]
+            self._request(stream, max(1, round(1e6 / period)))
             self._unanswered = None
         for message_id, (period, _) in self._wanted.items():
             past = max(heard.get(message_id, -SECOND), self._last.get(message_id, -SECOND))
             if now - past < SECOND:
                 continue
             self._last[message_id] = now
-            if message_id == NAMED_FLOAT:  # refused by all versions when asked for by itself
-                self._stream(message_id)
-            else:
-                self._unanswered = message_id
-                self._order(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, period)
+            self._unanswered = message_id
+            self._order(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, period)
             return
-
-    def _stream(self, message_id: int) -> None:
-        period, stream = self._wanted[message_id]
-        self._request(stream, max(1, round(1e6 / period)))
 
 
 class Difference(NamedTuple):

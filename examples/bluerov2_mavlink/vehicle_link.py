@@ -8,7 +8,7 @@ from typing import Any
 from navigation import BootClock, Exchange, Navigation, RestartedError, Sample
 from pilot import MANUAL, Pilot, Timeouts
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from vehicle_checks import NAMED_FLOAT, SECOND, Profile, Telemetry
+from vehicle_checks import SECOND, Profile, Telemetry
 from wrench_mapping import (
     MANUAL_CONTROL,
     NEUTRAL_PWM,
@@ -206,7 +206,8 @@ class VehicleLink:
     def _wanted_messages(self) -> dict[int, tuple[int, int]]:
         rates = dict(MESSAGES)
         if self._settings.how == MANUAL_CONTROL:
-            rates[NAMED_FLOAT] = 2, mavlink.MAV_DATA_STREAM_EXTENDED_STATUS
+            gain = mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT  # comes with its stream only
+            rates[gain] = 2, mavlink.MAV_DATA_STREAM_EXTENDED_STATUS
         return {
             message_id: (round(1e6 / (rate or self._settings.rate)), stream)
             for message_id, (rate, stream) in rates.items()
@@ -297,6 +298,8 @@ class VehicleLink:
         self.voltage = message.voltage_battery / 1000.0 if known else None
 
     def _motors(self, message: Any, _: int) -> None:
+        if message.port:  # outputs 17 to 32
+            return
         outputs = [getattr(message, f'servo{i + 1}_raw') for i in range(self._settings.thrusters)]
         self.pilot.motors(all(not out or abs(out - NEUTRAL_PWM) <= AT_REST for out in outputs))
 

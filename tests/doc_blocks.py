@@ -110,6 +110,6 @@ def read_page(path: Path) -> Page:
 
 
 def all_pages() -> list[Page]:
-    """README, docs and the README of the example that drives a vehicle."""
-    paths = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
-    return [read_page(path) for path in [*paths, ROOT / 'examples/bluerov2_mavlink/README.md']]
+    """README, docs and the READMEs of the examples."""
+    docs, examples = (sorted((ROOT / name).rglob('*.md')) for name in ('docs', 'examples'))
+    return [read_page(path) for path in [ROOT / 'README.md', *docs, *examples]]

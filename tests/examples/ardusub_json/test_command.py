@@ -1,0 +1,167 @@
+"""Options, refusals and the end of the example; which thruster a motor is."""
+
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from ardusub_mixer import FRAMES
+from json_motors import make_motors
+from sitl_peer import BACKEND, NEUTRAL, ROOT, SitlPeer, backend
+
+from auv_dynamics import load_vehicle
+from auv_dynamics.files.errors import InputError
+
+UP = ('0', '0', '-1', '0', '0', '0')  # NED, rad
+PULSES = np.array([1600.0, 1350, 1480, 1700, 1450, 1550, 1300, 1900] + [0.0] * 24)
+
+
+def refused(*options: str) -> str:
+    """The line with which it ends, exit code 2."""
+    command = [sys.executable, str(BACKEND), *options]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2, done.stderr
+    return done.stderr.splitlines()[-1]
+
+
+def test_a_port_in_use_is_named() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(('127.0.0.1', 0))
+        place = f'127.0.0.1:{taken.getsockname()[1]}'
+        line = refused('--vehicle', 'bluerov2', '--listen', place)
+    assert line == (
+        f'--listen: {place}: expected HOST:PORT that is free, found address already in use'
+    )
+
+
+@pytest.mark.parametrize(
+    ('options', 'expected'),
+    [
+        (('--vehicle', 'rexrov'), 'rexrov: thrusters: expected a vehicle with thrusters'),
+        (('--vehicle', 'bluerov'), 'bluerov2'),
+        (('--vehicle', 'bluerov2', '--eta', *UP), 'eta: expected finite numbers, a depth'),
+        (('--vehicle', 'bluerov2', '--motors', '1,2,3'), '--motors: expected each of T1, T2'),
+        (('--vehicle', 'bluerov2', '--motors', '1,2,3,4,5,x'), '--motors: expected'),
+        (('--vehicle', 'bluerov2', '--listen', 'here'), '--listen: here: expected HOST:PORT'),
+        (('--vehicle', 'bluerov2', '--listen', '127.0.0.1:99999'), 'expected HOST:PORT'),
+        (('--scenario', 'case1'), 'expected a vehicle with thrusters'),
+        (('--scenario', 'nowhere.yaml'), 'nowhere.yaml'),
+    ],
+)
+def test_wrong_input_is_one_line(options: tuple[str, ...], expected: str) -> None:
+    assert expected in refused(*options, *([] if '--listen' in options else ['--listen', ':0']))
+
+
+def test_a_folder_with_a_bag_is_not_written_to(tmp_path: Path) -> None:
+    (tmp_path / 'dive_0.mcap').touch()
+    line = refused('--vehicle', 'bluerov2', '--listen', ':0', '--bag', str(tmp_path))
+    assert line.startswith('--bag: ')
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_in_good_order(number: int, tmp_path: Path) -> None:
+    with backend('--vehicle', 'bluerov2', '--bag', str(tmp_path / 'dive')) as process:
+        SitlPeer(process.port).run(0.1)
+        process.process.send_signal(number)
+        assert process.ended() == 0
+    assert process.said[-1] == '0.100 s, 40 frames, 0 lost'
+    assert 'Traceback' not in ''.join(process.said)
+    assert (tmp_path / 'dive' / 'metadata.yaml').is_file()
+
+
+def test_it_says_once_that_nobody_is_there() -> None:
+    with backend('--vehicle', 'bluerov2') as process:
+        process.until('no frame of ArduSub for 5 s: waiting')
+        peer = SitlPeer(process.port)
+        assert peer.is_silent(2.5)
+        peer.run(0.1)
+    assert sum('waiting' in line for line in process.said) == 2  # and where it waits
+
+
+def test_a_length_in_simulated_time() -> None:
+    with backend('--vehicle', 'bluerov2', '--seconds', '0.5') as process:
+        peer = SitlPeer(process.port)
+        peer.run(0.5)
+        assert process.ended() == 0
+    assert process.said[-1].startswith('0.500 s, 200 frames')
+
+
+def test_no_time_sync_is_told() -> None:
+    with backend('--vehicle', 'bluerov2', '--no-time-sync') as process:
+        peer = SitlPeer(process.port)
+        peer.send(peer.packet(NEUTRAL))
+        assert b',"no_time_sync":1}' in peer.heard()
+
+
+def changed(folder: Path, name: str, order: list[int], turned: tuple[int, ...]) -> Path:
+    """A vehicle file with its thrusters in another order, some of them turned round."""
+    data = yaml.safe_load((ROOT / 'config' / 'vehicles' / f'{name}.yaml').read_text())
+    for i in turned:
+        one = data['thrusters'][i]
+        one['direction'] = [-component for component in one['direction']]
+        one['limit'] = one['limit'][::-1]
+    data['thrusters'] = [data['thrusters'][i] for i in order]
+    path = folder / 'mine.yaml'
+    path.write_text(yaml.safe_dump(data))
+    return path
+
+
+@pytest.mark.parametrize('name', ['bluerov2', 'bluerov2_heavy'])
+def test_motors_are_found_by_place_and_direction(name: str, tmp_path: Path) -> None:
+    usual = load_vehicle(name).thrusters
+    count = len(usual.names)
+    order = [int(i) for i in np.random.default_rng(1).permutation(count)]
+    mine = load_vehicle(changed(tmp_path, name, order, (0, count - 1))).thrusters
+    motors, text = make_motors(mine, None, 16)
+    assert f'FRAME_CONFIG {count // 2 - 2}' in text
+    assert text.endswith('T1 reversed, ' + ', '.join(usual.names[1:-1]) + f', T{count} reversed')
+    expected, _ = make_motors(usual, None, 16)
+    found = mine.matrix @ motors.thrusts(PULSES)
+    # turned round, pulse for pulse it pushes the same way, with the other end of the curve
+    there = usual.matrix @ expected.thrusts(PULSES)
+    assert np.abs(found - there).max() < 0.35 * np.abs(there).max()
+    same, _ = make_motors(load_vehicle(changed(tmp_path, name, order, ())).thrusters, None, 16)
+    T = usual.matrix[:, order]
+    assert T @ same.thrusts(PULSES) == pytest.approx(there)
+
+
+def test_a_full_pulse_gives_the_limits_of_the_vehicle_file() -> None:
+    thrusters = load_vehicle('bluerov2_heavy').thrusters
+    motors, _ = make_motors(thrusters, None, 16)
+    assert motors.thrusts(np.full(32, 1900.0)) == pytest.approx(thrusters.forward)
+    assert motors.thrusts(np.full(32, 1100.0)) == pytest.approx(-thrusters.reverse)
+    weak, _ = make_motors(thrusters, None, 12)
+    assert weak.thrusts(np.full(32, 1900.0)) == pytest.approx(0.72 * thrusters.forward, rel=0.05)
+
+
+def test_motors_by_the_option() -> None:
+    thrusters = load_vehicle('bluerov2').thrusters
+    motors, text = make_motors(thrusters, '2,-T1,3,4,6,5', 16)
+    assert 'T2, T1 reversed, T3, T4, T6, T5' in text
+    u = motors.thrusts(np.array([1900.0, 1900, 0, 0, 0, 1100] + [0.0] * 26))
+    assert u == pytest.approx([-40.2, 51.5, 0, 0, -40.2, 0])
+
+
+def test_thrusters_of_no_known_frame_are_taken_in_their_order(tmp_path: Path) -> None:
+    path = changed(tmp_path, 'bluerov2', [0, 1, 2, 3, 4], ())
+    motors, text = make_motors(load_vehicle(path).thrusters, None, 16)
+    assert 'no frame that is known here' in text
+    assert motors.channels.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_a_frame_is_matched_only_where_every_sign_is_right(tmp_path: Path) -> None:
+    data = yaml.safe_load((ROOT / 'config' / 'vehicles' / 'bluerov2_heavy.yaml').read_text())
+    data['thrusters'][4]['position'][0] *= -1  # two thrusters at one corner
+    path = tmp_path / 'mine.yaml'
+    path.write_text(yaml.safe_dump(data))
+    assert 'no frame that is known' in make_motors(load_vehicle(path).thrusters, None, 16)[1]
+    assert set(FRAMES) == {6, 8}
+
+
+def test_unknown_thruster_is_told_with_the_nearest() -> None:
+    with pytest.raises(InputError, match='T6'):
+        make_motors(load_vehicle('bluerov2').thrusters, 'T1,T2,T3,T4,T5,T66', 16)

@@ -38,6 +38,7 @@ LISTED = {
     ('auv_dynamics/files/lazy.py', 'importlib.import_module'),  # likewise
     ('auv_analysis/graph/domain.py', 'socket'),  # which ports are free
     ('udp.py', 'socket'),  # of the example's driver
+    ('json_backend.py', 'socket'),  # of the example that is ArduSub's physics
     ('auv_analysis/report/document.py', 'markupsafe.Markup'),  # of text that was escaped before
     ('auv_analysis/output/text.py', 'markupsafe.Markup'),  # of words of ours, and escaped
 }

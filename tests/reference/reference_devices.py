@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from math import exp
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,69 @@ from reference_vehicle import Array, rodrigues
 
 NOISE_OF_ROUNDING = 1e-9  # of the sum of all |d|: what lies below is not cut
 INTEGRALS = {'pid': 6}  # of the law's states; of the other laws all
+ROOT = Path(__file__).resolve().parents[2]
+CURVES = ROOT / 'src/auv_dynamics/auv_dynamics/vehicle/curves'  # measured data, no code
+
+
+def t200(volts: int) -> tuple[Array, Array]:
+    """Pulse widths and thrusts in N, sorted, of the table measured at so many volts."""
+    lines = [line for line in (CURVES / f't200_{volts}v.csv').open() if line[0] != '#']
+    rows = [(float(one['pwm_us']), float(one['thrust_kgf'])) for one in csv.DictReader(lines)]
+    pulses, thrusts = np.array(rows).T
+    return pulses, np.sort(thrusts) * 9.80665
+
+
+class Rotor:
+    """One thruster's rotor: what comes of the thrusts asked for, once per sample."""
+
+    def __init__(self, spec: dict[str, Any], entry: dict[str, Any], voltage: Any, h: float):
+        self.band = np.broadcast_to(np.asarray(spec.get('dead_band', 0.0), float), 2)
+        self.lag, self.h, self.voltage = spec.get('lag', 0.0), h, voltage
+        self.omega, self.zeta = spec.get('omega'), spec.get('zeta', 1.0)
+        self.entry, self.state = entry, np.zeros(2)
+
+    def at(self, u: float, volts: float) -> float:
+        """Thrust at a voltage of the command that gives u at the nominal one."""
+        known = self.entry['rotor']
+        if 'curve' not in known:
+            return u * (volts / known['voltage']) ** 2
+        _pulses, nominal = t200(int(known['curve'][5:7]))
+        if volts <= 10 or volts >= 20:
+            edge = 10 if volts <= 10 else 20
+            given = t200(edge)[1] * (volts / edge) ** 2
+        else:
+            low = 2 * int(volts // 2)
+            part = (volts - low) / 2
+            given = (1 - part) * t200(low)[1] + part * (t200(low + 2)[1] if part else 0.0)
+        turning = nominal != 0.0
+        x, first = np.unique(np.append(nominal[turning], 0.0), return_index=True)
+        return float(np.interp(u, x, np.append(given[turning], 0.0)[first]))
+
+    def __call__(self, u: float, k: int) -> float:
+        """Thrust of sample k."""
+        if -self.band[0] < u < self.band[1]:
+            u = 0.0
+        if self.voltage is not None:
+            first, last, time = (
+                self.voltage if np.ndim(self.voltage) else (self.voltage,) * 2 + (1,)
+            )
+            way = min(k * self.h / time, 1.0)
+            u = (1 - way) * self.at(u, first) + way * self.at(u, last)
+        if not self.lag and self.omega is None:
+            return u
+        asked = np.sign(u) * np.sqrt(abs(u))
+        if self.omega is None:
+            self.state[0] += (1 - exp(-self.h / self.lag)) * (asked - self.state[0])
+        else:
+            # the series of the exponential of the system and its constant input
+            A = np.array([[0.0, 1.0, 0.0], [-1.0, -2 * self.zeta / self.omega, 1.0], [0, 0, 0]])
+            A[1] *= self.omega**2
+            term = total = np.array([*self.state, asked])
+            for order in range(1, 40):
+                term = A @ term * self.h / order
+                total = total + term
+            self.state = total[:2]
+        return self.state[0] * abs(self.state[0])
 
 
 def thruster_matrix(thrusters: list[dict[str, Any]]) -> tuple[Array, Array, Array]:
@@ -37,7 +102,8 @@ class Actuators:
         h: float,
         faults: Faults | None = None,
     ):
-        unknown = set(spec) - {'limit', 'rate', 'lag', 'delay', 'thrusters'}
+        rotors = {'rotors', 'rotor_lag', 'dead_band', 'voltage'}
+        unknown = set(spec) - {'limit', 'rate', 'lag', 'delay', 'thrusters', 'saturation'} - rotors
         if unknown:
             raise ValueError(f'actuators do not know {sorted(unknown)}')
         self.limit = np.broadcast_to(np.asarray(spec.get('limit', np.inf), dtype=float), 6)
@@ -58,10 +124,46 @@ class Actuators:
             # a row that the rows before it span has no wrench of its own
             ranks = [np.linalg.matrix_rank(self.T[:i], tol=1e-9) for i in range(1, 7)]
             self.spanned = np.diff(ranks, prepend=0) == 0
+            self.rotors = (
+                self.make_rotors(spec, vehicle['thrusters'], h) if rotors & set(spec) else []
+            )
+        self.priority = spec.get('saturation') == 'priority'
         self.cuts = self.T is not None or bool(np.isfinite(self.limit).any())
         self.faults, self.k, self.heard_at, self.h = faults, -1, -1, h
         self.names = [one['name'] for one in vehicle.get('thrusters', [])]
         self.heard = np.zeros(6)
+
+    @staticmethod
+    def make_rotors(spec: dict[str, Any], entries: list[dict[str, Any]], h: float) -> list[Rotor]:
+        """Those of the vehicle file, or ideal ones, with what the scenario says in their place."""
+        made = []
+        for one in entries:
+            known = dict(one.get('rotor', {})) if spec.get('rotors') else {}
+            if 'rotor_lag' in spec:
+                known = {'dead_band': known.get('dead_band', 0.0), 'lag': spec['rotor_lag']}
+            if 'dead_band' in spec:
+                known['dead_band'] = spec['dead_band']
+            made.append(Rotor(known, one, spec.get('voltage'), h))
+        return made
+
+    def thrusts(self, tau: Array) -> Array:
+        """Thrusts that are asked for, within the limits."""
+        if not self.priority:
+            return self.within(self.T_plus @ tau)
+        first = np.array([0, 0, 1, 1, 1, 1.0])
+        kept, rest = self.within(self.T_plus @ (first * tau)), self.T_plus @ ((1 - first) * tau)
+        share = 1.0
+        for there, more, low, high in zip(kept, rest, self.lowest, self.highest, strict=True):
+            if there + more > high:
+                share = min(share, max(high - there, 0.0) / more)
+            elif there + more < low:
+                share = min(share, min(low - there, 0.0) / more)
+        return kept + share * rest
+
+    def within(self, u: Array) -> Array:
+        """Thrusts scaled down together."""
+        limit = np.where(u > 0.0, self.highest, self.lowest)
+        return u / max(1.0, (u / limit).max())
 
     def receive(self, tau: Array) -> Array:
         """h_k: what arrives of tau_k."""
@@ -80,10 +182,10 @@ class Actuators:
         """c_k of what the delay lets through, with the faults of thrusters and axes."""
         at_thrusters = self.faults.there('thruster', self.k)
         at_axes = self.faults.there('actuator', self.k)
-        if self.T is not None and at_thrusters:
-            u = self.T_plus @ tau
-            limit = np.where(u > 0.0, self.highest, self.lowest)
-            u = u / max(1.0, (u / limit).max())
+        if self.T is not None and (at_thrusters or self.rotors):
+            u = self.thrusts(tau)
+            for i, rotor in enumerate(self.rotors):
+                u[i] = rotor(u[i], self.k)
             for i, name in enumerate(self.names):
                 u[i] = weakened(u[i], [one for one in at_thrusters if one['thruster'] in (name, i)])
             c = np.clip(self.T @ u, -self.limit, self.limit)
@@ -94,7 +196,9 @@ class Actuators:
 
     def saturate(self, tau: Array) -> Array:
         """What thrusters and limits let through of tau, at once."""
-        if self.T is not None:
+        if self.priority:
+            tau = self.T @ self.thrusts(tau)
+        elif self.T is not None:
             u = self.T_plus @ tau  # thrusts
             share = 1.0
             for thrust, low, high in zip(u, self.lowest, self.highest, strict=True):
@@ -116,7 +220,16 @@ class Actuators:
         self.k += 1
         self.under_way.append(tau if self.faults is None else self.receive(tau))
         command = self.under_way.pop(0)
-        c = self.saturate(command) if self.faults is None else self.let_through(command)
+        if self.faults is not None:
+            c = self.let_through(command)
+        elif self.T is not None and self.rotors:
+            u = [
+                rotor(u, self.k)
+                for rotor, u in zip(self.rotors, self.thrusts(command), strict=True)
+            ]
+            c = np.clip(self.T @ u, -self.limit, self.limit)
+        else:
+            c = self.saturate(command)
         step = self.factor * (c - self.applied)
         self.applied = self.applied + np.clip(step, -self.rate, self.rate)
         return self.applied

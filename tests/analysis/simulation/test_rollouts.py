@@ -141,6 +141,20 @@ def test_actuators_sensors_and_a_current_act_on_each_rollout(law):
     assert (others['effort.rms.yaw'] != columns['effort.rms.yaw']).all()
 
 
+def test_rollouts_over_lag_dead_band_and_voltage():
+    acting = {'thrusters': True, 'saturation': 'priority', 'rotors': True, 'voltage': 16.0}
+    scenario = scenario_of('gvc', 'bluerov2_heavy', actuators=acting)
+    changes = {
+        'actuators.rotor_lag': np.linspace(0.02, 0.3, 9),
+        'actuators.dead_band': np.linspace(0.0, 6.0, 9),
+        'actuators.voltage': np.linspace(17.0, 11.5, 9),
+    }
+    columns = rollouts(scenario, 'gvc', changes, hold='zoh')
+    assert set(columns['status']) == {'ok'}
+    assert len(set(columns['velocity_error.rms.surge'])) == 9
+    same_as_alone(scenario, 'gvc', changes, 'zoh', columns, (0, 4, 8))
+
+
 def equal(one, other):
     for name, column in one.items():
         assert_array_equal(column, other[name], err_msg=name)

@@ -43,6 +43,7 @@ THRUSTERS = [
     for i, r in enumerate(CORNERS)
 ]
 PID = {'k_P': 3000.0, 'k_I': 200.0, 'k_D': [20, 20, 20, 5, 5, 5]}
+ROUGH = {'k_D': [60, 60, 90, 6, 6, 6], 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': [30, 30, 40, 3, 3, 3]}
 SMC = {'k_D': 2500.0, 'Lambda': 0.6, 'Gamma': 900.0}
 SWITCHED = SMC | {'k_S': 40.0, 'phi': [0.05, 0.05, 0.05, 0.02, 0.02, 0.02]}
 
@@ -71,6 +72,23 @@ SAMPLED = {
         'seed': 11,
     },
 }
+ROTORS = {
+    'priority': {'saturation': 'priority'},
+    'lag and dead band': {'rotor_lag': 0.15, 'dead_band': [4.0, 7.0]},
+    'second order': {'rotors': True, 'lag': 0.02},
+    'a battery beside its curve': {'voltage': 14.3, 'rotors': True},
+    'a battery that runs down': {'voltage': [17.0, 9.5, 1.2], 'saturation': 'priority'},
+    'all of it': {
+        'rotors': True, 'dead_band': 3.0, 'saturation': 'priority', 'voltage': [16.0, 14.0, 3.0],
+        'delay': 0.03, 'rate': 4e3, 'limit': [150, 120, 170, 30, 30, 25],
+    },
+}  # fmt: skip
+T200 = {'curve': 't200_16v', 'lag': 0.08, 'dead_band': [0.4, 0.5]}
+SQUARE = {'voltage': 15.0, 'omega': 18.0, 'zeta': 0.6}
+FAILING = [
+    {'kind': 'thruster', 'thruster': 'T2', 'efficiency': 0.4, 'from': 0.4, 'to': 1.2},
+    {'kind': 'thruster', 'thruster': 'T6', 'stuck': 9.0, 'from': 0.8},
+]
 DURATIONS = [8.0, pytest.param(30.0, marks=pytest.mark.long)]  # s
 BASE = {'setpoint': SIX, 'initial': TURNED, 'duration': 2.0}
 
@@ -101,6 +119,20 @@ def test_actuators_and_sensors(name, law):
     gains = {'cl': {'k_D': 2e3, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 5e3}, 'pid': PID, 'smc': SMC}
     ours, theirs = pair(law, 'zoh', vehicle, **BASE, **SAMPLED[name], gains=gains.get(law, PAPER))
     compare(ours, theirs)
+
+
+@pytest.mark.parametrize('faults', [[], FAILING], ids=['sound', 'failing'])
+@pytest.mark.parametrize('name', ROTORS)
+def test_thrusters_as_they_are(name, faults):
+    """Commands beyond the limits, some within the dead band; T200s and others side by side."""
+    vehicle = file_of('bluerov2_heavy')
+    for i, one in enumerate(vehicle['thrusters']):
+        one['rotor'] = SQUARE if i in (1, 4) else T200
+    actuators = {'thrusters': True, **ROTORS[name]}
+    data = BASE | {'actuators': actuators} | ({'faults': faults} if faults else {})
+    ours, theirs = pair('cl', 'zoh', vehicle, **data, gains=ROUGH)
+    assert np.abs(ours.tau - ours.tau_applied).max() > 10.0
+    compare(ours, theirs, 1e-9)
 
 
 @pytest.mark.parametrize('hold', ['continuous', 'zoh'])

@@ -215,6 +215,23 @@ def test_thrusters():
     assert light['largest']['heave'] == pytest.approx([2 * 40.2, 2 * 51.5], rel=1e-3)
 
 
+def test_rotors(capsys):
+    found = check_vehicle('bluerov2_heavy')['thrusters']['rotors']
+    assert len(found) == 8
+    assert found[0] == found[7]
+    assert (found[0]['curve'], found[0]['voltage'], found[0]['lag']) == ('t200_16v', 16.0, 0.029)
+    assert found[0]['dead_band'] == [0.35, 0.4]
+    assert found[0]['command_without_thrust'] == [1472.0, 1528.0]
+    assert 'Blue Robotics T200' in found[0]['source']
+    assert 'September-2019' in found[0]['source']
+    assert check_vehicle('girona500')['thrusters'] is None
+    main(['check-vehicle', 'bluerov2_heavy'])
+    text = capsys.readouterr().out
+    named = 'rotor of T1, T2, T3, T4, T5, T6, T7, T8: t200_16v, -39.9 to 51.44 N'
+    assert f'{named}, none from 1472 to 1528 pwm_us, 16 V, dead band 0.35 and 0.4 N, lag' in text
+    assert text.count('source: Blue Robotics T200') == 1
+
+
 def test_largest_steps():
     found = check_vehicle('lauv')['sampling']
     assert found['cl']['rate'] == pytest.approx(12 / 0.04)

@@ -24,7 +24,8 @@ from auv_analysis.scenario.scaling import TOP_SPEED
 from auv_analysis.studies.linearize.linearize import linearize
 from auv_analysis.studies.linearize.modes import FOUR, POLES, modes, pole_rows
 from auv_dynamics.vehicle import DOFS
-from auv_dynamics.vehicle.thrusters import Thrusters
+from auv_dynamics.vehicle.thruster_curves import source_of
+from auv_dynamics.vehicle.thrusters import Rotor, Thrusters
 from auv_dynamics.vehicle.vehicle import Vehicle, munk_terms
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 from auv_gvc_controller.control.gains import RINGS, UNSTABLE, sampled_rate
@@ -230,6 +231,26 @@ def _thrusters(thrusters: Thrusters) -> dict[str, Any]:
         'rank': thrusters.rank,
         'unactuated': {dof: list(others) for dof, others in lost.items()},
         'largest': {dof: None if dof in lost else largest(axis) for dof, axis in axes},
+        'rotors': [_rotor(rotor) for rotor in thrusters.rotors],
+    }
+
+
+def _rotor(rotor: Rotor) -> dict[str, Any]:
+    """What turns a thruster, None for what does not exist; N, V, s, rad/s."""
+    curve = rotor.curve
+    shipped = curve is not None and curve.voltage is not None
+    second = rotor.omega > 0.0
+    return {
+        'curve': 'square law' if curve is None else curve.name or 'table of the file',
+        'source': source_of(curve.name) if curve is not None and shipped else None,
+        'thrust': None if curve is None else curve.thrusts[[0, -1]].tolist(),
+        'command_without_thrust': None if curve is None else list(curve.dead_band),
+        'command_unit': None if curve is None else curve.unit,
+        'voltage': rotor.voltage,
+        'dead_band': list(rotor.dead_band),
+        'lag': None if second else rotor.lag,
+        'omega': rotor.omega if second else None,
+        'zeta': rotor.zeta if second else None,
     }
 
 
@@ -374,6 +395,28 @@ def _thrusters_table(found: dict[str, Any], out: Console) -> None:
     for dof, others in found['unactuated'].items():
         apart = f' apart from {" and ".join(others)}' if others else ''
         _say(out, f'{dof} cannot be actuated{apart}')
+    alike: dict[str, list[str]] = {}
+    for name, rotor in zip(found['names'], found['rotors'], strict=False):
+        alike.setdefault(_rotor_text(rotor), []).append(name)
+    for text, names in alike.items():
+        _say(out, f'rotor of {", ".join(names)}: {text}')
+    for source in dict.fromkeys(rotor['source'] for rotor in found['rotors'] if rotor['source']):
+        _say(out, f'source: {source}')
+
+
+def _rotor_text(rotor: Mapping[str, Any]) -> str:
+    parts = [rotor['curve']]
+    if rotor['thrust'] is not None:
+        (astern, ahead), (low, high) = rotor['thrust'], rotor['command_without_thrust']
+        parts.append(f'{astern:.4g} to {ahead:.4g} N')
+        parts.append(f'none from {low:g} to {high:g} {rotor["command_unit"]}')
+    parts.append(f'{rotor["voltage"]:g} V' if rotor['voltage'] else 'voltage unknown')
+    parts.append('dead band {:g} and {:g} N'.format(*rotor['dead_band']))
+    if rotor['omega'] is None:
+        parts.append(f'lag {rotor["lag"]:g} s')
+    else:
+        parts.append(f'second order, {rotor["omega"]:g} rad/s, damping ratio {rotor["zeta"]:g}')
+    return ', '.join(parts)
 
 
 def _sampling_table(found: dict[str, dict[str, Any]], out: Console) -> None:

@@ -172,6 +172,13 @@ def _columns(header: list[str]) -> tuple[str, str]:
     return found[0], found[1]
 
 
+def source_of(name: str) -> str:
+    """Source of a shipped curve: the comment at the head of its file."""
+    text = (SHIPPED / f'{name}.csv').read_text(encoding='utf-8')
+    said = [line.lstrip('# ') for line in text.splitlines() if line.startswith('#')]
+    return ' '.join(said)
+
+
 def load_curve(curve: str | Path, beside: Path | None = None) -> ThrusterCurve:
     """Curve of a CSV file, or a shipped one by its name.
 

@@ -32,7 +32,7 @@ disturbance:
   - {kind: model_error, mass: 0.05, added_mass: -0.2, damping: 0.3}
   - {kind: current, velocity: [0.3, 0.1, 0.0], east: {terms: [{amplitude: 0.1, omega: 1.0}]}}
 actuators: {limit: [80, 60, 90, 9, 9, 9], rate: 3000, lag: 0.05, delay: 0.02, thrusters: true,
-  saturation: priority, rotors: true, rotor_lag: 0.06, dead_band: [0.5, 0.7],
+  saturation: priority, rotors: true, rotor_lag: 0.02, dead_band: [0.5, 0.7],
   voltage: [16.0, 14.5, 1.5]}
 sensors: {velocity_noise: 0.01, attitude_noise: 0.02, drop_out: 0.2}
 """

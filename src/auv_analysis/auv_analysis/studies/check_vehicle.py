@@ -398,8 +398,8 @@ def _thrusters_table(found: dict[str, Any], out: Console) -> None:
     alike: dict[str, list[str]] = {}
     for name, rotor in zip(found['names'], found['rotors'], strict=False):
         alike.setdefault(_rotor_text(rotor), []).append(name)
-    for text, names in alike.items():
-        _say(out, f'rotor of {", ".join(names)}: {text}')
+    for text, thrusters in alike.items():
+        _say(out, f'rotor of {", ".join(thrusters)}: {text}')
     for source in dict.fromkeys(rotor['source'] for rotor in found['rotors'] if rotor['source']):
         _say(out, f'source: {source}')
 

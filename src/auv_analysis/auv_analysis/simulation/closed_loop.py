@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_dynamics.kernel.compile import compiled, once, specialised
+from auv_dynamics.kernel.compile import compiled, specialised
 from auv_dynamics.kernel.integrator import Tableau, fill_stages, fill_step, fill_sum
 from auv_dynamics.kernel.lanes import align_stack, of_block, uncounted
 from auv_dynamics.kernel.six import Vector, fill_vector, vector
@@ -224,94 +224,73 @@ class Workspace(NamedTuple):
     trial: np.ndarray
 
 
-@once
-def fill_continuous(
-    loop: Loop, tables: Tables, grid: StepBlock, tableau: Tableau, motion: LoopState,
-    work: Workspace, record: Any,
-) -> None:  # fmt: skip
-    """Take a block of steps with the law inside every stage."""
-    x, stages, step, every = motion.x, work.stages, grid.step, tableau.b.shape[0]
-    for row in range(grid.t.shape[0]):
-        k = grid.first + row
-        reference, F, current = tables.reference[row], tables.F[row], tables.current[row]
-        system = LawInside(loop, k, grid.t[row], reference, F, current, record)
-        count = every if k < grid.last else 1  # of the last sample nothing but its record
-        fill_stages(system, x, step, tableau, stages, work.trial, count)
-        if k < grid.last:
-            fill_sum(x, x, step, tableau.b, stages, count)
-            fill_unit_attitude(x)
-
-
-@once
-def fill_held(
-    loop: Loop, tables: Tables, grid: StepBlock, tableau: Tableau, motion: LoopState,
-    work: Workspace, record: Any,
-) -> None:  # fmt: skip
-    """Take a block of steps with the law at the samples, the wrench held between."""
-    truth, x, measured = loop.truth, motion.x, motion.measured
-    late = motion.history.shape[0] > 0
-    body, state = x[:SIZE], x[SIZE:]
-    for row in range(grid.t.shape[0]):
-        k = grid.first + row
-        reference, F, current = tables.reference[row], tables.F[row], tables.current[row]
-        if late:
-            fill_measured(tables.noise[row], body, motion.history[motion.history.shape[0] - 1])
-            fill_arrived(tables.faults[row], k, motion.history, measured)
-        elif tables.noise.shape[0] > 0:
-            fill_measured(tables.noise[row], body, measured)
-        else:
-            for i in range(SIZE):
-                measured[i] = body[i]
-        nu_d, nu_d_dot = vector(reference[0], 0), vector(reference[0], 6)
-        dt = grid.step if k > 0 else 0.0
-        tau, f = fill_sample(
-            grid.t[row, 0], dt, vector(measured, 7), attitude_of(measured), nu_d, nu_d_dot,
-            state, motion.rate, loop.gains, loop.model, loop.guard,
-        )  # fmt: skip
-        if loop.faults.any:
-            applied = fill_faulty(loop.actuators, tables.faults[row], k, tau, motion.memory)
-        else:
-            applied = fill_applied(loop.actuators, k, tau, motion.memory)
-        total = lumped(truth, attitude_of(x), vector(x, 7), applied, vector(F[0], 0), current)
-        fill_record(record, k, Sample(body, measured, state, nu_d, tau, applied, f, total))
-        if k < grid.last:
-            held = HeldWrench(truth, applied, F, current)
-            fill_step(held, body, grid.step, tableau, work.stages, work.trial)
-            fill_unit_attitude(body)
-
-
 @compiled
 def run_continuous(
-    loop: Loop, tables: Tables, grid: StepBlock, tableau: Tableau, motion: LoopState,
-    work: Workspace, record: Any, first: int, last: int, lanes: int | None,
+    loops: Loop, tables: Tables, grid: StepBlock, tableau: Tableau, motions: LoopState,
+    work: Workspace, records: Any, first: int, last: int, lanes: int | None,
 ) -> None:  # fmt: skip
-    """`fill_continuous` for the blocks of vehicles from `first` to before `last`.
+    """Take a block of steps with the law inside every stage, vehicle after vehicle.
 
-    All arrays but those of `grid` and `tableau` have a leading axis of blocks, see `of_block`;
-    `work` has one block, which all use.
+    From block of vehicles `first` to before `last`. All arrays but those of `grid` and `tableau`
+    have a leading axis of these blocks, see `of_block`; `work` has one, which all use.
     """
     align_stack(lanes)
-    steps, method = uncounted(grid), uncounted(tableau)
+    steps, method, (stages, trial) = uncounted(grid), uncounted(tableau), of_block(work, 0, lanes)
+    step, every = steps.step, method.b.shape[0]
     for b in range(first, last):
-        fill_continuous(
-            of_block(loop, b, lanes), of_block(tables, b, lanes), steps, method,
-            of_block(motion, b, lanes), of_block(work, 0, lanes), of_block(record, b, lanes),
-        )  # fmt: skip
+        loop, known = of_block(loops, b, lanes), of_block(tables, b, lanes)
+        x, record = of_block(motions, b, lanes).x, of_block(records, b, lanes)
+        for row in range(steps.t.shape[0]):
+            k, t = steps.first + row, steps.t[row]
+            reference, F, current = known.reference[row], known.F[row], known.current[row]
+            system = LawInside(loop, k, t, reference, F, current, record)
+            count = every if k < steps.last else 1  # of the last sample nothing but its record
+            fill_stages(system, x, step, method, stages, trial, count)
+            if k < steps.last:
+                fill_sum(x, x, step, method.b, stages, count)
+                fill_unit_attitude(x)
 
 
 @compiled
 def run_held(
-    loop: Loop, tables: Tables, grid: StepBlock, tableau: Tableau, motion: LoopState,
-    work: Workspace, record: Any, first: int, last: int, lanes: int | None,
+    loops: Loop, tables: Tables, grid: StepBlock, tableau: Tableau, motions: LoopState,
+    work: Workspace, records: Any, first: int, last: int, lanes: int | None,
 ) -> None:  # fmt: skip
-    """`fill_held` for the same."""
+    """Take a block of steps with the law at the samples, the wrench held; the rest as above."""
     align_stack(lanes)
-    steps, method = uncounted(grid), uncounted(tableau)
+    steps, method, (stages, trial) = uncounted(grid), uncounted(tableau), of_block(work, 0, lanes)
     for b in range(first, last):
-        fill_held(
-            of_block(loop, b, lanes), of_block(tables, b, lanes), steps, method,
-            of_block(motion, b, lanes), of_block(work, 0, lanes), of_block(record, b, lanes),
-        )  # fmt: skip
+        loop, known = of_block(loops, b, lanes), of_block(tables, b, lanes)
+        motion, record = of_block(motions, b, lanes), of_block(records, b, lanes)
+        truth, x, measured, history = loop.truth, motion.x, motion.measured, motion.history
+        body, state = x[:SIZE], x[SIZE:]
+        for row in range(steps.t.shape[0]):
+            k = steps.first + row
+            reference, F, current = known.reference[row], known.F[row], known.current[row]
+            if history.shape[0] > 0:
+                fill_measured(known.noise[row], body, history[history.shape[0] - 1])
+                fill_arrived(known.faults[row], k, history, measured)
+            elif known.noise.shape[0] > 0:
+                fill_measured(known.noise[row], body, measured)
+            else:
+                for i in range(SIZE):
+                    measured[i] = body[i]
+            nu_d, nu_d_dot = vector(reference[0], 0), vector(reference[0], 6)
+            dt = steps.step if k > 0 else 0.0
+            tau, f = fill_sample(
+                steps.t[row, 0], dt, vector(measured, 7), attitude_of(measured), nu_d, nu_d_dot,
+                state, motion.rate, loop.gains, loop.model, loop.guard,
+            )  # fmt: skip
+            if loop.faults.any:
+                applied = fill_faulty(loop.actuators, known.faults[row], k, tau, motion.memory)
+            else:
+                applied = fill_applied(loop.actuators, k, tau, motion.memory)
+            total = lumped(truth, attitude_of(x), vector(x, 7), applied, vector(F[0], 0), current)
+            fill_record(record, k, Sample(body, measured, state, nu_d, tau, applied, f, total))
+            if k < steps.last:
+                held = HeldWrench(truth, applied, F, current)
+                fill_step(held, body, steps.step, method, stages, trial)
+                fill_unit_attitude(body)
 
 
 RUNS = {'continuous': run_continuous, 'zoh': run_held}

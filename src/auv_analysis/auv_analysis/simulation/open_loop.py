@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_dynamics.kernel import LANES
-from auv_dynamics.kernel.compile import compiled, helper, once
+from auv_dynamics.kernel.compile import compiled, helper
 from auv_dynamics.kernel.integrator import TABLEAUS, Tableau
 from auv_dynamics.kernel.lanes import (
     align_stack,
@@ -124,55 +124,41 @@ def fill_corrected(x: np.ndarray, measured: np.ndarray, observer: np.ndarray) ->
             x[3 + i] = x[3 + i] + observer[i] * (measured[i] - x[3 + i])
 
 
-@once
-def fill_segment(
-    variant: Variant, segment: Segment, settings: Settings, tableau: Tableau, state: OpenState,
-    work: Work, seen: np.ndarray, result: np.ndarray, v: int, s: int,
-) -> None:  # fmt: skip
-    """Take the steps of a segment and write the states of its variants, the first of which is v.
-
-    `seen` (13, W) is the memory of `state.x` as numbers, `result` (V, S, rows, 13).
-    """
-    x, command, applied = state.x, work.command, state.applied
-    count, row = min(seen.shape[1], result.shape[0] - v), 0
-    for k in range(segment.commands.shape[0]):
-        fill_command(variant.allocation, segment.commands[k], command)
-        if settings.settled and k == 0:
-            fill_vector(applied, 0, vector(command, 0))
-        tau = fill_slowed(variant.follow, settings.slew, vector(command, 0), applied)
-        fill_plant_step(
-            variant.truth, x, tau, variant.F, variant.current, settings.step, tableau,
-            work.stages, work.trial,
-        )  # fmt: skip
-        if segment.measured.shape[0] > 0:
-            fill_corrected(x, segment.measured[k], settings.observer)
-        if (k + 1) % settings.every == 0:
-            for lane in range(count):
-                for i in range(SIZE):
-                    result[v + lane, s, row, i] = seen[i, lane]
-            row += 1
-
-
 @compiled
 def run_open(
     variants: Variant, segments: Segment, settings: Settings, tableau: Tableau, states: OpenState,
     work: Work, seen: np.ndarray, result: np.ndarray, first: int, last: int, lanes: int | None,
 ) -> None:  # fmt: skip
-    """`fill_segment` for blocks `first` to before `last`: those of a block share a segment.
+    """Take the steps of segments and write the states, for blocks `first` to before `last`.
 
     Segments have a leading axis of S and plain numbers, variants and states one of blocks, see
-    `of_block`; `work` has one block, which all use. Block b is of segment b % S.
+    `of_block`; `work` has one block, which all use. Block b is of segment b % S. `seen` (blocks,
+    13, W) is the memory of the states as numbers, `result` (V, S, rows, 13).
     """
     align_stack(lanes)
-    common, method, target = uncounted(settings), uncounted(tableau), uncounted(result)
-    count, wide = result.shape[1], seen.shape[2]
+    common, method, rows = uncounted(settings), uncounted(tableau), uncounted(result)
+    stages, trial, command = of_block(work, 0, lanes)
     for b in range(first, last):
-        v, s = b // count, b % count
-        fill_segment(
-            of_block(variants, v, lanes), of_block(segments, s, None), common, method,
-            of_block(states, b, lanes), of_block(work, 0, lanes), of_block(seen, b, None), target,
-            v * wide, s,
-        )  # fmt: skip
+        v, s = b // result.shape[1], b % result.shape[1]
+        variant, segment = of_block(variants, v, lanes), of_block(segments, s, None)
+        (x, applied), numbers = of_block(states, b, lanes), of_block(seen, b, None)
+        at, row = v * numbers.shape[1], 0
+        for k in range(segment.commands.shape[0]):
+            fill_command(variant.allocation, segment.commands[k], command)
+            if common.settled and k == 0:
+                fill_vector(applied, 0, vector(command, 0))
+            tau = fill_slowed(variant.follow, common.slew, vector(command, 0), applied)
+            fill_plant_step(
+                variant.truth, x, tau, variant.F, variant.current, common.step, method, stages,
+                trial,
+            )  # fmt: skip
+            if segment.measured.shape[0] > 0:
+                fill_corrected(x, segment.measured[k], common.observer)
+            if (k + 1) % common.every == 0:
+                for lane in range(min(numbers.shape[1], rows.shape[0] - at)):
+                    for i in range(SIZE):
+                        rows[at + lane, s, row, i] = numbers[i, lane]
+                row += 1
 
 
 def open_loop(

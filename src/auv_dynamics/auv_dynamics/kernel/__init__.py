@@ -18,8 +18,9 @@ can be left out). Without numba the same source runs as it is. Therefore:
    array (36,). Nothing is allocated: workspace is an argument.
 6. Time is `k * step`, never a sum. What is known before the run is tabulated on the grid of steps
    and stages, a block of steps at a time.
-7. `helper` before a function of the kernel, `once` where it is large and has one caller,
-   `compiled` only where Python calls it: each compiled function costs seconds at the first start.
+7. `helper` before a function of the kernel, `compiled` only where Python calls it: each compiled
+   function costs seconds at the first start, a large helper, which is compiled by itself as well,
+   half of that.
    Numbers that are not finite are not errors here: who has the record looks for them.
 8. The floating-point result may depend on nothing but the vehicle's own numbers: not on the other
    vehicles, on their order or on the threads. Products may be fused with sums, sums are not

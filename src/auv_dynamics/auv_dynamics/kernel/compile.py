@@ -2,9 +2,8 @@
 
 Few decorators are all that the mathematics knows of numba: `helper` for functions that are
 inlined wherever a compiled one calls them and stay plain Python by themselves: they may meet a
-user's own law, which need not be compilable; `once` for a helper that is large and called from one
-place, which numba then compiles as part of its caller; `compiled` for those that are called from
-Python, whose code other processes load; `uncached` where a user's law must not enter that cache.
+user's own law, which need not be compilable; `compiled` for those that are called from Python,
+whose code other processes load; `uncached` where a user's law must not enter that cache.
 
 Compiled code is kept in one explicit folder whose name changes with every source file that the
 kernels can depend on, so that a stale binary cannot be loaded: numba itself only looks at the file
@@ -24,7 +23,7 @@ from typing import Any, Protocol, TypeVar
 PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
 # a decorator of these, or a method that `specialised` compiles
 COMPILES = re.compile(
-    rb'^@(?:helper|once|of_numbers|compiled|uncached|specialised)\b'
+    rb'^@(?:helper|of_numbers|compiled|uncached|specialised)\b'
     rb'|^    def (?:wrench|fill_\w+)\((?!self)',
     re.M,
 )
@@ -125,7 +124,6 @@ if JITTED:
     helper: Decorator = register_jitable(forceinline=True, **OPTIONS)
     compiled: Decorator = numba.njit(cache=KEPT, nogil=True, forceinline=True, **OPTIONS)
     uncached: Decorator = numba.njit(nogil=True, **OPTIONS)
-    once: Decorator = register_jitable(inline='always')
     NUMBERS = numba.types.Number, numba.types.Boolean
 else:
 
@@ -133,7 +131,7 @@ else:
         """Return the function as it is: numba is absent or switched off."""
         return function
 
-    compiled = uncached = once = helper
+    compiled = uncached = helper
 
 
 def plain(function: Function) -> Function:

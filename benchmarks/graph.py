@@ -30,7 +30,7 @@ PATIENCE = 30.0  # s for the other end to appear
 STEADY = (0.1, 0.9)  # part of a run that is counted
 
 
-def end(process: subprocess.Popen) -> None:
+def end(process: subprocess.Popen[bytes]) -> None:
     """SIGTERM until it has ended: rclpy's wait does not wake at each of them."""
     while process.poll() is None:
         process.terminate()

@@ -28,6 +28,7 @@ from auv_dynamics.files.errors import FailedError, InputError, on_signals, reaso
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import read_text
 from auv_dynamics.plant.actuators import Actuators, make_actuators
+from auv_dynamics.plant.rotors import make_rotors
 from auv_dynamics.plant.uncertainty import make_uncertainty
 from auv_dynamics.vehicle.kinematics import euler
 
@@ -180,33 +181,37 @@ def opened(text: str) -> socket.socket:
 
 def made(options: argparse.Namespace) -> tuple[Physics, Bags | None]:
     """Vehicle in its water, and what records it."""
-    faults, lag = ((lambda: None), 1.0), None
+    faults, spec = ((lambda: None), 1.0), {}
     if options.scenario:
         scenario = load_scenario(options.scenario)
         vehicle, texts, name = scenario.vehicle, scenario.attachments, scenario.path
         water = scenario.uncertainty, scenario.data['integrator'], scenario.initial
         faults, spec = (scenario.fault_rows, scenario.step), scenario.data.get('actuators', {})
-        lag = {key: spec[key] for key in ('lag', 'rate') if key in spec}
-        say(f'{name}: no controllers, no sensors, of actuators lag and rate: ArduSub has its own')
+        say(f'{name}: controllers, sensors, limits and delay left out: ArduSub has its own')
     else:
         vehicle, name = load_vehicle(options.vehicle), options.vehicle
         texts = {'vehicle.yaml': read_text(shipped('vehicles', options.vehicle), 'vehicle')}
         start = np.array(options.eta), np.zeros(6)
         water = make_uncertainty(vehicle, [], name, []), 'rk4', start
-    if vehicle.thrusters is None:
+    if (thrusters := vehicle.thrusters) is None:
         raise InputError(name, 'thrusters', 'a vehicle with thrusters', 'none')
     eta = water[2][0]
     if not (np.isfinite(eta).all() and eta[2] >= 0.0):
         raise InputError(name, 'eta', 'finite numbers, a depth of 0 m or more', eta.tolist())
-    motors, text = make_motors(vehicle.thrusters, options.motors, options.voltage)
+    motors, text = make_motors(thrusters, options.motors, options.voltage)
     say(f'{vehicle.name}: {text}')
     bags = Bags(options.bag, texts) if options.bag else None
     record = bags.write if bags else lambda *_: None
 
-    def actuators(step: float) -> Actuators:
-        return make_actuators(lag or None, vehicle, step, name)
+    lag = {key: spec[key] for key in ('lag', 'rate') if key in spec}
+    turning = {'rotors': bool(thrusters.rotors), 'rotor_lag': spec.get('rotor_lag')}
 
-    return Physics(vehicle.thrusters.matrix, motors, *water, actuators, faults, record), bags
+    def actuators(step: float) -> tuple[Actuators, np.ndarray]:
+        rotors = make_rotors(turning, thrusters, vehicle.name, step, name)
+        response = np.zeros((0, 4)) if rotors is None else rotors.response
+        return make_actuators(lag or None, vehicle, step, name), response
+
+    return Physics(thrusters, motors, *water, actuators, faults, record), bags
 
 
 def serve(options: argparse.Namespace) -> str:
@@ -235,7 +240,7 @@ def main() -> int:
     parser.add_argument('--listen', default='127.0.0.1:9002', metavar='HOST:PORT')
     parser.add_argument('--eta', type=float, nargs=6, default=[0.0] * 6, help='start: NED, rad')
     parser.add_argument('--motors', help='thruster of each motor, - for reversed: --motors=2,-1,3')
-    parser.add_argument('--voltage', type=int, choices=range(10, 21, 2), default=16, help='V')
+    parser.add_argument('--voltage', type=float, help='of the battery, V')
     parser.add_argument('--bag', type=Path, help='record into this folder')
     parser.add_argument('--no-time-sync', action='store_true', help='as fast as both can')
     parser.add_argument('--seconds', type=float, default=float('inf'), help='simulated, then end')

@@ -7,7 +7,7 @@ from ardusub_mixer import FRAMES
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of
-from auv_dynamics.vehicle.thruster_curves import ThrusterCurve, load_curve
+from auv_dynamics.vehicle.thruster_curves import ThrusterCurve, at_voltage, load_curve
 from auv_dynamics.vehicle.thrusters import Thrusters
 
 CHANNELS = 32  # pulses that a frame carries at most
@@ -23,36 +23,43 @@ class Motors(NamedTuple):
     ----------
     channels : (n,) channel of each thruster, from 0
     reversed : (n,) whether it turns the other way round, as with MOT_n_DIRECTION -1
-    curve : thrust of a pulse
+    curves : thrust of a pulse, and (m,) indices of the thrusters that have it
     astern, ahead : (n,) factors on negative and on positive thrusts
 
     """
 
     channels: np.ndarray
     reversed: np.ndarray
-    curve: ThrusterCurve
+    curves: list[tuple[ThrusterCurve, np.ndarray]]
     astern: np.ndarray
     ahead: np.ndarray
 
     def thrusts(self, pulses: np.ndarray) -> np.ndarray:
         """Thrusts (n,), N, of pulses (32,), microseconds; 0 is no pulse and no thrust."""
-        u = self.curve.thrust(pulses[self.channels], self.reversed)
+        u = np.zeros(len(self.channels))
+        for curve, at in self.curves:
+            u[at] = curve.thrust(pulses[self.channels[at]], self.reversed[at])
         return u * np.where(u < 0.0, self.astern, self.ahead)
 
 
-def make_motors(thrusters: Thrusters, option: str | None, voltage: int) -> tuple[Motors, str]:
+def make_motors(
+    thrusters: Thrusters, option: str | None, voltage: float | None
+) -> tuple[Motors, str]:
     """Motors of a vehicle, and in words which thruster is which.
 
-    Each thruster has the curve of a T200, scaled so that a full pulse at 16 V gives its limits.
+    A thruster has the curve of its rotor in the vehicle file; one without a curve of pulses that of
+    a T200, scaled so that a full pulse at 16 V gives its limits.
 
     Parameters
     ----------
     thrusters : of the vehicle file
     option : thruster of each motor, by name or number, with - where it is reversed; None: by the
         frame of ArduSub whose signs the thrusters have, else in the file's order
-    voltage : of the speed controllers, V
+    voltage : of the battery, V; None: the nominal one of each rotor
 
     """
+    if voltage is not None and not 0.0 < voltage < np.inf:
+        raise InputError('--voltage', '', 'a positive number (V)', voltage)
     names = thrusters.names
     frame = '--motors' if option else NAMES.get(len(names), '')
     order = _ordered(option, names) if option else _matched(thrusters.matrix)
@@ -62,10 +69,21 @@ def make_motors(thrusters: Thrusters, option: str | None, voltage: int) -> tuple
     words = ', '.join(f'{names[i]}{" reversed" * flip}' for i, flip in order)
     flipped = np.array([flip for _, flip in sorted(order)])
     channels = np.argsort([i for i, _ in order])
-    full = load_curve('t200_16v').thrusts
-    limits = thrusters.reverse / -full[0], thrusters.forward / full[-1]
-    curve = load_curve(f't200_{voltage}v')
-    return Motors(channels, flipped, curve, *limits), f'{frame}; motors 1 to {len(names)}: {words}'
+    usual = load_curve('t200_16v')
+    scales = thrusters.reverse / -usual.thrusts[0], thrusters.forward / usual.thrusts[-1]
+    groups: dict[tuple[bytes, float], tuple[ThrusterCurve, list[int]]] = {}
+    for i in range(len(names)):
+        rotor = thrusters.rotors[i] if thrusters.rotors else None
+        curve, nominal = usual, 16.0
+        if rotor and rotor.voltage and rotor.curve and rotor.curve.unit == 'pwm_us':
+            curve, nominal = rotor.curve, rotor.voltage
+            scales[0][i] = scales[1][i] = 1.0
+        groups.setdefault((curve.thrusts.tobytes(), nominal), (curve, []))[1].append(i)
+    curves = [
+        (at_voltage(curve, nominal, voltage or nominal), np.array(at))
+        for (_, nominal), (curve, at) in groups.items()
+    ]
+    return Motors(channels, flipped, curves, *scales), f'{frame}; motors 1 to {len(names)}: {words}'
 
 
 def _ordered(option: str, names: tuple[str, ...]) -> Order:

@@ -10,11 +10,12 @@ from json_motors import CHANNELS, Motors
 
 from auv_dynamics.files.errors import FailedError
 from auv_dynamics.kernel.compile import plain
-from auv_dynamics.plant.actuators import IDEAL, Actuators
+from auv_dynamics.plant.actuators import Actuators
 from auv_dynamics.plant.faults import AXES, HELD, THRUSTERS, WRENCH, FaultRows
 from auv_dynamics.plant.plant import Plant, initial_state
 from auv_dynamics.plant.uncertainty import Uncertainty, to_body
 from auv_dynamics.vehicle.kinematics import position_rate, rotation
+from auv_dynamics.vehicle.thrusters import Thrusters
 
 LONGEST = 0.005  # s of an integration step: a longer frame takes several
 GRAVITY = np.array([0.0, 0.0, 9.80665])  # m/s^2, NED; what ArduPilot takes off: GRAVITY_MSS
@@ -49,25 +50,25 @@ class Physics:
 
     Parameters
     ----------
-    matrix : (6, n) T of tau = T u
+    thrusters : of the vehicle file
     motors : thrusts of pulses
     uncertainty : what acts on the plant besides
     integrator : 'ode5', 'rk4' or 'euler'
     start : eta (6,), nu (6,)
-    actuators : of a step in s: lag and slew rate between wrench and plant
+    actuators : of a step in s: lag and slew rate between wrench and plant, response of the rotors
     faults : makes the rows of a run that begins; s between two of them
     record : told of t, state, wrench of the pulses, wrench applied, F as each frame begins
 
     """
 
     def __init__(
-        self, matrix: np.ndarray, motors: Motors, uncertainty: Uncertainty, integrator: str,
+        self, thrusters: Thrusters, motors: Motors, uncertainty: Uncertainty, integrator: str,
         start: tuple[np.ndarray, np.ndarray],
-        actuators: Callable[[float], Actuators] = lambda _: IDEAL,
+        actuators: Callable[[float], tuple[Actuators, np.ndarray]],
         faults: tuple[Callable[[], FaultRows | None], float] = (lambda: None, 1.0),
         record: Callable[..., Any] = lambda *_: None,
     ):  # fmt: skip
-        self._T, self._motors, self._uncertainty = matrix, motors, uncertainty
+        self._T, self._motors, self._uncertainty = thrusters.matrix, motors, uncertainty
         self._integrator, self._start = integrator, initial_state(*start)
         self._actuators, self._make_rows, self._fault_step = actuators, *faults
         self._record = record
@@ -79,16 +80,17 @@ class Physics:
         self.t, self._x, self._rate = 0.0, self._start, 0
         self._rows, self._row, self._row_k = self._make_rows(), np.zeros(0), -1
         self._heard = np.zeros(CHANNELS)
+        self._speeds = np.zeros((2, self._T.shape[1]))  # of the rotors, sqrt(N), and their rates
 
     def step(self, pulses: np.ndarray, rate: int) -> Reading:
         """Hold pulses (32,) for 1/rate s; FailedError where the vehicle leaves finite numbers."""
         if rate != self._rate:
             self._began, self._frames, self._rate = self.t, 0, rate
             self._plant = self._plant_at(rate)
-        asked, tau = self._wrenches(pulses)
+        asked, u, fault = self._asked(pulses)
         before = self._x.copy()
         for i in range(self._substeps):
-            applied, F = self._plant.answer(tuple(tau.tolist()))
+            applied, F = self._plant.answer(tuple(self._delivered(u, fault).tolist()))
             if i == 0:
                 self._record(self.t, before, asked, applied, F)
             self._plant.advance()
@@ -107,22 +109,35 @@ class Physics:
         later = None if current is None else lambda t: current(t + began)
         uncertainty = replace(self._uncertainty, F=lambda t: F(t + began), current=later)
         step = 1.0 / (rate * self._substeps)
-        return Plant(uncertainty, step, self._integrator, self._x, self._actuators(step))
+        actuators, self._response = self._actuators(step)
+        return Plant(uncertainty, step, self._integrator, self._x, actuators)
 
-    def _wrenches(self, pulses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Wrench (6,) of the pulses, and what the faults of this time leave of it."""
-        asked = self._T @ self._motors.thrusts(pulses)
+    def _asked(self, pulses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        """Wrench (6,) of the pulses, thrusts (n,) of those that arrive, faults of this time."""
+        u = self._motors.thrusts(pulses)
         if self._rows is None:
-            return asked, asked
+            return self._T @ u, u, None
         while self._row_k < math.floor(self.t / self._fault_step + WHOLE):
             self._row, self._row_k = self._rows.rows(1)[0], self._row_k + 1
-        row = self._row
-        if row[WRENCH] != HELD:
-            self._heard = pulses if row[WRENCH] == 0.0 else np.zeros(CHANNELS)
-        u = self._motors.thrusts(self._heard)
-        if n := (len(row) - THRUSTERS) // 2:
-            u = row[THRUSTERS : THRUSTERS + n] * u + row[THRUSTERS + n :]
-        return asked, row[AXES : AXES + 6] * (self._T @ u) + row[AXES + 6 : THRUSTERS]
+        if self._row[WRENCH] != HELD:
+            self._heard = pulses if self._row[WRENCH] == 0.0 else np.zeros(CHANNELS)
+        return self._T @ u, self._motors.thrusts(self._heard), self._row
+
+    def _delivered(self, u: np.ndarray, fault: np.ndarray | None) -> np.ndarray:
+        """Wrench (6,) of rotors that follow the steady thrusts u over a step, and their faults."""
+        if len(P := self._response):  # as `fill_turned` of auv_dynamics.plant.rotors
+            asked = np.sign(u) * np.sqrt(np.abs(u))
+            ahead, rate = self._speeds[0] - asked, self._speeds[1]
+            self._speeds[:] = (
+                asked + P[:, 0] * ahead + P[:, 1] * rate,
+                P[:, 2] * ahead + P[:, 3] * rate,
+            )
+            u = self._speeds[0] * np.abs(self._speeds[0])
+        if fault is None:
+            return self._T @ u
+        if n := (len(fault) - THRUSTERS) // 2:
+            u = fault[THRUSTERS : THRUSTERS + n] * u + fault[THRUSTERS + n :]
+        return fault[AXES : AXES + 6] * (self._T @ u) + fault[AXES + 6 : THRUSTERS]
 
     @staticmethod
     def _stop_at_surface(x: np.ndarray) -> None:

@@ -48,6 +48,7 @@ def test_a_port_in_use_is_named() -> None:
         (('--vehicle', 'bluerov2', '--motors', '1,2,3,4,5,x'), '--motors: expected'),
         (('--vehicle', 'bluerov2', '--listen', 'here'), '--listen: here: expected HOST:PORT'),
         (('--vehicle', 'bluerov2', '--listen', '127.0.0.1:99999'), 'expected HOST:PORT'),
+        (('--vehicle', 'bluerov2', '--voltage', '-12'), '--voltage: expected a positive'),
         (('--scenario', 'case1'), 'expected a vehicle with thrusters'),
         (('--scenario', 'nowhere.yaml'), 'nowhere.yaml'),
     ],
@@ -104,6 +105,8 @@ def changed(folder: Path, name: str, order: list[int], turned: tuple[int, ...]) 
         one = data['thrusters'][i]
         one['direction'] = [-component for component in one['direction']]
         one['limit'] = one['limit'][::-1]
+    for one in data['thrusters'] if turned else ():
+        del one['rotor']  # whose curve has the other end ahead
     data['thrusters'] = [data['thrusters'][i] for i in order]
     path = folder / 'mine.yaml'
     path.write_text(yaml.safe_dump(data))
@@ -131,9 +134,9 @@ def test_motors_are_found_by_place_and_direction(name: str, tmp_path: Path) -> N
 
 def test_a_full_pulse_gives_the_limits_of_the_vehicle_file() -> None:
     thrusters = load_vehicle('bluerov2_heavy').thrusters
-    motors, _ = make_motors(thrusters, None, 16)
-    assert motors.thrusts(np.full(32, 1900.0)) == pytest.approx(thrusters.forward)
-    assert motors.thrusts(np.full(32, 1100.0)) == pytest.approx(-thrusters.reverse)
+    motors, _ = make_motors(thrusters, None, None)
+    assert motors.thrusts(np.full(32, 1900.0)) == pytest.approx(thrusters.forward, rel=0.01)
+    assert motors.thrusts(np.full(32, 1100.0)) == pytest.approx(-thrusters.reverse, rel=0.01)
     weak, _ = make_motors(thrusters, None, 12)
     assert weak.thrusts(np.full(32, 1900.0)) == pytest.approx(0.72 * thrusters.forward, rel=0.05)
 
@@ -143,7 +146,7 @@ def test_motors_by_the_option() -> None:
     motors, text = make_motors(thrusters, '2,-T1,3,4,6,5', 16)
     assert 'T2, T1 reversed, T3, T4, T6, T5' in text
     u = motors.thrusts(np.array([1900.0, 1900, 0, 0, 0, 1100] + [0.0] * 26))
-    assert u == pytest.approx([-40.2, 51.5, 0, 0, -40.2, 0])
+    assert u == pytest.approx([-40.2, 51.5, 0, 0, -40.2, 0], rel=0.01)
 
 
 def test_thrusters_of_no_known_frame_are_taken_in_their_order(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def test_signs_of_the_pilots_axes(peer: SitlPeer, vehicle: str, axis: str, way: 
     moved = np.concatenate([body - rest, told['gyro'][-1] - calm['gyro'][-1]])
     assert sign * way * moved[i] > 0.02
     if i < 3:  # and it is felt
-        felt = (told['accel_body'] - calm['accel_body'])[1]
+        felt = (told['accel_body'] - calm['accel_body'])[40]  # once the rotors turn
         assert sign * way * felt[i] > 0.2
     else:
         turned = (attitudes(calm)[-1].inv() * attitudes(told)[-1]).as_rotvec()
@@ -113,35 +113,22 @@ def test_position_and_attitude_are_integrals_of_velocity_and_gyro(peer: SitlPeer
 
 def wrench(name: str, pulses: list[int]) -> np.ndarray:
     """Of pulses, from the vehicle file's thrusters and Blue Robotics' table at 16 V."""
-    T, lowest, highest = thruster_matrix(vehicle_data(name)['thrusters'])
+    T, _, _ = thruster_matrix(vehicle_data(name)['thrusters'])
     curve = load_curve('t200_16v')
-    thrusts = np.interp(pulses[: T.shape[1]], curve.commands, curve.thrusts)
-    ends = np.where(thrusts < 0, lowest / curve.thrusts[0], highest / curve.thrusts[-1])
-    assert ends == pytest.approx(1.0, abs=0.01)
-    return T @ (thrusts * ends)
+    return T @ np.interp(pulses[: T.shape[1]], curve.commands, curve.thrusts)
 
 
 def test_motion_is_that_of_the_second_implementation(peer: SitlPeer, vehicle: str) -> None:
     told = peer.run(3.0, TURNING)
     plant, tau = Plant(vehicle_data(vehicle), []), wrench(vehicle, TURNING)
-    for k in range(0, len(told['gyro']) - 1, 57):
+    for k in range(228, len(told['gyro']) - 1, 57):  # the rotors turn
         R = attitudes(told)[k].as_matrix()
         gyro, felt = told['gyro'][k], (told['accel_body'][k] + told['accel_body'][k + 1]) / 2
         nu_dot = plant.acceleration(0.0, R, np.concatenate([R.T @ told['velocity'][k], gyro]), tau)
         expected = nu_dot[:3] + np.cross(gyro, R.T @ told['velocity'][k]) - R.T @ G
         assert felt == pytest.approx(expected, abs=0.005)
-        if k:
-            turning = (told['gyro'][k + 1] - told['gyro'][k - 1]) * 200
-            assert turning == pytest.approx(nu_dot[3:], abs=0.05)
-
-
-@pytest.mark.parametrize('rate', [50, 1200])
-def test_the_rate_of_frames_is_no_part_of_the_physics(peer: SitlPeer, rate: int) -> None:
-    usual = peer.run(2.0, TURNING)
-    peer.count, peer.rate = 0, rate
-    other = peer.run(2.0, TURNING)
-    for key in ('position', 'velocity', 'gyro', 'quaternion'):
-        assert other[key][-1] == pytest.approx(usual[key][-1], abs=1e-7)
+        turning = (told['gyro'][k + 1] - told['gyro'][k - 1]) * 200
+        assert turning == pytest.approx(nu_dot[3:], abs=0.05)
 
 
 def test_neutral_and_silent_motors_do_nothing(peer: SitlPeer) -> None:
@@ -183,6 +170,18 @@ def scenario(folder: Path, **changes: Any) -> str:
     path = folder / 'reef.yaml'
     path.write_text(yaml.safe_dump(copy.deepcopy(SCENARIO) | changes))
     return str(path)
+
+
+@pytest.mark.parametrize('rate', [50, 1200])
+def test_the_rate_of_frames_is_no_part_of_the_physics(rate: int, tmp_path: Path) -> None:
+    spec = {'thrusters': True, 'rotor_lag': 0.0}  # rotors are held over a step
+    with backend('--scenario', scenario(tmp_path, actuators=spec)) as process:
+        peer = SitlPeer(process.port)
+        usual = peer.run(2.0, TURNING)
+        peer.count, peer.rate = 0, rate
+        other = peer.run(2.0, TURNING)
+    for key in ('position', 'velocity', 'gyro', 'quaternion'):
+        assert other[key][-1] == pytest.approx(usual[key][-1], abs=1e-7)
 
 
 def test_velocity_in_a_current_is_over_ground(tmp_path: Path) -> None:
@@ -240,18 +239,29 @@ def test_lost_commands_are_held_and_then_none(tmp_path: Path) -> None:
     faster = [np.diff(np.linalg.norm(told['velocity'], axis=1)) for told in (before, held, after)]
     assert (faster[0] > 0).all()
     assert (faster[1] > 0).all()
-    assert (faster[2][8:] < 0).all()
+    assert (faster[2][80:] < 0).all()
 
 
-def test_lag_of_the_actuators_is_that_of_the_scenario(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ('lags', 'power'), [({'lag': 0.02, 'rotor_lag': 0.0}, 1), ({'rotor_lag': 0.02}, 2)]
+)
+def test_lags_are_those_of_the_scenario(lags: dict, power: int, tmp_path: Path) -> None:
     down, felt = motor_pulses([1500, 1500, 1400, 1500, 1500, 1500], 8), []
-    for spec in ({'actuators': {'lag': 0.02}}, {}):
-        with backend('--scenario', scenario(tmp_path, **spec)) as process:
+    for spec in (lags, {'rotor_lag': 0.0}):
+        actuators = {'thrusters': True, **spec}
+        with backend('--scenario', scenario(tmp_path, actuators=actuators)) as process:
             peer = SitlPeer(process.port)
             calm = peer.run(0.1)['accel_body'][-1, 2]
             felt.append(peer.run(0.02, down)['accel_body'][:, 2] - calm)
     slow, quick = felt
-    assert slow[7] / quick[0] == pytest.approx(1 - np.exp(-1.0), abs=0.03)  # 8 frames: 0.02 s
+    # 8 frames: 0.02 s; thrust goes by the square of a rotor's speed
+    assert slow[7] / quick[0] == pytest.approx((1 - np.exp(-1.0)) ** power, abs=0.03)
+
+
+def test_rotors_of_the_vehicle_file_follow_late(peer: SitlPeer) -> None:
+    calm = peer.run(0.1)['accel_body'][-1]
+    felt = np.linalg.norm(peer.run(0.1, TURNING)['accel_body'] - calm, axis=1)
+    assert felt[0] < 0.1 * felt[-1]
 
 
 def test_a_recording_is_a_run(tmp_path: Path) -> None:
@@ -274,11 +284,11 @@ def test_a_recording_is_a_run(tmp_path: Path) -> None:
     assert run.eta[1:, :3] == pytest.approx(told['position'][kept][:-1], abs=1e-12)
     assert run.nu[1:, 3:] == pytest.approx(told['gyro'][kept][:-1], abs=1e-12)
     assert run.tau == pytest.approx(np.tile(wrench('bluerov2_heavy', TURNING), (100, 1)))
-    assert run.tau_applied[:50] == pytest.approx(run.tau[:50])
+    assert run.tau_applied[30:50] == pytest.approx(run.tau[30:50], rel=1e-3)  # rotors turn
     assert np.abs(run.tau_applied[50:] - run.tau[50:]).max(axis=1).min() > 1.0
     # F is what the plain vehicle file does not know: its equation of motion holds with it
     plant = Plant(vehicle_data('bluerov2_heavy'), [])
-    for k in (5, 45, 95):
+    for k in (45, 95):
         R = attitudes(told)[4 * k - 1].as_matrix()
         nu_dot = plant.acceleration(0.0, R, run.nu[k], run.tau_applied[k] - run.disturbance[k])
         slope = (run.nu[k + 1] - run.nu[k - 1]) / 0.02

@@ -10,6 +10,7 @@ from simulated_driver import SimulatedDriver
 from auv_analysis.driver.excitation import (
     GOODBYE,
     PERIOD,
+    SETTLE,
     StoppedError,
     actuate,
     carry_out,
@@ -69,7 +70,7 @@ def test_nan_is_too_fast() -> None:
 def test_a_user_who_wants_an_end_gets_it_and_the_vehicle_gets_zero() -> None:
     driver = SimulatedDriver()
     with pytest.raises(StoppedError):
-        sent_by(driver, stopped=lambda: len(driver.sent) > 40)
+        sent_by(driver, stopped=lambda: len(driver.sent) > SETTLE / PERIOD + 15)
     assert any(tau != ZERO for tau in driver.sent)
     assert driver.sent[-LAST:] == [ZERO] * LAST
 

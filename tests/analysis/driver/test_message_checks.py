@@ -129,3 +129,9 @@ def test_speeds_of_a_healthy_driver_pass() -> None:
     assert {one.verdict for one in found.values()} == {PASS}
     few = found_by(odometry_log(motion()[:5]), *SPEEDS)
     assert {one.verdict for one in few.values()} == {NOT_CHECKED}
+
+
+def test_two_sources_in_turn_are_no_noise() -> None:
+    x = motion()
+    x[::2, 0] += 1.0
+    assert found_by(odometry_log(x), *SPEEDS)['jumps'].verdict == FAIL

@@ -5,7 +5,7 @@ import pytest
 from made_odometry import graph
 from simulated_driver import SimulatedDriver
 
-from auv_analysis.driver.checks import CHECKS
+from auv_analysis.driver.checks import CHECKS, document_of
 from auv_analysis.driver.checks import judge as judged
 from auv_analysis.driver.evidence import (
     FAIL,
@@ -17,7 +17,7 @@ from auv_analysis.driver.evidence import (
 )
 from auv_analysis.driver.excitation import PULSE, Plan, carry_out, plan_of
 from auv_analysis.driver.response import predicted
-from auv_dynamics import load_vehicle
+from auv_dynamics import Vehicle, load_vehicle
 from auv_dynamics.vehicle import DOFS
 
 AXES = ('surge', 'sway', 'yaw')
@@ -29,6 +29,23 @@ def gains(**factors: float):
     return lambda tau: size * tau
 
 
+OTHERWISE = {  # what a right driver of another vehicle than the model's may be
+    'quick': {'inertia': 0.3},
+    'quick and late': {'inertia': 0.3, 'delay': 0.3},
+    'slow': {'inertia': 3.0},
+    'slow and late': {'inertia': 3.0, 'delay': 0.15},
+    'dragging': {'damping': 3.0, 'delay': 0.3},
+    'with lag': {'lag': 0.15, 'delay': 0.1},
+    'quick, with lag, biased and noisy': {
+        'inertia': 0.3,
+        'lag': 0.15,
+        'delay': 0.1,
+        'bias': (0.03, -0.02, 0.01, 0.0, 0.0, 0.0),
+        'noise': 3e-3,
+    },
+}
+
+
 def exchanged(one: str, other: str):
     order = list(range(6))
     i, j = DOFS.index(one), DOFS.index(other)
@@ -36,11 +53,14 @@ def exchanged(one: str, other: str):
     return lambda tau: tau[order]
 
 
-def judge(driver: SimulatedDriver, *axes: str, vehicle: str = '') -> dict[str, CheckResult]:
-    model = load_vehicle(vehicle) if vehicle else driver.vehicle
-    plan = plan_of(model, axes, 0.1, None, None)
+def evidence_of(driver: SimulatedDriver, *axes: str, raised: float = 0.0) -> DriverRecord:
+    plan = plan_of(driver.vehicle, axes, 0.1, None, None, raised)
     excitation = carry_out(driver, plan, 0.5, lambda: False, lambda _: None)
-    evidence = DriverRecord(graph(), driver.log(), Settings(), excitation)
+    return DriverRecord(graph(), driver.log(), Settings(), excitation)
+
+
+def judge(driver: SimulatedDriver, *axes: str) -> dict[str, CheckResult]:
+    evidence = evidence_of(driver, *axes)
     ids = [id for id, check in CHECKS.items() if check.group == 'response']
     return {finding.id: finding for finding in judged(evidence, ids)}
 
@@ -132,3 +152,80 @@ def test_axes_without_thrusters_are_left_out() -> None:
     plan = plan_of(load_vehicle('bluerov2'), (), 0.1, None, None)
     assert set(plan.skipped) == {'pitch'}
     assert 'pitch' not in [trial.dof for trial in plan.trials]
+
+
+@pytest.mark.parametrize('model_error', OTHERWISE)
+def test_a_sign_is_told_whatever_the_model_is_off_by(model_error: str) -> None:
+    kind = {'noise': 1e-3, **OTHERWISE[model_error]}
+    for sign in (1.0, -1.0):
+        driver = SimulatedDriver(mapping=lambda tau, sign=sign: sign * tau, **kind)
+        evidence = evidence_of(driver, 'surge', 'roll', 'pitch', 'yaw')
+        for trial in evidence.answered:
+            found = CHECKS[f'response_{trial.trial.dof}'].finding(evidence)
+            assert trial.response.sign == sign, found
+            assert ('sign is reversed' in found.advice) == (sign < 0)
+
+
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+def test_what_fits_both_signs_is_undecided(sign: float) -> None:
+    driver = SimulatedDriver(mapping=lambda tau: sign * tau, delay=1.0, noise=3e-3, watchdog=None)
+    found = judge(driver, *AXES)
+    for dof in AXES:
+        one = found[f'response_{dof}']
+        assert one.verdict == NOT_CHECKED, one
+        assert 'undecided: both signs fit' in one.found
+        assert 'reversed' not in one.advice
+    assert found['response_delay'].verdict == NOT_CHECKED
+
+
+def test_the_delay_is_measured_and_what_to_do_with_it_is_said() -> None:
+    driver = SimulatedDriver(delay=0.12, noise=2e-3)
+    evidence = evidence_of(driver, *AXES)
+    delay = document_of(evidence, judged(evidence))['command_to_response_delay']
+    assert delay['seconds'] == pytest.approx(0.12, abs=3.0 * delay['uncertainty'])
+    assert 0.0 < delay['uncertainty'] < 0.05
+    assert set(delay['axes']) == set(AXES)
+    found = CHECKS['response_delay'].finding(evidence)
+    assert f'auv linearize SCENARIO {delay["option"]}' in found.found
+
+
+def test_noise_is_measured_at_rest() -> None:
+    found = judge(SimulatedDriver(noise=0.01), *AXES)
+    for dof in AXES:
+        one = found[f'response_{dof}']
+        assert one.verdict == PASS
+        assert one.numbers['noise_at_rest'] == pytest.approx(0.01, rel=0.15)
+
+
+def in_dead_band(vehicle: Vehicle):
+    """A mapping by thrusters of which none turns below the thrust that the vehicle file tells."""
+    thrusters = vehicle.thrusters
+    least = np.array([max(rotor.dead_band) for rotor in thrusters.rotors])
+
+    def acting(tau: np.ndarray) -> np.ndarray:
+        u = thrusters.inverse @ tau
+        return thrusters.matrix @ np.where(np.abs(u) < least, 0.0, u)
+
+    return acting
+
+
+def test_pulses_are_above_the_dead_band_of_the_vehicle_file() -> None:
+    driver = SimulatedDriver(noise=1e-3)
+    driver.take(in_dead_band(driver.vehicle))
+    evidence = evidence_of(driver, 'roll', 'yaw', raised=0.5)
+    trials = evidence.sent.plan.trials[:-1]
+    assert all(trial.size > trial.dead_band > 0.0 for trial in trials)
+    assert {trial.pulse for trial in trials} == {PULSE / 2}
+    for dof in ('roll', 'yaw'):
+        found = CHECKS[f'response_{dof}'].finding(evidence)
+        assert found.verdict == PASS, found
+
+
+def test_a_response_reduced_by_the_dead_band_is_named_as_such() -> None:
+    driver = SimulatedDriver(noise=1e-3)
+    driver.take(in_dead_band(driver.vehicle))
+    for dof in ('roll', 'yaw'):
+        found = judge(driver, dof)[f'response_{dof}']
+        assert found.verdict == NOT_CHECKED
+        assert 'reduced by the dead band of the thrusters' in found.found
+        assert 'no fault of sign or axis' in found.advice

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_odometry import found_in as found_by
 from made_odometry import graph, motion, odometry_log
+from scipy.signal import lfilter
 
 from auv_analysis.driver.checks import CHECKS
 from auv_analysis.driver.evidence import (
@@ -165,6 +166,7 @@ def test_everything_in_ros_axes_is_consistent_and_passes() -> None:
 @pytest.mark.parametrize('noise', NOISES)
 def test_a_vehicle_at_rest_tells_nothing(noise: float) -> None:
     found = found_in(motion(speed=0.01, noise=noise))
+    assert found.pop('velocity_bias').verdict == PASS
     assert {one.verdict for one in found.values()} == {NOT_CHECKED}
     assert 'moved too little' in found['twist_frame'].found
     assert 'move the vehicle' in found['twist_frame'].advice
@@ -231,3 +233,56 @@ def test_the_right_reading_fits_and_all_others_do_not() -> None:
         assert fits.right
         assert not fits.others
         assert fits.off[CHILD] < 0.03
+
+
+def at_rest(seconds: float = 10.0, rate: float = 50.0) -> np.ndarray:
+    """States (n, 13) of a vehicle that hangs still, noise of an estimator in it."""
+    random, n = np.random.default_rng(5), round(seconds * rate)
+    x = np.tile([3.0, -2.0, 5.0, 0.92, 0.0, 0.0, 0.392, *np.zeros(6)], (n, 1))
+    x[:, 3:7] /= np.linalg.norm(x[0, 3:7])
+    x[:, :3] += random.normal(0.0, 0.003, (n, 3))
+    x[:, 7:] += random.normal(0.0, 0.003, (n, 6))
+    return x
+
+
+def wander(n: int, size: float, last: float = 1.0, rate: float = 50.0) -> np.ndarray:
+    """First-order autoregressive noise (n,) of a standard deviation, that lasts for some s."""
+    rho = np.exp(-1.0 / (last * rate))
+    draw = np.random.default_rng(8).normal(0.0, size * np.sqrt(1.0 - rho**2), n)
+    return lfilter([1.0], [1.0, -rho], draw)
+
+
+def test_a_biased_velocity_is_told_from_a_current_by_the_position_at_rest() -> None:
+    x = at_rest()
+    bias = np.array([0.03, -0.02, 0.01])
+    finding = found_in(with_parts(x, v=x[:, 7:10] + bias))
+    found = finding['velocity_bias']
+    assert found.verdict == FAIL
+    assert 'velocity of the estimator is biased by 0.037' in found.found
+    assert 'surge +0.030, sway -0.020 and heave +0.010' in found.found
+    assert all('current' not in one.found for one in finding.values())
+    flow = np.array([0.05, 0.02, 0.0])
+    way = x[:, :3] + np.arange(len(x))[:, None] / 50.0 * flow
+    through_water = found_in(with_parts(x, p=way))['velocity_bias']
+    assert through_water.verdict == FAIL
+    assert 'a current, or a moving origin' in through_water.found
+    v = np.einsum('nji,j->ni', rotation(x[:, 3:7]), flow) + x[:, 7:10]
+    carried = found_in(with_parts(x, p=way, v=v))['velocity_bias']
+    assert carried.verdict == PASS
+    assert 'which agree: a current, or a moving origin' in carried.found
+
+
+def test_at_rest_nothing_is_told_of_a_bias_that_is_not_there() -> None:
+    found = found_in(at_rest())['velocity_bias']
+    assert found.verdict == PASS
+    assert 'current' not in found.found
+
+
+@pytest.mark.parametrize('last', [0.0, 0.3, 1.0])
+def test_noise_of_the_depth_at_rest_is_no_false_alarm(last: float) -> None:
+    x = at_rest()
+    depth = wander(len(x), 0.2, last) if last else np.random.default_rng(4).normal(0, 0.2, len(x))
+    x[:, 2] += depth
+    heard = odometry_log(x)
+    found = found_by(heard, *CHECKS)
+    assert [id for id, one in found.items() if one.verdict == FAIL] == []

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from auv_analysis.driver.excitation import Plan
 
 APPEARS = 5.0  # s within which discovery finds a driver that is there
+SPEED, FASTEST = 0.1, 0.5  # m/s and rad/s
 LOOK = 0.1  # s between two looks
 
 
@@ -52,8 +53,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add('--actuate', action='store_true', help=text)
     text = 'only this one; may be repeated; default: all that are actuated'
     add('--axis', action='append', choices=DOFS, help=text)
-    text = 'largest predicted speed, m/s and rad/s, default: 0.1'
-    add('--speed', type=number(above=0, at_most=0.5), default=0.1, metavar='V', help=text)
+    text = (
+        f'largest predicted speed, m/s and rad/s, default: {SPEED:g}, or up to {FASTEST:g} where '
+    )
+    text += "the vehicle file's thrusters would stay in their dead band"
+    add('--speed', type=number(above=0, at_most=FASTEST), metavar='V', help=text)
     add('--force', type=number(above=0), metavar='N', help='largest force, N')
     add('--torque', type=number(above=0), metavar='NM', help='largest torque, N m')
 
@@ -102,7 +106,10 @@ def _plan(options: argparse.Namespace) -> Plan | None:
     if vehicle is None:
         expected = 'a vehicle file with --actuate: it bounds the wrench and predicts the response'
         raise InputError('--vehicle', '', expected, None)
-    plan = plan_of(vehicle, options.axis or (), options.speed, options.force, options.torque)
+    speeds = (SPEED, FASTEST) if options.speed is None else (options.speed, options.speed)
+    plan = plan_of(
+        vehicle, options.axis or (), speeds[0], options.force, options.torque, raised=speeds[1]
+    )
     if not plan.trials:
         expected = f'axes that the thrusters of {vehicle.name} can move'
         raise InputError('--axis', '', expected, ', '.join(options.axis or ()))

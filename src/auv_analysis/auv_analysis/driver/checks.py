@@ -269,6 +269,7 @@ CHECKS = {
         _check('motion', motion, twist_checks.twist_frame),
         _check('motion', motion, twist_checks.angular_frame),
         *_per_dof('motion', motion, twist_checks.axis),
+        _check('motion', motion, twist_checks.velocity_bias),
         _check('response', wrenches, response.actuation),
         *_per_dof('response', wrenches, response.response),
         _check('response', wrenches, response.response_delay),
@@ -311,6 +312,7 @@ def refusal(findings: Sequence[CheckResult]) -> str:
 def document_of(evidence: DriverRecord, findings: Sequence[CheckResult]) -> dict[str, Any]:
     """All that was found, ready for JSON."""
     graph, log = evidence.graph, evidence.log
+    delay = response.command_to_response_delay(evidence)
     return {
         'place': graph.place,
         'topics': {ODOM: graph.odom, WRENCH: graph.wrench},
@@ -320,6 +322,7 @@ def document_of(evidence: DriverRecord, findings: Sequence[CheckResult]) -> dict
         'counts': counts(findings),
         'checks': [finding.document() for finding in findings],
         'trials': [trial.document() for trial in evidence.answered],
+        'command_to_response_delay': delay and delay.document(),
     }
 
 

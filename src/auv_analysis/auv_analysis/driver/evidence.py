@@ -139,16 +139,19 @@ class DriverRecord:
     passive: str = ''
 
     @cached_property
-    def _poses(self) -> tuple[np.ndarray, np.ndarray, bool]:
-        """States (n, 13) with an attitude, their rising times in ns, whether those of arrival."""
+    def _poses(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+        """States (n, 13) with an attitude, their rising times and arrivals in ns.
+
+        And whether these times are those of arrival.
+        """
         log = self.log
         norm = np.linalg.norm(log.x[:, 3:7], axis=1)
         good = log.finite & (np.abs(norm - 1.0) < UNIT)
         x, stamps, arrived = log.x[good], log.stamp_ns[good], log.arrived_ns[good]
         if (np.diff(stamps) > 0).all():
-            return x, stamps, False
+            return x, stamps, arrived, False
         newer = np.diff(np.maximum.accumulate(arrived), prepend=-1) > 0
-        return x[newer], arrived[newer], True
+        return x[newer], arrived[newer], arrived[newer], True
 
     @property
     def has_motion(self) -> bool:
@@ -158,9 +161,16 @@ class DriverRecord:
     @cached_property
     def motion(self) -> PoseTwist:
         """Pose and twist of the messages that tell them, where they are enough."""
-        x, ns, by_arrival = self._poses
+        x, ns, _, by_arrival = self._poses
         q = x[:, 3:7] / np.linalg.norm(x[:, 3:7], axis=1, keepdims=True)
         return PoseTwist((ns - ns[0]) / NANOSECONDS, x[:, :3], q, x[:, 7:], by_arrival)
+
+    @property
+    def uncommanded(self) -> np.ndarray:
+        """Which samples (n,) of the motion arrived before the first wrench."""
+        arrived, sent = self._poses[2], self.excitation.sent if self.excitation else ()
+        began = next((ns for one in sent for ns, _ in one.steps), arrived[-1] + 1)
+        return np.asarray(arrived < began)
 
     @cached_property
     def twist_fits(self) -> dict[str, TwistFit]:

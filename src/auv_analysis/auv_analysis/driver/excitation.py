@@ -15,7 +15,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
-from auv_analysis.driver.response import GainFit, Wrench, fit_response, predicted
+from auv_analysis.driver.response import (
+    SCALES,
+    GainFit,
+    Noise,
+    Wrench,
+    fit_response,
+    noise_at_rest,
+    predicted,
+)
 from auv_analysis.output.progress import say
 from auv_analysis.output.text import join
 from auv_dynamics.files.errors import on_signals
@@ -24,7 +32,11 @@ from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 PULSE = 1.0  # s that a wrench acts one way, then the other
+SHORT = 0.5  # s of it for a wrench that is large, since thrusters have a dead band
+ABOVE = 1.2  # times the wrench at which the last thruster turns: what is sent then
+LOADED = 0.01  # of the largest thrust: a thruster with less does not matter
 REST = 0.5  # s of zero before and after
+SETTLE = 2.0  # s of it before the first: a driver arms, and the noise at rest is measured
 HELD, UNHEARD = 0.5, 2.0  # s of a wrench, then of silence, to see whether the driver lets go
 ROUNDS = 4  # of making a wrench smaller: drag is not linear
 LEVEL = np.eye(13)[3]  # at rest, upright
@@ -39,6 +51,7 @@ COUNTDOWN = 3  # s before the first wrench
 MATCHES = 5.0  # s for the driver to be seen by a new publisher
 LOOK_AGAIN = 0.1  # s between two looks at what has come before that
 ZERO = (0.0,) * 6
+SIGNS = {1: 'right', 0: 'undecided', -1: 'reversed'}
 
 
 @dataclass(frozen=True)
@@ -50,12 +63,19 @@ class Trial:
     dof : its axis
     size : N or N m
     silent : whether it ends by silence, not by its opposite and zero
+    rest, pulse : s of zero before it, and of each way
+    dead_band : N or N m at which all its thrusters turn; 0: not known
+    speed : m/s and rad/s that are not passed, by the model
 
     """
 
     dof: str
     size: float
     silent: bool = False
+    rest: float = REST
+    pulse: float = PULSE
+    dead_band: float = 0.0
+    speed: float = 0.0
 
     @property
     def axis(self) -> int:
@@ -73,6 +93,11 @@ class Trial:
         return 'N' if self.axis < 3 else 'N m'
 
     @property
+    def turns(self) -> bool:
+        """Whether its thrusters are out of their dead band, as far as that is known."""
+        return self.size >= self.dead_band
+
+    @property
     def speed_unit(self) -> str:
         """Of the velocity along its axis."""
         return 'm/s' if self.axis < 3 else 'rad/s'
@@ -81,9 +106,9 @@ class Trial:
     def parts(self) -> list[tuple[Wrench, float]]:
         """Wrenches one after the other, and for how many s each is sent."""
         if self.silent:
-            return [(ZERO, REST), (self.tau, HELD)]
+            return [(ZERO, self.rest), (self.tau, HELD)]
         back = tuple(-number for number in self.tau)
-        return [(ZERO, REST), (self.tau, PULSE), (back, PULSE), (ZERO, REST)]
+        return [(ZERO, self.rest), (self.tau, self.pulse), (back, self.pulse), (ZERO, REST)]
 
     @property
     def seconds(self) -> float:
@@ -100,14 +125,17 @@ class Plan:
     vehicle : the model that it is made for
     trials : one after the other, that with silence last
     skipped : degree of freedom -> why none is sent for it
-    speed : m/s and rad/s that are not passed, by the model
 
     """
 
     vehicle: Vehicle
     trials: tuple[Trial, ...]
     skipped: Mapping[str, str]
-    speed: float
+
+    @property
+    def speed(self) -> float:
+        """What no velocity passes by the model, m/s and rad/s."""
+        return max(trial.speed for trial in self.trials)
 
     def lines(self) -> list[str]:
         """What is going to happen, for people."""
@@ -115,14 +143,19 @@ class Plan:
         moved = [f'{one.dof} ±{one.size:.3g} {one.unit}' for one in self.trials if not one.silent]
         last = self.trials[-1]
         return [
-            f'THE VEHICLE WILL MOVE for {seconds:.0f} s: {join(moved)}, {PULSE:g} s each way, '
+            f'THE VEHICLE WILL MOVE for {seconds:.0f} s: {join(moved)}, {PULSE:g} s or less each, '
             f'then {last.dof} {last.size:.3g} {last.unit} without a zero behind it',
             f'by the model at most {self.speed:g} m/s and rad/s; Ctrl-C sends zero and ends',
         ]
 
 
 def plan_of(
-    vehicle: Vehicle, dofs: Sequence[str], speed: float, force: float | None, torque: float | None
+    vehicle: Vehicle,
+    dofs: Sequence[str],
+    speed: float,
+    force: float | None,
+    torque: float | None,
+    raised: float = 0.0,
 ) -> Plan:
     """Wrenches that move a vehicle a little.
 
@@ -132,6 +165,7 @@ def plan_of(
     dofs : axes that are asked for; none: all
     speed : m/s and rad/s that no degree of freedom passes by the model
     force, torque : N and N m that none passes; none: only the speed limits them
+    raised : m/s and rad/s in place of the speed, where thrusters would stay in their dead band
 
     """
     lost = vehicle.thrusters.unactuated() if vehicle.thrusters is not None else {}
@@ -142,19 +176,35 @@ def plan_of(
     caps = (force, torque)
 
     def bounded(trial: Trial) -> Trial:
+        cap, dead_band = caps[trial.axis // 3], _dead_band(vehicle, trial.axis)
+        trial = replace(trial, dead_band=dead_band, speed=speed)
         most = _largest(vehicle, trial, speed)
-        cap = caps[trial.axis // 3]
+        if most < ABOVE * dead_band and raised > speed:
+            trial = replace(trial, pulse=SHORT, speed=raised)
+            most = min(_largest(vehicle, trial, raised), ABOVE * dead_band)
         return replace(trial, size=most if cap is None else min(most, cap))
 
     trials = [Trial(dof, 1.0) for dof in moved]
     if moved:
+        trials[0] = replace(trials[0], rest=SETTLE)
         trials.append(Trial(min(moved, key=CALM.index), 1.0, silent=True))
-    return Plan(vehicle, tuple(map(bounded, trials)), skipped, speed)
+    return Plan(vehicle, tuple(map(bounded, trials)), skipped)
+
+
+def _dead_band(vehicle: Vehicle, axis: int) -> float:
+    """N or N m along an axis at which all thrusters that it needs turn; 0 where none tells it."""
+    thrusters = vehicle.thrusters
+    if thrusters is None or not thrusters.rotors:
+        return 0.0
+    share = np.abs(thrusters.inverse[:, axis])
+    needed = share > LOADED * share.max()
+    least = np.array([max(rotor.dead_band) for rotor in thrusters.rotors])
+    return float((least[needed] / share[needed]).max(initial=0.0))
 
 
 def _largest(vehicle: Vehicle, trial: Trial, speed: float) -> float:
     """N or N m that no velocity passes a speed with: by inertia alone, and by the whole model."""
-    seconds = HELD + UNHEARD if trial.silent else PULSE
+    seconds = HELD + UNHEARD if trial.silent else trial.pulse
     size = speed / (seconds * float(np.abs(np.linalg.inv(vehicle.M)[:, trial.axis]).max()))
     for _ in range(ROUNDS):
         tau = replace(trial, size=size).tau
@@ -222,7 +272,9 @@ class Excitation:
 
     def measured(self, log: OdometryLog) -> 'list[MeasuredTrial]':
         """Trials that were not broken off and of which enough was heard."""
-        return [trial for sent in self.sent if (trial := _measured(self.plan.vehicle, sent, log))]
+        noise = _noise(self.sent, log)
+        trials = (_measured(self.plan.vehicle, sent, log, noise) for sent in self.sent)
+        return [trial for trial in trials if trial]
 
 
 class AbortError(RuntimeError):
@@ -392,6 +444,7 @@ class MeasuredTrial:
     trial : what was sent
     t, nu : (n,) s and (n, 6) m/s and rad/s, measured, by the times of arrival
     x : (13,) state at its beginning
+    noise : of nu at rest
     held : begin, end in s and wrench of each piece
     applied_t, applied : (m,) s and (m, 6) of wrench_applied
     silent_from : s, when the last wrench was sent
@@ -403,6 +456,7 @@ class MeasuredTrial:
     t: np.ndarray
     nu: np.ndarray
     x: np.ndarray
+    noise: Noise
     held: list[tuple[float, float, Wrench]]
     applied_t: np.ndarray
     applied: np.ndarray
@@ -413,10 +467,15 @@ class MeasuredTrial:
         """Response to the wrenches as they were sent."""
         return self.response_to(self.held)
 
-    def response_to(self, held: Sequence[tuple[float, float, Wrench]]) -> GainFit:
-        """Response if these wrenches had acted."""
-        model = predicted(self.vehicle, self.x, held)
-        return fit_response(self.t, self.nu, model, self.trial.axis)
+    def response_to(
+        self, held: Sequence[tuple[float, float, Wrench]], scales: np.ndarray = SCALES
+    ) -> GainFit:
+        """Response if these wrenches had acted, on a vehicle of one of these scales."""
+        axis = self.trial.axis
+        latest = self.trial.pulse / 2
+        return fit_response(
+            self.vehicle, self.x, held, self.t, self.nu, axis, self.noise, latest, scales
+        )
 
     def document(self) -> Mapping[str, Any]:
         """Ready for JSON."""
@@ -425,18 +484,32 @@ class MeasuredTrial:
             'dof': trial.dof,
             'size': trial.size,
             'unit': trial.unit,
+            'dead_band': trial.dead_band,
+            'sign': SIGNS[found.sign],
             'gain': found.gain,
             'delay': found.delay,
+            'delay_uncertainty': found.delay_error,
+            'noise_at_rest': float(np.sqrt(self.noise.variance[trial.axis])),
             'peaks_measured': found.measured.tolist(),
             'peaks_predicted': found.predicted.tolist(),
         }
 
 
-def _measured(vehicle: Vehicle, sent: Sent, log: OdometryLog) -> MeasuredTrial | None:
+def _noise(sent: Sequence[Sent], log: OdometryLog) -> Noise:
+    """Noise of the velocity before the first wrench that is not zero."""
+    steps = [step for one in sent for step in one.steps]
+    moved = next((ns for ns, tau in steps if tau != ZERO), 0)
+    before = log.finite & (log.arrived_ns <= moved)
+    before &= log.arrived_ns > moved - SETTLE * NANOSECONDS
+    return noise_at_rest((log.arrived_ns[before] - moved) / NANOSECONDS, log.x[before, 7:])
+
+
+def _measured(vehicle: Vehicle, sent: Sent, log: OdometryLog, noise: Noise) -> MeasuredTrial | None:
     """What was heard of a trial; None where it was broken off or too little came."""
     if not sent.ended_ns:
         return None
-    began = sent.steps[0][0]
+    steps = sent.steps[round((sent.trial.rest - REST) / PERIOD) :]
+    began = steps[0][0]
 
     def during(ns: np.ndarray) -> np.ndarray:
         return (ns >= began) & (ns <= sent.ended_ns)
@@ -453,7 +526,7 @@ def _measured(vehicle: Vehicle, sent: Sent, log: OdometryLog) -> MeasuredTrial |
     start = before[0].copy()
     start[7:] = np.median(before[:, 7:], axis=0)
     # pieces of time in which one wrench was held
-    runs = [(next(run)[0], tau) for tau, run in groupby(sent.steps, key=lambda step: step[1])]
+    runs = [(next(run)[0], tau) for tau, run in groupby(steps, key=lambda step: step[1])]
     ends = [*(ns for ns, _ in runs[1:]), sent.ended_ns]
     held = [(seconds(ns), seconds(end), tau) for (ns, tau), end in zip(runs, ends, strict=True)]
     acted = during(log.applied_arrived_ns)
@@ -463,8 +536,9 @@ def _measured(vehicle: Vehicle, sent: Sent, log: OdometryLog) -> MeasuredTrial |
         t,
         x[:, 7:],
         start,
+        noise,
         held,
         seconds(log.applied_arrived_ns[acted]),
         log.applied[acted],
-        seconds(sent.steps[-1][0]),
+        seconds(steps[-1][0]),
     )

@@ -15,6 +15,8 @@ from auv_dynamics.vehicle.kinematics import rotation
 
 USUAL = {ODOM, 'map', 'world', 'earth', 'base_link', 'base_footprint'}  # in ROS: ENU and FLU
 BETWEEN = 'put frame_converter_node between the driver and our nodes'
+BEYOND = 10.0  # times the median deviation of a step: nearly seven standard deviations
+IN_TURN = -0.75  # correlation of a step with the next: white noise has -0.5, two sources in turn -1
 FELL_OVER = 75.0  # deg from upright that no vehicle has at a check
 FLOATS = 40.0  # deg that it may have
 ABOVE = 0.5  # m above the origin that are worth a word
@@ -138,13 +140,18 @@ def jumps(evidence: DriverRecord) -> CheckResult:
         why = 'the stamps do not rise, and times of arrival are no measure of a step'
         return unchecked(expected, why)
     apart = np.diff(motion.t)[:, None]
-    position = _largest(np.diff(motion.p, axis=0) / apart)
+    steps = np.diff(motion.p, axis=0)
+    apart_from = steps - np.median(steps, axis=0)  # noise of the position makes no speed
+    noise = BEYOND * np.median(np.abs(apart_from), axis=0)
+    to_and_fro = (apart_from[1:] * apart_from[:-1]).sum(axis=0)
+    noise[to_and_fro < IN_TURN * (apart_from**2).sum(axis=0)] = 0.0
+    position = _largest(np.maximum(np.abs(steps) - noise, 0.0) / apart)
     attitude = _largest(np.diff(motion.turned, axis=0) / apart)
     linear, angular = _largest_halves(np.diff(motion.nu, axis=0) / apart)
     return judged(
         position <= speed and attitude <= turning and max(linear, angular) <= acceleration,
         expected,
-        f'position {number(position)} m/s, attitude {number(attitude)} rad/s, '
+        f'position {number(position)} m/s beyond its noise, attitude {number(attitude)} rad/s, '
         f'twist {number(linear)} m/s2 and {number(angular)} rad/s2',
         'a filter that is reset, two sources in turn, or an angle that leaps: smooth or refuse',
         position=position,

@@ -154,17 +154,16 @@ def _answers(trials: Sequence[MeasuredTrial]) -> Drawn:
     panels = []
     for measured in trials:
         trial, response = measured.trial, measured.response
-        nu, model = measured.nu[:, trial.axis], response.model
-        late, added = model.t + response.delay, model.added[:, trial.axis]
+        nu, late = measured.nu[:, trial.axis], response.t + response.delay
         curves = [
             Curve(measured.t, nu - nu[0], 'measured', {'color': COLOURS[trial.axis]}),
-            Curve(late, added, 'model', {'color': GREY, 'linestyle': '--'}),
+            Curve(late, response.form, 'fit', {'color': GREY, 'linestyle': '--'}),
         ]
         panels.append(Panel(curves, f'{trial.dof} ({trial.speed_unit})'))
     figure = plots.time_panels(panels, across=2)
     title = 'Answers to small wrenches'
     caption = (
         f'{title}: velocity since the beginning of each trial, and what the wrench adds to it by '
-        'the model, shifted by the delay that was found; drift beside it is taken off by the fit.'
+        'the fit, with its inertia, damping and delay; drift beside it is taken off.'
     )
     return figure, title, caption

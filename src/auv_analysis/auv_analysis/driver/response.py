@@ -1,4 +1,4 @@
-"""Response to wrenches: velocity by the model, and the measured one as a multiple of it."""
+"""Response to wrenches: velocity by the model, and the sign, size and delay of the measured one."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.interpolate import make_interp_spline
+from scipy.linalg import expm
 
 from auv_dynamics.plant.plant import eta_of
 from auv_dynamics.vehicle.kinematics import jacobian
@@ -17,9 +19,19 @@ Held = Sequence[tuple[float, float, Wrench]]  # begin and end in s of each wrenc
 
 ACCURATE = 1e-6  # m/s, rad/s, and relative
 STEPS = 0.02  # s between two values of a prediction
-LATEST = 0.8  # s of delay that are looked for
+OPPOSED = 3.0  # times as late may the other sign be that has to fit worse
 FINE = 0.01  # s between two delays that are tried
 ALIKE = 1e-6  # of the largest: terms that are as much alike are one
+TILT = 1e-4  # rad, by which restoring forces are linearised
+SCALES = np.array(  # inertia and damping, times the model's, under which a sign has to hold
+    [(a, b) for a in np.geomspace(0.25, 4.0, 9) for b in np.geomspace(0.25, 4.0, 5)]
+)
+MISFIT = 1.0  # of what no model explains: by so much the other sign has to be worse
+SURE = 8.0  # difference in log-likelihood beyond which noise at rest does not make it better
+KNOWN = 1.25  # times its estimate: what the variance of the noise may be
+AS_WELL = 0.03  # of what moved: models that leave so much more of it fit as well
+NOTHING = 0.2  # of the predicted response: none
+EXPLAINED = 0.3  # of what moved: a sign that leaves more of it is not told
 
 
 class Predicted(NamedTuple):
@@ -63,77 +75,209 @@ def _rate(vehicle: Vehicle, tau: np.ndarray, _: float, y: np.ndarray) -> np.ndar
     return np.concatenate([jacobian(eta) @ nu, vehicle.forward_dynamics(eta, nu, tau)])
 
 
+def _varied(
+    vehicle: Vehicle, x: np.ndarray, held: Held, model: Predicted, axis: int, scales: np.ndarray
+) -> Predicted:
+    """Velocity along an axis, (m, k) each, with k (2,) scales of the model's inertia and damping.
+
+    (1) is linear about the state x (13,) here, without C, with D at the mean speeds of the model:
+    responses to the steps of the wrench are added up.
+    """
+    eta, inverse = eta_of(x), np.linalg.inv(vehicle.M)
+    ways = (TILT * jacobian(eta)).T
+    K = np.array([vehicle.g(eta + way) - vehicle.g(eta - way) for way in ways]).T / (2.0 * TILT)
+    D = vehicle.D(np.abs(model.added).mean(axis=0))
+    inertia, damping = scales.T[:, :, None, None]
+    A = np.zeros((len(scales), 14, 14))  # displacement, velocity, a unit wrench, weight
+    A[:, :6, 6:12] = np.eye(6)
+    A[:, 6:12, :6] = -inverse @ K / inertia
+    A[:, 6:12, 6:12] = -inverse @ D * damping / inertia
+    A[:, 6:12, 12] = inverse[:, axis] / inertia[..., 0]
+    A[:, 6:12, 13] = -inverse @ vehicle.g(eta) / inertia[..., 0]
+    z = np.zeros((len(scales), 14, 2))
+    z[:, 12, 0] = z[:, 13, 1] = 1.0
+    z[:, 6:12, 1] = x[7:]
+    t, step, rows = np.arange(0.0, held[-1][1] + STEPS, STEPS), expm(STEPS * A), [z[:, 6 + axis]]
+    for _ in t[1:]:
+        z = step @ z
+        rows.append(z[:, 6 + axis])
+    by_step, alone = np.moveaxis(np.array(rows), 2, 0)
+    response = make_interp_spline(t, by_step, k=1)
+    changes = np.diff([tau[axis] for *_, tau in held], prepend=0.0)
+    added = sum(
+        size * response(np.maximum(t - begin, 0.0))
+        for (begin, *_), size in zip(held, changes, strict=True)
+    )
+    return Predicted(t, np.asarray(added), alone)
+
+
+class Noise(NamedTuple):
+    """Noise of the velocity at rest.
+
+    Attributes
+    ----------
+    variance : (6,) m2/s2 and rad2/s2
+    alike : (6,) how many samples in a row tell as much as one that is independent
+
+    """
+
+    variance: np.ndarray
+    alike: np.ndarray
+
+
+def noise_at_rest(t: np.ndarray, nu: np.ndarray) -> Noise:
+    """Noise of velocities (n, 6) at times (n,) in s beside a line; zero if n is below 5."""
+    if len(t) < 5:
+        return Noise(np.zeros(6), np.ones(6))
+    left = nu - np.polynomial.polynomial.polyval(t, np.polyfit(t, nu, 1)[::-1]).T
+    return Noise((left**2).sum(axis=0) / (len(t) - 2), in_a_row(left))
+
+
+def in_a_row(left: np.ndarray) -> np.ndarray:
+    """How many of the residuals (n, k) in a row tell as much as one: (1 + rho) / (1 - rho), (k,).
+
+    They are taken for a first-order autoregressive process.
+    """
+    squares = np.maximum((left**2).sum(axis=0), np.finfo(float).tiny)
+    rho = np.clip((left[1:] * left[:-1]).sum(axis=0) / squares, 0.0, 1.0 - 2.0 / len(left))
+    return np.asarray((1.0 + rho) / (1.0 - rho))
+
+
 @dataclass(frozen=True)
 class GainFit:
     """A measured velocity as a multiple of a predicted one, beside a steady drift.
 
     Attributes
     ----------
-    model : the prediction
-    gain : measured over predicted, in the axis of the wrench
-    delay : s
+    t, form : (m,) s and (m,) the response that fits best, m/s or rad/s, without its delay
+    scales : (2,) inertia and damping of that, times the model's
+    gain : peak of the measured over that of the predicted response, in the axis of the wrench
+    sign : 1: as it should be, -1: reversed, 0: undecided
+    delay, delay_error : s, and its standard error
     squares : of what is left of the velocity in that axis
     residual : its root mean square, m/s or rad/s
     measured, predicted : (6,) peak of each velocity, as far as it has the shape of the prediction
 
     """
 
-    model: Predicted
+    t: np.ndarray
+    form: np.ndarray
+    scales: np.ndarray
     gain: float
+    sign: int
     delay: float
+    delay_error: float
     squares: float
     residual: float
     measured: np.ndarray
     predicted: np.ndarray
 
 
-def fit_response(t: np.ndarray, nu: np.ndarray, model: Predicted, axis: int) -> GainFit:
+def fit_response(
+    vehicle: Vehicle,
+    x: np.ndarray,
+    held: Held,
+    t: np.ndarray,
+    nu: np.ndarray,
+    axis: int,
+    noise: Noise,
+    latest: float,
+    scales: np.ndarray = SCALES,
+) -> GainFit:
     """Fit gain * added(t - delay) + c_0 + c_1 t + c_2 alone(t) to a velocity.
 
     The wrench acts one way and then the other, so that what it adds rises and falls. What is
     steady, such as buoyancy, a current or a slow turn, is taken up by the straight line, and the
     swinging of a vehicle that something rights by the motion that the model has without a wrench.
+    A vehicle that is quicker or slower than its model can look like one that is late and goes the
+    other way: inertia and damping are nuisance parameters, and each sign has the best of them.
 
     Parameters
     ----------
+    vehicle, x : the model and its state (13,) at first
+    held : wrenches along the axis
     t, nu : (n,) s and (n, 6) m/s and rad/s, measured
-    model : what is predicted
     axis : of the wrench
+    noise : of nu at rest
+    latest : s of delay that may be, half of a pulse
+    scales : (k, 2) inertia and damping that may be, times the model's
 
     """
-    free = [np.interp(t, model.t, column) for column in model.alone.T]
-    delays = np.arange(0.0, LATEST, FINE)
-    forms = np.stack([np.interp(t - late, model.t, model.added[:, axis]) for late in delays])
-    fits = [_gains(t, nu[:, j], forms, free[j]) for j in range(6)]
-    best = [int(np.argmin(squares)) for _, squares in fits]
-    prompt = [np.interp(t, model.t, column) for column in model.added.T]
-    shares = [_gains(t, prompt[j], forms[:1], free[j])[0][0] for j in range(6)]
-    gains = np.array([gain[k] for (gain, _), k in zip(fits, best, strict=True)])
-    peak = float(np.abs(model.added[:, axis]).max())
-    squares = float(fits[axis][1][best[axis]])
-    residual = float(np.sqrt(squares / len(t)))
+    model = predicted(vehicle, x, held)
+    varied = _varied(vehicle, x, held, model, axis, scales)
+    if scales is SCALES:  # the model itself is not linear
+        scales = np.concatenate([np.ones((1, 2)), scales])
+        own = (np.interp(varied.t, model.t, part[:, axis]) for part in model[1:])
+        parts = zip(own, varied[1:], strict=True)
+        varied = Predicted(varied.t, *(np.column_stack([one, more]) for one, more in parts))
+    delays = np.arange(0.0, OPPOSED * latest + FINE / 2, FINE)
+    early = delays < latest + FINE / 2
+    late = np.maximum(t - delays[:, None], 0.0)
+    forms = np.moveaxis(make_interp_spline(varied.t, varied.added, k=1)(late), 2, 0)
+    alone = make_interp_spline(varied.t, varied.alone, k=1)(t).T
+    fits = [_gains(t, nu[:, axis], form, free) for form, free in zip(forms, alone, strict=True)]
+    gains, squares, still = (np.array([fit[i] for fit in fits]) for i in range(3))
+    # of each sign: by no response at all, where none of its kind makes it better
+    of_sign = {sign: np.where(np.sign(gains) == sign, squares, np.inf) for sign in (1, -1)}
+    best = {one: min(float(left[:, early].min()), still.min()) for one, left in of_sign.items()}
+    sign = max(best, key=lambda one: -best[one])
+    mine, least = of_sign[sign][:, early], best[sign]
+    opposite = min(float(of_sign[-sign].min()), float(still.min()))
+    white = KNOWN * float(noise.variance[axis]) * len(t)
+    chance = 2.0 * SURE * float((noise.variance * noise.alike)[axis])
+    unlike, moved = max(least - white, 0.0), float(still.min()) - white
+    # the scales nearest to the model's own of those that fit as well
+    alike = mine.min(axis=1) <= least + chance + AS_WELL * moved
+    k = int(np.argmin(np.where(alike, (np.log(scales) ** 2).sum(axis=1), np.inf)))
+    i = int(np.argmin(mine[k]))
+    form = gains[k, i] * varied.added[:, k]
+    delays = delays[early]
+    measured, shares = _peaks(t, nu, model, axis, delays)
+    measured[axis] = np.sign(gains[k, i]) * np.abs(form).max()
+    gain = float(measured[axis] / np.abs(model.added[:, axis]).max())
+    clear = opposite - least > MISFIT * unlike + chance and unlike < EXPLAINED * moved
+    told = clear and abs(gain) >= NOTHING
+    k, i = np.unravel_index(int(np.argmin(mine)), mine.shape)
+    left = _beside(t, alone[k], nu[:, axis] - gains[k, i] * forms[k, i])
+    spread = least / len(t) * float(in_a_row(left[:, None])[0])
+    likely = delays[mine.min(axis=0) <= least + spread]
+    error = float(np.hypot(np.abs(likely - delays[i]).max(initial=0.0), FINE / 2.0))
     return GainFit(
-        model,
-        float(gains[axis]),
-        float(delays[best[axis]]),
-        squares,
-        residual,
-        gains * peak,
-        np.array(shares) * peak,
-    )
+        varied.t, form, scales[k], gain, sign if told else 0, float(delays[i]), error,
+        least, float(np.sqrt(least / len(t))), measured, shares,
+    )  # fmt: skip
+
+
+def _peaks(
+    t: np.ndarray, nu: np.ndarray, model: Predicted, axis: int, delays: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Peak of each velocity, measured at whatever delay and predicted, in the shape of an axis."""
+    forms = np.stack([np.interp(t - late, model.t, model.added[:, axis]) for late in delays])
+    peaks = np.zeros((2, 6))
+    for j in range(6):
+        free, prompt = (np.interp(t, model.t, part[:, j]) for part in (model.alone, model.added))
+        gains, squares, _ = _gains(t, nu[:, j], forms, free)
+        peaks[:, j] = gains[np.argmin(squares)], _gains(t, prompt, forms[:1], free)[0][0]
+    measured, shares = peaks * np.abs(model.added[:, axis]).max()
+    return measured, shares
 
 
 def _gains(
     t: np.ndarray, y: np.ndarray, forms: np.ndarray, free: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Factor of each form (k, n) beside a straight line and a free motion; squares left by it."""
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Factor of each form (k, n) beside line and free motion; squares left by it, and by none."""
+    y, own = _beside(t, free, y), _beside(t, free, forms)
+    strong = (own**2).sum(axis=1)
+    told = strong > ALIKE * (forms**2).sum(axis=1)
+    gain = np.where(told, own @ y / np.where(told, strong, 1.0), 0.0)
+    still = float(y @ y)
+    return gain, np.maximum(still - gain**2 * strong, 0.0), still
+
+
+def _beside(t: np.ndarray, free: np.ndarray, signals: np.ndarray) -> np.ndarray:
+    """Signals (..., n) without a straight line and a free motion (n,)."""
     rest = np.stack([np.ones_like(t), t - t.mean(), free - free.mean()], axis=1)
     size = np.maximum(np.linalg.norm(rest, axis=0), np.finfo(float).tiny)
     basis, strength, _ = np.linalg.svd(rest / size, full_matrices=False)
     basis = basis[:, strength > ALIKE * strength[0]]
-    y = y - basis @ (basis.T @ y)
-    own = forms - forms @ basis @ basis.T
-    strong = (own**2).sum(axis=1)
-    told = strong > ALIKE * (forms**2).sum(axis=1)
-    gain = np.where(told, own @ y / np.where(told, strong, 1.0), 0.0)
-    return gain, np.maximum(y @ y - gain**2 * strong, 0.0)
+    return np.asarray(signals - signals @ basis @ basis.T)

@@ -1,21 +1,25 @@
 """Response checks: sign, axis, size and delay of the response to a wrench, and the watchdog."""
 
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
 import numpy as np
 
-from auv_analysis.driver.evidence import PASS, CheckResult, DriverRecord, judged, unchecked
-from auv_analysis.driver.excitation import MeasuredTrial
-from auv_analysis.driver.response import LATEST
+from auv_analysis.driver.evidence import CheckResult, DriverRecord, judged, unchecked
+from auv_analysis.driver.excitation import PULSE, MeasuredTrial
+from auv_analysis.driver.response import NOTHING
 from auv_analysis.output.text import join, number
 from auv_dynamics.ros.interface import WRENCH_APPLIED
 from auv_dynamics.vehicle import DOFS
 
 GAINS = (0.5, 2.0)  # of the measured over the predicted response
-NOTHING = 0.2  # of it: no response
 VAGUE = 1.0  # of the predicted peak: noise that hides the response
+LATEST = PULSE / 2  # s of delay that are looked for
 PROMPT = 0.3  # s
 ELSEWHERE = 0.5  # of the speed of the plan, in an axis where the model has none of it
 LONGEST = 1.0  # s of silence after which a driver must have let go
 LITTLE = 0.05  # of the wrench: less is none
+DEVIATION = 1.48  # standard deviation by the median one
 STEP = 0.2  # s between two times that are tried
 CLEAR = 25.0  # how much more often one explanation must be right: the difference in log-likelihood
 WATCHDOG = 'give the driver a watchdog: a wrench older than some 0.5 s is zero'
@@ -59,50 +63,112 @@ def response(dof: str, evidence: DriverRecord) -> CheckResult:
     numbers = {
         'gain': gain,
         'delay_s': found.delay,
+        'delay_uncertainty_s': found.delay_error,
         'peak': peak,
         'peak_predicted': model,
         'noise': found.residual,
+        'noise_at_rest': float(np.sqrt(measured.noise.variance[trial.axis])),
         'size': trial.size,
     }
-    if found.residual > VAGUE * abs(model):
+    other = _elsewhere(measured)
+    if found.residual > VAGUE * abs(model) and not found.sign:
         text += f', under a noise of {number(found.residual)}: too vague'
         advice = 'noise or drift hides the response: quieter water, or more --speed'
         return unchecked(expected, text, advice, **numbers)
-    advice = 'thrust and mass of the vehicle file, the scale of the mapping, or a dead band?'
-    other = _elsewhere(measured, excitation.plan.speed)
+    advice = 'thrust and mass of the vehicle file, or the scale of the mapping?'
+    if gain < GAINS[0]:
+        advice = f'the sign is right: a dead band that the driver leaves in, {advice}'
     if other and abs(gain) < GAINS[0]:
         text += f'; it answers in {other}'
         advice = f'{dof} and {other} are exchanged in the mapping of the wrench'
-    elif gain < -NOTHING:
-        advice = 'the sign is reversed: of this axis of the wrench, or of the velocity'
+    elif found.sign >= 0 and gain < GAINS[0] and not trial.turns:
+        text += f'; reduced by the dead band of the thrusters, {trial.dead_band:.3g} {trial.unit}'
+        return unchecked(expected, text, 'no fault of sign or axis; more --speed', **numbers)
     elif abs(gain) < NOTHING:
         advice = 'no answer: armed, enabled, in the right mode, beyond the dead band of --force?'
+    elif not found.sign:
+        text += '; undecided: both signs fit, with another inertia, damping or delay'
+        advice = 'leave the sign as it is; a truer vehicle file, quieter water or more --speed'
+        return unchecked(expected, text, advice, **numbers)
+    elif found.sign < 0:
+        advice = 'the sign is reversed: of this axis of the wrench, or of the velocity'
     return judged(GAINS[0] <= gain <= GAINS[1], expected, text, advice, **numbers)
 
 
-def _elsewhere(measured: MeasuredTrial, speed: float) -> str:
+def _elsewhere(measured: MeasuredTrial) -> str:
     """Degree of freedom that answers in the place of the one that was asked, or an empty text."""
     more = np.abs(measured.response.measured - measured.response.predicted)
     more[measured.trial.axis] = 0.0
     largest = int(np.argmax(more))
-    return DOFS[largest] if more[largest] > ELSEWHERE * speed else ''
+    return DOFS[largest] if more[largest] > ELSEWHERE * measured.trial.speed else ''
+
+
+class Delay(NamedTuple):
+    """Delay from a wrench to the odometry that shows the answer.
+
+    Attributes
+    ----------
+    seconds, uncertainty : median over the axes and its uncertainty, s
+    axes : degree of freedom -> both of its answer
+
+    """
+
+    seconds: float
+    uncertainty: float
+    axes: Mapping[str, tuple[float, float]]
+
+    @property
+    def option(self) -> str:
+        """What `auv linearize` is told of it."""
+        return f'--delay {self.seconds:.3g}'
+
+    def document(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        axes = {
+            dof: {'seconds': delay, 'uncertainty': error}
+            for dof, (delay, error) in self.axes.items()
+        }
+        return {
+            'seconds': self.seconds,
+            'uncertainty': self.uncertainty,
+            'option': self.option,
+            'axes': axes,
+        }
+
+
+def command_to_response_delay(evidence: DriverRecord) -> Delay | None:
+    """Delay of the answers whose sign is told; None where none is."""
+    axes = {
+        one.trial.dof: (one.response.delay, one.response.delay_error)
+        for one in evidence.answered
+        if one.response.sign
+    }
+    if not axes:
+        return None
+    delays, errors = np.array(list(axes.values())).T
+    # what the model is off by is off in every axis: many of them make it no surer
+    scatter = DEVIATION * np.median(np.abs(delays - np.median(delays)))
+    error = max(float(np.sqrt((errors**2).mean())), float(scatter))
+    return Delay(float(np.median(delays)), error, axes)
 
 
 def response_delay(evidence: DriverRecord) -> CheckResult:
     """Delay of the response."""
     expected = f'an answer within {PROMPT:g} s, to and fro'
-    late = [
-        one.response.delay
-        for one in evidence.answered
-        if response(one.trial.dof, evidence).verdict == PASS
-    ]
-    if not late:
+    delay = command_to_response_delay(evidence)
+    if delay is None:
         return unchecked(expected, 'no answer that is like the model')
-    middle, most = float(np.median(late)), max(late)
-    found = f'{middle:.2f} s (median of {len(late)}), {most:.2f} s at most'
+    most = max(seconds for seconds, _ in delay.axes.values())
+    found = f'{delay.seconds:.2f} ± {delay.uncertainty:.2f} s (median of {len(delay.axes)}), '
+    found += f'{"at least " if most >= LATEST else ""}{most:.2f} s at most; '
+    found += f'for gains with margins: auv linearize SCENARIO {delay.option}'
     advice = 'what waits on the way? a delay takes stability from every gain'
-    numbers = {'median_s': middle, 'largest_s': most}
-    return judged(middle <= PROMPT, expected, found, advice, **numbers)
+    numbers = {
+        'median_s': delay.seconds,
+        'uncertainty_s': delay.uncertainty,
+        'largest_s': most,
+    }
+    return judged(delay.seconds <= PROMPT, expected, found, advice, **numbers)
 
 
 def silence(evidence: DriverRecord) -> CheckResult:
@@ -113,7 +179,8 @@ def silence(evidence: DriverRecord) -> CheckResult:
         return unchecked(expected, evidence.sent.aborted or 'too little odometry')
     if (trial.applied_t > trial.silent_from).any():
         return _by_actuators(trial, expected)
-    return _by_motion(trial, expected)
+    alike = (one.response.scales for one in evidence.answered if one.trial.dof == trial.trial.dof)
+    return _by_motion(trial, next(alike, np.ones(2)), expected)
 
 
 def _by_actuators(trial: MeasuredTrial, expected: str) -> CheckResult:
@@ -128,13 +195,16 @@ def _by_actuators(trial: MeasuredTrial, expected: str) -> CheckResult:
     return judged(ceased <= LONGEST and not acts[-1], expected, found, WATCHDOG, **numbers)
 
 
-def _by_motion(trial: MeasuredTrial, expected: str) -> CheckResult:
-    """By the velocity: which time of letting go explains it best, against never letting go."""
+def _by_motion(trial: MeasuredTrial, scales: np.ndarray, expected: str) -> CheckResult:
+    """By the velocity: which time of letting go explains it best, against never letting go.
+
+    Inertia and damping are those, times the model's, of the answer in this axis.
+    """
     end = float(trial.t[-1])
     watched = end - trial.silent_from
     times = np.arange(0.0, watched, STEP)
-    left = np.array([_unexplained(trial, trial.silent_from + late) for late in times])
-    never = _unexplained(trial, end)
+    left = np.array([_unexplained(trial, scales, trial.silent_from + late) for late in times])
+    never = _unexplained(trial, scales, end)
     # of normal errors: n/2 times the logarithm of the ratio of the squares
     n, ceased = len(trial.t), float(times[left.argmin()])
     never, best, early = (
@@ -152,11 +222,11 @@ def _by_motion(trial: MeasuredTrial, expected: str) -> CheckResult:
     return unchecked(expected, 'the motion does not tell it', advice, **numbers)
 
 
-def _unexplained(trial: MeasuredTrial, until: float) -> float:
+def _unexplained(trial: MeasuredTrial, scales: np.ndarray, until: float) -> float:
     """Squares of the velocity that are left if the last wrench acted until a time, s."""
     end = float(trial.t[-1]) + LATEST
     *before, (begin, _, tau) = trial.held
     held = [*before, (begin, until, tau)]
     if until < end:
         held.append((until, end, (0.0,) * 6))
-    return trial.response_to(held).squares
+    return trial.response_to(held, scales[None]).squares

@@ -1,27 +1,41 @@
 """Twist checks: axes, sign and unit of the twist, by the rate of the pose."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from auv_analysis.driver.evidence import FAIL, PASS, CheckResult, DriverRecord, judged, unchecked
+from auv_analysis.driver.response import in_a_row
+from auv_analysis.metrics.local_polynomials import SMALLEST
 from auv_analysis.metrics.pose_twist import (
     CHILD,
     FITS,
     STILL,
     PoseTwist,
     TwistFit,
+    compare_rates,
+    turn,
 )
 from auv_analysis.output.text import join, number
 from auv_dynamics.vehicle import DOFS
 
 STANDS = 0.1  # of the larger speed: the other does not move
 FLOW = 0.03  # m/s of a current that is worth its name
+SAME = 0.5  # of the speed by the twist: a position that drifts less stands still
 LEVEL = 0.8  # of a current that does not rise or sink
 SLOPES = (0.75, 1.33)  # of the pose's rate over the twist, where they mean the same
 PART = 0.15  # of the whole speed: a smaller component says nothing against the others' errors
 CLEAR = 3.0  # times the noise
 STRONGEST = 0.2  # of the samples: a vehicle may move for a part of the time only
+CALM = 2.0  # s, the calmest of which tell how much an estimate wanders at rest
+SLOW = 0.1  # m/s, rad/s: what is faster is motion, however much wanders
+WANDERS = 0.05  # m/s of a velocity at rest, about its mean
+WAITED = 3.0  # s at least that a vehicle rests before the first wrench
+RELATED = 0.5  # squared correlation of pose and twist below which their ratio says nothing
 PER_AXIS = {CHILD, 'flu', 'degrees'}  # readings under which each axis is one by itself
 MOVE = 'move the vehicle while this listens, by hand or by its pilot, in all axes; or --actuate'
+CURRENT = 'a current, or a moving origin'
+OVER_GROUND = 'give the velocity over ground, not that through the water'
 TURN = 'turn the vehicle away from north, or tilt it, and move it again while this listens'
 
 FLU_ADVICE = (
@@ -119,7 +133,10 @@ def _frame(evidence: DriverRecord, half: str, unit: str, expected: str) -> Check
     if motion.by_arrival:
         by = ' (by the times of arrival, since the stamps do not rise)'
     if not fit.right:
-        found, advice = _cause(fit, half, unit)
+        if not (_moves(evidence, half) or (fit.best != CHILD and fit.off[fit.best] <= FITS)):
+            why = f'moved too little beside what it wanders at rest: {_speeds(fit, unit)}'
+            return unchecked(expected, why, MOVE, **numbers)
+        found, advice = _cause(evidence, fit, half, unit)
         return CheckResult(expected, found + by, FAIL, advice, numbers)
     found = f'they fit, off by {_percent(fit.off[CHILD])} of {number(fit.speed)} {unit}'
     if half == 'linear' and 'world' in fit.others:
@@ -130,7 +147,7 @@ def _frame(evidence: DriverRecord, half: str, unit: str, expected: str) -> Check
     return CheckResult(expected, found + by, PASS, '', numbers)
 
 
-def _cause(fit: TwistFit, half: str, unit: str) -> tuple[str, str]:
+def _cause(evidence: DriverRecord, fit: TwistFit, half: str, unit: str) -> tuple[str, str]:
     """What the twist seems to be instead, and how to mend it."""
     told = f'in those of child_frame_id it is off by {_percent(fit.off[CHILD])}'
     if fit.off[fit.best] <= FITS and fit.best != CHILD:
@@ -147,13 +164,106 @@ def _cause(fit: TwistFit, half: str, unit: str) -> tuple[str, str]:
         return f'the pose stands still: {_speeds(fit, unit)}', advice
     flow, level = (float(np.linalg.norm(fit.constant[:n])) for n in (3, 2))
     if half == 'linear' and fit.rest <= FITS and level > max(FLOW, LEVEL * flow):
-        found = f'{told}, by a constant {number(flow)} m/s: a current, or a moving origin'
-        return found, 'give the velocity over ground, not that through the water'
+        rest, found = standstill(evidence), f'{told}, by a constant {number(flow)} m/s'
+        biased = rest and rest.stands and rest.bias > STILL
+        return f'{found}: ' + ('see velocity_bias' if biased else CURRENT), OVER_GROUND
     if fit.scaled <= FITS:
         return f'{told}; multiplied by {number(fit.factor)} it fits', f'the unit is {unit}'
     found = f'{told}, and in no usual ones it fits: {fit.best} by {_percent(fit.off[fit.best])}'
     advice = 'a single axis? see its row below; else: are pose and twist of one time, one vehicle?'
     return found, advice
+
+
+def _moves(evidence: DriverRecord, half: str) -> bool:
+    """Whether a half of the twist or the rate of the pose is more than what it is at rest."""
+    pair = evidence.rates[half]
+    path = pair.path[:, :2] if half == 'linear' else pair.path  # a measured depth is noisy
+    squares = np.maximum((path**2).sum(axis=1), (pair.velocity**2).sum(axis=1))
+    count = min(max(round(CALM / float(np.median(np.diff(pair.t)))), 1), len(squares))
+    calm = np.convolve(squares, np.full(count, 1.0 / count), 'valid').min()
+    speed = float(np.sqrt(squares.mean()))
+    return speed > min(max(STILL, CLEAR * float(np.sqrt(calm))), SLOW)
+
+
+class Standstill(NamedTuple):
+    """Velocity of a vehicle that nobody commands or moves, in earth axes.
+
+    Attributes
+    ----------
+    drift, twist : (3,) m/s by the position, and by the twist
+    errors : (3,) standard error of their difference, m/s
+    body : (3,) mean of the twist in body axes, m/s
+
+    """
+
+    drift: np.ndarray
+    twist: np.ndarray
+    errors: np.ndarray
+    body: np.ndarray
+
+    @property
+    def bias(self) -> float:
+        """How much the two differ, where that is more than noise, m/s."""
+        return self._told(self.twist - self.drift)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the position stands still beside the twist."""
+        return self._told(self.drift) < SAME * float(np.linalg.norm(self.twist))
+
+    def _told(self, v: np.ndarray) -> float:
+        return float(np.linalg.norm(v[np.abs(v) > CLEAR * self.errors]))
+
+
+def standstill(evidence: DriverRecord) -> Standstill | None:
+    """Velocity without a command: of all that was heard before one, or of its end; None: moved."""
+    motion, free = evidence.motion, evidence.uncommanded
+    for seconds in (np.inf, WAITED):
+        here = free & (motion.t >= (motion.t[free].max(initial=0.0) - seconds))
+        if here.sum() < SMALLEST:
+            continue
+        t, p = motion.t[here], motion.p[here]
+        v = turn(motion.q[here], motion.nu[here, :3])
+        if np.sqrt(compare_rates(t, p, v).velocity.var(axis=0).sum()) > WANDERS:
+            continue
+        line = np.polyfit(t - t.mean(), p, 1)
+        off, about = p - (line[0] * (t - t.mean())[:, None] + line[1]), v - v.mean(axis=0)
+        n, spread = len(t), float(((t - t.mean()) ** 2).sum())
+        by_position = (off**2).sum(axis=0) / (n - 2) / spread * in_a_row(off)
+        by_twist = (about**2).sum(axis=0) / (n - 1) / n * in_a_row(about)
+        errors = np.sqrt(by_position + by_twist)
+        return Standstill(line[0], v.mean(axis=0), errors, motion.nu[here, :3].mean(axis=0))
+    return None
+
+
+def velocity_bias(evidence: DriverRecord) -> CheckResult:
+    """Velocity at rest."""
+    expected = f'at rest, position and twist drift alike, within {STILL:g} m/s'
+    if _no_position(evidence.motion):
+        return unchecked(expected, 'no position')
+    found = standstill(evidence)
+    if found is None:
+        advice = 'let it rest while this listens'
+        return unchecked(expected, 'the vehicle was moved, or too little was heard', advice)
+    parts = (found.drift, found.twist, found.errors)
+    drift, twist, error = (float(np.linalg.norm(part)) for part in parts)
+    bias = found.bias
+    numbers = {'bias': bias, 'drift': drift, 'twist': twist, 'standard_error': error}
+    text = f'{number(drift)} m/s by the position, {number(twist)} by the twist'
+    doubt = f'standard error {number(error)}'
+    if bias > STILL:
+        if found.stands:
+            each = join([f'{dof} {v:+.3f}' for dof, v in zip(DOFS[:3], found.body, strict=True)])
+            why = f'the velocity of the estimator is biased by {number(bias)} m/s ({each}), while '
+            why += f'the position stands still: {text}, {doubt}'
+            advice = 'calibrate the estimator, or give it a velocity sensor: no tracking is better'
+            return CheckResult(expected, why, FAIL, advice, numbers)
+        return CheckResult(expected, f'{text}, {doubt}: {CURRENT}', FAIL, OVER_GROUND, numbers)
+    if CLEAR * error > SLOW:
+        return unchecked(expected, f'{text}, {doubt}: too noisy', 'listen for longer', **numbers)
+    if drift > max(STILL, CLEAR * error):
+        text = f'{text}, which agree: {CURRENT}'
+    return CheckResult(expected, f'{text}, {doubt}', PASS, '', numbers)
 
 
 def _no_position(motion: PoseTwist) -> bool:
@@ -190,6 +300,10 @@ def axis(dof: str, evidence: DriverRecord) -> CheckResult:
     if largest < max(STILL, PART * fit.speed, CLEAR * both):
         why = f'moved too little: {number(largest)} {unit}, noise {number(both)}'
         return unchecked(expected, why, f'move it in {dof}', **numbers)
+    both_ways = float((path * velocity).sum()) ** 2
+    related = both_ways > RELATED * float((path**2).sum() * (velocity**2).sum())
+    if not related and not _moves(evidence, half):
+        return unchecked(expected, 'pose and twist wander apart', f'move it in {dof}', **numbers)
     if by_twist < PART * by_path:
         found = f'{number(by_path)} {unit} by the pose, {number(by_twist)} by the twist'
         return judged(False, expected, found, 'fill in this component', **numbers)

@@ -34,7 +34,7 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 PULSE = 1.0  # s that a wrench acts one way, then the other
 SHORT = 0.5  # s of it for a wrench that is large, since thrusters have a dead band
 ABOVE = 1.2  # times the wrench at which the last thruster turns: what is sent then
-LOADED = 0.01  # of the largest thrust: a thruster with less does not matter
+LOADED = 0.05  # of a wrench: a thruster that gives less of it does not matter
 REST = 0.5  # s of zero before and after
 SETTLE = 2.0  # s of it before the first: a driver arms, and the noise at rest is measured
 HELD, UNHEARD = 0.5, 2.0  # s of a wrench, then of silence, to see whether the driver lets go
@@ -197,7 +197,7 @@ def _dead_band(vehicle: Vehicle, axis: int) -> float:
     if thrusters is None or not thrusters.rotors:
         return 0.0
     share = np.abs(thrusters.inverse[:, axis])
-    needed = share > LOADED * share.max()
+    needed = thrusters.matrix[axis] * thrusters.inverse[:, axis] > LOADED
     least = np.array([max(rotor.dead_band) for rotor in thrusters.rotors])
     return float((least[needed] / share[needed]).max(initial=0.0))
 

@@ -108,7 +108,11 @@ def _varied(
         size * response(np.maximum(t - begin, 0.0))
         for (begin, *_), size in zip(held, changes, strict=True)
     )
-    return Predicted(t, np.asarray(added), alone)
+    own = np.isclose(scales, 1.0).all(axis=1)  # the model itself is not linear
+    parts = (np.asarray(added), alone)
+    for part, column in zip(parts, (model.added, model.alone), strict=True):
+        part[:, own] = np.interp(t, model.t, column[:, axis])[:, None]
+    return Predicted(t, *parts)
 
 
 class Noise(NamedTuple):
@@ -150,7 +154,7 @@ class GainFit:
     Attributes
     ----------
     t, form : (m,) s and (m,) the response that fits best, m/s or rad/s, without its delay
-    scales : (2,) inertia and damping of that, times the model's
+    scales : (2,) inertia and damping of that, times the model's, as near to it as fit
     gain : peak of the measured over that of the predicted response, in the axis of the wrench
     sign : 1: as it should be, -1: reversed, 0: undecided
     delay, delay_error : s, and its standard error
@@ -205,11 +209,6 @@ def fit_response(
     """
     model = predicted(vehicle, x, held)
     varied = _varied(vehicle, x, held, model, axis, scales)
-    if scales is SCALES:  # the model itself is not linear
-        scales = np.concatenate([np.ones((1, 2)), scales])
-        own = (np.interp(varied.t, model.t, part[:, axis]) for part in model[1:])
-        parts = zip(own, varied[1:], strict=True)
-        varied = Predicted(varied.t, *(np.column_stack([one, more]) for one, more in parts))
     delays = np.arange(0.0, OPPOSED * latest + FINE / 2, FINE)
     early = delays < latest + FINE / 2
     late = np.maximum(t - delays[:, None], 0.0)
@@ -230,20 +229,20 @@ def fit_response(
     alike = mine.min(axis=1) <= least + chance + AS_WELL * moved
     k = int(np.argmin(np.where(alike, (np.log(scales) ** 2).sum(axis=1), np.inf)))
     i = int(np.argmin(mine[k]))
-    form = gains[k, i] * varied.added[:, k]
+    form, near = gains[k, i] * varied.added[:, k], scales[k]
     delays = delays[early]
     measured, shares = _peaks(t, nu, model, axis, delays)
     measured[axis] = np.sign(gains[k, i]) * np.abs(form).max()
     gain = float(measured[axis] / np.abs(model.added[:, axis]).max())
     clear = opposite - least > MISFIT * unlike + chance and unlike < EXPLAINED * moved
     told = clear and abs(gain) >= NOTHING
-    k, i = np.unravel_index(int(np.argmin(mine)), mine.shape)
+    k, i = (int(one) for one in np.unravel_index(np.argmin(mine), mine.shape))
     left = _beside(t, alone[k], nu[:, axis] - gains[k, i] * forms[k, i])
     spread = least / len(t) * float(in_a_row(left[:, None])[0])
     likely = delays[mine.min(axis=0) <= least + spread]
     error = float(np.hypot(np.abs(likely - delays[i]).max(initial=0.0), FINE / 2.0))
     return GainFit(
-        varied.t, form, scales[k], gain, sign if told else 0, float(delays[i]), error,
+        varied.t, form, near, gain, sign if told else 0, float(delays[i]), error,
         least, float(np.sqrt(least / len(t))), measured, shares,
     )  # fmt: skip
 

@@ -81,7 +81,7 @@ def response(dof: str, evidence: DriverRecord) -> CheckResult:
     if other and abs(gain) < GAINS[0]:
         text += f'; it answers in {other}'
         advice = f'{dof} and {other} are exchanged in the mapping of the wrench'
-    elif found.sign >= 0 and gain < GAINS[0] and not trial.turns:
+    elif not trial.turns and abs(gain) < (GAINS[0] if found.sign > 0 else NOTHING):
         text += f'; reduced by the dead band of the thrusters, {trial.dead_band:.3g} {trial.unit}'
         return unchecked(expected, text, 'no fault of sign or axis; more --speed', **numbers)
     elif abs(gain) < NOTHING:

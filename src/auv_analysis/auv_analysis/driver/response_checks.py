@@ -7,7 +7,7 @@ import numpy as np
 
 from auv_analysis.driver.evidence import CheckResult, DriverRecord, judged, unchecked
 from auv_analysis.driver.excitation import PULSE, MeasuredTrial
-from auv_analysis.driver.response import NOTHING
+from auv_analysis.driver.response import FINE, NOTHING
 from auv_analysis.output.text import join, number
 from auv_dynamics.ros.interface import WRENCH_APPLIED
 from auv_dynamics.vehicle import DOFS
@@ -138,11 +138,10 @@ class Delay(NamedTuple):
 
 def command_to_response_delay(evidence: DriverRecord) -> Delay | None:
     """Delay of the answers whose sign is told; None where none is."""
-    axes = {
-        one.trial.dof: (one.response.delay, one.response.delay_error)
-        for one in evidence.answered
-        if one.response.sign
-    }
+    told = [one for one in evidence.answered if one.response.sign]
+    # a short pulse bounds the delay that it can tell
+    within = [one for one in told if one.response.delay + FINE < one.trial.pulse / 2] or told
+    axes = {one.trial.dof: (one.response.delay, one.response.delay_error) for one in within}
     if not axes:
         return None
     delays, errors = np.array(list(axes.values())).T

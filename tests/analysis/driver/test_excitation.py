@@ -10,12 +10,11 @@ from simulated_driver import SimulatedDriver
 from auv_analysis.driver.excitation import (
     GOODBYE,
     PERIOD,
-    SETTLE,
     StoppedError,
     actuate,
     carry_out,
-    plan_of,
 )
+from auv_analysis.driver.plan import SETTLE, plan_of
 from auv_dynamics.files.errors import ENDING, on_signals
 
 ZERO = (0.0,) * 6

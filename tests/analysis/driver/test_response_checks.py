@@ -15,7 +15,8 @@ from auv_analysis.driver.evidence import (
     DriverRecord,
     Settings,
 )
-from auv_analysis.driver.excitation import PULSE, Plan, carry_out, plan_of
+from auv_analysis.driver.excitation import carry_out
+from auv_analysis.driver.plan import PULSE, Plan, plan_of
 from auv_analysis.driver.response import predicted
 from auv_dynamics import Vehicle, load_vehicle
 from auv_dynamics.vehicle import DOFS

@@ -22,7 +22,8 @@ from auv_analysis.driver.checks import (
     judge,
 )
 from auv_analysis.driver.evidence import NOT_CHECKED, PASS, VERDICTS, DriverRecord, Settings
-from auv_analysis.driver.excitation import carry_out, plan_of
+from auv_analysis.driver.excitation import carry_out
+from auv_analysis.driver.plan import plan_of
 from auv_analysis.driver.report import write_results
 
 ROOT = Path(__file__).parents[3]

@@ -21,7 +21,7 @@ from auv_dynamics.vehicle import DOFS
 
 if TYPE_CHECKING:
     from auv_analysis.driver.evidence import DriverRecord
-    from auv_analysis.driver.excitation import Plan
+    from auv_analysis.driver.plan import Plan
 
 APPEARS = 5.0  # s within which discovery finds a driver that is there
 SPEED, FASTEST = 0.1, 0.5  # m/s and rad/s
@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 def _plan(options: argparse.Namespace) -> Plan | None:
     """What is going to be sent; None without --actuate."""
-    from auv_analysis.driver.excitation import plan_of
+    from auv_analysis.driver.plan import plan_of
     from auv_dynamics import load_vehicle
 
     vehicle = None if options.vehicle is None else load_vehicle(options.vehicle)

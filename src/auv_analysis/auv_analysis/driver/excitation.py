@@ -1,12 +1,12 @@
-"""Excitation: small wrenches along one axis at a time, and what was heard meanwhile.
+"""Excitation: a plan carried out, and what was heard meanwhile.
 
-Their size follows from the vehicle's inertia; they go out at a steady rate, each is preceded by a
-look at the vehicle, and the last ones are zero however it ends.
+Wrenches go out at a steady rate, each is preceded by a look at the vehicle, and the last ones are
+zero however it ends.
 """
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
 from threading import Event
@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
+from auv_analysis.driver.plan import REST, SETTLE, UNHEARD, ZERO, Plan, Trial
 from auv_analysis.driver.response import (
     SCALES,
     GainFit,
@@ -22,25 +23,13 @@ from auv_analysis.driver.response import (
     Wrench,
     fit_response,
     noise_at_rest,
-    predicted,
 )
 from auv_analysis.output.progress import say
 from auv_analysis.output.text import join
 from auv_dynamics.files.errors import on_signals
 from auv_dynamics.ros.interface import NANOSECONDS
-from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 
-PULSE = 1.0  # s that a wrench acts one way, then the other
-SHORT = 0.5  # s of it for a wrench that is large, since thrusters have a dead band
-ABOVE = 1.2  # times the wrench at which the last thruster turns: what is sent then
-LOADED = 0.05  # of a wrench: a thruster that gives less of it does not matter
-REST = 0.5  # s of zero before and after
-SETTLE = 2.0  # s of it before the first: a driver arms, and the noise at rest is measured
-HELD, UNHEARD = 0.5, 2.0  # s of a wrench, then of silence, to see whether the driver lets go
-ROUNDS = 4  # of making a wrench smaller: drag is not linear
-LEVEL = np.eye(13)[3]  # at rest, upright
-CALM = ('surge', 'sway', 'yaw', 'heave', 'roll', 'pitch')  # those first that nothing restores
 PERIOD = 0.02  # s between two wrenches
 GOODBYE = 0.3  # s of zero at the end
 RECENT = 5  # messages whose median is the speed
@@ -50,173 +39,7 @@ LEAST = 20  # messages of a trial
 COUNTDOWN = 3  # s before the first wrench
 MATCHES = 5.0  # s for the driver to be seen by a new publisher
 LOOK_AGAIN = 0.1  # s between two looks at what has come before that
-ZERO = (0.0,) * 6
 SIGNS = {1: 'right', 0: 'undecided', -1: 'reversed'}
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A wrench along one axis.
-
-    Attributes
-    ----------
-    dof : its axis
-    size : N or N m
-    silent : whether it ends by silence, not by its opposite and zero
-    rest, pulse : s of zero before it, and of each way
-    dead_band : N or N m at which all its thrusters turn; 0: not known
-    speed : m/s and rad/s that are not passed, by the model
-
-    """
-
-    dof: str
-    size: float
-    silent: bool = False
-    rest: float = REST
-    pulse: float = PULSE
-    dead_band: float = 0.0
-    speed: float = 0.0
-
-    @property
-    def axis(self) -> int:
-        """Index of its axis."""
-        return DOFS.index(self.dof)
-
-    @property
-    def tau(self) -> Wrench:
-        """The wrench, N and N m."""
-        return tuple(self.size if i == self.axis else 0.0 for i in range(6))
-
-    @property
-    def unit(self) -> str:
-        """Of its size."""
-        return 'N' if self.axis < 3 else 'N m'
-
-    @property
-    def turns(self) -> bool:
-        """Whether its thrusters are out of their dead band, as far as that is known."""
-        return self.size >= self.dead_band
-
-    @property
-    def speed_unit(self) -> str:
-        """Of the velocity along its axis."""
-        return 'm/s' if self.axis < 3 else 'rad/s'
-
-    @property
-    def parts(self) -> list[tuple[Wrench, float]]:
-        """Wrenches one after the other, and for how many s each is sent."""
-        if self.silent:
-            return [(ZERO, self.rest), (self.tau, HELD)]
-        back = tuple(-number for number in self.tau)
-        return [(ZERO, self.rest), (self.tau, self.pulse), (back, self.pulse), (ZERO, REST)]
-
-    @property
-    def seconds(self) -> float:
-        """How long it takes."""
-        return sum(seconds for _, seconds in self.parts) + (UNHEARD if self.silent else 0.0)
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What is going to be sent.
-
-    Attributes
-    ----------
-    vehicle : the model that it is made for
-    trials : one after the other, that with silence last
-    skipped : degree of freedom -> why none is sent for it
-
-    """
-
-    vehicle: Vehicle
-    trials: tuple[Trial, ...]
-    skipped: Mapping[str, str]
-
-    @property
-    def speed(self) -> float:
-        """What no velocity passes by the model, m/s and rad/s."""
-        return max(trial.speed for trial in self.trials)
-
-    def lines(self) -> list[str]:
-        """What is going to happen, for people."""
-        seconds = sum(trial.seconds for trial in self.trials)
-        moved = [f'{one.dof} ±{one.size:.3g} {one.unit}' for one in self.trials if not one.silent]
-        last = self.trials[-1]
-        return [
-            f'THE VEHICLE WILL MOVE for {seconds:.0f} s: {join(moved)}, {PULSE:g} s or less each, '
-            f'then {last.dof} {last.size:.3g} {last.unit} without a zero behind it',
-            f'by the model at most {self.speed:g} m/s and rad/s; Ctrl-C sends zero and ends',
-        ]
-
-
-def plan_of(
-    vehicle: Vehicle,
-    dofs: Sequence[str],
-    speed: float,
-    force: float | None,
-    torque: float | None,
-    raised: float = 0.0,
-) -> Plan:
-    """Wrenches that move a vehicle a little.
-
-    Parameters
-    ----------
-    vehicle : the model
-    dofs : axes that are asked for; none: all
-    speed : m/s and rad/s that no degree of freedom passes by the model
-    force, torque : N and N m that none passes; none: only the speed limits them
-    raised : m/s and rad/s in place of the speed, where thrusters would stay in their dead band
-
-    """
-    lost = vehicle.thrusters.unactuated() if vehicle.thrusters is not None else {}
-    asked = [dof for dof in DOFS if dof in (dofs or DOFS)]
-    skipped = {dof: 'not asked for: --axis' for dof in DOFS if dof not in asked}
-    skipped |= {dof: 'the thrusters of the vehicle file cannot' for dof in asked if dof in lost}
-    moved = [dof for dof in asked if dof not in skipped]
-    caps = (force, torque)
-
-    def bounded(trial: Trial) -> Trial:
-        cap, dead_band = caps[trial.axis // 3], _dead_band(vehicle, trial.axis)
-        trial = replace(trial, dead_band=dead_band, speed=speed)
-        most = _largest(vehicle, trial, speed)
-        if most < ABOVE * dead_band and raised > speed:
-            trial = replace(trial, pulse=SHORT, speed=raised)
-            most = min(_largest(vehicle, trial, raised), ABOVE * dead_band)
-        return replace(trial, size=most if cap is None else min(most, cap))
-
-    trials = [Trial(dof, 1.0) for dof in moved]
-    if moved:
-        trials[0] = replace(trials[0], rest=SETTLE)
-        trials.append(Trial(min(moved, key=CALM.index), 1.0, silent=True))
-    return Plan(vehicle, tuple(map(bounded, trials)), skipped)
-
-
-def _dead_band(vehicle: Vehicle, axis: int) -> float:
-    """N or N m along an axis at which all thrusters that it needs turn; 0 where none tells it."""
-    thrusters = vehicle.thrusters
-    if thrusters is None or not thrusters.rotors:
-        return 0.0
-    share = np.abs(thrusters.inverse[:, axis])
-    needed = thrusters.matrix[axis] * thrusters.inverse[:, axis] > LOADED
-    least = np.array([max(rotor.dead_band) for rotor in thrusters.rotors])
-    return float((least[needed] / share[needed]).max(initial=0.0))
-
-
-def _largest(vehicle: Vehicle, trial: Trial, speed: float) -> float:
-    """N or N m that no velocity passes a speed with: by inertia alone, and by the whole model."""
-    seconds = HELD + UNHEARD if trial.silent else trial.pulse
-    size = speed / (seconds * float(np.abs(np.linalg.inv(vehicle.M)[:, trial.axis]).max()))
-    for _ in range(ROUNDS):
-        tau = replace(trial, size=size).tau
-        back = tuple(-number for number in tau)
-        held = [(0.0, seconds, tau)]
-        if not trial.silent:  # what rights the vehicle can swing it faster on the way back
-            held += [(seconds, 2 * seconds, back), (2 * seconds, 4 * seconds, ZERO)]
-        fastest = float(np.abs(predicted(vehicle, LEVEL, held).added).max())
-        if fastest <= speed:
-            break
-        size *= speed / fastest
-    return size
 
 
 class DriverClient(Protocol):

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.driver.evidence import CheckResult, DriverRecord, judged, unchecked
-from auv_analysis.driver.excitation import PULSE, MeasuredTrial
+from auv_analysis.driver.excitation import MeasuredTrial
+from auv_analysis.driver.plan import PULSE
 from auv_analysis.driver.response import FINE, NOTHING
 from auv_analysis.output.text import join, number
 from auv_dynamics.ros.interface import WRENCH_APPLIED

@@ -221,6 +221,12 @@ def add_no_report(command: argparse.ArgumentParser) -> None:
     command.add_argument('--no-report', action='store_true', help=text)
 
 
+def add_delay(command: argparse._ActionsContainer) -> None:
+    """How late a wrench acts, for the margins of the loop."""
+    text = "s from a measurement to the wrench at the actuators; default: the scenario's"
+    command.add_argument('--delay', type=number(at_least=0.0), metavar='SECONDS', help=text)
+
+
 def add_hold(command: argparse.ArgumentParser) -> None:
     """How the law is evaluated between samples."""
     text = 'law in every stage of the integrator, or by zero-order hold; default: continuous'

@@ -1,4 +1,4 @@
-"""`auv linearize`: poles and matrices of a vehicle, or of a scenario's closed loops."""
+"""`auv linearize`: poles and matrices of a vehicle, or of a scenario's loops, and their margins."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from auv_analysis.cli.arguments import add_results
+from auv_analysis.cli.arguments import add_delay, add_results, number
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
     from auv_analysis.scenario.scenario import Scenario
     from auv_dynamics.vehicle.vehicle import Vehicle
 
-DOCUMENT = 'linearization.json'
 LONGEST = 90  # of the name in that of the folder
 
 
@@ -29,16 +28,28 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument('--nu0', nargs=6, type=float, metavar=six, help=text)
     text, three = 'attitude of the operating point, rad; default: level', ('PHI', 'THETA', 'PSI')
     command.add_argument('--attitude', nargs=3, type=float, metavar=three, help=text)
+    loop = command.add_mutually_exclusive_group()
+    add_delay(loop)
+    text = 'the delay that `auv check-driver --actuate --json` measured, from its document'
+    loop.add_argument('--delay-from', type=Path, metavar='CHECK.json', help=text)
+    text = "time constant of the actuators, s; default: the scenario's"
+    command.add_argument('--lag', type=number(at_least=0.0), metavar='SECONDS', help=text)
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Poles and matrices of a vehicle, or of a scenario's closed loops."""
     from auv_analysis.output.folder import results_folder
-    from auv_analysis.output.new_files import write_json
     from auv_analysis.output.progress import say, waiting
     from auv_analysis.scenario.scaling import UNFIT
     from auv_analysis.scenario.scenario import Scenario
-    from auv_analysis.studies.linearize.modes import document_of, linear_models, print_poles
+    from auv_analysis.studies.linearize.margins import ControlLoop, stability_margins
+    from auv_analysis.studies.linearize.modes import (
+        linear_models,
+        print_margins,
+        print_poles,
+        results_of,
+    )
+    from auv_gvc_controller.laws import OPEN_LOOP
     from auv_gvc_controller.laws.law import refusal
 
     subject, paths = _subject(options.subject)
@@ -49,28 +60,58 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         names = list(dict.fromkeys(options.controller or subject.controllers))
         for name in names:
             subject.controller(name)
-    elif options.controller:
-        expected = 'a scenario, which has controllers'
-        raise InputError(paths[0], '--controller', expected, 'a vehicle')
+    else:
+        for option in ('controller', 'delay', 'delay_from', 'lag'):
+            if getattr(options, option) is not None:
+                expected = 'a scenario, which has controllers'
+                name = f'--{option.replace("_", "-")}'
+                raise InputError(paths[0], name, expected, 'a vehicle')
+    delay = options.delay if options.delay_from is None else measured_delay(options.delay_from)
     eta0 = None if options.attitude is None else [0.0, 0.0, 0.0, *options.attitude]
     try:
         with waiting('linearising'):
             models = linear_models(subject, names, options.nu0, eta0)
+            loops = {
+                name: ControlLoop(subject, name, delay, options.lag, options.nu0, eta0)
+                for name in names
+                if isinstance(subject, Scenario) and subject.controller(name)['law'] != OPEN_LOOP
+            }
+            margins = {name: stability_margins(loop) for name, loop in loops.items()}
     except ValueError as error:
         raise InputError(paths[0], *refusal(error)) from None
     folder = f'linearize_{UNFIT.sub("_", subject.name)[:LONGEST]}'
     out = options.out or Path('runs') / folder
-    document = document_of(subject.name, models, left_out)
+    made = results_of(subject.name, models, margins, left_out)
+    document = made.to_json()
     with results_folder(out, overwrite=options.overwrite, inputs=paths) as results:
-        write_json(results.folder / DOCUMENT, document)
+        made.write(results.folder)
         from auv_analysis.studies.linearize.plots import draw  # with matplotlib, which loads slowly
 
-        with waiting('drawing the pole map'):
-            draw(models, results.folder / 'figures')
+        with waiting('drawing'):
+            draw(models, loops, results.folder / 'figures')
     if not options.json:
         print_poles(document)
-    say(f'matrices: {out / DOCUMENT}, pole map: {out / "figures" / "poles.png"}')
+        print_margins(margins)
+    say(f'matrices: {out / made.file}, pole map: {out / "figures" / "poles.png"}')
     return document
+
+
+def measured_delay(path: Path) -> float:
+    """Delay from command to response in the document of `auv check-driver --json`, s."""
+    import json
+
+    from auv_dynamics.files.yaml_files import read_text
+
+    key = 'command_to_response_delay'
+    try:
+        measured = json.loads(read_text(path, 'check-driver')).get(key)
+    except (ValueError, AttributeError):
+        raise InputError(path, '', 'the document of auv check-driver --json', 'another') from None
+    seconds = measured.get('seconds') if isinstance(measured, dict) else None
+    if not isinstance(seconds, int | float) or not seconds >= 0:
+        expected = 'a delay in s, which check-driver measures with --actuate'
+        raise InputError(path, f'{key}.seconds', expected, seconds)
+    return float(seconds)
 
 
 def _subject(given: str) -> tuple[Vehicle | Scenario, list[Path]]:

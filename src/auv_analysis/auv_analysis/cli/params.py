@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from auv_analysis.cli.arguments import SCENARIO, TO_FILE, add_results
+from auv_analysis.cli.arguments import SCENARIO, TO_FILE, add_delay, add_results
 from auv_dynamics.files.errors import InputError
 
 
@@ -16,6 +16,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument('--real-time', action='store_true', help='in real time, not in lock-step')
     text = "for a vehicle driver in the plant's place: in real time, without simulated time"
     command.add_argument('--no-plant', action='store_true', help=text)
+    add_delay(command)
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
@@ -24,6 +25,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.output.new_files import write_text
     from auv_analysis.output.progress import say
     from auv_analysis.scenario.scenario import load_scenario
+    from auv_analysis.studies.linearize.margins import margin_notes
 
     scenario = load_scenario(options.scenario)
     plant = not options.no_plant
@@ -42,6 +44,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         attachments={name: path.resolve() for name, path in attachments.items()},
     )
     if note := _missing(parameters[CONTROLLER], CONTROLLER):
+        say(note)
+    for note in margin_notes(scenario, [options.controller], options.delay):
         say(note)
     command = f'auv params {scenario.name} --controller {options.controller}'
     text = parameter_file(parameters, command)

@@ -67,6 +67,11 @@ def scenario_folder(
     ) as results:
         for warning in scenario.warnings:
             say(f'warning: {warning}')
+        if 'actuators' in scenario.data:
+            from auv_analysis.studies.linearize.margins import margin_notes  # with scipy.optimize
+
+            for note in margin_notes(scenario, names):
+                say(note)
         yield results
 
 

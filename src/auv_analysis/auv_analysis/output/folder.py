@@ -107,7 +107,7 @@ NAMES = (
     'wrenches.parquet', 'faults.parquet', 'linearization.json', SWEEP, CAMPAIGN, 'identify.json',
     'predict.json', 'coefficients.parquet', 'predictions.parquet', 'inertia.parquet',
     'deformation.parquet', 'shares.parquet', 'whiteness.parquet', 'profiles.parquet',
-    'excite.json', 'intervals.parquet', 'bounds.parquet', 'motion.parquet',
+    'excite.json', 'intervals.parquet', 'bounds.parquet', 'motion.parquet', 'margins.parquet',
 )  # fmt: skip
 
 

@@ -339,7 +339,7 @@ def linearize(
 
     """
     known, plant, law, gains = _parts(vehicle, law, gains, controller)
-    eta, nu = _point(eta0, 'eta0'), _point(nu0, 'nu0')
+    eta, nu = operating_point(eta0, 'eta0'), operating_point(nu0, 'nu0')
     if abs(np.cos(eta[4])) < LEVEL:
         raise ValueError(f'eta0: expected a pitch within +-pi/2, found {eta[4]:g}')
     if law is None:
@@ -364,14 +364,19 @@ def _parts(
         raise ValueError('law: expected controller or law, found both')
     if vehicle.uncertainty.current is not None:
         raise ValueError('vehicle: expected a scenario in still water, found a current')
-    errors = [spec for spec in vehicle.data['disturbance'] if spec['kind'] == 'model_error']
-    plant, _ = with_errors(vehicle.vehicle, errors)
     if controller is not None:
         law, gains = vehicle.controller(controller)['law'], vehicle.gain_values(controller)
-    return vehicle.vehicle, plant, law, gains
+    return vehicle.vehicle, plant_of(vehicle), law, gains
 
 
-def _point(value: Any, name: str) -> np.ndarray:
+def plant_of(scenario: Scenario) -> Vehicle:
+    """The vehicle with the scenario's model errors."""
+    errors = [spec for spec in scenario.data['disturbance'] if spec['kind'] == 'model_error']
+    return with_errors(scenario.vehicle, errors)[0]
+
+
+def operating_point(value: Any, name: str) -> np.ndarray:
+    """(6,) of what was given, zero where nothing was; ValueError names it."""
     point = np.zeros(6) if value is None else np.array(value, float)
     if point.shape != (6,) or not np.isfinite(point).all():
         raise ValueError(f'{name}: expected 6 finite numbers, found {value}')

@@ -1,4 +1,4 @@
-"""The poles of linear models: damping, frequency, where each one lives; document and table."""
+"""The poles of linear models: damping, frequency, where each one lives; results and tables."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,7 +8,8 @@ import scipy.linalg
 from rich.console import Console
 
 from auv_analysis.output.progress import TextConsole
-from auv_analysis.report.results import Shown, described, make_table, terminal
+from auv_analysis.output.text import number, plain
+from auv_analysis.report.results import Results, Shown, described, make_table, terminal
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.studies.linearize.linearize import Linearization, linearize
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -97,15 +98,31 @@ def linear_models(
     return found
 
 
-def document_of(
-    name: str, models: Mapping[str, Linearization], left_out: Sequence[str]
-) -> dict[str, Any]:
-    """Matrices, names, point and modes of each model, and what stands in none of them."""
-    return {
-        'name': name,
-        'models': {name: _model(model) for name, model in models.items()},
-        'left_out': list(left_out),
+def results_of(
+    name: str,
+    models: Mapping[str, Linearization],
+    margins: Mapping[str, Mapping[str, Any]],
+    left_out: Sequence[str],
+) -> Results:
+    """Matrices, names, point, modes and margins of each model, and what stands in none of them.
+
+    Parameters
+    ----------
+    name : of the vehicle or scenario
+    models : of `linear_models`
+    margins : controller -> what `stability_margins` gives, of those that have feedback
+    left_out : keys of the scenario
+
+    """
+    found = {
+        key: _model(model) | ({'margins': margins[key]} if key in margins else {})
+        for key, model in models.items()
     }
+    results = Results('linearization', {'name': name, 'models': found, 'left_out': list(left_out)})
+    if margins:
+        rows = [{'controller': key, **row} for key, one in margins.items() for row in one['axes']]
+        results.add('margins', 'Margins of each axis', rows, MARGINS, stub=2)
+    return results
 
 
 def _model(model: Linearization) -> dict[str, Any]:
@@ -130,6 +147,46 @@ POLES: dict[str, Shown] = {
     'mostly': 'mostly',
     'part': described('part', decimals=0, scale=100.0),
 }
+
+
+DECIBEL: dict[str, Any] = {'decimals': 1}
+NOW = 'velocity gain'
+MARGINS: dict[str, Shown] = {
+    'controller': 'controller',
+    'axis': 'axis',
+    'gain_margin_db': described('gain margin', unit='dB', **DECIBEL),
+    'phase_margin': described('phase margin', unit='deg', **DECIBEL),
+    'delay_margin': described('delay margin', unit='s', **FOUR),
+    'crossover': described('crossover', unit='rad/s', **FOUR),
+    'value': described('it is', group=NOW, **FOUR),
+    'largest': described('largest for 6 dB, 45 deg', group=NOW, **FOUR),
+}
+
+
+def print_margins(margins: Mapping[str, Mapping[str, Any]], out: Console | None = None) -> None:
+    """Print the margins of every controller; default: on standard output."""
+    out = out or TextConsole(highlight=False)
+    shown = {name: column for name, column in MARGINS.items() if name != 'controller'}
+    for name, found in margins.items():
+        times = (f'{key} {plain(found[key])} s' for key in ('period', 'delay', 'lag'))
+        state = 'stable' if found['stable'] else 'UNSTABLE'
+        out.print(f'\n{name}: {state} when held with {", ".join(times)}; opened axis by axis')
+        out.print(terminal(make_table(name, '', found['axes'], shown)))
+        if found['disk_margin'] is not None:
+            out.print(disk_sentence(found['disk_margin']))
+        if found['together'] is not None:
+            gain, factor = found['gain'], number(found['together'])
+            out.print(f'all of {gain} times {factor} keeps 6 dB and 45 deg on every axis')
+
+
+def disk_sentence(alpha: float) -> str:
+    """What a disk margin allows in all axes at once."""
+    decibel = 20 * np.log10((2 + alpha) / (2 - alpha)) if alpha < 2 else np.inf
+    degrees = 2 * np.degrees(np.arctan(alpha / 2))
+    return (
+        f'disk margin {alpha:.3g}: {decibel:.3g} dB either way, or {degrees:.3g} deg, '
+        'in all axes at once'
+    )
 
 
 def print_poles(document: dict[str, Any], out: Console | None = None) -> None:

@@ -1,0 +1,495 @@
+"""Gain, phase, delay and disk margins of a scenario's loops, and the gains that keep them."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar, root
+
+from auv_analysis.scenario.scenario import Scenario
+from auv_analysis.studies.linearize.linearize import (
+    ATTITUDE,
+    LawAt,
+    holding_point,
+    operating_point,
+    plant_jacobian,
+    plant_of,
+)
+from auv_analysis.studies.linearize.sampled_loop import (
+    HeldPlant,
+    SampledLaw,
+    SampledLoop,
+    behind_lag,
+)
+from auv_dynamics.files.yaml_files import matrix6
+from auv_dynamics.plant.rotors import KEYS
+from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.thrusters import Thrusters
+from auv_dynamics.vehicle.vehicle import Vehicle
+from auv_gvc_controller.laws import OPEN_LOOP
+from auv_gvc_controller.laws.law import make_gains
+from auv_gvc_controller.laws.model import control_model
+
+LEAST_GAIN, LEAST_PHASE = 10 ** (6 / 20), np.radians(45.0)  # what is to be kept
+POINTS, SLOWEST = 600, 1e-5  # of the grid: how many, and the first one relative to pi/h
+NEUTRAL = (
+    1e-7  # by which a pole may lie outside the unit circle: roll and pitch stay where they are
+)
+CLOSED = 1e-9  # of 1 - S: below it an axis is not controlled at all
+MEASURABLE = 1e-3  # a factor of the gain below it, or above its inverse, is no margin
+FACTOR = 100.0  # times and part of the present gain between which the largest one is looked for
+RATIO = 1.25  # of two that are tried
+MOST_PERIODS = 100  # of a delay
+STATIC = 1e-3  # of the first frequency, where the response is static; imaginary part that is none
+SHARP, TINY = 0.1, 1e-99  # damping below which a pole is a resonance, and what keeps log finite
+AROUND = np.concatenate([-np.geomspace(10, 0.1, 12), [0.0], np.geomspace(0.1, 10, 12)])
+
+
+@dataclass(frozen=True)
+class AxisMargins:
+    """Margins of a loop that is opened at one axis, the others closed.
+
+    Attributes
+    ----------
+    gain : factor of the loop gain at which the loop turns unstable; inf: none
+    reduction : factor below 1 at which it does; 0: none
+    phase : rad that it may lag or lead more; inf: none
+    delay : s that the wrench of the axis may come later; inf: any
+    crossover : rad/s at which the phase margin is met; NaN: none
+
+    """
+
+    gain: float = np.inf
+    reduction: float = 0.0
+    phase: float = np.inf
+    delay: float = np.inf
+    crossover: float = np.nan
+
+    @property
+    def to_spare(self) -> float:
+        """Relative distance of the worst of them from 6 dB either way and 45 deg."""
+        factor = min(self.gain, 1 / max(self.reduction, MEASURABLE))
+        return float(min(factor / LEAST_GAIN, self.phase / LEAST_PHASE, 1 / MEASURABLE) - 1)
+
+    @property
+    def kept(self) -> bool:
+        """Whether it has 6 dB either way and 45 deg."""
+        return self.to_spare >= 0
+
+
+def axis_margins(
+    loop: SampledLoop, axis: int, omega: np.ndarray, S: np.ndarray, *, delays: bool = True
+) -> AxisMargins:
+    """Margins of one axis of a stable loop.
+
+    From S_ii = 1/(1 + L_i) of the opened loop's gain L_i, which is finite where L_i is not: L_i is
+    real where S_ii is, and crosses -1 once multiplied by S_ii/(S_ii - 1); abs(L_i) = 1 where the
+    real part of S_ii is 1/2.
+
+    Parameters
+    ----------
+    loop : SampledLoop
+    axis : 0 to 5
+    omega : (n,) rad/s, the last one pi/h
+    S : (n,) S_ii there
+    delays : whether the delay margin is looked for, which takes longest
+
+    Skogestad & Postlethwaite 2005, section 2.4; Astrom & Murray 2021, section 10.3.
+
+    """
+    if np.abs(S - 1).max() < CLOSED:
+        return AxisMargins()
+
+    def exact(at: float) -> complex:
+        try:
+            return complex(loop.sensitivity(np.array(at))[axis, axis])
+        except np.linalg.LinAlgError:  # a pole of the opened loop: its gain is infinite
+            return 0j
+
+    real = [exact(at) for at in _zeros(lambda at: exact(at).imag, omega, S.imag)]
+    ends = [s for s in (exact(STATIC * float(omega[0])), complex(S[-1]))
+            if abs(s.imag) < STATIC * abs(s)]  # fmt: skip
+    factors = [s.real / (s.real - 1) for s in (*real, *ends) if s.real != 1]
+    ups = [factor for factor in factors if 1 < factor < 1 / MEASURABLE]
+    downs = [factor for factor in factors if MEASURABLE < factor < 1]
+    met = [(at, exact(at)) for at in _zeros(lambda at: exact(at).real - 0.5, omega, S.real - 0.5)]
+    phases = [np.pi - 2 * np.arctan(2 * abs(s.imag)) for _, s in met]
+    nearest = int(np.argmin(phases)) if phases else 0
+    return AxisMargins(
+        min(ups, default=np.inf),
+        max(downs, default=0.0),
+        min(phases, default=np.inf),
+        min((_delay(loop, axis, *one) for one in met), default=np.inf) if delays else np.nan,
+        met[nearest][0] if met else np.nan,
+    )
+
+
+def _zeros(exact: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> list[float]:
+    """Where a function of rad/s changes its sign, values (n,) being those on the grid."""
+    found = []
+    for k in np.flatnonzero(values[:-1] * values[1:] < 0):
+        low, high = float(omega[k]), float(omega[k + 1])
+        if exact(low) * exact(high) < 0:  # else it is rounding about zero
+            found.append(float(brentq(exact, low, high, xtol=1e-13 * high, rtol=1e-13)))
+    return found
+
+
+def _delay(loop: SampledLoop, axis: int, crossover: float, s: complex) -> float:
+    """Further delay of an axis, s, that takes the loop to the border from one of its crossovers.
+
+    The phase margin over the frequency is exact for whole periods, and the start for the others.
+    """
+    phase = (np.pi + np.angle(1 / s - 1)) % (2 * np.pi)
+    start = np.array([crossover, phase / crossover])
+
+    def missing(scaled: np.ndarray) -> list[float]:
+        omega, extra = scaled * start
+        value = loop.closing(omega, axis, max(extra, 0.0))
+        return [value.real, value.imag]
+
+    solved = root(missing, np.ones(2), tol=1e-12)
+    return float(start[1] * (solved.x[1] if np.abs(missing(solved.x)).max() < 1e-8 else 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class ControlLoop:
+    """A controller of a scenario in its loop about an operating point, its gain to be scaled.
+
+    The turning of roll into pitch by a yaw rate is left out: it is as slow as that rate, and an
+    attitude that no law of velocity pulls back says nothing of the margins.
+
+    Attributes
+    ----------
+    scenario, controller : which loop; a current is left out
+    delay : s from the sample to the wrench at the actuators, beside the hold; None: the scenario's
+    lag : s, of the wrench; None: the scenario's. That of its rotors comes on top
+    nu0, eta0 : (6,) the point as of `linearize`; None: at rest, level
+
+    Raises
+    ------
+    ValueError : a delay or lag that is negative or too long, a wrong point
+    ArithmeticError : the law holds nu0 in no state
+
+    """
+
+    scenario: Scenario
+    controller: str
+    delay: float | None = None
+    lag: float | None = None
+    nu0: Sequence[float] | np.ndarray | None = None
+    eta0: Sequence[float] | np.ndarray | None = None
+    plant: HeldPlant = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Check the times, and sample the plant."""
+        actuators, h = self.scenario.data.get('actuators', {}), self.scenario.step
+        for name in ('delay', 'lag'):
+            value = getattr(self, name)
+            value = float(actuators.get(name, 0.0) if value is None else value)
+            if not 0 <= value <= MOST_PERIODS * h:
+                expected = f'0 to {MOST_PERIODS * h:g} s, {MOST_PERIODS} steps'
+                raise ValueError(f'{name}: expected {expected}, found {value:g}')
+            object.__setattr__(self, name, value)
+        A, B = plant_jacobian(self._truth, *self._point)
+        A[ATTITUDE, ATTITUDE] = 0.0
+        thrusters = self._truth.thrusters if actuators.get('thrusters') else None
+        if thrusters is not None:
+            slow = rotor_lags(thrusters, actuators)
+            A, B = behind_lag(A, B, slow, thrusters.inverse, thrusters.matrix)
+        A, B = behind_lag(A, B, np.full(6, self.lag), np.eye(6), np.eye(6))
+        object.__setattr__(self, 'plant', HeldPlant(A, B, h))
+
+    @property
+    def late(self) -> bool:
+        """Whether a delay or a lag is known."""
+        return bool(self.delay or self.lag or len(self.plant.A) > 8)
+
+    @cached_property
+    def _truth(self) -> Vehicle:
+        return plant_of(self.scenario)
+
+    @cached_property
+    def _point(self) -> tuple[np.ndarray, np.ndarray]:
+        return operating_point(self.eta0, 'eta0'), operating_point(self.nu0, 'nu0')
+
+    @cached_property
+    def omega(self) -> np.ndarray:
+        """(n,) rad/s of the grid, up to half the sampling frequency."""
+        return np.geomspace(SLOWEST, 1.0, POINTS) * np.pi / self.plant.period
+
+    @cached_property
+    def _seen(self) -> np.ndarray:
+        z = np.exp(1j * self.omega * self.plant.period)
+        return self.plant.response(z, self.plant.input(self.delay or 0.0))
+
+    @property
+    def gain(self) -> str:
+        """Name of the gain of the velocity error, '' of a law that has none of the usual name."""
+        given = self.scenario.gain_values(self.controller)
+        return next((name for name in ('k_P', 'k_D') if name in given), '')
+
+    @property
+    def values(self) -> np.ndarray:
+        """(6,) diagonal of that gain."""
+        return np.diagonal(matrix6(self.scenario.gain_values(self.controller)[self.gain])).copy()
+
+    @cached_property
+    def _held(self) -> np.ndarray:
+        return holding_point(self._law(np.ones(6)), self._truth, *self._point)
+
+    def _law(self, scale: np.ndarray) -> LawAt:
+        values = self.scenario.gain_values(self.controller)
+        if self.gain:
+            scaled = matrix6(values[self.gain]) * np.sqrt(np.outer(scale, scale))
+            values = {**values, self.gain: scaled.tolist()}
+        gains = make_gains(self.scenario.controller(self.controller)['law'], values)
+        return LawAt(gains, control_model(self.scenario.vehicle), self._point[0][5])
+
+    def loop(self, scale: Sequence[float] | np.ndarray = (1.0,) * 6) -> SampledLoop:
+        """The loop, the gain of the velocity error scaled per axis by (6,) `scale`.
+
+        Off the diagonal it is scaled by the roots of both factors: it stays symmetric.
+        """
+        slope, _ = self._law(np.asarray(scale, float)).jacobian(self._held)
+        return SampledLoop(self.plant, SampledLaw.of(slope), self.delay or 0.0)
+
+    def sensitivity(self, loop: SampledLoop) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) rad/s and S (n, 6, 6) there: on the grid, and around each resonance of the loop."""
+        poles = np.log(np.linalg.eigvals(loop.transition()).astype(complex) + TINY)
+        poles = poles[(poles.imag > 0) & (np.abs(poles.real) < SHARP * poles.imag)]
+        near = poles.imag[:, None] + np.abs(poles.real)[:, None] * AROUND
+        near = np.clip(near.ravel() / self.plant.period, self.omega[0], self.omega[-2])
+        omega = np.concatenate([self.omega, near])
+        order = np.argsort(omega)
+        S = np.concatenate([loop.sensitivity(self.omega, self._seen), loop.sensitivity(near)])
+        return omega[order], S[order]
+
+    def margins(self, loop: SampledLoop) -> tuple[AxisMargins, ...]:
+        """Margins of the six axes."""
+        omega, S = self.sensitivity(loop)
+        return tuple(axis_margins(loop, i, omega, S[:, i, i]) for i in range(6))
+
+    def disk_margin(self, loop: SampledLoop) -> float:
+        """Alpha of the disk margin of all six axes at once, a lower bound; at most 2.
+
+        Gains within (2 - alpha)/(2 + alpha) and its inverse, or phases within 2 atan(alpha/2), in
+        every axis at the same time and independently, leave the loop stable: 1/alpha is the
+        structured singular value of S - I/2 for diagonal uncertainty, bounded by the largest
+        singular value after diagonal scaling, which makes it independent of units.
+
+        Seiler, Packard & Gahinet 2020; scaling by Perron eigenvectors, Safonov 1982.
+        """
+
+        def size(omega: np.ndarray) -> np.ndarray:
+            return _scaled_size(loop.sensitivity(omega) - np.eye(6) / 2)
+
+        grid, S = self.sensitivity(loop)
+        sizes = _scaled_size(S - np.eye(6) / 2)
+        peak = int(np.argmax(sizes))
+        around = grid[max(peak - 1, 0)], grid[min(peak + 1, len(sizes) - 1)]
+        best = minimize_scalar(lambda omega: -size(np.array(omega)), bounds=around)
+        return float(1 / max(sizes[peak], -best.fun))
+
+    def largest(self, axis: int | None = None) -> float:
+        """Largest factor of the velocity error's gain that keeps 6 dB and 45 deg; NaN: none.
+
+        Parameters
+        ----------
+        axis : whose gain is scaled, and whose loop has to keep them; None: all of them
+
+        """
+        chosen = range(6) if axis is None else (axis,)
+
+        # a law is linear in its gain, which is quadratic in the root of the factor
+        at = [self._slope_of(chosen, factor) for factor in (0.0, 1.0, 4.0)]
+        turned = (at[2] - 2 * at[1] + at[0]) / 2
+        straight = at[1] - at[0] - turned
+
+        def to_spare(factor: float) -> float:
+            slope = at[0] + straight * np.sqrt(factor) + turned * factor
+            loop = SampledLoop(self.plant, SampledLaw.of(slope), self.delay or 0.0)
+            if not stable(loop):
+                return -1.0
+            omega, S = self.sensitivity(loop)
+            found = (axis_margins(loop, i, omega, S[:, i, i], delays=False) for i in chosen)
+            return min(one.to_spare for one in found)
+
+        good = to_spare(1.0) >= 0
+        near = 1.0
+        while 1 / FACTOR < near < FACTOR:
+            far = near * RATIO if good else near / RATIO
+            if (to_spare(far) >= 0) != good:
+                return float(brentq(to_spare, *sorted((near, far)), rtol=1e-9))
+            near = far
+        return np.inf if good else np.nan
+
+    def _slope_of(self, axes: Sequence[int], factor: float) -> np.ndarray:
+        scale = np.ones(6)
+        scale[list(axes)] = factor
+        return self._law(scale).jacobian(self._held)[0]
+
+
+def rotor_lags(thrusters: Thrusters, actuators: Mapping[str, Any]) -> np.ndarray:
+    """(n,) s by which the thrusts of a scenario's actuators lag; zero where it asks for no rotors.
+
+    A small change of thrust follows its rotor's speed. A second-order response counts with the lag
+    that is as late at low frequency, 2 zeta / omega.
+    """
+    n = len(thrusters.names)
+    if 'rotor_lag' in actuators:
+        return np.full(n, float(actuators['rotor_lag']))
+    if not thrusters.rotors or not any(key in actuators for key in KEYS):
+        return np.zeros(n)
+    return np.array([
+        2 * rotor.zeta / rotor.omega if rotor.omega else rotor.lag for rotor in thrusters.rotors
+    ])  # fmt: skip
+
+
+def stable(loop: SampledLoop) -> bool:
+    """Whether nothing grows; roll and pitch that a law neither pulls back nor pushes may stay."""
+    return bool(np.abs(np.linalg.eigvals(loop.transition())).max() <= 1 + NEUTRAL)
+
+
+def _scaled_size(M: np.ndarray) -> np.ndarray:
+    """(...,) upper bound of the structured singular value of M (..., 6, 6), diagonal blocks."""
+    size = np.abs(M)
+    size = size + 1e-12 * size.max(axis=(-2, -1), keepdims=True)  # no zeros: one Perron eigenvector
+    right, left = (_perron(matrix) for matrix in (size, np.swapaxes(size, -2, -1)))
+    d = np.sqrt(left / right)
+    bound = np.linalg.norm(d[..., :, None] * M / d[..., None, :], 2, axis=(-2, -1))
+    return np.asarray(bound)
+
+
+def _perron(matrix: np.ndarray) -> np.ndarray:
+    values, vectors = np.linalg.eig(matrix)
+    largest = np.argmax(values.real, axis=-1)
+    return np.abs(np.take_along_axis(vectors, largest[..., None, None], -1)[..., 0])
+
+
+def stability_margins(setting: ControlLoop) -> dict[str, Any]:
+    """Margins of a loop, ready for JSON.
+
+    Parameters
+    ----------
+    setting : ControlLoop
+
+    Returns
+    -------
+    margins : `period`, `delay`, `lag` in s; `stable`; `kept`, 6 dB and 45 deg on every axis;
+        `disk_margin` alpha; `gain`, the name of the velocity error's, and `together`, the
+        largest factor of it on all axes at once that keeps them; `axes`, per axis `gain_margin` and
+        `gain_reduction` as factors, `gain_margin_db`, `phase_margin` in degrees, `delay_margin`
+        in s, `crossover` in rad/s, `value` and `largest` of the gain, scaled on this axis alone,
+        `kept`. What has no bound is None, and all margins where the loop is unstable
+
+    """
+    loop = setting.loop()
+    holds = stable(loop)
+    found: Sequence[AxisMargins | None] = setting.margins(loop) if holds else (None,) * 6
+    rows = [_row(setting, i, one) for i, one in enumerate(found)]
+    return {
+        'period': setting.plant.period,
+        'delay': setting.delay,
+        'lag': setting.lag,
+        'stable': holds,
+        'kept': all(row['kept'] for row in rows),
+        'disk_margin': setting.disk_margin(loop) if holds else None,
+        'gain': setting.gain,
+        'together': _bounded(setting.largest()) if setting.gain else None,
+        'axes': rows,
+    }
+
+
+def _row(setting: ControlLoop, axis: int, found: AxisMargins | None) -> dict[str, Any]:
+    row: dict[str, Any] = {'axis': DOFS[axis], 'kept': found is not None and found.kept}
+    if found is not None:
+        row |= {
+            'gain_margin': _bounded(found.gain),
+            'gain_margin_db': _bounded(20 * np.log10(found.gain)),
+            'gain_reduction': found.reduction or None,
+            'phase_margin': _bounded(np.degrees(found.phase)),
+            'delay_margin': _bounded(found.delay),
+            'crossover': _bounded(found.crossover),
+        }
+    if setting.gain:
+        value = float(setting.values[axis])
+        row |= {'value': value, 'largest': _bounded(value * setting.largest(axis))}
+    return row
+
+
+def _bounded(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def margin_notes(
+    scenario: Scenario, controllers: Sequence[str], delay: float | None = None
+) -> list[str]:
+    """Margins of controllers at rest and at the mean set-point, a line each; [] without a delay.
+
+    Parameters
+    ----------
+    scenario : whose actuators have a delay or a lag, else there is nothing to say
+    controllers : names of some of its own
+    delay : s, in place of the scenario's
+
+    Returns
+    -------
+    notes : 'note: ...' of a controller that keeps 6 dB and 45 deg on every axis, 'warning: ...' of
+        one that does not, with the factor of its gain that would
+
+    """
+    found = []
+    for name in controllers:
+        if scenario.controller(name)['law'] == OPEN_LOOP:
+            continue
+        points = np.zeros(6), _mean_setpoint(scenario)
+        try:
+            settings = [ControlLoop(scenario, name, delay, nu0=nu0) for nu0 in points]
+            if settings[0].late:
+                found.append(_note(settings))
+        except ValueError as error:
+            found.append(f'note: {scenario.path}: controllers.{name}: no margins: {error}')
+    return found
+
+
+def _mean_setpoint(scenario: Scenario) -> np.ndarray:
+    """(6,) of a thousand moments."""
+    moments = np.linspace(0.0, scenario.duration, 1001)
+    return np.asarray(scenario.setpoint.value(moments).mean(axis=0))
+
+
+def _note(settings: Sequence[ControlLoop]) -> str:
+    """One line of a controller, of the worst of its operating points."""
+    first = settings[0]
+    path = f'{first.scenario.path}: controllers.{first.controller}'
+    late = f'with a loop delay of {first.delay:g} s and a lag of {first.lag:g} s'
+    rows: list[tuple[int, AxisMargins]] = []
+    for setting in settings:
+        try:
+            loop = setting.loop()
+        except ArithmeticError as error:  # a velocity that the law cannot hold
+            if setting is first:
+                return f'note: {path}: no margins: {error}'
+            continue
+        if not stable(loop):
+            return f'warning: {path}: unstable {late}{_advice(setting)}'
+        rows += enumerate(setting.margins(loop))
+    gain = min(rows, key=lambda row: min(row[1].gain, 1 / max(row[1].reduction, MEASURABLE)))
+    phase = min(rows, key=lambda row: row[1].phase)
+    factor = min(gain[1].gain, 1 / max(gain[1].reduction, MEASURABLE))
+    text = (
+        f'{path}: gain margin {20 * np.log10(factor):.3g} dB ({DOFS[gain[0]]}), '
+        f'phase margin {np.degrees(phase[1].phase):.3g} deg ({DOFS[phase[0]]}) {late}'
+    )
+    if all(one.kept for _, one in rows):
+        return f'note: {text}'
+    return f'warning: {text}: below 6 dB and 45 deg{_advice(first)}'
+
+
+def _advice(setting: ControlLoop) -> str:
+    factor = setting.largest() if setting.gain else np.nan
+    if not np.isfinite(factor):
+        return '; see auv linearize'
+    return f'; {factor:.2g} times its {setting.gain} keeps them at rest, see auv linearize'

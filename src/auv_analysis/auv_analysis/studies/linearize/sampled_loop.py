@@ -1,0 +1,204 @@
+"""The sampled loop with delay and actuator lag: its exact frequency response and transitions.
+
+A law answers samples, its wrench is held for a control period h and arrives after a delay, then
+the actuators follow with a lag. Nothing is approximated: no Pade polynomial stands for the delay,
+and no half period for the hold.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+
+def behind_lag(
+    A: np.ndarray, B: np.ndarray, lag: np.ndarray, into: np.ndarray, out: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A and B of a plant behind first-order actuators, lag a_dot = into u - a, tau = out a.
+
+    Parameters
+    ----------
+    A, B : (n, n), (n, 6) of the plant
+    lag : (p,) time constants, s; 0: the actuator follows at once and is no state
+    into : (p, 6) from the wrench asked for to the actuators
+    out : (6, p) from the actuators to the wrench delivered
+
+    Returns
+    -------
+    A, B : (n + q, n + q), (n + q, 6) with the q slow actuators behind the plant's states
+
+    Fossen 2021, section 9.5.
+
+    """
+    slow = lag > 0
+    rate = 1 / lag[slow]
+    q = len(rate)
+    lagged = np.block([[A, B @ out[:, slow]], [np.zeros((q, len(A))), -np.diag(rate)]])
+    return lagged, np.vstack([B @ out[:, ~slow] @ into[~slow], rate[:, None] * into[slow]])
+
+
+class HeldInput(NamedTuple):
+    """x_{k+1} = Phi x_k + newest u_{k-whole} + older u_{k-whole-1}, of a delayed, held input.
+
+    Attributes
+    ----------
+    whole : periods of the delay
+    newest, older : (n, 6) by how much each of the two wrenches of a period acts in it
+
+    """
+
+    whole: int
+    newest: np.ndarray
+    older: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class HeldPlant:
+    """Plant behind a zero-order hold and a delay, exact at the samples.
+
+    Attributes
+    ----------
+    A, B : (n, n), (n, 6) of x_dot = A x + B u; its first eight states are what a law sees
+    period : h, s, for which u is held
+    Phi : (n, n) exp(A h)
+
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    period: float
+    Phi: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Transition over one period."""
+        object.__setattr__(self, 'Phi', self._over(self.period)[0])
+
+    def _over(self, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+        """exp(A t) and the integral of exp(A s) B over s from 0 to t."""
+        n, k = self.B.shape
+        whole = expm(seconds * np.block([[self.A, self.B], [np.zeros((k, n + k))]]))
+        return whole[:n, :n], whole[:n, n:]
+
+    def input(self, delay: float) -> HeldInput:
+        """How a wrench acts that comes `delay` s late, any number from 0 up.
+
+        Astrom & Wittenmark 1997, section 2.3.
+        """
+        whole = int(np.floor(delay / self.period + WHOLE))
+        rest = max(delay - whole * self.period, 0.0)
+        rest = 0.0 if rest < WHOLE * self.period else rest
+        after, newest = self._over(self.period - rest)
+        return HeldInput(whole, newest, after @ self._over(rest)[1])
+
+    def response(self, z: np.ndarray, held: HeldInput) -> np.ndarray:
+        """(..., 8, 6) from u to what the law sees, at z = exp(i omega h) (...,)."""
+        z = np.asarray(z)[..., None, None]
+        forced = held.newest + held.older / z
+        return (np.linalg.solve(z * np.eye(len(self.A)) - self.Phi, forced) / z**held.whole)[
+            ..., :8, :
+        ]
+
+
+WHOLE = 1e-9  # of a period: a delay nearer than this to a whole number of them is that number
+
+
+class SampledLaw(NamedTuple):
+    """tau_k = by_x x_k + by_state s_k, s_{k+1} = s_k + h (rate_by_x x_k + rate_by_state s_k).
+
+    Attributes
+    ----------
+    by_x, by_state : (6, 8), (6, m)
+    rate_by_x, rate_by_state : (m, 8), (m, m)
+
+    """
+
+    by_x: np.ndarray
+    by_state: np.ndarray
+    rate_by_x: np.ndarray
+    rate_by_state: np.ndarray
+
+    @classmethod
+    def of(cls, slope: np.ndarray) -> 'SampledLaw':
+        """Law with these derivatives (6 + m, 20 + m), see `LawAt.jacobian`."""
+        end = 8 + len(slope) - 6
+        return cls(slope[:6, :8], slope[:6, 8:end], slope[6:, :8], slope[6:, 8:end])
+
+    def response(self, z: np.ndarray, period: float) -> np.ndarray:
+        """(..., 6, 8) from what the law sees to tau."""
+        m = len(self.rate_by_x)
+        moved = (np.asarray(z) - 1)[..., None, None] * np.eye(m) - period * self.rate_by_state
+        return self.by_x + self.by_state @ np.linalg.solve(moved, period * self.rate_by_x)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledLoop:
+    """A law around a held plant, opened where the wrench leaves the law.
+
+    Attributes
+    ----------
+    plant, law : of the loop
+    delay : s from the sample to the wrench at the actuators, beside the hold
+
+    """
+
+    plant: HeldPlant
+    law: SampledLaw
+    delay: float
+
+    @cached_property
+    def held(self) -> HeldInput:
+        """How a wrench acts on the plant."""
+        return self.plant.input(self.delay)
+
+    def z(self, omega: np.ndarray) -> np.ndarray:
+        """exp(i omega h) at rad/s."""
+        return np.exp(1j * np.asarray(omega) * self.plant.period)
+
+    def gain(self, omega: np.ndarray, plant: np.ndarray | None = None) -> np.ndarray:
+        """Loop gain L (..., 6, 6) at omega (...,) rad/s; tau = -L u where the loop is open.
+
+        `plant` is the plant's response there where it is known.
+        """
+        z = self.z(omega)
+        seen = self.plant.response(z, self.held) if plant is None else plant
+        return -self.law.response(z, self.plant.period) @ seen
+
+    def sensitivity(self, omega: np.ndarray, plant: np.ndarray | None = None) -> np.ndarray:
+        """S = (I + L)^-1 (..., 6, 6), Skogestad & Postlethwaite 2005, section 2.2.
+
+        With the loop opened at axis i alone, the others closed, its gain is 1/S_ii - 1.
+        """
+        return np.linalg.inv(np.eye(6) + self.gain(omega, plant))
+
+    def closing(self, omega: float, axis: int, extra: float) -> complex:
+        """1 + the loop gain of an axis whose wrench comes `extra` s later still."""
+        z = self.z(np.array(omega))
+        seen = self.plant.response(z, self.held)
+        late = self.plant.input(self.delay + extra)
+        seen[:, axis] = self.plant.response(z, late)[:, axis]
+        whole = np.eye(6) - self.law.response(z, self.plant.period) @ seen
+        others = np.delete(np.delete(whole, axis, 0), axis, 1)
+        return complex(np.linalg.det(whole) / np.linalg.det(others))
+
+    def transition(self) -> np.ndarray:
+        """Transition matrix of the closed loop over a period: x, the law's state, past wrenches."""
+        held, law, h = self.held, self.law, self.plant.period
+        n, m = len(self.plant.A), len(law.rate_by_x)
+        past = held.whole + bool(held.older.any())
+        command = np.hstack([law.by_x, np.zeros((6, n - 8)), law.by_state])
+        A = np.zeros((n + m + 6 * past,) * 2)
+        A[:n, :n] = self.plant.Phi
+        A[n : n + m, :8] = h * law.rate_by_x
+        A[n : n + m, n : n + m] = np.eye(m) + h * law.rate_by_state
+        for steps, by in ((held.whole, held.newest), (held.whole + 1, held.older)):
+            if steps == 0:
+                A[:n, : n + m] += by @ command
+            elif steps <= past:
+                start = n + m + 6 * (steps - 1)
+                A[:n, start : start + 6] += by
+        if past:
+            A[n + m : n + m + 6, : n + m] = command
+            A[n + m + 6 :, n + m : -6] = np.eye(6 * (past - 1))
+        return A

@@ -150,16 +150,15 @@ POLES: dict[str, Shown] = {
 
 
 DECIBEL: dict[str, Any] = {'decimals': 1}
-NOW = 'velocity gain'
 MARGINS: dict[str, Shown] = {
     'controller': 'controller',
     'axis': 'axis',
-    'gain_margin_db': described('gain margin', unit='dB', **DECIBEL),
-    'phase_margin': described('phase margin', unit='deg', **DECIBEL),
-    'delay_margin': described('delay margin', unit='s', **FOUR),
+    'gain_margin_db': described('gain', unit='dB', **DECIBEL),
+    'phase_margin': described('phase', unit='deg', **DECIBEL),
+    'delay_margin': described('delay', unit='s', **FOUR),
     'crossover': described('crossover', unit='rad/s', **FOUR),
-    'value': described('it is', group=NOW, **FOUR),
-    'largest': described('largest for 6 dB, 45 deg', group=NOW, **FOUR),
+    'value': described('velocity gain', **FOUR),
+    'largest': described('at most', **FOUR),
 }
 
 

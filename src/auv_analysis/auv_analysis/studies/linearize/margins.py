@@ -266,10 +266,10 @@ class ControlLoop:
         S = np.concatenate([loop.sensitivity(self.omega, self._seen), loop.sensitivity(near)])
         return omega[order], S[order]
 
-    def margins(self, loop: SampledLoop) -> tuple[AxisMargins, ...]:
-        """Margins of the six axes."""
+    def margins(self, loop: SampledLoop, *, delays: bool = True) -> tuple[AxisMargins, ...]:
+        """Margins of the six axes; `delays`: with the delay margins, which take longest."""
         omega, S = self.sensitivity(loop)
-        return tuple(axis_margins(loop, i, omega, S[:, i, i]) for i in range(6))
+        return tuple(axis_margins(loop, i, omega, S[:, i, i], delays=delays) for i in range(6))
 
     def disk_margin(self, loop: SampledLoop) -> float:
         """Alpha of the disk margin of all six axes at once, a lower bound; at most 2.
@@ -437,7 +437,7 @@ def margin_notes(
     Returns
     -------
     notes : 'note: ...' of a controller that keeps 6 dB and 45 deg on every axis, 'warning: ...' of
-        one that does not, with the factor of its gain that would
+        one that does not
 
     """
     found = []
@@ -449,7 +449,7 @@ def margin_notes(
             settings = [ControlLoop(scenario, name, delay, nu0=nu0) for nu0 in points]
             if settings[0].late:
                 found.append(_note(settings))
-        except ValueError as error:
+        except Exception as error:  # a law of the user's own may raise anything
             found.append(f'note: {scenario.path}: controllers.{name}: no margins: {error}')
     return found
 
@@ -474,8 +474,8 @@ def _note(settings: Sequence[ControlLoop]) -> str:
                 return f'note: {path}: no margins: {error}'
             continue
         if not stable(loop):
-            return f'warning: {path}: unstable {late}{_advice(setting)}'
-        rows += enumerate(setting.margins(loop))
+            return f'warning: {path}: unstable {late}; see auv linearize'
+        rows += enumerate(setting.margins(loop, delays=False))
     gain = min(rows, key=lambda row: min(row[1].gain, 1 / max(row[1].reduction, MEASURABLE)))
     phase = min(rows, key=lambda row: row[1].phase)
     factor = min(gain[1].gain, 1 / max(gain[1].reduction, MEASURABLE))
@@ -485,11 +485,4 @@ def _note(settings: Sequence[ControlLoop]) -> str:
     )
     if all(one.kept for _, one in rows):
         return f'note: {text}'
-    return f'warning: {text}: below 6 dB and 45 deg{_advice(first)}'
-
-
-def _advice(setting: ControlLoop) -> str:
-    factor = setting.largest() if setting.gain else np.nan
-    if not np.isfinite(factor):
-        return '; see auv linearize'
-    return f'; {factor:.2g} times its {setting.gain} keeps them at rest, see auv linearize'
+    return f'warning: {text}: below 6 dB and 45 deg; see auv linearize'

@@ -214,7 +214,7 @@ def test_the_command_prints_margins_and_writes_them(tmp_path, capsys):
     for word in (
         'period 0.01 s, delay 0.03 s, lag 0.02 s',
         'disk margin',
-        'largest',
+        'axis   gain, dB  phase, deg  delay, s  crossover, rad/s  velocity gain  at most',
     ):
         assert word in text
     document = json.loads((out / 'linearization.json').read_text())

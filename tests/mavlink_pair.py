@@ -94,14 +94,14 @@ class Pair:
         self.run(seconds)
         self.up, self.down = ways
 
-    def steer(self, seconds: float, x: int = 600) -> None:
-        """Let somebody else's joystick say something 25 times a second."""
+    def steer(self, seconds: float, x: int = 600, every: float = 0.04) -> None:
+        """Let somebody else's joystick say something every so many s."""
         message = mavlink.MAVLink_manual_control_message(1, x, 0, 500, 0, 0)
         joystick = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
-        for _ in range(round(seconds / 0.04)):
+        for _ in range(round(seconds / every)):
             data = message.pack(joystick)
             self.autopilot.receive(*self._port.parse(data), self.now - self.booted)
-            self.run(0.04, self.tau)
+            self.run(every, self.tau)
 
     def flown(self, tau: Any = None) -> 'Pair':
         """The pair once wrenches reach the motors."""

@@ -68,8 +68,7 @@ def line(reading: Reading, *, paced: bool = True) -> bytes:
         'quaternion': reading.quaternion.tolist(),
         'velocity': reading.velocity.tolist(),
     }
-    if not paced:
-        document['no_time_sync'] = 1
+    document['no_time_sync'] = int(not paced)
     return b'\n%s\n' % json.dumps(document, separators=(',', ':'), allow_nan=False).encode()
 
 

@@ -12,6 +12,7 @@ from auv_dynamics.vehicle.thrusters import Thrusters
 
 CHANNELS = 32  # pulses that a frame carries at most
 NAMES = {6: 'VECTORED, FRAME_CONFIG 1', 8: 'VECTORED_6DOF, FRAME_CONFIG 2'}
+NOMINAL = 16.0  # V of the usual curve
 NONE = 1e-3  # m and of 1: below, a thruster has no share in a degree of freedom
 Order = list[tuple[int, bool]]  # thruster of each motor, and whether it is reversed
 
@@ -74,11 +75,12 @@ def make_motors(
     groups: dict[tuple[bytes, float], tuple[ThrusterCurve, list[int]]] = {}
     for i in range(len(names)):
         rotor = thrusters.rotors[i] if thrusters.rotors else None
-        curve, nominal = usual, 16.0
-        if rotor and rotor.voltage and rotor.curve and rotor.curve.unit == 'pwm_us':
-            curve, nominal = rotor.curve, rotor.voltage
+        curve, nominal = usual, NOMINAL
+        if rotor and rotor.curve and rotor.curve.unit == 'pwm_us':
+            curve, nominal = rotor.curve, rotor.voltage or voltage or NOMINAL
             scales[0][i] = scales[1][i] = 1.0
-        groups.setdefault((curve.thrusts.tobytes(), nominal), (curve, []))[1].append(i)
+        table = curve.commands.tobytes() + curve.thrusts.tobytes()
+        groups.setdefault((table, nominal), (curve, []))[1].append(i)
     curves = [
         (at_voltage(curve, nominal, voltage or nominal), np.array(at))
         for (_, nominal), (curve, at) in groups.items()

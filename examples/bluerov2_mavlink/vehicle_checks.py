@@ -1,5 +1,6 @@
 """What an ArduSub vehicle is asked for when it is met: messages, version, parameters."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
@@ -8,7 +9,8 @@ from wrench_mapping import MANUAL_CONTROL
 
 SECOND = 1_000_000_000  # ns
 TURN = SECOND // 10  # between two requests for messages
-AGAIN, TRIES = SECOND // 2, 4  # of a question that has no answer
+SLOW = 0.5  # of the wanted rate: another ground station has asked for less
+AGAIN, TRIES = SECOND // 2, 20  # of a question that has no answer
 LEAST_VERSION = (4, 0, 0)
 SEES_OVERRIDES = (4, 5, 0)  # from here on ArduSub's pilot-input failsafe
 DISARM = 2  # of FS_PILOT_INPUT and FS_GCS_ENABLE
@@ -36,17 +38,26 @@ class Telemetry:
     ):
         self._wanted, self._order, self._request = wanted, order, request
         self._last: dict[int, int] = {}  # ns of a request
-        self._due = 0
+        self._due = self._asked = self._counted = 0
+        self._counts: Counter[int] = Counter()
+        self._slow: set[int] = set()
         self._unanswered: int | None = None
 
     def answered(self, accepted: bool) -> None:
         """Take the answer to the request that was sent last."""
+        self._asked -= AGAIN
         if accepted:
             self._unanswered = None
 
+    def heard(self, message_id: int) -> None:
+        """Count a message."""
+        self._counts[message_id] += 1
+
     def tick(self, heard: dict[int, int], now: int) -> None:
-        """Ask for one that was not heard for a second; each once a second."""
-        if now < self._due:
+        """Ask for one that comes too slowly, or was not heard for a second; each once a second."""
+        self._count(now)
+        waiting = self._unanswered is not None and now - self._asked < AGAIN
+        if now < self._due or waiting:
             return
         self._due = now + TURN
         if self._unanswered is not None:
@@ -54,13 +65,26 @@ class Telemetry:
             self._request(stream, max(1, round(1e6 / period)))
             self._unanswered = None
         for message_id, (period, _) in self._wanted.items():
-            past = max(heard.get(message_id, -SECOND), self._last.get(message_id, -SECOND))
-            if now - past < SECOND:
+            came = -SECOND if message_id in self._slow else heard.get(message_id, -SECOND)
+            if now - max(came, self._last.get(message_id, -SECOND)) < SECOND:
                 continue
-            self._last[message_id] = now
+            self._slow.discard(message_id)
+            self._last[message_id], self._asked = now, now
             self._unanswered = message_id
             self._order(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, period)
             return
+
+    def _count(self, now: int) -> None:
+        """Note once a second what comes at less than half of its rate."""
+        if (passed := now - self._counted) < SECOND:
+            return
+        self._slow = {
+            message_id
+            for message_id, (period, _) in self._wanted.items()
+            if 0 < self._counts[message_id] < SLOW * passed / (1000 * period)
+        }
+        self._counted = now
+        self._counts.clear()
 
 
 class Difference(NamedTuple):
@@ -155,7 +179,7 @@ class Profile:
         obeys = f'it obeys that one only: start with -p system:={{:g}} or set {station}'
         other = f'the vehicle file has {thrusters} thrusters: set it, or give the right -p vehicle'
         serious = [(name, station, obeys) for name in STATION]
-        for name, expected, advice in [*serious, ('FRAME_CONFIG', FRAMES[thrusters], other)]:
+        for name, expected, advice in [*serious, ('FRAME_CONFIG', FRAMES.get(thrusters, 0), other)]:
             found = self.values.get(name, expected)
             if found != expected:
                 text = f'{name} is {found:g}, expected {expected}: {advice.format(found)}'

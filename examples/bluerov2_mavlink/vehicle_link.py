@@ -28,13 +28,14 @@ GAIN = 'PilotGain'  # NAMED_VALUE_FLOAT of ArduSub's
 AT_REST = 5  # us about neutral
 SENT = 2 * SECOND  # for which inputs are kept, to know them when the vehicle reports them
 FOLLOWED, STRANGE = 5, 6  # reports of inputs: known ones before strange ones count, and how many
+FORGOTTEN = 0.05  # of a strange one by each own: two pilots share the reads in any proportion
 
 # message id -> rate in Hz (0: that of the odometry), and the stream that has it
 MESSAGES = {
     mavlink.MAVLINK_MSG_ID_ATTITUDE: (0, mavlink.MAV_DATA_STREAM_EXTRA1),
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: (0, mavlink.MAV_DATA_STREAM_POSITION),
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: (20, mavlink.MAV_DATA_STREAM_RC_CHANNELS),
-    mavlink.MAVLINK_MSG_ID_RC_CHANNELS: (20, mavlink.MAV_DATA_STREAM_RC_CHANNELS),
+    mavlink.MAVLINK_MSG_ID_RC_CHANNELS: (50, mavlink.MAV_DATA_STREAM_RC_CHANNELS),
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: (2, mavlink.MAV_DATA_STREAM_EXTENDED_STATUS),
 }
 ODOMETRY = ('ATTITUDE', 'LOCAL_POSITION_NED')
@@ -100,7 +101,7 @@ class VehicleLink:
         self._serious: list[str] = []  # differences with which the vehicle is not taken
         self._inputs: deque[tuple[int, tuple[int, ...]]] = deque()  # sent: ns, pulses
         self._own: tuple[int, ...] = ()  # the last of them that the vehicle reported
-        self._followed = self._strange = 0
+        self._followed, self._strange = 0, 0.0
         self._now = 0
         self._telemetry = Telemetry(self._wanted_messages(), self._order, self._request_stream)
         self._takers: dict[str, Callable[[Any, int], Sample | None]] = {
@@ -145,6 +146,7 @@ class VehicleLink:
             self._say(f'refused: {error}')
             return None
         self._heard[message.get_msgId()] = now
+        self._telemetry.heard(message.get_msgId())
         return sample
 
     def command(self, axes: PilotAxes, now: int) -> None:
@@ -308,17 +310,17 @@ class VehicleLink:
 
         Two of them would take turns: the newest input counts. The driver is the one that yields.
         """
-        while self._inputs and now - self._inputs[0][0] > SENT:
+        while len(self._inputs) > 1 and now - self._inputs[0][0] > SENT:
             self._inputs.popleft()
         if not self.pilot.commands:
-            self._followed = self._strange = 0
+            self._followed, self._strange = 0, 0.0
             return
         found = tuple(getattr(message, f'chan{i}_raw') for i in range(1, 7))
         if found == self._own or any(found == pulses for _, pulses in self._inputs):
             self._own = found
-            self._followed, self._strange = self._followed + 1, max(0, self._strange - 1)
+            self._followed, self._strange = self._followed + 1, max(0.0, self._strange - FORGOTTEN)
         elif self._followed >= FOLLOWED:
-            self._strange += 2
+            self._strange += 1.0
         if self._strange >= STRANGE:
             self._say(self.pilot.let_go(f'another pilot steers, inputs {found}'))
 

@@ -203,9 +203,9 @@ def thrust_of(command: np.ndarray, reverse: np.ndarray, forward: np.ndarray) -> 
 
 
 def rc_override(axes: PilotAxes, system: int, component: int) -> Any:
-    """RC_CHANNELS_OVERRIDE of channels 1 to 6."""
+    """RC_CHANNELS_OVERRIDE of channels 1 to 6; 4.0 takes zeros of the others as a release."""
     return mavlink.MAVLink_rc_channels_override_message(
-        system, component, *axes.pulses(), KEEP, KEEP
+        system, component, *axes.pulses(), *[KEEP] * 12
     )
 
 

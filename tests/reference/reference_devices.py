@@ -151,7 +151,8 @@ class Actuators:
         if not self.priority:
             return self.within(self.T_plus @ tau)
         first = np.array([0, 0, 1, 1, 1, 1.0])
-        kept, rest = self.within(self.T_plus @ (first * tau)), self.T_plus @ ((1 - first) * tau)
+        kept, rest = self.T_plus @ (first * tau), self.T_plus @ ((1 - first) * tau)
+        kept = self.within(kept / 0.99) * 0.99  # a hundredth of each limit is left
         share = 1.0
         for there, more, low, high in zip(kept, rest, self.lowest, self.highest, strict=True):
             if there + more > high:

@@ -15,6 +15,7 @@ from auv_analysis.driver.excitation import (
     carry_out,
 )
 from auv_analysis.driver.plan import SETTLE, plan_of
+from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import ENDING, on_signals
 
 ZERO = (0.0,) * 6
@@ -58,6 +59,16 @@ def test_a_vehicle_that_moves_already_gets_nothing_but_zero() -> None:
     driver = SimulatedDriver(fast_after=0.0)
     assert 'already' in sent_by(driver).aborted
     assert set(driver.sent) == {ZERO}
+
+
+def test_a_wrench_above_a_dead_band_leaves_the_others_their_speed() -> None:
+    heavy = load_vehicle('bluerov2_heavy')  # whose file tells the dead band of its thrusters
+    plan = plan_of(heavy, ['surge', 'yaw'], 0.01, None, None, raised=0.5)
+    surge, yaw, _ = plan.trials
+    assert surge.speed == 0.01 or surge.turns
+    assert yaw.turns
+    assert 0.01 < yaw.speed < 0.5
+    assert plan.speed == max(one.speed for one in plan.trials)
 
 
 def test_nan_is_too_fast() -> None:

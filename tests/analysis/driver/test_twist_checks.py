@@ -191,6 +191,15 @@ def test_a_single_reversed_axis_is_named() -> None:
     assert found['twist_frame'].verdict == FAIL
 
 
+@pytest.mark.parametrize('seed', range(8))
+def test_noise_in_place_of_a_component_has_no_sign(seed: int) -> None:
+    x = motion(noise=1e-3)
+    x[:, 8] = np.random.default_rng(seed).normal(0.0, 0.03, len(x))
+    found = found_in(x)['axis_sway']
+    assert found.verdict != PASS
+    assert 'sign' not in found.advice
+
+
 def test_degrees_are_named_in_each_axis() -> None:
     x = motion()
     x[:, 10:] = np.degrees(x[:, 10:])

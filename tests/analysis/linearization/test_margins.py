@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.signal
+import yaml
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
@@ -201,6 +202,25 @@ def test_thrusters_that_give_no_roll_leave_it_out_of_the_loop():
     for dof, one in zip(DOFS, found, strict=True):
         assert np.isfinite(one.crossover) == (dof not in lost), dof
     assert lost
+
+
+def test_a_rotors_lag_counts_where_the_plant_has_it():
+    asked = ({'rotors': True}, {'voltage': 15.0}, {'dead_band': 1.0}, {'rotors': False})
+    made = [
+        ControlLoop(scenario_of(actuators={'thrusters': True, **one}), 'gvc').late for one in asked
+    ]
+    assert made == [True, False, False, False]
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_a_delay_of_many_steps_leaves_the_poles(tmp_path, capsys):
+    data = scenario_of(step=0.01, actuators={'delay': 2.0, 'lag': 3.0}).data
+    path = tmp_path / 'late.yaml'
+    path.write_text(yaml.safe_dump({**data, 'vehicle': 'bluerov2_heavy'}))
+    main(['linearize', str(path), '--controller', 'gvc', '--out', str(tmp_path / 'out')])
+    said = capsys.readouterr()
+    assert 'no margins beyond 100 steps' in said.err
+    assert 'pole, 1/s' in said.out
 
 
 @pytest.mark.usefixtures('unrendered')

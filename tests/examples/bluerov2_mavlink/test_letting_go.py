@@ -88,9 +88,12 @@ def test_a_joystick_that_takes_over_with_a_mode_is_not_hindered(mode: int) -> No
     assert 'set by somebody else' in pair.said[-1]
 
 
-def test_a_joystick_in_the_same_mode_is_noticed_and_given_way() -> None:
+@pytest.mark.parametrize('phase', [0.0, 0.012])
+@pytest.mark.parametrize('every', [0.02, 0.04, 0.052, 0.1])
+def test_a_joystick_in_the_same_mode_is_noticed_and_given_way(every: float, phase: float) -> None:
     pair = Pair().flown(PUSH)
-    pair.steer(2.0, x=-600)
+    pair.run(phase, PUSH)
+    pair.steer(8.0, x=-600, every=every)
     assert any('another pilot steers' in line for line in pair.said)
     before = inputs(pair)
     pair.steer(1.0, x=-600)

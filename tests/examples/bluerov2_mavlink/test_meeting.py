@@ -69,10 +69,26 @@ def test_messages_come_by_their_older_stream_where_they_must(refused: bool) -> N
             if getattr(message, 'command', None) == SET_INTERVAL
             else take(message, now)
         )
-    pair.run(2.0)
+    pair.run(5.0)
     assert len(pair.samples) > 40
     asked = {m.req_stream_id for m in pair.sent if m.get_type() == 'REQUEST_DATA_STREAM'}
     assert asked == {2, 3, 6, 10}
+
+
+def test_a_rate_that_another_ground_station_lowers_is_asked_for_again() -> None:
+    pair = Pair()
+    pair.run(2.0)
+    stream = mavlink.MAV_DATA_STREAM_POSITION
+    lower = mavlink.MAVLink_request_data_stream_message(1, 1, stream, 3, 1)
+    lower.pack(mavlink.MAVLink(None, srcSystem=255, srcComponent=190))
+    pair.autopilot.receive(lower, pair.now - pair.booted)
+    before = len(pair.samples)
+    pair.run(1.0)
+    assert len(pair.samples) - before < 25
+    pair.run(2.5)
+    before = len(pair.samples)
+    pair.run(1.0)
+    assert len(pair.samples) - before > 45
 
 
 def test_the_pilot_gain_comes_by_its_stream() -> None:
@@ -93,7 +109,7 @@ def test_without_either_it_waits_and_says_so(gain: float) -> None:
     silent = ['REQUEST_DATA_STREAM'] + ['PARAM_REQUEST_READ'] * (gain == 0.5)
     pair = deaf(Pair(Booted(gain=gain), BY_STICK), *silent)
     pair.link.pilot.want(True, pair.now)
-    pair.run(4.0, tau=[1.0, 0, 0, 0, 0, 0])
+    pair.run(12.0, tau=[1.0, 0, 0, 0, 0, 0])
     assert 'the pilot gain (PilotGain or JS_GAIN_DEFAULT)' in waits(pair)
     assert not [m for m in pair.sent if m.get_type() == 'MANUAL_CONTROL']
     assert told(pair, 'no answer about', 'JS_GAIN_DEFAULT') == (gain == 0.5)

@@ -132,23 +132,26 @@ class MotionGuard:
         before, most = self._speed(), TOO_FAST * speed
         if not before <= most:
             raise AbortError(f'it moves by {before:.3g} m/s or rad/s already, over {most:.3g}')
-        self._most = most + before
+        self._before = before
 
     def _speed(self) -> float:
         recent = self._client.buffer.recent(RECENT)[:, 7:]
         nu = np.median(recent, axis=0) if len(recent) else np.zeros(6)
         return max(float(np.linalg.norm(nu[:3])), float(np.linalg.norm(nu[3:])))
 
-    def look(self) -> None:
-        """Raise AbortError or StoppedError where the next wrench must not be sent."""
+    def look(self, planned: float) -> None:
+        """Raise AbortError or StoppedError where the next wrench must not be sent.
+
+        `planned` is the speed of the present trial, m/s and rad/s.
+        """
         if self._stopped():
             raise StoppedError
         newest = self._client.buffer.newest
         if newest is None or self._client.now_ns() - newest[0] > self._timeout * NANOSECONDS:
             raise AbortError(f'no odometry for {self._timeout:g} s')
-        speed = self._speed()
-        if not speed <= self._most:  # NaN is too fast as well
-            raise AbortError(f'{speed:.3g} m/s or rad/s, more than {self._most:.3g}')
+        speed, most = self._speed(), TOO_FAST * planned + self._before
+        if not speed <= most:  # NaN is too fast as well
+            raise AbortError(f'{speed:.3g} m/s or rad/s, more than {most:.3g}')
         if self._count % LOOK == 0 and (others := self._client.others()):
             raise AbortError(f'{others[0]} publishes the wrench as well')
         self._count += 1
@@ -248,12 +251,12 @@ def _send(client: DriverClient, guard: MotionGuard, sent: Sent) -> None:
     for tau, seconds in sent.trial.parts:
         for _ in range(round(seconds / PERIOD)):
             sent.steps.append((client.send(tau), tau))
-            guard.look()
+            guard.look(sent.trial.speed)
             client.listen(PERIOD)
     if sent.trial.silent:
         for _ in range(round(UNHEARD / PERIOD)):
             client.listen(PERIOD)
-            guard.look()
+            guard.look(sent.trial.speed)
     sent.ended_ns = client.now_ns()
 
 

@@ -83,6 +83,11 @@ class Trial:
         return [(ZERO, self.rest), (self.tau, self.pulse), (back, self.pulse), (ZERO, REST)]
 
     @property
+    def way(self) -> float:
+        """For how many s the wrench may act one way."""
+        return HELD + UNHEARD if self.silent else self.pulse
+
+    @property
     def seconds(self) -> float:
         """How long it takes."""
         return sum(seconds for _, seconds in self.parts) + (UNHEARD if self.silent else 0.0)
@@ -154,7 +159,8 @@ def plan_of(
         if most < ABOVE * dead_band and raised > speed:
             trial = replace(trial, pulse=SHORT, speed=raised)
             most = min(_largest(vehicle, trial, raised), ABOVE * dead_band)
-        return replace(trial, size=most if cap is None else min(most, cap))
+        trial = replace(trial, size=most if cap is None else min(most, cap))
+        return replace(trial, speed=max(speed, _fastest(vehicle, trial))) if dead_band else trial
 
     trials = [Trial(dof, 1.0) for dof in moved]
     if moved:
@@ -176,16 +182,19 @@ def _dead_band(vehicle: Vehicle, axis: int) -> float:
 
 def _largest(vehicle: Vehicle, trial: Trial, speed: float) -> float:
     """N or N m that no velocity passes a speed with: by inertia alone, and by the whole model."""
-    seconds = HELD + UNHEARD if trial.silent else trial.pulse
-    size = speed / (seconds * float(np.abs(np.linalg.inv(vehicle.M)[:, trial.axis]).max()))
+    size = speed / (trial.way * float(np.abs(np.linalg.inv(vehicle.M)[:, trial.axis]).max()))
     for _ in range(ROUNDS):
-        tau = replace(trial, size=size).tau
-        back = tuple(-number for number in tau)
-        held = [(0.0, seconds, tau)]
-        if not trial.silent:  # what rights the vehicle can swing it faster on the way back
-            held += [(seconds, 2 * seconds, back), (2 * seconds, 4 * seconds, ZERO)]
-        fastest = float(np.abs(predicted(vehicle, LEVEL, held).added).max())
+        fastest = _fastest(vehicle, replace(trial, size=size))
         if fastest <= speed:
             break
         size *= speed / fastest
     return size
+
+
+def _fastest(vehicle: Vehicle, trial: Trial) -> float:
+    """Largest velocity of any degree of freedom by the model, m/s and rad/s."""
+    seconds, back = trial.way, tuple(-number for number in trial.tau)
+    held = [(0.0, seconds, trial.tau)]
+    if not trial.silent:  # what rights the vehicle can swing it faster on the way back
+        held += [(seconds, 2 * seconds, back), (2 * seconds, 4 * seconds, ZERO)]
+    return float(np.abs(predicted(vehicle, LEVEL, held).added).max())

@@ -307,6 +307,12 @@ def axis(dof: str, evidence: DriverRecord) -> CheckResult:
     if by_twist < PART * by_path:
         found = f'{number(by_path)} {unit} by the pose, {number(by_twist)} by the twist'
         return judged(False, expected, found, 'fill in this component', **numbers)
+    if not related:
+        found = (
+            f'{number(by_twist)} {unit} that do not follow the pose, which has {number(by_path)}'
+        )
+        advice = 'axes mixed up, or nothing but noise in this component'
+        return judged(False, expected, found, advice, **numbers)
     slope = float((path * velocity).sum() / ((velocity**2).sum() - len(velocity) * noise[1]))
     found = f'the pose gives {number(slope)} times the twist, at {number(largest)} {unit}'
     good = SLOPES[0] <= slope <= SLOPES[1]

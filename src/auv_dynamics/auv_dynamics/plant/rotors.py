@@ -107,11 +107,10 @@ def _response(rotor: Rotor, step: float) -> np.ndarray:
         return np.array([np.exp(-step / rotor.lag) if rotor.lag else 0.0, 0.0, 0.0, 0.0])
     omega, zeta = rotor.omega, rotor.zeta
     split = omega * np.sqrt(complex(zeta**2 - 1.0))
-    even = np.cosh(split * step)
-    odd = np.sinh(split * step) / split if abs(split) > 0.0 else step
-    A = np.array([[0.0, 1.0], [-(omega**2), -2.0 * zeta * omega]])
-    about = A + zeta * omega * np.eye(2)
-    return (np.exp(-zeta * omega * step) * (even * np.eye(2) + odd * about)).real.ravel()
+    slow, fast = np.exp((split - zeta * omega) * step), np.exp((-split - zeta * omega) * step)
+    odd = (slow - fast) / (2.0 * split) if abs(split) > 0.0 else step * slow
+    about = np.array([[zeta * omega, 1.0], [-(omega**2), -zeta * omega]])
+    return ((slow + fast) / 2.0 * np.eye(2) + odd * about).real.ravel()
 
 
 def _pieces(

@@ -25,6 +25,8 @@ from auv_dynamics.kernel.six import (
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.thruster_curves import ThrusterCurve, curve_of
 
+LEFT = 0.01  # of a thruster's limit, by priority: small parts of the rest find room
+FULLER = (1.0 / (1.0 - LEFT),) * 6
 DEPENDENT = 1e-9  # a singular value or a row below this, relative to the largest, counts as zero
 UNIT = 0.01  # deviation of the norm of a direction from 1 that is worth a warning
 SCALED, PRIORITY = SATURATIONS = ('scaled', 'priority')
@@ -317,15 +319,15 @@ def share_beside(reach: AttainableWrench, kept: Vector, tau: Vector) -> Number:
 def shaped(first: np.ndarray | None, reach: AttainableWrench, tau: Numbers) -> tuple[Any, Number]:
     """Wrench, and the share of its thrusts, that brings every thrust within its limits.
 
-    Without priority it is tau and one share. With it, what comes first is scaled down by itself,
-    then the rest to the room that is left. `first` is that of reach: without priority the branch
-    is none when compiled.
+    Without priority it is tau and one share. With it, what comes first is scaled down by itself, to
+    all but `LEFT` of each limit, then the rest to the room that is left. `first` is that of reach:
+    without priority the branch is none when compiled.
     """
     if first is None:
         return tau, share_within(reach, tau)
     kept = scale(first, tau)
     rest = sub(tau, kept)
-    share = share_within(reach, kept)
+    share = share_within(reach, scale(FULLER, kept))
     kept = scale((share, share, share, share, share, share), kept)
     left = share_beside(reach, kept, rest)
     return add(kept, scale((left, left, left, left, left, left), rest)), 1.0

@@ -95,7 +95,7 @@ class ControllerSettings:
     )
     actuators_saturation: str = setting(
         SCALED,
-        'of thrusts beyond their limits: all together (scaled), or surge and sway first (priority)',
+        'of thrusts beyond their limits: all alike (scaled), or heave and attitude kept (priority)',
         'actuators.saturation',
         one_of=SATURATIONS,
     )

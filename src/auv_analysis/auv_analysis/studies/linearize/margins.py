@@ -24,7 +24,6 @@ from auv_analysis.studies.linearize.sampled_loop import (
     behind_lag,
 )
 from auv_dynamics.files.yaml_files import matrix6
-from auv_dynamics.plant.rotors import KEYS
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.thrusters import Thrusters
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -188,7 +187,7 @@ class ControlLoop:
         for name in ('delay', 'lag'):
             value = getattr(self, name)
             value = float(actuators.get(name, 0.0) if value is None else value)
-            if not 0 <= value <= MOST_PERIODS * h:
+            if value < 0 or (name == 'delay' and value > MOST_PERIODS * h):
                 expected = f'0 to {MOST_PERIODS * h:g} s, {MOST_PERIODS} steps'
                 raise ValueError(f'{name}: expected {expected}, found {value:g}')
             object.__setattr__(self, name, value)
@@ -293,7 +292,7 @@ class ControlLoop:
         return float(1 / max(sizes[peak], -best.fun))
 
     def largest(self, axis: int | None = None) -> float:
-        """Largest factor of the velocity error's gain that keeps 6 dB and 45 deg; NaN: none.
+        """Largest factor of the velocity error's gain that keeps 6 dB and 45 deg; 0: none.
 
         Parameters
         ----------
@@ -323,7 +322,7 @@ class ControlLoop:
             if (to_spare(far) >= 0) != good:
                 return float(brentq(to_spare, *sorted((near, far)), rtol=1e-9))
             near = far
-        return np.inf if good else np.nan
+        return np.inf if good else 0.0
 
     def _slope_of(self, axes: Sequence[int], factor: float) -> np.ndarray:
         scale = np.ones(6)
@@ -340,7 +339,7 @@ def rotor_lags(thrusters: Thrusters, actuators: Mapping[str, Any]) -> np.ndarray
     n = len(thrusters.names)
     if 'rotor_lag' in actuators:
         return np.full(n, float(actuators['rotor_lag']))
-    if not thrusters.rotors or not any(key in actuators for key in KEYS):
+    if not thrusters.rotors or not actuators.get('rotors'):
         return np.zeros(n)
     return np.array([
         2 * rotor.zeta / rotor.omega if rotor.omega else rotor.lag for rotor in thrusters.rotors
@@ -382,7 +381,8 @@ def stability_margins(setting: ControlLoop) -> dict[str, Any]:
         largest factor of it on all axes at once that keeps them; `axes`, per axis `gain_margin` and
         `gain_reduction` as factors, `gain_margin_db`, `phase_margin` in degrees, `delay_margin`
         in s, `crossover` in rad/s, `value` and `largest` of the gain, scaled on this axis alone,
-        `kept`. What has no bound is None, and all margins where the loop is unstable
+        `kept`. What has no bound is None, and all margins where the loop is unstable; the largest
+        gain is 0 where no multiple between a hundredth and a hundred keeps them
 
     """
     loop = setting.loop()
@@ -415,7 +415,10 @@ def _row(setting: ControlLoop, axis: int, found: AxisMargins | None) -> dict[str
         }
     if setting.gain:
         value = float(setting.values[axis])
-        row |= {'value': value, 'largest': _bounded(value * setting.largest(axis))}
+        row |= {
+            'value': value,
+            'largest': _bounded(value * setting.largest(axis)),
+        }
     return row
 
 
@@ -479,9 +482,11 @@ def _note(settings: Sequence[ControlLoop]) -> str:
     gain = min(rows, key=lambda row: min(row[1].gain, 1 / max(row[1].reduction, MEASURABLE)))
     phase = min(rows, key=lambda row: row[1].phase)
     factor = min(gain[1].gain, 1 / max(gain[1].reduction, MEASURABLE))
+    by_gain = f'{20 * np.log10(factor):.3g} dB ({DOFS[gain[0]]})'
+    by_phase = f'{np.degrees(phase[1].phase):.3g} deg ({DOFS[phase[0]]})'
     text = (
-        f'{path}: gain margin {20 * np.log10(factor):.3g} dB ({DOFS[gain[0]]}), '
-        f'phase margin {np.degrees(phase[1].phase):.3g} deg ({DOFS[phase[0]]}) {late}'
+        f'{path}: gain margin {by_gain if factor < 1 / MEASURABLE else "without end"}, '
+        f'phase margin {by_phase if np.isfinite(phase[1].phase) else "without end"} {late}'
     )
     if all(one.kept for _, one in rows):
         return f'note: {text}'

@@ -174,8 +174,8 @@ def print_margins(margins: Mapping[str, Mapping[str, Any]], out: Console | None 
         if found['disk_margin'] is not None:
             out.print(disk_sentence(found['disk_margin']))
         if found['together'] is not None:
-            gain, factor = found['gain'], number(found['together'])
-            out.print(f'all of {gain} times {factor} keeps 6 dB and 45 deg on every axis')
+            factor = number(found['together']) if found['together'] else 'no factor'
+            out.print(f'all of {found["gain"]} times {factor} keeps 6 dB and 45 deg on every axis')
 
 
 def disk_sentence(alpha: float) -> str:

@@ -1,6 +1,7 @@
 """Linear models against the paper's closed loop, the plant's own values and simulations."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -130,7 +131,7 @@ def test_model_errors_are_the_plants_and_the_law_holds_against_them():
 
 
 def test_own_law_of_a_user(monkeypatch):
-    monkeypatch.syspath_prepend('examples')
+    monkeypatch.syspath_prepend(Path(__file__).parents[3] / 'examples')
     model = linearize('bluerov2', law='own_law:ComputedTorque', gains={'k_P': 4.0, 'k_I': 2.0})
     # nu_dot = k_P nu_err + k_I z in every axis
     expected = [0, 0, *np.roots([1, 4, 2]).tolist() * 6]

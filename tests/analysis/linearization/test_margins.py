@@ -303,7 +303,7 @@ def test_what_a_genuine_autopilot_did_with_three_gains():
 
 @pytest.mark.parametrize('late', [(None, None), (0.03, 0.15)])
 def test_the_dive_of_the_example_keeps_the_margins_that_its_file_says(late):
-    path = 'examples/bluerov2_mavlink/dive.yaml'
+    path = Path(__file__).parents[3] / 'examples' / 'bluerov2_mavlink' / 'dive.yaml'
     scenario = load_scenario(path)
     for nu0 in (np.zeros(6), [0.4, 0, 0.1, 0, 0, 0.2]):
         setting = ControlLoop(scenario, 'gvc', *late, nu0=nu0)

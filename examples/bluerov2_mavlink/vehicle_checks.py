@@ -38,14 +38,14 @@ class Telemetry:
     ):
         self._wanted, self._order, self._request = wanted, order, request
         self._last: dict[int, int] = {}  # ns of a request
-        self._due = self._asked = self._counted = 0
+        self._due = self._until = self._counted = 0  # ns; until when an answer is waited for
         self._counts: Counter[int] = Counter()
         self._slow: set[int] = set()
         self._unanswered: int | None = None
 
     def answered(self, accepted: bool) -> None:
         """Take the answer to the request that was sent last."""
-        self._asked -= AGAIN
+        self._until = 0
         if accepted:
             self._unanswered = None
 
@@ -56,8 +56,7 @@ class Telemetry:
     def tick(self, heard: dict[int, int], now: int) -> None:
         """Ask for one that comes too slowly, or was not heard for a second; each once a second."""
         self._count(now)
-        waiting = self._unanswered is not None and now - self._asked < AGAIN
-        if now < self._due or waiting:
+        if now < self._due or (self._unanswered is not None and now < self._until):
             return
         self._due = now + TURN
         if self._unanswered is not None:
@@ -69,8 +68,8 @@ class Telemetry:
             if now - max(came, self._last.get(message_id, -SECOND)) < SECOND:
                 continue
             self._slow.discard(message_id)
-            self._last[message_id], self._asked = now, now
-            self._unanswered = message_id
+            self._last[message_id] = now
+            self._unanswered, self._until = message_id, now + AGAIN
             self._order(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, period)
             return
 

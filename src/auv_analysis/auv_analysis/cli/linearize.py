@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.output.progress import say, waiting
     from auv_analysis.scenario.scaling import UNFIT
     from auv_analysis.scenario.scenario import Scenario
-    from auv_analysis.studies.linearize.margins import MOST_PERIODS, ControlLoop, stability_margins
+    from auv_analysis.studies.linearize.margins import ControlLoop, stability_margins
     from auv_analysis.studies.linearize.modes import (
         linear_models,
         print_margins,
@@ -68,20 +68,16 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
                 raise InputError(paths[0], name, expected, 'a vehicle')
     delay = options.delay if options.delay_from is None else measured_delay(options.delay_from)
     eta0 = None if options.attitude is None else [0.0, 0.0, 0.0, *options.attitude]
-    looped = names if isinstance(subject, Scenario) else []
-    if isinstance(subject, Scenario) and delay is None:
-        own = subject.data.get('actuators', {}).get('delay', 0.0)
-        if own > MOST_PERIODS * subject.step:
-            say(f'{subject.path}: actuators.delay: no margins beyond {MOST_PERIODS} steps')
-            looped = []
     try:
         with waiting('linearising'):
             models = linear_models(subject, names, options.nu0, eta0)
-            loops = {
-                name: ControlLoop(subject, name, delay, options.lag, options.nu0, eta0)
-                for name in looped
-                if isinstance(subject, Scenario) and subject.controller(name)['law'] != OPEN_LOOP
-            }
+            loops = {}
+            if isinstance(subject, Scenario) and _is_soon(subject, delay):
+                loops = {
+                    name: ControlLoop(subject, name, delay, options.lag, options.nu0, eta0)
+                    for name in names
+                    if subject.controller(name)['law'] != OPEN_LOOP
+                }
             margins = {name: stability_margins(loop) for name, loop in loops.items()}
     except ValueError as error:
         raise InputError(paths[0], *refusal(error)) from None
@@ -100,6 +96,18 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         print_margins(margins)
     say(f'matrices: {out / made.file}, pole map: {out / "figures" / "poles.png"}')
     return document
+
+
+def _is_soon(scenario: Scenario, delay: float | None) -> bool:
+    """Whether there can be margins: with any delay that is given, as a longer one is refused."""
+    from auv_analysis.output.progress import say
+    from auv_analysis.studies.linearize.margins import MOST_PERIODS
+
+    own = scenario.data.get('actuators', {}).get('delay', 0.0)
+    if delay is not None or own <= MOST_PERIODS * scenario.step:
+        return True
+    say(f'{scenario.path}: actuators.delay: no margins beyond {MOST_PERIODS} steps')
+    return False
 
 
 def measured_delay(path: Path) -> float:

@@ -21,11 +21,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """The parameter file that `auv run` would write, for plain `ros2 run`."""
+    from auv_analysis.cli.scenario_runs import say_margins
     from auv_analysis.graph.node_parameters import CONTROLLER, node_parameters, parameter_file
     from auv_analysis.output.new_files import write_text
     from auv_analysis.output.progress import say
     from auv_analysis.scenario.scenario import load_scenario
-    from auv_analysis.studies.linearize.margins import margin_notes
 
     scenario = load_scenario(options.scenario)
     plant = not options.no_plant
@@ -45,8 +45,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     )
     if note := _missing(parameters[CONTROLLER], CONTROLLER):
         say(note)
-    for note in margin_notes(scenario, [options.controller], options.delay):
-        say(note)
+    say_margins(scenario, [options.controller], options.delay)
     command = f'auv params {scenario.name} --controller {options.controller}'
     text = parameter_file(parameters, command)
     if options.out is not None:

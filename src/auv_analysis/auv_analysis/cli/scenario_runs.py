@@ -67,12 +67,17 @@ def scenario_folder(
     ) as results:
         for warning in scenario.warnings:
             say(f'warning: {warning}')
-        if 'actuators' in scenario.data:
-            from auv_analysis.studies.linearize.margins import margin_notes  # with scipy.optimize
-
-            for note in margin_notes(scenario, names):
-                say(note)
+        say_margins(scenario, names)
         yield results
+
+
+def say_margins(scenario: Scenario, names: Sequence[str], delay: float | None = None) -> None:
+    """Say the margins of controllers whose wrench is late, by the scenario or by `delay` in s."""
+    if 'actuators' in scenario.data or delay is not None:
+        from auv_analysis.studies.linearize.margins import margin_notes  # with scipy.optimize
+
+        for note in margin_notes(scenario, names, delay):
+            say(note)
 
 
 def simulated(

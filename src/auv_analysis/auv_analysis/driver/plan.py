@@ -157,7 +157,7 @@ def plan_of(
         trial = replace(trial, dead_band=dead_band, speed=speed)
         most = _largest(vehicle, trial, speed)
         if most < ABOVE * dead_band and raised > speed:
-            trial = replace(trial, pulse=SHORT, speed=raised)
+            trial = replace(trial, pulse=SHORT)
             most = min(_largest(vehicle, trial, raised), ABOVE * dead_band)
         trial = replace(trial, size=most if cap is None else min(most, cap))
         return replace(trial, speed=max(speed, _fastest(vehicle, trial))) if dead_band else trial

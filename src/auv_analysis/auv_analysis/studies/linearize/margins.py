@@ -447,11 +447,11 @@ def margin_notes(
     for name in controllers:
         if scenario.controller(name)['law'] == OPEN_LOOP:
             continue
-        points = np.zeros(6), _mean_setpoint(scenario)
         try:
-            settings = [ControlLoop(scenario, name, delay, nu0=nu0) for nu0 in points]
-            if settings[0].late:
-                found.append(_note(settings))
+            at_rest = ControlLoop(scenario, name, delay)
+            if at_rest.late:
+                under_way = ControlLoop(scenario, name, delay, nu0=_mean_setpoint(scenario))
+                found.append(_note([at_rest, under_way]))
         except Exception as error:  # a law of the user's own may raise anything
             found.append(f'note: {scenario.path}: controllers.{name}: no margins: {error}')
     return found

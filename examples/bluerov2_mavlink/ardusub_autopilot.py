@@ -29,7 +29,7 @@ SPOOL_UP = SECOND // 2
 MODES = {0: 'STABILIZE', 2: 'ALT_HOLD', 19: 'MANUAL'}
 STABILIZE, ALT_HOLD, MANUAL = MODES
 GROUND_STATION = 255  # SYSID_MYGCS
-GCS_TIMEOUT = 5 * SECOND // 2
+GCS_TIMEOUT = 2.5  # s; FS_GCS_TIMEOUT where there is one
 SEES_OVERRIDES = (4, 5, 0)  # from here on the pilot-input failsafe
 RENAMED = (4, 7, 0)  # from here on SYSID_MYGCS is MAV_GCS_SYSID
 SEPARATE = (0, 65535)  # of an override: released to a receiver that is not there, left as it is
@@ -50,33 +50,19 @@ LEVEL, STILL, DEPTH, SINK = 1.5, 0.5, 0.8, 0.8  # of stabilising: input per rad,
 
 @dataclass(frozen=True)
 class Settings:
-    """What is simulated.
+    """What is simulated."""
 
-    Attributes
-    ----------
-    vehicle : vehicle file, or bare name
-    eta, nu : start, (6,) each
-    curve : of the thrusters, 'square' or 'measured'
-    voltage : of the supply, V
-    gain : pilot gain, JS_GAIN_DEFAULT
-    mode : at boot
-    version : of the firmware
-    position_after, ready_after : s from boot until there is a position, until it arms
-    velocity_bias : of the estimator, body frame, (3,) in m/s; 0.03 to 0.04 was seen
-
-    """
-
-    vehicle: str = 'bluerov2_heavy'
-    eta: tuple = (0.0,) * 6
-    nu: tuple = (0.0,) * 6
-    curve: str = 'square'
-    voltage: float = 16.0
-    gain: float = 0.5
-    mode: int = MANUAL
-    version: tuple = (4, 5, 0)
-    position_after: float = 50.0
-    ready_after: float = 10.0
-    velocity_bias: tuple = (0.0, 0.0, 0.0)
+    vehicle: str = 'bluerov2_heavy'  # vehicle file, or bare name
+    eta: tuple = (0.0,) * 6  # start, NED, m and rad
+    nu: tuple = (0.0,) * 6  # m/s and rad/s, FSD
+    curve: str = 'square'  # of the thrusters, or 'measured'
+    voltage: float = 16.0  # V, of the supply
+    gain: float = 0.5  # pilot gain, JS_GAIN_DEFAULT
+    mode: int = MANUAL  # at boot
+    version: tuple = (4, 5, 0)  # of the firmware
+    position_after: float = 50.0  # s from boot until there is a position
+    ready_after: float = 10.0  # s from boot until it arms
+    velocity_bias: tuple = (0.0,) * 3  # of the estimator, FSD, m/s; 0.03 to 0.04 was seen
 
 
 class Autopilot:
@@ -112,8 +98,11 @@ class Autopilot:
         self.parameters = {
             station: 255.0, 'FRAME_CONFIG': 2.0 if motors == 8 else 1.0, 'FS_GCS_ENABLE': 2.0,
             'FS_PILOT_INPUT': 2.0, 'FS_PILOT_TIMEOUT': 3.0, 'JS_GAIN_DEFAULT': settings.gain,
-            'JS_GAIN_MIN': 0.25, 'JS_GAIN_MAX': 1.0, 'JS_THR_GAIN': 1.0,
+            'JS_GAIN_MIN': 0.25, 'JS_GAIN_MAX': 1.0, 'JS_THR_GAIN': 1.0, 'ACRO_YAW_P': 3.375,
+            'RC_OPTIONS': 0.0, 'RC_OVERRIDE_TIME': 3.0,
         }  # fmt: skip
+        if settings.version >= RENAMED:
+            self.parameters |= {'FS_GCS_TIMEOUT': 5.0, 'MAV_GCS_SYSID_HI': 0.0}
         self._takers: dict[str, Callable[[Any, int], Any]] = {
             'HEARTBEAT': self._heartbeat,
             'TIMESYNC': self._timesync,
@@ -196,7 +185,8 @@ class Autopilot:
 
     def _watch_station(self, now: int) -> None:
         heard, action = self._station_heard, self.parameters['FS_GCS_ENABLE']
-        if self.armed and action == 2.0 and heard is not None and now - heard >= GCS_TIMEOUT:
+        timeout = self.parameters.get('FS_GCS_TIMEOUT', GCS_TIMEOUT) * SECOND
+        if self.armed and action == 2.0 and heard is not None and now - heard >= timeout:
             self._say(f'MYGCS: {GROUND_STATION}, heartbeat lost')
             self.armed = False
 
@@ -246,6 +236,7 @@ class Autopilot:
     def _take_override(self, message: Any, now: int) -> None:
         if message.get_srcSystem() != GROUND_STATION:
             return
+        self._station_heard = now
         for i in range(6):
             pulse = getattr(message, f'chan{i + 1}_raw')
             if pulse not in SEPARATE:
@@ -256,13 +247,13 @@ class Autopilot:
     def _manual_control(self, message: Any, now: int) -> None:
         if message.get_srcSystem() != GROUND_STATION:
             return
-        gain = self._settings.gain
-        sideways, up = 0.4 * gain, 0.8 * gain
-        pulses = (message.z * up + MIDDLE - 500 * up, *(
+        sideways = 0.4 * self._settings.gain
+        up = 2.0 * sideways * self.parameters['JS_THR_GAIN']
+        pulses = (message.z * up + int(MIDDLE - 500 * up), *(
             axis * sideways + MIDDLE for axis in (message.r, message.x, message.y)
         ))  # fmt: skip
         self._override = [MIDDLE, MIDDLE, *(min(1900, max(1100, int(pulse))) for pulse in pulses)]
-        self._pilot_heard = now
+        self._pilot_heard = self._station_heard = now
 
     def _report(self, message_id: int, now: int) -> None:
         """Send one of the messages that are sent by themselves."""

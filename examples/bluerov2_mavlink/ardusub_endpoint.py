@@ -15,7 +15,7 @@ PERIOD = 0.005  # s
 
 
 def main() -> None:
-    """Run until SIGTERM, SIGINT or the end of `--seconds`."""
+    """Run until SIGTERM or SIGINT."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--connection', default='udpout:127.0.0.1:14550')
     parser.add_argument('--system', type=int, default=1, help='MAVLink id of the vehicle')
@@ -31,13 +31,12 @@ def main() -> None:
         '--velocity-bias', type=float, nargs=3, default=[0.0] * 3, help='of the estimator, m/s'
     )
     parser.add_argument('--eta', type=float, nargs=6, default=[0.0] * 6, help='NED, rad')
-    parser.add_argument('--seconds', type=float, default=float('inf'))
     options = parser.parse_args()
     mode = next(number for number, name in MODES.items() if name == options.mode)
     settings = Settings(
         options.vehicle, tuple(options.eta), (0.0,) * 6,
         options.thrusters, options.voltage, options.gain, mode,
-        tuple(int(number) for number in options.firmware.split('.')),
+        tuple(int(number) for number in f'{options.firmware}.0.0'.split('.')[:3]),
         options.position_after, options.ready_after, tuple(options.velocity_bias),
     )  # fmt: skip
     port = UdpPort(options.connection, options.system, 1)
@@ -47,11 +46,11 @@ def main() -> None:
         signal.signal(number, lambda *_: stopped.append(True))
     boot = time.monotonic_ns()
     print(f'{options.vehicle}: {options.connection}', flush=True)
-    while not stopped and (now := time.monotonic_ns() - boot) < options.seconds * 1e9:
+    while not stopped:
         for message, address in port.receive():
             port.answer(address)
             autopilot.receive(message, time.monotonic_ns() - boot)
-        autopilot.advance(now)
+        autopilot.advance(time.monotonic_ns() - boot)
         select.select([port], [], [], PERIOD)
     port.close()
     state = 'armed' if autopilot.armed else 'disarmed'

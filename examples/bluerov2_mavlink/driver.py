@@ -9,7 +9,6 @@ import time
 from typing import Any
 
 import numpy as np
-from pilot import Timeouts
 from std_srvs.srv import SetBool
 from udp import UdpPort
 from vehicle_link import LinkSettings, VehicleLink
@@ -25,6 +24,7 @@ from auv_dynamics.ros.parameters import declare, refuse_unknown
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 POLL = 0.004  # s between two looks at the socket
+COMPONENT = 191  # MAVLink's onboard computer: two stations of one id are told apart by it
 LAST_WORDS = 1.5  # s for letting go at the end, at most
 
 
@@ -48,12 +48,12 @@ class Driver(BulkNode):
         dofs = FOUR if settings.how == MANUAL_CONTROL else tuple(range(6))
         self._mapping = WrenchMapping(vehicle, dofs, voltage)
         try:
-            self._port = UdpPort(connection, settings.station, 0)
+            self._port = UdpPort(connection, settings.station, COMPONENT)
         except (ValueError, OSError) as error:
             raise InputError(self.get_name(), 'connection', 'a free UDP port', error) from None
         self._link = VehicleLink(settings, self._port.send, self.graph.complain)
         self._waits: list[str] = []
-        self._stale = settings.wrench.neutral
+        self._stale = settings.neutral
         # stamps follow the steady clock: a step of the system's clock does not reach them
         self._epoch = self.get_clock().now().nanoseconds - time.monotonic_ns()
         self._say_odometry = self.graph.output(topics.ODOM)
@@ -85,7 +85,8 @@ class Driver(BulkNode):
                 self, 'command', str, OVERRIDE, 'six axes, or four for any pilot gain',
                 one_of=(OVERRIDE, MANUAL_CONTROL),
             ),
-            wrench=Timeouts(round(neutral * 1e9), round(disarm * 1e9)),
+            neutral=round(neutral * 1e9),
+            disarm=round(disarm * 1e9),
         )  # fmt: skip
 
     def _poll(self) -> None:
@@ -135,6 +136,7 @@ class Driver(BulkNode):
                 'armed': link.pilot.armed,
                 'commanded': link.pilot.commands,
                 'mode': link.pilot.mode,
+                'inputs': str(link.inputs),
                 'pilot gain': f'{link.gain} {link.gain_from}'.strip(),
                 'MAVLink refused': link.refused,
                 'MAVLink broken': self._port.broken,

@@ -1,6 +1,5 @@
 """When to arm, to command and to let go: decides, sends nothing."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from wrench_mapping import NEUTRAL, PilotAxes
@@ -12,14 +11,6 @@ KEEP_ALIVE = 100_000_000  # ns between two neutral inputs while the vehicle is i
 LETTING_GO = 50_000_000  # ns between two neutral inputs of letting go
 LEAST, MOST = 5, 20  # of these: always; until the motors are seen at rest
 ON_ITS_WAY = 300_000_000  # ns in which a heartbeat may be older than an acknowledgement
-
-
-@dataclass(frozen=True)
-class Timeouts:
-    """Silence of the wrench, ns: neutral after `neutral`, disarmed after `disarm`."""
-
-    neutral: int = 500_000_000
-    disarm: int = 3_000_000_000
 
 
 class Deed(NamedTuple):
@@ -43,12 +34,12 @@ class Pilot:
 
     Parameters
     ----------
-    timeouts : of the wrench
+    neutral, disarm : ns without a wrench after which it is neutral, disarmed
 
     """
 
-    def __init__(self, timeouts: Timeouts):
-        self._timeouts = timeouts
+    def __init__(self, neutral: int, disarm: int):
+        self._neutral, self._disarm = neutral, disarm
         self.wanted = self.armed = False
         self.mode: int | None = None
         self.why = 'not asked to arm'
@@ -61,12 +52,12 @@ class Pilot:
         self._sent = self._since = 0
         self._acknowledged = -ON_ITS_WAY
 
-    def want(self, on: bool, now: int) -> None:
+    def want(self, on: bool, now: int, why: str = 'asked to disarm') -> None:
         """Take the vehicle, or let it go: neutral and disarmed."""
         arming = now - self._asked.get('arm', -AGAIN) < AGAIN
         self._disarming = not on and (self.armed or (self.wanted and arming))
         self._end(0 if on else MOST)
-        self.wanted, self.why = on, '' if on else 'asked to disarm'
+        self.wanted, self.why = on, '' if on else why
         self._since, self._heard = now, None
 
     def acknowledged(self, now: int) -> None:
@@ -123,7 +114,7 @@ class Pilot:
 
     def is_fed(self, now: int) -> bool:
         """Whether wrenches come."""
-        return self._heard is not None and now - self._heard <= self._timeouts.neutral
+        return self._heard is not None and now - self._heard <= self._neutral
 
     def due(self, now: int, ready: bool, *, fresh: bool = False) -> Deed:
         """What to send at a time in ns.
@@ -139,7 +130,7 @@ class Pilot:
             return self._farewell(now)
         fed = self.is_fed(now)
         silence = now - (self._since if self._heard is None else self._heard)
-        if self.armed and silence > self._timeouts.disarm:
+        if self.armed and silence > self._disarm:
             self._disarming = True
         elif fed:
             self._disarming = False

@@ -45,11 +45,6 @@ class UdpPort:
         """File descriptor, to wait for."""
         return self._socket.fileno()
 
-    @property
-    def address(self) -> tuple[str, int]:
-        """Host and port of this side."""
-        return self._socket.getsockname()
-
     def is_peer(self, address: tuple[str, int]) -> bool:
         """Whether this is where messages are sent to."""
         return address == self._peer

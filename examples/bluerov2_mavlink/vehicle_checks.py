@@ -13,12 +13,21 @@ SLOW = 0.5  # of the wanted rate: another ground station has asked for less
 AGAIN, TRIES = SECOND // 2, 20  # of a question that has no answer
 LEAST_VERSION = (4, 0, 0)
 SEES_OVERRIDES = (4, 5, 0)  # from here on ArduSub's pilot-input failsafe
-DISARM = 2  # of FS_PILOT_INPUT and FS_GCS_ENABLE
+IGNORED = 2  # bit of RC_OPTIONS: whoever steers by MAVLink
 FRAMES = {6: 1, 8: 2}  # thrusters -> FRAME_CONFIG: vectored, vectored with 6 DOF
 STATION = ('SYSID_MYGCS', 'MAV_GCS_SYSID')  # 4.7 has renamed it
-PILOT = ('FS_PILOT_INPUT', 'FS_PILOT_TIMEOUT')
-GAINS = ('JS_GAIN_DEFAULT', 'JS_GAIN_MIN', 'JS_GAIN_MAX', 'JS_THR_GAIN')
-PARAMETERS = (*STATION, 'FRAME_CONFIG', 'FS_GCS_ENABLE', *PILOT, *GAINS)
+NEWER = ('MAV_GCS_SYSID_HI', 'FS_GCS_TIMEOUT')  # asked for first, and not waited for
+GAINS = ('JS_GAIN_DEFAULT', 'JS_GAIN_MIN', 'JS_GAIN_MAX')
+# parameter -> least and largest value, and what another one means
+EXPECTED = {
+    'FS_GCS_ENABLE': (2, 2, 'when this driver is killed the motors go on as last told; set 2'),
+    'FS_GCS_TIMEOUT': (0, 5, 'so many s they go on when this driver is killed; set 5'),
+    'FS_PILOT_TIMEOUT': (0.5, 3, 'set 3'),
+    'ACRO_YAW_P': (3.375, 3.375, 'yaw is stronger in the same proportion; set 3.375'),
+    'JS_THR_GAIN': (1, 1, 'heave is so much stronger; set 1'),
+}
+OTHERS = ('FRAME_CONFIG', 'FS_PILOT_INPUT', 'RC_OPTIONS', 'RC_OVERRIDE_TIME', *GAINS)
+PARAMETERS = dict.fromkeys((*NEWER, *STATION, *EXPECTED, *OTHERS))  # in this order
 Order = Callable[..., None]  # a command and its parameters
 
 
@@ -149,8 +158,9 @@ class Profile:
         return f'ArduSub {numbers} {self.kind}'.strip()
 
     def missing(self) -> list[str]:
-        """What is not known yet."""
-        return ['AUTOPILOT_VERSION'] * (self.version is None) + self._unknown()
+        """What is not known yet and is waited for."""
+        unknown = [name for name in self._unknown() if name not in NEWER]
+        return ['AUTOPILOT_VERSION'] * (self.version is None) + unknown
 
     def _unknown(self) -> list[str]:
         known = {*self.values} | ({*STATION} if {*STATION} & {*self.values} else set())
@@ -171,37 +181,36 @@ class Profile:
         how : 'rc_override' or 'manual_control'
 
         """
+        value = self.values.get
         if missing := self.missing():
             yield Difference(f'no answer about {", ".join(missing)}: not checked', False)
         if self.version and self.version < LEAST_VERSION:
             yield Difference(f'{self.firmware} is older than 4.0: nobody has tried it', False)
-        obeys = f'it obeys that one only: start with -p system:={{:g}} or set {station}'
-        other = f'the vehicle file has {thrusters} thrusters: set it, or give the right -p vehicle'
-        serious = [(name, station, obeys) for name in STATION]
-        for name, expected, advice in [*serious, ('FRAME_CONFIG', FRAMES.get(thrusters, 0), other)]:
-            found = self.values.get(name, expected)
-            if found != expected:
-                text = f'{name} is {found:g}, expected {expected}: {advice.format(found)}'
-                yield Difference(text, True)
-        yield from (Difference(text, False) for text in self._failsafes(how))
-
-    def _failsafes(self, how: str) -> Iterable[str]:
-        value = self.values.get
-        if (found := value('FS_GCS_ENABLE', DISARM)) != DISARM:
-            yield (
-                f'FS_GCS_ENABLE is {found:g}, expected 2: when this driver is killed the motors '
-                'go on as last told; set 2'
-            )
-        action, timeout = value(PILOT[0], DISARM), value(PILOT[1], 3.0)
+        for name in STATION:
+            found = value(name, station)
+            if not found <= station <= max(found, value('MAV_GCS_SYSID_HI', 0.0)):
+                advice = f'it obeys that one only: start with -p system:={found:g} or set {station}'
+                yield Difference(f'{name} is {found:g}, expected {station}: {advice}', True)
+        frame = FRAMES.get(thrusters, 0)
+        if (found := value('FRAME_CONFIG', frame)) != frame:
+            advice = f'the vehicle file has {thrusters} thrusters: set it, or give -p vehicle'
+            yield Difference(f'FRAME_CONFIG is {found:g}, expected {frame}: {advice}', True)
+        if int(value('RC_OPTIONS', 0.0)) & IGNORED or value('RC_OVERRIDE_TIME', 3.0) == 0.0:
+            text = 'RC_OPTIONS has bit 1, or RC_OVERRIDE_TIME is 0: nobody steers it by MAVLink; '
+            yield Difference(f'{text}clear the bit, and set 3', True)
+        for name, (least, most, what) in EXPECTED.items():
+            ignored = name == 'JS_THR_GAIN' and how != MANUAL_CONTROL
+            if not (ignored or least <= value(name, least) <= most):
+                expected = f'{least:g}' if least == most else f'{least:g} to {most:g}'
+                yield Difference(f'{name} is {value(name):g}, expected {expected}: {what}', False)
         blind = how != MANUAL_CONTROL and (self.version or LEAST_VERSION) < SEES_OVERRIDES
-        if blind and action == DISARM:
-            yield (
+        action = value('FS_PILOT_INPUT')
+        if blind and action == 2.0:
+            text = (
                 f'FS_PILOT_INPUT is 2 and {self.firmware} counts joysticks only: one that was used '
                 'since boot disarms this driver after FS_PILOT_TIMEOUT; boot again without it'
             )
-        elif not blind and action != DISARM:
-            yield f'FS_PILOT_INPUT is {action:g}, expected 2: a driver that hangs is not noticed'
-        if not 0.5 <= timeout <= 3.0:
-            yield f'FS_PILOT_TIMEOUT is {timeout:g} s, expected 0.5 to 3: set 3'
-        if how == MANUAL_CONTROL and (found := value('JS_THR_GAIN', 1.0)) != 1.0:
-            yield f'JS_THR_GAIN is {found:g}, expected 1: heave is so much stronger; set 1'
+            yield Difference(text, False)
+        elif not blind and action not in (2.0, None):
+            text = f'FS_PILOT_INPUT is {action:g}, expected 2: a driver that hangs is not noticed'
+            yield Difference(text, False)

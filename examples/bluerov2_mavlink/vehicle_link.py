@@ -2,11 +2,11 @@
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from navigation import BootClock, Exchange, Navigation, RestartedError, Sample
-from pilot import MANUAL, Pilot, Timeouts
+from pilot import MANUAL, Pilot
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from vehicle_checks import SECOND, Profile, Telemetry
 from wrench_mapping import (
@@ -15,23 +15,29 @@ from wrench_mapping import (
     OVERRIDE,
     PilotAxes,
     manual_control,
+    pulses_of,
     rc_override,
 )
 
 QUICK = SECOND // 10  # between two TIMESYNC requests until the clock is known
-HEARTBEATS = 200_000  # us, of the vehicle; 1 s without being asked
 GONE = 3 * SECOND  # without a heartbeat
 SAY_AGAIN = 10 * SECOND  # the same text
 FRESH = 5 * SECOND  # of a refusal to arm
 WARNING = mavlink.MAV_SEVERITY_WARNING
 GAIN = 'PilotGain'  # NAMED_VALUE_FLOAT of ArduSub's
-AT_REST = 5  # us about neutral
+AT_REST, DEAD = 5, 25  # us about neutral: of motors, and of inputs
 SENT = 2 * SECOND  # for which inputs are kept, to know them when the vehicle reports them
 FOLLOWED, STRANGE = 5, 6  # reports of inputs: known ones before strange ones count, and how many
 FORGOTTEN = 0.05  # of a strange one by each own: two pilots share the reads in any proportion
+UNSEEN = 0.06  # for which a strange one counts while no own one has been seen: 2 s of them
+SHARED = (
+    'another station has the id of this driver: while it is heard, the vehicle does not notice the '
+    'loss of this one (FS_GCS_ENABLE); end it, or give this one an id of its own'
+)
 
 # message id -> rate in Hz (0: that of the odometry), and the stream that has it
 MESSAGES = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: (5, mavlink.MAV_DATA_STREAM_EXTENDED_STATUS),  # in none
     mavlink.MAVLINK_MSG_ID_ATTITUDE: (0, mavlink.MAV_DATA_STREAM_EXTRA1),
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: (0, mavlink.MAV_DATA_STREAM_POSITION),
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: (20, mavlink.MAV_DATA_STREAM_RC_CHANNELS),
@@ -43,28 +49,16 @@ ODOMETRY = ('ATTITUDE', 'LOCAL_POSITION_NED')
 
 @dataclass(frozen=True)
 class LinkSettings:
-    """Who is talked to, and how.
+    """Who is talked to, and how."""
 
-    Attributes
-    ----------
-    system, component : MAVLink ids of the autopilot
-    station : of this side
-    thrusters : how many the vehicle file has
-    rate : of attitude and position, Hz
-    timeout : silence of the position after which the vehicle is not heard, ns
-    how : 'rc_override' (six axes) or 'manual_control' (four)
-    wrench : timeouts of the wrench
-
-    """
-
-    system: int = 1
-    component: int = mavlink.MAV_COMP_ID_AUTOPILOT1
-    station: int = 255
-    thrusters: int = 8
-    rate: float = 50.0
-    timeout: int = SECOND
-    how: str = OVERRIDE
-    wrench: Timeouts = field(default_factory=Timeouts)
+    system: int = 1  # MAVLink id of the vehicle
+    station: int = 255  # of this side
+    thrusters: int = 8  # of the vehicle file
+    rate: float = 50.0  # of attitude and position, Hz
+    timeout: int = SECOND  # of the position: the vehicle is not heard, ns
+    how: str = OVERRIDE  # six axes, or MANUAL_CONTROL: four
+    neutral: int = SECOND // 2  # ns without a wrench
+    disarm: int = 3 * SECOND  # ns without a wrench
 
 
 class VehicleLink:
@@ -82,7 +76,7 @@ class VehicleLink:
         self, settings: LinkSettings, send: Callable[[Any], None], say: Callable[[str], None]
     ):
         self._settings, self._send, self._tell = settings, send, say
-        self.pilot = Pilot(settings.wrench)
+        self.pilot = Pilot(settings.neutral, settings.disarm)
         self.clock = BootClock()
         self.profile = Profile(self._order, self._read_parameter)
         self.gain: float | None = 1.0 if settings.how == OVERRIDE else None
@@ -101,6 +95,7 @@ class VehicleLink:
         self._serious: list[str] = []  # differences with which the vehicle is not taken
         self._inputs: deque[tuple[int, tuple[int, ...]]] = deque()  # sent: ns, pulses
         self._own: tuple[int, ...] = ()  # the last of them that the vehicle reported
+        self.inputs: tuple[int, ...] = ()  # that the vehicle reported last, anybody's
         self._followed, self._strange = 0, 0.0
         self._now = 0
         self._telemetry = Telemetry(self._wanted_messages(), self._order, self._request_stream)
@@ -122,7 +117,7 @@ class VehicleLink:
     def is_vehicle(self, message: Any) -> bool:
         """Whether a message is of the autopilot that is talked to."""
         ids = message.get_srcSystem(), message.get_srcComponent()
-        return ids == (self._settings.system, self._settings.component)
+        return ids == self._target
 
     def receive(self, message: Any, now: int) -> Sample | None:
         """Take a message that arrived at `now` in ns; a sample of the motion where it gives one.
@@ -131,7 +126,7 @@ class VehicleLink:
         """
         self._now = now
         if not self.is_vehicle(message):
-            self.refused += 1
+            self._of_others(message)
             return None
         take = self._takers.get(message.get_type())
         if take is None:
@@ -156,14 +151,19 @@ class VehicleLink:
             self._steer(now, fresh=True)
 
     def tick(self, now: int) -> None:
-        """Send what is due at `now` in ns; to be called often."""
+        """Send what is due at `now` in ns; to be called often.
+
+        Heartbeats begin with the first input: those of a driver that only looks on would keep alive
+        the last input of one that was killed.
+        """
         self._now = now
         if self._sampled is not None and now - self._sampled > self._settings.timeout:
             self._sampled = None
             self.pilot.silence()
             self._say('vehicle not heard: neutral')
-        if self._is_due('heartbeat', now, SECOND):
-            self._send(ground_station_heartbeat())
+        if self._inputs and self._is_due('heartbeat', now, SECOND):
+            kind = mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID
+            self._send(mavlink.MAVLink_heartbeat_message(*kind, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
         if self._is_due('timesync', now, SECOND if self.clock.settled else QUICK):
             self._send(mavlink.MAVLink_timesync_message(0, now))
         self._telemetry.tick(self._heard, now)
@@ -203,7 +203,7 @@ class VehicleLink:
 
     @property
     def _target(self) -> tuple[int, int]:
-        return self._settings.system, self._settings.component
+        return self._settings.system, mavlink.MAV_COMP_ID_AUTOPILOT1
 
     def _wanted_messages(self) -> dict[int, tuple[int, int]]:
         rates = dict(MESSAGES)
@@ -244,8 +244,6 @@ class VehicleLink:
     def _compare(self) -> None:
         """Say what of the vehicle's parameters is not as it should be, once they are known."""
         self._compared, settings = True, self._settings
-        heartbeat = mavlink.MAVLINK_MSG_ID_HEARTBEAT  # what a pilot changes is seen the sooner
-        self._order(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, heartbeat, HEARTBEATS)
         found = [*self.profile.differences(settings.station, settings.thrusters, settings.how)]
         self._serious = [difference.text for difference in found if difference.serious]
         self.differences = [difference.text for difference in found]
@@ -267,11 +265,28 @@ class VehicleLink:
             self._order(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, float(deed.arm))
         if deed.axes is None:
             return
+        off = [pulse for pulse in self.inputs if pulse and abs(pulse - NEUTRAL_PWM) > DEAD]
+        if off and not self._inputs:
+            self._say(
+                f'inputs were {self.inputs} before: of a receiver, which steers again '
+                'RC_OVERRIDE_TIME after this driver falls silent, or the last of another pilot'
+            )
         if self._settings.how == MANUAL_CONTROL:
-            self._send(manual_control(deed.axes, self._settings.system, self.gain or 1.0))
+            gain = self.gain or 1.0
+            message = manual_control(deed.axes, self._settings.system, gain)
+            pulses = pulses_of(message, gain, self.profile.values.get('JS_THR_GAIN', 1.0))
         else:
-            self._inputs.append((now, deed.axes.pulses()))
-            self._send(rc_override(deed.axes, *self._target))
+            message, pulses = rc_override(deed.axes, *self._target), deed.axes.pulses()
+        self._inputs.append((now, pulses))
+        self._send(message)
+
+    def _of_others(self, message: Any) -> None:
+        """Count what is not of the vehicle; say whose heartbeats stand in for this driver's."""
+        self.refused += 1
+        who = message.get_type(), message.get_srcSystem()
+        if who == ('HEARTBEAT', self._settings.station) and SHARED not in self.differences:
+            self.differences.append(SHARED)
+            self._say(SHARED)
 
     def _heartbeat(self, message: Any, now: int) -> None:
         kind = message.type, message.autopilot
@@ -309,20 +324,26 @@ class VehicleLink:
         """Notice another pilot: inputs that this one has not sent, after they were its own.
 
         Two of them would take turns: the newest input counts. The driver is the one that yields.
+        Where its own never show, the vehicle obeys somebody or something else: it is disarmed.
         """
         while len(self._inputs) > 1 and now - self._inputs[0][0] > SENT:
             self._inputs.popleft()
+        self.inputs = found = tuple(getattr(message, f'chan{i}_raw') for i in range(1, 7))
         if not self.pilot.commands:
             self._followed, self._strange = 0, 0.0
             return
-        found = tuple(getattr(message, f'chan{i}_raw') for i in range(1, 7))
-        if found == self._own or any(found == pulses for _, pulses in self._inputs):
+        seen = self._followed >= FOLLOWED
+        if any(_alike(found, own) for own in (self._own, *(own for _, own in self._inputs))):
             self._own = found
             self._followed, self._strange = self._followed + 1, max(0.0, self._strange - FORGOTTEN)
-        elif self._followed >= FOLLOWED:
-            self._strange += 1.0
-        if self._strange >= STRANGE:
+        else:
+            self._strange += 1.0 if seen else UNSEEN
+        if self._strange >= STRANGE and seen:
             self._say(self.pilot.let_go(f'another pilot steers, inputs {found}'))
+        elif self._strange >= STRANGE:
+            why = f'inputs are {found}, not those sent: another pilot, his trims or input hold'
+            self.pilot.want(False, now, why)
+            self._say(f'{why}: disarmed until ~/arm is called')
 
     def _named(self, message: Any, _: int) -> None:
         if message.name == GAIN and self._settings.how == MANUAL_CONTROL:
@@ -361,12 +382,10 @@ class VehicleLink:
         self._navigation.reset()
 
 
+def _alike(some: tuple[int, ...], others: tuple[int, ...]) -> bool:
+    """Whether inputs are the same to 2 us, by which MANUAL_CONTROL may be rounded otherwise."""
+    return bool(others) and all(abs(a - b) <= 2 for a, b in zip(some, others, strict=True))
+
+
 def _younger(texts: dict[str, int], than: int) -> dict[str, int]:
     return {text: at for text, at in texts.items() if at > than}
-
-
-def ground_station_heartbeat() -> Any:
-    """HEARTBEAT of a ground station."""
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
-    )

@@ -6,7 +6,6 @@ that gives none, and there is one choice of it whose commands are a sum of axes.
 beyond what the axes or the thrusters reach, the whole wrench is scaled: its direction stays.
 """
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,9 +19,8 @@ ALIKE = 1e-9
 VERTICAL, HORIZONTAL = (2, 3, 4), (0, 1, 5)  # degrees of freedom by group of thrusters
 
 # T200: full thrust by supply, Blue Robotics, bollard pull
-VOLTS = (12.0, 16.0, 20.0)
+VOLTS = (12.0, 16.0, 20.0)  # the limits of the vehicle files belong to the one in the middle
 FORWARD, REVERSE = (3.71, 5.25, 6.7), (2.92, 4.1, 5.05)  # kgf
-NOMINAL = 16.0  # V, to which the limits of the vehicle files belong
 
 OVERRIDE, MANUAL_CONTROL = 'rc_override', 'manual_control'
 NEUTRAL_PWM, HALF = 1500, 400  # microseconds
@@ -51,25 +49,15 @@ NEUTRAL = PilotAxes()
 SIGNS = np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])  # of the axes against the degrees of freedom
 
 
-@dataclass(frozen=True, eq=False)
-class Group:
-    """Thrusters that ArduSub mixes together, and the degrees of freedom that they serve.
+class Group(NamedTuple):
+    """Thrusters that ArduSub mixes together, and the degrees of freedom that they serve."""
 
-    Attributes
-    ----------
-    thrusters, dofs : indices
-    inverse : (n, m) thrusts of a wrench
-    axes : (m, n) axes of commands, their best fit
-    idle, odd : (n,) thrusts without a wrench, commands that no axes give; None: there are none
-
-    """
-
-    thrusters: np.ndarray
-    dofs: tuple[int, ...]
-    inverse: np.ndarray
-    axes: np.ndarray
-    idle: np.ndarray | None
-    odd: np.ndarray | None
+    thrusters: np.ndarray  # indices, (n,)
+    dofs: tuple[int, ...]  # indices, (m,)
+    inverse: np.ndarray  # (n, m) thrusts of a wrench
+    axes: np.ndarray  # (m, n) axes of commands, their best fit
+    idle: np.ndarray | None  # (n,) thrusts without a wrench
+    odd: np.ndarray | None  # (n,) commands that no axes give
 
 
 class WrenchMapping:
@@ -128,24 +116,21 @@ class WrenchMapping:
         scale = min(1.0, reach / largest) if largest else 1.0
         return PilotAxes(*(SIGNS * axes * scale).tolist()), scale**2
 
-    def wrench(self, commands: np.ndarray) -> np.ndarray:
-        """Wrench (6,) that commands (n,) of the thrusters give, as this mapping takes it."""
-        return self._T @ thrust_of(np.asarray(commands, float), *self._limits)
-
 
 def _group(T: np.ndarray, thrusters: np.ndarray, dofs: tuple[int, ...], vehicle: Vehicle) -> Group:
     own = T[np.ix_(list(dofs), thrusters)]
     factors = np.sign(own).T  # ArduSub's, as the geometry has them
     idle, odd = _null(own), _null(factors.T)
     inverse = np.linalg.pinv(own)
-    even = len(dofs) == 1 and np.allclose(inverse, inverse[0])  # each thruster the same
-    if even:
-        idle = odd = None
-    elif len(thrusters) - len(dofs) > 1 or np.any(_product(idle, odd) < -ALIKE):
+    if len(dofs) == 1 and np.allclose(inverse, inverse[0]):  # each thruster the same
+        return Group(thrusters, dofs, inverse, np.linalg.pinv(factors), None, None)
+    strange = len(thrusters) - len(dofs) > 1
+    if idle is not None and odd is not None:
+        odd = odd if idle @ odd > 0 else -odd
+        strange = strange or bool(np.any(idle * odd < -ALIKE))
+    if strange:
         found = f'{len(thrusters)} thrusters for {len(dofs)} degrees of freedom'
         raise InputError(vehicle.name, 'thrusters', 'the arrangement of a BlueROV2', found)
-    if idle is not None and odd is not None and idle @ odd < 0:
-        odd = -odd
     return Group(thrusters, dofs, inverse, np.linalg.pinv(factors), idle, odd)
 
 
@@ -154,13 +139,6 @@ def _null(A: np.ndarray) -> np.ndarray | None:
     _, sizes, V = np.linalg.svd(A)
     free = A.shape[1] - int(np.sum(sizes > ALIKE * sizes[0]))
     return V[-1] if free == 1 else None
-
-
-def _product(idle: np.ndarray | None, odd: np.ndarray | None) -> np.ndarray:
-    if idle is None or odd is None:
-        return np.zeros(1)
-    product = idle * odd
-    return product * np.sign(product.sum())
 
 
 def _commands(
@@ -186,9 +164,7 @@ def supply_factors(voltage: float) -> tuple[float, float]:
     voltage : at the speed controllers, V; taken as 12 to 20, beyond which nothing is published
 
     """
-    kgf = (np.interp(voltage, VOLTS, table) for table in (REVERSE, FORWARD))
-    full = (np.interp(NOMINAL, VOLTS, table) for table in (REVERSE, FORWARD))
-    reverse, forward = (float(a / b) for a, b in zip(kgf, full, strict=True))
+    reverse, forward = (float(np.interp(voltage, VOLTS, t) / t[1]) for t in (REVERSE, FORWARD))
     return reverse, forward
 
 
@@ -216,3 +192,19 @@ def manual_control(axes: PilotAxes, system: int, gain: float) -> Any:
         for axis in (axes.forward, axes.lateral, axes.throttle, axes.yaw)
     )
     return mavlink.MAVLink_manual_control_message(system, x, y, MIDDLE + round(z / 2), r, 0)
+
+
+def pulses_of(message: Any, gain: float, heave: float) -> tuple[int, ...]:
+    """Input channels 1 to 6 that ArduSub makes of a MANUAL_CONTROL, to 2 us.
+
+    Parameters
+    ----------
+    message : MANUAL_CONTROL
+    gain, heave : pilot gain, and JS_THR_GAIN
+
+    """
+    side, up = HALF * gain / FULL, 2.0 * HALF * gain * heave / FULL
+    middle = int(NEUTRAL_PWM - MIDDLE * up)
+    others = (NEUTRAL_PWM + side * axis for axis in (message.r, message.x, message.y))
+    pulses = NEUTRAL_PWM, NEUTRAL_PWM, middle + up * message.z, *others
+    return tuple(int(max(NEUTRAL_PWM - HALF, min(NEUTRAL_PWM + HALF, p))) for p in pulses)

@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from ardusub_autopilot import ALT_HOLD, STABILIZE
-from mavlink_pair import Pair, nothing
+from mavlink_pair import Booted, Pair, nothing
 from pilot import LEAST, MOST
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from vehicle_link import LinkSettings
 from wrench_mapping import MANUAL_CONTROL, OVERRIDE
 
@@ -88,12 +89,17 @@ def test_a_joystick_that_takes_over_with_a_mode_is_not_hindered(mode: int) -> No
     assert 'set by somebody else' in pair.said[-1]
 
 
-@pytest.mark.parametrize('phase', [0.0, 0.012])
-@pytest.mark.parametrize('every', [0.02, 0.04, 0.052, 0.1])
-def test_a_joystick_in_the_same_mode_is_noticed_and_given_way(every: float, phase: float) -> None:
-    pair = Pair().flown(PUSH)
+@pytest.mark.parametrize(
+    ('every', 'phase', 'how'),
+    [(0.02, 0.0, OVERRIDE), (0.052, 0.012, OVERRIDE), (0.1, 0.0, OVERRIDE), (0.1, 0.012, OVERRIDE),
+     (0.04, 0.0, MANUAL_CONTROL), (0.1, 0.012, MANUAL_CONTROL)],
+)  # fmt: skip
+def test_a_joystick_in_the_same_mode_is_noticed_and_given_way(every, phase, how) -> None:
+    pair = Pair(link=LinkSettings(how=how)).flown(PUSH)
     pair.run(phase, PUSH)
-    pair.steer(8.0, x=-600, every=every)
+    for _ in range(8):
+        if pair.link.pilot.commands:
+            pair.steer(1.0, x=-600, every=every)
     assert any('another pilot steers' in line for line in pair.said)
     before = inputs(pair)
     pair.steer(1.0, x=-600)
@@ -102,8 +108,14 @@ def test_a_joystick_in_the_same_mode_is_noticed_and_given_way(every: float, phas
     assert pair.autopilot.armed, 'it is the pilot who has it now'
 
 
-def test_its_own_inputs_are_no_other_pilot() -> None:
-    pair = Pair().flown(PUSH)
+@pytest.mark.parametrize(
+    ('how', 'gain', 'heave'), [(OVERRIDE, 0.5, 1.0), (MANUAL_CONTROL, 0.5, 1.0),
+                               (MANUAL_CONTROL, 0.37, 1.7)],
+)  # fmt: skip
+def test_its_own_inputs_are_no_other_pilot(how: str, gain: float, heave: float) -> None:
+    pair = Pair(Booted(gain=gain), LinkSettings(how=how))
+    pair.autopilot.parameters['JS_THR_GAIN'] = heave
+    pair.flown(PUSH)
     for i in range(20):
         pair.run(0.5, tau=PUSH * np.sin(i))
     count = iter(range(10**6))
@@ -113,4 +125,41 @@ def test_its_own_inputs_are_no_other_pilot() -> None:
     pair.run(0.4, tau=PUSH)
     pair.up = bytes
     pair.run(1.0, tau=PUSH)
+    assert pair.link.pilot.commands
+
+
+def test_a_vehicle_that_takes_other_inputs_than_those_sent_is_disarmed() -> None:
+    pair = Pair(link=LinkSettings(how=MANUAL_CONTROL))
+    take = pair.autopilot._takers['MANUAL_CONTROL']
+
+    def with_input_hold(message, now: int) -> None:
+        message.x += 300
+        take(message, now)
+
+    pair.autopilot._takers['MANUAL_CONTROL'] = with_input_hold
+    pair.link.pilot.want(True, pair.now)
+    pair.run(1.5, tau=PUSH)
+    assert pair.autopilot.armed
+    pair.run(4.0, tau=PUSH)
+    assert not pair.autopilot.armed, 'nor armed again'
+    assert any('not those sent' in line for line in pair.said)
+
+
+def test_inputs_that_stand_before_it_comes_are_said_once() -> None:
+    pair = Pair()
+    pair.steer(1.0)
+    pair.flown(PUSH)
+    assert (
+        sum('inputs were (1500, 1500, 1500, 1500, 1620, 1500)' in line for line in pair.said) == 1
+    )
+
+
+def test_another_station_of_its_id_is_said_since_it_hides_a_loss_of_this_one() -> None:
+    pair = Pair().flown(PUSH)
+    other = mavlink.MAVLink(pair._downs, srcSystem=255, srcComponent=190)
+    for _ in range(3):
+        other.heartbeat_send(6, 8, 0, 0, 4)
+        pair.run(1.0, tau=PUSH)
+    assert [text for text in pair.said if 'another station has the id' in text] == pair.said
+    assert pair.link.differences == pair.said
     assert pair.link.pilot.commands

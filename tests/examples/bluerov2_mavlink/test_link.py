@@ -10,7 +10,7 @@ from mavlink_pair import SECOND, Booted, Pair, nothing
 from numpy.testing import assert_allclose
 from pilot import MANUAL
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from vehicle_link import LinkSettings
+from vehicle_link import LinkSettings, VehicleLink
 from wrench_mapping import MANUAL_CONTROL
 
 MOVING = Booted(eta=(1.0, -2.0, 3.0, 0.2, -0.3, 2.0), nu=(0.5, -0.3, 0.2, 0.1, 0.2, -0.3))
@@ -53,7 +53,7 @@ def test_the_vehicle_is_asked_for_what_is_needed_and_nothing_moves_unasked() -> 
     asked = {int(m.param1) for m in orders(pair, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)}
     assert asked == {0, 1, 30, 32, 36, 65}
     assert not sent(pair, 'REQUEST_DATA_STREAM'), 'all of them were granted'
-    assert len(sent(pair, 'HEARTBEAT')) == 2
+    assert not sent(pair, 'HEARTBEAT')
     assert not orders(pair, mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
     assert not sent(pair, 'RC_CHANNELS_OVERRIDE')
     assert not pair.autopilot.armed
@@ -123,6 +123,16 @@ def test_a_long_loss_is_disarmed_by_the_vehicle_and_wants_to_be_asked_again() ->
     pair.link.pilot.want(True, pair.now)
     pair.run(2.0, tau=PUSH)
     assert pair.autopilot.armed
+
+
+@pytest.mark.parametrize('asked', [False, True])
+def test_a_driver_that_follows_a_killed_one_does_not_keep_its_last_input_alive(asked) -> None:
+    pair = Pair().flown(PUSH)
+    pair.link = VehicleLink(LinkSettings(), pair._ups.send, pair.said.append)
+    pair.link.pilot.want(asked, pair.now)
+    pair.run(3.0)
+    assert pulses(pair) == [1500] * 8
+    assert not pair.autopilot.armed or asked
 
 
 def test_a_restart_of_the_vehicle_is_noticed_and_stamps_go_on() -> None:

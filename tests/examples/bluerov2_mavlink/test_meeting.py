@@ -138,7 +138,9 @@ def test_nothing_is_said_of_a_vehicle_as_it_should_be() -> None:
     [
         ('FS_GCS_ENABLE', 0.0, ('FS_GCS_ENABLE is 0, expected 2', 'set 2')),
         ('FS_PILOT_INPUT', 0.0, ('FS_PILOT_INPUT is 0, expected 2',)),
-        ('FS_PILOT_TIMEOUT', 0.25, ('FS_PILOT_TIMEOUT is 0.25 s, expected 0.5 to 3',)),
+        ('FS_PILOT_TIMEOUT', 0.25, ('FS_PILOT_TIMEOUT is 0.25, expected 0.5 to 3',)),
+        ('FS_GCS_TIMEOUT', 20.0, ('FS_GCS_TIMEOUT is 20, expected 0 to 5',)),
+        ('ACRO_YAW_P', 4.5, ('ACRO_YAW_P is 4.5, expected 3.375', 'yaw')),
     ],
 )
 def test_a_failsafe_that_is_off_is_said_once(name: str, value: float, words: tuple) -> None:
@@ -176,6 +178,8 @@ def test_before_4_5_a_joystick_that_was_used_disarms_the_driver_and_it_is_said_b
     [
         ('SYSID_MYGCS', 254.0, ('SYSID_MYGCS is 254, expected 255', '-p system:=254')),
         ('FRAME_CONFIG', 1.0, ('FRAME_CONFIG is 1, expected 2', '8 thrusters')),
+        ('RC_OPTIONS', 34.0, ('RC_OPTIONS has bit 1', 'nobody steers it by MAVLink')),
+        ('RC_OVERRIDE_TIME', 0.0, ('RC_OVERRIDE_TIME is 0', 'nobody steers it by MAVLink')),
     ],
 )
 def test_a_vehicle_that_would_not_obey_or_move_otherwise_is_not_armed(name, value, words) -> None:
@@ -187,6 +191,15 @@ def test_a_vehicle_that_would_not_obey_or_move_otherwise_is_not_armed(name, valu
     assert all(word in waits(pair)[-1] for word in words)
     assert not pair.autopilot.armed
     assert not [m for m in pair.sent if m.get_type() == 'RC_CHANNELS_OVERRIDE']
+
+
+@pytest.mark.parametrize(('last', 'taken'), [(255.0, True), (0.0, False)])
+def test_from_4_7_on_a_vehicle_may_obey_a_range_of_stations(last: float, taken: bool) -> None:
+    pair = Pair(Booted(version=(4, 7, 0)))
+    pair.autopilot.parameters |= {'MAV_GCS_SYSID': 250.0, 'MAV_GCS_SYSID_HI': last}
+    pair.link.pilot.want(True, pair.now)
+    pair.run(3.0, tau=[5.0, 0, 0, 0, 0, 0])
+    assert pair.autopilot.armed == taken
 
 
 def test_after_a_restart_it_asks_again() -> None:

@@ -108,14 +108,17 @@ def test_a_short_loss_of_the_link_gives_no_odometry_no_old_command_and_recovers(
     assert all(a < b for a, b in pairwise(stamps))
 
 
-def test_a_long_loss_is_disarmed_by_the_vehicle_and_wants_to_be_asked_again() -> None:
+@pytest.mark.parametrize('seconds', [1.8, 4.8])
+def test_a_long_loss_is_disarmed_by_the_vehicle_and_wants_to_be_asked_again(seconds) -> None:
     pair = Pair().flown(PUSH)
     pair.up = pair.down = nothing
     pair.run(1.2, tau=PUSH)
     assert max(pulses(pair)) > 1550, 'the last input stays'
-    pair.run(1.8, tau=PUSH)
+    pair.run(seconds, tau=PUSH)
     assert not pair.autopilot.armed, 'the failsafe of ArduSub'
-    pair.up = pair.down = bytes
+    pair.up, pair.down = bytes, lambda data: b'' if data[7:10] == bytes(3) else data
+    pair.run(0.3)  # an acknowledgement comes before a heartbeat, and both before a wrench
+    pair.down = bytes
     pair.run(3.0, tau=PUSH)
     assert not pair.autopilot.armed
     assert pair.autopilot.channels == NEUTRAL, 'whoever arms it next finds it at rest'

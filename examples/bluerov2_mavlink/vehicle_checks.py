@@ -1,8 +1,8 @@
 """What an ArduSub vehicle is asked for when it is met: messages, version, parameters."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from wrench_mapping import MANUAL_CONTROL
@@ -23,11 +23,11 @@ EXPECTED = {
     'FS_GCS_ENABLE': (2, 2, 'when this driver is killed the motors go on as last told; set 2'),
     'FS_GCS_TIMEOUT': (0, 5, 'so many s they go on when this driver is killed; set 5'),
     'FS_PILOT_TIMEOUT': (0.5, 3, 'set 3'),
-    'ACRO_YAW_P': (3.375, 3.375, 'yaw is stronger in the same proportion; set 3.375'),
-    'JS_THR_GAIN': (1, 1, 'heave is so much stronger; set 1'),
+    'ACRO_YAW_P': (3.375, 3.375, 'yaw is scaled in proportion; set 3.375'),
+    'JS_THR_GAIN': (1, 1, 'heave is so many times as strong; set 1'),
 }
 OTHERS = ('FRAME_CONFIG', 'FS_PILOT_INPUT', 'RC_OPTIONS', 'RC_OVERRIDE_TIME', *GAINS)
-PARAMETERS = dict.fromkeys((*NEWER, *STATION, *EXPECTED, *OTHERS))  # in this order
+PARAMETERS = (*NEWER, *STATION, *EXPECTED, *OTHERS)  # in this order
 Order = Callable[..., None]  # a command and its parameters
 
 
@@ -93,13 +93,6 @@ class Telemetry:
         }
         self._counted = now
         self._counts.clear()
-
-
-class Difference(NamedTuple):
-    """What is not as this driver needs it, and what to do; whether it must not arm so."""
-
-    text: str
-    serious: bool
 
 
 class Profile:
@@ -168,11 +161,11 @@ class Profile:
 
     def gain(self) -> float | None:
         """Pilot gain at boot, if that is within its limits; a button may have changed it since."""
-        default, least, most = (self.values.get(name, 0.0) for name in GAINS[:3])
+        default, least, most = (self.values.get(name, 0.0) for name in GAINS)
         return default if 0.1 <= least <= default <= most <= 1.0 else None
 
-    def differences(self, station: int, thrusters: int, how: str) -> Iterable[Difference]:
-        """What is not as it should be, once complete.
+    def differences(self, station: int, thrusters: int, how: str) -> tuple[list[str], list[str]]:
+        """What is not as it should be, and what to do, once complete.
 
         Parameters
         ----------
@@ -180,37 +173,41 @@ class Profile:
         thrusters : how many the vehicle file has
         how : 'rc_override' or 'manual_control'
 
+        Returns
+        -------
+        serious, others : with which the vehicle must not be armed, with which it may
+
         """
-        value = self.values.get
-        if missing := self.missing():
-            yield Difference(f'no answer about {", ".join(missing)}: not checked', False)
-        if self.version and self.version < LEAST_VERSION:
-            yield Difference(f'{self.firmware} is older than 4.0: nobody has tried it', False)
+        serious, others, value = [], [], self.values.get
         for name in STATION:
             found = value(name, station)
             if not found <= station <= max(found, value('MAV_GCS_SYSID_HI', 0.0)):
                 advice = f'it obeys that one only: start with -p system:={found:g} or set {station}'
-                yield Difference(f'{name} is {found:g}, expected {station}: {advice}', True)
+                serious.append(f'{name} is {found:g}, expected {station}: {advice}')
         frame = FRAMES.get(thrusters, 0)
         if (found := value('FRAME_CONFIG', frame)) != frame:
             advice = f'the vehicle file has {thrusters} thrusters: set it, or give -p vehicle'
-            yield Difference(f'FRAME_CONFIG is {found:g}, expected {frame}: {advice}', True)
+            serious.append(f'FRAME_CONFIG is {found:g}, expected {frame}: {advice}')
         if int(value('RC_OPTIONS', 0.0)) & IGNORED or value('RC_OVERRIDE_TIME', 3.0) == 0.0:
-            text = 'RC_OPTIONS has bit 1, or RC_OVERRIDE_TIME is 0: nobody steers it by MAVLink; '
-            yield Difference(f'{text}clear the bit, and set 3', True)
+            text = 'RC_OPTIONS has bit 1, or RC_OVERRIDE_TIME is 0: nobody steers it by MAVLink'
+            serious.append(f'{text}; clear the bit, and set 3')
+        if missing := self.missing():
+            others.append(f'no answer about {", ".join(missing)}: not checked')
+        if self.version and self.version < LEAST_VERSION:
+            others.append(f'{self.firmware} is older than 4.0: nobody has tried it')
         for name, (least, most, what) in EXPECTED.items():
-            ignored = name == 'JS_THR_GAIN' and how != MANUAL_CONTROL
-            if not (ignored or least <= value(name, least) <= most):
+            found = value(name, least)
+            if not least <= found <= most and (name != 'JS_THR_GAIN' or how == MANUAL_CONTROL):
                 expected = f'{least:g}' if least == most else f'{least:g} to {most:g}'
-                yield Difference(f'{name} is {value(name):g}, expected {expected}: {what}', False)
+                others.append(f'{name} is {found:g}, expected {expected}: {what}')
         blind = how != MANUAL_CONTROL and (self.version or LEAST_VERSION) < SEES_OVERRIDES
         action = value('FS_PILOT_INPUT')
         if blind and action == 2.0:
-            text = (
+            others.append(
                 f'FS_PILOT_INPUT is 2 and {self.firmware} counts joysticks only: one that was used '
                 'since boot disarms this driver after FS_PILOT_TIMEOUT; boot again without it'
             )
-            yield Difference(text, False)
         elif not blind and action not in (2.0, None):
             text = f'FS_PILOT_INPUT is {action:g}, expected 2: a driver that hangs is not noticed'
-            yield Difference(text, False)
+            others.append(text)
+        return serious, others

@@ -76,6 +76,7 @@ class VehicleLink:
         self, settings: LinkSettings, send: Callable[[Any], None], say: Callable[[str], None]
     ):
         self._settings, self._send, self._tell = settings, send, say
+        self._target = settings.system, mavlink.MAV_COMP_ID_AUTOPILOT1
         self.pilot = Pilot(settings.neutral, settings.disarm)
         self.clock = BootClock()
         self.profile = Profile(self._order, self._read_parameter)
@@ -116,8 +117,7 @@ class VehicleLink:
 
     def is_vehicle(self, message: Any) -> bool:
         """Whether a message is of the autopilot that is talked to."""
-        ids = message.get_srcSystem(), message.get_srcComponent()
-        return ids == self._target
+        return (message.get_srcSystem(), message.get_srcComponent()) == self._target
 
     def receive(self, message: Any, now: int) -> Sample | None:
         """Take a message that arrived at `now` in ns; a sample of the motion where it gives one.
@@ -201,10 +201,6 @@ class VehicleLink:
             waits.append(': '.join(['the vehicle to arm', *_younger(self._refusals, now - FRESH)]))
         return [*waits, *self._serious]
 
-    @property
-    def _target(self) -> tuple[int, int]:
-        return self._settings.system, mavlink.MAV_COMP_ID_AUTOPILOT1
-
     def _wanted_messages(self) -> dict[int, tuple[int, int]]:
         rates = dict(MESSAGES)
         if self._settings.how == MANUAL_CONTROL:
@@ -244,20 +240,17 @@ class VehicleLink:
     def _compare(self) -> None:
         """Say what of the vehicle's parameters is not as it should be, once they are known."""
         self._compared, settings = True, self._settings
-        found = [*self.profile.differences(settings.station, settings.thrusters, settings.how)]
-        self._serious = [difference.text for difference in found if difference.serious]
-        self.differences = [difference.text for difference in found]
+        asked = settings.station, settings.thrusters, settings.how
+        self._serious, others = self.profile.differences(*asked)
+        self.differences = [*self._serious, *others]
         for text in self.differences:
             self._say(text)
         if self.gain is None and (gain := self.profile.gain()) is not None:
             self.gain, self.gain_from = gain, 'JS_GAIN_DEFAULT'
 
-    def _is_ready(self) -> bool:
-        known = self.gain is not None and self._compared
-        return known and self._sampled is not None and not self._serious
-
     def _steer(self, now: int, *, fresh: bool = False) -> None:
-        deed = self.pilot.due(now, self._is_ready(), fresh=fresh)
+        known = self.gain is not None and self._compared and not self._serious
+        deed = self.pilot.due(now, known and self._sampled is not None, fresh=fresh)
         if deed.mode:
             flag = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
             self._order(mavlink.MAV_CMD_DO_SET_MODE, flag, MANUAL)

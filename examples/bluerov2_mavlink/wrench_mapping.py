@@ -107,8 +107,8 @@ class WrenchMapping:
         commands, axes = np.zeros(self._T.shape[1]), np.zeros(6)
         wanted = np.array(tau, float)
         for group in self._groups:
-            here = [limit[group.thrusters] for limit in self._limits]
-            p = _commands(group, group.inverse @ wanted[list(group.dofs)], *here)
+            here = self._limits[0][group.thrusters], self._limits[1][group.thrusters]
+            p = _commands(group, group.inverse @ wanted[list(group.dofs)], here)
             commands[group.thrusters] = p
             axes[list(group.dofs)] = group.axes @ p
             wanted -= self._T[:, group.thrusters] @ thrust_of(p, *here)  # e.g. pitch by surge
@@ -141,17 +141,15 @@ def _null(A: np.ndarray) -> np.ndarray | None:
     return V[-1] if free == 1 else None
 
 
-def _commands(
-    group: Group, thrust: np.ndarray, reverse: np.ndarray, forward: np.ndarray
-) -> np.ndarray:
+def _commands(group: Group, thrust: np.ndarray, limits: tuple) -> np.ndarray:
     """Commands whose thrusts give the same wrench and that are a sum of axes."""
     if group.idle is None or group.odd is None:
-        return command_of(thrust, reverse, forward)
+        return command_of(thrust, *limits)
     # odd . p rises with the share of idle thrust: there is one zero, and it lies in between
     low, high = -(span := 2.0 * np.abs(thrust).max() / np.abs(group.idle).min()), span
     for _ in range(BISECTIONS):
         middle = (low + high) / 2.0
-        p = command_of(thrust + middle * group.idle, reverse, forward)
+        p = command_of(thrust + middle * group.idle, *limits)
         low, high = (middle, high) if group.odd @ p < 0 else (low, middle)
     return p
 

@@ -122,8 +122,9 @@ def check_current(module: Any) -> None:
     steady = reference.Plant(REXROV, [FLOW])
     for eta in ATTITUDES:
         q = attitude_of(eta[3:])
-        found = plain(module.acceleration_in_current)(
-            vehicle.model, vehicle.M_RB.ravel(), tuple(q), tuple(NU), tuple(TAU), tuple(F), flow
+        truth = module.PlantModel(vehicle.model, vehicle.M_RB.ravel(), vehicle.model, False)
+        found = plain(module.true_acceleration)(
+            truth, tuple(q), tuple(NU), tuple(TAU), tuple(F), flow[None], 0
         )
         assert_allclose(plain(module.to_body)(tuple(q), tuple(F[:3])), turned(q).T @ F[:3])
         expected = steady.acceleration(t, turned(q), NU, TAU - F)
@@ -141,10 +142,11 @@ def check_uncertainty(module: Any) -> None:
     assert_allclose(made.truth.model.hydrostatics, [true['W'] - true['B'], *couple], rtol=1e-9)
     external = made.F(np.zeros(1))[0]
     q, tau = attitude_of(ETA[3:]), 900.0 * TAU
-    found = plain(module.lumped)(
-        made.truth, tuple(q), tuple(NU), tuple(tau), tuple(external), np.zeros((0, 6))
-    )
     nu_dot = reference.Plant(REXROV, SPECS).acceleration(0.0, turned(q), NU, tau)
+    still = np.zeros((0, 6))
+    given = made.truth, tuple(q), tuple(NU), tuple(tau), tuple(external)
+    assert_allclose(plain(module.true_acceleration)(*given, still, 0), nu_dot, rtol=1e-8)
+    found = plain(module.lumped)(*given, tuple(nu_dot))
     used = known['M'] @ nu_dot + reference.kirchhoff(known['M'], NU)
     used += reference.damping(known, NU) @ NU + gradient(REXROV, ETA)
     assert_allclose(found, tau - used, rtol=1e-8)

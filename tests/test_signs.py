@@ -104,7 +104,7 @@ FORMULAS = [
     ),
     Formula(
         'F current', 'auv_dynamics.plant.uncertainty',
-        ['make_current', 'to_body', 'acceleration_in_current'], check_current, 33,
+        ['make_current', 'to_body', 'true_acceleration'], check_current, 33,
     ),
     Formula(
         'F lumped', 'auv_dynamics.plant.uncertainty', ['with_errors', 'lumped'],

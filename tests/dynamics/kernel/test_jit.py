@@ -148,6 +148,31 @@ def test_a_folder_that_somebody_else_made_is_not_used(tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(not compile.JITTED, reason='numba is absent or switched off here')
+def test_one_clone_loads_what_another_compiled_unless_the_source_differs(tmp_path):
+    hits = []
+    for clone, added in (('one', 1), ('other', 1), ('changed', 2)):
+        module = tmp_path / clone / 'counting.py'
+        module.parent.mkdir()
+        module.write_text(
+            'from auv_dynamics.kernel.compile import compiled\n'
+            '@compiled\n'
+            'def next_one(x):\n'
+            f'    return x + {added}\n'
+        )
+        call = 'from counting import next_one; print(next_one(1), len(next_one.stats.cache_hits))'
+        done = subprocess.run(
+            [sys.executable, '-c', call],
+            cwd=module.parent,
+            env=os.environ | {'AUV_GVC_CACHE_DIR': str(tmp_path / 'cache')},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        hits.append(done.stdout.split())
+    assert hits == [['2', '0'], ['2', '1'], ['3', '0']]
+
+
+@pytest.mark.skipif(not compile.JITTED, reason='numba is absent or switched off here')
 @pytest.mark.parametrize('private', [True, False])
 def test_code_in_a_folder_of_somebody_else_is_neither_loaded_nor_kept(tmp_path, private):
     cache = tmp_path / 'cache' / compile.kernels_digest()

@@ -23,7 +23,6 @@ from auv_dynamics.kernel.lanes import (
     packed,
     select,
     sqrt,
-    uncounted,
     unpacked,
 )
 from auv_dynamics.kernel.six import matvec, vector
@@ -73,7 +72,7 @@ class Table(NamedTuple):
 def chosen(both, table, b, x, out, lanes):
     """All that lanes offer, on x (n,): used compiled and as it is."""
     own = of_block(both, b, lanes)
-    t = uncounted(of_block(table, b, lanes)).t
+    t = of_block(table, b, lanes).t
     product = matvec(own.A, vector(x, 0))
     for i in range(6):
         out[i] = select(x[i] > t[i], product[i], -x[i]) / 2.0 + abs(x[i]) * own.shared
@@ -141,11 +140,11 @@ def test_choices_of_single_numbers(x):
 
 @pytest.mark.skipif(not JITTED, reason='needs numba')
 def test_compiled_functions_keep_nothing_alive():
-    """Arrays that are seen uncounted are freed when their owner lets them go."""
+    """No references are counted: arrays are freed when their owner lets them go."""
 
     @compiled
     def first(table):
-        return uncounted(table).t[0]
+        return table.t[0]
 
     table, counts = Table(np.ones(3)), []
     for _ in range(100):

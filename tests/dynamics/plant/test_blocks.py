@@ -6,12 +6,12 @@ from plants import plant_of
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
-from auv_dynamics.plant.actuators import fill_applied, make_actuators, memory
-from auv_dynamics.plant.devices import LOST, SensorNoise, fill_measured
+from auv_dynamics.plant.actuators import make_actuators, memory
+from auv_dynamics.plant.devices import LOST, SensorNoise, compiled_applied, compiled_measured
 from auv_dynamics.plant.plant import (
     BLOCK,
     SIZE,
-    fill_plant_step,
+    compiled_plant_step,
     initial_state,
     lumped_uncertainty,
 )
@@ -45,15 +45,15 @@ def test_a_plant_goes_through_its_blocks_as_through_one_table():
     stages, trial = np.zeros((4, SIZE)), np.zeros(SIZE)
     truth = uncertainty.truth
     for k in range(STEPS + 1):
-        fill_measured(rows[k], x, measured)
+        compiled_measured(rows[k], x, measured)
         assert plant.k == k
         assert plant.lost == (rows[k, LOST] == 1.0)
         assert_array_equal(plant.x, x)
         assert_array_equal(plant.measured, measured)
-        applied = fill_applied(chain, k, command(k), state)
+        applied = compiled_applied(chain, k, command(k), state)
         lump = lumped_uncertainty(truth, x, applied, F[k], current[k])
         assert_array_equal(plant.answer(command(k)), [applied, lump])
-        fill_plant_step(truth, x, applied, F[k], current[k], STEP, tableau, stages, trial)
+        compiled_plant_step(truth, x, applied, F[k], current[k], STEP, tableau, stages, trial)
         plant.advance()
 
 

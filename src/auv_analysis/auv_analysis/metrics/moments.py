@@ -16,7 +16,7 @@ from auv_analysis.metrics.energy import component
 from auv_analysis.runs.run import Run, Windows
 from auv_dynamics.kernel import LANES
 from auv_dynamics.kernel.compile import compiled, helper
-from auv_dynamics.kernel.lanes import of_block, uncounted
+from auv_dynamics.kernel.lanes import of_block
 from auv_dynamics.kernel.six import (
     Vector,
     add,
@@ -125,9 +125,8 @@ def add_samples(
 
     `beside` (1, 30, WIDTH) is workspace. Zeros, which fill up the last register, add nothing.
     """
-    known, block = uncounted(maps), of_block(beside, 0, WIDTH)
-    s, q = of_block(sums, 0, WIDTH), of_block(squares, 0, WIDTH)
-    p = of_block(peaks, 0, WIDTH)
+    block, s = of_block(beside, 0, WIDTH), of_block(sums, 0, WIDTH)
+    q, p = of_block(squares, 0, WIDTH), of_block(peaks, 0, WIDTH)
     for k in range(0, nu.shape[0], 6 * WIDTH):
         if k + 6 * WIDTH <= nu.shape[0]:
             fill_signals(beside, nu, nu_d, tau, f, F, k, WIDTH)
@@ -136,7 +135,7 @@ def add_samples(
             fill_signals(beside, nu, nu_d, tau, f, F, k, (nu.shape[0] - k) // 6)
         add_sample(
             vector(block, 0), vector(block, 6), vector(block, 12), vector(block, 18),
-            vector(block, 24), known, s, q, p,
+            vector(block, 24), maps, s, q, p,
         )  # fmt: skip
 
 

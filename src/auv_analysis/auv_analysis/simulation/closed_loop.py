@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_dynamics.kernel.compile import compiled, specialised
-from auv_dynamics.kernel.integrator import Tableau, fill_stages, fill_step, fill_sum
-from auv_dynamics.kernel.lanes import align_stack, of_block, uncounted
+from auv_dynamics.kernel.integrator import Tableau, fill_stages, fill_sum
+from auv_dynamics.kernel.lanes import align_stack, of_block
 from auv_dynamics.kernel.six import Vector, fill_vector, vector
 from auv_dynamics.plant.actuators import Actuators, fill_applied
 from auv_dynamics.plant.devices import fill_arrived, fill_faulty, fill_measured
@@ -151,11 +151,11 @@ class LawInside(NamedTuple):
         nu_d, nu_d_dot = vector(system.reference[stage], 0), vector(system.reference[stage], 6)
         tau, f = wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
         change = state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model)
+        fill_plant_rate(truth, x, tau, F, system.current, stage, rate)
         if stage == 0:
-            total = lumped(truth, attitude, nu, tau, F, system.current)
+            total = lumped(truth, attitude, nu, tau, F, vector(rate, 7))
             sample = Sample(body, body, state, nu_d, tau, tau, f, total)
             fill_record(system.record, system.k, sample)
-        fill_plant_rate(truth, x, tau, F, system.current, stage, rate)
         for i in range(x.shape[0] - SIZE):
             rate[SIZE + i] = change[i]
 
@@ -235,19 +235,18 @@ def run_continuous(
     have a leading axis of these blocks, see `of_block`; `work` has one, which all use.
     """
     align_stack(lanes)
-    steps, method, (stages, trial) = uncounted(grid), uncounted(tableau), of_block(work, 0, lanes)
-    step, every = steps.step, method.b.shape[0]
+    (stages, trial), step, every = of_block(work, 0, lanes), grid.step, tableau.b.shape[0]
     for b in range(first, last):
         loop, known = of_block(loops, b, lanes), of_block(tables, b, lanes)
         x, record = of_block(motions, b, lanes).x, of_block(records, b, lanes)
-        for row in range(steps.t.shape[0]):
-            k, t = steps.first + row, steps.t[row]
+        for row in range(grid.t.shape[0]):
+            k, t = grid.first + row, grid.t[row]
             reference, F, current = known.reference[row], known.F[row], known.current[row]
             system = LawInside(loop, k, t, reference, F, current, record)
-            count = every if k < steps.last else 1  # of the last sample nothing but its record
-            fill_stages(system, x, step, method, stages, trial, count)
-            if k < steps.last:
-                fill_sum(x, x, step, method.b, stages, count)
+            count = every if k < grid.last else 1  # of the last sample nothing but its record
+            fill_stages(system, x, step, tableau, stages, trial, count)
+            if k < grid.last:
+                fill_sum(x, x, step, tableau.b, stages, count)
                 fill_unit_attitude(x)
 
 
@@ -258,14 +257,14 @@ def run_held(
 ) -> None:  # fmt: skip
     """Take a block of steps with the law at the samples, the wrench held; the rest as above."""
     align_stack(lanes)
-    steps, method, (stages, trial) = uncounted(grid), uncounted(tableau), of_block(work, 0, lanes)
+    (stages, trial), step, every = of_block(work, 0, lanes), grid.step, tableau.b.shape[0]
     for b in range(first, last):
         loop, known = of_block(loops, b, lanes), of_block(tables, b, lanes)
         motion, record = of_block(motions, b, lanes), of_block(records, b, lanes)
         truth, x, measured, history = loop.truth, motion.x, motion.measured, motion.history
         body, state = x[:SIZE], x[SIZE:]
-        for row in range(steps.t.shape[0]):
-            k = steps.first + row
+        for row in range(grid.t.shape[0]):
+            k = grid.first + row
             reference, F, current = known.reference[row], known.F[row], known.current[row]
             if history.shape[0] > 0:
                 fill_measured(known.noise[row], body, history[history.shape[0] - 1])
@@ -276,20 +275,23 @@ def run_held(
                 for i in range(SIZE):
                     measured[i] = body[i]
             nu_d, nu_d_dot = vector(reference[0], 0), vector(reference[0], 6)
-            dt = steps.step if k > 0 else 0.0
+            dt = step if k > 0 else 0.0
             tau, f = fill_sample(
-                steps.t[row, 0], dt, vector(measured, 7), attitude_of(measured), nu_d, nu_d_dot,
+                grid.t[row, 0], dt, vector(measured, 7), attitude_of(measured), nu_d, nu_d_dot,
                 state, motion.rate, loop.gains, loop.model, loop.guard,
             )  # fmt: skip
             if loop.faults.any:
                 applied = fill_faulty(loop.actuators, known.faults[row], k, tau, motion.memory)
             else:
                 applied = fill_applied(loop.actuators, k, tau, motion.memory)
-            total = lumped(truth, attitude_of(x), vector(x, 7), applied, vector(F[0], 0), current)
+            held = HeldWrench(truth, applied, F, current)
+            count = every if k < grid.last else 1  # as above
+            fill_stages(held, body, step, tableau, stages, trial, count)
+            nu, d, nu_dot = vector(x, 7), vector(F[0], 0), vector(stages[0], 7)
+            total = lumped(truth, attitude_of(x), nu, applied, d, nu_dot)
             fill_record(record, k, Sample(body, measured, state, nu_d, tau, applied, f, total))
-            if k < steps.last:
-                held = HeldWrench(truth, applied, F, current)
-                fill_step(held, body, steps.step, method, stages, trial)
+            if k < grid.last:
+                fill_sum(body, body, step, tableau.b, stages, count)
                 fill_unit_attitude(body)
 
 

@@ -17,7 +17,6 @@ from auv_dynamics.kernel.lanes import (
     of_block,
     packed,
     select,
-    uncounted,
     with_batch_axis,
 )
 from auv_dynamics.kernel.six import fill_vector, vector
@@ -136,7 +135,6 @@ def run_open(
     13, W) is the memory of the states as numbers, `result` (V, S, rows, 13).
     """
     align_stack(lanes)
-    common, method, rows = uncounted(settings), uncounted(tableau), uncounted(result)
     stages, trial, command = of_block(work, 0, lanes)
     for b in range(first, last):
         v, s = b // result.shape[1], b % result.shape[1]
@@ -145,19 +143,19 @@ def run_open(
         at, row = v * numbers.shape[1], 0
         for k in range(segment.commands.shape[0]):
             fill_command(variant.allocation, segment.commands[k], command)
-            if common.settled and k == 0:
+            if settings.settled and k == 0:
                 fill_vector(applied, 0, vector(command, 0))
-            tau = fill_slowed(variant.follow, common.slew, vector(command, 0), applied)
+            tau = fill_slowed(variant.follow, settings.slew, vector(command, 0), applied)
             fill_plant_step(
-                variant.truth, x, tau, variant.F, variant.current, common.step, method, stages,
+                variant.truth, x, tau, variant.F, variant.current, settings.step, tableau, stages,
                 trial,
             )  # fmt: skip
             if segment.measured.shape[0] > 0:
-                fill_corrected(x, segment.measured[k], common.observer)
-            if (k + 1) % common.every == 0:
-                for lane in range(min(numbers.shape[1], rows.shape[0] - at)):
+                fill_corrected(x, segment.measured[k], settings.observer)
+            if (k + 1) % settings.every == 0:
+                for lane in range(min(numbers.shape[1], result.shape[0] - at)):
                     for i in range(SIZE):
-                        rows[at + lane, s, row, i] = numbers[i, lane]
+                        result[at + lane, s, row, i] = numbers[i, lane]
                 row += 1
 
 

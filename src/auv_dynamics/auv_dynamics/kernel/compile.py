@@ -7,7 +7,8 @@ whose code other processes load; `uncached` where a user's law must not enter th
 
 Compiled code is kept in one explicit folder whose name changes with every source file that the
 kernels can depend on, so that a stale binary cannot be loaded: numba itself only looks at the file
-of the outermost function. To load it is to run it: the folder is its user's alone.
+of the outermost function. Where the sources lie does not matter: every clone of the same state
+loads the same code. To load it is to run it: the folder is its user's alone.
 """
 
 import hashlib
@@ -104,6 +105,10 @@ def is_private(folder: Path) -> bool:
 
 try:
     import numba
+    from numba.core.caching import CompileResultCacheImpl, FunctionCache
+    from numba.core.compiler import Compiler
+    from numba.core.compiler_machinery import PassManager, register_pass
+    from numba.core.typed_passes import NativeLowering
     from numba.extending import overload, register_jitable
 except ImportError:
     numba = None  # type: ignore[assignment]  # the module or its absence
@@ -112,19 +117,82 @@ config: Any = numba and numba.config
 JITTED = numba is not None and not config.DISABLE_JIT
 
 if JITTED:
-    KEPT = is_private(cache_folder())
-    if KEPT:
-        config.CACHE_DIR = str(cache_folder())
-    else:
-        text = (
-            f'warning: {cache_folder()}: not yours alone: compiled code is neither kept nor loaded'
-        )
+    FOLDER = cache_folder()
+    KEPT = is_private(FOLDER)
+    if not KEPT:
+        text = f'warning: {FOLDER}: not yours alone: compiled code is neither kept nor loaded'
         print(text, file=sys.stderr, flush=True)
-    OPTIONS: Any = {'fastmath': {'contract'}, 'error_model': 'numpy'}
-    helper: Decorator = register_jitable(forceinline=True, **OPTIONS)
-    compiled: Decorator = numba.njit(cache=KEPT, nogil=True, forceinline=True, **OPTIONS)
+
+    @register_pass(mutates_CFG=True, analysis_only=False)
+    class _Inner(NativeLowering):
+        """Ends at optimised LLVM code: what is inlined needs no machine code of its own."""
+
+        _name = 'inner_lowering'
+
+        def run_pass(self, state: Any) -> bool:
+            state.flags.no_compile = True
+            NativeLowering.run_pass(self, state)
+            found = state['cr']
+            key: Any = [].append  # numba wants a built-in function, and one for each
+            state.library._finalize_specific = lambda: None  # noqa: SLF001  no machine code
+            state.targetctx.insert_user_function(key, found.fndesc, [state.library])
+            state['cr'] = found._replace(cfunc=key)
+            return True
+
+    class _Inlined(Compiler):
+        """Compiles what is inlined wherever it is called."""
+
+        def define_pipelines(self) -> list[Any]:
+            (usual,) = super().define_pipelines()  # type: ignore[no-untyped-call]
+            passes: Any = PassManager('inlined')
+            for which, why in usual.passes:
+                passes.add_pass(_Inner if which is NativeLowering else which, why)
+            passes.finalize()
+            return [passes]
+
+    # without _nrt no references are counted: nothing is allocated, and callers hold their arrays
+    OPTIONS: Any = {'fastmath': {'contract'}, 'error_model': 'numpy', '_nrt': False}
+    INNER: Any = {
+        'forceinline': True,
+        'no_cfunc_wrapper': True,
+        'pipeline_class': _Inlined,
+        **OPTIONS,
+    }
+    helper: Decorator = register_jitable(**INNER)
     uncached: Decorator = numba.njit(nogil=True, **OPTIONS)
     NUMBERS = numba.types.Number, numba.types.Boolean
+
+    class _Place:
+        """Where numba looks for the code of a function: by what it is, not by where it lies."""
+
+        def __init__(self, function: Any, path: str):
+            self._module, self._path = function.__module__, Path(path)
+
+        @classmethod
+        def from_function(cls, function: Any, path: str) -> '_Place':
+            return cls(function, path)
+
+        def ensure_cache_path(self) -> None:
+            is_private(FOLDER)
+
+        def get_cache_path(self) -> str:
+            return str(FOLDER)
+
+        def get_source_stamp(self) -> str:
+            return hashlib.sha256(self._path.read_bytes()).hexdigest()
+
+        def get_disambiguator(self) -> str:
+            return str(self._module)
+
+    _FILES = type('_Files', (CompileResultCacheImpl,), {'_locator_classes': [_Place]})
+    _CACHE: Any = type('_Cache', (FunctionCache,), {'_impl_class': _FILES})
+
+    def compiled(function: Function, /) -> Function:
+        """Compile a function that Python calls; its code is kept for other processes."""
+        made: Any = numba.njit(nogil=True, forceinline=True, **OPTIONS)(function)
+        if KEPT:
+            made._cache = _CACHE(function)  # noqa: SLF001  as `cache=True` does, with another place
+        return made
 else:
 
     def helper(function: Function, /) -> Function:
@@ -168,12 +236,11 @@ def of_numbers(function: Function, /) -> Function:
     return overloaded(function, choose)
 
 
-def overloaded(function: Function, choose: Callable[..., Any], /) -> Function:
+def overloaded(function: Function, choose: Callable[..., Any], /, **options: Any) -> Function:
     """Let numba compile in place of a function what is chosen for the types of its arguments."""
     if JITTED:
         # not strict: numba would take an argument with an annotation for another one
-        options: Any = {'forceinline': True, **OPTIONS}
-        overload(function, jit_options=options, strict=False)(
+        overload(function, jit_options=INNER | options, strict=False)(
             lambda *types: choose(*types)  # noqa: PLW0108  numba looks at its code
         )
     return function

@@ -58,16 +58,8 @@ def align_stack(lanes: int | None) -> None:
     """
 
 
-def uncounted(value: Any) -> Any:
-    """The same arrays without numba's reference counts, which cost more than the arithmetic.
-
-    Whoever calls the kernel holds the arrays for as long as it runs.
-    """
-    return value
-
-
 def of_block(value: Any, b: int, lanes: int | None) -> Any:
-    """One block of a batch, uncounted.
+    """One block of a batch.
 
     Parameters
     ----------
@@ -219,15 +211,6 @@ if JITTED:
         return seen._getvalue()  # noqa: SLF001  numba's own way
 
     @intrinsic
-    def _uncounted(typingctx: Any, value: Any) -> Any:
-        result = viewed(value, 0, None)
-
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            return view(context, builder, (value, result), arguments[0], None)
-
-        return result(value), generate
-
-    @intrinsic
     def _of_block(typingctx: Any, value: Any, b: Any) -> Any:
         result = viewed(value, 1, None)
 
@@ -240,6 +223,5 @@ if JITTED:
         return lambda *given: function if isinstance(given[-1], types.NoneType) else None
 
     # an intrinsic is called without the typing context that its definition takes
-    overloaded(uncounted, lambda _: lambda value: _uncounted(value))  # type: ignore[call-arg]  # noqa: PLW0108
-    overloaded(of_block, _alone(lambda value, b, lanes: _of_block(value, b)))  # type: ignore[call-arg]
+    overloaded(of_block, _alone(lambda value, b, lanes: _of_block(value, b)), _nrt=True)  # type: ignore[call-arg]
     overloaded(align_stack, _alone(lambda lanes: None))

@@ -169,5 +169,5 @@ def _together(function: Any) -> Callable[..., Any]:
     return lambda *given: function if isinstance(given[-1], types.Integer) else None
 
 
-overloaded(lanes.of_block, _together(lambda value, b, lanes: _lanes_of(value, b)))
+overloaded(lanes.of_block, _together(lambda value, b, lanes: _lanes_of(value, b)), _nrt=True)
 overloaded(lanes.align_stack, _together(lambda lanes: _align_stack()))

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.kernel.compile import compiled, helper
+from auv_dynamics.kernel.compile import helper
 from auv_dynamics.kernel.lanes import Number, clip, select
 from auv_dynamics.kernel.six import (
     Numbers,
@@ -161,7 +161,7 @@ def fill_allocated(
     return fill_delivered(rotors, actuators.reach, None, k, tau, state[1 + actuators.delay :])
 
 
-@compiled
+@helper
 def fill_applied(actuators: Actuators, k: int, tau: Numbers, state: np.ndarray) -> Numbers:
     """Wrench applied from sample k on for the command tau; `state` of `memory` in place."""
     if actuators.ideal:

@@ -76,7 +76,7 @@ class SensorNoise:
         return np.column_stack([noise[:, :6], np.cos(angle), half * scale[:, None], lost])
 
 
-@compiled
+@helper
 def fill_measured(noise: np.ndarray, x: np.ndarray, measured: np.ndarray) -> None:
     """Write what is measured of the state x (13,); a lost sample changes nothing.
 
@@ -103,7 +103,7 @@ def history_shape(faults: FaultShape) -> tuple[int, int]:
     return (faults.delay + 2 if faults.delay else 0, SIZE)
 
 
-@compiled
+@helper
 def fill_arrived(fault: np.ndarray, k: int, history: np.ndarray, measured: np.ndarray) -> None:
     """Write the newest measurement that has arrived at step k into `measured` (13,).
 
@@ -195,7 +195,7 @@ def left_of_axes(fault: np.ndarray, c: Vector) -> Six:
     )
 
 
-@compiled
+@helper
 def fill_faulty(
     actuators: Actuators, fault: np.ndarray, k: int, tau: Vector, state: np.ndarray
 ) -> Numbers:
@@ -205,6 +205,10 @@ def fill_faulty(
     c = fill_left(actuators.rotors, actuators, fault, k, command, state)
     c = clipped(c, actuators.reach.limit)
     return fill_slowed(actuators.follow, actuators.slew, left_of_axes(fault, c), state[0])
+
+
+compiled_measured, compiled_arrived = compiled(fill_measured), compiled(fill_arrived)
+compiled_applied, compiled_faulty = compiled(fill_applied), compiled(fill_faulty)
 
 
 class Sensing:
@@ -248,11 +252,11 @@ class Sensing:
             return
         lost = bool(noise[LOST])
         if fault is None or len(self._history) == 0:
-            fill_measured(noise, x, self.measured)
+            compiled_measured(noise, x, self.measured)
             self.lost = lost
             return
-        fill_measured(noise, x, self._history[-1])
-        fill_arrived(fault, k, self._history, self.measured)
+        compiled_measured(noise, x, self._history[-1])
+        compiled_arrived(fault, k, self._history, self.measured)
         before, self.age = self.age, int(fault[AGE])
         self._losses[k % len(self._losses)] = lost
         nothing_new = k > 0 and self.age == before + 1
@@ -286,8 +290,8 @@ class Acting:
         """
         if fault is None:
             ideal = self._actuators.ideal
-            return tau if ideal else fill_applied(self._actuators, k, tau, self._memory)
+            return tau if ideal else compiled_applied(self._actuators, k, tau, self._memory)
         if heard:
             fault = fault.copy()
             fault[WRENCH] = 0.0
-        return fill_faulty(self._actuators, fault, k, tau, self._memory)
+        return compiled_faulty(self._actuators, fault, k, tau, self._memory)

@@ -46,7 +46,7 @@ def attitude_of(x: np.ndarray) -> tuple[Number, Number, Number, Number]:
     return (x[3], x[4], x[5], x[6])
 
 
-@compiled
+@helper
 def fill_plant_rate(
     truth: PlantModel, x: np.ndarray, tau: Vector, F: Vector, current: np.ndarray, stage: int,
     rate: np.ndarray,
@@ -83,7 +83,7 @@ class HeldWrench(NamedTuple):
         fill_plant_rate(system.truth, x, system.tau, F, system.current, stage, rate)
 
 
-@compiled
+@helper
 def fill_plant_step(
     truth: PlantModel, x: np.ndarray, tau: Vector, F: np.ndarray, current: np.ndarray, step: float,
     tableau: Tableau, stages: np.ndarray, trial: np.ndarray,
@@ -93,12 +93,17 @@ def fill_plant_step(
     fill_unit_attitude(x)
 
 
+compiled_plant_step = compiled(fill_plant_step)
+
+
 @compiled
 def lumped_uncertainty(
     truth: PlantModel, x: np.ndarray, tau: Vector, F: np.ndarray, current: np.ndarray
 ) -> Numbers:
     """F of (1) and (3) at the state x under the applied wrench tau, see `lumped`."""
-    return lumped(truth, attitude_of(x), vector(x, 7), tau, vector(F[0], 0), current)
+    attitude, nu, d = attitude_of(x), vector(x, 7), vector(F[0], 0)
+    nu_dot = true_acceleration(truth, attitude, nu, tau, d, current, 0)
+    return lumped(truth, attitude, nu, tau, d, nu_dot)
 
 
 def initial_state(eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
@@ -246,7 +251,7 @@ class Plant:
 
     def _integrate(self) -> None:
         row = self._row
-        fill_plant_step(
+        compiled_plant_step(
             self._uncertainty.truth,
             self.x,
             self._applied,

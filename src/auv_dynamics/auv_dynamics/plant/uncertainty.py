@@ -8,7 +8,7 @@ import numpy as np
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import matrix6
-from auv_dynamics.kernel.compile import compiled, helper
+from auv_dynamics.kernel.compile import helper
 from auv_dynamics.kernel.lanes import Number
 from auv_dynamics.kernel.six import (
     Numbers,
@@ -17,7 +17,6 @@ from auv_dynamics.kernel.six import (
     add,
     matvec,
     sub,
-    vector,
 )
 from auv_dynamics.plant.disturbance import Disturbance, Harmonics, make_disturbance
 from auv_dynamics.vehicle.model import (
@@ -85,37 +84,6 @@ def to_body(attitude: Vector, v: Vector) -> tuple[Number, Number, Number]:
         (1.0 - 2.0 * (y * y + z * z)) * a + 2.0 * (x * y + w * z) * b + 2.0 * (x * z - w * y) * c,
         2.0 * (x * y - w * z) * a + (1.0 - 2.0 * (x * x + z * z)) * b + 2.0 * (y * z + w * x) * c,
         2.0 * (x * z + w * y) * a + 2.0 * (y * z - w * x) * b + (1.0 - 2.0 * (x * x + y * y)) * c,
-    )
-
-
-@helper
-def acceleration_in_current(
-    model: Model,
-    M_RB: np.ndarray,
-    attitude: Vector,
-    nu: Vector,
-    tau: Vector,
-    F: Vector,
-    flow: Vector,
-) -> Six:
-    """nu_dot in a current `flow` = (v_c, v_c_dot) in NED.
-
-    (1) in nu_r = nu - (R^T v_c, 0) with M_RB (R^T v_c_dot, 0) on its left-hand side, then
-    nu_dot = nu_r_dot + (R^T v_c_dot - omega x R^T v_c, 0). Fossen 2021, section 10.3.
-    """
-    c0, c1, c2 = to_body(attitude, (flow[0], flow[1], flow[2]))
-    a0, a1, a2 = to_body(attitude, (flow[3], flow[4], flow[5]))
-    p, q, r = nu[3], nu[4], nu[5]
-    nu_r = (nu[0] - c0, nu[1] - c1, nu[2] - c2, p, q, r)
-    carried = matvec(M_RB, (a0, a1, a2, 0.0, 0.0, 0.0))
-    b = acceleration(model, attitude, nu_r, tau, add(F, carried))
-    return (
-        b[0] + a0 - (q * c2 - r * c1),
-        b[1] + a1 - (r * c0 - p * c2),
-        b[2] + a2 - (p * c1 - q * c0),
-        b[3],
-        b[4],
-        b[5],
     )
 
 
@@ -279,25 +247,42 @@ def true_acceleration(
     current: np.ndarray,
     stage: int,
 ) -> Six:
-    """nu_dot of the plant at a stage of the step; `current` (s, 6), or (0, 6) in still water."""
+    """nu_dot of the plant at a stage of the step, in its current (v_c, v_c_dot) in NED.
+
+    (1) in nu_r = nu - (R^T v_c, 0) with M_RB (R^T v_c_dot, 0) on its left-hand side, then
+    nu_dot = nu_r_dot + (R^T v_c_dot - omega x R^T v_c, 0). Fossen 2021, section 10.3. `current`
+    (s, 6), or (0, 6) in still water.
+    """
     if current.shape[0] == 0:
         return acceleration(truth.model, attitude, nu, tau, F)
-    flow = vector(current[stage], 0)
-    return acceleration_in_current(truth.model, truth.M_RB, attitude, nu, tau, F, flow)
+    flow = current[stage]
+    c = to_body(attitude, (flow[0], flow[1], flow[2]))
+    a = to_body(attitude, (flow[3], flow[4], flow[5]))
+    carried = matvec(truth.M_RB, (a[0], a[1], a[2], 0.0, 0.0, 0.0))
+    p, q, r = nu[3], nu[4], nu[5]
+    nu_r = (nu[0] - c[0], nu[1] - c[1], nu[2] - c[2], p, q, r)
+    b = acceleration(truth.model, attitude, nu_r, tau, add(F, carried))
+    return (
+        b[0] + a[0] - (q * c[2] - r * c[1]),
+        b[1] + a[1] - (r * c[0] - p * c[2]),
+        b[2] + a[2] - (p * c[1] - q * c[0]),
+        b[3],
+        b[4],
+        b[5],
+    )
 
 
-@compiled
+@helper
 def lumped(
-    truth: PlantModel, attitude: Vector, nu: Vector, tau: Vector, F: Numbers, current: np.ndarray
+    truth: PlantModel, attitude: Vector, nu: Vector, tau: Vector, F: Numbers, nu_dot: Vector
 ) -> Numbers:
     """F := tau - [M nu_dot + C nu + D nu + g] with the vehicle file's coefficients, (1), (3).
 
-    `tau` is the wrench really applied, `F` the external part, `current` at the stages of the step.
+    `tau` is the wrench really applied, `F` the external part, `nu_dot` that of the plant.
     """
     if truth.exact:
         return F
     known = truth.known
-    nu_dot = true_acceleration(truth, attitude, nu, tau, F, current, 0)
     return sub(
         tau,
         add(

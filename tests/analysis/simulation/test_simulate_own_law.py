@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
 from auv_dynamics import InputError
+from auv_dynamics.kernel.compile import cache_folder
 
 # CL by NumPy and a dictionary: what people write, and what numba does not compile
 OWN = """
@@ -68,7 +69,7 @@ np.savez(sys.argv[2], nu=run.nu, tau=run.tau, f=run.disturbance_estimate)
 def test_a_law_of_ones_own_is_plain_python(tmp_path, hold):
     (tmp_path / 'own_law_of_mine.py').write_text(OWN, encoding='utf-8')
     (tmp_path / 'script.py').write_text(SCRIPT, encoding='utf-8')
-    cache = tmp_path / 'cache'
+    cache = cache_folder().parent / 'own_law'  # apart from what else the tests compile
     done = subprocess.run(
         [sys.executable, str(tmp_path / 'script.py'), hold, str(tmp_path / 'run.npz')],
         env=os.environ | {'AUV_GVC_CACHE_DIR': str(cache)},

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from auv_dynamics.kernel import LANES
-from auv_dynamics.kernel.compile import JITTED, compiled
+from auv_dynamics.kernel.compile import JITTED, cache_folder, compiled
 from auv_dynamics.kernel.lanes import (
     ALIGNMENT,
     anywhere,
@@ -196,7 +196,8 @@ def test_everything_runs_without_vector_registers(tmp_path):
     """`simd` is optional: deleted, every vehicle is computed alone, with the same numbers."""
     (tmp_path / 'without').mkdir()
     (tmp_path / 'without' / 'sitecustomize.py').write_text(STUB)
-    arrays, caches = {}, {'with': {}, 'without': {'AUV_GVC_CACHE_DIR': str(tmp_path / 'cache')}}
+    own = {'AUV_GVC_CACHE_DIR': str(cache_folder().parent / 'without_simd')}  # its WIDTH is another
+    arrays, caches = {}, {'with': {}, 'without': own}
     for how in ('with', 'without'):
         out, path = tmp_path / f'{how}.npz', [os.environ.get('PYTHONPATH', '')]
         path = [str(tmp_path / how), *filter(None, path)]

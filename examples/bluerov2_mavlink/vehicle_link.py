@@ -21,6 +21,7 @@ from wrench_mapping import (
 
 QUICK = SECOND // 10  # between two TIMESYNC requests until the clock is known
 GONE = 3 * SECOND  # without a heartbeat
+STOOD = 5 * SECOND // 2  # after which ArduSub's failsafe has acted
 SAY_AGAIN = 10 * SECOND  # the same text
 FRESH = 5 * SECOND  # of a refusal to arm
 WARNING = mavlink.MAV_SEVERITY_WARNING
@@ -156,7 +157,10 @@ class VehicleLink:
         Heartbeats begin with the first input: those of a driver that only looks on would keep alive
         the last input of one that was killed.
         """
+        stood, self._done['tick'] = now - self._done.get('tick', now), now
         self._now = now
+        if self.pilot.wanted and stood > STOOD:
+            self._give_up(f'this driver stood still for {stood / SECOND:.1f} s', now)
         if self._sampled is not None and now - self._sampled > self._settings.timeout:
             self._sampled = None
             self.pilot.silence()
@@ -219,6 +223,10 @@ class VehicleLink:
             return False
         self._done[what] = now
         return True
+
+    def _give_up(self, why: str, now: int) -> None:
+        self.pilot.want(False, now, why)
+        self._say(f'{why}: disarmed until ~/arm is called')
 
     def _say(self, text: str) -> None:
         """Say a line; the same one again after a while only."""
@@ -335,8 +343,7 @@ class VehicleLink:
             self._say(self.pilot.let_go(f'another pilot steers, inputs {found}'))
         elif self._strange >= STRANGE:
             why = f'inputs are {found}, not those sent: another pilot, his trims or input hold'
-            self.pilot.want(False, now, why)
-            self._say(f'{why}: disarmed until ~/arm is called')
+            self._give_up(why, now)
 
     def _named(self, message: Any, _: int) -> None:
         if message.name == GAIN and self._settings.how == MANUAL_CONTROL:

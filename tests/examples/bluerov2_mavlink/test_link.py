@@ -2,6 +2,7 @@
 
 import math
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -126,6 +127,19 @@ def test_a_long_loss_is_disarmed_by_the_vehicle_and_wants_to_be_asked_again(seco
     pair.link.pilot.want(True, pair.now)
     pair.run(2.0, tau=PUSH)
     assert pair.autopilot.armed
+
+
+def test_a_driver_that_stood_still_wants_to_be_asked_again() -> None:
+    pair = Pair().flown(PUSH)
+    link, waiting = pair.link, []
+    pair.link = SimpleNamespace(receive=lambda m, _: waiting.append(m), tick=lambda _: None)
+    pair.run(3.5)
+    pair.link = link
+    for message in waiting[:100]:  # as many as the socket keeps, the oldest
+        link.receive(message, pair.now)
+    pair.run(2.0, tau=PUSH)
+    assert said(pair, 'this driver stood still for 3.5 s')
+    assert not pair.autopilot.armed
 
 
 @pytest.mark.parametrize('asked', [False, True])

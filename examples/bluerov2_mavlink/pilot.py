@@ -61,11 +61,8 @@ class Pilot:
         self._since, self._heard = now, None
 
     def acknowledged(self, now: int) -> None:
-        """Take that arming or disarming, whichever was asked for last, has been accepted.
-
-        After a loss of the link it says nothing: a vehicle that has disarmed itself accepts, too.
-        """
-        if self._lost:
+        """Take that arming or disarming, whichever was asked for last, has been accepted."""
+        if self._lost:  # a vehicle that has disarmed itself meanwhile accepts, too
             return
         armed = self._asked.get('arm', -1) > self._asked.get('disarm', -1)
         self._acknowledged = now

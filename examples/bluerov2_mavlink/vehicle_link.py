@@ -152,11 +152,7 @@ class VehicleLink:
             self._steer(now, fresh=True)
 
     def tick(self, now: int) -> None:
-        """Send what is due at `now` in ns; to be called often.
-
-        Heartbeats begin with the first input: those of a driver that only looks on would keep alive
-        the last input of one that was killed.
-        """
+        """Send what is due at `now` in ns; to be called often."""
         stood, self._done['tick'] = now - self._done.get('tick', now), now
         self._now = now
         if self.pilot.wanted and stood > STOOD:
@@ -165,6 +161,7 @@ class VehicleLink:
             self._sampled = None
             self.pilot.silence()
             self._say('vehicle not heard: neutral')
+        # before the first input they would keep alive what a killed driver has left
         if self._inputs and self._is_due('heartbeat', now, SECOND):
             kind = mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID
             self._send(mavlink.MAVLink_heartbeat_message(*kind, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))

@@ -1,7 +1,6 @@
 """Figures and report: complete, readable, honest about zeros, and free of outside resources."""
 
 import re
-from contextlib import nullcontext
 from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
@@ -16,7 +15,7 @@ from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018.claims import claims_part, judge_runs
 from auv_analysis.herman2018.paper import paper_figures
 from auv_analysis.output.text import fixed, join, number, plain, tied
-from auv_analysis.report import plots
+from auv_analysis.report import plots, run_report
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.report.run_report import write_report
@@ -41,47 +40,58 @@ def _summaries(runs: dict[str, Run]) -> dict:
     return {name: summarize(run) for name, run in runs.items()}
 
 
-def _write(out: Path, runs: dict[str, Run], scenario='a: 1', vehicle='b: 2  # <GIVEN>') -> str:
-    summaries = _summaries(runs)
-    out.mkdir(parents=True, exist_ok=True)
+def _write(
+    out: Path, runs: dict[str, Run], scenario='a: 1', vehicle='b: 2  # <GIVEN>'
+) -> tuple[str, dict[str, FigureRecord]]:
+    """Page of a report and the figures that were drawn for it."""
+    summaries, figures = _summaries(runs), {}
     sections, sentences = claims_part(out, judge_runs(runs, summaries), runs)
     more = {'couplings': sections}
-    path = write_report(out, runs, summaries, scenario, vehicle, more=more, sentences=sentences)
+
+    def draw(*arguments):
+        drawn = draw_figures(*arguments)
+        figures.update({figure.name: figure for figure in drawn})
+        return drawn
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_report, 'draw_figures', draw)
+        path = write_report(out, runs, summaries, scenario, vehicle, more=more, sentences=sentences)
     assert path == out / 'report.html'
-    return path.read_text(encoding='utf-8')
+    return path.read_text(encoding='utf-8'), figures
 
 
 @pytest.fixture(scope='module')
-def folder(tmp_path_factory) -> Path:
-    return tmp_path_factory.mktemp('case1')
-
-
-@pytest.fixture(scope='module')
-def report(case1, folder) -> str:
+def drawn(case1, tmp_path_factory) -> tuple[str, dict[str, FigureRecord]]:
     texts = load_scenario('case1').attachments
+    folder = tmp_path_factory.mktemp('case1')
     return _write(folder, case1, texts['scenario.yaml'], texts['vehicle.yaml'])
 
 
 @pytest.fixture(scope='module')
-def figures(case1, report, folder, tmp_path_factory, composing) -> dict[str, FigureRecord]:
-    """Those of the report."""
+def report(drawn) -> str:
+    return drawn[0]
+
+
+@pytest.fixture(scope='module')
+def figures(drawn) -> dict[str, FigureRecord]:
+    return drawn[1]
+
+
+@pytest.fixture(scope='module')
+def other(case1, tmp_path_factory, composing) -> tuple[str, dict[str, FigureRecord]]:
+    """Two seconds of another vehicle, of diagonal inertia, under an unknown disturbance."""
+    run = _short(case1['gvc'], 2.0)
+    M = np.diag(np.diagonal(run.vehicle.M))
+    vehicle = replace(run.vehicle, M=M, name='other', warnings=('file: key: <odd>',))
+    notes = ('3 samples dropped',)
+    run = replace(run, scenario='mine', vehicle=vehicle, notes=notes, disturbance=None)
     with composing():
-        composed = draw_figures(case1, tmp_path_factory.mktemp('composed'))
-    drawn = folder / 'figures'
-    return {
-        one.name: replace(one, png=drawn / one.png.name, pdf=drawn / one.pdf.name)
-        for one in composed
-    }
+        return _write(tmp_path_factory.mktemp('other'), {'gvc': run})
 
 
 def _short(run: Run, seconds: float) -> Run:
     keep = run.t <= seconds + run.step / 2
     return run.part(keep)
-
-
-def _uncoupled(run: Run) -> Run:
-    vehicle = replace(run.vehicle, M=np.diag(np.diagonal(run.vehicle.M)), name='uncoupled')
-    return replace(run, vehicle=vehicle)
 
 
 def _text(report: str) -> str:
@@ -150,29 +160,28 @@ def test_signals_that_stay_zero_are_named_and_not_drawn(case1, tmp_path, unrende
     assert 'not drawn: surge, sway, roll, pitch and yaw.' in errors.caption
 
 
-def test_diagonal_inertia_has_sentences_in_place_of_coupling_figures(case1, tmp_path, unrendered):
-    runs = {'gvc': _uncoupled(case1['gvc'])}
-    figures = {figure.name: figure for figure in draw_figures(runs, tmp_path / 'figures')}
+def test_diagonal_inertia_has_sentences_in_place_of_coupling_figures(other):
+    html, figures = other
     for name, symbol in (('delta_xi', 'Δξ'), ('delta_pi', 'Δπ')):
         assert figures[name].png is None
         assert figures[name].pdf is None
         assert f'{symbol} vanishes in all six degrees of freedom' in figures[name].caption
-    text = _text(_write(tmp_path, runs))
+    text = _text(html)
     assert 'no degree of freedom is coupled to another by inertia' in text
     assert 'Δξ vanishes in all six' in text
 
 
-def test_unknown_disturbance_leaves_out_what_needs_it(case1, tmp_path, unrendered):
-    runs = {name: replace(run, disturbance=None) for name, run in case1.items()}
-    names = [figure.name for figure in draw_figures(runs, tmp_path / 'figures')]
-    assert not [name for name in names if name.startswith(('lumped', 'uncertainty'))]
-    assert 'is neither drawn nor tabulated' in _text(_write(tmp_path, runs))
+def test_unknown_disturbance_leaves_out_what_needs_it(other):
+    html, figures = other
+    assert not [name for name in figures if name.startswith(('lumped', 'uncertainty'))]
+    assert 'is neither drawn nor tabulated' in _text(html)
 
 
 def test_one_uncertainty_figure_when_all_runs_have_the_same(figures, case1, tmp_path, unrendered):
     assert [name for name in figures if name.startswith('uncertainty')] == ['uncertainty_gvc']
-    cl = replace(case1['cl'], disturbance=2.0 * case1['cl'].disturbance)
-    names = [f.name for f in draw_figures({'gvc': case1['gvc'], 'cl': cl}, tmp_path)]
+    gvc, cl = (_short(case1[name], 1.0) for name in ('gvc', 'cl'))
+    cl = replace(cl, disturbance=2.0 * cl.disturbance)
+    names = [f.name for f in draw_figures({'gvc': gvc, 'cl': cl}, tmp_path)]
     assert {'uncertainty_gvc', 'uncertainty_cl'} <= set(names)
 
 
@@ -276,30 +285,32 @@ def test_report_says_what_it_must(report):
     assert 'None' not in text
 
 
-def test_report_of_one_run_and_of_three(case1, tmp_path, unrendered):
-    one = _text(_write(tmp_path / 'one', {'gvc': _short(case1['gvc'], 5.0)}))
+def test_report_of_one_run(other):
+    one = _text(other[0])
     assert 'Inputs compared' not in one
     assert 'Under cl' not in one
-    third = replace(case1['cl'], law='mine:Law')
-    runs = {'gvc': case1['gvc'], 'cl': case1['cl'], 'cl_2': third}
+
+
+def test_report_of_three_runs(case1, tmp_path, unrendered):
+    """All a sample longer than what is drawn in one phase."""
+    gvc, cl = (_short(case1[name], 4.01) for name in ('gvc', 'cl'))
+    third = replace(cl, law='mine:Law')
     with pytest.raises(ValueError, match='mine'):
         summarize(third)
-    summaries = _summaries({'gvc': case1['gvc'], 'cl': case1['cl']})
+    summaries = _summaries({'gvc': gvc, 'cl': cl})
     summaries['cl_2'] = summaries['cl'] | {'law': 'mine:Law'}
-    path = write_report(tmp_path / 'three', runs, summaries, '', '')
+    path = write_report(tmp_path, {'gvc': gvc, 'cl': cl, 'cl_2': third}, summaries, '', '')
     three = path.read_text(encoding='utf-8')
     assert {path.stem for path in (path.parent / 'figures').glob('errors_*.png')} == {
         'errors_gvc', 'errors_cl', 'errors_cl_2',
     }  # fmt: skip
     assert '<pre' not in three  # no listings of files that were not given
     assert 'mine:Law' in three
+    assert 'What was found' in three
 
 
-def test_report_of_another_vehicle_and_scenario(tmp_path, unrendered):
-    run = simulate(load_scenario('case1'), 'gvc')
-    vehicle = replace(run.vehicle, name='other', warnings=('file: key: <odd>',))
-    run = replace(run, scenario='mine', vehicle=vehicle, notes=('3 samples dropped',))
-    html = _write(tmp_path, {'gvc': _short(run, 1.0)})
+def test_report_of_another_vehicle_and_scenario(other):
+    html = other[0]
     text = _text(html)
     assert 'reconstructed' not in text
     assert 'claim-1"' not in html
@@ -310,11 +321,10 @@ def test_report_of_another_vehicle_and_scenario(tmp_path, unrendered):
     assert 'b: 2 # <GIVEN>' in text
 
 
-@pytest.mark.parametrize('seconds', [0.01, 2.0, 4.01])
-def test_report_of_short_runs(case1, tmp_path, seconds, composing):
-    runs = {'cl': _short(case1['cl'], seconds)}
-    with nullcontext() if seconds < 1.0 else composing():  # two samples are the hardest to draw
-        assert 'What was found' in _text(_write(tmp_path, runs))
+def test_report_of_two_samples(case1, tmp_path):
+    """They are the hardest to draw."""
+    html, _ = _write(tmp_path, {'cl': _short(case1['cl'], 0.01)})
+    assert 'What was found' in _text(html)
 
 
 def test_no_run_is_refused(tmp_path):

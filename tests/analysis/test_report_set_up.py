@@ -15,7 +15,6 @@ from auv_analysis.herman2018.claims import judge_runs
 from auv_analysis.herman2018.paper import paper_figure
 from auv_analysis.report import plots, run_plots
 from auv_analysis.report.digest import digest, digests
-from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.run_tables import certificate_table, reasons
 from auv_analysis.report.scenario_text import set_up
@@ -74,6 +73,13 @@ def case1() -> tuple[dict[str, Run], dict]:
     scenario = load_scenario('case1')
     runs = {name: simulate(scenario, name) for name in scenario.controllers}
     return runs, {name: summarize(run) for name, run in runs.items()}
+
+
+@pytest.fixture(scope='module')
+def page(rough, tmp_path_factory, composing) -> Path:
+    """Its report."""
+    with composing():
+        return write_report(tmp_path_factory.mktemp('page'), *rough, '')
 
 
 def _report(out: Path, runs, summaries, text) -> str:
@@ -151,8 +157,8 @@ def test_set_up_without_the_scenario_file_says_what_the_runs_say(rough, text):
     ]
 
 
-def test_report_of_a_rough_scenario(rough, tmp_path, unrendered):
-    text = _text(_report(tmp_path, *rough))
+def test_report_of_a_rough_scenario(page):
+    text = _text(page.read_text(encoding='utf-8'))
     for sentence in (
         'Set-up of rough',
         'commanded τ (thin, grey)',
@@ -169,18 +175,18 @@ def test_report_of_a_rough_scenario(rough, tmp_path, unrendered):
         '(26) is the derivative of L in none of these runs, so nothing is drawn.',
     ):
         assert sentence in text, sentence
-    assert not list((tmp_path / 'figures').glob('certificate_*'))
+    assert not list((page.parent / 'figures').glob('certificate_*'))
     assert 'None' not in text
     assert not re.search(r'\bnan\b', text)
 
 
-def test_a_law_that_estimates_nothing_has_no_estimation_error(rough, tmp_path, unrendered):
-    names = {figure.name: figure for figure in draw_figures(rough[0], tmp_path)}
-    assert names['lumped_error_gvc'].png is not None
-    assert names['lumped_error_pid'].png is None
-    assert 'w is −F, no error of an estimate' in names['lumped_error_pid'].caption
-    assert names['uncertainty_pid'].png is not None
-    assert 'Under pid nothing is estimated' in _text(_report(tmp_path / 'report', *rough))
+def test_a_law_that_estimates_nothing_has_no_estimation_error(page):
+    drawn = {path.stem for path in (page.parent / 'figures').glob('*.png')}
+    assert {'lumped_error_gvc', 'uncertainty_pid'} <= drawn
+    assert 'lumped_error_pid' not in drawn
+    text = _text(page.read_text(encoding='utf-8'))
+    assert 'estimation error, pid: the law estimates nothing; w is −F, no error of an' in text
+    assert 'Under pid nothing is estimated' in text
 
 
 def test_applied_and_commanded_wrench_are_both_drawn_with_their_limits(rough):
@@ -315,22 +321,22 @@ def test_runs_that_are_far_apart_share_a_scale_on_which_both_show(case1):
     assert 'dotted lines' in told_far
 
 
-def test_report_follows_the_readers_colour_scheme(rough, tmp_path, unrendered):
-    style = re.search(r'<style>(.*?)</style>', _report(tmp_path, *rough), re.DOTALL)[1]
+def test_report_follows_the_readers_colour_scheme(page):
+    style = re.search(r'<style>(.*?)</style>', page.read_text(encoding='utf-8'), re.DOTALL)[1]
     assert style.count('prefers-color-scheme: dark') == 1
     assert '[data-theme="dark"]' in style
     assert 'background: var(--paper)' in style
 
 
 def test_report_of_laws_without_a_certificate_has_reasons_and_no_empty_table(
-    rough, tmp_path, unrendered
+    rough, page, tmp_path, unrendered
 ):
     runs, summaries, text = rough
     only = {'pid': runs['pid']}
     html = _report(tmp_path, only, {'pid': summaries['pid']}, text)
     assert 'id="table-certificate"' not in html
     assert 'no certificate of the law pid is known' in _text(html)
-    assert 'id="table-certificate"' in _report(tmp_path / 'all', *rough)
+    assert 'id="table-certificate"' in page.read_text(encoding='utf-8')
 
 
 def test_restless_lines_lie_below_smooth_ones(case1):

@@ -209,7 +209,8 @@ def _figure(panel: TimePanel, dashes: Mapping[str, list[int]], columns: int, tim
 
 
 def _draw(plot: Any, panel: TimePanel, dashes: Mapping[str, list[int]], columns: int) -> None:
-    from bokeh.models import ColumnDataSource
+    from bokeh.core.property.vectorization import value
+    from bokeh.models import ColumnDataSource, LegendItem, Line, VArea
 
     sources: dict[bytes, Any] = {}
     base = np.zeros(1)
@@ -219,19 +220,19 @@ def _draw(plot: Any, panel: TimePanel, dashes: Mapping[str, list[int]], columns:
             t, y = thinned(t, y, t[0], t[-1], columns=columns)
         t, y = broken((t, y), curve.gaps, curve.step)
         source = sources.setdefault(t.tobytes(), ColumnDataSource({'t': t.astype(np.float32)}))
-        at, look = f'y{number}', {'source': source, 'name': f'{curve.run} {curve.key}'}
-        look['legend_label'] = look['name']
+        at, name = f'y{number}', f'{curve.run} {curve.key}'
         if panel.kind == 'stack':
             below, base = base, base + y
             source.data[f'{at}_below'] = np.broadcast_to(below, y.shape).astype(np.float32)
             source.data[at] = base.astype(np.float32)
-            drawn = plot.varea('t', f'{at}_below', at, color=curve.colour, **look)
+            glyph: Any = VArea(x='t', y1=f'{at}_below', y2=at, fill_color=curve.colour)
         else:
             source.data[at] = y.astype(np.float32)
-            dash = dashes[curve.run]
-            look |= {'line_color': curve.colour, 'line_dash': dash, 'line_width': curve.width}
-            drawn = plot.line('t', at, **look)
-        drawn.tags = [curve.run, curve.dof]
+            look = {'line_color': curve.colour, 'line_width': curve.width}
+            glyph = Line(x='t', y=at, line_dash=dashes[curve.run], **look)
+        # not by plot.line, which makes four glyphs of each that nobody selects or mutes
+        drawn = plot.add_glyph(source, glyph, name=name, tags=[curve.run, curve.dof])
+        plot.legend.items.append(LegendItem(label=value(name), renderers=[drawn]))
 
 
 def _shade(plot: Any, mark: Mark, faults: Sequence[Mark]) -> None:

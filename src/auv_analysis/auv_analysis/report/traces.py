@@ -72,7 +72,8 @@ def thinned(
     high = np.flatnonzero(y == np.maximum.reduceat(y, starts)[owner])
     low = low[np.diff(owner[low], prepend=-1) > 0]  # where several are smallest, the first
     high = high[np.diff(owner[high], append=len(starts)) > 0]  # and the last that is largest
-    keep = np.unique(np.concatenate([low, high, [0, len(t) - 1]]))
+    keep = np.zeros(len(t), bool)
+    keep[low] = keep[high] = keep[[0, -1]] = True
     return t[keep], y[keep]
 
 

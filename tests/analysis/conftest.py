@@ -37,8 +37,9 @@ def report_path(browser, short_runs, tmp_path_factory) -> Path:
         return write_report(out, short_runs, summaries, 'a: 1', 'b: 2')
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def report(browser, report_path) -> Iterator[Watched]:
+    """The page of all tests, each of which leaves it as it found it: opening takes seconds."""
     watched = Watched(browser, report_path)
     watched.page.wait_for_selector('.with-panels')
     yield watched

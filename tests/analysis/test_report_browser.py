@@ -18,12 +18,17 @@ def test_a_panel_shows_the_colours_of_its_degrees_of_freedom_until_they_are_swit
     for name in ('error-linear', 'tau-linear'):
         assert report.shown(name)['lines'] == ['gvc surge', 'gvc sway', 'cl surge', 'cl sway']
     assert len(report.shown('error-angular')['lines']) == 6
+    report.page.get_by_role('checkbox', name='heave').click()
+    assert len(report.shown('tau-linear')['lines']) == 6
 
 
 def test_a_controller_is_switched_off_in_all_panels(report):
-    report.page.locator('.panel-controls').get_by_role('checkbox', name='gvc').click()
+    switch = report.page.locator('.panel-controls').get_by_role('checkbox', name='gvc')
+    switch.click()
     assert {line.split()[0] for line in report.shown('error-linear')['lines']} == {'cl'}
     assert {line.split()[0] for line in report.shown('kinetic')['lines']} == {'cl'}
+    switch.click()
+    assert {line.split()[0] for line in report.shown('kinetic')['lines']} == {'cl', 'gvc'}
 
 
 def test_panels_share_one_time_axis(report):
@@ -59,6 +64,7 @@ def test_values_are_shown_at_the_time_pointed_at(report):
 
 def test_every_control_is_reached_by_the_tabulator(report):
     reached = set()
+    report.page.evaluate('document.activeElement.blur(), getSelection().setPosition(document.body)')
     for _ in range(40):
         report.page.keyboard.press('Tab')
         reached.add(report.page.evaluate('document.activeElement.value || ""'))
@@ -70,4 +76,5 @@ def test_still_figures_have_the_ground_of_the_page(report, theme):
     report.page.emulate_media(color_scheme=theme)
     report.page.wait_for_selector(f'[data-theme="{theme}"]')
     image = pixels(report.page.locator('#settling img'))
+    report.page.emulate_media(color_scheme='light')
     assert (np.median(image) > 200) == (theme == 'light')

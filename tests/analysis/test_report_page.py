@@ -8,6 +8,7 @@ from browser import Watched, pixels
 
 CELLS = """(table) => [...table.tBodies[0].rows].map((row) => [...row.cells].map(
   (cell) => cell.dataset.value ?? cell.textContent.replace(/\\s+/g, ' ').trim()))"""
+FOLD = "document.querySelectorAll('details.stills').forEach((one) => { one.open = false; })"
 
 
 def test_the_page_is_small_and_its_panels_replace_the_still_figures(report, report_path):
@@ -56,6 +57,7 @@ def test_paper_gets_the_still_figures(report):
     assert all(image.bounding_box()['height'] > 50 for image in images)
     assert report.page.pdf().count(b'/Subtype /Image') >= len(images)
     report.page.emulate_media(media='screen')
+    report.page.evaluate(FOLD)  # printing has opened them
 
 
 def test_without_scripts_the_still_figures_are_there(browser, report_path):

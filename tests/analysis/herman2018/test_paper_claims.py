@@ -2,14 +2,14 @@
 
 import re
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.herman2018 import paper
+from auv_analysis.herman2018 import cases, paper
 from auv_analysis.herman2018.cases import case_evidence, case_of, claims_sentences, paper_claims
 from auv_analysis.herman2018.claims import judged, write_claims
 from auv_analysis.herman2018.evidence import ErrorSensitivity, Quotes
@@ -20,6 +20,12 @@ from auv_analysis.studies.study.sensitivity import sensitivity
 NUMBER = re.compile(r'([+−]?)(\d[\d\u202f]*)(?:\.(\d+))?(?:·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?')
 POWERS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
 PITCH = 4
+
+
+@pytest.fixture(autouse=True)
+def few_samples(monkeypatch):
+    """As many as `sensitivities` has, where a test gives none."""
+    monkeypatch.setattr(cases, 'sensitivity', partial(sensitivity, count=64))
 
 
 @cache
@@ -56,8 +62,8 @@ def test_every_claim_is_judged_in_a_study_of_either_case(name):
     expected = dict.fromkeys(range(1, 22), 'reproduced')
     expected |= {8: 'partly', 9: 'partly', 14: 'not reproduced', 15: 'partly'}
     assert {claim.number: claim.verdict for claim in claims} == expected
-    cases = {claim.number: claim.case for claim in claims}
-    assert {n for n, case in cases.items() if case == 'case2'} == {17, 18, 19, 20} | (
+    of_case = {claim.number: claim.case for claim in claims}
+    assert {n for n, case in of_case.items() if case == 'case2'} == {17, 18, 19, 20} | (
         {21} if name == 'case2' else set()
     )
     assert all(claim.ours != MISSING and claim.window != MISSING for claim in claims)

@@ -210,7 +210,8 @@ def _figure(panel: TimePanel, dashes: Mapping[str, list[int]], columns: int, tim
 
 def _draw(plot: Any, panel: TimePanel, dashes: Mapping[str, list[int]], columns: int) -> None:
     from bokeh.core.property.vectorization import value
-    from bokeh.models import ColumnDataSource, LegendItem, Line, VArea
+    from bokeh.models import ColumnDataSource, Line, VArea
+    from bokeh.models.annotations import LegendItem
 
     sources: dict[bytes, Any] = {}
     base = np.zeros(1)
@@ -228,7 +229,7 @@ def _draw(plot: Any, panel: TimePanel, dashes: Mapping[str, list[int]], columns:
             glyph: Any = VArea(x='t', y1=f'{at}_below', y2=at, fill_color=curve.colour)
         else:
             source.data[at] = y.astype(np.float32)
-            look = {'line_color': curve.colour, 'line_width': curve.width}
+            look: dict[str, Any] = {'line_color': curve.colour, 'line_width': curve.width}
             glyph = Line(x='t', y=at, line_dash=dashes[curve.run], **look)
         # not by plot.line, which makes four glyphs of each that nobody selects or mutes
         drawn = plot.add_glyph(source, glyph, name=name, tags=[curve.run, curve.dof])

@@ -28,7 +28,7 @@ from auv_dynamics.files.errors import FailedError, InputError, on_signals, reaso
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import read_text
 from auv_dynamics.plant.actuators import Actuators, make_actuators
-from auv_dynamics.plant.rotors import make_rotors
+from auv_dynamics.plant.rotors import Rotors, make_rotors
 from auv_dynamics.plant.uncertainty import make_uncertainty
 from auv_dynamics.vehicle.kinematics import euler
 
@@ -205,10 +205,9 @@ def made(options: argparse.Namespace) -> tuple[Physics, Bags | None]:
     lag = {key: spec[key] for key in ('lag', 'rate') if key in spec}
     turning = {'rotors': bool(thrusters.rotors), 'rotor_lag': spec.get('rotor_lag')}
 
-    def actuators(step: float) -> tuple[Actuators, np.ndarray]:
+    def actuators(step: float) -> tuple[Actuators, Rotors | None]:
         rotors = make_rotors(turning, thrusters, vehicle.name, step, name)
-        response = np.zeros((0, 4)) if rotors is None else rotors.response
-        return make_actuators(lag or None, vehicle, step, name), response
+        return make_actuators(lag or None, vehicle, step, name), rotors
 
     return Physics(thrusters, motors, *water, actuators, faults, record), bags
 

@@ -13,6 +13,7 @@ from auv_dynamics.kernel.compile import plain
 from auv_dynamics.plant.actuators import Actuators
 from auv_dynamics.plant.faults import AXES, HELD, THRUSTERS, WRENCH, FaultRows
 from auv_dynamics.plant.plant import Plant, initial_state
+from auv_dynamics.plant.rotors import PER_ROW, Rotors, fill_followed
 from auv_dynamics.plant.uncertainty import Uncertainty, to_body
 from auv_dynamics.vehicle.kinematics import position_rate, rotation
 from auv_dynamics.vehicle.thrusters import Thrusters
@@ -55,7 +56,7 @@ class Physics:
     uncertainty : what acts on the plant besides
     integrator : 'ode5', 'rk4' or 'euler'
     start : eta (6,), nu (6,)
-    actuators : of a step in s: lag and slew rate between wrench and plant, response of the rotors
+    actuators : of a step in s: lag and slew rate between wrench and plant; the rotors
     faults : makes the rows of a run that begins; s between two of them
     record : told of t, state, wrench of the pulses, wrench applied, F as each frame begins
 
@@ -64,7 +65,7 @@ class Physics:
     def __init__(
         self, thrusters: Thrusters, motors: Motors, uncertainty: Uncertainty, integrator: str,
         start: tuple[np.ndarray, np.ndarray],
-        actuators: Callable[[float], tuple[Actuators, np.ndarray]],
+        actuators: Callable[[float], tuple[Actuators, Rotors | None]],
         faults: tuple[Callable[[], FaultRows | None], float] = (lambda: None, 1.0),
         record: Callable[..., Any] = lambda *_: None,
     ):  # fmt: skip
@@ -73,14 +74,18 @@ class Physics:
         self._actuators, self._make_rows, self._fault_step = actuators, *faults
         self._record = record
         self.reset()
-        self._plant = self._plant_at(USUAL)  # compiles or loads the kernel: not at the first frame
+        # compiles or loads the kernels: not at the first frame
+        self._plant = self._plant_at(USUAL)
+        self._delivered(np.zeros(len(self._T[0])), None)
+        self.reset()
 
     def reset(self) -> None:
         """Put the vehicle back to where it started, and time to zero."""
         self.t, self._x, self._rate = 0.0, self._start, 0
         self._rows, self._row, self._row_k = self._make_rows(), np.zeros(0), -1
         self._heard = np.zeros(CHANNELS)
-        self._speeds = np.zeros((2, self._T.shape[1]))  # of the rotors, sqrt(N), and their rates
+        self._speeds = np.zeros((-(-self._T.shape[1] // PER_ROW), 6))  # of the rotors
+        self._applied: tuple[float, ...] = (0.0,) * 6
 
     def step(self, pulses: np.ndarray, rate: int) -> Reading:
         """Hold pulses (32,) for 1/rate s; FailedError where the vehicle leaves finite numbers."""
@@ -90,9 +95,10 @@ class Physics:
         asked, u, fault = self._asked(pulses)
         before = self._x.copy()
         for i in range(self._substeps):
-            applied, F = self._plant.answer(tuple(self._delivered(u, fault).tolist()))
+            tau = tuple(self._delivered(u, fault).tolist())
+            self._applied, F = self._plant.answer(tau)
             if i == 0:
-                self._record(self.t, before, asked, applied, F)
+                self._record(self.t, before, asked, self._applied, F)
             self._plant.advance()
             self._x = self._plant.x
             self._stop_at_surface(self._x)
@@ -109,8 +115,9 @@ class Physics:
         later = None if current is None else lambda t: current(t + began)
         uncertainty = replace(self._uncertainty, F=lambda t: F(t + began), current=later)
         step = 1.0 / (rate * self._substeps)
-        actuators, self._response = self._actuators(step)
-        return Plant(uncertainty, step, self._integrator, self._x, actuators)
+        actuators, self._rotors = self._actuators(step)
+        applied = self._applied
+        return Plant(uncertainty, step, self._integrator, self._x, actuators, applied=applied)
 
     def _asked(self, pulses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
         """Wrench (6,) of the pulses, thrusts (n,) of those that arrive, faults of this time."""
@@ -125,14 +132,9 @@ class Physics:
 
     def _delivered(self, u: np.ndarray, fault: np.ndarray | None) -> np.ndarray:
         """Wrench (6,) of rotors that follow the steady thrusts u over a step, and their faults."""
-        if len(P := self._response):  # as `fill_turned` of auv_dynamics.plant.rotors
-            asked = np.sign(u) * np.sqrt(np.abs(u))
-            ahead, rate = self._speeds[0] - asked, self._speeds[1]
-            self._speeds[:] = (
-                asked + P[:, 0] * ahead + P[:, 1] * rate,
-                P[:, 2] * ahead + P[:, 3] * rate,
-            )
-            u = self._speeds[0] * np.abs(self._speeds[0])
+        if self._rotors is not None and self._rotors.turning:
+            u = u.copy()
+            fill_followed(self._rotors, u, self._speeds)
         if fault is None:
             return self._T @ u
         if n := (len(fault) - THRUSTERS) // 2:

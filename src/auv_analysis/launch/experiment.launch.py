@@ -15,6 +15,7 @@ from launch import LaunchContext, LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
     EmitEvent,
+    LogInfo,
     OpaqueFunction,
     RegisterEventHandler,
     SetEnvironmentVariable,
@@ -33,6 +34,7 @@ from auv_analysis.graph.node_parameters import (
     parameter_file,
 )
 from auv_analysis.scenario.scenario import load_scenario
+from auv_analysis.studies.linearize.margins import margin_notes
 from auv_dynamics.ros.security import enclave, loopback
 
 SWITCH = ('true', 'false', 'True', 'False')
@@ -95,7 +97,9 @@ def _nodes(context: LaunchContext) -> list:
         actions += [RegisterEventHandler(ended), node]
     # a driver may be on another machine: then the user's discovery range holds, by default this one
     local = [SetEnvironmentVariable(*item) for item in loopback().items()] if plant else []
-    return [*local, *actions]
+    said = [f'warning: {text}' for text in scenario.warnings]
+    said += margin_notes(scenario, [controller], driver=not plant)
+    return [*(LogInfo(msg=text) for text in said), *local, *actions]
 
 
 def _on_exit(name: str, last: bool, event: ProcessExited, context: LaunchContext) -> list:

@@ -18,6 +18,7 @@ MODULES = {
     'launch.actions': [
         'DeclareLaunchArgument',
         'EmitEvent',
+        'LogInfo',
         'OpaqueFunction',
         'RegisterEventHandler',
         'SetEnvironmentVariable',
@@ -99,6 +100,26 @@ def test_a_driver_in_place_of_the_plant_is_real_time(launch_file) -> None:
     assert not given['controller_node']['lockstep']
     assert not given['controller_node']['use_sim_time']
     assert of('SetEnvironmentVariable', listed) == [], 'it may be on another machine'
+
+
+def test_margins_are_said_before_a_vehicle_is_driven(launch_file, tmp_path: Path) -> None:
+    path = tmp_path / 'late.yaml'
+    gains = {'law': 'gvc', 'k_D': 20.0, 'k_I': 2.0, 'Lambda': 0.8, 'Gamma': 2.0}
+    data = {
+        'name': 'late', 'vehicle': 'bluerov2_heavy', 'duration': 1.0, 'step': 0.02, 'setpoint': {},
+        'controllers': {'quick': gains, 'slow': gains | {'k_D': 2.0, 'Lambda': 0.1, 'Gamma': 0.1}},
+    }  # fmt: skip
+
+    def said(**values: str) -> list[str]:
+        listed = actions(launch_file, scenario=str(path), plant='false', **values)
+        return [one.named['msg'] for one in listed if type(one).__name__ == 'LogInfo']
+
+    path.write_text(yaml.safe_dump(data))
+    (note,) = said(controller='quick')
+    assert 'no delay is known' in note
+    path.write_text(yaml.safe_dump(data | {'actuators': {'delay': 0.04}}))
+    assert 'below 6 dB and 45 deg' in said(controller='quick')[0]
+    assert said(controller='slow')[0].startswith('note: ')
 
 
 @pytest.mark.parametrize('switch', ['plant', 'record', 'analysis', 'use_sim_time', 'lockstep'])

@@ -1,5 +1,6 @@
 """Margins of sampled loops against a second sampling of them, simulations and known answers."""
 
+import copy
 import json
 from dataclasses import replace
 from itertools import product
@@ -19,7 +20,9 @@ from auv_analysis.studies.linearize.margins import (
     stability_margins,
     stable,
 )
+from auv_analysis.studies.linearize.sampled_loop import behind_rotors
 from auv_dynamics.vehicle import DOFS
+from auv_dynamics.vehicle.thrusters import Rotor
 
 CRUISE = np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.1])
 STEP = 0.02
@@ -158,6 +161,55 @@ def test_a_simulation_with_delay_dies_out_below_the_gain_margin_and_grows_above(
     assert last(1.0, 0.04 + (periods + 1) * STEP) > 2.0
 
 
+OWN = """
+from typing import NamedTuple
+import numpy as np
+
+class Squared(NamedTuple):
+    k_D: np.ndarray
+    STATES = 6
+
+    @staticmethod
+    def wrench(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        if gains.k_D[0] > MOST:
+            raise ArithmeticError('too much')
+        return 3.0 * gains.k_D.reshape(6, 6) ** 2 @ np.subtract(nu_d, nu) + state, np.zeros(6)
+
+    @staticmethod
+    def state_rate(t, nu, attitude, nu_d, nu_d_dot, state, gains, model):
+        return np.subtract(nu_d, nu)
+"""
+
+
+@pytest.mark.parametrize(('value', 'most'), [(2.0, 1e3), (20.0, 1e3), (2.0, 2.5)])
+def test_the_largest_gain_of_a_law_that_is_not_linear_in_it(value, most, tmp_path, monkeypatch):
+    module = f'own_{value:g}_{most:g}'.replace('.', '_')
+    (tmp_path / f'{module}.py').write_text(OWN.replace('MOST', str(most)))
+    monkeypatch.syspath_prepend(tmp_path)
+    spec = {'own': {'law': f'{module}:Squared', 'k_D': [value, 2.0, 2.0, 1.0, 1.0, 1.0]}}
+    setting = ControlLoop(scenario_of(controllers=spec), 'own', 0.1, 0.1)
+    factor = setting.largest(0)
+    if most == 2.5:
+        assert factor == pytest.approx(2.5 / value, rel=1e-5)
+        return
+    kept = [
+        setting.margins(setting.loop([times * factor, *[1.0] * 5]))[0].kept
+        for times in (0.9999, 1.0001)
+    ]
+    assert kept == [True, False]
+
+
+def test_a_gain_that_is_too_small_for_its_integral_has_a_larger_one():
+    law = LAWS['pid'] | {'k_P': 6.0, 'k_I': 60.0, 'k_D': 0.0}
+    setting = ControlLoop(scenario_of(controllers={'pid': law}), 'pid', 0.02)
+    assert not setting.margins(setting.loop())[0].kept
+    factor = setting.largest(0)
+    assert factor > 2
+    for times in (0.9999, 1.0001):
+        scale = [times * factor, *[1.0] * 5]
+        assert setting.margins(setting.loop(scale))[0].kept == (times < 1)
+
+
 @pytest.mark.parametrize('law', LAWS)
 def test_the_largest_gain_keeps_6_db_and_45_deg_and_not_a_little_more(law):
     scenario = scenario_of(actuators={'delay': 0.04, 'lag': 0.05})
@@ -210,6 +262,58 @@ def test_a_rotors_lag_counts_where_the_plant_has_it():
         ControlLoop(scenario_of(actuators={'thrusters': True, **one}), 'gvc').late for one in asked
     ]
     assert made == [True, False, False, False]
+
+
+def test_rotors_of_every_order_filter_their_own_thrusts():
+    random, s = np.random.default_rng(3), 7.0j
+    A, B, into, out = (random.normal(size=n) for n in ((8, 8), (8, 6), (5, 6), (6, 5)))
+    rotors = [Rotor(lag=0.2), Rotor(omega=9.0, zeta=0.3), Rotor(), Rotor(omega=5.0), Rotor(lag=1.0)]
+    filters = [1 / (0.2 * s + 1), 81 / (s**2 + 5.4 * s + 81), 1, 25 / (s + 5) ** 2, 1 / (s + 1)]
+    lagged, forced = behind_rotors(A, B, rotors, into, out)
+    assert len(lagged) == 8 + 1 + 2 + 2 + 1
+    found = np.linalg.solve(s * np.eye(len(lagged)) - lagged, forced)[:8]
+    expected = np.linalg.solve(s * np.eye(8) - A, B) @ out @ np.diag(filters) @ into
+    assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_a_simulation_with_rotors_that_swing_dies_out_below_the_gain_margin(tmp_path):
+    """Far from what a lag of 2 zeta/omega would give; thrusts are small about those that hold.
+
+    Rotors that step with the samples are half a step earlier than those that turn all the time.
+    """
+    omega, zeta, step = 12.0, 0.25, 0.005
+    data = copy.deepcopy(load_scenario('case1_bluerov2_heavy').vehicle_data)
+    for one in data['thrusters']:
+        one['rotor'] = {'omega': omega, 'zeta': zeta}
+    data['rigid_body']['mass'] += 6.0  # thrusts are well away from zero
+    (tmp_path / 'swinging.yaml').write_text(yaml.safe_dump(data))
+    law = {'law': 'pid', 'k_P': 60.0, 'k_I': 0.0, 'k_D': 0.0}
+    spec = {
+        'name': 'swing', 'vehicle': 'swinging.yaml', 'duration': 25.0, 'step': step, 'setpoint': {},
+        'initial': {'nu': [0, 0, 1e-4, 0, 0, 0]}, 'controllers': {'pid': law},
+    }  # fmt: skip
+
+    def scenario(factor, actuators):
+        gains = law | {'k_P': [60.0, 60.0, 60.0 * factor, 1.0, 1.0, 1.0]}
+        text = yaml.safe_dump(spec | {'controllers': {'pid': gains}, 'actuators': actuators})
+        (tmp_path / 'swings.yaml').write_text(text)
+        return load_scenario(tmp_path / 'swings.yaml')
+
+    def margin(**actuators):
+        setting = ControlLoop(scenario(1.0, {'thrusters': True, **actuators}), 'pid', step / 2)
+        return setting.margins(setting.loop())[2].gain
+
+    heave = margin(rotors=True)
+    assert margin(rotor_lag=2 * zeta / omega) > 2 * heave
+
+    def left(factor):
+        actuators = {'thrusters': True, 'rotors': True, 'delay': step}
+        run = simulate(scenario(factor, actuators), 'pid', hold='zoh')
+        return [np.abs(run.nu[at : at + 400, 2]).max() for at in (2000, 4600)]
+
+    before, after = left(0.98 * heave)
+    assert after < 0.5 * before < 0.1
+    assert min(left(1.02 * heave)) > 1.0
 
 
 @pytest.mark.usefixtures('unrendered')
@@ -283,8 +387,11 @@ def test_simulating_and_parameters_for_a_driver_warn(tmp_path, capsys):
     assert 'with a loop delay of 0.06 s and a lag of 0 s: below 6 dB' in capsys.readouterr().err
     path.write_text(text)
     common = ['params', str(path), '--controller', 'gvc', '--no-plant']
-    main(common)
+    main(common[:-1])
     assert 'margin' not in capsys.readouterr().err
+    main(common)
+    assert 'note: ' in (said := capsys.readouterr().err)
+    assert 'no delay is known, and no margins' in said
     main([*common, '--delay', '0.03'])
     assert 'below 6 dB and 45 deg' in capsys.readouterr().err
 
@@ -325,3 +432,27 @@ def test_the_dive_of_the_example_keeps_the_margins_that_its_file_says(late):
     before = replace(scenario, data=scenario.data | {'controllers': controllers})
     (warning,) = margin_notes(before, ['gvc'])
     assert warning.startswith('warning: ')
+
+
+def test_the_dive_is_quiet_with_6_db_more_on_any_axis_and_real_thrusters():
+    """Dead band, lag and a curve that is another one than was inverted: T200 at 15 V for 16 V."""
+    scenario = load_scenario(Path(__file__).parents[3] / 'examples/bluerov2_mavlink/dive.yaml')
+    real = {'thrusters': True, 'rotor_lag': 0.15, 'dead_band': [0.35, 0.4], 'voltage': 15.0}
+    gains = scenario.controllers['gvc']
+
+    def swing(k_D):
+        data = scenario.data | {
+            'controllers': {'gvc': gains | {'k_D': list(k_D)}},
+            'actuators': {'delay': 0.04, **real},
+            'duration': 60.0,
+        }
+        run = simulate(replace(scenario, data=data), 'gvc', hold='zoh')
+        return (run.nu - run.nu_d)[1500:].std(axis=0), run.tau[1500:].std(axis=0)
+
+    for factor in np.vstack([np.ones(6), 1 + np.eye(6)]):
+        error, tau = swing(factor * gains['k_D'])
+        assert error.max() < 0.002, factor
+        assert tau.max() < 0.2, factor
+    error, tau = swing([40, 40, 60, 4, 4, 4])
+    assert error.max() > 0.05
+    assert tau.max() > 20

@@ -100,6 +100,44 @@ def test_a_second_order_rotor_solves_its_equation(zeta):
     assert_allclose(found, expected, atol=1e-7)
 
 
+FULL = T @ np.array([0, 0, 0, 0, 51.5, 51.5, 51.5, 51.5])  # heave, at the limit ahead
+
+
+def dragged(n, u, seconds, lag=0.1, at=20.0):
+    """Speed of a rotor with drag after so long, by its equation."""
+    gain = 1 / (2 * lag * np.sqrt(at))
+    flow = solve_ivp(
+        lambda _, y: gain * (u - y * abs(y)), (0, seconds), [n], rtol=1e-10, atol=1e-12
+    )
+    return flow.y[0, -1]
+
+
+def test_a_propeller_with_drag_solves_its_equation_to_second_order():
+    vehicle, u = vehicle_with({'lag': 0.1, 'lag_at': 20.0}), INVERSE @ TAU
+    n = [dragged(dragged(0.0, one, 0.32), -0.5 * one, 0.16) for one in u]
+    expected = T @ (np.abs(n) * n)
+    errors = []
+    for step in (0.04, 0.02, 0.01, 0.005):
+        way = [TAU] * round(0.32 / step) + [-0.5 * TAU] * round(0.16 / step)
+        found = chain({'rotors': True}, way, vehicle, step)[-1]
+        errors.append(np.abs(found - expected).max())
+    assert errors[-1] < 1e-3 * np.abs(TAU).max()
+    assert np.log2(np.array(errors[:-1]) / errors[1:]).min() > 1.7
+
+
+@pytest.mark.parametrize('share', [1.0, 0.25, 0.01])
+def test_the_time_constant_of_a_propeller_with_drag_goes_by_its_speed(share):
+    vehicle = vehicle_with({'lag': 0.1, 'lag_at': 20.0})
+    settled = [share * FULL] * round(9.0 / np.sqrt(share) / STEP)
+    found = chain({'rotors': True}, [*settled, *[share * 0.9999 * FULL] * 30], vehicle)
+    left = found[-30:, 2] / (share * FULL[2]) - 0.9999
+    lag = 0.1 * np.sqrt(20.0 / (share * 51.5))
+    assert_allclose(np.log(left[:-1] / left[1:]), STEP / lag, rtol=1e-3)
+    # so slow a step that it would ring: it comes down without turning round
+    found = chain({'rotors': True}, [FULL] * 60 + [0.9999 * FULL] * 9, vehicle, step=0.5)
+    assert np.all(np.diff(found[59:, 2]) <= 1e-12)
+
+
 def test_thrust_goes_through_zero_where_the_rotor_turns_round():
     one = chain({'rotor_lag': 0.1}, [TAU] * 100 + [-TAU] * 100)
     assert_allclose(one[99], TAU, rtol=1e-3, atol=1e-2)

@@ -72,6 +72,7 @@ REFUSED = {
         {'dead_band': [1, 51.5]}, 'rotor.dead_band', 'less than the limits, 40.2 and 51.5 N',
         '[1, 51.5]'),
     'two lags': ({'lag': 0.1, 'omega': 9.0}, 'rotor.omega', 'one of lag and omega', 'both'),
+    'a thrust of no lag': ({'lag_at': 9.0}, 'rotor.lag_at', 'a positive lag beside', 'nothing'),
     'damping of nothing': ({'zeta': 0.7}, 'rotor.zeta', 'omega beside it', 'nothing'),
     'one column': ({'curve': {'percent': [0, 1]}}, 'rotor.curve', 'one column thrust_n', 'percent'),
     'unequal columns': (

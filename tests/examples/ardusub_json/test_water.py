@@ -211,6 +211,18 @@ def test_disturbances_go_on_when_the_rate_changes(tmp_path: Path) -> None:
         assert changed[key][-1] == pytest.approx(steady[key][-1], abs=1e-6)
 
 
+@pytest.mark.parametrize('lag', ['lag', 'rotor_lag'])
+def test_thrusters_go_on_following_when_the_rate_changes(lag: str, tmp_path: Path) -> None:
+    spec = {'thrusters': True, 'rotor_lag': 0.0} | {lag: 0.3}
+    with backend('--scenario', scenario(tmp_path, actuators=spec)) as process:
+        peer = SitlPeer(process.port)
+        before = peer.run(0.15, AHEAD)['accel_body'][:, 0]
+        peer.rate = 1000
+        after = peer.run(0.005, AHEAD)['accel_body'][:, 0]
+    assert before[-1] > 5 * before[0]
+    assert after[0] == pytest.approx(before[-1], rel=0.02)  # it rises by 1 % in a step
+
+
 def test_a_thruster_that_fails_is_that_of_its_motor(tmp_path: Path) -> None:
     fault = {'kind': 'thruster', 'thruster': 'T2', 'efficiency': 0.0, 'from': 0.5}
     spec = {'faults': [fault], 'actuators': {'thrusters': True}}

@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     )
     if note := _missing(parameters[CONTROLLER], CONTROLLER):
         say(note)
-    say_margins(scenario, [options.controller], options.delay)
+    say_margins(scenario, [options.controller], options.delay, driver=not plant)
     command = f'auv params {scenario.name} --controller {options.controller}'
     text = parameter_file(parameters, command)
     if options.out is not None:

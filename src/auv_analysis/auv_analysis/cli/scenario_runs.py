@@ -71,12 +71,14 @@ def scenario_folder(
         yield results
 
 
-def say_margins(scenario: Scenario, names: Sequence[str], delay: float | None = None) -> None:
-    """Say the margins of controllers whose wrench is late, by the scenario or by `delay` in s."""
-    if 'actuators' in scenario.data or delay is not None:
+def say_margins(
+    scenario: Scenario, names: Sequence[str], delay: float | None = None, *, driver: bool = False
+) -> None:
+    """Say the margins of controllers whose wrench is late, see `margin_notes`."""
+    if 'actuators' in scenario.data or delay is not None or driver:
         from auv_analysis.studies.linearize.margins import margin_notes  # with scipy.optimize
 
-        for note in margin_notes(scenario, names, delay):
+        for note in margin_notes(scenario, names, delay, driver=driver):
             say(note)
 
 

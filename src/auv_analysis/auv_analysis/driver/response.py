@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 from scipy.linalg import expm
 
+from auv_analysis.studies.linearize.linearize import ATTITUDE, NU, plant_jacobian
 from auv_dynamics.plant.plant import eta_of
 from auv_dynamics.vehicle.kinematics import jacobian
 from auv_dynamics.vehicle.vehicle import Vehicle
@@ -22,7 +23,6 @@ STEPS = 0.02  # s between two values of a prediction
 OPPOSED = 3.0  # times as late may the other sign be that has to fit worse
 FINE = 0.01  # s between two delays that are tried
 ALIKE = 1e-6  # of the largest: terms that are as much alike are one
-TILT = 1e-4  # rad, by which restoring forces are linearised
 SCALES = np.array(  # inertia and damping, times the model's, under which a sign has to hold
     [(a, b) for a in np.geomspace(0.25, 4.0, 9) for b in np.geomspace(0.25, 4.0, 5)]
 )
@@ -83,24 +83,24 @@ def _varied(
     (1) is linear about the state x (13,) here, without C, with D at the mean speeds of the model:
     responses to the steps of the wrench are added up.
     """
-    eta, inverse = eta_of(x), np.linalg.inv(vehicle.M)
-    ways = (TILT * jacobian(eta)).T
-    K = np.array([vehicle.g(eta + way) - vehicle.g(eta - way) for way in ways]).T / (2.0 * TILT)
-    D = vehicle.D(np.abs(model.added).mean(axis=0))
+    eta = eta_of(x)
+    free, forced = plant_jacobian(vehicle, eta, np.zeros(6))
+    inverse, D = forced[NU], vehicle.D(np.abs(model.added).mean(axis=0))
     inertia, damping = scales.T[:, :, None, None]
-    A = np.zeros((len(scales), 14, 14))  # displacement, velocity, a unit wrench, weight
-    A[:, :6, 6:12] = np.eye(6)
-    A[:, 6:12, :6] = -inverse @ K / inertia
-    A[:, 6:12, 6:12] = -inverse @ D * damping / inertia
-    A[:, 6:12, 12] = inverse[:, axis] / inertia[..., 0]
-    A[:, 6:12, 13] = -inverse @ vehicle.g(eta) / inertia[..., 0]
-    z = np.zeros((len(scales), 14, 2))
-    z[:, 12, 0] = z[:, 13, 1] = 1.0
-    z[:, 6:12, 1] = x[7:]
-    t, step, rows = np.arange(0.0, held[-1][1] + STEPS, STEPS), expm(STEPS * A), [z[:, 6 + axis]]
+    A = np.zeros((len(scales), 10, 10))  # roll and pitch, velocity, a unit wrench, weight
+    A[:, ATTITUDE, NU] = free[ATTITUDE, NU]
+    A[:, NU, ATTITUDE] = free[NU, ATTITUDE] / inertia
+    A[:, NU, NU] = -inverse @ D * damping / inertia
+    A[:, NU, 8] = inverse[:, axis] / inertia[..., 0]
+    A[:, NU, 9] = -inverse @ vehicle.g(eta) / inertia[..., 0]
+    z = np.zeros((len(scales), 10, 2))
+    z[:, 8, 0] = z[:, 9, 1] = 1.0
+    z[:, NU, 1] = x[7:]
+    row = NU.start + axis
+    t, step, rows = np.arange(0.0, held[-1][1] + STEPS, STEPS), expm(STEPS * A), [z[:, row]]
     for _ in t[1:]:
         z = step @ z
-        rows.append(z[:, 6 + axis])
+        rows.append(z[:, row])
     by_step, alone = np.moveaxis(np.array(rows), 2, 0)
     response = make_interp_spline(t, by_step, k=1)
     changes = np.diff([tau[axis] for *_, tau in held], prepend=0.0)

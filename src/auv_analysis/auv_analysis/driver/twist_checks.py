@@ -1,5 +1,6 @@
 """Twist checks: axes, sign and unit of the twist, by the rate of the pose."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -215,6 +216,7 @@ class Standstill(NamedTuple):
         return float(np.linalg.norm(v[np.abs(v) > CLEAR * self.errors]))
 
 
+@lru_cache(maxsize=1)
 def standstill(evidence: DriverRecord) -> Standstill | None:
     """Velocity without a command: of all that was heard before one, or of its end; None: moved."""
     motion, free = evidence.motion, evidence.uncommanded

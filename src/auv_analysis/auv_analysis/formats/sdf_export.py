@@ -89,7 +89,8 @@ def notes(vehicle: Vehicle, added_mass: str) -> list[str]:
         'Not held: density of the water and gravity, which are those of the world; the source.',
     ]
     if vehicle.thrusters is not None:
-        found.append('Not exported: thrusters.')
+        rotors = ', and lag, dead band and curve of their rotors' * bool(vehicle.thrusters.rotors)
+        found.append(f'Not exported: thrusters{rotors}.')
     return found
 
 

@@ -249,6 +249,7 @@ def _rotor(rotor: Rotor) -> dict[str, Any]:
         'voltage': rotor.voltage,
         'dead_band': list(rotor.dead_band),
         'lag': None if second else rotor.lag,
+        'lag_at': rotor.lag_at or None,
         'omega': rotor.omega if second else None,
         'zeta': rotor.zeta if second else None,
     }
@@ -413,7 +414,8 @@ def _rotor_text(rotor: Mapping[str, Any]) -> str:
     parts.append(f'{rotor["voltage"]:g} V' if rotor['voltage'] else 'voltage unknown')
     parts.append('dead band {:g} and {:g} N'.format(*rotor['dead_band']))
     if rotor['omega'] is None:
-        parts.append(f'lag {rotor["lag"]:g} s')
+        at = f' at {rotor["lag_at"]:g} N, by 1/sqrt(thrust)' if rotor['lag_at'] else ''
+        parts.append(f'lag {rotor["lag"]:g} s{at}')
     else:
         parts.append(f'second order, {rotor["omega"]:g} rad/s, damping ratio {rotor["zeta"]:g}')
     return ', '.join(parts)

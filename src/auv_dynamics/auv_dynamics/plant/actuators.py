@@ -150,15 +150,17 @@ def fill_slowed(follow: Vector, slew: Vector, c: Vector, a: np.ndarray) -> Six:
 
 @helper
 def fill_allocated(
-    rotors: Rotors | None, actuators: Actuators, k: int, tau: Numbers, state: np.ndarray
-) -> Numbers:
+    rotors: Rotors | None, actuators: Actuators, left: np.ndarray | None, k: int, tau: Numbers,
+    state: np.ndarray,
+) -> Numbers:  # fmt: skip
     """Wrench of the thrusters for the command tau; `rotors` are those of the actuators.
 
-    Without rotors the branch is none when compiled.
+    `left` is what faults leave of each thrust, as of `delivered`. Without rotors the branch is none
+    when compiled.
     """
     if rotors is None:
-        return allocated(actuators.reach, tau)
-    return fill_delivered(rotors, actuators.reach, None, k, tau, state[1 + actuators.delay :])
+        return allocated(actuators.reach, tau, left)
+    return fill_delivered(rotors, actuators.reach, left, k, tau, state[1 + actuators.delay :])
 
 
 @helper
@@ -167,6 +169,6 @@ def fill_applied(actuators: Actuators, k: int, tau: Numbers, state: np.ndarray) 
     if actuators.ideal:
         return tau
     command = waited(actuators, k, tau, state)
-    c = fill_allocated(actuators.rotors, actuators, k, command, state)
+    c = fill_allocated(actuators.rotors, actuators, None, k, command, state)
     c = clipped(c, actuators.reach.limit)
     return fill_slowed(actuators.follow, actuators.slew, c, state[0])

@@ -14,7 +14,14 @@ from auv_dynamics.kernel.six import (
     clipped,
     fill_vector,
 )
-from auv_dynamics.plant.actuators import Actuators, fill_applied, fill_slowed, memory, waited
+from auv_dynamics.plant.actuators import (
+    Actuators,
+    fill_allocated,
+    fill_applied,
+    fill_slowed,
+    memory,
+    waited,
+)
 from auv_dynamics.plant.faults import (
     AGE,
     AXES,
@@ -26,8 +33,6 @@ from auv_dynamics.plant.faults import (
     FaultShape,
     MeasurementFaults,
 )
-from auv_dynamics.plant.rotors import Rotors, fill_delivered
-from auv_dynamics.vehicle.thrusters import AttainableWrench, shaped, thrust
 
 WIDTH = 11  # columns of a row: velocity noise (6), rotation quaternion (4), whether it is lost
 LOST = WIDTH - 1
@@ -142,47 +147,6 @@ def fill_heard(fault: np.ndarray, tau: Vector, held: np.ndarray) -> Six:
 
 
 @helper
-def _left_in(
-    reach: AttainableWrench, fault: np.ndarray, j: int, tau: Vector, share: Number
-) -> Number:
-    n = reach.T.shape[1]
-    total = 0.0 * tau[j]
-    for i in range(n):
-        u = thrust(reach, i, tau) * share
-        left = fault[THRUSTERS + i] * u + fault[THRUSTERS + n + i]
-        total = total + reach.T[j, i] * left
-    return total
-
-
-@helper
-def left_of_thrusters(reach: AttainableWrench, fault: np.ndarray, tau: Numbers) -> Numbers:
-    """T u', u' what the faults leave of the thrusts; the allocation does not know of them."""
-    if reach.T.shape[1] == 0:
-        return tau
-    command, share = shaped(reach.first, reach, tau)
-    return (
-        _left_in(reach, fault, 0, command, share),
-        _left_in(reach, fault, 1, command, share),
-        _left_in(reach, fault, 2, command, share),
-        _left_in(reach, fault, 3, command, share),
-        _left_in(reach, fault, 4, command, share),
-        _left_in(reach, fault, 5, command, share),
-    )
-
-
-@helper
-def fill_left(
-    rotors: Rotors | None, actuators: Actuators, fault: np.ndarray, k: int, tau: Numbers,
-    state: np.ndarray,
-) -> Numbers:  # fmt: skip
-    """`fill_allocated` of actuators with faults; `rotors` are theirs."""
-    if rotors is None:
-        return left_of_thrusters(actuators.reach, fault, tau)
-    speeds = state[1 + actuators.delay :]
-    return fill_delivered(rotors, actuators.reach, fault[THRUSTERS:], k, tau, speeds)
-
-
-@helper
 def left_of_axes(fault: np.ndarray, c: Vector) -> Six:
     """What the faults of whole axes leave of a wrench."""
     return (
@@ -202,7 +166,7 @@ def fill_faulty(
     """`fill_applied` of actuators with faults; the last row of `state` is the last command."""
     heard = fill_heard(fault, tau, state[state.shape[0] - 1])
     command = waited(actuators, k, heard, state)
-    c = fill_left(actuators.rotors, actuators, fault, k, command, state)
+    c = fill_allocated(actuators.rotors, actuators, fault[THRUSTERS:], k, command, state)
     c = clipped(c, actuators.reach.limit)
     return fill_slowed(actuators.follow, actuators.slew, left_of_axes(fault, c), state[0])
 
@@ -277,9 +241,10 @@ class Acting:
         self._actuators, self._faulty = actuators, faults.shape.any
         self.reset()
 
-    def reset(self) -> None:
-        """Forget every command."""
+    def reset(self, applied: Numbers = (0.0,) * 6) -> None:
+        """Forget every command; `applied` is the wrench that lag and slew rate go on from."""
         self._memory = memory(self._actuators, faults=self._faulty)
+        self._memory[0] = applied
 
     def apply(
         self, k: int, tau: tuple[float, ...], fault: np.ndarray | None, *, heard: bool

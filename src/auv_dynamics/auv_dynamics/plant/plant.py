@@ -138,15 +138,16 @@ class Plant:
     faults : what fails of actuators, links and the delay of sensors; the other faults of sensors
         are part of `noise`
     seed : of the faults
+    applied : wrench before the first step, from which lag and slew rate of the actuators go on
 
     """
 
     def __init__(
         self, uncertainty: Uncertainty, step: float, integrator: str, x: np.ndarray,
         actuators: Actuators = IDEAL, noise: SensorNoise | None = None, faults: Faults = NONE,
-        seed: int = 0,
+        seed: int = 0, applied: tuple[float, ...] = (0.0,) * 6,
     ):  # fmt: skip
-        self._uncertainty, self._step = uncertainty, step
+        self._uncertainty, self._step, self._before = uncertainty, step, applied
         self._tableau = TABLEAUS[integrator]
         self._stages = np.zeros((len(self._tableau.b), SIZE))
         self._trial = np.zeros(SIZE)
@@ -169,7 +170,7 @@ class Plant:
         """Put the vehicle and its actuators back to where they started; time goes on."""
         self.x = self._start.copy()
         self._sensing.reset(self.x)
-        self._acting.reset()
+        self._acting.reset(self._before)
         self._applied: tuple[float, ...] = (0.0,) * 6
 
     @property

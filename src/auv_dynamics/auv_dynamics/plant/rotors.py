@@ -1,12 +1,13 @@
 """Thrusters as they are: dead band, battery voltage and the response of the rotor's speed."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.kernel.compile import helper
+from auv_dynamics.kernel.compile import compiled, helper
 from auv_dynamics.kernel.lanes import Number, clip, select, sqrt
 from auv_dynamics.kernel.six import Numbers, add
 from auv_dynamics.vehicle.thruster_curves import at_voltage
@@ -15,6 +16,7 @@ from auv_dynamics.vehicle.thrusters import (
     Rotor,
     Thrusters,
     column,
+    left_of,
     shaped,
     thrust,
 )
@@ -36,6 +38,9 @@ class Rotors(NamedTuple):
     response : (n, 4) of the deviation of the speed and of its rate over a step, row-major; (0, 4):
         the speed follows at once
     turning : number of rows of `response`
+    drag : (n, 2) weight of the thrusts over a step, 1/sqrt(N), and inverse of the weight of its
+        end, of rotors that the propeller's drag slows down; 0 in the first column: another; None:
+        there are none
 
     """
 
@@ -48,6 +53,7 @@ class Rotors(NamedTuple):
     pace: np.ndarray
     response: np.ndarray
     turning: int
+    drag: np.ndarray | None
 
 
 def make_rotors(
@@ -71,30 +77,41 @@ def make_rotors(
     """
     if not any(spec.get(key) not in (None, False) for key in KEYS):
         return None
-    known = thrusters.rotors
-    if spec.get('rotors') and not known:
+    if spec.get('rotors') and not thrusters.rotors:
         expected = f'a vehicle whose thrusters have a rotor, those of {vehicle} have none'
         raise InputError(file, 'actuators.rotors', expected, 'true')
-    count = len(thrusters.names)
-    rotors = known if spec.get('rotors') else (Rotor(),) * count
-    band = [spec.get('dead_band', rotor.dead_band) for rotor in rotors]
-    lag = spec.get('rotor_lag')
-    response = [_response(rotor if lag is None else Rotor(lag=lag), step) for rotor in rotors]
-    lagging = np.any(response)
+    rotors = asked_rotors(spec, thrusters)
+    response = np.array([_response(rotor, step) for rotor in rotors])
+    most = np.maximum(thrusters.reverse, thrusters.forward).tolist()
+    drag = np.array([_drag(*pair, step) for pair in zip(rotors, most, strict=True)])
+    lagging = response.any() or drag.any()
     (low, high, near, slope, change), pace = _pieces(
         spec.get('voltage'), thrusters, vehicle, step, file
     )
     return Rotors(
-        np.array([np.broadcast_to(one, 2) for one in band], float),
+        np.array([rotor.dead_band for rotor in rotors]),
         low,
         high,
         near,
         slope,
         change,
         np.array([pace]),
-        np.array(response) if lagging else np.zeros((0, 4)),
-        count if lagging else 0,
+        response if lagging else np.zeros((0, 4)),
+        len(rotors) if lagging else 0,
+        drag if drag.any() else None,
     )
+
+
+def asked_rotors(spec: Mapping[str, Any], thrusters: Thrusters) -> tuple[Rotor, ...]:
+    """Rotors of thrusters by the actuators of a scenario, as of `make_rotors`; else ideal ones."""
+    rotors = (thrusters.rotors if spec.get('rotors') else ()) or (Rotor(),) * len(thrusters.names)
+    own: dict[str, Any] = {}
+    if spec.get('rotor_lag') is not None:
+        own = {'lag': float(spec['rotor_lag']), 'lag_at': 0.0, 'omega': 0.0}
+    if 'dead_band' in spec:
+        reverse, forward = np.broadcast_to(spec['dead_band'], 2).astype(float).tolist()
+        own['dead_band'] = (reverse, forward)
+    return tuple(replace(rotor, **own) for rotor in rotors)
 
 
 def _response(rotor: Rotor, step: float) -> np.ndarray:
@@ -103,6 +120,8 @@ def _response(rotor: Rotor, step: float) -> np.ndarray:
     T n_dot + n = n_d (Fossen 2021, section 9.5), or n_ddot + 2 zeta omega n_dot + omega^2 n =
     omega^2 n_d, n_d held over the step: the exponential of the system's matrix times the step.
     """
+    if rotor.lag_at:
+        return np.zeros(4)
     if rotor.omega == 0.0:
         return np.array([np.exp(-step / rotor.lag) if rotor.lag else 0.0, 0.0, 0.0, 0.0])
     omega, zeta = rotor.omega, rotor.zeta
@@ -111,6 +130,20 @@ def _response(rotor: Rotor, step: float) -> np.ndarray:
     odd = (slow - fast) / (2.0 * split) if abs(split) > 0.0 else step * slow
     about = np.array([[zeta * omega, 1.0], [-(omega**2), -zeta * omega]])
     return ((slow + fast) / 2.0 * np.eye(2) + odd * about).real.ravel()
+
+
+def _drag(rotor: Rotor, most: float, step: float) -> tuple[float, float]:
+    """Row of `drag` of a rotor whose thrust is `most` N at its limit; see `fill_turned`.
+
+    n_dot = (u - n |n|) / (2 lag sqrt(lag_at)) has the time constant lag at the thrust lag_at. The
+    weight of the end of a step, 1/2 for a short one, makes a small deviation exact at the limit.
+    """
+    if not rotor.lag_at:
+        return 0.0, 0.0
+    gain = step / (2.0 * rotor.lag * np.sqrt(rotor.lag_at))
+    decay = 2.0 * gain * np.sqrt(most)  # step by time constant
+    end = -1.0 / np.expm1(-decay) - 1.0 / decay
+    return end * gain, 1.0 / end
 
 
 def _pieces(
@@ -185,11 +218,14 @@ def _steady(rotors: Rotors, i: int, k: int, u: Number) -> Number:
 
 
 @helper
-def fill_turned(rotors: Rotors, i: int, u: Number, row: np.ndarray) -> Number:
+def fill_turned(
+    drag: np.ndarray | None, rotors: Rotors, i: int, u: Number, row: np.ndarray
+) -> Number:
     """Thrust of a rotor whose steady thrust is u; `row` (6,) has its speed and rate, in place.
 
     Thrust goes by n |n| (Yoerger et al. 1990, equation (1); Fossen 2021, section 9.3), n in
-    sqrt(N).
+    sqrt(N). With drag the mean m of a step has n_dot = a (u - m |m|) (Yoerger et al. 1990), a
+    quadratic equation. `drag` is that of rotors: without any the branch is none when compiled.
     """
     P, j = rotors.response, 2 * (i % PER_ROW)
     root = sqrt(abs(u))
@@ -197,8 +233,23 @@ def fill_turned(rotors: Rotors, i: int, u: Number, row: np.ndarray) -> Number:
     ahead, rate = row[j] - asked, 1.0 * row[j + 1]
     speed = asked + (P[i, 0] * ahead + P[i, 1] * rate)
     row[j + 1] = P[i, 2] * ahead + P[i, 3] * rate
+    if drag is not None:
+        weight, away = drag[i, 0], drag[i, 1]
+        w = row[j] + weight * u
+        mean = 2.0 * w / (1.0 + sqrt(1.0 + 4.0 * weight * abs(w)))
+        speed = select(weight > 0.0, row[j] + away * (mean - row[j]), speed)
     row[j] = speed
     return speed * abs(speed)
+
+
+@compiled
+def fill_followed(rotors: Rotors, u: np.ndarray, speeds: np.ndarray) -> None:
+    """Write the thrusts of rotors into u (n,) in the place of their steady ones, N.
+
+    `speeds` (rows of three rotors, 6) in place; `rotors` have some that do not follow at once.
+    """
+    for i in range(len(u)):
+        u[i] = fill_turned(rotors.drag, rotors, i, u[i], speeds[i // PER_ROW])
 
 
 @helper
@@ -210,7 +261,7 @@ def fill_delivered(
 
     Parameters
     ----------
-    left : (2 n,) factor and offset that faults leave of each thrust; None: no faults
+    left : what faults leave of each thrust, as of `delivered`
     speeds : (..., 6) rows of three rotors, in place
 
     """
@@ -220,14 +271,6 @@ def fill_delivered(
     for i in range(n):
         u = _steady(rotors, i, k, thrust(reach, i, command) * share)
         if rotors.turning > 0:
-            u = fill_turned(rotors, i, u, speeds[i // PER_ROW])
-        total = add(total, column(reach, i, _left(left, i, n, u)))
+            u = fill_turned(rotors.drag, rotors, i, u, speeds[i // PER_ROW])
+        total = add(total, column(reach, i, left_of(left, i, n, u)))
     return total
-
-
-@helper
-def _left(left: np.ndarray | None, i: int, n: int, u: Number) -> Number:
-    """The branch is none when compiled, as without lift."""
-    if left is None:
-        return u
-    return left[i] * u + left[n + i]

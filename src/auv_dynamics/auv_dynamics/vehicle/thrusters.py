@@ -45,6 +45,7 @@ class Rotor:
     dead_band : thrusts in N, reverse and forward, below which it does not turn
     lag : s, time constant of the rotor's speed; 0: none
     omega, zeta : rad/s and damping ratio of a second-order response of it; omega = 0: none
+    lag_at : thrust in N at which lag is the time constant, which goes by 1/sqrt(thrust); 0: always
 
     """
 
@@ -54,6 +55,7 @@ class Rotor:
     lag: float = 0.0
     omega: float = 0.0
     zeta: float = 1.0
+    lag_at: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +208,10 @@ def _rotor(entry: Mapping[str, Any], place: str, file: object) -> Rotor:
         raise InputError(file, f'{key}.omega', 'one of lag and omega', 'both of them')
     if 'zeta' in spec and 'omega' not in spec:
         raise InputError(file, f'{key}.zeta', 'omega beside it', None)
-    numbers = {name: float(spec[name]) for name in ('lag', 'omega', 'zeta') if name in spec}
+    if 'lag_at' in spec and not spec.get('lag'):
+        raise InputError(file, f'{key}.lag_at', 'a positive lag beside it', spec.get('lag'))
+    times = ('lag', 'lag_at', 'omega', 'zeta')
+    numbers = {name: float(spec[name]) for name in times if name in spec}
     return Rotor(curve, voltage, (band[0], band[1]), **numbers)
 
 
@@ -341,24 +346,33 @@ def column(reach: AttainableWrench, i: int, u: Number) -> Six:
 
 
 @helper
-def _delivered_in(reach: AttainableWrench, j: int, tau: Vector, share: Number) -> Number:
-    total = 0.0 * tau[j]
-    for i in range(reach.T.shape[1]):
-        total = total + reach.T[j, i] * thrust(reach, i, tau) * share
-    return total
+def left_of(left: np.ndarray | None, i: int, n: int, u: Number) -> Number:
+    """What is left of the thrust u of thruster i of n; `left` as of `delivered`.
+
+    The branch is none when compiled, as without lift.
+    """
+    if left is None:
+        return u
+    return left[i] * u + left[n + i]
 
 
 @helper
-def delivered(reach: AttainableWrench, tau: Vector, share: Number) -> Six:
-    """T u with u a share of T^+ tau: six floats, N and N m."""
-    return (
-        _delivered_in(reach, 0, tau, share),
-        _delivered_in(reach, 1, tau, share),
-        _delivered_in(reach, 2, tau, share),
-        _delivered_in(reach, 3, tau, share),
-        _delivered_in(reach, 4, tau, share),
-        _delivered_in(reach, 5, tau, share),
-    )
+def delivered(
+    reach: AttainableWrench, tau: Numbers, share: Number, left: np.ndarray | None
+) -> Numbers:
+    """T u with u a share of T^+ tau: six floats, N and N m.
+
+    Parameters
+    ----------
+    left : (2 n,) factor and offset in N that faults leave of each thrust; None: no faults
+
+    """
+    n = reach.T.shape[1]
+    total = (0.0 * tau[0], 0.0 * tau[1], 0.0 * tau[2], 0.0 * tau[3], 0.0 * tau[4], 0.0 * tau[5])
+    for i in range(n):
+        u = left_of(left, i, n, thrust(reach, i, tau) * share)
+        total = add(total, column(reach, i, u))
+    return total
 
 
 @helper
@@ -369,7 +383,7 @@ def demanded(reach: AttainableWrench, tau: Numbers) -> Numbers:
     """
     if reach.T.shape[1] == 0:
         return tau
-    spanned, own = delivered(reach, tau, 1.0), reach.own
+    spanned, own = delivered(reach, tau, 1.0, None), reach.own
     return (
         select(own[0] > 0.0, spanned[0], tau[0]),
         select(own[1] > 0.0, spanned[1], tau[1]),
@@ -381,15 +395,18 @@ def demanded(reach: AttainableWrench, tau: Numbers) -> Numbers:
 
 
 @helper
-def allocated(reach: AttainableWrench, tau: Numbers) -> Numbers:
-    """T u with u = T^+ tau, scaled down until every thrust is within its limits."""
+def allocated(reach: AttainableWrench, tau: Numbers, left: np.ndarray | None) -> Numbers:
+    """T u with u = T^+ tau, scaled down until every thrust is within its limits.
+
+    `left` is what faults leave of u, as of `delivered`; the allocation does not know of them.
+    """
     if reach.T.shape[1] == 0:
         return tau
     command, share = shaped(reach.first, reach, tau)
-    return delivered(reach, command, share)
+    return delivered(reach, command, share, left)
 
 
 @helper
 def reachable(reach: AttainableWrench, tau: Numbers) -> Six:
     """The wrench that is had for the command tau: thruster allocation, then the axis limits."""
-    return clipped(allocated(reach, tau), reach.limit)
+    return clipped(allocated(reach, tau, None), reach.limit)

@@ -127,7 +127,10 @@ STEP = 1e-5  # of m/s, rad/s, rad: rounding leaves ten digits of a law's gains
 
 
 def jacobian(
-    function: Callable[[np.ndarray], np.ndarray], at: np.ndarray, step: float = STEP
+    function: Callable[[np.ndarray], np.ndarray],
+    at: np.ndarray,
+    step: float = STEP,
+    count: int | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Central differences over step, step/2 and step/4, extrapolated linearly to no step at all.
 
@@ -140,15 +143,16 @@ def jacobian(
     function : (n,) to (m,)
     at : (n,) where
     step : the largest one
+    count : k, of the first elements of `at` alone; None: all n
 
     Returns
     -------
-    J : (m, n) derivatives
-    error : (m, n) by how much the last two extrapolations differ
+    J : (m, k) derivatives
+    error : (m, k) by how much the last two extrapolations differ
 
     """
     columns, errors = [], []
-    for unit in np.eye(len(at)):
+    for unit in np.eye(len(at))[:count]:
         wide, half, quarter = (
             (function(at + h * unit) - function(at - h * unit)) / (2 * h)
             for h in (step, step / 2, step / 4)
@@ -256,9 +260,9 @@ class LawAt:
             raise ArithmeticError(f'the law gave what is not finite: {answer}')
         return answer
 
-    def jacobian(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives (6 + m, 20 + m) of the answer, and their errors."""
-        return jacobian(self.answer, y)
+    def jacobian(self, y: np.ndarray, count: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives (6 + m, 20 + m) of the answer, and their errors; by `count` of y alone."""
+        return jacobian(self.answer, y, count=count)
 
 
 def holding_point(law: LawAt, plant: Vehicle, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
@@ -287,7 +291,7 @@ def holding_point(law: LawAt, plant: Vehicle, eta: np.ndarray, nu: np.ndarray) -
         missing = needed - law.answer(y)
         if np.abs(missing).max() <= bound:
             return y
-        slope, _ = law.jacobian(y)
+        slope, _ = law.jacobian(y, 8 + m)
         y[8 : 8 + m] += np.linalg.lstsq(slope[:, 8 : 8 + m], missing, rcond=None)[0]
     raise ArithmeticError(
         f'the law holds nu = {nu} in no state: {np.abs(missing).max():.3g} N or N m are missing'

@@ -1,8 +1,9 @@
 """Gain, phase, delay and disk margins of a scenario's loops, and the gains that keep them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -21,11 +22,12 @@ from auv_analysis.studies.linearize.sampled_loop import (
     HeldPlant,
     SampledLaw,
     SampledLoop,
-    behind_lag,
+    behind_rotors,
 )
 from auv_dynamics.files.yaml_files import matrix6
+from auv_dynamics.plant.rotors import asked_rotors
 from auv_dynamics.vehicle import DOFS
-from auv_dynamics.vehicle.thrusters import Thrusters
+from auv_dynamics.vehicle.thrusters import Rotor
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.laws import OPEN_LOOP
 from auv_gvc_controller.laws.law import make_gains
@@ -38,12 +40,12 @@ NEUTRAL = (
 )
 CLOSED = 1e-9  # of 1 - S: below it an axis is not controlled at all
 MEASURABLE = 1e-3  # a factor of the gain below it, or above its inverse, is no margin
-FACTOR = 100.0  # times and part of the present gain between which the largest one is looked for
-RATIO = 1.25  # of two that are tried
+FACTORS = 100.0 ** np.linspace(-1, 1, 35)  # of the present gain: tried for the largest
 MOST_PERIODS = 100  # of a delay
 STATIC = 1e-3  # of the first frequency, where the response is static; imaginary part that is none
-SHARP, TINY = 0.1, 1e-99  # damping below which a pole is a resonance, and what keeps log finite
-AROUND = np.concatenate([-np.geomspace(10, 0.1, 12), [0.0], np.geomspace(0.1, 10, 12)])
+SHARP, UNDAMPED = 0.1, 1e-6  # damping below which a pole is a resonance, and the least one
+TINY = 1e-99  # what keeps log finite
+AROUND = np.concatenate([-np.geomspace(10, 0.1, 12), np.geomspace(0.1, 10, 12)])
 
 
 @dataclass(frozen=True)
@@ -165,6 +167,8 @@ class ControlLoop:
     delay : s from the sample to the wrench at the actuators, beside the hold; None: the scenario's
     lag : s, of the wrench; None: the scenario's. That of its rotors comes on top
     nu0, eta0 : (6,) the point as of `linearize`; None: at rest, level
+    plant : what the wrench acts on
+    turning : whether rotors follow late
 
     Raises
     ------
@@ -180,6 +184,7 @@ class ControlLoop:
     nu0: Sequence[float] | np.ndarray | None = None
     eta0: Sequence[float] | np.ndarray | None = None
     plant: HeldPlant = field(init=False)
+    turning: bool = field(init=False)
 
     def __post_init__(self) -> None:
         """Check the times, and sample the plant."""
@@ -195,15 +200,16 @@ class ControlLoop:
         A[ATTITUDE, ATTITUDE] = 0.0
         thrusters = self._truth.thrusters if actuators.get('thrusters') else None
         if thrusters is not None:
-            slow = rotor_lags(thrusters, actuators)
-            A, B = behind_lag(A, B, slow, thrusters.inverse, thrusters.matrix)
-        A, B = behind_lag(A, B, np.full(6, self.lag), np.eye(6), np.eye(6))
+            rotors = asked_rotors(actuators, thrusters)
+            A, B = behind_rotors(A, B, rotors, thrusters.inverse, thrusters.matrix)
+        object.__setattr__(self, 'turning', len(A) > 8)
+        A, B = behind_rotors(A, B, (Rotor(lag=self.lag or 0.0),) * 6, np.eye(6), np.eye(6))
         object.__setattr__(self, 'plant', HeldPlant(A, B, h))
 
     @property
     def late(self) -> bool:
         """Whether a delay or a lag is known."""
-        return bool(self.delay or self.lag or len(self.plant.A) > 8)
+        return bool(self.delay or self.lag or self.turning)
 
     @cached_property
     def _truth(self) -> Vehicle:
@@ -234,10 +240,6 @@ class ControlLoop:
         """(6,) diagonal of that gain."""
         return np.diagonal(matrix6(self.scenario.gain_values(self.controller)[self.gain])).copy()
 
-    @cached_property
-    def _held(self) -> np.ndarray:
-        return holding_point(self._law(np.ones(6)), self._truth, *self._point)
-
     def _law(self, scale: np.ndarray) -> LawAt:
         values = self.scenario.gain_values(self.controller)
         if self.gain:
@@ -251,14 +253,18 @@ class ControlLoop:
 
         Off the diagonal it is scaled by the roots of both factors: it stays symmetric.
         """
-        slope, _ = self._law(np.asarray(scale, float)).jacobian(self._held)
+        law = self._law(np.asarray(scale, float))
+        held = holding_point(law, self._truth, *self._point)
+        slope, _ = law.jacobian(held, 8 + law.states)
         return SampledLoop(self.plant, SampledLaw.of(slope), self.delay or 0.0)
 
     def sensitivity(self, loop: SampledLoop) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) rad/s and S (n, 6, 6) there: on the grid, and around each resonance of the loop."""
-        poles = np.log(np.linalg.eigvals(loop.transition()).astype(complex) + TINY)
+        """(n,) rad/s and S (n, 6, 6) there: on the grid, and around resonances."""
+        opened = np.linalg.eigvals(self.plant.Phi)
+        poles = np.log(np.concatenate([opened, loop.multipliers]).astype(complex) + TINY)
         poles = poles[(poles.imag > 0) & (np.abs(poles.real) < SHARP * poles.imag)]
-        near = poles.imag[:, None] + np.abs(poles.real)[:, None] * AROUND
+        width = np.maximum(np.abs(poles.real), UNDAMPED * poles.imag)
+        near = poles.imag[:, None] + width[:, None] * AROUND
         near = np.clip(near.ravel() / self.plant.period, self.omega[0], self.omega[-2])
         omega = np.concatenate([self.omega, near])
         order = np.argsort(omega)
@@ -299,56 +305,40 @@ class ControlLoop:
         axis : whose gain is scaled, and whose loop has to keep them; None: all of them
 
         """
-        chosen = range(6) if axis is None else (axis,)
-
-        # a law is linear in its gain, which is quadratic in the root of the factor
-        at = [self._slope_of(chosen, factor) for factor in (0.0, 1.0, 4.0)]
-        turned = (at[2] - 2 * at[1] + at[0]) / 2
-        straight = at[1] - at[0] - turned
+        chosen = list(range(6)) if axis is None else [axis]
 
         def to_spare(factor: float) -> float:
-            slope = at[0] + straight * np.sqrt(factor) + turned * factor
-            loop = SampledLoop(self.plant, SampledLaw.of(slope), self.delay or 0.0)
+            scale = np.ones(6)
+            scale[chosen] = factor
+            try:
+                loop = self.loop(scale)
+            except (ArithmeticError, ValueError):  # a gain that the law refuses, or cannot hold by
+                return -1.0
             if not stable(loop):
                 return -1.0
             omega, S = self.sensitivity(loop)
             found = (axis_margins(loop, i, omega, S[:, i, i], delays=False) for i in chosen)
             return min(one.to_spare for one in found)
 
-        good = to_spare(1.0) >= 0
-        near = 1.0
-        while 1 / FACTOR < near < FACTOR:
-            far = near * RATIO if good else near / RATIO
-            if (to_spare(far) >= 0) != good:
-                return float(brentq(to_spare, *sorted((near, far)), rtol=1e-9))
-            near = far
-        return np.inf if good else 0.0
+        def border(factors: np.ndarray, *, good: bool) -> float | None:
+            for near, far in pairwise(factors.tolist()):
+                if (to_spare(far) >= 0) != good:
+                    return float(brentq(to_spare, near, far, rtol=1e-6))
+            return None
 
-    def _slope_of(self, axes: Sequence[int], factor: float) -> np.ndarray:
-        scale = np.ones(6)
-        scale[list(axes)] = factor
-        return self._law(scale).jacobian(self._held)[0]
-
-
-def rotor_lags(thrusters: Thrusters, actuators: Mapping[str, Any]) -> np.ndarray:
-    """(n,) s by which the thrusts of a scenario's actuators lag; zero where it asks for no rotors.
-
-    A small change of thrust follows its rotor's speed. A second-order response counts with the lag
-    that is as late at low frequency, 2 zeta / omega.
-    """
-    n = len(thrusters.names)
-    if 'rotor_lag' in actuators:
-        return np.full(n, float(actuators['rotor_lag']))
-    if not thrusters.rotors or not actuators.get('rotors'):
-        return np.zeros(n)
-    return np.array([
-        2 * rotor.zeta / rotor.omega if rotor.omega else rotor.lag for rotor in thrusters.rotors
-    ])  # fmt: skip
+        present = len(FACTORS) // 2
+        if to_spare(1.0) >= 0:
+            return border(FACTORS[present:], good=True) or np.inf
+        if below := border(FACTORS[present::-1], good=False):
+            return below
+        if to_spare(FACTORS[-1]) >= 0:
+            return np.inf
+        return border(FACTORS[: present - 1 : -1], good=False) or 0.0
 
 
 def stable(loop: SampledLoop) -> bool:
     """Whether nothing grows; roll and pitch that a law neither pulls back nor pushes may stay."""
-    return bool(np.abs(np.linalg.eigvals(loop.transition())).max() <= 1 + NEUTRAL)
+    return bool(np.abs(loop.multipliers).max() <= 1 + NEUTRAL)
 
 
 def _scaled_size(M: np.ndarray) -> np.ndarray:
@@ -427,7 +417,11 @@ def _bounded(value: float) -> float | None:
 
 
 def margin_notes(
-    scenario: Scenario, controllers: Sequence[str], delay: float | None = None
+    scenario: Scenario,
+    controllers: Sequence[str],
+    delay: float | None = None,
+    *,
+    driver: bool = False,
 ) -> list[str]:
     """Margins of controllers at rest and at the mean set-point, a line each; [] without a delay.
 
@@ -436,6 +430,7 @@ def margin_notes(
     scenario : whose actuators have a delay or a lag, else there is nothing to say
     controllers : names of some of its own
     delay : s, in place of the scenario's
+    driver : a vehicle takes the plant's place, whose delay is to be known
 
     Returns
     -------
@@ -452,6 +447,9 @@ def margin_notes(
             if at_rest.late:
                 under_way = ControlLoop(scenario, name, delay, nu0=_mean_setpoint(scenario))
                 found.append(_note([at_rest, under_way]))
+            elif driver:
+                text = 'no delay is known, and no margins; auv check-driver --actuate measures it'
+                found.append(f'note: {scenario.path}: controllers.{name}: {text}')
         except Exception as error:  # a law of the user's own may raise anything
             found.append(f'note: {scenario.path}: controllers.{name}: no margins: {error}')
     return found
@@ -468,6 +466,7 @@ def _note(settings: Sequence[ControlLoop]) -> str:
     first = settings[0]
     path = f'{first.scenario.path}: controllers.{first.controller}'
     late = f'with a loop delay of {first.delay:g} s and a lag of {first.lag:g} s'
+    late += ' beside that of the rotors' * first.turning
     rows: list[tuple[int, AxisMargins]] = []
     for setting in settings:
         try:

@@ -5,38 +5,53 @@ the actuators follow with a lag. Nothing is approximated: no Pade polynomial sta
 and no half period for the hold.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
+from scipy.linalg import block_diag, expm
+
+from auv_dynamics.vehicle.thrusters import Rotor
 
 
-def behind_lag(
-    A: np.ndarray, B: np.ndarray, lag: np.ndarray, into: np.ndarray, out: np.ndarray
+def behind_rotors(
+    A: np.ndarray, B: np.ndarray, rotors: Sequence[Rotor], into: np.ndarray, out: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A and B of a plant behind first-order actuators, lag a_dot = into u - a, tau = out a.
+    """A and B of a plant behind actuators whose output follows what is asked of them.
+
+    lag a_dot + a = a_d, or a_ddot + 2 zeta omega a_dot + omega^2 a = omega^2 a_d: the deviation
+    (a - a_d, a_dot) has the rate F times itself. A small change of a thrust follows its rotor's
+    speed, as thrust goes by n |n|.
 
     Parameters
     ----------
     A, B : (n, n), (n, 6) of the plant
-    lag : (p,) time constants, s; 0: the actuator follows at once and is no state
+    rotors : p of them; one without a response in time follows at once and has no state
     into : (p, 6) from the wrench asked for to the actuators
     out : (6, p) from the actuators to the wrench delivered
 
     Returns
     -------
-    A, B : (n + q, n + q), (n + q, 6) with the q slow actuators behind the plant's states
+    A, B : (n + q, n + q), (n + q, 6) with the q states of slow actuators behind those of the plant
 
     Fossen 2021, section 9.5.
 
     """
-    slow = lag > 0
-    rate = 1 / lag[slow]
-    q = len(rate)
-    lagged = np.block([[A, B @ out[:, slow]], [np.zeros((q, len(A))), -np.diag(rate)]])
-    return lagged, np.vstack([B @ out[:, ~slow] @ into[~slow], rate[:, None] * into[slow]])
+    rates = [_rates(rotor) for rotor in rotors]
+    sizes = np.array([len(F) for F in rates])
+    slow, F = sizes > 0, block_diag(*rates)
+    E = np.eye(len(F))[:, (np.cumsum(sizes) - sizes)[slow]]  # outputs among the states
+    lagged = np.block([[A, B @ out[:, slow] @ E.T], [np.zeros((len(F), len(A))), F]])
+    return lagged, np.vstack([B @ out[:, ~slow] @ into[~slow], -F @ E @ into[slow]])
+
+
+def _rates(rotor: Rotor) -> np.ndarray:
+    """F (q, q) of a rotor, q its order."""
+    if rotor.omega:
+        return np.array([[0.0, 1.0], [-(rotor.omega**2), -2 * rotor.zeta * rotor.omega]])
+    return np.array([[-1 / rotor.lag]]) if rotor.lag else np.zeros((0, 0))
 
 
 class HeldInput(NamedTuple):
@@ -121,9 +136,8 @@ class SampledLaw(NamedTuple):
 
     @classmethod
     def of(cls, slope: np.ndarray) -> 'SampledLaw':
-        """Law with these derivatives (6 + m, 20 + m), see `LawAt.jacobian`."""
-        end = 8 + len(slope) - 6
-        return cls(slope[:6, :8], slope[:6, 8:end], slope[6:, :8], slope[6:, 8:end])
+        """Law with these derivatives (6 + m, 8 + m), see `LawAt.jacobian`."""
+        return cls(slope[:6, :8], slope[:6, 8:], slope[6:, :8], slope[6:, 8:])
 
     def response(self, z: np.ndarray, period: float) -> np.ndarray:
         """(..., 6, 8) from what the law sees to tau."""
@@ -181,6 +195,11 @@ class SampledLoop:
         whole = np.eye(6) - self.law.response(z, self.plant.period) @ seen
         others = np.delete(np.delete(whole, axis, 0), axis, 1)
         return complex(np.linalg.det(whole) / np.linalg.det(others))
+
+    @cached_property
+    def multipliers(self) -> np.ndarray:
+        """Eigenvalues of the transition over a period, in modulus at most 1 where it is stable."""
+        return np.linalg.eigvals(self.transition())
 
     def transition(self) -> np.ndarray:
         """Transition matrix of the closed loop over a period: x, the law's state, past wrenches."""

@@ -6,6 +6,7 @@ import pydoc
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,7 @@ ROS = ('rclpy', 'rcl_interfaces', 'launch', 'launch_ros', 'builtin_interfaces', 
 ORDER = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
 
 
+@cache
 def imported(path: Path) -> set[str]:
     """Modules that a file imports at its top level or inside functions."""
     found = set()

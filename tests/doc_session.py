@@ -37,6 +37,8 @@ class Session:
             if path.name not in MADE:
                 (folder / path.name).symlink_to(path)
         (folder / '.venv').symlink_to(sys.prefix)
+        if subprocess.run(['make', '-q', 'setup'], cwd=folder, check=False).returncode:
+            raise RuntimeError('run `make setup` first: a page would do it, for its own folder')
 
     def run(self, block: Block) -> None:
         """Do what a block says."""

@@ -2,24 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 from scipy.linalg import expm
 
+from auv_analysis.simulation.open_loop import open_loop
 from auv_analysis.studies.linearize.linearize import ATTITUDE, NU, plant_jacobian
 from auv_dynamics.plant.plant import eta_of
-from auv_dynamics.vehicle.kinematics import jacobian
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 Wrench = tuple[float, ...]
 Held = Sequence[tuple[float, float, Wrench]]  # begin and end in s of each wrench
 
-ACCURATE = 1e-6  # m/s, rad/s, and relative
-STEPS = 0.02  # s between two values of a prediction
+STEPS, FINER = 0.02, 4  # s between two values of a prediction, and steps between them
 OPPOSED = 3.0  # times as late may the other sign be that has to fit worse
 FINE = 0.01  # s between two delays that are tried
 ALIKE = 1e-6  # of the largest: terms that are as much alike are one
@@ -52,27 +49,21 @@ class Predicted(NamedTuple):
 
 def predicted(vehicle: Vehicle, x: np.ndarray, held: Held) -> Predicted:
     """Velocity with and without wrenches, by (1) and (2), from the state x (13,) on."""
-    nothing = [(begin, end, (0.0,) * 6) for begin, end, _ in held]
-    (t, moved), (_, left) = (_velocity(vehicle, x, parts) for parts in (held, nothing))
-    return Predicted(t, moved - left, left)
-
-
-def _velocity(vehicle: Vehicle, x: np.ndarray, held: Held) -> tuple[np.ndarray, np.ndarray]:
-    y = np.concatenate([eta_of(x), x[7:]])
-    times, rows = [np.array([held[0][0]])], [y[None, 6:]]
+    both = np.tile(x, (2, 1))
+    times, rows = [np.array([held[0][0]])], [both[:, None]]
     for begin, end, tau in held:
-        at = np.linspace(begin, end, max(round((end - begin) / STEPS), 1) + 1)
-        rate = partial(_rate, vehicle, np.array(tau))
-        solved = solve_ivp(rate, (begin, end), y, t_eval=at, rtol=ACCURATE, atol=ACCURATE)
-        y = solved.y[:, -1]
-        times.append(at[1:])
-        rows.append(solved.y[6:, 1:].T)
-    return np.concatenate(times), np.concatenate(rows)
-
-
-def _rate(vehicle: Vehicle, tau: np.ndarray, _: float, y: np.ndarray) -> np.ndarray:
-    eta, nu = y[:6], y[6:]
-    return np.concatenate([jacobian(eta) @ nu, vehicle.forward_dynamics(eta, nu, tau)])
+        count = max(round((end - begin) / STEPS), 1)
+        commands = np.zeros((2, FINER * count, 6))
+        commands[0] = tau
+        step = (end - begin) / (FINER * count)
+        found = open_loop(
+            vehicle, commands, both[None], step, integrator='ode5', every=FINER, threads=1
+        )[0]
+        both = found[:, -1]
+        times.append(np.linspace(begin, end, count + 1)[1:])
+        rows.append(found)
+    moved, left = np.concatenate(rows, axis=1)[..., 7:]
+    return Predicted(np.concatenate(times), moved - left, left)
 
 
 def _varied(

@@ -181,7 +181,7 @@ if JITTED:
         return value
 
     def view(context: Any, builder: Any, kinds: Any, value: Any, b: Any) -> Any:
-        """LLVM value of a tree of type kinds[0] as kinds[1], without counts; b: block or None."""
+        """LLVM value of a tree of type kinds[0] as kinds[1], one block b of it."""
         before, after = kinds
         if isinstance(before, types.BaseNamedTuple):
             parts = zip(zip(before, after, strict=True), range(len(before)), strict=True)
@@ -198,16 +198,14 @@ if JITTED:
         )
         shape = cgutils.unpack_tuple(builder, array.shape)
         strides = cgutils.unpack_tuple(builder, array.strides)
-        data, first = array.data, 0
-        if b is not None:
-            single = builder.icmp_signed('<=', shape[0], shape[0].type(1))
-            offset = builder.mul(builder.select(single, b.type(0), b), strides[0])
-            data, first = cgutils.pointer_add(builder, data, offset, seen.data.type), 1
-        last = first + after.ndim
+        single = builder.icmp_signed('<=', shape[0], shape[0].type(1))
+        offset = builder.mul(builder.select(single, b.type(0), b), strides[0])
+        data = cgutils.pointer_add(builder, array.data, offset, seen.data.type)
+        last = 1 + after.ndim
         size = context.get_constant(
             types.intp, context.get_abi_sizeof(context.get_data_type(after.dtype))
         )
-        populate_array(seen, data, shape[first:last], strides[first:last], size, meminfo=None)
+        populate_array(seen, data, shape[1:last], strides[1:last], size, meminfo=None)
         return seen._getvalue()  # noqa: SLF001  numba's own way
 
     @intrinsic

@@ -405,10 +405,7 @@ def _row(setting: ControlLoop, axis: int, found: AxisMargins | None) -> dict[str
         }
     if setting.gain:
         value = float(setting.values[axis])
-        row |= {
-            'value': value,
-            'largest': _bounded(value * setting.largest(axis)),
-        }
+        row |= {'value': value, 'largest': _bounded(value * setting.largest(axis))}
     return row
 
 

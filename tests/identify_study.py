@@ -18,7 +18,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import numpy as np
 import yaml
-from trials import SWINGS, gauss_markov, skewed, trial, truth, wrong_prior
+from helpers.sea_trials import SWINGS, gauss_markov, skewed, trial, truth, wrong_prior
 
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.studies.identify.couplings import couplings, signals_of

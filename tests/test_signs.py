@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-import flips
 import numpy as np
 import pytest
-from sign_checks import (
+from helpers import sign_flips
+from helpers.sign_checks import (
     check_algebra,
     check_C,
     check_couple,
@@ -24,7 +24,7 @@ from sign_checks import (
     check_U,
     published_vehicle,
 )
-from sign_checks_loop import (
+from helpers.sign_checks_loop import (
     check_current,
     check_law,
     check_multisine,
@@ -127,7 +127,7 @@ EACH = pytest.mark.parametrize('formula', FORMULAS, ids=lambda f: f.symbol)
 @EACH
 def test_the_code_passes_its_check(formula: Formula) -> None:
     formula.check(importlib.import_module(formula.module))
-    formula.check(flips.as_written(formula.module))
+    formula.check(sign_flips.as_written(formula.module))
 
 
 def notices(check: Callable[[Any], None], variant: SimpleNamespace) -> bool:
@@ -142,7 +142,7 @@ def notices(check: Callable[[Any], None], variant: SimpleNamespace) -> bool:
 
 def survivors(formula: Formula, check: Callable[[Any], None]) -> list[str]:
     """Signs that a check lets through when they are turned, by module, line and column."""
-    variants = list(flips.with_one_flipped(formula.module, formula.names))
+    variants = list(sign_flips.with_one_flipped(formula.module, formula.names))
     assert len(variants) >= formula.least
     return [place for place, variant in variants if not notices(check, variant)]
 

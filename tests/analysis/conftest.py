@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import Watched, chromium
+from helpers.browser import Watched, chromium
 from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize

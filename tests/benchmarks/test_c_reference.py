@@ -6,7 +6,7 @@ from dataclasses import replace
 import c_reference
 import numpy as np
 import pytest
-from closed_loops import FULL, SIX, TURNED, file_of
+from helpers.closed_loops import FULL, SIX, TURNED, file_of
 from loops import open_plants
 from numpy.testing import assert_allclose
 

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from harness import environment, fresh_domain
+from helpers.node_processes import environment, fresh_domain
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / 'benchmarks'
 

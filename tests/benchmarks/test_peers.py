@@ -3,7 +3,7 @@
 import numpy as np
 import peers
 import pytest
-from closed_loops import TURNED
+from helpers.closed_loops import TURNED
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate

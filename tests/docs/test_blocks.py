@@ -4,8 +4,19 @@ from pathlib import Path
 
 import pytest
 import yaml
-from doc_blocks import COMMAND, FILES, MARKS, NEEDS, ROOT, RUN, SHOWN, Block, Page, all_pages
-from doc_session import session
+from helpers.doc_blocks import (
+    COMMAND,
+    FILES,
+    MARKS,
+    NEEDS,
+    ROOT,
+    RUN,
+    SHOWN,
+    Block,
+    Page,
+    all_pages,
+)
+from helpers.doc_session import session
 
 PAGES = all_pages()
 BLOCKS = [(page, block) for page in PAGES for block in page.blocks]

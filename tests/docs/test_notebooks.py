@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from doc_blocks import ROOT
+from helpers.doc_blocks import ROOT
 
 nbformat = pytest.importorskip('nbformat', reason='make docs-tools installs it')
 NOTEBOOKS = sorted((ROOT / 'docs' / 'notebooks').glob('*.ipynb'))

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from browser import chromium
-from doc_blocks import ROOT
+from helpers.browser import chromium
+from helpers.doc_blocks import ROOT
 
 FOREIGN = re.compile(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="(?:https?:)?//[^"]*"')
 WIDTHS = (390, 1280)  # a phone and a desk

@@ -5,7 +5,7 @@ import re
 from typing import Any
 
 import pytest
-from doc_blocks import ROOT
+from helpers.doc_blocks import ROOT
 
 TEXT = (ROOT / 'docs' / 'theory.md').read_text(encoding='utf-8')
 EQUATION = re.compile(r'\\tag\{(\d+)\}\n\$\$\n(.*?)(?=\$\$|\Z)', re.DOTALL)

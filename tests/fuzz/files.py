@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import yaml
-from foreign_vehicles import BLUEROV2, REXROV, URDF, sdf
-from made_messages import ODOMETRY, Bag, odometry, serialized, stamped
+from helpers.foreign_vehicles import BLUEROV2, REXROV, URDF, sdf
+from helpers.made_messages import ODOMETRY, Bag, odometry, serialized, stamped
 from watchman import playground, watched
 
 from auv_analysis import load_scenario, simulate, summarize

@@ -14,7 +14,7 @@ import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from harness import GAINS, Peer, fresh_domain, parameters, start_node
+from helpers.node_processes import GAINS, Peer, fresh_domain, parameters, start_node
 from scramble import SPECIAL, scrambled
 
 from auv_analysis.bag import read_bag

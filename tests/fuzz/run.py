@@ -61,7 +61,7 @@ def scenarios(count: int, seed: int) -> Any:
 
 def parameters(count: int, seed: int) -> Any:
     """Parameter files of the nodes."""
-    from harness import environment, fresh_domain
+    from helpers.node_processes import environment, fresh_domain
     from start_up import originals, try_parameters
 
     os.environ.update(environment(fresh_domain()))
@@ -120,8 +120,8 @@ def bags(count: int, seed: int) -> Any:
 
 def costs(count: int, seed: int) -> Any:
     """Small bags that declare very many records."""
-    from costly_bags import drawn
     from files import try_costly_bag
+    from helpers.costly_bags import drawn
 
     verdicts: Counter[str] = Counter()
     for name, data in itertools.islice(drawn(random.Random(seed)), count):

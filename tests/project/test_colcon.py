@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from graph_runs import SIGNALS
-from harness import fresh_domain, installed_auv
+from helpers.graph_runs import SIGNALS
+from helpers.node_processes import fresh_domain, installed_auv
 
 from auv_analysis.bag import load_run
 

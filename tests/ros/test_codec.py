@@ -5,6 +5,7 @@ from functools import cache
 
 import pytest
 from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 from nav_msgs.msg import Odometry
@@ -12,7 +13,6 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
-from strategies import QUICK
 
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.codec import KINDS, Codec, Layout, first_stamp, verified_layout

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import Twist
-from harness import (
+from helpers.node_processes import (
     CONTROLLER,
     GAINS,
     assert_one_line,

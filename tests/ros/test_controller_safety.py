@@ -8,7 +8,15 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from harness import CONTROLLER, Peer, environment, fresh_domain, graph, parameters, stop
+from helpers.node_processes import (
+    CONTROLLER,
+    Peer,
+    environment,
+    fresh_domain,
+    graph,
+    parameters,
+    stop,
+)
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterValue

@@ -1,7 +1,7 @@
 """`auv doctor` on real participants: discovery on the loopback, and who is in the domain."""
 
 import pytest
-from harness import Peer, fresh_domain
+from helpers.node_processes import Peer, fresh_domain
 
 from auv_analysis.doctor import discovery
 

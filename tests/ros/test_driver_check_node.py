@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from faulty_drivers import NAMES
 from geometry_msgs.msg import WrenchStamped
-from harness import PATIENCE, Peer, environment, fresh_domain
+from helpers.faulty_drivers import NAMES
+from helpers.node_processes import PATIENCE, Peer, environment, fresh_domain
 
 from auv_analysis.driver.checks import PASSIVE, judge, refusal
 from auv_analysis.driver.evidence import (
@@ -29,14 +29,16 @@ TOPICS = {interface.ODOM: interface.ODOM, interface.WRENCH: interface.WRENCH}
 # a machine that is busy with other tests may keep all of them waiting
 PATIENT = Settings(timeout=4.0)
 
+TESTS = Path(__file__).parents[1]
+
 
 @pytest.fixture(scope='module')
 def domain() -> Iterator[int]:
     """Domain with all faulty drivers in it."""
     found = fresh_domain()
-    path = Path(__file__).parents[1] / 'faulty_drivers.py'
+    command = [sys.executable, '-m', 'helpers.faulty_drivers']
     process = subprocess.Popen(
-        [sys.executable, str(path)], env=environment(found), stdout=subprocess.PIPE, text=True
+        command, env=environment(found), cwd=TESTS, stdout=subprocess.PIPE, text=True
     )
     try:
         assert process.stdout.readline() == 'ready\n'

@@ -4,7 +4,15 @@ from contextlib import ExitStack
 
 import numpy as np
 import pytest
-from harness import CONTROLLER, assert_one_line, fresh_domain, graph, parameters, run_node, stop
+from helpers.node_processes import (
+    CONTROLLER,
+    assert_one_line,
+    fresh_domain,
+    graph,
+    parameters,
+    run_node,
+    stop,
+)
 from numpy.testing import assert_allclose
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message

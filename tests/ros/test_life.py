@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 import pytest
-from harness import PATIENCE, environment, fresh_domain
+from helpers.node_processes import PATIENCE, environment, fresh_domain
 
 from auv_dynamics.ros import node_interface
 

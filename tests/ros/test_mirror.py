@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
+from helpers.strategies import QUICK, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from strategies import QUICK, vectors
 
 from auv_dynamics.nodes.frame_converter_node import WORLD, mirrored, mirrored_odometry
 from auv_dynamics.ros import convert, interface

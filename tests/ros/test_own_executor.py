@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import rclpy
 from geometry_msgs.msg import WrenchStamped
-from harness import PATIENCE, fresh_domain, start_node, stop
+from helpers.node_processes import PATIENCE, fresh_domain, start_node, stop
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from harness import CONTROLLER, Peer, fresh_domain, graph, parameters
+from helpers.node_processes import CONTROLLER, Peer, fresh_domain, graph, parameters
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from harness import Peer, assert_one_line, graph, parameters, run_node
+from helpers.node_processes import Peer, assert_one_line, graph, parameters, run_node
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_dynamics.ros import convert, interface, topics

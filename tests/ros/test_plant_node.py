@@ -6,7 +6,7 @@ from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
-from harness import (
+from helpers.node_processes import (
     PATIENCE,
     assert_one_line,
     fresh_domain,

@@ -6,12 +6,11 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-import graph_runs
-import policies
 import pytest
 import yaml
-from harness import PATIENCE, Peer, fresh_domain, parameters, start_auv, start_node
-from made_messages import Bag
+from helpers import graph_runs, policies
+from helpers.made_messages import Bag
+from helpers.node_processes import PATIENCE, Peer, fresh_domain, parameters, start_auv, start_node
 from rclpy.serialization import serialize_message
 
 from auv_analysis import load_scenario

@@ -4,8 +4,8 @@ import os
 from pathlib import Path
 from xml.etree import ElementTree
 
-import policies
 import pytest
+from helpers import policies
 
 
 def test_policy_fits_the_schema() -> None:

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damaged_bags import seen_by_rosbags
-from disks import no_more_files, small_disk
-from harness import assert_one_line, graph, parameters, run_node, stop
+from helpers.damaged_bags import seen_by_rosbags
+from helpers.disks import no_more_files, small_disk
+from helpers.node_processes import assert_one_line, graph, parameters, run_node, stop
 
 from auv_analysis.bag import read_bag
 from auv_analysis.bag.recover import recover

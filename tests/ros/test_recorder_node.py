@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from builtin_interfaces.msg import Time
-from harness import (
+from helpers.node_processes import (
     PATIENCE,
     Peer,
     assert_one_line,

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
-from harness import assert_one_line, graph, parameters, run_node, stop
-from made_messages import Bag, serialized, stamped
-from played_bags import STEP, ended, made, playing, process, steps_of, there
+from helpers.made_messages import Bag, serialized, stamped
+from helpers.node_processes import assert_one_line, graph, parameters, run_node, stop
+from helpers.played_bags import STEP, ended, made, playing, process, steps_of, there
 
 from auv_analysis.bag import read_bag
 from auv_dynamics.ros import topics

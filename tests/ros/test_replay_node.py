@@ -4,9 +4,17 @@ import signal
 from pathlib import Path
 
 import pytest
-from harness import CONTROLLER, PATIENCE, Peer, fresh_domain, parameters, start_node, stop
-from made_messages import STRING, Bag, new, odometry, serialized
-from played_bags import (
+from helpers.made_messages import STRING, Bag, new, odometry, serialized
+from helpers.node_processes import (
+    CONTROLLER,
+    PATIENCE,
+    Peer,
+    fresh_domain,
+    parameters,
+    start_node,
+    stop,
+)
+from helpers.played_bags import (
     STATE,
     STEP,
     ended,

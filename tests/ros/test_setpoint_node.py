@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from harness import assert_one_line, graph, parameters, run_node
+from helpers.node_processes import assert_one_line, graph, parameters, run_node
 
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from harness import PATIENCE, Peer, fresh_domain, graph, parameters
+from helpers.node_processes import PATIENCE, Peer, fresh_domain, graph, parameters
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message

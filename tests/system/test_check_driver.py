@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from harness import Peer, fresh_domain, parameters, start_auv, start_node, stop
-from nursery import Process
+from helpers.fork_server import Process
+from helpers.node_processes import Peer, fresh_domain, parameters, start_auv, start_node, stop
 
 from auv_analysis.driver.checks import CHECKS
 from auv_analysis.driver.evidence import FAIL, PASS

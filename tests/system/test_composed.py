@@ -9,8 +9,8 @@ import numpy as np
 import psutil
 import pytest
 import yaml
-from graph_runs import every_message, node_of, nodes, recorded, start, start_installed
-from harness import auv, graph, installed_auv, parameters, stop
+from helpers.graph_runs import every_message, node_of, nodes, recorded, start, start_installed
+from helpers.node_processes import auv, graph, installed_auv, parameters, stop
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from std_srvs.srv import SetBool, Trigger

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from harness import auv
+from helpers.node_processes import auv
 
 from auv_analysis.cli import main
 

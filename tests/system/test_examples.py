@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from harness import auv, fresh_domain
+from helpers.node_processes import auv, fresh_domain
 
 from auv_analysis.bag import load_run
 

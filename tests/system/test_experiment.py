@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from graph_runs import (
+from helpers.graph_runs import (
     assert_same,
     both,
     every_message,
@@ -18,7 +18,7 @@ from graph_runs import (
     recorded,
     start_installed,
 )
-from harness import auv, fresh_domain, installed_auv
+from helpers.node_processes import auv, fresh_domain, installed_auv
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
@@ -219,7 +219,7 @@ def test_a_diverging_loop_says_so(tmp_path: Path) -> None:
 
 
 def test_a_domain_with_another_vehicle_is_refused(tmp_path: Path) -> None:
-    from harness import Peer
+    from helpers.node_processes import Peer
 
     from auv_dynamics.ros import topics
 

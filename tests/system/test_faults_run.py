@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
-from graph_runs import assert_same, both
-from harness import auv
-from pages import Page
+from helpers.graph_runs import assert_same, both
+from helpers.node_processes import auv
+from helpers.report_pages import Page
 
 from auv_analysis.bag import load_run, read_bag
 from auv_analysis.metrics.fault_response import FILE, responses

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from foreign_bags import NAMED, Maker, motion, nanoseconds, simple, simulated, write
-from harness import auv
+from helpers.foreign_bags import NAMED, Maker, motion, nanoseconds, simple, simulated, write
+from helpers.node_processes import auv
 
 from auv_analysis.cli import main
 

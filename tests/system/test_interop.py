@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from graph_runs import recorded
-from harness import auv
+from helpers.graph_runs import recorded
+from helpers.node_processes import auv
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import psutil
 import pytest
-from graph_runs import long_run, nodes
-from harness import Peer, auv, fresh_domain, start_auv
-from nursery import Process
+from helpers.fork_server import Process
+from helpers.graph_runs import long_run, nodes
+from helpers.node_processes import Peer, auv, fresh_domain, start_auv
 
 from auv_analysis.bag import load_run
 from auv_analysis.graph.experiment import COMPOSED, PACKAGES

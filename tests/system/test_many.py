@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
-from harness import auv
+from helpers.node_processes import auv
+from helpers.sweeps import run as run_sweep
+from helpers.sweeps import write_files
 from PIL import Image
-from sweeps import run as run_sweep
-from sweeps import write_files
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.runs.samples import write_samples

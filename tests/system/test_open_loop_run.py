@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from graph_runs import assert_same, both, recorded
+from helpers.graph_runs import assert_same, both, recorded
 
 from auv_analysis import load_scenario
 

@@ -15,10 +15,10 @@ import numpy as np
 import psutil
 import pytest
 import yaml
-from damaged_bags import seen_by_rosbags
-from disks import small_disk
-from graph_runs import node_of, nodes, start
-from harness import auv
+from helpers.damaged_bags import seen_by_rosbags
+from helpers.disks import small_disk
+from helpers.graph_runs import node_of, nodes, start
+from helpers.node_processes import auv
 
 from auv_analysis.bag import load_run, read_bag
 from auv_analysis.graph.supervisor import NodeDiedError, Supervisor

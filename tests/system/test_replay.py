@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from graph_runs import every_message, recorded
-from harness import (
+from helpers.fork_server import Process
+from helpers.graph_runs import every_message, recorded
+from helpers.node_processes import (
     PATIENCE,
     Peer,
     environment,
@@ -26,10 +27,9 @@ from harness import (
     start_node,
     stop,
 )
+from helpers.played_bags import ended, made, there
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from nursery import Process
-from played_bags import ended, made, there
 
 from auv_analysis import load_scenario
 from auv_analysis.bag import load_run

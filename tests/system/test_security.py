@@ -9,20 +9,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import networks
-import policies
 import psutil
 import pytest
 import yaml
-from harness import PATIENCE, auv, environment, fresh_domain, stop
-from nursery import NODES
+from helpers import networks, policies
+from helpers.fork_server import NODES
+from helpers.node_processes import PATIENCE, auv, environment, fresh_domain, stop
 
 from auv_analysis import load_scenario
 from auv_analysis.graph.supervisor import executable
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.security import PROFILES, RANGE, asked, loopback, require, stay_local
 
-TESTS = Path(__file__).resolve().parents[1]
+TESTS = str(Path(__file__).resolve().parents[1])
 PLANT = ('--ros-args', '-p', 'vehicle:=herman2018')
 ENFORCED = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce'}
 DDS_PORTS = range(7000, 32768)  # above them are those that the system hands out for sending
@@ -174,8 +173,8 @@ def test_what_the_user_has_chosen_stays(monkeypatch, chosen) -> None:
 
 def found(machine: networks.Machine, environ: dict[str, str], seconds: float = PATIENCE) -> str:
     """Nodes that a participant finds on a machine within so long."""
-    command = machine.command(sys.executable, str(TESTS / 'outsider.py'), str(seconds))
-    environ = {**environ, **({} if RANGE in environ else loopback())}
+    command = machine.command(sys.executable, '-m', 'helpers.discovery_probe', str(seconds))
+    environ = {**environ, 'PYTHONPATH': TESTS, **({} if RANGE in environ else loopback())}
     return subprocess.run(
         command, env=environ, capture_output=True, text=True, timeout=2 * PATIENCE, check=True
     ).stdout.strip()
@@ -202,9 +201,10 @@ def test_nothing_of_a_run_leaves_the_machine(tmp_path) -> None:
     path = tmp_path / 'short.yaml'
     path.write_text(yaml.safe_dump(data))
     with networks.two_machines() as (inside, _):
-        command = inside.command(sys.executable, str(TESTS / 'graph_runs.py'), str(path))
-        environ = environment(fresh_domain())
-        subprocess.run([*command, str(tmp_path / 'out')], env=environ, timeout=120, check=True)
+        command = inside.command(sys.executable, '-m', 'helpers.graph_runs', str(path))
+        environ = environment(fresh_domain()) | {'PYTHONPATH': TESTS}
+        command = [*command, str(tmp_path / 'out')]
+        subprocess.run(command, env=environ, timeout=120, check=True)
         assert inside.sent() == 0
     assert list(tmp_path.glob('out/*/*.mcap'))
 

@@ -17,8 +17,17 @@ import numpy as np
 import psutil
 import pytest
 import yaml
-from graph_runs import assert_same, both, long_run, node_of, nodes, raw_messages, record, start
-from harness import auv
+from helpers.graph_runs import (
+    assert_same,
+    both,
+    long_run,
+    node_of,
+    nodes,
+    raw_messages,
+    record,
+    start,
+)
+from helpers.node_processes import auv
 
 from auv_analysis import load_scenario
 from auv_analysis.bag import read_bag

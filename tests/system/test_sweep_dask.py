@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from sweeps import CAMPAIGN, ROLLOUTS, parts, rows, run, write_files
+from helpers.sweeps import CAMPAIGN, ROLLOUTS, parts, rows, run, write_files
 
 from auv_analysis.cli.main import main
 from auv_analysis.studies.sweep.campaign import load_campaign

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from sweeps import CAMPAIGN, parts, write_files
+from helpers.sweeps import CAMPAIGN, parts, write_files
 
 AUV = [sys.executable, '-m', 'auv_analysis.cli.main', 'sweep', 'campaign.yaml', '--workers', '2']
 BLOCKS = 48

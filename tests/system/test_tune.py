@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
-from harness import auv
-from tunings import GVC, SAME_CL, write
+from helpers.node_processes import auv
+from helpers.tunings import GVC, SAME_CL, write
 
 
 def tuned(folder: Path, *arguments: str) -> dict:

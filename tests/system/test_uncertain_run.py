@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from graph_runs import assert_same, both
-from harness import auv
+from helpers.graph_runs import assert_same, both
+from helpers.node_processes import auv
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate

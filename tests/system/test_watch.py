@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 import yaml
-from graph_runs import every_message, record
-from harness import PATIENCE, auv, fresh_domain, start_auv, start_installed_auv
-from nursery import Process
+from helpers.fork_server import Process
+from helpers.graph_runs import every_message, record
+from helpers.node_processes import PATIENCE, auv, fresh_domain, start_auv, start_installed_auv
 
 from auv_dynamics.ros import interface
 

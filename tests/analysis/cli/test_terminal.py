@@ -3,10 +3,10 @@
 import io
 from typing import Any
 
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
-from strategies import QUICK
 
 from auv_analysis.cli.scenario_runs import summary_tables
 from auv_analysis.output.text import number

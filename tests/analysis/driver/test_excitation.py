@@ -5,7 +5,7 @@ import threading
 
 import numpy as np
 import pytest
-from simulated_driver import SimulatedDriver
+from helpers.simulated_driver import SimulatedDriver
 
 from auv_analysis.driver.excitation import (
     GOODBYE,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_odometry import DRIVER, ODOMETRY, WRENCH, found_in, graph, healthy
+from helpers.made_odometry import DRIVER, ODOMETRY, WRENCH, found_in, graph, healthy
 
 from auv_analysis.driver.checks import CHECKS
 from auv_analysis.driver.evidence import (

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from made_odometry import found_in as found_by
-from made_odometry import healthy, motion, odometry_log
+from helpers.made_odometry import found_in as found_by
+from helpers.made_odometry import healthy, motion, odometry_log
 
 from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, CheckResult
 from auv_analysis.driver.odometry_log import OdometryLog

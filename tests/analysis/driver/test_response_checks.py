@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from made_odometry import graph
-from simulated_driver import SimulatedDriver
+from helpers.made_odometry import graph
+from helpers.simulated_driver import SimulatedDriver
 
 from auv_analysis.driver.checks import CHECKS, document_of
 from auv_analysis.driver.checks import judge as judged

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_odometry import graph, healthy
+from helpers.made_odometry import graph, healthy
+from helpers.simulated_driver import SimulatedDriver
 from pyarrow import parquet
 from rich.console import Console
-from simulated_driver import SimulatedDriver
 
 from auv_analysis.cli.main import main
 from auv_analysis.driver.checks import (

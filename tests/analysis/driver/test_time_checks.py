@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_odometry import BEGAN, found_in, healthy, motion, odometry_log
+from helpers.made_odometry import BEGAN, found_in, healthy, motion, odometry_log
 
 from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, CheckResult
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from made_odometry import found_in as found_by
-from made_odometry import graph, motion, odometry_log
+from helpers.made_odometry import found_in as found_by
+from helpers.made_odometry import graph, motion, odometry_log
 from scipy.signal import lfilter
 
 from auv_analysis.driver.checks import CHECKS

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from foreign_vehicles import BLUEROV2, REMUS, REMUS_LIFT, REXROV, URDF, sdf
+from helpers.foreign_vehicles import BLUEROV2, REMUS, REMUS_LIFT, REXROV, URDF, sdf
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.cli.main import main

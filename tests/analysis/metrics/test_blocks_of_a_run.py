@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from block_runs import in_blocks
-from certificates import certificate_of
+from helpers.block_runs import in_blocks
+from helpers.certificates import certificate_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal

@@ -8,11 +8,11 @@ import herman_reference as reference
 import numpy as np
 import pytest
 import yaml
-from certificates import lyapunov_summary
+from helpers.certificates import lyapunov_summary
+from helpers.strategies import QUICK, attitudes, full, gains, vectors, vehicles
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK, attitudes, full, gains, vectors, vehicles
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.metrics.certificate import certificate, sampled_integral

@@ -3,9 +3,9 @@
 import herman_reference as reference
 import numpy as np
 import pytest
+from helpers.strategies import QUICK, vectors, vehicles
 from hypothesis import given
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK, vectors, vehicles
 
 from auv_analysis.metrics.energy import generalised_velocity, kinetic_energy, shares
 from auv_dynamics import load_vehicle

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.signal import savgol_coeffs, savgol_filter
-from strategies import QUICK
 
 from auv_analysis.metrics.local_polynomials import (
     ORDER,

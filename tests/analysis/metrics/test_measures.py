@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK, vectors
 from hypothesis import given
-from strategies import QUICK, vectors
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics.measures import (

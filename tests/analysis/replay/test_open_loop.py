@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import rclpy
 import yaml
-from made_messages import Bag, odometry, serialized, stamped
+from helpers.made_messages import Bag, odometry, serialized, stamped
 
 from auv_analysis.bag.step_topics import ACCEL, ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import main

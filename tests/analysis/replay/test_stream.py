@@ -5,9 +5,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from helpers.made_messages import STRING, Bag, new, serialized
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from made_messages import STRING, Bag, new, serialized
 
 from auv_analysis.replay.played_bag import index_bag, messages
 from auv_dynamics.files.errors import InputError

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from helpers.strategies import QUICK, positive_definite
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK, positive_definite
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.scenario.scaling import (

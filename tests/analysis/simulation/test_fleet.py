@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 import pytest
-from closed_loops import file_of
+from helpers.closed_loops import file_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal

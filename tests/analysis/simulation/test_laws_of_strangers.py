@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from stranger_bags import SCENARIO, write
+from helpers.untrusted_bags import SCENARIO, write
 
 from auv_analysis import load_run, summarize
 from auv_analysis.cli import main

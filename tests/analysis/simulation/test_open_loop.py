@@ -8,12 +8,12 @@ from pathlib import Path
 import herman_reference as reference
 import numpy as np
 import pytest
-from closed_loops import TURNED, file_of
+from helpers.closed_loops import TURNED, file_of
+from helpers.plants import plant_of, push
+from helpers.strategies import QUICK, vehicles
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from plants import plant_of, push
-from strategies import QUICK, vehicles
 
 import auv_analysis.simulation.open_loop as module
 from auv_analysis import open_loop

@@ -6,7 +6,7 @@ of each series counts by itself, so that a wrong axis cannot hide behind a large
 
 import numpy as np
 import pytest
-from closed_loops import FULL, HARMONIC, PER_AXIS, SIX, TURNED, file_of, pair, wave
+from helpers.closed_loops import FULL, HARMONIC, PER_AXIS, SIX, TURNED, file_of, pair, wave
 from numpy.testing import assert_allclose
 from reference_cases import CL, ERRORS, PID, SMC, VARYING, off_centre
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from closed_loops import file_of, pair, wave
+from helpers.closed_loops import file_of, pair, wave
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis import simulate

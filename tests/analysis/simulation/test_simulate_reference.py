@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from closed_loops import FULL, HARMONIC, PER_AXIS, SIX, TURNED, file_of, pair, wave
+from helpers.closed_loops import FULL, HARMONIC, PER_AXIS, SIX, TURNED, file_of, pair, wave
+from helpers.strategies import QUICK, gains, vehicles
 from hypothesis import given, settings
 from numpy.testing import assert_allclose
-from strategies import QUICK, gains, vehicles
 
 SERIES = ('t', 'nu', 'nu_d', 'tau', 'disturbance', 'disturbance_estimate', 'eta')
 

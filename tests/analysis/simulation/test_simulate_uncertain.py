@@ -4,7 +4,7 @@ every one against the independent implementation."""
 import herman_reference as reference
 import numpy as np
 import pytest
-from closed_loops import (
+from helpers.closed_loops import (
     FULL,
     HARMONIC,
     PAPER,
@@ -15,10 +15,10 @@ from closed_loops import (
     pair,
     wave,
 )
+from helpers.strategies import QUICK, vectors, vehicles
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from strategies import QUICK, vectors, vehicles
 
 SERIES = ('t', 'nu', 'nu_d', 'tau', 'disturbance_estimate', 'eta', 'nu_measured', 'tau_applied')
 CURRENT = {'kind': 'current', 'velocity': [0.3, 0.1, -0.05]}

@@ -6,11 +6,11 @@ import json
 import numpy as np
 import pytest
 import yaml
-from foreign_vehicles import REMUS, REMUS_LIFT
+from helpers.foreign_vehicles import REMUS, REMUS_LIFT
+from helpers.strategies import QUICK, vehicles
 from hypothesis import given
 from numpy.testing import assert_allclose
 from rich.console import Console
-from strategies import QUICK, vehicles
 
 from auv_analysis.cli.main import main
 from auv_analysis.metrics.coupling import delta_pi, delta_xi

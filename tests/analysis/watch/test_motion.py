@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from strategies import QUICK
 
 from auv_analysis.metrics.coupling import LiveAnalysis
 from auv_analysis.watch.monitor import FRESH, HELD_NS, LiveMotion

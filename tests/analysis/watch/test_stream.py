@@ -1,9 +1,9 @@
 """Rates, gaps and repeated stamps of one topic, from messages with known numbers and stamps."""
 
 import pytest
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import QUICK
 
 from auv_analysis.watch.monitor import WINDOW, Stream
 

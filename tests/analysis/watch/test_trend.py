@@ -1,10 +1,10 @@
 """Largest values, rms and history of the last seconds."""
 
 import numpy as np
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from strategies import QUICK
 
 from auv_analysis.watch.monitor import BUCKET, BUCKETS, Trend
 

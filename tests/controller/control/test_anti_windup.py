@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_loops import file_of
+from helpers.closed_loops import file_of
 from numpy.testing import assert_array_equal
 
 from auv_analysis import load_scenario, simulate

@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK
 
 from auv_dynamics import InputError
 from auv_gvc_controller.control.setpoint import (

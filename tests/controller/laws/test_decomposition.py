@@ -5,10 +5,10 @@ from fractions import Fraction
 import herman_reference as reference
 import numpy as np
 import pytest
+from helpers.strategies import QUICK, positive_definite, vectors, vehicles
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK, positive_definite, vectors, vehicles
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict

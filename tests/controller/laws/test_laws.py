@@ -3,9 +3,9 @@
 import herman_reference as reference
 import numpy as np
 import pytest
+from helpers.strategies import QUICK, attitudes, full, gains, vectors, vehicles
 from hypothesis import given
 from numpy.testing import assert_allclose
-from strategies import QUICK, attitudes, full, gains, vectors, vehicles
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle.kinematics import quaternion

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 import yaml
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import QUICK
 
 from auv_analysis import load_scenario
 from auv_dynamics import load_vehicle

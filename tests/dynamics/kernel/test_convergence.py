@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import yaml
-from physics import body, drive, vehicle_of
+from helpers.physics import body, drive, vehicle_of
 
 from auv_analysis import load_scenario, simulate
 from auv_dynamics.files.shipped import shipped

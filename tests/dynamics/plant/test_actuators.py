@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK, vectors
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError

@@ -1,8 +1,8 @@
 """The plant of the nodes over more steps than are tabulated at once, against one long table."""
 
 import numpy as np
+from helpers.plants import plant_of
 from numpy.testing import assert_array_equal
-from plants import plant_of
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.kernel.integrator import TABLEAUS, stage_times

@@ -3,8 +3,8 @@
 import herman_reference as reference
 import numpy as np
 import pytest
+from helpers.plants import plant_of, push
 from numpy.testing import assert_allclose, assert_array_equal
-from plants import plant_of, push
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.plant.disturbance import KINDS, herman2018, make_disturbance

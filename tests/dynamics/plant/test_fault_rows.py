@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from helpers.plants import plant_of, push
 from numpy.testing import assert_allclose, assert_array_equal
-from plants import plant_of, push
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK, SPECS, WORKED
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from strategies import QUICK, SPECS, WORKED
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.disturbance import Harmonics

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from helpers.plants import plant_of
 from numpy.testing import assert_allclose
-from plants import plant_of
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.kernel.compile import plain

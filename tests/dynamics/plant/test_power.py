@@ -6,10 +6,10 @@ import herman_reference as reference
 import numpy as np
 import pytest
 import yaml
+from helpers.physics import drive, energy, vehicle_of
+from helpers.strategies import QUICK, attitudes, vectors, vehicles
 from hypothesis import given
 from numpy.testing import assert_allclose
-from physics import drive, energy, vehicle_of
-from strategies import QUICK, attitudes, vectors, vehicles
 
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.plant.plant import initial_state

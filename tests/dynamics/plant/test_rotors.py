@@ -6,11 +6,11 @@ import re
 import numpy as np
 import pytest
 import yaml
+from helpers.strategies import QUICK, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
-from strategies import QUICK, vectors
 
 from auv_dynamics import InputError, load_vehicle
 from auv_dynamics.files.shipped import shipped

@@ -3,10 +3,10 @@
 import herman_reference as reference
 import numpy as np
 import pytest
+from helpers.strategies import QUICK, SPECS, WORKED
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK, SPECS, WORKED
 
 from auv_dynamics.plant.disturbance import Harmonics
 

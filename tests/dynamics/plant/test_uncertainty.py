@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.plants import plant_of, push
+from helpers.strategies import QUICK, attitudes, full, vectors, vehicles
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from plants import plant_of, push
-from strategies import QUICK, attitudes, full, vectors, vehicles
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
+from helpers.physics import drive, vehicle_of
+from helpers.strategies import QUICK, attitudes, vectors, vehicles
 from hypothesis import given
 from numpy.testing import assert_allclose
-from physics import drive, vehicle_of
-from strategies import QUICK, attitudes, vectors, vehicles
 
 from auv_dynamics.plant.plant import initial_state
 from auv_dynamics.vehicle.kinematics import quaternion, rotation

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from helpers.physics import drive, vehicle_of
+from helpers.strategies import QUICK, attitudes, vectors, vehicles
 from hypothesis import given
 from numpy.testing import assert_allclose, assert_array_equal
-from physics import drive, vehicle_of
-from strategies import QUICK, attitudes, vectors, vehicles
 
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.plant.plant import initial_state

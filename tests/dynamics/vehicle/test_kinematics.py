@@ -3,12 +3,12 @@
 import herman_reference as reference
 import numpy as np
 import pytest
+from helpers.physics import R_ANGLES, R, T, body, drive, vehicle_of
+from helpers.strategies import QUICK, attitudes, vectors, vehicles
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from physics import R_ANGLES, R, T, body, drive, vehicle_of
 from scipy.integrate import solve_ivp
-from strategies import QUICK, attitudes, vectors, vehicles
 
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.plant.plant import eta_of, initial_state

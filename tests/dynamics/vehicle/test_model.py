@@ -4,9 +4,7 @@ import herman_reference as reference
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
-from numpy.testing import assert_allclose, assert_array_equal
-from physics import (
+from helpers.physics import (
     DENSE_C_NU,
     DENSE_M_A,
     DENSE_NU,
@@ -19,7 +17,9 @@ from physics import (
     vehicle_of,
     with_inertia,
 )
-from strategies import QUICK, attitudes, vectors, vehicles
+from helpers.strategies import QUICK, attitudes, vectors, vehicles
+from hypothesis import given
+from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_dynamics.files.shipped import shipped
 

@@ -6,10 +6,10 @@ import re
 import numpy as np
 import pytest
 import yaml
+from helpers.strategies import QUICK, vectors
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK, vectors
 
 from auv_dynamics import InputError, load_vehicle
 from auv_dynamics.files.shipped import shipped

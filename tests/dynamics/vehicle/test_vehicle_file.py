@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from helpers.strategies import QUICK, vehicles
 from hypothesis import given
 from jsonschema import Draft202012Validator
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK, vehicles
 
 from auv_dynamics import InputError, load_vehicle
 from auv_dynamics.files.shipped import shipped

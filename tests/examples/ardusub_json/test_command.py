@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import yaml
 from ardusub_mixer import FRAMES
+from helpers.sitl_peer import BACKEND, NEUTRAL, ROOT, SitlPeer, backend
 from json_motors import make_motors
-from sitl_peer import BACKEND, NEUTRAL, ROOT, SitlPeer, backend
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError

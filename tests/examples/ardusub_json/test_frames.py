@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from sitl_peer import NEUTRAL, Backend, SitlPeer, backend
+from helpers.sitl_peer import NEUTRAL, Backend, SitlPeer, backend
 
 AHEAD = [1400, 1400, 1600, 1600, 1500, 1500, 1500, 1500]
 

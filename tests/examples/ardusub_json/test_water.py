@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import yaml
 from ardusub_mixer import motor_pulses
+from helpers.sitl_peer import ROOT, SitlPeer, backend
 from reference_devices import thruster_matrix
 from reference_plant import Plant
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
-from sitl_peer import ROOT, SitlPeer, backend
 
 from auv_analysis import load_run
 from auv_dynamics.vehicle.thruster_curves import load_curve

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from ardusub_autopilot import ALT_HOLD, STABILIZE, Autopilot
-from mavlink_pair import SECOND, Booted
+from helpers.mavlink_pair import SECOND, Booted
 from numpy.testing import assert_allclose
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from harness import PATIENCE, Peer, fresh_domain, parameters, stop
-from mavlink_relay import Relay, free_port, start_program
+from helpers.mavlink_relay import Relay, free_port, start_program
+from helpers.node_processes import PATIENCE, Peer, fresh_domain, parameters, stop
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from std_srvs.srv import SetBool
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from ardusub_autopilot import ALT_HOLD, STABILIZE
-from mavlink_pair import Booted, Pair, nothing
+from helpers.mavlink_pair import Booted, Pair, nothing
 from pilot import LEAST, MOST
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from vehicle_link import LinkSettings

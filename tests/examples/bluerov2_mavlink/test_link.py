@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ardusub_autopilot import ALT_HOLD
-from mavlink_pair import SECOND, Booted, Pair, nothing
+from helpers.mavlink_pair import SECOND, Booted, Pair, nothing
 from numpy.testing import assert_allclose
 from pilot import MANUAL
 from pymavlink.dialects.v20 import ardupilotmega as mavlink

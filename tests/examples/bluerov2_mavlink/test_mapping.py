@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from ardusub_mixer import VECTORED_6DOF, motor_pulses, thrust
+from helpers.mavlink_pair import Booted, Pair
+from helpers.strategies import QUICK, vectors
 from hypothesis import given
-from mavlink_pair import Booted, Pair
 from numpy.testing import assert_allclose
-from strategies import QUICK, vectors
 from wrench_mapping import FOUR, SIGNS, PilotAxes, WrenchMapping, rc_override
 
 from auv_dynamics import load_vehicle

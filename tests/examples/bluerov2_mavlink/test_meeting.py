@@ -1,7 +1,7 @@
 """What the driver asks a vehicle for when they meet, what it waits for, what it says."""
 
 import pytest
-from mavlink_pair import Booted, Pair
+from helpers.mavlink_pair import Booted, Pair
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from vehicle_link import LinkSettings
 from wrench_mapping import MANUAL_CONTROL

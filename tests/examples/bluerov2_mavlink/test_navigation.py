@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mavlink_pair import SECOND, Pair
+from helpers.mavlink_pair import SECOND, Pair
 from navigation import ENOUGH, BootClock, Exchange, RestartedError, turned
 from numpy.testing import assert_allclose
 

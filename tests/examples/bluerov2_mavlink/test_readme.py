@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from ardusub_mixer import thrust
-from mavlink_relay import EXAMPLE
+from helpers.mavlink_relay import EXAMPLE
 from wrench_mapping import FOUR, WrenchMapping, command_of
 
 from auv_dynamics import load_vehicle

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness import PATIENCE, Peer, auv, fresh_domain, parameters, start_node, stop
-from mavlink_relay import EXAMPLE, free_port, start_program
+from helpers.mavlink_relay import EXAMPLE, free_port, start_program
+from helpers.node_processes import PATIENCE, Peer, auv, fresh_domain, parameters, start_node, stop
 from numpy.testing import assert_array_equal
 
 from auv_analysis.bag import load_run, open_bag

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from pages import check_numbers
+from helpers.report_pages import check_numbers
 from pyarrow import parquet
 
 from auv_analysis import load_scenario, simulate, summarize

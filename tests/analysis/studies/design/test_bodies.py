@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK, positive_definite, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from strategies import QUICK, positive_definite, vectors
 
 from auv_analysis.studies.design.change import (
     disc_added_mass,

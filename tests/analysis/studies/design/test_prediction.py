@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK, positive_definite, vectors
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from strategies import QUICK, positive_definite, vectors
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.metrics.coupling import delta_pi, delta_xi

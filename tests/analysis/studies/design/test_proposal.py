@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from pages import check_numbers
+from helpers.report_pages import check_numbers
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.output.folder import ResultsFolder

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import yaml
+from helpers.strategies import QUICK, vectors, vehicles
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from strategies import QUICK, vectors, vehicles
 
 from auv_analysis.studies.design.change import NAMES, ChangeSpace, rounded
 from auv_analysis.studies.design.setting import changed_data, changed_text

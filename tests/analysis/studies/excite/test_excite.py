@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from trials import recorded
+from helpers.sea_trials import recorded
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main

@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 import pytest
-import trials
 import yaml
-from foreign_bags import Maker, motion, simple, write
+from helpers import sea_trials
+from helpers.foreign_bags import Maker, motion, simple, write
 from pyarrow import parquet
 
 from auv_analysis.cli.main import main
@@ -31,7 +31,7 @@ def auv(capsys, *arguments: object) -> tuple[int, str]:
 def bag(tmp_path_factory):
     """A trial as our nodes would record it: odometry with noise, commanded wrench."""
     folder = tmp_path_factory.mktemp('trial')
-    record, run = trials.trial(folder, 'herman2018', 5, duration=60.0)
+    record, run = sea_trials.trial(folder, 'herman2018', 5, duration=60.0)
     part = motion(run, enu=False)
     noisy = part._replace(attitude=record.attitude[:, [1, 2, 3, 0]], twist=record.velocity)
     frames = 'odom_ned', 'base_link_fsd'
@@ -94,7 +94,7 @@ def test_intervals_on_request_stand_beside_the_others(bag, tmp_path):
 
 def test_the_file_predicts_the_recording(bag, identified, tmp_path, capsys):
     vehicle = identified / 'vehicle.yaml'
-    lag = ('--lag', trials.LAG, '--delay', trials.DELAY)
+    lag = ('--lag', sea_trials.LAG, '--delay', sea_trials.DELAY)
     code, _ = auv(capsys, 'predict', bag, '--vehicle', vehicle, '--out', tmp_path / 'p', *lag)
     assert code == 0
     document = json.loads((tmp_path / 'p' / 'predict.json').read_text(encoding='utf-8'))

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from helpers.sea_trials import DELAY, trial, truth, wrong_prior
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
-from trials import DELAY, trial, truth, wrong_prior
 
 from auv_analysis.bag.tracks import Track
 from auv_analysis.studies.identify.couplings import couplings

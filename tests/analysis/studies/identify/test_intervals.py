@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from helpers.sea_trials import SWINGS, gauss_markov, trial, truth
 from numpy.testing import assert_allclose
-from trials import SWINGS, gauss_markov, trial, truth
 
 from auv_analysis.studies.identify.identify import Settings, identify, split
 from auv_analysis.studies.identify.whiteness import told, whiteness

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.sea_trials import DELAY, LAG, trial, wrong_prior
 from numpy.testing import assert_allclose, assert_array_equal
-from trials import DELAY, LAG, trial, wrong_prior
 
 from auv_analysis.bag.tracks import Track, assembled
 from auv_analysis.studies.identify.bags import parts, without_constants

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK, attitudes, vectors, vehicles
 from hypothesis import given
 from numpy.testing import assert_allclose
-from strategies import QUICK, attitudes, vectors, vehicles
 
 from auv_analysis.studies.identify.record import continuous, rotated, small_rotation
 from auv_analysis.studies.identify.unknowns import DEFAULT, GROUPS, unknowns

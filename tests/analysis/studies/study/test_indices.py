@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import QUICK
 
 from auv_analysis.studies.sweep.indices import SensitivityPlan, spreads
 

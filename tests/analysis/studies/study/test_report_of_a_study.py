@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
-from pages import Page, at, check_numbers, tokens
+from helpers.report_pages import Page, at, check_numbers, tokens
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.cli import main

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
-from closed_loops import PER_AXIS
+from helpers.closed_loops import PER_AXIS
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate, summarize

@@ -1,7 +1,7 @@
 """A sweep whose figures are known functions of what varies."""
 
 import pytest
-from made_sweeps import SIMPLE, make_sweep, simple
+from helpers.made_sweeps import SIMPLE, make_sweep, simple
 
 from auv_analysis.studies.sweep.analysis import Analysis, analysed
 from auv_analysis.studies.sweep.dataset import open_sweep

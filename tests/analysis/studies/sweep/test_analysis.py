@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from helpers.made_sweeps import DAMPING, ENERGY, K_D, SETTLED, rows
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from made_sweeps import DAMPING, ENERGY, K_D, SETTLED, rows
 from scipy.stats import f_oneway, spearmanr
-from strategies import QUICK
 
 from auv_analysis.report.plots import distribution, new_figure
 from auv_analysis.studies.sweep.analysis import (

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from helpers.strategies import QUICK
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import QUICK
 
 from auv_analysis.studies.sweep.campaign import Campaign, load_campaign
 from auv_dynamics.files.errors import InputError

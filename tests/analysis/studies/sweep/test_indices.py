@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_sweeps import make_sweep
+from helpers.made_sweeps import make_sweep
 
 from auv_analysis.studies.sweep.analysis import analysed
 from auv_analysis.studies.sweep.dataset import open_sweep

@@ -6,7 +6,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
-from sweeps import CAMPAIGN, ROLLOUTS, Counting, parts, rows, run, write_files
+from helpers.sweeps import CAMPAIGN, ROLLOUTS, Counting, parts, rows, run, write_files
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.scenario.changes import changed_scenario

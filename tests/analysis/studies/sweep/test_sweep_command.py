@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pyarrow.parquet
 import pytest
-from sweeps import CAMPAIGN, ROLLOUTS, SCENARIO, parts, rows, write_files
+from helpers.sweeps import CAMPAIGN, ROLLOUTS, SCENARIO, parts, rows, write_files
 
 from auv_analysis.cli.main import main
 

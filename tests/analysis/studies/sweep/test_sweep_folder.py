@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from sweeps import CAMPAIGN, ROLLOUTS, ROOT, Counting, Interrupted, parts, run, write_files
+from helpers.sweeps import CAMPAIGN, ROLLOUTS, ROOT, Counting, Interrupted, parts, run, write_files
 
 from auv_analysis.studies.sweep.campaign import load_campaign
 from auv_analysis.studies.sweep.engine import SweepStoppedError

@@ -5,8 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_sweeps import ENERGY, K_D, MIXED, SIMPLE, change_manifest, make_sweep, mixed, rows, simple
-from pages import check_numbers
+from helpers.made_sweeps import (
+    ENERGY,
+    K_D,
+    MIXED,
+    SIMPLE,
+    change_manifest,
+    make_sweep,
+    mixed,
+    rows,
+    simple,
+)
+from helpers.report_pages import check_numbers
 from pyarrow import parquet
 
 from auv_analysis.cli import main as cli

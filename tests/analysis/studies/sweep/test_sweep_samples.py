@@ -4,12 +4,12 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from SALib.sample import sobol
 from scipy import stats
 from scipy.stats import qmc
-from strategies import QUICK
 
 from auv_analysis.studies.sweep.variation import (
     MOST_AT_ONCE,

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from helpers.tunings import GVC, SAME_CL, scenario
 from scipy.stats import binomtest, rankdata
-from tunings import GVC, SAME_CL, scenario
 
 from auv_analysis.studies.pairs import NEVER, holm, log_ratios, paired
 from auv_analysis.studies.tune.cost import Measures

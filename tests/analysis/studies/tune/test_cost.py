@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from tunings import GVC, scenario
+from helpers.tunings import GVC, scenario
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.metrics.quantities import COSTS

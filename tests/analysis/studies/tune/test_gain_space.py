@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-import tunings
+from helpers import tunings
+from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import QUICK
 
 from auv_analysis.studies.tune.cost import Measures
 from auv_analysis.studies.tune.gain_space import STRUCTURES, GainSpace, make_space, starts_of

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from helpers.strategies import QUICK
+from helpers.tunings import GVC, SAME_CL, scenario
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import QUICK
-from tunings import GVC, SAME_CL, scenario
 
 from auv_analysis import load_scenario
 from auv_analysis.scenario.changes import changed_scenario

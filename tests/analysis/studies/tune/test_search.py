@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tunings import DIAGONAL, GVC, scenario
+from helpers.tunings import DIAGONAL, GVC, scenario
 
 from auv_analysis.studies.tune import search as searching
 from auv_analysis.studies.tune.cost import Measures

@@ -8,8 +8,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import yaml
-from pages import check_numbers
-from tunings import GVC, SAME_CL, write
+from helpers.report_pages import check_numbers
+from helpers.tunings import GVC, SAME_CL, write
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main

@@ -1,0 +1,193 @@
+"""What a recording contradicts itself in is said, and the map takes it off."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import sea_trials
+from helpers.foreign_bags import (
+    SECOND,
+    UNNAMED,
+    Maker,
+    loaded,
+    motion,
+    nanoseconds,
+    simple,
+    simulated,
+    write,
+)
+from numpy.testing import assert_allclose
+
+from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.foreign_checks import acts_behind
+from auv_analysis.bag.foreign_topics import candidates
+from auv_analysis.bag.tracks import Track
+from auv_analysis.runs.run import Run
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.kinematics import quaternion
+
+KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
+TERMS = {  # two incommensurable sines per axis: motion enough for a delay to show
+    'surge': (0.5, 1.1), 'sway': (0.4, 1.3), 'heave': (0.3, 0.9),
+    'roll': (0.05, 1.7), 'pitch': (0.06, 1.2), 'yaw': (0.3, 0.8),
+}  # fmt: skip
+MOVING = {
+    dof: {
+        'terms': [
+            {'amplitude': size, 'omega': omega, 'phase': 0.3},
+            {'amplitude': size / 2, 'omega': 2.3 * omega, 'phase': 1.0},
+        ]
+    }
+    for dof, (size, omega) in TERMS.items()
+}
+
+
+@pytest.fixture(scope='module')
+def run() -> Run:
+    still = {'eta': [0.0] * 6, 'nu': [0.0] * 6}
+    return simulated(duration=40.0, setpoint=MOVING, initial=still)
+
+
+def bag_of(run: Run, folder: Path, tau: Run | None = None, wrench_later: float = 0.0) -> Path:
+    maker, seen = Maker(), motion(run, enu=True, keep=slice(None, None, 2))
+    forces = motion(tau or run, enu=True)
+    forces = forces._replace(t=forces.t + wrench_later)
+    return write(folder / 'dive', simple(seen, maker, '/o', '/w', UNNAMED, forces), maker)
+
+
+def true_nu(run: Run, found: Run) -> np.ndarray:
+    """Velocities that were simulated; wrenches are averaged, so it begins half a step later."""
+    t = found.t + found.step / 2
+    return np.stack([np.interp(t, run.t, column) for column in run.nu.T], axis=1)
+
+
+def said(run: Run, word: str) -> list[str]:
+    return [note for note in run.notes if word in note]
+
+
+def test_a_sound_recording_has_no_contradictions(run, tmp_path) -> None:
+    found = loaded(bag_of(run, tmp_path), **KEYS)
+    for word in ('not the rate', 'behind', 'is zero', 'bursts'):
+        assert not said(found, word), word
+    assert said(found, 'nor an error of the model')
+
+
+def test_an_angular_velocity_that_is_not_the_rate_of_the_attitude_is_named(run, tmp_path) -> None:
+    nu = run.nu.copy()
+    nu[:, 5] = 0.0
+    bag = bag_of(replace(run, nu=nu), tmp_path, tau=run)
+    (note,) = said(loaded(bag, **KEYS), 'not the rate of the attitude')
+    assert 'yaw 0 throughout in place of' in note
+    assert 'roll' not in note
+    file = tmp_path / 'map.yaml'
+    file.write_text('odometry: /o\nwrench: /w\nframes: enu_flu\nvehicle: rexrov\n'
+                    'rates: from attitude\n')  # fmt: skip
+    mended = loaded(bag, file)
+    assert not said(mended, 'not the rate')
+    inner = slice(50, -50)
+    truth = true_nu(run, mended)
+    assert_allclose(mended.nu[inner], truth[inner], atol=3e-3)
+
+
+def test_a_late_velocity_is_told_and_taken_off(run, tmp_path) -> None:
+    late = 0.2
+    maker, seen = Maker(), motion(run, enu=True, keep=slice(None, None, 2))
+    messages = simple(seen, maker, '/o', '/w', UNNAMED, motion(run, enu=True))
+    for i, ns in enumerate(nanoseconds(seen.t).tolist()):
+        stamp = ns + round(late * SECOND)
+        twist = maker.six('Twist', seen.twist[i])
+        messages.append(('/dvl', stamp, maker.stamped('Twist', stamp, 'base_link', twist)))
+    bag = write(tmp_path / 'dive', messages, maker)
+    keys = {'pose': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
+    found = loaded(bag, **keys, twist='/dvl')
+    notes = said(found, 'behind the position')
+    assert len(notes) == 1
+    value, error = (float(x) for x in notes[0].split('velocity is ')[1].split(' s')[0].split(' ± '))
+    assert abs(value - late) <= max(3.0 * error, 0.015)
+    assert len(said(found, 'behind the attitude')) == 1
+    mended = loaded(bag, **keys, twist={'topic': '/dvl', 'delay': late})
+    assert not said(mended, 'behind the')
+    truth = true_nu(run, mended)
+    assert_allclose(mended.nu, truth, atol=2e-3)
+
+
+@pytest.mark.parametrize('later', [-0.15, -0.3])
+def test_a_wrench_that_acts_behind_its_stamps_is_told_and_taken_off(later, run, tmp_path) -> None:
+    """Stamped 0.15 or 0.3 s before it acts; F shrinks when the map says so."""
+    bag = bag_of(run, tmp_path, wrench_later=later)
+    found = loaded(bag, **KEYS)
+    (note,) = said(found, 'the wrench acts')
+    value = float(note.split('acts ')[1].split(' ')[0])
+    assert value == pytest.approx(-later, abs=0.03)
+    keys = KEYS | {'wrench': {'topic': '/w', 'delay': -later}}
+    mended = loaded(bag, **keys)
+    assert not said(mended, 'the wrench acts')
+    sizes = [np.sqrt((one.unexplained**2).mean(axis=0)) for one in (found, mended)]
+    assert np.all(sizes[1] <= sizes[0])
+    assert np.any(sizes[1] < 0.5 * sizes[0])
+
+
+@pytest.mark.parametrize('late', [0.0, 0.12, 0.3])
+def test_a_delay_is_found_beside_couplings_and_noise_and_none_where_there_is_none(
+    late, tmp_path
+) -> None:
+    """Munk moments and restoring are larger than what the wrench changes, and noise is fed back."""
+    actuators = {'lag': 0.08, 'delay': late - 0.08} if late else {'lag': 0.001}
+    _, run = sea_trials.trial(tmp_path, 'bluerov2_heavy', duration=60.0, actuators=actuators)
+    ns = np.round(run.t * SECOND).astype(np.int64)
+    eta = np.concatenate([run.eta[:, :3], quaternion(run.eta[:, 3:])], axis=1)
+    pose, twist = (Track(role, '', ns, rows, np.inf, held=False)
+                   for role, rows in (('pose', eta), ('twist', run.nu)))  # fmt: skip
+    found = acts_behind(pose, twist, Track('wrench', '', ns, run.tau, np.inf, held=True))
+    if late:
+        assert found is not None
+        assert found.value == pytest.approx(late, abs=0.025)
+    else:
+        assert found is None
+
+
+def test_a_wrench_of_zeros_is_named(run, tmp_path) -> None:
+    none = replace(run, tau=0.0 * run.tau)
+    found = loaded(bag_of(run, tmp_path, tau=none), **KEYS)
+    (note,) = said(found, 'is zero')
+    assert note.startswith('/w: every wrench is zero')
+
+
+def test_stamps_in_bursts_are_told_and_spread(run, tmp_path) -> None:
+    maker, seen = Maker(), motion(run, enu=True, keep=slice(None, None, 2))
+    forces = motion(run, enu=True, keep=slice(None, None, 2))
+    steps = np.arange(len(forces.t))
+    burst = forces._replace(t=forces.t[steps - steps % 5] + 1e-5 * (steps % 5))  # five at once
+    bag = write(tmp_path / 'dive', simple(seen, maker, '/o', '/w', UNNAMED, burst), maker)
+    found = loaded(bag, **KEYS)
+    (note,) = said(found, 'bursts')
+    assert note.startswith('/w: its stamps come in bursts, 80 %')
+    keys = KEYS | {'wrench': {'topic': '/w', 'stamps': 'uniform'}}
+    mended = loaded(bag, **keys)
+    assert said(mended, 'spread evenly, as told')
+    errors = [np.abs(one.tau - run.tau[::2][: one.samples]).mean() for one in (found, mended)]
+    assert errors[1] < errors[0]
+
+
+def test_a_state_of_a_filter_is_no_candidate_for_thrusters(run, tmp_path) -> None:
+    maker, m = Maker(), motion(run.part(slice(5)), enu=True)
+    layout = maker.new('std_msgs/msg/MultiArrayLayout', [], 0)
+    array = maker.new('std_msgs/msg/Float64MultiArray', layout, np.zeros(6))
+    messages = simple(m, maker, '/o', '/w', UNNAMED)
+    messages += [(topic, SECOND, array) for topic in ('/ekf/state', '/rov/thruster_1/pwm')]
+    bag = write(tmp_path / 'dive', messages, maker)
+    assert candidates(survey(bag))['thrusters'] == ['/rov/thruster_1/pwm']
+
+
+@pytest.mark.parametrize(('text', 'line'), [
+    ('rates: gyro\n', 'rates: expected from attitude'),
+    ('wrench: {topic: /w, delay: late}\n', r'wrench.delay: expected a number \(s\), found late'),
+    ('wrench: {topic: /w, stamps: even}\n', 'wrench.stamps: expected header, log or uniform'),
+])  # fmt: skip
+def test_what_the_map_does_not_know_is_refused(text, line, tmp_path) -> None:
+    file = tmp_path / 'map.yaml'
+    base = '' if 'wrench' in text else 'wrench: /w\n'
+    file.write_text(f'odometry: /o\n{base}{text}')
+    with pytest.raises(InputError, match=line):
+        loaded(tmp_path, file)

@@ -1,0 +1,218 @@
+"""Bags of a driver: stamps of its own, set-points on another grid, topics under other names."""
+
+import tempfile
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.made_messages import FRAMES, ODOMETRY, Bag, odometry, serialized, stamped
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+
+from auv_analysis import load_scenario
+from auv_analysis.bag import load_run, open_bag, read_bag
+from auv_analysis.bag.metadata import RECORDING, recording_text
+from auv_analysis.nodes.recorder_node import StepLedger
+from auv_analysis.runs.run import Run, joined
+from auv_dynamics.files.errors import InputError
+
+MS = 1_000_000
+VEHICLE = load_scenario('case1').attachments['vehicle.yaml']
+GRID = 20  # ms between set-points
+quick = settings(max_examples=60)
+EXACT = '/**/controller_node:\n  ros__parameters: {setpoint_pairing: exact}\n'
+
+
+def state(k: int) -> np.ndarray:
+    return np.array([k, -k, 0.5 * k, 1.0, 0, 0, 0, *range(6)], float)
+
+
+def write(
+    folder: Path, stamps: list[int], setpoints: list[int], names: Any = None, *, ahead: int = 300,
+    unanswered: Any = (), **attached: str,
+) -> Path:  # fmt: skip
+    """Bag of odometry and wrenches at `stamps` in ms, and set-points, logged `ahead` of them."""
+    names = names or {}
+    bag = Bag(folder / 'bag.mcap', chunk_size=2000)
+    bag.attach('vehicle.yaml', VEHICLE)
+    bag.attach(RECORDING, attached.pop('recording', recording_text(False, {})))
+    for name, text in attached.items():
+        bag.attach(f'{name}.yaml', text)
+    plan = [(ms, 'odom', k, ms) for k, ms in enumerate(stamps)]
+    plan += [(ms, 'wrench', k, ms) for k, ms in enumerate(stamps) if k not in unanswered]
+    plan += [(ms - ahead, 'cmd_vel', k, ms) for k, ms in enumerate(setpoints)]
+    for _, role, k, ms in sorted(plan, key=lambda entry: entry[0]):
+        kind = {'wrench': 'Wrench', 'cmd_vel': 'Twist'}.get(role)
+        made = stamped(kind, ms * MS, [float(k)] * 6) if kind else odometry(ms * MS, state(k))
+        topic = names.get(role, f'/{role}')
+        bag.add(topic, made.__msgtype__ if kind else ODOMETRY, ms * MS, serialized(made))
+    return bag.close()
+
+
+def held_by_hand(stamps: list[int], setpoints: list[int]) -> dict[int, int]:
+    """Stamp of the odometry -> number of the newest set-point at or before it."""
+    earlier = {ms: [k for k, s in enumerate(setpoints) if s <= ms] for ms in stamps}
+    return {ms: ks[-1] for ms, ks in earlier.items() if ks}
+
+
+@given(
+    apart=st.lists(st.integers(5, 60), min_size=2, max_size=60),
+    first=st.integers(-50, 50),
+    lost=st.sets(st.integers(0, 90), max_size=40),
+    ahead=st.sampled_from([0, 7, 300, -30]),
+    rows=st.integers(1, 40),
+    unanswered=st.sets(st.integers(1, 60), max_size=5),
+)
+@quick
+def test_each_odometry_has_the_newest_set_point_before_it(
+    apart, first, lost, ahead, rows, unanswered
+) -> None:
+    stamps = (1000 + np.cumsum(apart)).tolist()
+    grid = range(stamps[0] + first, stamps[-1] + 200, GRID)
+    setpoints = [ms for i, ms in enumerate(grid) if i not in lost]
+    answered = [ms for k, ms in enumerate(stamps) if k not in unanswered]
+    expected = held_by_hand(answered, setpoints)
+    with tempfile.TemporaryDirectory() as folder:
+        path = write(Path(folder), stamps, setpoints, ahead=ahead, unanswered=unanswered)
+        if not setpoints:
+            expected = dict.fromkeys(answered, 0)
+        if len(expected) < 2:
+            with pytest.raises(InputError, match='at least two steps'):
+                load_run(path)
+            return
+        run = load_run(path)
+        found = joined([*open_bag(path, whole=1).run.blocks(rows)])
+    assert_array_equal(run.nu_d[:, 0], [*expected.values()])
+    assert_array_equal(run.t, (np.array([*expected]) - next(iter(expected))) / 1000)
+    assert_array_equal(run.tau[:, 0], [stamps.index(ms) for ms in expected])
+    assert found.notes == run.notes
+    for name, values in run.arrays().items():
+        assert_array_equal(found.arrays()[name], values, err_msg=name)
+
+
+def test_what_is_missing_at_the_start_is_said(tmp_path: Path) -> None:
+    run = load_run(write(tmp_path, [1000, 1021, 1039, 1060], [1020, 1040, 1060]))
+    assert len(run.t) == 3
+    assert run.notes == (
+        'odom: 1 of 4 messages are not complete on all topics',
+        'wrench: 1 of 4 messages are not complete on all topics',
+    )
+
+
+def test_a_controller_that_pairs_exactly_has_its_own_stamps(tmp_path: Path) -> None:
+    path = write(tmp_path, [1000, 1020, 1041, 1060], [1000, 1020, 1040, 1060], params=EXACT)
+    assert_array_equal(load_run(path).t, [0.0, 0.02, 0.06])
+
+
+NAMES = {'odom': '/rov/nav/odometry', 'wrench': '/rov/thrust'}
+OURS = {'/rov/nav/odometry': '/odom', '/rov/thrust': '/wrench'}
+STAMPS, SETPOINTS = [1000, 1021, 1039, 1060], [980, 1000, 1020, 1040, 1060]
+
+
+def test_remapped_topics_are_found_and_counted_by_their_own_names(tmp_path: Path) -> None:
+    plain = load_run(write(tmp_path / 'plain', STAMPS, SETPOINTS))
+    text = recording_text(False, OURS)
+    path = write(tmp_path / 'other', STAMPS, SETPOINTS, NAMES, recording=text)
+    found = load_run(path)
+    for name, values in plain.arrays().items():
+        assert_array_equal(found.arrays()[name], values, err_msg=name)
+    assert read_bag(path).counts == {'/cmd_vel': 5, '/rov/nav/odometry': 4, '/rov/thrust': 4}
+    assert isinstance(found, Run)
+
+
+def test_without_the_note_they_are_not_guessed(tmp_path: Path) -> None:
+    path = write(tmp_path, STAMPS, SETPOINTS, NAMES)
+    with pytest.raises(InputError, match=r'odom: expected messages, found .*/rov/nav/odometry'):
+        load_run(path)
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        ('topics: 3', 'topics: expected a mapping of topics to names, found 3'),
+        ('topics: {/a: [1]}', 'topics: expected a mapping of topics to names'),
+        ('topics: {/a: /odom, /b: /odom}', 'topics: expected each name once'),
+    ],
+)
+def test_a_note_that_is_none_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    path = write(tmp_path, STAMPS, SETPOINTS, recording=text)
+    with pytest.raises(InputError, match=f'{RECORDING}: {said}'):
+        load_run(path)
+
+
+def test_steps_that_are_not_of_one_length_are_no_gaps() -> None:
+    ledger = StepLedger(['odom'], 20 * MS, strict=False)
+    for ms in (0, 15, 40, 55, 80, 100):
+        ledger.add('odom', ms * MS)
+    assert ledger.gaps == {'odom': 0}
+    assert ledger.complete == 5
+    ledger.add('odom', 165 * MS)
+    assert ledger.gaps == {'odom': 2}
+
+
+def with_unusable_messages(path: Path, *, strict: bool) -> Path:
+    """Sixty steps: odometry in another frame, of NaN and cut, a wrench of inf and an absurd one."""
+    wrong = {40: np.inf, 50: 1e200}
+    bag = Bag(path, chunk_size=100_000)
+    bag.attach('vehicle.yaml', VEHICLE)
+    bag.attach(RECORDING, recording_text(strict, {}))
+    for k in range(60):
+        ns, values = k * 10 * MS, state(k)
+        values[7] = np.nan if k == 20 else 1.0
+        made = odometry(ns, values, ('elsewhere', FRAMES[1]) if k == 30 else FRAMES)
+        data = serialized(made)
+        bag.add('/odom', ODOMETRY, ns, data[: len(data) // 2] if k == 0 else data)
+        for topic, kind in (('/wrench', 'Wrench'), ('/cmd_vel', 'Twist')):
+            made = stamped(kind, ns, [wrong.get(k, k) if kind == 'Wrench' else float(k)] * 6)
+            bag.add(topic, made.__msgtype__, ns, serialized(made))
+    return bag.close()
+
+
+def test_messages_that_nobody_could_use_are_left_out_and_counted(tmp_path: Path) -> None:
+    """As the controller did that heard them."""
+    bag = with_unusable_messages(tmp_path / 'bag.mcap', strict=False)
+    run = load_run(bag)
+    kept = [k for k in range(60) if k not in (0, 20, 30, 40, 50)]
+    assert_array_equal(run.tau[:, 0], np.array(kept, float))
+    notes = ' '.join(run.notes)
+    assert 'bag.mcap: /odom: 3 unusable messages left out, the first one: ' in notes
+    assert 'bag.mcap: /wrench: 2 unusable messages left out, the first one: ' in notes
+    assert_array_equal(joined([*open_bag(bag, whole=16).run.blocks(7)]).tau, run.tau)
+
+
+def test_in_lock_step_they_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match='/odom: expected messages of its type, found'):
+        load_run(with_unusable_messages(tmp_path / 'bag.mcap', strict=True))
+
+
+def test_the_namespace_of_the_recorder_is_the_one_that_is_read(tmp_path: Path) -> None:
+    """Two vehicles in a bag; without a word of the recorder nobody chooses one."""
+
+    def bag(namespace: str | None) -> Path:
+        path = tmp_path / f'{namespace}'.replace('/', '_')
+        path.mkdir()
+        made = Bag(path / 'bag.mcap')
+        made.attach('vehicle.yaml', VEHICLE)
+        if namespace is not None:
+            made.attach(RECORDING, recording_text(False, {}, namespace))
+        for ms, (k, space) in product(range(0, 50, 10), enumerate(('/auv1', '/auv2', '/auv3'))):
+            odom = serialized(odometry(ms * MS, state(k)))
+            made.add(f'{space}/odom', ODOMETRY, ms * MS, odom)
+            if k < 2:
+                wrench = stamped('Wrench', ms * MS, [float(k)] * 6)
+                made.add(f'{space}/wrench', wrench.__msgtype__, ms * MS, serialized(wrench))
+        return made.close()
+
+    told, untold = bag('/auv2'), bag(None)
+    assert load_run(told).tau[0, 0] == 1.0
+    assert joined(list(open_bag(told, whole=2).run.blocks())).tau[0, 0] == 1.0
+    assert load_run(told, namespace='auv1').tau[0, 0] == 0.0
+    assert load_run(untold, namespace='/auv2').tau[0, 0] == 1.0
+    with pytest.raises(InputError, match=r'/auv1, /auv2$'):
+        load_run(untold)
+    for path, space in ((bag('/'), None), (told, '/auv4')):
+        with pytest.raises(InputError, match=r'namespace /.*--namespace.*/auv1, /auv2, /auv3'):
+            open_bag(path, namespace=space)

@@ -1,0 +1,278 @@
+"""Bags that look like those of other systems: their topics, types, axes, clocks and containers."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from helpers.foreign_bags import (
+    Maker,
+    Message,
+    Motion,
+    loaded,
+    motion,
+    nanoseconds,
+    simple,
+    simulated,
+    write,
+    write_chunks,
+)
+from numpy.testing import assert_allclose
+
+from auv_analysis.runs.run import Run
+from auv_dynamics import load_vehicle
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle.thruster_curves import load_curve
+
+Layout = tuple[list[Message], dict[str, Any]]
+
+
+@pytest.fixture(scope='module')
+def run() -> Run:
+    return simulated(duration=1.0)
+
+
+def uuv_simulator(run: Run, maker: Maker) -> Layout:
+    """Gazebo's ground truth, its velocity in earth axes, and a wrench without stamp."""
+    m, messages = motion(run, enu=True, world=True), []
+    for i, ns in enumerate(nanoseconds(m.t, epoch=172).tolist()):
+        odometry = maker.odometry(ns, ('world', 'rexrov/base_link'), m, i)
+        messages.append(('/rexrov/pose_gt', ns, odometry))
+        messages.append(('/rexrov/thruster_manager/input', ns, maker.six('Wrench', m.tau[i])))
+    return messages, {
+        'odometry': {'topic': '/rexrov/pose_gt', 'twist_frame': 'world'},
+        'wrench': '/rexrov/thruster_manager/input', 'frames': 'enu_flu',
+    }  # fmt: skip
+
+
+def mavros(run: Run, maker: Maker) -> Layout:
+    """ENU and FLU, and set-points of the velocity in a Twist without stamp."""
+    m = motion(run, enu=True)
+    topics = '/mavros/local_position/odom', '/mavros/wrench'
+    messages = simple(m, maker, *topics, ('map', 'base_link'))
+    for i, ns in enumerate(nanoseconds(m.t).tolist()):
+        setpoint = maker.six('Twist', m.nu_d[i])
+        messages.append(('/mavros/setpoint_velocity/cmd_vel_unstamped', ns, setpoint))
+    return messages, {
+        'odometry': topics[0], 'wrench': topics[1], 'frames': 'enu_flu',
+        'setpoint': '/mavros/setpoint_velocity/cmd_vel_unstamped',
+    }  # fmt: skip
+
+
+def cola2(run: Run, maker: Maker) -> Layout:
+    """NED, but a body frame that does not say so."""
+    topics = '/girona500/navigator/odometry', '/girona500/controller/body_force_req'
+    frames = 'world_ned', 'girona500/base_link'
+    messages = simple(motion(run, enu=False), maker, *topics, frames)
+    return messages, {'odometry': topics[0], 'wrench': topics[1], 'frames': 'ned_fsd'}
+
+
+def vortex(run: Run, maker: Maker) -> Layout:
+    """A navigation of its own and a controller in other axes than the navigation."""
+    navigation, control = motion(run, enu=True), motion(run, enu=False)
+    topics = '/nucleus/odom', '/thrust/wrench_input'
+    messages = simple(navigation, maker, *topics, ('odom', 'base_link'), control)
+    return messages, {
+        'odometry': {'topic': topics[0], 'frames': 'enu_flu'},
+        'wrench': {'topic': topics[1], 'frames': 'ned_fsd'},
+    }
+
+
+def apart(run: Run, maker: Maker) -> Layout:
+    """Pose and velocity as topics of their own, with covariances, and a filter's set-point."""
+    m, messages = motion(run, enu=True), []
+    for i, ns in enumerate(nanoseconds(m.t).tolist()):
+        pose = maker.covariant('Pose', maker.pose(m.position[i], m.attitude[i]))
+        twist = maker.covariant('Twist', maker.six('Twist', m.twist[i]))
+        wrench, setpoint = maker.six('Wrench', m.tau[i]), maker.six('Twist', m.nu_d[i])
+        for topic, name, frame, value in (
+            ('/ekf/pose', 'PoseWithCovariance', 'map', pose),
+            ('/dvl/twist', 'TwistWithCovariance', 'base_link', twist),
+            ('/thrusters/wrench', 'Wrench', 'base_link', wrench),
+            ('/cmd/twist', 'Twist', 'base_link', setpoint),
+        ):
+            messages.append((topic, ns, maker.stamped(name, ns, frame, value)))
+    return messages, {
+        'pose': '/ekf/pose', 'twist': '/dvl/twist', 'wrench': '/thrusters/wrench',
+        'setpoint': '/cmd/twist', 'frames': 'enu_flu',
+    }  # fmt: skip
+
+
+def simulated_clock(run: Run, maker: Maker) -> Layout:
+    """Stamps of a simulator's clock, logged by the wall's, twice as fast; the wrench has none."""
+    m, messages = motion(run, enu=True), []
+    logged = nanoseconds(m.t / 2.0)
+    for i, ns in enumerate(nanoseconds(m.t, epoch=12).tolist()):
+        odometry = maker.odometry(ns, ('odom', 'base_link'), m, i)
+        messages.append(('/odometry/filtered', logged[i], odometry))
+        messages.append(('/wrench_cmd', logged[i], maker.six('Wrench', m.tau[i])))
+    return messages, {
+        'odometry': '/odometry/filtered',
+        'wrench': '/wrench_cmd',
+        'frames': 'enu_flu',
+    }
+
+
+LAYOUTS: list[Callable[[Run, Maker], Layout]] = [
+    uuv_simulator, mavros, cola2, vortex, apart, simulated_clock,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize('kind', ['mcap', 'sqlite3', 'bag'])
+@pytest.mark.parametrize('layout', LAYOUTS, ids=lambda layout: layout.__name__)
+def test_layout(layout, kind, run, tmp_path) -> None:
+    maker = Maker(ros1=kind == 'bag')
+    messages, keys = layout(run, maker)
+    file = tmp_path / 'map.yaml'
+    file.write_text(yaml.safe_dump(keys | {'vehicle': 'rexrov', 'step': 0.01}))
+    found = loaded(write(tmp_path / 'other', messages, maker, kind=kind), file)
+    assert_allclose(found.t, run.t, atol=1e-9)
+    assert_allclose(found.nu, run.nu, atol=1e-7)
+    assert_allclose(found.eta, run.eta, atol=1e-7)
+    assert_allclose(found.tau, run.tau, rtol=1e-9, atol=1e-6)
+    if 'setpoint' in keys:
+        assert_allclose(found.nu_d, run.nu_d, atol=1e-9)
+    assert found.knows_setpoint == ('setpoint' in keys)
+
+
+def test_a_killed_recorder_leaves_files_without_metadata(run, tmp_path) -> None:
+    messages, keys = cola2(run, Maker())
+    bag = write(tmp_path / 'other', messages, Maker(), kind='sqlite3')
+    (bag / 'metadata.yaml').unlink()
+    assert loaded(bag, **keys).samples == run.samples
+    (file,) = bag.glob('*.db3')
+    assert loaded(file, **keys).samples == run.samples
+
+
+def test_an_mcap_that_was_not_finished_is_read_as_far_as_it_goes(run, tmp_path) -> None:
+    messages, keys = cola2(run, Maker())
+    file = write_chunks(tmp_path / 'killed.mcap', messages, Maker())
+    data = file.read_bytes()
+    file.write_bytes(data[: len(data) // 2])
+    found = loaded(file, **keys)
+    assert 'was not finished' in found.notes[0]
+    assert 1 < found.samples < run.samples
+
+
+def test_mcap_of_ros_1(run, tmp_path) -> None:
+    maker = Maker(ros1=True)
+    messages, keys = mavros(run, maker)
+    found = loaded(write_chunks(tmp_path / 'one.mcap', messages, maker), **keys, step=0.01)
+    assert_allclose(found.nu, run.nu, atol=1e-7)
+
+
+def numbers_on_a_topic(run: Run, numbers: np.ndarray, name: str = 'Float64MultiArray'):
+    """Odometry of a run on /o, and an array on /thrusts."""
+    maker, m = Maker(), motion(run, enu=False)
+    messages = [
+        message for message in simple(m, maker, '/o', '/w', ('odom_ned', 'base_frd'))
+        if message[0] == '/o'
+    ]  # fmt: skip
+    for ns, row in zip(nanoseconds(m.t).tolist(), numbers, strict=True):
+        if name == 'JointState':
+            none = np.zeros(0)
+            message = maker.new(
+                'sensor_msgs/msg/JointState', maker.header(ns, ''), [], none, none, row
+            )
+        else:
+            layout = maker.new('std_msgs/msg/MultiArrayLayout', [], 0)
+            data = row.astype(np.float32 if '32' in name else float)
+            message = maker.new(f'std_msgs/msg/{name}', layout, data)
+        messages.append(('/thrusts', ns, message))
+    return messages, maker
+
+
+@pytest.mark.parametrize('name', ['Float64MultiArray', 'Float32MultiArray', 'JointState'])
+def test_thrusts_become_the_wrench_of_the_vehicle_file(name, run, tmp_path) -> None:
+    vehicle = load_vehicle('bluerov2_heavy')
+    assert vehicle.thrusters is not None
+    u = np.random.default_rng(0).uniform(-20.0, 20.0, (run.samples, len(vehicle.thrusters.names)))
+    bag = write(tmp_path / 'other', *numbers_on_a_topic(run, u, name))
+    keys = {'odometry': '/o', 'thrusters': '/thrusts', 'step': 0.01}
+    found = loaded(bag, **keys, vehicle='bluerov2_heavy')
+    assert_allclose(found.tau, u @ vehicle.thrusters.matrix.T, rtol=1e-5, atol=1e-4)
+    with pytest.raises(InputError, match=r'thrusters: expected the thrusters.*found nothing'):
+        loaded(bag, **keys)
+
+
+def test_pulse_widths_become_a_wrench_by_a_curve(run, tmp_path) -> None:
+    vehicle, curve = load_vehicle('bluerov2_heavy'), load_curve('t200_16v')
+    assert vehicle.thrusters is not None
+    mirrored = np.isin(np.arange(8), [2, 4])
+    u = np.random.default_rng(0).uniform(-30.0, 30.0, (run.samples, 8))
+    bag = write(tmp_path / 'other', *numbers_on_a_topic(run, curve.command(u, mirrored)))
+
+    def read(**entry: Any) -> Run:
+        entry = {'topic': '/thrusts', 'curve': 't200_16v', 'reversed': ['T3', 5]} | entry
+        return loaded(bag, odometry='/o', thrusters=entry, step=0.01, vehicle='bluerov2_heavy')
+
+    found = read()
+    assert_allclose(found.tau, u @ vehicle.thrusters.matrix.T, atol=1e-9)
+    assert any('pwm_us into N by t200_16v, a steady curve' in note for note in found.notes)
+    wrong = read(reversed=[]).tau - found.tau
+    assert np.abs(wrong).max() > 10.0
+    for entry, expected in (
+        ({'curve': 't100'}, 'curve: expected a .csv file, or one of t200_10v'),
+        ({'reversed': ['T9']}, 'thrusters.reversed: expected one of T1, .*, or 1 to 8, found T9'),
+        ({'curve': ''}, 'thrusters.curve: expected a shipped thruster curve'),
+    ):
+        with pytest.raises(InputError, match=expected):
+            read(**entry)
+
+
+def test_a_curve_lies_beside_its_mapping_file(run, tmp_path) -> None:
+    u = np.full((run.samples, 8), 50.0)
+    bag = write(tmp_path / 'other', *numbers_on_a_topic(run, u))
+    (tmp_path / 'bench.csv').write_text('percent,thrust_n\n-100,-30\n-5,0\n5,0\n100,38\n')
+    (tmp_path / 'map.yaml').write_text(
+        'odometry: /o\nthrusters: {topic: /thrusts, curve: bench.csv}\nvehicle: bluerov2_heavy\n'
+    )
+    found = loaded(bag, tmp_path / 'map.yaml')
+    assert_allclose(found.tau[:, 2], 4 * 18.0, rtol=1e-12)  # four of eight push down
+
+
+def test_the_wrench_that_was_applied_explains_the_motion(run, tmp_path) -> None:
+    maker, m = Maker(), motion(run, enu=False)
+    messages = simple(m, maker, '/o', '/applied', ('odom_ned', 'base_fsd'))
+    for i, ns in enumerate(nanoseconds(m.t).tolist()):
+        wrench = maker.stamped('Wrench', ns, 'base_fsd', maker.six('Wrench', 3.0 * m.tau[i]))
+        messages.append(('/asked', ns, wrench))
+    keys = {'odometry': '/o', 'wrench': '/asked', 'step': 0.01}
+    bag = write(tmp_path / 'other', messages, maker)
+    both, asked = loaded(bag, **keys, wrench_applied='/applied'), loaded(bag, **keys)
+    assert both.acting
+    assert_allclose(both.tau, 3.0 * run.tau, rtol=1e-9)
+    assert_allclose(both.tau_applied, run.tau, rtol=1e-9)
+    apart = asked.unexplained - both.unexplained
+    assert np.abs(apart).max() > 100.0 * np.abs(both.unexplained_error).max()
+
+
+def test_a_doubtful_twist_frame_is_said(run, tmp_path) -> None:
+    maker = Maker()
+    messages, keys = uuv_simulator(run, maker)
+    bag = write(tmp_path / 'other', messages, maker)
+    assert not [note for note in loaded(bag, **keys).notes if 'fits better' in note]
+    told = keys | {'odometry': keys['odometry']['topic']}
+    (note,) = [note for note in loaded(bag, **told).notes if 'fits better' in note]
+    assert 'with twist_frame child' in note
+    assert note.endswith('world fits better')
+
+
+def test_a_position_above_the_water_is_said(run, tmp_path) -> None:
+    maker = Maker()
+    m = motion(run, enu=True)
+    low = Motion(m.t, m.position - [0.0, 0.0, 20.0], *m[2:])
+    bag = write(tmp_path / 'other', simple(low, maker, '/o', '/w', ('map', 'base')), maker)
+    keys = {'odometry': '/o', 'wrench': '/w'}
+    told = {frames: loaded(bag, **keys, frames=frames) for frames in ('ned_fsd', 'enu_flu')}
+    said = {frames: any('above its origin' in n for n in r.notes) for frames, r in told.items()}
+    assert said == {'ned_fsd': True, 'enu_flu': False}
+
+
+def test_the_name_is_that_of_the_bag_or_the_one_given(run, tmp_path) -> None:
+    messages, keys = cola2(run, Maker())
+    bag: Path = write(tmp_path / 'dive_7', messages, Maker())
+    names = [loaded(bag, **keys, **more).controller for more in ({}, {'name': 'trial'})]
+    assert names == ['dive_7', 'trial']

@@ -1,0 +1,171 @@
+"""A bag in mapped files is the run that reading it into memory gives, whatever its messages."""
+
+import mmap
+import tempfile
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.made_messages import ODOMETRY, Bag, odometry, serialized, stamped
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_bags import make_bag
+
+from auv_analysis import load_scenario, summarize
+from auv_analysis.bag import load_run, open_bag
+from auv_analysis.report.digest import digest
+from auv_analysis.runs.run import Run, joined
+from auv_dynamics.files.errors import FailedError, InputError
+
+STEP = 10_000_000
+ROLES = {
+    'odom': '', 'wrench': 'Wrench', 'cmd_vel': 'Twist', 'cmd_accel': 'Accel',
+    'disturbance': 'Wrench', 'wrench_applied': 'Wrench', 'ground_truth/odom': '',
+}  # fmt: skip
+VEHICLE = load_scenario('case1').attachments['vehicle.yaml']
+quick = settings(max_examples=60)
+
+
+def turning(k: int) -> np.ndarray:
+    """State number k of a vehicle that yaws on and on."""
+    psi = 0.7 * k
+    return np.array([k, -k, 0.5 * k, np.cos(psi / 2), 0, 0, np.sin(psi / 2), *range(6)], float)
+
+
+@st.composite
+def recordings(draw: st.DrawFn) -> Any:
+    """A function that writes a bag with steps lost, doubled and late."""
+    n, space = draw(st.integers(0, 30)), draw(st.sampled_from(['/', '/a/']))
+    others = [role for role in ROLES if role not in ('odom', 'wrench')]
+    roles = ['odom', 'wrench', *draw(st.lists(st.sampled_from(others), unique=True))]
+    ahead = draw(st.sampled_from([0, 5, 100]))
+    stamps = np.cumsum(draw(st.lists(st.sampled_from([1, 1, 1, 2, 7]), min_size=n, max_size=n)))
+    plan = [(k - ahead * (role == 'cmd_vel'), role, k) for k in range(n) for role in roles]
+    plan = [(when, role, k) for when, role, k in sorted(plan)]
+    for i in sorted(draw(st.sets(st.integers(0, 300), max_size=3)), reverse=True):
+        del plan[i : i + 1]
+    for i in draw(st.lists(st.integers(0, 300), max_size=2)):
+        plan[i:i] = plan[i : i + 1]  # the same message twice
+    if draw(st.booleans()) and len(plan) > 8:
+        i, j = draw(st.integers(0, len(plan) - 1)), draw(st.integers(0, len(plan) - 1))
+        plan[i], plan[j] = plan[j], plan[i]
+    size = draw(st.sampled_from([1, 2000, 100_000]))
+
+    def write(folder: Path) -> Path:
+        bag = Bag(folder / 'bag.mcap', chunk_size=size)
+        bag.attach('vehicle.yaml', VEHICLE)
+        for role in roles:
+            kind = f'geometry_msgs/msg/{ROLES[role]}Stamped' if ROLES[role] else ODOMETRY
+            bag.channel(f'{space}{role}', kind)
+        for _, role, k in plan:
+            ns = int(stamps[k]) * STEP
+            made = stamped(ROLES[role], ns, np.arange(6.0) * k) if ROLES[role] else None
+            made = made or odometry(ns, turning(k))
+            bag.add(f'{space}{role}', made.__msgtype__, ns, serialized(made))
+        return bag.close()
+
+    return write
+
+
+def outcome(reader: Any, *arguments: Any, **options: Any) -> Any:
+    try:
+        return reader(*arguments, **options)
+    except InputError as error:
+        return str(error)
+
+
+def assert_same(found: Run, expected: Run) -> None:
+    assert found.notes == expected.notes
+    assert found.step == expected.step
+    assert found.arrays().keys() == expected.arrays().keys()
+    for name, values in expected.arrays().items():
+        if name == 'eta':  # psi is unwrapped from block to block
+            np.testing.assert_allclose(found.eta, values, rtol=0, atol=1e-9)
+        else:
+            np.testing.assert_array_equal(found.arrays()[name], values)
+
+
+@given(recordings(), st.integers(1, 40), st.integers(0, 12))
+@quick
+def test_blocks_of_a_bag(write: Any, rows: int, whole: int) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = write(Path(folder))
+        expected = outcome(load_run, path)
+        if isinstance(expected, str):
+            assert outcome(open_bag, path, whole=whole) == expected
+            return
+        run, attachments = open_bag(path, whole=whole)
+        assert attachments == {'vehicle.yaml': VEHICLE}
+        assert run.extent == expected.extent
+        blocks = [*run.blocks(rows)]
+        assert [len(block.t) for block in blocks[:-1]] == [rows] * (len(blocks) - 1)
+        assert_same(joined(blocks), expected)
+
+
+def mapped(run: Run) -> set[str]:
+    """Names of the arrays that lie in files."""
+    return {name for name, values in run.arrays().items() if isinstance(root(values), mmap.mmap)}
+
+
+def root(values: Any) -> Any:
+    while getattr(values, 'base', None) is not None:
+        values = values.base
+    return values
+
+
+def test_a_short_bag_is_kept_in_memory_and_a_long_one_in_files(tmp_path) -> None:
+    bag = make_bag(tmp_path / 'bag', 100)
+    assert not mapped(open_bag(bag).run)
+    assert not mapped(open_bag(bag, whole=101).run)
+    long = open_bag(bag, whole=100).run
+    assert {'t', 'eta', 'nu', 'nu_d', 'nu_d_dot', 'tau'} <= mapped(long)
+
+
+def test_no_room_for_the_files_of_a_long_bag(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(tempfile, 'tempdir', '/dev/full')
+    with pytest.raises(FailedError, match='/dev/full: '):
+        open_bag(make_bag(tmp_path / 'bag', 100), whole=10)
+
+
+def test_summaries_do_not_depend_on_how_a_bag_is_read(tmp_path) -> None:
+    bag = make_bag(tmp_path / 'bag', 300, 'case1_rexrov')
+    assert summarize(open_bag(bag, whole=10).run) == summarize(load_run(bag))
+
+
+def test_a_bag_with_bad_messages_is_refused_when_it_is_opened(tmp_path) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    bag.attach('vehicle.yaml', VEHICLE)
+    for k in range(50):
+        bag.add('/odom', ODOMETRY, k * STEP, serialized(odometry(k * STEP, turning(k))))
+        row = np.full(6, np.nan if k == 40 else 1.0)
+        wrench = stamped('Wrench', k * STEP, row)
+        bag.add('/wrench', wrench.__msgtype__, k * STEP, serialized(wrench))
+    path = bag.close()
+    with pytest.raises(InputError, match='/wrench: expected usable messages, found wrench: '):
+        open_bag(path, whole=3)
+
+
+@pytest.mark.long
+def test_memory_does_not_grow_with_the_bag(tmp_path) -> None:
+    """Four times the steps: what is held more are the entries of four times the chunks."""
+    peaks = []
+    for steps in (12_000, 48_000):
+        bag = make_bag(tmp_path / f'{steps}', steps, chunk_size=1 << 17)
+        tracemalloc.start()
+        run = open_bag(bag, whole=10).run
+        for block in run.blocks(512):
+            del block
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert run.samples == steps + 1
+    assert peaks[1] < 1.2 * peaks[0], peaks
+
+
+def test_a_sketch_of_a_long_run_holds_few_points(tmp_path) -> None:
+    bag = make_bag(tmp_path / 'bag', 20_000)
+    drawn = digest(open_bag(bag, whole=10).run)
+    lines = [t.line()[0] for traces in drawn.traces.values() for t in traces]
+    assert max(map(len, lines)) <= 4000
+    assert max(map(len, lines)) > 2000

@@ -1,0 +1,132 @@
+"""`auv info` proposes a mapping file, with which a log can be read."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from helpers.foreign_bags import (
+    UNNAMED,
+    Maker,
+    loaded,
+    motion,
+    nanoseconds,
+    simple,
+    simulated,
+    write,
+)
+from helpers.foreign_logs import HEADS, SENSORS, columns, every, maker, text_of
+from numpy.testing import assert_allclose
+
+from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.foreign_topics import read_mapping
+from auv_analysis.bag.proposal import component_of, looked_through, proposal
+from auv_analysis.cli import main
+from auv_analysis.runs.run import Run
+
+
+@pytest.fixture(scope='module')
+def run() -> Run:
+    return simulated(duration=1.0)
+
+
+def proposed(bag: Path) -> tuple[str, dict[str, Any]]:
+    contents = survey(bag)
+    text = proposal(bag, contents, looked_through(bag, contents))
+    return text, yaml.safe_load(text)
+
+
+def saved(text: str, folder: Path, **more: Any) -> Path:
+    file = folder / 'map.yaml'
+    file.write_text(text + (yaml.safe_dump(more) if more else ''))
+    return file
+
+
+def test_a_table_is_read_by_what_is_proposed(run, tmp_path) -> None:
+    path = tmp_path / 'dive.csv'
+    path.write_text(HEADS['plain'][0] + text_of(columns(run)))
+    text, _ = proposed(path)
+    found = loaded(path, saved(text, tmp_path, vehicle='rexrov', step=0.01))
+    assert_allclose(found.nu, run.nu, atol=1e-12)
+    assert_allclose(found.eta, run.eta, atol=1e-12)
+    assert_allclose(found.tau, run.tau, rtol=1e-12)
+
+
+def test_topics_of_nobodys_types_are_found_by_their_names(run, tmp_path) -> None:
+    make = maker()
+    bag = write(tmp_path / 'dive', every(run, make), make)
+    text, keys = proposed(bag)
+    assert keys['pose'] == [
+        {'topic': '/imu', 'frames': 'enu_flu'},
+        {'topic': '/fix', 'fields': {'x': 'point.x', 'y': 'point.y'}},
+        {'topic': '/depth', 'fields': {'z': 'depth_mm'}, 'units': 'mm'},
+    ]
+    assert keys['twist'] == [
+        {'topic': '/dvl', 'fields': {'u': 'velocity.x', 'v': 'velocity.y', 'w': 'velocity.z'}},
+        {'topic': '/imu', 'frames': 'enu_flu'},
+    ]  # fmt: skip
+    assert keys['wrench'] == {'topic': '/force', 'fields': SENSORS['wrench']['fields']}
+    found = loaded(bag, saved(text, tmp_path, vehicle='rexrov', step=0.01))
+    assert_allclose(found.nu[:, 0], run.nu[:, 0], atol=1e-12)
+
+
+def test_an_odometry_of_zeros_is_left_out_and_said(run, tmp_path) -> None:
+    make, m = Maker(), motion(run, enu=True)
+    still = m._replace(twist=0.0 * m.twist)
+    messages = simple(m, make, '/nav/odometry', '/rov/wrench', UNNAMED)
+    for i, ns in enumerate(nanoseconds(m.t).tolist()):
+        messages += [('/rov/odom', ns + k, make.odometry(ns, UNNAMED, still, i)) for k in range(2)]
+    text, keys = proposed(write(tmp_path / 'dive', messages, make))
+    assert keys['odometry'] == {'topic': '/nav/odometry'}
+    assert '# /rov/odom: no attitude or no velocity in it but zeros\n' in text
+    assert 'frames: enu_flu    # the frame ids odom, base_link of /nav/odometry do not say' in text
+
+
+def test_what_is_missing_is_a_comment(tmp_path) -> None:
+    """A thesis: no position, empty rates, pulse widths, a filter's states beside them."""
+    path = tmp_path / 'x.csv'
+    head = 'time_ms;state_1;vel_x;vel_y;vel_z;roll [deg];pitch [deg];yaw [deg];gyro_x;motor1;motor2'
+    rows = [f'{20 * i};7;0.1;{i};0;1;2;{i};;1500;{1500 + i}' for i in range(99)]
+    path.write_text('\n'.join([head, *rows]))
+    text, keys = proposed(path)
+    stamp = {'field': 'time_ms', 'units': 'ms'}
+    assert keys['pose']['units'] == 'deg'
+    assert keys['rates'] == 'from attitude'
+    assert keys['thrusters'] == {
+        'topic': 'x', 'fields': ['motor1', 'motor2'], 'curve': 't200_16v', 'stamp': stamp,
+    }  # fmt: skip
+    assert '# pose: no topic was found with x, y, z\n' in text
+    read_mapping(saved(text, tmp_path), {})
+
+
+@pytest.mark.parametrize(('topic', 'path', 'component'), [
+    ('/dvl', 'velocity.x', 'u'), ('log', 'vy', 'v'), ('log', 'surge_vel', 'u'), ('log', 'w', 'w'),
+    ('/imu', 'angular_velocity.z', 'r'), ('log', 'rollspeed', 'p'),
+    ('log', 'yaw rate (deg/s)', 'r'),
+    ('log', 'gyroY', 'q'), ('log', 'Heading', 'psi'), ('/ahrs', 'rpy[1]', 'theta'),
+    ('/state', 'pose.orientation.w', 'qw'), ('/state', 'pose.orientation.x', 'qx'),
+    ('/pressure', 'depth', 'z'), ('log', 'pos_north', 'x'), ('/tau', 'N', 'N'), ('log', 'Fz', 'Z'),
+    ('/cmd', 'torque.x', 'K'), ('/wrench', 'data.yaw', 'N'),
+    ('/imu', 'linear_acceleration.x', ''), ('/imu', 'velocity_covariance[0]', ''),
+    ('/thrusters', 'force.x', ''), ('/ekf', 'state[0]', ''), ('log', 'N', ''), ('log', 'mag_x', ''),
+])  # fmt: skip
+def test_names_of_fields(topic, path, component) -> None:
+    assert component_of(topic, path) == component
+
+
+def test_info_shows_columns_and_the_mapping(run, tmp_path, capsys) -> None:
+    path = tmp_path / 'dive.csv'
+    path.write_text(HEADS['plain'][0] + text_of(columns(run)))
+    main.main(['info', str(path), '--json'])
+    document = json.loads(capsys.readouterr().out)
+    assert document['duration'] == pytest.approx(1.0)
+    assert document['messages'] == 101
+    surge = document['fields']['dive']['u']
+    assert surge['values'] == 101
+    assert (surge['least'], surge['largest']) == (np.min(run.nu[:, 0]), np.max(run.nu[:, 0]))
+    assert yaml.safe_load(document['mapping'])['twist']['topic'] == 'dive'
+    main.main(['info', str(path)])
+    text = capsys.readouterr().out
+    assert document['mapping'] in text

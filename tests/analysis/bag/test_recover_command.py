@@ -1,0 +1,431 @@
+"""`auv recover` as a user meets it: files, names, exit codes, and repairs that are ended midway."""
+
+import errno
+import fcntl
+import json
+import os
+import resource
+import tracemalloc
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from helpers.damaged_bags import (
+    ATTACHED,
+    STEP,
+    attachments_of,
+    messages_of,
+    old,
+    places,
+    seen_by_rosbags,
+    write_bag,
+)
+from mcap.records import Chunk, Message
+from mcap.stream_reader import breakup_chunk
+
+from auv_analysis.bag import read_bag
+from auv_analysis.bag import recover as recovery
+from auv_analysis.bag.metadata import Definition
+from auv_analysis.bag.output import Storage
+from auv_analysis.bag.recover import recover
+from auv_analysis.bag.writer import BagWriter
+from auv_analysis.cli.main import main
+
+
+def aged(bag: Path) -> Path:
+    for path in bag.iterdir():
+        old(path)
+    return bag
+
+
+def cut(path: Path, share: float = 0.6) -> bytes:
+    """Cut a file; what is left of it."""
+    data = path.read_bytes()
+    left = data[: int(share * len(data))]
+    path.write_bytes(left)
+    old(path)
+    return left
+
+
+def contents(bag: Path) -> dict[str, tuple]:
+    return {p.name: (p.read_bytes(), p.stat().st_mtime_ns, p.stat().st_ino) for p in bag.iterdir()}
+
+
+def command(capsys: pytest.CaptureFixture, *arguments: object) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of `auv recover`."""
+    code = 0
+    try:
+        main(['recover', *map(str, arguments)])
+    except SystemExit as ended:
+        code = int(ended.code or 0)
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def messages_in(chunk: Chunk) -> list[Message]:
+    return [record for record in breakup_chunk(chunk) if isinstance(record, Message)]
+
+
+def split_bag(folder: Path) -> Path:
+    """A bag of several files."""
+    bag = write_bag(folder, steps=60, max_duration=20 * STEP)
+    assert len(list(bag.glob('*.mcap'))) == 3
+    return aged(bag)
+
+
+def test_a_healthy_bag_is_not_touched(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    bag = split_bag(tmp_path / 'bag')
+    before, folder = contents(bag), bag.stat().st_mtime_ns
+    code, out, err = command(capsys, bag)
+    assert (code, err) == (0, '')
+    assert 'nothing was changed' in out
+    assert contents(bag) == before
+    assert bag.stat().st_mtime_ns == folder
+
+
+def test_json_is_one_document(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    left = cut(bag / 'bag_0.mcap')
+    code, out, _ = command(capsys, bag, '--json')
+    assert code == 0
+    document = json.loads(out)
+    assert document['changed']
+    (file,) = document['files']
+    assert file['state'] == 'repaired'
+    assert file['lost'][-1]['to'] == len(left)
+    assert document['messages'] == len(messages_of(bag / 'bag_0.mcap'))
+    assert document['attachments'] == sorted(ATTACHED)
+    assert document['topics']['/odom']['spacing'] == {'gaps': 0, 'missing': 0, 'longest': []}
+
+
+def test_a_damaged_chunk_amid_others_leaves_a_gap_that_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    path = bag / 'bag_0.mcap'
+    data = bytearray(path.read_bytes())
+    chunks = [(b, e, r) for b, e, r in places(bytes(data)) if isinstance(r, Chunk)]
+    begin, end, chunk = chunks[4]
+    data[(begin + end) // 2] ^= 1
+    path.write_bytes(data)
+    code, out, _ = command(capsys, old(path).parent)
+    assert code == 0
+    assert f'lost: bytes {begin} to {end}' in out
+    assert f'{len(messages_in(chunk))} known to be lost' in out
+    stamps = [message.log_time for message in messages_in(chunk) if message.channel_id == 1]
+    first, last = (stamps[0] - STEP) / 1e9, (stamps[-1] + STEP) / 1e9
+    assert f'/odom: nothing between {first:g} and {last:g} s' in out
+    assert command(capsys, bag)[0] == 0
+
+
+def test_a_split_bag_with_a_damaged_file(tmp_path: Path) -> None:
+    bag = split_bag(tmp_path / 'bag')
+    before = contents(bag)
+    data = (bag / 'bag_1.mcap').read_bytes()
+    begin = [b for b, _, r in places(data) if isinstance(r, Chunk)][2]
+    left = cut(bag / 'bag_1.mcap', (begin + 20) / len(data))
+    (bag / 'metadata.yaml').unlink()
+    document = recover(bag).document()
+    assert [f['state'] for f in document['files']] == ['healthy', 'repaired', 'healthy']
+    assert document['topics']['/odom']['spacing']['gaps'] == 1
+    after = contents(bag)
+    assert {k: after[k] for k in ('bag_0.mcap', 'bag_2.mcap')} == {
+        k: before[k] for k in ('bag_0.mcap', 'bag_2.mcap')
+    }
+    assert after['bag_1.mcap.damaged'][0] == left
+    rows = Counter(row for path in sorted(bag.glob('*.mcap')) for row in messages_of(path))
+    assert seen_by_rosbags(bag) == rows
+    assert all(len(attachments_of(path)) == 3 for path in bag.glob('*.mcap'))
+    assert recover(bag).changed is False
+
+
+@pytest.mark.parametrize('size', [0, 3, 8, 40])
+def test_a_last_file_in_which_nothing_is_yet(tmp_path: Path, size: int) -> None:
+    """The recorder was killed, or the power cut, when it had just begun a new file."""
+    bag = split_bag(tmp_path / 'bag')
+    (bag / 'metadata.yaml').unlink()
+    data = (bag / 'bag_2.mcap').read_bytes()[:size]
+    (bag / 'bag_2.mcap').write_bytes(data)
+    old(bag / 'bag_2.mcap')
+    assert read_bag(bag).counts['/odom'] == 40, 'read before it is repaired'
+    document = recover(bag).document()
+    assert document['files'][2]['state'] == 'left out'
+    assert (bag / 'bag_2.mcap.damaged').read_bytes() == data
+    assert sum(seen_by_rosbags(bag).values()) == document['messages']
+    assert recover(bag).changed is False
+
+
+def test_a_single_file(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    bag = split_bag(tmp_path / 'bag')
+    left = cut(bag / 'bag_1.mcap')
+    others = {k: v for k, v in contents(bag).items() if k != 'bag_1.mcap'}
+    assert command(capsys, bag / 'bag_1.mcap')[0] == 0
+    assert (bag / 'bag_1.mcap.damaged').read_bytes() == left
+    assert others.items() <= contents(bag).items()
+    assert messages_of(bag / 'bag_1.mcap')
+
+
+def test_a_missing_metadata_yaml_is_written_as_it_was(tmp_path: Path) -> None:
+    bag = split_bag(tmp_path / 'bag')
+    before, text = contents(bag), (bag / 'metadata.yaml').read_text()
+    (bag / 'metadata.yaml').unlink()
+    assert recover(bag).metadata == 'written'
+    assert yaml.safe_load((bag / 'metadata.yaml').read_text()) == yaml.safe_load(text)
+    after = contents(bag)
+    assert all(after[name] == before[name] for name in before if name.endswith('.mcap'))
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        'no: yaml: {', '- a\n', 'rosbag2_bagfile_information: 7\n',
+        'rosbag2_bagfile_information: {relative_file_paths: [../../secret.mcap]}\n',
+    ],
+)  # fmt: skip
+def test_a_metadata_yaml_that_does_not_fit_is_replaced(tmp_path: Path, text: str) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    (bag / 'metadata.yaml').write_text(text)
+    assert recover(bag).metadata == 'written'
+    assert sum(seen_by_rosbags(bag).values()) == 65
+
+
+@pytest.mark.parametrize('size', [0, 5, 30])
+def test_nothing_to_be_recovered(tmp_path: Path, capsys: pytest.CaptureFixture, size: int) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    path = bag / 'bag_0.mcap'
+    path.write_bytes(path.read_bytes()[:size])
+    before = contents(aged(bag))
+    code, out, err = command(capsys, bag)
+    assert (code, out) == (1, '')
+    assert err.splitlines() == [f'{bag}: nothing in it can be recovered']
+    assert contents(bag) == before
+
+
+def wrong(folder: Path) -> dict[str, Path]:
+    (folder / 'empty').mkdir()
+    (folder / 'sqlite').mkdir()
+    (folder / 'sqlite' / 'bag_0.db3').write_bytes(b'SQLite format 3')
+    (folder / 'text.mcap').write_text('no bag at all, but long enough to be looked through')
+    (folder / 'other.bag').write_text('#ROSBAG V2.0')
+    (folder / 'linked').mkdir()
+    (folder / 'linked' / 'a.mcap').symlink_to(write_bag(folder / 'true') / 'true_0.mcap')
+    (folder / 'piped').mkdir()
+    os.mkfifo(folder / 'piped' / 'a.mcap')
+    names = ('empty', 'sqlite', 'text.mcap', 'other.bag', 'linked', 'piped', 'none', 'none.mcap')
+    return {name: folder / name for name in names}
+
+
+def test_wrong_input_ends_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    for name, path in wrong(tmp_path).items():
+        code, out, err = command(capsys, path)
+        assert (code, out) == (2, ''), name
+        assert len(err.splitlines()) == 1, err
+        assert 'expected' in err
+        assert 'found' in err
+    assert sorted(os.listdir(tmp_path / 'true')) == ['metadata.yaml', 'true_0.mcap']
+
+
+def test_a_bag_that_is_being_recorded_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    writer = BagWriter(tmp_path / 'bag', {}, Storage())
+    code, _, err = command(capsys, tmp_path / 'bag')
+    assert code == 2
+    assert 'expected a bag that nobody is recording, found a file that is being written' in err
+    assert len(err.splitlines()) == 1
+    writer.close()
+    assert command(capsys, tmp_path / 'bag')[0] == 0
+
+
+@pytest.mark.parametrize('has_locks', [True, False])
+def test_a_network_file_system(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_locks: bool
+) -> None:
+    """There an exclusive lock asks for a file that may be written, or there is none at all."""
+
+    def flock(descriptor: int, _: int) -> None:
+        if not has_locks:
+            raise OSError(errno.ENOLCK, 'No locks available')
+        if fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE != os.O_RDWR:
+            raise OSError(errno.EBADF, 'Bad file descriptor')
+
+    bag = write_bag(tmp_path / 'bag')
+    monkeypatch.setattr(fcntl, 'flock', flock)
+    notes = recover(bag).document()['notes']
+    assert notes == ([] if has_locks else ['bag_0.mcap: not locked: no locks available'])
+
+
+def test_two_repairs_at_once(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    left = cut(bag / 'bag_0.mcap')
+    with (bag / 'bag_0.mcap').open('rb') as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        assert command(capsys, bag)[0] == 2
+    assert (bag / 'bag_0.mcap').read_bytes() == left
+
+
+def test_a_file_that_grows_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a recorder that takes no lock."""
+    bag = write_bag(tmp_path / 'bag')
+    path = bag / 'bag_0.mcap'
+    left = cut(path)
+    path.touch()
+
+    def grow(seconds: float) -> None:
+        assert 0 < seconds <= recovery.QUIET
+        with path.open('ab') as file:
+            file.write(b'more')
+
+    monkeypatch.setattr(recovery.time, 'sleep', grow)
+    code, _, err = command(capsys, bag)
+    assert code == 2
+    assert 'found a file that is being written' in err
+    assert path.read_bytes() == left + b'more'
+    assert sorted(os.listdir(bag)) == ['bag_0.mcap', 'metadata.yaml']
+
+
+class EndedError(BaseException):
+    """The process is gone."""
+
+
+def ended_at(monkeypatch: pytest.MonkeyPatch, name: str, number: int) -> None:
+    """Let the process end before call `number` of a function of `os`."""
+    original, left = getattr(os, name), [number]
+
+    def call(*arguments: Any, **options: Any) -> Any:
+        left[0] -= 1
+        if left[0] < 0:
+            raise EndedError
+        return original(*arguments, **options)
+
+    monkeypatch.setattr(os, name, call)
+
+
+@pytest.mark.parametrize('links', [True, False])
+@pytest.mark.parametrize(
+    ('name', 'number'),
+    [('fsync', 0), ('fsync', 1), ('link', 0), ('rename', 0), ('replace', 0), ('fsync', 2),
+     ('fsync', 3), ('replace', 1), ('fsync', 4)],
+)  # fmt: skip
+def test_a_repair_that_is_ended_is_finished_by_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, number: int, links: bool
+) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    left = cut(bag / 'bag_0.mcap')
+    rows = len(messages_of_a_copy(bag, tmp_path / 'copy'))
+    if not links:
+        monkeypatch.setattr(os, 'link', no_links)
+    with monkeypatch.context() as patch:
+        if name != 'link' or links:
+            ended_at(patch, name, number)
+        try:
+            recover(bag)
+        except EndedError:
+            kept = [p.read_bytes() for p in bag.glob('bag_0.mcap*') if not p.name.endswith('d')]
+            kept += [p.read_bytes() for p in bag.glob('*.mcap.damaged')]
+            assert left in kept, 'never less than before'
+    recover(bag)
+    assert len(messages_of(bag / 'bag_0.mcap')) == rows
+    assert (bag / 'bag_0.mcap.damaged').read_bytes() == left
+    assert sorted(os.listdir(bag)) == ['bag_0.mcap', 'bag_0.mcap.damaged', 'metadata.yaml']
+    assert sum(seen_by_rosbags(bag).values()) == rows
+    assert recover(bag).changed is False
+
+
+@pytest.mark.parametrize('kind', ['symlink', 'hard link'])
+def test_planted_links_are_not_written_through(tmp_path: Path, kind: str) -> None:
+    bag, victim = write_bag(tmp_path / 'bag'), tmp_path / 'victim'
+    left = cut(bag / 'bag_0.mcap')
+    (bag / 'metadata.yaml').unlink()
+    victim.write_text('precious')
+    for name in ('bag_0.mcap.unfinished', 'metadata.yaml.unfinished'):
+        if kind == 'symlink':
+            (bag / name).symlink_to(victim)
+        else:
+            (bag / name).hardlink_to(victim)
+    (bag / 'metadata.yaml').symlink_to(victim)
+    report = recover(bag)
+    assert victim.read_text() == 'precious'
+    assert (bag / 'bag_0.mcap.damaged').read_bytes() == left
+    assert report.metadata == 'written'
+    assert not (bag / 'metadata.yaml').is_symlink()
+    assert sum(seen_by_rosbags(bag).values()) == report.document()['messages']
+
+
+@pytest.mark.parametrize('target', ['bag_0.mcap', 'nowhere'])
+def test_a_planted_link_does_not_pass_for_the_damaged_file(tmp_path: Path, target: str) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    left = cut(bag / 'bag_0.mcap')
+    (bag / 'bag_0.mcap.damaged').symlink_to(target)
+    file = recover(bag / 'bag_0.mcap').files[0]
+    assert (bag / str(file.kept_as)).read_bytes() == left
+
+
+def no_links(*_: Any) -> None:
+    raise PermissionError(1, 'operation not permitted')
+
+
+def messages_of_a_copy(bag: Path, copy: Path) -> list:
+    copy.mkdir()
+    (copy / 'bag_0.mcap').write_bytes((bag / 'bag_0.mcap').read_bytes())
+    old(copy / 'bag_0.mcap')
+    recover(copy)
+    return messages_of(copy / 'bag_0.mcap')
+
+
+def test_a_repaired_file_that_is_damaged_again(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    first = cut(bag / 'bag_0.mcap', 0.8)
+    recover(bag)
+    second = cut(bag / 'bag_0.mcap', 0.7)
+    recover(bag)
+    assert (bag / 'bag_0.mcap.damaged').read_bytes() == first
+    assert (bag / 'bag_0.mcap.damaged.2').read_bytes() == second
+    assert recover(bag).changed is False
+
+
+def test_a_full_disk_leaves_the_file_as_it_was(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    left = cut(bag / 'bag_0.mcap')
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, hard))
+    try:
+        code, _, err = command(capsys, bag)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert code == 1
+    assert 'file too large; the file is as it was' in err
+    assert len(err.splitlines()) == 1
+    assert (bag / 'bag_0.mcap').read_bytes() == left
+    assert command(capsys, bag)[0] == 0
+
+
+def test_attachments_are_never_used_as_paths(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'deep' / 'bag')
+    cut(bag / 'bag_0.mcap')
+    recover(bag)
+    assert '../escape.yaml' in dict(attachments_of(bag / 'bag_0.mcap'))
+    assert sorted(p.name for p in tmp_path.rglob('*escape*')) == []
+
+
+def test_memory_does_not_grow_with_the_bag(tmp_path: Path) -> None:
+    text, payload = 'string data\n', b'\0\1\0\0' + bytes(100_000)
+    writer = BagWriter(tmp_path / 'bag', {}, Storage('none'))
+    writer.add_channel(Definition('/blob', 'std_msgs/msg/String'), text)
+    for k in range(400):
+        writer.write('/blob', k, payload)
+    writer.close()
+    path = tmp_path / 'bag' / 'bag_0.mcap'
+    size = len(cut(path, 0.95))
+    tracemalloc.start()
+    recover(tmp_path / 'bag')
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert size > 35e6
+    assert peak < 12e6

@@ -1,0 +1,161 @@
+"""Stamps as bags have them: out of order, doubled, begun anew, missing, on another clock."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.foreign_bags import (
+    SECOND,
+    UNNAMED,
+    Maker,
+    loaded,
+    motion,
+    simple,
+    simulated,
+    write,
+)
+from numpy.testing import assert_allclose, assert_array_equal
+
+from auv_analysis.bag.foreign_messages import Recorded, longest_stretch, on_the_clock, ordered
+from auv_analysis.bag.foreign_topics import MappedTopic
+from auv_analysis.runs.run import Run
+from auv_dynamics.files.errors import InputError
+
+KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu', 'step': 0.01}
+
+
+@pytest.fixture(scope='module')
+def run() -> Run:
+    return simulated(duration=1.0)
+
+
+def recorded(stamps, role: str = 'twist', log=None, *, stamped: bool = True) -> Recorded:
+    stamps = np.array(stamps, np.int64)
+    log = stamps if log is None else np.array(log, np.int64)
+    rows = np.arange(len(stamps), dtype=float)[:, None]
+    return Recorded(Path('bag'), MappedTopic(role, f'/{role}'), '', '', log, stamps, stamped, rows)
+
+
+def test_late_messages_are_sorted_and_counted() -> None:
+    notes: list[str] = []
+    found = ordered(recorded([1, 4, 2, 3, 5]), notes)
+    assert_array_equal(found.stamps, [1, 2, 3, 4, 5])
+    assert_array_equal(found.rows[:, 0], [0, 2, 3, 1, 4])
+    assert notes == ['/twist: 2 messages came out of order and were sorted']
+
+
+@pytest.mark.parametrize(('role', 'kept', 'word'), [('twist', 1, 'first'), ('wrench', 2, 'last')])
+def test_of_doubled_stamps_the_first_measurement_and_the_last_command_count(role, kept, word):
+    notes: list[str] = []
+    found = ordered(recorded([1, 4, 4, 5], role), notes)
+    assert_array_equal(found.stamps, [1, 4, 5])
+    assert_array_equal(found.rows[:, 0], [0, kept, 3])
+    assert notes == [f'/{role}: 1 stamps came again, the {word} of each is kept']
+
+
+def test_of_a_clock_that_begins_anew_the_longest_stretch_is_read() -> None:
+    notes: list[str] = []
+    seconds = np.array([7, 8, 9, 2, 3, 4, 5, 1, 2])
+    found = longest_stretch(recorded(seconds * SECOND), notes)
+    assert_array_equal(found.stamps, np.array([2, 3, 4, 5]) * SECOND)
+    assert notes == ['/twist: the clock jumps back 2 times, by up to 7 s; read the longest of 3 '
+                     'stretches, left 5 messages']  # fmt: skip
+    small = recorded([0, SECOND, SECOND // 2, 2 * SECOND])
+    assert longest_stretch(small, notes) is small, 'a late message is no new beginning'
+
+
+def test_logged_times_are_put_on_another_clock() -> None:
+    clock = recorded(np.arange(5) * SECOND, log=(100 + 2 * np.arange(5)) * SECOND)
+    notes: list[str] = []
+    logged = recorded(np.array([99, 101, 104, 110]) * SECOND, stamped=False)
+    found = on_the_clock(logged, clock, notes)
+    assert_allclose(found.stamps / SECOND, [-1.0, 0.5, 2.0, 6.0])
+    assert 'logged 102 s off the stamps of /twist' in notes[0]
+    near = recorded(np.arange(5) * SECOND, log=np.arange(5) * SECOND + SECOND // 10)
+    assert on_the_clock(logged, near, []) is logged, 'one clock and a delay'
+
+
+def messages(run: Run) -> list:
+    seen = motion(run, enu=True)
+    return simple(seen, Maker(), '/o', '/w', UNNAMED)
+
+
+def test_shuffled_and_doubled_messages_make_the_same_run(run, tmp_path) -> None:
+    listed = messages(run)
+    rng = np.random.default_rng(5)
+    late = [(topic, log + int(rng.integers(0, 40_000_000)), m) for topic, log, m in listed]
+    doubled = late + [late[i] for i in rng.integers(0, len(late), 20)]
+    found = loaded(write(tmp_path / 'other', doubled, Maker()), **KEYS)
+    assert_allclose(found.nu, run.nu, atol=1e-9)
+    assert_allclose(found.tau, run.tau, rtol=1e-9)
+    said = ' '.join(found.notes)
+    assert 'came out of order' in said
+    assert 'stamps came again' in said
+
+
+def test_a_simulation_that_was_reset_is_read_as_one_of_its_runs(run, tmp_path) -> None:
+    maker = Maker()
+    short = messages(run.part(slice(0, 40)))
+    second = messages(run)
+    for _, log, message in second:  # later, but stamped five seconds before
+        ns = log - 2_000_000 - 5 * SECOND
+        message.header.stamp = maker.header(ns, '').stamp
+    again = [(topic, log + 2 * SECOND, message) for topic, log, message in second]
+    found = loaded(write(tmp_path / 'other', short + again, maker), **KEYS)
+    assert_allclose(found.nu, run.nu, atol=1e-9)
+    assert_allclose(found.tau, run.tau, rtol=1e-9)
+    assert sum('the clock jumps back 1 times, by up to 5.39 s' in n for n in found.notes) == 1
+
+
+def test_jitter_of_the_stamps_moves_values_by_no_more_than_it_is(run, tmp_path) -> None:
+    seen = motion(run, enu=True)
+    t = seen.t + np.random.default_rng(1).uniform(0.0, 0.004, len(seen.t))
+    maker = Maker()
+    listed = simple(seen._replace(t=t), maker, '/o', '/w', UNNAMED, seen)
+    found = loaded(write(tmp_path / 'other', listed, maker), **KEYS)
+    truth = np.stack([np.interp(found.t + t[0], run.t, column) for column in run.nu.T], axis=1)
+    rate = np.abs(np.diff(run.nu, axis=0)).max(axis=0) / run.step
+    assert np.all(np.abs(found.nu - truth) <= 0.0141 * rate)
+
+
+def test_zero_stamps_give_way_to_the_time_of_logging(run, tmp_path) -> None:
+    maker, listed = Maker(), messages(run)
+    for _, _, message in listed:
+        message.header.stamp = maker.header(0, '').stamp
+    found = loaded(write(tmp_path / 'other', listed, maker), **KEYS)
+    assert_allclose(found.nu, run.nu, atol=1e-9)
+    assert sum('every stamp is zero' in note for note in found.notes) == 2
+
+
+def test_messages_that_must_not_be_used_are_left_out(run, tmp_path) -> None:
+    seen = motion(run, enu=True)
+    seen.twist[50, 2], seen.attitude[70] = np.nan, 0.0
+    bag = write(tmp_path / 'other', simple(seen, Maker(), '/o', '/w', UNNAMED), Maker())
+    found = loaded(bag, **KEYS)
+    assert found.notes[0] == ('/o: 2 of 101 messages were left out: not finite, or without a unit '
+                              'quaternion')  # fmt: skip
+    good = np.delete(np.arange(101), [50, 70])
+    assert_allclose(found.nu[good], run.nu[good], atol=1e-9)
+    assert np.isfinite(found.nu).all()
+
+
+def test_topics_that_never_meet_are_refused(run, tmp_path) -> None:
+    seen = motion(run, enu=True)
+    later = seen._replace(t=seen.t + 100.0)
+    bag = write(tmp_path / 'other', simple(seen, Maker(), '/o', '/w', UNNAMED, later), Maker())
+    found = r'a time with all mapped topics .*found /o 0 to 1 s, /w 100 to 101 s'
+    with pytest.raises(InputError, match=found):
+        loaded(bag, **KEYS)
+
+
+@pytest.mark.parametrize(('keys', 'line'), [
+    ({'odometry': '/x'}, r'odometry: expected a topic of the bag: /o, found /x'),
+    ({'odometry': '/w'}, r'/w: expected nav_msgs/msg/Odometry, found geometry_msgs/msg/WrenchStam'),
+    ({'wrench': '/o'}, r'/o: expected geometry_msgs/msg/WrenchStamped or geometry_msgs/msg/Wr'),
+    ({'frames': None}, r"/o: frame_id: expected --frames ned_fsd or enu_flu.*'odom', 'base_link'$"),
+    ({'vehicle': None}, r'^options: vehicle \(--vehicle\): expected a vehicle file or a shipped'),
+])  # fmt: skip
+def test_what_does_not_fit_is_refused_in_one_line(keys, line, run, tmp_path) -> None:
+    bag = write(tmp_path / 'other', messages(run), Maker())
+    with pytest.raises(InputError, match=line):
+        loaded(bag, **{**KEYS, **keys})

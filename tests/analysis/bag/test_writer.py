@@ -1,0 +1,208 @@
+"""The bag writer without a graph: its thread keeps deadlines, files end where they should."""
+
+import os
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from helpers.damaged_bags import (
+    ATTACHED,
+    QOS,
+    STEP,
+    attachments_of,
+    messages_of,
+    seen_by_rosbags,
+    write_bag,
+)
+from helpers.made_messages import STRING, TYPES, serialized
+
+from auv_analysis.bag import output, read_bag
+from auv_analysis.bag import writer as writer_module
+from auv_analysis.bag.metadata import Definition
+from auv_analysis.bag.output import LEAST_SIZE, Storage
+from auv_analysis.bag.recover import recover
+from auv_analysis.bag.writer import BagWriter, RecordingError
+
+PATIENCE = 20.0  # s
+
+
+def writer_of(folder: Path, **storage: object) -> BagWriter:
+    writer = BagWriter(folder, ATTACHED, Storage(**storage))
+    for topic in ('/a', '/b'):
+        text = TYPES.generate_msgdef(STRING, ros_version=2)[0]
+        writer.add_channel(
+            Definition(topic, STRING, qos=QOS, digest=TYPES.hash_rihs01(STRING)), text
+        )
+    return writer
+
+
+def said(text: str) -> bytes:
+    return serialized(TYPES.types[STRING](text))
+
+
+def test_a_chunk_is_closed_while_the_program_is_busy_with_something_else(tmp_path: Path) -> None:
+    writer = writer_of(tmp_path / 'bag')
+    writer.write('/a', 0, said('lonely'))
+    limit = time.monotonic() + PATIENCE
+    while read_bag(writer.path).counts.get('/a') != 1:  # no call of the writer
+        assert time.monotonic() < limit
+    writer.close()
+
+
+def test_the_disk_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[int] = []
+    monkeypatch.setattr(output.os, 'fdatasync', lambda fd: synced.append(os.fstat(fd).st_size))
+    writer = writer_of(tmp_path / 'bag')
+    limit = time.monotonic() + PATIENCE
+    for k in range(3):
+        writer.write('/a', k, said('x' * k))
+        seen = len(synced)
+        while len(synced) <= seen or read_bag(writer.path).counts.get('/a', 0) <= k:
+            assert time.monotonic() < limit
+            time.sleep(0.01)
+    writer.close()
+    assert synced == sorted(synced)
+    assert synced[-1] == (tmp_path / 'bag' / 'bag_0.mcap').stat().st_size
+
+
+def test_a_disk_that_fails_ends_the_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: int) -> None:
+        if b'a message' in (tmp_path / 'bag/bag_0.mcap').read_bytes():
+            raise OSError(5, 'Input/output error')
+
+    writer = writer_of(tmp_path / 'bag', compression='none')
+    monkeypatch.setattr(output.os, 'fdatasync', broken)
+    limit = time.monotonic() + PATIENCE
+    writer.write('/a', 0, said('a message'))
+    while not writer.trouble:
+        assert time.monotonic() < limit
+        time.sleep(0.01)
+    with pytest.raises(RecordingError, match=r'bag_0.mcap: input/output error'):
+        writer.write('/a', 0, said('x'))
+    with pytest.raises(RecordingError, match='input/output error'):
+        writer.close()
+    assert read_bag(tmp_path / 'bag').counts['/a'] > 0
+
+
+@pytest.mark.parametrize('compression', ['zstd', 'lz4', 'none'])
+@pytest.mark.parametrize('compressible', [True, False])
+def test_no_file_is_larger_than_it_may_be(
+    tmp_path: Path, compression: str, compressible: bool
+) -> None:
+    largest = LEAST_SIZE // 4
+    writer = writer_of(tmp_path / 'bag', compression=compression, max_size=largest, chunk_size=9000)
+    rows = []
+    for k in range(400):
+        data = said('x' * 4000) if compressible else said('') + os.urandom(4000)
+        writer.write('/ab'[0] + 'ab'[k % 2], k * STEP, data)
+        rows.append((f'/{"ab"[k % 2]}', k * STEP, data))
+    writer.close()
+    files = sorted(
+        (tmp_path / 'bag').glob('*.mcap'), key=lambda p: int(p.stem.removeprefix('bag_'))
+    )
+    sizes = [path.stat().st_size for path in files]
+    assert max(sizes) <= largest
+    assert compressible or compression != 'none' or min(sizes[:-1]) > 0.9 * largest
+    assert [row for path in files for row in messages_of(path)] == rows
+    assert seen_by_rosbags(tmp_path / 'bag') == Counter(rows)
+    assert all([name for name, _ in attachments_of(path)] == [*ATTACHED] for path in files)
+    assert recover(tmp_path / 'bag').changed is False
+
+
+@pytest.mark.parametrize('where', ['loss', 'free_space', 'sync', 'flush'])
+def test_any_exception_of_the_thread_ends_the_recording_in_good_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    writer = writer_of(tmp_path / 'bag', free_space=1)
+    writer.write('/a', 0, said('a message'))
+
+    def strange(*_: object) -> None:
+        raise ValueError('nobody has thought of this')
+
+    with monkeypatch.context() as patched:
+        kind = writer_module.BagFile if where == 'flush' else output.Output
+        patched.setattr(kind, where, strange)
+        limit = time.monotonic() + PATIENCE
+        while not writer.trouble:
+            assert time.monotonic() < limit
+            time.sleep(0.01)
+    assert writer.trouble.endswith('bag_0.mcap: ValueError: nobody has thought of this')
+    writer.write('/a', 1, said('another one'))
+    writer.close()
+    contents = read_bag(tmp_path / 'bag')
+    assert contents.counts == {'/a': 2}
+    assert contents.notes == []
+    assert not recover(tmp_path / 'bag').changed
+
+
+def test_the_thread_does_not_stumble_over_files_that_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writer_module, 'LOOK', 0.0)
+    monkeypatch.setattr(writer_module, 'CHECK_PERIOD', 0.0)
+    monkeypatch.setattr(writer_module, 'SYNC_PERIOD', 0.0)
+    writer = writer_of(tmp_path / 'bag', max_duration=3 * STEP)
+    for k in range(900):
+        writer.write('/a', k * STEP, said(''))
+    writer.close()
+    assert len(list((tmp_path / 'bag').glob('*.mcap'))) == 300
+    assert read_bag(tmp_path / 'bag').counts['/a'] == 900
+
+
+def test_a_message_larger_than_a_file_has_one_of_its_own(tmp_path: Path) -> None:
+    writer = writer_of(tmp_path / 'bag', max_size=50_000)
+    for k in range(3):
+        writer.write('/a', k, said('') + os.urandom(80_000))
+    writer.close()
+    assert len(list((tmp_path / 'bag').glob('*.mcap'))) == 3
+    assert read_bag(tmp_path / 'bag').counts['/a'] == 3
+
+
+def test_bursts_of_topics_do_not_multiply_the_files(tmp_path: Path) -> None:
+    """A recorder takes all that a topic has sent before it looks at the next."""
+    writer = writer_of(tmp_path / 'bag', max_duration=100 * STEP)
+    for burst in range(10):
+        for topic in ('/a', '/b'):
+            for k in range(50 * burst, 50 * burst + 50):
+                writer.write(topic, k * STEP, said(''))
+    writer.close()
+    assert len(list((tmp_path / 'bag').glob('*.mcap'))) == 5
+
+
+def test_a_topic_that_begins_a_file_and_falls_silent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(output, 'SILENCE', -1.0)
+    writer = writer_of(tmp_path / 'bag', max_duration=100 * STEP)
+    writer.write('/a', 0, said(''))
+    for k in range(250):
+        writer.write('/b', k * STEP, said(''))
+    writer.close()
+    assert len(list((tmp_path / 'bag').glob('*.mcap'))) == 3
+
+
+def test_a_folder_with_a_bag_is_not_written_to(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    (bag / 'bag_0.mcap').rename(bag / 'other.mcap')
+    with pytest.raises(FileExistsError):
+        BagWriter(bag, {})
+    assert sorted(os.listdir(bag)) == ['metadata.yaml', 'other.mcap']
+
+
+def test_definitions_stand_outside_of_the_chunks(tmp_path: Path) -> None:
+    """So that the first chunk, when it is damaged, does not take all others with it."""
+    writer = writer_of(tmp_path / 'bag', chunk_size=100)
+    for k in range(20):
+        writer.write('/a', k, said('x' * 50))
+    path = writer.path
+    writer.close()
+    data = bytearray(path.read_bytes())
+    chunk = data.index(b'zstd')
+    data[chunk + 20] ^= 1
+    path.write_bytes(data[: len(data) // 2])  # and there is no summary
+    os.utime(path, (0, 0))
+    document = recover(tmp_path / 'bag').document()
+    assert document['topics']['/a']['messages'] > 5

@@ -1,0 +1,139 @@
+"""Faults in a report: words in the set-up, spans and numbers in figures and panels, a section."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+import yaml
+from helpers.report_pages import Page
+
+from auv_analysis import simulate, summarize
+from auv_analysis.cli import main
+from auv_analysis.report import plots
+from auv_analysis.report.digest import digests
+from auv_analysis.report.document import NUMBERS
+from auv_analysis.report.faults import fault_part
+from auv_analysis.report.panels import TimeCurve, TimePanel, document, interactive
+from auv_analysis.report.scenario_text import set_up
+from auv_analysis.runs.run import Run
+from auv_analysis.scenario.fault_words import Mark
+from auv_analysis.scenario.scenario import load_scenario
+
+FAULTS = [
+    {'kind': 'thruster', 'thruster': 2, 'efficiency': 0.5, 'from': 1.0, 'to': 2.0},
+    {'kind': 'sensor_drop_out', 'probability': 0.25, 'from': 1.5, 'to': 1.8},
+    {'kind': 'wrench_loss', 'from': 2.5},
+]
+DATA = {
+    'name': 'failing',
+    'vehicle': 'bluerov2_heavy',
+    'duration': 4.0,
+    'step': 0.01,
+    'controllers': {
+        'gvc': {'law': 'gvc', 'k_D': 5.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 5.0},
+        'slow': {'law': 'gvc', 'k_D': 2.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 5.0},
+    },
+    'setpoint': {'surge': {'offset': 0.3}, 'yaw': {'offset': 0.1}},
+    'actuators': {'thrusters': True},
+    'faults': FAULTS,
+}
+TEXT = yaml.safe_dump(DATA, sort_keys=False)
+
+
+@pytest.fixture(scope='module')
+def runs(tmp_path_factory) -> dict[str, Run]:
+    path = tmp_path_factory.mktemp('failing') / 'failing.yaml'
+    path.write_text(TEXT, encoding='utf-8')
+    scenario = load_scenario(path)
+    return {name: simulate(scenario, name, 'zoh') for name in scenario.controllers}
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory, composing) -> Path:
+    root = tmp_path_factory.mktemp('report')
+    (root / 'failing.yaml').write_text(TEXT, encoding='utf-8')
+    arguments = ['simulate', str(root / 'failing.yaml'), '--hold', 'zoh', '--out']
+    with composing():
+        main.main([*arguments, str(root / 'out')])
+    return root / 'out'
+
+
+def test_the_set_up_says_every_fault(runs):
+    summaries = {name: summarize(run) for name, run in runs.items()}
+    rows = dict(set_up(runs, summaries, TEXT).rows)
+    assert rows['faults'] == [
+        'thruster T3 at 50 %, 1–2 s',
+        '25 % of the measurements lost, 1.5–1.8 s',
+        'wrenches lost, from 2.5 s on',
+    ]
+    assert rows['sensors'] == ['perfect: the law sees the true state; but for the faults']
+    assert rows['actuators'][-1].endswith('; but for the faults')
+    assert rows['seed'] == ['0']
+
+
+def test_spans_and_numbers_of_a_figure(runs):
+    digest = digests(runs)['gvc']
+    with plots.style():
+        axes = plots.new_figure(2.0).subplots()
+        axes.set_xlim(0.0, 2.2)
+        plots.shade(axes, digest)
+    spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
+    assert spans == [(1.0, 2.0), pytest.approx((1.5, 1.8))]
+    assert [(text.get_text(), text.get_position()[0]) for text in axes.texts] == [
+        ('1', 1.5), ('2', pytest.approx(1.65))
+    ]  # fmt: skip
+    high = [text.get_position()[1] for text in axes.texts]
+    assert high[1] < high[0], 'two at one time stand below each other'
+    assert axes.get_xlim() == (0.0, 2.2)
+    sentence = plots.shade_sentence(digest)
+    assert sentence.startswith(' Shaded: 1 thruster T3 at 50 %, 1–2 s; 2 25 % of the meas')
+
+
+def test_panels_are_shaded_where_all_runs_have_the_same_faults(runs, folder):
+    page = (folder / 'report.html').read_text(encoding='utf-8').replace('\u00a0', ' ')
+    assert re.search(r'<p class="faults">Shaded: 1 .*; 3 wrenches lost, from 2.5 s on\.</p>', page)
+    shown = digests(runs)
+    other = replace(shown['slow'], faults=())
+    assert interactive({'gvc': shown['gvc'], 'slow': other}).faults == ''
+
+
+def test_a_panel_has_a_span_and_a_number_per_fault():
+    marks = (Mark(1, 'x', 'x', 1.0, 2.0), Mark(2, 'x', 'x', 3.0, float('inf')))
+    t = np.linspace(0.0, 4.0, 5)
+    panel = TimePanel('p', 'P', 'y (m)', (TimeCurve('gvc', 'surge', '#000000', t, t),))
+    (marked, _), (bare, _) = (document([panel], {'gvc': []}, m, (0.0, 4.0)) for m in (marks, ()))
+    text = json.dumps(marked)
+    left = re.findall(r'"name": "BoxAnnotation".{0,400}?"left": ([\d.]+)', text)
+    assert {float(x) for x in left} >= {1.0, 3.0}
+    assert text.count('"name": "Label"') == 2
+    assert '"name": "Label"' not in json.dumps(bare)
+
+
+def test_every_number_of_the_section_is_in_the_file(folder):
+    held = parquet.read_table(folder / 'faults.parquet')
+    rows = parquet.read_table(folder / NUMBERS).to_pylist()
+    shown = [row for row in rows if row['table'].startswith('faults_')]
+    assert {row['table'] for row in shown} == {'faults_1', 'faults_2', 'faults_3'}
+    for row in shown:
+        column, place = re.fullmatch(r'faults\.parquet:(.+)\[(\d+)\]', row['source']).groups()
+        assert row['value'] == held.column(column)[int(place)].as_py()
+
+
+def test_the_section_and_its_sentences_are_on_the_page(folder):
+    text = (folder / 'report.html').read_text(encoding='utf-8')
+    page = Page(text)
+    assert 'faults' in page.ids
+    assert len(page.tables['faults_1']) == 12
+    for words in ('Fault 1: thruster T3 at 50 %', 'The fault that disturbs gvc most', 'Shaded: '):
+        assert words in text.replace('\u00a0', ' '), words
+    assert (folder / 'figures' / 'faults.pdf').is_file()
+
+
+def test_runs_with_other_faults_share_no_section(runs, tmp_path):
+    other = replace(runs['slow'], faults=())
+    assert fault_part(tmp_path, {'gvc': runs['gvc'], 'slow': other}) is None
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,351 @@
+"""The report on uncertain plants, devices, laws without an estimate, and the certificate."""
+
+import re
+from dataclasses import replace
+from html import unescape
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from helpers.certificates import certificate_of
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.herman2018.claims import judge_runs
+from auv_analysis.herman2018.paper import paper_figure
+from auv_analysis.report import plots, run_plots
+from auv_analysis.report.digest import digest, digests
+from auv_analysis.report.run_report import write_report
+from auv_analysis.report.run_tables import certificate_table, reasons
+from auv_analysis.report.scenario_text import set_up
+from auv_analysis.report.wrench_plots import applied_figure, certificate_figure
+from auv_analysis.runs.run import Run
+from auv_gvc_controller.laws.model import control_model
+
+DATA = {
+    'name': 'rough',
+    'vehicle': 'rexrov',
+    'duration': 5.0,
+    'step': 0.01,
+    'seed': 3,
+    'controllers': {
+        'gvc': {'law': 'gvc', 'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0},
+        'wound': {
+            'law': 'gvc', 'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0,
+            'anti_windup': False,
+        },
+        'pid': {'law': 'pid', 'k_P': 5000.0, 'k_I': 100.0, 'k_D': 10.0},
+    },
+    'setpoint': {
+        'surge': {'offset': 0.2, 'terms': [{'amplitude': -1.0, 'omega': 0.157, 'phase': 0.5}]},
+        'yaw': {'terms': [{'amplitude': 0.1, 'omega': 0.2}]},
+    },
+    'disturbance': [
+        {'kind': 'herman2018', 'exponent_sign': -1, 'scale': 2},
+        {'kind': 'model_error', 'mass': 0.05, 'added_mass': -0.2, 'damping': 0.3},
+        {'kind': 'current', 'velocity': [0.3, 0.1, 0.0]},
+    ],
+    'actuators': {
+        'limit': [3000, 3000, 4000, 800, 800, 500], 'rate': 20000, 'lag': 0.05, 'delay': 0.02,
+    },
+    'sensors': {'velocity_noise': 0.002, 'attitude_noise': 0.001, 'drop_out': 0.1},
+}  # fmt: skip
+
+
+def _study(folder: Path, hold='zoh', **changes) -> tuple[dict[str, Run], dict, str]:
+    """Runs, summaries and text of the scenario above with some entries replaced; None: absent."""
+    data = {key: value for key, value in (DATA | changes).items() if value is not None}
+    text = yaml.safe_dump(data, sort_keys=False)
+    path = folder / 'rough.yaml'
+    path.write_text(text, encoding='utf-8')
+    scenario = load_scenario(path)
+    runs = {name: simulate(scenario, name, hold) for name in scenario.controllers}
+    return runs, {name: summarize(run) for name, run in runs.items()}, text
+
+
+@pytest.fixture(scope='module')
+def rough(tmp_path_factory) -> tuple[dict[str, Run], dict, str]:
+    return _study(tmp_path_factory.mktemp('rough'))
+
+
+@pytest.fixture(scope='module')
+def case1() -> tuple[dict[str, Run], dict]:
+    scenario = load_scenario('case1')
+    runs = {name: simulate(scenario, name) for name in scenario.controllers}
+    return runs, {name: summarize(run) for name, run in runs.items()}
+
+
+@pytest.fixture(scope='module')
+def page(rough, tmp_path_factory, composing) -> Path:
+    """Its report."""
+    with composing():
+        return write_report(tmp_path_factory.mktemp('page'), *rough, '')
+
+
+def _report(out: Path, runs, summaries, text) -> str:
+    return write_report(out, runs, summaries, text, '').read_text(encoding='utf-8')
+
+
+def _text(report: str) -> str:
+    body = report[report.index('<body>') : report.index('<script>')]
+    plain = unescape(re.sub(r'\s+', ' ', re.sub(r'<[^>]+>', '', body)))
+    return plain.replace('\u00a0', ' ').replace('\u202f', '')
+
+
+def _words(runs, summaries, text) -> dict[str, list[str]]:
+    rows = set_up(runs, summaries, text).rows
+    return {name: [line.replace('\u202f', '') for line in lines] for name, lines in rows}
+
+
+def test_set_up_says_every_number_of_the_scenario(rough):
+    words = _words(*rough)
+    assert words['set-point'] == ['surge 0.2 − 1 sin(0.157 t + 0.5) m/s; yaw 0.1 sin(0.2 t) rad/s']
+    assert words['disturbances'] == [
+        'kind: herman2018, exponent_sign: -1, scale: 2',
+        'kind: model_error, mass: 0.05, added_mass: -0.2, damping: 0.3',
+        'kind: current, velocity: [0.3, 0.1, 0.0]',
+    ]
+    assert words['actuators'] == [
+        'limit: [3000, 3000, 4000, 800, 800, 500], rate: 20000, lag: 0.05, delay: 0.02'
+    ]
+    assert words['anti-windup'] == ['on for gvc and pid; off for wound']
+    assert words['sensors'] == ['velocity_noise: 0.002, attitude_noise: 0.001, drop_out: 0.1']
+    assert words['seed'] == ['3']
+    assert any('symmetrised' in line for line in words['warnings'])
+    assert not any('/' in line.partition(': ')[0] for line in words['warnings']), 'no folders'
+    assert list(set_up(*rough).limit) == DATA['actuators']['limit']
+
+
+def test_set_up_of_ideal_devices(tmp_path):
+    words = _words(
+        *_study(
+            tmp_path,
+            duration=0.1,
+            controllers={'gvc': DATA['controllers']['gvc']},
+            actuators=None,
+            sensors=None,
+            disturbance=[{'kind': 'harmonic', 'sway': {'offset': -4.0}}],
+        )
+    )
+    assert words['disturbances'] == ['kind: harmonic, sway: {offset: -4.0}']
+    assert words['actuators'] == ['ideal: the commanded wrench is the applied one']
+    assert words['sensors'] == ['perfect: the law sees the true state']
+    assert 'anti-windup' not in words
+
+
+def test_gains_too_fast_for_the_step_are_warned_of_in_sampled_runs_only(rough):
+    runs, summaries, text = rough
+    fast = {name: run for name, run in runs.items() if name == 'pid'}
+    fast['pid'] = replace(fast['pid'], step=0.5)
+    assert any('pid: lambda_max' in line for line in _words(fast, summaries, text)['warnings'])
+    inside = {'pid': replace(fast['pid'], hold='continuous')}
+    words = _words(inside, summaries, text)
+    assert not [line for line in words.get('warnings', []) if 'lambda_max' in line]
+
+
+@pytest.mark.parametrize('text', ['', 'a: 1', '- 1', 'name: [', 'other'])
+def test_set_up_without_the_scenario_file_says_what_the_runs_say(rough, text):
+    runs, summaries, original = rough
+    text = original.replace('name: rough', 'name: other') if text == 'other' else text
+    scene = set_up(runs, summaries, text)
+    assert scene.name == ''
+    assert scene.limit is None
+    words = _words(runs, summaries, text)
+    assert words['gvc'] == [
+        'disturbances current, herman2018 and model_error; the actuators are not ideal; '
+        'the law sees measurements'
+    ]
+
+
+def test_report_of_a_rough_scenario(page):
+    text = _text(page.read_text(encoding='utf-8'))
+    for sentence in (
+        'Set-up of rough',
+        'commanded τ (thin, grey)',
+        'Dotted: axis limits',
+        'The law saw measured velocities; these errors are those of the true ones.',
+        'The actuators deliver at most',
+        'commanded input τ',
+        'Of the commanded wrench.',
+        'Kf of pid is zero (no adaptive term)',
+        'velocity gain K_D of gvc and wound',
+        'omega_f = 20 I (default)',
+        'F contains model error and current and so depends on the motion of this very run.',
+        'no certificate of the law pid is known',
+        '(26) is the derivative of L in none of these runs, so nothing is drawn.',
+    ):
+        assert sentence in text, sentence
+    assert not list((page.parent / 'figures').glob('certificate_*'))
+    assert 'None' not in text
+    assert not re.search(r'\bnan\b', text)
+
+
+def test_a_law_that_estimates_nothing_has_no_estimation_error(page):
+    drawn = {path.stem for path in (page.parent / 'figures').glob('*.png')}
+    assert {'lumped_error_gvc', 'uncertainty_pid'} <= drawn
+    assert 'lumped_error_pid' not in drawn
+    text = _text(page.read_text(encoding='utf-8'))
+    assert 'estimation error, pid: the law estimates nothing; w is −F, no error of an' in text
+    assert 'Under pid nothing is estimated' in text
+
+
+def test_applied_and_commanded_wrench_are_both_drawn_with_their_limits(rough):
+    run, limit = rough[0]['wound'], np.array(DATA['actuators']['limit'], float)
+    with plots.style():
+        figure, _, caption = applied_figure(digest(run), limit)
+    surge = figure.axes[0]
+    lines = [np.asarray(line.get_ydata(), float) for line in surge.lines]
+    drawn = [line for line in lines if len(line) == len(run.t)]
+    assert np.array_equal(drawn[0], run.tau[:, 0])
+    assert np.array_equal(drawn[1], run.applied[:, 0])
+    assert [line[0] for line in lines if len(line) == 2] == [-3000.0, 3000.0]
+    assert len({line.get_color() for line in surge.lines[:2]}) == 2
+    assert len({line.get_linewidth() for line in surge.lines[:2]}) == 2
+    cut = [axes for axes in figure.axes if axes.get_title(loc='right')]
+    assert cut == [surge]
+    for axes in figure.axes:  # a command that leaves its panel is told of
+        low, high = axes.get_ylim()
+        inside = all(low <= y <= high for y in axes.lines[0].get_ydata())
+        assert inside == (axes not in cut)
+    assert 'leave the panel: their peak is written above' in caption
+
+
+def test_a_plant_with_devices_is_not_the_papers(case1):
+    runs, summaries = case1
+    assert len(judge_runs(runs, summaries)) == 21
+    for change in (
+        {'applied': runs['gvc'].tau},
+        {'measured': runs['gvc'].nu},
+        {'kinds': frozenset({'herman2018', 'current'})},
+    ):
+        changed = {name: replace(run, **change) for name, run in runs.items()}
+        assert judge_runs(changed, summaries) == []
+        assert paper_figure(changed['gvc'], 'errors') is None
+
+
+def test_certificate_table_prints_the_summary(case1):
+    summaries = case1[1]
+    table = certificate_table(summaries)
+    rows = {row[0].text: row[1:-1] for row in table.rows}
+    assert reasons(summaries) == []
+    share = summaries['gvc']['lyapunov']['share_of_time_increasing']
+    shown = rows['L increases by (26)'][0]
+    assert shown.text == f'{100 * share:.1f}'
+    assert shown.value == 100 * share
+    assert rows['L at the start'][1].text == f'{summaries["cl"]["lyapunov"]["L_first"]:.0f}'
+
+
+def test_every_reason_against_a_certificate_is_given_once(rough):
+    found = reasons(rough[1])
+    assert len(found) == len(set(found)) == 4
+    assert sum('of gvc, wound and pid' in text for text in found) == 3
+    assert sum('of pid:' in text for text in found) == 1
+    table = certificate_table(rough[1])
+    assert table.rows[0][3].text == '–'
+
+
+def test_certificate_arrays_are_those_of_the_summary(case1):
+    for name, run in case1[0].items():
+        found = certificate_of(run, control_model(run.vehicle))
+        figures = case1[1][name]['lyapunov']
+        assert found.L[-1] == figures['L_last']
+        assert np.linalg.norm(found.w, axis=1).max() == figures['sup_w']
+    run = case1[0]['gvc']
+    for change in ({'law': 'smc'}, {'gains': {}}, {'disturbance': None}):
+        assert certificate_of(replace(run, **change), control_model(run.vehicle)) is None
+
+
+def test_certificate_figure_holds_the_measured_derivative_against_26_and_28(case1):
+    run, summary = case1[0]['gvc'], case1[1]['gvc']
+    found = certificate_of(run, control_model(run.vehicle))
+    with plots.style():
+        figure, _, caption = certificate_figure(digest(run), summary)
+    energy, early, late = figure.axes
+    assert energy.get_yscale() == 'log'
+    assert early.get_yscale() == 'symlog'
+    assert late.get_yscale() == 'symlog'
+    assert 'linear between them and logarithmic beyond' in caption
+    rest = found.t > found.t[0] + 2.0
+    curves = [np.asarray(line.get_ydata(), float) for line in late.lines]
+    for values in (found.bound, found.identity, found.L_dot):
+        assert any(len(y) == rest.sum() and np.array_equal(y, values[rest]) for y in curves)
+    assert 'Grey: where (26) is positive' in caption
+    assert 'held between samples' not in caption
+    assert 'The certificate does not apply' not in caption
+    with plots.style():
+        sampled = replace(run, hold='zoh')
+        assert 'held between samples' in certificate_figure(digest(sampled), summary)[2]
+
+
+def test_certificate_is_drawn_where_26_holds_along_solutions_and_says_so(tmp_path, unrendered):
+    changes = {
+        'disturbance': [{'kind': 'herman2018'}, {'kind': 'model_error', 'mass': 0.1}],
+        'actuators': None,
+        'sensors': None,
+    }
+    runs, summaries, text = _study(tmp_path, hold='continuous', **changes)
+    words = _text(_report(tmp_path / 'report', runs, summaries, text))
+    drawn = {path.stem for path in (tmp_path / 'report/figures').glob('certificate_*.png')}
+    assert drawn == {'certificate_gvc', 'certificate_wound'}
+    assert 'The certificate does not apply here: F contains model_error' in words
+    assert 'an identity and no proof that L decreases' in words
+    assert 'first order in the step' not in words
+
+
+def test_certificate_figure_of_next_to_nothing(case1):
+    run, summary = case1[0]['gvc'], case1[1]['gvc']
+    two = run.part(run.t <= 0.015)
+    assert certificate_figure(digest(two), summary)[0] is None
+
+
+def test_axes_that_are_called_logarithmic_are(case1):
+    runs = case1[0]
+    with plots.style():
+        shares, _, caption = run_plots.energy_shares(digests(runs))
+        assert 'logarithmic axis' in caption
+        assert shares.axes[0].get_xscale() == 'log'
+        pushed = replace(runs['gvc'], tau=-np.abs(runs['gvc'].tau))
+        inputs, _, _ = run_plots.inputs(digests({'gvc': pushed}))
+        assert {axes.get_xscale() for axes in inputs.axes} == {'log'}
+
+
+def test_runs_that_are_far_apart_share_a_scale_on_which_both_show(case1):
+    gvc, cl = case1[0]['gvc'], case1[0]['cl']
+    with plots.style():
+        near, _, told = run_plots.inputs(digests({'gvc': gvc, 'cl': gvc}))
+        apart = digests({'gvc': gvc, 'cl': replace(cl, tau=1000.0 * cl.tau)})
+        far, _, told_far = run_plots.inputs(apart)
+    assert {axes.get_yscale() for axes in near.axes} == {'linear'}
+    assert far.axes[2].get_yscale() == 'symlog'
+    assert 'dotted lines' not in told
+    assert 'dotted lines' in told_far
+
+
+def test_report_follows_the_readers_colour_scheme(page):
+    style = re.search(r'<style>(.*?)</style>', page.read_text(encoding='utf-8'), re.DOTALL)[1]
+    assert style.count('prefers-color-scheme: dark') == 1
+    assert '[data-theme="dark"]' in style
+    assert 'background: var(--paper)' in style
+
+
+def test_report_of_laws_without_a_certificate_has_reasons_and_no_empty_table(
+    rough, page, tmp_path, unrendered
+):
+    runs, summaries, text = rough
+    only = {'pid': runs['pid']}
+    html = _report(tmp_path, only, {'pid': summaries['pid']}, text)
+    assert 'id="table-certificate"' not in html
+    assert 'no certificate of the law pid is known' in _text(html)
+    assert 'id="table-certificate"' in page.read_text(encoding='utf-8')
+
+
+def test_restless_lines_lie_below_smooth_ones(case1):
+    run = case1[0]['gvc']
+    noise = np.random.default_rng(1).normal(size=run.tau.shape) * 100.0
+    runs = {'smooth': run, 'noisy': replace(run, tau=run.tau + noise, measured=run.nu)}
+    with plots.style():
+        figure, _, _ = run_plots.inputs(digests(runs))
+    for axes in figure.axes:
+        smooth, noisy = axes.lines[:2]
+        assert smooth.get_zorder() > noisy.get_zorder()
+        assert smooth.get_color() != noisy.get_color()

@@ -1,0 +1,174 @@
+"""Thinned lines and statistics of a run in blocks: nothing that a reader could see is lost."""
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.block_runs import in_blocks
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from PIL import Image
+
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.metrics.statistics import Statistics, followed, part_of
+from auv_analysis.report import plots
+from auv_analysis.report.digest import digest
+from auv_analysis.report.run_report import write_report
+from auv_analysis.report.traces import COLUMNS, FEW, Trace, thinned
+from auv_analysis.runs.run import Run
+
+quick = settings(max_examples=40)
+
+
+def signal(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return np.cumsum(rng.uniform(0.001, 0.02, n)), rng.normal(size=n).round(1)
+
+
+@given(
+    seed=st.integers(0, 999),
+    n=st.integers(1, 30_000),
+    rows=st.integers(500, 20_000),
+    logarithmic=st.booleans(),
+)
+@quick
+def test_a_trace_in_blocks_is_the_line_of_the_whole(seed, n, rows, logarithmic) -> None:
+    t, y = signal(seed, n)
+    trace = Trace(t[0], t[-1], logarithmic=logarithmic)
+    for i in range(0, n, rows):
+        trace.add(t[i : i + rows], y[i : i + rows])
+    whole = t, y
+    if n > FEW:
+        whole = thinned(t, y, t[0], t[-1], logarithmic=logarithmic)
+    for found, expected in zip(trace.line(), whole, strict=True):
+        assert_array_equal(found, expected)
+
+
+@given(seed=st.integers(0, 999), n=st.integers(FEW + 1, 30_000))
+@quick
+def test_columns_keep_their_extremes_in_the_order_of_time(seed, n) -> None:
+    t, y = signal(seed, n)
+    few_t, few_y = thinned(t, y, t[0], t[-1])
+    assert len(few_t) <= 2 * COLUMNS
+    assert np.all(np.diff(few_t) > 0)
+    assert (few_t[0], few_t[-1], few_y[0], few_y[-1]) == (t[0], t[-1], y[0], y[-1])
+    width = (t[-1] - t[0]) / (COLUMNS - 1)
+    column, few_column = (((x - t[0]) / width).astype(int) for x in (t, few_t))
+    for c in np.unique(column)[:: COLUMNS // 50]:
+        assert y[column == c].max() == few_y[few_column == c].max()
+        assert y[column == c].min() == few_y[few_column == c].min()
+
+
+def repeated(run: Run, n: int) -> Run:
+    """The samples of a run over and over, n of them."""
+    k = np.arange(n)
+    return replace(run.part(k % len(run.t)), t=k * run.step)
+
+
+@pytest.fixture(scope='module')
+def run() -> Run:
+    scenario = load_scenario('case1')
+    short = replace(scenario, data=scenario.data | {'duration': 8.0})
+    return replace(simulate(short, 'gvc', 'zoh'), scenario='mine', law_state=None)
+
+
+def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
+    """One sample in a hundred thousand, on the picture itself."""
+    n, quiet = 100_000, replace(run, nu=0.0 * run.nu, nu_d=0.0 * run.nu_d, tau=0.0 * run.tau)
+    pictures = []
+    for spike in (0.0, 5.0):
+        long = repeated(quiet, n)
+        long.nu_d[:, 2] += 1e-3 * np.sin(long.t)
+        long.nu_d[long.t == 642.0, 2] = spike
+        drawn = digest(long)
+        t, y = drawn.line('error', 2, 'late')
+        assert (y == spike).sum() >= (spike > 0)
+        assert len(t) <= 2 * COLUMNS
+        with plots.style():
+            figure = plots.new_figure(3.0)
+            axes = figure.subplots()
+            plots.draw_lines(axes, drawn, 'error', 'late', [2])
+            axes.set_ylim(-1.0, 6.0)
+            png, _ = plots.save(figure, tmp_path, f'spike_{spike:g}')
+        pictures.append(np.asarray(Image.open(png).convert('L'), float))
+    rows, columns = np.nonzero(pictures[0] - pictures[1] > 60.0)
+    assert np.ptp(rows) > 0.6 * pictures[0].shape[0], 'a line over most of the height'
+    assert np.ptp(columns) <= 6, 'and a few pixels wide'
+
+
+@pytest.mark.long
+def test_a_report_does_not_grow_with_the_run(run, tmp_path) -> None:
+    """The page is flat; a PDF grows until its lines are full, 4000 points each."""
+    sizes = []
+    for n in (50_000, 400_000):
+        long = repeated(run, n)
+        out = tmp_path / str(n)
+        out.mkdir()
+        report = write_report(out, {'gvc': long}, {'gvc': summarize(long)}, '', '')
+        names = {path.stem for path in (out / 'figures').glob('*.png')}
+        assert {'errors_gvc', 'settling', 'inputs_gvc', 'certificate_gvc'} <= names
+        pdfs = sum(path.stat().st_size for path in (out / 'figures').glob('*.pdf'))
+        sizes.append((report.stat().st_size, pdfs))
+    assert sizes[1][0] < 1.3 * sizes[0][0]
+    assert sizes[1][1] < 1_500_000
+
+
+@given(seed=st.integers(0, 99), n=st.integers(2, 50), cut=st.integers(1, 49))
+@quick
+def test_parts_follow_one_another(seed, n, cut) -> None:
+    t, values = np.arange(n) / 10, np.random.default_rng(seed).normal(size=(n, 3)).round(1)
+    cut = min(cut, n - 1)
+    whole = part_of(t, values)
+    found = followed(part_of(t[:cut], values[:cut]), part_of(t[cut:], values[cut:]))
+    for name in ('count', 'start', 'end', 'first', 'last', 'low', 'high', 'peak', 'at'):
+        assert_array_equal(getattr(found, name), getattr(whole, name))
+    for name in ('sums', 'squares', 'path', 'mean', 'rms', 'span'):
+        assert_allclose(getattr(found, name), getattr(whole, name), rtol=1e-12, atol=1e-12)
+    assert whole.at.tolist() == [t[i] for i in np.abs(values).argmax(axis=0)]
+    assert_allclose(whole.path, np.abs(np.diff(values, axis=0)).sum(axis=0))
+
+
+def test_statistics_between_cuts() -> None:
+    t, values = np.arange(10.0), np.arange(10.0)[:, None]
+    statistics = Statistics([2.5, 7.0])
+    for i in range(0, 10, 4):
+        statistics.add(t[i : i + 4], values[i : i + 4])
+    assert statistics.between(2.5, 7.0).sums == 3 + 4 + 5 + 6
+    assert statistics.between(7.0).count == 3
+    assert statistics.between(None, 2.5).high == 2
+    assert Statistics([1.0]).between() is None
+
+
+def test_a_sketch_in_blocks_is_that_of_the_whole(run) -> None:
+    whole = digest(run)
+    parts = digest(in_blocks(run, 37))
+    assert whole.columns == parts.columns
+    assert (whole.settled, whole.F_digest) == (parts.settled, parts.F_digest)
+    for name in whole.columns:
+        for window in ((0.0,), (2.0,), (0.0, 2.0), (2.0 / 3.0 * run.duration,)):
+            one, other = whole.part(name, *window), parts.part(name, *window)
+            assert_allclose(one.rms, other.rms, rtol=1e-12)
+            assert_array_equal(one.at, other.at)
+    assert whole.traces.keys() == parts.traces.keys()
+    for key, traces in whole.traces.items():
+        for one, other in zip(traces, parts.traces[key], strict=True):
+            assert_allclose(one.line(), other.line(), rtol=1e-9, atol=1e-9)
+    assert_allclose(whole.stack[1], parts.stack[1], rtol=1e-12, atol=1e-12)
+    seconds = run.t >= 2.0 - 0.005
+    error = run.nu_d - run.nu
+    assert_allclose(whole.part('error', 2.0).peak, np.abs(error[seconds]).max(axis=0))
+    assert_allclose(whole.part('error').path, np.abs(np.diff(error, axis=0)).sum(axis=0))
+
+
+def test_memory_does_not_grow_with_the_run(run) -> None:
+    peaks = []
+    for n in (40_000, 160_000):
+        long = repeated(run, n)
+        tracemalloc.start()
+        summarize(long)
+        digest(long)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.1 * peaks[0], peaks

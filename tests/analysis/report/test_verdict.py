@@ -1,0 +1,138 @@
+"""The verdict on several controllers: who, by how much, with which gains, at which effort."""
+
+import copy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers import tunings
+from helpers.report_pages import tokens
+
+from auv_analysis import simulate, summarize
+from auv_analysis.cli import main
+from auv_analysis.report.digest import RunDigest, digests
+from auv_analysis.report.verdict import FAILED, verdict
+
+CL = tunings.SAME_CL | {'k_D': 30.0}
+Runs = tuple[dict[str, RunDigest], dict[str, Any]]
+
+
+def made(folder: Path, controllers: dict[str, Any], **changes: Any) -> Runs:
+    scenario = tunings.scenario(folder, controllers, **changes)
+    runs = {name: simulate(scenario, name) for name in controllers}
+    return digests(runs), {name: summarize(run) for name, run in runs.items()}
+
+
+@pytest.fixture(scope='module')
+def two(tmp_path_factory) -> Runs:
+    return made(tmp_path_factory.mktemp('two'), {'cl': CL, 'gvc': tunings.GVC})
+
+
+def said(two: Runs, **changes: Any) -> str:
+    """Verdict with other errors, peaks, gains or settling times of gvc and of cl."""
+    runs, summaries = two[0], copy.deepcopy(two[1])
+    places = {
+        'rms': ('velocity_error', 'rms'), 'times': ('velocity_error', 'settling_time'),
+        'peaks': ('effort', 'max'), 'K_D': ('gains', 'K_D'),
+    }  # fmt: skip
+    for key, values in changes.items():
+        for name, value in zip(('gvc', 'cl'), values, strict=True):
+            group, figure = places[key]
+            summaries[name][group][figure] = value
+    return ' '.join(verdict(runs, summaries))
+
+
+def test_errors_gains_and_peaks_are_in_the_first_sentence(two: Runs) -> None:
+    runs, summaries = two
+    first, second = verdict(runs, summaries)
+    assert first.startswith('gvc tracks better than cl: against cl, gvc has ')
+    K_D, peak = (
+        [np.array(f(summaries[name])) for name in ('gvc', 'cl')]
+        for f in (lambda s: np.diagonal(s['gains']['K_D']), lambda s: s['effort']['max'])
+    )
+    factor = K_D[0] / K_D[1]
+    force = peak[0][:3].max() / peak[1][:3].max()
+    wanted = [*(f(factor[g]) for g in (slice(0, 3), slice(3, 6)) for f in (min, max)), force]
+    for (shown, half), value in zip(tokens(first), wanted, strict=False):
+        assert abs(shown - value) <= half
+    assert 'velocity gain K_D in translation' in first
+    assert 'auv tune SCENARIO' in second
+    assert verdict(dict(reversed(runs.items())), summaries)[0] == first
+
+
+def test_the_verdict_stands_above_the_tables_and_first_in_the_report(
+    tmp_path: Path, capsys, monkeypatch
+) -> None:
+    from auv_analysis.report import run_report
+
+    found = []
+    monkeypatch.setattr(run_report, 'draw_figures', lambda *_: [])
+    monkeypatch.setattr(
+        run_report, 'write_document', lambda out, *rest: found.append(rest[2]) or out
+    )
+    path = tunings.write(tmp_path, {'cl': CL, 'gvc': tunings.GVC}, duration=0.5)
+    main.main(['simulate', str(path), '--out', str(tmp_path / 'out')])
+    shown = capsys.readouterr().err
+    first = found[0][0].text
+    assert first.startswith('gvc tracks better than cl')
+    assert shown.index('gvc tracks better than cl') < shown.index('gvc: law gvc')
+
+
+ONE, HALF, TWICE = [1.0] * 6, [0.5] * 6, [2.0] * 6
+MIXED = [0.5] * 3 + [2.0] * 3
+
+
+@pytest.mark.parametrize(
+    ('changes', 'parts'),
+    [
+        ({'rms': (HALF, ONE)}, ['gvc tracks better', '0.50 times the RMS velocity error']),
+        ({'rms': (TWICE, ONE)}, ['cl tracks better than gvc']),
+        ({'rms': (MIXED, ONE)}, ['none tracks better in all', 'translation and 2.0 times in']),
+        ({'rms': (ONE, ONE)}, ['cl and gvc track alike', 'the same RMS velocity error']),
+        ({'rms': ([0.0] * 6, [0.0] * 6)}, ['track alike']),
+        ({'rms': ([0.0] * 6, ONE)}, ['gvc tracks better', '0 times the RMS velocity error']),
+        ({'rms': (HALF, ONE), 'peaks': ([0.0] * 6, [0.0] * 6)}, ['the same peak moment (0 ag']),
+        ({'rms': (HALF, ONE), 'peaks': (ONE, [0.0] * 6)}, ['infinitely many', '(1.00 against 0 N']),
+        ({'rms': (HALF, ONE), 'peaks': ([0.0] * 6, ONE)}, ['0 times the peak force']),
+        ({'rms': (HALF, ONE), 'K_D': (None, None)}, ['gvc tracks better than cl']),
+        ({'times': ([None] * 6, [None] * 6)}, ['neither gvc nor cl settles in all']),
+        ({'times': ([None, *ONE[1:]], ONE)}, ['cl settles in 1.0 s, gvc does not in surge']),
+        ({'times': (ONE, [*ONE[1:], None])}, ['gvc settles in 1.0 s, cl does not in yaw']),
+        ({'rms': (None, None), 'times': (None, None)}, []),
+    ],
+)  # fmt: skip
+def test_every_pair_of_outcomes(two: Runs, changes: dict[str, Any], parts: list[str]) -> None:
+    text = said(two, **changes)
+    assert all(part in text for part in parts), text
+    assert bool(text) == bool(parts)
+    assert 'nan' not in text
+    assert ('K_D' in text) == (bool(parts) and 'K_D' not in changes)
+
+
+def test_of_several_the_best_is_held_against_the_next(tmp_path: Path) -> None:
+    weak = CL | {'k_D': 3.0}
+    runs, summaries = made(tmp_path, {'weak': weak, 'gvc': tunings.GVC, 'cl': CL})
+    (text, _) = verdict(runs, summaries)
+    assert text.startswith('Of 3 controllers, gvc tracks best, cl next: against cl, gvc has ')
+    left = {name: (runs[name], summaries[name]) for name in ('weak', 'cl')}
+    (_, without) = verdict(*({n: pair[i] for n, pair in left.items()} for i in (0, 1)))
+    assert 'auv tune SCENARIO --reference cl compares' in without
+    one = {'gvc': runs['gvc']}, {'gvc': summaries['gvc']}
+    assert verdict(*one) == []
+
+
+def test_what_is_not_alike_is_not_ranked(two: Runs, tmp_path: Path) -> None:
+    runs, summaries = two
+    setpoint = {'surge': {'offset': 0.2}}
+    others, more = made(tmp_path, {'other': CL}, setpoint=setpoint)
+    (text,) = verdict({'gvc': runs['gvc'], **others}, {'gvc': summaries['gvc'], **more})
+    assert text == 'These runs cannot be ranked: they differ in set-point.'
+
+
+def test_a_controller_that_diverged_is_named_first(two: Runs) -> None:
+    runs, summaries = two
+    left = {'gvc': replace(runs['gvc'], notes=(f'{FAILED}: cl diverges at 1 s',))}
+    (text,) = verdict(left, {'gvc': summaries['gvc']})
+    assert text == f'Not all are compared: {FAILED}: cl diverges at 1 s.'

@@ -1,0 +1,295 @@
+"""Our programs as processes of their own, forked from one that has imported them all.
+
+To import what a node needs takes longer than most tests of nodes, and `auv run` starts five of
+them for each controller. What the executables themselves do before that is seen by the tests that
+start the installed ones.
+"""
+
+import contextlib
+import ctypes
+import json
+import os
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import IO, Any
+
+from setproctitle import setproctitle
+
+from auv_analysis import load_scenario
+from auv_analysis.graph import supervisor
+from auv_analysis.graph.experiment import COMPOSED, PACKAGES
+from auv_analysis.simulation.simulate import warm_up
+from auv_dynamics.ros.interface import PARENT
+
+NODES = {  # and the package of each
+    **PACKAGES,
+    'frame_converter_node': 'auv_dynamics',
+    'replay_node': 'auv_analysis',
+    COMPOSED: 'auv_analysis',
+}
+STARTERS = {'auv': 'auv_analysis.cli.main', 'record': 'helpers.graph_runs'}  # of nodes
+LOADED = (  # what `auv` imports once it knows what it has to do
+    *('auv_analysis.cli.scenario_runs', 'auv_analysis.graph.recorded_runs'),
+    *('auv_analysis.studies.compare.sources', 'auv_analysis.output.keyboard'),
+    *('auv_analysis.report.document', 'auv_analysis.report.plots'),
+)
+INTERPRETER = Path(sys.executable).name.encode()
+SIZE = 1 << 20  # bytes of a request, at most
+ROOM = 4096  # bytes of a command line in the list of processes, which lie in the environment
+
+
+class Process:
+    """A program that was forked: what `subprocess.Popen` tells and does of a process."""
+
+    def __init__(self, args: Sequence[str], pid: int, outputs: Sequence[int], ended: int):
+        self.args, self.pid = args, pid
+        self.returncode: int | None = None
+        self.streams: list[IO[str]] = [os.fdopen(output, errors='replace') for output in outputs]
+        self._ended = ended
+        self._said = [''] * len(outputs)
+        self._readers: list[threading.Thread] = []
+
+    @property
+    def stdout(self) -> IO[str]:
+        """Its output, with its errors where these have no pipe of their own."""
+        return self.streams[0]
+
+    @property
+    def stderr(self) -> IO[str]:
+        """Its errors."""
+        return self.streams[1]
+
+    def _read(self, i: int) -> None:
+        self._said[i] = self.streams[i].read()
+
+    def poll(self) -> int | None:
+        """Exit code, negative for a signal; None while it runs."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(0.0)
+        return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Exit code, once it has ended; TimeoutExpired after so many s."""
+        if self.returncode is None:
+            with selectors.DefaultSelector() as selector:
+                selector.register(self._ended, selectors.EVENT_READ)
+                if not selector.select(timeout):
+                    raise subprocess.TimeoutExpired(list(self.args), timeout or 0.0)
+            self.returncode = int(os.read(self._ended, 16))
+            os.close(self._ended)
+        return self.returncode
+
+    def communicate(self, timeout: float | None = None) -> tuple[str, str]:
+        """Output and errors that have not been read yet, once it has ended."""
+        if not self._readers:
+            count = range(len(self.streams))
+            self._readers = [threading.Thread(target=self._read, args=[i]) for i in count]
+            for reader in self._readers:
+                reader.daemon = True
+                reader.start()
+        for reader in self._readers:
+            reader.join(timeout)
+            if reader.is_alive():
+                raise subprocess.TimeoutExpired(list(self.args), timeout or 0.0)
+        self.wait(timeout)
+        for stream in self.streams:
+            stream.close()
+        output, errors = [*self._said, ''][:2]
+        return output, errors
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, where it still runs."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """End it."""
+        self.send_signal(signal.SIGKILL)
+
+
+class Line:
+    """The way to the process that forks."""
+
+    def __init__(self, end: socket.socket):
+        self._end = end
+
+    def start(
+        self,
+        arguments: Sequence[str],
+        environ: Mapping[str, str],
+        folder: str = '',
+        files: tuple[int, int] | None = None,
+    ) -> Process:
+        """Start a program.
+
+        Parameters
+        ----------
+        arguments : command line; the first is the program, by its name or as an executable
+        environ : of the process
+        folder : that it works in, by default that of this process
+        files : that take its output and its errors, by default pipes: one of a node, two of others
+
+        """
+        name = Path(arguments[0]).name
+        pipes = [] if files else [os.pipe() for _ in range(1 + (name in STARTERS))]
+        ended, code = os.pipe()
+        ends = [end for _, end in pipes]
+        request = [list(arguments), dict(environ), folder or os.getcwd()]
+        said = files or (ends[0], ends[-1])
+        try:
+            socket.send_fds(self._end, [json.dumps(request).encode()], [*said, code])
+        finally:
+            for number in (*ends, code):
+                os.close(number)
+        return Process(arguments, int(self._end.recv(16)), [pipe for pipe, _ in pipes], ended)
+
+
+class ForkServer(Line):
+    """A process that forks, started."""
+
+    def __init__(self) -> None:
+        end, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        super().__init__(end)
+        with theirs:
+            command = [sys.executable, '-m', __name__, str(theirs.fileno())]
+            environ = {**os.environ, 'AUV_GVC_ROOM': ' ' * ROOM}
+            self._process = subprocess.Popen(
+                command,
+                env=environ,
+                cwd=Path(__file__).parents[1],
+                stdin=subprocess.DEVNULL,
+                pass_fds=[theirs.fileno()],
+            )
+
+
+def grow(main: Callable[[], Any], arguments: list[str]) -> int:
+    """What the interpreter does with a script; its exit code."""
+    sys.argv = arguments
+    try:
+        main()
+    except SystemExit as error:
+        return int(error.code or 0)
+    except BaseException:
+        traceback.print_exc()
+        return 1
+    return 0
+
+
+def entitle(command: Sequence[str]) -> None:
+    """Be found by a command line in the list of processes, under the interpreter's name for ROS."""
+    setproctitle(' '.join(command))
+    libc = ctypes.CDLL(None)
+    for name in ('program_invocation_name', 'program_invocation_short_name'):
+        ctypes.c_char_p.in_dll(libc, name).value = INTERPRETER
+
+
+def of_a_run(line: Line) -> Callable[..., Process]:
+    """What the supervisor of a run starts its nodes by, in place of a new interpreter."""
+
+    def begin(command: Sequence[str], env: Mapping[str, str], stdout: IO[bytes], **_: Any) -> Any:
+        # it is not `auv` that has forked it
+        environ = {**env, PARENT: str(os.getppid())}
+        return line.start(command, environ, files=(stdout.fileno(), stdout.fileno()))
+
+    return begin
+
+
+def fork(
+    main: Callable[[], Any], request: Any, said: Sequence[int], inherited: Sequence[int]
+) -> tuple[int, socket.socket | None]:
+    """Process id of a new program, and the way on which it asks for nodes."""
+    arguments, environ, folder = request
+    is_starter = Path(arguments[0]).name in STARTERS
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    if pid := os.fork():
+        theirs.close()
+        if not is_starter:
+            ours.close()
+        return pid, ours if is_starter else None
+    code = 1
+    try:
+        for number in (*inherited, ours.detach()):
+            os.close(number)
+        os.environ.clear()
+        os.environ.update(environ)
+        os.chdir(folder)
+        os.dup2(said[0], 1)
+        os.dup2(said[1], 2)
+        sys.stdout = os.fdopen(1, 'w', 1, closefd=False)
+        sys.stderr = os.fdopen(2, 'w', 1, errors='backslashreplace', closefd=False)
+        entitle([sys.executable, *arguments])
+        if is_starter:
+            supervisor.begin = of_a_run(Line(theirs))
+        else:
+            theirs.close()
+            os.setsid()
+        code = grow(main, arguments)
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        os._exit(code)
+
+
+def serve(line: socket.socket, mains: Mapping[str, Callable[[], Any]]) -> None:
+    """Fork what is asked for and tell how it ended, until nobody asks any more."""
+    selector, ends = selectors.DefaultSelector(), dict[int, tuple[int, int]]()
+    lines = {line.fileno(): line}
+    selector.register(line, selectors.EVENT_READ)
+    while lines:
+        for key, _ in selector.select():
+            if key.fd in ends:
+                pid, code = ends.pop(key.fd)
+                selector.unregister(key.fd)
+                os.close(key.fd)
+                how = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+                with contextlib.suppress(BrokenPipeError):
+                    os.write(code, str(how).encode())
+                os.close(code)
+                continue
+            asking = lines[key.fd]
+            data, handed, *_ = socket.recv_fds(asking, SIZE, 3)
+            if not data:
+                selector.unregister(asking)
+                del lines[key.fd]
+                asking.close()
+                continue
+            request, (*said, code) = json.loads(data), handed
+            inherited = [*lines, code, *ends, *(one[1] for one in ends.values())]
+            pid, more = fork(mains[Path(request[0][0]).name], request, said, inherited)
+            for number in said:
+                os.close(number)
+            if more:
+                lines[more.fileno()] = more
+                selector.register(more, selectors.EVENT_READ)
+            watched = os.pidfd_open(pid)
+            ends[watched] = pid, code
+            selector.register(watched, selectors.EVENT_READ)
+            asking.send(str(pid).encode())
+
+
+def main() -> None:
+    """Import the programs and load what they call most, then serve."""
+    setproctitle('fork server')  # before the environment is changed, in which it finds its room
+    modules = {**{name: f'{package}.nodes.{name}' for name, package in NODES.items()}, **STARTERS}
+    mains = {name: import_module(module).main for name, module in modules.items()}
+    for module in LOADED:
+        import_module(module)
+    warm_up(load_scenario('case1'), ['gvc'])
+    with socket.socket(fileno=int(sys.argv[1])) as line:
+        serve(line, mains)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,69 @@
+"""A wire between driver and vehicle that can be cut, and programs of the example as processes."""
+
+import select
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+from helpers.node_processes import environment
+
+EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'bluerov2_mavlink'
+
+
+def start_program(name: str, domain: int, *arguments: str) -> subprocess.Popen:
+    """Start a program of the example; its output is captured."""
+    return subprocess.Popen(
+        [sys.executable, str(EXAMPLE / name), *arguments],
+        env=environment(domain), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+
+
+def free_port() -> int:
+    """UDP port of the loopback that nobody has."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+class Relay:
+    """Passes datagrams between a vehicle that sends to `port` and a driver that listens."""
+
+    def __init__(self, driver: int):
+        self._vehicle_side, self._driver_side = (
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)
+        )
+        self._vehicle_side.bind(('127.0.0.1', 0))
+        self._driver_side.bind(('127.0.0.1', 0))
+        self.driver = ('127.0.0.1', driver)
+        self._vehicle: tuple[str, int] | None = None
+        self.port = self._vehicle_side.getsockname()[1]
+        self.cut = self._ended = False
+        self._thread = threading.Thread(target=self._pass, daemon=True)
+        self._thread.start()
+
+    def inject(self, data: bytes) -> None:
+        """Send the driver a datagram that is not the vehicle's."""
+        self._driver_side.sendto(data, self.driver)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._ended = True
+        self._thread.join(timeout=5.0)
+
+    def _pass(self) -> None:
+        sides = [self._vehicle_side, self._driver_side]
+        while not self._ended:
+            for side in select.select(sides, [], [], 0.1)[0]:
+                data, address = side.recvfrom(65535)
+                if side is self._vehicle_side:
+                    self._vehicle = address
+                if self.cut:
+                    continue
+                if side is self._vehicle_side:
+                    self._driver_side.sendto(data, self.driver)
+                elif self._vehicle is not None:
+                    self._vehicle_side.sendto(data, self._vehicle)
+        for side in sides:
+            side.close()

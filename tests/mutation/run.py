@@ -1,7 +1,8 @@
-"""Mutation testing of the mathematics: `make mutation MUTANTS=<count or all> SEED=<seed>`.
+"""Mutation testing: `make mutation MUTANTS=<count or all> SEED=<seed> ONLY=<parts of paths>`.
 
-Cosmic-ray changes one operator, comparison or number of a formula at a time; a test that
-`mutation.toml` names for the file has to fail then, in plain Python. What survives stands in
+Cosmic-ray changes one operator, comparison or number of a formula at a time, `wiring.py` arguments,
+keys, names and statements of nodes and of what is shown; a test that `mutation.toml` names for the
+file has to fail then, in plain Python. What survives stands in
 `equivalent.toml` with the reason why no test can tell, and is subtracted; README.md says more.
 """
 
@@ -27,7 +28,7 @@ Stages = dict[Path, list[list[str]]]
 
 def arguments() -> argparse.Namespace:
     """What was asked for."""
-    parser = argparse.ArgumentParser(description='Mutation testing of the mathematics.')
+    parser = argparse.ArgumentParser(description='Mutation testing.')
     parser.add_argument('--mutants', default='500', help='how many, drawn at random, or all')
     parser.add_argument('--seed', type=int, default=0, help='of the draw')
     parser.add_argument(
@@ -102,7 +103,8 @@ def main() -> int:
         for file in sorted(own)
         if any(part in file for part in given.only)
     }
-    every = mutants(list(stages))
+    wiring = {ROOT / 'src' / file for kind in plan['wiring'] for file in plan[kind]}
+    every = mutants(list(stages), wiring)
     count = len(every) if given.mutants == 'all' else min(int(given.mutants), len(every))
     chosen = sorted(random.Random(given.seed).sample(range(len(every)), count))
     print(f'{count} of {len(every)} mutants of {len(stages)} files, seed {given.seed}', flush=True)

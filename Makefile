@@ -79,11 +79,11 @@ properties: setup  ## the property tests with EXAMPLES examples each, drawn by S
 	  tests/dynamics tests/controller tests/analysis tests/reference
 
 # in an environment of its own, so that .venv stays what people use
-mutation: setup  ## mutants of the mathematics: MUTANTS=count or all, SEED=number
+mutation: setup  ## mutants of formulas, nodes and reports: MUTANTS=count or all, SEED=number, ONLY="parts of paths"
 	test -x $(VENV)/mutation/bin/python || $(PYTHON) -m venv $(VENV)/mutation
 	$(VENV)/mutation/bin/python -m pip install --quiet -r requirements-mutation.txt
 	$(VENV)/mutation/bin/python tests/mutation/run.py --python $(abspath $(BIN))/python \
-	    --mutants $(MUTANTS) --seed $(SEED)
+	    --mutants $(MUTANTS) --seed $(SEED) $(if $(ONLY),--only $(ONLY))
 
 audit: setup  ## known vulnerabilities of what is installed; exit code 3: nothing was audited
 	test -x $(VENV)/audit/bin/python || $(PYTHON) -m venv $(VENV)/audit

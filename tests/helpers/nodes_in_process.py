@@ -1,0 +1,117 @@
+"""Our nodes in the test's own process, and their messages written and read field by field.
+
+Nothing of ours makes or reads the messages here: an axis that `convert` and `interface` exchanged
+alike would not be seen by either.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
+from helpers.node_processes import Peer, fresh_domain
+from nav_msgs.msg import Odometry
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+
+SECOND = 10**9
+NED, FSD = 'odom_ned', 'base_link_fsd'
+AXES = ('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw')
+PARTS = {  # of a stamped message: its linear and its angular vector
+    TwistStamped: lambda m: (m.twist.linear, m.twist.angular),
+    AccelStamped: lambda m: (m.accel.linear, m.accel.angular),
+    WrenchStamped: lambda m: (m.wrench.force, m.wrench.torque),
+}
+
+
+class Program(Peer):
+    """A program with nodes of ours and one of its own, in one executor of rclpy's."""
+
+    def __init__(self) -> None:
+        super().__init__(fresh_domain())
+        self.nodes: list[Any] = []
+
+    def add(self, make: Callable[..., Any], given: dict[str, Any], **options: Any) -> Any:
+        """Add a node with parameters."""
+        values = [Parameter(name, value=value) for name, value in given.items()]
+        node = make(
+            context=self.context, use_global_arguments=False, parameter_overrides=values, **options
+        )
+        self.executor.add_node(node)
+        self.nodes.append(node)
+        return node
+
+    def drop(self, node: Any) -> None:
+        """End a node as its process would."""
+        self.nodes.remove(node)
+        self.executor.remove_node(node)
+        node.close()
+        node.destroy_node()
+
+    def close(self) -> None:
+        """End everything."""
+        for node in [*self.nodes]:
+            self.drop(node)
+        super().close()
+
+
+@contextmanager
+def program() -> Iterator[Program]:
+    """A program that is ended after the test."""
+    made = Program()
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def _stamp(message: Any, ns: int, frame: str) -> Any:
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(ns, SECOND)
+    message.header.frame_id = frame
+    return message
+
+
+def odometry(ns: int, x: Any) -> Odometry:
+    """Odometry of a state (13,): position, quaternion w x y z, twist."""
+    message = _stamp(Odometry(), ns, NED)
+    message.child_frame_id = FSD
+    p, q, t = message.pose.pose.position, message.pose.pose.orientation, message.twist.twist
+    p.x, p.y, p.z, q.w, q.x, q.y, q.z = map(float, x[:7])
+    t.linear.x, t.linear.y, t.linear.z = map(float, x[7:10])
+    t.angular.x, t.angular.y, t.angular.z = map(float, x[10:])
+    return message
+
+
+def state_of(message: Odometry) -> list[float]:
+    """State (13,) of an odometry."""
+    p, q, t = message.pose.pose.position, message.pose.pose.orientation, message.twist.twist
+    twist = [t.linear.x, t.linear.y, t.linear.z, t.angular.x, t.angular.y, t.angular.z]
+    return [p.x, p.y, p.z, q.w, q.x, q.y, q.z, *twist]
+
+
+def six(kind: type, ns: int, values: Any) -> Any:
+    """TwistStamped, AccelStamped or WrenchStamped of (6,) in the body frame."""
+    message = _stamp(kind(), ns, FSD)
+    linear, angular = PARTS[kind](message)
+    linear.x, linear.y, linear.z, angular.x, angular.y, angular.z = map(float, values)
+    return message
+
+
+def six_of(message: Any) -> list[float]:
+    """The six numbers of a message."""
+    if isinstance(message, JointState):
+        assert tuple(message.name) == AXES
+        return list(message.effort)
+    linear, angular = PARTS[type(message)](message)
+    return [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+
+
+def ns_of(message: Any) -> int:
+    """Stamp of a message, ns."""
+    return message.header.stamp.sec * SECOND + message.header.stamp.nanosec
+
+
+def frames_of(message: Any) -> tuple[str, ...]:
+    """Frame ids of a message."""
+    child = (message.child_frame_id,) if isinstance(message, Odometry) else ()
+    return message.header.frame_id, *child

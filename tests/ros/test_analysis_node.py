@@ -1,0 +1,88 @@
+"""The analysis node against the independent implementation, every axis different."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import herman_reference as reference
+import numpy as np
+import pytest
+import yaml
+from helpers import nodes_in_process as by_hand
+from helpers.nodes_in_process import Program, program
+from numpy.testing import assert_allclose
+from reference_cases import off_centre
+
+from auv_analysis.nodes.analysis_node import AnalysisNode
+from auv_dynamics.ros import topics
+
+STEP = 10_000_000
+EVERY = 3
+RNG = np.random.default_rng(7)
+NU, NU_D, TAU, F, ESTIMATE = (RNG.uniform(-1, 1, (10, 6)) * scale for scale in (1, 2, 80, 30, 20))
+SAID = {  # topic -> what it is of step k, by the independent implementation, and its unit's size
+    'analysis/kinetic_energy': lambda k: energy(NU[k]),
+    'analysis/kinetic_energy_shares': lambda k: 100 * energy(NU[k]) / energy(NU[k]).sum(),
+    'analysis/delta_xi': lambda k: np.linalg.solve(UPSILON, NU[k]) - NU[k],
+    'analysis/delta_pi': lambda k: UPSILON.T @ TAU[k] - TAU[k],
+    'analysis/lumped_error': lambda k: ESTIMATE[k] - F[k],
+}
+UPSILON, N = reference.decompose(reference.vehicle_matrices(off_centre())['M'])
+
+
+def energy(nu: np.ndarray) -> np.ndarray:
+    return reference.kinetic_energy(N, UPSILON, nu)[1]
+
+
+def of_step(k: int) -> dict[topics.Topic, object]:
+    x = np.array([1.0, -2.0, 3.0, 0.5, -0.5, 0.5, 0.5, *NU[k]])
+    values = {topics.CMD_VEL: NU_D, topics.WRENCH: TAU, topics.DISTURBANCE: F}
+    values[topics.DISTURBANCE_ESTIMATE] = ESTIMATE
+    said = {t: by_hand.six(t.type, k * STEP, rows[k]) for t, rows in values.items()}
+    return {topics.ODOM: by_hand.odometry(k * STEP, x), **said}
+
+
+@pytest.fixture(scope='module')
+def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp('vehicle') / 'off_centre.yaml'
+    path.write_text(yaml.safe_dump({'format': 1, 'name': 'off_centre', **off_centre()}))
+    return path
+
+
+@pytest.fixture
+def analysis(vehicle: Path) -> Iterator[Program]:
+    with program() as made:
+        made.add(AnalysisNode, {'vehicle': str(vehicle), 'every': EVERY})
+        made.listen(*topics.ANALYSIS_TOPICS, topics.DIAGNOSTICS)
+        assert {topic.name for topic in topics.ANALYSIS_TOPICS} == {*SAID}
+        for name in SAID:
+            made.until(lambda n=name: made.node.count_publishers(n), name)
+        yield made
+
+
+def heard(made: Program, name: str, count: int) -> list:
+    return made.until(lambda: len(made.heard[name]) >= count and made.heard[name], name)
+
+
+def test_every_published_axis_is_that_of_the_independent_implementation(analysis) -> None:
+    assert not np.isclose(UPSILON[np.triu_indices(6, 1)], 0.0).all(axis=0)
+    for k in range(10):
+        for topic, message in of_step(k).items():
+            analysis.publish(topic, message)
+    for name, expected in SAID.items():
+        found = heard(analysis, name, 4)
+        assert [by_hand.ns_of(m) for m in found] == [k * STEP for k in range(0, 10, EVERY)], name
+        for k, message in zip(range(0, 10, EVERY), found, strict=True):
+            assert by_hand.frames_of(message) == ('base_link_fsd',)
+            assert_allclose(by_hand.six_of(message), expected(k), rtol=1e-9, atol=1e-12)
+
+
+def test_messages_that_come_in_any_order_are_paired_by_their_stamps(analysis) -> None:
+    messages = {k: of_step(k) for k in range(8)}
+    order = [topics.DISTURBANCE_ESTIMATE, topics.WRENCH, topics.ODOM, topics.CMD_VEL]
+    for topic in [*order, topics.DISTURBANCE]:
+        for k in range(8):
+            analysis.publish(topic, messages[k][topic])
+    for name, expected in SAID.items():
+        for k, message in zip((0, 3, 6), heard(analysis, name, 3), strict=True):
+            assert by_hand.ns_of(message) == k * STEP
+            assert_allclose(by_hand.six_of(message), expected(k), rtol=1e-9, atol=1e-12)

@@ -22,6 +22,8 @@ endif
 
 COUNT ?= 10
 SEED ?= 0
+LOAD ?= 8
+TIMES ?= 1
 STEPS ?= 1000000
 KILLS ?= 200
 DAY ?= 86400
@@ -29,7 +31,7 @@ EXAMPLES ?= 500
 SEEDS ?= 10
 MUTANTS ?= 500
 
-.PHONY: help setup case1 case2 test quick coverage soak fuzz identify-study properties mutation audit bench bench-growth build colcon-test wheels
+.PHONY: help setup case1 case2 test test-loaded quick coverage soak nightly fuzz identify-study properties mutation audit bench bench-growth build colcon-test wheels
 .PHONY: lint format hooks interop docs docs-links docs-test docs-tools clean
 
 help:  ## this list
@@ -51,9 +53,19 @@ case1 case2: setup  ## the paper's experiment: GVC against CL on real nodes, wit
 	@echo "open runs/$@/report.html"
 
 # four workers on two cores: the tests of the nodes mostly wait
+TEST := $(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
+
 test: setup  ## the tests
 	$(BIN)/python tests/compile_kernels.py
-	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
+	$(TEST)
+
+# AUV_GVC_PATIENCE is the factor of every limit
+test-loaded: setup  ## the same beside LOAD busy processes, TIMES in a row, each in an order drawn by SEED, SEED + 1, ...
+	$(BIN)/python tests/compile_kernels.py
+	for seed in $$(seq $(SEED) $$(($(SEED) + $(TIMES) - 1))); do \
+	  AUV_GVC_PATIENCE=$${AUV_GVC_PATIENCE:-4} AUV_GVC_ORDER=$$seed \
+	    $(BIN)/python tests/helpers/busy.py $(LOAD) $(TEST) || exit 1; \
+	done
 
 quick: setup  ## the tests that start no nodes: what to run after every change
 	$(BIN)/python tests/compile_kernels.py
@@ -66,6 +78,11 @@ coverage: setup  ## lines and branches that the tests see: all of the mathematic
 soak: setup docs-tools  ## COUNT random runs by SEED, KILLS of nodes, a run of STEPS, one of DAY s, what else takes long
 	AUV_GVC_COUNT=$(COUNT) AUV_GVC_SEED=$(SEED) AUV_GVC_STEPS=$(STEPS) AUV_GVC_KILLS=$(KILLS) \
 	  AUV_GVC_DAY=$(DAY) $(BIN)/python -m pytest -m long tests
+
+# each of them even where another fails; soak has the long pages of docs, wheels, colcon's install and kills
+nightly: docs-tools  ## what takes hours: soak, the tests by colcon and under load, fuzz at length, a draw of mutants
+	$(BIN)/python -m pip install --quiet -r requirements-rerun.txt
+	$(MAKE) --keep-going --no-print-directory soak colcon-test test-loaded fuzz mutation
 
 identify-study: setup  ## how often the intervals of auv identify cover the truth, over SEEDS noise seeds
 	cd tests && $(abspath $(BIN))/python identify_study.py $(SEEDS)

@@ -147,12 +147,15 @@ def _call(library: Any, loops: Loops, figures: np.ndarray, rows: np.ndarray | No
     )
 
 
+def compilers() -> list[str]:
+    """Names of C compilers, the first that is there to be taken."""
+    return [*filter(None, [os.environ.get('CC')]), 'cc', 'gcc', 'clang']
+
+
 def compiler() -> str:
-    """Path of $CC, cc, gcc or clang; NoCompilerError where there is none."""
-    for name in filter(None, (os.environ.get('CC'), 'cc', 'gcc', 'clang')):
-        path = shutil.which(name)
-        if path:
-            return path
+    """Path of a compiler; NoCompilerError where there is none."""
+    for path in filter(None, map(shutil.which, compilers())):
+        return path
     raise NoCompilerError(f'{SOURCE.name}: expected a C compiler (CC, cc, gcc, clang), found none')
 
 

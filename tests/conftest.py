@@ -4,11 +4,13 @@ A test that waits for nodes is run again where the machine gave this process no 
 what it saw then says nothing of the nodes. The summary names it as a rerun.
 
 Examples of property tests are the same in every run, and nobody judges how long one takes;
-`make properties` asks for more of them, drawn by a seed.
+`make properties` asks for more of them, drawn by a seed. `AUV_GVC_ORDER=seed` draws the order of
+files, and of the tests in each.
 """
 
 import gc
 import os
+import random
 import signal
 import threading
 import time
@@ -18,12 +20,16 @@ from pathlib import Path
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # before NumPy: the workers share the cores
 
 import pytest
+from helpers.needs import judged, unproven
+from helpers.patience import FACTOR, patience
 from hypothesis import settings
 
 HERE = Path(__file__).parent
 FIRST = ('system', 'ros')
 TIMED = {*FIRST, 'examples'}  # folders of tests that wait for nodes
 PAUSE = 0.25  # s: watchdogs of half a second have then been called by the machine
+LIMIT, LONG_LIMIT = 300.0, 7200.0  # s, after which a test hangs, with its fixtures and reruns
+ORDER = os.environ.get('AUV_GVC_ORDER')  # seed
 
 settings.register_profile(
     'tests', derandomize='AUV_GVC_EXAMPLES' not in os.environ, deadline=None, database=None
@@ -85,7 +91,47 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         folder = Path(item.path).parent.name
         return folders.index(folder if folder in FIRST else '')
 
-    items.sort(key=place)
+    if ORDER is None:
+        items.sort(key=place)
+    else:
+        items[:] = drawn(items, random.Random(ORDER))
     for item in items:
+        limit = LONG_LIMIT if item.get_closest_marker('long') else LIMIT
+        item.add_marker(pytest.mark.timeout(patience(limit)))
         if TIMED.intersection(Path(item.path).parts[len(HERE.parts) :]):
             item.add_marker(AGAIN)
+
+
+def drawn(items: list[pytest.Item], rng: random.Random) -> list[pytest.Item]:
+    """Files in random order, each with its tests in random order."""
+    files = dict[Path, list[pytest.Item]]()
+    for item in items:
+        files.setdefault(item.path, []).append(item)
+    shuffled = [rng.sample(tests, len(tests)) for tests in files.values()]
+    rng.shuffle(shuffled)
+    return [item for tests in shuffled for item in tests]
+
+
+def pytest_report_header() -> str:
+    """Say what is not as usual."""
+    order = 'waiting tests first' if ORDER is None else f'AUV_GVC_ORDER={ORDER}'
+    return f'patience: {FACTOR:g} times, order: {order}'
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Iterator[None]:
+    """Let no skip pass that CI must not have."""
+    return judged((yield))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Iterator[None]:
+    """The same of a whole file."""
+    return judged((yield))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """List what was skipped, and what that leaves unproven."""
+    if lines := unproven(terminalreporter.stats.get('skipped', ())):
+        terminalreporter.section('not proven here')
+        terminalreporter.write('\n'.join([*lines, '']))

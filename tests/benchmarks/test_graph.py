@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from helpers.node_processes import environment, fresh_domain
+from helpers.patience import patience
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / 'benchmarks'
 
@@ -25,7 +26,8 @@ json.dump({name: asdict(measured) for name, measured in found.items()}, sys.stdo
 def test_graph_measures_ping_pong_and_both_graphs() -> None:
     ended = subprocess.run(
         [sys.executable, '-c', SCRIPT], cwd=BENCHMARKS,
-        env=environment(fresh_domain()), capture_output=True, text=True, timeout=300, check=False,
+        env=environment(fresh_domain()), capture_output=True, text=True, timeout=patience(300),
+        check=False,
     )  # fmt: skip
     assert ended.returncode == 0, ended.stderr
     measured = json.loads(ended.stdout)

@@ -36,11 +36,8 @@ def test_its_rate_integrated_by_ode5_is_the_kernels_run(initial):
     assert_allclose(x[7:13], final_velocity(scenario), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ('module', 'peer'), [('scipy', peers.solve_ivp), ('control', peers.python_control)]
-)
-def test_a_peer_ends_where_the_kernel_ends(module, peer):
-    pytest.importorskip(module, reason=f'{module} is only installed by make bench')
+@pytest.mark.parametrize('peer', [peers.solve_ivp, peers.python_control], ids=['scipy', 'control'])
+def test_a_peer_ends_where_the_kernel_ends(peer):
     scenario = case1()
     x = peer(*peers.closed_loop(scenario, 'gvc'), DURATION)
     assert_allclose(x[7:13], final_velocity(scenario), rtol=0, atol=1e-6)

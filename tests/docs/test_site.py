@@ -4,11 +4,13 @@ import os
 import re
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 from helpers.browser import chromium
 from helpers.doc_blocks import ROOT
+from helpers.needs import need
 
 FOREIGN = re.compile(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="(?:https?:)?//[^"]*"')
 WIDTHS = (390, 1280)  # a phone and a desk
@@ -17,7 +19,7 @@ MATHS = 'mjx-container'
 
 @pytest.fixture(scope='module')
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    pytest.importorskip('sphinx', reason='make docs-tools installs it')
+    need('sphinx', find_spec('sphinx'))
     out = tmp_path_factory.mktemp('site')
     binaries = Path(sys.executable).parent
     ended = subprocess.run(

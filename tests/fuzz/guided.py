@@ -16,7 +16,7 @@ import atheris
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import decoding
 import files
-import watchman
+from watchman import WAITING
 
 READERS = ('files', 'vehicle_file', 'interface', 'ros.codec', 'scenario', 'scenario_values')
 WHERE = re.compile(rf'auv_(dynamics|analysis)\.({"|".join(READERS)}|bag\..*)')
@@ -42,7 +42,6 @@ TARGETS: dict[str, tuple[Callable[[bytes], object], Callable[[], list[bytes]], i
 def main(target: str, count: str, seed: str) -> None:
     """Try so many inputs; libFuzzer ends the process, with another code than 0 on a failure."""
     one, originals, longest = TARGETS[target]
-    watchman.PATIENCE = 0  # libFuzzer has the alarm clock
     failures = Path(os.environ.get('AUV_GVC_FUZZ_FAILURES', 'fuzz-failures')).resolve()
     failures.mkdir(parents=True, exist_ok=True)
     corpus = Path(tempfile.mkdtemp(prefix='auv_gvc_corpus_'))
@@ -53,7 +52,8 @@ def main(target: str, count: str, seed: str) -> None:
         one(bytes(data))
 
     options = [
-        *(f'-runs={count}', f'-seed={int(seed) + 1}', f'-max_len={longest}', '-timeout=30'),
+        *(f'-runs={count}', f'-seed={int(seed) + 1}', f'-max_len={longest}'),
+        f'-timeout={round(WAITING)}',  # on the wall; `watched` counts the work
         *('-rss_limit_mb=4096', f'-artifact_prefix={failures}/{target}-', '-verbosity=0'),
         '-print_final_stats=1',
     ]

@@ -15,6 +15,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from helpers.node_processes import GAINS, Peer, fresh_domain, parameters, start_node
+from helpers.patience import patience
 from scramble import SPECIAL, scrambled
 
 from auv_analysis.bag import read_bag
@@ -109,7 +110,7 @@ def fuzz_node(name: str, count: int, seed: int, folder: Path) -> dict[str, int]:
         peer.close()
         process.terminate()
         try:
-            output, _ = process.communicate(timeout=30)
+            output, _ = process.communicate(timeout=patience(30))
         except subprocess.TimeoutExpired:
             process.kill()
             output, _ = process.communicate()

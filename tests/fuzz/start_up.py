@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from files import CrashError, bags, dumped
+from helpers.patience import patience
 from watchman import playground, watched
 
 from auv_analysis.graph.node_parameters import node_parameters
@@ -33,7 +34,7 @@ NODES: dict[str, Callable[[], Any]] = {
     'frame_converter_node': FrameConverterNode,
     'replay_node': ReplayNode,
 }
-PATIENCE = 60.0  # s
+PATIENCE = patience(60.0)  # s
 
 BESIDE: dict[str, dict[str, Any]] = {  # nodes that are in no run
     'frame_converter_node': {

@@ -10,8 +10,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-PATIENCE = 20  # s of CPU for an input, six times that by the clock; 0: another watches
-CLOCKS = {signal.ITIMER_PROF: signal.SIGPROF, signal.ITIMER_REAL: signal.SIGALRM}
+from helpers.patience import patience
+
+WORK = 20.0  # s of CPU for an input
+WAITING = patience(600.0)  # s for one that only waits
+CLOCKS = {signal.ITIMER_PROF: (signal.SIGPROF, WORK), signal.ITIMER_REAL: (signal.SIGALRM, WAITING)}
 MEMORY = 1 << 29  # bytes that an input may need beside what there was before
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 sys.dont_write_bytecode = True  # a module that is compiled while an input is tried is no stray file
@@ -57,8 +60,8 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
 sys.addaudithook(_audit)
 
 
-def _late(*_: Any) -> None:
-    raise HangError(f'more than {PATIENCE} s')
+def _late(number: int, _: Any) -> None:
+    raise HangError(f'more than {dict(CLOCKS.values())[number]:g} s')
 
 
 def _peak() -> int:
@@ -82,20 +85,18 @@ def watched(*folders: Path) -> Iterator[None]:
     system = [Path('/dev'), Path('/proc'), Path(cache)]
     _allowed = [Path(os.path.realpath(folder)) for folder in (*folders, *system)]
     _stray.clear()
-    if PATIENCE:
-        before = [(number, signal.signal(number, _late)) for number in CLOCKS.values()]
-        signal.setitimer(signal.ITIMER_PROF, PATIENCE)
-        signal.setitimer(signal.ITIMER_REAL, 6 * PATIENCE)
+    before = {number: signal.signal(number, _late) for number, _ in CLOCKS.values()}
+    for clock, (_, limit) in CLOCKS.items():
+        signal.setitimer(clock, limit)
     Path('/proc/self/clear_refs').write_text('5')  # the peak is from now on
     begin = _peak()
     try:
         yield
     finally:
         _allowed = None
-        if PATIENCE:
-            for clock, (number, handler) in zip(CLOCKS, before, strict=True):
-                signal.setitimer(clock, 0)
-                signal.signal(number, handler)
+        for clock, (number, _) in CLOCKS.items():
+            signal.setitimer(clock, 0)
+            signal.signal(number, before[number])
     if (more := _peak() - begin) > MEMORY:
         raise GreedError(f'{more >> 20} MiB')
     if _stray:

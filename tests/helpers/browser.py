@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
+from helpers.needs import need
+from helpers.patience import patience
 from PIL import Image
+from playwright.sync_api import sync_playwright
 
 NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable')
 SHOWN = """(name) => {
@@ -23,11 +25,9 @@ SHOWN = """(name) => {
 @contextmanager
 def chromium() -> Iterator[Any]:
     """The browser; the test that asks for it is skipped where there is none."""
-    playwright = pytest.importorskip('playwright.sync_api', reason='playwright is not installed')
     found = next(filter(None, map(shutil.which, NAMES)), None)
-    if found is None:
-        pytest.skip(f'no browser: none of {", ".join(NAMES)} is on the PATH')
-    with playwright.sync_playwright() as driver:
+    need('chromium', found)
+    with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=found)
         try:
             yield browser
@@ -45,7 +45,7 @@ class Watched:
         self.page = browser.new_context(
             viewport={'width': 1280, 'height': 900}, **context
         ).new_page()
-        self.page.set_default_timeout(20_000)
+        self.page.set_default_timeout(1000 * patience(20))
         self.page.on('request', lambda request: self.requests.append(request.url))
         self.page.on('pageerror', lambda error: self.complaints.append(str(error)))
         self.page.on('console', self._heard)

@@ -13,9 +13,10 @@ from typing import Any
 import matplotlib as mpl
 from helpers.doc_blocks import ROOT, Block, Page
 from helpers.node_processes import environment, fresh_domain
+from helpers.patience import patience
 
 # s, after which a block has failed: a busy machine is slow, a page is no benchmark
-PATIENCE = 1800.0
+PATIENCE = patience(1800.0)
 MADE = {'runs', 'build', 'install', 'log', '.git', '.venv', 'docs', '.pytest_cache'}
 ENDED = (0, -signal.SIGTERM)  # of what runs in a terminal until the page ends
 
@@ -101,7 +102,7 @@ class Session:
                 os.killpg(process.pid, signal.SIGTERM)
             except ProcessLookupError:
                 continue
-        codes = [process.wait(60) for process in self._terminals]
+        codes = [process.wait(patience(60)) for process in self._terminals]
         assert all(code in ENDED for code in codes), codes
 
 

@@ -19,6 +19,7 @@ from helpers.node_processes import (
     start_auv,
     start_installed_auv,
 )
+from helpers.patience import patience
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
@@ -50,7 +51,7 @@ def record(scenario: Path, out: Path, *controllers: str, domain: int | None = No
 def recorded(scenario: Path, out: Path, *controllers: str) -> Path:
     """Record to the end, all controllers or these; the folder."""
     process = record(scenario, out, *controllers)
-    _, errors = process.communicate(timeout=120)
+    _, errors = process.communicate(timeout=patience(120))
     assert process.returncode == 0, errors
     return out
 
@@ -78,7 +79,7 @@ def nodes(folder: Path) -> dict[str, psutil.Process]:
 
 def node_of(out: Path, name: str) -> psutil.Process:
     """A node of this run, once steps are being recorded."""
-    limit = time.monotonic() + 60
+    limit = time.monotonic() + patience(60)
     while time.monotonic() < limit:
         bags = list(out.glob('*/*.mcap'))
         if bags and bags[0].stat().st_size > ENOUGH and name in (running := nodes(out)):

@@ -8,6 +8,7 @@ import threading
 from pathlib import Path
 
 from helpers.node_processes import environment
+from helpers.patience import patience
 
 EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'bluerov2_mavlink'
 
@@ -50,7 +51,7 @@ class Relay:
     def close(self) -> None:
         """End the thread."""
         self._ended = True
-        self._thread.join(timeout=5.0)
+        self._thread.join(timeout=patience(5.0))
 
     def _pass(self) -> None:
         sides = [self._vehicle_side, self._driver_side]

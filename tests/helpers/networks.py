@@ -5,7 +5,7 @@ import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-import pytest
+from helpers.needs import need
 
 INSIDE, OUTSIDE = '10.9.8.7', '10.9.8.6'
 TOOLS = ('unshare', 'nsenter', 'ip')
@@ -47,14 +47,12 @@ class Machine:
 @contextmanager
 def two_machines() -> Iterator[tuple[Machine, Machine]]:
     """Two machines on one wire; the test is skipped where they cannot be had."""
-    if not all(map(shutil.which, TOOLS)):
-        pytest.skip(f'expected {", ".join(TOOLS)}')
+    need('namespaces', all(map(shutil.which, TOOLS)))
     with ExitStack() as stack:
         machines = [Machine(), Machine()]
         for machine in machines:
             stack.callback(machine.close)
-        if not all(machine.made for machine in machines):
-            pytest.skip('expected the right to make network namespaces')
+        need('namespaces', all(machine.made for machine in machines))
         peer = str(machines[1].process.pid)
         machines[0].run('ip', 'link', 'add', 'wire', 'type', 'veth', 'peer', 'name', 'wire',
                         'netns', peer)  # fmt: skip

@@ -14,6 +14,7 @@ from typing import Any
 
 import rclpy
 from helpers.fork_server import ForkServer, Process
+from helpers.patience import patience
 from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -23,7 +24,7 @@ from auv_analysis.graph.domain import is_free
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.security import loopback
 
-PATIENCE = 30.0  # s, after which a test that waits has failed
+PATIENCE = patience(30.0)  # s, after which a test that waits has failed
 _domains = itertools.count()
 
 
@@ -152,12 +153,12 @@ class Peer:
             self.call(GetParameters, f'{node}/get_parameters')
 
     def until(
-        self, done: Callable[[], Any], what: str = 'condition', patience: float = PATIENCE
+        self, done: Callable[[], Any], what: str = 'condition', limit: float = PATIENCE
     ) -> Any:
         """Spin until something is true; fail when it takes too long."""
-        limit = time.monotonic() + patience
+        end = time.monotonic() + limit
         while not (result := done()):
-            assert time.monotonic() < limit, f'{what} within {patience:g} s'
+            assert time.monotonic() < end, f'{what} within {limit:g} s'
             self.executor.spin_once(timeout_sec=0.05)
         return result
 
@@ -249,5 +250,5 @@ def installed_auv(*arguments: str, **options: Any) -> subprocess.CompletedProces
 
 
 def _to_its_end(process: Process | subprocess.Popen) -> subprocess.CompletedProcess:
-    said = process.communicate(timeout=600)
+    said = process.communicate(timeout=patience(600))
     return subprocess.CompletedProcess(process.args, process.returncode, *said)

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from helpers.patience import patience
 
 ROOT = Path(__file__).resolve().parents[2]
 BACKEND = ROOT / 'examples' / 'ardusub_json' / 'json_backend.py'
@@ -24,7 +25,7 @@ NEUTRAL = [1500] * 16
 KEYS = ('timestamp', 'gyro', 'accel_body', 'position', 'attitude', 'quaternion', 'velocity')
 NUMBER = r'-?\d+(?:\.\d+)?(?:e[-+]?\d+)?'
 NUMBERS = re.compile(rf'\[({NUMBER}(?:, *{NUMBER})*)\]|{NUMBER}')
-PATIENCE = 60.0  # s, for a kernel that has to be compiled
+PATIENCE = patience(60.0)  # s, for a kernel that has to be compiled
 
 
 def read(data: bytes) -> dict[str, Any]:

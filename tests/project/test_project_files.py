@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from helpers.needs import need
 
 ROOT = Path(__file__).resolve().parents[2]
 CONTRIBUTING = (ROOT / 'CONTRIBUTING.md').read_text()
@@ -82,8 +83,7 @@ def test_citation_names_the_paper_of_the_readme() -> None:
 
 def test_container_is_linted() -> None:
     linter = BIN / 'hadolint'
-    if not linter.exists():
-        pytest.skip('hadolint is not installed')
+    need('hadolint', linter.exists())
     done = subprocess.run(
         [linter, ROOT / 'Dockerfile'], capture_output=True, text=True, check=False
     )

@@ -17,6 +17,7 @@ from helpers.node_processes import (
     parameters,
     stop,
 )
+from helpers.patience import patience
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterValue
@@ -60,7 +61,7 @@ class Driver:
         self.peer.spin(PERIOD)
 
     def until(self, done: Callable[[], bool], what: str) -> None:
-        limit = time.monotonic() + 30.0
+        limit = time.monotonic() + patience(30.0)
         while not done():
             assert time.monotonic() < limit, what
             self.step()
@@ -260,7 +261,7 @@ def test_broken_messages_among_good_ones_are_refused_counted_and_never_forwarded
         driver.works()  # well past the ramp
         usual = driver.surge[-1]
         seen = len(driver.surge)
-        health, limit = {}, time.monotonic() + 30.0
+        health, limit = {}, time.monotonic() + patience(30.0)
         while not all(int(health.get(f'refused {kind}', 0)) >= 3 for kind in BROKEN):
             assert time.monotonic() < limit, health
             # a queue of one loses a message that the next one catches up with: sent once more
@@ -390,7 +391,7 @@ def test_an_error_inside_a_transition_leaves_no_wrench_and_can_be_mended() -> No
     finally:
         peer.close()
         process.terminate()
-        assert process.wait(timeout=30) == 0
+        assert process.wait(timeout=patience(30)) == 0
 
 
 STEPS = {  # s -> surge, m/s

@@ -10,6 +10,7 @@ import pytest
 from geometry_msgs.msg import WrenchStamped
 from helpers.faulty_drivers import NAMES
 from helpers.node_processes import PATIENCE, Peer, environment, fresh_domain
+from helpers.patience import patience
 
 from auv_analysis.driver.checks import PASSIVE, judge, refusal
 from auv_analysis.driver.evidence import (
@@ -27,7 +28,7 @@ from auv_dynamics.ros.interface import Frames
 SECONDS = 3.0  # of listening
 TOPICS = {interface.ODOM: interface.ODOM, interface.WRENCH: interface.WRENCH}
 # a machine that is busy with other tests may keep all of them waiting
-PATIENT = Settings(timeout=4.0)
+PATIENT = Settings(timeout=patience(4.0))
 
 TESTS = Path(__file__).parents[1]
 
@@ -196,7 +197,7 @@ def test_with_another_commander_nothing_is_sent(domain: int) -> None:
     client = RosDriverClient(domain, '/healthy', TOPICS, Frames(), commands=True)
     try:
         peer.until(lambda: client.listen(0.05) or (len(client.buffer) > 50 and client.others()))
-        settings = Settings(timeout=4.0, actuates=True)
+        settings = Settings(timeout=patience(4.0), actuates=True)
         found = judge(DriverRecord(client.graph('here'), client.log(0), settings), PASSIVE)
         assert client.others() == ['/test_peer']
         assert 'wrench_publishers' in refusal(found)  # and whatever a busy machine adds

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from helpers.damaged_bags import seen_by_rosbags
 from helpers.disks import no_more_files, small_disk
+from helpers.needs import need
 from helpers.node_processes import assert_one_line, graph, parameters, run_node, stop
 
 from auv_analysis.bag import read_bag
@@ -199,8 +200,7 @@ def test_a_folder_that_becomes_read_only(tmp_path: Path) -> None:
         recorder.acknowledged()
         recorder.on_disk(bag / 'bag_0.mcap')
         with no_more_files(bag) as possible:
-            if not possible:
-                pytest.skip('this user may write everywhere')
+            need('read-only folders', possible)
             recorder.give(100)
             recorder.ends(f'{bag}/bag_1.mcap: ')
     assert_steps_from_the_first(bag)
@@ -253,8 +253,7 @@ def test_a_wrong_storage_parameter_ends_in_one_line(
 
 def test_a_bag_on_a_full_disk_is_not_begun(tmp_path: Path) -> None:
     with small_disk(tmp_path / 'disk', 8) as disk:
-        if disk is None:
-            pytest.skip('mounting is not permitted')
+        need('mounting', disk)
         attached = tmp_path / 'long.yaml'
         attached.write_text('x' * 100_000)
         arguments = [*parameters(bag=disk / 'bag', storage__free_space=0)]

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from audit.run import FINE, NOT_AUDITED, ROOT, VULNERABLE, verdict
+from helpers.needs import need
 
 ADVISORY = {'id': 'CVE-2099-1', 'fix_versions': ['99.0'], 'aliases': ['GHSA-made-up']}
 REFUSED = (
@@ -103,8 +104,7 @@ def test_pip_audit_itself_finds_fails_and_passes(tmp_path: Path) -> None:
     subprocess.run([sys.executable, '-m', 'venv', str(made)], check=True)
     python = made / 'bin/python'
     install = [str(python), '-m', 'pip', 'install', '--quiet', '-r', 'requirements-audit.txt']
-    if subprocess.run(install, cwd=ROOT, check=False).returncode:
-        pytest.skip('pip-audit cannot be installed here')
+    need('pip-audit', not subprocess.run(install, cwd=ROOT, check=False).returncode)
 
     def audit(url: str) -> subprocess.CompletedProcess:
         command = [str(python), 'tests/audit/run.py', '--python', str(python), '--url', url]

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from helpers.fork_server import Process
 from helpers.node_processes import Peer, fresh_domain, parameters, start_auv, start_node, stop
+from helpers.patience import patience
 
 from auv_analysis.driver.checks import CHECKS
 from auv_analysis.driver.evidence import FAIL, PASS
@@ -20,7 +21,7 @@ from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import Frames, wrench_of
 
 VEHICLE = parameters(vehicle='bluerov2_heavy', step=0.02, initial__eta='[0.0,0.0,5.0,0.0,0.0,0.8]')
-LIMIT = 180.0  # s
+LIMIT = patience(180.0)  # s
 RATE = 50.0  # Hz
 ZERO = (0.0,) * 6
 AT_REST = np.eye(13)[3]

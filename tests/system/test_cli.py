@@ -17,6 +17,7 @@ import psutil
 import pytest
 import yaml
 from geometry_msgs.msg import WrenchStamped
+from helpers.patience import patience
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 
@@ -448,7 +449,7 @@ def _dropped() -> None:
 def test_interrupt_that_python_drops_ends_the_command(monkeypatch, capsys) -> None:
     def command(_: object) -> dict:
         CALLBACK(_dropped)()
-        limit = time.monotonic() + 30
+        limit = time.monotonic() + patience(30)
         while time.monotonic() < limit:
             time.sleep(0.01)
         return {}
@@ -482,7 +483,7 @@ def test_interrupt_ends_simulate_whenever_it_comes(folder) -> None:
             process.wait(0.3 + i / 40 * whole)
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGINT)
-            _, errors = process.communicate(timeout=60)
+            _, errors = process.communicate(timeout=patience(60))
             assert process.returncode == 1 or i > 34, errors  # it may have come to its end
             assert 'Traceback' not in errors
             assert json.loads((folder / 'runs/case1/summary.json').read_text())

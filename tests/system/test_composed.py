@@ -11,6 +11,7 @@ import pytest
 import yaml
 from helpers.graph_runs import every_message, node_of, nodes, recorded, start, start_installed
 from helpers.node_processes import auv, graph, installed_auv, parameters, stop
+from helpers.patience import patience
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from std_srvs.srv import SetBool, Trigger
@@ -67,7 +68,7 @@ def test_all_nodes_are_one_process_under_a_name_of_its_own(tmp_path: Path) -> No
     assert list(nodes(out)) == [ALONE]
     assert not any(part.endswith('_node') for part in composed.cmdline())
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60)
+    process.communicate(timeout=patience(60))
     assert process.returncode == 1
     assert not nodes(out)
     run = load_run(out / 'gvc')
@@ -81,8 +82,8 @@ def test_it_does_not_outlive_auv(tmp_path: Path) -> None:
     process = start_installed(write(tmp_path, duration=600.0), out, '--composed')
     composed = node_of(out, ALONE)
     process.kill()
-    process.communicate(timeout=60)
-    composed.wait(timeout=10)
+    process.communicate(timeout=patience(60))
+    composed.wait(timeout=patience(10))
     assert 'not finished' not in ' '.join(load_run(out / 'gvc').notes)
 
 
@@ -91,7 +92,7 @@ def test_its_death_ends_the_run_and_loses_nothing_that_was_written(tmp_path: Pat
     out = tmp_path / 'out'
     process = start(write(tmp_path, duration=600.0), out, '--composed')
     node_of(out, ALONE).kill()
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=patience(60))
     assert process.returncode == 1
     assert f'{ALONE} ended with exit code -9' in errors
     run = load_run(out / 'gvc')
@@ -121,7 +122,7 @@ def test_a_node_that_ends_is_named_and_everything_said_before_is_in_the_bag(
 def test_wrong_input_of_one_node_ends_all_in_one_line(tmp_path: Path) -> None:
     with graph((ALONE, parameters(bag=tmp_path / 'bag', vehicle='nothing'))) as (_, processes):
         process = processes[ALONE]
-        output, _ = process.communicate(timeout=60)
+        output, _ = process.communicate(timeout=patience(60))
         assert process.returncode == 2
         assert len(output.strip().splitlines()) == 1, output
 
@@ -168,7 +169,7 @@ def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
         except psutil.NoSuchProcess:
             break
         time.sleep(0.05)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=patience(60))
     assert process.returncode == 0, errors
     half = len(sizes) // 2
     assert max(sizes[half:]) < max(sizes[:half]) + 5.0, 'MB'

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from helpers.needs import needing
 from helpers.node_processes import auv, fresh_domain
+from helpers.patience import patience
 
 from auv_analysis.bag import load_run
 
@@ -20,7 +22,7 @@ GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 def run(name: str, *arguments: str, cwd: Path) -> str:
     ended = subprocess.run(
         [sys.executable, str(EXAMPLES / name), *arguments, '--domain-id', str(fresh_domain())],
-        cwd=cwd, capture_output=True, text=True, timeout=180, check=False,
+        cwd=cwd, capture_output=True, text=True, timeout=patience(180), check=False,
     )  # fmt: skip
     assert ended.returncode == 0, ended.stderr
     return ended.stdout
@@ -87,7 +89,7 @@ def test_a_law_that_fails_on_the_nodes_is_told_and_is_no_success(tmp_path: Path)
     assert 'boom' in summaries['mine']['notes'][0]
 
 
-@pytest.mark.skipif(shutil.which('ros2') is None, reason='no ros2 command: it has no wheel')
+@needing('ros2', shutil.which('ros2'))
 def test_ros2_run_finds_the_nodes() -> None:
     ended = subprocess.run(
         ['ros2', 'pkg', 'executables', 'auv_dynamics'], capture_output=True, text=True, check=True

@@ -19,6 +19,7 @@ from helpers.graph_runs import (
     start_installed,
 )
 from helpers.node_processes import auv, fresh_domain, installed_auv
+from helpers.patience import patience
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.bag import load_run, read_bag
@@ -193,12 +194,12 @@ def test_ending_auv_ends_its_nodes_and_keeps_earlier_results(tmp_path: Path, how
     node_of(out, 'plant_node')
     policies = {name: os.sched_getscheduler(node.pid) for name, node in nodes(out).items()}
     process.send_signal(how)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=patience(60))
     assert how == signal.SIGKILL or errors.splitlines()[-1] == 'interrupted'
     prompt = {name for name, policy in policies.items() if policy != os.SCHED_BATCH}
     assert len(policies) == 5
     assert prompt == {'plant_node', 'controller_node'}, 'observers give way to them'
-    limit = time.monotonic() + 10
+    limit = time.monotonic() + patience(10)
     while nodes(out):
         assert time.monotonic() < limit, 'its nodes outlive auv'
         time.sleep(0.05)

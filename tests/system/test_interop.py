@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from helpers.graph_runs import recorded
+from helpers.needs import need
 from helpers.node_processes import auv
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -112,19 +113,23 @@ def test_schemas_hashes_and_attachments(bag: Path) -> None:
 @pytest.fixture(scope='module')
 def core(tmp_path_factory) -> Callable[[Path], dict[str, Any]]:
     """What @mcap/core reads from a file."""
-    if shutil.which('npm') is None:
-        pytest.skip('npm is not installed')
+    need('npm', shutil.which('npm'))
     folder = tmp_path_factory.mktemp('npm')
     for name in ('package.json', 'read.mjs'):
         shutil.copy(CHECK / name, folder)
 
-    def run(*command: str) -> str:
-        ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        assert ended.returncode == 0, ended.stderr
-        return ended.stdout
+    def run(*command: str) -> subprocess.CompletedProcess:
+        return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
-    run('npm', 'install', '--no-audit', '--no-fund', '--silent')
-    return lambda path: json.loads(run('node', 'read.mjs', str(path)))
+    def read(path: Path) -> dict[str, Any]:
+        ended = run('node', 'read.mjs', str(path))
+        assert ended.returncode == 0, ended.stderr
+        return json.loads(ended.stdout)
+
+    need('npm registry', run('npm', 'view', '@mcap/core', 'version').returncode == 0)
+    installed = run('npm', 'install', '--no-audit', '--no-fund', '--silent')
+    assert installed.returncode == 0, installed.stderr
+    return read
 
 
 def test_npm_mcap_core(bag: Path, core: Callable[[Path], dict[str, Any]]) -> None:
@@ -178,30 +183,50 @@ def split(bag: Path, tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize('name', ['repaired', 'split'])
-def test_repaired_and_split_bags(
-    name: str, core: Callable[[Path], dict[str, Any]], request: pytest.FixtureRequest, bag: Path
-) -> None:
-    """rosbags, mcap-ros2-support and @mcap/core read the same wrenches as our reader."""
-    folder = request.getfixturevalue(name)
-    wrenches: dict[str, dict[int, list[float]]] = {'rosbags': {}, 'mcap_ros2': {}, 'core': {}}
+def by_rosbags(folder: Path) -> dict[int, list[float]]:
     with AnyReader([folder]) as reader:
-        for c, stamp, raw in reader.messages():
-            if c.topic == '/wrench':
-                wrenches['rosbags'][stamp] = wrench_row(reader.deserialize(raw, c.msgtype))
+        return {
+            stamp: wrench_row(reader.deserialize(raw, c.msgtype))
+            for c, stamp, raw in reader.messages()
+            if c.topic == '/wrench'
+        }
+
+
+def by_mcap_ros2(folder: Path) -> dict[int, list[float]]:
+    found = {}
     for path in bag_files(folder):
         with path.open('rb') as stream:
             read = make_reader(stream, decoder_factories=[DecoderFactory()], validate_crcs=True)
             for _, c, m, decoded in read.iter_decoded_messages():
                 if c.topic == '/wrench':
-                    wrenches['mcap_ros2'][m.log_time] = wrench_row(decoded)
-        document = core(path)
-        wrenches['core'].update(zip(document['stamps'], document['wrench'], strict=True))
-        assert set(document['attachments']) >= {'scenario.yaml', 'vehicle.yaml', 'params.yaml'}
+                    found[m.log_time] = wrench_row(decoded)
+    return found
+
+
+def assert_as_ours(folder: Path, found: dict[int, list[float]]) -> None:
+    """The same wrenches as our reader's."""
     stamps, rows = read_bag(folder).messages['/wrench']
-    for found in wrenches.values():
-        assert sorted(found) == stamps.tolist()
-        assert np.array_equal([found[stamp] for stamp in stamps.tolist()], rows[:, :6])
+    assert sorted(found) == stamps.tolist()
+    assert np.array_equal([found[stamp] for stamp in stamps.tolist()], rows[:, :6])
+
+
+@pytest.mark.parametrize('name', ['repaired', 'split'])
+def test_repaired_and_split_bags(name: str, request: pytest.FixtureRequest, bag: Path) -> None:
+    folder = request.getfixturevalue(name)
+    for read in (by_rosbags, by_mcap_ros2):
+        assert_as_ours(folder, read(folder))
     run, whole = load_run(folder), load_run(bag)
     assert np.array_equal(run.tau, whole.tau[: len(run.t)])
     assert name == 'repaired' or len(run.t) == len(whole.t)
+
+
+@pytest.mark.parametrize('name', ['repaired', 'split'])
+def test_npm_mcap_core_reads_repaired_and_split_bags(
+    name: str, core: Callable[[Path], dict[str, Any]], request: pytest.FixtureRequest
+) -> None:
+    folder, found = request.getfixturevalue(name), {}
+    for path in bag_files(folder):
+        document = core(path)
+        found.update(zip(document['stamps'], document['wrench'], strict=True))
+        assert set(document['attachments']) >= {'scenario.yaml', 'vehicle.yaml', 'params.yaml'}
+    assert_as_ours(folder, found)

@@ -16,6 +16,7 @@ import pytest
 from helpers.fork_server import Process
 from helpers.graph_runs import long_run, nodes
 from helpers.node_processes import Peer, auv, fresh_domain, start_auv
+from helpers.patience import patience
 
 from auv_analysis.bag import load_run
 from auv_analysis.graph.experiment import COMPOSED, PACKAGES
@@ -24,7 +25,7 @@ from auv_dynamics.ros import interface, topics
 KILLS = int(os.environ.get('AUV_GVC_KILLS', '200'))
 SEED = int(os.environ.get('AUV_GVC_SEED', '0'))
 NAMES = (*PACKAGES, COMPOSED)
-FLUSHED = 1.0  # s of records that a kill may cost
+FLUSHED = patience(1.0)  # s of records that a kill may cost
 STEPS = 1_000_000  # more than any of these runs sees
 
 
@@ -72,7 +73,7 @@ def killed(folder: Path, kill: Kill) -> tuple[float, Process, Progress]:
     process = start_auv(
         'run', str(long_run(folder, STEPS)), '--out', str(out), *options, domain=domain
     )
-    limit = time.monotonic() + 60
+    limit = time.monotonic() + patience(60)
     victim: psutil.Process | None = None
     while victim is None or not (kill.starting or progress.steps):
         assert time.monotonic() < limit, f'{kill.name} does not run'
@@ -87,7 +88,7 @@ def check_kill(folder: Path, kill: Kill, *options: str) -> str:
     """Kill, and see what was promised; what was left of the run. `options` of the analysis."""
     when, process, progress = killed(folder, kill)
     try:
-        _, errors = process.communicate(timeout=10)  # s, as promised
+        _, errors = process.communicate(timeout=patience(10))  # s, as promised
     finally:
         process.kill()
         progress.peer.close()

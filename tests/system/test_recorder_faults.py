@@ -18,7 +18,9 @@ import yaml
 from helpers.damaged_bags import seen_by_rosbags
 from helpers.disks import small_disk
 from helpers.graph_runs import node_of, nodes, start
+from helpers.needs import need
 from helpers.node_processes import auv
+from helpers.patience import patience
 
 from auv_analysis.bag import load_run, read_bag
 from auv_analysis.graph.supervisor import NodeDiedError, Supervisor
@@ -31,7 +33,7 @@ SCENARIO = {
     'setpoint': {'surge': {'offset': 0.5, 'terms': [{'amplitude': 0.1, 'omega': 0.5}]}},
     'disturbance': {'kind': 'herman2018'},
 }  # fmt: skip
-SOON = 10.0  # s, within which a run ends that has lost its recorder
+SOON = patience(10.0)  # s, within which a run ends that has lost its recorder
 
 
 def write(path: Path, **changes: object) -> Path:
@@ -107,7 +109,7 @@ def test_what_was_finished_before_is_still_reported(tmp_path: Path) -> None:
     found = [node for name, node in nodes(out / 'two').items() if name == 'recorder_node']
     found[0].send_signal(signal.SIGKILL)
     # the report of the first, whose kernels may have to be compiled, comes after the end of the run
-    ended(process, out, 'recorder_node ended with exit code -9', within=120.0)
+    ended(process, out, 'recorder_node ended with exit code -9', within=patience(120.0))
     summary = json.loads((out / 'summary.json').read_text())
     assert summary.keys() == {'one'}
     assert 'another controller did not come to its end' in ' '.join(summary['one']['notes'])
@@ -140,12 +142,11 @@ def test_a_disk_that_fills_up(tmp_path: Path) -> None:
     """The guard ends the run while there is room for the summary of what was finished before."""
     controllers = {f'gvc{i}': {'law': 'gvc', **GAINS} for i in range(9)}
     with small_disk(tmp_path / 'disk', (32 << 10) + 1600) as disk:
-        if disk is None:
-            pytest.skip('mounting is not permitted')
+        need('mounting', disk)
         out = disk / 'out'
         scenario = write(tmp_path / 's.yaml', duration=20.0, controllers=controllers)
         process = start(scenario, out)
-        _, errors = process.communicate(timeout=120)
+        _, errors = process.communicate(timeout=patience(120))
         assert process.returncode == 1, errors
         assert 'recorder_node ended with exit code 1' in errors
         assert 'bytes free on its file system, storage.free_space asks for 33554432' in errors
@@ -159,8 +160,7 @@ def test_a_disk_that_fills_up(tmp_path: Path) -> None:
 
 def test_a_node_that_cannot_even_say_so(tmp_path: Path) -> None:
     with small_disk(tmp_path / 'disk', 64) as disk:
-        if disk is None:
-            pytest.skip('mounting is not permitted')
+        need('mounting', disk)
         with (disk / 'full').open('wb', buffering=0) as file, suppress(OSError):
             while True:
                 file.write(bytes(4096))

@@ -28,6 +28,7 @@ from helpers.graph_runs import (
     start,
 )
 from helpers.node_processes import auv
+from helpers.patience import patience
 
 from auv_analysis import load_scenario
 from auv_analysis.bag import read_bag
@@ -126,7 +127,7 @@ def hold_up(recorder: psutil.Process, process: subprocess.Popen, sizes: list[dic
                     break
             done[kind] += 1
     except psutil.NoSuchProcess:
-        process.wait(timeout=300)
+        process.wait(timeout=patience(300))
     return done
 
 
@@ -179,7 +180,7 @@ def test_a_day_of_vehicle_time_keeps_its_memory(tmp_path: Path) -> None:
     with contextlib.suppress(psutil.NoSuchProcess):
         while not ended_within(process, 1.0):
             sizes.append({name: node.memory_info().rss / 1e6 for name, node in running.items()})
-    _, errors = process.communicate(timeout=120)
+    _, errors = process.communicate(timeout=patience(120))
     assert process.returncode == 0, errors
     counts = read_bag(out / 'gvc', decode=False).counts
     assert all(counts[f'/{topic}'] == round(DAY / 0.05) + 1 for topic in interface.STEP_TOPICS)
@@ -215,7 +216,7 @@ def test_a_recorder_held_up_for_too_long_fails_loudly(
     ended_within(process, seconds)
     if recorder.is_running() and process.poll() is None:
         recorder.resume()
-    _, errors = process.communicate(timeout=120)
+    _, errors = process.communicate(timeout=patience(120))
     assert process.returncode == 1
     assert re.search(said, errors), errors
     assert not nodes(out)

@@ -17,7 +17,6 @@ from auv_analysis.studies.sweep.engine import opened, sweep
 from auv_analysis.studies.sweep.folder import sweep_folder
 from auv_dynamics.files.errors import InputError
 
-pytest.importorskip('distributed')
 ADDRESS = re.compile(r'tcp://127\.0\.0\.1:\d+')
 
 

@@ -8,11 +8,14 @@ import time
 from pathlib import Path
 
 import pytest
+from helpers.patience import patience
 from helpers.sweeps import CAMPAIGN, parts, write_files
 
 AUV = [sys.executable, '-m', 'auv_analysis.cli.main', 'sweep', 'campaign.yaml', '--workers', '2']
 BLOCKS = 48
-PATIENCE = 600.0  # s, after which a test that waits has failed: the first process compiles
+PATIENCE = patience(
+    600.0
+)  # s, after which a test that waits has failed: the first process compiles
 
 
 @pytest.fixture

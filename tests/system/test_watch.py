@@ -13,6 +13,7 @@ import yaml
 from helpers.fork_server import Process
 from helpers.graph_runs import every_message, record
 from helpers.node_processes import PATIENCE, auv, fresh_domain, start_auv, start_installed_auv
+from helpers.patience import patience
 
 from auv_dynamics.ros import interface
 
@@ -54,7 +55,7 @@ def test_a_run_is_the_same_beside_a_watch_that_is_even_stopped(scenario, tmp_pat
         seen = first_look(beside, run)
         beside.send_signal(signal.SIGSTOP)  # while the run is under way
         assert float(re.search(r't = ([\d.]+) s', seen)[1]) < SCENARIO['duration']
-        _, errors = run.communicate(timeout=120)
+        _, errors = run.communicate(timeout=patience(120))
         assert run.returncode == 0, errors
         beside.send_signal(signal.SIGCONT)
         beside.send_signal(signal.SIGINT)
@@ -68,7 +69,7 @@ def test_a_run_is_the_same_beside_a_watch_that_is_even_stopped(scenario, tmp_pat
         assert seen[topic]['gaps'] == seen[topic]['repeats'] == seen[topic]['refused'] == 0
 
     alone = record(scenario, tmp_path / 'alone')
-    assert alone.wait(timeout=120) == 0
+    assert alone.wait(timeout=patience(120)) == 0
     bags = [every_message(tmp_path / name / 'gvc', *PACED) for name in ('watched', 'alone')]
     assert bags[0].keys() == bags[1].keys()
     for topic, messages in bags[0].items():

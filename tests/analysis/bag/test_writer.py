@@ -16,6 +16,7 @@ from helpers.damaged_bags import (
     write_bag,
 )
 from helpers.made_messages import STRING, TYPES, serialized
+from helpers.patience import patience
 
 from auv_analysis.bag import output, read_bag
 from auv_analysis.bag import writer as writer_module
@@ -24,7 +25,7 @@ from auv_analysis.bag.output import LEAST_SIZE, Storage
 from auv_analysis.bag.recover import recover
 from auv_analysis.bag.writer import BagWriter, RecordingError
 
-PATIENCE = 20.0  # s
+PATIENCE = patience(20.0)  # s
 
 
 def writer_of(folder: Path, **storage: object) -> BagWriter:

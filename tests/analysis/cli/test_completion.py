@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from helpers.needs import need
 
 from auv_analysis.cli import main
 from auv_analysis.cli.tune import LAWS
@@ -61,8 +62,7 @@ def test_code_is_valid_in_its_shell(shell: str, capsys: pytest.CaptureFixture) -
     main.main(['completion', shell])
     code = capsys.readouterr().out
     assert 'auv' in code
-    if shutil.which(shell) is None:
-        pytest.skip(f'{shell} is not installed')
+    need(shell, shutil.which(shell))
     subprocess.run([shell, '-n'], input=code, text=True, check=True)
 
 

@@ -2,9 +2,12 @@
 
 import json
 import re
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
+import trimesh
+from helpers.needs import needing
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 
@@ -12,8 +15,7 @@ from auv_analysis.cli.main import main
 from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle.vehicle import skew
 
-trimesh = pytest.importorskip('trimesh', reason='requirements-mesh.txt is not installed')
-pytest.importorskip('capytaine', reason='requirements-mesh.txt is not installed')
+pytestmark = needing('capytaine', find_spec('capytaine'))
 
 RHO = 1000.0
 ERROR = 0.02  # of the inertia of hull and water, which the refinement ends at

@@ -186,7 +186,6 @@ def test_a_run_is_printed_in_a_line(run: Run) -> None:
 
 
 def test_a_run_is_a_data_frame(run: Run) -> None:
-    pytest.importorskip('pandas')
     frame = run.to_pandas()
     assert frame.index.name == 't'
     assert_array_equal(frame.index, run.t)

@@ -2,10 +2,13 @@
 
 import sys
 from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.needs import need
 from numpy.testing import assert_allclose
 
 from auv_analysis.cli.main import main
@@ -66,7 +69,8 @@ def test_an_earlier_file_is_not_replaced_unasked(monkeypatch, capsys, tmp_path) 
 
 
 def test_every_sample_is_in_the_file(monkeypatch, tmp_path: Path) -> None:
-    chunk = pytest.importorskip('rerun.chunk', reason='rerun-sdk is not installed')
+    need('rerun-sdk', find_spec('rerun'))
+    chunk = import_module('rerun.chunk')
     monkeypatch.setattr(Run, 'blocks', lambda run: (run.part(slice(i, i + 3)) for i in (0, 3, 6)))
     run, path = made_run(), tmp_path / 'made.rrd'
     assert rerun_export.export(run, path) == SAMPLES

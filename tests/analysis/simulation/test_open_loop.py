@@ -9,6 +9,7 @@ import herman_reference as reference
 import numpy as np
 import pytest
 from helpers.closed_loops import TURNED, file_of
+from helpers.needs import needing
 from helpers.plants import plant_of, push
 from helpers.strategies import QUICK, vehicles
 from hypothesis import given
@@ -223,7 +224,7 @@ def test_several_vehicles_one_of_which_has_lift():
         assert_allclose(states, alone, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.skipif(not JITTED, reason='nothing is compiled')
+@needing('numba', JITTED)
 def test_nothing_is_compiled_anew_for_arrays_of_another_kind():
     vehicle = load_vehicle('rexrov')
     commands, start = recorded(vehicle, 2), in_segments(START, 2)
@@ -322,7 +323,7 @@ def test_wrong_arguments(changes, match):
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not JITTED, reason='runs this file again without numba')
+@needing('numba', JITTED)
 def test_the_same_source_runs_without_numba():
     command = [sys.executable, '-m', 'pytest', '-q', '-x', '-p', 'no:cacheprovider', __file__]
     environment = {**os.environ, 'NUMBA_DISABLE_JIT': '1'}

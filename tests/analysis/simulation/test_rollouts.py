@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.closed_loops import SIX, TURNED
+from helpers.needs import needing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
@@ -169,7 +170,7 @@ MANY = {
 ALL = rollouts(GVC, 'gvc', MANY)
 
 
-@pytest.mark.skipif(not JITTED, reason='takes long')
+@needing('numba', JITTED)
 @settings(max_examples=25)
 @given(st.lists(st.integers(0, 36), min_size=1, max_size=40), st.integers(1, 3))
 def test_no_rollout_depends_on_those_beside_it(rows, threads):
@@ -290,7 +291,7 @@ def test_no_changes_give_the_run_of_the_scenario():
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not JITTED, reason='runs this file again without numba')
+@needing('numba', JITTED)
 def test_the_same_source_runs_without_numba_for_every_law():
     command = [sys.executable, '-m', 'pytest', '-q', '-x', '-p', 'no:cacheprovider', __file__]
     environment = {**os.environ, 'NUMBA_DISABLE_JIT': '1'}

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.needs import needing
 from numpy.testing import assert_array_equal
 
 from auv_analysis import load_scenario, simulate, summarize
@@ -107,7 +108,7 @@ def test_law_that_numba_fails_on_in_any_way_runs_as_plain_python(
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not JITTED, reason='nothing is compiled')
+@needing('numba', JITTED)
 def test_the_template_of_a_law_is_compiled(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     main.main(['new', 'law', 'template_of_a_law'])

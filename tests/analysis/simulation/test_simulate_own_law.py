@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.patience import patience
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
@@ -76,7 +77,7 @@ def test_a_law_of_ones_own_is_plain_python(tmp_path, hold):
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
+        timeout=patience(300),
     )
     assert done.returncode == 0, done.stderr
     kept = [path.name for path in cache.rglob('*.nb?') if b'own_law_of_mine' in path.read_bytes()]

@@ -8,6 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.needs import needing
+from helpers.patience import patience
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
@@ -58,7 +60,7 @@ def run_script(tmp_path, **environment):
         capture_output=True,
         text=True,
         check=False,
-        timeout=300,
+        timeout=patience(300),
     )
     assert done.returncode == 0, done.stderr
     return dict(np.load(out))
@@ -77,7 +79,7 @@ def check_same(arrays):
             assert_allclose(other, ours, rtol=0, atol=1e-12 * scale, err_msg=f'{law} {hold} {key}')
 
 
-@pytest.mark.skipif(not compile.JITTED, reason='numba is absent or switched off here')
+@needing('numba', compile.JITTED)
 def test_the_compiled_kernel_agrees_with_the_source(tmp_path):
     check_same(run_script(tmp_path, NUMBA_DISABLE_JIT='1'))
 
@@ -147,7 +149,7 @@ def test_a_folder_that_somebody_else_made_is_not_used(tmp_path, monkeypatch):
     assert not compile.is_private(tmp_path / 'theirs')
 
 
-@pytest.mark.skipif(not compile.JITTED, reason='numba is absent or switched off here')
+@needing('numba', compile.JITTED)
 def test_one_clone_loads_what_another_compiled_unless_the_source_differs(tmp_path):
     hits = []
     for clone, added in (('one', 1), ('other', 1), ('changed', 2)):
@@ -172,7 +174,7 @@ def test_one_clone_loads_what_another_compiled_unless_the_source_differs(tmp_pat
     assert hits == [['2', '0'], ['2', '1'], ['3', '0']]
 
 
-@pytest.mark.skipif(not compile.JITTED, reason='numba is absent or switched off here')
+@needing('numba', compile.JITTED)
 @pytest.mark.parametrize('private', [True, False])
 def test_code_in_a_folder_of_somebody_else_is_neither_loaded_nor_kept(tmp_path, private):
     cache = tmp_path / 'cache' / compile.kernels_digest()

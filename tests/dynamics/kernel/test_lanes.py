@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from helpers.needs import needing
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
@@ -96,7 +97,7 @@ def fill_blocks(both, table, x, out, lanes):
         chosen(both, table, b, of_block(x, b, lanes), of_block(out, b, lanes), lanes)
 
 
-@pytest.mark.skipif(not LANES, reason='needs numba')
+@needing('numba', LANES)
 @given(count=SIZES, seed=st.integers(0, 2**32 - 1))
 def test_compiled_lanes_do_what_is_done_to_each_vehicle(count, seed):
     """In registers, and compiled for one vehicle after the other, as in plain Python."""
@@ -138,7 +139,7 @@ def test_choices_of_single_numbers(x):
     assert anywhere(x > 0) == (x > 0)
 
 
-@pytest.mark.skipif(not JITTED, reason='needs numba')
+@needing('numba', JITTED)
 def test_compiled_functions_keep_nothing_alive():
     """No references are counted: arrays are freed when their owner lets them go."""
 
@@ -191,7 +192,7 @@ np.savez(
 """
 
 
-@pytest.mark.skipif(not LANES, reason='needs numba')
+@needing('numba', LANES)
 def test_everything_runs_without_vector_registers(tmp_path):
     """`simd` is optional: deleted, every vehicle is computed alone, with the same numbers."""
     (tmp_path / 'without').mkdir()

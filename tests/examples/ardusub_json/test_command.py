@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from ardusub_mixer import FRAMES
+from helpers.patience import patience
 from helpers.sitl_peer import BACKEND, NEUTRAL, ROOT, SitlPeer, backend
 from json_motors import make_motors
 
@@ -23,7 +24,9 @@ PULSES = np.array([1600.0, 1350, 1480, 1700, 1450, 1550, 1300, 1900] + [0.0] * 2
 def refused(*options: str) -> str:
     """The line with which it ends, exit code 2."""
     command = [sys.executable, str(BACKEND), *options]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=patience(60), check=False
+    )
     assert done.returncode == 2, done.stderr
     return done.stderr.splitlines()[-1]
 

@@ -67,6 +67,7 @@ class Products:
         self.sums = np.zeros((6, 6))
         self.peaks = np.zeros(6)
 
+    @np.errstate(over='ignore', invalid='ignore')  # what overflows is null in a summary
     def add(self, signals: np.ndarray) -> None:
         """Add the next samples (n, 6)."""
         self.count += len(signals)
@@ -108,6 +109,7 @@ def pieces(weights: np.ndarray, signals: np.ndarray) -> np.ndarray:
     return weights * signals[..., np.newaxis, :]
 
 
+@np.errstate(over='ignore', invalid='ignore')
 def coupling_terms(weights: np.ndarray, products: Products) -> list[dict[str, Any]]:
     """Pieces of (31) or (32) in figures: which degree of freedom deforms which other, and how much.
 

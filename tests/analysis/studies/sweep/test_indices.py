@@ -11,7 +11,6 @@ from auv_analysis.studies.sweep.dataset import open_sweep
 from auv_analysis.studies.sweep.indices import designed
 from auv_dynamics.vehicle import DOFS
 
-pytest.importorskip('SALib')
 ENERGY = 'kinetic_energy.mean'
 A, B, C = 'controllers.*.k_D', 'controllers.*.k_I', 'setpoint.surge.offset'
 UNIFORM = '\n'.join(f'      {path}: {{uniform: {{from: 1.0, to: 2.0}}}}' for path in (A, B, C))

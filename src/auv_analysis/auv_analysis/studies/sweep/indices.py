@@ -1,5 +1,6 @@
 """Sensitivity indices after Sobol' and Morris: of a campaign, and of a design of one's own."""
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -231,7 +232,9 @@ def sobol_indices(
     """
     from SALib.analyze import sobol
 
-    return sobol.analyze(cube(names), y, calc_second_order=second_order, seed=seed)
+    with warnings.catch_warnings():
+        warnings.filterwarnings('ignore', 'Constant values')  # whose indices are 0
+        return sobol.analyze(cube(names), y, calc_second_order=second_order, seed=seed)
 
 
 def morris_indices(

@@ -11,14 +11,14 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
-SHARES = {  # of all inputs
+SHARES = {  # of the inputs
     'vehicles': 0.20, 'imports': 0.06, 'scenarios': 0.16, 'parameters': 0.04, 'text': 0.08,
     'messages': 0.23, 'decoding': 0.13, 'bags': 0.078, 'guided_bags': 0.02, 'costs': 0.002,
 }  # fmt: skip
@@ -169,16 +169,18 @@ def one(target: str, count: int, seed: int) -> int:
     return 0
 
 
-def together(targets: Iterable[str], count: int, seed: int, jobs: int) -> int:
-    """Try targets in processes of their own."""
+def together(targets: Sequence[str], count: int, seed: int, jobs: int) -> int:
+    """Try targets in processes of their own, which share the inputs."""
 
     from compile_kernels import LAWS, compile_law
 
     for law in LAWS:  # no input waits for the compiler
         compile_law(law)
 
+    inputs = sum(SHARES[target] for target in targets)
+
     def start(target: str) -> int:
-        number = max(1, round(count * SHARES[target]))
+        number = max(1, round(count * SHARES[target] / inputs))
         command = [
             *(sys.executable, str(HERE / 'run.py'), '--only', target),
             *('--count', str(number), '--seed', str(seed)),
@@ -202,10 +204,12 @@ def main() -> None:
     parser.add_argument('--seed', type=int, default=0)
     parser.add_argument('--jobs', type=int, default=2, help='targets at a time')
     parser.add_argument('--only', choices=SHARES, help='one target, with all the inputs')
+    parser.add_argument('--unguided', action='store_true', help='leave out what atheris guides')
     options = parser.parse_args()
     if options.only:
         sys.exit(one(options.only, options.count, options.seed))
-    sys.exit(together(SHARES, options.count, options.seed, options.jobs))
+    targets = [target for target in SHARES if not (options.unguided and target in GUIDED)]
+    sys.exit(together(targets, options.count, options.seed, options.jobs))
 
 
 if __name__ == '__main__':

@@ -28,7 +28,7 @@ class Need:
     excuse: str = ''  # why it may be absent on CI; empty: it has to be there
 
 
-ATHERIS_HAS_WHEELS = (platform.system(), platform.machine()) == ('Linux', 'x86_64')
+CAPYTAINE_HAS_WHEELS = (platform.system(), platform.machine()) == ('Linux', 'x86_64')
 NEEDS = {
     'chromium': Need('that reports and the site work in a browser'),
     'gcc': Need('that the scalar C reference computes what the kernel computes'),
@@ -41,13 +41,9 @@ NEEDS = {
         'that @mcap/core reads our bags, beside rosbags and mcap-ros2-support',
         'a machine may have no way to the registry',
     ),
-    'atheris': Need(
-        'that nothing from outside breaks anything: files, messages and bags that are fuzzed',
-        '' if ATHERIS_HAS_WHEELS else 'it has wheels for Linux on x86_64 alone',
-    ),
     'capytaine': Need(
         'that the added mass of meshes is right',
-        '' if ATHERIS_HAS_WHEELS else 'it has wheels for Linux on x86_64 alone',
+        '' if CAPYTAINE_HAS_WHEELS else 'it has wheels for Linux on x86_64 alone',
     ),
     'ros2': Need(
         'that ROS 2 itself finds our executables and takes our security policy',

@@ -31,7 +31,7 @@ EXAMPLES ?= 500
 SEEDS ?= 10
 MUTANTS ?= 500
 
-.PHONY: help setup case1 case2 test test-loaded quick coverage soak nightly fuzz identify-study properties mutation audit bench bench-growth build colcon-test wheels
+.PHONY: help setup case1 case2 test kernels test-loaded quick coverage soak nightly fuzz identify-study properties mutation audit bench bench-growth build colcon-test wheels
 .PHONY: lint format hooks interop docs docs-links docs-test docs-tools clean
 
 help:  ## this list
@@ -55,24 +55,23 @@ case1 case2: setup  ## the paper's experiment: GVC against CL on real nodes, wit
 # four workers on two cores: the tests of the nodes mostly wait
 TEST := $(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 
-test: setup  ## the tests
-	$(BIN)/python tests/compile_kernels.py
+test: kernels  ## the tests
 	$(TEST)
 
-# AUV_GVC_PATIENCE is the factor of every limit
-test-loaded: setup  ## the same beside LOAD busy processes, TIMES in a row, each in an order drawn by SEED, SEED + 1, ...
+kernels: setup  ## compile what the tests call, where it is not compiled
 	$(BIN)/python tests/compile_kernels.py
+
+# AUV_GVC_PATIENCE is the factor of every limit
+test-loaded: kernels  ## the same beside LOAD busy processes, TIMES in a row, each in an order drawn by SEED, SEED + 1, ...
 	for seed in $$(seq $(SEED) $$(($(SEED) + $(TIMES) - 1))); do \
 	  AUV_GVC_PATIENCE=$${AUV_GVC_PATIENCE:-4} AUV_GVC_ORDER=$$seed \
 	    $(BIN)/python tests/helpers/busy.py $(LOAD) $(TEST) || exit 1; \
 	done
 
-quick: setup  ## the tests that start no nodes: what to run after every change
-	$(BIN)/python tests/compile_kernels.py
+quick: kernels  ## the tests that start no nodes: what to run after every change
 	$(BIN)/python -m pytest -n 3 --dist loadfile --ignore tests/system --ignore tests/ros
 
-coverage: setup  ## lines and branches that the tests see: all of the mathematics, nine tenths of the rest
-	$(BIN)/python tests/compile_kernels.py
+coverage: kernels  ## lines and branches that the tests see: all of the mathematics, nine tenths of the rest
 	$(BIN)/python tests/coverage/run.py
 
 soak: setup docs-tools  ## COUNT random runs by SEED, KILLS of nodes, a run of STEPS, one of DAY s, what else takes long

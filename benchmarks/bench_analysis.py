@@ -1,10 +1,9 @@
 """Figures of long runs: against NumPy over whole arrays, and how much memory an hour takes."""
 
-import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,8 @@ from typing import Any
 import numpy as np
 from bench_commands import AUV
 from loops import CONTROLLER, case1
-from made_bags import make_bag
-from measure import RUNS, Measured, interleaved, speed
+from made_bags import BRIEF, made_bag
+from measure import Measured, interleaved, speed
 
 from auv_analysis import simulate
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
@@ -35,7 +34,7 @@ from auv_gvc_controller.laws.model import ControlModel, control_model
 SAMPLES = 1_000_000
 SIGNALS = ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance', 'disturbance_estimate')
 SAME = 1e-9  # relative, of sums that are taken in another order
-BRIEF, HOUR = 36_000, 360_000  # steps at 100 Hz
+HOUR = 360_000  # steps at 100 Hz
 MB = 1e6
 
 
@@ -87,18 +86,15 @@ def whole(run: Run, model: ControlModel) -> list[np.ndarray]:
 
 def one_hour() -> dict[str, Measured]:
     """Peak memory of `auv analyze` on a bag of an hour, beside one of six minutes."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        bags = [make_bag(folder / str(steps), steps) for steps in (HOUR, BRIEF)]
-        out = ['--out', str(folder / 'out'), '--overwrite', '--json']
-        pairs = [
-            [peak_memory([AUV, 'analyze', str(b), *out]) / MB for b in bags] for _ in range(RUNS)
-        ]
-    ratios = [hour / brief for hour, brief in pairs]
-    value, reference = (statistics.median(column) for column in zip(*pairs, strict=True))
-    spread = min(ratios), max(ratios)
-    measured = Measured(value, 'MB', statistics.median(ratios), reference, RUNS, spread)
-    return {'analysis_one_hour_rss_mb': measured}
+    with tempfile.TemporaryDirectory() as folder:
+        hour, brief = (analysed_memory(made_bag(steps), folder) for steps in (HOUR, BRIEF))
+        return interleaved({'analysis_one_hour_rss_mb': hour}, brief, 'MB', warm=False)
+
+
+def analysed_memory(bag: Path, out: str) -> Callable[[], float]:
+    """Measurement of the peak memory of `auv analyze`, MB."""
+    command = [AUV, 'analyze', str(bag), '--out', out, '--overwrite', '--json']
+    return lambda: peak_memory(command) / MB
 
 
 # a process takes the peak of the one that started it along: this small one stands between

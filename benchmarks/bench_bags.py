@@ -1,10 +1,9 @@
 """Reading bags to arrays: against `mcap`'s raw reader and, for information, the usual decoders."""
 
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from made_bags import make_bag
+from made_bags import BRIEF, made_bag
 from mcap.reader import make_reader
 from mcap_ros2.reader import read_ros2_messages
 from measure import Measured, interleaved, speed
@@ -12,20 +11,19 @@ from rosbags.highlevel import AnyReader
 
 from auv_analysis.bag import bag_files, read_bag
 
-STEPS, FEW = 30_000, 2_000  # of 8 messages each; few for those that decode message by message
+FEW = 2_000  # steps of 8 messages each, for those that decode message by message
 
 
 def against_readers() -> dict[str, Measured]:
     """Messages per second to arrays; the raw reader only hands out records."""
-    with tempfile.TemporaryDirectory() as folder:
-        long, brief = (make_bag(Path(folder) / str(steps), steps) for steps in (STEPS, FEW))
-        messages = raw(long)
-        if sum(read_bag(long).counts.values()) != messages:
-            raise ArithmeticError(f'expected all {messages} messages, found others')
-        ours, unit = speed(lambda: read_bag(long), messages), 'messages/s'
-        found = interleaved({'bag_read_vs_raw_reader': ours}, _speed(raw, long), unit)
-        for name, decoder in (('rosbags', rosbags), ('mcap_ros2_support', mcap_ros2_support)):
-            found |= interleaved({f'bag_read_vs_{name}': ours}, _speed(decoder, brief), unit)
+    long, brief = made_bag(BRIEF), made_bag(FEW)
+    messages = raw(long)
+    if sum(read_bag(long).counts.values()) != messages:
+        raise ArithmeticError(f'expected all {messages} messages, found others')
+    ours, unit = speed(lambda: read_bag(long), messages), 'messages/s'
+    found = interleaved({'bag_read_vs_raw_reader': ours}, _speed(raw, long), unit)
+    for name, decoder in (('rosbags', rosbags), ('mcap_ros2_support', mcap_ros2_support)):
+        found |= interleaved({f'bag_read_vs_{name}': ours}, _speed(decoder, brief), unit)
     return found
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from measure import Measured
 
 FLAT = 0.1  # memory that grows by less over ten times the length does not grow
+NOT_JUDGED = 'not judged'
 NOISE = 0.02  # an aim that is missed by less is not told from one that is reached
 
 
@@ -39,9 +40,11 @@ class Key:
         return measured.ratio
 
     def verdict(self, measured: Measured) -> str:
-        """'aim reached', 'met', 'MISSED' or, where nothing is asked for, ''."""
+        """'aim reached', 'met', 'MISSED', 'not judged: load x', or '' where nothing is asked."""
         if self.must is None or self.aim is None:
             return ''
+        if measured.load and not measured.load.quiet:
+            return f'{NOT_JUDGED}: load {measured.load.others:.1f}'
         number = self.number(measured)
         if not self._within(number, self.must, 0.0):
             return 'MISSED'

@@ -15,7 +15,10 @@ PACKAGES = (
 
 
 def machine() -> dict[str, object]:
-    """Processor, cores that may be used, memory in GB, kernel, and the load at the start."""
+    """Processor, cores that may be used, memory in GB, kernel, and the load at the start.
+
+    Each key has the load that others made beside it: see `load.Load`.
+    """
     return {
         'cpu': _cpu(),
         'cores': len(os.sched_getaffinity(0)),

@@ -3,11 +3,15 @@
 import gc
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-RUNS = 7
+from load import Load, look
+
+LEAST, RUNS = 3, 7  # rounds
+ALIKE = 1.05  # largest over smallest ratio of rounds that need no further one
+LONG = 40.0  # s of rounds, after which there is no further one
 REFERENCE = ''  # its name among the subjects
 
 
@@ -21,6 +25,7 @@ class Measured:
     ratio : median of the ratios run by run; None where there is no reference
     spread : smallest and largest of these ratios
     runs : number of them
+    load : of others meanwhile
 
     """
 
@@ -30,6 +35,7 @@ class Measured:
     reference: float | None
     runs: int
     spread: tuple[float, float] | None = None
+    load: Load | None = None
 
 
 def interleaved(
@@ -37,24 +43,40 @@ def interleaved(
     reference: Callable[[], float],
     unit: str,
     runs: int = RUNS,
+    *,
+    warm: bool = True,
 ) -> dict[str, Measured]:
     """Ratio of each subject to one reference, in turns, so that all see the same machine.
+
+    There are at least three rounds; further ones only while the ratios differ, and not for long.
 
     Parameters
     ----------
     subjects, reference : each call measures once and returns a time or a speed in `unit`;
         all are called once before, unmeasured
-    runs : rounds; every second one goes backwards
+    runs : rounds at most; every second one goes backwards
+    warm : whether the unmeasured calls are made
 
     """
     parts = {**subjects, REFERENCE: reference}
-    for part in parts.values():
+    for part in parts.values() if warm else ():
         part()
     rounds: list[dict[str, float]] = []
-    for run in range(runs):
-        order = list(parts)[:: -1 if run % 2 else 1]
-        rounds.append({name: parts[name]() for name in order})
+    began = time.monotonic()
+    while len(rounds) < runs and not _enough(rounds, subjects, time.monotonic() - began):
+        values = {}
+        for name in list(parts)[:: -1 if len(rounds) % 2 else 1]:
+            look()
+            values[name] = parts[name]()
+        rounds.append(values)
     return {name: _measured(rounds, name, unit) for name in subjects}
+
+
+def _enough(rounds: Sequence[Mapping[str, float]], subjects: Iterable[str], elapsed: float) -> bool:
+    if len(rounds) < LEAST:
+        return False
+    ratios = [[values[name] / values[REFERENCE] for values in rounds] for name in subjects]
+    return elapsed > LONG or all(max(each) <= ALIKE * min(each) for each in ratios)
 
 
 def _measured(rounds: list[dict[str, float]], name: str, unit: str) -> Measured:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from keys import KEYS, Key
+from load import Load
 from measure import Measured
 
 README = Path(__file__).with_name('README.md')
@@ -20,16 +21,16 @@ def table(results: Mapping[str, Any]) -> str:
 
     """
     lines = [conditions(results), '']
-    lines += ['| key | what | reference | value | ratio | must | aim | verdict |']
-    lines += ['|---|---|---|---|---|---|---|---|']
+    lines += ['| key | what | reference | value | ratio | must | aim | verdict | others |']
+    lines += ['|---|---|---|---|---|---|---|---|---|']
     reasons = []
     for key in KEYS:
         bounds = f'{key.bound(key.must)} | {key.bound(key.aim)}'
         if key.name not in results:
-            row = f'| `{key.name}` | {key.what} | {key.reference} | | | {bounds} | not measured |'
+            row = f'| `{key.name}` | {key.what} | {key.reference} | | | {bounds} | not measured | |'
             lines.append(row)
             continue
-        measured = Measured(**results[key.name])
+        measured = restored(results[key.name])
         lines.append(_row(key, measured))
         if key.verdict(measured) in ('met', 'MISSED'):
             reasons.append(f'* `{key.name}`: {key.why or "no reason is known."}')
@@ -57,9 +58,19 @@ def _row(key: Key, measured: Measured) -> str:
         ratio += f' ({measured.spread[0]:.3g}–{measured.spread[1]:.3g})'
     cells = (
         f'`{key.name}`', key.what, reference, quantity(measured.value, measured.unit), ratio,
-        key.bound(key.must), key.bound(key.aim), key.verdict(measured),
+        key.bound(key.must), key.bound(key.aim), key.verdict(measured), _others(measured.load),
     )  # fmt: skip
     return f'| {" | ".join(cells)} |'
+
+
+def restored(entry: Mapping[str, Any]) -> Measured:
+    """What was measured, from its entry in results.json."""
+    load = entry.get('load')
+    return Measured(**{**entry, 'load': Load(**load) if load else None})
+
+
+def _others(load: Load | None) -> str:
+    return '' if load is None else f'{load.others:.1f}, {load.cpu:.0%}'
 
 
 def quantity(value: float, unit: str) -> str:

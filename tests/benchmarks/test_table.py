@@ -1,20 +1,27 @@
 """How `make bench` measures in turns, judges and writes its table; no test looks at a clock."""
 
 import json
-from dataclasses import asdict
+import subprocess
+import sys
+from contextlib import ExitStack
+from dataclasses import asdict, replace
 
 import keys
 import pytest
 import run
 import table
+from load import Load, look, watched
 from measure import Measured, interleaved
 
 MACHINE = {'cpu': 'a processor', 'cores': 2, 'memory_gb': 8.0, 'kernel': 'Linux 6'}
 CONDITIONS = {'machine': MACHINE, 'versions': {'python': '3.11.7'}}
 
 
-def measured(ratio, value=1.0):
-    return Measured(value, 's', ratio, 2.0, 7, (ratio, ratio))
+QUIET, BUSY = Load(0.4, 0.2, 2.2), Load(2.6, 0.5, 4.4)
+
+
+def measured(ratio, value=1.0, load=QUIET):
+    return Measured(value, 's', ratio, 2.0, 7, (ratio, ratio), load)
 
 
 def test_every_round_calls_each_once_and_every_second_goes_backwards():
@@ -42,6 +49,48 @@ def test_the_ratio_is_the_median_of_pairs_not_of_columns():
     subject, reference = iter([0, 1, 4, 9]), iter([1, 1, 2, 9])
     found = interleaved({'a': lambda: next(subject)}, lambda: next(reference), 's', runs=3)['a']
     assert (found.ratio, found.value / found.reference) == (1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ('ratios', 'rounds'),
+    [([2.0, 2.0, 2.0], 3), ([2.0, 2.2, 2.0, 2.1], 7), ([2.0, 2.09, 2.04], 3), ([2.0, 2.2], 2)],
+)
+def test_rounds_end_when_they_agree(ratios, rounds):
+    subject = iter([99.0, *ratios, *([2.0] * 9)])
+    found = interleaved({'a': lambda: next(subject)}, lambda: 1.0, 's', runs=max(rounds, 2))['a']
+    assert found.runs == rounds
+    assert found.spread == (min(ratios), max(ratios))
+
+
+def test_what_settles_by_itself_is_not_called_unmeasured():
+    numbers = iter([1.0, 1.0, 1.0])
+    assert interleaved({'a': lambda: next(numbers)}, lambda: 2.0, 's', warm=False)['a'].runs == 3
+
+
+def test_the_load_of_others_counts_what_runs_beside():
+    script = 'print("runs", flush=True)\nwhile True: pass'
+    with ExitStack() as stack:
+        for _ in range(3):
+            command = [sys.executable, '-c', script]
+            process = stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE))
+            stack.callback(process.kill)
+            process.stdout.readline()
+        with watched() as watch:
+            look()
+        load = watch.load()
+    assert min(watch.seen) >= 3
+    assert load.others >= 3
+    assert not load.quiet
+
+
+@pytest.mark.parametrize('ratio', [0.2, 0.7])
+def test_nothing_is_judged_beside_busy_programs(ratio):
+    busy = measured(ratio, load=BUSY)
+    assert keys.BY_NAME['rollout_vs_c'].verdict(busy) == 'not judged: load 2.6'
+    assert keys.BY_NAME['bag_read_vs_rosbags'].verdict(busy) == ''
+    results = {'rollout_vs_c': asdict(busy), **CONDITIONS}
+    row = next(line for line in table.table(results).splitlines() if '`rollout_vs_c`' in line)
+    assert row.endswith('| not judged: load 2.6 | 2.6, 50% |')
 
 
 @pytest.mark.parametrize(
@@ -95,7 +144,7 @@ def test_the_table_names_what_was_missed_and_why_and_what_was_not_measured():
     results = {'rollout_vs_c': asdict(measured(0.7)), **CONDITIONS}
     text = table.table(results)
     row = next(line for line in text.splitlines() if '`rollout_vs_c`' in line)
-    assert '| **0.7** (0.7–0.7) | ≤ 0.6 | ≤ 0.25 | MISSED |' in row
+    assert '| **0.7** (0.7–0.7) | ≤ 0.6 | ≤ 0.25 | MISSED | 0.4, 20% |' in row
     assert '* `rollout_vs_c`: ' in text
     assert text.count('| not measured |') == len(keys.KEYS) - 1
 
@@ -105,12 +154,15 @@ def test_results_survive_json():
     assert '**1.5** (1.5–1.5)' in table.table(results)
 
 
-@pytest.mark.parametrize(('ratio', 'code'), [(1.5, 0), (4.5, 1)])
-def test_only_judges_and_writes_nothing(ratio, code, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ('ratio', 'load', 'code'), [(1.5, QUIET, 0), (4.5, QUIET, 1), (1.5, BUSY, 3), (4.5, BUSY, 3)]
+)
+def test_only_judges_and_writes_nothing(ratio, load, code, tmp_path, monkeypatch, capsys):
     results, readme = tmp_path / 'results.json', tmp_path / 'README.md'
     monkeypatch.setattr(run, 'RESULTS', results)
     monkeypatch.setattr(table, 'README', readme)
-    monkeypatch.setattr(run, 'measure', lambda names: ({n: measured(ratio) for n in names}, {}))
+    found = measured(ratio, load=load)
+    monkeypatch.setattr(run, 'measure', lambda names: (dict.fromkeys(names, found), {}))
     with pytest.raises(SystemExit) as end:
         run.main(['--only', 'help_vs_python'])
     assert end.value.code == code
@@ -125,7 +177,8 @@ def test_a_benchmark_that_fails_is_named_and_does_not_cost_the_others(monkeypatc
     monkeypatch.setattr('bench_commands.command_line', lambda: {'help_vs_python': measured(1.5)})
     monkeypatch.setattr('bench_commands.sweep', fails, raising=False)
     found, missing = run.measure({'help_vs_python', 'sweep_10k_vs_c'})
-    assert found == {'help_vs_python': measured(1.5)}
+    assert replace(found.pop('help_vs_python'), load=QUIET) == measured(1.5)
+    assert not found
     assert missing == {'sweep_10k_vs_c': 'ValueError: no'}
     assert 'sweep_10k_vs_c: not measured: ValueError: no\n' in capsys.readouterr().err
 

@@ -12,8 +12,6 @@ import gc
 import os
 import random
 import signal
-import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,12 +20,12 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # before NumPy: the workers 
 import pytest
 from helpers.needs import judged, unproven
 from helpers.patience import FACTOR, patience
+from helpers.stalls import PAUSE, PAUSES
 from hypothesis import settings
 
 HERE = Path(__file__).parent
 FIRST = ('system', 'ros')
 TIMED = {*FIRST, 'examples'}  # folders of tests that wait for nodes
-PAUSE = 0.25  # s: watchdogs of half a second have then been called by the machine
 LIMIT, LONG_LIMIT = 300.0, 7200.0  # s, after which a test hangs, with its fixtures and reruns
 ORDER = os.environ.get('AUV_GVC_ORDER')  # seed
 
@@ -42,23 +40,6 @@ if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:  # by `nohup`
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
-class Pauses(threading.Thread):
-    """Measures for how long this process gets no turn."""
-
-    def __init__(self) -> None:
-        super().__init__(daemon=True)
-        self.longest = 0.0  # s
-
-    def run(self) -> None:
-        """Sleep, and see how late it wakes."""
-        now, sleep = time.monotonic, threading.Event().wait  # tests replace those of `time`
-        while True:
-            before = now()
-            sleep(0.02)
-            self.longest = max(self.longest, now() - before)
-
-
-PAUSES = Pauses()
 AGAIN = pytest.mark.flaky(reruns=2, condition=lambda: PAUSES.longest > PAUSE)
 
 

@@ -31,8 +31,12 @@ from auv_dynamics.ros.topics import DIAGNOSTICS
 FRAMES = Frames()
 PERIOD = 0.02
 X = np.array([0, 0, 0, 1, 0, 0, 0, 0.1, 0, 0, 0, 0, 0], float)
-REAL = [*CONTROLLER, *parameters(odometry_timeout=0.3, setpoint_timeout=0.3, ramp=0.2)]
-SLOW = 3.0  # s, of a ramp
+TIMEOUT = patience(0.3)  # s, of the watchdogs
+OLD = round(patience(1.0) * 10**9)  # ns: older than they allow
+WATCHED = parameters(odometry_timeout=TIMEOUT, setpoint_timeout=TIMEOUT)
+REAL = [*CONTROLLER, *WATCHED, *parameters(ramp=patience(0.2))]
+SLOW = patience(3.0)  # s, of a ramp
+SILENT = f'no odometry for {TIMEOUT:g} s'
 
 
 class Driver:
@@ -111,7 +115,7 @@ def driver():
 @pytest.fixture(scope='module')
 def recovering():
     """One driver, which is broken and mended again and again, its ramp longer than most pauses."""
-    yield from driven(*parameters(ramp=1.0))
+    yield from driven(*parameters(ramp=patience(1.0)))
 
 
 @pytest.fixture
@@ -139,24 +143,24 @@ def freeze(driver: Driver) -> None:
 
 
 def silent_ahead(driver: Driver) -> None:
-    """Two seconds of set-points at once, and no more."""
+    """Set-points of far more than the timeout at once, and no more."""
     now = time.time_ns()
-    for k in range(200):
+    for k in range(round(600 * TIMEOUT)):
         ahead = convert.twist(now + k * 10_000_000, (0.5, 0, 0, 0, 0, 0), FRAMES)
         driver.peer.publish(topics.CMD_VEL, ahead)
     driver.setpoints = False
 
 
 FAULTS: dict[str, tuple[Callable[[Driver], None], str]] = {
-    'odometry falls silent': (lambda d: setattr(d, 'odometry', False), 'no odometry for 0.3 s'),
+    'odometry falls silent': (lambda d: setattr(d, 'odometry', False), SILENT),
     'set-points fall silent': (lambda d: setattr(d, 'setpoints', False), 'no set-point for'),
     'set-points ahead, then none': (silent_ahead, 'no set-point heard for'),
-    'old set-points': (lambda d: setattr(d, 'setpoint_age', 10**9), 'no set-point for'),
+    'old set-points': (lambda d: setattr(d, 'setpoint_age', OLD), 'no set-point for'),
     'odometry is late': (
-        lambda d: setattr(d, 'clock', lambda: time.time_ns() - 10**9), 'no odometry for 0.3 s',
+        lambda d: setattr(d, 'clock', lambda: time.time_ns() - OLD), SILENT,
     ),
-    'odometry is not a number': (lambda d: d.x.__setitem__(7, math.nan), 'no odometry for 0.3 s'),
-    'its stamp is frozen': (freeze, 'no odometry for 0.3 s'),
+    'odometry is not a number': (lambda d: d.x.__setitem__(7, math.nan), SILENT),
+    'its stamp is frozen': (freeze, SILENT),
 }  # fmt: skip
 
 
@@ -252,7 +256,7 @@ def test_broken_messages_among_good_ones_are_refused_counted_and_never_forwarded
     still = parameters(  # without integrals and filter, the wrench stays what it is
         law='gvc', vehicle='herman2018', gains__k_D='[12.0]', gains__k_I='[0.0]',
         # no pause of a busy machine is as long as these
-        gains__Lambda='[1e-9]', gains__Gamma='[0.0]', odometry_timeout=3.0, setpoint_timeout=3.0,
+        gains__Lambda='[1e-9]', gains__Gamma='[0.0]', odometry_timeout=SLOW, setpoint_timeout=SLOW,
         limits__gap=10.0, limits__wrench='[1e5]', setpoint_acceleration='none',
     )  # fmt: skip
     with graph(('controller_node', still)) as (peer, processes):
@@ -447,8 +451,8 @@ def test_the_wrench_changes_no_faster_than_its_limit() -> None:
 
 
 OPEN_LOOP = parameters(
-    law='multisine', vehicle='herman2018', limits__wrench='[60.0]', odometry_timeout=0.3,
-    setpoint_timeout=0.3, ramp=SLOW, gains__offset='[50.0, 0.0, 0.0, 0.0, 0.0, 0.0]',
+    law='multisine', vehicle='herman2018', limits__wrench='[60.0]', odometry_timeout=TIMEOUT,
+    setpoint_timeout=TIMEOUT, ramp=SLOW, gains__offset='[50.0, 0.0, 0.0, 0.0, 0.0, 0.0]',
     gains__amplitude='[20.0, 0.0, 0.0, 0.0, 0.0, 0.0]', gains__omega='[8.0]', gains__phase='[0.0]',
 )  # fmt: skip
 

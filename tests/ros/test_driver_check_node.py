@@ -11,6 +11,7 @@ from geometry_msgs.msg import WrenchStamped
 from helpers.faulty_drivers import NAMES
 from helpers.node_processes import PATIENCE, Peer, environment, fresh_domain
 from helpers.patience import patience
+from helpers.stalls import undisturbed
 
 from auv_analysis.driver.checks import PASSIVE, judge, refusal
 from auv_analysis.driver.evidence import (
@@ -52,6 +53,10 @@ def domain() -> Iterator[int]:
 @pytest.fixture(scope='module')
 def judged(domain: int) -> dict[str, dict[str, CheckResult]]:
     """Driver -> check -> finding."""
+    return undisturbed(lambda: judged_once(domain), lambda found: not failed(found['healthy']))
+
+
+def judged_once(domain: int) -> dict[str, dict[str, CheckResult]]:
     clients = {name: RosDriverClient(domain, f'/{name}', TOPICS, Frames()) for name in NAMES}
     found = {}
     try:

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from helpers.node_processes import PATIENCE, Peer, fresh_domain, graph, parameters
+from helpers.patience import patience
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -62,7 +63,8 @@ class Ears:
 
 
 @pytest.fixture
-def ears() -> Iterator[Ears]:
+def ears(monkeypatch) -> Iterator[Ears]:
+    monkeypatch.setattr('auv_analysis.watch.monitor.SILENT', patience(3.0))
     domain = fresh_domain()
     peer = Peer(domain)
     made = Ears(peer, domain)

@@ -105,9 +105,15 @@ def test_reading_it_in_blocks_gives_the_same(dive) -> None:
 
 def test_the_stamps_of_the_wrench_are_those_of_the_odometry(dive) -> None:
     _, heard = dive
-    asked = {interface.nanoseconds(m.header.stamp) for m in heard[ODOM.name]}
-    answers = [interface.nanoseconds(m.header.stamp) for m in heard[WRENCH.name]]
-    assert set(answers) <= asked
+    asked, answers = (
+        np.unique([interface.nanoseconds(m.header.stamp) for m in heard[topic.name]])
+        for topic in (ODOM, WRENCH)
+    )
+    at = np.searchsorted(asked, answers).clip(1, len(asked) - 1)
+    missed = asked[at] - asked[at - 1] > 1.5 * np.median(np.diff(asked))  # what we did not hear
+    heard_then = (answers >= asked[0]) & (answers <= asked[-1])
+    assert (np.isin(answers, asked) | missed)[heard_then].all()
+    assert np.isin(answers, asked).mean() > 0.5
     assert {m.header.frame_id for m in heard[WRENCH.name]} == {FRAMES.base}
 
 

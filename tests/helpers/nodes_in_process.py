@@ -6,8 +6,11 @@ alike would not be seen by either.
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+import yaml
 from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
 from helpers.node_processes import Peer, fresh_domain
 from nav_msgs.msg import Odometry
@@ -63,6 +66,28 @@ def program() -> Iterator[Program]:
         yield made
     finally:
         made.close()
+
+
+def write_vehicle(folder: Path, data: dict[str, Any]) -> Path:
+    """A vehicle file of what the independent implementation takes."""
+    path = folder / 'vehicle.yaml'
+    path.write_text(yaml.safe_dump({'format': 1, 'name': 'made', **data}))
+    return path
+
+
+def quaternion_of(rotation: np.ndarray) -> np.ndarray:
+    """Quaternion w x y z of a rotation (3, 3): an eigenvector, by Bar-Itzhack (2000)."""
+    a, b, c = rotation
+    K = np.array(
+        [
+            [a[0] - b[1] - c[2], 0, 0, 0],
+            [b[0] + a[1], b[1] - a[0] - c[2], 0, 0],
+            [c[0] + a[2], c[1] + b[2], c[2] - a[0] - b[1], 0],
+            [c[1] - b[2], a[2] - c[0], b[0] - a[1], a[0] + b[1] + c[2]],
+        ]
+    )
+    x, y, z, w = np.linalg.eigh(K)[1][:, -1]
+    return np.array([w, x, y, z])
 
 
 def _stamp(message: Any, ns: int, frame: str) -> Any:

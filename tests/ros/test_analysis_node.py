@@ -6,9 +6,8 @@ from pathlib import Path
 import herman_reference as reference
 import numpy as np
 import pytest
-import yaml
 from helpers import nodes_in_process as by_hand
-from helpers.nodes_in_process import Program, program
+from helpers.nodes_in_process import Program, program, write_vehicle
 from numpy.testing import assert_allclose
 from reference_cases import off_centre
 
@@ -43,9 +42,7 @@ def of_step(k: int) -> dict[topics.Topic, object]:
 
 @pytest.fixture(scope='module')
 def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp('vehicle') / 'off_centre.yaml'
-    path.write_text(yaml.safe_dump({'format': 1, 'name': 'off_centre', **off_centre()}))
-    return path
+    return write_vehicle(tmp_path_factory.mktemp('vehicle'), off_centre())
 
 
 @pytest.fixture

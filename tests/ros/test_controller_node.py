@@ -24,7 +24,6 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from std_srvs.srv import Trigger
 
 from auv_dynamics.files.errors import ENDING
 from auv_dynamics.ros import convert, interface, topics
@@ -314,55 +313,11 @@ def test_a_transition_that_does_not_exist_is_survived() -> None:
     assert 'No transition' in output
 
 
-def test_reactivation_starts_from_zero_integrals() -> None:
-    """Rival controllers keep their integral over a deactivation (ros2_controllers#1840)."""
-    arguments = [*CONTROLLER, *parameters(lockstep=True, setpoint_pairing='exact')]
-    with graph(('controller_node', arguments)) as (peer, _):
-        peer.listen(topics.WRENCH)
-        for k in range(60):
-            peer.publish(topics.CMD_VEL, setpoint(k))
-        for k in range(50):
-            peer.publish(topics.ODOM, odometry(k))
-            answered(peer, k + 1)
-        first, last = peer.heard['wrench'][0], peer.heard['wrench'][-1]
-        assert last.wrench.force.x != first.wrench.force.x
-        assert change(peer, Transition.TRANSITION_DEACTIVATE)
-        assert change(peer, Transition.TRANSITION_ACTIVATE)
-        peer.publish(topics.ODOM, odometry(55))
-        again = answered(peer, 51)[-1]
-        assert again.wrench == first.wrench
-
-
-def test_reset_empties_the_integrals(lockstep) -> None:
-    peer, _ = lockstep
-    for k in range(50):
-        peer.publish(topics.CMD_VEL, setpoint(k))
-        peer.publish(topics.ODOM, odometry(k))
-        answered(peer, k + 1)
-    assert peer.call(Trigger, 'controller_node/reset').success
-    peer.publish(topics.CMD_VEL, setpoint(50))
-    peer.publish(topics.ODOM, odometry(50))
-    first, last = answered(peer, 51)[0], answered(peer, 51)[-1]
-    # what is left is the one step since the reset
-    assert abs(last.wrench.force.x - first.wrench.force.x) < 0.5
-
-
 def test_real_time_answers_zero_before_the_first_setpoint() -> None:
     with graph(('controller_node', CONTROLLER)) as (peer, _):
         peer.listen(topics.WRENCH)
         peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
         assert offer(peer).wrench.force.x == 0, 'no set-point yet'
-
-
-def test_real_time_lets_go_when_odometry_falls_silent() -> None:
-    arguments = [*CONTROLLER, *parameters(odometry_timeout=0.5, setpoint_timeout=10.0)]
-    with graph(('controller_node', arguments)) as (peer, _):
-        peer.listen(topics.WRENCH)
-        peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
-        peer.publish(topics.CMD_VEL, setpoint_of_now())
-        peer.spin(0.1)
-        peer.until(lambda: offer(peer).wrench.force.x > 0, 'a wrench')
-        peer.until(lambda: peer.heard['wrench'][-1].wrench.force.x == 0, 'a zero wrench')
 
 
 @pytest.mark.parametrize(

@@ -1,25 +1,20 @@
 """Our nodes in an executor of somebody else's, and as a user starts them: public rclpy alone."""
 
 import os
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import rclpy
 from geometry_msgs.msg import WrenchStamped
-from helpers.node_processes import PATIENCE, fresh_domain, start_node, stop
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.parameter import Parameter
-from rclpy.signals import SignalHandlerOptions
+from helpers.node_processes import fresh_domain, start_node, stop
+from helpers.nodes_in_process import Program, program
 
 from auv_dynamics.nodes.plant_node import PlantNode
 from auv_dynamics.ros import convert, node_main, topics
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.node_interface import steady_timer
-from auv_dynamics.ros.security import loopback
 from auv_gvc_controller.nodes.controller_node import ControllerNode
 from auv_gvc_controller.nodes.setpoint_node import SetpointNode
 
@@ -31,56 +26,18 @@ CONTROLLER: dict[str, Any] = {
 AHEAD = (0.2, 0.0, 0.0, 0.0, 0.0, 0.1)
 
 
-class House:
-    """A program of a user's: a context, one executor, nodes that are added to it."""
-
-    def __init__(self) -> None:
-        os.environ.update(loopback())
-        self.context, self.nodes = Context(), []
-        rclpy.init(
-            context=self.context,
-            domain_id=fresh_domain(),
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
-        self.executor = SingleThreadedExecutor(context=self.context)
-
-    def add(self, make: Callable[..., Any], given: dict[str, Any]) -> Any:
-        """Add a node with parameters."""
-        values = [Parameter(name, value=value) for name, value in given.items()]
-        node = make(context=self.context, use_global_arguments=False, parameter_overrides=values)
-        self.executor.add_node(node)
-        self.nodes.append(node)
-        return node
-
-    def until(self, done: Callable[[], Any]) -> None:
-        """Spin until something is true."""
-        limit = time.monotonic() + PATIENCE
-        while not done():
-            assert time.monotonic() < limit
-            self.executor.spin_once(timeout_sec=0.1)
-
-    def close(self) -> None:
-        """End everything."""
-        for node in self.nodes:
-            node.close()
-            node.destroy_node()
-        self.executor.shutdown()
-        rclpy.try_shutdown(context=self.context)
-
-
 @pytest.fixture
-def house(monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
+def house(monkeypatch: pytest.MonkeyPatch) -> Iterator[Program]:
     def taken(*_: Any) -> None:
         raise AssertionError('past the executor')
 
     monkeypatch.setattr(node_main, 'taken', taken)
     monkeypatch.setattr(node_main, 'DataWait', taken)
-    made = House()
-    yield made
-    made.close()
+    with program() as made:
+        yield made
 
 
-def test_plant_and_controller_share_the_executor_of_a_user(house: House) -> None:
+def test_plant_and_controller_share_the_executor_of_a_user(house: Program) -> None:
     plant = house.add(PlantNode, PLANT)
     controller = house.add(ControllerNode, CONTROLLER)
     user = rclpy.create_node('user', context=house.context, use_global_arguments=False)
@@ -100,7 +57,7 @@ def test_plant_and_controller_share_the_executor_of_a_user(house: House) -> None
     user.destroy_node()
 
 
-def test_broken_bytes_are_refused_and_leave_the_executor_alone(house: House) -> None:
+def test_broken_bytes_are_refused_and_leave_the_executor_alone(house: Program) -> None:
     plant = house.add(PlantNode, PLANT)
     user = rclpy.create_node('user', context=house.context, use_global_arguments=False)
     house.executor.add_node(user)
@@ -113,7 +70,7 @@ def test_broken_bytes_are_refused_and_leave_the_executor_alone(house: House) -> 
     user.destroy_node()
 
 
-def test_a_run_in_lock_step_needs_no_data_path_either(house: House) -> None:
+def test_a_run_in_lock_step_needs_no_data_path_either(house: Program) -> None:
     run = {'lockstep': True, 'duration': 0.5, 'expected_subscribers': ['odom=2']}
     house.add(SetpointNode, {'lockstep': True, 'duration': 0.5, 'setpoint.surge.offset': 0.2})
     house.add(ControllerNode, {**CONTROLLER, 'lockstep': True, 'setpoint_pairing': 'exact',

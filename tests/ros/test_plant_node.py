@@ -1,6 +1,5 @@
 """The plant node: lock-step on the wrench's stamp, start barrier, watchdog, reset, real time."""
 
-import itertools
 import signal
 from subprocess import CompletedProcess
 
@@ -20,7 +19,6 @@ from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
-from auv_dynamics.vehicle.kinematics import rotation
 
 FRAMES = Frames()
 STEP = 10_000_000
@@ -170,89 +168,6 @@ def test_credit_holds_the_plant_while_the_recorder_is_behind() -> None:
         assert step_of(odometry(peer, 3)[2]) == 2
 
 
-def test_reset_restores_the_state_and_not_the_time() -> None:
-    extra = ['-p', 'initial.eta:=[1.0, 2.0, 3.0, 0.0, 0.0, 0.5]']
-    with graph(('plant_node', barrier(*extra))) as (peer, _):
-        listening(peer)
-        for k in range(20):
-            odometry(peer, k + 1)
-            peer.publish(topics.WRENCH, wrench(k, (500.0, 0, 0, 0, 0, 0)))
-        moved = odometry(peer, 21)[-1].twist.twist.linear.x
-        assert peer.call(Trigger, 'plant_node/reset').success
-        peer.publish(topics.WRENCH, wrench(20, (0.0,) * 6))
-        message = odometry(peer, 22)[-1]
-        assert step_of(message) == 21
-        assert moved > 0.1
-        assert abs(message.twist.twist.linear.x) < 0.01
-        assert message.pose.pose.position.x == pytest.approx(1.0, abs=1e-3)
-
-
-def test_the_answer_to_a_step_is_an_answer_to_its_state_also_after_a_reset() -> None:
-    """F of a step belongs to the state that was published; the state of the start comes next."""
-    error = ['-p', 'disturbance.names:=["a"]', *parameters(disturbance__a__kind='model_error')]
-    extra = [*error, '-p', 'disturbance.a.dD:=[9.0]', '-p', 'initial.nu:=[1,0,0,0,0,0]']
-    heard = []
-    for resets in (False, True):
-        with graph(('plant_node', barrier(*extra))) as (peer, _):
-            listening(peer)
-            for k in range(5):
-                odometry(peer, k + 1)
-                peer.publish(topics.WRENCH, wrench(k))
-            odometry(peer, 6)
-            if resets:
-                assert 'from step 6' in peer.call(Trigger, 'plant_node/reset').message
-            peer.publish(topics.WRENCH, wrench(5))
-            peer.until(lambda: len(peer.heard['disturbance']) == 6, 'F of step 5')
-            heard.append(peer.heard['disturbance'][5].wrench)
-            surge = odometry(peer, 7)[6].twist.twist.linear.x
-            assert (surge == 1.0) == resets
-    assert heard[0] == heard[1]
-
-
-def test_twist_is_in_the_child_frame() -> None:
-    """Rivals publish it in the odom frame (Plankton#52, uuv_simulator#165)."""
-    extra = [
-        '-p',
-        'initial.eta:=[0.0, 0.0, 0.0, 0.0, 0.0, 1.2]',
-        '-p',
-        'initial.nu:=[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]',
-    ]
-    with graph(('plant_node', barrier(*extra))) as (peer, _):
-        listening(peer)
-        for k in range(2):
-            odometry(peer, k + 1)
-            peer.publish(topics.WRENCH, wrench(k))
-        first, second = odometry(peer, 2)[:2]
-    assert first.child_frame_id == 'base_link_fsd'
-    assert first.header.frame_id == 'odom_ned'
-    assert first.twist.twist.linear.x == 1.0
-    a, b = first.pose.pose.position, second.pose.pose.position
-    q = first.pose.pose.orientation
-    moved = np.array([b.x - a.x, b.y - a.y, b.z - a.z]) / 0.01
-    assert np.allclose(moved, rotation([q.w, q.x, q.y, q.z]) @ [1, 0, 0], atol=0.02)
-    assert np.allclose(moved, [np.cos(1.2), np.sin(1.2), 0], atol=0.02)
-
-
-def test_real_time_holds_the_last_wrench_then_lets_go() -> None:
-    arguments = parameters(vehicle='herman2018_neutral', wrench_timeout=0.3)
-    arguments += ['-p', 'expected_subscribers:=["odom=1"]']
-    with graph(('plant_node', arguments)) as (peer, _):
-        listening(peer)
-        odometry(peer, 3)
-        for _ in itertools.repeat(None, 10):
-            peer.publish(topics.WRENCH, wrench(len(peer.heard['odom']), (300.0, 0, 0, 0, 0, 0)))
-            peer.spin(0.02)
-        peer.until(lambda: peer.heard['odom'][-1].twist.twist.linear.x > 0.05, 'motion')
-
-        def slowing() -> bool:
-            surge = [m.twist.twist.linear.x for m in peer.heard['odom'][-2:]]
-            return surge[1] < surge[0]
-
-        peer.until(slowing, 'the wrench to end')
-        stamps = [step_of(m) for m in peer.heard['odom']]
-        assert stamps == list(range(len(stamps)))
-
-
 REAL = [*parameters(vehicle='herman2018_neutral'), '-p', 'expected_subscribers:=["odom=1"]']
 
 
@@ -349,28 +264,6 @@ def test_a_second_clock_is_refused_by_who_comes_later() -> None:
 )
 def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expected: str) -> None:
     assert_one_line(run_node('plant_node', *arguments), key, expected)
-
-
-def test_actuators_and_sensors_have_topics_of_their_own() -> None:
-    extra = parameters(actuators__limit='[5.0]', sensors__velocity_noise='[0.1]', seed=3)
-    with graph(('plant_node', barrier(*extra))) as (peer, _):
-        listening(peer)
-        peer.listen(topics.WRENCH_APPLIED, topics.GROUND_TRUTH)
-        odometry(peer, 1)
-        for k in range(3):
-            peer.publish(topics.WRENCH, wrench(k))
-            odometry(peer, k + 2)
-        peer.until(lambda: len(peer.heard['wrench_applied']) == 3, 'applied wrenches')
-        applied, truth = peer.heard['wrench_applied'], peer.heard['ground_truth/odom']
-        peer.until(lambda: len(truth) == 4, 'true states')
-        assert [step_of(m) for m in applied] == [0, 1, 2]
-        assert [m.wrench.force.x for m in applied] == [5.0] * 3
-        assert [step_of(m) for m in truth] == [0, 1, 2, 3]
-        assert truth[0].header.frame_id == 'odom_ned'
-        assert truth[0].twist.twist.linear.x == 0.0
-        assert peer.heard['odom'][0].twist.twist.linear.x != 0.0
-        for odom, twist in zip(peer.heard['odom'], peer.heard['twist'], strict=True):
-            assert odom.twist.twist == twist.twist
 
 
 def test_real_time_withholds_a_lost_sample() -> None:

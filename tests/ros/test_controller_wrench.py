@@ -1,0 +1,157 @@
+"""The wrench of the controller node, to its last digits that of the independent implementation."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import herman_reference as reference
+import numpy as np
+import pytest
+from helpers import nodes_in_process as by_hand
+from helpers.nodes_in_process import Program, program, quaternion_of, write_vehicle
+from numpy.testing import assert_allclose
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from reference_cases import off_centre
+from std_srvs.srv import Trigger
+
+from auv_dynamics.ros import topics
+from auv_gvc_controller.nodes.controller_node import ControllerNode
+
+STEP = 20_000_000
+STEPS = 4
+PER_AXIS = {
+    'k_D': [8.0, 10, 12, 6, 9, 11], 'k_I': [1.0, 2, 3, 4, 5, 6],
+    'Lambda': [0.5, 0.6, 0.7, 0.8, 0.9, 1], 'Gamma': [30.0, 40, 50, 60, 70, 80],
+}  # fmt: skip
+LAWS: dict[str, dict[str, list[float]]] = {
+    'gvc': PER_AXIS,
+    'cl': {gain: [100.0 * value for value in row] for gain, row in PER_AXIS.items()},
+    'pid': {
+        'k_P': [4e3, 5e3, 6e3, 700, 800, 900], 'k_I': [2e3, 1e3, 500, 400, 300, 200],
+        'k_D': [50.0, 60, 70, 8, 9, 10], 'omega_f': [20.0, 18, 16, 14, 12, 10],
+        'k_FF': [1.0, 0.9, 0.8, 0.7, 0.6, 0.5],
+    },
+    'smc': {
+        'k_D': [4e3, 5e3, 6e3, 700, 800, 900], 'Lambda': PER_AXIS['Lambda'],
+        'Gamma': [9e3, 8e3, 7e3, 600, 500, 400], 'k_S': [100.0, 90, 80, 7, 6, 5],
+        'phi': [0.05, 0.06, 0.07, 0.08, 0.09, 0.1],
+    },
+}  # fmt: skip
+EXACT = {
+    'lockstep': True, 'setpoint_pairing': 'exact', 'setpoint_acceleration': 'topic',
+    'limits.acceleration': 1e4,
+}  # fmt: skip
+RNG = np.random.default_rng(5)
+ETA = np.concatenate([RNG.uniform(-5, 5, (400, 3)), RNG.uniform(-0.6, 0.6, (400, 3))], axis=1)
+NU, NU_D, NU_D_DOT = (RNG.uniform(-1, 1, (400, 6)) * size for size in (0.8, 1.0, 0.5))
+KNOWN = reference.vehicle_matrices(off_centre())
+
+
+@pytest.fixture(scope='module')
+def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_vehicle(tmp_path_factory.mktemp('vehicle'), off_centre())
+
+
+@pytest.fixture
+def made() -> Iterator[Program]:
+    with program() as new:
+        new.listen(topics.WRENCH, topics.DISTURBANCE_ESTIMATE)
+        yield new
+
+
+def controller(made: Program, vehicle: Path, law: str, **settings: Any) -> ControllerNode:
+    given = {f'gains.{gain}': list(map(float, row)) for gain, row in LAWS[law].items()}
+    node = made.add(
+        ControllerNode, {'law': law, 'vehicle': str(vehicle), **EXACT, **given, **settings}
+    )
+    made.until(lambda: made.node.count_publishers('wrench'), 'a controller')
+    return node
+
+
+def offered(made: Program, k: int) -> None:
+    """Set-point, acceleration and odometry of step k; the answer has come."""
+    rotation = reference.jacobian(ETA[k])[:3, :3]
+    state = [*ETA[k, :3], *quaternion_of(rotation), *NU[k]]
+    for topic, row in ((topics.CMD_VEL, NU_D[k]), (topics.CMD_ACCEL, NU_D_DOT[k])):
+        made.publish(topic, by_hand.six(topic.type, k * STEP, row))
+    count = len(made.heard['wrench'])
+    made.publish(topics.ODOM, by_hand.odometry(k * STEP, state))
+    made.until(lambda: len(made.heard['disturbance_estimate']) > count, f'answer {k}')
+    made.until(lambda: len(made.heard['wrench']) > count, f'wrench {k}')
+
+
+def expected(law: str, gains: dict[str, Any], first: int, count: int) -> list[tuple]:
+    """(tau, f) of some steps, from zero integrals, by the independent implementation."""
+    entry = {gain: reference.square(row if len(row) > 1 else row[0]) for gain, row in gains.items()}
+    size, at = reference.control_law(KNOWN, {'law': law, **entry})
+    x, rate, said = np.zeros(size), np.zeros(size), []
+    for k in range(first, first + count):
+        x = x + rate * STEP / 1e9
+        g = reference.restoring(KNOWN, ETA[k])
+        tau, rate, f = at(NU[k], NU_D[k], NU_D_DOT[k], g)(x)
+        said.append((tau, f))
+    return said
+
+
+def answers_as(
+    made: Program, law: str, gains: dict[str, Any], first: int, limit: Any = np.inf
+) -> None:
+    """Offer some steps from zero integrals; every axis of each answer is as it should be."""
+    for k in range(first, first + STEPS):
+        offered(made, k)
+    wrenches = made.heard['wrench'][-STEPS:]
+    estimates = made.heard['disturbance_estimate'][-STEPS:]
+    said = expected(law, gains, first, STEPS)
+    for i, (tau, f) in enumerate(said):
+        for message, values in ((wrenches[i], np.clip(tau, -limit, limit)), (estimates[i], f)):
+            assert by_hand.ns_of(message) == (first + i) * STEP
+            assert by_hand.frames_of(message) == ('base_link_fsd',)
+            scale = np.abs(values).max()
+            assert_allclose(by_hand.six_of(message), values, rtol=1e-9, atol=1e-9 * scale)
+
+
+def change(node: ControllerNode, **values: Any) -> None:
+    """Change parameters while the controller is inactive."""
+    assert node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+    given = [Parameter(name.replace('__', '.'), value=v) for name, v in values.items()]
+    assert all(result.successful for result in node.set_parameters(given))
+    assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+
+
+@pytest.mark.parametrize('law', LAWS)
+def test_each_gain_that_is_changed_while_inactive_is_taken(made, vehicle, law: str) -> None:
+    node, gains, k = controller(made, vehicle, law), dict(LAWS[law]), 0
+    answers_as(made, law, gains, k)
+    for gain, row in LAWS[law].items():
+        k += STEPS
+        gains[gain] = [1.5 * value + 0.1 for value in reversed(row)]
+        change(node, **{f'gains__{gain}': gains[gain]})
+        answers_as(made, law, gains, k)
+
+
+def test_a_law_that_is_changed_while_inactive_is_taken(made, vehicle) -> None:
+    node = controller(made, vehicle, 'gvc')
+    answers_as(made, 'gvc', PER_AXIS, 0)
+    change(node, law='cl')
+    answers_as(made, 'cl', PER_AXIS, STEPS)
+    change(node, law='gvc', gains__k_D=[7.0])
+    answers_as(made, 'gvc', PER_AXIS | {'k_D': [7.0]}, 2 * STEPS)
+
+
+def test_limits_that_are_changed_while_inactive_are_taken(made, vehicle) -> None:
+    node = controller(made, vehicle, 'gvc', anti_windup=False)
+    small, large = [50.0, 60.0, 70.0, 8.0, 9.0, 10.0], [500.0, 400.0, 300.0, 90.0, 80.0, 70.0]
+    for i, limit in enumerate((small, large)):
+        change(node, limits__wrench=limit)
+        answers_as(made, 'gvc', PER_AXIS, i * STEPS, np.array(limit))
+
+
+def test_integrals_begin_anew_with_an_activation_and_with_a_reset(made, vehicle) -> None:
+    """Rival controllers keep them over a deactivation (ros2_controllers#1840)."""
+    node = controller(made, vehicle, 'gvc')
+    answers_as(made, 'gvc', PER_AXIS, 0)
+    change(node)
+    answers_as(made, 'gvc', PER_AXIS, STEPS)
+    assert made.call(Trigger, 'controller_node/reset').success
+    answers_as(made, 'gvc', PER_AXIS, 2 * STEPS)

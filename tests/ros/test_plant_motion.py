@@ -1,0 +1,242 @@
+"""The plant node's motion and forces are those of the independent implementation; its pace."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import herman_reference as reference
+import numpy as np
+import pytest
+from helpers import nodes_in_process as by_hand
+from helpers.nodes_in_process import Program, program, quaternion_of, write_vehicle
+from numpy.testing import assert_allclose
+from reference_cases import off_centre
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import SetBool, Trigger
+
+from auv_dynamics.nodes.plant_node import PlantNode
+from auv_dynamics.ros import topics
+
+H, STEP = 0.02, 20_000_000
+LAST = 6
+POSE = reference.RotationMatrix()
+ETA, NU = [1.0, -2.0, 3.0, 0.4, -0.5, 2.5], [0.4, -0.3, 0.2, 0.1, -0.2, 0.3]
+TAU = np.random.default_rng(11).uniform(-1, 1, (LAST + 1, 6)) * [900, 800, 700, 90, 80, 70]
+LIMIT = [400.0, 350.0, 300.0, 40.0, 35.0, 30.0]
+NOISE = [0.1, 0.2, 0.3, 0.04, 0.05, 0.06]
+WATER = [
+    {'kind': 'harmonic', 'sway': {'offset': 25.0, 'terms': [
+        {'amplitude': 40.0, 'omega': 0.8, 'phase': 0.3}]}, 'pitch': {'offset': -8.0}},
+    {'kind': 'model_error', 'dD': [90.0, 80.0, 70.0, 9.0, 8.0, 7.0], 'buoyancy': 0.02},
+    {'kind': 'current', 'velocity': [0.5, -0.3, 0.2]},
+]  # fmt: skip
+PARAMETERS: dict[str, Any] = {
+    'step': H, 'duration': LAST * H, 'lockstep': True, 'initial.eta': ETA, 'initial.nu': NU,
+    'disturbance.names': ['a', 'b', 'c'], 'disturbance.a.kind': 'harmonic',
+    'disturbance.a.sway.offset': 25.0, 'disturbance.a.sway.amplitude': [40.0],
+    'disturbance.a.sway.omega': [0.8], 'disturbance.a.sway.phase': [0.3],
+    'disturbance.a.pitch.offset': -8.0, 'disturbance.b.kind': 'model_error',
+    'disturbance.b.dD': WATER[1]['dD'], 'disturbance.b.buoyancy': 0.02,
+    'disturbance.c.kind': 'current', 'disturbance.c.velocity': WATER[2]['velocity'],
+}  # fmt: skip
+DEVICES = {'actuators.limit': LIMIT, 'sensors.velocity_noise': NOISE, 'seed': 3}
+
+
+@pytest.fixture(scope='module')
+def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_vehicle(tmp_path_factory.mktemp('vehicle'), off_centre())
+
+
+@pytest.fixture
+def made() -> Iterator[Program]:
+    with program() as new:
+        heard = (topics.ODOM, topics.TWIST, topics.DISTURBANCE, topics.CLOCK)
+        new.listen(*heard, topics.WRENCH_APPLIED, topics.GROUND_TRUTH)
+        yield new
+
+
+def moved(
+    steps: int, limit: Any, integrator: str = 'ode5', reset: int | None = None
+) -> Iterator[tuple]:
+    """Position, rotation, nu, applied wrench and F of each step, under TAU."""
+    plant, known = reference.Plant(off_centre(), WATER), reference.vehicle_matrices(off_centre())
+    nodes, rows, weights = reference.TABLEAUX[integrator]
+    x = start = np.concatenate((POSE.start(np.array(ETA)), NU))
+    n = POSE.size
+
+    def rate(t: float, x: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        R, pose_dot = POSE.rate(x[:n], x[n:])
+        return np.concatenate((pose_dot, plant.acceleration(t, R, x[n:], tau)))
+
+    for k in range(steps + 1):
+        applied, R, nu = np.clip(TAU[k], -limit, limit), POSE.rotation(x[:n]), x[n:]
+        model = known['M'] @ plant.acceleration(k * H, R, nu, applied)
+        model += (reference.coriolis(known['M'], nu) + reference.damping(known, nu)) @ nu
+        F = applied - model - reference.restoring_from_rotation(known, R)
+        yield x[:3], R, nu, applied, F
+        stages = np.zeros((len(nodes), len(x)))
+        for i, (node, row) in enumerate(zip(nodes, rows, strict=True)):
+            stages[i] = rate((k + node) * H, x + H * (np.array(row) @ stages[:i]), applied)
+        x = x + H * (np.array(weights) @ stages)
+        x[:n] = POSE.tidy(x[:n])
+        x = start if k == reset else x
+
+
+def stamps(messages: list) -> list[int]:
+    return [by_hand.ns_of(message) for message in messages]
+
+
+def answered(made: Program, k: int) -> None:
+    """Wait for step k, answer it, and wait for what opposed the answer."""
+    made.until(lambda: stamps(made.heard['odom'])[-1:] == [k * STEP], f'step {k}')
+    made.publish(topics.WRENCH, by_hand.six(topics.WRENCH.type, k * STEP, TAU[k]))
+    made.until(lambda: stamps(made.heard['disturbance'])[-1:] == [k * STEP], f'F of step {k}')
+
+
+def assert_state(message: Any, position: Any, R: Any, nu: Any) -> None:
+    state = by_hand.state_of(message)
+    assert by_hand.frames_of(message) == ('odom_ned', 'base_link_fsd')
+    assert_allclose(state[:3], position, rtol=0, atol=1e-9)
+    q = quaternion_of(R)
+    assert_allclose(np.sign(q @ state[3:7]) * np.array(state[3:7]), q, rtol=0, atol=1e-9)
+    assert_allclose(state[7:], nu, rtol=0, atol=1e-9)
+
+
+def assert_six(message: Any, values: Any) -> None:
+    assert by_hand.frames_of(message) == ('base_link_fsd',)
+    assert_allclose(by_hand.six_of(message), values, rtol=1e-8, atol=1e-8)
+
+
+def test_motion_and_forces_are_those_of_the_independent_implementation(made, vehicle) -> None:
+    node = made.add(PlantNode, {**PARAMETERS, 'vehicle': str(vehicle)})
+    for k in range(LAST + 1):
+        answered(made, k)
+    made.until(lambda: node.exit_code is not None, 'the end')
+    made.until(lambda: len(made.heard['twist']) == LAST + 1, 'the last twist')
+    assert node.exit_code == 0
+    odometry, twists, forces = (made.heard[name] for name in ('odom', 'twist', 'disturbance'))
+    clock: list[Clock] = made.heard['/clock']
+    assert [m.clock.sec * 10**9 + m.clock.nanosec for m in clock] == stamps(odometry)
+    assert stamps(odometry) == stamps(twists) == stamps(forces)
+    assert not made.heard['wrench_applied']
+    assert not made.heard['ground_truth/odom']
+    for k, (position, R, nu, _, F) in enumerate(moved(LAST, np.inf)):
+        assert_state(odometry[k], position, R, nu)
+        assert_six(twists[k], nu)
+        assert_six(forces[k], F)
+
+
+def test_the_integrator_is_the_one_that_is_asked_for(made, vehicle) -> None:
+    made.add(PlantNode, {**PARAMETERS, 'vehicle': str(vehicle), 'integrator': 'euler'})
+    answered(made, 0)
+    made.until(lambda: len(made.heard['odom']) == 2, 'step 1')
+    state = by_hand.state_of(made.heard['odom'][1])
+    (position, _, nu, _, _) = [*moved(1, np.inf, 'euler')][1]
+    assert_allclose([*state[:3], *state[7:]], [*position, *nu], rtol=0, atol=1e-12)
+
+
+def test_actuators_and_sensors_are_those_of_the_independent_implementation(made, vehicle) -> None:
+    made.add(PlantNode, {**PARAMETERS, **DEVICES, 'vehicle': str(vehicle)})
+    for k in range(LAST + 1):
+        answered(made, k)
+    made.until(lambda: len(made.heard['wrench_applied']) == LAST + 1, 'what was applied')
+    made.until(lambda: len(made.heard['ground_truth/odom']) == LAST + 1, 'the truth')
+    sensors = reference.Sensors({'velocity_noise': NOISE}, 3)
+    for k, (position, R, nu, applied, F) in enumerate(moved(LAST, np.array(LIMIT))):
+        measured = sensors(position, R, nu)
+        assert_state(made.heard['odom'][k], *measured)
+        assert_six(made.heard['twist'][k], measured[2])
+        assert_state(made.heard['ground_truth/odom'][k], position, R, nu)
+        assert_six(made.heard['wrench_applied'][k], applied)
+        assert_six(made.heard['disturbance'][k], F)
+        for name in ('ground_truth/odom', 'wrench_applied'):
+            assert by_hand.ns_of(made.heard[name][k]) == k * STEP
+
+
+def test_a_reset_puts_the_vehicle_back_after_the_step_that_is_under_way(made, vehicle) -> None:
+    made.add(PlantNode, {**PARAMETERS, 'vehicle': str(vehicle)})
+    for k in range(3):
+        answered(made, k)
+    made.until(lambda: len(made.heard['odom']) == 4, 'step 3')
+    assert 'from step 4' in made.call(Trigger, 'plant_node/reset').message
+    for k in range(3, 6):
+        answered(made, k)
+    for k, (position, R, nu, _, F) in enumerate(moved(5, np.inf, reset=3)):
+        assert_state(made.heard['odom'][k], position, R, nu)
+        assert_six(made.heard['disturbance'][k], F)
+
+
+REAL = {'step': H, 'actuators.limit': [1e6], 'wrench_timeout': 0.2}
+PACE = 0.05  # s, step of a plant whose pace is measured
+WINDOW = 2.0  # s of it
+
+
+def arrivals(made: Program) -> list[tuple[float, float]]:
+    """(steady s, stamp in s) of the odometry from now on."""
+    seen: list[tuple[float, float]] = []
+    made.node.create_subscription(
+        topics.ODOM.type,
+        topics.ODOM.name,
+        lambda message: seen.append((time.monotonic(), by_hand.ns_of(message) / 1e9)),
+        topics.every_step(),
+    )
+    return seen
+
+
+def test_real_time_keeps_its_pace(made, vehicle) -> None:
+    """n steps in n h by the steady clock, over a time in which the machine gave this process turns.
+
+    A gap between two messages of half a step more or less is a stall, or what made up for one:
+    then neither end of the window says when its step was due, and another window is taken.
+    """
+    made.add(PlantNode, {'vehicle': str(vehicle), **REAL, 'step': PACE})
+    seen = arrivals(made)
+
+    def window() -> list[tuple[float, float]]:
+        gaps = np.diff([at for at, _ in seen])
+        count = round(WINDOW / PACE)
+        regular = np.abs(gaps - PACE) < PACE / 2
+        for i in range(1, len(gaps) - count):
+            if regular[i - 1 : i + count].all():
+                return seen[i : i + count + 1]
+        return []
+
+    found = np.array(made.until(window, f'{WINDOW:g} s without a stall'))
+    passed, simulated = found[-1] - found[0]
+    assert abs(simulated - passed) < 0.05 * passed
+    assert_allclose(np.diff(found[:, 1]), PACE, rtol=0, atol=1e-9)
+
+
+def test_a_pause_in_real_time_stops_the_time_of_the_run(made, vehicle) -> None:
+    made.add(PlantNode, {'vehicle': str(vehicle), **REAL})
+    made.until(lambda: len(made.heard['odom']) > 5, 'odometry')
+    assert made.call(SetBool, 'plant_node/run', SetBool.Request(data=False)).message == 'paused'
+    count = len(made.heard['odom'])
+    made.spin(10 * H)
+    assert len(made.heard['odom']) <= count + 1, 'one may have been under way'
+    count = len(made.heard['odom'])
+    assert made.call(SetBool, 'plant_node/run', SetBool.Request(data=True)).message == 'running'
+    made.until(lambda: len(made.heard['odom']) > count + 5, 'odometry again')
+    assert stamps(made.heard['odom']) == [k * STEP for k in range(len(made.heard['odom']))]
+
+
+def test_silence_of_the_controller_gives_zero_wrench_and_it_comes_back(made, vehicle) -> None:
+    made.add(PlantNode, {'vehicle': str(vehicle), **REAL, 'initial.nu': NU})
+    applied = made.heard['wrench_applied']
+    made.until(lambda: len(applied) > 3, 'the beginning')
+    assert by_hand.six_of(applied[-1]) == [0.0] * 6, 'nothing before the first wrench'
+    for tau in (TAU[0], TAU[1]):
+
+        def drives(tau: np.ndarray = tau) -> bool:
+            newest = by_hand.ns_of(made.heard['odom'][-1])
+            made.publish(topics.WRENCH, by_hand.six(topics.WRENCH.type, newest, tau))
+            made.spin(H)
+            return by_hand.six_of(applied[-1]) == [*tau]
+
+        made.until(drives, 'the wrench')
+        last, begun = time.monotonic(), len(applied)
+        made.until(lambda: by_hand.six_of(applied[-1]) == [0.0] * 6, 'a zero wrench')
+        assert time.monotonic() - last > REAL['wrench_timeout'] - 2 * H, 'it is held before'
+        held = [by_hand.six_of(message) for message in applied[begun:]]
+        assert held == [[*tau]] * (len(held) - 1) + [[0.0] * 6]

@@ -1,17 +1,14 @@
 """What tests of reports share: the report of case1's first seconds in a browser, quick figures."""
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from itertools import count
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
 
 import pytest
+from helpers.artists import captured
 from helpers.browser import Watched, chromium
-from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.report import plots
 from auv_analysis.report.run_report import write_report
 from auv_analysis.runs.run import Run
 
@@ -33,7 +30,7 @@ def short_runs() -> dict[str, Run]:
 def report_path(browser, short_runs, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp('report')
     summaries = {name: summarize(run) for name, run in short_runs.items()}
-    with _composing():
+    with captured():
         return write_report(out, short_runs, summaries, 'a: 1', 'b: 2')
 
 
@@ -49,27 +46,11 @@ def report(browser, report_path) -> Iterator[Watched]:
 @pytest.fixture
 def unrendered() -> Iterator[None]:
     """Figures are composed but not rendered, which takes most of the time of a report."""
-    with _composing():
+    with captured():
         yield
 
 
 @pytest.fixture(scope='session')
 def composing() -> Callable[[], AbstractContextManager[None]]:
     """The same for a part of a test, or for a fixture that several tests share."""
-    return _composing
-
-
-@contextmanager
-def _composing() -> Iterator[None]:
-    heights = count(300)  # the same image twice would be one in a printed page
-
-    def save(figure: Any, folder: Path, name: str) -> tuple[Path, Path]:
-        folder.mkdir(parents=True, exist_ok=True)
-        png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
-        Image.new('RGB', (720, next(heights)), 'white').save(png)
-        pdf.write_bytes(b'not rendered')
-        return png, pdf
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plots, 'save', save)
-        yield
+    return captured

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers.table_heads import check_head
 from pyarrow import parquet
 
 TOKEN = re.compile(r'−?\d(?:[\d\u202f]*)(?:\.\d+)?(?:·10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?')
@@ -72,13 +73,15 @@ def at(document, pointer: str):
 
 
 def check_numbers(folder: Path) -> int:
-    """Hold every number of a report's tables against its text, its unit and its source.
+    """Hold every number of a report's tables against its text, its head, its unit and its source.
 
     Returns how many have their source in a JSON file of the folder, or in a row of a Parquet file.
     """
     kept: dict[str, Any] = {}
+    heads: dict[str, Any] = {}
     checked = 0
     for row in parquet.read_table(folder / 'numbers.parquet').to_pylist():
+        check_head(row, heads, folder)
         shown = tokens(row['text'])
         if shown and not re.search('[<–]', row['text']):  # a bound, a range
             assert abs(shown[0][0] - row['value']) <= shown[0][1] + 1e-12 * abs(shown[0][0]), row

@@ -15,7 +15,7 @@ from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018.claims import claims_part, judge_runs
 from auv_analysis.herman2018.paper import paper_figures
 from auv_analysis.output.text import fixed, join, number, plain, tied
-from auv_analysis.report import plots, run_report
+from auv_analysis.report import run_report
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.report.run_report import write_report
@@ -133,23 +133,6 @@ def test_the_paper_figures_are_all_there(figures, case1, tmp_path, unrendered):
 def test_a_figure_is_not_called_the_papers_when_the_gains_are_others(case1):
     gvc = replace(case1['gvc'], gains=case1['gvc'].gains | {'Gamma': 61.0})
     assert paper_figures(gvc) == []
-
-
-def test_structural_zeros_are_named_and_not_drawn(
-    figures, monkeypatch, case1, tmp_path, unrendered
-):
-    assert 'not drawn: pitch and yaw.' in figures['delta_xi'].caption
-    assert 'not drawn: surge, sway and heave.' in figures['delta_pi'].caption
-    drawn = []
-    original = plots.draw_lines
-
-    def spy(axes, run, signal, part, columns):
-        drawn.append(tuple(columns))
-        original(axes, run, signal, part, columns)
-
-    monkeypatch.setattr(plots, 'draw_lines', spy)
-    draw_figures({'gvc': _short(case1['gvc'], 5.0)}, tmp_path)
-    assert drawn[-4:] == [(0, 1, 2), (3,), (3, 4, 5), (3, 4, 5)]
 
 
 def test_signals_that_stay_zero_are_named_and_not_drawn(case1, tmp_path, unrendered):

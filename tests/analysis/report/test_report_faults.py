@@ -1,11 +1,9 @@
 """Faults in a report: words in the set-up, spans and numbers in figures and panels, a section."""
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pyarrow.parquet as parquet
 import pytest
 import yaml
@@ -17,10 +15,9 @@ from auv_analysis.report import plots
 from auv_analysis.report.digest import digests
 from auv_analysis.report.document import NUMBERS
 from auv_analysis.report.faults import fault_part
-from auv_analysis.report.panels import TimeCurve, TimePanel, document, interactive
+from auv_analysis.report.panels import interactive
 from auv_analysis.report.scenario_text import set_up
 from auv_analysis.runs.run import Run
-from auv_analysis.scenario.fault_words import Mark
 from auv_analysis.scenario.scenario import load_scenario
 
 FAULTS = [
@@ -99,18 +96,6 @@ def test_panels_are_shaded_where_all_runs_have_the_same_faults(runs, folder):
     shown = digests(runs)
     other = replace(shown['slow'], faults=())
     assert interactive({'gvc': shown['gvc'], 'slow': other}).faults == ''
-
-
-def test_a_panel_has_a_span_and_a_number_per_fault():
-    marks = (Mark(1, 'x', 'x', 1.0, 2.0), Mark(2, 'x', 'x', 3.0, float('inf')))
-    t = np.linspace(0.0, 4.0, 5)
-    panel = TimePanel('p', 'P', 'y (m)', (TimeCurve('gvc', 'surge', '#000000', t, t),))
-    (marked, _), (bare, _) = (document([panel], {'gvc': []}, m, (0.0, 4.0)) for m in (marks, ()))
-    text = json.dumps(marked)
-    left = re.findall(r'"name": "BoxAnnotation".{0,400}?"left": ([\d.]+)', text)
-    assert {float(x) for x in left} >= {1.0, 3.0}
-    assert text.count('"name": "Label"') == 2
-    assert '"name": "Label"' not in json.dumps(bare)
 
 
 def test_every_number_of_the_section_is_in_the_file(folder):

@@ -18,7 +18,7 @@ from auv_analysis.report.digest import digest, digests
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.run_tables import certificate_table, reasons
 from auv_analysis.report.scenario_text import set_up
-from auv_analysis.report.wrench_plots import applied_figure, certificate_figure
+from auv_analysis.report.wrench_plots import certificate_figure
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
 
@@ -189,27 +189,6 @@ def test_a_law_that_estimates_nothing_has_no_estimation_error(page):
     assert 'Under pid nothing is estimated' in text
 
 
-def test_applied_and_commanded_wrench_are_both_drawn_with_their_limits(rough):
-    run, limit = rough[0]['wound'], np.array(DATA['actuators']['limit'], float)
-    with plots.style():
-        figure, _, caption = applied_figure(digest(run), limit)
-    surge = figure.axes[0]
-    lines = [np.asarray(line.get_ydata(), float) for line in surge.lines]
-    drawn = [line for line in lines if len(line) == len(run.t)]
-    assert np.array_equal(drawn[0], run.tau[:, 0])
-    assert np.array_equal(drawn[1], run.applied[:, 0])
-    assert [line[0] for line in lines if len(line) == 2] == [-3000.0, 3000.0]
-    assert len({line.get_color() for line in surge.lines[:2]}) == 2
-    assert len({line.get_linewidth() for line in surge.lines[:2]}) == 2
-    cut = [axes for axes in figure.axes if axes.get_title(loc='right')]
-    assert cut == [surge]
-    for axes in figure.axes:  # a command that leaves its panel is told of
-        low, high = axes.get_ylim()
-        inside = all(low <= y <= high for y in axes.lines[0].get_ydata())
-        assert inside == (axes not in cut)
-    assert 'leave the panel: their peak is written above' in caption
-
-
 def test_a_plant_with_devices_is_not_the_papers(case1):
     runs, summaries = case1
     assert len(judge_runs(runs, summaries)) == 21
@@ -221,18 +200,6 @@ def test_a_plant_with_devices_is_not_the_papers(case1):
         changed = {name: replace(run, **change) for name, run in runs.items()}
         assert judge_runs(changed, summaries) == []
         assert paper_figure(changed['gvc'], 'errors') is None
-
-
-def test_certificate_table_prints_the_summary(case1):
-    summaries = case1[1]
-    table = certificate_table(summaries)
-    rows = {row[0].text: row[1:-1] for row in table.rows}
-    assert reasons(summaries) == []
-    share = summaries['gvc']['lyapunov']['share_of_time_increasing']
-    shown = rows['L increases by (26)'][0]
-    assert shown.text == f'{100 * share:.1f}'
-    assert shown.value == 100 * share
-    assert rows['L at the start'][1].text == f'{summaries["cl"]["lyapunov"]["L_first"]:.0f}'
 
 
 def test_every_reason_against_a_certificate_is_given_once(rough):
@@ -255,26 +222,16 @@ def test_certificate_arrays_are_those_of_the_summary(case1):
         assert certificate_of(replace(run, **change), control_model(run.vehicle)) is None
 
 
-def test_certificate_figure_holds_the_measured_derivative_against_26_and_28(case1):
+def test_certificate_figure_says_what_it_rests_on(case1):
     run, summary = case1[0]['gvc'], case1[1]['gvc']
-    found = certificate_of(run, control_model(run.vehicle))
     with plots.style():
         figure, _, caption = certificate_figure(digest(run), summary)
-    energy, early, late = figure.axes
-    assert energy.get_yscale() == 'log'
-    assert early.get_yscale() == 'symlog'
-    assert late.get_yscale() == 'symlog'
+        sampled = certificate_figure(digest(replace(run, hold='zoh')), summary)[2]
+    assert [axes.get_yscale() for axes in figure.axes] == ['log', 'symlog', 'symlog']
     assert 'linear between them and logarithmic beyond' in caption
-    rest = found.t > found.t[0] + 2.0
-    curves = [np.asarray(line.get_ydata(), float) for line in late.lines]
-    for values in (found.bound, found.identity, found.L_dot):
-        assert any(len(y) == rest.sum() and np.array_equal(y, values[rest]) for y in curves)
     assert 'Grey: where (26) is positive' in caption
-    assert 'held between samples' not in caption
     assert 'The certificate does not apply' not in caption
-    with plots.style():
-        sampled = replace(run, hold='zoh')
-        assert 'held between samples' in certificate_figure(digest(sampled), summary)[2]
+    assert [('held between samples' in text) for text in (caption, sampled)] == [False, True]
 
 
 def test_certificate_is_drawn_where_26_holds_along_solutions_and_says_so(tmp_path, unrendered):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.metrics.summary import band_of
 from auv_analysis.report.digest import digest
 from auv_analysis.studies.compare import plots
 from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank
@@ -66,30 +65,10 @@ def test_ranks_are_by_value_and_what_never_settles_is_last(entries, table) -> No
     assert list(ranking.mean_rank) == sorted(ranking.mean_rank)
 
 
-def test_ratios_are_powers_of_two_of_the_median(table) -> None:
-    ranking = rank(table)
-    j = [m.name for m in ranking.measures].index('kinetic_energy.mean')
-    assert np.nanmedian(2.0 ** ranking.ratios[:, j]) == pytest.approx(1.0, rel=0.5)
-    expected = np.log2(ranking.values[:, j] / np.median(ranking.values[:, j]))
-    np.testing.assert_allclose(ranking.ratios[:, j], expected)
-
-
 def test_equal_runs_have_nothing_to_rank(entries) -> None:
     ranking = rank(comparison_table([entries[0], replace(entries[0], name='again')]))
     assert ranking.measures == []
     assert ranking.runs == ['case1/gvc', 'again']
-
-
-def test_error_still_to_come_is_the_largest_ratio_from_then_on(entries) -> None:
-    run = simulate(SHORT, 'cl')
-    band = band_of(np.abs(run.nu_d).max(axis=0))
-    ratio = (np.abs(run.nu_d - run.nu) / band).max(axis=1)
-    rest = np.maximum.accumulate(ratio[::-1])[::-1]
-    t, drawn = plots.still_to_come(entries[1].digest)
-    assert np.all(np.diff(drawn) <= 0)
-    inside = t > 0
-    exact = rest[np.searchsorted(run.t, t[inside] - 1e-9)]
-    np.testing.assert_allclose(drawn[inside], exact, rtol=0.02)
 
 
 def test_it_falls_below_one_where_the_run_settles(entries) -> None:

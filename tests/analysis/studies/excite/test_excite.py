@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.report_pages import check_numbers
 from helpers.sea_trials import recorded
 
 from auv_analysis import load_scenario, simulate
@@ -12,7 +13,7 @@ from auv_analysis.cli import main
 from auv_analysis.output.folder import listed_in, results_folder
 from auv_analysis.studies.excite.drive import Bounds, Family, Request, scenario_in_memory
 from auv_analysis.studies.excite.excite import _fleet, excite
-from auv_analysis.studies.excite.report import results_of, scenario_text
+from auv_analysis.studies.excite.report import results_of, scenario_text, sentences, write_report
 from auv_analysis.studies.identify.identify import identify
 from auv_dynamics.files.errors import FailedError
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
@@ -58,6 +59,40 @@ def test_results_take_the_place_of_earlier_ones(excited, tmp_path: Path) -> None
             files = {path.name for path in results_of(excited).write(folder)}
     assert 'excite.json' in files
     assert files <= listed_in(out).keys()
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_the_report_has_its_numbers_where_their_heads_say(excited, tmp_path: Path) -> None:
+    results = results_of(excited)
+    (tmp_path / 'scenario.yaml').write_text(scenario_text(excited))
+    results.write(tmp_path)
+    write_report(excited, results, tmp_path)
+    assert check_numbers(tmp_path) > 100
+    tau, nu = excited.motion.commands[0, 0], excited.motion.states[0, 0, :, 7:]
+    for i, row in enumerate(results.tables['motion'].records()):
+        assert row['wrench'] == np.abs(tau[:, i]).max()
+        assert row['velocity'] == np.abs(nu[:, i]).max()
+        assert row['rms'] == pytest.approx(np.sqrt(np.mean(nu[:, i] ** 2)))
+    bounds = results.tables['bounds'].records()
+    assert [row['prior'] for row in bounds] == excited.used[0].tolist()
+    assert [row['worst'] for row in bounds] == excited.used.max(axis=0).tolist()
+    rows = {row['name']: row for row in results.tables['intervals'].records()}
+    for found, key in ((excited.predicted, 'half'), (excited.case1, 'half_case1')):
+        for name, half in halves(found).items():
+            assert rows[name][key] == pytest.approx(half)
+    first, second, third, *_ = sentences(results)
+    told = sum(row['half'] is not None for row in rows.values())
+    case1 = sum(row['half_case1'] is not None for row in rows.values())
+    assert first.startswith(f'{told} of {len(rows)} coefficients would be identified by 40 s of it')
+    assert f', {case1} by case 1 of the same length' in first
+    mine, others = halves(excited.predicted), halves(excited.case1)
+    ratio = 1 / np.median([others[name] / mine[name] for name in others if name in mine])
+    assert f'its intervals are {ratio:.2f} times as wide as those of case 1' in second
+    worst = excited.used.max(axis=0)
+    share = f'{100 * worst.max():.0f} % of the {bounds[int(worst.argmax())]["bound"]}'
+    assert third == (
+        f'Of {len(excited.used)} vehicles around the prior the worst uses {share} that is allowed.'
+    )
 
 
 def test_it_tells_more_than_case_1(excited) -> None:

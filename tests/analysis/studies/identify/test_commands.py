@@ -7,6 +7,7 @@ import pytest
 import yaml
 from helpers import sea_trials
 from helpers.foreign_bags import Maker, motion, simple, write
+from helpers.report_pages import check_numbers
 from pyarrow import parquet
 
 from auv_analysis.cli.main import main
@@ -73,6 +74,7 @@ def test_a_bag_becomes_a_vehicle_file(identified):
     assert {'delta_xi_max.sway', 'N.yaw', 'share.surge', 'Upsilon.pitch.heave'} <= found.keys()
     for name in ('predictions', 'inertia', 'deformation', 'shares', 'whiteness'):
         assert (identified / f'{name}.parquet').exists()
+    assert check_numbers(identified) > 200
     page = (identified / 'report.html').read_text(encoding='utf-8')
     assert 'What was identified' in page
     assert 'residuals are white' in document['residuals']

@@ -1,0 +1,46 @@
+"""The recorded wrench beside that of another law, and their difference."""
+
+import numpy as np
+import pytest
+from helpers.artists import named, same
+from helpers.made_runs import DOFS
+
+from auv_analysis.replay import compared as replay
+
+WRENCH = ('N', 'N m')
+RNG = np.random.default_rng
+
+
+def test_wrenches_of_another_law_beside_the_recorded_ones() -> None:
+    rng = RNG(8)
+    both = replay.Compared(np.arange(50) * 0.1, *rng.normal(size=(2, 50, 6)))
+    document = {
+        'answered': {'law': 'pid'}, 'recorded': {'law': 'gvc'}, 'reproduction': 'not reproduced'
+    }  # fmt: skip
+    figure, title, _ = replay._figure(document, both)
+    key = figure.axes[1].get_legend()
+    for k, axes in enumerate(figure.axes):
+        i = k // 2 + 3 * (k % 2)
+        symbol = rf'$\tau_{{{"XYZKMN"[i]}}}$'
+        assert axes.get_ylabel() == f'{DOFS[i]}: {symbol} ({WRENCH[i // 3]})'
+        shown = named(axes, key)
+        assert list(shown) == ['recorded (gvc)', 'pid, open loop']
+        for (curve,), wrench in zip(shown.values(), (both.recorded, both.answered), strict=True):
+            same(curve, both.t, wrench[:, i])
+        assert axes.get_xlabel() == ('$t$ (s)' if k > 3 else '')
+    assert title == 'What pid, open loop would have commanded'
+    assert figure.get_suptitle() == 'Not reproduced'
+
+
+def test_differences_of_wrenches_have_their_sign() -> None:
+    both = replay.Compared(
+        np.arange(2.0), np.full((2, 6), 3.0), np.full((2, 6), [1.0, 2, 3, 4, 5, 7])
+    )
+    found = replay.metrics_of(both)
+    assert found['difference']['max'] == pytest.approx([2.0, 1.0, 0.0, 1.0, 2.0, 4.0])
+    assert found['recorded']['rms'] == pytest.approx([3.0] * 6)
+    assert found['answered']['rms'] == pytest.approx([1.0, 2, 3, 4, 5, 7])
+    uneven = replay.Compared(np.arange(2.0), np.zeros((2, 6)), np.array([[3.0] * 6, [-4.0] * 6]))
+    assert replay.metrics_of(uneven)['answered'] == {
+        'rms': pytest.approx([np.sqrt(12.5)] * 6), 'max': [4.0] * 6
+    }  # fmt: skip

@@ -1,0 +1,75 @@
+"""Plots of the atlas: every bar and cell against the couplings of its vehicle."""
+
+from types import SimpleNamespace as Made
+
+import numpy as np
+import pytest
+from helpers import artists
+from helpers.artists import cells, heat_maps, points
+from helpers.made_runs import DOFS
+
+from auv_analysis.studies.atlas import plots as atlas
+
+VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
+RNG = np.random.default_rng
+
+
+def _chart(name: str, seed: int, *, diagonal: bool = False, failure: str = '') -> Made:
+    rng = RNG(seed)
+    couplings = Made(
+        is_diagonal=diagonal, correlation=rng.uniform(-0.5, 0.5, (6, 6)),
+        velocity_shares=np.triu(rng.uniform(0.0, 0.2, (6, 6)), 1),
+        input_shares=np.tril(rng.uniform(0.0, 0.2, (6, 6)), -1),
+        largest=rng.uniform(0.5, 0.6), strength=rng.uniform(0.6, 0.9), pairs=[('sway', 'roll')],
+        zeros={'delta_xi': ['yaw'], 'delta_pi': ['surge']},
+    )  # fmt: skip
+    reached = {'failure': failure} | {
+        f'{kind}_max': rng.uniform(0.1, 9.0, 6)
+        * [kind != 'delta_pi', 1, 1, 1, 1, kind == 'delta_pi']
+        for kind in ('delta_xi', 'delta_pi')
+    }
+    return Made(name=name, couplings=couplings, reached=reached)
+
+
+def test_an_atlas(tmp_path) -> None:
+    charts = [
+        _chart('a', 1),
+        _chart('flat', 2, diagonal=True),
+        _chart('b', 3),
+        _chart('c', 4, failure='x'),
+    ]
+    with artists.captured() as figures:
+        atlas.draw(charts, tmp_path)
+    assert set(figures) == {'strength', 'correlation', 'shares', 'case1_delta_xi', 'case1_delta_pi'}
+    coupled = [chart for chart in charts if chart.name != 'flat']
+    (axes,) = figures['strength'].axes
+    assert artists.ticks(axes, 'y') == {0: 'a', 1: 'b', 2: 'c'}
+    assert axes.get_xlabel().endswith('(%)')
+    for k, chart in enumerate(coupled):
+        bar, (x, y) = axes.patches[k], points(artists.lines(axes)[0])
+        assert bar.get_x() + bar.get_width() == pytest.approx(100 * chart.couplings.strength)
+        assert bar.get_y() + bar.get_height() / 2 == pytest.approx(k)
+        assert (x[k], y[k]) == (pytest.approx(100 * chart.couplings.largest), k)
+    assert [text.get_text() for text in axes.texts] == ['sway–roll'] * 3
+    for name, label in (('correlation', 'inertial correlation'), ('shares', 'share of energy (%)')):
+        panels = [axes for axes in figures[name].axes if axes.images]
+        assert [axes.get_title(loc='left') for axes in panels] == ['a', 'b', 'c']
+        assert panels[0].images[0].colorbar.ax.get_xlabel() == label
+        for axes, chart in zip(panels, coupled, strict=True):
+            found = chart.couplings
+            values = (
+                found.correlation
+                if name == 'correlation'
+                else 100 * (found.velocity_shares + found.input_shares)
+            )
+            for (row, column), value in cells(axes).items():
+                i, j = DOFS.index(row), DOFS.index(column)
+                assert value == pytest.approx(np.nan if i == j else values[i, j], nan_ok=True)
+    for kind, symbol, units in (('delta_xi', 'Δξ', VELOCITY), ('delta_pi', 'Δπ', WRENCH)):
+        maps = heat_maps(figures[f'case1_{kind}'])
+        assert list(maps) == [f'{symbol} ({unit})' for unit in units]
+        whole = {place: value for found in maps.values() for place, value in found.items()}
+        assert len(whole) == 12
+        for (name, dof), value in whole.items():
+            chart = next(c for c in charts if c.name == name)
+            assert value == pytest.approx(chart.reached[f'{kind}_max'][DOFS.index(dof)])

@@ -1,0 +1,78 @@
+"""Plots of a design: before and after, of the right run and the right entry."""
+
+from types import SimpleNamespace as Made
+
+import numpy as np
+import pytest
+from helpers import artists
+from helpers.artists import named, same
+from helpers.made_runs import DOFS, UPSILON_INV, VEHICLE, made
+
+from auv_analysis.studies.design import plots as design
+
+RNG = np.random.default_rng
+
+
+def _designed():
+    before, after = made('gvc', 'gvc', 1), made('gvc', 'gvc', 2)
+    names = ('delta_xi.surge', 'delta_pi.pitch', 'delta_xi.sway', 'delta_pi.yaw')
+    shares = {'before': (0.9, 0.5, 0.2, 1e-6), 'after': (0.05, 0.45, 0.6, 1e-7)}
+    rng = RNG(3)
+    upper = {key: np.eye(6) + np.triu(rng.normal(size=(6, 6)), 1) for key in shares}
+    document = {
+        'ranking': [
+            {'coupling': name, 'share': {key: shares[key][k] for key in shares}}
+            for k, name in enumerate(names)
+        ],
+        'reduce': 'delta_xi.surge', 'controller': 'gvc',
+        'measures': [{'name': 'delta_pi_max.surge', 'unit': 'N'},
+                     {'name': 'delta_xi_max.surge', 'unit': 'm/s'}],
+        'proposal': {f'Upsilon_{key}': U.tolist() for key, U in upper.items()},
+    }  # fmt: skip
+    vehicle = Made(setting=Made(space=Made(vehicle=VEHICLE)))
+    runs = {'before': before, 'after': after}
+    phases = {
+        name: Made(runs={'gvc': run, 'cl': made('cl', 'cl', 9)}) for name, run in runs.items()
+    }
+    return Made(document=document, proposal=vehicle, **phases), runs, upper
+
+
+def test_a_design_before_and_after(tmp_path) -> None:
+    result, runs, upper = _designed()
+    with artists.captured() as figures:
+        records = design.draw_design(result, tmp_path)
+    assert set(figures) == {'couplings', 'reduced', 'Upsilon'}
+    (axes,) = figures['couplings'].axes
+    symbols = [r'$\Delta\xi_1$ surge', r'$\Delta\pi_5$ pitch', r'$\Delta\xi_2$ sway']
+    assert artists.ticks(axes, 'y') == dict(enumerate(symbols))
+    shown = named(axes)
+    assert {name: curves[0][0].tolist() for name, curves in shown.items()} == {
+        'before': [0.9, 0.5, 0.2], 'after': [0.05, 0.45, 0.6],
+    }  # fmt: skip
+    assert [curves[0][1].tolist() for curves in shown.values()] == [[0, 1, 2]] * 2
+    assert [t.get_fontweight() for t in axes.get_yticklabels()] == ['bold', 'normal', 'normal']
+    assert axes.get_ylim()[0] > axes.get_ylim()[1]
+    assert axes.get_xscale() == 'log'
+    (axes,) = figures['reduced'].axes
+    assert axes.get_ylabel() == r'$\Delta\xi_1$ (m/s)'
+    assert axes.get_xlabel() == '$t$ (s)'
+    for name, (curve,) in named(axes).items():
+        run = runs[name]
+        same(curve, run.t, (run.nu @ UPSILON_INV.T - run.nu)[:, 0])
+    assert records['reduced'].caption.startswith('delta_xi.surge of the vehicle before and after')
+    M = VEHICLE.M
+    panels = figures['Upsilon'].axes[:2]
+    for axes, (key, U) in zip(panels, upper.items(), strict=True):
+        assert axes.get_title(loc='left').endswith(key)
+        weight = np.sqrt(np.diag(M)[:, None] / np.diag(M)[None, :])
+        assert np.asarray(axes.images[0].get_array()) == pytest.approx(
+            np.abs(weight * U - np.eye(6))
+        )
+        assert list(artists.ticks(axes).values()) == list(DOFS)
+        for text in axes.texts:
+            column, row = map(round, text.get_position())
+            assert float(text.get_text().replace('−', '-')) == pytest.approx(
+                U[row, column], rel=0.06
+            )
+        assert len(axes.texts) == 15
+    assert list(artists.ticks(panels[0], 'y').values()) == list(DOFS)

@@ -1,0 +1,300 @@
+"""Plots of a sweep: every line, band, bar and cell against the rows that it sums up."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import artists
+from helpers.artists import bands, bars, cells, heat_maps, named, points
+from helpers.made_sweeps import DAMPING, ENERGY, K_D, MIXED, SIMPLE, make_sweep, mixed, rows
+from matplotlib.figure import Figure
+
+from auv_analysis.metrics.measures import BY_NAME
+from auv_analysis.simulation.reduction import COLUMNS
+from auv_analysis.studies.sweep.analysis import Analysis, analysed
+from auv_analysis.studies.sweep.dataset import open_sweep, short_names
+from auv_analysis.studies.sweep.plots import draw, main_measures
+
+Drawn = tuple[Analysis, dict[str, Figure], dict[str, str]]
+NUMBERS = [name for name in COLUMNS if name not in ('status', 'reason')]
+
+
+def known(controller, values, index):
+    """Every column another function of what varies, of another size under each controller."""
+    factor = 1.0 if controller == 'gvc' else 2.5
+    bent = 4 * (values[DAMPING] - 0.5) ** 2
+    made = {
+        name: factor * (1 + k) * (values[K_D] + (k % 3) * bent)
+        for k, name in enumerate(NUMBERS)
+    }  # fmt: skip
+    late = np.where(values[K_D] > 2.0, values[K_D] / factor, np.nan)
+    return made | {f'velocity_error.settling_time.{dof}': late for dof in ('surge', 'heave')}
+
+
+def drawn_of(folder: Path, campaign: str, figures) -> Drawn:
+    analysis = analysed(open_sweep(make_sweep(folder, campaign, figures)))
+    with artists.captured() as found:
+        records = draw(analysis, folder / 'figures')
+    return analysis, found, {name: record.caption for name, record in records.items()}
+
+
+@pytest.fixture(scope='module')
+def simple(tmp_path_factory) -> Drawn:
+    text = SIMPLE.replace('count: 400', 'count: 60')
+    return drawn_of(tmp_path_factory.mktemp('simple'), text, known)
+
+
+@pytest.fixture(scope='module')
+def failing(tmp_path_factory) -> Drawn:
+    def figures(controller, values, index):
+        return mixed(controller, values, index) | {
+            'effort.max.surge': np.arange(len(index)) + 1.0 + 10.0 * (controller == 'cl')
+        }
+
+    return drawn_of(tmp_path_factory.mktemp('mixed'), MIXED, figures)
+
+
+def test_distributions_are_those_of_the_rows(simple: Drawn) -> None:
+    analysis, figures, _ = simple
+    panels = [axes for axes in figures['distributions'].axes if axes.lines]
+    assert len(panels) == len(analysis.measures) > 10
+    for k, (axes, measure) in enumerate(zip(panels, analysis.measures, strict=True)):
+        assert axes.get_title(loc='left') == measure.label
+        assert axes.get_xlabel() == measure.unit
+        assert axes.get_ylabel() == ('' if k % 4 else 'share of rows')
+        shown = named(axes, figures['distributions'].legends[0])
+        assert list(shown) == ['gvc', 'cl']
+        for name, ((x, share),) in shown.items():
+            mine = analysis.sweep.table(['controller'])['controller'].to_numpy() == name
+            values = analysis.sweep.measure(measure)[mine]
+            late = np.where(np.isnan(values), np.inf, values)
+            assert share == pytest.approx([np.mean(late <= at) for at in x], abs=1.5 / len(late))
+            assert x[-1] == pytest.approx(np.nanmax(values))
+        apart = np.nanmax(analysis.values[measure.name]) > 30 * np.nanmin(
+            analysis.values[measure.name]
+        )
+        assert axes.get_xscale() == ('log' if apart else 'linear')
+
+
+def test_what_matters_stands_in_its_row_and_column(simple: Drawn) -> None:
+    analysis, figures, _ = simple
+    maps = heat_maps(figures['influence'])
+    assert list(maps) == ['gvc: explained (%)', 'cl: explained (%)']
+    short = short_names(analysis.factors)
+    for label, found in maps.items():
+        controller = label.partition(':')[0]
+        for (measure, path), value in found.items():
+            (name,) = [m.name for m in analysis.measures if m.label == measure]
+            (whole,) = [p for p, s in short.items() if s == path]
+            mine = rows(analysis, 'influence', controller=controller, figure=name, path=whole)
+            expected = mine[0]['explained_percent'] if mine else np.nan
+            assert value == pytest.approx(expected, nan_ok=True)
+    shares = {}
+    for row in analysis.tables['influence']:
+        shares.setdefault(row['path'], []).append(row['explained_percent'])
+    order = sorted(shares, key=lambda path: -np.mean(shares[path]))
+    first = [path for _, path in next(iter(maps.values()))][: len(order)]
+    assert first == [short[path] for path in order]
+
+
+def test_dependence_shows_the_quantiles_along_its_path(simple: Drawn) -> None:
+    analysis, figures, captions = simple
+    factors = {f.path: f for f in analysis.factors}
+    seen = set()
+    for name in (name for name in figures if name.startswith('dependence')):
+        figure, path = figures[name], captions[name].split(' on ')[1].split(' ', 1)[0].rstrip(':')
+        seen.add(path)
+        short = short_names(analysis.factors)[path]
+        assert figure.get_supxlabel().startswith(short)
+        panels = [axes for axes in figure.axes if axes.lines]
+        chosen = main_measures(analysis)
+        assert len(panels) == len(chosen) == 6
+        for axes, measure in zip(panels, chosen, strict=True):
+            assert axes.get_title(loc='left') == measure.label
+            assert axes.get_ylabel() == measure.unit
+            controllers = ['cl'] if path == 'controllers.cl.k_I' else ['gvc', 'cl']
+            for k, controller in enumerate(controllers):
+                mine = rows(
+                    analysis, 'dependence', controller=controller, path=path, figure=measure.name
+                )
+                wanted = {
+                    key: np.array([np.nan if r[key] is None else r[key] for r in mine], float)
+                    for key in ('middle', 'low', 'quarter', 'median', 'three_quarters', 'high')
+                }
+                if factors[path].binned:
+                    _banded(axes, figure, controller, k, wanted)
+                    dots = [points(x) for x in artists.lines(axes) if x.get_linestyle() == 'None']
+                    x, y = dots[k]
+                    rows_ = analysis.rows_of(controller)
+                    assert np.array_equal(x, factors[path].numbers[rows_])
+                    assert np.array_equal(y, analysis.values[measure.name][rows_], equal_nan=True)
+                else:
+                    _barred(axes, k, wanted, len(controllers))
+                    assert [t.get_text() for t in axes.get_xticklabels()] == ['ode5', 'rk4']
+            assert [t.get_text() for t in figure.legends[0].get_texts()] == controllers
+    assert seen == {K_D, DAMPING, 'controllers.cl.k_I', 'integrator'}
+
+
+def _banded(axes, figure, controller: str, k: int, wanted) -> None:
+    (median,) = (
+        named(axes, figure.legends[0])[controller]
+        if len(figure.legends[0].get_texts()) > 1
+        else [points(x) for x in artists.lines(axes) if x.get_linestyle() != 'None']
+    )
+    assert median[0] == pytest.approx(wanted['middle'])
+    assert median[1] == pytest.approx(wanted['median'], nan_ok=True)
+    for band, (low, high) in zip(
+        bands(axes)[2 * k : 2 * k + 2],
+        (('low', 'high'), ('quarter', 'three_quarters')),
+        strict=True,
+    ):
+        _, x, lower, upper = band
+        there = np.isfinite(wanted[low]) & np.isfinite(wanted[high])
+        assert x == pytest.approx(wanted['middle'][there])
+        assert lower == pytest.approx(wanted[low][there])
+        assert upper == pytest.approx(wanted[high][there])
+
+
+def _barred(axes, k: int, wanted, count: int) -> None:
+    thin, thick = axes.collections[2 * k : 2 * k + 2]
+    place = np.arange(2) + 0.6 * ((k + 0.5) / count - 0.5)
+    for lines, (low, high) in ((thin, ('low', 'high')), (thick, ('quarter', 'three_quarters'))):
+        for j, segment in enumerate(lines.get_segments()):
+            ends = (wanted[low][j], wanted[high][j])
+            if np.isnan(ends).any():
+                assert not len(segment)
+                continue
+            assert segment[:, 0] == pytest.approx(place[j])
+            assert segment[:, 1] == pytest.approx(ends)
+    assert thin.get_linewidth()[0] < thick.get_linewidth()[0]
+    x, y = points(axes.lines[k])
+    assert x == pytest.approx(place)
+    assert y == pytest.approx(wanted['median'], nan_ok=True)
+
+
+def test_the_two_paths_that_matter_most_stand_in_their_cells(simple: Drawn) -> None:
+    analysis, figures, captions = simple
+    first, second = analysis.pair
+    short = short_names(analysis.factors)
+    panels = [axes for axes in figures['together'].axes if axes.images]
+    wanted = [(m, c) for m in main_measures(analysis)[:2] for c in ('gvc', 'cl')]
+    assert len(panels) == len(wanted)
+    for axes, (measure, controller) in zip(panels, wanted, strict=True):
+        assert axes.get_title(loc='left') == f'{controller}: {measure.label}'
+        assert (axes.get_ylabel(), axes.get_xlabel()) == (short[first.path], short[second.path])
+        assert axes.images[0].colorbar.ax.get_ylabel() == measure.unit
+        for (down, across), value in cells(axes).items():
+            (row,) = [
+                r for r in rows(analysis, 'together', controller=controller, figure=measure.name)
+                if (r['value'], r['other_value']) == (down, across)
+            ]  # fmt: skip
+            expected = np.nan if row['median'] is None else row['median']
+            assert value == pytest.approx(expected, nan_ok=True)
+    assert f'each combination of {first.path} and {second.path}' in captions['together']
+
+
+def test_failures_are_the_shares_of_their_rows(failing: Drawn) -> None:
+    analysis, figures, _ = failing
+    figure = figures['failures']
+    table = analysis.sweep.table(['controller', 'status', *analysis.sweep.paths]).to_pylist()
+    short = short_names(analysis.factors)
+    panels = [axes for axes in figure.axes if axes.patches]
+    assert len(panels) == 3
+    for axes in panels:
+        (path,) = [p for p, s in short.items() if s == axes.get_title(loc='left')]
+        assert axes.get_ylabel() == 'rows (%)'
+        (factor,) = [f for f in analysis.factors if f.path == path]
+        labels = [text.get_text() for text in axes.get_xticklabels()]
+        found = bars(axes, figure.legends[0])
+        values = list(dict.fromkeys(str(row[path]) for row in table))
+        assert len(labels) == len(values) == len(factor.labels)
+        for j, value in enumerate(
+            sorted(
+                values, key=lambda v: factor.labels.index(v.replace('-', '−').removesuffix('.0'))
+            )
+        ):
+            mine = [
+                row['status'] for row in table
+                if str(row[path]) == value
+                and ('gvc' not in path or row['controller'] == 'gvc')
+            ]  # fmt: skip
+            lost, refused = (100 * mine.count(w) / len(mine) for w in ('diverged', 'refused'))
+            assert found['diverged'][j] == pytest.approx((j, 0.0, lost))
+            assert found['refused'][j] == pytest.approx((j, lost, lost + refused))
+
+
+MORRIS = f"""
+name: morr
+scenario: case1
+vary:
+  - morris:
+      {K_D}: {{uniform: {{from: 1.0, to: 2.0}}}}
+      {DAMPING}: {{uniform: {{from: 1.0, to: 2.0}}}}
+    count: 12
+"""
+SALTELLI = MORRIS.replace('morris', 'saltelli').replace('count: 12', 'count: 32')
+
+
+def test_elementary_effects_stand_at_their_places(tmp_path: Path) -> None:
+    pytest.importorskip('SALib')
+    analysis, figures, _ = drawn_of(tmp_path, MORRIS, known)
+    figure = figures['elementary_effects']
+    assert figure.get_supxlabel().startswith(r'$\mu^*$')
+    assert figure.get_supylabel().startswith(r'$\sigma$')
+    key = dict(zip((t.get_text() for t in figure.legends[0].get_texts()),
+                   figure.legends[0].legend_handles, strict=True))  # fmt: skip
+    short = short_names(analysis.factors)
+    shown = [m for m in main_measures(analysis) if rows(analysis, 'indices', figure=m.name)]
+    panels = [axes for axes in figure.axes if axes.lines]
+    for axes, measure in zip(panels, shown, strict=True):
+        assert axes.get_title(loc='left') == f'{measure.label} ({measure.unit})'
+        dots = [line for line in artists.lines(axes) if len(line.get_xdata()) == 1]
+        mine = rows(analysis, 'indices', figure=measure.name)
+        assert len(dots) == len(mine) == 4
+        for row in mine:
+            (dot,) = [
+                d for d in dots
+                if d.get_color() == key[short[row['path']]].get_color()
+                and d.get_marker() == key[row['controller']].get_marker()
+            ]  # fmt: skip
+            assert [v[0] for v in points(dot)] == pytest.approx([row['mu_star'], row['sigma']])
+        (ends,) = [points(x) for x in artists.lines(axes) if len(x.get_xdata()) == 2]
+        assert np.array_equal(ends[0], ends[1])
+        assert ends[0][1] == pytest.approx(1.1 * max(row['mu_star'] for row in mine))
+
+
+def test_total_indices_stand_in_their_cells(tmp_path: Path) -> None:
+    pytest.importorskip('SALib')
+    analysis, figures, captions = drawn_of(tmp_path, SALTELLI, known)
+    maps = heat_maps(figures['total_indices'])
+    assert list(maps) == ['(a) $S_T$', '(b) $S_T$']
+    assert '(a) gvc; (b) cl' in captions['total_indices']
+    short = short_names(analysis.factors)
+    for controller, found in zip(('gvc', 'cl'), maps.values(), strict=True):
+        for (label, path), value in found.items():
+            (row,) = [
+                r for r in rows(analysis, 'indices', controller=controller, **{'with': None})
+                if BY_NAME[r['figure']].label == label and short[r['path']] == path
+            ]  # fmt: skip
+            assert value == pytest.approx(row['ST'])
+
+
+def test_measures_of_errors_and_settling_are_drawn_first(simple: Drawn) -> None:
+    names = [m.name for m in main_measures(simple[0])]
+    assert names == [
+        'overall.velocity_error.settling_time', 'overall.velocity_error.rms.linear',
+        'overall.velocity_error.rms.angular', ENERGY, 'overall.effort.rms.linear',
+        'overall.coupling.delta_xi_max.angular',
+    ]  # fmt: skip
+
+
+def test_no_plot_is_without_an_oracle(simple: Drawn, failing: Drawn) -> None:
+    checked = {'distributions', 'influence', 'together', 'failures'}
+    checked |= {f'dependence_{i}' for i in (1, 2, 3, 4)}
+    assert set(simple[1]) | set(failing[1]) == checked
+
+
+def test_what_does_not_vary_is_said(failing: Drawn) -> None:
+    caption = failing[2]['distributions']
+    assert 'The same in every row:' in caption
+    assert 'RMS error, linear' in caption

@@ -1,0 +1,342 @@
+"""Sentences and small tables of the studies, by their numbers: who, by how much, which way."""
+
+from types import SimpleNamespace as Made
+
+import numpy as np
+import pytest
+
+from auv_analysis.report.results import Results
+from auv_analysis.studies.atlas import report as atlas
+from auv_analysis.studies.design import report as design
+from auv_analysis.studies.identify import report as identify
+from auv_analysis.studies.sweep import report as sweep
+from auv_analysis.studies.tune import report as tune
+from auv_analysis.studies.tune.cost import Measures
+
+
+def _predicted(predictor: str, horizon: float, low: float, ratio: float, high: float) -> dict:
+    return {
+        'predictor': predictor, 'horizon': horizon, 'ratio': ratio, 'ratio_low': low,
+        'ratio_high': high,
+    }  # fmt: skip
+
+
+BETTER, WORSE, EVEN = (0.3, 0.4, 0.5), (1.1, 1.25, 1.5), (0.8, 1.0, 1.2)
+
+
+@pytest.mark.parametrize(
+    ('prior', 'rival', 'text'),
+    [
+        (BETTER, BETTER, 'The new model predicts what it has not seen better than the prior: '
+                         '0.40 times its error at 5 s (0.30 to 0.50).'),
+        (WORSE, BETTER, 'The new model is not better than the prior: '
+                        '1.2 times its error at 5 s (1.1 to 1.5).'),
+        (EVEN, BETTER, 'The new model cannot be told from the prior on what was held out: '
+                       '1.0 times its error at 5 s (0.80 to 1.2).'),
+        (BETTER, EVEN, 'The new model predicts what it has not seen better than the prior: '
+                       '0.40 times its error at 5 s (0.30 to 0.50); not clearly better than '
+                       'persistence and black box.'),
+    ],
+)  # fmt: skip
+def test_the_verdict_on_a_model(prior, rival, text: str) -> None:
+    rows = [_predicted('prior', 0.1, *WORSE), *(_predicted('prior', h, *prior) for h in (0.5, 5.0))]
+    rows += [
+        _predicted(name, h, *rival) for name in ('persistence', 'black box') for h in (0.5, 5.0)
+    ]
+    assert identify.verdict(rows, []) == text
+    assert identify.verdict(rows, ['it floats', 'x']) == 'No vehicle file: it floats.'
+    assert identify.verdict([], []).startswith('Nothing was held out')
+
+
+def test_the_worst_horizon_decides() -> None:
+    rows = [_predicted('prior', 0.5, *WORSE), _predicted('prior', 5.0, *BETTER)]
+    assert identify.verdict(rows, []) == (
+        'The new model is not better than the prior: 1.2 times its error at 0.5 s (1.1 to 1.5).'
+    )
+
+
+def test_the_verdict_on_a_vehicle_alone() -> None:
+    rows = [_predicted('persistence', h, *BETTER) for h in (0.1, 0.5, 2.0)]
+    rows += [_predicted('black box', 0.5, *WORSE), _predicted('black box', 2.0, *BETTER)]
+    assert identify.verdict_alone('v', rows) == (
+        'v predicts better than persistence and worse than black box at 0.5 s.'
+    )
+    rows[-2] = _predicted('black box', 0.5, *EVEN)
+    assert identify.verdict_alone('v', rows).endswith('not clearly better than black box.')
+    assert identify.verdict_alone('v', []) == 'Nothing was held out.'
+
+
+def test_sentences_of_an_identification() -> None:
+    facts = {
+        'verdict': 'V.', 'contradictions': ['first', 'second'], 'file': '',
+        'identified': ['a', 'b', 'c'], 'not_identified': ['d'], 'hardly_moving': ['e', 'f'],
+        'residuals': 'R', 'combinations': [{'words': f'w{k}'} for k in range(6)],
+        'excitation': ['more of it'],
+    }  # fmt: skip
+    rows = [
+        {'pair': 'roll, yaw', 'verdict': 'real', 'Upsilon': 0.1, 'M': 4.0, 'M_low': 3.0,
+         'M_high': 6.0, 'unit': 'kg m²'},
+        {'pair': 'surge, pitch', 'verdict': 'real', 'Upsilon': -0.5, 'M': -70.0, 'M_low': -80.0,
+         'M_high': -60.0, 'unit': 'kg m'},
+        {'pair': 'sway, roll', 'verdict': 'not known', 'Upsilon': 9.0, 'M': 1.0, 'M_low': 0.0,
+         'M_high': 2.0, 'unit': 'kg m'},
+    ]  # fmt: skip
+    results = Results('identify', facts)
+    results.add('inertia', 'x', rows, {})
+    assert identify.sentences(results) == [
+        'V.', 'Second.', '3 of 4 coefficients are identified.',
+        'The coupling of surge with pitch is real: −70.0 ± 10 kg m.',
+        'The coupling of roll with yaw is real: 4.00 ± 1.5 kg m².',
+        'Not searched, as it hardly moves: e and f.', 'R.',
+        'Open: w0.', 'Open: w1.', 'Open: w2.', 'Open: w3.', 'More of it.',
+    ]  # fmt: skip
+    facts['file'] = 'vehicle.yaml'
+    assert identify.sentences(results)[1:3] == ['First.', 'Second.']
+
+
+@pytest.mark.parametrize(
+    ('name', 'indexed'),
+    [('M.pitch.surge', 'M[4][0]'), ('D_linear.roll', 'D_linear[3][3]'), ('lag', 'lag'),
+     ('D_quadratic.yaw.sway', 'D_quadratic[5][1]'), ('gain.surge', 'gain.surge')],
+)  # fmt: skip
+def test_coefficients_are_named_by_indices(name: str, indexed: str) -> None:
+    assert identify._indexed(name) == indexed
+
+
+def test_numbers_for_programs_stand_under_their_names() -> None:
+    rows = [{'name': 'M.yaw', 'deviation': 1.0, 'status': 'identified', 'unit': 'kg', 'value': 2.0,
+             'low': 3.0, 'high': 4.0, 'prior': 5.0}]  # fmt: skip
+    predictions = [{'predictor': p, 'horizon': 0.5, 'error': e}
+                   for p, e in (('new', 1.0), ('prior', 2.0), ('black box', 3.0))]  # fmt: skip
+    parts = ('', '_prior', '_low', '_high')
+    tables = {
+        name: [who | {f'{symbol}{part}': f'{symbol}{part}' for symbol in symbols for part in parts}]
+        for name, who, symbols in (
+            ('deformation', {'dof': 'roll'}, ('delta_xi_max', 'delta_pi_max')),
+            ('shares', {'dof': 'yaw'}, ('N', 'share')),
+            ('inertia', {'pair': 'surge, pitch'}, ('Upsilon',)),
+        )
+    }
+    found = identify._listed(rows, predictions, tables)
+    assert found['parameters'] == [{
+        'name': 'M[5][5]', 'std': 1.0, 'identifiable': True, 'unit': 'kg', 'value': 2.0,
+        'low': 3.0, 'high': 4.0, 'prior': 5.0,
+    }]  # fmt: skip
+    assert found['prediction'] == [{'horizon': 0.5, 'model': 1.0, 'prior': 2.0, 'black_box': 3.0}]
+    names = {
+        'delta_xi_max.roll': 'delta_xi_max', 'delta_pi_max.roll': 'delta_pi_max', 'N.yaw': 'N',
+        'share.yaw': 'share', 'Upsilon.surge.pitch': 'Upsilon',
+    }  # fmt: skip
+    assert found['couplings'] == [
+        {'name': name, 'value': s, 'prior': f'{s}_prior', 'low': f'{s}_low', 'high': f'{s}_high'}
+        for name, s in names.items()
+    ]
+
+
+# atlas
+
+
+def _chart(name: str, strength: float, pairs, failure: str = '') -> Made:
+    zeros = {'delta_xi': ['yaw'], 'delta_pi': ['surge', 'sway'] if pairs else list('abcdef')}
+    couplings = Made(
+        name=name, is_diagonal=not pairs, strength=strength, largest=strength / 2, pairs=pairs,
+        zeros=zeros, damped=[('sway', 'yaw')] if pairs else [],
+    )  # fmt: skip
+    return Made(name=name, couplings=couplings, reached={'failure': failure})
+
+
+def test_findings_of_an_atlas() -> None:
+    charts = [_chart('a', 0.5, [('sway', 'roll')]), _chart('b', 0.2, [('surge', 'pitch')], 'x'),
+              _chart('c', 0.0, [])]  # fmt: skip
+    assert [(s.text, s.source) for s in atlas.findings(charts)] == [
+        ('Inertia couples a the most: cross terms reach 50.0 % of the energy without them, of sway '
+         'and roll alone 25.0 %.', 'table-ranking'),
+        ('c has a diagonal M: Upsilon = I, nothing is coupled by inertia.', 'table-ranking'),
+        ('Case 1 diverges on b, which therefore have no peaks.', 'case1'),
+    ]  # fmt: skip
+    table = atlas.ranking(Results('atlas', {'vehicles': {}}), charts)
+    heads = [head.label for head in table.columns]
+    assert heads[3:4] + heads[5:] == [
+        'between', 'Δξ always zero', 'Δπ always zero', 'damping couples',
+    ]  # fmt: skip
+    assert [[row[i].text for i in (0, 3, 5, 6, 7)] for row in table.rows] == [
+        ['a', 'sway–roll', 'yaw', 'surge, sway', 'sway–yaw'],
+        ['b', 'surge–pitch', 'yaw', 'surge, sway', 'sway–yaw'],
+        ['c', 'none', 'yaw', 'all six', 'none'],
+    ]
+
+
+def test_the_unit_of_an_entry_is_that_of_its_velocities() -> None:
+    chart = _chart('a', 0.5, [('sway', 'roll'), ('roll', 'yaw'), ('surge', 'heave')])
+    table = atlas.pairs(Results('atlas', {'vehicles': {}}), [chart])
+    assert [[row[i].text for i in (1, 2, 5)] for row in table.rows] == [
+        ['sway', 'roll', 'm/s per rad/s'], ['roll', 'yaw', 'rad/s per rad/s'],
+        ['surge', 'heave', 'm/s per m/s'],
+    ]  # fmt: skip
+
+
+# tune
+
+
+class Tuned:
+    """A tuning whose ratios are given."""
+
+    def __init__(self, *, reached: bool = True):
+        sizes = {'weighted_error': 2.0, 'effort': 50.0}
+        reference = Measures(
+            **{name: np.array([sizes.get(name, 9.0)]) for name in Measures._fields}
+        )
+        self.request = Made(reference='gvc')
+        self.goal = Made(names=('weighted_error', 'effort'), reference=reference, tolerance=0.01)
+        self.scenario = Made(controllers=['gvc', 'gvc_tuned', 'cl_tuned'])
+        self.laws = {'gvc_tuned': Made(law='gvc', best=Made(reached=True)),
+                     'cl_tuned': Made(law='cl', best=Made(reached=reached))}  # fmt: skip
+        self.retuned = 'gvc_tuned'
+        self.draws = {'gvc': Made(error=np.zeros(40))}
+        self.comparisons = [
+            Made(measure=measure, against=against, controller=name, ratio=ratio, verdict=verdict)
+            for measure, against, name, ratio, verdict in (
+                ('weighted_error', 'gvc', 'gvc_tuned', 0.5, -1),
+                ('weighted_error', 'gvc', 'cl_tuned', 1.5, 1),
+                ('effort', 'gvc', 'cl_tuned', 9.0, 1),
+                ('weighted_error', 'gvc_tuned', 'cl_tuned', None, 0),
+            )
+        ]
+
+    def ratio(self, name: str, measure: str) -> float:
+        return {'gvc_tuned': (0.25, 1.001), 'cl_tuned': (0.5, 0.998)}[name][measure == 'effort']
+
+    def remarks(self, name: str) -> list[str]:
+        return ['at its bound'] if name == 'cl_tuned' else []
+
+
+def test_findings_of_a_tuning() -> None:
+    assert [s.text for s in tune.findings(Tuned())] == [
+        'At the effort of gvc (50.00 J/s², met within 0.20 %), the least time-weighted error that '
+        'the search found is 0.250 for gvc and 0.500 for cl, as parts of gvc’s 2.00 J.',
+        'gvc’s own law, searched in the same way, comes to 0.250: that is the gains’ part. What is '
+        'left to the law is a factor of 2.00 for cl.',
+        'Over 40 draws of model error and disturbance, the same for all, in time-weighted error: '
+        'gvc_tuned (0.500 times) is ahead of gvc; cl_tuned (1.50 times) is behind gvc (ratios '
+        'after Hodges and Lehmann; Wilcoxon signed-rank test, Holm’s correction, level 0.05).',
+        'Over 40 draws of model error and disturbance, the same for all, in time-weighted error: '
+        'cl_tuned (no ratio) is not told apart from gvc_tuned (ratios after Hodges and Lehmann; '
+        'Wilcoxon signed-rank test, Holm’s correction, level 0.05).',
+        'cl_tuned: at its bound.',
+    ]
+    lost = [s.text for s in tune.findings(Tuned(reached=False))]
+    assert lost[1] == (
+        'No gains of cl that were tried have the effort of gvc within 1.0 %; the nearest are '
+        '−0.20 % away, and cl_tuned is no fair comparison.'
+    )
+    assert 'gvc_tuned (0.500 times) is ahead of gvc (ratios' in lost[2]
+
+
+# design
+
+
+def test_changes_of_a_design_are_marked() -> None:
+    document = {
+        'reduce': 'delta_xi.sway', 'controller': 'gvc',
+        'side_effects': [{'name': 'effort.max.yaw'}],
+        'measures': [
+            {'name': 'delta_xi_max.sway', 'before': 0.2, 'after': 0.05, 'unit': 'm/s'},
+            {'name': 'effort.max.yaw', 'before': 2.0, 'after': 3.0, 'unit': 'N m'},
+            {'name': 'effort.max.surge', 'before': 4.0, 'after': 4.0, 'unit': 'N'},
+        ],
+        'controllers': {
+            name: {'measures': [
+                {'name': 'delta_xi_max.sway', 'before': 1.0, 'after': 2.0, 'unit': 'm/s'},
+                {'name': 'velocity_error.rms.sway', 'before': 1.0, 'after': 2.0, 'unit': 'm/s'},
+            ]} for name in ('gvc', 'cl')
+        },
+    }  # fmt: skip
+    results = Results('design', document)
+    table = design.measures_table(results)
+    assert [[cell.text for cell in row] for row in table.rows] == [
+        ['delta_xi_max.sway', '0.200', '0.0500', '−75.0 %', 'm/s'],
+        ['effort.max.yaw', '2.00', '3.00', '+50.0 %', 'N m'],
+        ['effort.max.surge', '4.00', '4.00', '=', 'N'],
+    ]
+    assert [row[0].kind for row in table.rows] == ['good', 'bad', '']
+    others = design.controllers_table(results)
+    assert [[cell.text for cell in row] for row in others.rows] == [
+        ['cl', 'delta_xi_max.sway', '1.00', '2.00', '+100.0 %', 'm/s']
+    ]
+
+
+def test_the_best_change_of_each_part_is_in_the_matrix() -> None:
+    def one(coupling: str, part: str, ratio, **about) -> dict:
+        return {'coupling': coupling, 'part': part, 'ratio': ratio, 'predicted': 0.7, 'score': 9.0,
+                'values': {'x': 1.25}, 'failure': None, 'proposed': False} | about  # fmt: skip
+
+    alternatives = [
+        one('delta_xi.sway', 'shift', 0.9), one('delta_xi.sway', 'shift', 0.4, proposed=True),
+        one('delta_xi.sway', 'disc', None, failure='it diverges', values={}),
+        one('delta_pi.yaw', 'disc', 0.75),
+    ]  # fmt: skip
+    results = Results('design', {'alternatives': alternatives, 'reduce': 'delta_xi.sway'})
+    table = design.matrix_table(results)
+    assert [head.unit for head in table.columns] == ['', '%', '%']
+    assert [[cell.text for cell in row] for row in table.rows] == [
+        ['delta_xi.sway', '40.0', '–'], ['delta_pi.yaw', '–', '75.0'],
+    ]  # fmt: skip
+    assert [row[1].kind for row in table.rows] == ['good', '']
+    mine = design.alternatives_table(results)
+    assert [[cell.text for cell in row][1:] for row in mine.rows] == [
+        ['0.700', '0.900', '9.00', 'x 1.25', ''], ['0.700', '0.400', '9.00', 'x 1.25', 'proposed'],
+        ['0.700', '–', '9.00', 'none', 'it diverges'],
+    ]  # fmt: skip
+
+
+# sweep
+
+
+def test_findings_of_a_sweep() -> None:
+    settled = 'overall.velocity_error.settling_time'
+    counts = [
+        {'controller': 'gvc', 'rows': 20, 'ok': 20, 'diverged': 0, 'refused': 0},
+        {'controller': 'cl', 'rows': 30, 'ok': 20, 'diverged': 4, 'refused': 6},
+    ]
+    quantiles = [
+        {'figure': 'other', 'controller': 'cl', 'rows': 9, 'known': 9, 'median': 1.0},
+        {'figure': settled, 'controller': 'gvc', 'rows': 20, 'known': 5, 'median': None},
+        {'figure': settled, 'controller': 'cl', 'rows': 8, 'known': 6, 'median': 2.5},
+        {'figure': settled, 'controller': 'none', 'rows': 0, 'known': 0, 'median': None},
+    ]
+    analysis = Made(
+        sweep=Made(rows=50, planned=60), tables={'quantiles': quantiles}, counts=lambda: counts,
+        notes=['what is odd'],
+    )  # fmt: skip
+    assert [(s.text, s.source) for s in sweep.findings(analysis)] == [
+        ('The sweep is not finished: 50 of 60 rows are there.', 'table-counts'),
+        ('Under gvc all errors settle in 25.0 % of the 20 rows that came to their end.',
+         'table-quantiles'),
+        ('Under cl all errors settle in 75.0 % of the 8 rows that came to their end, in half of '
+         'them within 2.50 s.', 'table-quantiles'),
+        ('Of 30 rows of cl, 4 diverged and 6 refused.', 'failures'),
+        ('What is odd.', 'campaign'),
+    ]  # fmt: skip
+    analysis.sweep.planned = 50
+    assert sweep.findings(analysis)[0].text.startswith('Under gvc')
+
+
+def test_values_of_a_campaign_in_words() -> None:
+    assert sweep._said([1, 2.5, 'a']) == '1, 2.5, a'
+    assert sweep._said({'uniform': {'from': 1.0, 'to': 3.0}}) == 'uniform: from 1, to 3'
+    assert sweep._said(list(range(60))).endswith('…')
+    assert len(sweep._said(list(range(60)))) == 79
+
+
+def test_the_values_at_which_most_rows_fail_come_first() -> None:
+    rows = [
+        {'path': 'p', 'value': str(k), 'controller': 'gvc', 'rows': 10, 'diverged': d, 'refused': r,
+         'diverged_percent': 10.0 * d, 'refused_percent': 10.0 * r}
+        for k, (d, r) in enumerate([(1, 0), (0, 0), (2, 3), (0, 4)])
+    ]  # fmt: skip
+    table, *_ = sweep._failures(Made(tables={'failures': rows}, reasons=list))
+    assert [[cell.text for cell in row] for row in table.rows] == [
+        ['p', '2', 'gvc', '10', '20.0', '30.0'], ['p', '3', 'gvc', '10', '0', '40.0'],
+        ['p', '0', 'gvc', '10', '10.0', '0'],
+    ]  # fmt: skip
+    assert table.source(0, 'rows') == 'failures.parquet:rows[2]'

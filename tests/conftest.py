@@ -26,7 +26,7 @@ from hypothesis import settings
 HERE = Path(__file__).parent
 FIRST = ('system', 'ros')
 TIMED = {*FIRST, 'examples'}  # folders of tests that wait for nodes
-LIMIT, LONG_LIMIT = 300.0, 7200.0  # s, after which a test hangs, with its fixtures and reruns
+LIMIT, LONG_LIMIT = 600.0, 7200.0  # s, after which a test hangs, with its fixtures and reruns
 ORDER = os.environ.get('AUV_GVC_ORDER')  # seed
 
 settings.register_profile(

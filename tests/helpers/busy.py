@@ -4,6 +4,7 @@ python tests/helpers/busy.py COUNT COMMAND...
 """
 
 import os
+import signal
 import subprocess
 import sys
 
@@ -12,6 +13,7 @@ BUSY = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent: sum(rang
 
 def main(count: str, *command: str) -> int:
     """Exit code of the command."""
+    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))  # it ends what it has started
     busy = [subprocess.Popen([sys.executable, '-c', BUSY]) for _ in range(int(count))]
     print(f'busy beside it: {[process.pid for process in busy]}, on {os.cpu_count()} cores')
     try:

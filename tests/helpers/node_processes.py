@@ -147,7 +147,7 @@ class Peer:
             services = dict(self.node.get_service_names_and_types())
             return {node for node in nodes() if f'{node}/get_parameters' in services}
 
-        limit = time.monotonic() + 1.0  # a tool has no parameters, and answers nothing
+        limit = time.monotonic() + patience(1.0)  # a tool has no parameters, and answers nothing
         self.until(lambda: asked() == nodes() or time.monotonic() > limit)
         for node in asked():
             self.call(GetParameters, f'{node}/get_parameters')

@@ -57,7 +57,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
         TESTS.parent / 'pyproject.toml',
     ]
     environ = {
-        **os.environ, 'PYTHONPATH': str(TESTS), 'AUV_GVC_PATIENCE': '0.01', 'AUV_GVC_STRICT': '1',
+        **os.environ, 'PYTHONPATH': str(TESTS), 'AUV_GVC_PATIENCE': '0.005', 'AUV_GVC_STRICT': '1',
         'AUV_GVC_ABSENT': 'fish',
     }  # fmt: skip
     done = subprocess.run(

@@ -19,6 +19,7 @@ from helpers.node_processes import (
     start_node,
     stop,
 )
+from helpers.patience import patience
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterValue
@@ -383,7 +384,7 @@ def test_thrusters_that_the_vehicle_has_not_are_refused() -> None:
 
 @pytest.mark.parametrize('limit', ['limits__wrench', 'actuators__limit'])
 def test_in_real_time_nothing_beyond_the_limit_is_published(limit: str) -> None:
-    told = parameters(**{limit: '[5.0]'}, ramp=0.0, setpoint_timeout=60.0)
+    told = parameters(**{limit: '[5.0]'}, ramp=0.0, setpoint_timeout=patience(60.0))
     with graph(('controller_node', [*UNLIMITED, *GAINS, *told])) as (peer, _):
         peer.listen(topics.WRENCH)
         peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')

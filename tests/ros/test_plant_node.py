@@ -15,6 +15,7 @@ from helpers.node_processes import (
     start_node,
     stop,
 )
+from helpers.patience import patience
 from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics.ros import convert, interface, topics
@@ -116,7 +117,10 @@ def test_a_pause_holds_the_next_step() -> None:
 
 
 def test_silence_ends_the_run_and_is_named() -> None:
-    with graph(('plant_node', barrier(*parameters(wrench_timeout=0.5)))) as (peer, processes):
+    with graph(('plant_node', barrier(*parameters(wrench_timeout=patience(0.5))))) as (
+        peer,
+        processes,
+    ):
         listening(peer)
         odometry(peer, 1)
         process = processes['plant_node']
@@ -128,7 +132,7 @@ def test_silence_ends_the_run_and_is_named() -> None:
 
 
 def test_silence_of_the_recorder_ends_the_run_and_is_named() -> None:
-    extra = parameters(recorder_window=2, wrench_timeout=1.0)
+    extra = parameters(recorder_window=2, wrench_timeout=patience(1.0))
     with graph(('plant_node', barrier(*extra))) as (peer, processes):
         listening(peer)
         peer.node.create_publisher(topics.PROGRESS.type, topics.PROGRESS.name, 1)
@@ -139,7 +143,8 @@ def test_silence_of_the_recorder_ends_the_run_and_is_named() -> None:
         peer.until(lambda: process.poll() is not None, 'the end')
         code, output = stop(process)
     assert code == 1
-    assert 'no answer on recorder/progress to step 2 for 1 s; its publisher: test_peer' in output
+    assert f'no answer on recorder/progress to step 2 for {patience(1.0):g} s; ' in output
+    assert '; its publisher: test_peer' in output
 
 
 def test_without_recorder_it_ends_with_the_last_wrench() -> None:

@@ -30,7 +30,8 @@ class Sea:
         self.relay = Relay(port)
         self.driver = start_program(
             'driver.py', self.domain, '--ros-args',
-            *parameters(connection=f'udpin:127.0.0.1:{port}', disarm_timeout=1.0, autoarm=True),
+            *parameters(connection=f'udpin:127.0.0.1:{port}', autoarm=True),
+            *parameters(disarm_timeout=patience(1.0)),
         )  # fmt: skip
         self.vehicle = self.launch()
         self.peer = Peer(self.domain)

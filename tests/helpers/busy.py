@@ -13,15 +13,17 @@ BUSY = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent: sum(rang
 
 def main(count: str, *command: str) -> int:
     """Exit code of the command."""
-    signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))  # it ends what it has started
     busy = [subprocess.Popen([sys.executable, '-c', BUSY]) for _ in range(int(count))]
-    print(f'busy beside it: {[process.pid for process in busy]}, on {os.cpu_count()} cores')
+    print(f'busy beside it: {[one.pid for one in busy]}, on {os.cpu_count()} cores', flush=True)
     try:
-        return subprocess.run(command, check=False).returncode
+        process = subprocess.Popen(command)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal, which the command has as well
+        signal.signal(signal.SIGTERM, lambda *_: process.send_signal(signal.SIGINT))
+        return process.wait()
     finally:
-        for process in busy:
-            process.kill()
-            process.wait()
+        for one in busy:
+            one.kill()
+            one.wait()
 
 
 if __name__ == '__main__':

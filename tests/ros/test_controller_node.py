@@ -144,7 +144,7 @@ def test_ends_on_a_signal(lockstep, how: int) -> None:
     peer.publish(topics.ODOM, odometry(0))
     answered(peer, 1)  # so that both ends have matched
     peer.publish(topics.ODOM, odometry(1))
-    peer.spin(0.5)
+    peer.spin(patience(0.5))
     code, _ = stop(process, how)
     assert code == 0
     last = answered(peer, 2)[-1]
@@ -308,7 +308,7 @@ def test_a_transition_that_does_not_exist_is_survived() -> None:
         peer.until(client.service_is_ready)
         wrong = Transition(id=Transition.TRANSITION_ACTIVATE)
         client.call_async(ChangeState.Request(transition=wrong))
-        peer.spin(0.5)
+        peer.spin(patience(0.5))
         assert state(peer) == 'active'
         _, output = stop(processes['controller_node'])
     assert 'No transition' in output

@@ -13,6 +13,7 @@ from helpers.node_processes import (
     run_node,
     stop,
 )
+from helpers.patience import patience
 from numpy.testing import assert_allclose
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -128,7 +129,7 @@ def running():
 
 @pytest.fixture
 def peer(running):
-    running.spin(0.1)  # what is still under way
+    running.spin(patience(0.1))  # what is still under way
     for heard in running.heard.values():
         heard.clear()
     return running

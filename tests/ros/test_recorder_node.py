@@ -19,6 +19,7 @@ from helpers.node_processes import (
     run_node,
     stop,
 )
+from helpers.patience import patience
 from mcap.reader import make_reader
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
@@ -121,7 +122,7 @@ def test_a_kill_loses_at_most_the_last_second(tmp_path: Path) -> None:
         acknowledged(peer, 9)
         path = tmp_path / 'bag' / 'bag_0.mcap'
         peer.until(lambda: path.stat().st_size > 5000, 'the chunk to be closed')
-        peer.spin(1.2)
+        peer.spin(patience(1.2))
         processes['recorder_node'].kill()
         processes['recorder_node'].wait(PATIENCE)
     contents = read_bag(tmp_path / 'bag')

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.node_processes import assert_one_line, graph, parameters, run_node
+from helpers.patience import patience
 
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
@@ -125,12 +126,12 @@ def test_goes_on_when_the_driver_starts_again_with_its_clock_at_zero() -> None:
         old = 100 * 10**9
         for k in range(3):
             peer.publish(topics.ODOM, odometry(old + k * STEP))
-            peer.spin(0.2)
+            peer.spin(patience(0.2))
         peer.until(lambda: len(peer.heard['cmd_vel']) >= 8, 'eight set-points')
-        peer.spin(0.5)  # it was away
+        peer.spin(patience(0.5))  # it was away
         for k in range(3):
             peer.publish(topics.ODOM, odometry(10**9 + k * STEP))
-            peer.spin(0.2)
+            peer.spin(patience(0.2))
         peer.until(lambda: stamps(peer, 'cmd_vel')[-1] == 10**9 + 7 * STEP, 'set-points')
         new = [m for m in peer.heard['cmd_vel'] if interface.nanoseconds(m.header.stamp) < old]
         assert [interface.nanoseconds(m.header.stamp) for m in new] == [

@@ -4,6 +4,7 @@ import json
 import os
 import pty
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -224,16 +225,17 @@ def test_a_terminal_that_is_closed_leaves_a_zero_wrench(tmp_path: Path) -> None:
     peer = Peer(domain)
     peer.listen(topics.WRENCH)
     options = (str(made(tmp_path / 'bag', 500)), '--rate', '0.2', *FORCED)
-    pid, terminal = pty.fork()
-    if not pid:
-        command = str(Path(sys.executable).with_name('auv'))
-        os.execve(command, [command, 'replay', *options], environment(domain))
+    ours, its = pty.openpty()
+    command = ['setsid', '--ctty', str(Path(sys.executable).with_name('auv')), 'replay', *options]
+    process = subprocess.Popen(command, env=environment(domain), stdin=its, stdout=its, stderr=its)
+    os.close(its)
     try:
         forces = forces_once_moving(peer)
-        os.close(terminal)
+        os.close(ours)
         peer.until(lambda: forces()[-1] == 0.0, 'the zero wrench')
-        peer.until(lambda: os.waitpid(pid, os.WNOHANG)[0], 'the end')
+        peer.until(lambda: process.poll() is not None, 'the end')
     finally:
+        process.kill()
         peer.close()
 
 

@@ -29,9 +29,8 @@ def files(tmp_path: Path) -> Path:
 
 def start(files: Path, out: str) -> subprocess.Popen:
     return subprocess.Popen(
-        [*AUV, '--out', out], cwd=files, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509  ignored in background
-    )  # fmt: skip
+        [*AUV, '--out', out], cwd=files, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
 
 
 def stamps(folder: Path) -> dict[str, tuple[int, int]]:

@@ -12,6 +12,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 from PIL import Image
 
 from auv_analysis.report import plots
@@ -152,6 +153,13 @@ def cells(axes: Axes, rows: Axes | None = None) -> dict[tuple[str, str], float]:
         if word and not nothing:
             shown, half = _number(word)
             assert abs(shown - value) <= half * (1 + 1e-6), (word, value)
+    unknown = {place for place, value in found.items() if np.isnan(value)}
+    crossed = {
+        (down[round(patch.get_y() + 0.5)], across[round(patch.get_x() + 0.5)])
+        for patch in axes.patches
+        if isinstance(patch, Rectangle) and patch.get_hatch()
+    }
+    assert crossed == unknown, 'what is unknown is crossed out, and nothing else'
     return found
 
 

@@ -110,6 +110,9 @@ def _fits(name: str, value: str, row: dict[str, Any], column: Any, words: str, e
         names = [key for key in NAMES if key in entry]
         names = [key for key in ('run', 'name') if key in entry][:1] or names
         return all(_said(entry[key], words) for key in names)
+    if name == '<fault>':
+        mine = row['table'].rpartition('_')[2] == str(entry['fault'])
+        return mine and _said(entry['controller'], words) and _said(entry['dof'], words)
     if name == '<of the objective>':
         return _said(entry['controller'], words) and entry['measure'] == 'weighted_error'
     if name == '<of the part>':

@@ -5,6 +5,7 @@ import pytest
 from helpers.artists import named, same
 from helpers.made_runs import DOFS
 
+from auv_analysis.cli import replay as command
 from auv_analysis.replay import compared as replay
 
 WRENCH = ('N', 'N m')
@@ -44,3 +45,25 @@ def test_differences_of_wrenches_have_their_sign() -> None:
     assert replay.metrics_of(uneven)['answered'] == {
         'rms': pytest.approx([np.sqrt(12.5)] * 6), 'max': [4.0] * 6
     }  # fmt: skip
+
+
+def test_the_printed_table_has_each_number_in_its_column(capsys) -> None:
+    wrench = {
+        part: {kind: [100.0 * k + 10 * j + i + 1 for i in range(6)]
+               for j, kind in enumerate(('rms', 'max'))}
+        for k, part in enumerate(('recorded', 'answered', 'difference'))
+    }  # fmt: skip
+    document = {'reproduction': 'reproduced', 'answered': {'law': 'pid'}, 'wrench': wrench,
+                'notes': ['odd']}  # fmt: skip
+    command._show(document)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == 'reproduced'
+    assert [word for line in lines[1:3] for word in line.split()] == [
+        'recorded', 'pid', 'difference', *['rms', 'max'] * 3,
+    ]  # fmt: skip
+    for i, (dof, line) in enumerate(zip(DOFS, lines[3:9], strict=True)):
+        values = [*line.replace('N m', 'N·m').split()]
+        assert values[:2] == [f'{dof},', 'N' if i < 3 else 'N·m']
+        wanted = [six[i] for part in wrench.values() for six in part.values()]
+        assert [float(value) for value in values[2:]] == wanted
+    assert lines[9] == 'note: odd'

@@ -50,3 +50,43 @@ def test_numbers_of_figures_have_no_raised_digits(value: float) -> None:
     if text.startswith('$'):
         mantissa, power = text.strip('$').replace('}', '').split(r'\cdot10^{')
         assert float(mantissa) * 10.0 ** int(power) == pytest.approx(value)
+
+
+def _axes(*points: float):
+    axes = plots.new_figure(2.0).subplots()
+    axes.plot(range(len(points)), points)
+    return axes
+
+
+def test_an_axis_is_logarithmic_where_something_positive_is_to_be_seen() -> None:
+    for points, scale in (((1.0, 10.0, 1e7), 'log'), ((-1.0, 10.0, 1e7), 'linear'),
+                          ((0.0, 0.0, 0.0), 'linear'), ((1.0, 2.0), 'linear'),
+                          ((0.0, 1.0, 2.0), 'log')):  # fmt: skip
+        axes = _axes(*points)
+        plots.logarithmic(axes, 'y')
+        assert (axes.get_xscale(), axes.get_yscale()) == ('linear', scale), points
+    text = _logarithmic(1.0, 10.0, 1e7).yaxis.get_major_formatter()
+    assert [text(x, 0) for x in (1e-4, 0.01, 1e5)] == ['0.0001', '0.01', '100000']
+    assert [text(x, 0) for x in (1e-5, 1e6)] == ['$10^{-5}$', '$10^{6}$']
+
+
+def _logarithmic(*points: float):
+    axes = _axes(*points)
+    plots.logarithmic(axes, 'y')
+    return axes
+
+
+def test_a_symmetric_axis_marks_where_it_becomes_logarithmic() -> None:
+    axes = _axes(-30.0, 0.0, 5000.0)
+    assert plots.symmetric(axes, 4.0) == 10.0
+    borders = [line.get_ydata()[0] for line in axes.lines[1:]]
+    assert borders == [-10.0, 10.0]
+    assert axes.get_yscale() == 'symlog'
+    assert axes.yaxis.get_transform().linthresh == 10.0
+    named = dict(
+        zip(axes.get_yticks(), (t.get_text() for t in axes.get_yticklabels()), strict=True)
+    )
+    assert named == {
+        0.0: '0', 10.0: '$10^{1}$', 100.0: '$10^{2}$', 1000.0: '$10^{3}$', -10.0: '$-10^{1}$'
+    }  # fmt: skip
+    assert plots.symmetric(_axes(-1.0, 0.0, 2.0), 0.2) == 0.1

@@ -205,6 +205,9 @@ def test_errors_still_to_come_are_those_of_their_runs(request, runs, together: s
             same((t, y), run.t[1:] - START, np.array(rest))
         band = max(0.02 * np.abs(runs['two'].nu_d[:, i]).max(), 0.005)
         assert levels(axes) == ([pytest.approx(band)] if together == 'pair' else [])
+        colours = {line.get_color() for line in artists.lines(axes)}
+        assert (colours == {plots.COLOURS[i]}) == (together == 'pair')
+        assert len(colours) == {'pair': 1, 'three': 3}[together]
         assert axes.get_title(loc='left') == f'({"abcdef"[i]}) {DOFS[i]}'
         assert axes.get_xlabel() == ('$t$ (s)' if i > 2 else '')
         assert (axes.get_xscale(), axes.get_yscale()) == ('log', 'log')
@@ -301,6 +304,7 @@ def test_shares_of_the_mean_energy_are_those_of_their_runs(three, runs) -> None:
     assert axes.get_xscale() == 'log'
     low, high = axes.get_xlim()
     assert low < min(found.values()) < max(found.values()) < high
+    assert axes.get_ylim() == (5.5, -0.5)
     assert '0 to 10 s (filled) and of the whole run (open)' in three[1]['energy_shares']
 
 
@@ -508,12 +512,22 @@ def page(runs):
     """Bokeh's figures of the page of all runs by name, and the panels that they are of."""
     from bokeh.document import Document
 
+    made: list[Document] = []
+
+    class Kept(Document):
+        def to_json(self, **_):
+            made.append(self)
+            return {}
+
     sets = panel_sets(digests(runs))
     panels = {panel.name: panel for part in sets.values() for panel in part.panels}
     dashes = {'one': [], 'two': [7, 3], 'three': [2, 2]}
-    content, _ = document([*panels.values()], dashes, MARKS, (START, START + 12.0))
-    plots_of = {plot.name: plot for plot in Document.from_json(content).roots}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr('bokeh.document.Document', Kept)
+        _, roots = document([*panels.values()], dashes, MARKS, (START, START + 12.0))
+    plots_of = {plot.name: plot for plot in made[0].roots}
     assert list(plots_of) == list(panels)
+    assert roots == {name: plot.id for name, plot in plots_of.items()}
     return plots_of, panels
 
 
@@ -618,4 +632,3 @@ def test_a_page_spans_all_of_its_runs_and_names_their_dashes(runs) -> None:
     assert found.runs == {'one': '', 'later': '7 3'}
     assert found.dofs == dict(zip(DOFS, plots.COLOURS, strict=True))
     assert found.faults == ''
-    assert interactive(digests({'one': one})).faults == '1 first, 5–7 s; 2 second, from 6 s on'

@@ -10,7 +10,8 @@ from helpers.made_runs import DOFS, SAMPLES, STEP, UPSILON, UPSILON_INV, VEHICLE
 from auv_analysis import summarize
 from auv_analysis.report import run_tables as tables
 from auv_analysis.report.digest import digests
-from auv_analysis.report.run_report import findings, namesakes
+from auv_analysis.report.run_report import _apart, findings, namesakes
+from auv_analysis.report.wrench_plots import estimate_finding
 from auv_analysis.runs.run import Run
 
 UNLIKE = {'k_D': [1.0, 2, 3, 4, 5, 6], 'k_I': 2.0, 'Lambda': 0.5, 'Gamma': 7.0}
@@ -286,3 +287,35 @@ def test_runs_of_one_name_and_other_set_points_are_told_of(runs) -> None:
     same = replace(runs['two'], nu_d=runs['one'].nu_d)
     assert namesakes([*digests({'one': runs['one'], 'two': same}).values()]) == []
     assert STEP == 0.05
+
+
+def test_what_a_model_leaves_unexplained_in_words() -> None:
+    found = {'rms': [1.0, 2.0, 3.0, 4.0, 6.0, 5.0], 'error_rms': [0.1, 0.2, 0.3, 0.4, 0.6, 0.5]}
+    effort = {'rms': [10.0, 20.0, 30.0, 40.0, 60.0, 50.0]}
+    summary = {'unexplained': found, 'required_wrench': None, 'effort': effort}
+    assert estimate_finding('told', summary) == (
+        'Of told the model leaves at most 3.00 ± 0.30 N (heave; the wrench has 30.0 N) and '
+        '6.00 ± 0.60 N m (pitch; the wrench has 60.0 N m) unexplained, RMS.'
+    )
+    summary = {'unexplained': None, 'required_wrench': found, 'effort': effort}
+    assert estimate_finding('lost', summary) == (
+        'The motion of lost needed at most 3.00 ± 0.30 N (heave) and 6.00 ± 0.60 N m (pitch), RMS.'
+    )
+    assert estimate_finding('bare', {'unexplained': None, 'required_wrench': None}) == ''
+
+
+def test_how_far_apart_runs_end(runs) -> None:
+    one, two = (run.eta.copy() for run in runs.values())
+    two[0] = one[0]
+    nu = runs['two'].nu.copy()
+    nu[0] = runs['one'].nu[0]
+    like = {'one': runs['one'], 'two': replace(runs['two'], eta=two, nu=nu, nu_d=runs['one'].nu_d)}
+    like['same'] = like['one']
+    apart = np.linalg.norm(one[-1, :3] - two[-1, :3])
+    assert _apart(digests(like)) == pytest.approx(apart)
+    assert _apart(digests({'one': like['one']})) is None
+    moved = like | {'two': replace(like['two'], eta=two + 0.1)}
+    assert _apart(digests(moved)) is None
+    assert _apart(digests(like | {'two': replace(like['two'], nu_d=nu)})) is None
+    shorter = replace(like['two'], **{k: a[:-5] for k, a in like['two'].arrays().items()})
+    assert _apart(digests(like | {'two': shorter})) is None

@@ -340,3 +340,32 @@ def test_the_values_at_which_most_rows_fail_come_first() -> None:
         ['p', '0', 'gvc', '10', '10.0', '0'],
     ]  # fmt: skip
     assert table.source(0, 'rows') == 'failures.parquet:rows[2]'
+
+
+def test_what_matters_most_stands_first_for_each_measure() -> None:
+    names = ('overall.effort.rms.linear', 'kinetic_energy.mean')
+    rows = [
+        {'figure': figure, 'controller': controller, 'path': path, 'explained_percent': share,
+         'spearman': None}
+        for figure in reversed(names) for controller in ('gvc', 'cl')
+        for path, share in (('scenario.a', 10.0), ('scenario.b', 70.0), ('scenario.c', 20.0))
+    ]  # fmt: skip
+    factors = [Made(path=f'scenario.{x}') for x in 'abc']
+    measures = [Made(name=name) for name in names]
+    analysis = Made(measures=measures, factors=factors, tables={'influence': rows})
+    table = sweep._influences(analysis)
+    found = [[cell.text for cell in row[:4]] for row in table.rows]
+    assert [row[2][-1] for row in found] == ['b', 'c', 'a'] * 4
+    assert [row[1] for row in found] == ['cl'] * 3 + ['gvc'] * 3 + ['cl'] * 3 + ['gvc'] * 3
+    assert [row[0] for row in found] == ['RMS input, linear'] * 6 + ['kinetic energy'] * 6
+    assert [row[3] for row in found[:3]] == ['70.0', '20.0', '10.0']
+
+
+def test_the_largest_share_of_energy_in_case_1_is_shown() -> None:
+    shares = [0.1, 0.7, 0.2, 0.6, 0.3, 0.0]
+    chart = _chart('a', 0.5, [('sway', 'roll')])
+    chart.reached['delta_xi_energy_percent'] = shares
+    case1 = {'delta_xi_max': [1.0, 2, 3, 4, 5, 6], 'delta_xi_energy_percent': shares}
+    results = Results('atlas', {'vehicles': {'a': {'case1': case1}}})
+    ((*cells,),) = atlas.reached(results, [chart, _chart('b', 0.1, [], 'x')], 'delta_xi').rows
+    assert [cell.value for cell in cells[1:]] == [1.0, 2.0, 3.0, 4.0, 5.0, None, 0.7]

@@ -8,6 +8,7 @@ from helpers import artists
 from helpers.artists import cells, heat_maps, points
 from helpers.made_runs import DOFS
 
+from auv_analysis.report import plots as plotting
 from auv_analysis.studies.atlas import plots as atlas
 
 VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
@@ -73,3 +74,5 @@ def test_an_atlas(tmp_path) -> None:
         for (name, dof), value in whole.items():
             chart = next(c for c in charts if c.name == name)
             assert value == pytest.approx(chart.reached[f'{kind}_max'][DOFS.index(dof)])
+        words = [t.get_text() for axes in figures[f'case1_{kind}'].axes for t in axes.texts]
+        assert words.count(plotting.ALWAYS) == 2, 'one of each vehicle that did not diverge'

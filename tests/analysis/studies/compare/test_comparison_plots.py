@@ -12,6 +12,7 @@ from scipy.stats import rankdata
 
 from auv_analysis import summarize
 from auv_analysis.report.digest import digest
+from auv_analysis.report.plots import ALWAYS
 from auv_analysis.studies.compare import plots
 from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank, write_table
 from auv_analysis.studies.compare.report import findings, overview, six_table
@@ -80,6 +81,8 @@ def test_cells_are_those_of_the_summaries(small, few, name: str) -> None:
         for dof, value in zip(DOFS, values, strict=True):
             expected = np.nan if value is None else value
             assert whole[one.name, dof] == pytest.approx(expected, nan_ok=True), (one.name, dof)
+    always = [t for axes in small[0][name].axes for t in axes.texts if t.get_text() == ALWAYS]
+    assert len(always) == (len(few) - 1 if name in ('delta_xi', 'delta_pi') else 0)
 
 
 def test_energy_bars_are_shares_and_dots_are_means(small, few) -> None:

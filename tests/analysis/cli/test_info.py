@@ -1,0 +1,52 @@
+"""What `auv info` prints: each count beside its topic, each range beside its field."""
+
+from auv_analysis.cli.info import _print_info
+
+DOCUMENT = {
+    'bag': 'some.mcap', 'messages': 12, 'duration': 2.5,
+    'topics': {
+        '/odom': {'type': 'nav_msgs/msg/Odometry', 'messages': 7},
+        '/wrench': {'type': 'geometry_msgs/msg/WrenchStamped', 'messages': 5},
+    },
+    'namespace': '/auv', 'attachments': ['params.yaml', 'vehicle.yaml'],
+    'candidates': {'odometry': ['/odom', '/pose'], 'wrench': []},
+    'fields': {
+        '/odom': {
+            'twist.u': {'values': 7, 'least': -1.25, 'largest': 3.5},
+            'name': {'values': 6, 'least': None, 'largest': None},
+        }
+    },
+    'mapping': 'odometry: /odom', 'notes': ['one is odd'],
+}  # fmt: skip
+
+
+def printed(capsys, **changes: object) -> list[list[str]]:
+    _print_info(DOCUMENT | changes)
+    return [line.split() for line in capsys.readouterr().out.splitlines() if line.split()]
+
+
+def test_every_number_stands_beside_its_name(capsys) -> None:
+    assert printed(capsys) == [
+        ['some.mcap:', '12', 'messages,', '2.5', 's'],
+        ['topic', 'type', 'messages'],
+        ['/odom', 'nav_msgs/msg/Odometry', '7'],
+        ['/wrench', 'geometry_msgs/msg/WrenchStamped', '5'],
+        ['namespace:', '/auv'],
+        ['attachments:', 'params.yaml,', 'vehicle.yaml'],
+        ['could', 'be', 'mapped', 'as', 'odometry:', '/odom,', '/pose'],
+        ['topic', 'field', 'values', 'least', 'largest'],
+        ['/odom', 'twist.u', '7', '-1.25', '3.5'],
+        ['/odom', 'name', '6'],
+        ['a', 'mapping', 'file', 'to', 'begin', 'with,', 'for', '--map:'],
+        ['odometry:', '/odom'],
+        ['note:', 'one', 'is', 'odd'],
+    ]
+
+
+def test_what_a_bag_does_not_have_is_left_out(capsys) -> None:
+    bare = printed(
+        capsys, duration=None, namespace=None, attachments=[], fields={}, mapping='', notes=[]
+    )
+    assert bare[0][-2:] == ['no', 'messages']
+    assert ['attachments:', 'none'] in bare
+    assert [words[0] for words in bare[4:]] == ['attachments:', 'could']

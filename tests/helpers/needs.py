@@ -49,6 +49,9 @@ NEEDS = {
         'that ROS 2 itself finds our executables and takes our security policy',
         'its command line tools and sros2 have no wheels',
     ),
+    'launch': Need(
+        'that `ros2 launch` itself takes our launch file', 'it comes with ROS 2, and has no wheels'
+    ),
     'rerun-sdk': Need('that rerun reads what is exported to it', '170 MB: nightly installs it'),
     'pip-audit': Need(
         'that pip-audit itself finds, fails and passes', 'a machine may have no way to a registry'

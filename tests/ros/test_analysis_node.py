@@ -6,11 +6,13 @@ from pathlib import Path
 import herman_reference as reference
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from helpers import nodes_in_process as by_hand
 from helpers.nodes_in_process import Program, program, write_vehicle
 from numpy.testing import assert_allclose
 from reference_cases import off_centre
 
+from auv_analysis.nodes import analysis_node
 from auv_analysis.nodes.analysis_node import AnalysisNode
 from auv_dynamics.ros import topics
 
@@ -83,3 +85,46 @@ def test_messages_that_come_in_any_order_are_paired_by_their_stamps(analysis) ->
         for k, message in zip((0, 3, 6), heard(analysis, name, 3), strict=True):
             assert by_hand.ns_of(message) == k * STEP
             assert_allclose(by_hand.six_of(message), expected(k), rtol=1e-9, atol=1e-12)
+
+
+def test_what_never_comes_holds_nothing_else_up(analysis, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(analysis_node, 'CAPACITY', 6)
+    messages = {k: of_step(k) for k in range(10)}
+    for k in range(10):  # two of 0, 3, 6 and 9 may wait
+        analysis.publish(topics.ODOM, messages[k][topics.ODOM])
+    heard(analysis, 'analysis/delta_xi', 4)
+    for k in (0, 3, 6, 9):
+        analysis.publish(topics.WRENCH, messages[k][topics.WRENCH])
+    found = heard(analysis, 'analysis/delta_pi', 2)
+    analysis.spin(0.1)
+    assert [by_hand.ns_of(message) for message in found] == [6 * STEP, 9 * STEP]
+
+
+def test_health_tells_the_vehicle_the_newest_step_and_the_error_of_its_velocity(analysis) -> None:
+    told = analysis.heard['/diagnostics']
+    (silent,) = analysis.until(lambda: told and told[-1].status, 'diagnostics')
+    assert silent.level == DiagnosticStatus.STALE
+    assert 'odom' in silent.message
+    for k in range(5):
+        for topic in (topics.CMD_VEL, topics.ODOM):
+            analysis.publish(topic, of_step(k)[topic])
+
+    def of_step_three() -> DiagnosticStatus | None:
+        return told[-1].status[0] if by_hand.ns_of(told[-1]) == 3 * STEP else None
+
+    status = analysis.until(of_step_three, 'diagnostics of step 3')
+    facts = {pair.key: pair.value for pair in status.values}
+    assert (status.level, status.message) == (DiagnosticStatus.OK, 'ok')
+    assert (status.name, status.hardware_id) == ('/analysis_node', 'rexrov')
+    expected = np.abs(NU_D[3] - NU[3]).max()
+    assert float(facts['largest velocity error']) == pytest.approx(expected, rel=1e-12)
+
+
+def test_where_sensors_lie_the_truth_is_looked_at(vehicle: Path) -> None:
+    with program() as made:
+        made.add(AnalysisNode, {'vehicle': str(vehicle), 'every': 1, 'ground_truth': True})
+        made.listen(topics.DELTA_XI)
+        made.publish(topics.GROUND_TRUTH, of_step(2)[topics.ODOM])
+        (message,) = heard(made, 'analysis/delta_xi', 1)
+        expected = SAID['analysis/delta_xi'](2)
+        assert_allclose(by_hand.six_of(message), expected, rtol=1e-9, atol=1e-12)

@@ -83,7 +83,7 @@ def offered(made: Program, k: int) -> None:
 
 def expected(law: str, gains: dict[str, Any], first: int, count: int) -> list[tuple]:
     """(tau, f) of some steps, from zero integrals, by the independent implementation."""
-    entry = {gain: reference.square(row if len(row) > 1 else row[0]) for gain, row in gains.items()}
+    entry = {gain: reference.square(np.squeeze(row)) for gain, row in gains.items()}
     size, at = reference.control_law(KNOWN, {'law': law, **entry})
     x, rate, said = np.zeros(size), np.zeros(size), []
     for k in range(first, first + count):
@@ -155,3 +155,34 @@ def test_integrals_begin_anew_with_an_activation_and_with_a_reset(made, vehicle)
     answers_as(made, 'gvc', PER_AXIS, STEPS)
     assert made.call(Trigger, 'controller_node/reset').success
     answers_as(made, 'gvc', PER_AXIS, 2 * STEPS)
+
+
+def test_a_gain_may_be_one_number_six_or_a_matrix(made, vehicle) -> None:
+    node = controller(made, vehicle, 'gvc')
+    full = np.diag([8.0, 10, 12, 6, 9, 11]) + np.arange(36.0).reshape(6, 6) / 20
+    for i, value in enumerate((full, np.array([9.0]))):
+        change(node, gains__k_D=value.ravel().tolist())
+        gains = PER_AXIS | {'k_D': full if i == 0 else [9.0]}
+        answers_as(made, 'gvc', gains, i * STEPS)
+
+
+def test_it_is_ready_while_it_is_active(made, vehicle) -> None:
+    node = controller(made, vehicle, 'gvc', autostart=False)
+
+    def ready() -> tuple[bool, str]:
+        answer = made.call(Trigger, 'controller_node/ready')
+        return answer.success, answer.message
+
+    assert ready() == (False, 'inactive')
+    assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+    assert ready() == (False, 'inactive')
+    assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+    assert ready() == (True, 'ready')
+    answers_as(made, 'gvc', PER_AXIS, 0)
+    change(node)
+    assert node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+    assert ready() == (False, 'inactive')
+    assert node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
+    assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+    assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+    answers_as(made, 'gvc', PER_AXIS, STEPS)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from helpers import nodes_in_process as by_hand
 from helpers.nodes_in_process import Program, program, quaternion_of, write_vehicle
+from helpers.patience import patience
 from numpy.testing import assert_allclose
 from reference_cases import off_centre
 from rosgraph_msgs.msg import Clock
@@ -167,7 +168,7 @@ def test_a_reset_puts_the_vehicle_back_after_the_step_that_is_under_way(made, ve
         assert_six(made.heard['disturbance'][k], F)
 
 
-REAL = {'step': H, 'actuators.limit': [1e6], 'wrench_timeout': 0.2}
+REAL = {'step': H, 'actuators.limit': [1e6], 'wrench_timeout': patience(0.2)}
 PACE = 0.05  # s, step of a plant whose pace is measured
 WINDOW = 2.0  # s of it
 

@@ -1,6 +1,7 @@
 """The plant node: lock-step on the wrench's stamp, start barrier, watchdog, reset, real time."""
 
 import signal
+from collections.abc import Iterator
 from subprocess import CompletedProcess
 
 import numpy as np
@@ -15,15 +16,18 @@ from helpers.node_processes import (
     start_node,
     stop,
 )
+from helpers.nodes_in_process import Program, program
 from helpers.patience import patience
 from std_srvs.srv import SetBool, Trigger
 
+from auv_dynamics.nodes.plant_node import PlantNode
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 
 FRAMES = Frames()
 STEP = 10_000_000
-LOCKSTEP = parameters(vehicle='herman2018', lockstep=True, duration=1.0)
+LOCKSTEP = {'vehicle': 'herman2018', 'lockstep': True, 'duration': 1.0}
+BARRIER = {**LOCKSTEP, 'expected_subscribers': ['odom=1', 'disturbance=1']}
 
 
 def wrench(k: int, tau=(10.0, 0, 0, 0, 0, 0), frames: Frames = FRAMES):
@@ -39,138 +43,179 @@ def odometry(peer, count: int) -> list:
     return peer.heard['odom']
 
 
-def barrier(*extra: str) -> list[str]:
-    return [*LOCKSTEP, '-p', 'expected_subscribers:=["odom=1", "disturbance=1"]', *extra]
-
-
 def listening(peer) -> None:
     peer.listen(topics.ODOM, topics.TWIST, topics.DISTURBANCE, topics.CLOCK)
 
 
-def test_advances_only_on_the_wrench_of_its_own_stamp() -> None:
-    with graph(('plant_node', barrier())) as (peer, processes):
-        listening(peer)
-        assert [step_of(m) for m in odometry(peer, 1)] == [0]
-        for wrong in (
-            wrench(1),
-            wrench(5),
-            wrench(0, (np.nan,) * 6),
-            wrench(0, frames=Frames(base='x')),
-        ):
-            peer.publish(topics.WRENCH, wrong)
-        peer.spin(0.3)
-        assert len(peer.heard['odom']) == 1, 'no step without its wrench'
-        for k in range(3):
-            peer.publish(topics.WRENCH, wrench(k))
-            assert [step_of(m) for m in odometry(peer, k + 2)][-1] == k + 1
-        peer.until(lambda: len(peer.heard['disturbance']) == 3, 'a disturbance per wrench')
-        assert [step_of(m) for m in peer.heard['disturbance']] == [0, 1, 2]
-        code, output = stop(processes['plant_node'])
-    assert code == 0
+def answered(peer, first: int, count: int) -> None:
+    """Answer some steps as they come."""
+    for k in range(first, first + count):
+        odometry(peer, k + 1)
+        peer.publish(topics.WRENCH, wrench(k))
+
+
+@pytest.fixture
+def peer() -> Iterator[Program]:
+    with program() as made:
+        yield made
+
+
+def test_advances_only_on_the_wrench_of_its_own_stamp(peer, capfd) -> None:
+    plant = peer.add(PlantNode, BARRIER)
+    listening(peer)
+    assert [step_of(m) for m in odometry(peer, 1)] == [0]
+    for wrong in (
+        wrench(1),
+        wrench(5),
+        wrench(0, (np.nan,) * 6),
+        wrench(0, frames=Frames(base='x')),
+    ):
+        peer.publish(topics.WRENCH, wrong)
+    peer.until(lambda: plant.graph.refused.total() == 4, 'refusals')
+    peer.spin(0.1)
+    assert len(peer.heard['odom']) == 1, 'no step without its wrench'
+    for k in range(3):
+        peer.publish(topics.WRENCH, wrench(k))
+        assert [step_of(m) for m in odometry(peer, k + 2)][-1] == k + 1
+        peer.publish(topics.WRENCH, wrench(k))  # a second answer is none
+    peer.until(lambda: plant.graph.refused.total() == 7, 'refusals')
+    peer.until(lambda: len(peer.heard['disturbance']) == 3, 'a disturbance per wrench')
+    assert [step_of(m) for m in peer.heard['disturbance']] == [0, 1, 2]
+    assert plant.plant.k == 3
+    output = capfd.readouterr().err
     for word in ('frame_id', 'finite', 'stamp'):
         assert word in output, output
 
 
-def test_publishes_nothing_before_its_subscribers_have_matched() -> None:
+def test_publishes_nothing_before_its_subscribers_have_matched(peer) -> None:
     """Rival recordings lose the first messages (rosbag2#1430)."""
-    with graph(('plant_node', barrier())) as (peer, _):
-        answer = peer.call(Trigger, 'plant_node/ready')
-        assert not answer.success
-        assert 'odom' in answer.message
-        peer.spin(0.3)
-        listening(peer)
-        assert step_of(odometry(peer, 1)[0]) == 0, 'the very first step is heard'
-        assert peer.call(Trigger, 'plant_node/ready').success
+    peer.add(PlantNode, BARRIER)
+    answer = peer.call(Trigger, 'plant_node/ready')
+    assert not answer.success
+    assert 'odom' in answer.message
+    peer.spin(0.6)
+    listening(peer)
+    assert step_of(odometry(peer, 1)[0]) == 0, 'the very first step is heard'
+    assert peer.call(Trigger, 'plant_node/ready').success
 
 
-def test_run_names_the_first_node_that_is_not_ready() -> None:
-    extra = ['-p', 'start_after:=["first", "second"]', *parameters(start_paused=True)]
-    with graph(('plant_node', barrier(*extra))) as (peer, _):
-        listening(peer)
+def test_run_names_the_first_node_that_is_not_ready(peer) -> None:
+    peer.add(PlantNode, {**BARRIER, 'start_after': ['first', 'second'], 'start_paused': True})
+    listening(peer)
 
-        def ready(_, response):
-            response.success = True
-            return response
+    def ready(_, response):
+        response.success = True
+        return response
 
-        def ask():
-            return peer.call(SetBool, 'plant_node/run', SetBool.Request(data=True))
+    def ask():
+        return peer.call(SetBool, 'plant_node/run', SetBool.Request(data=True))
 
-        assert ask().message == 'first'
-        peer.node.create_service(Trigger, 'first/ready', ready)
-        peer.until(lambda: ask().message == 'second', 'the second to be named')
-        assert not peer.heard['odom']
-        peer.node.create_service(Trigger, 'second/ready', ready)
-        peer.until(lambda: ask().success, 'consent')
-        assert step_of(odometry(peer, 1)[0]) == 0
-
-
-def test_a_pause_holds_the_next_step() -> None:
-    with graph(('plant_node', barrier())) as (peer, _):
-        listening(peer)
-        odometry(peer, 1)
-        assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=False)).success
-        peer.publish(topics.WRENCH, wrench(0))
-        peer.spin(0.3)
-        assert len(peer.heard['odom']) == 1
-        assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=True)).success
-        assert step_of(odometry(peer, 2)[1]) == 1
+    assert ask().message == 'first'
+    peer.node.create_service(Trigger, 'first/ready', ready)
+    peer.until(lambda: ask().message == 'second', 'the second to be named')
+    assert not peer.heard['odom']
+    peer.node.create_service(Trigger, 'second/ready', ready)
+    peer.until(lambda: ask().success, 'consent')
+    assert step_of(odometry(peer, 1)[0]) == 0
 
 
-def test_silence_ends_the_run_and_is_named() -> None:
-    with graph(('plant_node', barrier(*parameters(wrench_timeout=patience(0.5))))) as (
-        peer,
-        processes,
-    ):
-        listening(peer)
-        odometry(peer, 1)
-        process = processes['plant_node']
-        peer.until(lambda: process.poll() is not None, 'the end')
-        code, output = stop(process)
-    assert code == 1
-    assert 'no answer on wrench to step 0' in output
-    assert 'no controller' in output
+def test_a_pause_holds_the_next_step(peer) -> None:
+    peer.add(PlantNode, {**BARRIER, 'wrench_timeout': patience(1.0)})
+    listening(peer)
+    odometry(peer, 1)
+    assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=False)).success
+    peer.publish(topics.WRENCH, wrench(0))
+    peer.spin(patience(1.3))
+    assert len(peer.heard['odom']) == 1
+    assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=True)).success
+    assert step_of(odometry(peer, 2)[1]) == 1
+    answered(peer, 1, 2)
+    odometry(peer, 4)
 
 
-def test_silence_of_the_recorder_ends_the_run_and_is_named() -> None:
-    extra = parameters(recorder_window=2, wrench_timeout=patience(1.0))
-    with graph(('plant_node', barrier(*extra))) as (peer, processes):
-        listening(peer)
-        peer.node.create_publisher(topics.PROGRESS.type, topics.PROGRESS.name, 1)
-        for k in range(2):
-            odometry(peer, k + 1)
-            peer.publish(topics.WRENCH, wrench(k))
-        process = processes['plant_node']
-        peer.until(lambda: process.poll() is not None, 'the end')
-        code, output = stop(process)
-    assert code == 1
-    assert f'no answer on recorder/progress to step 2 for {patience(1.0):g} s; ' in output
-    assert '; its publisher: test_peer' in output
+def test_silence_ends_the_run_and_is_named(peer, capfd) -> None:
+    plant = peer.add(PlantNode, {**BARRIER, 'wrench_timeout': patience(0.5)})
+    listening(peer)
+    odometry(peer, 1)
+    peer.until(lambda: plant.exit_code is not None, 'the end')
+    assert plant.exit_code == 1
+    assert 'no answer on wrench to step 0 for' in (said := capfd.readouterr().err)
+    assert 'its publisher: no controller' in said
 
 
-def test_without_recorder_it_ends_with_the_last_wrench() -> None:
-    with graph(('plant_node', barrier(*parameters(duration=0.03)))) as (peer, processes):
-        listening(peer)
-        for k in range(4):
-            odometry(peer, k + 1)
-            peer.publish(topics.WRENCH, wrench(k))
-        process = processes['plant_node']
-        peer.until(lambda: process.poll() is not None, 'the end')
-        assert process.returncode == 0
-        peer.until(lambda: len(peer.heard['disturbance']) == 4, 'the last disturbance')
+def test_a_controller_that_falls_silent_ends_the_run_and_is_named(peer, capfd) -> None:
+    plant = peer.add(PlantNode, {**BARRIER, 'wrench_timeout': patience(1.0)})
+    listening(peer)
+    answered(peer, 0, 2)
+    odometry(peer, 3)
+    peer.until(lambda: plant.exit_code is not None, 'the end')
+    assert plant.exit_code == 1
+    said = capfd.readouterr().err
+    assert f'no answer on wrench to step 2 for {patience(1.0):g} s; ' in said
+    assert '; its publisher: test_peer' in said
 
 
-def test_credit_holds_the_plant_while_the_recorder_is_behind() -> None:
-    with graph(('plant_node', barrier(*parameters(recorder_window=2)))) as (peer, _):
-        listening(peer)
-        peer.until(lambda: peer.node.count_subscribers('recorder/progress'), 'a listener')
-        for k in range(2):  # ack is -1: steps 0 and 1 are free
-            odometry(peer, k + 1)
-            peer.publish(topics.WRENCH, wrench(k))
-        peer.spin(0.3)
-        assert len(peer.heard['odom']) == 2
-        progress = topics.PROGRESS.type(stamp=convert.stamp(0))
-        peer.publish(topics.PROGRESS, progress)
-        assert step_of(odometry(peer, 3)[2]) == 2
+def test_silence_of_the_recorder_ends_the_run_and_is_named(peer, capfd) -> None:
+    plant = peer.add(PlantNode, {**BARRIER, 'recorder_window': 2, 'wrench_timeout': patience(1.0)})
+    listening(peer)
+    peer.node.create_publisher(topics.PROGRESS.type, topics.PROGRESS.name, 1)
+    answered(peer, 0, 2)
+    peer.until(lambda: plant.exit_code is not None, 'the end')
+    assert plant.exit_code == 1
+    said = capfd.readouterr().err
+    assert f'no answer on recorder/progress to step 2 for {patience(1.0):g} s; ' in said
+    assert '; its publisher: test_peer' in said
+
+
+def test_without_recorder_it_ends_with_the_last_wrench(peer) -> None:
+    plant = peer.add(PlantNode, {**BARRIER, 'duration': 0.03})
+    listening(peer)
+    answered(peer, 0, 3)
+    odometry(peer, 4)
+    peer.spin(0.1)
+    assert plant.exit_code is None, 'the last step is not answered yet'
+    answered(peer, 3, 1)
+    peer.until(lambda: plant.exit_code is not None, 'the end')
+    assert plant.exit_code == 0
+    peer.until(lambda: len(peer.heard['disturbance']) == 4, 'the last disturbance')
+
+
+def test_credit_holds_the_plant_while_the_recorder_is_behind(peer) -> None:
+    plant = peer.add(PlantNode, {**BARRIER, 'recorder_window': 2, 'duration': 0.05})
+    listening(peer)
+    answered(peer, 0, 2)  # ack is -1: steps 0 and 1 are free
+    peer.spin(0.2)
+    assert len(peer.heard['odom']) == 2
+
+    def acknowledged(k: int) -> None:
+        peer.publish(topics.PROGRESS, topics.PROGRESS.type(stamp=convert.stamp(k * STEP)))
+
+    acknowledged(0)
+    assert step_of(odometry(peer, 3)[2]) == 2
+    acknowledged(2)
+    acknowledged(1)  # an old word takes nothing back
+    answered(peer, 2, 3)
+    peer.spin(0.2)
+    assert len(peer.heard['odom']) == 5
+    acknowledged(5)
+    answered(peer, 5, 1)
+    peer.until(lambda: len(peer.heard['disturbance']) == 6, 'the last wrench')
+    peer.spin(0.1)
+    assert plant.exit_code is None, 'it is the recorder that ends the run'
+
+
+def test_a_reset_in_real_time_puts_the_vehicle_back_at_once(peer) -> None:
+    start = [1.0, 2.0, 3.0, 0.0, 0.0, 0.5]
+    plant = peer.add(PlantNode, {'vehicle': 'herman2018', 'initial.eta': start})
+    listening(peer)
+    odometry(peer, 20)
+    moved = peer.heard['odom'][-1].pose.pose.position.z
+    assert peer.call(Trigger, 'plant_node/reset').success
+    before = len(peer.heard['odom'])
+    back = odometry(peer, before + 2)[-1].pose.pose.position.z
+    assert abs(back - 3.0) < abs(moved - 3.0), 'it rises, being light'
+    steps = [step_of(m) for m in peer.heard['odom']]
+    assert steps == [*range(plant.plant.k)][: len(steps)], 'the time goes on'
 
 
 REAL = [*parameters(vehicle='herman2018_neutral'), '-p', 'expected_subscribers:=["odom=1"]']
@@ -307,4 +352,5 @@ def test_real_time_withholds_a_lost_sample() -> None:
     ],
 )  # fmt: skip
 def test_wrong_uncertainty_ends_with_one_line(extra, words) -> None:
-    assert_one_line(run_node('plant_node', *LOCKSTEP, *parameters(**extra)), *words)
+    lockstep = parameters(**LOCKSTEP)
+    assert_one_line(run_node('plant_node', *lockstep, *parameters(**extra)), *words)

@@ -1,72 +1,25 @@
 """The launch file without `launch`, which has no wheel: what it makes of its arguments."""
 
-import runpy
-import sys
+import importlib
+import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import yaml
+from helpers.launch_actions import FILE, actions, launch_file, of
+from helpers.needs import need
 
 from auv_analysis.graph.experiment import PACKAGES
 
-FILE = Path(__file__).parents[3] / 'src/auv_analysis/launch/experiment.launch.py'
-MODULES = {
-    'launch': ['LaunchContext', 'LaunchDescription'],
-    'launch.actions': [
-        'DeclareLaunchArgument',
-        'EmitEvent',
-        'LogInfo',
-        'OpaqueFunction',
-        'RegisterEventHandler',
-        'SetEnvironmentVariable',
-    ],
-    'launch.event_handlers': ['OnProcessExit'],
-    'launch.events': ['Shutdown'],
-    'launch.events.process': ['ProcessExited'],
-    'launch.substitutions': ['LaunchConfiguration'],
-    'launch_ros': [],
-    'launch_ros.actions': ['Node'],
-}
 
-
-class Made:
-    """Anything of launch: it keeps what it was made of."""
-
-    def __init__(self, *positional: Any, **named: Any):
-        self.positional, self.named = positional, named
-
-    def perform(self, values: dict[str, str]) -> str:
-        return values[self.positional[0]]
-
-
-@pytest.fixture
-def launch_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[dict[str, Any]]:
-    """Globals of the launch file; `kept` is what it leaves to be done at the end."""
-    for name, classes in MODULES.items():
-        module = ModuleType(name)
-        vars(module).update({one: type(one, (Made,), {}) for one in classes})
-        monkeypatch.setitem(sys.modules, name, module)
-    kept: list[tuple] = []
-    monkeypatch.setattr('atexit.register', lambda *call, **named: kept.append((call, named)))
+@pytest.fixture(name='launch_file')
+def made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[dict[str, Any]]:
     monkeypatch.chdir(tmp_path)
-    yield runpy.run_path(str(FILE)) | {'kept': kept}
-    for (do, *rest), named in kept:
-        do(*rest, **named)
-
-
-def actions(launch_file: dict[str, Any], **values: str) -> list[Any]:
-    described = launch_file['generate_launch_description']().positional[0]
-    declared = {one.positional[0]: one.named for one in described if one.positional}
-    assert all(v in (declared[k]['choices'] or [v]) for k, v in values.items())
-    defaults = {name: one['default_value'] for name, one in declared.items()}
-    return launch_file['_nodes'](defaults | values)
-
-
-def of(kind: str, listed: list[Any]) -> list[Any]:
-    return [one for one in listed if type(one).__name__ == kind]
+    with launch_file() as read:
+        yield read
 
 
 def nodes(listed: list[Any]) -> tuple[list[str], dict[str, dict[str, Any]]]:
@@ -146,6 +99,20 @@ def test_the_folder_of_its_files_goes_with_it(launch_file) -> None:
     (node, *_) = of('Node', actions(launch_file))
     folder = Path(node.named['parameters'][0]).parent
     assert folder.is_dir()
-    for (do, *rest), named in launch_file['kept']:
-        do(*rest, **named)
+    for do in launch_file['kept']:
+        do()
     assert not folder.exists()
+
+
+def test_launch_itself_makes_the_same_of_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Where `launch` is installed, as beside ROS 2 from Debian packages."""
+    need('launch', importlib.util.find_spec('launch'))
+    launch, sources = map(importlib.import_module, ('launch', 'launch.launch_description_sources'))
+    monkeypatch.chdir(tmp_path)
+    described = sources.get_launch_description_from_python_launch_file(str(FILE))
+    context = launch.LaunchContext()
+    made = [one for entity in described.entities for one in entity.visit(context) or []]
+    found = {one.node_executable: one.node_package for one in of('Node', made)}
+    assert found == PACKAGES

@@ -14,7 +14,7 @@ from cosmic_ray.work_item import MutationSpec, TestOutcome, WorkerOutcome
 
 COPIED = ('src', 'tests', 'config', 'docs', 'examples', 'pyproject.toml', 'README.md')
 SKIPPED = shutil.ignore_patterns('__pycache__', 'node_modules', '*.egg-info')
-PATIENCE = 120.0  # s, after which a mutant that does not end counts as killed
+PATIENCE = 240.0  # s, after which a mutant that does not end counts as killed
 PYTEST = '-m pytest -x -q --assert=plain -p no:cacheprovider'
 PLAIN = {  # no numba, one thread, and no plugin of pytest that these tests do not need
     'NUMBA_DISABLE_JIT': '1',

@@ -19,6 +19,7 @@ from helpers.node_processes import (
     start_node,
     stop,
 )
+from helpers.nodes_in_process import program
 from helpers.patience import patience
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -30,10 +31,15 @@ from auv_dynamics.files.errors import ENDING
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.node_interface import ERROR, WARN
+from auv_gvc_controller.nodes.controller_node import ControllerNode
 
 FRAMES = Frames()
 STEP = 10_000_000
 X = np.array([0, 0, 0, 1, 0, 0, 0, 0.1, 0, 0, 0, 0, 0], float)
+GIVEN = {
+    'law': 'gvc', 'vehicle': 'herman2018', 'limits.wrench': [1e5], 'gains.k_D': [12.0],
+    'gains.k_I': [1.0], 'gains.Lambda': [0.8], 'gains.Gamma': [60.0],
+}  # fmt: skip
 UNLIMITED = parameters(law='gvc', vehicle='herman2018')
 LOCKSTEP = [*CONTROLLER, *parameters(lockstep=True, setpoint_pairing='exact')]
 
@@ -233,14 +239,15 @@ def test_mistakes_with_set_points_are_explained() -> None:
 
 def test_stamps_of_set_points_without_a_time_are_explained() -> None:
     unstamped = topics.CMD_VEL, lambda _: convert.twist(0, (0.1, 0, 0, 0, 0, 0), FRAMES)
-    with graph(('controller_node', CONTROLLER)) as (peer, _):
+    with program() as peer:
+        peer.add(ControllerNode, GIVEN)
         peer.listen(topics.DIAGNOSTICS)
         explained(peer, ERROR, 'found stamp 0', unstamped)  # they are refused as well
 
 
 def test_a_set_point_that_waits_for_its_acceleration_is_explained() -> None:
-    waits = [*CONTROLLER, *parameters(setpoint_acceleration='topic')]
-    with graph(('controller_node', waits)) as (peer, _):
+    with program() as peer:
+        peer.add(ControllerNode, {**GIVEN, 'setpoint_acceleration': 'topic'})
         peer.listen(topics.DIAGNOSTICS)
         moving = topics.CMD_VEL, lambda ns: convert.twist(ns, (0.1, 0, 0, 0, 0, 0), FRAMES)
         said = 'nobody publishes /cmd_accel; setpoint_acceleration: topic waits for it'
@@ -312,13 +319,6 @@ def test_a_transition_that_does_not_exist_is_survived() -> None:
         assert state(peer) == 'active'
         _, output = stop(processes['controller_node'])
     assert 'No transition' in output
-
-
-def test_real_time_answers_zero_before_the_first_setpoint() -> None:
-    with graph(('controller_node', CONTROLLER)) as (peer, _):
-        peer.listen(topics.WRENCH)
-        peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
-        assert offer(peer).wrench.force.x == 0, 'no set-point yet'
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,18 @@
 """The wrench of the controller node, to its last digits that of the independent implementation."""
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import herman_reference as reference
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from helpers import nodes_in_process as by_hand
 from helpers.nodes_in_process import Program, program, quaternion_of, write_vehicle
+from helpers.patience import patience
 from numpy.testing import assert_allclose
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
@@ -186,3 +190,102 @@ def test_it_is_ready_while_it_is_active(made, vehicle) -> None:
     assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
     assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
     answers_as(made, 'gvc', PER_AXIS, STEPS)
+
+
+STILL = {  # without integrals and filter: the wrench of a state stays what it is
+    **PER_AXIS, 'k_I': [0.0], 'Lambda': [1e-9], 'Gamma': [0.0],
+}  # fmt: skip
+BESIDE = {
+    'lockstep': False, 'setpoint_pairing': 'latest', 'setpoint_acceleration': 'none',
+    'limits.wrench': [1e5, 2e5, 3e5, 4e5, 5e5, 20.0], 'ramp': 0.1,
+    'odometry_timeout': patience(0.3), 'setpoint_timeout': patience(0.3),
+}  # fmt: skip
+OK, WARN, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.STALE
+
+
+class Vehicle:
+    """One that stands still in one state beside a controller, and an operator."""
+
+    def __init__(self, made: Program):
+        self.made, self.says = made, {topics.ODOM, topics.CMD_VEL}
+        made.listen(topics.DIAGNOSTICS)
+
+    def step(self) -> None:
+        """What both say at one moment."""
+        now = time.time_ns()
+        state = [*ETA[0, :3], *quaternion_of(reference.jacobian(ETA[0])[:3, :3]), *NU[0]]
+        if topics.CMD_VEL in self.says:
+            self.made.publish(topics.CMD_VEL, by_hand.six(topics.CMD_VEL.type, now, NU_D[0]))
+        if topics.ODOM in self.says:
+            self.made.publish(topics.ODOM, by_hand.odometry(now, state))
+        self.made.spin(0.02)
+
+    def until(self, done: Callable[[], Any], what: str) -> Any:
+        limit = time.monotonic() + patience(30.0)
+        while not (found := done()):
+            assert time.monotonic() < limit, what
+            self.step()
+        return found
+
+    def gets(self, wrench: Any) -> None:
+        """Go on until the wrench is this one, every axis."""
+        heard, seen = self.made.heard['wrench'], len(self.made.heard['wrench'])
+        close = partial(np.allclose, b=wrench, rtol=1e-6, atol=1e-6)
+        self.until(
+            lambda: len(heard) > seen + 1 and close(by_hand.six_of(heard[-1])), f'wrench {wrench}'
+        )
+
+    def is_told(self, level: bytes, said: str, **facts: str) -> None:
+        """Go on until the diagnostics say this."""
+        heard, seen = self.made.heard['/diagnostics'], len(self.made.heard['/diagnostics'])
+
+        def told() -> bool:
+            for message in heard[seen:]:
+                (status,) = message.status
+                found = {pair.key.replace(' ', '_'): pair.value for pair in status.values}
+                if (status.level, facts | found) == (level, found) and said in status.message:
+                    return True
+            return False
+
+        self.until(told, f'{said}, {facts}')
+
+
+def test_silence_in_real_time_gives_zero_wrench_is_explained_and_it_comes_back(
+    made, vehicle
+) -> None:
+    gains = {f'gains.{gain}': [*map(float, row)] for gain, row in STILL.items()}
+    node = controller(made, vehicle, 'gvc', **BESIDE, **gains)
+    ship, zero = Vehicle(made), [0.0] * 6
+    entry = {gain: reference.square(np.squeeze(row)) for gain, row in STILL.items()}
+    size, at = reference.control_law(KNOWN, {'law': 'gvc', **entry})
+    g = reference.restoring(KNOWN, ETA[0])
+    tau, _, _ = at(NU[0], NU_D[0], np.zeros(6), g)(np.zeros(size))
+    limit = np.array(BESIDE['limits.wrench'])
+    tau = np.clip(tau, -limit, limit)
+    assert abs(tau[5]) == limit[5]
+    assert np.abs(tau[:5]).min() > 1.0
+    ship.says = set()
+    ship.is_told(STALE, 'no odometry yet', active='True', watchdog='none')
+    ship.says = {topics.ODOM}
+    ship.gets(zero)
+    ship.is_told(WARN, 'nobody publishes /cmd_vel', watchdog='no set-point yet')
+    ship.says = {topics.ODOM, topics.CMD_VEL}
+    ship.gets(tau)
+    ship.is_told(OK, 'ok', watchdog='none', watchdog_trips='0', refused='0')
+    silences = (topics.ODOM, STALE, 'no odometry for'), (topics.CMD_VEL, WARN, 'no set-point for')
+    for i, (silent, level, said) in enumerate(silences, start=1):
+        ship.says.discard(silent)
+        ship.until(lambda: by_hand.six_of(made.heard['wrench'][-1]) == zero, 'a zero wrench')
+        ship.is_told(level, said, watchdog_trips=str(i))
+        ship.says.add(silent)
+        ship.gets(tau)
+        ship.is_told(OK, 'ok', watchdog='none', watchdog_trips=str(i))
+    assert node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+    made.until(lambda: by_hand.six_of(made.heard['wrench'][-1]) == zero, 'a zero wrench')
+    count = len(made.heard['wrench'])
+    ship.is_told(OK, 'ok', active='False')
+    assert len(made.heard['wrench']) == count, 'inactive, it says nothing'
+    assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+    ship.gets(tau)
+    assert node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
+    made.until(lambda: by_hand.six_of(made.heard['wrench'][-1]) == zero, 'a zero wrench')

@@ -53,9 +53,10 @@ class StepLedger:
             due = self._origin + expected * self._step
             text = f'{topic}: expected step {expected} ({due} ns), found {ns} ns'
             raise LostStepError(f'{text}: {"doubled" if k < expected else "lost"}')
-        if topic in self._last:  # without a grid: by the time since the message before
-            self.gaps[topic] += max(0, round((ns - self._last[topic]) / self._step) - 1)
-        self._last[topic] = max(ns, self._last.get(topic, ns))
+        if not self._strict:  # without a grid: by the time since the message before
+            last = self._last.get(topic, ns)
+            self.gaps[topic] += max(0, round((ns - last) / self._step) - 1)
+            self._last[topic] = max(ns, last)
         self._newest[topic] = max(self._newest[topic], k)
 
     @property
@@ -135,7 +136,7 @@ class RecorderNode(BulkNode):
         self._progress = self.graph.publisher(topics.PROGRESS, topics.one_at_a_time())
         self._ours = {self._record(topic) for topic in topics.TOPICS}
         self._others = OtherTopics(self, wanted, self._take)
-        steady_timer(self, 0.02, self._report)
+        steady_timer(self, 0.05, self._report)
         steady_timer(self, 0.2, self._keep)
         steady_timer(self, 0.5, lambda: self._others.look(self._ours))
         expected = ', '.join(p.topics)

@@ -197,7 +197,7 @@ class Plant:
     @property
     def diverged(self) -> bool:
         """Whether a velocity has left what any vehicle could have, or the finite numbers."""
-        return not (np.abs(self.x[7:]) < DIVERGED).all()
+        return not all(abs(speed) < DIVERGED for speed in self.x[7:].tolist())
 
     def answer(
         self, tau: tuple[float, ...], *, heard: bool = False

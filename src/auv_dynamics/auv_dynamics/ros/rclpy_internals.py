@@ -6,7 +6,7 @@ are subscribed by name alone. Without these names everything else works.
 
 import ctypes
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -32,12 +32,15 @@ def has_data_path() -> bool:
     return FOUND and os.environ.get('AUV_GVC_EXECUTOR') != 'plain'
 
 
-def taken(subscription: Subscription) -> Iterator[tuple[Any, dict[str, Any]]]:
-    """Everything that has arrived on a subscription: message and what is known of its way."""
+def taken(subscription: Subscription, most: int) -> list[tuple[Any, dict[str, Any]]]:
+    """What has arrived on a subscription, at most so many: message, what is known of its way."""
     handle, kind, raw = subscription.handle, subscription.msg_type, subscription.raw
+    entries: list[tuple[Any, dict[str, Any]]] = []
     with handle:
-        while (entry := handle.take_message(kind, raw)) is not None:
-            yield entry
+        take = handle.take_message
+        while len(entries) < most and (entry := take(kind, raw)) is not None:
+            entries.append(entry)
+    return entries
 
 
 class DataWait:

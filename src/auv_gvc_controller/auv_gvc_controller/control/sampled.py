@@ -1,5 +1,6 @@
 """A law between samples: zero-order hold, as the nodes and `simulate(hold='zoh')` run it."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -172,9 +173,10 @@ class SampledLaw:
     def __init__(self, gains: Any, model: ControlModel, reach: AttainableWrench | None = None):
         self._gains, self._model = gains, model
         self._guard = anti_windup(gains, reach)
-        self._sample = compiled_sample if is_compiled(gains) else fill_sample
+        self._compiled = is_compiled(gains)
+        self._sample = compiled_sample if self._compiled else fill_sample
         self.reset()
-        if is_compiled(gains):
+        if self._compiled:
             # compile or load the kernel now: the first sample must not wait for it
             self.sample(0.0, 0.0, ZERO, UPRIGHT, ZERO, ZERO)
             self.reset()
@@ -218,12 +220,14 @@ class SampledLaw:
             tuple(map(float, values)) for values in (nu, attitude, nu_d, nu_d_dot)
         )
         state, rate = self._state.copy(), self._rate.copy()
-        with np.errstate(all='ignore'), user_law(self._gains):
-            tau, f = self._sample(
-                t, dt, nu, attitude, nu_d, nu_d_dot, state, rate,
-                self._gains, self._model, self._guard,
-            )  # fmt: skip
-        if not np.all(np.isfinite([*tau, *f, *state, *rate])):
+        given = (t, dt, nu, attitude, nu_d, nu_d_dot, state, rate)
+        known = (self._gains, self._model, self._guard)
+        if self._compiled:  # nothing of Python's to catch, and it is called at every step
+            tau, f = self._sample(*given, *known)
+        else:
+            with np.errstate(all='ignore'), user_law(self._gains):
+                tau, f = self._sample(*given, *known)
+        if not all(map(math.isfinite, (*tau, *f, *state.tolist(), *rate.tolist()))):
             raise ArithmeticError(f'the law gave a wrench that is not finite: {tau}')
         self._state, self._rate = state, rate
         return tau, f

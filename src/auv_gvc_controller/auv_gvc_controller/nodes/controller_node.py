@@ -203,6 +203,7 @@ def _joined(watchdog: str, why: str) -> str:
 
 
 WATCH = 0.02  # s between two looks at what stays away
+WATCH_LOCKSTEP = 0.1  # s in lock-step, where nothing is late: each look costs the time of a step
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
@@ -230,7 +231,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self.graph.in_trouble_while(self._trouble)
         self._subscribe()
         self.create_service(Trigger, '~/reset', self._on_reset)
-        steady_timer(self, WATCH, self._watch)
+        period = WATCH_LOCKSTEP if self._settings.lockstep else WATCH
+        steady_timer(self, period, self._watch)
         if self._settings.autostart:
             self._autostart()
         if self.exit_code is None:

@@ -42,7 +42,8 @@ class SetpointNode(BulkNode):
         self._gap = self._stride = 1  # steps from one odometry to the next; the usual number
         self._next = 0
         self._first, self._rows = 0, np.zeros((0, 12))
-        steady_timer(self, 0.02, self._publish)
+        # in lock-step the odometry asks; this is for when the subscribers match after it
+        steady_timer(self, 0.1 if self.lockstep else 0.02, self._publish)
         self.graph.in_trouble_while(self._trouble)
         self.begin(f'publishes set-points every {grid.step:g} s, once there is odometry')
 

@@ -23,6 +23,8 @@ def against_pingpong(
 ) -> dict[str, Measured]:
     """Steps per second of five processes and of one process, every topic recorded.
 
+    One process is measured on rclpy's own executors as well, with a tenth of the steps.
+
     Parameters
     ----------
     steps : of a run
@@ -35,6 +37,12 @@ def against_pingpong(
     subjects = {
         'graph_vs_pingpong': lambda: graph_rate(steps),
         'composed_vs_pingpong': lambda: graph_rate(steps, composed=True),
+        'composed_plain_vs_pingpong': lambda: graph_rate(
+            steps // 10, composed=True, executor='plain'
+        ),
+        'composed_events_vs_pingpong': lambda: graph_rate(
+            steps // 10, composed=True, executor='events'
+        ),
     }
     # each call starts processes of its own, and counts when they have settled
     return interleaved(subjects, lambda: pingpong(trips_for), 'steps/s', runs, warm=False)

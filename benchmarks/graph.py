@@ -13,12 +13,15 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
 import yaml
 from loops import CONTROLLER
 
+from auv_analysis.graph import supervisor
 from auv_analysis.graph.domain import chosen_domain
 from auv_analysis.graph.experiment import environment, run_controller
 from auv_analysis.scenario.scenario import load_scenario
@@ -27,6 +30,7 @@ from auv_dynamics.ros.security import loopback
 
 SETTLE = 1.0  # s of ping-pong before it is counted
 PATIENCE = 30.0  # s for the other end to appear
+ON_EXECUTOR = Path(__file__).with_name('on_executor.py')
 STEADY = (0.1, 0.9)  # part of a run that is counted
 
 
@@ -108,13 +112,26 @@ def _pong() -> None:
         try_shutdown()
 
 
-def graph_rate(steps: int, *, composed: bool = False) -> float:
+@contextmanager
+def on_executor(name: str) -> Iterator[None]:
+    """Start nodes on one of rclpy's executors, 'plain' or 'events'; '': as `auv run` does."""
+    begin, wrapper = supervisor.begin, [sys.executable, str(ON_EXECUTOR), name]
+    if name:
+        supervisor.begin = lambda command, **how: begin([*wrapper, *command], **how)
+    try:
+        yield
+    finally:
+        supervisor.begin = begin
+
+
+def graph_rate(steps: int, *, composed: bool = False, executor: str = '') -> float:
     """Lock-steps per second of Case 1 on the node graph, every topic recorded.
 
     Parameters
     ----------
     steps : length of the run
     composed : all nodes in one process, else one process each
+    executor : of rclpy, 'plain' or 'events'; '': that of lock-step
 
     Returns
     -------
@@ -132,10 +149,11 @@ def graph_rate(steps: int, *, composed: bool = False) -> float:
         warm_up(scenario, [CONTROLLER])
         graph = Watcher(domain)
         try:
-            run_controller(
-                scenario, CONTROLLER, Path(folder) / 'out', domain, graph,
-                lambda step: progress.append((time.monotonic(), step)), composed=composed,
-            )  # fmt: skip
+            with on_executor(executor):
+                run_controller(
+                    scenario, CONTROLLER, Path(folder) / 'out', domain, graph,
+                    lambda step: progress.append((time.monotonic(), step)), composed=composed,
+                )  # fmt: skip
         finally:
             graph.close()
     low, high = (part * steps for part in STEADY)

@@ -127,6 +127,14 @@ KEYS = (
         'rclpy and the recording; the ping-pong is spread over two cores.',
     ),
     Key(
+        'composed_plain_vs_pingpong', "the same, rclpy's `SingleThreadedExecutor` serves it all",
+        'round trips of bare rclpy', 'gain',
+    ),
+    Key(
+        'composed_events_vs_pingpong', "the same, rclpy's `EventsExecutor` serves it all",
+        'round trips of bare rclpy', 'gain',
+    ),
+    Key(
         'bag_read_vs_raw_reader', 'messages of a bag to arrays',
         '`mcap` raw reader', 'gain', 15.0, 30.0,
         'nearly half of the time is decompression and the checksum of each chunk, which the raw '
@@ -157,7 +165,12 @@ GROUPS = {
     'bench_rollouts:against_scipy': ('rollout_vs_solve_ivp',),
     'bench_rollouts:against_python_control': ('rollout_vs_python_control',),
     'bench_commands:sweep': ('sweep_10k_vs_c',),
-    'bench_nodes:against_pingpong': ('graph_vs_pingpong', 'composed_vs_pingpong'),
+    'bench_nodes:against_pingpong': (
+        'graph_vs_pingpong',
+        'composed_vs_pingpong',
+        'composed_plain_vs_pingpong',
+        'composed_events_vs_pingpong',
+    ),
     'bench_bags:against_readers': (
         'bag_read_vs_raw_reader',
         'bag_read_vs_rosbags',

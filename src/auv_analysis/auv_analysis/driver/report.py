@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from matplotlib.figure import Figure
 from pyarrow import parquet
 
@@ -14,6 +13,7 @@ from auv_analysis.driver.checks import CHECKS, GROUPS
 from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, CheckResult, DriverRecord
 from auv_analysis.driver.excitation import MeasuredTrial
 from auv_analysis.driver.odometry_checks import reference_ns
+from auv_analysis.output.arrow import pa
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.text import join
 from auv_analysis.report import plots

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from pyarrow import parquet
 
 from auv_analysis.herman2018 import paper, rules
@@ -21,6 +20,7 @@ from auv_analysis.herman2018.evidence import (
 )
 from auv_analysis.herman2018.paper import CASES, is_plain, paper_run
 from auv_analysis.metrics.quantities import Quantity
+from auv_analysis.output.arrow import pa
 from auv_analysis.output.text import MISSING, fixed, join
 from auv_analysis.report.digest import TINY, RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence, prose

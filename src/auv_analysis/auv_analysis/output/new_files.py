@@ -111,7 +111,7 @@ def write_table(path: Path, columns: Mapping[str, Sequence[Any]]) -> Path:
 
 def arrow_table(columns: Mapping[str, Sequence[Any]]) -> 'pa.Table':
     """Columns of words, truths or numbers; a column of nothing but null is one of numbers."""
-    import pyarrow as pa
+    from auv_analysis.output.arrow import pa
 
     def array(values: Sequence[Any]) -> pa.Array:
         numbers = all(type(value) in (int, float) or value is None for value in values)

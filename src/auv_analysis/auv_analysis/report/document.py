@@ -17,11 +17,11 @@ from typing import Any
 
 import jinja2
 import markupsafe
-import pyarrow as pa
 from markupsafe import Markup
 from pyarrow import parquet
 
 from auv_analysis.metrics.quantities import SIGNALS
+from auv_analysis.output.arrow import pa
 from auv_analysis.output.text import Maths, fixed, join, number, plain, tied
 from auv_analysis.report.panels import Interactive, PanelSet
 from auv_analysis.report.plots import FigureRecord

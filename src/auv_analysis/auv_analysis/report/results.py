@@ -15,12 +15,12 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast
 
-import pyarrow as pa
 from pyarrow import parquet
 from rich import table as rich_table
 from rich.text import Text
 
 from auv_analysis.metrics.quantities import Quantity, quantity
+from auv_analysis.output.arrow import pa
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.text import MISSING, Maths, fixed, number, plain
 

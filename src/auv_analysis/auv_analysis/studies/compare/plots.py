@@ -5,13 +5,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from auv_analysis.metrics.measures import FAMILIES
 from auv_analysis.metrics.summary import BAND_TEXT, DWELL, band_of
+from auv_analysis.output.arrow import pa
 from auv_analysis.report import plots
 from auv_analysis.report.digest import RunDigest
 from auv_analysis.report.plots import ALWAYS, COLOURS, GREY, MOST_LINES, FigureRecord, HeatMap, look

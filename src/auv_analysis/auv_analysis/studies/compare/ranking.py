@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from pyarrow import csv, parquet
 from scipy.stats import rankdata
 
 from auv_analysis.metrics.measures import MEASURES, Measure, flat
+from auv_analysis.output.arrow import pa
 from auv_analysis.report.digest import RunDigest
 from auv_analysis.report.results import array_of
 

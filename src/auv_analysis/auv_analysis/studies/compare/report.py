@@ -6,11 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-
 from auv_analysis.metrics.measures import FAMILIES, MEASURES
 from auv_analysis.metrics.quantities import Quantity, quantity
 from auv_analysis.metrics.summary import summarize
+from auv_analysis.output.arrow import pa
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import each, say, waiting
 from auv_analysis.output.text import join, number

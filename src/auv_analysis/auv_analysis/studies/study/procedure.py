@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from matplotlib.axes import Axes
 from pyarrow import parquet
 
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.metrics.energy import kinetic_energy
 from auv_analysis.metrics.quantities import VELOCITY, WRENCH, Quantity, gain_mathtext, quantity
+from auv_analysis.output.arrow import pa
 from auv_analysis.output.new_files import write_table
 from auv_analysis.output.text import Maths, fixed, join, number, plain, symbol
 from auv_analysis.report import plots

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.quantities import COSTS
+from auv_analysis.output.arrow import pa
 from auv_analysis.report.results import Results, known
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario, load_scenario, write_inputs

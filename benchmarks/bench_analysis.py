@@ -5,7 +5,6 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,15 +84,18 @@ def whole(run: Run, model: ControlModel) -> list[np.ndarray]:
 
 
 def one_hour() -> dict[str, Measured]:
-    """Peak memory of `auv analyze` on a bag of an hour, beside one of six minutes."""
+    """Peak memory of `auv analyze` and `auv info` on a bag of an hour, beside six minutes."""
     with tempfile.TemporaryDirectory() as folder:
-        hour, brief = (analysed_memory(made_bag(steps), folder) for steps in (HOUR, BRIEF))
-        return interleaved({'analysis_one_hour_rss_mb': hour}, brief, 'MB', warm=False)
+        analyze = ['analyze', '--out', folder, '--overwrite', '--json']
+        found: dict[str, Measured] = {}
+        for key, command in (('analysis', analyze), ('info', ['info', '--json'])):
+            hour, brief = (_memory([AUV, *command, str(made_bag(n))]) for n in (HOUR, BRIEF))
+            found |= interleaved({f'{key}_one_hour_rss_mb': hour}, brief, 'MB', warm=False)
+        return found
 
 
-def analysed_memory(bag: Path, out: str) -> Callable[[], float]:
-    """Measurement of the peak memory of `auv analyze`, MB."""
-    command = [AUV, 'analyze', str(bag), '--out', out, '--overwrite', '--json']
+def _memory(command: Sequence[str]) -> Callable[[], float]:
+    """Measurement of the peak memory of a command, MB."""
     return lambda: peak_memory(command) / MB
 
 

@@ -2,10 +2,9 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import rankdata
 
 from auv_analysis.metrics.measures import BY_NAME, FAMILIES, MEASURES, Measure, described
 from auv_analysis.output.progress import each
@@ -31,12 +30,27 @@ def ordered(values: np.ndarray, unit: str) -> np.ndarray:
 
 
 def quantiles(values: np.ndarray, levels: Iterable[float]) -> np.ndarray:
-    """Quantiles that are values themselves, so that one of them may be infinite."""
-    known = values[~np.isnan(values)]
-    levels = np.asarray(list(levels))
-    if len(known) == 0:
+    """Quantiles that are values themselves, so that one of them may be infinite; NaN is left out.
+
+    Parameters
+    ----------
+    values : (n,)
+    levels : from 0 to 1
+
+    """
+    return _at(_ascending(values), levels)
+
+
+def _ascending(values: np.ndarray) -> np.ndarray:
+    return np.sort(values[~np.isnan(values)])
+
+
+def _at(ascending: np.ndarray, levels: Iterable[float]) -> np.ndarray:
+    """Quantiles of sorted values: the inverse of their distribution function."""
+    levels, n = np.asarray(list(levels)), len(ascending)
+    if n == 0:
         return np.full(len(levels), np.nan)
-    return np.quantile(known, levels, method='inverted_cdf')
+    return ascending[np.clip(np.ceil(n * levels - 1).astype(int), 0, n - 1)]
 
 
 def finite(value: float) -> float | None:
@@ -49,12 +63,17 @@ def spread(values: np.ndarray, unit: str) -> Row:
 
     `known` counts the values that exist; of a time, the quantiles count one that does not as late.
     """
-    known = values[np.isfinite(values)]
-    at = quantiles(ordered(values, unit), LEVELS.values())
-    row: Row = {'rows': len(values), 'known': len(known)}
-    row |= {'smallest': finite(known.min()) if len(known) else None}
+    return _spread(_ascending(ordered(values, unit)), len(values))
+
+
+def _spread(ascending: np.ndarray, rows: int) -> Row:
+    """The same of sorted values, of which the last ones may be infinite."""
+    known = ascending[: np.searchsorted(ascending, np.inf)]
+    row: Row = {'rows': rows, 'known': len(known)}
+    row |= {'smallest': finite(known[0]) if len(known) else None}
+    at = _at(ascending, LEVELS.values())
     row |= {name: finite(value) for name, value in zip(LEVELS, at, strict=True)}
-    row |= {'largest': finite(known.max()) if len(known) else None}
+    row |= {'largest': finite(known[-1]) if len(known) else None}
     return row | {'mean': finite(known.mean()) if len(known) else None}
 
 
@@ -78,10 +97,8 @@ def _of_column(sweep: Sweep, name: str, values: np.ndarray) -> Iterator[Row]:
 
 def thinned(values: np.ndarray) -> np.ndarray:
     """Values with the same quantiles, few enough to be drawn; NaN is left out."""
-    known = values[~np.isnan(values)]
-    if len(known) <= POINTS:
-        return known
-    return np.quantile(known, np.linspace(0.0, 1.0, POINTS), method='inverted_cdf')
+    known = _ascending(values)
+    return known if len(known) <= POINTS else _at(known, np.linspace(0.0, 1.0, POINTS))
 
 
 def varying(values: Sequence[np.ndarray], unit: str) -> bool:
@@ -94,14 +111,46 @@ def varying(values: Sequence[np.ndarray], unit: str) -> bool:
     return late or bool(np.ptp(known) > 1e-12 * np.abs(known).max())
 
 
-def influence(ranks: np.ndarray, factor: Factor, rows: np.ndarray) -> Row | None:
+class Ordered(NamedTuple):
+    """Values of a figure in the m rows of a controller, sorted.
+
+    Attributes
+    ----------
+    ascending : (k,) of those that exist; of a time, one that does not is infinite and the last
+    places : (k,) which of the rows each is
+    ranks : (m,) from 1 on, the mean of those that are equal; NaN of what does not exist
+
+    """
+
+    ascending: np.ndarray
+    places: np.ndarray
+    ranks: np.ndarray
+
+    @classmethod
+    def of(cls, values: np.ndarray, unit: str = '') -> 'Ordered':
+        """Of the values (m,) of a figure in its unit."""
+        at = ordered(values, unit)
+        places = np.argsort(at)[: len(at) - int(np.isnan(at).sum())]  # NaN is the last
+        ascending, ranks = at[places], np.full(len(at), np.nan)
+        new = ascending[1:] != ascending[:-1]
+        starts = np.flatnonzero(np.append([True], new)[: len(places)])  # of what is equal
+        ends = np.append(starts[1:], len(ascending))
+        ranks[places] = np.repeat((starts + ends + 1) / 2, ends - starts)
+        return cls(ascending, places, ranks)
+
+    def groups(self, codes: np.ndarray, count: int) -> list[np.ndarray]:
+        """Values in each of so many groups, sorted, by the group (m,) of each row."""
+        return by_group(self.ascending, codes[self.places], count)
+
+
+def influence(ranks: np.ndarray, codes: np.ndarray, others: np.ndarray | None) -> Row | None:
     """How much of the order of a figure a path explains.
 
     Parameters
     ----------
     ranks : (m,) of the figure
-    factor : the path
-    rows : (m,) indices of these rows
+    codes : (m,) group of the path in these rows
+    others : (m,) ranks of its numbers; None of words and lists
 
     Returns
     -------
@@ -112,14 +161,13 @@ def influence(ranks: np.ndarray, factor: Factor, rows: np.ndarray) -> Row | None
             rises and falls again
 
     """
-    codes = factor.codes[rows]
-    groups = len(np.unique(codes))
+    groups = np.count_nonzero(np.bincount(codes))
     if len(ranks) < FEWEST or groups < 2 or np.ptp(ranks) == 0 or len(ranks) <= groups:
         return None
     spearman = None
-    if factor.numbers is not None:
-        others = rankdata(factor.numbers[rows])
-        spearman = float(np.corrcoef(ranks, others)[0, 1])
+    if others is not None:
+        a, b = ranks - ranks.mean(), others - others.mean()
+        spearman = float(a @ b / np.sqrt((a @ a) * (b @ b)))
     return {'spearman': spearman, 'explained_percent': 100 * explained(ranks, codes)}
 
 
@@ -135,30 +183,24 @@ def explained(ranks: np.ndarray, codes: np.ndarray) -> float:
     return float(np.clip(1.0 - within, 0.0, 1.0))
 
 
-def ranks_of(values: np.ndarray, measure: Measure) -> tuple[np.ndarray, np.ndarray]:
-    """Ranks of the values that exist, and which rows these are; a time that does not is late."""
-    at = ordered(values, measure.unit)
-    there = np.flatnonzero(~np.isnan(at))
-    return rankdata(at[there]), there
-
-
-def along(values: np.ndarray, rows: np.ndarray, factor: Factor, measure: Measure) -> Iterator[Row]:
+def along(figure: Ordered, codes: np.ndarray, factor: Factor, measure: Measure) -> Iterator[Row]:
     """Quantiles of a figure in each group of a path.
 
     Parameters
     ----------
-    values : (n,) of all rows
-    rows : (m,) indices of the rows that count
+    figure : its values in the m rows that count
+    codes : (m,) group of each row
     factor : the path
     measure : whose values they are
 
     """
-    groups = by_group(values[rows], factor.codes[rows], len(factor.labels))
+    count = len(factor.labels)
+    groups, rows = figure.groups(codes, count), np.bincount(codes, minlength=count)
     for i, (label, group) in enumerate(zip(factor.labels, groups, strict=True)):
         row: Row = {'path': factor.path, 'figure': measure.name, 'unit': measure.unit}
         row |= {'group': i, 'value': label, 'middle': finite(factor.middles[i])}
         ends = (None, None) if factor.edges is None else map(float, factor.edges[i])
-        yield row | dict(zip(('from', 'to'), ends, strict=True)) | spread(group, measure.unit)
+        yield row | dict(zip(('from', 'to'), ends, strict=True)) | _spread(group, int(rows[i]))
 
 
 def together(
@@ -174,7 +216,7 @@ def together(
     """
     first, second = (merged(factor) for factor in pair)
     width = len(second[1])
-    codes = first[0][rows] * width + second[0][rows]
+    codes = first[0][rows] * np.int32(width) + second[0][rows]
     groups = by_group(values[rows], codes, len(first[1]) * width)
     for i, group in enumerate(groups):
         at = quantiles(ordered(group, measure.unit), [0.5])[0]
@@ -236,7 +278,7 @@ def pairs(sweep: Sweep, values: np.ndarray, measure: Measure) -> Iterator[Row]:
         d = log_ratios(at[mine[both]], at[other[both]])
         if len(d) == 0:
             continue
-        found = paired(d)
+        found = paired(d, test=False)
         low, high = found.interval or (None, None)
         yield {
             'figure': measure.name,
@@ -311,11 +353,25 @@ class Analysis:
     values: dict[str, np.ndarray] = field(default_factory=dict)
     pair: list[Factor] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    _rows: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
+    _ranks: dict[tuple[str, str], np.ndarray] = field(default_factory=dict, repr=False)
 
     def rows_of(self, controller: str) -> np.ndarray:
         """Indices of the rows of a controller that have figures."""
-        place = self.sweep.controllers.index(controller)
-        return np.flatnonzero((self.sweep.controller == place) & (self.sweep.status == 0))
+        if controller not in self._rows:
+            place = self.sweep.controllers.index(controller)
+            mine = (self.sweep.controller == place) & (self.sweep.status == 0)
+            self._rows[controller] = np.flatnonzero(mine)
+        return self._rows[controller]
+
+    def ranks_of(self, factor: Factor, controller: str) -> np.ndarray | None:
+        """Ranks of the numbers of a path in these rows; None of words and lists."""
+        if factor.numbers is None:
+            return None
+        key = factor.path, controller
+        if key not in self._ranks:
+            self._ranks[key] = Ordered.of(factor.numbers[self.rows_of(controller)]).ranks
+        return self._ranks[key]
 
     def counts(self) -> list[Row]:
         """Rows of each controller by status, and the commonest reasons."""
@@ -392,18 +448,30 @@ def _one_measure(analysis: Analysis, measure: Measure, groups: Sequence[Any]) ->
     analysis.measures.append(measure)
     tables['paired'] += pairs(sweep, values, measure)
     for controller, rows in zip(sweep.controllers, ok, strict=True):
-        ranks, there = ranks_of(values[rows], measure)
+        figure = Ordered.of(values[rows], measure.unit)
         names = {'controller': controller, 'figure': measure.name}
         for factor in analysis.factors:
             if not (factor.differs and factor.concerns(controller)):
                 continue
-            for row in along(values, rows, factor, measure):
+            codes = factor.codes[rows]
+            for row in along(figure, codes, factor, measure):
                 tables['dependence'].append({'controller': controller} | row)
-            if found := influence(ranks, factor, rows[there]):
+            if found := _influence(analysis, figure, factor, codes, controller):
                 tables['influence'].append(names | {'path': factor.path} | found)
     for group in groups:
         tables['indices'] += indices(sweep, group, values, measure)
         analysis.notes += omitted(sweep, group, values, measure)
+
+
+def _influence(
+    analysis: Analysis, figure: Ordered, factor: Factor, codes: np.ndarray, controller: str
+) -> Row | None:
+    there = ~np.isnan(figure.ranks)
+    if there.all():
+        return influence(figure.ranks, codes, analysis.ranks_of(factor, controller))
+    rows, numbers = analysis.rows_of(controller)[there], factor.numbers
+    others = None if numbers is None else Ordered.of(numbers[rows]).ranks
+    return influence(figure.ranks[there], codes[there], others)
 
 
 def _pairs(analysis: Analysis) -> None:

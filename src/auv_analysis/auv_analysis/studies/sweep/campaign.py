@@ -37,7 +37,11 @@ STEPS_AT_ONCE = 500_000  # of a block, about: a fraction of a second, compiled
 PLAIN_BLOCK = 8  # rollouts of a user's own law: as plain Python a second or more each
 SMALLEST_BLOCK, LARGEST_BLOCK = 16, 1024
 BLOCKS_AT_LEAST = 8  # so that every core has something to do
-MOST_PARTS = 10_000  # files of a result, about
+MOST_PARTS = 256  # files of a result, about
+# of NumPy's SeedSequence, which is O'Neill's `seed_seq_fe`: starts and factors of its hashes
+HASH_POOL, TIMES_POOL = 0x43B0D7E5, 0x931E8875
+HASH_STATE, TIMES_STATE = 0x8B51F9DD, 0x58F38DED
+TIMES_BEFORE, TIMES_HASHED = 0xCA01F9DD, 0x4973F715
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,12 +121,42 @@ class Campaign:
 
     def seeds(self, first: int, last: int) -> np.ndarray:
         """Seeds (n,) of these rollouts, each a function of the root seed and its index alone."""
-        root = self.data['seed']
-        words = [
-            np.random.SeedSequence(root, spawn_key=(i,)).generate_state(1, np.uint64)[0]
-            for i in range(first, last)
-        ]
-        return (np.array(words, np.uint64) >> np.uint64(1)).astype(np.int64)
+        words = first_words(self.data['seed'], np.arange(first, last, dtype=np.uint64))
+        return (words >> np.uint64(1)).astype(np.int64)
+
+
+def first_words(root: int, indices: np.ndarray) -> np.ndarray:
+    """First 64-bit word of NumPy's `SeedSequence(root, spawn_key=(i,))`, of many i at once.
+
+    Parameters
+    ----------
+    root : from 0 on
+    indices : (n,) uint64, the i
+
+    Returns
+    -------
+    words : (n,) uint64
+
+    """
+    pool = [np.full(len(indices), word) for word in np.random.SeedSequence(root).pool]
+    low, high = indices.astype(np.uint32), (indices >> np.uint64(32)).astype(np.uint32)
+    rounds = 4 * max(4, -(-root.bit_length() // 32))  # that the root took, four for each word
+    factor = HASH_POOL * pow(TIMES_POOL, rounds, 1 << 32) % (1 << 32)
+    for word, there in ((low, np.ones(len(low), bool)), (high, high > 0)):
+        for i, before in enumerate(pool):
+            hashed, factor = _hashed(word, factor, TIMES_POOL)
+            mixed: np.ndarray = np.uint32(TIMES_BEFORE) * before - np.uint32(TIMES_HASHED) * hashed
+            pool[i] = np.where(there, mixed ^ mixed >> np.uint32(16), before)
+    first, factor = _hashed(pool[0], HASH_STATE, TIMES_STATE)
+    second, _ = _hashed(pool[1], factor, TIMES_STATE)
+    return first | second.astype(np.uint64) << np.uint64(32)
+
+
+def _hashed(words: np.ndarray, factor: int, times: int) -> tuple[np.ndarray, int]:
+    """Words (n,) after one round of the hash, and the factor of the next round."""
+    following = factor * times % (1 << 32)
+    words = (words ^ np.uint32(factor)) * np.uint32(following)
+    return words ^ words >> np.uint32(16), following
 
 
 def load_campaign(campaign: str | Path) -> Campaign:

@@ -6,20 +6,22 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.dataset as ds
 from pyarrow import parquet
 
 from auv_analysis.metrics.measures import Measure
+from auv_analysis.output.arrow import pa
 from auv_analysis.output.folder import PART, ROLLOUTS, SWEEP
 from auv_analysis.output.text import plain
 from auv_analysis.scenario.changes import said_of, split
 from auv_analysis.studies.sweep.variation import kind_of
 from auv_dynamics.files.errors import InputError, first_line, reason, shorten
+
+if TYPE_CHECKING:
+    import pyarrow.dataset as ds
 
 STATUSES = ('ok', 'diverged', 'refused')
 OWN = ('index', 'controller', 'seed', 'status', 'reason')
@@ -120,8 +122,10 @@ class Sweep:
         return measure.of(lambda name: table[name].to_numpy().astype(float))
 
     @cached_property
-    def _dataset(self) -> ds.Dataset:
+    def _dataset(self) -> 'ds.Dataset':
         """The parts as one; kept, so that what they say of themselves is read once."""
+        import pyarrow.dataset as ds  # it asks for pandas, after which `arrow` looked
+
         return ds.dataset([str(path) for path in self.parts], format='parquet')
 
     def table(self, columns: list[str]) -> pa.Table:
@@ -212,6 +216,7 @@ def _read(path: Path, columns: list[str]) -> None:
 
 
 MOST_VALUES = 12  # different numbers up to which each is a group of its own
+FIRST = 1000  # rows that mostly show whether there are more
 BINS = 16
 LONGEST = 40  # of a word that is shown as it is
 LONGEST_UNIT, LONGEST_LABEL = 14, 18  # of an axis, of a value at it
@@ -274,11 +279,14 @@ def _varied(sweep: Sweep, path: str) -> Factor:
     if pa.types.is_integer(kind) or pa.types.is_floating(kind):
         numbers = column.to_numpy().astype(float)
         codes, edges, binned = _groups(numbers)
-        labels = _labels(edges)
-        codes = codes.astype(np.int32)
-        return Factor(path, unit, meaning, numbers, codes, labels, edges, binned)
+        return Factor(path, unit, meaning, numbers, _small(codes), _labels(edges), edges, binned)
     codes, labels = _categories(column)
-    return Factor(path, unit, meaning, None, codes.astype(np.int32), labels, None, False)
+    return Factor(path, unit, meaning, None, _small(codes), labels, None, False)
+
+
+def _small(codes: np.ndarray) -> np.ndarray:
+    """Groups as the smallest integers that hold them: NumPy sorts those of 16 bits by radix."""
+    return codes.astype(np.min_scalar_type(int(codes.max(initial=0))))
 
 
 def _said(sweep: Sweep, path: str) -> tuple[str, str]:
@@ -291,18 +299,17 @@ def _said(sweep: Sweep, path: str) -> tuple[str, str]:
 
 def _groups(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
     """Group of each number, ends of the groups, and whether they are bins."""
-    values, codes = np.unique(numbers, return_inverse=True)
-    if len(values) <= MOST_VALUES:
-        return codes, np.stack([values, values], axis=1), False
+    if len(np.unique(numbers[:FIRST])) <= MOST_VALUES:  # else there is no need to sort them all
+        values, codes = np.unique(numbers, return_inverse=True)
+        if len(values) <= MOST_VALUES:
+            return codes, np.stack([values, values], axis=1), False
     count = int(np.clip(len(numbers) // ROWS_PER_BIN, 2, BINS))
     cuts = np.unique(np.quantile(numbers, np.linspace(0, 1, count + 1)[1:-1]))
     codes = np.searchsorted(cuts, numbers, side='right')
-    used, codes = np.unique(codes, return_inverse=True)
-    order = np.argsort(codes, kind='stable')
-    starts = np.searchsorted(codes[order], np.arange(len(used)))
-    low = np.minimum.reduceat(numbers[order], starts)
-    high = np.maximum.reduceat(numbers[order], starts)
-    return codes, np.stack([low, high], axis=1), True
+    used = np.bincount(codes) > 0
+    codes = _small((np.cumsum(used) - 1)[codes])
+    groups = by_group(numbers, codes, int(used.sum()))
+    return codes, np.array([[group.min(), group.max()] for group in groups]), True
 
 
 def _labels(edges: np.ndarray) -> list[str]:

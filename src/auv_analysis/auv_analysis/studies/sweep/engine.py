@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
+from auv_analysis.output.arrow import pa
 from auv_analysis.scenario.changes import VEHICLE, split
 from auv_analysis.scenario.scenario import Scenario, scenario_from
 from auv_analysis.studies.sweep.campaign import Campaign, of_controller

@@ -91,8 +91,9 @@ class SweepFolder:
     def finished(self, columns: list[str]) -> Iterator[tuple[int, 'pa.Table']]:
         """Number and some columns of each finished block; what cannot be read is not finished."""
         for number, path in sorted(self._parts()):
-            import pyarrow as pa
             import pyarrow.parquet as pq
+
+            from auv_analysis.output.arrow import pa
 
             with suppress(pa.ArrowInvalid, OSError):
                 yield number, pq.ParquetFile(path).read(columns)
@@ -109,12 +110,14 @@ class SweepFolder:
 
     def store(self, block: int, table: 'pa.Table') -> None:
         """Write a finished block."""
-        import pyarrow as pa
         import pyarrow.parquet as pq
+
+        from auv_analysis.output.arrow import pa
 
         sink = pa.BufferOutputStream()
         words = [field.name for field in table.schema if pa.types.is_string(field.type)]
-        pq.write_table(table, sink, compression='zstd', use_dictionary=words)
+        options = {'compression': 'zstd', 'use_dictionary': words, 'write_statistics': False}
+        pq.write_table(table, sink, **options)  # what is asked of a sweep is asked of all its rows
         write(self.data / f'part-{block:08d}.parquet', sink.getvalue())
 
 

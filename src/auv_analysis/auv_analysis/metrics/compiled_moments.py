@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from auv_analysis.metrics.moments import (
+from auv_analysis.metrics.signals import (
     DELTA_PI,
     DELTA_XI,
     ENERGY,

@@ -1,63 +1,35 @@
 """Sums and largest magnitudes of a run's signals, in one go over its samples.
 
-A signal is formed from the sample at hand and only its sums are kept. What a signal is stands once,
-in `signals`: it takes the numbers of one sample where it is compiled, and whole columns of a block
-where it is not.
+A signal is formed from the sample at hand and only its sums are kept.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from auv_analysis.metrics.energy import component
+from auv_analysis.metrics.signals import (
+    DELTA_PI,
+    DELTA_XI,
+    ENERGY,
+    ERROR,
+    LUMPED,
+    NAMES,
+    SETPOINT,
+    TAU,
+    Maps,
+    maps_of,
+    signals,
+)  # fmt: skip
 from auv_analysis.runs.run import Run, Windows
-from auv_dynamics.kernel.compile import helper
-from auv_dynamics.kernel.six import Vector, sub, upper, upper_T
-from auv_gvc_controller.laws.model import ControlModel
 
-NAMES = ('error', 'lumped_error', 'tau', 'delta_xi', 'delta_pi', 'energy', 'nu_d')
-ERROR, LUMPED, TAU, DELTA_XI, DELTA_PI, ENERGY, SETPOINT = range(len(NAMES))
+__all__ = [
+    'DELTA_PI', 'DELTA_XI', 'ENERGY', 'ERROR', 'LUMPED', 'SETPOINT', 'TAU', 'Maps', 'Moments',
+    'Tally', 'add_columns', 'known_or_zero', 'maps_of',
+]  # fmt: skip
 SIMULATED = 'simulate'  # source of a run that this process computed
-
-
-class Maps(NamedTuple):
-    """What leads from nu and tau to the signals: flat, row-major."""
-
-    Upsilon: np.ndarray
-    Upsilon_inv: np.ndarray
-    N: np.ndarray
-
-
-def maps_of(model: ControlModel) -> Maps:
-    """Maps of a vehicle."""
-    return Maps(model.Upsilon, model.Upsilon_inv, model.N)
-
-
-@helper
-def signals(
-    nu: Vector, nu_d: Vector, tau: Vector, f: Vector, F: Vector, maps: Any
-) -> tuple[Vector, ...]:
-    """The signals of `NAMES`, six numbers each: m/s, rad/s; N, N m; J.
-
-    `maps` has the fields of `Maps`. Equations (30) for the energy, (33) and (34).
-    """
-    xi, N = upper(maps.Upsilon_inv, nu), maps.N
-    energy = (
-        component(N[0], xi[0]), component(N[1], xi[1]), component(N[2], xi[2]),
-        component(N[3], xi[3]), component(N[4], xi[4]), component(N[5], xi[5]),
-    )  # fmt: skip
-    return (
-        sub(nu_d, nu),
-        sub(f, F),
-        tau,
-        sub(xi, nu),
-        sub(upper_T(maps.Upsilon, tau), tau),
-        energy,
-        nu_d,
-    )
 
 
 def add_columns(

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.metrics.energy import shares
-from auv_analysis.metrics.moments import signals
+from auv_analysis.metrics.signals import signals
 from auv_analysis.metrics.summary import TRANSIENT, has_settled
 from auv_analysis.simulation.closed_loop import Sample
 from auv_dynamics.files.yaml_files import LARGEST

@@ -236,7 +236,6 @@ SALTELLI = MORRIS.replace('morris', 'saltelli').replace('count: 12', 'count: 32'
 
 
 def test_elementary_effects_stand_at_their_places(tmp_path: Path) -> None:
-    pytest.importorskip('SALib')
     analysis, figures, _ = drawn_of(tmp_path, MORRIS, known)
     figure = figures['elementary_effects']
     assert figure.get_supxlabel().startswith(r'$\mu^*$')
@@ -264,7 +263,6 @@ def test_elementary_effects_stand_at_their_places(tmp_path: Path) -> None:
 
 
 def test_total_indices_stand_in_their_cells(tmp_path: Path) -> None:
-    pytest.importorskip('SALib')
     analysis, figures, captions = drawn_of(tmp_path, SALTELLI, known)
     maps = heat_maps(figures['total_indices'])
     assert list(maps) == ['(a) $S_T$', '(b) $S_T$']

@@ -200,7 +200,9 @@ def test_credit_holds_the_plant_while_the_recorder_is_behind(peer) -> None:
     acknowledged(5)
     answered(peer, 5, 1)
     peer.until(lambda: len(peer.heard['disturbance']) == 6, 'the last wrench')
-    peer.spin(0.1)
+    peer.publish(topics.WRENCH, wrench(5))
+    peer.until(lambda: plant.graph.refused.total() == 1, 'a second answer to be refused')
+    assert len(peer.heard['disturbance']) == 6
     assert plant.exit_code is None, 'it is the recorder that ends the run'
 
 

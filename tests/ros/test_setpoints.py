@@ -46,6 +46,7 @@ def test_every_axis_is_that_of_the_independent_implementation(
                 lambda n=wanted: START + n * STEP in map(by_hand.ns_of, made.heard['cmd_accel']),
                 f'set-point {wanted}',
             )
+        made.spin(0.1)  # nothing comes behind the last one
         steps = [(by_hand.ns_of(m) - START) / STEP for m in made.heard['cmd_vel']]
         assert steps == [*range(wanted + 1)], 'each once, up to the end'
         assert steps == [(by_hand.ns_of(m) - START) / STEP for m in made.heard['cmd_accel']]

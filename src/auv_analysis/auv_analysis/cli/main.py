@@ -152,10 +152,13 @@ def _main(arguments: list[str] | None) -> None:
 
 
 def _work(command: Callable[..., dict[str, Any]], options: Any) -> None:
+    from auv_analysis.output.parallel import a_copy_beside
     from auv_dynamics.files.errors import FailedError
 
     try:
-        _print(options, command(options))
+        with a_copy_beside():
+            document = command(options)
+        _print(options, document)
     except FailedError as error:
         if error.document is not None:
             _print(options, error.document)

@@ -6,6 +6,7 @@ Kinds: `time_panels`, `heat_map` with numbers, `distribution`, `small_multiples`
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from PIL import Image
 
 from auv_analysis.metrics.quantities import Quantity, mathtext
 from auv_analysis.metrics.statistics import Part
-from auv_analysis.output.progress import each
+from auv_analysis.output.parallel import results
 from auv_analysis.output.text import fixed, number, plain, typeset
 from auv_analysis.report.digest import RunDigest
 from auv_dynamics.vehicle import DOFS
@@ -112,14 +113,15 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     return png, pdf
 
 
-def saved(folder: Path, name: str, figure: Figure | None, title: str, caption: str) -> FigureRecord:
-    """Save what was drawn; None: nothing, and the caption says why."""
+def _saved(folder: Path, name: str, make: Callable[[], Drawn]) -> FigureRecord:
+    """Draw and save a figure; where there is nothing to draw, the caption says why."""
+    figure, title, caption = make()
     files = (None, None) if figure is None else save(figure, folder, name)
     return FigureRecord(name, title, caption, *files)
 
 
 def save_figures(folder: Path, drawn: Mapping[str, Callable[[], Drawn]]) -> dict[str, FigureRecord]:
-    """Draw and save figures, one after the other, in the style of reports.
+    """Draw and save figures in the style of reports.
 
     Parameters
     ----------
@@ -129,9 +131,8 @@ def save_figures(folder: Path, drawn: Mapping[str, Callable[[], Drawn]]) -> dict
     """
     folder.mkdir(parents=True, exist_ok=True)
     with style():
-        return {
-            name: saved(folder, name, *make()) for name, make in each(drawn.items(), len(drawn))
-        }
+        made = results([partial(_saved, folder, name, make) for name, make in drawn.items()])
+        return dict(zip(drawn, made, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,99 @@
+"""Independent tasks, by this process and, in a command on several cores, by a copy of it beside."""
+
+import contextlib
+import os
+import pickle
+import select
+import signal
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
+from typing import TypeVar
+
+from auv_analysis.output.progress import each
+
+T = TypeVar('T')
+MOST = 256  # tasks whose numbers fit into a byte each
+PATIENCE = 10.0  # s that the copy may take longer than five times the share of this process
+_beside: ContextVar[bool] = ContextVar('beside', default=False)
+
+
+@contextlib.contextmanager
+def a_copy_beside() -> Iterator[None]:
+    """Let `results` use a second core as long as this lasts."""
+    token = _beside.set(True)
+    try:
+        yield
+    finally:
+        _beside.reset(token)
+
+
+def results(tasks: Sequence[Callable[[], T]]) -> Iterator[T]:
+    """Results of tasks in their order, which depend on nothing that another one does.
+
+    Each process takes the next task that nobody has taken. What the copy does not give, for
+    whatever reason, is done here, so that an error is raised where it would be without it.
+    """
+    if not (_beside.get() and 1 < len(tasks) <= MOST and len(os.sched_getaffinity(0)) > 1):
+        yield from (task() for task in each(tasks, len(tasks)))
+        return
+    numbers, fill = os.pipe()
+    os.write(fill, bytes(range(len(tasks))))
+    os.close(fill)
+    copy, answer = _forked(tasks, numbers)
+    began, found = time.monotonic(), dict[int, T]()
+    try:
+        for number, here in each(_taken(numbers), len(tasks)):
+            if here:
+                found[number] = tasks[number]()
+        found |= _answered(answer, PATIENCE + 5 * (time.monotonic() - began))
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(copy, signal.SIGKILL)
+        os.waitpid(copy, 0)
+        os.close(numbers)
+        os.close(answer)
+    yield from (found[i] if i in found else task() for i, task in enumerate(tasks))
+
+
+def _taken(numbers: int) -> Iterator[tuple[int, bool]]:
+    """Number of each task, and whether it is to be done here: to read its byte is to take it."""
+    following = 0
+    while byte := os.read(numbers, 1):
+        yield from ((number, False) for number in range(following, byte[0]))
+        yield byte[0], True
+        following = byte[0] + 1
+
+
+def _forked(tasks: Sequence[Callable[[], T]], numbers: int) -> tuple[int, int]:
+    """Process id of the copy, and the end of a pipe that its results come from."""
+    answer, end = os.pipe()
+    with warnings.catch_warnings():
+        # Python warns where there are threads; the copy calls nothing of what they do, and is left
+        warnings.simplefilter('ignore', DeprecationWarning)
+        copy = os.fork()
+    if copy:
+        os.close(end)
+        return copy, answer
+    try:
+        done = pickle.dumps({number: tasks[number]() for number, here in _taken(numbers) if here})
+        with os.fdopen(end, 'wb') as stream:
+            stream.write(done)
+    finally:
+        os._exit(0)
+
+
+def _answered(answer: int, patience: float) -> dict[int, T]:
+    """Results of the copy by number; none where it ended or hangs."""
+    said, until = b'', time.monotonic() + patience
+    while select.select([answer], [], [], max(0.0, until - time.monotonic()))[0]:
+        part = os.read(answer, 1 << 16)
+        if not part:
+            break
+        said += part
+    try:
+        found: dict[int, T] = pickle.loads(said)
+    except (EOFError, pickle.UnpicklingError):
+        return {}
+    return found

@@ -1,13 +1,18 @@
 """The laws at single states: against the reference, by their closed loop, and by limits."""
 
+import subprocess
+import sys
+
 import herman_reference as reference
 import numpy as np
 import pytest
+from helpers.needs import needing
 from helpers.strategies import QUICK, attitudes, full, gains, vectors, vehicles
 from hypothesis import given
 from numpy.testing import assert_allclose
 
 from auv_dynamics import load_vehicle
+from auv_dynamics.kernel import compile
 from auv_dynamics.vehicle.kinematics import quaternion
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.control.gains import body_gains
@@ -156,3 +161,33 @@ def test_gvc_of_a_diagonal_inertia_is_cl_with_gains_times_N(size, eta, nu, nu_d,
         ours('gvc', vehicle, PAPER, *rest), ours('cl', vehicle, scaled, *rest), strict=True
     ):
         assert_allclose(one, other, rtol=0, atol=1e-11 * (1 + np.abs(other).max()))
+
+
+OWN = """
+import numba
+from auv_dynamics.kernel.six import add
+from auv_gvc_controller.laws.gvc import GVC
+
+
+@numba.njit
+def twice(a):
+    return add(a, a)
+
+
+class Own(GVC):
+    pass
+"""
+
+
+@needing('numba', compile.JITTED)
+def test_what_a_law_compiles_by_itself_calls_the_helpers_of_the_kernel(tmp_path):
+    """Numba is told of them when the law is loaded: by then nothing has been compiled."""
+    (tmp_path / 'own.py').write_text(OWN)
+    script = (
+        'from auv_gvc_controller.laws.law import law_class; law_class("own:Own"); '
+        'import own; print(own.twice((1.0, 2.0, 3.0, 4.0, 5.0, 6.0)))'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', script], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == '(2.0, 4.0, 6.0, 8.0, 10.0, 12.0)'

@@ -32,7 +32,7 @@ for law in ('gvc', 'cl'):
         run = simulate(scenario, law, hold)
         for key in sys.argv[2:]:
             arrays[f'{law} {hold} {key}'] = getattr(run, key)
-assert not hasattr(sys.modules.get('numba'), 'njit') or jit.config.DISABLE_JIT
+assert not hasattr(sys.modules.get('numba'), 'njit') or sys.modules['numba'].config.DISABLE_JIT
 np.savez(sys.argv[1], **arrays)
 """
 # found before every other sitecustomize: numba then looks as if it were not installed

@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-import jsonschema
 import numpy as np
 
 from auv_analysis.scenario.scenario import Scenario, scenario_from, vehicle_path_of
@@ -258,6 +257,8 @@ def _applicable(node: Any, root: dict[str, Any], data: Any) -> Iterator[dict[str
     for inner in (*node.get('allOf', ()), *node.get('anyOf', ())):
         yield from _applicable(inner, root, data)
     if 'if' in node:
+        import jsonschema  # slow to load
+
         holds = jsonschema.Draft202012Validator(node['if']).is_valid(data)
         yield from _applicable(node.get('then' if holds else 'else'), root, data)
 

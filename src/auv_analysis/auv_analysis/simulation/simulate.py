@@ -21,7 +21,7 @@ from auv_analysis.simulation.closed_loop import (
 )
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.yaml_files import LARGEST
-from auv_dynamics.kernel.compile import JITTED, cache_folder, config, plain
+from auv_dynamics.kernel.compile import INSTALLED, JITTED, cache_folder, plain
 from auv_dynamics.kernel.integrator import TABLEAUS, stage_times
 from auv_dynamics.kernel.lanes import with_batch_axis
 from auv_dynamics.plant.actuators import memory
@@ -182,7 +182,7 @@ def announce(scenario: Scenario, controllers: list[str]) -> None:
             law = type(gains).__name__
             print(f'{name}: the law {law} runs as plain Python', file=sys.stderr)
     if not JITTED:
-        why = 'numba is switched off' if config else 'numba is not installed'
+        why = 'numba is switched off' if INSTALLED else 'numba is not installed'
         print(f'{why}: the kernel runs as plain Python, slower', file=sys.stderr)
     elif not any(cache_folder().glob('**/*.nbi')):
         print('compiling the kernel for this machine, once ...', file=sys.stderr, flush=True)

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import jsonschema
 import numpy as np
 import yaml
 
@@ -19,6 +18,9 @@ from auv_dynamics.files.errors import (
     shorten,
 )
 from auv_dynamics.files.nearest import meant, one_of
+
+if TYPE_CHECKING:
+    import jsonschema
 
 MOST_ENTRIES = 100_000  # of a text, with its aliases written out
 LONGEST_TEXT = 4 << 20  # characters
@@ -178,6 +180,8 @@ def check(data: dict[str, Any], schema_path: Path, file: object) -> None:
 
 def validate(data: dict[str, Any], root: dict[str, Any], file: object) -> None:
     """`check` by a schema that has been read."""
+    import jsonschema  # slow to load, and most nodes read no such file
+
     _check_finite(data, file)
     validator = jsonschema.Draft202012Validator(root)
     errors = sorted(validator.iter_errors(data), key=_rank)
@@ -185,7 +189,7 @@ def validate(data: dict[str, Any], root: dict[str, Any], file: object) -> None:
         raise _as_input_error(errors[0], root, file)
 
 
-def _rank(error: jsonschema.ValidationError) -> tuple[Any, ...]:
+def _rank(error: 'jsonschema.ValidationError') -> tuple[Any, ...]:
     # unknown keys first (a misspelt key also leaves a missing one), then in file order
     order = {'additionalProperties': 0, 'unevaluatedProperties': 0, 'required': 2}
     return order.get(error.validator, 1), [str(part) for part in error.absolute_path]
@@ -200,7 +204,7 @@ def dotted(path: Any) -> str:
 
 
 def _as_input_error(
-    error: jsonschema.ValidationError, root: dict[str, Any], file: object
+    error: 'jsonschema.ValidationError', root: dict[str, Any], file: object
 ) -> InputError:
     # of an alternative (6 numbers or 6x6) only an entry that is no number at all is named itself
     for inner in sorted(error.context or [], key=lambda e: -len(e.absolute_path)):
@@ -231,7 +235,7 @@ def _as_input_error(
     return InputError(file, dotted(path), f'{_title(error, root)}{likely}', found)
 
 
-def _title(error: jsonschema.ValidationError, root: dict[str, Any]) -> str:
+def _title(error: 'jsonschema.ValidationError', root: dict[str, Any]) -> str:
     """Title of the innermost schema node on the way to the error that has one."""
     node: Any = root
     title = root.get('title', '')

@@ -29,9 +29,36 @@ can be left out). Without numba the same source runs as it is. Therefore:
 `LANES` is how many vehicles run side by side, None where each runs alone.
 """
 
-try:
-    from auv_dynamics.kernel.simd import LANES as _REGISTER
-except ImportError:
-    LANES: int | None = None
-else:
-    LANES = _REGISTER
+from typing import TYPE_CHECKING, Any
+
+from auv_dynamics.kernel.compile import JITTED, load, loads_by
+
+if TYPE_CHECKING:
+    LANES: int | None
+
+
+def _numba_side() -> Any:
+    from auv_dynamics.kernel import jit
+
+    try:
+        from auv_dynamics.kernel import simd
+    except ImportError:  # it is optional
+        globals()['LANES'] = None
+    else:
+        globals()['LANES'] = simd.LANES
+    return jit
+
+
+loads_by(_numba_side)
+
+
+def __getattr__(name: str) -> Any:
+    """`LANES`, for which numba is loaded."""
+    if name != 'LANES':
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    try:
+        if JITTED:
+            load()
+    except ImportError:  # numba is not for this Python or this NumPy
+        pass
+    return globals().setdefault(name, None)

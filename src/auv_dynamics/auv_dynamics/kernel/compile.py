@@ -11,21 +11,24 @@ of the outermost function. Where the sources lie does not matter: every clone of
 loads the same code. To load it is to run it: the folder is its user's alone.
 """
 
+import contextlib
+import functools
 import hashlib
 import importlib.util
 import os
 import re
 import stat
 import sys
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 PACKAGES = ('auv_dynamics', 'auv_gvc_controller', 'auv_analysis')
-# a decorator of these, or a method that `specialised` compiles
+# a decorator of these, a method that `specialised` compiles, or how numba is told
 COMPILES = re.compile(
     rb'^@(?:helper|of_numbers|compiled|uncached|specialised)\b'
-    rb'|^    def (?:wrench|fill_\w+)\((?!self)',
+    rb'|^    def (?:wrench|fill_\w+)\((?!self)|^from numba\b',
     re.M,
 )
 IMPORT = re.compile(rb'^\s*(?:from|import)\s+(auv_[\w.]+)(?:\s+import\s+(\([^)]*\)|.*))?', re.M)
@@ -103,96 +106,126 @@ def is_private(folder: Path) -> bool:
     return found.st_uid == 0 and stat.S_ISDIR(found.st_mode) and not found.st_mode & 0o022
 
 
-try:
-    import numba
-    from numba.core.caching import CompileResultCacheImpl, FunctionCache
-    from numba.core.compiler import Compiler
-    from numba.core.compiler_machinery import PassManager, register_pass
-    from numba.core.typed_passes import NativeLowering
-    from numba.extending import overload, register_jitable
-except ImportError:
-    numba = None  # type: ignore[assignment]  # the module or its absence
+def _found() -> bool:
+    """Whether numba is installed; to import it takes half a second of each process."""
+    try:
+        return importlib.util.find_spec('numba') is not None
+    except ImportError:
+        return False
 
-config: Any = numba and numba.config
-JITTED = numba is not None and not config.DISABLE_JIT
+
+def _switched_off() -> bool:
+    numba = sys.modules.get('numba')
+    return bool(numba.config.DISABLE_JIT if numba else int(os.environ.get(SWITCH) or 0))
+
+
+SWITCH = 'NUMBA_DISABLE_JIT'
+INSTALLED = _found()
+JITTED = INSTALLED and not _switched_off()
+
+
+@contextlib.contextmanager
+def _unimported(module: str) -> Iterator[None]:
+    """Let an import of a module that is not loaded yet find nothing."""
+    modules: dict[str, Any] = sys.modules
+    modules.setdefault(module, None)
+    try:
+        yield
+    finally:
+        if modules[module] is None:
+            del modules[module]
+
+
+class _Numba:
+    """The side of numba, `jit`: loaded when something is first called that it compiles.
+
+    Until then it is only noted what it will have to know. Many processes compile nothing.
+    """
+
+    def __init__(self) -> None:
+        self._jit: Any = None
+        self._waiting: list[Callable[[Any], object]] = []
+        self._lock = threading.RLock()
+        self.import_side: Callable[[], Any] = lambda: None
+
+    def tell(self, what: Callable[[Any], object]) -> None:
+        """Call with `jit`, now or once it is there."""
+        if self._jit is None:
+            self._waiting.append(what)
+        else:
+            what(self._jit)
+
+    def load(self) -> Any:
+        """`jit`, which knows all that was decorated; ImportError where numba does not load."""
+        with self._lock:
+            if self._jit is None:
+                with _unimported('coverage'):  # numba would load it where it is installed
+                    self._jit = self.import_side()
+                for what in self._waiting:
+                    what(self._jit)
+        return self._jit
+
+
+_NUMBA = _Numba()
+load = _NUMBA.load
+
+
+def loads_by(import_side: Callable[[], Any]) -> None:
+    """Let `load` import `jit` in this way: of the modules of the kernel, this one knows none."""
+    _NUMBA.import_side = import_side
+
+
+@functools.cache
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+class _Compiled:
+    """A function that is compiled, or loaded, when it is first called.
+
+    Parameters
+    ----------
+    function : plain Python
+
+    """
+
+    def __init__(self, function: Callable[..., Any]):
+        self.py_func = function
+        functools.update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._made(*arguments)
+
+    @functools.cached_property
+    def _made(self) -> Any:
+        try:
+            return load().kept(self.py_func)
+        except ImportError as error:  # it is there, but not for this Python or this NumPy
+            _say(f'warning: numba: {error}: the kernel runs as plain Python, slower')
+            return self.py_func
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith('__'):
+            raise AttributeError(name)
+        return getattr(self._made, name)  # `_numba_type_`, too: what is compiled may call it
+
 
 if JITTED:
-    FOLDER = cache_folder()
-    KEPT = is_private(FOLDER)
-    if not KEPT:
-        text = f'warning: {FOLDER}: not yours alone: compiled code is neither kept nor loaded'
-        print(text, file=sys.stderr, flush=True)
 
-    @register_pass(mutates_CFG=True, analysis_only=False)
-    class _Inner(NativeLowering):
-        """Ends at optimised LLVM code: what is inlined needs no machine code of its own."""
-
-        _name = 'inner_lowering'
-
-        def run_pass(self, state: Any) -> bool:
-            state.flags.no_compile = True
-            NativeLowering.run_pass(self, state)
-            found = state['cr']
-            key: Any = [].append  # numba wants a built-in function, and one for each
-            state.library._finalize_specific = lambda: None  # noqa: SLF001  no machine code
-            state.targetctx.insert_user_function(key, found.fndesc, [state.library])
-            state['cr'] = found._replace(cfunc=key)
-            return True
-
-    class _Inlined(Compiler):
-        """Compiles what is inlined wherever it is called."""
-
-        def define_pipelines(self) -> list[Any]:
-            (usual,) = super().define_pipelines()  # type: ignore[no-untyped-call]
-            passes: Any = PassManager('inlined')
-            for which, why in usual.passes:
-                passes.add_pass(_Inner if which is NativeLowering else which, why)
-            passes.finalize()
-            return [passes]
-
-    # without _nrt no references are counted: nothing is allocated, and callers hold their arrays
-    OPTIONS: Any = {'fastmath': {'contract'}, 'error_model': 'numpy', '_nrt': False}
-    INNER: Any = {
-        'forceinline': True,
-        'no_cfunc_wrapper': True,
-        'pipeline_class': _Inlined,
-        **OPTIONS,
-    }
-    helper: Decorator = register_jitable(**INNER)
-    uncached: Decorator = numba.njit(nogil=True, **OPTIONS)
-    NUMBERS = numba.types.Number, numba.types.Boolean
-
-    class _Place:
-        """Where numba looks for the code of a function: by what it is, not by where it lies."""
-
-        def __init__(self, function: Any, path: str):
-            self._module, self._path = function.__module__, Path(path)
-
-        @classmethod
-        def from_function(cls, function: Any, path: str) -> '_Place':
-            return cls(function, path)
-
-        def ensure_cache_path(self) -> None:
-            is_private(FOLDER)
-
-        def get_cache_path(self) -> str:
-            return str(FOLDER)
-
-        def get_source_stamp(self) -> str:
-            return hashlib.sha256(self._path.read_bytes()).hexdigest()
-
-        def get_disambiguator(self) -> str:
-            return str(self._module)
-
-    _FILES = type('_Files', (CompileResultCacheImpl,), {'_locator_classes': [_Place]})
-    _CACHE: Any = type('_Cache', (FunctionCache,), {'_impl_class': _FILES})
+    def helper(function: Function, /) -> Function:
+        """Let what is compiled call a function, and inline it."""
+        _NUMBA.tell(lambda jit: jit.inlined(function))
+        return function
 
     def compiled(function: Function, /) -> Function:
         """Compile a function that Python calls; its code is kept for other processes."""
-        made: Any = numba.njit(nogil=True, forceinline=True, **OPTIONS)(function)
-        if KEPT:
-            made._cache = _CACHE(function)  # noqa: SLF001  as `cache=True` does, with another place
-        return made
+        found: Any = _Compiled(function)
+        return found
+
+    def uncached(function: Function, /) -> Function:
+        """Compile a function that Python calls; its code is not kept."""
+        found: Function = load().uncached(function)
+        return found
 else:
 
     def helper(function: Function, /) -> Function:
@@ -231,7 +264,7 @@ def of_numbers(function: Function, /) -> Function:
     """
 
     def choose(first: Any, *_: Any) -> Any:
-        return function if isinstance(first, NUMBERS) else None
+        return function if isinstance(first, load().NUMBERS) else None
 
     return overloaded(function, choose)
 
@@ -239,8 +272,5 @@ def of_numbers(function: Function, /) -> Function:
 def overloaded(function: Function, choose: Callable[..., Any], /, **options: Any) -> Function:
     """Let numba compile in place of a function what is chosen for the types of its arguments."""
     if JITTED:
-        # not strict: numba would take an argument with an annotation for another one
-        overload(function, jit_options=INNER | options, strict=False)(
-            lambda *types: choose(*types)  # noqa: PLW0108  numba looks at its code
-        )
+        _NUMBA.tell(lambda jit: jit.overloaded(function, choose, options))
     return function

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_dynamics.kernel.compile import JITTED, helper, of_numbers, overloaded
+from auv_dynamics.kernel.compile import helper, of_numbers
 
 Number = Any  # a float, or that of each of several vehicles: a lane
 ALIGNMENT = 64  # bytes of a cache line
@@ -159,67 +159,3 @@ def joined(values: Sequence[Any], counts: Sequence[int]) -> Any:
     if isinstance(first, tuple):
         return type(first)(*(joined(parts, counts) for parts in zip(*values, strict=True)))
     return first
-
-
-if JITTED:
-    import numba
-    from numba.core import cgutils
-    from numba.extending import intrinsic
-    from numba.np.arrayobj import make_array, populate_array
-
-    types: Any = numba.types  # its own annotations know no named tuples
-
-    def viewed(value: Any, lost: int, dtype: Any) -> Any:
-        """Numba's type of a tree of arrays that lose so many axes; dtype None: their own."""
-        if isinstance(value, types.Array):
-            return types.Array(
-                dtype or value.dtype, value.ndim - lost, value.layout, aligned=dtype is None
-            )
-        if isinstance(value, types.BaseNamedTuple):
-            parts = [viewed(part, lost, dtype) for part in value]
-            return types.BaseTuple.from_types(parts, value.instance_class)
-        return value
-
-    def view(context: Any, builder: Any, kinds: Any, value: Any, b: Any) -> Any:
-        """LLVM value of a tree of type kinds[0] as kinds[1], one block b of it."""
-        before, after = kinds
-        if isinstance(before, types.BaseNamedTuple):
-            parts = zip(zip(before, after, strict=True), range(len(before)), strict=True)
-            inner = [
-                view(context, builder, pair, builder.extract_value(value, i), b)
-                for pair, i in parts
-            ]
-            return context.make_tuple(builder, after, inner)
-        if not isinstance(before, types.Array):
-            return value
-        array, seen = (
-            make_array(before)(context, builder, value),
-            make_array(after)(context, builder),
-        )
-        shape = cgutils.unpack_tuple(builder, array.shape)
-        strides = cgutils.unpack_tuple(builder, array.strides)
-        single = builder.icmp_signed('<=', shape[0], shape[0].type(1))
-        offset = builder.mul(builder.select(single, b.type(0), b), strides[0])
-        data = cgutils.pointer_add(builder, array.data, offset, seen.data.type)
-        last = 1 + after.ndim
-        size = context.get_constant(
-            types.intp, context.get_abi_sizeof(context.get_data_type(after.dtype))
-        )
-        populate_array(seen, data, shape[1:last], strides[1:last], size, meminfo=None)
-        return seen._getvalue()  # noqa: SLF001  numba's own way
-
-    @intrinsic
-    def _of_block(typingctx: Any, value: Any, b: Any) -> Any:
-        result = viewed(value, 1, None)
-
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            return view(context, builder, (value, result), *arguments)
-
-        return result(value, types.intp), generate
-
-    def _alone(function: Any) -> Callable[..., Any]:
-        return lambda *given: function if isinstance(given[-1], types.NoneType) else None
-
-    # an intrinsic is called without the typing context that its definition takes
-    overloaded(of_block, _alone(lambda value, b, lanes: _of_block(value, b)), _nrt=True)  # type: ignore[call-arg]
-    overloaded(align_stack, _alone(lambda lanes: None))

@@ -10,18 +10,15 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from auv_dynamics.kernel import lanes
-from auv_dynamics.kernel.compile import JITTED, overloaded
-
-if not JITTED:
-    raise ImportError('nothing is compiled')
-
 from llvmlite import ir
 from llvmlite.binding import get_host_cpu_features
 from numba import types
 from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
+
+from auv_dynamics.kernel import jit, lanes
+from auv_dynamics.kernel.compile import overloaded
 
 LANES = 8 if get_host_cpu_features().get('avx512f') else 4  # float64 in a vector register
 CONTRACT = ('contract',)  # as in compile.OPTIONS: a product may be fused with the sum that follows
@@ -142,10 +139,10 @@ _lower(lanes.select, Lane, (Choice, Lane, Lane), lambda builder, c, a, b: builde
 @intrinsic
 def _lanes_of(typingctx, value, b):
     """Lanes (...,) of one block of arrays (blocks, ..., LANES)."""
-    result = lanes.viewed(value, 2, Lane)
+    result = jit.viewed(value, 2, Lane)
 
     def generate(context, builder, signature, arguments):
-        return lanes.view(context, builder, (value, result), *arguments)
+        return jit.view(context, builder, (value, result), *arguments)
 
     return result(value, types.intp), generate
 

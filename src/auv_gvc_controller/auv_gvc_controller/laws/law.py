@@ -11,6 +11,7 @@ import numpy as np
 from auv_dynamics.files.errors import named_line
 from auv_dynamics.files.nearest import meant, one_of
 from auv_dynamics.files.yaml_files import matrix6
+from auv_dynamics.kernel.compile import JITTED, load
 from auv_gvc_controller.laws import NAMES, OPEN_LOOP
 
 SHIPPED: dict[str, Any] = {
@@ -54,6 +55,8 @@ def law_class(name: str) -> Any:
         raise ValueError(f'expected {expected}{likely}, found no {attribute} in {module}') from None
     except (Exception, SystemExit) as error:  # whatever a user's module does when it is imported
         raise ValueError(f'expected {expected}, found {name!r} ({named_line(error)})') from None
+    if JITTED and 'numba' in sys.modules:
+        load()  # what it compiles by itself may call the kernel's helpers
     missing = [
         part for part in ('wrench', 'state_rate', 'STATES', '_fields') if not hasattr(law, part)
     ]

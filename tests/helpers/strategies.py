@@ -11,7 +11,13 @@ from hypothesis.extra.numpy import arrays
 from auv_dynamics.files.yaml_files import matrix6
 from auv_dynamics.vehicle import DOFS
 
-QUICK = settings(max_examples=int(os.environ.get('AUV_GVC_EXAMPLES', '25')))  # `make properties`
+
+def examples(count: int, **options: Any) -> settings:
+    """So many examples of a property in `make test`, as many as it is told in `make properties`."""
+    return settings(max_examples=int(os.environ.get('AUV_GVC_EXAMPLES', count)), **options)
+
+
+QUICK = examples(10)
 
 
 def vectors(n: int = 6, largest: float = 3.0) -> st.SearchStrategy[np.ndarray]:

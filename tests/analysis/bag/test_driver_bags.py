@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.made_messages import FRAMES, ODOMETRY, Bag, odometry, serialized, stamped
-from hypothesis import given, settings
+from helpers.strategies import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
@@ -22,7 +23,7 @@ from auv_dynamics.files.errors import InputError
 MS = 1_000_000
 VEHICLE = load_scenario('case1').attachments['vehicle.yaml']
 GRID = 20  # ms between set-points
-quick = settings(max_examples=60)
+quick = examples(15)
 EXACT = '/**/controller_node:\n  ros__parameters: {setpoint_pairing: exact}\n'
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.made_messages import ODOMETRY, Bag, odometry, serialized, stamped
-from hypothesis import given, settings
+from helpers.strategies import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from made_bags import make_bag
 
@@ -25,7 +26,7 @@ ROLES = {
     'disturbance': 'Wrench', 'wrench_applied': 'Wrench', 'ground_truth/odom': '',
 }  # fmt: skip
 VEHICLE = load_scenario('case1').attachments['vehicle.yaml']
-quick = settings(max_examples=60)
+quick = examples(15)
 
 
 def turning(k: int) -> np.ndarray:

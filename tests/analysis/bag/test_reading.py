@@ -18,7 +18,8 @@ from helpers.made_messages import (
     stamped,
 )
 from helpers.plain_reader import slow_read_bag
-from hypothesis import HealthCheck, given, settings
+from helpers.strategies import examples
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from auv_analysis.bag import BagContents, read_bag, step_topics
@@ -38,7 +39,8 @@ ODD = (  # what a message may be in place of a usable one of constant length
     'big endian', 'trailing bytes', 'other frame', 'longer frame', 'no frame', 'NaN', 'infinite',
     'long quaternion', 'cut', 'late', 'negative', 'not text',
 )  # fmt: skip
-quick = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SHARED = [HealthCheck.function_scoped_fixture]
+quick = examples(15, suppress_health_check=SHARED)
 
 
 def row(k: int, width: int) -> np.ndarray:
@@ -157,7 +159,7 @@ def test_bags_that_are_cut(write: Any, share: float) -> None:
 
 
 @given(bags(odd=()), st.lists(st.tuples(st.floats(0, 1), st.integers(1, 255)), min_size=1))
-@settings(quick, max_examples=100)
+@examples(30, suppress_health_check=SHARED)
 def test_bags_with_damaged_bytes(write: Any, flips: list[tuple[float, int]]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         last = sorted(write(Path(folder)).glob('*.mcap'))[-1]

@@ -19,7 +19,8 @@ from helpers.damaged_bags import (
     write_bag,
 )
 from helpers.made_messages import COMPRESSIONS, STRING, TYPES, Bag, serialized
-from hypothesis import given, settings
+from helpers.strategies import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_analysis.bag import read_bag
@@ -102,7 +103,7 @@ def check_cut(data: bytes, size: int) -> None:
 
 
 @given(share=st.floats(0, 1, exclude_max=True))
-@settings(max_examples=25)
+@examples(15)
 def test_a_bag_that_is_cut_anywhere(share: float) -> None:
     check_cut(whole(), int(share * len(whole())))
 
@@ -134,7 +135,7 @@ def check_flip(data: bytes, place: int, mask: int) -> None:
 
 
 @given(share=st.floats(0, 1, exclude_max=True), mask=st.integers(1, 255))
-@settings(max_examples=25)
+@examples(15)
 def test_one_damaged_byte_costs_its_record_alone(share: float, mask: int) -> None:
     check_flip(whole(), int(share * len(whole())), mask)
 
@@ -166,7 +167,7 @@ def foreign_bags(draw: st.DrawFn, **fixed: Any) -> bytes:
 
 
 @given(data=foreign_bags(), share=st.floats(0, 1))
-@settings(max_examples=25)
+@examples(15)
 def test_bags_of_other_writers_that_are_cut(data: bytes, share: float) -> None:
     """Every record of which all bytes are there; without checksums as well."""
     size = int(share * len(data))
@@ -183,7 +184,7 @@ def test_bags_of_other_writers_that_are_cut(data: bytes, share: float) -> None:
     data=foreign_bags(enable_crcs=True),
     flips=st.lists(st.tuples(st.floats(0, 1), st.integers(1, 255)), max_size=4),
 )
-@settings(max_examples=25)
+@examples(15)
 def test_bags_of_other_writers_with_damaged_bytes(data: bytes, flips: list) -> None:
     """Whatever comes out can be read by others, and is not damaged any more."""
     broken = bytearray(data)

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from helpers.block_runs import in_blocks
 from helpers.certificates import certificate_of
-from hypothesis import given, settings
+from helpers.strategies import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -23,7 +24,7 @@ from auv_analysis.metrics.compiled_moments import add_compiled
 from auv_analysis.runs.run import Run, joined
 from auv_gvc_controller.laws.model import control_model
 
-quick = settings(max_examples=20)
+quick = examples(10)
 ROWS = st.integers(1, 40) | st.integers(100, 450)
 
 

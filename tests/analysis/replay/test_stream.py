@@ -6,14 +6,15 @@ from pathlib import Path
 
 import pytest
 from helpers.made_messages import STRING, Bag, new, serialized
-from hypothesis import HealthCheck, given, settings
+from helpers.strategies import examples
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from auv_analysis.replay.played_bag import index_bag, messages
 from auv_dynamics.files.errors import InputError
 
 TOPICS = ('/a', '/b', '/c')
-quick = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+quick = examples(15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 TIMES = st.lists(st.tuples(st.integers(0, 30), st.integers(0, 2)), max_size=40)
 
 

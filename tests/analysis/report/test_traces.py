@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.block_runs import in_blocks
-from hypothesis import given, settings
+from helpers.strategies import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
@@ -19,7 +20,7 @@ from auv_analysis.report.run_report import write_report
 from auv_analysis.report.traces import COLUMNS, FEW, Trace, thinned
 from auv_analysis.runs.run import Run
 
-quick = settings(max_examples=40)
+quick = examples(15)
 
 
 def signal(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,8 @@ import copy
 import numpy as np
 import pytest
 from helpers.closed_loops import file_of
-from hypothesis import given, settings
+from helpers.strategies import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
@@ -62,7 +63,7 @@ def there(name):
 
 
 @pytest.mark.parametrize('name', FILES)
-@settings(max_examples=25)
+@examples(10)
 @given(data=st.data())
 def test_a_fleet_is_the_vehicles_of_as_many_files(name, data):
     """Bit for bit, and refused where a file is."""
@@ -133,7 +134,7 @@ def test_matrices_of_numbers_diagonals_and_matrices():
     assert_array_equal(matrices(full[:, 0]), [np.diag(full[0, 0]), np.diag(full[1, 0])])
 
 
-@settings(max_examples=50)
+@examples(15)
 @given(seed=st.integers(0, 2**32 - 1), shape=st.sampled_from([(1,), (5,), (2, 3)]))
 def test_stacked_matrices_decompose_like_single_ones(seed, shape):
     A = np.random.default_rng(seed).normal(size=(*shape, 6, 6))

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from helpers.closed_loops import SIX, TURNED
 from helpers.needs import needing
-from hypothesis import given, settings
+from helpers.strategies import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
@@ -171,7 +172,7 @@ ALL = rollouts(GVC, 'gvc', MANY)
 
 
 @needing('numba', JITTED)
-@settings(max_examples=25)
+@examples(8)
 @given(st.lists(st.integers(0, 36), min_size=1, max_size=40), st.integers(1, 3))
 def test_no_rollout_depends_on_those_beside_it(rows, threads):
     """Bit for bit, whatever their number, order and lane, and the number of threads."""

@@ -15,8 +15,8 @@ from helpers.closed_loops import (
     pair,
     wave,
 )
-from helpers.strategies import QUICK, vectors, vehicles
-from hypothesis import given, settings
+from helpers.strategies import examples, vectors, vehicles
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
@@ -89,7 +89,7 @@ FAILING = [
     {'kind': 'thruster', 'thruster': 'T2', 'efficiency': 0.4, 'from': 0.4, 'to': 1.2},
     {'kind': 'thruster', 'thruster': 'T6', 'stuck': 9.0, 'from': 0.8},
 ]
-DURATIONS = [8.0, pytest.param(30.0, marks=pytest.mark.long)]  # s
+DURATIONS = [4.0, pytest.param(30.0, marks=pytest.mark.long)]  # s
 BASE = {'setpoint': SIX, 'initial': TURNED, 'duration': 2.0}
 
 
@@ -173,7 +173,7 @@ def test_long_runs_of_the_papers_cases(case, law, hold, duration):
     compare(*pair(law, hold, file_of('herman2018'), base=case, duration=duration))
 
 
-@settings(QUICK, max_examples=8)
+@examples(4)
 @given(
     vehicle=vehicles(heavy_water=False),
     errors=st.fixed_dictionaries(

@@ -1,6 +1,6 @@
 """What a recording contradicts itself in: axes, rates, delays, a wrench that is not there."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ SMOOTH = 0.3  # s over which rates are fitted that are held against each other i
 SMOOTHER = 0.6, 1.0  # s, the same of a wrench: noise that the controller answers brings it forward
 TOLD = 0.9  # of the acceleration that nothing else explains: what a wrench must explain of it
 FARTHEST, FINE = 1.0, 0.01  # s: delays that are tried, and between them
+COARSE = 5  # times as far apart at first: what is compared is smooth over many times that
 MOST = 8000  # samples that are looked at
 PARTS = 20  # of the samples, by whose scatter the error of a delay is known
 CLEAR = 3.0  # standard errors: a delay that is no chance
@@ -216,14 +217,14 @@ def behind(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Delay | Non
     whole = cumulative_trapezoid(velocity, t, axis=0, initial=0.0)
     early, late = (rates(t, signal, t, _count(t, SMOOTH)).rate for signal in (path, whole))
     inside = (t > t[0] + FARTHEST) & (t < t[-1] - FARTHEST)
-    tried = np.arange(-FARTHEST, FARTHEST + FINE / 2, FINE)
     if inside.sum() < PARTS:
         return None
-    left = np.empty((PARTS, len(tried)))
-    for k, delay in enumerate(tried):
+
+    def left(delay: float) -> np.ndarray:
         moved = np.stack([np.interp(t[inside] + delay, t, column) for column in late.T], axis=1)
-        left[:, k] = _sums(((early[inside] - moved) ** 2).sum(axis=1))
-    return _clear(_least(tried, left))
+        return _sums(((early[inside] - moved) ** 2).sum(axis=1))
+
+    return _clear(_least(-FARTHEST, left)[0])
 
 
 def acts_behind(pose: Track, twist: Track, wrench: Track) -> Delay | None:
@@ -269,15 +270,14 @@ def _acts_behind(
         return values - Q @ (Q.T @ values)
 
     y = rest(nu_dot[inside] / np.where(scale > 0, scale, 1.0))
-    tried = np.arange(-FARTHEST / 2, FARTHEST + FINE / 2, FINE)
-    left = np.empty((PARTS, len(tried)))
-    for k, delay in enumerate(tried):
+
+    def left(delay: float) -> np.ndarray:
         X = rest(np.stack([np.interp(t[inside] - delay, t, column) for column in tau.T], axis=1))
         X = X / np.maximum(np.abs(X).max(axis=0), TINY)
-        left[:, k] = _sums(((y - X @ np.linalg.lstsq(X, y, rcond=None)[0]) ** 2).sum(axis=1))
-    if left.sum(axis=0).min() > (1.0 - TOLD) * (y**2).sum():
-        return None
-    return _least(tried, left)
+        return _sums(((y - X @ np.linalg.lstsq(X, y, rcond=None)[0]) ** 2).sum(axis=1))
+
+    found, least = _least(-FARTHEST / 2, left)
+    return None if least > (1.0 - TOLD) * (y**2).sum() else found
 
 
 def _count(t: np.ndarray, seconds: float) -> int:
@@ -289,28 +289,36 @@ def _sums(squares: np.ndarray) -> np.ndarray:
     return np.array([part.sum() for part in np.array_split(squares, PARTS)])
 
 
-def _least(tried: np.ndarray, left: np.ndarray) -> Delay | None:
-    """The delay that leaves least; None at the edge of those that are tried.
+def _least(first: float, left: Callable[[float], np.ndarray]) -> tuple[Delay | None, float]:
+    """The delay that leaves least, and how much; None at the edge of those that are tried.
 
     Its error is that of an M-estimate, by the scatter of the parts' derivatives.
 
     Parameters
     ----------
-    tried : (m,) delays, s, equally far apart
-    left : (PARTS, m) what each leaves in each part
+    first : the earliest delay, s; `FARTHEST` is the latest
+    left : what a delay leaves (PARTS,) in each part of the time
 
     """
-    total = left.sum(axis=0)
-    k = int(np.argmin(total))
-    if not 0 < k < len(tried) - 1:
-        return None
-    low, middle, high = total[k - 1 : k + 2]
+    found: dict[int, np.ndarray] = {}
+
+    def total(k: int) -> float:
+        if k not in found:
+            found[k] = left(first + k * FINE)
+        return float(found[k].sum())
+
+    last = round((FARTHEST - first) / FINE)
+    near = min(range(0, last + 1, COARSE), key=total)
+    k = min(range(max(near - COARSE, 0), min(near + COARSE, last) + 1), key=total)
+    if not 0 < k < last:
+        return None, total(k)
+    low, middle, high = (total(j) for j in (k - 1, k, k + 1))
     curvature = (low - 2.0 * middle + high) / FINE**2
-    value = float(tried[k] + 0.5 * FINE * (low - high) / max(low - 2.0 * middle + high, TINY))
-    slopes = (left[:, k + 1] - left[:, k - 1]) / (2.0 * FINE)
+    beside = 0.5 * FINE * (low - high) / max(low - 2.0 * middle + high, TINY)
+    slopes = (found[k + 1] - found[k - 1]) / (2.0 * FINE)
     slopes = slopes - slopes.mean()
     error = float(np.sqrt((slopes**2).sum()) / max(curvature, TINY))
-    return Delay(value, error)
+    return Delay(first + k * FINE + beside, error), middle
 
 
 def _clear(delay: Delay | None) -> Delay | None:

@@ -28,15 +28,24 @@ def auv(capsys, *arguments: object) -> tuple[int, str]:
     return code, capsys.readouterr().err
 
 
-@pytest.fixture(scope='module')
-def bag(tmp_path_factory):
+def recording(folder, duration):
     """A trial as our nodes would record it: odometry with noise, commanded wrench."""
-    folder = tmp_path_factory.mktemp('trial')
-    record, run = sea_trials.trial(folder, 'herman2018', 5, duration=60.0)
+    record, run = sea_trials.trial(folder, 'herman2018', 5, duration=duration)
     part = motion(run, enu=False)
     noisy = part._replace(attitude=record.attitude[:, [1, 2, 3, 0]], twist=record.velocity)
     frames = 'odom_ned', 'base_link_fsd'
     return write(folder / 'bag', simple(noisy, Maker(), '/odom', '/wrench', frames), Maker())
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    return recording(tmp_path_factory.mktemp('trial'), 60.0)
+
+
+@pytest.fixture(scope='module')
+def short(tmp_path_factory):
+    """What is refused before anything is identified, whatever its length."""
+    return recording(tmp_path_factory.mktemp('short'), 6.0)
 
 
 @pytest.fixture(scope='module')
@@ -80,6 +89,7 @@ def test_a_bag_becomes_a_vehicle_file(identified):
     assert 'residuals are white' in document['residuals']
 
 
+@pytest.mark.usefixtures('unrendered')
 def test_intervals_on_request_stand_beside_the_others(bag, tmp_path):
     out = tmp_path / 'asked'
     fewer = ('--fixed', 'M', '--fixed', 'D_quadratic')
@@ -144,18 +154,18 @@ def test_a_vehicle_that_no_command_takes_gives_no_file(tmp_path):
         (('--odom', '/odom', '--wrench', '/wrench', '--applied'), 'options: wrench_applied'),
     ],
 )
-def test_refusals(bag, extra, said, tmp_path, capsys):
-    given = ('identify', bag, '--vehicle', 'herman2018', '--out', tmp_path / 'x')
+def test_refusals(short, extra, said, tmp_path, capsys):
+    given = ('identify', short, '--vehicle', 'herman2018', '--out', tmp_path / 'x')
     code, error = auv(capsys, *given, *extra)
     assert code == 2
     assert said in error
     assert not (tmp_path / 'x').exists()
 
 
-def test_a_prior_file_needs_values_and_deviations(bag, tmp_path, capsys):
+def test_a_prior_file_needs_values_and_deviations(short, tmp_path, capsys):
     file = tmp_path / 'prior.yaml'
     file.write_text('M.surge.surge: 300\n', encoding='utf-8')
-    code, said = auv(capsys, 'identify', bag, '--vehicle', 'herman2018', '--prior', file,
+    code, said = auv(capsys, 'identify', short, '--vehicle', 'herman2018', '--prior', file,
                      '--out', tmp_path / 'x')  # fmt: skip
     assert code == 2
     assert 'a mapping with value and a positive deviation' in said
@@ -166,7 +176,7 @@ def test_rotations_alone_tell_the_rotational_block(bag, tmp_path):
     told = {'odometry': '/odom', 'wrench': '/wrench', 'unknown': ['x', 'y', 'z', 'u', 'v', 'w']}
     (tmp_path / 'map.yaml').write_text(yaml.safe_dump(told))
     main(['identify', str(bag), '--map', str(tmp_path / 'map.yaml'), '--vehicle', 'herman2018',
-          '--out', str(tmp_path / 'out')])  # fmt: skip
+          '--out', str(tmp_path / 'out'), '--no-report'])  # fmt: skip
     rows = parquet.read_table(tmp_path / 'out' / 'coefficients.parquet').to_pylist()
     found = {row['name']: row for row in rows if row['name'].startswith('M.')}
     truth = load_vehicle('herman2018')
@@ -191,10 +201,10 @@ def test_rotations_alone_tell_the_rotational_block(bag, tmp_path):
     ({'wrench': {'topic': '/wrench', 'fields': {'X': 'wrench.force.x'}}}, 'all six components'),
 ])  # fmt: skip
 def test_without_wrench_or_attitude_nothing_is_identified(
-    command, told, line, bag, tmp_path, capsys
+    command, told, line, short, tmp_path, capsys
 ):
     (tmp_path / 'map.yaml').write_text(yaml.safe_dump({'odometry': '/odom', **told}))
-    code, said = auv(capsys, command, bag, '--map', tmp_path / 'map.yaml', '--vehicle',
+    code, said = auv(capsys, command, short, '--map', tmp_path / 'map.yaml', '--vehicle',
                      'herman2018', '--out', tmp_path / 'out')  # fmt: skip
     assert code == 2
     assert line in said

@@ -3,7 +3,7 @@
 import copy
 import json
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -50,15 +50,14 @@ def scenario_of(step=STEP, vehicle='case1_bluerov2_heavy', **changes):
 
 
 def grown(setting, gain=(1,) * 6, later=(0,) * 6, fine=2):
-    """Largest modulus of the closed loop's multipliers over a period, from smaller steps.
+    """Largest modulus of the closed loop's multipliers over a period, from parts of it.
 
-    The wrench of each axis, `gain` times the law's, is looked up in a list of past ones at every
-    `fine`-th of a period; delays are whole multiples of that, `later` on top for each axis.
+    The wrench of each axis, `gain` times the law's, is looked up in a list of past ones for every
+    part; delays are whole multiples of the `fine`-th of a period, `later` on top for each axis.
     """
     loop, h = setting.loop(), setting.plant.period
     n = len(setting.plant.A)
     system = setting.plant.A, setting.plant.B, np.eye(n), np.zeros((n, 6))
-    A, B, *_ = scipy.signal.cont2discrete(system, h / fine, 'zoh')
     ticks = round(setting.delay / h * fine) + np.array(later)
     assert ticks[0] - later[0] == pytest.approx(setting.delay / h * fine, abs=1e-6)
     law, m = loop.law, len(loop.law.rate_by_x)
@@ -68,9 +67,11 @@ def grown(setting, gain=(1,) * 6, later=(0,) * 6, fine=2):
     u = np.array(gain)[:, None] * (law.by_x @ x[:8] + law.by_state @ s)
     wrenches = [u, *before]  # the newest first
     after = x
-    for tick in range(fine):
+    changes = sorted({0, *(ticks % fine).tolist()})  # where a newer wrench begins to act
+    for tick, end in pairwise([*changes, fine]):
         ago = -((tick - ticks) // fine)
         held = np.stack([wrenches[k][i] for i, k in enumerate(ago)])
+        A, B, *_ = scipy.signal.cont2discrete(system, (end - tick) * h / fine, 'zoh')
         after = A @ after + B @ held
     s = s + h * (law.rate_by_x @ x[:8] + law.rate_by_state @ s)
     return np.abs(np.linalg.eigvals(np.concatenate([after, s, *wrenches[:past]]))).max()

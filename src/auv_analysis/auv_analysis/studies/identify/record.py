@@ -160,8 +160,9 @@ def smoothed(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 def small_rotation(q: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Rotation (..., 3) in rad that leads from attitudes q (..., 4) to nearby p, body axes."""
-    w, x, y, z = np.moveaxis(q, -1, 0)
-    a, b, c, d = np.moveaxis(p, -1, 0)
+    # component by component, each in one piece: half the time of strided ones
+    w, x, y, z = np.ascontiguousarray(np.moveaxis(q, -1, 0))
+    a, b, c, d = np.ascontiguousarray(np.moveaxis(p, -1, 0))
     sign = 2.0 * np.sign(w * a + x * b + y * c + z * d)
     turned = (
         w * b - x * a - y * d + z * c,

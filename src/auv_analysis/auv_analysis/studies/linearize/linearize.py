@@ -1,7 +1,8 @@
 """Linear models of a vehicle and of its closed loop: A, B, C, D of python-control and SciPy."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -234,25 +235,24 @@ class LawAt:
     """
 
     def __init__(self, gains: Any, model: ControlModel, psi: float):
-        self._gains, self._model, self._psi = gains, model, psi
+        self._gains, self._model = gains, model
+        # most of what is asked about an attitude leaves it as it is
+        self._attitude = lru_cache(maxsize=8)(
+            lambda phi, theta: tuple(quaternion(np.array([phi, theta, psi])).tolist())
+        )
         self._guard = anti_windup(gains, None)
         self._sample = compiled_sample if is_compiled(gains) else fill_sample
         self.states = type(gains).STATES
 
     def answer(self, y: np.ndarray) -> np.ndarray:
         """(6 + m,): tau in N and N m, then the rates of the law's m states, at t = 0."""
-        m = self.states
-        nu, state, nu_d, nu_d_dot = np.split(y[2:], [6, 6 + m, 12 + m])
-        attitude = quaternion(np.array([y[0], y[1], self._psi]))
-        return self._tau_and_rate((nu, attitude, nu_d, nu_d_dot), state.copy())
-
-    def _tau_and_rate(self, given: Iterable[Iterable[float]], state: np.ndarray) -> np.ndarray:
+        m, (phi, theta, *rest) = self.states, y.tolist()
+        nu, nu_d, nu_d_dot = (tuple(rest[k : k + 6]) for k in (0, 6 + m, 12 + m))
         # a sample after no time at all: nothing is integrated
-        nu, attitude, nu_d, nu_d_dot = (tuple(map(float, part)) for part in given)
-        rate = np.zeros(self.states)
+        state, rate = y[8 : 8 + m].copy(), np.zeros(m)
         with user_law(self._gains):
             tau, _ = self._sample(
-                0.0, 0.0, nu, attitude, nu_d, nu_d_dot, state, rate,
+                0.0, 0.0, nu, self._attitude(phi, theta), nu_d, nu_d_dot, state, rate,
                 self._gains, self._model, self._guard,
             )  # fmt: skip
         answer = np.concatenate([tau, rate])

@@ -66,20 +66,18 @@ def pytest_collection() -> Iterator[None]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    folders = [*FIRST, '']
-
-    def place(item: pytest.Item) -> int:
-        folder = Path(item.path).parent.name
-        return folders.index(folder if folder in FIRST else '')
-
+    files, above = {item.path for item in items}, len(HERE.parts)
+    rooms = {path: path.parts[above] if len(path.parts) > above else '' for path in files}
     if ORDER is None:
-        items.sort(key=place)
+        last = len(FIRST)
+        places = {room: FIRST.index(room) if room in FIRST else last for room in rooms.values()}
+        items.sort(key=lambda item: places[rooms[item.path]])
     else:
         items[:] = drawn(items, random.Random(ORDER))
     for item in items:
         limit = LONG_LIMIT if item.get_closest_marker('long') else LIMIT
         item.add_marker(pytest.mark.timeout(patience(limit)))
-        if TIMED.intersection(Path(item.path).parts[len(HERE.parts) :]):
+        if rooms[item.path] in TIMED:
             item.add_marker(AGAIN)
 
 

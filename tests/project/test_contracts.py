@@ -81,13 +81,6 @@ def test_a_node_loads_numba_for_a_kernel_alone_and_nothing_that_only_commands_ne
     assert not loaded(module) & SLOW
 
 
-def test_layers_never_import_upward() -> None:
-    for path in SOURCES:
-        package = path.relative_to(ROOT / 'src').parts[0]
-        above = ORDER[ORDER.index(package) + 1 :]
-        assert not [m for m in imported(path) if m.split('.')[0] in above], path
-
-
 def test_topic_names_stand_in_one_module() -> None:
     # twist, wrench, disturbance and disturbance_estimate are words of other things as well
     names = [n for n in interface.STEP_TOPICS if '_' in n and n != 'disturbance_estimate']

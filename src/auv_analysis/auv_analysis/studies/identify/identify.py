@@ -367,9 +367,8 @@ def _with_best_delay(
     """
     names = u.names
 
-    def attempt(steps: int, theta: np.ndarray, z: np.ndarray | None = None) -> Fit:
-        delayed = u.with_delay(steps * problem.step)
-        return problem.fit(delayed, theta, z, most=25, tolerance=1e-5)
+    def attempt(steps: int, theta: np.ndarray) -> Fit:
+        return problem.fit(u.with_delay(steps * problem.step), theta, most=25, tolerance=1e-5)
 
     def with_lag(theta: np.ndarray, lag: float) -> np.ndarray:
         theta = theta.copy()
@@ -389,7 +388,7 @@ def _with_best_delay(
         j = k
         while j + way >= 0 and j + way not in tried:
             lag = float(u.coefficients(tried[j].theta).lag) - way * problem.step
-            tried[j + way] = attempt(j + way, with_lag(tried[j].theta, lag), tried[j].starts)
+            tried[j + way] = attempt(j + way, with_lag(tried[j].theta, lag))
             if tried[j + way].cost > tried[j].cost + nearby:
                 break
             j += way

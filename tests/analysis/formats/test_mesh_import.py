@@ -19,7 +19,6 @@ pytestmark = needing('capytaine', find_spec('capytaine'))
 
 RHO = 1000.0
 ERROR = 0.02  # of the inertia of hull and water, which the refinement ends at
-ROUGH = '--panels', '800', '--tolerance', '0.2'  # where the number itself is not in question
 
 
 @pytest.fixture
@@ -69,7 +68,7 @@ def assert_within(M_A, exact, hull, error):
 
 def test_sphere_has_half_of_the_displaced_mass(imported):
     hull = sphere()
-    vehicle, document = imported(hull, '--tolerance', '0.05')
+    vehicle, document = imported(hull)
     assert document['format'] == 'mesh'
     assert_within(vehicle.M_A, RHO * hull.volume / 2 * np.diag([1, 1, 1, 0, 0, 0]), hull, ERROR)
     assert vehicle.buoyancy == pytest.approx(RHO * 9.81 * 4 / 3 * np.pi)
@@ -141,7 +140,7 @@ def test_two_spheres_move_the_water_together(imported):
     centres, radius = np.array([[0.0, -1.5, 0.4], [0.0, 1.5, 0.4]]), 1.0
     exact = sources_added_mass(centres, radius)
     hull = trimesh.util.concatenate([sphere(3, radius, at) for at in centres])
-    vehicle, document = imported(hull, '--panels', '2000', '--tolerance', '0.1')
+    vehicle, document = imported(hull)
     centred = np.eye(6)
     centred[:3, 3:] = skew(vehicle.r_B)
     assert_within(centred.T @ vehicle.M_A @ centred, centred.T @ exact @ centred, hull, ERROR)
@@ -159,14 +158,15 @@ def wedge():
 
 def test_axes_units_and_origin_turn_and_shift_the_same_hull(imported):
     hull = wedge()
-    vehicle, _ = imported(hull, *ROUGH)
-    turned, _ = imported(hull, *ROUGH, axes='flu')
+    rough = '--tolerance', '0.2'
+    vehicle, _ = imported(hull, *rough)
+    turned, _ = imported(hull, *rough, axes='flu')
     T = np.diag([1.0, -1, -1, 1, -1, -1])
     assert_allclose(turned.M_A, T @ vehicle.M_A @ T, rtol=1e-6, atol=1e-3)
     assert_allclose(turned.r_B, vehicle.r_B * [1, -1, -1])
     origin = np.array([0.5, -0.25, 1.0])
     moved, _ = imported(
-        hull.copy().apply_scale(1000), *ROUGH, '--origin', '500', '-250', '1000', units='mm',
+        hull.copy().apply_scale(1000), *rough, '--origin', '500', '-250', '1000', units='mm',
         mass=RHO * hull.volume,
     )  # fmt: skip
     assert_allclose(moved.r_B, vehicle.r_B - origin, atol=1e-6)
@@ -180,14 +180,14 @@ def test_axes_units_and_origin_turn_and_shift_the_same_hull(imported):
 
 def test_a_box_keeps_its_symmetry_and_comes_out_of_a_mesh_with_faults(imported):
     hull = trimesh.creation.box((2, 1, 0.5))
-    vehicle, _ = imported(hull, *ROUGH)
+    vehicle, _ = imported(hull)
     assert_array_equal(vehicle.M_A, np.diag(np.diagonal(vehicle.M_A)))
     inner = trimesh.creation.box((1, 0.5, 0.25))
     broken = trimesh.util.concatenate([hull, inner])
     keep = np.arange(len(broken.faces)) != 3
     broken.update_faces(keep)
     broken.invert()
-    again, document = imported(broken, *ROUGH, name='hull.obj', mass=RHO)
+    again, document = imported(broken, name='hull.obj', mass=RHO)
     assert_allclose(again.M_A, vehicle.M_A, rtol=0.02, atol=2.0)
     said = ' '.join(document['traps'])
     for words in ('1 triangles added', 'normals turned outwards in 2 of 2', 'is not wetted'):
@@ -198,7 +198,7 @@ def test_a_box_keeps_its_symmetry_and_comes_out_of_a_mesh_with_faults(imported):
 def test_what_the_user_gives_takes_the_place_of_the_uniform_hull(imported):
     hull = trimesh.creation.box((2, 1, 0.5))
     inertia = ['--inertia', '110', '300', '400', '0', '5', '0', '--products', 'integral']
-    vehicle, document = imported(hull, *ROUGH, '--cog', '0', '0', '0.05', *inertia)
+    vehicle, document = imported(hull, '--cog', '0', '0', '0.05', *inertia)
     assert_array_equal(vehicle.r_G, [0, 0, 0.05])
     body = document['vehicle']['rigid_body']
     assert body['inertia'] == [[110, 0, -5], [0, 300, 0], [-5, 0, 400]]
@@ -206,7 +206,7 @@ def test_what_the_user_gives_takes_the_place_of_the_uniform_hull(imported):
 
 
 def test_the_vehicle_is_taken_by_other_commands(imported, tmp_path, capsys):
-    imported(trimesh.creation.box((2, 1, 0.5)), *ROUGH, '--cog', '0', '0', '0.05')
+    imported(trimesh.creation.box((2, 1, 0.5)), '--cog', '0', '0', '0.05')
     main(['check-vehicle', 'a.yaml', '--json'])
     json.loads(capsys.readouterr().out)
     main(['new', 'scenario', 'mine', '--vehicle', 'a.yaml'])

@@ -61,7 +61,7 @@ def _add_mesh(command: argparse.ArgumentParser, point: tuple[str, ...]) -> None:
     text = 'relative error of the added mass that ends the refinement; default: 0.02'
     mesh.add_argument('--tolerance', type=number(above=0, below=1), metavar='VALUE', help=text)
     text = 'at most so many (48 bytes for each pair of them); default: 5500'
-    mesh.add_argument('--panels', type=whole(700, 30000), metavar='COUNT', help=text)
+    mesh.add_argument('--panels', type=whole(2000, 30000), metavar='COUNT', help=text)
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:

@@ -58,8 +58,10 @@ class FileExtent:
 
     def span(self, first: int, last: int) -> None:
         """Note that there are messages logged from `first` to `last`, ns."""
-        self.first = first if self.first is None else min(self.first, first)
-        self.last = last if self.last is None else max(self.last, last)
+        if self.first is None or first < self.first:
+            self.first = first
+        if self.last is None or last > self.last:
+            self.last = last
 
 
 @dataclass

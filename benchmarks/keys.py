@@ -123,8 +123,8 @@ KEYS = (
     Key(
         'composed_vs_pingpong', 'all nodes in one process, every topic recorded: steps',
         'round trips of bare rclpy', 'gain', 0.5, 1.7,
-        'one thread takes and publishes every message by itself, two thirds of the time within '
-        'rclpy and the recording; the ping-pong is spread over two cores.',
+        'one thread takes, publishes and records every message by itself, which is half of its '
+        'time; the ping-pong is spread over two cores.',
     ),
     Key(
         'composed_plain_vs_pingpong', "the same, rclpy's `SingleThreadedExecutor` serves it all",

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from auv_analysis.metrics.measures import BY_NAME
 from auv_analysis.simulation.reduction import COLUMNS
 from auv_analysis.studies.sweep.analysis import Analysis, analysed
-from auv_analysis.studies.sweep.dataset import open_sweep, short_names
+from auv_analysis.studies.sweep.dataset import numbers_of, open_sweep, short_names
 from auv_analysis.studies.sweep.plots import draw, main_measures
 
 Drawn = tuple[Analysis, dict[str, Figure], dict[str, str]]
@@ -66,7 +66,8 @@ def test_distributions_are_those_of_the_rows(simple: Drawn) -> None:
         assert list(shown) == ['gvc', 'cl']
         for name, ((x, share),) in shown.items():
             mine = analysis.sweep.table(['controller'])['controller'].to_numpy() == name
-            values = analysis.sweep.measure(measure)[mine]
+            table = analysis.sweep.table(list(measure.columns))
+            values = measure.of(lambda name, table=table: numbers_of(table, name))[mine]
             late = np.where(np.isnan(values), np.inf, values)
             assert share == pytest.approx([np.mean(late <= at) for at in x], abs=1.5 / len(late))
             assert x[-1] == pytest.approx(np.nanmax(values))

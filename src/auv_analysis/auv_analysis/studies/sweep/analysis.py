@@ -11,7 +11,14 @@ from auv_analysis.output.progress import each
 from auv_analysis.output.text import join
 from auv_analysis.report.results import Results
 from auv_analysis.studies.pairs import log_ratios, paired
-from auv_analysis.studies.sweep.dataset import STATUSES, Factor, Sweep, by_group, factors_of
+from auv_analysis.studies.sweep.dataset import (
+    STATUSES,
+    Factor,
+    Sweep,
+    by_group,
+    factors_of,
+    numbers_of,
+)  # fmt: skip
 from auv_analysis.studies.sweep.indices import designed, failing, indices, omitted
 from auv_analysis.studies.sweep.variation import kind_of
 from auv_dynamics.vehicle import DOFS
@@ -77,14 +84,16 @@ def _spread(ascending: np.ndarray, rows: int) -> Row:
     return row | {'mean': finite(known.mean()) if len(known) else None}
 
 
-def figures_spread(sweep: Sweep) -> Iterator[Row]:
+def figures_spread(analysis: 'Analysis') -> Iterator[Row]:
     """Rows of `quantiles.parquet`: controller, figure, its unit and meaning, its quantiles."""
+    known = analysis.spreads
     for measure in MEASURES:
-        yield from _of_column(sweep, measure.name, sweep.measure(measure))
+        yield from known[measure.name]
     for family in FAMILIES:
-        table = sweep.table([f'{family}.{dof}' for dof in DOFS])
-        for name in table.column_names:
-            yield from _of_column(sweep, name, table[name].to_numpy().astype(float))
+        names = [f'{family}.{dof}' for dof in DOFS]
+        table = analysis.sweep.table([name for name in names if name not in known])
+        for name in names:
+            yield from known.get(name) or _of_column(analysis.sweep, name, numbers_of(table, name))
 
 
 def _of_column(sweep: Sweep, name: str, values: np.ndarray) -> Iterator[Row]:
@@ -342,6 +351,7 @@ class Analysis:
     values : measure -> (n,) of all rows
     pair : the two paths that matter most; none where there are fewer
     notes : what is worth saying, one line each
+    spreads : figure -> its rows of the table `quantiles`
 
     """
 
@@ -353,6 +363,7 @@ class Analysis:
     values: dict[str, np.ndarray] = field(default_factory=dict)
     pair: list[Factor] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    spreads: dict[str, list[Row]] = field(default_factory=dict)
     _rows: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
     _ranks: dict[tuple[str, str], np.ndarray] = field(default_factory=dict, repr=False)
 
@@ -425,7 +436,7 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
     _pairs(analysis)
     _failures(analysis)
     analysis.tables['best'] = best(sweep, analysis.values, BY_NAME[by])
-    analysis.tables['quantiles'] = list(figures_spread(sweep))
+    analysis.tables['quantiles'] = list(figures_spread(analysis))
     return analysis
 
 
@@ -439,7 +450,11 @@ def _tied(sweep: Sweep) -> Iterator[str]:
 
 def _one_measure(analysis: Analysis, measure: Measure, groups: Sequence[Any]) -> None:
     sweep, tables = analysis.sweep, analysis.tables
-    values = analysis.values[measure.name] = sweep.measure(measure)
+    table = sweep.table(list(measure.columns))
+    values = analysis.values[measure.name] = measure.of(lambda name: numbers_of(table, name))
+    for name in measure.columns:  # while they are at hand
+        analysis.spreads[name] = list(_of_column(sweep, name, numbers_of(table, name)))
+    analysis.spreads[measure.name] = list(_of_column(sweep, measure.name, values))
     ok = [analysis.rows_of(name) for name in sweep.controllers]
     if not varying([values[rows] for rows in ok], measure.unit):
         known = values[np.isfinite(values) & (sweep.status == 0)]

@@ -12,7 +12,6 @@ import numpy as np
 import pyarrow.compute as pc
 from pyarrow import parquet
 
-from auv_analysis.metrics.measures import Measure
 from auv_analysis.output.arrow import pa
 from auv_analysis.output.folder import PART, ROLLOUTS, SWEEP
 from auv_analysis.output.text import plain
@@ -112,15 +111,6 @@ class Sweep:
             found.append(Pair(a, b, first[both[1]], second[both[2]]))
         return found
 
-    def numbers(self, column: str) -> np.ndarray:
-        """Column of numbers (n,), NaN where there is none."""
-        return self.table([column])[column].to_numpy().astype(float)
-
-    def measure(self, measure: Measure) -> np.ndarray:
-        """Values (n,) of a measure, NaN where there is none."""
-        table = self.table(list(measure.columns))
-        return measure.of(lambda name: table[name].to_numpy().astype(float))
-
     @cached_property
     def _dataset(self) -> 'ds.Dataset':
         """The parts as one; kept, so that what they say of themselves is read once."""
@@ -144,6 +134,11 @@ class Sweep:
             if path in spec[kind]:
                 return kind, spec[kind][path]
         raise KeyError(path)
+
+
+def numbers_of(table: pa.Table, column: str) -> np.ndarray:
+    """Column of numbers (n,) of some rows, NaN where there is none."""
+    return table[column].to_numpy().astype(float, copy=False)
 
 
 def open_sweep(folder: Path) -> Sweep:

@@ -144,9 +144,9 @@ def freeze(driver: Driver) -> None:
 
 def silent_ahead(driver: Driver) -> None:
     """Set-points of far more than the timeout at once, and no more."""
-    now = time.time_ns()
-    for k in range(round(600 * TIMEOUT)):
-        ahead = convert.twist(now + k * 10_000_000, (0.5, 0, 0, 0, 0, 0), FRAMES)
+    now, apart = time.time_ns(), round(TIMEOUT / 15 * 10**9)
+    for k in range(200):
+        ahead = convert.twist(now + k * apart, (0.5, 0, 0, 0, 0, 0), FRAMES)
         driver.peer.publish(topics.CMD_VEL, ahead)
     driver.setpoints = False
 

@@ -68,7 +68,7 @@ def assert_within(M_A, exact, hull, error):
 
 def test_sphere_has_half_of_the_displaced_mass(imported):
     hull = sphere()
-    vehicle, document = imported(hull)
+    vehicle, document = imported(hull, '--tolerance', '0.05')
     assert document['format'] == 'mesh'
     assert_within(vehicle.M_A, RHO * hull.volume / 2 * np.diag([1, 1, 1, 0, 0, 0]), hull, ERROR)
     assert vehicle.buoyancy == pytest.approx(RHO * 9.81 * 4 / 3 * np.pi)
@@ -140,7 +140,7 @@ def test_two_spheres_move_the_water_together(imported):
     centres, radius = np.array([[0.0, -1.5, 0.4], [0.0, 1.5, 0.4]]), 1.0
     exact = sources_added_mass(centres, radius)
     hull = trimesh.util.concatenate([sphere(3, radius, at) for at in centres])
-    vehicle, document = imported(hull)
+    vehicle, document = imported(hull, '--panels', '2000', '--tolerance', '0.1')
     centred = np.eye(6)
     centred[:3, 3:] = skew(vehicle.r_B)
     assert_within(centred.T @ vehicle.M_A @ centred, centred.T @ exact @ centred, hull, ERROR)

@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from typing import TypeVar
 
-from auv_analysis.output.progress import each
-
 T = TypeVar('T')
 MOST = 256  # tasks whose numbers fit into a byte each
 PATIENCE = 10.0  # s that the copy may take longer than five times the share of this process
@@ -35,6 +33,8 @@ def results(tasks: Sequence[Callable[[], T]]) -> Iterator[T]:
     Each process takes the next task that nobody has taken. What the copy does not give, for
     whatever reason, is done here, so that an error is raised where it would be without it.
     """
+    from auv_analysis.output.progress import each  # with rich, without which `auv doctor` starts
+
     if not (_beside.get() and 1 < len(tasks) <= MOST and len(os.sched_getaffinity(0)) > 1):
         yield from (task() for task in each(tasks, len(tasks)))
         return

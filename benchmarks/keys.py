@@ -156,6 +156,13 @@ KEYS = (
         'info_one_hour_rss_mb', 'memory of `auv info` on a bag of one hour',
         'one of six minutes', 'memory', 120.0, 1.0,
     ),
+    Key(
+        'case1_again_s', '`auv run case1`, both laws on five nodes each, with report', '',
+        'cost', 15.0, 10.0,
+    ),
+    Key('study_s', '`auv study case1`', '', 'cost', 10.0, 8.0),
+    Key('simulate_s', '`auv simulate case1 --no-report`', '', 'cost', 1.5, 1.0),
+    Key('node_ready_cpu_s', 'CPU time until a controller node tracks', '', 'cost', 1.5, 1.0),
     Key('help_vs_python', '`auv --help`', '`python -c pass`', 'cost', 4.0, 2.0),
 )  # fmt: skip
 BY_NAME = {key.name: key for key in KEYS}
@@ -182,5 +189,7 @@ GROUPS = {
     ),
     'bench_analysis:against_numpy': ('analysis_vs_numpy',),
     'bench_analysis:one_hour': ('analysis_one_hour_rss_mb', 'info_one_hour_rss_mb'),
+    'bench_commands:again': ('case1_again_s', 'study_s', 'simulate_s'),
+    'bench_commands:node_ready': ('node_ready_cpu_s',),
     'bench_commands:command_line': ('help_vs_python',),
 }

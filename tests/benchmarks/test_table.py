@@ -109,13 +109,13 @@ def test_verdict(name, ratio, verdict):
 
 @pytest.mark.parametrize(
     ('value', 'ratio', 'verdict'),
-    [(399.0, 1.05, 'aim reached'), (399.0, 2.0, 'met'), (401.0, 1.0, 'MISSED')],
+    [(249.0, 1.05, 'aim reached'), (249.0, 2.0, 'met'), (251.0, 1.0, 'MISSED')],
 )
 def test_memory_is_judged_by_its_size_and_its_aim_by_its_growth(value, ratio, verdict):
     key = keys.BY_NAME['analysis_one_hour_rss_mb']
     result = Measured(value, 'MB', ratio, value / ratio, 7)
     assert (key.number(result), key.verdict(result)) == (value, verdict)
-    assert (key.bound(key.must), key.bound(key.aim)) == ('≤ 400', 'flat')
+    assert (key.bound(key.must), key.bound(key.aim)) == ('≤ 250', 'flat')
 
 
 def test_what_is_there_for_information_is_not_judged():

@@ -10,16 +10,9 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import f_oneway, spearmanr
 
 from auv_analysis.report.plots import distribution, new_figure
-from auv_analysis.studies.sweep.analysis import (
-    Analysis,
-    analysed,
-    explained,
-    ordered,
-    quantiles,
-    spread,
-    thinned,
-)
+from auv_analysis.studies.sweep.analysis import Analysis, analysed, explained
 from auv_analysis.studies.sweep.dataset import by_group
+from auv_analysis.studies.sweep.quantiles import ordered, quantiles, spread, thinned
 
 
 def test_figures_that_never_differ_are_named_not_analysed(results: Analysis) -> None:

@@ -1,6 +1,6 @@
 """All that is computed of a sweep: quantiles, what matters, pairs, the best rows, as results."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -20,68 +20,21 @@ from auv_analysis.studies.sweep.dataset import (
     numbers_of,
 )  # fmt: skip
 from auv_analysis.studies.sweep.indices import designed, failing, indices, omitted
+from auv_analysis.studies.sweep.quantiles import (
+    Row,
+    finite,
+    ordered,
+    quantiles,
+    spread,
+    spread_of_sorted,
+    varying,
+)  # fmt: skip
 from auv_analysis.studies.sweep.variation import kind_of
 from auv_dynamics.vehicle import DOFS
 
-LEVELS = {'low': 0.05, 'quarter': 0.25, 'median': 0.5, 'three_quarters': 0.75, 'high': 0.95}
-Row = dict[str, Any]
-POINTS = 201  # of a distribution function as it is drawn
 FEWEST = 8  # rows that a correlation is worth computing of
 MOST_CELLS = 10  # groups of a path that a table of two has room for
 COUNT = 10  # best rows of each controller
-
-
-def ordered(values: np.ndarray, unit: str) -> np.ndarray:
-    """The same values; a time that does not exist is later than any other."""
-    return np.where(np.isnan(values), np.inf, values) if unit == 's' else values
-
-
-def quantiles(values: np.ndarray, levels: Iterable[float]) -> np.ndarray:
-    """Quantiles that are values themselves, so that one of them may be infinite; NaN is left out.
-
-    Parameters
-    ----------
-    values : (n,)
-    levels : from 0 to 1
-
-    """
-    return _at(_ascending(values), levels)
-
-
-def _ascending(values: np.ndarray) -> np.ndarray:
-    return np.sort(values[~np.isnan(values)])
-
-
-def _at(ascending: np.ndarray, levels: Iterable[float]) -> np.ndarray:
-    """Quantiles of sorted values: the inverse of their distribution function."""
-    levels, n = np.asarray(list(levels)), len(ascending)
-    if n == 0:
-        return np.full(len(levels), np.nan)
-    return ascending[np.clip(np.ceil(n * levels - 1).astype(int), 0, n - 1)]
-
-
-def finite(value: float) -> float | None:
-    """A number, None where it is not finite."""
-    return float(value) if np.isfinite(value) else None
-
-
-def spread(values: np.ndarray, unit: str) -> Row:
-    """Quantiles of a figure as columns; None: it does not exist there, such as a settling time.
-
-    `known` counts the values that exist; of a time, the quantiles count one that does not as late.
-    """
-    return _spread(_ascending(ordered(values, unit)), len(values))
-
-
-def _spread(ascending: np.ndarray, rows: int) -> Row:
-    """The same of sorted values, of which the last ones may be infinite."""
-    known = ascending[: np.searchsorted(ascending, np.inf)]
-    row: Row = {'rows': rows, 'known': len(known)}
-    row |= {'smallest': finite(known[0]) if len(known) else None}
-    at = _at(ascending, LEVELS.values())
-    row |= {name: finite(value) for name, value in zip(LEVELS, at, strict=True)}
-    row |= {'largest': finite(known[-1]) if len(known) else None}
-    return row | {'mean': finite(known.mean()) if len(known) else None}
 
 
 def figures_spread(analysis: 'Analysis') -> Iterator[Row]:
@@ -102,22 +55,6 @@ def _of_column(sweep: Sweep, name: str, values: np.ndarray) -> Iterator[Row]:
         rows = (sweep.controller == i) & (sweep.status == 0)
         names = {'controller': controller, 'figure': name, 'label': label}
         yield names | {'unit': unit, 'meaning': meaning} | spread(values[rows], unit)
-
-
-def thinned(values: np.ndarray) -> np.ndarray:
-    """Values with the same quantiles, few enough to be drawn; NaN is left out."""
-    known = _ascending(values)
-    return known if len(known) <= POINTS else _at(known, np.linspace(0.0, 1.0, POINTS))
-
-
-def varying(values: Sequence[np.ndarray], unit: str) -> bool:
-    """Whether there is more than one value; of a time, one that does not exist is one as well."""
-    whole = np.concatenate(values)
-    known = whole[np.isfinite(whole)]
-    if len(known) == 0:
-        return False
-    late = unit == 's' and len(known) < len(whole)
-    return late or bool(np.ptp(known) > 1e-12 * np.abs(known).max())
 
 
 class Ordered(NamedTuple):
@@ -209,7 +146,11 @@ def along(figure: Ordered, codes: np.ndarray, factor: Factor, measure: Measure) 
         row: Row = {'path': factor.path, 'figure': measure.name, 'unit': measure.unit}
         row |= {'group': i, 'value': label, 'middle': finite(factor.middles[i])}
         ends = (None, None) if factor.edges is None else map(float, factor.edges[i])
-        yield row | dict(zip(('from', 'to'), ends, strict=True)) | _spread(group, int(rows[i]))
+        yield (
+            row
+            | dict(zip(('from', 'to'), ends, strict=True))
+            | spread_of_sorted(group, int(rows[i]))
+        )
 
 
 def together(

@@ -14,8 +14,9 @@ from auv_analysis.metrics.measures import BY_NAME, Measure
 from auv_analysis.output.text import join, plain, typeset
 from auv_analysis.report import plots
 from auv_analysis.report.plots import COLOURS, GREY, FigureRecord, HeatMap, heat_map, look
-from auv_analysis.studies.sweep.analysis import SAMPLE, Analysis, Row, ordered, thinned
+from auv_analysis.studies.sweep.analysis import SAMPLE, Analysis
 from auv_analysis.studies.sweep.dataset import Factor, cut, short_names, with_unit
+from auv_analysis.studies.sweep.quantiles import Row, ordered, thinned
 
 MOST_PATHS = 6  # whose dependence is drawn
 MOST_GRIDS = 3  # controllers side by side

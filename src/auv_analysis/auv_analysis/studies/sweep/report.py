@@ -12,8 +12,9 @@ from auv_analysis.output.text import join, number
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.results import Column, Table, described, make_table, terminal, view_of_file
-from auv_analysis.studies.sweep.analysis import BEST_BY, Analysis, Row, analysed, results_of
+from auv_analysis.studies.sweep.analysis import BEST_BY, Analysis, analysed, results_of
 from auv_analysis.studies.sweep.dataset import STATUSES, open_sweep, short_names
+from auv_analysis.studies.sweep.quantiles import Row
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.files.nearest import one_of
 

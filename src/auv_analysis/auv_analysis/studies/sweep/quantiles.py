@@ -1,0 +1,80 @@
+"""Quantiles of one column of figures; of times, one that does not exist is the latest."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+LEVELS = {'low': 0.05, 'quarter': 0.25, 'median': 0.5, 'three_quarters': 0.75, 'high': 0.95}
+Row = dict[str, Any]
+POINTS = 201  # of a distribution function as it is drawn
+
+
+def ordered(values: np.ndarray, unit: str) -> np.ndarray:
+    """The same values; a time that does not exist is later than any other."""
+    return np.where(np.isnan(values), np.inf, values) if unit == 's' else values
+
+
+def quantiles(values: np.ndarray, levels: Iterable[float]) -> np.ndarray:
+    """Quantiles that are values themselves, so that one of them may be infinite; NaN is left out.
+
+    Parameters
+    ----------
+    values : (n,)
+    levels : from 0 to 1
+
+    """
+    return at_levels(ascending(values), levels)
+
+
+def ascending(values: np.ndarray) -> np.ndarray:
+    """The values that exist, sorted."""
+    return np.sort(values[~np.isnan(values)])
+
+
+def at_levels(known: np.ndarray, levels: Iterable[float]) -> np.ndarray:
+    """Quantiles of sorted values: the inverse of their distribution function."""
+    levels, n = np.asarray(list(levels)), len(known)
+    if n == 0:
+        return np.full(len(levels), np.nan)
+    return known[np.clip(np.ceil(n * levels - 1).astype(int), 0, n - 1)]
+
+
+def finite(value: float) -> float | None:
+    """A number, None where it is not finite."""
+    return float(value) if np.isfinite(value) else None
+
+
+def spread(values: np.ndarray, unit: str) -> Row:
+    """Quantiles of a figure as columns; None: it does not exist there, such as a settling time.
+
+    `known` counts the values that exist; of a time, the quantiles count one that does not as late.
+    """
+    return spread_of_sorted(ascending(ordered(values, unit)), len(values))
+
+
+def spread_of_sorted(values: np.ndarray, rows: int) -> Row:
+    """The same of sorted values, of which the last ones may be infinite."""
+    known = values[: np.searchsorted(values, np.inf)]
+    row: Row = {'rows': rows, 'known': len(known)}
+    row |= {'smallest': finite(known[0]) if len(known) else None}
+    at = at_levels(values, LEVELS.values())
+    row |= {name: finite(value) for name, value in zip(LEVELS, at, strict=True)}
+    row |= {'largest': finite(known[-1]) if len(known) else None}
+    return row | {'mean': finite(known.mean()) if len(known) else None}
+
+
+def thinned(values: np.ndarray) -> np.ndarray:
+    """Values with the same quantiles, few enough to be drawn; NaN is left out."""
+    known = ascending(values)
+    return known if len(known) <= POINTS else at_levels(known, np.linspace(0.0, 1.0, POINTS))
+
+
+def varying(values: Sequence[np.ndarray], unit: str) -> bool:
+    """Whether there is more than one value; of a time, one that does not exist is one as well."""
+    whole = np.concatenate(values)
+    known = whole[np.isfinite(whole)]
+    if len(known) == 0:
+        return False
+    late = unit == 's' and len(known) < len(whole)
+    return late or bool(np.ptp(known) > 1e-12 * np.abs(known).max())

@@ -36,6 +36,8 @@ LISTED = {
     ('auv_dynamics/ros/topics.py', 'importlib.import_module'),  # installed messages
     ('auv_analysis/cli/main.py', 'importlib.import_module'),  # names of ours, as below
     ('auv_dynamics/files/lazy.py', 'importlib.import_module'),  # likewise
+    ('auv_dynamics/kernel/jit.py', 'importlib.import_module'),  # a module of numba
+    ('auv_analysis/output/parallel.py', 'pickle'),  # what a forked copy of the process computed
     ('auv_analysis/graph/domain.py', 'socket'),  # which ports are free
     ('udp.py', 'socket'),  # of the example's driver
     ('json_backend.py', 'socket'),  # of the example that is ArduSub's physics

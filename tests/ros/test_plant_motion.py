@@ -8,6 +8,7 @@ from typing import Any
 import herman_reference as reference
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from helpers import nodes_in_process as by_hand
 from helpers.nodes_in_process import Program, program, quaternion_of, write_vehicle
 from helpers.patience import patience
@@ -185,7 +186,7 @@ def arrivals(made: Program) -> list[tuple[float, float]]:
     return seen
 
 
-def test_real_time_keeps_its_pace(made, vehicle) -> None:
+def test_real_time_keeps_its_pace(made, vehicle, capfd) -> None:
     """n steps in n h by the steady clock, over a time in which the machine gave this process turns.
 
     A gap between two messages of half a step more or less is a stall, or what made up for one:
@@ -207,6 +208,27 @@ def test_real_time_keeps_its_pace(made, vehicle) -> None:
     passed, simulated = found[-1] - found[0]
     assert abs(simulated - passed) < 0.05 * passed
     assert_allclose(np.diff(found[:, 1]), PACE, rtol=0, atol=1e-9)
+    assert (
+        'time goes on from step' not in capfd.readouterr().err
+        or max(np.diff(np.array(seen)[:, 0])) > 0.4
+    )
+
+
+def test_real_time_ends_with_its_last_step_and_tells_of_silence_until_then(made, vehicle) -> None:
+    plant = made.add(PlantNode, {'vehicle': str(vehicle), **REAL, 'duration': 2.0})
+    made.listen(topics.DIAGNOSTICS)
+    told = made.heard['/diagnostics']
+
+    def level() -> bytes:
+        return told[-1].status[0].level if told else DiagnosticStatus.ERROR
+
+    made.until(lambda: level() == DiagnosticStatus.STALE, 'silence to be told')
+    assert 'no wrench for' in told[-1].status[0].message
+    made.until(lambda: plant.exit_code is not None, 'the end')
+    assert plant.exit_code == 0
+    assert stamps(made.heard['odom'])[-1] == 100 * STEP
+    count = len(told)
+    made.until(lambda: len(told) > count and level() == DiagnosticStatus.OK, 'no silence behind it')
 
 
 def test_a_pause_in_real_time_stops_the_time_of_the_run(made, vehicle) -> None:

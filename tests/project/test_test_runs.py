@@ -58,7 +58,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     ]
     environ = {
         **os.environ, 'PYTHONPATH': str(TESTS), 'AUV_GVC_PATIENCE': '0.005', 'AUV_GVC_STRICT': '1',
-        'AUV_GVC_ABSENT': 'fish',
+        'AUV_GVC_ABSENT': 'fish', 'PYTEST_ADDOPTS': '',
     }  # fmt: skip
     done = subprocess.run(
         [*command, '-v', '-p', 'no:cacheprovider', path],

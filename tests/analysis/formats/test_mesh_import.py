@@ -162,7 +162,9 @@ def test_axes_units_and_origin_turn_and_shift_the_same_hull(imported):
     vehicle, _ = imported(hull, *rough)
     turned, _ = imported(hull, *rough, axes='flu')
     T = np.diag([1.0, -1, -1, 1, -1, -1])
-    assert_allclose(turned.M_A, T @ vehicle.M_A @ T, rtol=1e-6, atol=1e-3)
+    # capytaine's integrals jump: corners that differ by 5e-16 m move M_A by 1e-5, its error is 1e-2
+    exact = T @ vehicle.M_A @ T
+    assert_allclose(turned.M_A, exact, atol=1e-4 * np.abs(exact).max())
     assert_allclose(turned.r_B, vehicle.r_B * [1, -1, -1])
     origin = np.array([0.5, -0.25, 1.0])
     moved, _ = imported(

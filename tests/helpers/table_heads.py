@@ -105,7 +105,7 @@ def _fits(name: str, value: str, row: dict[str, Any], column: Any, words: str, e
     if name in ('<first>', '<second>'):
         return row['row'].split(', ')[1 + (name == '<second>')] == DOFS[int(value)]
     if name == '<best>':
-        return value.endswith(row['column']) or row['column'] in ('kinetic energy', *_labels(value))
+        return value.endswith(row['column']) or row['column'] in _labels(value)
     if name == '<n>':
         names = [key for key in NAMES if key in entry]
         names = [key for key in ('run', 'name') if key in entry][:1] or names

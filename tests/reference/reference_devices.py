@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from functools import cache
 from math import exp
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,29 @@ ROOT = Path(__file__).resolve().parents[2]
 CURVES = ROOT / 'src/auv_dynamics/auv_dynamics/vehicle/curves'  # measured data, no code
 
 
+@cache
 def t200(volts: int) -> tuple[Array, Array]:
     """Pulse widths and thrusts in N, sorted, of the table measured at so many volts."""
     lines = [line for line in (CURVES / f't200_{volts}v.csv').open() if line[0] != '#']
     rows = [(float(one['pwm_us']), float(one['thrust_kgf'])) for one in csv.DictReader(lines)]
     pulses, thrusts = np.array(rows).T
     return pulses, np.sort(thrusts) * 9.80665
+
+
+@cache
+def thrusts(rated: int, volts: float) -> tuple[Array, Array]:
+    """Thrusts at the nominal voltage, sorted, and at another one for the same pulse widths."""
+    _pulses, nominal = t200(rated)
+    if volts <= 10 or volts >= 20:
+        edge = 10 if volts <= 10 else 20
+        given = t200(edge)[1] * (volts / edge) ** 2
+    else:
+        low = 2 * int(volts // 2)
+        part = (volts - low) / 2
+        given = (1 - part) * t200(low)[1] + part * (t200(low + 2)[1] if part else 0.0)
+    turning = nominal != 0.0
+    x, first = np.unique(np.append(nominal[turning], 0.0), return_index=True)
+    return x, np.append(given[turning], 0.0)[first]
 
 
 class Rotor:
@@ -33,23 +51,21 @@ class Rotor:
         self.lag, self.h, self.voltage = spec.get('lag', 0.0), h, voltage
         self.omega, self.zeta = spec.get('omega'), spec.get('zeta', 1.0)
         self.entry, self.state = entry, np.zeros(2)
+        if self.omega is not None:
+            # the series of the exponential of the system and its constant input
+            A = np.array([[0.0, 1.0, 0.0], [-1.0, -2 * self.zeta / self.omega, 1.0], [0, 0, 0]])
+            A[1] *= self.omega**2
+            term = self.transition = np.eye(3)
+            for order in range(1, 40):
+                term = A @ term * h / order
+                self.transition = self.transition + term
 
     def at(self, u: float, volts: float) -> float:
         """Thrust at a voltage of the command that gives u at the nominal one."""
         known = self.entry['rotor']
         if 'curve' not in known:
             return u * (volts / known['voltage']) ** 2
-        _pulses, nominal = t200(int(known['curve'][5:7]))
-        if volts <= 10 or volts >= 20:
-            edge = 10 if volts <= 10 else 20
-            given = t200(edge)[1] * (volts / edge) ** 2
-        else:
-            low = 2 * int(volts // 2)
-            part = (volts - low) / 2
-            given = (1 - part) * t200(low)[1] + part * (t200(low + 2)[1] if part else 0.0)
-        turning = nominal != 0.0
-        x, first = np.unique(np.append(nominal[turning], 0.0), return_index=True)
-        return float(np.interp(u, x, np.append(given[turning], 0.0)[first]))
+        return float(np.interp(u, *thrusts(int(known['curve'][5:7]), volts)))
 
     def __call__(self, u: float, k: int) -> float:
         """Thrust of sample k."""
@@ -67,14 +83,7 @@ class Rotor:
         if self.omega is None:
             self.state[0] += (1 - exp(-self.h / self.lag)) * (asked - self.state[0])
         else:
-            # the series of the exponential of the system and its constant input
-            A = np.array([[0.0, 1.0, 0.0], [-1.0, -2 * self.zeta / self.omega, 1.0], [0, 0, 0]])
-            A[1] *= self.omega**2
-            term = total = np.array([*self.state, asked])
-            for order in range(1, 40):
-                term = A @ term * self.h / order
-                total = total + term
-            self.state = total[:2]
+            self.state = (self.transition @ [*self.state, asked])[:2]
         return self.state[0] * abs(self.state[0])
 
 

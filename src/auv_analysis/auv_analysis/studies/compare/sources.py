@@ -266,7 +266,7 @@ def _open_bag(source: RunSource, vehicle: str | None) -> Recording:
 
 def _check_moving(bag: Path, recording: Recording) -> None:
     """Refuse an odometry of zeros where there is another one."""
-    if recording.run.nu.any() or recording.run.eta[:, :3].any():
+    if any(part.nu.any() or part.eta[:, :3].any() for part in recording.run.blocks()):
         return
     types = survey(bag).types
     topic = next((name for name in types if name.endswith(f'/{ODOM}')), ODOM)

@@ -1,7 +1,8 @@
-"""The order of the tests: what waits for nodes first, so that parallel workers end together.
+"""The order of the tests: those that wait for nodes between those that compute.
 
-A test that waits for nodes is run again where the machine gave this process no turn for a while:
-what it saw then says nothing of the nodes. The summary names it as a rerun.
+So workers that mostly wait share the cores with others all the time. A test that waits for nodes
+is run again where the machine gave this process no turn for a while: what it saw then says nothing
+of the nodes. The summary names it as a rerun.
 
 Examples of property tests are the same in every run, and nobody judges how long one takes;
 `make properties` asks for more of them, drawn by a seed. `AUV_GVC_ORDER=seed` draws the order of
@@ -24,8 +25,8 @@ from helpers.stalls import PAUSE, PAUSES
 from hypothesis import settings
 
 HERE = Path(__file__).parent
-FIRST = ('system', 'ros')
-TIMED = {*FIRST, 'examples'}  # folders of tests that wait for nodes
+TIMED = {'system', 'ros', 'examples'}  # folders of tests that wait for nodes
+ENDS = 0.8  # part of the order in which they stand: at the end no worker is to wait alone
 LIMIT, LONG_LIMIT = 600.0, 7200.0  # s, after which a test hangs, with its fixtures and reruns
 ORDER = os.environ.get('AUV_GVC_ORDER')  # seed
 
@@ -69,9 +70,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     files, above = {item.path for item in items}, len(HERE.parts)
     rooms = {path: path.parts[above] if len(path.parts) > above else '' for path in files}
     if ORDER is None:
-        last = len(FIRST)
-        places = {room: FIRST.index(room) if room in FIRST else last for room in rooms.values()}
-        items.sort(key=lambda item: places[rooms[item.path]])
+        places = spread(list(dict.fromkeys(item.path for item in items)), rooms)
+        items.sort(key=lambda item: places[item.path])
     else:
         items[:] = drawn(items, random.Random(ORDER))
     for item in items:
@@ -79,6 +79,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         item.add_marker(pytest.mark.timeout(patience(limit)))
         if rooms[item.path] in TIMED:
             item.add_marker(AGAIN)
+
+
+def spread(files: list[Path], rooms: dict[Path, str]) -> dict[Path, float]:
+    """Where each file comes: both kinds evenly, those that wait all before the last fifth."""
+    waiting = [path for path in files if rooms[path] in TIMED]
+    computing = [path for path in files if rooms[path] not in TIMED]
+    places = {path: ENDS * i / len(waiting) for i, path in enumerate(waiting)}
+    return places | {path: i / len(computing) for i, path in enumerate(computing)}
 
 
 def drawn(items: list[pytest.Item], rng: random.Random) -> list[pytest.Item]:
@@ -93,7 +101,7 @@ def drawn(items: list[pytest.Item], rng: random.Random) -> list[pytest.Item]:
 
 def pytest_report_header() -> str:
     """Say what is not as usual."""
-    order = 'waiting tests first' if ORDER is None else f'AUV_GVC_ORDER={ORDER}'
+    order = 'spread' if ORDER is None else f'AUV_GVC_ORDER={ORDER}'
     return f'patience: {FACTOR:g} times, order: {order}'
 
 

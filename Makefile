@@ -95,7 +95,7 @@ properties: setup  ## the property tests with EXAMPLES examples each, drawn by S
 	  tests/dynamics tests/controller tests/analysis tests/reference
 
 # in an environment of its own, so that .venv stays what people use
-mutation: setup  ## mutants of formulas, nodes and reports: MUTANTS=count or all, SEED=number, ONLY="parts of paths"
+mutation: setup  ## mutants of formulas, nodes, plots and reports: MUTANTS=count or all, SEED=number, ONLY="nodes pages" or parts of paths
 	test -x $(VENV)/mutation/bin/python || $(PYTHON) -m venv $(VENV)/mutation
 	$(VENV)/mutation/bin/python -m pip install --quiet -r requirements-mutation.txt
 	$(VENV)/mutation/bin/python tests/mutation/run.py --python $(abspath $(BIN))/python \

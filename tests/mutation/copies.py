@@ -16,8 +16,7 @@ COPIED = ('src', 'tests', 'config', 'docs', 'examples', 'pyproject.toml', 'READM
 SKIPPED = shutil.ignore_patterns('__pycache__', 'node_modules', '*.egg-info')
 PATIENCE = 240.0  # s, after which a mutant that does not end counts as killed
 PYTEST = '-m pytest -x -q --assert=plain -p no:cacheprovider'
-PLAIN = {  # no numba, one thread, and no plugin of pytest that these tests do not need
-    'NUMBA_DISABLE_JIT': '1',
+PLAIN = {  # one thread, and no plugin of pytest that these tests do not need
     'OMP_NUM_THREADS': '1',
     'OPENBLAS_NUM_THREADS': '1',
     'PYTEST_DISABLE_PLUGIN_AUTOLOAD': '1',
@@ -58,21 +57,25 @@ class Copy:
         how = ['-m', 'compileall', '-q', '--invalidation-mode', 'checked-hash', 'src', 'tests']
         subprocess.run([python, *how], cwd=folder, check=True)
 
-    def _command(self, stages: list[list[str]]) -> str:
+    def _command(self, stages: list[list[str]], compiled: bool) -> str:
         """Shell command that runs lists of tests in turn, until one fails."""
         path = ':'.join(f'{self._folder}/src/{package}' for package in PACKAGES)
+        plain = '' if compiled else 'NUMBA_DISABLE_JIT=1'
         tests = (' '.join(f'tests/{one}' for one in stage) for stage in stages if stage)
-        runs = ' && '.join(f'{self._python} {PYTEST} {names}' for names in tests) or 'true'
+        runs = ' && '.join(f'{plain} {self._python} {PYTEST} {names}' for names in tests) or 'true'
         return f'sh -c "cd {self._folder} && export PYTHONPATH={path} && {runs}"'
 
-    def complaint(self, tests: list[str]) -> str:
-        """Output of tests that fail before anything is changed; '' when all pass."""
-        ended = subprocess.run(
-            self._command([tests]), shell=True, capture_output=True, text=True, check=False
-        )
-        return ended.stdout + ended.stderr if ended.returncode else ''
+    def complaint(self, tests: list[tuple[bool, str]]) -> str:
+        """Output of tests, compiled or not, that fail before anything is changed; '' of none."""
+        found = ''
+        for compiled in (False, True):
+            names = [name for kind, name in tests if kind == compiled]
+            command = self._command([names], compiled)
+            ended = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+            found += ended.stdout + ended.stderr if ended.returncode else ''
+        return found
 
-    def verdict(self, mutant: MutationSpec, stages: list[list[str]]) -> Verdict:
+    def verdict(self, mutant: MutationSpec, stages: list[list[str]], compiled: bool) -> Verdict:
         """Try a mutant of the checkout here."""
         file = mutant.module_path.relative_to(self._root)
         here = MutationSpec(
@@ -83,7 +86,7 @@ class Copy:
             start_pos=mutant.start_pos,
             end_pos=mutant.end_pos,
         )
-        result = mutate_and_test([here], self._command(stages), PATIENCE)
+        result = mutate_and_test([here], self._command(stages, compiled), PATIENCE)
         if result.worker_outcome != WorkerOutcome.NORMAL:
             raise RuntimeError(f'{file}: {mutant}\n{result.output}')
         outcome = 'killed' if result.test_outcome == TestOutcome.KILLED else 'survived'

@@ -1,8 +1,8 @@
 """Which mutants there are: cosmic-ray's of formulas, `wiring`'s beside some of them elsewhere.
 
-Always in one order. Left out are annotations, decorators, what an f-string, a `raise` or a log
-says, how long somebody has patience, and what fails in every test that reaches it or does what
-another mutant does already: they would only flatter the ratio.
+Always in one order. Left out are annotations, decorators, what a `raise` or a log says, how long
+somebody has patience, how a plot is laid out, and what fails in every test that reaches it or does
+what another mutant does already: they would only flatter the ratio.
 """
 
 import ast
@@ -31,7 +31,21 @@ SWAPPED = re.compile(  # of wiring: of many ways to break an operator, the next 
     r'|NotEq_Eq|Is_IsNot|IsNot_Is|In_NotIn|NotIn_In)$)'
 )
 TOLD = {'begin', 'info', 'warning', 'error', 'print', 'get_logger', 'InputError'}  # to people
-PATIENCE = re.compile(r'^[A-Z_, ]+ = .*  # s\b')  # a constant: how long is for people to judge
+JUDGED = re.compile(  # constants: how long, how large and in which colour is for people to judge
+    r"^[A-Z_, ]+(: .*)? = .*  # (s|in|px|opacity)\b|^[A-Z_, ]+ = \(?'#|^STYLE = "
+)
+LAYOUT = re.compile(  # keywords: how large, how faint, where the name of something stands
+    r'(line|eline|edge|markeredge)widths?|lw|(font|label|marker|cap)size|s|fontweight'
+    r'|\w*rotation|handlelength|loc|location|bbox_to_anchor|ncols|zorder|alpha|ha|va'
+    r'|(width|height)_ratios|aspect|fraction|shrink|linscale|interpolation|textcoords|xytext'
+    r'|rasterized|squeeze|optimize|strict|digits'
+)
+COLOUR = re.compile(r'\w*colou?rs?|hatch|fmt')  # keywords whose value, where it is a text, is taste
+LAYS_OUT = {  # calls
+    'new_figure', 'ConstrainedLayoutEngine', 'tick_params', 'margins', 'set_visible', 'grid',
+    'set_minor_locator', 'minorticks_off', 'small_heads', 'set_axis_off', 'set_edgecolor',
+}  # fmt: skip
+ROUNDED = {'number', 'plain', 'fixed'}  # calls: a value, and its digits
 
 
 def mutants(paths: list[Path], wiring: set[Path]) -> list[MutationSpec]:
@@ -40,7 +54,8 @@ def mutants(paths: list[Path], wiring: set[Path]) -> list[MutationSpec]:
     for path in paths:
         source = path.read_text(encoding='utf-8')
         tree = ast.parse(source)
-        spared = _spared_places(tree) + (_told_places(tree, source) if path in wiring else [])
+        parts = _no_code(tree) + (_judged(tree, source) if path in wiring else _texts(tree))
+        spared = [_place(part) for part in parts if part is not None]
         for item in _all_work_items([path], {}):
             (mutant,) = item.mutations
             name = mutant.operator_name
@@ -51,20 +66,13 @@ def mutants(paths: list[Path], wiring: set[Path]) -> list[MutationSpec]:
     return sorted(found, key=lambda m: (m.module_path, m.start_pos, m.operator_name, m.occurrence))
 
 
-def _told_places(tree: ast.Module, source: str) -> list[Place]:
-    """Places of what is said to people, and of how long somebody has patience."""
-    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
-    said = [
-        ((call.lineno, call.col_offset), (call.end_lineno or 0, call.end_col_offset or 0))
-        for call in calls
-        if getattr(call.func, 'attr', getattr(call.func, 'id', '')) in TOLD
-    ]
-    lines = enumerate(source.splitlines(), start=1)
-    return said + [((k, 0), (k + 1, 0)) for k, line in lines if PATIENCE.match(line)]
-
-
-def _spared_places(tree: ast.Module) -> list[Place]:
+def _place(part: ast.AST) -> Place:
     """(line, column) from and up to which nothing is mutated."""
+    return (part.lineno, part.col_offset), (part.end_lineno, part.end_col_offset)
+
+
+def _no_code(tree: ast.Module) -> list[ast.AST | None]:
+    """Decorators, annotations, errors."""
     parts: list[ast.AST | None] = []
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -73,10 +81,34 @@ def _spared_places(tree: ast.Module) -> list[Place]:
             parts.append(node.returns)
         if isinstance(node, ast.arg | ast.AnnAssign):
             parts.append(node.annotation)
-        if isinstance(node, ast.JoinedStr | ast.Raise):
+        if isinstance(node, ast.Raise):
             parts.append(node)
-    return [
-        ((part.lineno, part.col_offset), (part.end_lineno, part.end_col_offset))
-        for part in parts
-        if part is not None
-    ]
+    return parts
+
+
+def _texts(tree: ast.Module) -> list[ast.AST | None]:
+    return [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)]
+
+
+def _judged(tree: ast.Module, source: str) -> list[ast.AST | None]:
+    """What is said to people, how long somebody has patience, and how a plot is laid out."""
+    lines = source.splitlines()
+    parts: list[ast.AST | None] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign | ast.AnnAssign) and JUDGED.search(lines[node.lineno - 1]):
+            parts.append(node)
+        if isinstance(node, ast.Dict):
+            keys = [getattr(key, 'value', None) for key in node.keys]
+            named = list(zip(keys, node.values, strict=True))
+        elif isinstance(node, ast.Call):
+            name = getattr(node.func, 'attr', getattr(node.func, 'id', ''))
+            parts += [node] if name in TOLD | LAYS_OUT else []
+            parts += node.args[1:] if name in ROUNDED else []
+            named = [(keyword.arg, keyword.value) for keyword in node.keywords]
+        else:
+            continue
+        for key, value in named:
+            words, literal = str(key), isinstance(value, ast.Constant)
+            if LAYOUT.fullmatch(words) or (literal and COLOUR.fullmatch(words)):
+                parts.append(value)
+    return parts

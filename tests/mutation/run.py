@@ -1,9 +1,9 @@
-"""Mutation testing: `make mutation MUTANTS=<count or all> SEED=<seed> ONLY=<parts of paths>`.
+"""Mutation testing: `make mutation MUTANTS=<count or all> SEED=<seed> ONLY=<kinds or paths>`.
 
 Cosmic-ray changes one operator, comparison or number of a formula at a time, `wiring.py` arguments,
 keys, names and statements of nodes and of what is shown; a test that `mutation.toml` names for the
-file has to fail then, in plain Python. What survives stands in
-`equivalent.toml` with the reason why no test can tell, and is subtracted; README.md says more.
+file has to fail then. What survives stands in `equivalent.toml` with the reason why no test can
+tell, and is subtracted; README.md says more.
 """
 
 import argparse
@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
+from typing import NamedTuple
 
 from copies import Copy, Verdict, copies
 from cosmic_ray.work_item import MutationSpec
@@ -23,7 +24,13 @@ from mutants import mutants
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 WANTED = 0.95  # share of killed mutants, without the equivalent ones
-Stages = dict[Path, list[list[str]]]
+
+
+class Tests(NamedTuple):
+    """Tests of a file in stages, and whether the kernels that they call are compiled."""
+
+    stages: list[list[str]]
+    compiled: bool
 
 
 def arguments() -> argparse.Namespace:
@@ -32,7 +39,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument('--mutants', default='500', help='how many, drawn at random, or all')
     parser.add_argument('--seed', type=int, default=0, help='of the draw')
     parser.add_argument(
-        '--only', nargs='*', default=[''], help='files with one of these in their path'
+        '--only', nargs='*', default=[''], help='kinds of files, or parts of their paths'
     )
     parser.add_argument('--workers', type=int, default=2)
     parser.add_argument(
@@ -45,14 +52,16 @@ def arguments() -> argparse.Namespace:
 
 
 def verdicts(
-    chosen: list[MutationSpec], stages: Stages, python: Path, workers: int
+    chosen: list[MutationSpec], tests: dict[Path, Tests], python: Path, workers: int
 ) -> Iterator[Verdict]:
     """Verdicts in the order of the mutants, as they come."""
     with copies(ROOT, workers, python) as made, ThreadPoolExecutor(workers) as pool:
-        used = [stages[mutant.module_path] for mutant in chosen]
-        tests = sorted({test for lists in used for one in lists for test in one})
+        used = [tests[path] for path in {mutant.module_path for mutant in chosen}]
+        first = sorted(
+            {(one.compiled, name) for one in used for stage in one.stages for name in stage}
+        )
         complaints = list(
-            pool.map(Copy.complaint, made, (tests[i::workers] for i in range(workers)))
+            pool.map(Copy.complaint, made, (first[i::workers] for i in range(workers)))
         )
         if any(complaints):
             sys.exit('without any mutant the tests fail\n' + ''.join(complaints))
@@ -63,7 +72,7 @@ def verdicts(
         def judge(mutant: MutationSpec) -> Verdict:
             copy = free.get()
             try:
-                return copy.verdict(mutant, stages[mutant.module_path])
+                return copy.verdict(mutant, *tests[mutant.module_path])
             finally:
                 free.put(copy)
 
@@ -93,25 +102,21 @@ def main() -> int:
     given = arguments()
     plan = tomllib.loads((HERE / 'mutation.toml').read_text(encoding='utf-8'))
     equivalent = equivalents()
-    own = {
-        file: [plan['quick'][kind], tests]
+    tests = {
+        ROOT / 'src' / file: Tests([plan['quick'][kind], own], kind in plan['compiled'])
         for kind in plan['quick']
-        for file, tests in plan[kind].items()
-    }
-    stages = {
-        ROOT / 'src' / file: own[file]
-        for file in sorted(own)
-        if any(part in file for part in given.only)
+        for file, own in plan[kind].items()
+        if any(part in f'{kind} {file}' for part in given.only)
     }
     wiring = {ROOT / 'src' / file for kind in plan['wiring'] for file in plan[kind]}
-    every = mutants(list(stages), wiring)
+    every = mutants(sorted(tests), wiring)
     count = len(every) if given.mutants == 'all' else min(int(given.mutants), len(every))
     chosen = sorted(random.Random(given.seed).sample(range(len(every)), count))
-    print(f'{count} of {len(every)} mutants of {len(stages)} files, seed {given.seed}', flush=True)
+    print(f'{count} of {len(every)} mutants of {len(tests)} files, seed {given.seed}', flush=True)
 
     tally: Counter[str] = Counter()
     for i, one in enumerate(
-        verdicts([every[k] for k in chosen], stages, given.python, given.workers), start=1
+        verdicts([every[k] for k in chosen], tests, given.python, given.workers), start=1
     ):
         listed = (one.file, squeezed(one.before), squeezed(one.after)) in equivalent
         outcome = 'equivalent' if listed and one.outcome == 'survived' else one.outcome

@@ -74,12 +74,16 @@ class Wiring(Operator):
 
 
 class Exchange(Wiring):
-    """Two neighbours of a call, a tuple or a list change places; of keywords the values do."""
+    """Two neighbours of a call, tuple, list or text change places; of keywords the values do."""
 
     def _pairs(self, node: Any) -> list[tuple[Any, int, Any, int]]:
         """Parents and places of what is exchanged."""
         children = getattr(node, 'children', [])
         found = []
+        if node.type == 'fstring':
+            shown = [one for one in children if one.type == 'fstring_expr']
+            pairs = [(one, 1, other, 1) for one, other in pairwise(shown)]
+            return [pair for pair in pairs if self._exchangeable(pair)]
         if node.type == 'dictorsetmaker' and all(colon == ':' for colon in children[1::4]):
             found = [(node, i, node, k) for i, k in pairwise(range(2, len(children), 4))]
         elif node.type not in LISTS or _is_symmetric(node):

@@ -14,7 +14,8 @@ def listed(name: str) -> dict:
 def test_files_and_tests_are_there() -> None:
     stages = listed('mutation.toml')
     files = {file: tests for kind in stages['quick'] for file, tests in stages[kind].items()}
-    assert set(stages) == {'wiring', 'quick', *stages['quick']} > {*stages['wiring']}
+    assert set(stages) == {'wiring', 'compiled', 'quick', *stages['quick']}
+    assert {*stages['wiring'], *stages['compiled']} < {*stages['quick']}
     tests = [test for named in (*files.values(), *stages['quick'].values()) for test in named]
     assert not [file for file in files if not (ROOT / 'src' / file).is_file()]
     assert not [test for test in tests if not (ROOT / 'tests' / test.split('::')[0]).is_file()]

@@ -93,9 +93,13 @@ def test_the_folder_holds_report_document_and_all_that_was_heard_and_sent(tmp_pa
         assert f'>{id}' in page
     samples = parquet.read_table(tmp_path / 'samples.parquet')
     assert samples.num_rows == len(evidence.log.arrived_ns)
-    np.testing.assert_array_equal(samples['u'], evidence.log.x[:, 7])
+    assert samples.column_names[2:] == ['x', 'y', 'z', 'qw', 'qx', 'qy', 'qz', 'u', 'v', 'w', 'p', 'q', 'r']
+    np.testing.assert_array_equal(np.array(samples.columns[2:]).T, evidence.log.x)
     sent = parquet.read_table(tmp_path / 'wrenches.parquet')
     assert set(sent['trial'].to_pylist()) == {'surge'}
+    assert sent.column_names == ['trial', 'sent_ns', *'XYZKMN']
+    steps = [tau for one in evidence.excitation.sent for _, tau in one.steps]
+    np.testing.assert_array_equal(np.array(sent.columns[2:]).T, steps)
     assert np.abs(sent['X']).max() == pytest.approx(document['trials'][0]['size'])
     figures = {path.stem for path in (tmp_path / 'figures').iterdir()}
     assert figures == {'timing', 'linear', 'angular', 'answers'}

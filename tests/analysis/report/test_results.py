@@ -5,13 +5,26 @@ import io
 import json
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as parquet
 import pytest
+from helpers.report_pages import at
 from rich.console import Console
 
 from auv_analysis.metrics.quantities import METRICS, SIGNALS, mathtext, quantity
-from auv_analysis.output.text import MISSING
-from auv_analysis.report.results import Column, Results, numbers_of, terminal, to_csv
+from auv_analysis.output.text import MISSING, Maths
+from auv_analysis.report.results import (
+    Column,
+    Results,
+    described,
+    document_table,
+    known,
+    make_table,
+    numbers_of,
+    terminal,
+    to_csv,
+    view_of_file,
+)
 from auv_dynamics.vehicle import DOFS
 
 ROWS = [
@@ -81,6 +94,64 @@ def test_terminal_and_csv_show_the_same_table(results: Results) -> None:
     rows = list(csv.reader(io.StringIO(to_csv(table))))
     assert rows[0] == ['controller', 'input RMS input, surge, N', 'share, %', 'count']
     assert rows[1] == ['<a>', '1234.5', '25.0', '3']
+
+
+LOOKS = {
+    'name': 'what', 'note': Column('', look='below'), 'law': Column('law', look='maths'),
+    'rated': Column('rated', look='badge'), 'is_so': 'so', 'several': 'several',
+    'whole': Column('whole', look='plain'), 'none': 'none', 'far': described('far', 'it', 'm'),
+    'bad': Column('far', group='not', kind='how'),
+}  # fmt: skip
+LOOKED = {
+    'name': 'one', 'note': 'of x_d', 'law': 'k_D', 'rated': 'good', 'is_so': True,
+    'several': [2.5, 4.0], 'whole': 1500.0, 'none': 0, 'far': 1234.5, 'bad': 0.0, 'how': 'bad',
+}  # fmt: skip
+
+
+def test_each_look_of_a_cell() -> None:
+    table = make_table('t', 'T.', [LOOKED], LOOKS, anchor='at')
+    ((first, law, rated, *words, whole, none, far, bad),) = table.rows
+    assert (first.text, first.remark, first.anchor) == ('one', 'of x_d', 'at-one')
+    assert [type(text) for text in (first.text, first.remark, law.text)] == [str, Maths, Maths]
+    assert (rated.text, rated.kind) == ('good', 'badge')
+    assert [cell.text for cell in words] == ['yes', '2.50, 4.00']
+    assert [cell.text for cell in (whole, none, far, bad)] == ['1\u202f500', '0', '1\u202f234', '0']
+    assert [cell.kind for cell in (whole, none, far, bad)] == ['', 'zero', '', 'bad']
+    assert [head.meaning for head in table.meanings] == ['it']
+    assert table.heads == [('', 8), ('not', 1)]
+
+
+def test_a_terminal_says_units_and_colours_verdicts() -> None:
+    shown = terminal(make_table('t', 'T.', [LOOKED], LOOKS), title=True)
+    assert shown.title == 'T.'
+    assert terminal(make_table('t', 'T.', [LOOKED], LOOKS)).title is None
+    assert [column.header for column in shown.columns][-2:] == ['far, m', 'not far']
+    assert [column.justify for column in shown.columns] == ['left'] * 5 + ['right'] * 4
+    assert [next(iter(c.cells)).style for c in shown.columns][-3:] == ['dim', '', 'red']
+
+
+def test_a_table_of_a_document_points_into_it() -> None:
+    results = Results('study', {'a/b': {'c~': [1.0, 2.0]}, 'none': None})
+    rows = [{'x': ('a/b', 'c~', 1), 'word': 'w'}, {'x': ('none', 'gone'), 'word': 'v'}]
+    table = document_table(results, 't', 'T.', rows, {'x': 'x', 'word': 'word'}, stub=2)
+    assert (table.name, table.caption) == ('t', 'T.')
+    (row,) = numbers_of([table])
+    assert (row['row'], row['value']) == ('2.00, w', 2.0)
+    file, _, pointer = row['source'].partition(':')
+    assert file == 'study.json'
+    assert at(results.to_json(), pointer) == 2.0
+    assert table.rows[1][0].text == MISSING
+
+
+def test_a_view_of_a_file_points_to_the_rows_it_shows() -> None:
+    table = view_of_file('t', 'T.', [{'x': 1.5}, {'x': 2.5}], {'x': 'x'}, 'f.parquet', [7, 3])
+    assert (table.name, table.caption) == ('t', 'T.')
+    assert [row['source'] for row in numbers_of([table])] == ['f.parquet:x[7]', 'f.parquet:x[3]']
+
+
+def test_json_knows_no_infinity_and_no_array() -> None:
+    found = known({'a': np.array([[1.0, np.nan]]), 'b': (float('inf'), 2), 'c': np.float64(3.0)})
+    assert found == {'a': [[1.0, None]], 'b': [None, 2], 'c': 3.0}
 
 
 @pytest.mark.parametrize('name', [*METRICS])

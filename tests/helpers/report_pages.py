@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.table_heads import check_head
+from helpers.table_heads import check_head, check_order
 from pyarrow import parquet
 
 TOKEN = re.compile(r'−?\d(?:[\d\u202f]*)(?:\.\d+)?(?:·10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?')
@@ -79,9 +79,10 @@ def check_numbers(folder: Path) -> int:
     """
     kept: dict[str, Any] = {}
     heads: dict[str, Any] = {}
+    shown_at: list[tuple[dict[str, Any], int]] = []
     checked = 0
     for row in parquet.read_table(folder / 'numbers.parquet').to_pylist():
-        check_head(row, heads, folder)
+        shown_at.append((row, check_head(row, heads, folder)))
         shown = tokens(row['text'])
         if shown and not re.search('[<–]', row['text']):  # a bound, a range
             assert abs(shown[0][0] - row['value']) <= shown[0][1] + 1e-12 * abs(shown[0][0]), row
@@ -99,4 +100,5 @@ def check_numbers(folder: Path) -> int:
             continue
         assert value * float(factor or 1) == pytest.approx(row['value'], rel=1e-12), row
         checked += 1
+    check_order(shown_at)
     return checked

@@ -9,10 +9,12 @@ A line of `table_heads.txt` is `table | row | head | unit | source`. The source 
 - `<any>` is any name, and `<gain>` any word.
 
 A table, row, head that no line has is an error: whoever adds a column says here what it holds.
+The heads of a row, and rows that stand there by name, come in the order of the lines.
 """
 
 import json
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +50,10 @@ RULES = [
 ]
 
 
-def check_head(row: dict[str, Any], files: dict[str, Any], folder: Path) -> None:
+def check_head(row: dict[str, Any], files: dict[str, Any], folder: Path) -> int:
     """Hold a number of a report's tables against where its row and its head say that it stands.
+
+    Returns the number of the line that says so.
 
     Parameters
     ----------
@@ -65,7 +69,27 @@ def check_head(row: dict[str, Any], files: dict[str, Any], folder: Path) -> None
         and rule[4].partition(':')[0] == row['source'].partition(':')[0]
     ]  # fmt: skip
     assert rules, f'no line of table_heads.txt for {row}'
-    assert any(_told(row, rule, files, folder) for rule in rules), row
+    told = [rule for rule in rules if _told(row, rule, files, folder)]
+    assert told, row
+    return RULES.index(told[0])
+
+
+def check_order(shown: list[tuple[dict[str, Any], int]]) -> None:
+    """Hold the order of a table's heads, and of rows that lines name, against that of the lines.
+
+    Parameters
+    ----------
+    shown : rows of `numbers.parquet` in their order, each with the number of its line
+
+    """
+    heads: set[str] = set()  # of one row
+    for (one, line), (other, next_line) in pairwise(shown):
+        heads.add(one['column'])
+        in_row = one['row'] == other['row'] and other['column'] not in heads
+        heads = heads if in_row else set()
+        by_name = '.*' != RULES[line][1].pattern != RULES[next_line][1].pattern != '.*'
+        if one['table'] == other['table'] and (in_row or by_name):
+            assert line <= next_line, (one, other)
 
 
 def _told(row: dict[str, Any], rule: Any, files: dict[str, Any], folder: Path) -> bool:

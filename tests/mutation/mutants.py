@@ -32,13 +32,14 @@ SWAPPED = re.compile(  # of wiring: of many ways to break an operator, the next 
 )
 TOLD = {'begin', 'info', 'warning', 'error', 'print', 'get_logger', 'InputError'}  # to people
 JUDGED = re.compile(  # constants: how long, how large and in which colour is for people to judge
-    r"^[A-Z_, ]+(: .*)? = .*  # (s|in|px|opacity)\b|^[A-Z_, ]+ = \(?'#|^STYLE = "
+    r"^[A-Z_, ]+(: .*)? = .*  # (s|in|px|opacity)\b|^[A-Z_, ]+ = \(?'#|^(STYLE|DASHES)\b"
 )
 LAYOUT = re.compile(  # keywords: how large, how faint, where the name of something stands
     r'(line|eline|edge|markeredge)widths?|lw|(font|label|marker|cap)size|s|fontweight'
     r'|\w*rotation|handlelength|loc|location|bbox_to_anchor|ncols|zorder|alpha|ha|va'
     r'|(width|height)_ratios|aspect|fraction|shrink|linscale|interpolation|textcoords|xytext'
-    r'|rasterized|squeeze|optimize|strict|digits'
+    r'|rasterized|squeeze|optimize|strict|digits|autohide|level|\w*_font_\w+|minor_tick_line_color'
+    r'|padding|spacing|(glyph|label)_height|glyph_width|min_border_left|toolbar_location|sizing_mode'
 )
 COLOUR = re.compile(r'\w*colou?rs?|hatch|fmt')  # keywords whose value, where it is a text, is taste
 LAYS_OUT = {  # calls
@@ -97,6 +98,8 @@ def _judged(tree: ast.Module, source: str) -> list[ast.AST | None]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Assign | ast.AnnAssign) and JUDGED.search(lines[node.lineno - 1]):
             parts.append(node)
+        if isinstance(node, ast.Assign) and LAYOUT.fullmatch(getattr(node.targets[0], 'attr', '')):
+            parts.append(node)
         if isinstance(node, ast.Dict):
             keys = [getattr(key, 'value', None) for key in node.keys]
             named = list(zip(keys, node.values, strict=True))
@@ -105,6 +108,10 @@ def _judged(tree: ast.Module, source: str) -> list[ast.AST | None]:
             parts += [node] if name in TOLD | LAYS_OUT else []
             parts += node.args[1:] if name in ROUNDED else []
             named = [(keyword.arg, keyword.value) for keyword in node.keywords]
+        elif isinstance(node, ast.arguments):
+            args = [*node.args[len(node.args) - len(node.defaults) :], *node.kwonlyargs]
+            values = [*node.defaults, *node.kw_defaults]
+            named = [(a.arg, value) for a, value in zip(args, values, strict=True) if value]
         else:
             continue
         for key, value in named:

@@ -93,7 +93,21 @@ def test_the_folder_holds_report_document_and_all_that_was_heard_and_sent(tmp_pa
         assert f'>{id}' in page
     samples = parquet.read_table(tmp_path / 'samples.parquet')
     assert samples.num_rows == len(evidence.log.arrived_ns)
-    assert samples.column_names[2:] == ['x', 'y', 'z', 'qw', 'qx', 'qy', 'qz', 'u', 'v', 'w', 'p', 'q', 'r']
+    assert samples.column_names[2:] == [
+        'x',
+        'y',
+        'z',
+        'qw',
+        'qx',
+        'qy',
+        'qz',
+        'u',
+        'v',
+        'w',
+        'p',
+        'q',
+        'r',
+    ]
     np.testing.assert_array_equal(np.array(samples.columns[2:]).T, evidence.log.x)
     sent = parquet.read_table(tmp_path / 'wrenches.parquet')
     assert set(sent['trial'].to_pylist()) == {'surge'}

@@ -338,6 +338,10 @@ def test_certificates_are_those_of_their_runs(three, runs, name: str) -> None:
     assert [axes.get_title(loc='left') for axes in (energy, *rates)] == ['(a)', '(b)', '(c)']
     assert 'the first 2 s; (c) the rest' in three[1][f'certificate_{name}']
     assert 'The wrench is held between samples' in three[1][f'certificate_{name}']
+    assert (
+        'against the identity (26) and the bound (28), the first 2 s; (c)'
+        in (three[1][f'certificate_{name}'])
+    )
 
 
 def _increasing(axes, t: np.ndarray, grey: np.ndarray) -> None:
@@ -486,6 +490,26 @@ def test_settling_bands_stand_under_faults_where_the_runs_share_them(runs, tmp_p
         assert levels(axes) == pytest.approx([-band, band])
 
 
+def test_what_was_not_recorded_is_said_in_its_panel(runs, foreign, tmp_path) -> None:
+    lost = {name: replace(run, nu=run.nu.copy(), tau=run.tau.copy()) for name, run in runs.items()}
+    told = foreign['told']
+    wrench = told.unexplained.copy()
+    wrench[:, 1] = np.nan
+    for run in lost.values():
+        run.nu[:, 1] = run.tau[:, 1] = np.nan
+    alone, _ = _drawn({'told': replace(told, unexplained=wrench)}, tmp_path)
+    del lost['three']
+    figures, captions = _drawn(lost, tmp_path)
+    for figure in (figures['settling'], figures['inputs_compared'], alone['unexplained_told']):
+        for axes in figure.axes:
+            gone = axes.get_title(loc='left').endswith('sway')
+            assert [text.get_text() for text in axes.texts] == ['not recorded'] * gone
+            assert bool(artists.lines(axes)) != gone
+    assert captions['kinetic_energy'].startswith('Kinetic energy: not all velocities were recorded')
+    assert captions['energy_shares'].startswith('Shares of kinetic energy: not all velocities')
+    assert 'Not recorded, or resting on what was not: sway.' in captions['errors_one']
+
+
 def test_no_figure_is_without_an_oracle(three, pair, foreign) -> None:
     checked = {kind if kind in LEADING else f'{kind}_{name}' for kind, name in EACH}
     checked |= {'settling', 'inputs_compared', 'kinetic_energy', 'energy_shares'}
@@ -585,6 +609,7 @@ def test_interactive_energies_shares_and_certificates(page, runs) -> None:
         plot, parts = page[0][f'shares-{name}'], energies(runs[name].nu)
         assert plot.yaxis[0].axis_label == 'share (%)'
         parts = 100.0 * parts / parts.sum(axis=1, keepdims=True)
+        assert len(plot.legend[0].items) == 6
         for i, (words, glyph, t, data) in enumerate(_glyphs(plot)):
             assert words == f'{name} {DOFS[i]}'
             assert t == pytest.approx(runs[name].t, rel=1e-6)

@@ -10,7 +10,11 @@ from helpers.made_runs import DOFS, SAMPLES, STEP, UPSILON, UPSILON_INV, VEHICLE
 from auv_analysis import summarize
 from auv_analysis.report import run_tables as tables
 from auv_analysis.report.digest import digests
-from auv_analysis.report.run_report import _apart, findings, namesakes
+from auv_analysis.report.document import Gallery
+from auv_analysis.report.panels import panel_sets
+from auv_analysis.report.run_plots import draw_figures
+from auv_analysis.report.run_report import SectionInputs, _apart, findings, namesakes
+from auv_analysis.report.scenario_text import set_up
 from auv_analysis.report.wrench_plots import estimate_finding
 from auv_analysis.runs.run import Run
 
@@ -302,6 +306,48 @@ def test_what_a_model_leaves_unexplained_in_words() -> None:
         'The motion of lost needed at most 3.00 ± 0.30 N (heave) and 6.00 ± 0.60 N m (pitch), RMS.'
     )
     assert estimate_finding('bare', {'unexplained': None, 'required_wrench': None}) == ''
+
+
+def contents(runs, summaries, folder) -> dict[str, list[str]]:
+    """Section -> names of its tables and figures, '' of text, those in a gallery in brackets."""
+    shown = {name: replace(run, controller=name) for name, run in digests(runs).items()}
+    figures = draw_figures(shown, folder, summaries)
+    scenes = {tuple(shown): set_up(shown, summaries, '')}
+    of = SectionInputs(shown, summaries, scenes, figures, panel_sets(shown))
+
+    def name(block) -> str:
+        if isinstance(block, Gallery):
+            return f'[{" ".join(figure.name for figure in block.figures)}]'
+        return getattr(block, 'name', '')
+
+    return {section.name: [name(block) for block in section.blocks] for section in of.sections()}
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_each_section_shows_its_own_tables_and_figures(runs, summaries, tmp_path) -> None:
+    found = contents(runs, summaries, tmp_path)
+    assert found == {
+        'experiment': ['', 'controllers', 'set_up', ''],
+        'gains': ['', 'Upsilon', 'N', 'gain_K_D_3', 'gain_K_f_4'],
+        'tracking': [
+            'key_figures', 'settling', '[errors_one errors_two]',
+            '[lumped_error_one lumped_error_two uncertainty_one uncertainty_two]',
+            '[inputs_one inputs_two inputs_compared]',
+            '', 'certificate', '', '[certificate_one certificate_two]',
+        ],
+        'energy': ['', 'energy', 'energy_shares', '[kinetic_energy]'],
+        'couplings': ['', 'couplings', 'terms', '[delta_xi delta_pi]'],
+        'basis': [''],
+    }  # fmt: skip
+    lost = {'one': replace(runs['one'], disturbance=None, nu=runs['one'].nu.copy())}
+    lost['one'].nu[:, 0] = np.nan
+    found = contents(lost, {'one': summarize(lost['one'])}, tmp_path)
+    assert found['tracking'] == [
+        'key_figures', 'settling', '[errors_one]', '', '[inputs_one]', '', '', '', '',
+    ]  # fmt: skip
+    assert found['energy'] == [
+        '', 'energy', 'energy_components', 'kinetic_energy', 'energy_shares', '[]',
+    ]  # fmt: skip
 
 
 def test_how_far_apart_runs_end(runs) -> None:

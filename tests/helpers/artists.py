@@ -22,8 +22,14 @@ Curves = dict[str, list[tuple[np.ndarray, np.ndarray]]]
 
 @contextmanager
 def captured() -> Iterator[dict[str, Figure]]:
-    """Figures by name, as they are composed; nothing is rendered."""
+    """Figures by name, as they are composed; nothing is rendered. A caption is sentences."""
     found: dict[str, Figure] = {}
+    composed = plots._saved
+
+    def saved(*of: Any) -> plots.FigureRecord:
+        record = composed(*of)
+        assert record.title[-1] != '.' == record.caption[-1], record
+        return record
 
     def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
         found[name] = figure
@@ -35,6 +41,7 @@ def captured() -> Iterator[dict[str, Figure]]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plots, 'save', save)
+        patch.setattr(plots, '_saved', saved)
         yield found
 
 
@@ -114,6 +121,15 @@ def bands(axes: Axes) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
         edges = [[f(vertices[vertices[:, 0] == at, 1]) for at in x] for f in (np.min, np.max)]
         found.append((to_hex(band.get_facecolor()[0]), x, *map(np.array, edges)))
     return found
+
+
+def holds(axes: Axes) -> bool:
+    """Whether all points of lines and marks are within the limits of a panel."""
+    shown = [np.c_[points(line)] for line in lines(axes)]
+    shown += [np.asarray(marks.get_offsets(), float) for marks in axes.collections]
+    at = np.concatenate(shown)
+    ends = np.sort([axes.get_xlim(), axes.get_ylim()])
+    return bool(np.all((at >= ends[:, 0]) & (at <= ends[:, 1]) | np.isnan(at)))
 
 
 def ticks(axes: Axes, across: str = 'x') -> Mapping[float, str]:

@@ -46,6 +46,7 @@ LAYS_OUT = {  # calls
     'new_figure', 'ConstrainedLayoutEngine', 'tick_params', 'margins', 'set_visible', 'grid',
     'set_minor_locator', 'minorticks_off', 'small_heads', 'set_axis_off', 'set_edgecolor',
 }  # fmt: skip
+DASHED = re.compile(r'\(0, \([\d., ]+\)\)')  # lengths of the dashes of a line
 ROUNDED = {'number', 'plain', 'fixed'}  # calls: a value, and its digits
 
 
@@ -99,6 +100,8 @@ def _judged(tree: ast.Module, source: str) -> list[ast.AST | None]:
         if isinstance(node, ast.Assign | ast.AnnAssign) and JUDGED.search(lines[node.lineno - 1]):
             parts.append(node)
         if isinstance(node, ast.Assign) and LAYOUT.fullmatch(getattr(node.targets[0], 'attr', '')):
+            parts.append(node)
+        if isinstance(node, ast.Tuple) and DASHED.fullmatch(ast.unparse(node)):
             parts.append(node)
         if isinstance(node, ast.Dict):
             keys = [getattr(key, 'value', None) for key in node.keys]

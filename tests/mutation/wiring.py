@@ -128,10 +128,15 @@ class OtherKey(Wiring):
         return not is_text and PLAIN.match(leaf.value) is not None and ' ' not in leaf.value
 
     def other(self, node: Any) -> str | None:
-        """The next key."""
+        """The next key, in the quotes of this one: it may stand in a text."""
         if not self._is_key(node):
             return None
-        return self.after(node, [leaf for leaf in self.leaves(node) if self._is_key(leaf)])
+        mark, mine = node.value[0], node.value[1:-1]
+        keys = [leaf for leaf in self.leaves(node) if self._is_key(leaf)]
+        place = next(i for i, leaf in enumerate(keys) if leaf is node)
+        others = (leaf.value[1:-1] for leaf in keys[place:] + keys[:place])
+        found = next((key for key in others if key != mine and mark not in key), None)
+        return None if found is None else f'{mark}{found}{mark}'
 
 
 class OtherName(Wiring):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from helpers.certificates import certificate_of
+from helpers.made_runs import made
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018.claims import judge_runs
@@ -306,3 +307,19 @@ def test_restless_lines_lie_below_smooth_ones(case1):
         smooth, noisy = axes.lines[:2]
         assert smooth.get_zorder() > noisy.get_zorder()
         assert smooth.get_color() != noisy.get_color()
+
+
+def test_how_a_law_is_run_is_said_of_those_that_differ() -> None:
+    about = {'gains': {'K_D': None}}
+    runs = {name: made(name, 'gvc', 1) for name in ('one', 'two')}
+    held = {name: replace(run, hold='zoh') for name, run in runs.items()}
+    through = {name: replace(run, hold='continuous') for name, run in runs.items()}
+    mixed = {'one': held['one'], 'two': through['two']}
+    said = [
+        dict(set_up(some, dict.fromkeys(some, about), '').rows)['integration']
+        for some in (held, through, mixed)
+    ]
+    assert said[2] == [f'{text} ({name})' for (text,), name in zip(said, runs, strict=False)]
+    assert [('sampled' in text, 'every stage' in text) for text in said[2]] == [
+        (True, False), (False, True),
+    ]  # fmt: skip

@@ -44,6 +44,9 @@ def test_a_row_per_run_with_every_figure(entries, table) -> None:
         if known.summary:
             assert row['effort.max.heave'] == known.summary['effort']['max'][2]
             assert row['samples'] == known.summary['samples']
+    names = ['run', 'scenario', 'vehicle', 'controller', 'law', 'origin', 'hold', 'failure']
+    assert table.column_names[:8] == names
+    assert [row['hold'] for row in rows] == [e.digest and e.digest.hold for e in entries]
     assert rows[-1]['failure'] == 'it diverges'
     assert {row['duration'] for row in rows} == {6.0, 3.0, None}
     assert rows[-1]['kinetic_energy.mean'] is None

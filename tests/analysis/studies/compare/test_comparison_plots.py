@@ -190,6 +190,8 @@ def test_rows_of_colours_are_the_errors_to_come_of_their_runs(many, tmp_path) ->
     axes = figure.axes[0]
     (mesh,) = axes.collections
     values = np.ma.filled(mesh.get_array(), np.nan).reshape(len(entries), -1)
+    edges = mesh.get_coordinates()[:, 0, 1].tolist()
+    assert edges == [row - 0.5 for row in range(len(entries) + 1)]
     times = np.geomspace(STEP, 12.0, values.shape[1])
     assert artists.ticks(axes, 'y') == dict(enumerate(e.name for e in entries))
     for row, one in zip(values, many, strict=False):

@@ -62,6 +62,7 @@ def test_a_design_before_and_after(tmp_path) -> None:
     assert records['reduced'].caption.startswith('delta_xi.surge of the vehicle before and after')
     M = VEHICLE.M
     panels = figures['Upsilon'].axes[:2]
+    assert panels[0].get_gridspec().get_geometry() == (1, 2), 'the left one names the rows of both'
     for axes, (key, U) in zip(panels, upper.items(), strict=True):
         assert axes.get_title(loc='left').endswith(key)
         weight = np.sqrt(np.diag(M)[:, None] / np.diag(M)[None, :])

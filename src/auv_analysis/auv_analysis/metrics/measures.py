@@ -6,6 +6,7 @@ a comparison, of a rollout in a sweep.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, Literal
 
 import numpy as np
@@ -42,10 +43,10 @@ class Measure:
 
     def of(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         """Values (n,) from those of its columns; NaN where one of them does not exist."""
-        values = np.stack([column(name) for name in self.columns])
+        values = map(column, self.columns)
         if self.rule == 'norm':
-            return np.sqrt(np.square(values).sum(axis=0))
-        return values.max(axis=0)
+            return np.sqrt(sum(map(np.square, values)))
+        return reduce(np.maximum, values)
 
 
 def _halves(family: str, rule: Literal['norm', 'largest']) -> list[Measure]:

@@ -3,9 +3,9 @@
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
-from scipy.stats import norm, wilcoxon
 
 TIE = 1e-9  # relative difference below which two numbers are the same: rounding is no finding
 NEVER = np.log(1e300)  # of the ratio of what does not exist to what does
@@ -65,7 +65,7 @@ def paired(d: np.ndarray, *, test: bool = True) -> Pairs:
 
     """
     ordered, n = np.sort(d), len(d)
-    bound = norm.ppf(0.5 + CONFIDENCE / 2) * np.sqrt((2 * n + 1) / (1.5 * n * (n + 1)))
+    bound = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2) * np.sqrt((2 * n + 1) / (1.5 * n * (n + 1)))
     few = ordered if n <= MOST else ordered[((np.arange(MOST) + 0.5) * (n / MOST)).astype(int)]
     low, high = _crossing(few, bound, np.greater), _crossing(few, -bound, np.greater_equal)
     middle = (_crossing(few, 0, np.greater) + _crossing(few, 0, np.greater_equal)) / 2
@@ -81,30 +81,45 @@ def paired(d: np.ndarray, *, test: bool = True) -> Pairs:
     )
 
 
-def _effect(ordered: np.ndarray, shift: float = 0.0) -> float:
-    """Signed-rank sum of sorted (n,) less a shift, as a part of its largest value.
+def _effect(ordered: np.ndarray) -> float:
+    """Signed-rank sum of sorted (n,), as a part of its largest value.
 
-    It is the number of Walsh averages (d_i + d_j) / 2, i <= j, above the shift less that below it.
+    It is the number of Walsh averages (d_i + d_j) / 2, i <= j, above 0 less that below it.
     """
-    n, others = len(ordered), 2 * shift - ordered
-    above = n * n - int(np.searchsorted(ordered, others, 'right').sum())
-    below = int(np.searchsorted(ordered, others, 'left').sum())
-    alone = int(np.sign(ordered - shift).sum())
-    return (above - below + alone) / (n * (n + 1))
+    n = len(ordered)
+    sides = [np.searchsorted(ordered, -ordered, side).sum() for side in ('left', 'right')]
+    return (n * n - int(sum(sides)) + int(np.sign(ordered).sum())) / (n * (n + 1))
 
 
 def _crossing(ordered: np.ndarray, level: float, above: np.ufunc) -> float:
-    """Where `_effect` ceases to be above a level as the shift grows; bisection."""
-    low, high = float(ordered[0]), float(ordered[-1])
+    """Where `_effect` of `ordered` less a shift ceases to be above a level as the shift grows.
+
+    By bisection. How many d_j are below 2 * shift - d_i is counted anew only for those d_i where
+    it differs between the ends of the interval.
+    """
+    n, low, high = len(ordered), float(ordered[0]), float(ordered[-1])
+    others, least, most = ordered, np.zeros(n, int), np.full(n, n)
+    counted = 0  # twice the sum over all other i
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        low, high = (middle, high) if above(_effect(ordered, middle), level) else (low, middle)
+        left, right = (np.searchsorted(ordered, 2 * middle - others, s) for s in ('left', 'right'))
+        alone = n - sum(int(np.searchsorted(ordered, middle, s)) for s in ('left', 'right'))
+        signed = n * n - counted - int(left.sum() + right.sum()) + alone
+        if above(signed / (n * (n + 1)), level):
+            low, least = middle, left
+        else:
+            high, most = middle, right
+        open_ = least < most
+        counted += 2 * int(least[~open_].sum())
+        others, least, most = others[open_], least[open_], most[open_]
     return high
 
 
 def _p(d: np.ndarray) -> float:
     if np.all(d == 0):
         return 1.0
+    from scipy.stats import wilcoxon
+
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')  # of few draws
         return float(wilcoxon(d, zero_method='zsplit').pvalue)

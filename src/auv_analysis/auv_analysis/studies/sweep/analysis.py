@@ -1,8 +1,11 @@
 """All that is computed of a sweep: quantiles, what matters, pairs, the best rows, as results."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from functools import partial
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,13 +16,14 @@ from auv_analysis.report.results import Results
 from auv_analysis.studies.pairs import log_ratios, paired
 from auv_analysis.studies.sweep.dataset import (
     STATUSES,
+    THREADS,
     Factor,
     Sweep,
     by_group,
     factors_of,
     numbers_of,
 )  # fmt: skip
-from auv_analysis.studies.sweep.indices import designed, failing, indices, omitted
+from auv_analysis.studies.sweep.indices import Designed, designed, failing, indices, omitted
 from auv_analysis.studies.sweep.quantiles import (
     Row,
     finite,
@@ -37,24 +41,26 @@ MOST_CELLS = 10  # groups of a path that a table of two has room for
 COUNT = 10  # best rows of each controller
 
 
-def figures_spread(analysis: 'Analysis') -> Iterator[Row]:
+def _spreads(analysis: 'Analysis', columns: Mapping[str, np.ndarray]) -> None:
     """Rows of `quantiles.parquet`: controller, figure, its unit and meaning, its quantiles."""
-    known = analysis.spreads
-    for measure in MEASURES:
-        yield from known[measure.name]
-    for family in FAMILIES:
-        names = [f'{family}.{dof}' for dof in DOFS]
-        table = analysis.sweep.table([name for name in names if name not in known])
-        for name in names:
-            yield from known.get(name) or _of_column(analysis.sweep, name, numbers_of(table, name))
+    for name, values in columns.items():
+        label, unit, meaning = described(name)
+        said = {'figure': name, 'label': label, 'unit': unit, 'meaning': meaning}
+        analysis.spreads[name] = [
+            {'controller': controller} | said | spread(values[analysis.rows_of(controller)], unit)
+            for controller in analysis.sweep.controllers
+        ]
 
 
-def _of_column(sweep: Sweep, name: str, values: np.ndarray) -> Iterator[Row]:
-    label, unit, meaning = described(name)
-    for i, controller in enumerate(sweep.controllers):
-        rows = (sweep.controller == i) & (sweep.status == 0)
-        names = {'controller': controller, 'figure': name, 'label': label}
-        yield names | {'unit': unit, 'meaning': meaning} | spread(values[rows], unit)
+def _family(analysis: 'Analysis', family: str) -> None:
+    names = [f'{family}.{dof}' for dof in DOFS]
+    if names[0] not in analysis.spreads:
+        _spreads(analysis, _columns(analysis.sweep, names))
+
+
+def _columns(sweep: Sweep, names: Sequence[str]) -> dict[str, np.ndarray]:
+    table = sweep.table([*names])
+    return {name: numbers_of(table, name) for name in names}
 
 
 class Ordered(NamedTuple):
@@ -260,10 +266,11 @@ def best(
 
     """
     values, found = figures[by.name], []
+    given_rows = sweep.table(['index', 'seed', *sweep.paths])
     for i, controller in enumerate(sweep.controllers):
         rows = np.flatnonzero((sweep.controller == i) & (sweep.status == 0) & np.isfinite(values))
         places = rows[np.argsort(values[rows], kind='stable')[:count]]
-        table = sweep.table(['index', 'seed', *sweep.paths]).take(places).to_pylist()
+        table = given_rows.take(places).to_pylist()
         for rank, (place, given) in enumerate(zip(places, table, strict=True), start=1):
             row = {'by': by.name, 'controller': controller, 'rank': rank}
             row |= {'rollout': given.pop('index'), **given}
@@ -371,13 +378,22 @@ def analysed(sweep: Sweep, by: str = BEST_BY) -> Analysis:
         *_tied(sweep),
         *(n for group in groups for n in failing(sweep, group)),
     ]
-    for measure in each(MEASURES, len(MEASURES)):
-        _one_measure(analysis, measure, groups)
+    with ThreadPoolExecutor(THREADS) as pool:
+        for factor, controller in product(analysis.factors, sweep.controllers):
+            if factor.differs and factor.concerns(controller):
+                pool.submit(analysis.ranks_of, factor, controller)  # which every measure needs
+        found = pool.map(partial(_rows_of, analysis), MEASURES)
+        for measure, rows in zip(MEASURES, each(found, len(MEASURES)), strict=True):
+            _add(analysis, measure, rows, groups)
+        list(pool.map(partial(_family, analysis), FAMILIES))
+    figures = [m.name for m in MEASURES] + [
+        f'{family}.{dof}' for family in FAMILIES for dof in DOFS
+    ]
+    analysis.tables['quantiles'] = [row for name in figures for row in analysis.spreads[name]]
     analysis.pair = analysis.most_influential()[:2]
     _pairs(analysis)
     _failures(analysis)
     analysis.tables['best'] = best(sweep, analysis.values, BY_NAME[by])
-    analysis.tables['quantiles'] = list(figures_spread(analysis))
     return analysis
 
 
@@ -389,20 +405,16 @@ def _tied(sweep: Sweep) -> Iterator[str]:
             yield f'{names} vary side by side: what one explains may be the work of another'
 
 
-def _one_measure(analysis: Analysis, measure: Measure, groups: Sequence[Any]) -> None:
-    sweep, tables = analysis.sweep, analysis.tables
-    table = sweep.table(list(measure.columns))
-    values = analysis.values[measure.name] = measure.of(lambda name: numbers_of(table, name))
-    for name in measure.columns:  # while they are at hand
-        analysis.spreads[name] = list(_of_column(sweep, name, numbers_of(table, name)))
-    analysis.spreads[measure.name] = list(_of_column(sweep, measure.name, values))
+def _rows_of(analysis: Analysis, measure: Measure) -> list[tuple[str, Row]] | None:
+    """Rows of a measure with the tables that they are of; None where it does not vary."""
+    sweep = analysis.sweep
+    columns = _columns(sweep, measure.columns)
+    values = analysis.values[measure.name] = measure.of(columns.__getitem__)
+    _spreads(analysis, columns | {measure.name: values})  # while they are at hand
     ok = [analysis.rows_of(name) for name in sweep.controllers]
     if not varying([values[rows] for rows in ok], measure.unit):
-        known = values[np.isfinite(values) & (sweep.status == 0)]
-        analysis.fixed[measure.name] = float(known[0]) if len(known) else None
-        return
-    analysis.measures.append(measure)
-    tables['paired'] += pairs(sweep, values, measure)
+        return None
+    found = [('paired', row) for row in pairs(sweep, values, measure)]
     for controller, rows in zip(sweep.controllers, ok, strict=True):
         figure = Ordered.of(values[rows], measure.unit)
         names = {'controller': controller, 'figure': measure.name}
@@ -411,11 +423,28 @@ def _one_measure(analysis: Analysis, measure: Measure, groups: Sequence[Any]) ->
                 continue
             codes = factor.codes[rows]
             for row in along(figure, codes, factor, measure):
-                tables['dependence'].append({'controller': controller} | row)
-            if found := _influence(analysis, figure, factor, codes, controller):
-                tables['influence'].append(names | {'path': factor.path} | found)
+                found.append(('dependence', {'controller': controller} | row))
+            if shares := _influence(analysis, figure, factor, codes, controller):
+                found.append(('influence', names | {'path': factor.path} | shares))
+    return found
+
+
+def _add(
+    analysis: Analysis,
+    measure: Measure,
+    rows: list[tuple[str, Row]] | None,
+    groups: Sequence[Designed],
+) -> None:
+    sweep, values = analysis.sweep, analysis.values[measure.name]
+    if rows is None:
+        known = values[np.isfinite(values) & (sweep.status == 0)]
+        analysis.fixed[measure.name] = float(known[0]) if len(known) else None
+        return
+    analysis.measures.append(measure)
+    for name, row in rows:
+        analysis.tables[name].append(row)
     for group in groups:
-        tables['indices'] += indices(sweep, group, values, measure)
+        analysis.tables['indices'] += indices(sweep, group, values, measure)
         analysis.notes += omitted(sweep, group, values, measure)
 
 

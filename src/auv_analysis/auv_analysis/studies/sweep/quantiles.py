@@ -24,20 +24,14 @@ def quantiles(values: np.ndarray, levels: Iterable[float]) -> np.ndarray:
     levels : from 0 to 1
 
     """
-    return at_levels(ascending(values), levels)
+    known = values[~np.isnan(values)]
+    places = _places(len(known), levels)
+    return np.partition(known, places)[places] if len(known) else np.full(len(places), np.nan)
 
 
-def ascending(values: np.ndarray) -> np.ndarray:
-    """The values that exist, sorted."""
-    return np.sort(values[~np.isnan(values)])
-
-
-def at_levels(known: np.ndarray, levels: Iterable[float]) -> np.ndarray:
-    """Quantiles of sorted values: the inverse of their distribution function."""
-    levels, n = np.asarray(list(levels)), len(known)
-    if n == 0:
-        return np.full(len(levels), np.nan)
-    return known[np.clip(np.ceil(n * levels - 1).astype(int), 0, n - 1)]
+def _places(count: int, levels: Iterable[float]) -> np.ndarray:
+    """Places of quantiles among sorted values: the inverse of their distribution function."""
+    return np.clip(np.ceil(count * np.array([*levels]) - 1).astype(int), 0, max(count - 1, 0))
 
 
 def finite(value: float) -> float | None:
@@ -50,7 +44,12 @@ def spread(values: np.ndarray, unit: str) -> Row:
 
     `known` counts the values that exist; of a time, the quantiles count one that does not as late.
     """
-    return spread_of_sorted(ascending(ordered(values, unit)), len(values))
+    at = ordered(values, unit)
+    at = at[~np.isnan(at)]
+    if len(at):
+        last = max(np.count_nonzero(at < np.inf) - 1, 0)
+        at.partition([0, *_places(len(at), LEVELS.values()), last])  # sorted where it is read
+    return spread_of_sorted(at, len(values))
 
 
 def spread_of_sorted(values: np.ndarray, rows: int) -> Row:
@@ -58,7 +57,7 @@ def spread_of_sorted(values: np.ndarray, rows: int) -> Row:
     known = values[: np.searchsorted(values, np.inf)]
     row: Row = {'rows': rows, 'known': len(known)}
     row |= {'smallest': finite(known[0]) if len(known) else None}
-    at = at_levels(values, LEVELS.values())
+    at = values[_places(len(values), LEVELS.values())] if len(values) else [np.nan] * len(LEVELS)
     row |= {name: finite(value) for name, value in zip(LEVELS, at, strict=True)}
     row |= {'largest': finite(known[-1]) if len(known) else None}
     return row | {'mean': finite(known.mean()) if len(known) else None}
@@ -66,8 +65,8 @@ def spread_of_sorted(values: np.ndarray, rows: int) -> Row:
 
 def thinned(values: np.ndarray) -> np.ndarray:
     """Values with the same quantiles, few enough to be drawn; NaN is left out."""
-    known = ascending(values)
-    return known if len(known) <= POINTS else at_levels(known, np.linspace(0.0, 1.0, POINTS))
+    known = np.count_nonzero(~np.isnan(values))
+    return quantiles(values, np.linspace(0.0, 1.0, min(int(known), POINTS)))
 
 
 def varying(values: Sequence[np.ndarray], unit: str) -> bool:

@@ -119,19 +119,24 @@ def make_distribution(spec: Mapping[str, Any]) -> Distribution:
 
 
 def _of_interval(name: str, low: float, high: float, mode: float | None) -> Distribution:
-    from scipy import stats
-
+    # as scipy.stats has them, which takes longer to load than a small sweep to compute
     if mode is not None and not low <= mode <= high:
         raise ValueError(f'a mode from {low:g} to {high:g}', f'{mode:g}')
     if low == high:
         return _choice(np.array([low]))
-    if mode is not None:
-        frozen = stats.triang((mode - low) / (high - low), low, high - low)
-    elif name == 'loguniform':
-        frozen = stats.loguniform(low, high)
-    else:
-        frozen = stats.uniform(low, high - low)
-    return Distribution(frozen.ppf, bounded=True)
+    if name == 'loguniform':
+        ends = np.log([low, high])
+        return Distribution(
+            lambda u: np.clip(np.exp(ends[0] + u * (ends[1] - ends[0])), low, high), bounded=True
+        )
+    c = None if mode is None else (mode - low) / (high - low)
+
+    def quantile(u: np.ndarray) -> np.ndarray:
+        if c is not None:
+            u = np.where(u < c, np.sqrt(c * u), 1 - np.sqrt((1 - c) * (1 - u)))
+        return u * (high - low) + low
+
+    return Distribution(quantile, bounded=True)
 
 
 def _normal(spec: Mapping[str, Any], *, log: bool) -> Distribution:

@@ -5,6 +5,8 @@ help and completion are quick.
 """
 
 import _thread
+import atexit
+import gc
 import importlib
 import json
 import os
@@ -62,6 +64,7 @@ AGAIN = 0.05  # s after which a Ctrl-C that was dropped is repeated
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command; exit code 0 fine, 1 the work failed, 2 wrong input."""
+    atexit.register(gc.freeze)  # else Python looks through all that is left, for a second
     before, sys.unraisablehook = sys.unraisablehook, _repeat_interrupt
     try:
         _main(arguments)

@@ -1,6 +1,7 @@
 """Independent tasks, by this process and, in a command on several cores, by a copy of it beside."""
 
 import contextlib
+import gc
 import os
 import pickle
 import select
@@ -41,6 +42,7 @@ def results(tasks: Sequence[Callable[[], T]]) -> Iterator[T]:
     numbers, fill = os.pipe()
     os.write(fill, bytes(range(len(tasks))))
     os.close(fill)
+    gc.freeze()  # neither process looks through, and so copies, what both have
     copy, answer = _forked(tasks, numbers)
     began, found = time.monotonic(), dict[int, T]()
     try:

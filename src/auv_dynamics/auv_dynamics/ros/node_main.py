@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import rclpy
 from rclpy.exceptions import ParameterUninitializedException
@@ -349,6 +349,7 @@ def _orphaned() -> bool:
     return parent is not None and os.getppid() != int(parent)
 
 
-def main_of(*makes: Callable[[], Any]) -> None:
+def main_of(*makes: Callable[[], Any]) -> NoReturn:
     """Entry point of an executable with one node, or several."""
-    sys.exit(live(makes))
+    # all is closed and said: Python would take a second to unload numba and the middleware
+    os._exit(live(makes))

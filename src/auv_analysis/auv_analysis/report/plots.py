@@ -37,6 +37,7 @@ NOTHING = '#ececec'  # where there are no samples
 FAULT, FAULT_INK = '#fcefd6', '#8a5a00'  # where something has failed, and its number
 GREY = '#6b6b6b'
 PALETTE = 64  # colours of a PNG
+WHITE = 0xFFFFFFFF
 WIDTH = 6.27  # in, text of Taylor & Francis's LaTeX class in large format: A4, margins of 1 in
 DPI = 184
 GROUPS = (range(3), range(3, 6))  # linear, angular
@@ -103,14 +104,28 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     # once each by the canvases themselves: savefig would draw every figure twice
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert('RGB')
-    # few colours: a fifth of the bytes, so that a report stays small
-    few = drawn.quantize(PALETTE, dither=Image.Dither.NONE)
-    few.save(png, optimize=True, dpi=(DPI, DPI))
+    _few_colours(np.asarray(canvas.buffer_rgba())).save(png, dpi=(DPI, DPI))
     figure.set_layout_engine('none')  # laid out once is enough
     dates = {'CreationDate': None, 'Creator': None, 'Producer': None}
     FigureCanvasPdf(figure).print_pdf(pdf, metadata=dates)
     return png, pdf
+
+
+def _few_colours(pixels: np.ndarray) -> Image.Image:
+    """Image of RGBA pixels (h, w, 4) with a palette: a third of the bytes, so a report is small.
+
+    White, which most of them are, has an entry of its own and is not looked at any further.
+    """
+    inked = (pixels.view(np.uint32) != WHITE)[..., 0]
+    inked[0, 0] = True  # one at least
+    few = Image.fromarray(pixels[inked][np.newaxis]).convert('RGB')
+    few = few.quantize(PALETTE - 1, dither=Image.Dither.NONE)
+    entries = np.full(inked.shape, PALETTE - 1, np.uint8)
+    entries[inked] = np.asarray(few)[0]
+    image = Image.fromarray(entries)
+    colours = few.getpalette() or []
+    image.putpalette([*colours, *[255] * (3 * PALETTE - len(colours))])
+    return image
 
 
 def _saved(folder: Path, name: str, make: Callable[[], Drawn]) -> FigureRecord:

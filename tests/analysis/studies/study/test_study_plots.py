@@ -30,7 +30,7 @@ def _sensitive(method: str) -> Made:
 def test_sensitivities_stand_beside_their_measures(method: str, tmp_path) -> None:
     found = _sensitive(method)
     with artists.captured() as figures:
-        record = study.sensitivity_plot(found, tmp_path)
+        (record,) = study.sensitivity_plots([found], tmp_path)
     left, right = figures['sensitivity_cl'].axes
     order = [Kpi('velocity_error.rms', 'sway'), Kpi('velocity_error.rms', 'roll'),
              Kpi('effort.max', 'yaw')]  # fmt: skip

@@ -1,6 +1,7 @@
 """What a change of the gains does: the file, a table per controller, a plot, sentences."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from auv_analysis.output.new_files import write_table
 from auv_analysis.output.text import Maths, fixed, join, number, plain, symbol
 from auv_analysis.report import plots
 from auv_analysis.report.document import Block, Section, Sentence
-from auv_analysis.report.plots import FigureRecord, HeatMap
+from auv_analysis.report.plots import Drawn, FigureRecord, HeatMap, save_figures
 from auv_analysis.report.results import Column, Table, make_table
 from auv_analysis.runs.run import AnyRun, Run
 from auv_analysis.studies.study.sensitivity import Kpi, Row, Sensitivity
@@ -187,26 +188,29 @@ def _headline(of: Sensitivity, name: str, dof: str, main: Row) -> str:
     )
 
 
-def sensitivity_plot(found: Sensitivity, folder: Path) -> FigureRecord:
-    """Draw the errors, estimates and inputs of one controller; no files where nothing follows."""
-    name, title = f'sensitivity_{found.controller}', f'Sensitivity to the gains, {found.controller}'
+def sensitivity_plots(found: Sequence[Sensitivity], folder: Path) -> list[FigureRecord]:
+    """Draw the errors, estimates and inputs of each controller; no files where nothing follows."""
+    made = {f'sensitivity_{of.controller}': partial(_plot, of) for of in found}
+    return [*save_figures(folder, made).values()]
+
+
+def _plot(found: Sensitivity) -> Drawn:
+    title = f'Sensitivity to the gains, {found.controller}'
     shown = {kpi: rows for kind in SHOWN for kpi, rows in found.kpis.items() if kpi.name == kind}
     if not shown:
-        return FigureRecord(name, title, f'{title}: nothing to draw.', None, None)
+        return None, title, f'{title}: nothing to draw.'
     sobol = found.method == 'sobol'
-    with plots.style():
-        figure = plots.new_figure(ROW * len(shown) + 0.9)
-        left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.5, 1.0))
-        weights = np.array([
-            [row[found.weight] for gain in found.gains for row in rows if row['gain'] == gain]
-            for rows in shown.values()
-        ])  # fmt: skip
-        heads = [gain_mathtext(gain) for gain in found.gains]
-        plots.draw_grid(right, HeatMap(weights, heads, '', 'Blues', decimals=2), 7.5)
-        _bars(left, shown)
-        plots.letter(left, 0, 'spread, 95 % interval')
-        plots.letter(right, 1, 'total index $S_T$' if sobol else r'$\mu^*$')
-        files = plots.save(figure, folder, name)
+    figure = plots.new_figure(ROW * len(shown) + 0.9)
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.5, 1.0))
+    weights = np.array([
+        [row[found.weight] for gain in found.gains for row in rows if row['gain'] == gain]
+        for rows in shown.values()
+    ])  # fmt: skip
+    heads = [gain_mathtext(gain) for gain in found.gains]
+    plots.draw_grid(right, HeatMap(weights, heads, '', 'Blues', decimals=2), 7.5)
+    _bars(left, shown)
+    plots.letter(left, 0, 'spread, 95 % interval')
+    plots.letter(right, 1, 'total index $S_T$' if sobol else r'$\mu^*$')
     what = (
         'share of its variance that each gain makes, alone and with the others (total index of '
         'Sobol’; the sum may exceed 1)'
@@ -218,7 +222,7 @@ def sensitivity_plot(found: Sensitivity, folder: Path) -> FigureRecord:
         f'multiplied by a number of its own between 1/{plain(found.span)} and '
         f'{plain(found.span)}; (b) {what}.'
     )
-    return FigureRecord(name, title, caption, *files)
+    return figure, title, caption
 
 
 def _bars(axes: Axes, shown: Mapping[Kpi, Sequence[Row]]) -> None:
@@ -271,7 +275,7 @@ def sensitivity_section(out: Path, found: Sequence[Sensitivity]) -> Part:
 
 def _of_controllers(out: Path, found: Sequence[Sensitivity]) -> Iterator[Block]:
     known = [of for of in found if not of.refusal]
-    yield from (sensitivity_plot(of, out / 'figures') for of in known)
+    yield from sensitivity_plots(known, out / 'figures')
     yield from (sensitivity_table(found, of.controller) for of in known)
     left_out = left_out_table(found)
     if left_out is not None:

@@ -10,6 +10,8 @@ SOURCES := $(foreach p,$(PACKAGES),src/$(p)/setup.py src/$(p)/setup.cfg src/$(p)
 
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# beside the compiled kernels: both are found by content, wherever a clone lies
+export MYPY_CACHE_DIR ?= $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/auv_gvc/mypy
 export PYTHONDONTWRITEBYTECODE :=  # else each node and each worker compiles all modules anew
 
 ifeq ($(ROS_DISTRO),jazzy)

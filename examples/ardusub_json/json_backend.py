@@ -10,7 +10,7 @@ import socket
 import struct
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -229,8 +229,8 @@ def serve(options: argparse.Namespace) -> str:
     return f'{physics.t:.3f} s, {backend.frames} frames, {backend.lost} lost'
 
 
-def main() -> int:
-    """Exit code: 0, 1 where the work failed, 2 for wrong input."""
+def options_of(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """What the command line says."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     water = parser.add_mutually_exclusive_group(required=True)
     water.add_argument('--vehicle', help='vehicle file with thrusters, or bare name')
@@ -242,8 +242,13 @@ def main() -> int:
     parser.add_argument('--bag', type=Path, help='record into this folder')
     parser.add_argument('--no-time-sync', action='store_true', help='as fast as both can')
     parser.add_argument('--seconds', type=float, default=float('inf'), help='simulated, then end')
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Exit code: 0, 1 where the work failed, 2 for wrong input."""
     try:
-        say(serve(parser.parse_args()))
+        say(serve(options_of(arguments)))
     except (InputError, FailedError) as error:
         say(str(error))
         return 2 if isinstance(error, InputError) else 1

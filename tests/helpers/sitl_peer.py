@@ -1,4 +1,4 @@
-"""ArduSub's side of the JSON interface, and the backend as a process for it to talk to.
+"""ArduSub's side of the JSON interface, and the backend for it to talk to.
 
 Written from the interface's description and from how SITL reads an answer: it looks for a key, and
 for its numbers directly behind the colon.
@@ -12,12 +12,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import json_backend
 import numpy as np
 from helpers.patience import patience
+from json_backend import Frame, made, options_of, parse
 
 ROOT = Path(__file__).resolve().parents[2]
 BACKEND = ROOT / 'examples' / 'ardusub_json' / 'json_backend.py'
@@ -92,6 +94,32 @@ class SitlPeer:
         finally:
             self.socket.settimeout(PATIENCE)
         return False
+
+
+class DirectPeer(SitlPeer):
+    """The same without a network: of what answers frames in this process."""
+
+    def __init__(self, answer: Callable[[Frame], bytes], rate: int = 400):
+        self.rate, self.channels, self.count, self._answer = rate, 16, 0, answer
+
+    def send(self, data: bytes) -> None:
+        frame = parse(data)
+        assert frame
+        self._data = self._answer(frame)
+
+    def heard(self) -> bytes:
+        return self._data
+
+
+@contextlib.contextmanager
+def direct(*options: str, rate: int = 400) -> Iterator[DirectPeer]:
+    """Autopilot of a backend in this process."""
+    told = options_of(options)
+    physics, bags = made(told)
+    begin, paced = (bags.begin if bags else lambda: None), not told.no_time_sync
+    yield DirectPeer(json_backend.Backend(None, physics, begin, paced=paced).answer, rate)
+    if bags:
+        bags.close()
 
 
 class Backend:

@@ -4,14 +4,16 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import json_backend
 import numpy as np
 import pytest
 import yaml
 from ardusub_mixer import FRAMES
 from helpers.patience import patience
-from helpers.sitl_peer import BACKEND, NEUTRAL, ROOT, SitlPeer, backend
+from helpers.sitl_peer import BACKEND, NEUTRAL, ROOT, SitlPeer, backend, direct
 from json_motors import make_motors
 
 from auv_dynamics import load_vehicle
@@ -21,24 +23,27 @@ UP = ('0', '0', '-1', '0', '0', '0')  # NED, rad
 PULSES = np.array([1600.0, 1350, 1480, 1700, 1450, 1550, 1300, 1900] + [0.0] * 24)
 
 
-def refused(*options: str) -> str:
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture) -> Callable[..., str]:
     """The line with which it ends, exit code 2."""
-    command = [sys.executable, str(BACKEND), *options]
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=patience(60), check=False
-    )
-    assert done.returncode == 2, done.stderr
-    return done.stderr.splitlines()[-1]
+
+    def said(*options: str) -> str:
+        assert json_backend.main(options) == 2
+        return capsys.readouterr().err.splitlines()[-1]
+
+    return said
 
 
 def test_a_port_in_use_is_named() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(('127.0.0.1', 0))
         place = f'127.0.0.1:{taken.getsockname()[1]}'
-        line = refused('--vehicle', 'bluerov2', '--listen', place)
-    assert line == (
-        f'--listen: {place}: expected HOST:PORT that is free, found address already in use'
-    )
+        command = [sys.executable, str(BACKEND), '--vehicle', 'bluerov2', '--listen', place]
+        done = subprocess.run(
+            command, stderr=subprocess.PIPE, text=True, timeout=patience(60), check=False
+        )
+    line = f'--listen: {place}: expected HOST:PORT that is free, found address already in use\n'
+    assert (done.returncode, done.stderr) == (2, line)
 
 
 @pytest.mark.parametrize(
@@ -56,11 +61,11 @@ def test_a_port_in_use_is_named() -> None:
         (('--scenario', 'nowhere.yaml'), 'nowhere.yaml'),
     ],
 )
-def test_wrong_input_is_one_line(options: tuple[str, ...], expected: str) -> None:
+def test_wrong_input_is_one_line(refused, options: tuple[str, ...], expected: str) -> None:
     assert expected in refused(*options, *([] if '--listen' in options else ['--listen', ':0']))
 
 
-def test_a_folder_with_a_bag_is_not_written_to(tmp_path: Path) -> None:
+def test_a_folder_with_a_bag_is_not_written_to(refused, tmp_path: Path) -> None:
     (tmp_path / 'dive_0.mcap').touch()
     line = refused('--vehicle', 'bluerov2', '--listen', ':0', '--bag', str(tmp_path))
     assert line.startswith('--bag: ')
@@ -77,13 +82,13 @@ def test_a_signal_ends_it_in_good_order(number: int, tmp_path: Path) -> None:
     assert (tmp_path / 'dive' / 'metadata.yaml').is_file()
 
 
-def test_it_says_once_that_nobody_is_there() -> None:
-    with backend('--vehicle', 'bluerov2') as process:
-        process.until('no frame of ArduSub for 5 s: waiting')
-        peer = SitlPeer(process.port)
-        assert peer.is_silent(2.5)
-        peer.run(0.1)
-    assert sum('waiting' in line for line in process.said) == 2  # and where it waits
+def test_it_says_once_that_nobody_is_there(monkeypatch, capsys) -> None:
+    monkeypatch.setattr(json_backend, 'SILENCE', 0.5)
+    with json_backend.opened('127.0.0.1:0') as port:
+        waits = json_backend.Backend(port, None, lambda: None, paced=True)
+        waits.serve()
+        waits.serve()
+    assert capsys.readouterr().err == 'no frame of ArduSub for 0.5 s: waiting\n'
 
 
 def test_a_length_in_simulated_time() -> None:
@@ -95,8 +100,7 @@ def test_a_length_in_simulated_time() -> None:
 
 
 def test_no_time_sync_is_told() -> None:
-    with backend('--vehicle', 'bluerov2', '--no-time-sync') as process:
-        peer = SitlPeer(process.port)
+    with direct('--vehicle', 'bluerov2', '--no-time-sync') as peer:
         peer.send(peer.packet(NEUTRAL))
         assert b',"no_time_sync":1}' in peer.heard()
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from ardusub_mixer import motor_pulses
-from helpers.sitl_peer import ROOT, SitlPeer, backend
+from helpers.sitl_peer import ROOT, DirectPeer, direct
 from reference_devices import thruster_matrix
 from reference_plant import Plant
 from scipy.integrate import cumulative_trapezoid
@@ -37,17 +37,31 @@ def vehicle(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture(scope='module')
-def deep(vehicle: str) -> Iterator[SitlPeer]:
-    with backend('--vehicle', vehicle, '--eta', *DEEP) as process:
-        yield SitlPeer(process.port)
+def deep(vehicle: str) -> Iterator[DirectPeer]:
+    with direct('--vehicle', vehicle, '--eta', *DEEP) as made:
+        yield made
+
+
+def anew(peer: DirectPeer) -> DirectPeer:
+    peer.count, peer.rate = 1, 400
+    peer.frame()  # so that frame 0 goes back
+    peer.count = 0
+    return peer
 
 
 @pytest.fixture
-def peer(deep: SitlPeer) -> SitlPeer:
-    deep.count, deep.rate = 1, 400
-    deep.frame()  # so that frame 0 goes back
-    deep.count = 0
-    return deep
+def peer(deep: DirectPeer) -> DirectPeer:
+    return anew(deep)
+
+
+@pytest.fixture(scope='module')
+def calm(deep: DirectPeer) -> dict[str, np.ndarray]:
+    return anew(deep).run(0.25)
+
+
+@pytest.fixture(scope='module')
+def turning(deep: DirectPeer) -> dict[str, np.ndarray]:
+    return anew(deep).run(2.0, TURNING)
 
 
 def attitudes(told: dict[str, np.ndarray]) -> Rotation:
@@ -69,11 +83,11 @@ SEEN = {  # where a positive input of the pilot is seen, and which way
 
 @pytest.mark.parametrize('axis', AXES)
 @pytest.mark.parametrize('way', [1, -1])
-def test_signs_of_the_pilots_axes(peer: SitlPeer, vehicle: str, axis: str, way: int) -> None:
+def test_signs_of_the_pilots_axes(
+    calm: dict, peer: DirectPeer, vehicle: str, axis: str, way: int
+) -> None:
     motors = VEHICLES[vehicle]
     inputs = [1500 + 160 * way * (name == axis) for name in AXES]
-    calm = peer.run(0.25)
-    peer.count = 0
     told = peer.run(0.25, motor_pulses(inputs, motors))
     if (axis, motors) == ('pitch', 6):  # which six thrusters do not have
         assert all(np.array_equal(told[key], calm[key]) for key in told)
@@ -91,16 +105,16 @@ def test_signs_of_the_pilots_axes(peer: SitlPeer, vehicle: str, axis: str, way: 
         assert sign * way * turned[i - 3] > 0.002
 
 
-def test_specific_force_is_that_of_the_reported_motion(peer: SitlPeer) -> None:
-    told = peer.run(3.0, TURNING)
+def test_specific_force_is_that_of_the_reported_motion(turning: dict) -> None:
+    told = turning
     assert np.abs(told['gyro']).max() > 0.3
     expected = force(told, 400)
     assert told['accel_body'][2:-2] == pytest.approx(expected[2:-2], abs=0.03)
     assert np.abs(told['accel_body'] + [0, 0, 9.8]).max() > 0.5  # far more than that tolerance
 
 
-def test_position_and_attitude_are_integrals_of_velocity_and_gyro(peer: SitlPeer) -> None:
-    told = peer.run(3.0, TURNING)
+def test_position_and_attitude_are_integrals_of_velocity_and_gyro(turning: dict) -> None:
+    told = turning
     way = cumulative_trapezoid(told['velocity'], dx=1 / 400, axis=0)
     assert told['position'][1:] - told['position'][0] == pytest.approx(way, abs=1e-5)
     attitude = attitudes(told)[0]
@@ -118,8 +132,8 @@ def wrench(name: str, pulses: list[int]) -> np.ndarray:
     return T @ np.interp(pulses[: T.shape[1]], curve.commands, curve.thrusts)
 
 
-def test_motion_is_that_of_the_second_implementation(peer: SitlPeer, vehicle: str) -> None:
-    told = peer.run(3.0, TURNING)
+def test_motion_is_that_of_the_second_implementation(turning: dict, vehicle: str) -> None:
+    told = turning
     plant, tau = Plant(vehicle_data(vehicle), []), wrench(vehicle, TURNING)
     for k in range(228, len(told['gyro']) - 1, 57):  # the rotors turn
         R = attitudes(told)[k].as_matrix()
@@ -131,7 +145,7 @@ def test_motion_is_that_of_the_second_implementation(peer: SitlPeer, vehicle: st
         assert turning == pytest.approx(nu_dot[3:], abs=0.05)
 
 
-def test_neutral_and_silent_motors_do_nothing(peer: SitlPeer) -> None:
+def test_neutral_and_silent_motors_do_nothing(peer: DirectPeer) -> None:
     neutral = peer.run(0.5)
     peer.count = 0
     silent = peer.run(0.5, [0] * 16)
@@ -142,8 +156,8 @@ def test_neutral_and_silent_motors_do_nothing(peer: SitlPeer) -> None:
 
 
 def test_a_buoyant_vehicle_stays_at_the_surface() -> None:
-    with backend('--vehicle', 'bluerov2', '--eta', *SHALLOW) as process:
-        told = SitlPeer(process.port, rate=100).run(8.0)
+    with direct('--vehicle', 'bluerov2', '--eta', *SHALLOW, rate=100) as peer:
+        told = peer.run(8.0)
     depth = told['position'][:, 2]
     assert depth[0] > 0.04
     assert (depth >= 0).all()
@@ -175,21 +189,20 @@ def scenario(folder: Path, **changes: Any) -> str:
 @pytest.mark.parametrize('rate', [50, 1200])
 def test_the_rate_of_frames_is_no_part_of_the_physics(rate: int, tmp_path: Path) -> None:
     spec = {'thrusters': True, 'rotor_lag': 0.0}  # rotors are held over a step
-    with backend('--scenario', scenario(tmp_path, actuators=spec)) as process:
-        peer = SitlPeer(process.port)
-        usual = peer.run(2.0, TURNING)
+    with direct('--scenario', scenario(tmp_path, actuators=spec)) as peer:
+        usual = peer.run(1.0, TURNING)
         peer.count, peer.rate = 0, rate
-        other = peer.run(2.0, TURNING)
+        other = peer.run(1.0, TURNING)
     for key in ('position', 'velocity', 'gyro', 'quaternion'):
         assert other[key][-1] == pytest.approx(usual[key][-1], abs=1e-7)
 
 
 def test_velocity_in_a_current_is_over_ground(tmp_path: Path) -> None:
     current = [{'kind': 'current', 'velocity': [0.3, -0.1, 0.0]}]
-    with backend('--scenario', scenario(tmp_path, disturbance=current)) as process:
-        told = SitlPeer(process.port, rate=100).run(30.0)
+    with direct('--scenario', scenario(tmp_path, disturbance=current), rate=100) as peer:
+        told = peer.run(20.0)
     assert told['velocity'][-1, :2] == pytest.approx([0.3, -0.1], abs=0.02)
-    assert told['position'][-1, :2] == pytest.approx(np.array([0.3, -0.1]) * 30, abs=1.5)
+    assert told['position'][-1, :2] == pytest.approx(np.array([0.3, -0.1]) * 20, abs=1.5)
     first = told['accel_body'][0] + [0, 0, 9.80665]  # pushed the way of the current
     pushed = Rotation.from_euler('z', 0.7).apply(first)
     assert pushed[0] > 0.01
@@ -200,8 +213,7 @@ def test_velocity_in_a_current_is_over_ground(tmp_path: Path) -> None:
 
 def test_disturbances_go_on_when_the_rate_changes(tmp_path: Path) -> None:
     push = [{'kind': 'harmonic', 'surge': {'terms': [{'amplitude': 10.0, 'omega': 3.0}]}}]
-    with backend('--scenario', scenario(tmp_path, disturbance=push)) as process:
-        peer = SitlPeer(process.port)
+    with direct('--scenario', scenario(tmp_path, disturbance=push)) as peer:
         steady = peer.run(1.5)
         peer.count = 0
         peer.run(0.5)
@@ -214,8 +226,7 @@ def test_disturbances_go_on_when_the_rate_changes(tmp_path: Path) -> None:
 @pytest.mark.parametrize('lag', ['lag', 'rotor_lag'])
 def test_thrusters_go_on_following_when_the_rate_changes(lag: str, tmp_path: Path) -> None:
     spec = {'thrusters': True, 'rotor_lag': 0.0} | {lag: 0.3}
-    with backend('--scenario', scenario(tmp_path, actuators=spec)) as process:
-        peer = SitlPeer(process.port)
+    with direct('--scenario', scenario(tmp_path, actuators=spec)) as peer:
         before = peer.run(0.15, AHEAD)['accel_body'][:, 0]
         peer.rate = 1000
         after = peer.run(0.005, AHEAD)['accel_body'][:, 0]
@@ -226,8 +237,7 @@ def test_thrusters_go_on_following_when_the_rate_changes(lag: str, tmp_path: Pat
 def test_a_thruster_that_fails_is_that_of_its_motor(tmp_path: Path) -> None:
     fault = {'kind': 'thruster', 'thruster': 'T2', 'efficiency': 0.0, 'from': 0.5}
     spec = {'faults': [fault], 'actuators': {'thrusters': True}}
-    with backend('--scenario', scenario(tmp_path, **spec)) as process:
-        peer = SitlPeer(process.port)
+    with direct('--scenario', scenario(tmp_path, **spec)) as peer:
         told = peer.run(1.0, AHEAD)
         peer.count = 0
         again = peer.run(1.0, AHEAD)
@@ -242,8 +252,7 @@ def test_a_thruster_that_fails_is_that_of_its_motor(tmp_path: Path) -> None:
 
 def test_lost_commands_are_held_and_then_none(tmp_path: Path) -> None:
     fault = {'kind': 'wrench_loss', 'from': 0.5, 'timeout': 0.25}
-    with backend('--scenario', scenario(tmp_path, faults=[fault])) as process:
-        peer = SitlPeer(process.port)
+    with direct('--scenario', scenario(tmp_path, faults=[fault])) as peer:
         before, held, after = (
             peer.run(seconds, pulses)
             for seconds, pulses in ((0.5, AHEAD), (0.25, [1500] * 8), (0.5, AHEAD))
@@ -261,8 +270,7 @@ def test_lags_are_those_of_the_scenario(lags: dict, power: int, tmp_path: Path) 
     down, felt = motor_pulses([1500, 1500, 1400, 1500, 1500, 1500], 8), []
     for spec in (lags, {'rotor_lag': 0.0}):
         actuators = {'thrusters': True, **spec}
-        with backend('--scenario', scenario(tmp_path, actuators=actuators)) as process:
-            peer = SitlPeer(process.port)
+        with direct('--scenario', scenario(tmp_path, actuators=actuators)) as peer:
             calm = peer.run(0.1)['accel_body'][-1, 2]
             felt.append(peer.run(0.02, down)['accel_body'][:, 2] - calm)
     slow, quick = felt
@@ -270,7 +278,7 @@ def test_lags_are_those_of_the_scenario(lags: dict, power: int, tmp_path: Path) 
     assert slow[7] / quick[0] == pytest.approx((1 - np.exp(-1.0)) ** power, abs=0.03)
 
 
-def test_rotors_of_the_vehicle_file_follow_late(peer: SitlPeer) -> None:
+def test_rotors_of_the_vehicle_file_follow_late(peer: DirectPeer) -> None:
     calm = peer.run(0.1)['accel_body'][-1]
     felt = np.linalg.norm(peer.run(0.1, TURNING)['accel_body'] - calm, axis=1)
     assert felt[0] < 0.1 * felt[-1]
@@ -284,8 +292,7 @@ def test_a_recording_is_a_run(tmp_path: Path) -> None:
         'disturbance': [{'kind': 'current', 'velocity': [0.3, -0.1, 0.0]}],
     }
     bag = tmp_path / 'dive'
-    with backend('--scenario', scenario(tmp_path, **spec), '--bag', str(bag)) as process:
-        peer = SitlPeer(process.port)
+    with direct('--scenario', scenario(tmp_path, **spec), '--bag', str(bag)) as peer:
         peer.run(0.2)
         peer.count = 0
         told = peer.run(1.0, TURNING)

@@ -1,4 +1,4 @@
-"""Our programs as processes of their own, forked from one that has imported them all.
+"""Our programs as processes of their own, forked from one that has imported them.
 
 To import what a node needs takes longer than most tests of nodes, and `auv run` starts five of
 them for each controller. What the executables themselves do before that is seen by the tests that
@@ -7,6 +7,8 @@ start the installed ones.
 
 import contextlib
 import ctypes
+import gc
+import inspect
 import json
 import os
 import selectors
@@ -17,10 +19,14 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from runpy import run_path
 from typing import IO, Any
 
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.type_support import check_for_type_support
 from setproctitle import setproctitle
 
 from auv_analysis import load_scenario
@@ -28,6 +34,7 @@ from auv_analysis.graph import supervisor
 from auv_analysis.graph.experiment import COMPOSED, PACKAGES
 from auv_analysis.simulation.simulate import warm_up
 from auv_dynamics.ros.interface import PARENT
+from auv_dynamics.ros.topics import TOPICS
 
 NODES = {  # and the package of each
     **PACKAGES,
@@ -36,11 +43,12 @@ NODES = {  # and the package of each
     COMPOSED: 'auv_analysis',
 }
 STARTERS = {'auv': 'auv_analysis.cli.main', 'record': 'helpers.graph_runs'}  # of nodes
+MODULES = {**{name: f'{package}.nodes.{name}' for name, package in NODES.items()}, **STARTERS}
 LOADED = (  # what `auv` imports once it knows what it has to do
     *('auv_analysis.cli.scenario_runs', 'auv_analysis.graph.recorded_runs'),
     *('auv_analysis.studies.compare.sources', 'auv_analysis.output.keyboard'),
-    *('auv_analysis.report.document', 'auv_analysis.report.plots'),
 )
+REPORT = ('auv_analysis.report.document', 'auv_analysis.report.plots')
 INTERPRETER = Path(sys.executable).name.encode()
 SIZE = 1 << 20  # bytes of a request, at most
 ROOM = 4096  # bytes of a command line in the list of processes, which lie in the environment
@@ -242,7 +250,28 @@ def fork(
         os._exit(code)
 
 
-def serve(line: socket.socket, mains: Mapping[str, Callable[[], Any]]) -> None:
+def program(arguments: Sequence[str]) -> Callable[[], Any]:
+    """What runs a program, which is imported before the first fork that needs it."""
+    name = Path(arguments[0]).name
+    known = len(sys.modules)
+    if name not in MODULES:  # a script
+        sys.path.append(str(Path(arguments[0]).parent))
+        import_module(Path(name).stem)
+        main = partial(run_path, arguments[0], run_name='__main__')
+    else:
+        if name == 'auv':
+            reports = {'run', 'simulate', 'analyze'} & {*arguments[1:2]}
+            more = REPORT if reports and '--no-report' not in arguments else ()
+            for module in (*LOADED, *more):
+                import_module(module)
+        main = import_module(MODULES[name]).main
+    if len(sys.modules) > known:
+        inspect.getmodule(inspect.currentframe())  # looks at all of them, as a first line of a log
+        gc.freeze()  # no page of these is copied because a program looks for its garbage
+    return main
+
+
+def serve(line: socket.socket) -> None:
     """Fork what is asked for and tell how it ended, until nobody asks any more."""
     selector, ends = selectors.DefaultSelector(), dict[int, tuple[int, int]]()
     lines = {line.fileno(): line}
@@ -267,7 +296,7 @@ def serve(line: socket.socket, mains: Mapping[str, Callable[[], Any]]) -> None:
                 continue
             request, (*said, code) = json.loads(data), handed
             inherited = [*lines, code, *ends, *(one[1] for one in ends.values())]
-            pid, more = fork(mains[Path(request[0][0]).name], request, said, inherited)
+            pid, more = fork(program(request[0]), request, said, inherited)
             for number in said:
                 os.close(number)
             if more:
@@ -280,15 +309,13 @@ def serve(line: socket.socket, mains: Mapping[str, Callable[[], Any]]) -> None:
 
 
 def main() -> None:
-    """Import the programs and load what they call most, then serve."""
+    """Load what the programs call most, then serve."""
     setproctitle('fork server')  # before the environment is changed, in which it finds its room
-    modules = {**{name: f'{package}.nodes.{name}' for name, package in NODES.items()}, **STARTERS}
-    mains = {name: import_module(module).main for name, module in modules.items()}
-    for module in LOADED:
-        import_module(module)
     warm_up(load_scenario('case1'), ['gvc'])
+    for kind in (ParameterEvent, *(topic.type for topic in TOPICS)):
+        check_for_type_support(kind)
     with socket.socket(fileno=int(sys.argv[1])) as line:
-        serve(line, mains)
+        serve(line)
 
 
 if __name__ == '__main__':

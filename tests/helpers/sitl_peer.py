@@ -5,11 +5,10 @@ for its numbers directly behind the colon.
 """
 
 import contextlib
+import os
 import re
 import socket
 import struct
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +17,7 @@ from typing import Any
 
 import json_backend
 import numpy as np
+from helpers.node_processes import fork_server
 from helpers.patience import patience
 from json_backend import Frame, made, options_of, parse
 
@@ -126,16 +126,15 @@ class Backend:
     """The example as a process; `said` are its lines."""
 
     def __init__(self, *options: str):
-        command = [sys.executable, str(BACKEND), '--listen', '127.0.0.1:0', *options]
-        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        command = [str(BACKEND), '--listen', '127.0.0.1:0', *options]
+        self.process = fork_server().start(command, os.environ)
         self.said: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         self.port = int(self.until('waiting for ArduSub on udp').rpartition(':')[2])
 
     def _read(self) -> None:
-        assert self.process.stderr is not None
-        for line in self.process.stderr:
+        for line in self.process.stdout:
             self.said.append(line.rstrip('\n'))
 
     def until(self, text: str) -> str:

@@ -3,11 +3,13 @@
 import signal
 import socket
 import time
+from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
-from helpers.mavlink_relay import Relay, free_port, start_program
+from helpers.mavlink_relay import Relay, fork_program, free_port, start_program
 from helpers.node_processes import PATIENCE, Peer, fresh_domain, parameters, stop
 from helpers.patience import patience
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -25,10 +27,11 @@ PUSH = (12.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 class Sea:
     """Driver, wire and vehicle, and a controller of the test's own: it answers with one wrench."""
 
-    def __init__(self) -> None:
+    def __init__(self, start: Callable[..., Any] = fork_program) -> None:
+        self.start = start
         self.domain, port = fresh_domain(), free_port()
         self.relay = Relay(port)
-        self.driver = start_program(
+        self.driver = start(
             'driver.py', self.domain, '--ros-args',
             *parameters(connection=f'udpin:127.0.0.1:{port}', autoarm=True),
             *parameters(disarm_timeout=patience(1.0)),
@@ -45,7 +48,7 @@ class Sea:
 
     def launch(self):
         """A vehicle that has just been booted."""
-        return start_program(
+        return self.start(
             'ardusub_endpoint.py',
             self.domain,
             '--connection',
@@ -212,9 +215,13 @@ def test_a_wrench_that_must_not_be_used_is_refused(sea, kind, tau, age) -> None:
     assert np.isfinite(sea.odometry[-1][1]).all()
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGHUP], ids=['SIGINT', 'SIGHUP'])
-def test_a_signal_leaves_the_vehicle_disarmed_its_inputs_neutral(number) -> None:
-    sea = Sea()
+@pytest.mark.parametrize(
+    ('start', 'number'),
+    [(start_program, signal.SIGINT), (fork_program, signal.SIGHUP)],
+    ids=['SIGINT', 'SIGHUP'],
+)
+def test_a_signal_leaves_the_vehicle_disarmed_its_inputs_neutral(start, number) -> None:
+    sea = Sea(start)
     try:
         sea.tau = PUSH
         sea.until(lambda: sea.surge > 0.2, 'the vehicle to go ahead')

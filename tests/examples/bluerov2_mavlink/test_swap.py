@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.mavlink_relay import EXAMPLE, free_port, start_program
+from helpers.mavlink_relay import EXAMPLE, fork_program, free_port
 from helpers.node_processes import PATIENCE, Peer, auv, fresh_domain, parameters, start_node, stop
 from numpy.testing import assert_array_equal
 
@@ -48,11 +48,11 @@ def dive(tmp_path_factory):
         )
         for name in ('analysis_node', 'setpoint_node', 'controller_node'):
             started[name] = start_node(name, domain, *common, *FRAME_IDS)
-        started['driver'] = start_program(
+        started['driver'] = fork_program(
             'driver.py', domain, '--ros-args', *NAMES, *FRAME_IDS, '-r', '__ns:=/rov',
             *parameters(connection=f'udpin:127.0.0.1:{port}', autoarm=True),
         )  # fmt: skip
-        started['vehicle'] = start_program(
+        started['vehicle'] = fork_program(
             'ardusub_endpoint.py', domain, '--connection', f'udpout:127.0.0.1:{port}',
             '--position-after', '0.5', '--ready-after', '1',
             '--thrusters', 'measured', '--eta', '0', '0', '2', '0.1', '-0.1', '1.5',

@@ -10,6 +10,7 @@ for, and PilotGain with its older stream only.
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -65,6 +66,9 @@ class Settings:
     velocity_bias: tuple = (0.0,) * 3  # of the estimator, FSD, m/s; 0.03 to 0.04 was seen
 
 
+vehicle_of = cache(load_vehicle)
+
+
 class Autopilot:
     """One boot of the autopilot; `now` of its methods is ns since then.
 
@@ -76,7 +80,7 @@ class Autopilot:
     """
 
     def __init__(self, settings: Settings, send: Callable[[Any], None]):
-        vehicle = load_vehicle(settings.vehicle)
+        vehicle = vehicle_of(settings.vehicle)
         assert vehicle.thrusters is not None
         self._settings, self._send, self._T = settings, send, vehicle.thrusters.matrix
         truth = make_uncertainty(vehicle, [], settings.vehicle, [])
@@ -87,7 +91,8 @@ class Autopilot:
         self._override = [MIDDLE] * 6  # as it was last received
         self.channels = [MIDDLE] * 6  # as they were last read
         motors = self._T.shape[1]
-        self.pulses = [MIDDLE] * motors
+        self.pulses = self._outputs = [MIDDLE] * motors  # of the inputs
+        self._inputs, self._tau = [float(MIDDLE)] * 6, (0.0,) * 6
         self._coming = deque([self.pulses] * (1 + ON_THE_WAY), maxlen=1 + ON_THE_WAY)
         self._pilot_heard: int | None = None
         self._station_heard: int | None = None
@@ -152,12 +157,15 @@ class Autopilot:
         if k % INPUT == 0:
             self.channels = list(self._override)
         drives = self.armed and k * STEP - self._armed_at >= SPOOL_UP
-        self._coming.append(
-            motor_pulses(self._stabilised(), motors) if drives else [MIDDLE] * motors
-        )
-        self.pulses = self._coming[0] if self.armed else [MIDDLE] * motors
-        tau = self._T @ thrust(self.pulses, self._settings.curve, self._settings.voltage)
-        self.plant.answer(tuple(tau.tolist()))
+        inputs = self._stabilised() if drives else [MIDDLE] * 6
+        if inputs != self._inputs:
+            self._inputs, self._outputs = inputs, motor_pulses(inputs, motors)
+        self._coming.append(self._outputs)
+        before, self.pulses = self.pulses, self._coming[0] if self.armed else [MIDDLE] * motors
+        if self.pulses != before:
+            tau = self._T @ thrust(self.pulses, self._settings.curve, self._settings.voltage)
+            self._tau = tuple(tau.tolist())
+        self.plant.answer(self._tau)
         self.plant.advance()
 
     def _stabilised(self) -> list[float]:

@@ -5,14 +5,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from ardusub_autopilot import Autopilot, Settings
+from ardusub_autopilot import Autopilot, Settings, vehicle_of
 from navigation import Sample
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from udp import UdpPort
 from vehicle_link import LinkSettings, VehicleLink
 from wrench_mapping import FOUR, MANUAL_CONTROL, WrenchMapping
-
-from auv_dynamics import load_vehicle
 
 PERIOD = 4_000_000  # ns
 SECOND = 1_000_000_000
@@ -54,7 +52,7 @@ class Pair:
         self.tau: Any = None  # of the last run
         self.link = VehicleLink(link, self._ups.send, self.said.append)
         dofs = FOUR if link.how == MANUAL_CONTROL else tuple(range(6))
-        vehicle = load_vehicle(self.settings.vehicle)
+        vehicle = vehicle_of(self.settings.vehicle)
         self.mapping = WrenchMapping(vehicle, dofs, self.settings.voltage)
         self._port = UdpPort('udpin:127.0.0.1:0', 255, 0)
         self.boot()
@@ -106,7 +104,7 @@ class Pair:
     def flown(self, tau: Any = None) -> 'Pair':
         """The pair once wrenches reach the motors."""
         self.link.pilot.want(True, self.now)
-        self.run(3.0, tau=np.zeros(6) if tau is None else tau)
+        self.run(2.0, tau=np.zeros(6) if tau is None else tau)
         assert self.autopilot.armed
         return self
 

@@ -35,10 +35,10 @@ def test_the_input_becomes_neutral_and_then_nothing_is_sent(way: str, how: str) 
     pair = Pair(link=LinkSettings(how=how)).flown(PUSH)
     assert pair.autopilot.channels != NEUTRAL
     {**OWN, **FOREIGN}[way](pair)
-    pair.run(2.5, tau=PUSH)
+    pair.run(1.5, tau=PUSH)
     assert pair.autopilot.channels == NEUTRAL
     before, mode = inputs(pair), pair.autopilot.mode
-    pair.run(2.0, tau=PUSH)
+    pair.run(1.5, tau=PUSH)
     assert pair.autopilot.channels == NEUTRAL
     assert (inputs(pair), pair.autopilot.mode) == (before, mode), 'nothing is taken back'
     assert np.abs(np.array(pair.autopilot.pulses) - 1500).max() < 100, 'it may stabilise itself'
@@ -116,7 +116,7 @@ def test_its_own_inputs_are_no_other_pilot(how: str, gain: float, heave: float) 
     pair = Pair(Booted(gain=gain), LinkSettings(how=how))
     pair.autopilot.parameters['JS_THR_GAIN'] = heave
     pair.flown(PUSH)
-    for i in range(20):
+    for i in range(8):
         pair.run(0.5, tau=PUSH * np.sin(i))
     count = iter(range(10**6))
     pair.up = lambda data: b'' if next(count) % 3 == 0 else data

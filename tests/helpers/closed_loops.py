@@ -1,6 +1,8 @@
 """Closed loops for tests: ours and the independent implementation's, of a changed scenario."""
 
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 
 import herman_reference as reference
 import numpy as np
@@ -30,15 +32,23 @@ FULL = {'k_D': (9.0 * DENSE).tolist(), 'k_I': (2.0 * DENSE).tolist(),
 TURNED = {'eta': [1.0, -2.0, 3.0, 0.4, -0.5, 2.5], 'nu': [0.4, -0.3, 0.2, 0.1, -0.2, 0.3]}
 
 
+case = cache(load_scenario)
+
+
 def file_of(vehicle: str) -> dict:
+    return deepcopy(read(vehicle))
+
+
+@cache
+def read(vehicle: str) -> dict:
     return yaml.safe_load(shipped('vehicles', vehicle).read_text(encoding='utf-8'))
 
 
 def pair(law, hold, vehicle, **changes):
     """(ours, theirs) of one controller of case1 with some of its entries replaced."""
-    base = load_scenario(changes.pop('base', 'case1'))
+    base = case(changes.pop('base', 'case1'))
     values = changes.pop('gains', None)
-    data = base.data | {'duration': 1.0} | changes
+    data = base.data | {'duration': 0.5} | changes
     if values is not None:
         data['controllers'] = {law: values | {'law': law}}
     scenario = replace(base, vehicle=vehicle_from_dict(vehicle, 'vehicle.yaml'), data=data)

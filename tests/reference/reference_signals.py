@@ -76,7 +76,8 @@ def disturbance(spec: list[dict[str, Any]] | dict[str, Any] | None, t: float) ->
                 150 * f3 * exp(3 * g) + 12,
                 50 * f3 * exp(3 * g) + 4,
             ]
-            total += square(item.get('scale', 1.0)) @ equation_39
+            scale = item.get('scale')
+            total += equation_39 if scale is None else square(scale) @ equation_39
     return total
 
 

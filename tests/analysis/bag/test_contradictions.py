@@ -46,7 +46,7 @@ MOVING = {
 @pytest.fixture(scope='module')
 def run() -> Run:
     still = {'eta': [0.0] * 6, 'nu': [0.0] * 6}
-    return simulated(duration=40.0, setpoint=MOVING, initial=still)
+    return simulated(duration=25.0, setpoint=MOVING, initial=still)
 
 
 def bag_of(run: Run, folder: Path, tau: Run | None = None, wrench_later: float = 0.0) -> Path:

@@ -32,12 +32,17 @@ LINEAR = ['u', 'v', 'w']
 
 @pytest.fixture(scope='module')
 def run() -> Run:
-    return simulated(duration=6.0)
+    return simulated(duration=3.0)
 
 
 @pytest.fixture(scope='module')
 def bag(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return written(run, tmp_path_factory.mktemp('bags') / 'whole')
+
+
+@pytest.fixture(scope='module')
+def whole(bag: Path) -> dict[str, Any]:
+    return summarize(loaded(bag, **KEYS, **WRENCH))
 
 
 def written(run: Run, path: Path, lacking: tuple[int, ...] = ()) -> Path:
@@ -79,8 +84,9 @@ COMPARED = ('kinetic_energy', 'velocity', 'velocity_error', 'settling', 'couplin
 
 @pytest.mark.parametrize('lacking', [(0, 1, 2), (2,), (5,), (0, 1, 2, 3, 4, 5)])
 @pytest.mark.parametrize('how', ['told', 'nan'])
-def test_what_does_not_need_a_velocity_is_as_if_it_were_there(how, lacking, run, bag, tmp_path):
-    whole = summarize(loaded(bag, **KEYS, **WRENCH))
+def test_what_does_not_need_a_velocity_is_as_if_it_were_there(
+    how, lacking, run, bag, whole, tmp_path
+):
     if how == 'told':
         lacks = loaded(bag, **KEYS, **WRENCH, unknown=['uvwpqr'[i] for i in lacking])
     else:
@@ -148,8 +154,8 @@ def test_without_wrench_the_required_one_is_that_which_acted(tmp_path):
     assert np.all((apart < 0.1).mean(axis=0) < 0.5), 'an error said to be far larger than it is'
 
 
-def test_without_wrench_only_what_needs_it_is_null(bag):
-    whole, found = summarize(loaded(bag, **KEYS, **WRENCH)), summarize(loaded(bag, **KEYS))
+def test_without_wrench_only_what_needs_it_is_null(bag, whole):
+    found = summarize(loaded(bag, **KEYS))
     Upsilon = np.array(whole['decomposition']['Upsilon'])
     null = {'effort.rms', 'effort.max'}
     null |= {

@@ -9,6 +9,7 @@ from helpers.foreign_bags import UNNAMED, Maker, loaded, motion, simple, simulat
 from numpy.testing import assert_allclose
 
 from auv_analysis.runs.run import Run
+from auv_dynamics.vehicle import DOFS
 
 KEYS = {'odometry': '/o', 'wrench': '/w', 'frames': 'enu_flu'}
 NOISE = np.array([3e-3, 3e-3, 3e-3, 2e-3, 2e-3, 2e-3])  # m/s, rad/s
@@ -32,6 +33,13 @@ def recorded(run: Run, folder: Path, noise: np.ndarray, seed: int = 0, **keys) -
     return loaded(bag, **KEYS, **keys)
 
 
+@pytest.fixture(scope='module')
+def noisy(run: Run, tmp_path_factory: pytest.TempPathFactory) -> list[Run]:
+    """Four recordings with all of the noise."""
+    folder = tmp_path_factory.mktemp('noisy')
+    return [recorded(run, folder, NOISE, seed) for seed in range(4)]
+
+
 def true_F(run: Run, found: Run, start: float) -> np.ndarray:
     return np.stack([np.interp(found.t + start, run.t, c) for c in run.disturbance.T], axis=1)
 
@@ -44,9 +52,10 @@ def deviations(run: Run, found: Run) -> np.ndarray:
 
 
 @pytest.mark.parametrize('scale', [0.1, 1.0])
-def test_the_error_that_is_shown_covers_the_real_one(scale, run, tmp_path) -> None:
+def test_the_error_that_is_shown_covers_the_real_one(scale, run, noisy, tmp_path) -> None:
     """Of Gaussian errors 68 % are within one standard error, 95 % within two."""
-    runs = [recorded(run, tmp_path, scale * NOISE, seed) for seed in range(4)]
+    little = range(4 if scale < 1.0 else 0)
+    runs = [recorded(run, tmp_path, scale * NOISE, seed) for seed in little] or noisy
     found = np.concatenate([deviations(run, one) for one in runs])
     within = [(np.abs(found) < k).mean(axis=0) for k in (1.0, 2.0)]
     assert np.all(within[0] > 0.6), within[0]
@@ -54,8 +63,8 @@ def test_the_error_that_is_shown_covers_the_real_one(scale, run, tmp_path) -> No
     assert np.all(within[0] < 0.95), 'an error that is said to be far larger than it is'
 
 
-def test_the_estimate_is_close_enough_to_be_of_use(run, tmp_path) -> None:
-    found = recorded(run, tmp_path, NOISE)
+def test_the_estimate_is_close_enough_to_be_of_use(run, noisy) -> None:
+    found = noisy[0]
     said = np.sqrt((found.unexplained_error**2).mean(axis=0))
     assert np.all(said < 0.5 * np.sqrt((run.disturbance**2).mean(axis=0)))
     assert_allclose(found.acceleration['velocity_noise'], NOISE, rtol=0.15)
@@ -70,25 +79,22 @@ def test_without_disturbance_nothing_is_unexplained(tmp_path) -> None:
     assert np.all((within < 2.0).mean(axis=0) > 0.9)
 
 
-@pytest.mark.parametrize('axis', range(6))
-def test_it_is_positive_where_it_opposes_the_wrench(axis, tmp_path) -> None:
-    """Signs of F, M nu_dot and tau: a constant force on one axis alone, from rest."""
-    names = ('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw')
-    F = 300.0
-    harmonic = {'kind': 'harmonic', names[axis]: {'offset': F}}
+def test_it_is_positive_where_it_opposes_the_wrench(tmp_path) -> None:
+    """Signs of F, M nu_dot and tau: constant forces, of another size on each axis, from rest."""
+    F = np.array([300.0, -250.0, 200.0, 150.0, -100.0, 50.0])
+    offsets = {name: {'offset': size} for name, size in zip(DOFS, F.tolist(), strict=True)}
+    harmonic = {'kind': 'harmonic', **offsets}
     run = simulated(duration=3.0, **LEVEL, disturbance=[harmonic])
     found = recorded(run, tmp_path, 0.0 * NOISE, step=0.05)
     settled = found.t > 0.5
-    expected = np.eye(6)[axis] * F
-    assert_allclose(found.unexplained[settled].mean(axis=0), expected, atol=0.02 * F)
+    assert_allclose(found.unexplained[settled].mean(axis=0), F, atol=6.0)
 
 
-def test_a_wrench_in_the_wrong_direction_is_found(run, tmp_path) -> None:
+def test_a_wrench_in_the_wrong_direction_is_found(run, noisy, tmp_path) -> None:
     turned = replace(run, tau=run.tau * [1, 1, -1, 1, 1, 1])
     found = recorded(turned, tmp_path, NOISE)
-    true = recorded(run, tmp_path, NOISE, seed=1)
     sizes = [
-        np.linalg.norm(one.unexplained, axis=0) / np.sqrt(one.samples) for one in (found, true)
+        np.linalg.norm(one.unexplained, axis=0) / np.sqrt(one.samples) for one in (found, noisy[1])
     ]
     ratio = sizes[0] / sizes[1]
     assert ratio[2] > 5.0
@@ -100,8 +106,8 @@ def test_a_given_window_is_used(run, tmp_path) -> None:
     assert_allclose(found.acceleration['window'], 0.7, rtol=0.05)
 
 
-def test_one_window_is_worse_than_the_one_that_was_chosen(run, tmp_path) -> None:
-    chosen = recorded(run, tmp_path, NOISE)
+def test_one_window_is_worse_than_the_one_that_was_chosen(run, noisy, tmp_path) -> None:
+    chosen = noisy[0]
     narrow = recorded(run, tmp_path, NOISE, seed=1, window=0.2)
     errors = [np.abs(true_F(run, one, 0.0) - one.unexplained).mean(axis=0)
               for one in (chosen, narrow)]  # fmt: skip

@@ -92,6 +92,7 @@ FAILING = [
     {'kind': 'thruster', 'thruster': 'T2', 'efficiency': 0.4, 'from': 0.2, 'to': 0.6},
     {'kind': 'thruster', 'thruster': 'T6', 'stuck': 9.0, 'from': 0.4},
 ]
+DURATIONS = [1.0, pytest.param(30.0, marks=pytest.mark.long)]  # s
 BASE = {'setpoint': SIX, 'initial': TURNED}
 BACKWARDS = TURNED | {'nu': [-3.0, 0.3, 0.2, 0.1, -0.2, 0.3]}
 SAMPLES = BASE | {'duration': 1.0}
@@ -164,20 +165,20 @@ LONG = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.parametrize('duration', DURATIONS)
 @pytest.mark.parametrize('name', LONG)
-def test_long_runs(name):
+def test_long_runs(name, duration):
     hold = ('continuous', 'zoh')[list(LONG).index(name) % 2]
     changes = dict(LONG[name])
     vehicle = file_of(changes.pop('vehicle', 'herman2018'))
-    compare(*pair('gvc', hold, vehicle, **changes, duration=30.0))
+    compare(*pair('gvc', hold, vehicle, **changes, duration=duration))
 
 
-@pytest.mark.long
+@pytest.mark.parametrize('duration', DURATIONS)
 @pytest.mark.parametrize('hold', ['continuous', 'zoh'])
 @pytest.mark.parametrize(('case', 'law'), [('case1', 'gvc'), ('case1', 'cl'), ('case2', 'cl')])
-def test_long_runs_of_the_papers_cases(case, law, hold):
-    compare(*pair(law, hold, file_of('herman2018'), base=case, duration=30.0))
+def test_long_runs_of_the_papers_cases(case, law, hold, duration):
+    compare(*pair(law, hold, file_of('herman2018'), base=case, duration=duration))
 
 
 @examples(4)

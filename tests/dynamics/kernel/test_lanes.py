@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from helpers.needs import needing
+from helpers.strategies import examples
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
@@ -98,6 +99,7 @@ def fill_blocks(both, table, x, out, lanes):
 
 
 @needing('numba', LANES)
+@examples(30)
 @given(count=SIZES, seed=st.integers(0, 2**32 - 1))
 def test_compiled_lanes_do_what_is_done_to_each_vehicle(count, seed):
     """In registers, and compiled for one vehicle after the other, as in plain Python."""
@@ -174,39 +176,40 @@ class Blocked:
 sys.meta_path.insert(0, Blocked())
 """
 SCRIPT = """
-import sys
 import numpy as np
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.simulation.rollouts import rollouts
 from auv_dynamics.kernel import LANES
 
-assert (LANES is None) == (sys.argv[1] == 'without')
 scenario = changed_scenario(load_scenario('case1'), {'duration': 0.3})
 found = rollouts(scenario, 'gvc', {'controllers.gvc.k_D': [0.9, 1.0, 1.1]})
 summary = summarize(simulate(scenario, 'gvc'))
-np.savez(
-    sys.argv[2], rms=[found[f'velocity_error.rms.{dof}'] for dof in ('surge', 'roll', 'yaw')],
-    effort=summary['effort']['rms'], energy=summary['kinetic_energy']['mean'],
-)
+numbers = {
+    'rms': [found[f'velocity_error.rms.{dof}'] for dof in ('surge', 'roll', 'yaw')],
+    'effort': summary['effort']['rms'], 'energy': summary['kinetic_energy']['mean'],
+}
+"""
+KEPT = """
+import sys
+assert LANES is None
+np.savez(sys.argv[1], **numbers)
 """
 
 
 @needing('numba', LANES)
 def test_everything_runs_without_vector_registers(tmp_path):
     """`simd` is optional: deleted, every vehicle is computed alone, with the same numbers."""
-    (tmp_path / 'without').mkdir()
-    (tmp_path / 'without' / 'sitecustomize.py').write_text(STUB)
-    own = {'AUV_GVC_CACHE_DIR': str(cache_folder().parent / 'without_simd')}  # its WIDTH is another
-    arrays, caches = {}, {'with': {}, 'without': own}
-    for how in ('with', 'without'):
-        out, path = tmp_path / f'{how}.npz', [os.environ.get('PYTHONPATH', '')]
-        path = [str(tmp_path / how), *filter(None, path)]
-        subprocess.run(
-            [sys.executable, '-c', SCRIPT, how, str(out)],
-            env=os.environ | {'PYTHONPATH': os.pathsep.join(path)} | caches[how],
-            check=True,
-        )
-        arrays[how] = dict(np.load(out))
-    for name, expected in arrays['with'].items():
-        np.testing.assert_allclose(arrays['without'][name], expected, rtol=1e-12)
+    (tmp_path / 'sitecustomize.py').write_text(STUB)
+    here: dict = {}
+    exec(SCRIPT, here)
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get('PYTHONPATH')])])
+    own = str(cache_folder().parent / 'without_simd')  # its WIDTH is another
+    subprocess.run(
+        [sys.executable, '-c', SCRIPT + KEPT, str(tmp_path / 'without.npz')],
+        env=os.environ | {'PYTHONPATH': path, 'AUV_GVC_CACHE_DIR': own},
+        check=True,
+    )
+    without = np.load(tmp_path / 'without.npz')
+    for name, expected in here['numbers'].items():
+        np.testing.assert_allclose(without[name], expected, rtol=1e-12)

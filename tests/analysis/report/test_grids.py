@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib.colors import LogNorm
+from PIL import Image
 
 from auv_analysis.output.text import number, typeset
 from auv_analysis.report import plots
@@ -90,3 +91,17 @@ def test_a_symmetric_axis_marks_where_it_becomes_logarithmic() -> None:
         0.0: '0', 10.0: '$10^{1}$', 100.0: '$10^{2}$', 1000.0: '$10^{3}$', -10.0: '$-10^{1}$'
     }  # fmt: skip
     assert plots.symmetric(_axes(-1.0, 0.0, 2.0), 0.2) == 0.1
+
+
+def test_a_small_bar_has_its_colour_in_the_png(tmp_path) -> None:
+    with plots.style():
+        figure = plots.new_figure(3.0)
+        left, right = figure.subplots(1, 2)
+        left.barh(range(6), [9.0, 9.0, 9.0, 0.3, 9.0, 9.0], color=plots.COLOURS)
+        values = np.linspace(0.0, 1.0, 120).reshape(10, 12)
+        plots.draw_grid(right, HeatMap(values, [f'{i}' for i in range(12)], '', 'Blues'), 4.0)
+        png, _ = plots.save(figure, tmp_path, 'bars')
+    pixels = np.asarray(Image.open(png).convert('RGB')).reshape(-1, 3).astype(int)
+    for colour in plots.COLOURS:
+        wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+        assert np.abs(pixels - wanted).max(axis=1).min() <= 12, colour

@@ -36,7 +36,7 @@ DASHES = ('-', (0, (4, 1.6)), (0, (1, 1.3)), (0, (6, 1.4, 1, 1.4)), (0, (9, 2)),
 NOTHING = '#ececec'  # where there are no samples
 FAULT, FAULT_INK = '#fcefd6', '#8a5a00'  # where something has failed, and its number
 GREY = '#6b6b6b'
-PALETTE = 64  # colours of a PNG
+PALETTE = 128  # colours of a PNG
 WHITE = 0xFFFFFFFF
 WIDTH = 6.27  # in, text of Taylor & Francis's LaTeX class in large format: A4, margins of 1 in
 DPI = 184
@@ -119,7 +119,8 @@ def _few_colours(pixels: np.ndarray) -> Image.Image:
     inked = (pixels.view(np.uint32) != WHITE)[..., 0]
     inked[0, 0] = True  # one at least
     few = Image.fromarray(pixels[inked][np.newaxis]).convert('RGB')
-    few = few.quantize(PALETTE - 1, dither=Image.Dither.NONE)
+    # by the largest error: a small bar keeps its colour as well
+    few = few.quantize(PALETTE - 1, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     entries = np.full(inked.shape, PALETTE - 1, np.uint8)
     entries[inked] = np.asarray(few)[0]
     image = Image.fromarray(entries)

@@ -210,12 +210,13 @@ class _Source:
 
     def _warn_quadratic(self, quadratic: np.ndarray) -> None:
         generator = np.random.default_rng(0)
-        for nu in np.vstack([np.eye(6), -np.eye(6), generator.normal(size=(200, 6))]):
-            power = nu @ quadratic @ (np.abs(nu) * nu)
-            if power < -ROUNDING * np.abs(quadratic).max():
-                text = f'nu = {_numbers(nu)} gains energy from it ({power:.3g} W)'
-                self._warn('damping.quadratic', text)
-                return
+        nu = np.vstack([np.eye(6), -np.eye(6), generator.normal(size=(200, 6))])
+        power = (nu @ quadratic * np.abs(nu) * nu).sum(axis=1)
+        gaining = power < -ROUNDING * np.abs(quadratic).max()
+        if gaining.any():
+            k = int(np.argmax(gaining))
+            text = f'nu = {_numbers(nu[k])} gains energy from it ({power[k]:.3g} W)'
+            self._warn('damping.quadratic', text)
 
     def check_units(self, mass: float, volume: float, density: float) -> None:
         """Refuse what is wrong by a factor of a thousand, warn of what probably is."""

@@ -1,7 +1,7 @@
 """Multisines of wrench or of set-points, the motion that they make, and how far it goes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 
 from auv_analysis.runs.run import Run
 from auv_analysis.scenario.scaling import UNFIT
-from auv_analysis.scenario.scenario import Scenario, scenario_from
+from auv_analysis.scenario.scenario import Scenario, resolved, scenario_from
 from auv_analysis.simulation.open_loop import open_loop
 from auv_analysis.simulation.simulate import DivergedError, simulate
 from auv_analysis.studies.identify.unknowns import DEFAULT
@@ -289,12 +289,15 @@ def motion_of(
 def _closed(request: Request, waves: Harmonics, errors: Sequence[dict[str, Any]]) -> Motion:
     """Motions of closed loops, without noise: that of the sensors is no part of the plan."""
     commands, states = [], []
+    checked: Scenario | None = None  # the first: others differ in amplitudes and model error alone
     for error in errors:
         for b in range(len(waves.offset)):
             data = scenario_of(request, waves.part(b))
             del data['sensors']
             data['disturbance'] = [error] if error else []
-            command, state = recorded(scenario_in_memory(request, data), CONTROLLER[True])
+            checked = checked or scenario_in_memory(request, data)
+            scenario = replace(checked, data=resolved(data))
+            command, state = recorded(scenario, CONTROLLER[True])
             commands.append(command)
             states.append(state)
     shape = len(errors), len(waves.offset)

@@ -83,7 +83,7 @@ def test_what_diverged_is_larger_and_both_diverged_tie() -> None:
         measures([1.0, np.nan, np.nan, np.inf, 2.0]),
     )
     np.testing.assert_array_equal(log_ratios(a.error, b.error), [NEVER, 0, -NEVER, 0, 0])
-    row = compare({'a': measures([np.nan] * 12), 'b': measures([1.0] * 12)}, [('a', 'b')])[0]
+    row = compare({'a': measures([np.nan] * 20), 'b': measures([1.0] * 20)}, [('a', 'b')])[0]
     assert (row.ratio, row.interval, row.larger, row.verdict) == (None, None, 1.0, 1)
 
 

@@ -129,14 +129,11 @@ def test_same_seed_same_document_another_seed_another(command: Callable) -> None
 
 @pytest.mark.usefixtures('unrendered')
 def test_equal_error_and_no_draws(command: Callable, tmp_path: Path) -> None:
-    arguments = ('--equal', 'error', '--index', 'mean', '--samples', '0', *QUICK[:2])
-    code, out, _ = command(*arguments, '--json')
+    write(tmp_path, {'gvc': GVC, 'cl': SAME_CL}, duration=1.0)
+    arguments = ('--equal', 'error', '--index', 'mean', '--samples', '0')
+    code, out, _ = command(*QUICK, *arguments, '--json')
     document = json.loads(out)
     assert (code, document['monte_carlo']) == (0, None)
-    assert {e['structure'] for e in document['controllers'].values() if e['tuned']} <= {
-        'mass',
-        'scalar',
-    }
     _equal(document, 'error', 1e-3)
     effort = {n: e['measures']['effort'] for n, e in document['controllers'].items()}
     assert effort['gvc_tuned'] <= effort['gvc'] * 1.001
@@ -151,7 +148,11 @@ def test_scenario_without_gvc_needs_a_reference(command: Callable, tmp_path: Pat
     assert 'controllers: expected a controller of law gvc, or --reference' in lines[0]
     code, out, _ = command('--reference', 'cl', '--law', 'cl', '--samples', '0', '--json')
     assert code == 0
-    assert [n for n, e in json.loads(out)['controllers'].items() if e['tuned']] == ['cl_tuned']
+    [(name, entry)] = [
+        found for found in json.loads(out)['controllers'].items() if found[1]['tuned']
+    ]
+    assert name == 'cl_tuned'
+    assert entry['structure'] in {'mass', 'scalar'}
 
 
 @pytest.mark.long
@@ -196,7 +197,7 @@ def test_actuators_need_sampling(command: Callable, tmp_path: Path) -> None:
 @pytest.mark.usefixtures('unrendered')
 def test_names_that_are_taken_stay_what_they_are(command: Callable, tmp_path: Path) -> None:
     write(tmp_path, {'gvc': GVC, 'cl_tuned': SAME_CL}, duration=0.3)
-    code, out, _ = command(*QUICK[:2], '--samples', '0', '--json')
+    code, out, _ = command(*QUICK, '--samples', '0', '--json')
     names = ['gvc', 'cl_tuned', 'gvc_tuned', 'cl_tuned_again']
     assert (code, list(json.loads(out)['controllers'])) == (0, names)
     left = yaml.safe_load((tmp_path / 'runs/tune_small/scenario.yaml').read_text())

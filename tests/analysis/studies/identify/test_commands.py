@@ -49,9 +49,10 @@ def short(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
-def identified(bag, tmp_path_factory):
+def identified(bag, tmp_path_factory, composing):
     out = tmp_path_factory.mktemp('found') / 'identified'
-    main(['identify', str(bag), '--vehicle', 'herman2018', '--out', str(out)])
+    with composing():
+        main(['identify', str(bag), '--vehicle', 'herman2018', '--out', str(out)])
     return out
 
 
@@ -92,7 +93,7 @@ def test_a_bag_becomes_a_vehicle_file(identified):
 @pytest.mark.usefixtures('unrendered')
 def test_intervals_on_request_stand_beside_the_others(bag, tmp_path):
     out = tmp_path / 'asked'
-    fewer = ('--fixed', 'M', '--fixed', 'D_quadratic')
+    fewer = ('--part', '0:30', '--fixed', 'M', '--fixed', 'D_quadratic')
     asked = ('--bootstrap', 40, '--profile', 'lag')
     given = ('identify', bag, '--vehicle', 'herman2018', '--out', out)
     main([str(argument) for argument in (*given, *fewer, *asked)])
@@ -115,7 +116,8 @@ def test_the_file_predicts_the_recording(bag, identified, tmp_path, capsys):
 
 def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, capsys):
     out = tmp_path / 'other'
-    given = ('identify', bag, '--vehicle', 'rexrov', '--out', out, '--no-report')
+    fewer = ('--part', '0:20', '--free', 'M.diagonal', '--free', 'D_linear')
+    given = ('identify', bag, '--vehicle', 'rexrov', '--out', out, '--no-report', *fewer)
     code, said = auv(capsys, *given)
     assert code == 1
     assert 'another vehicle' in said

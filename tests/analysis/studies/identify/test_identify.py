@@ -29,6 +29,7 @@ from auv_dynamics.vehicle.vehicle_file import is_semidefinite, load_vehicle, veh
 
 REST = {dof: {} for dof in DOFS}
 SINE = {'surge': {'terms': [{'amplitude': 0.3, 'omega': 0.5}]}}
+FEW = ('M.diagonal', 'D_linear', 'lag', 'delay')  # free where the rest is known: a fit of a second
 
 
 @pytest.fixture(scope='module')
@@ -148,7 +149,7 @@ def test_a_velocity_that_is_not_measured_is_found_where_the_model_shows_it(herma
     velocity[:, 2] = np.nan
     training, held = split([replace(herman[0], velocity=velocity)], 0.25)
     vehicle = load_vehicle('herman2018')
-    result = identify(training, held, vehicle)
+    result = identify(training, held, vehicle, Settings(('M', *FEW[1:])))
     true = truth(result.fit.unknowns, vehicle)
     rows = {row['name']: row for row in result.coefficients()}
     assert rows['M.surge.surge']['value'] == pytest.approx(300.0, rel=0.02)
@@ -160,7 +161,7 @@ def test_a_velocity_that_is_not_measured_is_found_where_the_model_shows_it(herma
 def test_what_somebody_knows_is_kept(herman):
     training, held = split([herman[0]], 0.25)
     believed = {'M.surge.surge': (280.0, 1e-3)}
-    result = identify(training, held, load_vehicle('herman2018'), Settings(believed=believed))
+    result = identify(training, held, load_vehicle('herman2018'), Settings(FEW, believed=believed))
     rows = {row['name']: row for row in result.coefficients()}
     assert rows['M.surge.surge']['value'] == pytest.approx(280.0, abs=0.01)
     assert rows['M.surge.surge']['status'] == 'prior', 'the recording adds nothing to it'

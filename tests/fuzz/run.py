@@ -12,7 +12,6 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -170,30 +169,29 @@ def one(target: str, count: int, seed: int) -> int:
 
 
 def together(targets: Sequence[str], count: int, seed: int, jobs: int) -> int:
-    """Try targets in processes of their own, which share the inputs."""
-
+    """Try targets in processes of their own, which share the inputs and what was imported."""
+    import start_up  # noqa: F401
+    import structures  # noqa: F401
     from compile_kernels import LAWS, compile_law
 
     for law in LAWS:  # no input waits for the compiler
         compile_law(law)
 
     inputs = sum(SHARES[target] for target in targets)
-
-    def start(target: str) -> int:
-        number = max(1, round(count * SHARES[target] / inputs))
-        command = [
-            *(sys.executable, str(HERE / 'run.py'), '--only', target),
-            *('--count', str(number), '--seed', str(seed)),
-        ]
-        code = subprocess.run(command, check=False).returncode
-        if code:
+    waiting, running, failed = [*targets], dict[int, str](), 0
+    while waiting or running:
+        if waiting and len(running) < jobs:
+            target = waiting.pop(0)
+            if pid := os.fork():
+                running[pid] = target
+                continue
+            os._exit(one(target, max(1, round(count * SHARES[target] / inputs)), seed))
+        pid, status = os.wait()
+        target = running.pop(pid)
+        if code := os.waitstatus_to_exitcode(status):
             print(f'{target} ended with exit code {code}', file=sys.stderr)
-        return code
-
-    with ThreadPoolExecutor(jobs) as pool:
-        codes = list(pool.map(start, targets))
-    failed = sum(map(bool, codes))
-    print(f'{count} inputs, seed {seed}: {failed or "none"} of {len(codes)} targets failed')
+            failed += 1
+    print(f'{count} inputs, seed {seed}: {failed or "none"} of {len(targets)} targets failed')
     return int(failed > 0)
 
 

@@ -215,7 +215,7 @@ def behind(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Delay | Non
     if np.sqrt((velocity**2).sum(axis=1).mean()) < STILL:  # or nothing measured
         return None
     whole = cumulative_trapezoid(velocity, t, axis=0, initial=0.0)
-    early, late = (rates(t, signal, t, _count(t, SMOOTH)).rate for signal in (path, whole))
+    early, late = _rates(t, SMOOTH, path, whole)
     inside = (t > t[0] + FARTHEST) & (t < t[-1] - FARTHEST)
     if inside.sum() < PARTS:
         return None
@@ -258,7 +258,7 @@ def _acts_behind(
     t: np.ndarray, nu: np.ndarray, tau: np.ndarray, whole: np.ndarray, seconds: float
 ) -> Delay | None:
     """By one filter, in s: velocities (n, k), integrals of the wrench and of what is beside it."""
-    nu_dot, tau, beside = (rates(t, x, t, _count(t, seconds)).rate for x in (nu, tau, whole))
+    nu_dot, tau, beside = _rates(t, seconds, nu, tau, whole)
     inside = (t > t[0] + FARTHEST) & (t < t[-1] - FARTHEST)
     if inside.sum() < 10 * PARTS:
         return None
@@ -280,8 +280,11 @@ def _acts_behind(
     return None if least > (1.0 - TOLD) * (y**2).sum() else found
 
 
-def _count(t: np.ndarray, seconds: float) -> int:
-    return max(2 * round(seconds / float(np.median(np.diff(t))) / 2) + 1, SMALLEST)
+def _rates(t: np.ndarray, seconds: float, *signals: np.ndarray) -> list[np.ndarray]:
+    """Rates of signals (n, k) by one filter, in s, whose weights are found once."""
+    count = max(2 * round(seconds / float(np.median(np.diff(t))) / 2) + 1, SMALLEST)
+    found = rates(t, np.concatenate(signals, axis=1), t, count).rate
+    return np.split(found, np.cumsum([one.shape[1] for one in signals])[:-1], axis=1)
 
 
 def _sums(squares: np.ndarray) -> np.ndarray:

@@ -179,17 +179,16 @@ def compare_rates(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Rate
     count = min(max(count, SMALLEST), len(t))
     probes = t[:: -(-len(t) // PROBES)]
     whole = cumulative_trapezoid(velocity, t, axis=0, initial=0.0)
-    by_path, by_velocity = (rates(t, signal, probes, count) for signal in (path, whole))
-    noise = [
-        squares / max(freedom, 1.0)
-        for squares, freedom in (residuals(t, path), residuals(t, velocity))
-    ]
+    k = path.shape[1]
+    found = rates(t, np.concatenate([path, whole], axis=1), probes, count)
+    squares, freedom = residuals(t, np.concatenate([path, velocity], axis=1))
+    noise = squares / max(freedom, 1.0)
     return RatePair(
         probes,
-        by_path.rate,
-        by_velocity.rate,
-        noise[0] * float(by_path.gain.mean()),
-        noise[1] * float(by_velocity.inner_gain.mean()),
+        found.rate[:, :k],
+        found.rate[:, k:],
+        noise[:k] * float(found.gain.mean()),
+        noise[k:] * float(found.inner_gain.mean()),
     )
 
 

@@ -344,11 +344,7 @@ def test_the_command_prints_margins_and_writes_them(tmp_path, capsys):
         assert word in text
     document = json.loads((out / 'linearization.json').read_text())
     expected = ControlLoop(load_scenario('case1_bluerov2_heavy'), 'gvc', 0.03, 0.02)
-    loop, found = expected.loop(), document['models']['gvc']['margins']
-    assert found['disk_margin'] == expected.disk_margin(loop)
-    for row, one in zip(found['axes'], expected.margins(loop), strict=True):
-        assert (row['gain_margin'], row['crossover']) == (one.gain, one.crossover)
-    assert found['axes'][2]['largest'] == expected.values[2] * expected.largest(2)
+    assert document['models']['gvc']['margins'] == stability_margins(expected)
     assert (out / 'margins.parquet').is_file()
     assert (out / 'figures' / 'bode_gvc.png').is_file()
 

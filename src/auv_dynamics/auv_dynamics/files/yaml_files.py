@@ -1,5 +1,6 @@
 """YAML and JSON files: read within bounds and checked against a JSON schema."""
 
+import copy
 import json
 import re
 from collections.abc import Iterator
@@ -80,9 +81,14 @@ def parse_any_yaml(text: str, path: object) -> Any:
     if len(text) > LONGEST_TEXT:
         found = f'{len(text)} characters'
         raise InputError(path, '', f'YAML of at most {LONGEST_TEXT} characters', found)
+    return copy.deepcopy(_parsed(text, str(path)))
+
+
+@lru_cache(maxsize=8)  # a command reads its vehicle's file several times
+def _parsed(text: str, path: str) -> Any:
     try:
         loader = _Loader(text)
-        loader.name = str(path)
+        loader.name = path
         data = loader.get_single_data()
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark

@@ -154,7 +154,7 @@ def test_small_files_of_very_many_records_cost_little(
     tmp_path: Path, kind: str, capsys: pytest.CaptureFixture
 ) -> None:
     path = tmp_path / 'bag_0.mcap'
-    path.write_bytes(costly_bags.KINDS[kind](500_000))
+    path.write_bytes(costly_bags.KINDS[kind](1_000_000))
     for command in ('info', 'recover'):
         old(path)
         ended = 0

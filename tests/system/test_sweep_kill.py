@@ -2,16 +2,15 @@
 
 import random
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
+from helpers.fork_server import Process
+from helpers.node_processes import start_auv
 from helpers.patience import patience
 from helpers.sweeps import CAMPAIGN, parts, write_files
 
-AUV = [sys.executable, '-m', 'auv_analysis.cli.main', 'sweep', 'campaign.yaml', '--workers', '2']
 BLOCKS = 48
 PATIENCE = patience(
     600.0
@@ -27,10 +26,8 @@ def files(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def start(files: Path, out: str) -> subprocess.Popen:
-    return subprocess.Popen(
-        [*AUV, '--out', out], cwd=files, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+def start(files: Path, out: str) -> Process:
+    return start_auv('sweep', 'campaign.yaml', '--workers', '2', '--out', out, cwd=files)
 
 
 def stamps(folder: Path) -> dict[str, tuple[int, int]]:
@@ -39,7 +36,7 @@ def stamps(folder: Path) -> dict[str, tuple[int, int]]:
     return {path.name: (path.stat().st_ino, path.stat().st_mtime_ns) for path in listed}
 
 
-def wait_for_parts(process: subprocess.Popen, folder: Path, count: int) -> None:
+def wait_for_parts(process: Process, folder: Path, count: int) -> None:
     until = time.monotonic() + PATIENCE
     while len(stamps(folder)) < count:
         assert process.poll() is None, process.communicate()

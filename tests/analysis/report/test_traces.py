@@ -14,7 +14,7 @@ from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics.statistics import Statistics, followed, part_of
-from auv_analysis.report import plots
+from auv_analysis.report import plots, run_plots
 from auv_analysis.report.digest import digest
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.traces import COLUMNS, FEW, Trace, thinned
@@ -90,7 +90,7 @@ def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
         with plots.style():
             figure = plots.new_figure(3.0)
             axes = figure.subplots()
-            plots.draw_lines(axes, drawn, 'error', 'late', [2])
+            run_plots.draw_lines(axes, drawn, 'error', 'late', [2])
             axes.set_ylim(-1.0, 6.0)
             png, _ = plots.save(figure, tmp_path, f'spike_{spike:g}')
         pictures.append(np.asarray(Image.open(png).convert('L'), float))

@@ -280,17 +280,6 @@ def unrecorded(part: Part, skip: Sequence[str] = ()) -> list[str]:
     return [dof for dof, x in zip(DOFS, part.peak, strict=True) if np.isnan(x) and dof not in skip]
 
 
-def draw_lines(axes: Axes, run: RunDigest, signal: str, part: str, columns: Sequence[int]) -> None:
-    """Lines of some columns of a signal over a part of the time, in their colours."""
-    ends = []
-    for i in columns:
-        t, y = run.drawn(signal, i, part)
-        axes.plot(t, y, color=COLOURS[i])
-        ends = [t[0], t[-1]]
-    axes.set_xlim(*ends)
-    shade(axes, run)
-
-
 def shade(axes: Axes, run: RunDigest) -> None:
     """Grey where a run has no samples, over whatever is drawn there; the limits stay.
 
@@ -441,13 +430,6 @@ def heat_map(rows: Sequence[str], grids: Sequence[HeatMap], width: float = WIDTH
         place: dict[str, Any] = {'location': 'bottom', 'aspect': 30, 'fraction': 0.05}
         scale_bar(figure, axes.images[0], grid.label, ax=axes, **place)
     return figure
-
-
-def small_heads(figure: Figure, grids: Sequence[HeatMap]) -> None:
-    """Heads that are paths: small, and upright where there are more than two."""
-    for axes, grid in zip(figure.axes, grids, strict=False):
-        angle = 90 if len(grid.columns) > 2 else 0
-        axes.tick_params(axis='x', labelrotation=angle, labelsize='small')
 
 
 def scale_bar(figure: Figure, image: ScalarMappable, label: str, **place: Any) -> None:

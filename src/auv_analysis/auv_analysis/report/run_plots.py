@@ -208,7 +208,7 @@ def _split_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequen
     for row, columns in enumerate(groups):
         for column, part in enumerate(('early', 'late')):
             axes = grid[row, column]
-            plots.draw_lines(axes, run, signal, part, columns)
+            draw_lines(axes, run, signal, part, columns)
             plots.letter(axes, 2 * row + column)
         grid[row, 0].set_ylabel(quantity.axis(columns))
         plots.key(grid[row, 1], quantity, columns)
@@ -222,7 +222,7 @@ def _whole_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequen
     figure = plots.new_figure(2.0 * len(groups) + 0.25)
     grid = figure.subplots(len(groups), 1, squeeze=False, sharex=True)[:, 0]
     for row, columns in enumerate(groups):
-        plots.draw_lines(grid[row], run, signal, 'whole', columns)
+        draw_lines(grid[row], run, signal, 'whole', columns)
         grid[row].set_ylabel(quantity.axis(columns))
         plots.letter(grid[row], row)
         plots.key(grid[row], quantity, columns)
@@ -445,3 +445,14 @@ def _six_panels(runs: Mapping[str, RunDigest]) -> tuple[Figure, list[Axes]]:
     for axes in panels[3:]:
         axes.set_xlabel('$t$ (s)')
     return figure, panels
+
+
+def draw_lines(axes: Axes, run: RunDigest, signal: str, part: str, columns: Sequence[int]) -> None:
+    """Lines of some columns of a signal over a part of the time, in their colours."""
+    ends = []
+    for i in columns:
+        t, y = run.drawn(signal, i, part)
+        axes.plot(t, y, color=COLOURS[i])
+        ends = [t[0], t[-1]]
+    axes.set_xlim(*ends)
+    plots.shade(axes, run)

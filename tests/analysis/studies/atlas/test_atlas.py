@@ -28,7 +28,7 @@ def test_the_strongest_come_first_and_equal_inertias_share_a_panel(found) -> Non
                                        'bluerov2_heavy']  # fmt: skip
     assert [name for name, _ in coupled(found)] == ['herman2018, herman2018_neutral', 'rexrov']
     assert uncoupled(found) == (
-        'bluerov2_heavy has a diagonal M: Upsilon = I, nothing is coupled by inertia.'
+        ' bluerov2_heavy has a diagonal M: Upsilon = I, nothing is coupled by inertia.'
     )
 
 

@@ -65,12 +65,12 @@ def coupled(charts: Sequence[Chart]) -> list[tuple[str, Chart]]:
 
 
 def uncoupled(charts: Sequence[Chart]) -> str:
-    """Sentence that names the vehicles of diagonal M; '' where there is none."""
+    """Sentence, behind a blank, that names the vehicles of diagonal M; '' where there is none."""
     names = [chart.name for chart in charts if chart.couplings.is_diagonal]
     if not names:
         return ''
     verb = 'has' if len(names) == 1 else 'have'
-    return f'{join(names)} {verb} a diagonal M: Upsilon = I, nothing is coupled by inertia.'
+    return f' {join(names)} {verb} a diagonal M: Upsilon = I, nothing is coupled by inertia.'
 
 
 def _correlation(charts: Sequence[Chart]) -> Drawn:
@@ -89,7 +89,7 @@ def _correlation(charts: Sequence[Chart]) -> Drawn:
     caption = Maths(
         f'{title} M_ij / sqrt(M_ii M_jj) of the vehicles that are coupled: where i and j move with '
         'equal kinetic energies, their cross term is this part of the sum of the two. All panels '
-        'have one scale; 0: not coupled; the diagonal is left out. {}',
+        'have one scale; 0: not coupled; the diagonal is left out.{}',
         uncoupled(charts),
     )
     return _panels(grids), title, caption
@@ -111,7 +111,7 @@ def _shares(charts: Sequence[Chart]) -> Drawn:
         f'{title}: of the energy of a motion in the column’s degree of freedom alone, the share '
         'that the decomposition finds in the row’s component ξ (above the diagonal: what deforms '
         'velocities, Δξ); of the energy that an impulse in the column’s alone leaves, the share in '
-        'the row’s component (below: what deforms inputs, Δπ). One logarithmic scale; 0: none. '
+        'the row’s component (below: what deforms inputs, Δπ). One logarithmic scale; 0: none.'
     )
     return _panels(grids), title, caption + uncoupled(charts)
 
@@ -135,7 +135,7 @@ def _strength(charts: Sequence[Chart]) -> Drawn:
     shown = [chart for chart in charts if not chart.couplings.is_diagonal]
     title = 'Strength of inertial coupling'
     if not shown:
-        return None, title, f'{title}: {uncoupled(charts)}'
+        return None, title, f'{title}:{uncoupled(charts)}'
     figure = plots.new_figure(0.9 + 0.3 * len(shown))
     axes = figure.subplots()
     places = np.arange(len(shown))
@@ -152,7 +152,7 @@ def _strength(charts: Sequence[Chart]) -> Drawn:
     axes.grid(axis='y', visible=False)
     caption = (
         f'{title}: bars, the largest part that all cross terms together have, over all motions, of '
-        'the kinetic energy without them; dots, the same of the pair that is named. '
+        'the kinetic energy without them; dots, the same of the pair that is named.'
     )
     return figure, title, caption + uncoupled(charts)
 
@@ -163,7 +163,7 @@ def _reached(charts: Sequence[Chart], kind: str) -> Drawn:
     symbol, units = KINDS[kind]
     title = f'{symbol} reached in case 1'
     if not shown:
-        return None, title, f'{title}: {uncoupled(charts)}'
+        return None, title, f'{title}:{uncoupled(charts)}'
     values = np.array([chart.reached[f'{kind}_max'] for chart in shown])
     always = np.array([[dof in c.couplings.zeros[kind] for dof in DOFS] for c in shown])
     halves = slice(0, 3), slice(3, 6)
@@ -173,7 +173,7 @@ def _reached(charts: Sequence[Chart], kind: str) -> Drawn:
     ]
     caption = (
         f'{title}, scaled to each vehicle, under GVC: the largest magnitude of the run; {ALWAYS}: '
-        'zero for every motion by the structure of M. '
+        'zero for every motion by the structure of M.'
     )
     names = [chart.name for chart in shown]
     return heat_map(names, grids), title, caption + uncoupled(charts)

@@ -72,7 +72,9 @@ def findings(charts: Sequence[Chart]) -> list[Sentence]:
             f'{number(PERCENT * first.strength)} % of the energy without them, of {i} and {j} '
             f'alone {number(PERCENT * first.largest)} %.'
         )
-    sentences = [Sentence(text, 'table-ranking') for text in [*found, uncoupled(charts)] if text]
+    sentences = [
+        Sentence(text, 'table-ranking') for text in [*found, uncoupled(charts).strip()] if text
+    ]
     failed = [chart.name for chart in charts if chart.reached['failure']]
     if failed:
         text = f'Case 1 diverges on {join(failed)}, which therefore have no peaks.'

@@ -5,7 +5,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from auv_analysis.studies.sweep.dataset import (
 )  # fmt: skip
 from auv_analysis.studies.sweep.indices import Designed, designed, failing, indices, omitted
 from auv_analysis.studies.sweep.quantiles import (
+    Ordered,
     Row,
     finite,
     ordered,
@@ -61,38 +61,6 @@ def _family(analysis: 'Analysis', family: str) -> None:
 def _columns(sweep: Sweep, names: Sequence[str]) -> dict[str, np.ndarray]:
     table = sweep.table([*names])
     return {name: numbers_of(table, name) for name in names}
-
-
-class Ordered(NamedTuple):
-    """Values of a figure in the m rows of a controller, sorted.
-
-    Attributes
-    ----------
-    ascending : (k,) of those that exist; of a time, one that does not is infinite and the last
-    places : (k,) which of the rows each is
-    ranks : (m,) from 1 on, the mean of those that are equal; NaN of what does not exist
-
-    """
-
-    ascending: np.ndarray
-    places: np.ndarray
-    ranks: np.ndarray
-
-    @classmethod
-    def of(cls, values: np.ndarray, unit: str = '') -> 'Ordered':
-        """Of the values (m,) of a figure in its unit."""
-        at = ordered(values, unit)
-        places = np.argsort(at)[: len(at) - int(np.isnan(at).sum())]  # NaN is the last
-        ascending, ranks = at[places], np.full(len(at), np.nan)
-        new = ascending[1:] != ascending[:-1]
-        starts = np.flatnonzero(np.append([True], new)[: len(places)])  # of what is equal
-        ends = np.append(starts[1:], len(ascending))
-        ranks[places] = np.repeat((starts + ends + 1) / 2, ends - starts)
-        return cls(ascending, places, ranks)
-
-    def groups(self, codes: np.ndarray, count: int) -> list[np.ndarray]:
-        """Values in each of so many groups, sorted, by the group (m,) of each row."""
-        return by_group(self.ascending, codes[self.places], count)
 
 
 def influence(ranks: np.ndarray, codes: np.ndarray, others: np.ndarray | None) -> Row | None:

@@ -118,7 +118,7 @@ def _influence(analysis: Analysis) -> Drawn:
         names = [m.name for m in analysis.measures]
         grids.append(_shares(analysis, rows, names, paths, 'explained_percent', label, 100.0))
     figure = heat_map([m.label for m in analysis.measures], grids)
-    plots.small_heads(figure, grids)
+    _small_heads(figure, grids)
     title = 'What matters'
     caption = (
         f'{title}: share of the variance of the ranks of a measure that lies between the groups of '
@@ -161,7 +161,7 @@ def _total_indices(analysis: Analysis) -> Drawn:
         grids.append(_shares(analysis, mine, measures, paths, 'ST', f'({letter}) $S_T$'))
         said.append(f'({letter}) {controller}{f", {case}" if case else ""}')
     figure = heat_map([BY_NAME[name].label for name in measures], grids)
-    plots.small_heads(figure, grids)
+    _small_heads(figure, grids)
     title = 'Total sensitivity indices'
     caption = (
         f'{title} of Sobol’: the share of the variance of a measure that would be left if all but '
@@ -366,3 +366,10 @@ def _failures(analysis: Analysis) -> Drawn:
         'all controllers together; of each one in failures.parquet.'
     )
     return figure, title, caption
+
+
+def _small_heads(figure: Figure, grids: Sequence[HeatMap]) -> None:
+    """Heads that are paths: small, and upright where there are more than two."""
+    for axes, grid in zip(figure.axes, grids, strict=False):
+        angle = 90 if len(grid.columns) > 2 else 0
+        axes.tick_params(axis='x', labelrotation=angle, labelsize='small')

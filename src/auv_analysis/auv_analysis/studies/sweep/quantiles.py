@@ -1,9 +1,11 @@
 """Quantiles of one column of figures; of times, one that does not exist is the latest."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from auv_analysis.studies.sweep.dataset import by_group
 
 LEVELS = {'low': 0.05, 'quarter': 0.25, 'median': 0.5, 'three_quarters': 0.75, 'high': 0.95}
 Row = dict[str, Any]
@@ -13,6 +15,38 @@ POINTS = 201  # of a distribution function as it is drawn
 def ordered(values: np.ndarray, unit: str) -> np.ndarray:
     """The same values; a time that does not exist is later than any other."""
     return np.where(np.isnan(values), np.inf, values) if unit == 's' else values
+
+
+class Ordered(NamedTuple):
+    """Values of a figure in the m rows of a controller, sorted.
+
+    Attributes
+    ----------
+    ascending : (k,) of those that exist; of a time, one that does not is infinite and the last
+    places : (k,) which of the rows each is
+    ranks : (m,) from 1 on, the mean of those that are equal; NaN of what does not exist
+
+    """
+
+    ascending: np.ndarray
+    places: np.ndarray
+    ranks: np.ndarray
+
+    @classmethod
+    def of(cls, values: np.ndarray, unit: str = '') -> 'Ordered':
+        """Of the values (m,) of a figure in its unit."""
+        at = ordered(values, unit)
+        places = np.argsort(at)[: len(at) - int(np.isnan(at).sum())]  # NaN is the last
+        ascending, ranks = at[places], np.full(len(at), np.nan)
+        new = ascending[1:] != ascending[:-1]
+        starts = np.flatnonzero(np.append([True], new)[: len(places)])  # of what is equal
+        ends = np.append(starts[1:], len(ascending))
+        ranks[places] = np.repeat((starts + ends + 1) / 2, ends - starts)
+        return cls(ascending, places, ranks)
+
+    def groups(self, codes: np.ndarray, count: int) -> list[np.ndarray]:
+        """Values in each of so many groups, sorted, by the group (m,) of each row."""
+        return by_group(self.ascending, codes[self.places], count)
 
 
 def quantiles(values: np.ndarray, levels: Iterable[float]) -> np.ndarray:

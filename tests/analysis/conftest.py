@@ -1,6 +1,6 @@
 """What tests of reports share: the report of case1's first seconds in a browser, quick figures."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -9,8 +9,24 @@ from helpers.artists import captured
 from helpers.browser import Watched, chromium
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.report import results
 from auv_analysis.report.run_report import write_report
 from auv_analysis.runs.run import Run
+
+
+@pytest.fixture(scope='session', autouse=True)
+def known_columns() -> Iterator[None]:
+    """No table shows a column that none of its rows has, which would be empty: a wrong key."""
+    arrow = results._arrow
+
+    def checked(rows, order):
+        if rows and not isinstance(rows, Mapping):
+            assert not {*order} - {name for row in rows for name in row}
+        return arrow(rows, order)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, '_arrow', checked)
+        yield
 
 
 @pytest.fixture(scope='session')

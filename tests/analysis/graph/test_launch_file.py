@@ -108,7 +108,8 @@ def test_launch_itself_makes_the_same_of_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Where `launch` is installed, as beside ROS 2 from Debian packages."""
-    need('launch', importlib.util.find_spec('launch'))
+    found = importlib.util.find_spec('launch')  # without an origin it is the folder of our file
+    need('launch', found and found.origin)
     launch, sources = map(importlib.import_module, ('launch', 'launch.launch_description_sources'))
     monkeypatch.chdir(tmp_path)
     described = sources.get_launch_description_from_python_launch_file(str(FILE))

@@ -4,8 +4,10 @@ import sys
 
 import pytest
 from geometry_msgs.msg import WrenchStamped
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile
 
-from auv_dynamics.ros.topics import message_class, type_name
+from auv_dynamics.ros.topics import message_class, qos_entry, type_name
 
 
 def test_a_message_is_found_by_its_name() -> None:
@@ -27,3 +29,8 @@ def test_a_name_that_somebody_makes_up_imports_nothing(name: str) -> None:
 def test_a_message_that_its_package_lacks_is_missed() -> None:
     with pytest.raises(AttributeError, match='NoSuchMessage'):
         message_class('geometry_msgs/msg/NoSuchMessage')
+
+
+def test_the_times_of_a_profile_are_seconds_and_the_rest_of_them() -> None:
+    entry = qos_entry(QoSProfile(depth=1, deadline=Duration(seconds=2, nanoseconds=500)))
+    assert entry['deadline'] == {'sec': 2, 'nsec': 500}

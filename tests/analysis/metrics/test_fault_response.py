@@ -111,6 +111,10 @@ def test_every_number_of_the_tables_is_in_the_file(made, tmp_path):
     held = parquet.read_table(tmp_path / FILE)
     numbers = parquet.read_table(tmp_path / 'numbers.parquet').to_pylist()
     assert len(numbers) == 90
+    first = next(iter(found['gvc']))
+    (begin, end), _, (_, last) = first.windows
+    assert f'. Before is {begin:g}–{end:.6g} s, after is ' in tables[0].caption
+    assert f'–{last:.6g} s (' in tables[0].caption
     for row in numbers:
         file, column, place = re.fullmatch(r'(.+):(.+)\[(\d+)\]', row['source']).groups()
         assert file == FILE

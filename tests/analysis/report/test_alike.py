@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers import made_runs
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.report.digest import alike, digests
@@ -83,3 +84,12 @@ def test_noise_above_the_band_is_called_so_where_the_velocity_was_measured(run, 
     text = said({'a': noisy})
     assert ('within its noise floor of' in text) == measured
     assert ('do not settle within 4 s: in the last 0.2 s' in text) != measured
+
+
+@pytest.mark.parametrize(('last', 'settled'), [(60, 3.0), (233, np.inf)])
+def test_settled_is_the_last_time_of_a_large_error_unless_it_is_too_late(last, settled) -> None:
+    run = made_runs.made('gvc', 'gvc', 1)
+    error = np.zeros_like(run.nu)
+    error[last, 4] = 0.02
+    found = digests({'gvc': replace(run, nu=run.nu_d - error, faults=())})['gvc']
+    assert found.settled == pytest.approx(settled)

@@ -31,8 +31,9 @@ SWAPPED = re.compile(  # of wiring: of many ways to break an operator, the next 
     r'|NotEq_Eq|Is_IsNot|IsNot_Is|In_NotIn|NotIn_In)$)'
 )
 TOLD = {'begin', 'info', 'warning', 'error', 'print', 'get_logger', 'InputError'}  # to people
+WAITED = {'wait_for_all_acked'}  # for how long
 JUDGED = re.compile(  # constants: how long, how large and in which colour is for people to judge
-    r"^[A-Z_, ]+(: .*)? = .*  # (s|in|px|opacity)\b|^[A-Z_, ]+ = \(?'#|^(STYLE|DASHES)\b"
+    r"^[A-Z_, ]+(: .*)? = .*  # (s|steps|in|px|opacity)\b|^[A-Z_, ]+ = \(?'#|^(STYLE|DASHES)\b"
 )
 LAYOUT = re.compile(  # keywords: how large, how faint, where the name of something stands
     r'(line|eline|edge|markeredge)widths?|lw|(font|label|marker|cap)size|s|fontweight'
@@ -85,6 +86,8 @@ def _no_code(tree: ast.Module) -> list[ast.AST | None]:
             parts.append(node.annotation)
         if isinstance(node, ast.Raise):
             parts.append(node)
+        if isinstance(node, ast.ExceptHandler):
+            parts.append(node.type)  # one of several is caught in any order
     return parts
 
 
@@ -108,7 +111,7 @@ def _judged(tree: ast.Module, source: str) -> list[ast.AST | None]:
             named = list(zip(keys, node.values, strict=True))
         elif isinstance(node, ast.Call):
             name = getattr(node.func, 'attr', getattr(node.func, 'id', ''))
-            parts += [node] if name in TOLD | LAYS_OUT else []
+            parts += [node] if name in TOLD | WAITED | LAYS_OUT else []
             parts += node.args[1:] if name in ROUNDED else []
             named = [(keyword.arg, keyword.value) for keyword in node.keywords]
         elif isinstance(node, ast.arguments):

@@ -1,5 +1,6 @@
 """The wrench of the controller node, to its last digits that of the independent implementation."""
 
+import re
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -243,7 +244,7 @@ class Vehicle:
             for message in heard[seen:]:
                 (status,) = message.status
                 found = {pair.key.replace(' ', '_'): pair.value for pair in status.values}
-                if (status.level, facts | found) == (level, found) and said in status.message:
+                if (status.level, found | facts) == (level, found) and said in status.message:
                     return True
             return False
 
@@ -251,7 +252,7 @@ class Vehicle:
 
 
 def test_silence_in_real_time_gives_zero_wrench_is_explained_and_it_comes_back(
-    made, vehicle
+    made, vehicle, capfd
 ) -> None:
     gains = {f'gains.{gain}': [*map(float, row)] for gain, row in STILL.items()}
     node = controller(made, vehicle, 'gvc', **BESIDE, **gains)
@@ -289,3 +290,6 @@ def test_silence_in_real_time_gives_zero_wrench_is_explained_and_it_comes_back(
     ship.gets(tau)
     assert node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
     made.until(lambda: by_hand.six_of(made.heard['wrench'][-1]) == zero, 'a zero wrench')
+    told = re.findall('takes over|lets go', capfd.readouterr().err)
+    assert told == ['takes over', 'lets go'] * (len(told) // 2), 'each change is said, and once'
+    assert len(told) >= 8

@@ -1,6 +1,7 @@
 """What each node publishes, hears and offers, of which type and quality, in both paces."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,8 @@ import pytest
 from helpers.nodes_in_process import program
 from rclpy.qos import DurabilityPolicy
 
+from auv_analysis import load_scenario
+from auv_analysis.graph.node_parameters import node_parameters
 from auv_analysis.nodes.analysis_node import AnalysisNode
 from auv_analysis.nodes.recorder_node import RecorderNode
 from auv_dynamics.nodes.frame_converter_node import FrameConverterNode
@@ -68,6 +71,7 @@ CASES: list[tuple[Callable[..., Any], dict[str, Any], bool, Ends, Ends]] = [
     (RecorderNode, {'bag': 'bag'}, False, {'recorder/progress': FEW},
      dict.fromkeys(EVERYTHING, ALL)),
 ]  # fmt: skip
+SENSING = {'actuators': {'limit': 1e4}, 'sensors': {'velocity_noise': 0.1}}
 SERVICES = {  # beside ~/ready and what every node of rclpy offers
     'plant_node': {'run', 'reset'},
     'controller_node': {
@@ -120,3 +124,19 @@ def test_topics_types_and_quality_of_service_are_those_of_the_contract(
         usual = ('parameter', 'type_description')
         rest = {service for service in offered if not any(word in service for word in usual)}
         assert rest == own
+
+
+@pytest.mark.parametrize('sensing', [False, True])
+def test_a_run_waits_for_all_who_subscribe(sensing: bool) -> None:
+    plant, controller, setpoint, recorder = CASES[sensing], CASES[2], CASES[4], CASES[-1]
+    nodes = (plant, setpoint, controller, CASES[6 + sensing], recorder)
+    scenario = load_scenario('case1')
+    scenario = replace(scenario, data=scenario.data | (SENSING if sensing else {}))
+    given = node_parameters(scenario, 'gvc', bag=Path('bag'))
+    found = [values.get('expected_subscribers', []) for values in given.values()]
+    for said, (_, _, _, published, _) in zip(found, nodes, strict=True):
+        counts = {
+            topic: sum(topic in heard for *_, heard in nodes)
+            for topic in published if topic in EVERYTHING and not topic.startswith(('/', 'rec'))
+        }  # fmt: skip
+        assert {*said} == {f'{topic}={count}' for topic, count in counts.items() if count}

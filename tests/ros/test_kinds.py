@@ -7,7 +7,7 @@ from geometry_msgs.msg import WrenchStamped
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 
-from auv_dynamics.ros.topics import message_class, qos_entry, type_name
+from auv_dynamics.ros.topics import is_name, message_class, qos_entry, type_name
 
 
 def test_a_message_is_found_by_its_name() -> None:
@@ -29,6 +29,11 @@ def test_a_name_that_somebody_makes_up_imports_nothing(name: str) -> None:
 def test_a_message_that_its_package_lacks_is_missed() -> None:
     with pytest.raises(AttributeError, match='NoSuchMessage'):
         message_class('geometry_msgs/msg/NoSuchMessage')
+
+
+def test_a_topic_has_a_name_that_the_middleware_takes_whole() -> None:
+    assert all(map(is_name, ('odom', '/auv1/cmd_vel')))
+    assert not any(map(is_name, ('', 'a b', 'a\0b', 'é', '1st', 'a//b', 'a/')))
 
 
 def test_the_times_of_a_profile_are_seconds_and_the_rest_of_them() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 from helpers.node_processes import CONTROLLER, Peer, fresh_domain, graph, parameters
+from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
 
@@ -50,10 +51,14 @@ def test_what_is_dumped_loads_back(node: str, tmp_path: Path) -> None:
     assert dict(zip(names, map(parameter_value_to_python, again[1]), strict=True)) == dumped
 
 
-def test_an_empty_list_and_null_are_no_value() -> None:
-    unset = ['-p', 'limits.wrench_rate:=[]', '-p', 'actuators.limit:=null']
-    with graph(('controller_node', [*NODES['controller_node'], *unset])) as (peer, processes):
+def test_an_empty_list_and_null_are_no_value_and_whole_numbers_are_numbers() -> None:
+    given = ['-p', 'limits.wrench_rate:=[]', '-p', 'actuators.limit:=null']
+    given += ['-p', 'limits.wrench:=70', '-p', 'ramp:=2']
+    with graph(('controller_node', [*NODES['controller_node'], *given])) as (peer, processes):
         names, values, _ = asked(peer, 'controller_node')
         found = dict(zip(names, values, strict=True))
         assert found['limits.wrench_rate'].type == found['actuators.limit'].type == 0
+        assert parameter_value_to_python(found['limits.wrench']) == [70.0]
+        assert found['limits.wrench'].type == ParameterType.PARAMETER_DOUBLE_ARRAY
+        assert found['ramp'].type == ParameterType.PARAMETER_DOUBLE
         assert processes['controller_node'].poll() is None

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.node_processes import Peer, assert_one_line, graph, parameters, run_node
 from helpers.patience import patience
+from helpers.stalls import undisturbed
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_dynamics.ros import convert, interface, topics
@@ -75,12 +76,30 @@ def test_lock_step_repeats_delays_biases_and_keeps() -> None:
 
 def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
     heard_again = 120 + round(patience(60))  # steps, of which the watchdog waits for half
+    last = heard_again + 70
+
+    def held(found: tuple[list[int], list[int], np.ndarray]) -> bool:
+        applied = found[2]
+        return bool(applied[125] == applied[119] > 0)
+
+    true, stamps, applied = found = undisturbed(lambda: in_real_time(heard_again, last), held)
+    assert true == list(range(last + 1))
+    # lost from 30 to before 50; what was measured from 80 on was still under way at 100
+    assert stamps == [*range(30), *range(50, 80), *range(100, last + 1)]
+    meanwhile = set(applied[120:heard_again]) - {0.0}
+    assert len(meanwhile) <= 1, 'the last one is held, then none: none that came meanwhile'
+    assert held(found), 'the last one is held'
+    assert (applied[heard_again - 15 : heard_again] == 0).all(), 'then the watchdog has zeroed it'
+    assert applied[-10:].min() > heard_again, 'and wrenches are heard again'
+
+
+def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.ndarray]:
+    """Steps of truth and odometry and the applied surge force, answering step k with k + 1 N."""
     given = faults(
         gone={'kind': 'sensor_drop_out', '_from': 0.3, 'to': 0.5},
         late={'kind': 'sensor_delay', 'delay': 0.2, '_from': 0.6, 'to': 1.0},
         mute={'kind': 'wrench_loss', '_from': 1.2, 'to': heard_again * 0.01},
     )
-    last = heard_again + 70
     plant = parameters(vehicle='herman2018', duration=last * 0.01, wrench_timeout=patience(0.3))
     ready = ['-p', 'expected_subscribers:=["odom=2", "wrench_applied=1", "ground_truth/odom=1"]']
     with graph((PLANT, [*plant, *ready, *given])) as (peer, _):
@@ -96,16 +115,8 @@ def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
         truth = peer.heard[topics.GROUND_TRUTH.name]
         peer.until(lambda: truth and step_of(truth[-1]) == last, 'the end')
         peer.until(lambda: len(peer.heard[topics.WRENCH_APPLIED.name]) > last, 'every wrench')
-        stamps = [step_of(m) for m in peer.heard[topics.ODOM.name]]
         applied = np.array([m.wrench.force.x for m in peer.heard[topics.WRENCH_APPLIED.name]])
-    assert [step_of(m) for m in truth] == list(range(last + 1))
-    # lost from 30 to before 50; what was measured from 80 on was still under way at 100
-    assert stamps == [*range(30), *range(50, 80), *range(100, last + 1)]
-    meanwhile = set(applied[120:heard_again]) - {0.0}
-    assert len(meanwhile) <= 1, 'the last one is held, then none: none that came meanwhile'
-    assert applied[125] == applied[119] > 0, 'the last one is held'
-    assert (applied[heard_again - 15 : heard_again] == 0).all(), 'then the watchdog has zeroed it'
-    assert applied[-10:].min() > heard_again, 'and wrenches are heard again'
+        return [step_of(m) for m in truth], [step_of(m) for m in peer.heard['odom']], applied
 
 
 @pytest.mark.parametrize(

@@ -249,17 +249,20 @@ def test_silence_of_the_controller_gives_zero_wrench_and_it_comes_back(made, veh
     applied = made.heard['wrench_applied']
     made.until(lambda: len(applied) > 3, 'the beginning')
     assert by_hand.six_of(applied[-1]) == [0.0] * 6, 'nothing before the first wrench'
+    last = 0.0  # s, before the last wrench was said
     for tau in (TAU[0], TAU[1]):
 
         def drives(tau: np.ndarray = tau) -> bool:
+            nonlocal last
             newest = by_hand.ns_of(made.heard['odom'][-1])
+            last = time.monotonic()
             made.publish(topics.WRENCH, by_hand.six(topics.WRENCH.type, newest, tau))
             made.spin(H)
             return by_hand.six_of(applied[-1]) == [*tau]
 
         made.until(drives, 'the wrench')
-        last, begun = time.monotonic(), len(applied)
+        begun = len(applied)
         made.until(lambda: by_hand.six_of(applied[-1]) == [0.0] * 6, 'a zero wrench')
-        assert time.monotonic() - last > REAL['wrench_timeout'] - 2 * H, 'it is held before'
+        assert time.monotonic() - last > REAL['wrench_timeout'], 'it is held before'
         held = [by_hand.six_of(message) for message in applied[begun:]]
         assert held == [[*tau]] * (len(held) - 1) + [[0.0] * 6]

@@ -19,6 +19,7 @@ from helpers.node_processes import (
     run_node,
     stop,
 )
+from helpers.nodes_in_process import program
 from helpers.patience import patience
 from mcap.reader import make_reader
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -29,6 +30,7 @@ from std_msgs.msg import Header, String
 from auv_analysis.bag import read_bag
 from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.mcap_file import McapFile
+from auv_analysis.nodes.recorder_node import RecorderNode
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import NANOSECONDS, Frames, nanoseconds
 from auv_dynamics.ros.rclpy_internals import raw_class
@@ -90,6 +92,19 @@ def test_the_clock_of_the_last_steps_is_waited_for(tmp_path: Path, goes_on: bool
     counts = read_bag(tmp_path / 'bag', decode=False).counts
     assert counts['/clock'] == (21 if goes_on else 15)
     assert counts['/odom'] == 21
+
+
+def test_in_real_time_progress_is_that_of_odometry_and_whoever_comes_late_hears_it(
+    tmp_path: Path,
+) -> None:
+    given = {'bag': str(tmp_path / 'bag'), 'topics': ['odom', 'cmd_vel'], 'strict': False}
+    with program() as made:
+        made.add(RecorderNode, given)
+        for k in range(3):
+            publish_step(made, k)
+        made.spin(0.3)
+        made.listen(topics.PROGRESS)
+        acknowledged(made, 2)
 
 
 @pytest.mark.parametrize('how', [signal.SIGTERM, signal.SIGINT])

@@ -40,6 +40,15 @@ def test_every_node_gets_its_parameters_and_the_bag_that_of_its_namespace(launch
     assert all(given[name]['use_sim_time'] == (name != 'plant_node') for name in names)
 
 
+def test_lock_step_and_the_clock_are_two_switches(launch_file) -> None:
+    _, given = nodes(actions(launch_file, use_sim_time='false'))
+    assert given['controller_node']['lockstep']
+    assert not given['controller_node']['use_sim_time']
+    _, given = nodes(actions(launch_file, lockstep='false'))
+    assert not given['plant_node']['lockstep']
+    assert given['controller_node']['use_sim_time']
+
+
 def test_beside_another_plant_there_is_no_clock(launch_file) -> None:
     _, given = nodes(actions(launch_file, publish_clock='false'))
     assert not given['plant_node']['publish_clock']

@@ -97,7 +97,7 @@ class PublicationLedger:
         """Count a publication; LostStepError after a gap. None: the middleware does not number."""
         if number is None:
             return
-        last = self._newest.get(topic, number - 1)
+        last = self._newest.get(topic, number)
         self._newest[topic] = number
         if number > last + 1:
             self.gaps[topic] = self.gaps.get(topic, 0) + number - last - 1

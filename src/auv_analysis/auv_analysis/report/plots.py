@@ -61,6 +61,7 @@ STYLE = {
     'xtick.labelsize': 7.5, 'ytick.labelsize': 7.5, 'legend.frameon': False,
     'legend.fontsize': 7.8, 'legend.handlelength': 1.6, 'legend.columnspacing': 1.2,
     'legend.borderaxespad': 0.0, 'pdf.fonttype': 42, 'figure.dpi': DPI, 'savefig.dpi': DPI,
+    'agg.path.chunksize': 1000,  # a line that fills its panel takes 40 MB at once
 }  # fmt: skip
 Drawn = tuple[Figure | None, str, str]  # with title and caption
 

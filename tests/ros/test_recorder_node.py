@@ -30,7 +30,12 @@ from std_msgs.msg import Header, String
 from auv_analysis.bag import read_bag
 from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.mcap_file import McapFile
-from auv_analysis.nodes.recorder_node import RecorderNode
+from auv_analysis.nodes.recorder_node import (
+    LostStepError,
+    PublicationLedger,
+    RecorderNode,
+    StepLedger,
+)
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import NANOSECONDS, Frames, nanoseconds
 from auv_dynamics.ros.rclpy_internals import raw_class
@@ -160,6 +165,43 @@ def test_a_lost_or_doubled_step_is_an_error(tmp_path: Path, steps: tuple, word: 
     assert word in output
     assert 'expected step 2' in output
     assert read_bag(tmp_path / 'bag').counts['/odom'] == 3, 'what came is kept'
+
+
+def test_the_ledger_says_which_step_is_due_when_and_who_is_behind() -> None:
+    ledger = StepLedger(['odom', 'wrench'], 10)
+    assert (ledger.complete, ledger.behind()) == (-1, 'none')
+    for topic, ns in (('odom', 100), ('odom', 110), ('wrench', 100), ('odom', 120)):
+        ledger.add(topic, ns)
+    assert (ledger.complete, ledger.complete_ns, ledger.behind()) == (0, 100, 'wrench at step 0')
+    ledger.add('wrench', 110)
+    assert (ledger.complete, ledger.complete_ns) == (1, 110)
+    with pytest.raises(
+        LostStepError, match=r'odom: expected step 3 \(130 ns\), found 150 ns: lost'
+    ):
+        ledger.add('odom', 150)
+    with pytest.raises(LostStepError, match=r'step 2 \(120 ns\), found 110 ns: doubled'):
+        ledger.add('wrench', 110)
+    with pytest.raises(LostStepError, match='found 121 ns'):
+        ledger.add('wrench', 121)
+
+
+def test_without_a_grid_gaps_are_counted_by_the_time_since_the_message_before() -> None:
+    ledger = StepLedger(['odom'], 10, strict=False)
+    for ns in (3, 14, 41, 33, 50, 63):  # 33 came late
+        ledger.add('odom', ns)
+    assert ledger.gaps == {'odom': 2}
+    assert ledger.complete == 6
+
+
+def test_publications_are_followed_by_their_numbers() -> None:
+    counted = PublicationLedger(strict=False)
+    for number in (7, 8, None, 11, 12):
+        counted.add('clock', number)
+    assert counted.gaps == {'clock': 2}
+    strict = PublicationLedger()
+    strict.add('clock', 7)
+    with pytest.raises(LostStepError, match='clock: expected publication 8, found 9: lost'):
+        strict.add('clock', 9)
 
 
 LAST = 123_456_789  # ns

@@ -122,8 +122,9 @@ def test_a_signal_closes_the_bag(tmp_path: Path, how: int) -> None:
         for k in range(10):
             publish_step(peer, k)
         acknowledged(peer, 9)
-        code, _ = stop(processes['recorder_node'], how)
+        code, output = stop(processes['recorder_node'], how)
     assert code == 0
+    assert 'did not arrive' not in output
     contents = read_bag(tmp_path / 'bag')
     assert contents.notes == []
     assert contents.counts['/odom'] == 10

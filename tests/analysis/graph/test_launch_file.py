@@ -26,9 +26,14 @@ def nodes(listed: list[Any]) -> tuple[list[str], dict[str, dict[str, Any]]]:
     """Names of the nodes, and the parameters in their file."""
     found = of('Node', listed)
     (path,) = {one.named['parameters'][0] for one in found}
-    data = yaml.safe_load(Path(path).read_text())
+    text = Path(path).read_text()
+    assert text.startswith('# case1, gvc: ros2 launch\n')
+    data = yaml.safe_load(text)
     named = {name.rpartition('/')[2]: value['ros__parameters'] for name, value in data.items()}
-    assert {one.named['package'] for one in found} == {PACKAGES[name] for name in named}
+    for one in found:
+        name = one.named['executable']
+        assert (one.named['package'], one.named['name']) == (PACKAGES[name], name)
+        assert one.named['ros_arguments'] == ['--enclave', f'/auv_gvc/{name}']
     return [one.named['executable'] for one in found], named
 
 

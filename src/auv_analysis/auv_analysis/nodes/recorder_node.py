@@ -164,8 +164,7 @@ class RecorderNode(BulkNode):
             if timed and (ns or zero_is_a_time):
                 if step_topic:
                     self._time.follow(ns)
-                    if self._time.early:
-                        self._release()
+                    self._release()
                 published = (of_a_step and way.get('source_timestamp')) or ns
                 self._write(resolved, kind, message, ns, published)
             else:

@@ -214,6 +214,13 @@ def test_real_time_keeps_its_pace(made, vehicle, capfd) -> None:
     )
 
 
+def test_the_first_step_in_real_time_is_the_beginning(made, vehicle) -> None:
+    made.add(PlantNode, {'vehicle': str(vehicle), **REAL, 'step': 1.0})
+    seen = arrivals(made)
+    (zero, _), (one, _) = made.until(lambda: seen[1:] and seen[:2], 'two steps')
+    assert one - zero > 0.5
+
+
 def test_real_time_ends_with_its_last_step_and_tells_of_silence_until_then(made, vehicle) -> None:
     plant = made.add(PlantNode, {'vehicle': str(vehicle), **REAL, 'duration': 2.0})
     made.listen(topics.DIAGNOSTICS)
@@ -223,7 +230,9 @@ def test_real_time_ends_with_its_last_step_and_tells_of_silence_until_then(made,
         return told[-1].status[0].level if told else DiagnosticStatus.ERROR
 
     made.until(lambda: level() == DiagnosticStatus.STALE, 'silence to be told')
-    assert 'no wrench for' in told[-1].status[0].message
+    (status,) = told[-1].status
+    assert 'no wrench for' in status.message
+    assert (status.name, status.hardware_id) == ('/plant_node', 'rexrov')
     made.until(lambda: plant.exit_code is not None, 'the end')
     assert plant.exit_code == 0
     assert stamps(made.heard['odom'])[-1] == 100 * STEP

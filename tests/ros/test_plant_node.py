@@ -111,11 +111,14 @@ def test_run_names_the_first_node_that_is_not_ready(peer) -> None:
         return peer.call(SetBool, 'plant_node/run', SetBool.Request(data=True))
 
     assert ask().message == 'first'
+    told = peer.call(Trigger, 'plant_node/ready')
+    assert (told.success, 'first' in told.message) == (False, True)
     peer.node.create_service(Trigger, 'first/ready', ready)
     peer.until(lambda: ask().message == 'second', 'the second to be named')
     assert not peer.heard['odom']
     peer.node.create_service(Trigger, 'second/ready', ready)
     peer.until(lambda: ask().success, 'consent')
+    assert peer.call(Trigger, 'plant_node/ready').success
     assert step_of(odometry(peer, 1)[0]) == 0
 
 

@@ -164,6 +164,7 @@ class RealTime:
             self._began = time.monotonic()
             if not hasattr(self, '_timer'):
                 self._timer = steady_timer(self._node, self._node.step_ns / 1e9, self._tick)
+            self._tick()
 
     def resume(self) -> None:
         """Go on after a pause, from the step that was held."""

@@ -269,7 +269,7 @@ def test_silence_in_real_time_gives_zero_wrench_is_explained_and_it_comes_back(
     ship.is_told(STALE, 'no odometry yet', active='True', watchdog='none')
     ship.says = {topics.ODOM}
     ship.gets(zero)
-    ship.is_told(WARN, 'nobody publishes /cmd_vel', watchdog='no set-point yet')
+    ship.is_told(WARN, 'no set-point yet: nobody publishes /cmd_vel', watchdog='no set-point yet')
     ship.says = {topics.ODOM, topics.CMD_VEL}
     ship.gets(tau)
     ship.is_told(OK, 'ok', watchdog='none', watchdog_trips='0', refused='0')

@@ -5,9 +5,11 @@ from pathlib import Path
 import pytest
 import yaml
 from helpers.node_processes import CONTROLLER, Peer, fresh_domain, graph, parameters
-from rcl_interfaces.msg import ParameterType
+from helpers.nodes_in_process import program
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
+
+from auv_gvc_controller.nodes.controller_node import ControllerNode
 
 FAULT = ['-p', 'faults.names:=["gone"]', *parameters(faults__gone__kind='sensor_drop_out')]
 HARMONIC = ['-p', 'disturbance.names:=["a"]', *parameters(disturbance__a__kind='harmonic')]
@@ -51,14 +53,21 @@ def test_what_is_dumped_loads_back(node: str, tmp_path: Path) -> None:
     assert dict(zip(names, map(parameter_value_to_python, again[1]), strict=True)) == dumped
 
 
-def test_an_empty_list_and_null_are_no_value_and_whole_numbers_are_numbers() -> None:
+def test_an_empty_list_and_null_are_no_value() -> None:
     given = ['-p', 'limits.wrench_rate:=[]', '-p', 'actuators.limit:=null']
-    given += ['-p', 'limits.wrench:=70', '-p', 'ramp:=2']
     with graph(('controller_node', [*NODES['controller_node'], *given])) as (peer, processes):
         names, values, _ = asked(peer, 'controller_node')
         found = dict(zip(names, values, strict=True))
         assert found['limits.wrench_rate'].type == found['actuators.limit'].type == 0
-        assert parameter_value_to_python(found['limits.wrench']) == [70.0]
-        assert found['limits.wrench'].type == ParameterType.PARAMETER_DOUBLE_ARRAY
-        assert found['ramp'].type == ParameterType.PARAMETER_DOUBLE
         assert processes['controller_node'].poll() is None
+
+
+def test_whole_numbers_are_numbers_and_one_is_a_list_where_several_may_be() -> None:
+    given = {'limits.wrench': [70, 71, 72, 73, 74, 75], 'limits.wrench_rate': 80, 'ramp': 2}
+    gains = {'gains.k_D': 12, 'gains.k_I': [1], 'gains.Lambda': 0.8, 'gains.Gamma': [60.0]}
+    with program() as made:
+        node = made.add(ControllerNode, {'law': 'gvc', 'vehicle': 'herman2018', **gains, **given})
+        found = {name: node.get_parameter(name).value for name in given}
+    expected = {'limits.wrench': [70.0, 71.0, 72.0, 73.0, 74.0, 75.0], 'limits.wrench_rate': [80.0]}
+    assert found == {**expected, 'ramp': 2.0}
+    assert {type(value) for value in (*found['limits.wrench'], found['ramp'])} == {float}

@@ -57,3 +57,21 @@ def test_every_axis_is_that_of_the_independent_implementation(
             assert_allclose(by_hand.six_of(acceleration), slope, rtol=0, atol=1e-12)
             assert by_hand.frames_of(velocity) == by_hand.frames_of(acceleration)
             assert by_hand.frames_of(velocity) == ('base_link_fsd',)
+
+
+def test_without_a_horizon_it_is_ahead_by_the_usual_gap_between_odometries() -> None:
+    with program() as made:
+        made.add(SetpointNode, {'step': 0.02, 'lockstep': False, **WAVES})
+        made.listen(topics.CMD_VEL)
+        made.until(lambda: made.node.count_publishers('cmd_vel'), 'a publisher')
+        heard = made.heard['cmd_vel']
+
+        def newest() -> float:
+            return (by_hand.ns_of(heard[-1]) - START) / STEP if heard else -1
+
+        # after 5, which is late, as before; every other one from 6 on is usual when it is so twice
+        for at, until in ((0, 1), (1, 2), (5, 6), (6, 7), (8, 9), (10, 12), (12, 14)):
+            made.publish(topics.ODOM, by_hand.odometry(START + at * STEP, [0, 0, 0, 1, *[0] * 9]))
+            made.until(lambda n=until: newest() >= n, f'set-point {until}')
+            made.spin(0.05)
+            assert newest() == until

@@ -75,16 +75,19 @@ def compile_law(law: str) -> None:
 
 
 def compile_open_loop() -> None:
-    """The plant alone, which knows no law."""
+    """The plant alone, which knows no law, and what is measured of it less what is simulated."""
     import numpy as np
 
     from auv_analysis import open_loop
+    from auv_analysis.studies.identify.residuals import fill_residuals
     from auv_dynamics import load_vehicle
     from auv_dynamics.plant.plant import initial_state
 
     start = initial_state(np.zeros((1, 1, 6)), np.zeros((1, 1, 6)))
     for vehicle in ('rexrov', 'lauv'):
-        open_loop(load_vehicle(vehicle), np.zeros((1, 1, 6)), start, 0.01)
+        states = open_loop(load_vehicle(vehicle), np.zeros((1, 1, 6)), start, 0.01)
+    one, e = np.ones(1), np.zeros((1, 1, 9))
+    fill_residuals(start[..., 3:], states, 0, one, e[0, :, :6], e[0, :, :4], np.ones(9), e)
 
 
 def main() -> None:

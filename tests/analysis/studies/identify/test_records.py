@@ -13,7 +13,14 @@ from auv_analysis.studies.identify.bags import parts, without_constants
 from auv_analysis.studies.identify.identify import Settings, as_filed, identify, split
 from auv_analysis.studies.identify.output_error import on_steps
 from auv_analysis.studies.identify.prediction import held_of, predict
-from auv_analysis.studies.identify.record import Record, of_tracks, segments_of
+from auv_analysis.studies.identify.record import (
+    Record,
+    of_tracks,
+    rotated,
+    segments_of,
+    small_rotation,
+)
+from auv_analysis.studies.identify.residuals import FARTHEST, fill_residuals
 from auv_analysis.studies.identify.start import least_squares_start
 from auv_analysis.studies.identify.unknowns import unknowns
 from auv_dynamics.files.errors import InputError
@@ -122,6 +129,27 @@ def test_what_stands_still_tells_no_noise():
     found = replace(still, velocity=velocity).noise()
     assert_array_equal(np.isnan(found), np.isin(np.arange(9), [2, 6, 7, 8]))
     assert_allclose(found[[0, 1, 3, 4, 5]], 1.0, rtol=0.1)
+
+
+def test_residuals_are_measured_less_simulated_at_the_time_of_the_measurement():
+    draw = np.random.default_rng(2)
+    turns = 0.1 * draw.normal(size=(2, 3, 6, 3))
+    states = draw.normal(size=(2, 3, 6, 13))  # of two variants, three segments after each step
+    states[..., 3:7] = rotated(np.tile(AHEAD, (2, 3, 6, 1)), turns)
+    start, later = states[:, :, 0, 3:].copy(), np.ascontiguousarray(states[:, :, 1:])
+    at = np.array([0.4, 1.0, 2.0 + 1e-9, 3.25, 5.0])
+    nu, q = draw.normal(size=(5, 6)), -rotated(np.tile(AHEAD, (5, 1)), turns[0, 0, :5])
+    nu[1, 2], q[3] = np.nan, np.nan
+    later[1, 1, 1, 7] = np.nan  # has diverged
+    scale, e = np.arange(1.0, 10.0), np.empty((2, 5, 9))
+    fill_residuals(start, later, 1, at, nu, q, scale, e)
+    for v in range(2):
+        then = np.concatenate([start[v, 1, None], later[v, 1, :, 3:]])
+        seen = np.stack([np.interp(at, range(6), column) for column in then.T], axis=1)
+        expected = np.concatenate([nu - seen[:, 4:], small_rotation(seen[:, :4], q)], axis=1)
+        expected = np.where(np.isnan(np.concatenate([nu, q[:, 1:]], axis=1)), 0.0, expected / scale)
+        assert_allclose(e[v], np.nan_to_num(expected, nan=-FARTHEST), atol=1e-7)
+    assert e[1, 2, 0] == -FARTHEST
 
 
 def test_the_observer_sees_velocity_and_attitude_with_stamps_of_their_own():

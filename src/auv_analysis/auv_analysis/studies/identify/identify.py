@@ -37,6 +37,7 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import is_semidefinite
 
 SHORT, LONG = 1.25, 10.0  # s, of segments of the first fit, and at most
+UNMEASURED = 5.0  # s, of the first fit where a velocity is not measured: each start guesses it
 GROWTH = 10.0  # of a start's error, up to which a segment goes on
 FEWEST = 4  # segments
 FIRST = 240  # segments, evenly chosen, that are enough for the first fit
@@ -206,7 +207,10 @@ def _search(
 
     """
     u, theta, late = begun
-    first = _with_best_delay(problem(min(SHORT, longest), most=FIRST), u, theta, late, NEARBY)[0]
+    measured = problem(min(SHORT, longest), most=FIRST)
+    if np.isnan(measured.noise[:6]).any():
+        measured = problem(min(UNMEASURED, longest), most=FIRST)
+    first = _with_best_delay(measured, u, theta, late, NEARBY)[0]
     u, theta = first.unknowns, first.theta
 
     def suited(gain: float) -> float:
@@ -367,8 +371,9 @@ def _with_best_delay(
     """
     names = u.names
 
-    def attempt(steps: int, theta: np.ndarray) -> Fit:
-        return problem.fit(u.with_delay(steps * problem.step), theta, most=25, tolerance=1e-5)
+    def attempt(steps: int, theta: np.ndarray, starts: np.ndarray | None = None) -> Fit:
+        late = u.with_delay(steps * problem.step)
+        return problem.fit(late, theta, starts, most=25, tolerance=1e-5)
 
     def with_lag(theta: np.ndarray, lag: float) -> np.ndarray:
         theta = theta.copy()
@@ -388,7 +393,7 @@ def _with_best_delay(
         j = k
         while j + way >= 0 and j + way not in tried:
             lag = float(u.coefficients(tried[j].theta).lag) - way * problem.step
-            tried[j + way] = attempt(j + way, with_lag(tried[j].theta, lag))
+            tried[j + way] = attempt(j + way, with_lag(tried[j].theta, lag), tried[j].starts)
             if tried[j + way].cost > tried[j].cost + nearby:
                 break
             j += way

@@ -14,14 +14,13 @@ import numpy as np
 from scipy.stats import t as student
 
 from auv_analysis.simulation.open_loop import open_loop
-from auv_analysis.studies.identify.record import Segment, rotated, small_rotation
+from auv_analysis.studies.identify.record import Segment, rotated
+from auv_analysis.studies.identify.residuals import FARTHEST, fill_residuals
 from auv_analysis.studies.identify.unknowns import Unknowns
 from auv_dynamics.vehicle.vehicle import Vehicle
 
 STEP = 3e-7  # of theta, for derivatives: as much truncated as rounded
 CERTAIN, UNSEEN = 10.0, 0.3  # of starts: deviations of the noise; m/s, rad/s where not measured
-ON_STEP = 1e-6  # steps, by which a measurement may miss one
-FARTHEST = 1e3  # deviations of the noise: a residual beyond it has diverged
 BYTES = 1 << 24  # of states that are held at once
 LARGEST = 1.5  # step of theta
 BLOCKS, MOST_BLOCKS = 24, 400  # of time, of which the jackknife leaves out one after the other
@@ -34,12 +33,14 @@ class Normal:
 
     Attributes
     ----------
+    cost : sum of squares of residuals, starts and prior
     A, g : (n, n) and (n,) of theta, summed over segments
     cross : (S, 9, n) of starts and theta
     inner, right : (S, 9, 9) and (S, 9) of starts
 
     """
 
+    cost: float
     A: np.ndarray
     g: np.ndarray
     cross: np.ndarray
@@ -128,57 +129,54 @@ class OutputError:
     observer: float = 0.0
     _deviation: np.ndarray = field(init=False)
     _certain: np.ndarray = field(init=False)
+    _first: np.ndarray = field(init=False)
+    _commands: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
+        self._first = np.stack([one.start for one in self.segments])
+        self._commands = np.stack([np.concatenate([s.before, s.command]) for s in self.segments])
         self._deviation = np.where(np.isfinite(self.noise), self.noise, UNSEEN)
         self._certain = np.where(np.isfinite(self.noise), CERTAIN, 1.0)
 
     def simulate(
         self, unknowns: Unknowns, thetas: np.ndarray, starts: np.ndarray, which: slice
     ) -> np.ndarray:
-        """States (V, S, n + 1, 10) of some segments for thetas (V, n), starts (V, S, 10)."""
-        segments = self.segments[which]
+        """States (V, S, n, 13) after each step of segments for thetas (V, n), starts (V, S, 10)."""
         found = unknowns.coefficients(thetas)
         lag = np.maximum(found.lag, 1e-9)
         follow = np.repeat(-np.expm1(-self.step / lag)[:, None], 6, axis=1)
-        allocation = np.eye(6) * found.gain[:, None, :]
-        delay = float(unknowns.prior.delay) / self.step
-        late = [delayed(one, delay) for one in segments]
-        past = np.stack([before for before, _ in late])  # (S, p, 6)
-        applied = _lagged(np.einsum('vim,spm->vspi', allocation, past), follow)
+        late = delayed(self._commands[which], float(unknowns.prior.delay) / self.step)
+        past, commands = np.split(late, [len(self.segments[0].before)], axis=1)
         x0 = np.zeros((*starts.shape[:2], 13))
         x0[..., 3:] = starts
-        seen = np.stack([on_steps(one) for one in segments]) if self.observer else None
-        found_states = open_loop(
-            found.model(self.vehicle.lift), np.stack([command for _, command in late]), x0,
-            self.step, allocation=allocation, follow=follow, applied=applied, bias=found.bias,
+        seen = np.stack([on_steps(one) for one in self.segments[which]]) if self.observer else None
+        return open_loop(
+            found.model(self.vehicle.lift), commands, x0, self.step,
+            allocation=np.eye(6) * found.gain[:, None, :], follow=follow,
+            applied=found.gain[:, None, :] * _lagged(past, follow), bias=found.bias,
             current=found.current, measured=seen,
             observer=np.full(10, self.observer) if self.observer else None,
         )  # fmt: skip
-        return np.concatenate([starts[:, :, None], found_states[..., 3:]], axis=2)
 
     def starts(self, z: np.ndarray, which: slice = slice(None)) -> np.ndarray:
-        """Attitude and velocity (S, 10) of the starts z (S, 9) in deviations: nu, then rotation."""
-        first = np.stack([segment.start for segment in self.segments[which]])
-        moved = z * self._deviation
-        q = rotated(first[:, :4], moved[:, 6:])
-        return np.concatenate([q, first[:, 4:] + moved[:, :6]], axis=1)
+        """Attitude and velocity (..., S, 10) of starts z (..., S, 9): nu, then rotation."""
+        first, moved = self._first[which], z * self._deviation
+        q = rotated(first[:, :4], moved[..., 6:])
+        return np.concatenate([q, first[:, 4:] + moved[..., :6]], axis=-1)
 
-    def residuals(self, which: slice, states: np.ndarray) -> Iterator[np.ndarray]:
+    def residuals(
+        self, which: slice, starts: np.ndarray, states: np.ndarray
+    ) -> Iterator[np.ndarray]:
         """Of each segment (V, r, 9): measured less simulated in deviations; 0: not measured."""
         scale = self._deviation * (1.0 - self.observer)  # states are those behind a correction
-        for i, segment in enumerate(self.segments[which]):
-            simulated = at_times(states[:, i], segment.at)
-            e = np.empty((*simulated.shape[:2], 9))
+        for s, segment in enumerate(self.segments[which]):
+            e = np.empty((len(states), len(segment.at), 9))
+            at, nu, q = (
+                np.require(part, float, ('C', 'A', 'W'))  # another kind would be compiled for
+                for part in (segment.at, segment.nu, segment.q)
+            )
             with np.errstate(all='ignore'):  # states may be what is left of a divergence
-                np.subtract(segment.nu, simulated[..., 4:], out=e[..., :6])
-                e[..., 6:] = small_rotation(simulated[..., :4], segment.q)
-                e /= scale
-            np.fmin(np.fmax(e, -FARTHEST, out=e), FARTHEST, out=e)  # no number: farthest
-            known = np.isfinite(segment.nu)
-            known = np.concatenate([known, np.repeat(np.isfinite(segment.q[:, :1]), 3, 1)], axis=1)
-            if not known.all():
-                e[:, ~known] = 0.0
+                fill_residuals(starts, states, s, at, nu, q, scale, e)
             yield e
 
     def slices(self, variants: int) -> Iterator[slice]:
@@ -192,52 +190,56 @@ class OutputError:
         """Sum of squares of residuals, starts and prior."""
         total = unknowns.prior_cost(theta) + float(((z / self._certain) ** 2).sum())
         for which in self.slices(1):
-            states = self.simulate(unknowns, theta[None], self.starts(z[which], which)[None], which)
-            total += sum(float((e**2).sum()) for e in self.residuals(which, states))
+            starts = self.starts(z[None, which], which)
+            states = self.simulate(unknowns, theta[None], starts, which)
+            total += sum(float((e**2).sum()) for e in self.residuals(which, starts, states))
         return total
 
-    def _jacobians(
+    def _derivatives(
         self, unknowns: Unknowns, theta: np.ndarray, z: np.ndarray
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Of each segment its residuals (r,) and their derivatives (n + 9, r)."""
+    ) -> Iterator[np.ndarray]:
+        """Of each segment its residuals and their derivatives (1 + n + 9, r)."""
         n = len(theta)
         thetas = np.concatenate([theta[None], theta + STEP * np.eye(n), np.tile(theta, (9, 1))])
+        moves = np.concatenate([np.zeros((1 + n, 9)), STEP * np.eye(9)])[:, None]
         for which in self.slices(len(thetas)):
-            starts = np.repeat(self.starts(z[which], which)[None], len(thetas), axis=0)
-            for k in range(9):
-                starts[1 + n + k] = self.starts(z[which] + STEP * np.eye(9)[k], which)
+            starts = self.starts(z[which] + moves, which)
             states = self.simulate(unknowns, thetas, starts, which)
-            for e in self.residuals(which, states):
-                flat = e.reshape(len(thetas), -1)
-                J = (flat[1:] - flat[0]) / STEP
-                J[:, np.abs(J).max(axis=0) >= FARTHEST / STEP] = 0.0
-                yield flat[0], J
+            for e in self.residuals(which, starts, states):
+                rows = e.reshape(len(thetas), -1)
+                rows[1:] -= rows[0]
+                if max(rows[1:].max(), -rows[1:].min()) >= FARTHEST:  # one has diverged
+                    rows[1:, np.abs(rows[1:]).max(axis=0) >= FARTHEST] = 0.0
+                rows[1:] /= STEP
+                yield rows
 
     def normal(self, unknowns: Unknowns, theta: np.ndarray, z: np.ndarray) -> Normal:
         """Normal equations."""
-        n, S = len(theta), len(self.segments)
-        A, g = np.zeros((n, n)), np.zeros(n)
-        cross, inner, right = np.empty((S, 9, n)), np.empty((S, 9, 9)), np.empty((S, 9))
-        for s, (r, J) in enumerate(self._jacobians(unknowns, theta, z)):
-            full, of_full = J @ J.T, J @ r
-            A += full[:n, :n]
-            g += of_full[:n]
-            cross[s], inner[s], right[s] = full[n:, :n], full[n:, n:], of_full[n:]
+        n, S = 1 + len(theta), len(self.segments)
+        total = np.zeros((n, n))  # of residuals and theta
+        of_starts = np.empty((S, 9, n + 9))
+        for s, rows in enumerate(self._derivatives(unknowns, theta, z)):
+            products = rows @ rows.T
+            total += products[:n, :n]
+            of_starts[s] = products[n:]
         own = 1.0 / self._certain**2
-        return Normal(A, g, cross, inner + np.diag(own), right + z * own)
+        cost = unknowns.prior_cost(theta) + float((own * z**2).sum() + total[0, 0])
+        inner, right = of_starts[..., n:] + np.diag(own), of_starts[..., 0] + z * own
+        return Normal(cost, total[1:, 1:], total[0, 1:], of_starts[..., 1:n], inner, right)
 
     def blocks(self, fit: Fit) -> Blocks:
         """Normal equations by blocks of time."""
         n, S = len(fit.theta), len(self.segments)
         parts, together = -(-BLOCKS // S), -(-S // MOST_BLOCKS)
         A, g = np.zeros((fit.blocks, n, n)), np.zeros((fit.blocks, n))
-        for s, (r, J) in enumerate(self._jacobians(fit.unknowns, fit.theta, fit.starts)):
+        for s, rows in enumerate(self._derivatives(fit.unknowns, fit.theta, fit.starts)):
+            r, J = rows[0], rows[1:]
             inner = J[n:] @ J[n:].T + np.diag(1.0 / self._certain**2)
             alone = J[:n] - np.linalg.solve(inner, J[n:] @ J[:n].T).T @ J[n:]  # by no start
-            for k, rows in enumerate(np.array_split(np.arange(len(r)), parts)):
+            for k, part in enumerate(np.array_split(np.arange(len(r)), parts)):
                 b = (s * parts + k) // together
-                A[b] += alone[:, rows] @ alone[:, rows].T
-                g[b] += alone[:, rows] @ r[rows]
+                A[b] += alone[:, part] @ alone[:, part].T
+                g[b] += alone[:, part] @ r[part]
         return Blocks(A, g)
 
     def covariance(self, fit: Fit) -> np.ndarray:
@@ -265,21 +267,31 @@ class OutputError:
 
         """
         z = np.zeros((len(self.segments), 9)) if z is None else z
-        cost, small, damping = self.cost(unknowns, theta, z), 0, 1e-3
-        normal = self.normal(unknowns, theta, z)
+        normal, damping, small, rejected = self.normal(unknowns, theta, z), 1e-3, 0, 0
+        cost = normal.cost
         for _iteration in range(most):
-            for _ in range(14):
-                move, moves = _step(unknowns, theta, normal, damping)
+            move, moves, less = _step(unknowns, theta, normal, 0.0)
+            if less < tolerance * cost:  # all that is left to be had
+                new_cost = self.cost(unknowns, theta + move, z + moves)
+                if new_cost < cost:
+                    theta, z, cost = theta + move, z + moves, new_cost
+                break
+            easy, after = rejected == 0, None
+            for rejected in range(14):
+                move, moves, _ = _step(unknowns, theta, normal, damping)
                 new, new_z = theta + move, z + moves
-                new_cost = self.cost(unknowns, new, new_z)
+                if easy and rejected == 0:  # a step that is taken needs derivatives in any case
+                    after = self.normal(unknowns, new, new_z)
+                new_cost = after.cost if after else self.cost(unknowns, new, new_z)
                 if new_cost < cost:
                     break
-                damping *= 6.0
+                damping, after = 6.0 * damping, None
             else:
                 break
             gain = (cost - new_cost) / cost
-            theta, z, cost, damping = new, new_z, new_cost, max(damping / 8.0, 1e-12)
-            normal = self.normal(unknowns, theta, z)
+            theta, z, cost = new, new_z, new_cost
+            normal = after or self.normal(unknowns, theta, z)
+            damping = max(damping / 8.0, 1e-12)
             small = small + 1 if gain < tolerance else 0
             if small >= 2 or gain < tolerance / 100:
                 break
@@ -293,21 +305,22 @@ class OutputError:
     def misfit(self, fit: Fit) -> Iterator[tuple[Segment, np.ndarray]]:
         """Segments with their residuals (r, 9), in deviations of the noise; 0: not measured."""
         for which in self.slices(1):
-            starts = self.starts(fit.starts[which], which)[None]
+            starts = self.starts(fit.starts[None, which], which)
             states = self.simulate(fit.unknowns, fit.theta[None], starts, which)
-            pairs = zip(self.segments[which], self.residuals(which, states), strict=True)
+            pairs = zip(self.segments[which], self.residuals(which, starts, states), strict=True)
             yield from ((segment, e[0]) for segment, e in pairs)
 
     def growth(self, unknowns: Unknowns, theta: np.ndarray) -> np.ndarray:
         """(n + 1,) by how much a small change of a start has grown since its first second."""
         found = []
         for which in self.slices(10):
-            z = np.zeros((len(self.segments[which]), 9))
-            starts = [self.starts(z, which)]
-            starts += [self.starts(z + STEP * np.eye(9)[k], which) for k in range(9)]
-            states = self.simulate(unknowns, np.tile(theta, (10, 1)), np.stack(starts), which)
-            states = np.clip(np.nan_to_num(states, nan=FARTHEST), -FARTHEST, FARTHEST)
-            change = (states[1:] - states[:1])[..., 4:] / (STEP * self._deviation[:6])
+            z = np.zeros((10, len(self.segments[which]), 9))
+            z[1:] += STEP * np.eye(9)[:, None]
+            starts = self.starts(z, which)
+            states = self.simulate(unknowns, np.tile(theta, (10, 1)), starts, which)
+            nu = np.concatenate([starts[:, :, None, 4:], states[..., 7:]], axis=2)
+            nu = np.clip(np.nan_to_num(nu, nan=FARTHEST), -FARTHEST, FARTHEST)
+            change = (nu[1:] - nu[:1]) / (STEP * self._deviation[:6])
             size = np.linalg.norm(change, axis=(0, 3))
             first = size[:, : max(round(1.0 / self.step), 1) + 1].max(axis=1, keepdims=True)
             found.append(size / first)
@@ -316,23 +329,14 @@ class OutputError:
 
 def _step(
     unknowns: Unknowns, theta: np.ndarray, normal: Normal, damping: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Steps (n,) of theta and (S, 9) of the starts."""
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Steps (n,) of theta and (S, 9) of the starts, and by how much a parabola then falls."""
     P, p = unknowns.precision(theta)
     A, g, back = normal.eliminated(damping)
     move = -np.linalg.solve(A + P + damping * np.diag(np.diag(P + normal.A)), g + p)
+    less = float((normal.right * back[..., -1]).sum() - (g + p) @ move)
     move *= min(1.0, LARGEST / max(np.abs(move).max(initial=0.0), 1e-300))
-    return move, -back[..., -1] - back[..., :-1] @ move
-
-
-def at_times(states: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """States (V, r, 10) at some times in steps, by straight lines through (V, n + 1, 10)."""
-    nearest = np.rint(at).astype(int)
-    if np.abs(at - nearest).max() < ON_STEP:
-        return states[:, nearest]
-    first = np.minimum(at.astype(int), states.shape[1] - 2)
-    share = (at - first)[:, None]
-    return states[:, first] * (1.0 - share) + states[:, first + 1] * share
+    return move, -back[..., -1] - back[..., :-1] @ move, less
 
 
 def on_steps(segment: Segment) -> np.ndarray:
@@ -345,21 +349,19 @@ def on_steps(segment: Segment) -> np.ndarray:
     return found
 
 
-def delayed(segment: Segment, steps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Commands before (p, 6) and along (n, 6) a segment, later by a number of steps."""
+def delayed(commands: np.ndarray, steps: float) -> np.ndarray:
+    """Commands (S, n, 6) later by a number of steps; the first one was there before."""
     whole = int(np.floor(steps))
     share = steps - whole
-    every = np.concatenate([segment.before, segment.command])
-    k = np.arange(len(every))
-    late = (1.0 - share) * every[np.maximum(k - whole, 0)]
-    late = late + share * every[np.maximum(k - whole - 1, 0)]
-    return late[: len(segment.before)], late[len(segment.before) :]
+    k = np.arange(commands.shape[1])
+    late = (1.0 - share) * commands[:, np.maximum(k - whole, 0)]
+    return late + share * commands[:, np.maximum(k - whole - 1, 0)] if share else late
 
 
 def _lagged(past: np.ndarray, follow: np.ndarray) -> np.ndarray:
-    """What a lag (V, 6) has made of wrenches (V, S, p, 6) before a segment: (V, S, 6)."""
-    count = past.shape[2]
+    """What lags (V, 6) have made of wrenches (S, p, 6) before a segment: (V, S, 6)."""
+    count = past.shape[1]
     left = (1.0 - follow)[:, None, :] ** np.arange(count)[::-1, None]  # (V, p, 6)
     share = follow[:, None, :] * left
     share[:, 0] += (1.0 - follow) ** count
-    return np.einsum('vpi,vspi->vsi', share, past)
+    return np.einsum('vpi,spi->vsi', share, past, optimize=True)

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.studies.identify.output_error import ON_STEP, OutputError, at_times
+from auv_analysis.studies.identify.output_error import OutputError
 from auv_analysis.studies.identify.record import Record, Segment, down_of
+from auv_analysis.studies.identify.residuals import ON_STEP
 from auv_analysis.studies.identify.unknowns import Unknowns
 from auv_dynamics.vehicle.vehicle import Vehicle
 
@@ -121,9 +122,18 @@ def predict(
                 for which in model.slices(1)
             ]
             every = np.concatenate(states)
-            nu = np.nan_to_num(every[..., 4:], nan=DIVERGED)
-            found.append(at_times(nu, held.horizons / record.step))
+            nu = np.nan_to_num(every[..., 7:], nan=DIVERGED)
+            found.append(_after(nu, held.horizons / record.step))
     return Prediction(name, np.concatenate(found) - held.measured)
+
+
+def _after(rows: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Rows (S, h, 6) after numbers of steps from 1, by straight lines through those (S, n, 6)."""
+    nearest = np.rint(steps)
+    steps = np.where(np.abs(steps - nearest) < ON_STEP, nearest, steps)
+    first = steps.astype(int) - 1
+    share = (steps - 1 - first)[:, None]
+    return rows[:, first] * (1.0 - share) + rows[:, np.ceil(steps).astype(int) - 1] * share
 
 
 def persistence(held: Held) -> Prediction:

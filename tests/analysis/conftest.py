@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
+from helpers import approved as approving
 from helpers.artists import captured
 from helpers.browser import Watched, chromium
 
@@ -70,3 +71,13 @@ def unrendered() -> Iterator[None]:
 def composing() -> Callable[[], AbstractContextManager[None]]:
     """The same for a part of a test, or for a fixture that several tests share."""
     return captured
+
+
+@pytest.fixture
+def approved(request: pytest.FixtureRequest) -> Iterator[approving.Approved]:
+    """Holds all that the test shows, which it makes or names, against the approved text."""
+    shown = approving.Approved()
+    with shown.watching():
+        yield shown
+    path = request.path.parent / 'approved' / f'{request.path.stem.removeprefix("test_")}.txt'
+    approving.check(path, request.node.name, shown.lines())

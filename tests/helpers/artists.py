@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.shown import figure_lines
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -22,7 +23,10 @@ Curves = dict[str, list[tuple[np.ndarray, np.ndarray]]]
 
 @contextmanager
 def captured() -> Iterator[dict[str, Figure]]:
-    """Figures by name, as they are composed; nothing is rendered. A caption is sentences."""
+    """Figures by name, as they are composed; nothing is rendered. A caption is sentences.
+
+    The PDF of a figure says in lines what it shows.
+    """
     found: dict[str, Figure] = {}
     composed = plots._saved
 
@@ -36,7 +40,7 @@ def captured() -> Iterator[dict[str, Figure]]:
         folder.mkdir(parents=True, exist_ok=True)
         png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
         Image.new('RGB', (720, 300 + len(found)), 'white').save(png)
-        pdf.write_bytes(b'not rendered')
+        pdf.write_text('\n'.join(figure_lines(figure)), encoding='utf-8')
         return png, pdf
 
     with pytest.MonkeyPatch.context() as patch:

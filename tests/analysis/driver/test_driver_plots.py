@@ -3,12 +3,15 @@
 from types import SimpleNamespace as Made
 
 import numpy as np
+import pytest
 from helpers import artists
 from helpers.artists import points, same
 from helpers.made_runs import DOFS
 
 from auv_analysis.driver import report as driver
 from auv_analysis.driver.evidence import Settings
+
+pytestmark = pytest.mark.usefixtures('approved')
 
 VELOCITY = ('m/s', 'rad/s')
 RNG = np.random.default_rng

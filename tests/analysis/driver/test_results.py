@@ -81,11 +81,14 @@ def test_the_terminal_shows_each_failure_with_what_was_expected_and_advice() -> 
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_the_folder_holds_report_document_and_all_that_was_heard_and_sent(tmp_path: Path) -> None:
+def test_the_folder_holds_report_document_and_all_that_was_heard_and_sent(
+    tmp_path: Path, approved
+) -> None:
     evidence = commanded()
     findings = judge(evidence)
     document = document_of(evidence, findings)
     page = write_results(tmp_path, evidence, findings, document).read_text()
+    approved.folder(tmp_path)
     assert json.loads((tmp_path / 'check.json').read_text()) == document
     for title in GROUPS.values():
         assert title in page
@@ -120,13 +123,14 @@ def test_the_folder_holds_report_document_and_all_that_was_heard_and_sent(tmp_pa
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_a_driver_that_is_not_there_leaves_a_report_as_well(tmp_path: Path) -> None:
+def test_a_driver_that_is_not_there_leaves_a_report_as_well(tmp_path: Path, approved) -> None:
     heard = healthy()
     nothing = replace(heard, **{name: getattr(heard, name)[:0] for name in
                                 ('arrived_ns', 'stamp_ns', 'x')}, frames={})  # fmt: skip
     evidence = DriverRecord(graph(odom_publishers=()), nothing, Settings(), passive='not asked for')
     findings = judge(evidence)
     write_results(tmp_path, evidence, findings, document_of(evidence, findings))
+    approved.folder(tmp_path)
     assert parquet.read_table(tmp_path / 'samples.parquet').num_rows == 0
 
 

@@ -8,6 +8,8 @@ from helpers.made_runs import DOFS
 from auv_analysis.cli import replay as command
 from auv_analysis.replay import compared as replay
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 WRENCH = ('N', 'N m')
 RNG = np.random.default_rng
 
@@ -47,7 +49,7 @@ def test_differences_of_wrenches_have_their_sign() -> None:
     }  # fmt: skip
 
 
-def test_the_printed_table_has_each_number_in_its_column(capsys) -> None:
+def test_the_printed_table_has_each_number_in_its_column(capsys, approved) -> None:
     wrench = {
         part: {kind: [100.0 * k + 10 * j + i + 1 for i in range(6)]
                for j, kind in enumerate(('rms', 'max'))}
@@ -57,6 +59,7 @@ def test_the_printed_table_has_each_number_in_its_column(capsys) -> None:
                 'notes': ['odd']}  # fmt: skip
     command._show(document)
     lines = capsys.readouterr().err.splitlines()
+    approved.add(lines)
     assert lines[0] == 'reproduced'
     assert [word for line in lines[1:3] for word in line.split()] == [
         'recorded', 'pid', 'difference', *['rms', 'max'] * 3,

@@ -63,8 +63,9 @@ def made(tmp_path: Path, **changes) -> str:
     return (tmp_path / 'report.html').read_text(encoding='utf-8')
 
 
-def test_a_document_of_all_kinds_of_blocks(tmp_path):
+def test_a_document_of_all_kinds_of_blocks(tmp_path, approved):
     text = made(tmp_path)
+    approved.folder(tmp_path)
     page = Page(text)
     assert page.tables['t'] == [
         [('<a>', None), ('0', '0.0')], [('b', None), (MISSING, None)],

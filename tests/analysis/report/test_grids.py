@@ -9,6 +9,8 @@ from auv_analysis.output.text import number, typeset
 from auv_analysis.report import plots
 from auv_analysis.report.plots import ALWAYS, HeatMap, draw_grid, heat_map
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 
 def texts(grid: HeatMap) -> list[str]:
     axes = plots.new_figure(2.0).subplots()

@@ -19,6 +19,8 @@ from auv_analysis.report.panels import (
 )
 from auv_dynamics.vehicle import DOFS
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 
 @pytest.fixture(scope='module')
 def case1() -> dict[str, RunDigest]:

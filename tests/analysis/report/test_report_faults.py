@@ -61,6 +61,10 @@ def folder(tmp_path_factory, composing) -> Path:
     return root / 'out'
 
 
+def test_all_that_it_shows(folder, approved):
+    approved.folder(folder, panels=True)
+
+
 def test_the_set_up_says_every_fault(runs):
     summaries = {name: summarize(run) for name, run in runs.items()}
     rows = dict(set_up(runs, summaries, TEXT).rows)

@@ -83,6 +83,10 @@ def page(rough, tmp_path_factory, composing) -> Path:
         return write_report(tmp_path_factory.mktemp('page'), *rough, '')
 
 
+def test_all_that_it_shows(page, approved):
+    approved.folder(page.parent)
+
+
 def _report(out: Path, runs, summaries, text) -> str:
     return write_report(out, runs, summaries, text, '').read_text(encoding='utf-8')
 

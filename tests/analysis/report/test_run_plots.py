@@ -39,6 +39,8 @@ from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 
 @pytest.fixture(scope='module')
 def runs() -> dict[str, Run]:

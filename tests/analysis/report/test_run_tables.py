@@ -18,6 +18,8 @@ from auv_analysis.report.scenario_text import set_up
 from auv_analysis.report.wrench_plots import estimate_finding
 from auv_analysis.runs.run import Run
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 UNLIKE = {'k_D': [1.0, 2, 3, 4, 5, 6], 'k_I': 2.0, 'Lambda': 0.5, 'Gamma': 7.0}
 
 

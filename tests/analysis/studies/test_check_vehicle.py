@@ -215,7 +215,7 @@ def test_thrusters():
     assert light['largest']['heave'] == pytest.approx([2 * 40.2, 2 * 51.5], rel=1e-3)
 
 
-def test_rotors(capsys):
+def test_rotors(capsys, approved):
     found = check_vehicle('bluerov2_heavy')['thrusters']['rotors']
     assert len(found) == 8
     assert found[0] == found[7]
@@ -227,6 +227,7 @@ def test_rotors(capsys):
     assert check_vehicle('girona500')['thrusters'] is None
     main(['check-vehicle', 'bluerov2_heavy'])
     text = capsys.readouterr().out
+    approved.add(text.splitlines())
     named = 'rotor of T1, T2, T3, T4, T5, T6, T7, T8: t200_16v, -39.9 to 51.44 N'
     assert f'{named}, none from 1472 to 1528 pwm_us, 16 V, dead band 0.35 and 0.4 N, lag' in text
     assert text.count('source: Blue Robotics T200') == 1
@@ -262,9 +263,10 @@ def test_the_tables_carry_the_numbers(name, capsys):
     assert document['statement'] in capsys.readouterr().out
 
 
-def test_command_prints_tables_or_one_document(capsys):
+def test_command_prints_tables_or_one_document(capsys, approved):
     main(['check-vehicle', 'bluerov2'])
     captured = capsys.readouterr()
+    approved.add(captured.out.splitlines())
     assert 'pitch cannot be actuated apart from surge and heave' in captured.out
     assert captured.err == ''
     main(['check-vehicle', 'bluerov2', '--json'])

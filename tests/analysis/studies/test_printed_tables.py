@@ -19,11 +19,15 @@ DOFS = ('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw')
 class Printed:
     """Tables and lines, in their order, of what a function prints."""
 
-    def __init__(self, monkeypatch, module):
+    def __init__(self, monkeypatch, module, approved):
         self.tables: list[Table] = []
         self._file = io.StringIO()
         self.out = Console(file=self._file, width=400)
         monkeypatch.setattr(module, 'terminal', self._keep)
+        approved.add(self)
+
+    def __iter__(self):
+        return iter(self.lines)
 
     def _keep(self, table: Table) -> str:
         self.tables.append(table)
@@ -86,8 +90,8 @@ def _vehicle(numbers) -> dict:
     }  # fmt: skip
 
 
-def test_a_vehicle_that_is_checked(monkeypatch) -> None:
-    printed = Printed(monkeypatch, check_vehicle)
+def test_a_vehicle_that_is_checked(monkeypatch, approved) -> None:
+    printed = Printed(monkeypatch, check_vehicle, approved)
     numbers = (101.0 + k for k in count())
     document = _vehicle(numbers)
     check_vehicle.print_check(document, printed.out)
@@ -135,8 +139,8 @@ def test_a_vehicle_that_is_checked(monkeypatch) -> None:
     assert any(line.startswith(f'eigenvalues {eigenvalues}; ') for line in printed.lines)
 
 
-def test_poles_of_models(monkeypatch) -> None:
-    printed = Printed(monkeypatch, linearize)
+def test_poles_of_models(monkeypatch, approved) -> None:
+    printed = Printed(monkeypatch, linearize, approved)
     modes = [
         {'pole': [0.5, 0.25], 'damping_ratio': 0.1, 'natural_frequency': 0.2, 'time_constant': 0.3,
          'mostly': 'roll', 'part': 0.4},
@@ -164,8 +168,8 @@ def test_poles_of_models(monkeypatch) -> None:
     ]  # fmt: skip
 
 
-def test_margins_of_controllers(monkeypatch) -> None:
-    printed = Printed(monkeypatch, linearize)
+def test_margins_of_controllers(monkeypatch, approved) -> None:
+    printed = Printed(monkeypatch, linearize, approved)
     axes = [
         {'axis': dof, 'gain_margin_db': 10.0 + k, 'phase_margin': 20.0 + k,
          'delay_margin': 30.0 + k, 'crossover': 40.0 + k, 'value': 50.0 + k, 'largest': 60.0 + k}
@@ -195,8 +199,8 @@ def test_a_disk_margin_in_decibels(alpha: float, decibel: str) -> None:
     assert f': {decibel} dB either way' in linearize.disk_sentence(alpha)
 
 
-def test_a_sweep_prints_three_measures_of_each_controller(monkeypatch, capsys) -> None:
-    printed = Printed(monkeypatch, sweep)
+def test_a_sweep_prints_three_measures_of_each_controller(monkeypatch, capsys, approved) -> None:
+    printed = Printed(monkeypatch, sweep, approved)
     names = ('overall.velocity_error.settling_time', 'overall.velocity_error.rms.linear',
              'overall.effort.rms.linear', 'kinetic_energy.mean')  # fmt: skip
     columns = ('low', 'quarter', 'median', 'three_quarters', 'high', 'known', 'rows')
@@ -211,12 +215,13 @@ def test_a_sweep_prints_three_measures_of_each_controller(monkeypatch, capsys) -
              '95 %': 'high', 'unit': 'unit', 'exists in': 'known', 'of': 'rows'}  # fmt: skip
     assert printed.rows(0) == [{h: row[key] for h, key in heads.items()} for row in rows[:6]]
     said = capsys.readouterr().err
+    approved.add(said.splitlines())
     assert 'note: not finished, 7 of 9 rows are there' in said
     assert 'note: odd' in said
 
 
-def test_a_tuning_prints_what_each_controller_costs(monkeypatch, capsys) -> None:
-    printed = Printed(monkeypatch, tune)
+def test_a_tuning_prints_what_each_controller_costs(monkeypatch, capsys, approved) -> None:
+    printed = Printed(monkeypatch, tune, approved)
     measures = {name: 10.0 * k + 1 for k, name in enumerate(tune.COSTS)}
     entries = {
         'gvc': {'law': 'gvc', 'measures': measures, 'equality': 0.0},
@@ -245,6 +250,8 @@ def test_a_tuning_prints_what_each_controller_costs(monkeypatch, capsys) -> None
         'effort, J/s²': 100 + measures['effort'], 'equality, %': -25.0,
         'settled, s': 100 + measures['settling'], 'draws': 0.5,
     }  # fmt: skip
-    assert 'It is so.' in capsys.readouterr().err
+    said = capsys.readouterr().err
+    approved.add(said.splitlines())
+    assert 'It is so.' in said
     table = tune.controllers_table(Results('tune', facts | {'equal': 'error'}))
     assert table.rows[1][-1].value == 7.0, 'of equal error it is the effort that counts'

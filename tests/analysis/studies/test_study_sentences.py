@@ -13,6 +13,8 @@ from auv_analysis.studies.sweep import report as sweep
 from auv_analysis.studies.tune import report as tune
 from auv_analysis.studies.tune.cost import Measures
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 
 def _predicted(predictor: str, horizon: float, low: float, ratio: float, high: float) -> dict:
     return {

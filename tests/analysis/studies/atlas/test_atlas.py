@@ -49,7 +49,7 @@ def test_a_document_has_no_nan(found) -> None:
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_command_writes_table_and_report(tmp_path: Path, capsys) -> None:
+def test_command_writes_table_and_report(tmp_path: Path, capsys, approved) -> None:
     data = yaml.safe_load(shipped('vehicles', 'rexrov').read_text(encoding='utf-8'))
     mine = tmp_path / 'mine.yaml'
     mine.write_text(yaml.safe_dump(data))  # its name is that of the shipped one
@@ -58,6 +58,7 @@ def test_command_writes_table_and_report(tmp_path: Path, capsys) -> None:
     whole = json.loads(capsys.readouterr().out)
     assert whole == json.loads((out / 'atlas.json').read_text())
     assert set(whole['vehicles']) == {'rexrov', 'rexrov_2', 'lauv'}
+    approved.folder(out)
     table = parquet.read_table(out / 'atlas.parquet').to_pylist()
     assert len(table) == 3 * 36
     row = next(r for r in table if (r['vehicle'], r['in'], r['of']) == ('rexrov', 'sway', 'roll'))

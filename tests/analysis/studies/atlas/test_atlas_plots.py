@@ -11,6 +11,8 @@ from helpers.made_runs import DOFS
 from auv_analysis.report import plots as plotting
 from auv_analysis.studies.atlas import plots as atlas
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
 RNG = np.random.default_rng
 

@@ -51,9 +51,10 @@ def test_command_compares_scenarios_by_name(scenarios, capsys) -> None:
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_every_number_of_the_report_is_in_the_table(scenarios) -> None:
+def test_every_number_of_the_report_is_in_the_table(scenarios, approved) -> None:
     main.main(['analyze', *scenarios])
     out = Path('runs/analyze_one_two_wild')
+    approved.folder(out)
     table = parquet.read_table(out / 'comparison.parquet').to_pylist()
     assert check_numbers(out) > 200
     assert {f'rank.{name}' for name in BY_NAME} & set(table[0])

@@ -17,6 +17,8 @@ from auv_analysis.studies.compare import plots
 from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank, write_table
 from auv_analysis.studies.compare.report import findings, overview, six_table
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 NAMES = [f'{scenario}/{controller}' for scenario in 'abc' for controller in ('cl', 'gvc', 'pid')]
 
 

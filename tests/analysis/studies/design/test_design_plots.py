@@ -10,6 +10,8 @@ from helpers.made_runs import DOFS, UPSILON_INV, VEHICLE, made
 
 from auv_analysis.studies.design import plots as design
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 RNG = np.random.default_rng
 
 

@@ -244,14 +244,16 @@ def test_an_unknown_coupling_is_refused_with_those_that_exist():
     assert coupling_named('delta_pi_max.pitch', []) == 'delta_pi.pitch'
 
 
-def test_the_report_and_its_numbers(short, tmp_path, capsys):
+@pytest.mark.usefixtures('unrendered')
+def test_the_report_and_its_numbers(short, tmp_path, capsys, approved):
     result, out = designed('rexrov', tmp_path, short)
     page = write_report(result, out).read_text(encoding='utf-8')
+    approved.folder(out)
     for word in ('delta_pi.pitch', 'Which change removes which coupling', 'vehicle_before.yaml'):
         assert word in page
     for name in ('couplings', 'reduced', 'Upsilon'):
         for ending in ('png', 'pdf'):
-            assert (out / 'figures' / f'{name}.{ending}').stat().st_size > 1000
+            assert (out / 'figures' / f'{name}.{ending}').is_file()
     assert check_numbers(out) > 100
     document = json.loads((out / 'design.json').read_text())
     print_design(document)

@@ -62,12 +62,15 @@ def test_results_take_the_place_of_earlier_ones(excited, tmp_path: Path) -> None
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_the_report_has_its_numbers_where_their_heads_say(excited, tmp_path: Path) -> None:
+def test_the_report_has_its_numbers_where_their_heads_say(
+    excited, tmp_path: Path, approved
+) -> None:
     results = results_of(excited)
     (tmp_path / 'scenario.yaml').write_text(scenario_text(excited))
     results.write(tmp_path)
     write_report(excited, results, tmp_path)
     assert check_numbers(tmp_path) > 100
+    approved.folder(tmp_path)
     tau, nu = excited.motion.commands[0, 0], excited.motion.states[0, 0, :, 7:]
     for i, row in enumerate(results.tables['motion'].records()):
         assert row['wrench'] == np.abs(tau[:, i]).max()

@@ -10,6 +10,8 @@ from helpers.made_runs import DOFS
 
 from auv_analysis.studies.excite import plots as excite
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
 RNG = np.random.default_rng
 

@@ -56,6 +56,10 @@ def identified(bag, tmp_path_factory, composing):
     return out
 
 
+def test_all_that_the_report_shows(identified, approved):
+    approved.folder(identified)
+
+
 def test_a_bag_becomes_a_vehicle_file(identified):
     vehicle = load_vehicle(identified / 'vehicle.yaml')
     truth = load_vehicle('herman2018')
@@ -91,7 +95,7 @@ def test_a_bag_becomes_a_vehicle_file(identified):
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_intervals_on_request_stand_beside_the_others(bag, tmp_path):
+def test_intervals_on_request_stand_beside_the_others(bag, tmp_path, approved):
     out = tmp_path / 'asked'
     fewer = ('--part', '0:30', '--fixed', 'M', '--fixed', 'D_quadratic')
     asked = ('--bootstrap', 40, '--profile', 'lag')
@@ -103,6 +107,7 @@ def test_intervals_on_request_stand_beside_the_others(bag, tmp_path):
     assert lag['profile_low'] < lag['value'] < lag['profile_high']
     assert parquet.read_table(out / 'profiles.parquet').num_rows >= 5
     assert (out / 'figures' / 'profiles.png').exists()
+    approved.folder(out)
 
 
 def test_the_file_predicts_the_recording(bag, identified, tmp_path, capsys):

@@ -11,6 +11,8 @@ from scipy.signal import welch
 
 from auv_analysis.studies.identify import plots as identify
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 VELOCITY = ('m/s', 'rad/s')
 RNG = np.random.default_rng
 

@@ -10,6 +10,8 @@ from helpers.made_runs import DOFS
 
 from auv_analysis.studies.linearize import plots as linearize
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 RNG = np.random.default_rng
 
 

@@ -329,13 +329,14 @@ def test_a_delay_of_many_steps_leaves_the_poles(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_the_command_prints_margins_and_writes_them(tmp_path, capsys):
+def test_the_command_prints_margins_and_writes_them(tmp_path, capsys, approved):
     out = tmp_path / 'out'
     check = tmp_path / 'check.json'
     check.write_text('{"command_to_response_delay": {"seconds": 0.03}}')
     line = ['linearize', 'case1_bluerov2_heavy', '--controller', 'gvc', '--out', str(out)]
     main([*line, '--delay-from', str(check), '--lag', '0.02'])
     text = capsys.readouterr().out
+    approved.add(text.splitlines())
     for word in (
         'period 0.01 s, delay 0.03 s, lag 0.02 s',
         'disk margin',

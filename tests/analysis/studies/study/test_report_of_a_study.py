@@ -29,6 +29,10 @@ def rows(folder) -> list[dict]:
     return parquet.read_table(folder / NUMBERS).to_pylist()
 
 
+def test_all_that_it_shows(folder, approved):
+    approved.folder(folder)
+
+
 def test_every_number_of_every_table_is_found_where_its_source_says(folder, rows):
     assert check_numbers(folder) > 100
     summary = json.loads((folder / 'summary.json').read_text(encoding='utf-8'))

@@ -10,6 +10,8 @@ from helpers.artists import cells
 from auv_analysis.studies.study import procedure as study
 from auv_analysis.studies.study.sensitivity import Kpi
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 RNG = np.random.default_rng
 
 

@@ -15,6 +15,8 @@ from auv_analysis.studies.sweep.analysis import Analysis, analysed
 from auv_analysis.studies.sweep.dataset import numbers_of, open_sweep, short_names
 from auv_analysis.studies.sweep.plots import draw, main_measures
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 Drawn = tuple[Analysis, dict[str, Figure], dict[str, str]]
 NUMBERS = [name for name in COLUMNS if name not in ('status', 'reason')]
 

@@ -109,10 +109,11 @@ def test_the_document_has_no_nan(results: Analysis) -> None:
 
 @pytest.mark.usefixtures('unrendered')
 @pytest.mark.parametrize(('campaign', 'known'), [(SIMPLE, simple), (MIXED, mixed)])
-def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known) -> None:
+def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known, approved) -> None:
     out = tmp_path / 'report'
     cli.main(['analyze', str(make_sweep(tmp_path, campaign, known)), '--out', str(out)])
     assert check_numbers(out) > 100
+    approved.folder(out)
 
 
 @pytest.mark.usefixtures('unrendered')

@@ -41,7 +41,8 @@ def command(tmp_path: Path, monkeypatch, capsys) -> Callable:
     return call
 
 
-def test_folder_document_and_files_agree(command: Callable, tmp_path: Path) -> None:
+@pytest.mark.usefixtures('unrendered')
+def test_folder_document_and_files_agree(command: Callable, tmp_path: Path, approved) -> None:
     code, out, lines = command(*QUICK, '--json')
     folder = tmp_path / 'runs/tune_small'
     document = json.loads(out)
@@ -57,6 +58,7 @@ def test_folder_document_and_files_agree(command: Callable, tmp_path: Path) -> N
     _perturbed(document, folder)
     assert all(sentence['source'] for sentence in document['verdict'])
     assert check_numbers(folder) > 100
+    approved.folder(folder)
     said = {sentence['text'] for sentence in document['verdict']}
     entries = document['controllers'].items()
     assert {f'{name}: {text}.' for name, entry in entries for text in entry['remarks']} <= said

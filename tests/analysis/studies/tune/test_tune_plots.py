@@ -12,6 +12,8 @@ from auv_analysis.report import plots as plotting
 from auv_analysis.studies.tune import plots as tune
 from auv_analysis.studies.tune.cost import Measures
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 RNG = np.random.default_rng
 
 

@@ -1,0 +1,153 @@
+"""Texts that somebody has read and approved, beside the tests: all that a page or figure shows.
+
+They say what changed, not whether it is right: that is what other tests compute. In words nothing
+may differ. Numbers may by one part in a thousand or by half a unit of their last digit, so that
+other processors and other versions of NumPy agree. After a change that is meant,
+
+    AUV_GVC_APPROVE=1 pytest <the test>
+
+writes the texts anew; `git diff` shows what there is to read.
+"""
+
+import os
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+import pytest
+from helpers import shown
+from matplotlib.figure import Figure
+
+from auv_analysis.report import panels, plots, results
+
+APPROVE = bool(os.environ.get('AUV_GVC_APPROVE'))
+RELATIVE, NOISE = 1e-3, 1e-9
+MOST = 12  # differences that are shown
+NUMBER = re.compile(
+    r'(?<![\w#.])[−+-]?\d[\d\u202f]*(?:\.\d+)?(?:e[+-]?\d+|·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(?!\w)'
+)
+POWERS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
+MASKED = ((re.compile(r'/(?:[\w.+-]+/)+'), '<folder>/'),)
+
+
+def _value(text: str) -> tuple[float, float]:
+    """A number, and half a unit of its last digit."""
+    plain = text.replace('\u202f', '').replace('−', '-')
+    mantissa, _, power = plain.replace('·10', 'e').partition('e')
+    scale = 10.0 ** int(power.translate(POWERS) or 0)
+    return float(mantissa) * scale, 0.5000001 * scale * 10.0 ** -len(mantissa.partition('.')[2])
+
+
+def alike(one: str, other: str) -> bool:
+    """Whether two lines have the same words, and numbers that are near."""
+    if one == other:
+        return True
+    if NUMBER.sub('#', one) != NUMBER.sub('#', other):
+        return False
+    for a, b in zip(NUMBER.findall(one), NUMBER.findall(other), strict=True):
+        (x, half), (y, other_half) = _value(a), _value(b)
+        near = max(RELATIVE * max(abs(x), abs(y)), min(half, other_half), NOISE)
+        if abs(x - y) > near:
+            return False
+    return True
+
+
+def _differences(approved: list[str], found: list[str]) -> list[str]:
+    """Pairs of lines that differ, from the first on in which they do."""
+    pairs = [(a, b) for a, b in zip_longest(approved, found, fillvalue='') if not alike(a, b)]
+    told = []
+    for a, b in pairs[:MOST]:
+        at = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), 0)
+        told += [f'- {"…" * (at > 40)}{a[max(at - 40, 0) : at + 80]}',
+                 f'+ {"…" * (at > 40)}{b[max(at - 40, 0) : at + 80]}']  # fmt: skip
+    return told + [f'and {len(pairs) - MOST} more'] * (len(pairs) > MOST)
+
+
+def check(path: Path, name: str, lines: Iterable[str]) -> None:
+    """Hold lines against those approved under a name in a file, or approve them."""
+    found = [line.rstrip() for text in lines for line in text.splitlines()]
+    for pattern, mask in MASKED:
+        found = [pattern.sub(mask, line) for line in found]
+    parts = _parts(path)
+    known = parts.get(name, [])
+    if _same(known, found):
+        return
+    if APPROVE:
+        parts[name] = found
+        path.parent.mkdir(exist_ok=True)
+        texts = ('\n'.join([f'=== {key}', *parts[key], '']) for key in sorted(parts))
+        path.write_text(''.join(texts), encoding='utf-8')
+        return
+    told = '\n'.join(_differences(known, found))
+    pytest.fail(f'{path.name}, {name}: - approved, + found\n{told}\n{__doc__}', pytrace=False)
+
+
+def _same(approved: list[str], found: list[str]) -> bool:
+    return len(approved) == len(found) and all(map(alike, approved, found))
+
+
+def _parts(path: Path) -> dict[str, list[str]]:
+    if not path.exists():
+        return {}
+    _, *parts = re.split(r'^=== ', path.read_text(encoding='utf-8'), flags=re.MULTILINE)
+    return {name: text.splitlines() for name, _, text in (part.partition('\n') for part in parts)}
+
+
+class Approved:
+    """What a test shows: figures, tables and panels that it makes, and pages that it names."""
+
+    def __init__(self) -> None:
+        self._made: list[Figure | plots.FigureRecord | results.Table | Iterable[str]] = []
+        self._pages: list[str] = []
+
+    def add(self, lines: Iterable[str]) -> None:
+        """Lines to approve as they stand, such as what is printed."""
+        self._made.append(lines)
+
+    def folder(self, folder: Path, *, panels: bool = False) -> None:
+        """The page of a folder, and its figures, composed by `artists.captured`."""
+        page = (folder / 'report.html').read_text(encoding='utf-8')
+        lines = [*shown.page_lines(page, panels=panels)]
+        for path in sorted(folder.glob('figures/*.pdf')):
+            lines += [f'figure {path.stem}', *path.read_text(encoding='utf-8').splitlines()]
+        self._pages += lines
+
+    def lines(self) -> Iterator[str]:
+        """The pages, else all that was made, in this order."""
+        yield from self._pages
+        for one in [] if self._pages else self._made:
+            if isinstance(one, Figure):
+                yield 'figure'
+                yield from shown.figure_lines(one)
+            elif isinstance(one, plots.FigureRecord):
+                yield f'{one.name}: {one.title}. {one.caption}'
+            elif isinstance(one, results.Table):
+                yield from shown.table_lines(one)
+            else:
+                yield from one
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Collect what is made meanwhile."""
+        document = panels.document
+
+        def kept(make: Any) -> Any:
+            def made(one: Any, *args: Any, **about: Any) -> None:
+                make(one, *args, **about)
+                self._made.append(one)
+
+            return made
+
+        def panels_of(*args: Any) -> list[Any]:
+            found = document(*args)
+            self._made.append([*shown.panel_lines(found)])
+            return found
+
+        with pytest.MonkeyPatch.context() as patch:
+            for kind in (Figure, plots.FigureRecord, results.Table):
+                patch.setattr(kind, '__init__', kept(kind.__init__))
+            patch.setattr(panels, 'document', panels_of)
+            yield

@@ -1,0 +1,360 @@
+"""All that a page, a figure or a panel shows to a reader, as lines of text.
+
+How something is laid out (sizes, widths, places of legends) is left out. Of data stands a digest.
+"""
+
+import base64
+import gzip
+import json
+import zlib
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from itertools import groupby, zip_longest
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import Collection
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.spines import Spine
+from matplotlib.text import Annotation, Text
+from matplotlib.ticker import FixedLocator, FuncFormatter
+
+from auv_analysis.report.results import Table
+
+FEW = 3  # values that are written as they are
+
+
+def digest(values: Any) -> str:
+    """Some numbers; of many how many, first, last, least, largest, mean, mean of a ramp of them."""
+    x = np.ma.filled(np.ma.asarray(values, float), np.nan).ravel()
+    known = x[np.isfinite(x)]
+    size = np.abs(known).max(initial=0.0)
+    if len(x) > FEW and np.ptp(np.diff(x)) <= 1e-9 * size:
+        return f'{len(x)} evenly {_number(x[0], size)} to {_number(x[-1], size)}'
+    if len(x) > FEW:
+        ramp = np.linspace(-1.0, 1.0, len(x))[np.isfinite(x)]
+        ends = [known[0], known[-1], known.min(), known.max()] if len(known) else []
+        means = [known.mean(), np.mean(known * ramp)] if len(known) else []
+        unknown = f' {len(x) - len(known)} unknown' if len(known) < len(x) else ''
+        return f'{len(x)}{unknown}: {" ".join(_number(v, size) for v in [*ends, *means])}'
+    return ' '.join(_number(v, size) for v in x)
+
+
+def _number(value: float, size: float) -> str:
+    """A whole number, or four digits; rounding noise is zero."""
+    if abs(value) <= 1e-9 * size:
+        return '0'
+    whole = value == round(value, 0) and abs(value) < 1e4
+    return f'{value:.0f}' if whole else f'{value:#.4g}'
+
+
+def table_lines(table: Table) -> Iterator[str]:
+    """Heads with units, and rows."""
+    yield f'table {table.name}: {table.caption}'
+    heads = [(head.group, head.label, head.unit and f'({head.unit})') for head in table.columns]
+    rows = [
+        [(cell.text, cell.remark and f'({cell.remark})', cell.kind and f'[{cell.kind}]')
+         for cell in row] for row in table.rows
+    ]  # fmt: skip
+    for row in [heads, *rows]:
+        yield ' | '.join(' '.join(filter(None, parts)) for parts in row)
+    yield from [table.note] if table.note else []
+
+
+# figures
+
+
+def figure_lines(figure: Figure) -> Iterator[str]:
+    """Panels of a figure, artist by artist."""
+    title = figure.get_suptitle()
+    yield from [f'title {title}'] if title else []
+    yield from (f'text {_words(text)}' for text in figure.texts if text.get_text() != title)
+    for key in figure.legends:
+        yield _legend(key)
+    for axes in figure.axes:
+        if getattr(axes, '_colorbar', None) is not None:
+            words = f'{axes.get_xlabel()}{axes.get_ylabel()}'
+            yield f'colours: {words} {digest([*axes.get_xlim(), *axes.get_ylim()])}'
+        elif axes.axison and axes.get_visible():
+            yield from _axes_lines(axes)
+
+
+def _axes_lines(axes: Axes) -> Iterator[str]:
+    place = axes.get_subplotspec()
+    where = f' {place.rowspan.start},{place.colspan.start}' if place is not None else ''
+    titles = [axes.get_title(loc=side) for side in ('left', 'center', 'right')]
+    yield f'axes{where}: {" ".join(filter(None, titles))}'
+    for name, axis in (('x', axes.xaxis), ('y', axes.yaxis)):
+        low, high = getattr(axes, f'get_{name}lim')()
+        limits = '' if getattr(axes, f'get_autoscale{name}_on')() else f' {digest([low, high])}'
+        ticks = ''
+        if isinstance(axis.get_major_locator(), FixedLocator):
+            locations, texts = axis.get_ticklocs(), axis.get_ticklabels()
+            words = [text.get_text() for text in texts]
+            pairs = zip_longest((_number(at, 1.0) for at in locations), words, fillvalue='')
+            ticks = ' ticks ' + ', '.join(a if a == b else f'{a} {b}' for a, b in pairs)
+        elif isinstance(axis.get_major_formatter(), FuncFormatter):
+            ticks = ' ticks ' + ', '.join(axis.get_major_formatter()(v, 0) for v in (0.01, 0.5, 20))
+        inverted = ' inverted' if axis.get_inverted() else ''
+        yield f'  {name} {axis.get_label_text()} {axis.get_scale()}{inverted}{limits}{ticks}'
+    kept = [one for one in axes.get_children() if one.get_visible() and one is not axes.patch]
+    for (kind, look), group in groupby(kept, key=_kind_and_look):
+        if kind and (data := _data(kind, [*group], axes)):
+            yield f'  {kind}{look}: {data}'
+    if axes.get_legend() is not None:
+        yield f'  {_legend(axes.get_legend())}'
+
+
+def _kind_and_look(artist: Artist) -> tuple[str, str]:
+    if isinstance(artist, Line2D):
+        return 'line', _look(artist)
+    if isinstance(artist, AxesImage):
+        return 'image', f' {artist.get_cmap().name} {_norm(artist)}'
+    if isinstance(artist, Collection):
+        return type(artist).__name__, _look(artist)
+    if isinstance(artist, Text):
+        return ('texts', '') if artist.get_text() and not _is_title(artist) else ('', '')
+    if isinstance(artist, Patch) and not isinstance(artist, Spine):
+        return type(artist).__name__, _look(artist)
+    return '', ''
+
+
+def _is_title(text: Text) -> bool:
+    axes = text.axes
+    return axes is not None and text in (axes.title, axes._left_title, axes._right_title)
+
+
+def _data(kind: str, artists: list[Any], axes: Axes) -> str:
+    if kind == 'line':
+        return '; '.join(_line(line, axes) for line in artists if np.size(line.get_xdata()))
+    if kind == 'texts':
+        return '; '.join(map(_words, artists))
+    if kind == 'image':
+        return '; '.join(f'{one.get_array().shape} {digest(one.get_array())}' for one in artists)
+    if isinstance(artists[0], Patch):
+        ends = [one.get_path().transformed(one.get_patch_transform()).get_extents().extents
+                for one in artists]  # fmt: skip
+        return _frame(artists[0], axes) + ' / '.join(map(digest, np.transpose(ends)))
+    return '; '.join(_collection(one) for one in artists)
+
+
+def _line(line: Line2D, axes: Axes) -> str:
+    x, y, frame = digest(line.get_xdata()), digest(line.get_ydata()), _frame(line, axes)
+    return {'across ': f'across at {y}', 'up ': f'up at {x}'}.get(frame, f'{frame}{x} / {y}')
+
+
+def _collection(one: Any) -> str:
+    points = np.asarray(one.get_offsets(), float)
+    if len(points) == 1 and not points.any():
+        points = np.concatenate([path.vertices for path in one.get_paths()] or [points])
+    values = one.get_array()
+    scale = '' if values is None else f' by {one.get_cmap().name} {_norm(one)} {digest(values)}'
+    return f'{digest(points[:, 0])} / {digest(points[:, 1])}{scale}'
+
+
+def _frame(artist: Artist, axes: Axes) -> str:
+    """In which coordinates something is drawn."""
+    transform = artist.get_transform()
+    for word, one in (('across ', axes.get_yaxis_transform()), ('up ', axes.get_xaxis_transform()),
+                      ('of the axes ', axes.transAxes)):  # fmt: skip
+        if transform == one or getattr(transform, '_b', None) == one:
+            return word
+    return ''
+
+
+def _norm(mapped: Any) -> str:
+    low, high = mapped.get_clim()
+    return f'{type(mapped.norm).__name__} {digest([low, high])}'
+
+
+def _look(artist: Any) -> str:
+    """Colours, dashes, marker, hatch."""
+    if isinstance(artist, Line2D):
+        parts = [to_hex(artist.get_color())]
+        if artist.get_linestyle() == 'None':
+            parts.append('no line')
+        elif (dashes := artist._unscaled_dash_pattern)[1]:  # no public way to it
+            parts.append(f'dashes {digest(dashes[1])}')
+        marker = artist.get_marker()
+        if marker not in ('None', None, ''):
+            filled = to_hex(artist.get_markerfacecolor(), keep_alpha=True)
+            parts.append(f'marker {marker} {filled}')
+    elif isinstance(artist, Patch):
+        parts = [to_hex(artist.get_facecolor()) if artist.get_fill() else 'empty']
+        parts += [f'hatch {artist.get_hatch()}'] if artist.get_hatch() else []
+    else:
+        faces, edges = artist.get_facecolor(), artist.get_edgecolor()
+        colours = faces if len(faces) else edges
+        kinds = [*dict.fromkeys(map(to_hex, colours))]
+        parts = kinds if len(kinds) <= 6 else [f'{len(kinds)} colours {digest(colours)}']
+        sizes = np.unique(getattr(artist, 'get_sizes', list)())
+        parts += [f'sizes {digest(sizes)}'] if len(sizes) > 1 else []
+    label = str(artist.get_label())
+    named = label and not label.startswith('_')
+    return f' {" ".join(parts)}{f" {label!r}" if named else ""}'
+
+
+def _words(text: Text) -> str:
+    """A text and where it stands; how far an annotation stands off is layout."""
+    at = text.xy if isinstance(text, Annotation) else text.get_position()
+    numbers = [value for value in at if not isinstance(value, str)]
+    return f'{text.get_text()!r} {to_hex(text.get_color())} at {digest(numbers)}'
+
+
+def _legend(key: Legend) -> str:
+    title = key.get_title().get_text()
+    looks = [_look(handle) for handle in key.legend_handles]
+    words = [text.get_text() for text in key.get_texts()]
+    entries = ', '.join(
+        f'{word}{look.removesuffix(f" {word!r}")}' for word, look in zip(words, looks, strict=True)
+    )
+    return f'legend {title}: {entries}'
+
+
+# panels of a page
+
+
+def panel_lines(document: list[Any]) -> Iterator[str]:
+    """Figures of Bokeh's JSON: axes, lines, what is shaded, what a cursor tells."""
+    models: dict[str, dict[str, Any]] = {}
+
+    def collect(part: Any) -> None:
+        if isinstance(part, dict):
+            if part.get('type') == 'object':
+                models[part['id']] = part
+            part = list(part.values())
+        if isinstance(part, list):
+            for one in part:
+                collect(one)
+
+    collect(document[0])
+
+    def get(part: Any, *names: str) -> Any:
+        for name in names:
+            part = models[part['id']].get('attributes', {}).get(name)
+            if part is None:
+                return None
+        return part
+
+    for root in document[0]['roots']:
+        scale = models[get(root, 'y_scale')['id']]['name']
+        ends = digest([get(root, 'x_range', name) or 0.0 for name in ('start', 'end')])
+        labels = [get(axis, 'axis_label') for axis in [*get(root, 'below'), *get(root, 'left')]]
+        yield f'panel {get(root, "name")}: {scale} {labels} from {ends}'
+        for one in get(root, 'renderers'):
+            glyph, data = get(one, 'glyph'), dict(get(one, 'data_source', 'data')['entries'])
+            kind, look = models[glyph['id']]['name'], dict(models[glyph['id']]['attributes'])
+            ends = [digest(_array(data[look.pop(name)['field']]))
+                    for name in ('x', 'y', 'y1', 'y2') if name in look]  # fmt: skip
+            dashes = look.get('line_dash', '')
+            colour = look.get('line_color') or look.get('fill_color')
+            words = f'{get(one, "name")} {get(one, "tags")} {colour} {dashes}'
+            yield f'  {kind} {words}: {" / ".join(ends)}'
+        tools = [f'{models[tool["id"]]["name"]} {get(tool, "tooltips") or ""}'.strip()
+                 for tool in get(root, 'toolbar', 'tools')]  # fmt: skip
+        yield f'  tools {", ".join(tools)}'
+        for one in [*(get(root, 'center') or []), *(get(root, 'above') or [])]:
+            name = models[one['id']]['name']
+            if name == 'BoxAnnotation':
+                ends = [get(one, end) for end in ('left', 'right')]
+                ends = [end if isinstance(end, float | int) else np.nan for end in ends]
+                yield f'  box {digest(ends)}'
+            elif name == 'Label':
+                yield f'  label {get(one, "text")} at {digest([get(one, "x"), get(one, "y")])}'
+            elif name == 'Legend':
+                items = [(get(item, 'label')['value'], get(item, 'renderers')[0])
+                         for item in get(one, 'items')]  # fmt: skip
+                pairs = [(word, get(drawn, 'name')) for word, drawn in items]
+                yield '  legend ' + ', '.join(a if a == b else f'{a} = {b}' for a, b in pairs)
+
+
+def _array(entry: dict[str, Any]) -> np.ndarray:
+    data = base64.b64decode(entry['array']['data'])
+    return np.frombuffer(gzip.decompress(data) if data[:2] == b'\x1f\x8b' else data, entry['dtype'])
+
+
+# pages
+
+
+BLOCKS = frozenset({
+    'p', 'h1', 'h2', 'h3', 'li', 'dt', 'dd', 'tr', 'caption', 'figcaption', 'summary', 'pre',
+    'div', 'section', 'label', 'legend', 'fieldset',
+})  # fmt: skip
+LEFT_OUT = frozenset(
+    {'script', 'style', 'nav', 'button.theme', 'button.csv', 'dl.provenance', 'a.anchor', 'head'}
+)
+VOID = frozenset({'img', 'input', 'meta', 'br', 'path', 'link'})
+
+
+class _Reader(HTMLParser):
+    """Lines of a page: blocks with the name of their tag and their anchor, a row's cells in one."""
+
+    def __init__(self, page: str):
+        super().__init__()
+        self.lines: list[str] = []
+        self._line, self._head = '', ''
+        self._open: list[str] = []  # elements that are left out, or text as it stands
+        self.panels = ''
+        self.feed(page)
+        self._flush()
+
+    def _flush(self) -> None:
+        text = ' '.join(self._line.split()).strip('| ')
+        if text:
+            self.lines.append(f'{self._head} {text}'.strip())
+        self._line, self._head = '', ''
+
+    def handle_starttag(self, tag, attributes):
+        about = {name: value or '' for name, value in attributes}
+        names = {tag, f'{tag}.{about.get("class")}', f'{tag}#{about.get("id")}'}
+        if self._open:
+            self._open += [tag] if tag not in VOID else []
+            return
+        if names & LEFT_OUT or about.get('id') in ('quantities', 'panel-data'):
+            self._open.append(f'{tag}#panel-data' if about.get('id') == 'panel-data' else tag)
+            return
+        if tag in BLOCKS:
+            self._flush()
+            self._head = tag if tag not in ('tr', 'div', 'section') else ''
+        if about.get('id'):
+            self._line += f'#{about["id"]} '
+        if tag in ('td', 'th'):
+            self._line += ' | '
+        looks = {*about.get('class', '').split()} - {'n', 'text'}
+        if tag in ('td', 'th', 'tr') and looks:
+            self._line += f'[{" ".join(looks)}] '
+        if tag == 'img':
+            self._line += f' alt: {about["alt"].partition(". ")[0]}. '
+        for name in ('href', 'value', 'style', 'stroke-dasharray', 'colspan'):
+            self._line += f' {name}={about[name]} ' if name in about and tag != 'meta' else ''
+
+    def handle_endtag(self, tag):
+        if self._open:
+            self._open.pop()
+        elif tag in BLOCKS:
+            self._flush()
+
+    def handle_data(self, data):
+        if self._open:
+            self.panels += data if self._open[0].endswith('#panel-data') else ''
+        elif self._head == 'pre':
+            lines = data.splitlines()
+            self._line += f'{len(lines)} lines, first: {lines[0] if lines else ""}'
+        else:
+            self._line += data
+
+
+def page_lines(page: str, *, panels: bool) -> Iterator[str]:
+    """Sections, sentences, tables and captions of a page, and its panels where asked for."""
+    reader = _Reader(page)
+    yield from reader.lines
+    if panels:
+        text = zlib.decompress(base64.b64decode(reader.panels)).decode()
+        yield from panel_lines(json.loads(text))

@@ -256,18 +256,24 @@ def _gains(
     t: np.ndarray, y: np.ndarray, forms: np.ndarray, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Factor of each form (k, n) beside line and free motion; squares left by it, and by none."""
-    y, own = _beside(t, free, y), _beside(t, free, forms)
-    strong = (own**2).sum(axis=1)
-    told = strong > ALIKE * (forms**2).sum(axis=1)
-    gain = np.where(told, own @ y / np.where(told, strong, 1.0), 0.0)
+    basis, y = _steady(t, free), _beside(t, free, y)
+    size = np.einsum('kn,kn->k', forms, forms)
+    strong = size - ((forms @ basis) ** 2).sum(axis=1)  # of what is left beside line and motion
+    told = strong > ALIKE * size
+    gain = np.where(told, forms @ y / np.where(told, strong, 1.0), 0.0)
     still = float(y @ y)
     return gain, np.maximum(still - gain**2 * strong, 0.0), still
 
 
-def _beside(t: np.ndarray, free: np.ndarray, signals: np.ndarray) -> np.ndarray:
-    """Signals (..., n) without a straight line and a free motion (n,)."""
+def _beside(t: np.ndarray, free: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """A signal (n,) without a straight line and a free motion (n,)."""
+    basis = _steady(t, free)
+    return np.asarray(y - basis @ (y @ basis))
+
+
+def _steady(t: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Orthonormal basis (n, k) of a straight line and a free motion (n,)."""
     rest = np.stack([np.ones_like(t), t - t.mean(), free - free.mean()], axis=1)
     size = np.maximum(np.linalg.norm(rest, axis=0), np.finfo(float).tiny)
     basis, strength, _ = np.linalg.svd(rest / size, full_matrices=False)
-    basis = basis[:, strength > ALIKE * strength[0]]
-    return np.asarray(signals - signals @ basis @ basis.T)
+    return np.asarray(basis[:, strength > ALIKE * strength[0]])

@@ -30,7 +30,7 @@ from auv_dynamics.files.shipped import shipped
 SHORT = """
 name: short
 vehicle: herman2018
-duration: 3.0
+duration: 1.5
 step: 0.01
 controllers:
   soft: {law: cl, k_D: 12, k_I: 1, Lambda: 0.8, Gamma: 60}

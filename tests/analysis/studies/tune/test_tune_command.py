@@ -27,7 +27,7 @@ def command(tmp_path: Path, monkeypatch, capsys) -> Callable:
     """`auv tune s.yaml` in this process: exit code, stdout, lines of stderr."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(searching, 'POINTS', 64)
-    write(tmp_path, {'gvc': GVC, 'cl': SAME_CL | {'k_D': 300.0}}, duration=3.0)
+    write(tmp_path, {'gvc': GVC, 'cl': SAME_CL | {'k_D': 300.0}}, duration=1.0)
 
     def call(*arguments: str) -> tuple[object, str, list[str]]:
         code: object = 0

@@ -130,15 +130,16 @@ def period(vehicle, axis):
         nu_dot = np.linalg.solve(vehicle.M, -vehicle.g(x[:6]))
         return np.concatenate([jacobian(x[:6]) @ x[6:], nu_dot])
 
-    x, h, times = np.zeros(12), 0.01, []
+    x, h, k, times = np.zeros(12), 0.01, 0, []
     x[axis] = 1e-4
-    for k in range(2000):
+    while len(times) < 3 and k < 2000:
         a = rate(x)
         b = rate(x + h / 2 * a)
         c = rate(x + h / 2 * b)
         before, x = x[axis], x + h / 6 * (a + 2 * b + 2 * c + rate(x + h * c))
         if before < 0 <= x[axis]:
             times.append(h * (k + before / (before - x[axis])))
+        k += 1
     return np.diff(times).mean()
 
 

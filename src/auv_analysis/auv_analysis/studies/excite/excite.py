@@ -108,6 +108,10 @@ def excite(request: Request, tick: Tick = lambda text, share: None) -> Excited:
 
     low, high = families[0].box
     middle = np.zeros((1, len(low)))
+    least = middle.copy()
+    least[:, : len(families[0].driven)] = np.log(LEAST)
+    motion = motion_of(request, families[0].waves(least), *fleet)
+    _check(request, request.bounds.used(motion)[:, 0])  # what leaves them undriven always does
     gained = []
     for k, family in enumerate(families):
         tick('phases', k / PHASES)

@@ -33,6 +33,7 @@ from auv_analysis import load_scenario
 from auv_analysis.graph import supervisor
 from auv_analysis.graph.experiment import COMPOSED, PACKAGES
 from auv_analysis.simulation.simulate import warm_up
+from auv_dynamics.ros import node_interface
 from auv_dynamics.ros.interface import PARENT
 from auv_dynamics.ros.topics import TOPICS
 
@@ -311,6 +312,7 @@ def serve(line: socket.socket) -> None:
 def main() -> None:
     """Load what the programs call most, then serve."""
     setproctitle('fork server')  # before the environment is changed, in which it finds its room
+    node_interface.DIAGNOSTICS_PERIOD = 0.2  # s: who waits for what a node says waits for less
     warm_up(load_scenario('case1'), ['gvc'])
     for kind in (ParameterEvent, *(topic.type for topic in TOPICS)):
         check_for_type_support(kind)

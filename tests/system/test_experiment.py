@@ -16,6 +16,7 @@ from helpers.graph_runs import (
     node_of,
     nodes,
     recorded,
+    start,
     start_installed,
 )
 from helpers.node_processes import auv, fresh_domain, installed_auv
@@ -189,7 +190,8 @@ def test_ending_auv_ends_its_nodes_and_keeps_earlier_results(tmp_path: Path, how
         (results.folder / 'summary.json').write_text('earlier')
     out = tmp_path / 'out' / 'unfinished'
     scenario = write(tmp_path / 's.yaml', duration=600.0)
-    process = start_installed(scenario, results.out, '--overwrite')
+    begin = start_installed if how == signal.SIGKILL else start  # who dies ends no child of others
+    process = begin(scenario, results.out, '--overwrite')
     node_of(out, 'plant_node')
     policies = {name: os.sched_getscheduler(node.pid) for name, node in nodes(out).items()}
     process.send_signal(how)

@@ -95,6 +95,9 @@ def test_energies_of_a_log_are_those_of_the_run(log, mapping, run) -> None:
     assert_allclose(found['coupling']['delta_xi_max'], truth['coupling']['delta_xi_max'], atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    'log', ['dive.tlog', pytest.param('dive.BIN', marks=pytest.mark.long)], indirect=True
+)
 def test_a_vehicle_is_identified_from_a_log(log, mapping, tmp_path) -> None:
     out = tmp_path / 'identified'
     few = ('--free', 'M.diagonal', '--free', 'lag', '--free', 'delay')  # all of it takes seconds

@@ -27,13 +27,25 @@ class Body(ReadDataStream):
 
     def __init__(self, data: bytes):
         super().__init__(BytesIO(data))
-        self._size = len(data)
+        self._data = data
 
     def read(self, length: int) -> bytes:
         """The next bytes; McapError where there are fewer."""
-        if length > self._size - self.count:
+        begin = self._count
+        self._count = self._within(begin + length)
+        return self._data[begin : self._count]
+
+    def read_prefixed_string(self) -> str:
+        """The next text, at once: a small file may hold millions of them."""
+        begin = self._count + 4
+        length = int.from_bytes(self._data[self._count : begin], 'little')
+        self._count = self._within(begin + length)
+        return str(self._data[begin : self._count], 'utf-8')
+
+    def _within(self, end: int) -> int:
+        if end > len(self._data):
             raise McapError('a record that is shorter than its fields')
-        return super().read(length)
+        return end
 
 
 class MessageTable(NamedTuple):

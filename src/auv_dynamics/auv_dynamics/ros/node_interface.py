@@ -42,6 +42,7 @@ from auv_dynamics.ros.topics import (
     one_at_a_time,
 )
 
+DIAGNOSTICS_PERIOD = 1.0  # s
 LOUD = 1.0  # s between two reports of the same kind
 ASK_AGAIN = 1.0  # s: an answer is lost when it comes before both ends have matched
 LASTING = 1.0  # s, after which what is wrong is logged: names and matches may come late
@@ -142,7 +143,7 @@ class NodeInterface:
             DIAGNOSTICS.type, DIAGNOSTICS.name, one_at_a_time()
         )
         node.create_service(Trigger, '~/ready', self._answer_ready)
-        steady_timer(node, 1.0, self.publish_diagnostics)
+        steady_timer(node, DIAGNOSTICS_PERIOD, self.publish_diagnostics)
 
     def publisher(self, topic: Topic, qos: QoSProfile | None = None) -> Publisher:
         """Publisher of a topic, by default one that loses nothing."""

@@ -9,6 +9,7 @@ other processors and other versions of NumPy agree. After a change that is meant
 writes the texts anew; `git diff` shows what there is to read.
 """
 
+import json
 import os
 import re
 from collections.abc import Iterable, Iterator
@@ -21,7 +22,7 @@ import pytest
 from helpers import shown
 from matplotlib.figure import Figure
 
-from auv_analysis.report import panels, plots, results
+from auv_analysis.report import document, panels, plots, results
 
 APPROVE = bool(os.environ.get('AUV_GVC_APPROVE'))
 RELATIVE, NOISE = 1e-3, 1e-9
@@ -30,7 +31,7 @@ NUMBER = re.compile(
     r'(?<![\w#.])[−+-]?\d[\d\u202f]*(?:\.\d+)?(?:e[+-]?\d+|·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(?!\w)'
 )
 POWERS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
-MASKED = ((re.compile(r'/(?:[\w.+-]+/)+'), '<folder>/'),)
+MASKED = ((re.compile(r'(?<![\w.])/(?:[\w.+-]+/)+'), '<folder>/'),)
 
 
 def _value(text: str) -> tuple[float, float]:
@@ -100,23 +101,27 @@ class Approved:
     """What a test shows: figures, tables and panels that it makes, and pages that it names."""
 
     def __init__(self) -> None:
-        self._made: list[Figure | plots.FigureRecord | results.Table | Iterable[str]] = []
+        self._made: list[Any] = []
+        self._told: list[Iterable[str]] = []
         self._pages: list[str] = []
 
     def add(self, lines: Iterable[str]) -> None:
         """Lines to approve as they stand, such as what is printed."""
-        self._made.append(lines)
+        self._told.append(lines)
 
     def folder(self, folder: Path, *, panels: bool = False) -> None:
-        """The page of a folder, and its figures, composed by `artists.captured`."""
+        """The page of a folder, its figures, composed by `artists.captured`, and its documents."""
         page = (folder / 'report.html').read_text(encoding='utf-8')
         lines = [*shown.page_lines(page, panels=panels)]
         for path in sorted(folder.glob('figures/*.pdf')):
             lines += [f'figure {path.stem}', *path.read_text(encoding='utf-8').splitlines()]
-        self._pages += lines
+        for path in sorted(folder.glob('*.json')):
+            if path.name not in ('manifest.json', 'summary.json'):
+                lines += [path.name, *shown.document_lines(json.loads(path.read_text()))]
+        self._pages += [*lines, *map(shown.parquet_line, sorted(folder.glob('*.parquet')))]
 
     def lines(self) -> Iterator[str]:
-        """The pages, else all that was made, in this order."""
+        """The pages, else all that was made, in this order; then what was added."""
         yield from self._pages
         for one in [] if self._pages else self._made:
             if isinstance(one, Figure):
@@ -126,13 +131,17 @@ class Approved:
                 yield f'{one.name}: {one.title}. {one.caption}'
             elif isinstance(one, results.Table):
                 yield from shown.table_lines(one)
+            elif isinstance(one, document.Sentence):
+                yield f'{one.text} {one.source}'
             else:
                 yield from one
+        for lines in self._told:
+            yield from lines
 
     @contextmanager
     def watching(self) -> Iterator[None]:
         """Collect what is made meanwhile."""
-        document = panels.document
+        compose = panels.document
 
         def kept(make: Any) -> Any:
             def made(one: Any, *args: Any, **about: Any) -> None:
@@ -142,12 +151,12 @@ class Approved:
             return made
 
         def panels_of(*args: Any) -> list[Any]:
-            found = document(*args)
+            found = compose(*args)
             self._made.append([*shown.panel_lines(found)])
             return found
 
         with pytest.MonkeyPatch.context() as patch:
-            for kind in (Figure, plots.FigureRecord, results.Table):
+            for kind in (Figure, plots.FigureRecord, results.Table, document.Sentence):
                 patch.setattr(kind, '__init__', kept(kind.__init__))
             patch.setattr(panels, 'document', panels_of)
             yield

@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from itertools import groupby, zip_longest
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from matplotlib.patches import Patch
 from matplotlib.spines import Spine
 from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FixedLocator, FuncFormatter
+from pyarrow import parquet
 
 from auv_analysis.report.results import Table
 
@@ -358,3 +360,43 @@ def page_lines(page: str, *, panels: bool) -> Iterator[str]:
     if panels:
         text = zlib.decompress(base64.b64decode(reader.panels)).decode()
         yield from panel_lines(json.loads(text))
+
+
+# files beside a page
+
+
+def document_lines(found: Any, path: str = '') -> Iterator[str]:
+    """A JSON document, objects without others in one line, the first and the last of a list."""
+    if isinstance(found, dict):
+        inner = {key: value for key, value in found.items() if _holds_objects(value)}
+        flat = [f'{key} {_leaf(value)}' for key, value in found.items() if key not in inner]
+        yield from [f'{path or "/"}: {", ".join(flat)}'] if flat else []
+        for key, value in inner.items():
+            yield from document_lines(value, f'{path}/{key}')
+    else:
+        for i in sorted({0, len(found) - 1}):
+            yield from document_lines(found[i], f'{path}/{i + 1} of {len(found)}')
+
+
+def _holds_objects(value: Any) -> bool:
+    return isinstance(value, dict) or (
+        isinstance(value, list) and bool(value) and all(isinstance(one, dict) for one in value)
+    )
+
+
+def _leaf(value: Any) -> str:
+    try:
+        numbers = np.array(value, float) if isinstance(value, list) and value else None
+    except (TypeError, ValueError):
+        numbers = None
+    if numbers is not None:
+        return f'{"x".join(map(str, numbers.shape))} {digest(numbers)}'
+    if isinstance(value, float):
+        return _number(value, 0.0)
+    return str(value)
+
+
+def parquet_line(path: Path) -> str:
+    """Rows and columns of a Parquet file."""
+    schema, rows = parquet.read_schema(path), parquet.read_metadata(path).num_rows
+    return f'{path.name}: {rows} rows, {", ".join(schema.names)}'

@@ -34,6 +34,10 @@ def _table(runs: dict[str, Run]) -> dict:
     return {claim.number: claim for claim in claims}
 
 
+def _lines(table: dict) -> list[str]:
+    return [f'{n} | {c.verdict} | {c.ours} | {c.window} | {c.remark}' for n, c in table.items()]
+
+
 def _shortened(run: Run, seconds: float) -> Run:
     keep = run.t <= seconds + run.step / 2
     return run.part(keep)
@@ -59,8 +63,9 @@ def test_another_experiment_of_the_same_name_is_not_the_papers(case1):
         assert _table({'gvc': replace(run, **changes)}) == {}
 
 
-def test_verdicts_of_case_2(case2):
+def test_verdicts_of_case_2(case2, approved):
     table = _table(case2)
+    approved.add(_lines(table))
     decided = CASE2_ONLY | {21}
     assert {number for number, claim in table.items() if claim.verdict == 'reproduced'} == decided
     others = [claim for number, claim in table.items() if number not in decided]
@@ -121,13 +126,14 @@ def test_kinetic_energy_far_from_the_paper_is_not_reproduced(case1):
     assert _table(case1 | {'gvc': gvc})[9].verdict == 'not reproduced'
 
 
-def test_exchanged_laws_turn_case_2_around(case2):
+def test_exchanged_laws_turn_case_2_around(case2, approved):
     gvc, cl = case2['gvc'], case2['cl']
     exchanged = {
         'gvc': replace(gvc, nu=cl.nu, tau=cl.tau),
         'cl': replace(cl, nu=gvc.nu, tau=gvc.tau),
     }
     table = _table(exchanged)
+    approved.add(_lines(table))
     assert [table[number].verdict for number in (17, 18, 20)] == ['not reproduced'] * 3
     assert table[19].verdict == 'reproduced'
 
@@ -143,21 +149,24 @@ def test_runs_are_known_by_law_and_gains_not_by_name(case1):
     assert '(36), (37)' in row.remark
 
 
-def test_one_run_leaves_the_comparisons_open(case1):
+def test_one_run_leaves_the_comparisons_open(case1, approved):
     table = _table({'gvc': case1['gvc']})
+    approved.add(_lines(table))
     assert {n for n, c in table.items() if c.verdict == 'not evaluated'} == {2, 3, 6, 14, 15}
     assert table[1].verdict == 'reproduced'
 
 
-def test_unknown_disturbance_leaves_the_claims_on_it_open(case1):
+def test_unknown_disturbance_leaves_the_claims_on_it_open(case1, approved):
     blind = {name: replace(run, disturbance=None) for name, run in case1.items()}
     table = _table(blind)
+    approved.add(_lines(table))
     assert {table[number].verdict for number in (5, 6, 7, 8)} == {'not evaluated'}
     assert 'F is not known' in table[5].remark
 
 
-def test_a_short_run_decides_only_what_it_can(case1):
+def test_a_short_run_decides_only_what_it_can(case1, approved):
     table = _table({name: _shortened(run, 1.0) for name, run in case1.items()})
+    approved.add(_lines(table))
     open_rows = {n for n, claim in table.items() if claim.verdict == 'not evaluated'}
     assert open_rows == {1, 2, 3, 5, 6, 7, 9, 10, 14, 15}
     assert 'at least 2.5 s' in table[1].remark

@@ -9,6 +9,7 @@ import pytest
 import rclpy
 import yaml
 from helpers.made_messages import Bag, odometry, serialized, stamped
+from helpers.shown import document_lines
 
 from auv_analysis.bag.step_topics import ACCEL, ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import main
@@ -245,13 +246,14 @@ def test_refuses_parameters_that_are_none(tmp_path: Path, params: dict) -> None:
         recorded_loop(write(tmp_path / 'bag.mcap', params=params))
 
 
-def test_the_command_leaves_figures_and_refuses_a_taken_folder(tmp_path, capsys) -> None:
+def test_the_command_leaves_figures_and_refuses_a_taken_folder(tmp_path, capsys, approved) -> None:
     bag, out = write(tmp_path / 'bag.mcap'), tmp_path / 'out'
     command = ['replay', str(bag), '--law', 'cl', '--gain', 'k_D=1,2,3,4,5,6', '--out', str(out)]
     with pytest.raises(SystemExit) as ended:
         main.main([*command, '--json'])
     assert ended.value.code == 1
     document = json.loads(capsys.readouterr().out)
+    approved.add(document_lines(document))
     assert document['answered']['gains']['k_D'] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
     assert document == json.loads((out / 'open_loop.json').read_text())
     assert next(iter(document)) == 'reproduced'

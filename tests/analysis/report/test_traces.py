@@ -20,8 +20,6 @@ from auv_analysis.report.run_report import write_report
 from auv_analysis.report.traces import COLUMNS, FEW, Trace, thinned
 from auv_analysis.runs.run import Run
 
-pytestmark = pytest.mark.usefixtures('approved')
-
 quick = examples(15)
 
 

@@ -103,8 +103,11 @@ MIXED = [0.5] * 3 + [2.0] * 3
         ({'rms': (None, None), 'times': (None, None)}, []),
     ],
 )  # fmt: skip
-def test_every_pair_of_outcomes(two: Runs, changes: dict[str, Any], parts: list[str]) -> None:
+def test_every_pair_of_outcomes(
+    two: Runs, changes: dict[str, Any], parts: list[str], approved
+) -> None:
     text = said(two, **changes)
+    approved.add([text])
     assert all(part in text for part in parts), text
     assert bool(text) == bool(parts)
     assert 'nan' not in text

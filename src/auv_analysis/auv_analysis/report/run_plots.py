@@ -220,7 +220,7 @@ def _split_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequen
 def _whole_panels(run: RunDigest, signal: str, quantity: Quantity, drawn: Sequence[int]) -> Figure:
     groups = _groups(drawn)
     figure = plots.new_figure(2.0 * len(groups) + 0.25)
-    grid = figure.subplots(len(groups), 1, squeeze=False, sharex=True)[:, 0]
+    grid = figure.subplots(len(groups), 1, squeeze=False, sharex=True).ravel()
     for row, columns in enumerate(groups):
         draw_lines(grid[row], run, signal, 'whole', columns)
         grid[row].set_ylabel(quantity.axis(columns))

@@ -13,7 +13,13 @@ from auv_analysis.cli import main
 from auv_analysis.output.folder import listed_in, results_folder
 from auv_analysis.studies.excite.drive import Bounds, Family, Request, scenario_in_memory
 from auv_analysis.studies.excite.excite import _fleet, excite
-from auv_analysis.studies.excite.report import results_of, scenario_text, sentences, write_report
+from auv_analysis.studies.excite.report import (
+    print_results,
+    results_of,
+    scenario_text,
+    sentences,
+    write_report,
+)
 from auv_analysis.studies.identify.identify import identify
 from auv_dynamics.files.errors import FailedError
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
@@ -63,7 +69,7 @@ def test_results_take_the_place_of_earlier_ones(excited, tmp_path: Path) -> None
 
 @pytest.mark.usefixtures('unrendered')
 def test_the_report_has_its_numbers_where_their_heads_say(
-    excited, tmp_path: Path, approved
+    excited, tmp_path: Path, capsys, approved
 ) -> None:
     results = results_of(excited)
     (tmp_path / 'scenario.yaml').write_text(scenario_text(excited))
@@ -71,6 +77,8 @@ def test_the_report_has_its_numbers_where_their_heads_say(
     write_report(excited, results, tmp_path)
     assert check_numbers(tmp_path) > 100
     approved.folder(tmp_path)
+    print_results(results, Path('folder'))
+    approved.add(capsys.readouterr().out.splitlines())
     tau, nu = excited.motion.commands[0, 0], excited.motion.states[0, 0, :, 7:]
     for i, row in enumerate(results.tables['motion'].records()):
         assert row['wrench'] == np.abs(tau[:, i]).max()

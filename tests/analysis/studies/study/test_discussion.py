@@ -5,11 +5,14 @@ from functools import cache
 
 import numpy as np
 import pyarrow.parquet as parquet
+import pytest
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.studies.study.procedure import discussion, write_samples
 from auv_dynamics.vehicle import DOFS
+
+pytestmark = pytest.mark.usefixtures('approved')
 
 
 @cache

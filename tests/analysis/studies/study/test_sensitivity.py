@@ -59,7 +59,7 @@ LAWS = dict(zip(NAMES, [
 
 
 @pytest.mark.parametrize('method', ['sobol', 'morris'])
-def test_powers_of_the_gains_are_found(monkeypatch, method):
+def test_powers_of_the_gains_are_found(monkeypatch, method, approved):
     known(monkeypatch, **LAWS)
     found = sensitivity(short(), 'gvc', method=method, count=256)
     of = found.of('velocity_error.rms')
@@ -94,7 +94,7 @@ def column(rows, name: str) -> list[float]:
     return [of[gain] for gain in ('k_D', 'k_I', 'Lambda', 'Gamma')]
 
 
-def test_what_cannot_be_followed_is_named(monkeypatch):
+def test_what_cannot_be_followed_is_named(monkeypatch, approved):
     figures = {
         'velocity_error.settling_time.surge': lambda k, G: np.where(k > 1.0, np.nan, k),
         'velocity_error.settling_time.sway': lambda k, G: np.where(k > 1.0, 0.0, k),
@@ -106,6 +106,7 @@ def test_what_cannot_be_followed_is_named(monkeypatch):
     known(monkeypatch, **figures)
     found = sensitivity(short(), 'gvc', count=16)
     reasons = {e.kpi.column: e.reason for e in found.excluded}
+    approved.add(f'{column}: {reason}' for column, reason in reasons.items())
     assert 'does not settle in' in reasons['velocity_error.settling_time.surge']
     assert 'zero in' in reasons['velocity_error.settling_time.sway']
     assert 'rounding' in reasons['effort.rms.surge']
@@ -114,7 +115,7 @@ def test_what_cannot_be_followed_is_named(monkeypatch):
     assert [kpi.column for kpi in found.kpis] == ['effort.rms.heave']
 
 
-def test_diverging_loops_narrow_the_span_and_are_counted(monkeypatch):
+def test_diverging_loops_narrow_the_span_and_are_counted(monkeypatch, approved):
     known(monkeypatch, limit=1.5, **LAWS)
     found = sensitivity(short(), 'gvc', count=32)
     assert found.span == pytest.approx(2.0**0.5)
@@ -127,13 +128,14 @@ def test_diverging_loops_narrow_the_span_and_are_counted(monkeypatch):
     assert f'{found.failed[2.0]} rollouts failed' in text
 
 
-def test_loops_that_always_diverge_are_a_refusal_with_its_reason(monkeypatch, tmp_path):
+def test_loops_that_always_diverge_are_a_refusal_with_its_reason(monkeypatch, tmp_path, approved):
     known(monkeypatch, limit=1.01, **LAWS)
     found = sensitivity(short(), 'gvc', count=32)
     assert len(found.failed) == 4
     assert 'not finite from t = 1 s' in found.refusal
     known(monkeypatch, limit=0.5, **LAWS)
     own = sensitivity(short(), 'gvc', count=32)
+    approved.add([found.refusal, own.refusal])
     assert 'own gains' in own.refusal
     assert not own.rows
     table = left_out_table([own])
@@ -236,7 +238,7 @@ def test_wrong_input_is_refused():
         sensitivity(short(), 'nobody')
 
 
-def test_table_sentences_and_file_say_the_same(monkeypatch, tmp_path):
+def test_table_sentences_and_file_say_the_same(monkeypatch, tmp_path, approved):
     known(monkeypatch, **LAWS)
     found = sensitivity(short(), 'gvc', count=64)
     sway = found.of('velocity_error.rms')['sway'][0]

@@ -143,7 +143,7 @@ def _strength(charts: Sequence[Chart]) -> Drawn:
     axes.plot([100 * c.couplings.largest for c in shown], places, 'o', color=COLOURS[0])
     for i, chart in enumerate(shown):
         pair = '–'.join(chart.couplings.pairs[0])
-        axes.annotate(pair, (100 * chart.couplings.strength, i), (9, 0), va='center',
+        axes.annotate(pair, (100 * chart.couplings.strength, i), xytext=(9, 0), va='center',
                       textcoords='offset points', fontsize='medium')  # fmt: skip
     axes.set_yticks(places, [chart.name for chart in shown])
     axes.set(ylim=(len(shown) - 0.5, -0.5), xlabel='cross terms / energy without them (%)')

@@ -438,7 +438,8 @@ def side_effect_warnings(effects: Sequence[Mapping[str, Any]]) -> list[str]:
         for row in effects[:MOST]
     ]
     if len(effects) > MOST:
-        named.append(f'{len(effects) - MOST} others')
+        more = len(effects) - MOST
+        named.append(f'{more} other{"s" * (more > 1)}')
     return [f'side effects above {100 * (WORSE - 1):.0f} %: {join(named)}']
 
 

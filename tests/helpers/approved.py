@@ -12,6 +12,7 @@ writes the texts anew; `git diff` shows what there is to read.
 import json
 import os
 import re
+import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from itertools import zip_longest
@@ -31,7 +32,10 @@ NUMBER = re.compile(
     r'(?<![\w#.])[−+-]?\d[\d\u202f]*(?:\.\d+)?(?:e[+-]?\d+|·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(?!\w)'
 )
 POWERS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
-MASKED = ((re.compile(r'(?<![\w.])/(?:[\w.+-]+/)+'), '<folder>/'),)
+FOLDERS = re.compile(
+    f'(?:{re.escape(tempfile.gettempdir())}|{re.escape(str(Path(__file__).parents[2]))})'
+    r'(?:/[\w.+-]+)*/'
+)
 
 
 def _value(text: str) -> tuple[float, float]:
@@ -40,6 +44,11 @@ def _value(text: str) -> tuple[float, float]:
     mantissa, _, power = plain.replace('·10', 'e').partition('e')
     scale = 10.0 ** int(power.translate(POWERS) or 0)
     return float(mantissa) * scale, 0.5000001 * scale * 10.0 ** -len(mantissa.partition('.')[2])
+
+
+def _words(line: str) -> str:
+    """A line without its numbers, and without the blanks that make up for their lengths."""
+    return ' '.join(NUMBER.sub('#', line).split())
 
 
 def alike(one: str, other: str) -> bool:
@@ -70,8 +79,7 @@ def _differences(approved: list[str], found: list[str]) -> list[str]:
 def check(path: Path, name: str, lines: Iterable[str]) -> None:
     """Hold lines against those approved under a name in a file, or approve them."""
     found = [line.rstrip() for text in lines for line in text.splitlines()]
-    for pattern, mask in MASKED:
-        found = [pattern.sub(mask, line) for line in found]
+    found = [FOLDERS.sub('<folder>/', line) for line in found]
     parts = _parts(path)
     known = parts.get(name, [])
     if _same(known, found):
@@ -105,12 +113,15 @@ class Approved:
         self._told: list[Iterable[str]] = []
         self._pages: list[str] = []
 
-    def add(self, lines: Iterable[str]) -> None:
-        """Lines to approve as they stand, such as what is printed."""
-        self._told.append(lines)
+    def add(self, lines: Iterable[str], *, numbers: bool = True) -> None:
+        """Lines to approve beside, such as what is printed; they may be made later."""
+        self._told.append(lines if numbers else map(_words, lines))
 
-    def folder(self, folder: Path, *, panels: bool = False) -> None:
-        """The page of a folder, its figures, composed by `artists.captured`, and its documents."""
+    def folder(self, folder: Path, *, panels: bool = False, numbers: bool = True) -> None:
+        """The page of a folder, its figures, composed by `artists.captured`, and its documents.
+
+        Without numbers where a search found them, which takes another way on another processor.
+        """
         page = (folder / 'report.html').read_text(encoding='utf-8')
         lines = [*shown.page_lines(page, panels=panels)]
         for path in sorted(folder.glob('figures/*.pdf')):
@@ -118,7 +129,8 @@ class Approved:
         for path in sorted(folder.glob('*.json')):
             if path.name not in ('manifest.json', 'summary.json'):
                 lines += [path.name, *shown.document_lines(json.loads(path.read_text()))]
-        self._pages += [*lines, *map(shown.parquet_line, sorted(folder.glob('*.parquet')))]
+        lines += map(shown.parquet_line, sorted(folder.glob('*.parquet')))
+        self._pages += lines if numbers else map(_words, lines)
 
     def lines(self) -> Iterator[str]:
         """The pages, else all that was made, in this order; then what was added."""

@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 
 from auv_analysis.report import document, panels, plots, results
 
-APPROVE = bool(os.environ.get('AUV_GVC_APPROVE'))
+APPROVE = 'AUV_GVC_APPROVE' in os.environ and 'CI' not in os.environ
 RELATIVE, NOISE = 1e-3, 1e-9
 MOST = 12  # differences that are shown
 NUMBER = re.compile(

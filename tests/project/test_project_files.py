@@ -100,3 +100,11 @@ def test_container_takes_nothing_that_is_made_here() -> None:
     ]
     assert len(folders) == 6
     assert set(folders) < set(ignored)
+
+
+def test_every_approved_text_belongs_to_a_test() -> None:
+    for path in (ROOT / 'tests').rglob('approved/*.txt'):
+        tests = (path.parents[1] / f'test_{path.stem}.py').read_text(encoding='utf-8')
+        names = re.findall(r'^=== (\w+)', path.read_text(encoding='utf-8'), re.M)
+        assert names, path
+        assert not [name for name in names if f'def {name}(' not in tests], path

@@ -28,8 +28,16 @@ def _is_symmetric(node: Any) -> bool:
     """Whether a list is a comprehension, or what `min` or `max` of it does not depend on order."""
     if any(one.type.endswith('comp_for') for one in node.children):
         return True
-    called = node.parent.get_previous_leaf() if node.parent is not None else None
-    return node.type == 'arglist' and called is not None and called.value in OPPOSITE
+    holder = node.parent
+    if node.type == 'testlist_comp' and holder.type == 'atom':
+        holder = holder.parent  # a list that is the one argument
+    called = holder.get_previous_leaf() if holder is not None else None
+    return (
+        node.type in ('arglist', 'testlist_comp')
+        and (node.type == 'arglist' or holder.type == 'trailer')
+        and called is not None
+        and called.value in OPPOSITE
+    )
 
 
 class Wiring(Operator):

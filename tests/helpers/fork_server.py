@@ -49,6 +49,7 @@ LOADED = (  # what `auv` imports once it knows what it has to do
     *('auv_analysis.cli.scenario_runs', 'auv_analysis.graph.recorded_runs'),
     *('auv_analysis.studies.compare.sources', 'auv_analysis.output.keyboard'),
 )
+PERIOD = 0.2  # s, of diagnostics: who waits for what a node says waits for a fifth
 REPORT = ('auv_analysis.report.document', 'auv_analysis.report.plots')
 INTERPRETER = Path(sys.executable).name.encode()
 SIZE = 1 << 20  # bytes of a request, at most
@@ -312,7 +313,7 @@ def serve(line: socket.socket) -> None:
 def main() -> None:
     """Load what the programs call most, then serve."""
     setproctitle('fork server')  # before the environment is changed, in which it finds its room
-    node_interface.DIAGNOSTICS_PERIOD = 0.2  # s: who waits for what a node says waits for less
+    node_interface.DIAGNOSTICS_PERIOD = PERIOD
     warm_up(load_scenario('case1'), ['gvc'])
     for kind in (ParameterEvent, *(topic.type for topic in TOPICS)):
         check_for_type_support(kind)

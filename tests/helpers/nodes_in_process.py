@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 import yaml
 from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
+from helpers.fork_server import PERIOD
 from helpers.node_processes import Peer, fresh_domain
 from nav_msgs.msg import Odometry
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
+
+from auv_dynamics.ros import node_interface
 
 SECOND = 10**9
 NED, FSD = 'odom_ned', 'base_link_fsd'
@@ -32,6 +35,7 @@ class Program(Peer):
 
     def __init__(self) -> None:
         super().__init__(fresh_domain())
+        node_interface.DIAGNOSTICS_PERIOD = PERIOD
         self.nodes: list[Any] = []
 
     def add(self, make: Callable[..., Any], given: dict[str, Any], **options: Any) -> Any:

@@ -86,6 +86,57 @@ def failed(found: dict[str, CheckResult]) -> set[str]:
     return {id for id, one in found.items() if one.verdict == FAIL}
 
 
+@pytest.mark.parametrize('commands', [False, True])
+def test_nothing_is_published_until_it_speaks(commands: bool) -> None:
+    domain = fresh_domain()
+    peer, client = Peer(domain), RosDriverClient(domain, '/', TOPICS, Frames(), commands=commands)
+    name = COMMANDER if commands else interface.OBSERVER
+    try:
+
+        def listens() -> bool:
+            client.listen(0.01)
+            return peer.node.count_subscribers('odom') > 0 and name in peer.node.get_node_names()
+
+        peer.until(listens)
+        published = peer.node.get_publisher_names_and_types_by_node
+        assert published(name, '/') == []
+        assert peer.node.get_client_names_and_types_by_node(name, '/') == []
+        if not commands:
+            with pytest.raises(RuntimeError, match='publishes nothing'):
+                client.advertise()
+            return
+        client.advertise()
+        peer.until(
+            lambda: published(name, '/') == [('/wrench', ['geometry_msgs/msg/WrenchStamped'])]
+        )
+        with pytest.raises(RuntimeError, match='odometry'):
+            client.send((0.0,) * 6)  # nothing has been heard yet
+        client.retire()
+        peer.until(lambda: published(name, '/') == [])
+    finally:
+        client.close()
+        peer.close()
+
+
+def test_two_that_command_see_each_other_although_they_have_one_name() -> None:
+    domain = fresh_domain()
+    clients = [RosDriverClient(domain, '/', TOPICS, Frames(), commands=True) for _ in '12']
+    try:
+        assert [client.advertise() for client in clients] == [False, False]
+        limit = time.monotonic() + PATIENCE
+        while not all(client.others() == [f'/{COMMANDER}'] for client in clients):
+            assert time.monotonic() < limit
+            for client in clients:
+                client.listen(0.05)
+        clients[0].retire()
+        while clients[1].others():
+            assert time.monotonic() < limit
+            clients[1].listen(0.05)
+    finally:
+        for client in clients:
+            client.close()
+
+
 def test_a_healthy_driver_passes(judged) -> None:
     found = judged['healthy']
     assert failed(found) == set()
@@ -143,57 +194,6 @@ def test_what_there_is_elsewhere_is_named(domain: int) -> None:
     assert 'nav_msgs/msg/Odometry is on' in found[0].found
     assert '/healthy/odom of /healthy/driver' in found[0].found
     assert {one.verdict for one in found if one.id in ('rate', 'frames')} == {NOT_CHECKED}
-
-
-@pytest.mark.parametrize('commands', [False, True])
-def test_nothing_is_published_until_it_speaks(commands: bool) -> None:
-    domain = fresh_domain()
-    peer, client = Peer(domain), RosDriverClient(domain, '/', TOPICS, Frames(), commands=commands)
-    name = COMMANDER if commands else interface.OBSERVER
-    try:
-
-        def listens() -> bool:
-            client.listen(0.01)
-            return peer.node.count_subscribers('odom') > 0 and name in peer.node.get_node_names()
-
-        peer.until(listens)
-        published = peer.node.get_publisher_names_and_types_by_node
-        assert published(name, '/') == []
-        assert peer.node.get_client_names_and_types_by_node(name, '/') == []
-        if not commands:
-            with pytest.raises(RuntimeError, match='publishes nothing'):
-                client.advertise()
-            return
-        client.advertise()
-        peer.until(
-            lambda: published(name, '/') == [('/wrench', ['geometry_msgs/msg/WrenchStamped'])]
-        )
-        with pytest.raises(RuntimeError, match='odometry'):
-            client.send((0.0,) * 6)  # nothing has been heard yet
-        client.retire()
-        peer.until(lambda: published(name, '/') == [])
-    finally:
-        client.close()
-        peer.close()
-
-
-def test_two_that_command_see_each_other_although_they_have_one_name() -> None:
-    domain = fresh_domain()
-    clients = [RosDriverClient(domain, '/', TOPICS, Frames(), commands=True) for _ in '12']
-    try:
-        assert [client.advertise() for client in clients] == [False, False]
-        limit = time.monotonic() + PATIENCE
-        while not all(client.others() == [f'/{COMMANDER}'] for client in clients):
-            assert time.monotonic() < limit
-            for client in clients:
-                client.listen(0.05)
-        clients[0].retire()
-        while clients[1].others():
-            assert time.monotonic() < limit
-            clients[1].listen(0.05)
-    finally:
-        for client in clients:
-            client.close()
 
 
 def test_with_another_commander_nothing_is_sent(domain: int) -> None:

@@ -16,7 +16,7 @@ from auv_analysis.herman2018.claims import claims_part, judge_runs
 from auv_analysis.herman2018.paper import paper_figures
 from auv_analysis.output.text import fixed, join, number, plain, tied
 from auv_analysis.report import run_report
-from auv_analysis.report.plots import FigureRecord
+from auv_analysis.report.plots import FigureRecord, style
 from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.traces import thinned
@@ -304,9 +304,14 @@ def test_report_of_another_vehicle_and_scenario(other):
     assert 'b: 2 # <GIVEN>' in text
 
 
-def test_report_of_two_samples(case1, tmp_path):
+def test_report_of_two_samples(case1, tmp_path, composing):
     """They are the hardest to draw."""
-    html, _ = _write(tmp_path, {'cl': _short(case1['cl'], 0.01)})
+    with composing() as figures:
+        html, _ = _write(tmp_path, {'cl': _short(case1['cl'], 0.01)})
+    with style():
+        for figure in figures.values():
+            figure.canvas.draw()
+    assert len(figures) >= 7
     assert 'What was found' in _text(html)
 
 

@@ -13,11 +13,13 @@ from helpers import costly_bags
 from helpers.damaged_bags import UPRIGHT, old
 from helpers.made_messages import TYPES, odometry, serialized, stamped
 from mcap.data_stream import RecordBuilder
+from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Message, Schema
 
 from auv_analysis import load_scenario
 from auv_analysis.bag import attachments, limits, load_run, mcap_file, metadata, read_bag
 from auv_analysis.bag.any_bag import survey
+from auv_analysis.bag.chunks import Body
 from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli.main import main
@@ -196,6 +198,15 @@ def test_strings_that_reach_beyond_their_record(tmp_path: Path) -> None:
     path = tmp_path / 'bag.mcap'
     path.write_bytes(MAGIC + record(Header('ros2', 'harm')) + channel + bytes(100))
     assert 'damaged from byte' in read_bag(path).notes[0]
+
+
+@pytest.mark.parametrize('data', [b'\1\0', b'\3\0\0\0ab', b'\xff\xff\xff\xff'])
+def test_a_text_that_is_longer_than_its_record_is_damage(data: bytes) -> None:
+    with pytest.raises(McapError, match='shorter than its fields'):
+        Body(data).read_prefixed_string()
+    with pytest.raises(McapError, match='shorter than its fields'):
+        Body(data).read(len(data) + 1)
+    assert Body(b'\2\0\0\0abc').read_prefixed_string() == 'ab'
 
 
 def test_attachments_that_are_too_long_or_too_many(

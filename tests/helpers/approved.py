@@ -48,7 +48,7 @@ def _value(text: str) -> tuple[float, float]:
 
 def _words(line: str) -> str:
     """A line without its numbers, and without the blanks that make up for their lengths."""
-    return ' '.join(NUMBER.sub('#', line).split())
+    return ' '.join(NUMBER.sub('#', FOLDERS.sub('<folder>/', line)).split())
 
 
 def alike(one: str, other: str) -> bool:
@@ -118,12 +118,13 @@ class Approved:
         self._told.append(lines if numbers else map(_words, lines))
 
     def folder(self, folder: Path, *, panels: bool = False, numbers: bool = True) -> None:
-        """The page of a folder, its figures, composed by `artists.captured`, and its documents.
+        """What is in a folder: page, figures, composed by `artists.captured`, and documents.
 
         Without numbers where a search found them, which takes another way on another processor.
         """
-        page = (folder / 'report.html').read_text(encoding='utf-8')
-        lines = [*shown.page_lines(page, panels=panels)]
+        page, lines = folder / 'report.html', list[str]()
+        if page.exists():
+            lines += shown.page_lines(page.read_text(encoding='utf-8'), panels=panels)
         for path in sorted(folder.glob('figures/*.pdf')):
             lines += [f'figure {path.stem}', *path.read_text(encoding='utf-8').splitlines()]
         for path in sorted(folder.glob('*.json')):

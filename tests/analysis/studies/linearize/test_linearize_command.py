@@ -33,6 +33,7 @@ def test_a_vehicle_alone(tmp_path, capsys):
 def test_the_loops_of_a_scenario_as_a_table(tmp_path, capsys, approved):
     main(['linearize', 'case1', '--controller', 'cl', '--out', str(tmp_path / 'out')])
     text = capsys.readouterr().out
+    approved.folder(tmp_path / 'out')
     approved.add(text.splitlines())
     for word in ('open loop: 8 states', 'cl: 20 states', 'damping', 'frequency, rad/s', '±'):
         assert word in text

@@ -336,6 +336,7 @@ def test_the_command_prints_margins_and_writes_them(tmp_path, capsys, approved):
     line = ['linearize', 'case1_bluerov2_heavy', '--controller', 'gvc', '--out', str(out)]
     main([*line, '--delay-from', str(check), '--lag', '0.02'])
     text = capsys.readouterr().out
+    approved.folder(out)
     approved.add(text.splitlines())
     for word in (
         'period 0.01 s, delay 0.03 s, lag 0.02 s',

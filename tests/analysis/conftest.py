@@ -10,7 +10,6 @@ from helpers.artists import captured
 from helpers.browser import Watched, chromium
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.output import parallel
 from auv_analysis.report import results
 from auv_analysis.report.run_report import write_report
 from auv_analysis.runs.run import Run
@@ -75,11 +74,8 @@ def composing() -> Callable[[], AbstractContextManager[None]]:
 
 
 @pytest.fixture
-def approved(
-    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[approving.Approved]:
+def approved(request: pytest.FixtureRequest) -> Iterator[approving.Approved]:
     """Holds all that the test shows, which it makes or names, against the approved text."""
-    monkeypatch.setattr(parallel, 'MOST', 0)  # what a copy of this process makes is not seen
     shown = approving.Approved()
     with shown.watching():
         yield shown

@@ -70,3 +70,12 @@ def test_the_printed_table_has_each_number_in_its_column(capsys, approved) -> No
         wanted = [six[i] for part in wrench.values() for six in part.values()]
         assert [float(value) for value in values[2:]] == wanted
     assert lines[9] == 'note: odd'
+
+
+def test_what_is_said_of_a_recorded_law_that_is_asked_again(approved) -> None:
+    found = [
+        replay.Reproduction(relative, within, 0.01)
+        for relative, within in ((None, None), (None, 0.0), (None, 2.0), (0.005, 1.0), (0.02, 1.0))
+    ]
+    assert [one.holds for one in found] == [None, True, False, True, False]
+    approved.add(one.sentence() for one in found)

@@ -18,7 +18,7 @@ from auv_analysis.report import plots, run_plots
 from auv_analysis.report.digest import digest, digests
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.run_tables import certificate_table, reasons
-from auv_analysis.report.scenario_text import set_up
+from auv_analysis.report.scenario_text import gain_text, set_up
 from auv_analysis.report.wrench_plots import certificate_figure
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
@@ -119,6 +119,12 @@ def test_set_up_says_every_number_of_the_scenario(rough):
     assert any('symmetrised' in line for line in words['warnings'])
     assert not any('/' in line.partition(': ')[0] for line in words['warnings']), 'no folders'
     assert list(set_up(*rough).limit) == DATA['actuators']['limit']
+
+
+def test_gains_are_short_where_they_can_be() -> None:
+    assert gain_text(2.5) == '2.5 I'
+    assert gain_text([1, 2, 3, 4, 5, 6]) == 'diag(1, 2, 3, 4, 5, 6)'
+    assert gain_text((np.eye(6) + np.eye(6, k=1)).tolist()) == 'full matrix, in the listing'
 
 
 def test_set_up_of_ideal_devices(tmp_path):

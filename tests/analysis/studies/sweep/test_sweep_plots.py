@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from auv_analysis.metrics.measures import BY_NAME
 from auv_analysis.simulation.reduction import COLUMNS
+from auv_analysis.studies.sweep import report
 from auv_analysis.studies.sweep.analysis import Analysis, analysed
 from auv_analysis.studies.sweep.dataset import numbers_of, open_sweep, short_names
 from auv_analysis.studies.sweep.plots import draw, main_measures
@@ -246,6 +247,7 @@ def test_elementary_effects_stand_at_their_places(tmp_path: Path) -> None:
     key = dict(zip((t.get_text() for t in figure.legends[0].get_texts()),
                    figure.legends[0].legend_handles, strict=True))  # fmt: skip
     short = short_names(analysis.factors)
+    assert [*report._indices(analysis)]
     shown = [m for m in main_measures(analysis) if rows(analysis, 'indices', figure=m.name)]
     panels = [axes for axes in figure.axes if axes.lines]
     for axes, measure in zip(panels, shown, strict=True):
@@ -268,6 +270,7 @@ def test_elementary_effects_stand_at_their_places(tmp_path: Path) -> None:
 def test_total_indices_stand_in_their_cells(tmp_path: Path) -> None:
     analysis, figures, captions = drawn_of(tmp_path, SALTELLI, known)
     maps = heat_maps(figures['total_indices'])
+    assert [*report._indices(analysis)]
     assert list(maps) == ['(a) $S_T$', '(b) $S_T$']
     assert '(a) gvc; (b) cl' in captions['total_indices']
     short = short_names(analysis.factors)

@@ -137,7 +137,7 @@ def _drawn(runs: Mapping[str, RunDigest]) -> Drawn:
 
 
 def _panel(axes: Axes, runs: Mapping[str, RunDigest], i: int, band: float | None) -> None:
-    low, high = 0.0, 0.0
+    low = high = 0.0
     for n, run in enumerate(runs.values()):
         split = ('error', 'early') in run.traces
         for part in ('early', 'late') if split else ('whole',):

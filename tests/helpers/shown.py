@@ -8,6 +8,7 @@ import gzip
 import json
 import zlib
 from collections.abc import Iterator
+from functools import cache
 from html.parser import HTMLParser
 from itertools import groupby, zip_longest
 from pathlib import Path
@@ -22,6 +23,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.mathtext import MathTextParser
 from matplotlib.patches import Patch
 from matplotlib.spines import Spine
 from matplotlib.text import Annotation, Text
@@ -74,7 +76,9 @@ def table_lines(table: Table) -> Iterator[str]:
 
 
 def figure_lines(figure: Figure) -> Iterator[str]:
-    """Panels of a figure, artist by artist."""
+    """Panels of a figure, artist by artist; ValueError where a text cannot be set."""
+    for text in figure.findobj(Text):
+        _set(text.get_text())
     title = figure.get_suptitle()
     yield from [f'title {title}'] if title else []
     yield from (f'text {_words(text)}' for text in figure.texts if text.get_text() != title)
@@ -86,6 +90,12 @@ def figure_lines(figure: Figure) -> Iterator[str]:
             yield f'colours: {words} {digest([*axes.get_xlim(), *axes.get_ylim()])}'
         elif axes.axison and axes.get_visible():
             yield from _axes_lines(axes)
+
+
+@cache
+def _set(text: str) -> None:
+    if '$' in text:
+        MathTextParser('path').parse(text)
 
 
 def _axes_lines(axes: Axes) -> Iterator[str]:

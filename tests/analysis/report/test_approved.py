@@ -3,7 +3,8 @@
 from pathlib import Path
 
 import pytest
-from helpers import approved
+from helpers import approved, shown
+from matplotlib.figure import Figure
 
 
 @pytest.mark.parametrize(
@@ -43,3 +44,12 @@ def test_a_difference_is_shown_and_approved_on_request(tmp_path: Path, monkeypat
             approved.check(path, 'b', lines)
     with pytest.raises(pytest.fail.Exception, match='- \n\\+ new'):
         approved.check(path, 'unknown', ['new'])
+
+
+def test_a_text_that_cannot_be_set_is_no_figure() -> None:
+    figure = Figure()
+    figure.subplots().set_xlabel(r'$\xi_1$')
+    assert list(shown.figure_lines(figure))
+    figure.text(0.5, 0.5, r'$\frac{1$')
+    with pytest.raises(ValueError, match='frac'):
+        list(shown.figure_lines(figure))

@@ -45,7 +45,8 @@ LAYOUT = re.compile(  # keywords: how large, how faint, where the name of someth
 COLOUR = re.compile(r'\w*colou?rs?|hatch|fmt')  # keywords whose value, where it is a text, is taste
 LAYS_OUT = {  # calls
     'new_figure', 'ConstrainedLayoutEngine', 'tick_params', 'margins', 'set_visible', 'grid',
-    'set_minor_locator', 'minorticks_off', '_small_heads', 'set_axis_off', 'set_edgecolor',
+    'set_minor_locator', 'LogLocator', 'minorticks_off', '_small_heads', 'set_axis_off',
+    'set_edgecolor',
 }  # fmt: skip
 DASHED = re.compile(r'\(0, \([\d., ]+\)\)')  # lengths of the dashes of a line
 ROUNDED = {'number', 'plain', 'fixed'}  # calls: a value, and its digits

@@ -121,6 +121,17 @@ def test_equal_inputs_reproduce_claim_14(case1):
     assert _table(case1 | {'cl': replace(cl, tau=peak)})[14].verdict == 'partly'
 
 
+def test_claim_7_wants_both_uncertain_axes_above_the_certain_one(case1):
+    gvc = case1['gvc']
+    assert _table(case1)[7].verdict == 'reproduced'
+    first = np.abs(gvc.disturbance_estimate - gvc.disturbance)[gvc.t < 2.0].max(axis=0)
+    for certain, pair in ((1, (0, 2)), (3, (4, 5))):
+        estimate = gvc.disturbance_estimate.copy()
+        estimate[5, certain] = gvc.disturbance[5, certain] + first[[*pair]].mean()
+        changed = replace(gvc, disturbance_estimate=estimate)
+        assert _table(case1 | {'gvc': changed})[7].verdict == 'partly'
+
+
 def test_kinetic_energy_far_from_the_paper_is_not_reproduced(case1):
     gvc = replace(case1['gvc'], nu=1.2 * case1['gvc'].nu)
     assert _table(case1 | {'gvc': gvc})[9].verdict == 'not reproduced'

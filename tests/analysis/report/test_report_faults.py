@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace as Made
 
+import numpy as np
 import pyarrow.parquet as parquet
 import pytest
 import yaml
@@ -151,3 +152,9 @@ def test_runs_with_other_faults_share_no_section(runs, tmp_path):
     other = replace(runs['slow'], faults=())
     assert fault_part(tmp_path, {'gvc': runs['gvc'], 'slow': other}) is None
     assert not list(tmp_path.iterdir())
+
+
+def test_runs_of_which_one_has_no_set_point_have_no_responses_to_compare(runs, tmp_path):
+    aimless = replace(runs['slow'], nu_d=np.full_like(runs['slow'].nu_d, np.nan))
+    section, sentences = fault_part(tmp_path, {'gvc': runs['gvc'], 'slow': aimless})
+    assert (len(section.blocks), sentences) == (1, [])

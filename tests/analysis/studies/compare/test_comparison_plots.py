@@ -320,3 +320,9 @@ def test_energies_of_made_runs_differ() -> None:
     """What the oracles rest on: no two columns are alike."""
     run = made('a', 'cl', 1)
     assert len(set(np.round(energies(run.nu).mean(axis=0), 6))) == 6
+
+
+def test_without_set_points_no_error_is_drawn() -> None:
+    figure, title, caption = plots.errors([])
+    assert figure is None
+    assert caption == f'{title}: without set-points there is none.'

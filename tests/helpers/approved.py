@@ -21,6 +21,7 @@ from typing import Any
 
 import pytest
 from helpers import shown
+from helpers.report_pages import value_of
 from matplotlib.figure import Figure
 
 from auv_analysis.report import document, panels, plots, results
@@ -31,19 +32,10 @@ MOST = 12  # differences that are shown
 NUMBER = re.compile(
     r'(?<![\w#.])[−+-]?\d[\d\u202f]*(?:\.\d+)?(?:e[+-]?\d+|·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(?!\w)'
 )
-POWERS = str.maketrans('⁻⁰¹²³⁴⁵⁶⁷⁸⁹', '-0123456789')
 FOLDERS = re.compile(
     f'(?:{re.escape(tempfile.gettempdir())}|{re.escape(str(Path(__file__).parents[2]))})'
     r'(?:/[\w.+-]+)*/'
 )
-
-
-def _value(text: str) -> tuple[float, float]:
-    """A number, and half a unit of its last digit."""
-    plain = text.replace('\u202f', '').replace('−', '-')
-    mantissa, _, power = plain.replace('·10', 'e').partition('e')
-    scale = 10.0 ** int(power.translate(POWERS) or 0)
-    return float(mantissa) * scale, 0.5000001 * scale * 10.0 ** -len(mantissa.partition('.')[2])
 
 
 def _words(line: str) -> str:
@@ -58,7 +50,7 @@ def alike(one: str, other: str) -> bool:
     if NUMBER.sub('#', one) != NUMBER.sub('#', other):
         return False
     for a, b in zip(NUMBER.findall(one), NUMBER.findall(other), strict=True):
-        (x, half), (y, other_half) = _value(a), _value(b)
+        (x, half), (y, other_half) = value_of(a), value_of(b)
         near = max(RELATIVE * max(abs(x), abs(y)), min(half, other_half), NOISE)
         if abs(x - y) > near:
             return False

@@ -56,13 +56,15 @@ class Page(HTMLParser):
 
 def tokens(text: str) -> list[tuple[float, float]]:
     """Numbers in a text, each with half a unit of its last digit."""
-    found = []
-    for match in TOKEN.finditer(text):
-        mantissa, _, power = match[0].replace('\u202f', '').replace('−', '-').partition('·10')
-        scale = 10.0 ** int(power.translate(POWERS)) if power else 1.0
-        decimals = len(mantissa.partition('.')[2])
-        found.append((float(mantissa) * scale, 0.5000001 * 10.0**-decimals * scale))
-    return found
+    return [value_of(match[0]) for match in TOKEN.finditer(text)]
+
+
+def value_of(text: str) -> tuple[float, float]:
+    """A number, and half a unit of its last digit."""
+    plain = text.replace('\u202f', '').replace('−', '-')
+    mantissa, _, power = plain.replace('·10', 'e').partition('e')
+    scale = 10.0 ** int(power.translate(POWERS) or 0)
+    return float(mantissa) * scale, 0.5000001 * scale * 10.0 ** -len(mantissa.partition('.')[2])
 
 
 def at(document, pointer: str):

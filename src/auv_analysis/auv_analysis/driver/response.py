@@ -228,7 +228,7 @@ def fit_response(
     clear = opposite - least > MISFIT * unlike + chance and unlike < EXPLAINED * moved
     told = clear and abs(gain) >= NOTHING
     k, i = (int(one) for one in np.unravel_index(np.argmin(mine), mine.shape))
-    left = _beside(t, alone[k], nu[:, axis] - gains[k, i] * forms[k, i])
+    left = _beside(_steady(t, alone[k]), nu[:, axis] - gains[k, i] * forms[k, i])
     spread = least / len(t) * float(in_a_row(left[:, None])[0])
     likely = delays[mine.min(axis=0) <= least + spread]
     error = float(np.hypot(np.abs(likely - delays[i]).max(initial=0.0), FINE / 2.0))
@@ -256,7 +256,8 @@ def _gains(
     t: np.ndarray, y: np.ndarray, forms: np.ndarray, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Factor of each form (k, n) beside line and free motion; squares left by it, and by none."""
-    basis, y = _steady(t, free), _beside(t, free, y)
+    basis = _steady(t, free)
+    y = _beside(basis, y)
     size = np.einsum('kn,kn->k', forms, forms)
     strong = size - ((forms @ basis) ** 2).sum(axis=1)  # of what is left beside line and motion
     told = strong > ALIKE * size
@@ -265,9 +266,8 @@ def _gains(
     return gain, np.maximum(still - gain**2 * strong, 0.0), still
 
 
-def _beside(t: np.ndarray, free: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """A signal (n,) without a straight line and a free motion (n,)."""
-    basis = _steady(t, free)
+def _beside(basis: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """A signal (n,) without what an orthonormal basis (n, k) spans."""
     return np.asarray(y - basis @ (y @ basis))
 
 

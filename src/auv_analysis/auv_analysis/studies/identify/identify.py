@@ -161,7 +161,8 @@ def identify(
     longest = min(sum(r.end - r.start for r in training) / FEWEST, LONG, room)
     if settings.segment:
         problem(settings.segment)  # refused before anything is fitted
-    final, halves, tried = _search(problem, (u, theta, late), longest, settings, say)
+    shortest = min(UNMEASURED if np.isnan(noise[:6]).any() else SHORT, longest)
+    final, halves, tried = _search(problem, (u, theta, late), (shortest, longest), settings, say)
     whole = final.fit(tried[0].unknowns, tried[0].theta, tried[0].starts)
     beside = _between(tried) + _bias(whole, halves) + _of_still(final, whole, every)
     covariance = final.covariance(whole) + beside
@@ -186,7 +187,7 @@ def identify(
 def _search(
     problem: Callable[..., OutputError],
     begun: tuple[Unknowns, np.ndarray, float],
-    longest: float,
+    lengths: tuple[float, float],
     settings: Settings,
     say: Say,
 ) -> tuple[OutputError, OutputError, list[Fit]]:
@@ -196,7 +197,7 @@ def _search(
     ----------
     problem : segments of a length in s, with the gain of the observer, and at most so many
     begun : unknowns, where to begin, and lag and delay together, s
-    longest : s, of segments
+    lengths : s, of the first segments, and of all at most
     settings : of which segment and observer count
     say : told what is being done
 
@@ -206,11 +207,8 @@ def _search(
     tried : fits with neighbouring delays, the best one first
 
     """
-    u, theta, late = begun
-    measured = problem(min(SHORT, longest), most=FIRST)
-    if np.isnan(measured.noise[:6]).any():
-        measured = problem(min(UNMEASURED, longest), most=FIRST)
-    first = _with_best_delay(measured, u, theta, late, NEARBY)[0]
+    (u, theta, late), (shortest, longest) = begun, lengths
+    first = _with_best_delay(problem(shortest, most=FIRST), u, theta, late, NEARBY)[0]
     u, theta = first.unknowns, first.theta
 
     def suited(gain: float) -> float:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.collections import Collection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -77,7 +78,7 @@ def table_lines(table: Table) -> Iterator[str]:
 
 def figure_lines(figure: Figure) -> Iterator[str]:
     """Panels of a figure, artist by artist; ValueError where a text cannot be set."""
-    for text in figure.findobj(Text):
+    for text in _texts(figure):
         _set(text.get_text())
     title = figure.get_suptitle()
     yield from [f'title {title}'] if title else []
@@ -90,6 +91,18 @@ def figure_lines(figure: Figure) -> Iterator[str]:
             yield f'colours: {words} {digest([*axes.get_xlim(), *axes.get_ylim()])}'
         elif axes.axison and axes.get_visible():
             yield from _axes_lines(axes)
+
+
+def _texts(artist: Artist) -> Iterator[Text]:
+    """All texts but those of ticks that matplotlib chooses itself."""
+    for child in artist.get_children():
+        if isinstance(child, Axis):
+            fixed = isinstance(child.get_major_locator(), FixedLocator)
+            yield from [child.label, *(child.get_ticklabels() if fixed else [])]
+        elif isinstance(child, Text):
+            yield child
+        else:
+            yield from _texts(child)
 
 
 @cache

@@ -220,7 +220,10 @@ def _draw(plot: Any, panel: TimePanel, dashes: Mapping[str, list[int]], columns:
         if panel.kind != 'stack' and len(t) > 2 * columns:
             t, y = thinned(t, y, t[0], t[-1], columns=columns)
         t, y = broken((t, y), curve.gaps, curve.step)
-        source = sources.setdefault(t.tobytes(), ColumnDataSource({'t': t.astype(np.float32)}))
+        times = t.tobytes()
+        if times not in sources:
+            sources[times] = ColumnDataSource({'t': t.astype(np.float32)})
+        source = sources[times]
         at, name = f'y{number}', f'{curve.run} {curve.key}'
         if panel.kind == 'stack':
             below, base = base, base + y

@@ -209,9 +209,7 @@ def of_a_run(line: Line) -> Callable[..., Process]:
     """What the supervisor of a run starts its nodes by, in place of a new interpreter."""
 
     def begin(command: Sequence[str], env: Mapping[str, str], stdout: IO[bytes], **_: Any) -> Any:
-        # it is not `auv` that has forked it
-        environ = {**env, PARENT: str(os.getppid())}
-        return line.start(command, environ, files=(stdout.fileno(), stdout.fileno()))
+        return line.start(command, env, files=(stdout.fileno(), stdout.fileno()))
 
     return begin
 
@@ -234,6 +232,8 @@ def fork(
             os.close(number)
         os.environ.clear()
         os.environ.update(environ)
+        if PARENT in environ:  # it is not `auv` that has forked it
+            os.environ[PARENT] = str(os.getppid())
         os.chdir(folder)
         os.dup2(said[0], 1)
         os.dup2(said[1], 2)

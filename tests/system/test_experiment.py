@@ -62,10 +62,10 @@ def write(path: Path, **changes) -> Path:
 
 @pytest.fixture(scope='module')
 def done(tmp_path_factory) -> Path:
-    """Two recorded runs of the same scenario: gvc in folder one, with a report, both in two."""
+    """Two recorded runs of the same scenario: gvc in folder one, both in two."""
     root = tmp_path_factory.mktemp('run')
     scenario = write(root / 'six_dofs.yaml')
-    options = '--out', str(root / 'one'), '--controller', 'gvc', '--json'
+    options = '--out', str(root / 'one'), '--controller', 'gvc', '--json', '--no-report'
     ended = installed_auv('run', str(scenario), *options)
     assert ended.returncode == 0, ended.stderr
     assert json.loads(ended.stdout).keys() == {'gvc'}
@@ -141,8 +141,6 @@ def test_twist_is_in_the_child_frame(done: Path) -> None:
 
 def test_what_a_run_leaves(done: Path) -> None:
     out = done / 'one'
-    assert {'summary.json', 'report.html', 'figures', 'gvc'} <= {p.name for p in out.iterdir()}
-    assert len(list((out / 'figures').glob('*.png'))) >= 7
     summary = json.loads((out / 'summary.json').read_text())
     assert summary['gvc']['source'] == 'bag'
     assert summary['gvc']['samples'] == 301

@@ -7,12 +7,14 @@ import numpy as np
 import pyarrow.parquet as parquet
 import pytest
 from helpers.artists import captured
+from helpers.fork_server import of_a_run
 from helpers.graph_runs import assert_same, both
-from helpers.node_processes import auv
+from helpers.node_processes import fork_server, fresh_domain
 from helpers.report_pages import Page
 
 from auv_analysis.bag import load_run, read_bag
 from auv_analysis.cli.main import main
+from auv_analysis.graph import supervisor
 from auv_analysis.metrics.fault_response import FILE, responses
 from auv_analysis.runs.run import Run
 from auv_dynamics.ros import interface
@@ -44,9 +46,10 @@ faults:
 def done(tmp_path_factory) -> Path:
     root = tmp_path_factory.mktemp('failing')
     (root / 'failing.yaml').write_text(SCENARIO)
-    options = '--out', str(root / 'out'), '--composed', '--no-report'
-    ended = auv('run', str(root / 'failing.yaml'), *options)
-    assert ended.returncode == 0, ended.stderr
+    with captured(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(supervisor, 'begin', of_a_run(fork_server()))
+        patch.setenv('ROS_DOMAIN_ID', str(fresh_domain()))
+        main(['run', str(root / 'failing.yaml'), '--out', str(root / 'out'), '--composed'])
     return root
 
 
@@ -87,18 +90,15 @@ def test_the_bag_shows_each_fault(recorded: Run) -> None:
     assert np.ptp(recorded.tau[590:], axis=0).max() > 1e-2
 
 
-def test_the_report_says_what_the_law_did(done: Path, recorded: Run, tmp_path: Path) -> None:
-    out = tmp_path / 'out'
-    with captured() as figures:
-        main(['analyze', str(done / 'out' / 'gvc'), '--out', str(out)])
-    page = Page((out / 'report.html').read_text(encoding='utf-8'))
+def test_the_report_says_what_the_law_did(done: Path, recorded: Run) -> None:
+    page = Page((done / 'out' / 'report.html').read_text(encoding='utf-8'))
     tables = [name for name in page.tables if name.startswith('faults_')]
     assert tables == [f'faults_{number}' for number in range(1, 9)]
-    rows = parquet.read_table(out / FILE).to_pylist()
+    rows = parquet.read_table(done / 'out' / FILE).to_pylist()
     assert len(rows) == 8 * 6
     assert {row['controller'] for row in rows} == {'gvc'}
     known = {(one.mark.number, one.dof): one for one in responses(recorded)}
     for row in rows:
         assert row['rms_during'] == known[row['fault'], row['dof']].rms[1]
     assert all(row['end'] is None and row['recovery'] is None for row in rows[-6:])
-    assert 'faults' in figures
+    assert (done / 'out' / 'figures' / 'faults.png').is_file()

@@ -115,7 +115,7 @@ def long_schema(count: int) -> bytes:
 
 def long_maps(count: int) -> bytes:
     """Channels with very much to be said of them."""
-    about = b''.join(text(f'{i}') + text('') for i in range(count // 50))
+    about = b''.join(text(f'{i}') + text('') for i in range(count // 200))
     return file_of(chunk(schema(1) + b''.join(channel(i, '/x', 1, about) for i in range(50))))
 
 

@@ -6,6 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 RUNS := $(VENV)/.runs
+COLLECTED := $(VENV)/.collected
 PACKAGES := auv_dynamics auv_gvc_controller auv_analysis
 SOURCES := $(foreach p,$(PACKAGES),src/$(p)/setup.py src/$(p)/setup.cfg src/$(p)/package.xml)
 
@@ -66,7 +67,12 @@ TEST := $(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
 test: kernels  ## the tests
 	$(TEST)
 
-kernels: setup  ## compile what the tests call, where it is not compiled
+# once: else four workers compile the same modules side by side; what cannot be imported they report
+$(COLLECTED): $(READY)
+	$(BIN)/python -m pytest --collect-only -qq > /dev/null || true
+	@touch $@
+
+kernels: $(COLLECTED)  ## compile what the tests call, where it is not compiled
 	$(BIN)/python tests/compile_kernels.py
 
 # AUV_GVC_PATIENCE is the factor of every limit

@@ -26,7 +26,11 @@ def sorted_poles(A):
 
 
 def test_derivatives_of_what_has_a_corner_in_its_slope():
-    J, error = jacobian(lambda x: np.array([np.abs(x[0]) * x[0] + x[1], x[0] * x[1]]), np.zeros(2))
+    def corner(points):
+        x, y = points.T
+        return np.stack([np.abs(x) * x + y, x * y], axis=1)
+
+    J, error = jacobian(corner, np.zeros(2))
     assert_allclose(J, [[0, 1], [0, 0]], atol=1e-12)
     assert error.max() < 1e-10
     J, error = jacobian(lambda x: np.sin(50 * x), np.array([0.3]))
@@ -45,7 +49,7 @@ def test_vehicle_alone_against_differences_of_its_dynamics(name):
         return np.concatenate([(kinematics(eta) @ nu)[3:5], nu_dot])
 
     y0 = np.concatenate([model.x0, model.u0])
-    slope, _ = jacobian(rate, y0)
+    slope, _ = jacobian(lambda points: np.stack([rate(y) for y in points]), y0)
     assert_allclose(np.hstack([model.A, model.B]), slope, atol=1e-8 * np.abs(slope).max())
     assert_allclose(model.drift, rate(y0), atol=1e-12)
     assert np.abs(model.drift[:2]).max() > 0.01  # inclined and turning: no rest

@@ -49,17 +49,17 @@ def scenario_of(step=STEP, vehicle='case1_bluerov2_heavy', **changes):
     return replace(base, data=base.data | data)
 
 
-def grown(setting, gain=(1,) * 6, later=(0,) * 6, fine=2):
+def grown(loop, gain=(1,) * 6, later=(0,) * 6, fine=2):
     """Largest modulus of the closed loop's multipliers over a period, from parts of it.
 
     The wrench of each axis, `gain` times the law's, is looked up in a list of past ones for every
     part; delays are whole multiples of the `fine`-th of a period, `later` on top for each axis.
     """
-    loop, h = setting.loop(), setting.plant.period
-    n = len(setting.plant.A)
-    system = setting.plant.A, setting.plant.B, np.eye(n), np.zeros((n, 6))
-    ticks = round(setting.delay / h * fine) + np.array(later)
-    assert ticks[0] - later[0] == pytest.approx(setting.delay / h * fine, abs=1e-6)
+    plant, h, delay = loop.plant, loop.plant.period, loop.held.delay
+    n = len(plant.A)
+    system = plant.A, plant.B, np.eye(n), np.zeros((n, 6))
+    ticks = round(delay / h * fine) + np.array(later)
+    assert ticks[0] - later[0] == pytest.approx(delay / h * fine, abs=1e-6)
     law, m = loop.law, len(loop.law.rate_by_x)
     past = int(-(-ticks.max() // fine))
     now = np.eye(n + m + 6 * past, dtype=complex)
@@ -92,7 +92,7 @@ def test_margins_are_where_a_second_sampling_of_the_loop_turns_unstable(law, lat
         unit = np.eye(6)[i]
 
         def scaled(factor, unit=unit):
-            return grown(setting, 1 + (factor - 1) * unit)
+            return grown(loop, 1 + (factor - 1) * unit)
 
         assert np.isfinite(one.gain), DOFS[i]
         assert at_border(scaled(one.gain * 0.9999), scaled(one.gain * 1.0001)), (DOFS[i], one)
@@ -107,7 +107,7 @@ def test_margins_are_where_a_second_sampling_of_the_loop_turns_unstable(law, lat
             continue
         fine = 1000  # delays in steps of a thousandth of a period
         ticks = int(one.delay / STEP * fine)
-        borders = [grown(setting, later=(k * unit).astype(int), fine=fine)
+        borders = [grown(loop, later=(k * unit).astype(int), fine=fine)
                    for k in (ticks, ticks + 1)]  # fmt: skip
         assert at_border(*borders), (DOFS[i], one)
 
@@ -236,7 +236,7 @@ def test_disk_margin_holds_for_gains_and_phases_of_all_axes_at_once():
     for _ in range(200):
         # the border of the disk: (2 + alpha w)/(2 - alpha w), w on the unit circle
         w = np.exp(2j * np.pi * random.random(6))
-        assert grown(setting, (2 + 0.999 * alpha * w) / (2 - 0.999 * alpha * w)) < 1 + 1e-7
+        assert grown(loop, (2 + 0.999 * alpha * w) / (2 - 0.999 * alpha * w)) < 1 + 1e-7
 
 
 def test_an_unstable_loop_has_no_margins_but_a_gain_that_has():

@@ -141,7 +141,7 @@ def jacobian(
 
     Parameters
     ----------
-    function : (n,) to (m,)
+    function : (K, n) to (K, m), points to values
     at : (n,) where
     step : the largest one
     count : k, of the first elements of `at` alone; None: all n
@@ -152,16 +152,13 @@ def jacobian(
     error : (m, k) by how much the last two extrapolations differ
 
     """
-    columns, errors = [], []
-    for unit in np.eye(len(at))[:count]:
-        wide, half, quarter = (
-            (function(at + h * unit) - function(at - h * unit)) / (2 * h)
-            for h in (step, step / 2, step / 4)
-        )
-        first, second = 2 * half - wide, 2 * quarter - half
-        columns.append(second)
-        errors.append(np.abs(second - first))
-    return np.stack(columns, axis=1), np.stack(errors, axis=1)
+    steps = np.array([step, step / 2, step / 4])
+    moves = steps[:, None, None] * np.eye(len(at))[:count]  # (3, k, n)
+    values = function(np.stack([at + moves, at - moves]).reshape(-1, len(at)))
+    ahead, back = values.reshape(2, 3, moves.shape[1], -1)
+    wide, half, quarter = (ahead - back) / (2 * steps[:, None, None])
+    first, second = 2 * half - wide, 2 * quarter - half
+    return second.T, np.abs(second - first).T
 
 
 LEVEL = 1e-6  # distance of abs(theta) from pi/2 below which Euler angles are of no use
@@ -244,25 +241,31 @@ class LawAt:
         self._sample = compiled_sample if is_compiled(gains) else fill_sample
         self.states = type(gains).STATES
 
-    def answer(self, y: np.ndarray) -> np.ndarray:
-        """(6 + m,): tau in N and N m, then the rates of the law's m states, at t = 0."""
-        m, (phi, theta, *rest) = self.states, y.tolist()
-        nu, nu_d, nu_d_dot = (tuple(rest[k : k + 6]) for k in (0, 6 + m, 12 + m))
-        # a sample after no time at all: nothing is integrated
-        state, rate = y[8 : 8 + m].copy(), np.zeros(m)
+    def answers(self, points: np.ndarray) -> np.ndarray:
+        """(K, 6 + m) of (K, 20 + m): tau in N, N m, then rates of the law's m states, at t = 0."""
+        m = self.states
+        found = np.zeros((len(points), 6 + m))
         with user_law(self._gains):
-            tau, _ = self._sample(
-                0.0, 0.0, nu, self._attitude(phi, theta), nu_d, nu_d_dot, state, rate,
-                self._gains, self._model, self._guard,
-            )  # fmt: skip
-        answer = np.concatenate([tau, rate])
-        if not np.isfinite(answer).all():
-            raise ArithmeticError(f'the law gave what is not finite: {answer}')
-        return answer
+            states = points[:, 8 : 8 + m].copy()
+            for answer, state, y in zip(found, states, points.tolist(), strict=True):
+                # a sample after no time at all: nothing is integrated
+                tau, _ = self._sample(
+                    0.0, 0.0, tuple(y[2:8]), self._attitude(y[0], y[1]), tuple(y[8 + m : 14 + m]),
+                    tuple(y[14 + m :]), state, answer[6:], self._gains, self._model, self._guard,
+                )  # fmt: skip
+                answer[:6] = tau
+        if not np.isfinite(found).all():
+            wrong = found[~np.isfinite(found).all(axis=1)][0]
+            raise ArithmeticError(f'the law gave what is not finite: {wrong}')
+        return found
+
+    def answer(self, y: np.ndarray) -> np.ndarray:
+        """(6 + m,) of one point (20 + m,)."""
+        return self.answers(y[None])[0]
 
     def jacobian(self, y: np.ndarray, count: int | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives (6 + m, 20 + m) of the answer, and their errors; by `count` of y alone."""
-        return jacobian(self.answer, y, count=count)
+        return jacobian(self.answers, y, count=count)
 
 
 def holding_point(law: LawAt, plant: Vehicle, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:

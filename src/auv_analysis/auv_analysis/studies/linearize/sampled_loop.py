@@ -59,11 +59,13 @@ class HeldInput(NamedTuple):
 
     Attributes
     ----------
-    whole : periods of the delay
+    delay : s
+    whole : periods of it
     newest, older : (n, 6) by how much each of the two wrenches of a period acts in it
 
     """
 
+    delay: float
     whole: int
     newest: np.ndarray
     older: np.ndarray
@@ -105,7 +107,7 @@ class HeldPlant:
         rest = max(delay - whole * self.period, 0.0)
         rest = 0.0 if rest < WHOLE * self.period else rest
         after, newest = self._over(self.period - rest)
-        return HeldInput(whole, newest, after @ self._over(rest)[1])
+        return HeldInput(delay, whole, newest, after @ self._over(rest)[1])
 
     def response(self, z: np.ndarray, held: HeldInput) -> np.ndarray:
         """(..., 8, 6) from u to what the law sees, at z = exp(i omega h) (...,)."""
@@ -153,18 +155,13 @@ class SampledLoop:
     Attributes
     ----------
     plant, law : of the loop
-    delay : s from the sample to the wrench at the actuators, beside the hold
+    held : how a wrench acts on the plant, which comes late beside the hold
 
     """
 
     plant: HeldPlant
     law: SampledLaw
-    delay: float
-
-    @cached_property
-    def held(self) -> HeldInput:
-        """How a wrench acts on the plant."""
-        return self.plant.input(self.delay)
+    held: HeldInput
 
     def z(self, omega: np.ndarray) -> np.ndarray:
         """exp(i omega h) at rad/s."""
@@ -190,7 +187,7 @@ class SampledLoop:
         """1 + the loop gain of an axis whose wrench comes `extra` s later still."""
         z = self.z(np.array(omega))
         seen = self.plant.response(z, self.held)
-        late = self.plant.input(self.delay + extra)
+        late = self.plant.input(self.held.delay + extra)
         seen[:, axis] = self.plant.response(z, late)[:, axis]
         whole = np.eye(6) - self.law.response(z, self.plant.period) @ seen
         others = np.delete(np.delete(whole, axis, 0), axis, 1)

@@ -53,6 +53,13 @@ def refused(tmp_path, monkeypatch, capsys):
     return run
 
 
+@pytest.fixture
+def rough(monkeypatch):
+    """Options for a base and a tolerance that take little time, the formulas the same."""
+    monkeypatch.setattr(mesh_import, 'SMALLEST_BASE', 20)
+    return '--tolerance', '0.2'
+
+
 def sphere(subdivisions=3, radius=1.0, at=(0.0, 0.0, 0.0)):
     """A mesh of the sphere's volume."""
     mesh = trimesh.creation.icosphere(subdivisions)
@@ -67,9 +74,9 @@ def assert_within(M_A, exact, hull, error):
     assert np.max(np.abs(M_A - exact) / np.outer(size, size)) < error
 
 
-def test_sphere_has_half_of_the_displaced_mass(imported):
+def test_sphere_has_half_of_the_displaced_mass(imported, rough):
     hull = sphere()
-    vehicle, document = imported(hull, '--tolerance', '0.1')
+    vehicle, document = imported(hull, *rough)
     assert document['format'] == 'mesh'
     assert_within(vehicle.M_A, RHO * hull.volume / 2 * np.diag([1, 1, 1, 0, 0, 0]), hull, ERROR)
     assert vehicle.buoyancy == pytest.approx(RHO * 9.81 * 4 / 3 * np.pi)
@@ -137,11 +144,11 @@ def sources_added_mass(centres, radius):
     )
 
 
-def test_two_spheres_move_the_water_together(imported):
+def test_two_spheres_move_the_water_together(imported, rough):
     centres, radius = np.array([[0.0, -1.5, 0.4], [0.0, 1.5, 0.4]]), 1.0
     exact = sources_added_mass(centres, radius)
     hull = trimesh.util.concatenate([sphere(3, radius, at) for at in centres])
-    vehicle, document = imported(hull, '--panels', '2000', '--tolerance', '0.1')
+    vehicle, document = imported(hull, *rough, '--panels', '2000')
     centred = np.eye(6)
     centred[:3, 3:] = skew(vehicle.r_B)
     assert_within(centred.T @ vehicle.M_A @ centred, centred.T @ exact @ centred, hull, ERROR)
@@ -157,9 +164,8 @@ def wedge():
     return trimesh.Trimesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 
-def test_axes_units_and_origin_turn_and_shift_the_same_hull(imported, monkeypatch):
-    monkeypatch.setattr(mesh_import, 'SMALLEST_BASE', 40)  # rough: both are in error by the same
-    hull, rough = wedge(), ('--tolerance', '0.2')
+def test_axes_units_and_origin_turn_and_shift_the_same_hull(imported, rough):
+    hull = wedge()  # both are in error by the same
     vehicle, _ = imported(hull, *rough)
     origin = np.array([0.5, -0.25, 1.0])
     moved, _ = imported(
@@ -177,16 +183,16 @@ def test_axes_units_and_origin_turn_and_shift_the_same_hull(imported, monkeypatc
     assert np.abs(vehicle.M_A[:3, 3:]).max() > 1.0
 
 
-def test_a_box_keeps_its_symmetry_and_comes_out_of_a_mesh_with_faults(imported):
+def test_a_box_keeps_its_symmetry_and_comes_out_of_a_mesh_with_faults(imported, rough):
     hull = trimesh.creation.box((2, 1, 0.5))
-    vehicle, _ = imported(hull, '--tolerance', '0.05')
+    vehicle, _ = imported(hull, *rough)
     assert_array_equal(vehicle.M_A, np.diag(np.diagonal(vehicle.M_A)))
     inner = trimesh.creation.box((1, 0.5, 0.25))
     broken = trimesh.util.concatenate([hull, inner])
     keep = np.arange(len(broken.faces)) != 3
     broken.update_faces(keep)
     broken.invert()
-    again, document = imported(broken, '--tolerance', '0.05', name='hull.obj', mass=RHO)
+    again, document = imported(broken, *rough, name='hull.obj', mass=RHO)
     assert_allclose(again.M_A, vehicle.M_A, rtol=0.02, atol=2.0)
     said = ' '.join(document['traps'])
     for words in ('1 triangles added', 'normals turned outwards in 2 of 2', 'is not wetted'):
@@ -194,10 +200,12 @@ def test_a_box_keeps_its_symmetry_and_comes_out_of_a_mesh_with_faults(imported):
     assert again.buoyancy == pytest.approx(RHO * 9.81)
 
 
-def test_what_the_user_gives_is_taken_and_the_vehicle_by_other_commands(imported, tmp_path, capsys):
+def test_what_the_user_gives_is_taken_and_the_vehicle_by_other_commands(
+    imported, rough, tmp_path, capsys
+):
     hull = trimesh.creation.box((2, 1, 0.5))
     inertia = ['--inertia', '110', '300', '400', '0', '5', '0', '--products', 'integral']
-    vehicle, document = imported(hull, '--cog', '0', '0', '0.05', '--tolerance', '0.1', *inertia)
+    vehicle, document = imported(hull, '--cog', '0', '0', '0.05', *rough, *inertia)
     assert_array_equal(vehicle.r_G, [0, 0, 0.05])
     body = document['vehicle']['rigid_body']
     assert body['inertia'] == [[110, 0, -5], [0, 300, 0], [-5, 0, 400]]

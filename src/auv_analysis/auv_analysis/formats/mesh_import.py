@@ -431,8 +431,12 @@ def panel_added_mass(triangles: np.ndarray) -> np.ndarray:
     corners = np.arange(3 * len(triangles)).reshape(-1, 3)
     faces = np.column_stack([corners, corners[:, 2]])
     with _quiet(capytaine):
-        mesh = capytaine.Mesh(vertices=triangles.reshape(-1, 3), faces=faces)
-        single, double = capytaine.Delhommeau().evaluate(
+        mesh = capytaine.Mesh(
+            vertices=triangles.reshape(-1, 3), faces=faces, auto_clean=False, auto_check=False
+        )
+        # a table of waves is not used without a surface: a small one takes no time
+        small = {'tabulation_nr': 4, 'tabulation_nz': 4, 'tabulation_nb_integration_points': 5}
+        single, double = capytaine.Delhommeau(**small, tabulation_cache_dir=None).evaluate(
             mesh, mesh, free_surface=np.inf, water_depth=np.inf, adjoint_double_layer=False
         )
     area = _areas(triangles)

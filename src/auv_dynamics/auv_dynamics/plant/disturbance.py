@@ -50,13 +50,13 @@ class Harmonics:
         t = np.asarray(t, float)
         over_time = (..., *(None,) * t.ndim)
         out = np.empty((*offset.shape[:-1], *t.shape, 6))
-        for i in range(6):
-            out[..., i] = offset[..., i][over_time]
-            for j in range(self.terms[i].shape[-2]):
-                amplitude, omega, phase = np.moveaxis(
-                    self.terms[i][..., j, :][over_time], -1 - t.ndim, 0
-                )
-                out[..., i] += term(amplitude, omega, omega * t + phase)
+        for i, rows in enumerate(self.terms):
+            column = np.empty(out.shape[:-1])
+            column[...] = offset[..., i][over_time]
+            for j in range(rows.shape[-2]):
+                amplitude, omega, phase = (rows[..., j, k][over_time] for k in range(3))
+                column += term(amplitude, omega, omega * t + phase)
+            out[..., i] = column
         return out
 
     def part(self, keep: Any) -> 'Harmonics':

@@ -26,7 +26,8 @@ QUICK = ('--law', 'cl', '--samples', '12', '--structure', 'mass')
 def command(tmp_path: Path, monkeypatch, capsys) -> Callable:
     """`auv tune s.yaml` in this process: exit code, stdout, lines of stderr."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(searching, 'POINTS', 64)
+    for name, fewer in (('POINTS', 64), ('STARTS', 2), ('SHORT', 8)):
+        monkeypatch.setattr(searching, name, fewer)
     write(tmp_path, {'gvc': GVC, 'cl': SAME_CL | {'k_D': 300.0}}, duration=1.0)
 
     def call(*arguments: str) -> tuple[object, str, list[str]]:

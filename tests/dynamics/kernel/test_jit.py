@@ -150,7 +150,6 @@ def test_a_folder_that_somebody_else_made_is_not_used(tmp_path, monkeypatch):
 
 @needing('numba', compile.JITTED)
 def test_one_clone_loads_what_another_compiled_unless_the_source_differs(tmp_path):
-    hits = []
     for clone, added in (('one', 1), ('other', 1), ('changed', 2)):
         module = tmp_path / clone / 'counting.py'
         module.parent.mkdir()
@@ -160,17 +159,24 @@ def test_one_clone_loads_what_another_compiled_unless_the_source_differs(tmp_pat
             'def next_one(x):\n'
             f'    return x + {added}\n'
         )
-        call = 'from counting import next_one; print(next_one(1), len(next_one.stats.cache_hits))'
+    call = (
+        'import sys\n'
+        'for sys.path[0] in sys.argv[1:]:\n'
+        '    sys.modules.pop("counting", None)\n'
+        '    from counting import next_one\n'
+        '    print(next_one(1), len(next_one.stats.cache_hits))\n'
+    )
+    hits = []
+    for clones in (['one'], ['other', 'changed']):
         done = subprocess.run(
-            [sys.executable, '-c', call],
-            cwd=module.parent,
+            [sys.executable, '-c', call, *(str(tmp_path / clone) for clone in clones)],
             env=os.environ | {'AUV_GVC_CACHE_DIR': str(tmp_path / 'cache')},
             capture_output=True,
             text=True,
             check=True,
         )
-        hits.append(done.stdout.split())
-    assert hits == [['2', '0'], ['2', '1'], ['3', '0']]
+        hits += done.stdout.splitlines()
+    assert hits == ['2 0', '2 1', '3 0']
     assert list((tmp_path / 'cache').glob('**/*.nb?'))
 
 

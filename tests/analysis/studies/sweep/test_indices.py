@@ -18,7 +18,7 @@ SALTELLI = f"""
 name: salt
 scenario: case1
 controllers: [gvc]
-block: 64
+block: 256
 vary:
   - grid: {{integrator: [ode5, rk4]}}
   - saltelli:
@@ -91,7 +91,7 @@ def test_rows_that_settle_are_no_sample_of_the_design(tmp_path: Path) -> None:
 
 
 def test_an_unfinished_design_uses_its_whole_base_points(tmp_path: Path) -> None:
-    out = make_sweep(tmp_path, SALTELLI, linear, range(20))  # 20 * 64 of 2 * 2048 rollouts
+    out = make_sweep(tmp_path, SALTELLI, linear, range(5))  # 5 * 256 of 2 * 2048 rollouts
     found = [row for row in indices(out) if row['with'] is None]
     assert {(row['case'], row['points']) for row in found} == {('integrator = ode5', 160)}
 

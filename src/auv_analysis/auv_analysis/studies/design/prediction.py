@@ -328,7 +328,10 @@ class Prediction:
 
 def smooth_peak(signals: np.ndarray) -> np.ndarray:
     """(mean of s^8)^(1/8) over the samples of signals: (..., n, m) to (..., m)."""
-    return (signals**8).mean(axis=-2) ** 0.125
+    squares = signals * signals
+    squares *= squares
+    squares *= squares  # a power of eight takes ten times as long
+    return squares.mean(axis=-2) ** 0.125
 
 
 def decomposed(M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

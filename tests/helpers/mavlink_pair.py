@@ -1,7 +1,7 @@
 """The driver's link and the simulated autopilot, joined by bytes, in a time of the test's own."""
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -69,6 +69,7 @@ class Pair:
     def run(self, seconds: float, tau: Any = None) -> None:
         """Let time pass; each sample is answered with the wrench tau."""
         self.tau = tau
+        axes_of = cache(lambda gain: self.mapping.axes(np.array(tau), gain))
         for _ in range(round(seconds * SECOND / PERIOD)):
             self.now += PERIOD
             for message in self._over(self._ups, self.up):
@@ -81,7 +82,7 @@ class Pair:
                     continue
                 self.samples.append(sample)
                 if tau is not None:
-                    axes, self.share = self.mapping.axes(np.array(tau), self.link.gain or 1.0)
+                    axes, self.share = axes_of(self.link.gain or 1.0)
                     self.link.command(axes, self.now)
             self.link.tick(self.now)
 

@@ -202,12 +202,10 @@ def fit_response(
     varied = _varied(vehicle, x, held, model, axis, scales)
     delays = np.arange(0.0, OPPOSED * latest + FINE / 2, FINE)
     early = delays < latest + FINE / 2
-    late = np.maximum(t - delays[:, None], 0.0) / STEPS  # linearly between the predicted steps
-    at = np.minimum(late.astype(int), len(varied.t) - 2)
+    late = np.maximum(t - delays[:, None], 0.0)
 
     def form_of(k: int, which: int | slice = slice(None)) -> np.ndarray:
-        row = np.ascontiguousarray(varied.added[:, k])
-        return np.asarray(row[at[which]] + (late - at)[which] * np.diff(row)[at[which]])
+        return np.interp(late[which], varied.t, varied.added[:, k])
 
     alone = make_interp_spline(varied.t, varied.alone, k=1)(t).T
     # one form after the other, each of which fits into the processor's cache

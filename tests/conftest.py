@@ -41,6 +41,9 @@ if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:  # by `nohup`
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
+if os.environ.get('AUV_GVC_TESTS') != str(os.getppid()):  # no worker of xdist
+    os.environ['AUV_GVC_TESTS'] = str(os.getpid())  # whose programs are forked by one process
+
 AGAIN = pytest.mark.flaky(reruns=2, condition=lambda: PAUSES.longest > PAUSE)
 
 

@@ -52,6 +52,7 @@ LOADED = (  # what `auv` imports once it knows what it has to do
 PERIOD = 0.2  # s, of diagnostics: who waits for what a node says waits for a fifth
 REPORT = ('auv_analysis.report.document', 'auv_analysis.report.plots')
 INTERPRETER = Path(sys.executable).name.encode()
+OWNER = 'AUV_GVC_TESTS'  # in the environment: process id of the whole run, by tests/conftest.py
 SIZE = 1 << 20  # bytes of a request, at most
 ROOM = 4096  # bytes of a command line in the list of processes, which lie in the environment
 
@@ -167,21 +168,30 @@ class Line:
 
 
 class ForkServer(Line):
-    """A process that forks, started."""
+    """The process that forks for all workers of a test run, started where it is not there yet."""
 
     def __init__(self) -> None:
-        end, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        owner = os.environ.setdefault(OWNER, str(os.getpid()))
+        name = f'\0auv_gvc forks for {owner}'
+        end = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         super().__init__(end)
-        with theirs:
-            command = [sys.executable, '-m', __name__, str(theirs.fileno())]
-            environ = {**os.environ, 'AUV_GVC_ROOM': ' ' * ROOM}
-            self._process = subprocess.Popen(
-                command,
-                env=environ,
-                cwd=Path(__file__).parents[1],
-                stdin=subprocess.DEVNULL,
-                pass_fds=[theirs.fileno()],
-            )
+        while end.connect_ex(name):
+            with (
+                socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as entrance,
+                contextlib.suppress(OSError),  # another worker has just taken the name
+            ):
+                entrance.bind(name)
+                entrance.listen()
+                self._start(entrance.fileno(), owner)
+
+    def _start(self, entrance: int, owner: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', __name__, str(entrance), owner],
+            env={**os.environ, 'AUV_GVC_ROOM': ' ' * ROOM},
+            cwd=Path(__file__).parents[1],
+            stdin=subprocess.DEVNULL,
+            pass_fds=[entrance],
+        )
 
 
 def grow(main: Callable[[], Any], arguments: list[str]) -> int:
@@ -273,13 +283,16 @@ def program(arguments: Sequence[str]) -> Callable[[], Any]:
     return main
 
 
-def serve(line: socket.socket) -> None:
-    """Fork what is asked for and tell how it ended, until nobody asks any more."""
+def serve(entrance: socket.socket, owner: int) -> None:
+    """Fork what is asked for and tell how it ended, for as long as the process `owner` runs."""
     selector, ends = selectors.DefaultSelector(), dict[int, tuple[int, int]]()
-    lines = {line.fileno(): line}
-    selector.register(line, selectors.EVENT_READ)
-    while lines:
+    lines = dict[int, socket.socket]()
+    for waited in (entrance, owner):
+        selector.register(waited, selectors.EVENT_READ)
+    while True:
         for key, _ in selector.select():
+            if key.fd == owner:
+                return
             if key.fd in ends:
                 pid, code = ends.pop(key.fd)
                 selector.unregister(key.fd)
@@ -289,6 +302,11 @@ def serve(line: socket.socket) -> None:
                     os.write(code, str(how).encode())
                 os.close(code)
                 continue
+            if key.fd == entrance.fileno():
+                more, _ = entrance.accept()
+                lines[more.fileno()] = more
+                selector.register(more, selectors.EVENT_READ)
+                continue
             asking = lines[key.fd]
             data, handed, *_ = socket.recv_fds(asking, SIZE, 3)
             if not data:
@@ -297,13 +315,14 @@ def serve(line: socket.socket) -> None:
                 asking.close()
                 continue
             request, (*said, code) = json.loads(data), handed
-            inherited = [*lines, code, *ends, *(one[1] for one in ends.values())]
-            pid, more = fork(program(request[0]), request, said, inherited)
+            inherited = [entrance.fileno(), owner, *lines, code]
+            inherited += [*ends, *(one[1] for one in ends.values())]
+            pid, line = fork(program(request[0]), request, said, inherited)
             for number in said:
                 os.close(number)
-            if more:
-                lines[more.fileno()] = more
-                selector.register(more, selectors.EVENT_READ)
+            if line:
+                lines[line.fileno()] = line
+                selector.register(line, selectors.EVENT_READ)
             watched = os.pidfd_open(pid)
             ends[watched] = pid, code
             selector.register(watched, selectors.EVENT_READ)
@@ -317,8 +336,9 @@ def main() -> None:
     warm_up(load_scenario('case1'), ['gvc'])
     for kind in (ParameterEvent, *(topic.type for topic in TOPICS)):
         check_for_type_support(kind)
-    with socket.socket(fileno=int(sys.argv[1])) as line:
-        serve(line)
+    entrance, owner = map(int, sys.argv[1:])
+    with socket.socket(fileno=entrance) as listening, contextlib.suppress(ProcessLookupError):
+        serve(listening, os.pidfd_open(owner))
 
 
 if __name__ == '__main__':

@@ -45,7 +45,7 @@ def environment(domain: int) -> dict[str, str]:
 
 @cache
 def fork_server() -> ForkServer:
-    """The process that forks the programs of this worker."""
+    """The process that forks the programs of this run."""
     return ForkServer()
 
 

@@ -36,19 +36,20 @@ def delta_pi(Upsilon: np.ndarray, tau: np.ndarray) -> np.ndarray:
     return mapped(input_deformation(Upsilon), tau)
 
 
-def structural_zeros(Upsilon: np.ndarray, Upsilon_inv: np.ndarray) -> dict[str, list[str]]:
+def structural_zeros(Upsilon: np.ndarray) -> dict[str, list[str]]:
     """Degrees of freedom whose delta_xi or delta_pi vanishes for every motion.
 
-    Row i of Upsilon^-1 - I gives delta_xi_i, column i of Upsilon - I gives delta_pi_i.
+    Row i of Upsilon^-1 - I gives delta_xi_i, column i of Upsilon - I gives delta_pi_i. That row is
+    zero where row i of Upsilon - I is: Upsilon is unit upper triangular.
     """
+    deformation = np.abs(input_deformation(Upsilon))
 
-    def empty(rows: np.ndarray) -> list[str]:
-        size = np.abs(rows).max(axis=1)
+    def empty(size: np.ndarray) -> list[str]:
         return [dof for dof, entry in zip(DOFS, size, strict=True) if entry <= NEGLIGIBLE]
 
     return {
-        'delta_xi': empty(velocity_deformation(Upsilon_inv)),
-        'delta_pi': empty(input_deformation(Upsilon)),
+        'delta_xi': empty(deformation.max(axis=0)),
+        'delta_pi': empty(deformation.max(axis=1)),
     }
 
 
@@ -161,7 +162,7 @@ class LiveAnalysis:
     def __init__(self, vehicle: Vehicle):
         self._Upsilon, self._N = decompose(vehicle.M)
         self._Upsilon_inv = inverse_upper(self._Upsilon)
-        self.structural_zeros = structural_zeros(self._Upsilon, self._Upsilon_inv)
+        self.structural_zeros = structural_zeros(self._Upsilon)
 
     def energy(self, nu: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
         """Kinetic energy by component in J and its shares in %, (30)."""

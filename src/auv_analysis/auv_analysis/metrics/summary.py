@@ -97,7 +97,7 @@ def summarize(
         'coupling': {
             'delta_xi_max': if_known(deformed, whole.peak(moments.DELTA_XI)),
             'delta_pi_max': if_known(input_deformed, whole.peak(moments.DELTA_PI)),
-            'structural_zeros': structural_zeros(Upsilon, Upsilon_inv),
+            'structural_zeros': structural_zeros(Upsilon),
         },
         'coupling_terms': {
             'delta_xi': coupling_terms(velocity_deformation(Upsilon_inv), velocities),

@@ -177,9 +177,7 @@ def _inputs(run: RunDigest, limit: np.ndarray | None) -> Drawn:
 
 
 def _deformation(kind: str, run: RunDigest) -> Drawn:
-    model = control_model(run.vehicle)
-    Upsilon, Upsilon_inv = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
-    zeros = structural_zeros(Upsilon, Upsilon_inv)[kind]
+    zeros = structural_zeros(control_model(run.vehicle).Upsilon.reshape(6, 6))[kind]
     if kind == 'delta_xi':
         return six_signals(kind, run, SIGNALS['delta_xi'], zeros)
     drawn = six_signals(kind, run, SIGNALS['delta_pi'], zeros)

@@ -70,7 +70,7 @@ def check_vehicle(name_or_path: str | Path, speed: float | None = None) -> dict[
             'condition_number': float(moments[-1] / moments[0]),
         },
         'couplings': couplings,
-        'structural_zeros': structural_zeros(Upsilon, inverse),
+        'structural_zeros': structural_zeros(Upsilon),
         'statement': _statement(couplings),
         'hydrostatics': _hydrostatics(vehicle),
         'damping': _damping(vehicle),

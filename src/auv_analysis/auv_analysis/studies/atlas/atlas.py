@@ -184,7 +184,7 @@ def couplings_of(vehicle: Vehicle, name: str) -> Couplings:
         velocity_shares=_without_rounding(velocity_shares(vehicle.M), NEGLIGIBLE**2),
         input_shares=_without_rounding(input_shares(vehicle.M), NEGLIGIBLE**2),
         strength=0.0 if diagonal else coupling_strength(vehicle.M),
-        zeros=structural_zeros(Upsilon, inverse),
+        zeros=structural_zeros(Upsilon),
         damped=_damped(vehicle),
     )
 

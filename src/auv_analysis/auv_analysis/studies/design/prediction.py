@@ -104,7 +104,7 @@ def effort_of(tau: np.ndarray, M_inv: np.ndarray, weights: np.ndarray) -> np.nda
 def present(vehicle: Vehicle) -> list[str]:
     """Couplings that the structure of a vehicle's M allows, by name."""
     Upsilon, _ = decompose(vehicle.M)
-    zeros = structural_zeros(Upsilon, inverse_upper(Upsilon))
+    zeros = structural_zeros(Upsilon)
     return [name for name in COUPLINGS if name.split('.')[1] not in zeros[name.split('.')[0]]]
 
 

@@ -78,9 +78,7 @@ def sort_out(found: Mapping[str, np.ndarray], vehicle: Vehicle) -> tuple[list[Kp
     vehicle : whose structure makes couplings vanish
 
     """
-    model = control_model(vehicle)
-    Upsilon, Upsilon_inv = (m.reshape(6, 6) for m in (model.Upsilon, model.Upsilon_inv))
-    zeros = structural_zeros(Upsilon, Upsilon_inv)
+    zeros = structural_zeros(control_model(vehicle).Upsilon.reshape(6, 6))
     kept, excluded = [], []
     for kpi in KPIS:
         reason = _structural(kpi, zeros) or _reason(kpi, found)

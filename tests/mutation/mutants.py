@@ -30,8 +30,10 @@ SWAPPED = re.compile(  # of wiring: of many ways to break an operator, the next 
     r'|ComparisonOperator_(?!(Lt_LtE|LtE_Lt|Gt_GtE|GtE_Gt|Lt_Gt|Gt_Lt|LtE_GtE|GtE_LtE|Eq_NotEq'
     r'|NotEq_Eq|Is_IsNot|IsNot_Is|In_NotIn|NotIn_In)$)'
 )
+TYPES = {'Callable', 'Mapping', 'Sequence', 'dict', 'list', 'tuple'}  # a name of one is annotation
 TOLD = {'begin', 'info', 'warning', 'error', 'print', 'get_logger', 'InputError'}  # to people
 WAITED = {'wait_for_all_acked'}  # for how long
+REPEATED = {'steady_timer'}  # the second argument: how often
 JUDGED = re.compile(  # constants: how long, how large and in which colour is for people to judge
     r"^[A-Z_, ]+(: .*)? = .*  # (s|steps|in|px|opacity)\b|^[A-Z_, ]+ = \(?'#|^(STYLE|DASHES)\b"
 )
@@ -39,7 +41,7 @@ LAYOUT = re.compile(  # keywords: how large, how faint, where the name of someth
     r'(line|eline|edge|markeredge)widths?|lw|(font|label|marker|cap)size|s|fontweight'
     r'|\w*rotation|handlelength|loc|location|bbox_to_anchor|ncols|zorder|alpha|ha|va'
     r'|(width|height)_ratios|aspect|fraction|shrink|linscale|interpolation|textcoords|xytext'
-    r'|rasterized|squeeze|optimize|strict|digits|autohide|level|\w*_font_\w+|minor_tick_line_color'
+    r'|rasterized|squeeze|no_wrap|overflow|justify|highlight|optimize|strict|digits|autohide|level|\w*_font_\w+|minor_tick_line_color'
     r'|padding|spacing|(glyph|label)_height|glyph_width|min_border_left|toolbar_location|sizing_mode'
 )
 COLOUR = re.compile(r'\w*colou?rs?|hatch|fmt')  # keywords whose value, where it is a text, is taste
@@ -76,7 +78,7 @@ def _place(part: ast.AST) -> Place:
 
 
 def _no_code(tree: ast.Module) -> list[ast.AST | None]:
-    """Decorators, annotations, errors."""
+    """Decorators, annotations and names of types, errors."""
     parts: list[ast.AST | None] = []
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -85,6 +87,9 @@ def _no_code(tree: ast.Module) -> list[ast.AST | None]:
             parts.append(node.returns)
         if isinstance(node, ast.arg | ast.AnnAssign):
             parts.append(node.annotation)
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Subscript):
+            kind = getattr(node.value.value, 'id', '')
+            parts.append(node.value if kind in TYPES else None)
         if isinstance(node, ast.Raise):
             parts.append(node)
         if isinstance(node, ast.ExceptHandler):
@@ -97,7 +102,7 @@ def _texts(tree: ast.Module) -> list[ast.AST | None]:
 
 
 def _judged(tree: ast.Module, source: str) -> list[ast.AST | None]:
-    """What is said to people, how long somebody has patience, and how a plot is laid out."""
+    """What is said to people, how long and how often somebody waits, how a plot is laid out."""
     lines = source.splitlines()
     parts: list[ast.AST | None] = []
     for node in ast.walk(tree):
@@ -114,6 +119,7 @@ def _judged(tree: ast.Module, source: str) -> list[ast.AST | None]:
             name = getattr(node.func, 'attr', getattr(node.func, 'id', ''))
             parts += [node] if name in TOLD | WAITED | LAYS_OUT else []
             parts += node.args[1:] if name in ROUNDED else []
+            parts += node.args[1:2] if name in REPEATED else []
             named = [(keyword.arg, keyword.value) for keyword in node.keywords]
         elif isinstance(node, ast.arguments):
             args = [*node.args[len(node.args) - len(node.defaults) :], *node.kwonlyargs]

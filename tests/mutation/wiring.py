@@ -16,6 +16,7 @@ LISTS = ('arglist', 'testlist_comp', 'testlist', 'testlist_star_expr')
 LITERALS = ('string', 'strings', 'number', 'keyword', 'lambdef', 'operator')
 OPPOSITE = {'min': 'max', 'max': 'min', 'any': 'all', 'all': 'any'}
 OPPOSITE |= {'minimum': 'maximum', 'maximum': 'minimum', 'argmin': 'argmax', 'argmax': 'argmin'}
+ORDERLESS = {*OPPOSITE, 'grade'}  # calls of one list; grade counts the parts of a claim
 PLAIN = re.compile(r'[\'"]')  # begins a string that is neither formatted nor raw
 Place = tuple[tuple[int, int], tuple[int, int]]
 
@@ -25,10 +26,13 @@ def _bare(node: Any) -> str:
 
 
 def _is_symmetric(node: Any) -> bool:
-    """Whether a list is a comprehension, or what `min` or `max` of it does not depend on order."""
+    """Whether a list is a comprehension, or none looks at its order: `in`, `min`, `grade`."""
     if any(one.type.endswith('comp_for') for one in node.children):
         return True
     holder = node.parent
+    looked_into = node.type == 'testlist_comp' and holder.get_previous_leaf() == 'in'
+    if looked_into and holder.parent.type == 'comparison':
+        return True
     if node.type == 'testlist_comp' and holder.type == 'atom':
         holder = holder.parent  # a list that is the one argument
     called = holder.get_previous_leaf() if holder is not None else None
@@ -36,7 +40,7 @@ def _is_symmetric(node: Any) -> bool:
         node.type in ('arglist', 'testlist_comp')
         and (node.type == 'arglist' or holder.type == 'trailer')
         and called is not None
-        and called.value in OPPOSITE
+        and called.value in ORDERLESS
     )
 
 

@@ -9,6 +9,8 @@ from helpers.nodes_in_process import program
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
 
+from auv_analysis.nodes.recorder_node import RecorderNode
+from auv_dynamics.files.errors import InputError
 from auv_gvc_controller.nodes.controller_node import ControllerNode
 
 FAULT = ['-p', 'faults.names:=["gone"]', *parameters(faults__gone__kind='sensor_drop_out')]
@@ -71,3 +73,32 @@ def test_whole_numbers_are_numbers_and_one_is_a_list_where_several_may_be() -> N
     expected = {'limits.wrench': [70.0, 71.0, 72.0, 73.0, 74.0, 75.0], 'limits.wrench_rate': [80.0]}
     assert found == {**expected, 'ramp': 2.0}
     assert {type(value) for value in (*found['limits.wrench'], found['ramp'])} == {float}
+
+
+CONTROL = {'law': 'gvc', 'vehicle': 'herman2018', 'gains.k_D': 12.0}
+
+
+@pytest.mark.parametrize(
+    ('kind', 'given', 'expected'),
+    [
+        (RecorderNode, {'storage.chunk_size': 1000}, 'a number from 1024 to'),
+        (RecorderNode, {'storage.max_duration': 1e10}, 'a number from 0.0 to 1000000000.0'),
+        (RecorderNode, {'strict': 1}, 'true or false'),
+        (RecorderNode, {'topics': [1]}, 'a list of words'),
+        (RecorderNode, {'storage.max_size': 0.5}, 'a whole number'),
+        (ControllerNode, {'ramp': -1.0}, 'a number from 0.0 to inf'),
+        (ControllerNode, {'ramp': '1'}, 'a number'),
+        (ControllerNode, {'ramp': True}, 'a number'),
+        (ControllerNode, {'vehicle': 1}, 'a word'),
+        (ControllerNode, {'limits.wrench': ['1']}, 'a list of numbers'),
+        (ControllerNode, {'limits.wrench': [1.0, float('nan')]}, 'finite numbers'),
+        (ControllerNode, {'setpoint_pairing': 'last'}, 'one of exact, latest'),
+        (ControllerNode, {'rampe': 1.0}, '(nearest: ramp)'),
+    ],
+)
+def test_what_is_refused_is_told_by_name(kind, given, expected: str) -> None:
+    own = CONTROL if kind is ControllerNode else {'bag': 'x'}
+    with program() as made, pytest.raises(InputError) as caught:
+        made.add(kind, own | given)
+    assert caught.value.key == next(iter(given))
+    assert expected in caught.value.expected

@@ -55,7 +55,8 @@ SWITCHES = {
     'anti_windup', 'publish_clock',
 }  # fmt: skip
 LISTS_OF_WORDS = {
-    'expected_subscribers', 'start_after', 'disturbance.names', 'topics', 'attachments',
+    'expected_subscribers', 'start_after', 'disturbance.names', 'faults.names', 'topics',
+    'attachments',
 }  # fmt: skip
 LISTS = {
     'initial.eta', 'initial.nu', 'amplitude', 'omega', 'phase', 'scale', 'dM', 'dD', 'velocity',
@@ -80,6 +81,7 @@ disturbance:
 - {kind: current, velocity: [1, 0, 0]}
 actuators: {limit: 100, rate: [1, 2, 3, 4, 5, 6], lag: 1, delay: 2}
 sensors: {velocity_noise: 1, attitude_noise: [1, 2, 3], drop_out: 1}
+faults: [{kind: sensor_delay, delay: 1, from: 1, to: 2}, {kind: wrench_loss, from: 2, to: 3}]
 """
 
 
@@ -161,6 +163,12 @@ def test_every_value_has_its_type(whole: Scenario, lockstep: bool) -> None:
                 assert {type(entry) for entry in value} == {kind[1]}, name
             else:
                 assert type(value) is kind, name
+
+
+@pytest.mark.parametrize('lockstep', [True, False])
+def test_all_that_the_nodes_are_told(whole: Scenario, lockstep: bool, approved) -> None:
+    parameters = _parameters(whole, 'mine', lockstep=lockstep)
+    approved.add(parameter_file(parameters, 'whole').splitlines())
 
 
 def test_every_subscriber_that_is_waited_for_runs(whole: Scenario) -> None:

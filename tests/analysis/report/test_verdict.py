@@ -14,6 +14,7 @@ from auv_analysis import simulate, summarize
 from auv_analysis.cli import main
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.verdict import FAILED, verdict
+from auv_analysis.runs.run import Extent
 
 CL = tunings.SAME_CL | {'k_D': 30.0}
 Runs = tuple[dict[str, RunDigest], dict[str, Any]]
@@ -124,6 +125,49 @@ def test_of_several_the_best_is_held_against_the_next(tmp_path: Path) -> None:
     assert 'auv tune SCENARIO --reference cl compares' in without
     one = {'gvc': runs['gvc']}, {'gvc': summaries['gvc']}
     assert verdict(*one) == []
+
+
+def of_errors(two: Runs, **errors: tuple[float, float]) -> str:
+    """First sentence on runs that differ in their errors in translation and in rotation alone."""
+    summaries = {name: copy.deepcopy(two[1]['gvc']) for name in errors}
+    for name, (linear, angular) in errors.items():
+        summaries[name]['velocity_error']['rms'] = [linear] * 3 + [angular] * 3
+    return verdict(dict.fromkeys(errors, two[0]['gvc']), summaries)[0]
+
+
+def test_where_none_is_best_in_both_the_best_in_each_are_compared(two: Runs) -> None:
+    text = of_errors(two, a=(0.5, 2.0), b=(1.0, 1.0), c=(2.0, 0.9))
+    assert text.startswith('Of 3 controllers, none tracks better in all, neither a nor c: ')
+
+
+def test_the_best_may_be_worse_by_less_than_counts(two: Runs) -> None:
+    text = of_errors(two, a=(1.0, 1.0), b=(1.005, 0.5), c=(2.0, 2.0))
+    assert text.startswith('Of 3 controllers, b tracks best, a next: ')
+
+
+def longer(run: RunDigest, times: float) -> Extent:
+    return run.extent._replace(end=run.start + times * run.duration)
+
+
+@pytest.mark.parametrize(
+    ('word', 'change'),
+    [
+        ('vehicle', lambda run: {'vehicle': run.vehicle.changed(M=1.1 * run.vehicle.M)}),
+        ('length', lambda run: {'known_extent': longer(run, 1.02)}),
+        ('start', lambda run: {'begin': run.begin + 0.006 * (np.arange(12) == 3)}),
+        ('disturbance', lambda run: {'course': run.course | {'F': run.course['F'] + 1.0}}),
+        ('', lambda run: {
+            'known_extent': longer(run, 1.005),
+            'begin': run.begin + np.where(np.arange(12) < 3, 1.0, 0.004),
+        }),
+    ],
+)  # fmt: skip
+def test_runs_are_ranked_where_they_share_all_but_the_law(two: Runs, word: str, change) -> None:
+    runs, summaries = two
+    changed = runs | {'cl': replace(runs['cl'], **change(runs['cl']))}
+    text = verdict(changed, summaries)[0]
+    wanted = f'These runs cannot be ranked: they differ in {word}.' if word else 'gvc tracks better'
+    assert text.startswith(wanted)
 
 
 def test_what_is_not_alike_is_not_ranked(two: Runs, tmp_path: Path) -> None:

@@ -24,10 +24,10 @@ WINDOW = 2000  # steps that the plant may be ahead of the recorder
 HORIZON = 200  # steps that set-points are published ahead in lock-step
 WRENCH_TIMEOUT = 30.0  # s of silence that end a lock-step run
 TIMEOUT = 0.5  # s, the real-time watchdogs
-OF_PLANT_ALONE = (  # no driver has to offer them
+OF_PLANT_ALONE = {  # no driver has to offer them
     *(interface.TWIST, interface.DISTURBANCE),
     *(interface.WRENCH_APPLIED, interface.GROUND_TRUTH),
-)
+}
 SUBSCRIBERS: dict[str, dict[str, tuple[str, ...]]] = {  # topic -> who subscribes, by publisher
     PLANT: {
         interface.ODOM: (CONTROLLER, SETPOINT, ANALYSIS, RECORDER),

@@ -107,8 +107,8 @@ class PublicationLedger:
 
 
 PATIENCE = 2.0  # s for the clock of the last steps, which nothing else waits for
-NUMBERED = (*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK)  # with one publisher each
-TIMED = (*topics.STEP_TOPICS, topics.CLOCK)  # whose stamp is the log time, and the publish time
+NUMBERED = {*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK}  # with one publisher each
+TIMED = {*topics.STEP_TOPICS, topics.CLOCK}  # whose stamp is the log time, and the publish time
 
 
 class RecorderNode(BulkNode):
@@ -154,10 +154,8 @@ class RecorderNode(BulkNode):
         zero_is_a_time = self._time.simulated or topic is topics.CLOCK
 
         def callback(message: bytes, way: dict[str, Any]) -> None:
-            ns = 0
             try:
-                if timed or awaited:
-                    ns = first_stamp(message)
+                ns = first_stamp(message) if timed or awaited else 0
             except BadMessageError:
                 self._take(resolved, kind, message, way)
                 raise
@@ -198,9 +196,9 @@ class RecorderNode(BulkNode):
         try:
             self._writer.write(topic, ns, message, published)
         except RecordingError as error:
-            self._end(1, str(error))
+            self._end(str(error))
         if self._writer.trouble:
-            self._end(1, self._writer.trouble)
+            self._end(self._writer.trouble)
 
     def _meet(self, topic: str, kind: str) -> None:
         """Define a topic in the bag, with what its publishers offer."""
@@ -216,7 +214,7 @@ class RecorderNode(BulkNode):
                 Definition(topic, kind, qos=qos, digest=digest), schema_text(kind)
             )
         except RecordingError as error:
-            self._end(1, str(error))
+            self._end(str(error))
 
     def _count(self, name: str, step_topic: str, ns: int, number: int | None) -> None:
         try:
@@ -224,12 +222,12 @@ class RecorderNode(BulkNode):
                 self._ledger.add(step_topic, ns)
             self._publications.add(name, number)
         except LostStepError as error:
-            self._end(1, str(error))
+            self._end(str(error))
 
     def _report(self) -> None:
         """Publish the last complete step when it is new, and end when it is the last one."""
         if self._writer.trouble:
-            self._end(1, self._writer.trouble)
+            self._end(self._writer.trouble)
         complete = self._ledger.complete
         if complete > self._reported:
             self._reported = complete
@@ -237,7 +235,7 @@ class RecorderNode(BulkNode):
         last, due = self._last, self._last_due
         analysed = due is None or self._newest[topics.LUMPED_ERROR.name] >= due
         if last is not None and complete >= last and analysed and self._clock_is_whole():
-            self._end(0)
+            self._end()
 
     def _clock_is_whole(self) -> bool:
         """Whether the clock, if there is one, has come to the last step too, or stands still."""
@@ -259,18 +257,20 @@ class RecorderNode(BulkNode):
         self.graph.latest_ns = max(0, self._time.latest)
         self.graph.facts.update(complete=self._ledger.complete, behind=self._ledger.behind())
 
-    def _end(self, code: int, text: str = '') -> None:
+    def _end(self, error: str = '') -> None:
         if self.exit_code is not None:
             return
-        if text:
-            self._complain(text)
-        self.exit_code = code
+        self.exit_code = 0
+        if error:
+            self._complain(error)
         self._progress.wait_for_all_acked(Duration(seconds=1.0))
 
     def _complain(self, text: str) -> None:
+        """Log an error, once, and fail."""
         if text not in self._complaints:
             self.get_logger().error(text)
         self._complaints.add(text)
+        self.exit_code = 1
 
     def close(self) -> None:
         """Finish the bag with everything that has arrived, and say what has not."""
@@ -280,7 +280,6 @@ class RecorderNode(BulkNode):
             self._writer.close()
         except RecordingError as error:
             self._complain(str(error))
-            self.exit_code = 1
         lost = {topic: gaps for topic, gaps in self._ledger.gaps.items() if gaps}
         if lost or self._publications.gaps:
             lost.update(self._publications.gaps)
@@ -297,7 +296,6 @@ class RecorderNode(BulkNode):
         silent = [topic for topic in p.topics if not has(self.resolve_topic_name(topic))]
         if silent:
             self._complain(f'{p.bag}: expected topics without any message: {", ".join(silent)}')
-            self.exit_code = 1
 
 
 def main() -> None:

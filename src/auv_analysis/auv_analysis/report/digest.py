@@ -146,11 +146,11 @@ def last_third(run: RunInfo) -> float:
 
 
 ESTIMATES = ('unexplained', 'required_wrench')  # wrenches that are estimated with their error
-SPLIT = ('error', 'lumped_error', 'tau', 'delta_pi')  # begin with a peak that dwarfs the rest
-WHOLE = (
+SPLIT = {'error', 'lumped_error', 'tau', 'delta_pi'}  # begin with a peak that dwarfs the rest
+WHOLE = {
     'F', 'delta_xi', 'applied', 'kinetic', 'wanted', 'energy', 'unexplained', 'required_wrench',
     'least', 'most',
-)  # fmt: skip
+}  # fmt: skip
 NEAR_ZERO = 0.005  # m/s, rad/s: what counts as a settled error
 SHARE_COLUMNS = 600  # of the stacked shares
 COURSE = 1000  # samples, at most, by which runs are compared

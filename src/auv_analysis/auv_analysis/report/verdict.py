@@ -76,12 +76,13 @@ def _errors(summary: Summary) -> np.ndarray | None:
 
 def _differing(runs: Sequence[RunDigest]) -> list[str]:
     """What the runs would need in common and do not have; where they start counts for nothing."""
-    M, begin, length = runs[0].vehicle.M, runs[0].begin, runs[0].duration
+    first, *others = runs
+    M, begin, length = first.vehicle.M, first.begin, first.duration
     depends = any(kind in OF_THE_MOTION for run in runs for kind in run.kinds or ())
     same = {
-        'vehicle': all(np.array_equal(run.vehicle.M, M) for run in runs),
-        'length': all(abs(run.duration - length) <= EQUAL * length for run in runs),
-        'start': not any(np.any(np.abs(run.begin - begin)[3:] > SMALLEST_BAND) for run in runs),
+        'vehicle': all(np.array_equal(run.vehicle.M, M) for run in others),
+        'length': all(abs(run.duration - length) <= EQUAL * length for run in others),
+        'start': not any(np.any(np.abs(run.begin - begin)[3:] > SMALLEST_BAND) for run in others),
         'set-point': alike(runs, 'nu_d'),
         'disturbance': depends or alike(runs, 'F'),
     }
@@ -114,17 +115,14 @@ def _head(best: str, other: str, errors: Mapping[str, np.ndarray]) -> str:
 
 
 def _gains(mine: Summary, theirs: Summary) -> tuple[str, list[float]]:
-    """Diagonal of K_D to the other one's: words, and least and largest ratio of each group."""
+    """Diagonal of K_D to the other one's: words, and the ratio of each axis."""
     K_D = [summary['gains']['K_D'] for summary in (mine, theirs)]
     if any(matrix is None or np.any(np.diagonal(matrix) <= 0) for matrix in K_D):
         return '', []
     of_axes = np.diagonal(K_D[0]) / np.diagonal(K_D[1])
-    spans = [(float(of_axes[g].min()), float(of_axes[g].max())) for g in GROUPS.values()]
-    texts = [_times(*span) for span in spans]
-    where = ' (body frame), '
-    if texts[0] == texts[1]:
-        return f'{_of(texts[0], GAIN)}{where}', [*spans[0], *spans[1]]
-    return f'{_both(GAIN, texts)}{where}', [*spans[0], *spans[1]]
+    texts = [_times(of_axes[g].min(), of_axes[g].max()) for g in GROUPS.values()]
+    text = _of(texts[0], GAIN) if texts[0] == texts[1] else _both(GAIN, texts)
+    return f'{text} (body frame), ', of_axes.tolist()
 
 
 def _effort(mine: Summary, theirs: Summary) -> tuple[str, float]:

@@ -250,7 +250,7 @@ class PlantNode(BulkNode):
 
     def __init__(self, **options: Any):
         super().__init__('plant_node', **options)
-        self._born, self._rivals_since = time.monotonic(), 0.0
+        self._born = time.monotonic()
         self.graph = NodeInterface(self)
         timeout = 30.0 if self.lockstep else 0.5
         p = declare_settings(self, PlantSettings, wrench_timeout=timeout)
@@ -271,6 +271,7 @@ class PlantNode(BulkNode):
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.paused = p.start_paused
         self._started: float | None = None
+        self._alone = time.monotonic()  # when nobody else published the clock
         steady_timer(self, 0.05, self._start)
 
     def _make_plant(self, p: PlantSettings) -> Plant:
@@ -328,15 +329,14 @@ class PlantNode(BulkNode):
     def _is_only_clock(self, now: float) -> bool:
         """Whether nobody else publishes `/clock`; who came later ends with one line."""
         names = sorted(map(full_name, other_publishers(self, topics.CLOCK.name)))
-        self._rivals_since = (self._rivals_since or now) if names else 0.0
-        if not names or (NAMELESS in names and now - self._rivals_since < NEW):
-            return not names
-        if self.exit_code is None:
+        if not names:
+            self._alone = now
+        elif self.exit_code is None and (NAMELESS not in names or now - self._alone >= NEW):
             expected = f'nobody else who publishes {topics.CLOCK.name}, or false'
             found = ', '.join(names)
             print(InputError(self.get_name(), 'publish_clock', expected, found), file=sys.stderr)
             self.exit_code = 2
-        return False
+        return not names
 
     def publish_state(self, measured: int | None) -> None:
         """Publish step k; odometry first, since the controller waits for it.

@@ -161,7 +161,7 @@ class NodeInterface:
             ),
         )
         self.publishers[topic.name] = publisher
-        self._single |= {topic} & {*SINGLE}
+        self._single |= {topic} & SINGLE
         return publisher
 
     def codec(self, topic: Topic) -> Codec:
@@ -213,7 +213,7 @@ class NodeInterface:
             raw=True,
         )
         self.node.add_data(subscription)
-        self._single |= {topic} & {*SINGLE}
+        self._single |= {topic} & SINGLE
 
     def ready(self) -> bool:
         """Whether every expected subscriber has matched; once true it stays true."""

@@ -13,7 +13,7 @@ from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of as nearest_of
 from auv_dynamics.ros.settings import Settings, read_settings
 
-KNOWN_TO_ALL = ('use_sim_time', 'start_type_description_service')
+KNOWN_TO_ALL = {'use_sim_time', 'start_type_description_service'}
 TYPE_WORDS = {
     RosParameter.Type.BOOL: 'true or false',
     RosParameter.Type.INTEGER: 'a whole number',

@@ -52,7 +52,7 @@ STEP_TOPICS = (
     *(WRENCH_APPLIED, GROUND_TRUTH),
 )
 ANALYSIS_TOPICS = (KINETIC_ENERGY, KINETIC_ENERGY_SHARES, DELTA_XI, DELTA_PI, LUMPED_ERROR)
-SINGLE = (ODOM, WRENCH, CLOCK)  # for one publisher: others would be obeyed as well
+SINGLE = {ODOM, WRENCH, CLOCK}  # for one publisher: others would be obeyed as well
 TOPICS = (*STEP_TOPICS, *ANALYSIS_TOPICS, PROGRESS, DIAGNOSTICS, CLOCK)
 
 
@@ -96,7 +96,7 @@ def best_effort(depth: int = interface.DEPTH) -> QoSProfile:
 
 
 NAME = re.compile(r'([a-z]\w*)/msg/([A-Z]\w*)', re.ASCII)
-STAMPED_TYPES = ('std_msgs/msg/Header', 'rosgraph_msgs/msg/Clock')
+STAMPED_TYPES = {'std_msgs/msg/Header', 'rosgraph_msgs/msg/Clock'}
 
 
 def type_name(kind: type) -> str:

@@ -41,7 +41,7 @@ from auv_gvc_controller.laws.model import control_model
 GAINS = {gain for law in SHIPPED.values() for gain in law._fields}
 WRITABLE = 'gains.'
 SETTINGS = {name_of(entry) for entry in fields(ControllerSettings) if entry.metadata}
-FIXED = ('setpoint_pairing', 'setpoint_acceleration')  # which decide what is heard
+FIXED = {'setpoint_pairing', 'setpoint_acceleration'}  # which decide what is heard
 LAWS = f'{", ".join(SHIPPED)} or module:Class of your own'
 
 

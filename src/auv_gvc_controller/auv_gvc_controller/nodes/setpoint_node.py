@@ -38,10 +38,9 @@ class SetpointNode(BulkNode):
         # in lock-step the odometry may go on for `horizon` steps while this node does not look
         gap = max(interface.NANOSECONDS, (10 + self._horizon) * self._step_ns)
         self._guard = OdometryGuard(gap, Limits(), lockstep=False, patience=PATIENCE)
-        self._newest = -1
+        self._newest = self._next = self._first = 0
         self._gap = self._stride = 1  # steps from one odometry to the next; the usual number
-        self._next = 0
-        self._first, self._rows = 0, np.zeros((0, 12))
+        self._rows = np.empty(0)  # of the steps from `_first` on
         # in lock-step the odometry asks; this is for when the subscribers match after it
         steady_timer(self, 0.1 if self.lockstep else 0.02, self._publish)
         self.graph.in_trouble_while(self._trouble)

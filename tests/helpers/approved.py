@@ -122,7 +122,8 @@ class Approved:
         for path in sorted(folder.glob('*.json')):
             if path.name not in ('manifest.json', 'summary.json'):
                 lines += [path.name, *shown.document_lines(json.loads(path.read_text()))]
-        lines += map(shown.parquet_line, sorted(folder.glob('*.parquet')))
+        for path in sorted(folder.glob('*.parquet')):
+            lines += shown.parquet_lines(path)
         self._pages += lines if numbers else map(_words, lines)
 
     def lines(self) -> Iterator[str]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -419,7 +420,15 @@ def _leaf(value: Any) -> str:
     return str(value)
 
 
-def parquet_line(path: Path) -> str:
-    """Rows and columns of a Parquet file."""
-    schema, rows = parquet.read_schema(path), parquet.read_metadata(path).num_rows
-    return f'{path.name}: {rows} rows, {", ".join(schema.names)}'
+def parquet_lines(path: Path) -> Iterator[str]:
+    """Rows of a Parquet file, and what is in each column."""
+    table = parquet.read_table(path)
+    yield f'{path.name}: {table.num_rows} rows, {", ".join(table.column_names)}'
+    for name, found in zip(table.column_names, table.columns, strict=True):
+        column = found.combine_chunks().flatten() if pa.types.is_list(found.type) else found
+        if pa.types.is_string(column.type):
+            words = [*dict.fromkeys(map(str, column.to_pylist()))]
+            few = len(words) <= FEW
+            yield f'  {name} {", ".join(words if few else [words[0], "…", words[-1]])}'
+        elif len(column):
+            yield f'  {name} {digest(column.cast(pa.float64(), safe=False).to_numpy())}'

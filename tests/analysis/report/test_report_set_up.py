@@ -127,6 +127,13 @@ def test_gains_are_short_where_they_can_be() -> None:
     assert gain_text((np.eye(6) + np.eye(6, k=1)).tolist()) == 'full matrix, in the listing'
 
 
+def test_a_start_is_said_where_there_is_one(rough):
+    runs, summaries, text = rough
+    assert 'start' not in _words(runs, summaries, text)
+    text += 'initial: {nu: [0.1, 0, 0, 0, 0, 0]}\n'
+    assert _words(runs, summaries, text)['start'] == ['nu: [0.1, 0, 0, 0, 0, 0]']
+
+
 def test_set_up_of_ideal_devices(tmp_path):
     words = _words(
         *_study(

@@ -61,9 +61,9 @@ def foreign() -> dict[str, Run]:
     """Runs of another system: one whose wrench was recorded, and one without."""
     rng = np.random.default_rng(7)
     wrench, error = rng.normal(size=(SAMPLES, 6)) * 50.0, 1.0 + rng.random((SAMPLES, 6))
-    about = {'disturbance': None, 'acceleration': {'filter': 'f', 'window': 1.0}, 'faults': ()}
+    about = {'disturbance': None, 'acceleration': {'filter': 'f', 'window': 1.0}}
     told = made('told', 'gvc', 8, unexplained=wrench, unexplained_error=error, **about)
-    nothing = {'tau': np.full((SAMPLES, 6), np.nan)}
+    nothing = {'tau': np.full((SAMPLES, 6), np.nan), 'faults': ()}
     lost = made(
         'lost', 'gvc', 9, **about | nothing, required_wrench=2 * wrench, required_wrench_error=error
     )
@@ -499,7 +499,7 @@ def test_what_was_not_recorded_is_said_in_its_panel(runs, foreign, tmp_path) -> 
     wrench[:, 1] = np.nan
     for run in lost.values():
         run.nu[:, 1] = run.tau[:, 1] = np.nan
-    alone, _ = _drawn({'told': replace(told, unexplained=wrench)}, tmp_path)
+    alone, _ = _drawn({'told': replace(told, unexplained=wrench, faults=())}, tmp_path)
     del lost['three']
     figures, captions = _drawn(lost, tmp_path)
     for figure in (figures['settling'], figures['inputs_compared'], alone['unexplained_told']):

@@ -19,12 +19,11 @@ from auv_analysis.herman2018.evidence import (
     Verdict,
 )
 from auv_analysis.herman2018.paper import CASES, is_plain, paper_run
-from auv_analysis.metrics.quantities import Quantity
 from auv_analysis.output.arrow import pa
 from auv_analysis.output.text import MISSING, fixed, join
 from auv_analysis.report.digest import TINY, RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence, prose
-from auv_analysis.report.results import Column, Table, make_table
+from auv_analysis.report.results import Column, Shown, Table, described, make_table
 from auv_analysis.runs.run import AnyRun, RunInfo
 from auv_analysis.scenario.scenario import load_scenario
 from auv_dynamics.plant.disturbance import make_disturbance
@@ -308,15 +307,15 @@ def _obstacle(row: Row, case: str, evidence: Evidence | None) -> tuple[Verdict |
 FILE = 'claims.parquet'  # every number of the table: a row each, and one at least of every claim
 FACTS = ('number', 'case', 'claim', 'paper', 'ours', 'verdict', 'criterion', 'remark', 'window')
 WORDS = Column('', look='below')
-COLUMNS: dict[str, Column | Quantity | str] = {
+COLUMNS: dict[str, Shown] = {
     'number': 'no.',
-    'verdict': Column(Quantity('', '', 'verdict', '', 'by the criterion'), look='badge'),
-    'claim': Column(Quantity('', '', 'claim and criterion', '', 'what decides it'), look='maths'),
+    'verdict': described('verdict', 'by the criterion', look='badge'),
+    'claim': described('claim and criterion', 'what decides it', look='maths'),
     'criterion': WORDS,
-    'paper': Column(Quantity('', '', 'paper', '', 'as printed; yes: in words'), look='maths'),
-    'ours': Column(Quantity('', '', 'ours', '', 'computed from the runs'), look='maths'),
+    'paper': described('paper', 'as printed; yes: in words', look='maths'),
+    'ours': described('ours', 'computed from the runs', look='maths'),
     'remark': WORDS,
-    'window': Column(Quantity('', '', 'window', '', 'time that ours is of, and the case')),
+    'window': described('window', 'time that ours is of, and the case'),
     'case': WORDS,
 }
 CAPTION = (

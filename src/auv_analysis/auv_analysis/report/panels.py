@@ -22,6 +22,7 @@ from auv_dynamics.vehicle import DOFS
 INK, BOUND, IDENTITY = '#1a1a1a', '#D55E00', '#56B4E9'
 FAULT = '#e69f00'
 HEIGHT = 215  # px
+THIN, LINE, WIDE = 1.0, 1.6, 3.0  # px, widths of lines
 LEFT = 58  # px, so that the time axes of all panels lie above each other
 POINTS = 300_000  # of all panels together, so that a page stays small
 FEWEST = 200  # columns of pixels that a line keeps however many lines there are
@@ -50,7 +51,7 @@ class TimeCurve:
     colour: str
     t: np.ndarray
     y: np.ndarray
-    width: float = 1.6
+    width: float = LINE
     gaps: tuple[tuple[float, float], ...] = ()
     step: float = 0.0
 
@@ -313,9 +314,9 @@ def _certificates(runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:
     lines = tuple(_curve(name, run, 'L', INK, 'L') for name, run in there.items())
     yield TimePanel('L', 'Lyapunov function, (23)', 'L (J)', lines, 'log')
     looks = {
-        'bound': ('bound (28)', BOUND, 1.6),
-        'identity': ('identity (26)', IDENTITY, 3.0),
-        'L_dot': ('measured', INK, 1.0),
+        'bound': ('bound (28)', BOUND, LINE),
+        'identity': ('identity (26)', IDENTITY, WIDE),
+        'L_dot': ('measured', INK, THIN),
     }
     for name, run in there.items():
         curves = tuple(
@@ -326,7 +327,7 @@ def _certificates(runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:
 
 
 def _kinetic(runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:
-    looks = {'wanted': ('of the set-point', GREY, 3.0), 'kinetic': ('of the run', INK, 1.6)}
+    looks = {'wanted': ('of the set-point', GREY, WIDE), 'kinetic': ('of the run', INK, LINE)}
     curves = tuple(
         _curve(name, run, key, colour, signal, width=width)
         for name, run in runs.items()
@@ -353,7 +354,7 @@ def _curve(
     colour: str,
     signal: str,
     column: int = 0,
-    width: float = 1.6,
+    width: float = LINE,
 ) -> TimeCurve:
     """Line over the whole run, of its phases where it is drawn in two."""
     parts = ('whole',) if (signal, 'whole') in run.traces else ('early', 'late')

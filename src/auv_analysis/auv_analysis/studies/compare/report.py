@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.metrics.measures import FAMILIES, MEASURES
-from auv_analysis.metrics.quantities import Quantity, quantity
+from auv_analysis.metrics.quantities import quantity
 from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.arrow import pa
 from auv_analysis.output.new_files import write_json
@@ -16,7 +16,7 @@ from auv_analysis.output.text import join, number
 from auv_analysis.report.digest import digest
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
-from auv_analysis.report.results import Column, Table, make_table
+from auv_analysis.report.results import Column, Table, described, make_table
 from auv_analysis.report.run_report import namesakes
 from auv_analysis.studies.compare.plots import SIX, draw
 from auv_analysis.studies.compare.ranking import (
@@ -39,15 +39,13 @@ SECTIONS = {  # section -> its title, and the plots in it
     'inputs': ('Inputs', ('rms_inputs', 'peak_inputs')),
 }
 NAMED = {
-    'run': Quantity('', '', 'run'),
-    'scenario': Quantity(
-        '', '', 'scenario', '', 'what is asked of the vehicle, and what disturbs it'
-    ),
-    'vehicle': Quantity('', '', 'vehicle', '', 'what the controller knows of the vehicle'),
-    'controller': Quantity('', '', 'controller', '', 'name of the controller in its scenario'),
-    'law': Quantity('', '', 'law', '', 'control law'),
-    'duration': Quantity('', 's', 'duration', '', 'length of the run'),
-    'step': Quantity('', 's', 'step', '', 'control period'),
+    'run': described('run'),
+    'scenario': described('scenario', 'what is asked of the vehicle, and what disturbs it'),
+    'vehicle': described('vehicle', 'what the controller knows of the vehicle'),
+    'controller': described('controller', 'name of the controller in its scenario'),
+    'law': described('law', 'control law'),
+    'duration': described('duration', 'length of the run', 's'),
+    'step': described('step', 'control period', 's'),
 }
 SHARES = 'kinetic_energy.shares_percent'
 SETTLED = 'overall.velocity_error.settling_time'
@@ -169,7 +167,7 @@ def _counted(entries: Sequence[Entry], name: str) -> str:
 
 def overview(table: pa.Table) -> Table:
     """The table with a row per run: who it is, and every measure that sums it up."""
-    measures = {m.name: Quantity('', m.unit, m.label, '', m.meaning) for m in MEASURES}
+    measures = {m.name: described(m.label, m.meaning, m.unit) for m in MEASURES}
     shown = NAMED | measures | _six_columns(SHARES, 'share of kinetic energy')
     failed = [row['run'] for row in table.to_pylist() if row['failure']]
     note = f'Failed, without metrics: {join(failed)}.' if failed else ''

@@ -11,14 +11,14 @@ from pyarrow import parquet
 
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.metrics.energy import kinetic_energy
-from auv_analysis.metrics.quantities import VELOCITY, WRENCH, Quantity, gain_mathtext, quantity
+from auv_analysis.metrics.quantities import VELOCITY, WRENCH, gain_mathtext, quantity
 from auv_analysis.output.arrow import pa
 from auv_analysis.output.new_files import write_table
 from auv_analysis.output.text import Maths, fixed, join, number, plain, symbol
 from auv_analysis.report import plots
 from auv_analysis.report.document import Block, Section, Sentence
 from auv_analysis.report.plots import Drawn, FigureRecord, HeatMap, save_figures
-from auv_analysis.report.results import Column, Table, make_table
+from auv_analysis.report.results import Shown, Table, described, make_table
 from auv_analysis.runs.run import AnyRun, Run
 from auv_analysis.studies.study.sensitivity import Kpi, Row, Sensitivity
 from auv_dynamics.vehicle import DOFS
@@ -39,20 +39,18 @@ WEIGHTS = {
     ),
     'morris': ('effect μ*', 'mean change of the logarithm over the whole range of this gain'),
 }
-HEADS: dict[str, Column | Quantity | str] = {
+HEADS: dict[str, Shown] = {
     'kpi': 'KPI',
-    'value': Quantity('', '', 'value', '', 'with the gains of the scenario'),
+    'value': described('value', 'with the gains of the scenario'),
     'unit': 'unit',
-    'spread': Column(
-        Quantity('', '', 'spread', '', 'standard deviation of its logarithm: about its relative '
-                 'change'), digits=2),
-    'spread_conf': Column(Quantity('', '', '±', '', 'half of its 95 % interval'), digits=1),
-    'rank': Quantity('', '', 'place', '', 'by spread among its degrees of freedom'),
-    'alike': 'of',
-    'gain': Quantity('', '', 'main gain', '', 'the gain that does most'),
-    'doubled': Column(
-        Quantity('', '%', '× 2', '', 'change of the KPI when that gain is doubled'), digits=2
+    'spread': described(
+        'spread', 'standard deviation of its logarithm: about its relative change', digits=2
     ),
+    'spread_conf': described('±', 'half of its 95 % interval', digits=1),
+    'rank': described('place', 'by spread among its degrees of freedom'),
+    'alike': 'of',
+    'gain': described('main gain', 'the gain that does most'),
+    'doubled': described('× 2', 'change of the KPI when that gain is doubled', '%', digits=2),
 }  # fmt: skip
 SHOWN = (  # what is drawn of step 3
     'velocity_error.rms', 'velocity_error.max_after_2s', 'lumped_error.rms', 'effort.rms',
@@ -113,9 +111,8 @@ def sensitivity_table(found: Sequence[Sensitivity], controller: str) -> Table:
         gain, name = (column, of.weight) if column in of.gains else (row['gain'], column)
         return f'{FILE}:{name}[{place[controller, row["figure"], row["dof"], gain]}]'
 
-    gains: dict[str, Column | Quantity | str] = {
-        gain: Column(Quantity('', '', symbol(gain), '', meaning), group, decimals=2)
-        for gain in of.gains
+    gains: dict[str, Shown] = {
+        gain: described(symbol(gain), meaning, group=group, decimals=2) for gain in of.gains
     }
     caption = (
         f'How the KPIs of {controller} change when every gain is multiplied by a number '

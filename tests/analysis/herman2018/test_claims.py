@@ -1,15 +1,22 @@
 """The claims table on the paper's own cases, and that its verdicts follow the numbers."""
 
-from dataclasses import replace
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.herman2018.claims import judge_runs
-from auv_analysis.herman2018.evidence import grade
+from auv_analysis.herman2018 import paper
+from auv_analysis.herman2018.claims import ROWS, Row, judge_runs
+from auv_analysis.herman2018.evidence import ErrorSensitivity, Evidence, Signals, grade
 from auv_analysis.output.text import MISSING
+from auv_analysis.report.digest import digests
 from auv_analysis.runs.run import Run
+from auv_dynamics.vehicle import DOFS
 
 CASE2_ONLY = {17, 18, 19, 20}
 
@@ -199,3 +206,79 @@ def test_grade_counts_the_parts():
     assert grade([True, True]) == 'reproduced'
     assert grade(np.array([True, False])) == 'partly'
     assert grade([False]) == 'not reproduced'
+
+
+FARTHEST = 300.0  # times
+ANSWERS = np.array([0.1, 0.2, 0.3, 0.4, 0.9, 0.5])
+Asked = tuple[str, str, tuple[float, ...]]  # law, name of a signal, window
+
+
+@dataclass(frozen=True, eq=False)
+class Scaled(Signals):
+    """Signals of a law's run, of which one is some times as large in one window."""
+
+    law: str
+    which: Asked
+    times: np.ndarray
+    asked: dict[Asked, None]
+
+    def part(self, name: str, *window: float) -> Any:
+        found, key = super().part(name, *window), (self.law, name, window)
+        self.asked[key] = None
+        kinds = ('peak', 'rms', 'mean', 'span', 'path', 'last')
+        values = {kind: getattr(found, kind) for kind in kinds}
+        if key == self.which:
+            values = {kind: self.times * value for kind, value in values.items()}
+        return SimpleNamespace(**values)
+
+
+class Experiment:
+    """A row of the table, judged on runs of which one number is changed."""
+
+    def __init__(self, row: Row, runs: dict[str, Any]):
+        self._row, self._runs = row, runs
+        self.asked: dict[Asked, None] = {}
+        self.usual = self.verdict(('', '', ()), 0, 1.0)
+        self.asked |= {(law, name, ()): None for law in runs for name in ('gains', 'others')}
+        self.asked |= {('', 'N', ()): None}
+
+    def verdict(self, which: Asked, axis: int, factor: float) -> str:
+        times = np.where(np.arange(6) == axis, factor, 1.0)
+        signals = {
+            law: Scaled(run, law, which, times, self.asked) for law, run in self._runs.items()
+        }
+        answers = {
+            law: ErrorSensitivity(*(
+                ANSWERS * (times if which[:2] == (law, name) else 1.0)
+                for name in ('gains', 'others')
+            ))
+            for law in signals
+        }  # fmt: skip
+        N = np.array(paper.N) * (times if which[1] == 'N' else 1.0)
+        return self._row.judge(Evidence(signals, tuple(N), answers)).verdict
+
+    def flips(self, which: Asked, axis: int) -> Iterator[str]:
+        """Factors from which on the verdict is another one."""
+        for end in (-np.log(FARTHEST), np.log(FARTHEST)):
+            here, there, changed = 0.0, end, self.verdict(which, axis, np.exp(end))
+            while changed != self.usual and abs(there - here) > 1e-4:
+                middle = (here + there) / 2
+                same = self.verdict(which, axis, np.exp(middle)) == changed
+                here, there = (here, middle) if same else (middle, there)
+            if changed != self.usual:
+                yield f'{changed} {"above" if end > 0 else "below"} {np.exp(there):.3f} times'
+
+
+def test_where_each_verdict_changes(case1, case2, approved):
+    known = {'case1': digests(case1), 'case2': digests(case2)}
+    lines = []
+    for number, row in enumerate(ROWS, start=1):
+        runs = known[row.cases[0]]
+        runs = dict.fromkeys(runs, runs['gvc']) if number == 14 else runs  # else they differ by far
+        tried = Experiment(row, runs)
+        for (law, name, window), axis in itertools.product([*tried.asked], range(6)):
+            if found := ', '.join(tried.flips((law, name, window), axis)):
+                begin = ' to '.join(f'{time:g}' for time in window)
+                lines.append(f'{number} {law} {name} {begin} {DOFS[axis]}: {found}')
+    approved.add(lines)
+    assert {line.split()[0] for line in lines} == {str(n) for n in range(1, 22)} - {'17'}

@@ -100,16 +100,14 @@ def _panel(axes: Axes, poles: Mapping[str, np.ndarray], limit: float) -> None:
         ray = ([-reach, 0, -reach], [height, 0, -height])
         axes.plot(*ray, color=GREY, linewidth=0.4, alpha=0.7)
     axes.axvline(0.0, color='black', linewidth=0.7)
-    right = 0.08 * reach
-    for index, (name, values) in enumerate(poles.items()):
-        shown = values[np.abs(values) <= limit * (1 + 1e-9)]
-        right = max(right, 1.1 * shown.real.max(initial=0.0))
+    inside = {name: v[np.abs(v) <= limit * (1 + 1e-9)] for name, v in poles.items()}
+    for index, (name, shown) in enumerate(inside.items()):
         colour, mark = COLOURS[index % len(COLOURS)], MARKS[index % len(MARKS)]
         face = colour if mark in 'x+' else 'none'
         style: dict[str, Any] = {'color': colour, 'facecolors': face, 's': 22, 'linewidths': 0.9}
         axes.scatter(shown.real, shown.imag, marker=mark, label=name, zorder=3, **style)
-    axes.set_xlim(-reach, right)
-    largest = max(float(np.abs(v[np.abs(v) <= limit * (1 + 1e-9)].imag).max(initial=0.0))
-                  for v in poles.values())  # fmt: skip
-    axes.set_ylim(-max(1.15 * largest, 0.3 * reach), max(1.15 * largest, 0.3 * reach))
+    every = np.concatenate([*inside.values()])
+    top = max([0.3 * reach, *1.15 * every.imag])  # poles are conjugate
+    axes.set_xlim(-reach, max([0.08 * reach, *1.1 * every.real]))
+    axes.set_ylim(-top, top)
     axes.set_xlabel('real part (1/s)')

@@ -75,6 +75,18 @@ def test_whole_numbers_are_numbers_and_one_is_a_list_where_several_may_be() -> N
     assert {type(value) for value in (*found['limits.wrench'], found['ramp'])} == {float}
 
 
+def test_what_decides_whom_a_controller_hears_is_fixed() -> None:
+    with program() as made:
+        node = made.add(ControllerNode, CONTROL)
+        names = node.get_parameters_by_prefix('')
+        own = [name for name in names if not name.startswith('qos_overrides.')]
+        fixed = {about.name for about in node.describe_parameters(own) if about.read_only}
+    assert fixed == {
+        'vehicle', 'lockstep', 'autostart', 'setpoint_pairing', 'setpoint_acceleration',
+        'odom_frame', 'base_frame', 'expected_subscribers', 'start_type_description_service',
+    }  # fmt: skip
+
+
 CONTROL = {'law': 'gvc', 'vehicle': 'herman2018', 'gains.k_D': 12.0}
 
 

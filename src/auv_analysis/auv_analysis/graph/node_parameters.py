@@ -28,23 +28,23 @@ OF_PLANT_ALONE = {  # no driver has to offer them
     *(interface.TWIST, interface.DISTURBANCE),
     *(interface.WRENCH_APPLIED, interface.GROUND_TRUTH),
 }
-SUBSCRIBERS: dict[str, dict[str, tuple[str, ...]]] = {  # topic -> who subscribes, by publisher
+SUBSCRIBERS: dict[str, dict[str, set[str]]] = {  # topic -> who subscribes, by publisher
     PLANT: {
-        interface.ODOM: (CONTROLLER, SETPOINT, ANALYSIS, RECORDER),
-        interface.TWIST: (RECORDER,),
-        interface.DISTURBANCE: (ANALYSIS, RECORDER),
-        interface.WRENCH_APPLIED: (RECORDER,),
-        interface.GROUND_TRUTH: (ANALYSIS, RECORDER),
+        interface.ODOM: {CONTROLLER, SETPOINT, ANALYSIS, RECORDER},
+        interface.TWIST: {RECORDER},
+        interface.DISTURBANCE: {ANALYSIS, RECORDER},
+        interface.WRENCH_APPLIED: {RECORDER},
+        interface.GROUND_TRUTH: {ANALYSIS, RECORDER},
     },
     SETPOINT: {
-        interface.CMD_VEL: (CONTROLLER, ANALYSIS, RECORDER),
-        interface.CMD_ACCEL: (CONTROLLER, RECORDER),
+        interface.CMD_VEL: {CONTROLLER, ANALYSIS, RECORDER},
+        interface.CMD_ACCEL: {CONTROLLER, RECORDER},
     },
     CONTROLLER: {
-        interface.WRENCH: (PLANT, ANALYSIS, RECORDER),
-        interface.DISTURBANCE_ESTIMATE: (ANALYSIS, RECORDER),
+        interface.WRENCH: {PLANT, ANALYSIS, RECORDER},
+        interface.DISTURBANCE_ESTIMATE: {ANALYSIS, RECORDER},
     },
-    ANALYSIS: dict.fromkeys(interface.ANALYSIS_TOPICS, (RECORDER,)),
+    ANALYSIS: {topic: {RECORDER} for topic in interface.ANALYSIS_TOPICS},
 }
 
 

@@ -381,7 +381,7 @@ def _counts(claims: Sequence[Claim]) -> Iterator[str]:
 
 def write_claims(folder: Path, claims: Sequence[Claim]) -> Path:
     """Write `claims.parquet`, long: `of` says whether a number is 'ours' or the 'paper''s."""
-    rows = [{**facts, **value} for claim in claims for facts, value in _numbers(claim)]
+    rows = [row for claim in claims for row in _numbers(claim)]
     types = {'number': pa.int64(), 'value': pa.float64()}
     names = (*FACTS, 'of', 'name', 'value', 'unit')
     schema = pa.schema([(name, types.get(name, pa.string())) for name in names])
@@ -389,10 +389,10 @@ def write_claims(folder: Path, claims: Sequence[Claim]) -> Path:
     return folder / FILE
 
 
-def _numbers(claim: Claim) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
+def _numbers(claim: Claim) -> Iterator[dict[str, Any]]:
     facts = {name: str(getattr(claim, name)) for name in FACTS} | {'number': claim.number}
     for of, values in (('ours', claim.values), ('paper', claim.printed)):
         for entry in values:
-            yield facts, {'of': of, **entry._asdict()}
+            yield facts | {'of': of} | entry._asdict()
     if not (claim.values or claim.printed):
-        yield facts, {'of': '', 'name': '', 'value': None, 'unit': ''}
+        yield facts | {'of': '', 'name': '', 'value': None, 'unit': ''}

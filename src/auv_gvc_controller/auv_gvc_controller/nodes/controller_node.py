@@ -257,29 +257,29 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Build the controller; one line says what is missing."""
-        return super().on_configure(state) if self._build() else FAILURE
+        return SUCCESS if self._build() else FAILURE
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start from zero integrals with the parameters of this moment."""
         if not self._build():
             return FAILURE
         self._active = True
-        return super().on_activate(state)
+        return SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Leave the vehicle without a wrench."""
         self._leave()
-        return super().on_deactivate(state)
+        return SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Leave the vehicle without a wrench."""
         self._leave()
-        return super().on_shutdown(state)
+        return SUCCESS
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Leave the vehicle without a wrench; success leads to unconfigured, and on from there."""
         self._leave()
-        return super().on_error(state)
+        return SUCCESS
 
     def _leave(self) -> None:
         self._let_go()

@@ -118,8 +118,9 @@ def _axes_lines(axes: Axes) -> Iterator[str]:
     titles = [axes.get_title(loc=side) for side in ('left', 'center', 'right')]
     yield f'axes{where}: {" ".join(filter(None, titles))}'
     for name, axis in (('x', axes.xaxis), ('y', axes.yaxis)):
-        low, high = getattr(axes, f'get_{name}lim')()
-        limits = '' if getattr(axes, f'get_autoscale{name}_on')() else f' {digest([low, high])}'
+        limits = '' if getattr(axes, f'get_autoscale{name}_on')() else f' {_limits(axes, name)}'
+        alike = getattr(axes, f'get_shared_{name}_axes')().get_siblings(axes)
+        scale = f'{axis.get_scale()}{" shared" * (len(alike) > 1)}'
         ticks = ''
         if isinstance(axis.get_major_locator(), FixedLocator):
             locations, texts = axis.get_ticklocs(), axis.get_ticklabels()
@@ -129,13 +130,22 @@ def _axes_lines(axes: Axes) -> Iterator[str]:
         elif isinstance(axis.get_major_formatter(), FuncFormatter):
             ticks = ' ticks ' + ', '.join(axis.get_major_formatter()(v, 0) for v in (0.01, 0.5, 20))
         inverted = ' inverted' if axis.get_inverted() else ''
-        yield f'  {name} {axis.get_label_text()} {axis.get_scale()}{inverted}{limits}{ticks}'
+        yield f'  {name} {axis.get_label_text()} {scale}{inverted}{limits}{ticks}'
     kept = [one for one in axes.get_children() if one.get_visible() and one is not axes.patch]
     for (kind, look), group in groupby(kept, key=_kind_and_look):
         if kind and (data := _data(kind, [*group], axes)):
             yield f'  {kind}{look}: {data}'
     if axes.get_legend() is not None:
         yield f'  {_legend(axes.get_legend())}'
+
+
+def _limits(axes: Axes, name: str) -> str:
+    """Ends of an axis; those of the data by this word, exactly."""
+    ends = getattr(axes, f'get_{name}lim')()
+    of_data = getattr(axes.dataLim, f'interval{name}')
+    size = np.abs(ends).max()
+    pairs = zip(ends, of_data, strict=True)
+    return ' '.join('data' if end == other else _number(end, size) for end, other in pairs)
 
 
 def _kind_and_look(artist: Artist) -> tuple[str, str]:

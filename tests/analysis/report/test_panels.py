@@ -12,7 +12,6 @@ from auv_analysis.report import panels as page
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.panels import (
     different_disturbances,
-    document,
     interactive,
     packed,
     panel_sets,
@@ -78,7 +77,7 @@ def test_a_controller_that_estimates_nothing_has_no_lumped_error(case1):
 def shown(runs: dict[str, RunDigest]) -> str:
     """Bokeh's JSON of the panels of errors."""
     panels = panel_sets(runs)['errors'].panels
-    return json.dumps(document(panels, {'gvc': [], 'cl': []}, (), (0.0, 5.0))[0])
+    return json.dumps(page.document(panels, {'gvc': [], 'cl': []}, (), (0.0, 5.0))[0])
 
 
 def test_many_lines_are_thinned_to_a_budget(case1, monkeypatch):

@@ -20,7 +20,7 @@ from auv_analysis.report.run_report import write_report
 from auv_analysis.report.run_tables import certificate_table, reasons
 from auv_analysis.report.scenario_text import gain_text, set_up
 from auv_analysis.report.wrench_plots import certificate_figure
-from auv_analysis.runs.run import Run
+from auv_analysis.runs.run import FOREIGN, Run
 from auv_gvc_controller.laws.model import control_model
 
 DATA = {
@@ -127,11 +127,33 @@ def test_gains_are_short_where_they_can_be() -> None:
     assert gain_text((np.eye(6) + np.eye(6, k=1)).tolist()) == 'full matrix, in the listing'
 
 
-def test_a_start_is_said_where_there_is_one(rough):
-    runs, summaries, text = rough
-    assert 'start' not in _words(runs, summaries, text)
-    text += 'initial: {nu: [0.1, 0, 0, 0, 0, 0]}\n'
-    assert _words(runs, summaries, text)['start'] == ['nu: [0.1, 0, 0, 0, 0, 0]']
+SCENARIOS: dict[str, dict] = {
+    'ideal': {'actuators': None, 'sensors': None, 'disturbance': [], 'integrator': 'rk4'},
+    'from a start': {'initial': {'nu': [0.1, 0, 0, 0, 0, 0]}, 'seed': None},
+    'open loop': {'excitation': {'surge': {'terms': [{'amplitude': 9, 'omega': 2, 'phase': -1}]}}},
+    'read': {'setpoint': {'file': 'x.csv'}, 'excitation': {'yaw': {'offset': 0.0}}},
+    'thrusters': {'actuators': {'thrusters': True}, 'setpoint': {'heave': {'offset': 0.0}}},
+    'slow': {'actuators': {'lag': 0.1}, 'disturbance': {'kind': 'current', 'velocity': [1, 0, 0]}},
+    'faulty': {'faults': [
+        {'kind': 'sensor_delay', 'delay': 0.1, 'from': 1.0, 'to': 2.0},
+        {'kind': 'wrench_loss', 'from': 3.0},
+    ]},
+    'delayed': {'faults': [{'kind': 'sensor_delay', 'delay': 0.1, 'from': 1.0, 'to': 2.0}]},
+}  # fmt: skip
+
+
+def test_what_is_said_of_each_scenario(rough, approved):
+    runs, summaries, _ = rough
+    others = runs | {
+        'gvc': replace(runs['gvc'], hold='continuous'),
+        'pid': replace(runs['pid'], source=FOREIGN),
+    }
+    for name, changes in SCENARIOS.items():
+        data = {key: value for key, value in (DATA | changes).items() if value is not None}
+        text = yaml.safe_dump(data, sort_keys=False)
+        found = set_up(others if name == 'slow' else runs, summaries, text)
+        approved.add([f'{name}: {found.name}, {found.limit}'])
+        approved.add([f'  {what}: {line}' for what, lines in found.rows for line in lines])
 
 
 def test_set_up_of_ideal_devices(tmp_path):

@@ -501,7 +501,10 @@ def test_what_was_not_recorded_is_said_in_its_panel(runs, foreign, tmp_path) -> 
         run.nu[:, 1] = run.tau[:, 1] = np.nan
     alone, _ = _drawn({'told': replace(told, unexplained=wrench, faults=())}, tmp_path)
     del lost['three']
+    lost['one'].tau[:, 3] = 0.0
     figures, captions = _drawn(lost, tmp_path)
+    scales = [axes.get_yscale() for axes in figures['inputs_compared'].axes]
+    assert scales[3] == 'linear', 'what does nothing is not far from what does'
     for figure in (figures['settling'], figures['inputs_compared'], alone['unexplained_told']):
         for axes in figure.axes:
             gone = axes.get_title(loc='left').endswith('sway')

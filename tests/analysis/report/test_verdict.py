@@ -102,6 +102,8 @@ MIXED = [0.5] * 3 + [2.0] * 3
         ({'times': ([None, *ONE[1:]], ONE)}, ['cl settles in 1.0 s, gvc does not in surge']),
         ({'times': (ONE, [*ONE[1:], None])}, ['gvc settles in 1.0 s, cl does not in yaw']),
         ({'rms': (None, None), 'times': (None, None)}, []),
+        ({'rms': ([None, *ONE[1:]], ONE)}, []),
+        ({'peaks': (ONE, [None, *ONE[1:]])}, []),
     ],
 )  # fmt: skip
 def test_every_pair_of_outcomes(

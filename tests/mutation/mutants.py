@@ -48,7 +48,7 @@ COLOUR = re.compile(r'\w*colou?rs?|hatch|fmt')  # keywords whose value, where it
 LAYS_OUT = {  # calls
     'new_figure', 'ConstrainedLayoutEngine', 'tick_params', 'margins', 'set_visible', 'grid',
     'set_minor_locator', 'LogLocator', 'minorticks_off', '_small_heads', 'set_axis_off',
-    'set_edgecolor',
+    'set_edgecolor', 'set_alpha',
 }  # fmt: skip
 DASHED = re.compile(r'\(0, \([\d., ]+\)\)')  # lengths of the dashes of a line
 ROUNDED = {'number', 'plain', 'fixed'}  # calls: a value, and its digits

@@ -262,11 +262,13 @@ def test_certificate_arrays_are_those_of_the_summary(case1):
         assert certificate_of(replace(run, **change), control_model(run.vehicle)) is None
 
 
-def test_certificate_figure_says_what_it_rests_on(case1):
+def test_certificate_figure_says_what_it_rests_on(case1, approved):
     run, summary = case1[0]['gvc'], case1[1]['gvc']
     with plots.style():
         figure, _, caption = certificate_figure(digest(run), summary)
         sampled = certificate_figure(digest(replace(run, hold='zoh')), summary)[2]
+        short = certificate_figure(digest(run.part(run.t <= 3.0)), summary)[2]
+    approved.add([caption, sampled, short])
     assert [axes.get_yscale() for axes in figure.axes] == ['log', 'symlog', 'symlog']
     assert 'linear between them and logarithmic beyond' in caption
     assert 'Grey: where (26) is positive' in caption
@@ -292,7 +294,9 @@ def test_certificate_is_drawn_where_26_holds_along_solutions_and_says_so(tmp_pat
 def test_certificate_figure_of_next_to_nothing(case1):
     run, summary = case1[0]['gvc'], case1[1]['gvc']
     two = run.part(run.t <= 0.015)
-    assert certificate_figure(digest(two), summary)[0] is None
+    title = 'Certificate, gvc'
+    found = certificate_figure(digest(two), summary)
+    assert found == (None, title, f'{title}: too little to draw.')
 
 
 def test_axes_that_are_called_logarithmic_are(case1):

@@ -156,8 +156,8 @@ def _certificate_caption(
 ) -> str:
     parts = [f'{title}: (a) L of (23) on a logarithmic axis; (b) its derivative, measured from L']
     parts[0] += ', against the identity (26) and the bound (28)'
-    parts[0] += f', the first {TRANSIENT:g} s' if split else ''
-    parts[0] += '; (c) the rest on a scale of its own.' if split else '.'
+    rest = f', the first {TRANSIENT:g} s; (c) the rest on a scale of its own'
+    parts[0] += f'{rest if split else ""}.'
     if partly:
         parts += ['An axis with two dotted lines is linear between them and logarithmic beyond.']
     parts += ['Grey: where (26) is positive, so that L increases.']

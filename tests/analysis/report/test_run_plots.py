@@ -662,3 +662,25 @@ def test_a_page_spans_all_of_its_runs_and_names_their_dashes(runs) -> None:
     assert found.runs == {'one': '', 'later': '7 3'}
     assert found.dofs == dict(zip(DOFS, plots.COLOURS, strict=True))
     assert found.faults == ''
+
+
+def test_what_cannot_be_drawn_is_said_in_place_of_a_figure(tmp_path) -> None:
+    unknown, zero = np.full((SAMPLES, 6), np.nan), np.zeros((SAMPLES, 6))
+    about = {'disturbance': None, 'acceleration': {'filter': 'f', 'window': 1.0}, 'faults': ()}
+    estimate = {'unexplained': unknown, 'unexplained_error': unknown}
+    runs = {
+        'aimless': made('aimless', 'gvc', 4, nu_d=unknown, **about),
+        'lost': made('lost', 'gvc', 5, nu=unknown, **about, **estimate),
+        'still': made('still', 'pid', 6, nu=zero, nu_d=zero, tau=zero, disturbance_estimate=zero),
+    }
+    for name, run in runs.items():
+        _, captions = _drawn({name: run}, tmp_path / name)
+        told = [text for text in captions.values() if 'Not recorded' not in text]
+        assert any(text.endswith(END[name]) for text in told)
+
+
+END = {
+    'aimless': ': without a set-point there is none.',
+    'lost': ': every row of (1) needs what was not recorded.',
+    'still': ': zero throughout.',
+}

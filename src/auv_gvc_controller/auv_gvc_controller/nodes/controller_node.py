@@ -188,7 +188,7 @@ class Idle:
         ns, at = self._heard.get(topics.CMD_VEL.name, (0, -LATE))
         if time.monotonic() - at > LATE:
             return why_silent(self._node, topics.CMD_VEL)
-        _, derivative_at = self._heard.get(topics.CMD_ACCEL.name, (0, -LATE))
+        _, derivative_at = self._heard.get(topics.CMD_ACCEL.name, (0, -math.inf))
         if self._derivative and time.monotonic() - derivative_at > LATE:
             silent = why_silent(self._node, topics.CMD_ACCEL) or 'no cmd_accel of its stamp comes'
             return f'{silent}; setpoint_acceleration: topic waits for it'

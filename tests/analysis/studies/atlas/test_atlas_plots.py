@@ -78,3 +78,9 @@ def test_an_atlas(tmp_path) -> None:
             assert value == pytest.approx(chart.reached[f'{kind}_max'][DOFS.index(dof)])
         words = [t.get_text() for axes in figures[f'case1_{kind}'].axes for t in axes.texts]
         assert words.count(plotting.ALWAYS) == 2, 'one of each vehicle that did not diverge'
+
+
+def test_an_atlas_of_vehicles_that_nothing_couples(tmp_path) -> None:
+    with artists.captured() as figures:
+        atlas.draw([_chart('flat', 2, diagonal=True), _chart('round', 3, diagonal=True)], tmp_path)
+    assert not figures

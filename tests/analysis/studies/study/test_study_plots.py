@@ -72,3 +72,10 @@ def test_the_measure_that_follows_the_gains_most_in_words() -> None:
     assert study._headline(found, 'velocity_error.rms', 'sway', main).endswith(
         '(spread 1.2, place 2 to 3 of 6): doubling k_D changes it by about +12 %.'
     )
+
+
+def test_sensitivities_of_nothing_that_is_drawn(tmp_path) -> None:
+    found = _sensitive('sobol')
+    found.kpis.clear()
+    (record,) = study.sensitivity_plots([found], tmp_path)
+    assert (record.png, record.pdf) == (None, None)

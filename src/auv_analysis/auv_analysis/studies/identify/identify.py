@@ -317,6 +317,8 @@ def _of_still(problem: OutputError, fit: Fit, every: Unknowns) -> np.ndarray:
     names = fit.unknowns.names
     kept = [every.names.index(name) for name in names]
     rest = [k for k, name in enumerate(every.names) if name not in names]
+    if not rest:
+        return np.zeros((len(names), len(names)))
     theta = np.zeros(len(every.entries))
     theta[kept] = fit.theta
     S = problem.normal(every, theta, fit.starts).eliminated()[0]

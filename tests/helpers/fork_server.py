@@ -171,7 +171,10 @@ class ForkServer(Line):
     """The process that forks for all workers of a test run, started where it is not there yet."""
 
     def __init__(self) -> None:
-        owner = os.environ.setdefault(OWNER, str(os.getpid()))
+        mine = str(os.getpid())
+        told = os.environ.get(OWNER)
+        # what a test starts has its own, which holds its output open no longer than it lives
+        owner = told if told in (mine, str(os.getppid())) else mine
         name = f'\0auv_gvc forks for {owner}'
         end = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         super().__init__(end)

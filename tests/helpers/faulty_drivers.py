@@ -65,9 +65,9 @@ class Driver(Node):
         kind = Wrench if name == 'plain_wrench' else WrenchStamped
         self.create_subscription(kind, 'wrench', lambda _: None, 1)
         self._began = self.get_clock().now().nanoseconds
-        self.create_timer(1.0 / (SLOW if name == 'slow' else RATE), self._tick)
+        self._every = round(RATE / SLOW) if name == 'slow' else 1
 
-    def _tick(self) -> None:
+    def tick(self) -> None:
         now = self.get_clock().now().nanoseconds
         at = min(round((now - self._began) / NANOSECONDS * RATE), len(self._states) - 1)
         x = STATES.get(self._name, lambda x: x)(self._states[at])
@@ -75,7 +75,7 @@ class Driver(Node):
         # the states are those of the grid: stamps are its times as well
         stamp = self._began + round(at * NANOSECONDS / RATE)
         stamp = {'frozen': self._began, 'old': stamp - OLD}.get(self._name, stamp)
-        if at > self._k or self._name == 'frozen':
+        if at >= self._k + self._every or self._name == 'frozen':
             self._k = at
             message = convert.odometry(stamp, x, frames)
             if self._name == 'garbled' and at % 10 == 0:
@@ -87,8 +87,11 @@ def main() -> None:
     rclpy.init()
     states = motion(SECONDS, RATE)
     executor = SingleThreadedExecutor()
-    for name in NAMES:
-        executor.add_node(Driver(name, states))
+    drivers = [Driver(name, states) for name in NAMES]
+    for driver in drivers:
+        executor.add_node(driver)
+    # one timer for all: rclpy looks at every node each time that it wakes up
+    drivers[0].create_timer(1.0 / RATE, lambda: [driver.tick() for driver in drivers])
     print('ready', flush=True)
     executor.spin()
 

@@ -1,6 +1,8 @@
 """Reports as data: what the page shows is what lies beside it, and every source leads somewhere."""
 
+import platform
 import re
+from importlib.metadata import version
 from pathlib import Path
 
 import pyarrow.parquet as parquet
@@ -45,10 +47,20 @@ def test_every_link_leads_to_an_anchor_that_there_is_once(folder):
     assert {'experiment', 'table-key_figures', 'claim-14', 'quantities'} <= set(page.ids)
 
 
-def test_a_report_says_what_made_it(folder):
+def test_a_report_says_what_made_it(folder, monkeypatch):
     text = (folder / 'report.html').read_text(encoding='utf-8')
-    assert 'numpy' in text
+    packages = ('auv_analysis', 'auv_gvc_controller', 'auv_dynamics', 'numpy', 'numba', 'scipy')
+    versions = {'Python': platform.python_version()} | {n: version(n) for n in packages}
+    listed = ', '.join(f'{name} {found}' for name, found in versions.items())
+    assert f'<dt>versions</dt><dd>{listed}; sources' in text
     assert re.search(r'<dt>written</dt><dd>\d{4}-\d\d-\d\d', text)
+    for program, command in (
+        ('bin/auv', "auv simulate 'a b'"),
+        ('auv_analysis/cli.py', "auv simulate 'a b'"),
+        ('other.py', ''),
+    ):
+        monkeypatch.setattr('sys.argv', [program, 'simulate', 'a b'])
+        assert document.provenance().command == command
 
 
 def made(tmp_path: Path, **changes) -> str:

@@ -98,6 +98,7 @@ MIXED = [0.5] * 3 + [2.0] * 3
         ({'rms': (HALF, ONE), 'peaks': (ONE, [0.0] * 6)}, ['infinitely many', '(1.00 against 0 N']),
         ({'rms': (HALF, ONE), 'peaks': ([0.0] * 6, ONE)}, ['0 times the peak force']),
         ({'rms': (HALF, ONE), 'K_D': (None, None)}, ['gvc tracks better than cl']),
+        ({'rms': (HALF, ONE), 'K_D': ([[0.0] * 6] * 6,) * 2}, ['gvc tracks better than cl']),
         ({'times': ([None] * 6, [None] * 6)}, ['neither gvc nor cl settles in all']),
         ({'times': ([None, *ONE[1:]], ONE)}, ['cl settles in 1.0 s, gvc does not in surge']),
         ({'times': (ONE, [*ONE[1:], None])}, ['gvc settles in 1.0 s, cl does not in yaw']),

@@ -241,7 +241,7 @@ def distribution(
     """
     for name, values in samples.items():
         finite = np.sort(values[np.isfinite(values)])
-        share = np.arange(1, len(finite) + 1) / max(len(values), 1)
+        share = np.arange(1, len(finite) + 1) / len(values)
         axes.plot(finite, share, drawstyle='steps-post', label=name, **looks.get(name, {}))
     axes.set_ylim(0.0, 1.0)
 

@@ -146,6 +146,7 @@ class ControllerParameters:
 
 
 LATE = 1.0  # s without a message, after which nobody is said to publish
+NEVER = 0, -math.inf  # stamp of a message, ns, and time when it came, s
 NO_ODOMETRY, NO_SETPOINT = 'no odometry', 'no set-point'  # what the watchdog's texts begin with
 
 
@@ -185,10 +186,10 @@ class Idle:
         return (ERROR, watchdog) if watchdog else (OK, '')
 
     def _no_setpoint(self, odometry_ns: int) -> str:
-        ns, at = self._heard.get(topics.CMD_VEL.name, (0, -LATE))
+        ns, at = self._heard.get(topics.CMD_VEL.name, NEVER)
         if time.monotonic() - at > LATE:
             return why_silent(self._node, topics.CMD_VEL)
-        _, derivative_at = self._heard.get(topics.CMD_ACCEL.name, (0, -math.inf))
+        _, derivative_at = self._heard.get(topics.CMD_ACCEL.name, NEVER)
         if self._derivative and time.monotonic() - derivative_at > LATE:
             silent = why_silent(self._node, topics.CMD_ACCEL) or 'no cmd_accel of its stamp comes'
             return f'{silent}; setpoint_acceleration: topic waits for it'

@@ -41,7 +41,8 @@ LAYOUT = re.compile(  # keywords: how large, how faint, where the name of someth
     r'(line|eline|edge|markeredge)widths?|lw|(font|label|marker|cap)size|s|fontweight'
     r'|\w*rotation|handlelength|loc|location|bbox_to_anchor|ncols|zorder|alpha|ha|va'
     r'|(width|height)_ratios|aspect|fraction|shrink|linscale|interpolation|textcoords|xytext'
-    r'|rasterized|squeeze|no_wrap|overflow|justify|highlight|optimize|strict|digits|autohide|level|\w*_font_\w+|minor_tick_line_color'
+    r'|rasterized|squeeze|no_wrap|overflow|justify|highlight|optimize|strict|digits|autohide'
+    r'|level|\w*_font_\w+|minor_tick_line_color'
     r'|padding|spacing|(glyph|label)_height|glyph_width|min_border_left|toolbar_location|sizing_mode'
 )
 COLOUR = re.compile(r'\w*colou?rs?|hatch|fmt')  # keywords whose value, where it is a text, is taste
@@ -61,7 +62,7 @@ def mutants(paths: list[Path], wiring: set[Path]) -> list[MutationSpec]:
         source = path.read_text(encoding='utf-8')
         tree = ast.parse(source)
         parts = _no_code(tree) + (_judged(tree, source) if path in wiring else _texts(tree))
-        spared = [_place(part) for part in parts if part is not None]
+        spared = [_place(part, source.splitlines()) for part in parts if part is not None]
         for item in _all_work_items([path], {}):
             (mutant,) = item.mutations
             name = mutant.operator_name
@@ -72,9 +73,10 @@ def mutants(paths: list[Path], wiring: set[Path]) -> list[MutationSpec]:
     return sorted(found, key=lambda m: (m.module_path, m.start_pos, m.operator_name, m.occurrence))
 
 
-def _place(part: ast.AST) -> Place:
-    """(line, column) from and up to which nothing is mutated."""
-    return (part.lineno, part.col_offset), (part.end_lineno, part.end_col_offset)
+def _place(part: ast.AST, lines: list[str]) -> Place:
+    """(line, column) from and up to which nothing is mutated; `ast` counts columns in bytes."""
+    ends = (part.lineno, part.col_offset), (part.end_lineno, part.end_col_offset)
+    return tuple((n, len(lines[n - 1].encode()[:byte].decode())) for n, byte in ends)
 
 
 def _no_code(tree: ast.Module) -> list[ast.AST | None]:

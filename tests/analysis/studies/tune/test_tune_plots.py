@@ -99,6 +99,15 @@ def test_distributions_over_draws() -> None:
     assert figure.axes[0].get_ylabel() == 'share of the draws'
 
 
+def test_a_measure_is_drawn_where_any_controller_has_it() -> None:
+    tuning = Tuned()
+    tuning.draws['mine'].late_error[:] = np.nan
+    assert len(tune.distributions(tuning)[0].axes) == 3
+    for draws in tuning.draws.values():
+        draws.late_error[:] = np.nan
+    assert len(tune.distributions(tuning)[0].axes) == 2
+
+
 def test_paired_ratios_are_of_the_same_draws() -> None:
     tuning = Tuned()
     figure, title, _ = tune.paired(tuning)

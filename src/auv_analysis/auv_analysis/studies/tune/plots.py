@@ -186,8 +186,7 @@ def _scaled(axes: Axes, measure: str) -> None:
         return
     axes.set_xscale('log')
     low, high = axes.get_xlim()
-    wide = low > 0 and high / low > 300
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if high > 300 * low else (1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter('{x:g}')
     axes.xaxis.set_minor_locator(NullLocator())
 

@@ -1,5 +1,6 @@
 """`auv check-driver` beside real drivers: each fault fails its check, and nothing is published."""
 
+import json
 import subprocess
 import sys
 import time
@@ -8,11 +9,13 @@ from pathlib import Path
 
 import pytest
 from geometry_msgs.msg import WrenchStamped
+from helpers.artists import captured
 from helpers.faulty_drivers import NAMES
 from helpers.node_processes import PATIENCE, Peer, environment, fresh_domain
 from helpers.patience import patience
 from helpers.stalls import undisturbed
 
+from auv_analysis.cli.main import main
 from auv_analysis.driver.checks import PASSIVE, judge, refusal
 from auv_analysis.driver.evidence import (
     FAIL,
@@ -176,6 +179,19 @@ def test_a_conflict_of_policies_is_that_of_the_middleware(judged) -> None:
     finding = judged['best_effort']['qos_recorder']
     assert 'reliability best_effort' in finding.found
     assert 'best effort publisher and reliable subscription' in finding.found
+
+
+def test_the_command_leaves_its_document_and_a_report(
+    domain: int, tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+    where = '--namespace', '/ros_frames', '--out', str(tmp_path / 'out')
+    with captured(), pytest.raises(SystemExit, match='1'):
+        main(['check-driver', *where, '--seconds', str(patience(1.0)), '--json'])
+    document = json.loads(capsys.readouterr().out)
+    assert {one['id']: one['verdict'] for one in document['checks']}['frames'] == FAIL
+    assert json.loads((tmp_path / 'out' / 'check.json').read_text()) == document
+    assert (tmp_path / 'out' / 'report.html').is_file()
 
 
 def test_what_there_is_elsewhere_is_named(domain: int) -> None:

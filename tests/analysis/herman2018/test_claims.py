@@ -156,6 +156,14 @@ def test_exchanged_laws_turn_case_2_around(case2, approved):
     assert table[19].verdict == 'reproduced'
 
 
+def test_an_effort_of_one_law_alone_is_unbounded(case2):
+    gvc, cl = (replace(run, tau=run.tau * (np.arange(6) != 1)) for run in case2.values())
+    assert list(case2) == ['gvc', 'cl']
+    assert ' unbounded, ' in _table(case2 | {'gvc': gvc})[19].ours
+    assert ' −100.0, ' in _table(case2 | {'cl': cl})[19].ours
+    assert ' +0.0, ' in _table({'gvc': gvc, 'cl': cl})[19].ours
+
+
 def test_runs_are_known_by_law_and_gains_not_by_name(case1):
     renamed = {'fast': case1['gvc'], 'slow': case1['cl']}
     same = [(claim.ours, claim.verdict) for claim in _table(case1).values()]

@@ -12,6 +12,7 @@ from helpers.report_pages import tokens
 
 from auv_analysis import simulate, summarize
 from auv_analysis.cli import main
+from auv_analysis.metrics.lyapunov import OF_THE_MOTION
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.verdict import FAILED, verdict
 from auv_analysis.runs.run import Extent
@@ -159,6 +160,10 @@ def longer(run: RunDigest, times: float) -> Extent:
         ('length', lambda run: {'known_extent': longer(run, 1.02)}),
         ('start', lambda run: {'begin': run.begin + 0.006 * (np.arange(12) == 3)}),
         ('disturbance', lambda run: {'course': run.course | {'F': run.course['F'] + 1.0}}),
+        ('', lambda run: {  # a force that follows the motion is another one of each run
+            'kinds': frozenset({min(OF_THE_MOTION)}),
+            'course': run.course | {'F': run.course['F'] + 1.0},
+        }),
         ('', lambda run: {
             'known_extent': longer(run, 1.005),
             'begin': run.begin + np.where(np.arange(12) < 3, 1.0, 0.004),

@@ -80,7 +80,7 @@ def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
 
     def held(found: tuple[list[int], list[int], np.ndarray]) -> bool:
         applied = found[2]
-        return bool(applied[125] == applied[119] > 0)
+        return bool(120 >= applied[125] >= applied[119] > 0)  # of step 119 at the latest
 
     true, stamps, applied = found = undisturbed(lambda: in_real_time(heard_again, last), held)
     assert true == list(range(last + 1))

@@ -43,7 +43,6 @@ CLOSED = 1e-9  # of 1 - S: below it an axis is not controlled at all
 MEASURABLE = 1e-3  # a factor of the gain below it, or above its inverse, is no margin
 FACTORS = 100.0 ** np.linspace(-1, 1, 35)  # of the present gain: tried for the largest
 MOST_PERIODS = 100  # of a delay
-MOST_SECANTS = 60  # to a zero: a handful is usual
 STATIC = 1e-3  # of the first frequency, where the response is static; imaginary part that is none
 SHARP, UNDAMPED = 0.1, 1e-6  # damping below which a pole is a resonance, and the least one
 TINY = 1e-99  # what keeps log finite
@@ -105,23 +104,20 @@ def axis_margins(
     if np.abs(S - 1).max() < CLOSED:
         return AxisMargins()
 
-    def exact(at: np.ndarray) -> np.ndarray:
+    def exact(at: float) -> complex:
         try:
-            return loop.sensitivity(at)[:, axis, axis]
+            return complex(loop.sensitivity(np.array(at))[axis, axis])
         except np.linalg.LinAlgError:  # a pole of the opened loop: its gain is infinite
-            if len(at) == 1:
-                return np.zeros(1, complex)
-            return np.concatenate([exact(one) for one in np.split(at, len(at))])
+            return 0j
 
-    real, crossed, values = _crossings(exact, omega, S)
-    ends = np.append(exact(STATIC * omega[:1]), S[-1])
-    static = ends[np.abs(ends.imag) < STATIC * np.abs(ends)]
-    known = [s for s in np.concatenate([real, static]).real.tolist() if s != 1]
-    factors = [s / (s - 1) for s in known]
+    real = [exact(at) for at in _zeros(lambda at: exact(at).imag, omega, S.imag)]
+    ends = [s for s in (exact(STATIC * float(omega[0])), complex(S[-1]))
+            if abs(s.imag) < STATIC * abs(s)]  # fmt: skip
+    factors = [s.real / (s.real - 1) for s in (*real, *ends) if s.real != 1]
     ups = [factor for factor in factors if 1 < factor < 1 / MEASURABLE]
     downs = [factor for factor in factors if MEASURABLE < factor < 1]
-    met = list(zip(crossed.tolist(), values.tolist(), strict=True))
-    phases = [float(np.pi - 2 * np.arctan(2 * abs(s.imag))) for _, s in met]
+    met = [(at, exact(at)) for at in _zeros(lambda at: exact(at).real - 0.5, omega, S.real - 0.5)]
+    phases = [np.pi - 2 * np.arctan(2 * abs(s.imag)) for _, s in met]
     nearest = int(np.argmin(phases)) if phases else 0
     return AxisMargins(
         min(ups, default=np.inf),
@@ -132,35 +128,14 @@ def axis_margins(
     )
 
 
-def _crossings(
-    exact: Callable[[np.ndarray], np.ndarray], omega: np.ndarray, S: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """S where it is real, then rad/s and S where its real part is 1/2, S (n,) being on the grid.
-
-    Regula falsi in all intervals at once: an end that stays counts half as much each time
-    (Illinois method, Dahlquist & Bjorck 1974, section 6.4).
-    """
-    on_grid = np.stack([S.imag, S.real - 0.5])
-    which, k = np.nonzero(on_grid[:, :-1] * on_grid[:, 1:] < 0)
-
-    def part(values: np.ndarray) -> np.ndarray:
-        return np.where(which == 0, values.imag, values.real - 0.5)
-
-    a, b = omega[k], omega[k + 1]
-    f, g = map(part, np.split(exact(np.concatenate([a, b])), 2))
-    inside = f * g < 0  # else it is rounding about zero
-    which, a, b, f, g = which[inside], a[inside], b[inside], f[inside], g[inside]
-    for _ in range(MOST_SECANTS):
-        new = b - g * (b - a) / (g - f)
-        values = exact(new)
-        value = part(values)
-        crossed = value * g < 0
-        a, f = np.where(crossed, b, a), np.where(crossed, g, f / 2)
-        moved = np.abs(new - b)
-        b, g = new, value
-        if np.all((moved <= 1e-13 * b) | (g == 0.0)):
-            break
-    return values[which == 0], b[which == 1], values[which == 1]
+def _zeros(exact: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> list[float]:
+    """Where a function of rad/s changes its sign, values (n,) being those on the grid."""
+    found = []
+    for k in np.flatnonzero(values[:-1] * values[1:] < 0):
+        low, high = float(omega[k]), float(omega[k + 1])
+        if exact(low) * exact(high) < 0:  # else it is rounding about zero
+            found.append(float(brentq(exact, low, high, xtol=1e-13 * high, rtol=1e-13)))
+    return found
 
 
 def _delay(loop: SampledLoop, axis: int, crossover: float, s: complex) -> float:

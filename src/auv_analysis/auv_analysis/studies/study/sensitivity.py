@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.metrics.coupling import structural_zeros
-from auv_analysis.metrics.quantities import Quantity, quantity
+from auv_analysis.metrics.quantities import HALVES, Quantity, quantity
 from auv_analysis.runs.run import Hold
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario
@@ -114,9 +114,8 @@ def _reason(kpi: Kpi, found: Mapping[str, np.ndarray]) -> str:
 def _largest_of_kind(kpi: Kpi, found: Mapping[str, np.ndarray]) -> float:
     if kpi.dof == 'all':
         return 0.0
-    i = DOFS.index(kpi.dof)
-    alike = range(3) if i < 3 else range(3, 6)
-    return max(float(np.nanmax(found[f'{kpi.name}.{DOFS[j]}'], initial=0.0)) for j in alike)
+    alike = next(dofs for dofs in HALVES.values() if kpi.dof in dofs)
+    return max(float(np.nanmax(found[f'{kpi.name}.{dof}'], initial=0.0)) for dof in alike)
 
 
 COUNTS = {'sobol': 256, 'morris': 32}  # default base points, trajectories

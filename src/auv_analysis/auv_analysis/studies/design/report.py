@@ -114,7 +114,7 @@ def _sections(result: DesignStudy, figures: Mapping[str, FigureRecord]) -> list[
     ]
     others = controllers_table(results)
     effect += [] if others is None else [others]
-    failures = [
+    effect += [
         f'Under {name}: {one["failure"]}.'
         for name, one in document['controllers'].items()
         if one['failure']
@@ -122,7 +122,7 @@ def _sections(result: DesignStudy, figures: Mapping[str, FigureRecord]) -> list[
     choice = [matrix_table(results), alternatives_table(results)]
     return [
         Section('proposal', 'The change', proposal),
-        Section('effect', 'What it does', [*effect, *failures]),
+        Section('effect', 'What it does', effect),
         Section('choice', 'Which change removes which coupling', choice),
         Section('method', 'How it was found', [*METHOD, *document['assumptions']]),
     ]

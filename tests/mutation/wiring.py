@@ -72,7 +72,7 @@ class Wiring(Operator):
 
     def other(self, node: Any) -> str | None:
         """What the value of a leaf becomes; None: it stays."""
-        raise NotImplementedError
+        return None
 
     def mutation_positions(self, node: Any) -> Iterator[Place]:
         """Where a leaf changes."""

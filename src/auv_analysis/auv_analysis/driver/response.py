@@ -203,13 +203,10 @@ def fit_response(
     delays = np.arange(0.0, OPPOSED * latest + FINE / 2, FINE)
     early = delays < latest + FINE / 2
     late = np.maximum(t - delays[:, None], 0.0)
-
-    def form_of(k: int, which: int | slice = slice(None)) -> np.ndarray:
-        return np.interp(late[which], varied.t, varied.added[:, k])
-
+    forms = make_interp_spline(varied.t, varied.added, k=1)(late)
+    forms = np.ascontiguousarray(np.moveaxis(forms, 2, 0))  # each is gone through by itself
     alone = make_interp_spline(varied.t, varied.alone, k=1)(t).T
-    # one form after the other, each of which fits into the processor's cache
-    fits = [_gains(t, nu[:, axis], form_of(k), free) for k, free in enumerate(alone)]
+    fits = [_gains(t, nu[:, axis], form, free) for form, free in zip(forms, alone, strict=True)]
     gains, squares, still = (np.array([fit[i] for fit in fits]) for i in range(3))
     # of each sign: by no response at all, where none of its kind makes it better
     of_sign = {sign: np.where(np.sign(gains) == sign, squares, np.inf) for sign in (1, -1)}
@@ -232,7 +229,7 @@ def fit_response(
     clear = opposite - least > MISFIT * unlike + chance and unlike < EXPLAINED * moved
     told = clear and abs(gain) >= NOTHING
     k, i = (int(one) for one in np.unravel_index(np.argmin(mine), mine.shape))
-    left = _beside(_steady(t, alone[k]), nu[:, axis] - gains[k, i] * form_of(k, i))
+    left = _beside(_steady(t, alone[k]), nu[:, axis] - gains[k, i] * forms[k, i])
     spread = least / len(t) * float(in_a_row(left[:, None])[0])
     likely = delays[mine.min(axis=0) <= least + spread]
     error = float(np.hypot(np.abs(likely - delays[i]).max(initial=0.0), FINE / 2.0))

@@ -4,7 +4,7 @@ import csv
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -200,19 +200,13 @@ def load_curve(curve: str | Path, beside: Path | None = None) -> ThrusterCurve:
             raise InputError(
                 'curve', '', f'a .csv file, or {one_of(curve, shipped_curves())}', curve
             )
-        return _shipped(str(curve))
-    if beside is not None and (beside / path).is_file():
+        path = SHIPPED / f'{curve}.csv'
+    elif beside is not None and (beside / path).is_file():
         path = beside / path
     return _parsed(read_text(path, 'thruster curve'), path, str(curve))
 
 
-@cache
-def _shipped(name: str) -> ThrusterCurve:
-    """A voltage between two of a family asks for all of them."""
-    path = SHIPPED / f'{name}.csv'
-    return _parsed(read_text(path, 'thruster curve'), path, name)
-
-
+@lru_cache(maxsize=32)  # a voltage between two of a family asks for all of them
 def _parsed(text: str, path: Path, name: str) -> ThrusterCurve:
     lines = [
         (number, line) for number, line in enumerate(text.splitlines(), 1)

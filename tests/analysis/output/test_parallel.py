@@ -7,7 +7,7 @@ from functools import partial
 import psutil
 import pytest
 
-from auv_analysis.output.parallel import a_copy_beside, results
+from auv_analysis.output.parallel import a_copy_beside, meanwhile, results
 
 HERE = os.getpid()
 
@@ -63,3 +63,23 @@ def test_an_error_is_raised_whoever_meets_it_and_no_copy_is_left():
     with a_copy_beside(), pytest.raises(ValueError, match='task'):
         list(results([partial(fail, i) for i in range(4)]))
     assert psutil.Process().children() == before
+
+
+def test_a_copy_does_meanwhile_what_is_asked_for_later():
+    before = psutil.Process().children()
+    with a_copy_beside(), meanwhile(partial(doing, 7)) as made:
+        number, process = made()
+    assert (number, process != HERE) == (7, True)
+    with meanwhile(partial(doing, 7)) as made:
+        assert made() == (7, HERE)
+    assert psutil.Process().children() == before
+
+
+def test_what_it_does_not_give_is_done_here():
+    def fail():
+        if os.getpid() != HERE:
+            os.kill(os.getpid(), signal.SIGKILL)
+        raise ValueError('here')
+
+    with a_copy_beside(), meanwhile(fail) as made, pytest.raises(ValueError, match='here'):
+        made()

@@ -14,13 +14,13 @@ from typing import TypeVar
 
 T = TypeVar('T')
 MOST = 256  # tasks whose numbers fit into a byte each
-PATIENCE = 10.0  # s that the copy may take longer than five times the share of this process
+PATIENCE = 10.0  # s that the copy may take longer than this process, or than five times its share
 _beside: ContextVar[bool] = ContextVar('beside', default=False)
 
 
 @contextlib.contextmanager
 def a_copy_beside() -> Iterator[None]:
-    """Let `results` use a second core as long as this lasts."""
+    """Let `results` and `meanwhile` use a second core as long as this lasts."""
     token = _beside.set(True)
     try:
         yield
@@ -36,14 +36,10 @@ def results(tasks: Sequence[Callable[[], T]]) -> Iterator[T]:
     """
     from auv_analysis.output.progress import each  # with rich, without which `auv doctor` starts
 
-    if not (_beside.get() and 1 < len(tasks) <= MOST and len(os.sched_getaffinity(0)) > 1):
+    if not (1 < len(tasks) <= MOST and _two_cores()):
         yield from (task() for task in each(tasks, len(tasks)))
         return
-    numbers, fill = os.pipe()
-    os.write(fill, bytes(range(len(tasks))))
-    os.close(fill)
-    gc.freeze()  # neither process looks through, and so copies, what both have
-    copy, answer = _forked(tasks, numbers)
+    numbers, copy, answer = _forked(tasks)
     began, found = time.monotonic(), dict[int, T]()
     try:
         for number, here in each(_taken(numbers), len(tasks)):
@@ -51,12 +47,32 @@ def results(tasks: Sequence[Callable[[], T]]) -> Iterator[T]:
                 found[number] = tasks[number]()
         found |= _answered(answer, PATIENCE + 5 * (time.monotonic() - began))
     finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(copy, signal.SIGKILL)
-        os.waitpid(copy, 0)
         os.close(numbers)
-        os.close(answer)
+        _end(copy, answer)
     yield from (found[i] if i in found else task() for i, task in enumerate(tasks))
+
+
+@contextlib.contextmanager
+def meanwhile(task: Callable[[], T]) -> Iterator[Callable[[], T]]:
+    """What gives the result of a task, which a copy does until then where `results` has one."""
+    if not _two_cores():
+        yield task
+        return
+    numbers, copy, answer = _forked([task])
+    os.close(numbers)
+
+    def result() -> T:
+        found: dict[int, T] = _answered(answer, PATIENCE)
+        return found[0] if found else task()
+
+    try:
+        yield result
+    finally:
+        _end(copy, answer)
+
+
+def _two_cores() -> bool:
+    return _beside.get() and len(os.sched_getaffinity(0)) > 1
 
 
 def _taken(numbers: int) -> Iterator[tuple[int, bool]]:
@@ -68,22 +84,33 @@ def _taken(numbers: int) -> Iterator[tuple[int, bool]]:
         following = byte[0] + 1
 
 
-def _forked(tasks: Sequence[Callable[[], T]], numbers: int) -> tuple[int, int]:
-    """Process id of the copy, and the end of a pipe that its results come from."""
+def _forked(tasks: Sequence[Callable[[], T]]) -> tuple[int, int, int]:
+    """End of a pipe with the numbers of tasks, the copy's process id, that of its results."""
+    numbers, fill = os.pipe()
+    os.write(fill, bytes(range(len(tasks))))
+    os.close(fill)
     answer, end = os.pipe()
+    gc.freeze()  # neither process looks through, and so copies, what both have
     with warnings.catch_warnings():
         # Python warns where there are threads; the copy calls nothing of what they do, and is left
         warnings.simplefilter('ignore', DeprecationWarning)
         copy = os.fork()
     if copy:
         os.close(end)
-        return copy, answer
+        return numbers, copy, answer
     try:
         done = pickle.dumps({number: tasks[number]() for number, here in _taken(numbers) if here})
         with os.fdopen(end, 'wb') as stream:
             stream.write(done)
     finally:
         os._exit(0)
+
+
+def _end(copy: int, answer: int) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(copy, signal.SIGKILL)
+    os.waitpid(copy, 0)
+    os.close(answer)
 
 
 def _answered(answer: int, patience: float) -> dict[int, T]:

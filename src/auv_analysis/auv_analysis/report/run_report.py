@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.quantities import VELOCITY, WRENCH
 from auv_analysis.metrics.summary import band_of
+from auv_analysis.output.parallel import meanwhile
 from auv_analysis.output.text import fixed, join, largest, number, plain, residuals
 from auv_analysis.report import run_tables as tables
 from auv_analysis.report.digest import ESTIMATES, TINY, RunDigest, alike, digests, last_third
@@ -74,8 +76,9 @@ def write_report(
         for names, text in _shared_by(shown, scenario_text)
     }
     limits = {name: scene.limit for names, scene in scenes.items() for name in names}
-    figures = draw_figures(shown, out / 'figures', summaries, limits)
-    panels = interactive(shown)
+    with meanwhile(partial(interactive, shown)) as made:
+        figures = draw_figures(shown, out / 'figures', summaries, limits)
+        panels = made()
     sections = SectionInputs(shown, summaries, scenes, figures, panels.sets).sections()
     scenarios = list(dict.fromkeys(run.scenario for run in shown.values()))
     vehicles = list(dict.fromkeys(run.vehicle.name for run in shown.values()))

@@ -35,6 +35,7 @@ from pyarrow import parquet
 from auv_analysis.report.results import Table
 
 FEW = 3  # values that are written as they are
+CANCELS = 1e3  # what is left of a sum whose terms cancel is noise sooner than a term is
 
 
 def digest(values: Any) -> str:
@@ -49,7 +50,8 @@ def digest(values: Any) -> str:
         ends = [known[0], known[-1], known.min(), known.max()] if len(known) else []
         means = [known.mean(), np.mean(known * ramp)] if len(known) else []
         unknown = f' {len(x) - len(known)} unknown' if len(known) < len(x) else ''
-        return f'{len(x)}{unknown}: {" ".join(_number(v, size) for v in [*ends, *means])}'
+        said = [*(_number(v, size) for v in ends), *(_number(v, CANCELS * size) for v in means)]
+        return f'{len(x)}{unknown}: {" ".join(said)}'
     return ' '.join(_number(v, size) for v in x)
 
 

@@ -32,7 +32,7 @@ def test_poles_and_loops(tmp_path) -> None:
     with artists.captured() as figures:
         records = linearize.draw(models, {'cl': loop}, tmp_path)
     assert set(figures) == {'poles', 'bode_cl'}
-    poles = {name: np.linalg.eigvals(model.A) for name, model in models.items()}
+    poles = {name: np.sort_complex(np.linalg.eigvals(model.A)) for name, model in models.items()}
     every = np.concatenate([*poles.values()])
     moving = np.abs(every)[np.abs(every) > 1e-9]
     reach = (np.abs(every).max(), 1.5 * np.median(moving))

@@ -38,7 +38,8 @@ def modes(model: Linearization) -> list[dict[str, Any]]:
     weights = np.abs(left.conj() * right)
     weights /= np.maximum(weights.sum(axis=0), np.finfo(float).tiny)
     smallest = NEGLIGIBLE * np.abs(values).max(initial=0.0)
-    order = np.lexsort((values.imag, -values.real, np.abs(values)))
+    near = np.round(values / (smallest or 1.0))  # of equal poles the solver's rounding has no say
+    order = np.lexsort((weights.argmax(axis=0), near.imag, -near.real, np.abs(near)))
     kept = [i for i in order if values[i].imag >= 0]
     return [_mode(complex(values[i]), weights[:, i], model.states, smallest) for i in kept]
 

@@ -71,7 +71,7 @@ def _bode(name: str, setting: ControlLoop) -> Drawn:
 
 
 def _pole_map(models: Mapping[str, Linearization]) -> Drawn:
-    poles = {name: np.linalg.eigvals(model.A) for name, model in models.items()}
+    poles = {name: np.sort_complex(np.linalg.eigvals(model.A)) for name, model in models.items()}
     every = np.concatenate(list(poles.values()))
     sizes = np.abs(every)[np.abs(every) > 1e-9]
     near = SLOW * float(np.median(sizes)) if len(sizes) else 1.0

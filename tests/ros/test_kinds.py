@@ -3,21 +3,11 @@
 import sys
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
-from geometry_msgs.msg import Wrench, WrenchStamped
+from geometry_msgs.msg import WrenchStamped
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Empty, Header, String
 
-from auv_dynamics.ros.topics import (
-    begins_with_stamp,
-    is_name,
-    message_class,
-    qos_entry,
-    type_name,
-)
+from auv_dynamics.ros.topics import is_name, message_class, qos_entry, type_name
 
 
 def test_a_message_is_found_by_its_name() -> None:
@@ -44,11 +34,6 @@ def test_a_message_that_its_package_lacks_is_missed() -> None:
 def test_a_topic_has_a_name_that_the_middleware_takes_whole() -> None:
     assert all(map(is_name, ('odom', '/auv1/cmd_vel')))
     assert not any(map(is_name, ('', 'a b', 'a\0b', 'é', '1st', 'a//b', 'a/')))
-
-
-def test_what_has_a_header_in_front_begins_with_its_time() -> None:
-    assert all(map(begins_with_stamp, (WrenchStamped, JointState, Header, Clock)))
-    assert not any(map(begins_with_stamp, (Wrench, String, DiagnosticStatus, Empty)))
 
 
 def test_the_times_of_a_profile_are_seconds_and_the_rest_of_them() -> None:

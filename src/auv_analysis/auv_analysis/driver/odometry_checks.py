@@ -315,7 +315,7 @@ def drift(evidence: DriverRecord) -> CheckResult:
     parts = np.array_split(np.arange(len(t)), SPANS)
     freshest = [part[np.argmin(late[part])] for part in parts]
     (slope, _), covariance = np.polyfit(t[freshest], late[freshest], 1, cov=True)
-    faster, error = float(-slope), float(np.sqrt(covariance[0, 0]))
+    faster, error = 0.0 - float(slope), float(np.sqrt(covariance[0, 0]))
     found = f'{faster:+.2g} s/s, standard error {error:.1g}'
     advice = 'is the stamp a time in seconds and nanoseconds, of a clock that is not simulated?'
     good = abs(faster) <= DRIFT + SURE * error

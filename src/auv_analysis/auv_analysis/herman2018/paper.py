@@ -10,10 +10,6 @@ from auv_analysis.runs.run import RunInfo
 from auv_dynamics.files.yaml_files import matrix6
 
 AnyFacts = TypeVar('AnyFacts', bound=RunInfo)
-CITATION = (
-    'P. Herman, Velocity tracking controller for simulation analysis of underwater vehicle '
-    'model, Journal of Marine Engineering & Technology, 2018'
-)
 CASES = ('case1', 'case2')
 
 GVC_GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}  # (36), (37)

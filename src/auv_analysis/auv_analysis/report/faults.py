@@ -81,8 +81,8 @@ def fault_overview(found: Found) -> Iterator[Sentence]:
         text += f'{_unit(worst)} in {worst.dof}'
         if ended:
             back = len(ended) - len(open_ones)
-            text += f'; after {back} of the {len(ended)} that end every error comes back into its '
-            text += 'settling band before anything else changes'
+            text += f'; after {back or "none"} of the {len(ended)} that end every error comes back '
+            text += 'into its settling band before anything else changes'
         yield Sentence(f'{text}.', 'faults')
 
 

@@ -5,8 +5,6 @@ Nothing else is typed: texts, heads, units, and the pointer from a shown cell to
 follow from the table.
 """
 
-import csv
-import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -379,19 +377,6 @@ def plain_table(**look: Any) -> rich_table.Table:
     return rich_table.Table(
         **{'box': None, 'header_style': 'bold', 'pad_edge': False, 'title_justify': 'left'} | look
     )
-
-
-def to_csv(table: Table) -> str:
-    """A table as CSV: shown columns, full precision."""
-    out = io.StringIO()
-    writer = csv.writer(out)
-    writer.writerow(
-        f'{" ".join(filter(None, [head.group, head.label]))}{f", {head.unit}" if head.unit else ""}'
-        for head in table.columns
-    )
-    for row in table.rows:
-        writer.writerow(cell.text if cell.value is None else cell.value for cell in row)
-    return out.getvalue()
 
 
 Shown = Column | Quantity | str  # what a column of a table is

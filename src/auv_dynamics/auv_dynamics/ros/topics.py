@@ -96,7 +96,6 @@ def best_effort(depth: int = interface.DEPTH) -> QoSProfile:
 
 
 NAME = re.compile(r'([a-z]\w*)/msg/([A-Z]\w*)', re.ASCII)
-STAMPED_TYPES = {'std_msgs/msg/Header', 'rosgraph_msgs/msg/Clock'}
 
 
 def type_name(kind: type) -> str:
@@ -116,14 +115,6 @@ def message_class(name: str) -> type:
     if not match or not any((Path(place) / 'msg/__init__.py').is_file() for place in places):
         raise ImportError(f'{name}: no message that is installed here')
     return getattr(importlib.import_module(f'{match[1]}.msg'), match[2])
-
-
-def begins_with_stamp(kind: Any) -> bool:
-    """Whether a serialized message of a class begins with its time."""
-    if type_name(kind) in STAMPED_TYPES:
-        return True
-    fields = kind.get_fields_and_field_types()
-    return bool(fields) and next(iter(fields.values())) == 'std_msgs/Header'
 
 
 def qos_entry(qos: QoSProfile) -> dict[str, Any]:

@@ -270,7 +270,7 @@ def _every(
     made = []
     for i, j in LOWER:
         unit = UNFAMILIAR / 2 if i == j else CORRELATION  # M goes as the square of R
-        si = ('kg', 'kg m', 'kg m2')[(i > 2) + (j > 2)]
+        si = ('kg', 'kg m', 'kg m²')[(i > 2) + (j > 2)]
         made.append(Entry('M', (i, j), f'M.{DOFS[i]}.{DOFS[j]}', unit, si))
     drag = _resistance(vehicle, speeds, wrenches)
     for group, power in (('D_linear', 1), ('D_quadratic', 2)):
@@ -278,7 +278,7 @@ def _every(
             for j in range(6):
                 unit = DAMPING * np.sqrt(drag[i] * drag[j] / (speeds[i] * speeds[j]) ** power)
                 name = f'{group}.{DOFS[i]}' + ('' if i == j else f'.{DOFS[j]}')
-                per = ('m/s' if j < 3 else 'rad/s') + ('' if power == 1 else ')2')
+                per = ('m/s' if j < 3 else 'rad/s') + ('' if power == 1 else ')²')
                 si = f'{"N" if i < 3 else "N m"}/{"(" if power == 2 else ""}{per}'
                 made.append(Entry(group, (i, j), name, unit, si))
     weight, size = float(vehicle.weight), np.abs(prior.hydrostatics)

@@ -177,7 +177,7 @@ def _headline(of: Sensitivity, name: str, dof: str, main: Row) -> str:
     sign, gain = '−' if main['doubled'] < 0 else '+', main['gain']
     share = ''
     if of.method == 'sobol':
-        share = f'{gain} makes {number(100 * main["ST"], 2)} % of its variance, and '
+        share = f'{gain} makes {number(min(100 * main["ST"], 100), 2)} % of its variance, and '
     return (
         f'Under {of.controller} the {quantity(name).label} that follows the gains most is that of '
         f'{dof} (spread {number(main["spread"], 2)}, {sure}): '

@@ -2,6 +2,7 @@
 
 import pytest
 from helpers.node_processes import Peer, fresh_domain
+from helpers.patience import patience
 
 from auv_analysis.doctor import discovery
 
@@ -14,6 +15,7 @@ def test_two_participants_find_each_other() -> None:
 def test_a_foreign_node_in_the_domain_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     domain = fresh_domain()
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+    monkeypatch.setattr(discovery, 'LOOKS', patience(discovery.LOOKS))
     peer = Peer(domain)
     try:
         (finding,) = discovery.peers()

@@ -98,7 +98,7 @@ def test_the_worst_fault_is_named(made):
     overview = [sentence.text for sentence in fault_overview(found)]
     assert 'disturbs gvc most is number 2' in overview[0]
     assert 'after 1 of the 1 that end' in overview[0]
-    assert 'after 0 of the 1 that end' in overview[1]
+    assert 'after none of the 1 that end' in overview[1]
 
 
 def test_every_number_of_the_tables_is_in_the_file(made, tmp_path):

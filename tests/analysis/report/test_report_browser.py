@@ -125,7 +125,8 @@ def test_a_narrow_page_does_not_scroll_sideways(report):
         report.page.emulate_media(color_scheme=theme)
         report.panel('error-linear')
         report.page.wait_for_selector(f'[data-theme="{theme}"]')
-        assert report.page.evaluate('document.documentElement.scrollWidth') <= 390
+        # once the panels are laid out anew
+        report.page.wait_for_function('document.documentElement.scrollWidth <= 390')
     report.page.set_viewport_size(usual)
     report.page.emulate_media(color_scheme='light')
 

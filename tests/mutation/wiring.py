@@ -16,7 +16,8 @@ LISTS = ('arglist', 'testlist_comp', 'testlist', 'testlist_star_expr')
 LITERALS = ('string', 'strings', 'number', 'keyword', 'lambdef', 'operator')
 OPPOSITE = {'min': 'max', 'max': 'min', 'any': 'all', 'all': 'any'}
 OPPOSITE |= {'minimum': 'maximum', 'maximum': 'minimum', 'argmin': 'argmax', 'argmax': 'argmin'}
-ORDERLESS = {*OPPOSITE, 'grade'}  # calls of one list; grade counts the parts of a claim
+# calls whose arguments, or one list of them, have no order; grade counts the parts of a claim
+ORDERLESS = {*OPPOSITE, 'grade', 'allclose', 'array_equal'}
 PLAIN = re.compile(r'[\'"]')  # begins a string that is neither formatted nor raw
 Place = tuple[tuple[int, int], tuple[int, int]]
 

@@ -256,9 +256,7 @@ def _is_case(run: RunDigest) -> bool:
         wanted['F'] = make_disturbance(case.data['disturbance'])(t)
     return np.allclose(run.vehicle.M, case.vehicle.M) and all(
         name in run.course
-        and bool(
-            np.all(np.abs(run.course[name] - values) <= SAME * np.abs(values).max(axis=0) + TINY)
-        )
+        and np.allclose(run.course[name], values, 0.0, SAME * np.abs(values).max(axis=0) + TINY)
         for name, values in wanted.items()
     )
 

@@ -36,7 +36,8 @@ def test_cells_say_zero_always_zero_and_nothing() -> None:
     )
     grid = HeatMap(values, 'abcd', '', structural=always)
     assert texts(grid) == ['0', ALWAYS, r'$1.2\cdot10^{-7}$']
-    assert texts(HeatMap(np.array([[-0.04, 2.26]]), 'ab', '', decimals=1)) == ['0.0', '2.3']
+    rounded = HeatMap(np.array([[-0.04, 2.26, 0.0, -1.0]]), 'abcd', '', decimals=1)
+    assert texts(rounded) == ['0.0', '2.3', '0', '−1.0']
 
 
 def test_names_and_numbers_give_way_where_rows_are_many() -> None:

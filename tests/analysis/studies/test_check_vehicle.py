@@ -234,6 +234,38 @@ def test_rotors(capsys, approved):
     assert text.count('source: Blue Robotics T200') == 1
 
 
+def test_rotors_of_a_file_have_no_source(written, capsys):
+    data = file_of('bluerov2_heavy')
+    table = {'percent': [-90.0, -10.0, 15.0, 95.0], 'thrust_n': [-41.0, 0.0, 0.0, 52.5]}
+    rotors = [{'curve': table, 'lag': 0.1, 'lag_at': 20.0},
+              {'omega': 25.0, 'zeta': 0.7, 'dead_band': [0.2, 0.3]}]  # fmt: skip
+    for one, thruster in enumerate(data['thrusters']):
+        thruster['rotor'] = rotors[one % 2]
+    path = written(data)
+    one, other, *_ = check_vehicle(path)['thrusters']['rotors']
+    assert one == {
+        'curve': 'table of the file', 'source': None, 'thrust': [-41.0, 52.5], 'voltage': None,
+        'command_without_thrust': [-10.0, 15.0], 'command_unit': 'percent',
+        'dead_band': [0.0, 0.0], 'lag': 0.1, 'lag_at': 20.0, 'omega': None, 'zeta': None,
+    }  # fmt: skip
+    assert other == {
+        'curve': 'square law', 'source': None, 'thrust': None, 'voltage': None,
+        'command_without_thrust': None, 'command_unit': None, 'dead_band': [0.2, 0.3],
+        'lag': None, 'lag_at': None, 'omega': 25.0, 'zeta': 0.7,
+    }  # fmt: skip
+    main(['check-vehicle', str(path)])
+    text = capsys.readouterr().out
+    assert 'source: Blue' not in text
+    assert (
+        'rotor of T1, T3, T5, T7: table of the file, -41 to 52.5 N, none from -10 to 15 percent, '
+        'voltage unknown, dead band 0 and 0 N, lag 0.1 s at 20 N, by 1/sqrt(thrust)\n'
+    ) in text
+    assert (
+        'rotor of T2, T4, T6, T8: square law, voltage unknown, dead band 0.2 and 0.3 N, '
+        'second order, 25 rad/s, damping ratio 0.7\n'
+    ) in text
+
+
 def test_largest_steps():
     found = check_vehicle('lauv')['sampling']
     assert found['cl']['rate'] == pytest.approx(12 / 0.04)

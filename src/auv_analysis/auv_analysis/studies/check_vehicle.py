@@ -238,11 +238,10 @@ def _thrusters(thrusters: Thrusters) -> dict[str, Any]:
 def _rotor(rotor: Rotor) -> dict[str, Any]:
     """What turns a thruster, None for what does not exist; N, V, s, rad/s."""
     curve = rotor.curve
-    shipped = curve is not None and curve.voltage is not None
     second = rotor.omega > 0.0
     return {
         'curve': 'square law' if curve is None else curve.name or 'table of the file',
-        'source': source_of(curve.name) if curve is not None and shipped else None,
+        'source': source_of(curve.name) if curve and curve.voltage else None,
         'thrust': None if curve is None else curve.thrusts[[0, -1]].tolist(),
         'command_without_thrust': None if curve is None else list(curve.dead_band),
         'command_unit': None if curve is None else curve.unit,

@@ -6,7 +6,7 @@ import time
 from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from typing import Any
+from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
@@ -146,8 +146,14 @@ class ControllerParameters:
 
 
 LATE = 1.0  # s without a message, after which nobody is said to publish
-NEVER = 0, -math.inf  # stamp of a message, ns, and time when it came, s
 NO_ODOMETRY, NO_SETPOINT = 'no odometry', 'no set-point'  # what the watchdog's texts begin with
+
+
+class Heard(NamedTuple):
+    """Newest stamp of a topic, ns, and when it came by the steady clock, s."""
+
+    ns: int = 0
+    at: float = -math.inf
 
 
 class Idle:
@@ -162,11 +168,11 @@ class Idle:
 
     def __init__(self, node: Any, derivative: bool):
         self._node, self._derivative = node, derivative
-        self._heard: dict[str, tuple[int, float]] = {}  # topic -> newest stamp, steady s
+        self._heard = dict[str, Heard]()  # by topic
 
     def hear(self, topic: topics.Topic, ns: int) -> None:
         """Note a set-point or its derivative."""
-        self._heard[topic.name] = ns, time.monotonic()
+        self._heard[topic.name] = Heard(ns, time.monotonic())
 
     def health(self, watchdog: str, odometry_ns: int | None) -> Health:
         """Level and explanation of what the watchdog says.
@@ -186,15 +192,19 @@ class Idle:
         return (ERROR, watchdog) if watchdog else (OK, '')
 
     def _no_setpoint(self, odometry_ns: int) -> str:
-        ns, at = self._heard.get(topics.CMD_VEL.name, NEVER)
-        if time.monotonic() - at > LATE:
+        setpoint = self._heard.get(topics.CMD_VEL.name, Heard())
+        if time.monotonic() - setpoint.at > LATE:
             return why_silent(self._node, topics.CMD_VEL)
-        _, derivative_at = self._heard.get(topics.CMD_ACCEL.name, NEVER)
-        if self._derivative and time.monotonic() - derivative_at > LATE:
+        derivative = self._heard.get(topics.CMD_ACCEL.name, Heard())
+        if self._derivative and time.monotonic() - derivative.at > LATE:
             silent = why_silent(self._node, topics.CMD_ACCEL) or 'no cmd_accel of its stamp comes'
             return f'{silent}; setpoint_acceleration: topic waits for it'
-        if abs(apart := (ns - odometry_ns) / NANOSECONDS) > LATE:
-            found = 'stamp 0' if ns == 0 else f'stamps {abs(apart):.3g} s apart from those of odom'
+        if abs(apart := (setpoint.ns - odometry_ns) / NANOSECONDS) > LATE:
+            found = (
+                'stamp 0'
+                if setpoint.ns == 0
+                else f'stamps {abs(apart):.3g} s apart from those of odom'
+            )
             return f'cmd_vel: expected the time at which it is valid as stamp, found {found}'
         return ''
 

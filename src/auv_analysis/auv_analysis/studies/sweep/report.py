@@ -313,7 +313,8 @@ def _best(analysis: Analysis) -> Table:
               for f in analysis.factors}  # fmt: skip
     shown |= {m.name: described(m.label, m.meaning, m.unit, digits=4)
               for m in analysis.measures}  # fmt: skip
-    caption = f'Rollouts with the smallest {BY_NAME[rows[0]["by"]].label}, of each controller.'
+    (by,) = {row['by'] for row in rows}
+    caption = f'Rollouts with the smallest {BY_NAME[by].label}, of each controller.'
     return _view('best', caption, enumerate(rows), shown)
 
 

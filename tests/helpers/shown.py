@@ -228,10 +228,13 @@ def _look(artist: Any) -> str:
         parts = [to_hex(artist.get_facecolor()) if artist.get_fill() else 'empty']
         parts += [f'hatch {artist.get_hatch()}'] if artist.get_hatch() else []
     else:
-        faces, edges = artist.get_facecolor(), artist.get_edgecolor()
-        colours = faces if len(faces) else edges
-        kinds = [*dict.fromkeys(map(to_hex, colours))]
-        parts = kinds if len(kinds) <= 6 else [f'{len(kinds)} colours {digest(colours)}']
+        parts = []
+        for word, colours in (('', artist.get_facecolor()), ('edged ', artist.get_edgecolor())):
+            kinds = [*dict.fromkeys(map(to_hex, colours))]
+            many = [f'{len(kinds)} colours {digest(colours)}']
+            found = kinds if len(kinds) <= 6 else many
+            if found and found != parts:
+                parts += [f'{word * bool(parts)}{found[0]}', *found[1:]]
         sizes = np.unique(getattr(artist, 'get_sizes', list)())
         parts += [f'sizes {digest(sizes)}'] if len(sizes) > 1 else []
     label = str(artist.get_label())
@@ -366,7 +369,7 @@ class _Reader(HTMLParser):
         if tag in ('td', 'th'):
             self._line += ' | '
         looks = {*about.get('class', '').split()} - {'n', 'text'}
-        if tag in ('td', 'th', 'tr') and looks:
+        if looks and (tag in ('td', 'th', 'tr') or 'badge' in looks):
             self._line += f'[{" ".join(looks)}] '
         if tag == 'img':
             self._line += f' alt: {about["alt"].partition(". ")[0]}. '

@@ -90,6 +90,8 @@ def test_the_clock_of_the_last_steps_is_waited_for(tmp_path: Path, goes_on: bool
                 peer.publish(topics.CLOCK, Clock(clock=convert.stamp(k * STEP)))
         acknowledged(peer, 20)
         process = processes['recorder_node']
+        peer.spin(0.3)
+        assert process.poll() is None
         for k in range(15, 21) if goes_on else ():
             peer.publish(topics.CLOCK, Clock(clock=convert.stamp(k * STEP)))
         peer.until(lambda: process.poll() is not None, 'the end')

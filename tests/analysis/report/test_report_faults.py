@@ -93,6 +93,10 @@ def test_spans_and_numbers_of_a_figure(runs):
     high = [text.get_position()[1] for text in axes.texts]
     assert high[1] < high[0], 'two at one time stand below each other'
     assert axes.get_xlim() == (0.0, 2.2)
+    axes.clear()
+    axes.set_xlim(2.2, 2.6)
+    plots.shade(axes, digest)
+    assert [text.get_text() for text in axes.texts] == ['3'], 'those before are not seen here'
     sentence = plots.shade_sentence(digest)
     assert sentence.startswith(' Shaded: 1 thruster T3 at 50 %, 1–2 s; 2 25 % of the meas')
 

@@ -42,7 +42,7 @@ def test_a_trace_in_blocks_is_the_line_of_the_whole(seed, n, rows, logarithmic) 
         trace.add(t[i : i + rows], y[i : i + rows])
     whole = t, y
     if n > FEW:
-        whole = thinned(t, y, t[0], t[-1], logarithmic=logarithmic)
+        whole = thinned(t, y, logarithmic=logarithmic)
     for found, expected in zip(trace.line(), whole, strict=True):
         assert_array_equal(found, expected)
 
@@ -51,7 +51,7 @@ def test_a_trace_in_blocks_is_the_line_of_the_whole(seed, n, rows, logarithmic) 
 @quick
 def test_columns_keep_their_extremes_in_the_order_of_time(seed, n) -> None:
     t, y = signal(seed, n)
-    few_t, few_y = thinned(t, y, t[0], t[-1])
+    few_t, few_y = thinned(t, y)
     assert len(few_t) <= 2 * COLUMNS
     assert np.all(np.diff(few_t) > 0)
     assert (few_t[0], few_t[-1], few_y[0], few_y[-1]) == (t[0], t[-1], y[0], y[-1])
@@ -97,6 +97,16 @@ def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
     rows, columns = np.nonzero(pictures[0] - pictures[1] > 60.0)
     assert np.ptp(rows) > 0.6 * pictures[0].shape[0], 'a line over most of the height'
     assert np.ptp(columns) <= 6, 'and a few pixels wide'
+
+
+def test_shares_are_those_of_the_mean_energy_of_each_column(run) -> None:
+    long = repeated(run, 8 * len(run.t))
+    few_t, parts = digest(long).stack
+    assert len(few_t) < len(long.t) / 2
+    assert np.all(np.diff(few_t) > 0)
+    assert long.t[0] <= few_t[0] < few_t[-1] <= long.t[-1]
+    assert_allclose(few_t, np.linspace(few_t[0], few_t[-1], len(few_t)), atol=2 * long.step)
+    assert_allclose(parts.sum(axis=1), 100.0)
 
 
 @pytest.mark.long

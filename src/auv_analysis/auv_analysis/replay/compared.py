@@ -205,7 +205,7 @@ def _figure(document: Mapping[str, Any], both: Compared) -> tuple[Figure, str, s
         for k, (name, wrench, dash) in enumerate(pairs):
             t, tau = both.t, wrench[:, i]
             if len(t) > FEW:
-                t, tau = thinned(t, tau, t[0], t[-1])
+                t, tau = thinned(t, tau)
             axes.plot(t, tau, color=COLOURS[k], linestyle=dash, label=name)
         axes.set_ylabel(f'{DOFS[i]}: {SIGNALS["tau"].axis([i])}')
     for axes in panels[-1]:

@@ -219,7 +219,7 @@ def _draw(plot: Any, panel: TimePanel, dashes: Mapping[str, list[int]], columns:
     for number, curve in enumerate(panel.curves):
         t, y = curve.t, curve.y
         if panel.kind != 'stack' and len(t) > 2 * columns:
-            t, y = thinned(t, y, t[0], t[-1], columns=columns)
+            t, y = thinned(t, y, columns=columns)
         t, y = broken((t, y), curve.gaps, curve.step)
         times = t.tobytes()
         if times not in sources:

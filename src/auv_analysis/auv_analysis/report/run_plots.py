@@ -373,7 +373,8 @@ def energy_shares(runs: Mapping[str, RunDigest]) -> Drawn:
             place = {'y': i + offset, 'marker': marker, 'edgecolors': COLOURS[i], 's': 30}
             axes.scatter(whole[i], facecolors='white', linewidths=1.0, zorder=3, **place)
             axes.scatter(early[i], facecolors=COLOURS[i], linewidths=1.0, zorder=4, **place)
-        smallest = min([smallest, *early[early > 0], *whole[whole > 0]])
+        both = np.append(early, whole)
+        smallest = min([smallest, *both[both > 0]])
         handles.append(_mark(marker, run.controller))
     left = max(10.0 ** np.floor(np.log10(smallest) - 0.3), SMALLEST_SHARE)
     plots.logarithmic(axes, 'x')

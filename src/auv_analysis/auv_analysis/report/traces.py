@@ -38,14 +38,13 @@ class Trace:
         t, y = (np.concatenate(values) for values in zip(*self._parts, strict=True))
         if self._seen <= FEW:
             return t, y
-        return thinned(t, y, *self._ends, logarithmic=self._logarithmic)
+        return thinned(t, y, self._ends, logarithmic=self._logarithmic)
 
 
 def thinned(
     t: np.ndarray,
     y: np.ndarray,
-    begin: float,
-    end: float,
+    ends: tuple[float, float] | None = None,
     *,
     logarithmic: bool = False,
     columns: int = COLUMNS,
@@ -55,7 +54,7 @@ def thinned(
     Parameters
     ----------
     t, y : (n,) samples, t rising
-    begin, end : times between which the columns lie
+    ends : times between which the columns lie; none: the first and the last
     logarithmic : columns of equal width on a logarithmic time axis; t > 0 then
     columns : how many
 
@@ -64,7 +63,9 @@ def thinned(
     t, y : (m,) some of the samples in their order; thinning them again changes nothing
 
     """
-    place, (left, right) = (np.log(t), np.log([begin, end])) if logarithmic else (t, (begin, end))
+    place, (left, right) = t, ends or (t[0], t[-1])
+    if logarithmic:
+        place, left, right = np.log(t), np.log(left), np.log(right)
     column = np.floor((place - left) / (right - left) * (columns - 1)).clip(0, columns - 2)
     starts = np.flatnonzero(np.diff(column, prepend=-1.0))
     owner = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(t)))

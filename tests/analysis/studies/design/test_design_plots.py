@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers import artists
 from helpers.artists import named, same
-from helpers.made_runs import DOFS, UPSILON_INV, VEHICLE, made
+from helpers.made_runs import DOFS, UPSILON, UPSILON_INV, VEHICLE, made
 
 from auv_analysis.studies.design import plots as design
 
@@ -37,6 +37,20 @@ def _designed():
         name: Made(runs={'gvc': run, 'cl': made('cl', 'cl', 9)}) for name, run in runs.items()
     }
     return Made(document=document, proposal=vehicle, **phases), runs, upper
+
+
+def test_what_begins_with_a_peak_is_drawn_in_two_phases(tmp_path) -> None:
+    result, runs, _ = _designed()
+    result.document['reduce'] = 'delta_pi.surge'
+    with artists.captured() as figures:
+        design.draw_design(result, tmp_path)
+    left, right = figures['reduced'].axes
+    assert left.get_ylabel() == r'$\Delta\pi_1$ (N)'
+    for axes, late in ((left, False), (right, True)):
+        for name, (curve,) in named(axes, right.get_legend()).items():
+            run = runs[name]
+            seen = (run.t > run.start + 2.0) == late
+            same(curve, run.t[seen], (run.tau @ UPSILON - run.tau)[seen, 0])
 
 
 def test_a_design_before_and_after(tmp_path) -> None:

@@ -237,7 +237,7 @@ def _panels(groups: Mapping[str, Mapping[str, RunDigest]], labels: Sequence[str]
 
 def _rows(entries: Sequence[Entry]) -> Figure:
     lines = [still_to_come(entry.digest) for entry in entries if entry.digest]
-    first = min(t[t > 0].min() for t, _ in lines)
+    first = min(t[0] for t, _ in lines)
     times = np.geomspace(first, max(t[-1] for t, _ in lines), TIMES)
     values = np.full((len(lines), TIMES), np.nan)
     for row, (t, ratio) in zip(values, lines, strict=True):

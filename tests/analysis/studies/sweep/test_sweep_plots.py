@@ -1,6 +1,8 @@
 """Plots of a sweep: every line, band, bar and cell against the rows that it sums up."""
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from matplotlib.figure import Figure
 
 from auv_analysis.metrics.measures import BY_NAME
 from auv_analysis.simulation.reduction import COLUMNS
-from auv_analysis.studies.sweep import report
+from auv_analysis.studies.sweep import plots, report
 from auv_analysis.studies.sweep.analysis import Analysis, analysed
 from auv_analysis.studies.sweep.dataset import numbers_of, open_sweep, short_names
 from auv_analysis.studies.sweep.plots import draw, main_measures
@@ -99,6 +101,13 @@ def test_what_matters_stands_in_its_row_and_column(simple: Drawn) -> None:
     order = sorted(shares, key=lambda path: -np.mean(shares[path]))
     first = [path for _, path in next(iter(maps.values()))][: len(order)]
     assert first == [short[path] for path in order]
+
+
+def test_of_many_controllers_three_stand_side_by_side(simple: Drawn) -> None:
+    many = SimpleNamespace(controllers=['gvc', 'cl', 'gvc', 'pid'])
+    figure, _, caption = plots._influence(replace(simple[0], sweep=many))
+    assert sum(len(axes.images) for axes in figure.axes) == 3
+    assert caption.endswith(' pid: in influence.parquet.')
 
 
 def test_dependence_shows_the_quantiles_along_its_path(simple: Drawn) -> None:

@@ -370,7 +370,7 @@ class _Reader(HTMLParser):
             self._line += ' | '
         looks = {*about.get('class', '').split()} - {'n', 'text'}
         if looks and (tag in ('td', 'th', 'tr') or 'badge' in looks):
-            self._line += f'[{" ".join(looks)}] '
+            self._line += f'[{" ".join(sorted(looks))}] '
         if tag == 'img':
             self._line += f' alt: {about["alt"].partition(". ")[0]}. '
         for name in ('href', 'value', 'style', 'stroke-dasharray', 'colspan'):

@@ -123,7 +123,7 @@ def test_run_names_the_first_node_that_is_not_ready(peer) -> None:
 
 
 def test_a_pause_holds_the_next_step(peer) -> None:
-    peer.add(PlantNode, {**BARRIER, 'wrench_timeout': patience(1.0)})
+    plant = peer.add(PlantNode, {**BARRIER, 'wrench_timeout': patience(1.0)})
     listening(peer)
     odometry(peer, 1)
     assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=False)).success
@@ -132,6 +132,10 @@ def test_a_pause_holds_the_next_step(peer) -> None:
     assert len(peer.heard['odom']) == 1
     assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=True)).success
     assert step_of(odometry(peer, 2)[1]) == 1
+    for data in (False, True):  # a controller has as long after a pause as before it
+        assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=data)).success
+        peer.spin(patience(0.6))
+    assert plant.exit_code is None
     answered(peer, 1, 2)
     odometry(peer, 4)
 

@@ -174,7 +174,7 @@ def document(
 def _columns(panels: Sequence[TimePanel]) -> int:
     """Columns of pixels in which lines are thinned, so that all of them stay within `POINTS`."""
     points = sum(len(curve.t) for panel in panels for curve in panel.curves)
-    longest = max((len(curve.t) for panel in panels for curve in panel.curves), default=0)
+    longest = max((len(curve.t) for panel in panels for curve in panel.curves), default=FEWEST)
     return longest if points <= POINTS else max(FEWEST, longest // 2 * POINTS // points)
 
 

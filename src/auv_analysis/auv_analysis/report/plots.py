@@ -117,7 +117,7 @@ def _few_colours(pixels: np.ndarray) -> Image.Image:
 
     White, which most of them are, has an entry of its own and is not looked at any further.
     """
-    inked = (pixels.view(np.uint32) != WHITE)[..., 0]
+    inked = np.squeeze(pixels.view(np.uint32) != WHITE, axis=-1)
     inked[0, 0] = True  # one at least
     few = Image.fromarray(pixels[inked][np.newaxis]).convert('RGB')
     # by the largest error: a small bar keeps its colour as well

@@ -6,6 +6,7 @@ import numpy as np
 
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.studies.identify.identified import Identified
+from auv_analysis.studies.identify.unknowns import inertia_unit
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import decompose, inverse_upper
 
@@ -50,7 +51,7 @@ def couplings(found: Identified) -> dict[str, list[dict[str, Any]]]:
                 'not known' if name not in known
                 else 'real' if real else 'uncertain'
             )  # fmt: skip
-            row['unit'] = ('kg', 'kg m', 'kg m²')[(i > 2) + (j > 2)]
+            row['unit'] = inertia_unit(i, j)
             inertia.append(row)
     apart = [_excludes_zero(A[2:]) for A in (inverse, Upsilon)]
     deformation: list[dict[str, Any]] = []

@@ -263,6 +263,11 @@ def _with_believed(
     return Coefficients(**own)
 
 
+def inertia_unit(i: int, j: int) -> str:
+    """Unit of M_ij."""
+    return ('kg', 'kg m', 'kg m²')[(i > 2) + (j > 2)]
+
+
 def _every(
     vehicle: Vehicle, prior: Coefficients, speeds: np.ndarray, wrenches: np.ndarray
 ) -> list[Entry]:
@@ -270,8 +275,7 @@ def _every(
     made = []
     for i, j in LOWER:
         unit = UNFAMILIAR / 2 if i == j else CORRELATION  # M goes as the square of R
-        si = ('kg', 'kg m', 'kg m²')[(i > 2) + (j > 2)]
-        made.append(Entry('M', (i, j), f'M.{DOFS[i]}.{DOFS[j]}', unit, si))
+        made.append(Entry('M', (i, j), f'M.{DOFS[i]}.{DOFS[j]}', unit, inertia_unit(i, j)))
     drag = _resistance(vehicle, speeds, wrenches)
     for group, power in (('D_linear', 1), ('D_quadratic', 2)):
         for i in range(6):

@@ -228,18 +228,19 @@ def _look(artist: Any) -> str:
         parts = [to_hex(artist.get_facecolor()) if artist.get_fill() else 'empty']
         parts += [f'hatch {artist.get_hatch()}'] if artist.get_hatch() else []
     else:
-        parts = []
-        for word, colours in (('', artist.get_facecolor()), ('edged ', artist.get_edgecolor())):
-            kinds = [*dict.fromkeys(map(to_hex, colours))]
-            many = [f'{len(kinds)} colours {digest(colours)}']
-            found = kinds if len(kinds) <= 6 else many
-            if found and found != parts:
-                parts += [f'{word * bool(parts)}{found[0]}', *found[1:]]
+        faces, edges = map(_colours, (artist.get_facecolor(), artist.get_edgecolor()))
+        parts = [faces or edges]
+        parts += [f'edged {edges}'] if faces and edges not in ('', faces) else []
         sizes = np.unique(getattr(artist, 'get_sizes', list)())
         parts += [f'sizes {digest(sizes)}'] if len(sizes) > 1 else []
     label = str(artist.get_label())
     named = label and not label.startswith('_')
-    return f' {" ".join(parts)}{f" {label!r}" if named else ""}'
+    return f' {" ".join(filter(None, parts))}{f" {label!r}" if named else ""}'
+
+
+def _colours(colours: np.ndarray) -> str:
+    kinds = dict.fromkeys(map(to_hex, colours))
+    return ' '.join(kinds) if len(kinds) <= 6 else f'{len(kinds)} colours {digest(colours)}'
 
 
 def _words(text: Text) -> str:

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from helpers import artists
+from helpers.approved import Approved
 from helpers.artists import bands, legend, levels, named, same, spans
 from helpers.certificates import certificate_of
 from helpers.made_runs import (
@@ -91,9 +92,16 @@ def three(runs, tmp_path_factory) -> tuple[Figures, dict[str, str]]:
 
 
 @pytest.fixture(scope='module')
-def pair(runs, tmp_path_factory) -> Figures:
-    two = {name: runs[name] for name in ('one', 'two')}
-    return _drawn(two, tmp_path_factory.mktemp('pair'))[0]
+def pair(runs, tmp_path_factory) -> tuple[Figures, list[str]]:
+    """Figures, and all that they show."""
+    two, shown = {name: runs[name] for name in ('one', 'two')}, Approved()
+    with shown.watching():
+        figures, _ = _drawn(two, tmp_path_factory.mktemp('pair'))
+    return figures, [*shown.lines()]
+
+
+def test_all_that_two_runs_show(pair, approved) -> None:
+    approved.add(pair[1])
 
 
 SIX: dict[str, tuple[Callable[[Run], np.ndarray], tuple[str, str], Sequence[str]]] = {
@@ -193,9 +201,8 @@ def test_a_line_breaks_a_step_behind_the_begin_of_a_gap(three) -> None:
 
 
 @pytest.mark.parametrize('together', ['pair', 'three'])
-def test_errors_still_to_come_are_those_of_their_runs(request, runs, together: str) -> None:
-    found = request.getfixturevalue(together)
-    figure = found['settling'] if together == 'pair' else found[0]['settling']
+def test_errors_still_to_come_are_those_of_their_runs(pair, three, runs, together: str) -> None:
+    figure = (pair if together == 'pair' else three)[0]['settling']
     names = ['one', 'two'] if together == 'pair' else list(runs)
     for i, axes in enumerate(figure.axes):
         shown = named(axes, figure.legends[0])
@@ -219,9 +226,8 @@ def test_errors_still_to_come_are_those_of_their_runs(request, runs, together: s
 
 
 @pytest.mark.parametrize('together', ['pair', 'three'])
-def test_inputs_compared_are_those_of_their_runs(request, runs, together: str) -> None:
-    found = request.getfixturevalue(together)
-    figure = found['inputs_compared'] if together == 'pair' else found[0]['inputs_compared']
+def test_inputs_compared_are_those_of_their_runs(pair, three, runs, together: str) -> None:
+    figure = (pair if together == 'pair' else three)[0]['inputs_compared']
     names = ['one', 'two'] if together == 'pair' else list(runs)
     for i, axes in enumerate(figure.axes):
         shown = named(axes, figure.legends[0])
@@ -243,9 +249,8 @@ def test_captions_name_the_dashes_of_each_run(three, pair) -> None:
 
 
 @pytest.mark.parametrize('together', ['pair', 'three'])
-def test_kinetic_energies_are_those_of_their_runs(request, runs, together: str) -> None:
-    found = request.getfixturevalue(together)
-    figure = found['kinetic_energy'] if together == 'pair' else found[0]['kinetic_energy']
+def test_kinetic_energies_are_those_of_their_runs(pair, three, runs, together: str) -> None:
+    figure = (pair if together == 'pair' else three)[0]['kinetic_energy']
     names = ['one', 'two'] if together == 'pair' else list(runs)
     left, right = figure.axes
     wanted = 'set-point' if together == 'pair' else 'set-point of two'

@@ -1,5 +1,6 @@
 """A hundred inputs of `make fuzz` with a fixed seed, without the targets that atheris guides."""
 
+import os
 import re
 import subprocess
 import sys
@@ -7,7 +8,8 @@ from pathlib import Path
 
 from helpers.patience import patience
 
-RUN = Path(__file__).resolve().parents[1] / 'fuzz' / 'run.py'
+ROOT = Path(__file__).resolve().parents[2]
+RUN = ROOT / 'tests' / 'fuzz' / 'run.py'
 COUNT, SEED = 100, 20181
 
 
@@ -16,6 +18,7 @@ def test_nothing_from_outside_breaks_anything(tmp_path: Path) -> None:
     ended = subprocess.run(
         [sys.executable, str(RUN), *options],
         cwd=tmp_path,
+        env=os.environ | {'HYPOTHESIS_STORAGE_DIRECTORY': str(ROOT / '.hypothesis')},
         capture_output=True,
         text=True,
         timeout=patience(540),

@@ -147,7 +147,7 @@ def _measured(*rows: np.ndarray) -> np.ndarray:
 
 def _misread(pair: RatePair, i: int, fits: float) -> str:
     """What the two say of an axis where they differ; '' where they do not."""
-    one = RatePair(pair.t, *(part[..., i : i + 1] for part in pair[1:]))
+    one = pair.part(slice(i, i + 1))
     by_path, by_twist, apart = one.sizes
     size = max(by_path, by_twist)
     if size <= max(STILL, one.noise) or apart <= fits * size:

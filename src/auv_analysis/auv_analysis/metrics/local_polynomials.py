@@ -60,34 +60,35 @@ def nearest(times: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
 
 
 def weights(
-    times: np.ndarray, at: np.ndarray, first: np.ndarray, count: int, order: int, rate: bool
-) -> np.ndarray:
-    """Weights of the samples in the value, or the rate, of the fitted polynomial.
+    times: np.ndarray, at: np.ndarray, first: np.ndarray, count: int, *orders: int, rate: bool
+) -> list[np.ndarray]:
+    """Weights of the samples in the value, or the rate, of the fitted polynomials.
 
     Parameters
     ----------
     times : (n,) rising, s
     at : (m,) times of interest, s
     first : (m,) index of the first sample of each window
-    count : samples of a window, above `order`
-    order : of the polynomials
+    count : samples of a window, above each order
+    orders : of the polynomials
     rate : whether the first derivative is asked for, else the value
 
     Returns
     -------
-    weights : (m, count), those of a rate in 1/s
+    weights : (m, count) for each order, those of a rate in 1/s
 
     """
     window = times[first[:, None] + np.arange(count)]
     middle = window.mean(axis=1, keepdims=True)
     scale = (window[:, -1:] - window[:, :1]) / 2.0
-    V = _powers((window - middle) / scale, order)
-    asked = _powers((at[:, None] - middle) / scale, order)[:, 0]
+    V = _powers((window - middle) / scale, max(orders))
+    asked = _powers((at[:, None] - middle) / scale, max(orders))[:, 0]
     if rate:
-        asked[:, 1:] = asked[:, :-1] * np.arange(1, order + 1) / scale
+        asked[:, 1:] = asked[:, :-1] * np.arange(1, max(orders) + 1) / scale
         asked[:, 0] = 0.0
-    solved = np.linalg.solve(V.swapaxes(1, 2) @ V, asked[..., None])
-    return (V @ solved)[..., 0]
+    A = V.swapaxes(1, 2) @ V
+    solved = [np.linalg.solve(A[:, :n, :n], asked[:, :n, None]) for n in np.add(orders, 1)]
+    return [(V[..., : x.shape[1]] @ x)[..., 0] for x in solved]
 
 
 def _powers(x: np.ndarray, order: int) -> np.ndarray:
@@ -116,8 +117,8 @@ def rates(times: np.ndarray, values: np.ndarray, at: np.ndarray, count: int) -> 
         here = slice(i, i + rows)
         first = nearest(times, at[here], count)
         window = values[first[:, None] + np.arange(count)]
-        w = weights(times, at[here], first, count, ORDER, rate=True)
-        more = weights(times, at[here], first, count, ORDER + 2, rate=True) - w
+        w, finer = weights(times, at[here], first, count, ORDER, ORDER + 2, rate=True)
+        more = finer - w
         # the weights of a rate sum up to zero, so that it is one of differences: by their sums
         apart = np.diff(times[first[:, None] + np.arange(count)], axis=1)
         inner_gain[here] = ((np.cumsum(w[:, :-1], axis=1) * apart) ** 2).sum(axis=1)
@@ -138,7 +139,7 @@ def residuals(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, float]
     for i in range(0, len(times), rows):
         here = np.arange(i, min(i + rows, len(times)))
         first = nearest(times, times[here], SMALLEST)
-        w = weights(times, times[here], first, SMALLEST, ORDER, rate=False)
+        (w,) = weights(times, times[here], first, SMALLEST, ORDER, rate=False)
         smooth = np.einsum('mc,mck->mk', w, values[first[:, None] + np.arange(SMALLEST)])
         squares += ((values[here] - smooth) ** 2).sum(axis=0)
         freedom += float((1.0 - w[np.arange(len(here)), here - first]).sum())

@@ -128,13 +128,13 @@ ANGULAR: Mapping[str, Reading] = {
 
 
 class RatePair(NamedTuple):
-    """Rate of a path beside a velocity that may be it, both through one filter.
+    """Rates of paths beside velocities that may be them, all through one filter.
 
     Attributes
     ----------
     t : (m,) s
-    path, velocity : (m, 3), unit of the velocity
-    path_noise, velocity_noise : (3,) variance of noise in them
+    path, velocity : (m, k), unit of the velocity
+    path_noise, velocity_noise : (k,) variance of noise in them
 
     """
 
@@ -158,6 +158,10 @@ class RatePair(NamedTuple):
         """Root mean square of the noise in their difference."""
         return float(np.sqrt((self.path_noise + self.velocity_noise).sum()))
 
+    def part(self, columns: slice) -> 'RatePair':
+        """Some of the columns."""
+        return RatePair(self.t, *(values[..., columns] for values in self[1:]))
+
 
 def _size(rows: np.ndarray, noise: np.ndarray) -> float:
     return float(np.sqrt(max((rows**2).sum(axis=1).mean() - noise.sum(), 0.0)))
@@ -172,7 +176,7 @@ def compare_rates(t: np.ndarray, path: np.ndarray, velocity: np.ndarray) -> Rate
     Parameters
     ----------
     t : (n,) s, rising, n at least `SMALLEST`
-    path, velocity : (n, 3), unit and unit per s
+    path, velocity : (n, k), unit and unit per s
 
     """
     count = 2 * round(WINDOW / float(np.median(np.diff(t))) / 2) + 1
@@ -249,7 +253,9 @@ class TwistFit:
 
 def fit_readings(motion: PoseTwist, readings: Mapping[str, Reading]) -> TwistFit:
     """Compare every reading, such as those of `LINEAR`, with the motion."""
-    pairs = {name: compare_rates(motion.t, *read(motion)) for name, read in readings.items()}
+    paths, velocities = zip(*(read(motion) for read in readings.values()), strict=True)
+    all_of_them = compare_rates(motion.t, np.hstack(paths), np.hstack(velocities))
+    pairs = {name: all_of_them.part(slice(3 * i, 3 * i + 3)) for i, name in enumerate(readings)}
     off = {}
     for name, pair in pairs.items():
         by_path, by_twist, apart = pair.sizes

@@ -152,7 +152,7 @@ def smoothed(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
     for i in range(0, len(at), most):
         here = at[i : i + most]
         first = nearest(t, here, count)
-        w = weights(t, here, first, count, ORDER, rate=False)
+        (w,) = weights(t, here, first, count, ORDER, rate=False)
         window = rows[first[:, None] + np.arange(count)]
         found[i : i + most] = np.einsum('mc,mck->mk', w, window)
     return found

@@ -47,7 +47,7 @@ def short_runs() -> dict[str, Run]:
 def report_path(browser, short_runs, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp('report')
     summaries = {name: summarize(run) for name, run in short_runs.items()}
-    with captured():
+    with captured(panels=True):
         return write_report(out, short_runs, summaries, 'a: 1', 'b: 2')
 
 

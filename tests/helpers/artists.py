@@ -16,16 +16,17 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from PIL import Image
 
+from auv_analysis.report import panels as interactive
 from auv_analysis.report import plots
 
 Curves = dict[str, list[tuple[np.ndarray, np.ndarray]]]
 
 
 @contextmanager
-def captured() -> Iterator[dict[str, Figure]]:
+def captured(*, panels: bool = False) -> Iterator[dict[str, Figure]]:
     """Figures by name, as they are composed; nothing is rendered. A caption is sentences.
 
-    The PDF of a figure says in lines what it shows.
+    The PDF of a figure says in lines what it shows. `panels`: with what a browser draws of them.
     """
     found: dict[str, Figure] = {}
     composed = plots._saved
@@ -46,6 +47,9 @@ def captured() -> Iterator[dict[str, Figure]]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plots, 'save', save)
         patch.setattr(plots, '_saved', saved)
+        if not panels:
+            patch.setattr(interactive, 'document', lambda *_: [])
+            patch.setattr(interactive, 'library', str)
         yield found
 
 

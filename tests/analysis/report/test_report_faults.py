@@ -57,7 +57,7 @@ def folder(tmp_path_factory, composing) -> Path:
     root = tmp_path_factory.mktemp('report')
     (root / 'failing.yaml').write_text(TEXT, encoding='utf-8')
     arguments = ['simulate', str(root / 'failing.yaml'), '--hold', 'zoh', '--out']
-    with composing():
+    with composing(panels=True):
         main.main([*arguments, str(root / 'out')])
     return root / 'out'
 

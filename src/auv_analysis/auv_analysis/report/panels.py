@@ -114,8 +114,6 @@ class Interactive:
 
 def interactive(runs: Mapping[str, RunDigest]) -> Interactive:
     """Panels of some runs with all that a page needs to show them; one run at least."""
-    from bokeh.resources import Resources  # loads slowly
-
     sets = panel_sets(runs)
     marks = _marks(runs)
     start = min(run.start for run in runs.values())
@@ -126,12 +124,19 @@ def interactive(runs: Mapping[str, RunDigest]) -> Interactive:
         sets=sets,
         runs={name: ' '.join(map(str, dash)) for name, dash in dashes.items()},
         data=packed(json.dumps(document(panels, dashes, marks, (start, end)), allow_nan=False)),
-        library='\n'.join(Resources(mode='inline', components=['bokeh']).js_raw),
+        library=library(),
         script=(HERE / 'panels.js').read_text(encoding='utf-8'),
         faults='; '.join(f'{mark.number} {mark.label}, {mark.times}' for mark in marks),
         start=start,
         end=end,
     )
+
+
+def library() -> str:
+    """BokehJS, which draws the panels."""
+    from bokeh.resources import Resources  # loads slowly
+
+    return '\n'.join(Resources(mode='inline', components=['bokeh']).js_raw)
 
 
 def packed(text: str) -> str:

@@ -329,17 +329,17 @@ BLOCKS = frozenset({
     'p', 'h1', 'h2', 'h3', 'li', 'dt', 'dd', 'tr', 'caption', 'figcaption', 'summary', 'pre',
     'div', 'section', 'label', 'legend', 'fieldset',
 })  # fmt: skip
-LEFT_OUT = frozenset(
-    {'script', 'style', 'nav', 'button.theme', 'button.csv', 'dl.provenance', 'a.anchor', 'head'}
-)
+UNSEEN = frozenset({'script', 'style', 'dl.provenance'})
+ALIKE = frozenset({'head', 'nav', 'button.theme', 'button.csv', 'a.anchor', 'section#quantities'})
 VOID = frozenset({'img', 'input', 'meta', 'br', 'path', 'link'})
 
 
 class _Reader(HTMLParser):
     """Lines of a page: blocks with the name of their tag and their anchor, a row's cells in one."""
 
-    def __init__(self, page: str):
+    def __init__(self, page: str, left_out: frozenset[str]):
         super().__init__()
+        self._left_out = left_out
         self.lines: list[str] = []
         self._line, self._head = '', ''
         self._open: list[str] = []  # elements that are left out, or text as it stands
@@ -359,7 +359,7 @@ class _Reader(HTMLParser):
         if self._open:
             self._open += [tag] if tag not in VOID else []
             return
-        if names & LEFT_OUT or about.get('id') in ('quantities', 'panel-data'):
+        if names & self._left_out or about.get('id') == 'panel-data':
             self._open.append(f'{tag}#panel-data' if about.get('id') == 'panel-data' else tag)
             return
         if tag in BLOCKS:
@@ -393,9 +393,15 @@ class _Reader(HTMLParser):
             self._line += data
 
 
+def frame_lines(page: str) -> Iterator[str]:
+    """What is alike on all pages: head, links to the sections, buttons, the list of quantities."""
+    own = {*page_lines(page, panels=False)}
+    yield from (line for line in _Reader(page, UNSEEN).lines if line not in own)
+
+
 def page_lines(page: str, *, panels: bool) -> Iterator[str]:
     """Sections, sentences, tables and captions of a page, and its panels where asked for."""
-    reader = _Reader(page)
+    reader = _Reader(page, UNSEEN | ALIKE)
     yield from reader.lines
     if panels:
         text = zlib.decompress(base64.b64decode(reader.panels)).decode()

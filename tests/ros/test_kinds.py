@@ -5,7 +5,13 @@ import sys
 import pytest
 from geometry_msgs.msg import WrenchStamped
 from rclpy.duration import Duration
-from rclpy.qos import QoSProfile
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
 
 from auv_dynamics.ros.topics import is_name, message_class, qos_entry, type_name
 
@@ -36,6 +42,24 @@ def test_a_topic_has_a_name_that_the_middleware_takes_whole() -> None:
     assert not any(map(is_name, ('', 'a b', 'a\0b', 'é', '1st', 'a//b', 'a/')))
 
 
-def test_the_times_of_a_profile_are_seconds_and_the_rest_of_them() -> None:
-    entry = qos_entry(QoSProfile(depth=1, deadline=Duration(seconds=2, nanoseconds=500)))
-    assert entry['deadline'] == {'sec': 2, 'nsec': 500}
+def test_a_profile_is_written_whole() -> None:
+    times = {
+        key: Duration(seconds=k, nanoseconds=500 + k)
+        for k, key in enumerate(('deadline', 'lifespan', 'liveliness_lease_duration'), start=2)
+    }
+    words = {
+        'history': HistoryPolicy.KEEP_LAST,
+        'reliability': ReliabilityPolicy.BEST_EFFORT,
+        'durability': DurabilityPolicy.TRANSIENT_LOCAL,
+        'liveliness': LivelinessPolicy.MANUAL_BY_TOPIC,
+    }
+    plain = {'depth': 7, 'avoid_ros_namespace_conventions': True}
+    assert qos_entry(QoSProfile(**times, **words, **plain)) == plain | {
+        'history': 'keep_last',
+        'reliability': 'best_effort',
+        'durability': 'transient_local',
+        'liveliness': 'manual_by_topic',
+        'deadline': {'sec': 2, 'nsec': 502},
+        'lifespan': {'sec': 3, 'nsec': 503},
+        'liveliness_lease_duration': {'sec': 4, 'nsec': 504},
+    }

@@ -24,6 +24,14 @@ NODES = {
     'recorder_node': [],
 }
 
+WHOLE, WIDE = 2**62, 1e308  # what stands for no limit
+RANGES = {  # of the plant's parameters
+    'step': (1e-9, 1e9), 'duration': (0.0, 1e9), 'recorder_window': (0, 2999), 'seed': (0, WHOLE),
+    'wrench_timeout': (0.0, WIDE), 'actuators.delay': (0.0, 60.0), 'actuators.lag': (0.0, WIDE),
+    'actuators.rotor_lag': (0.0, WIDE), 'sensors.drop_out': (0.0, 1.0),
+    'faults.gone.from': (0.0, WIDE), 'faults.gone.probability': (0.0, 1.0),
+}  # fmt: skip
+
 
 def asked(peer: Peer, node: str) -> tuple[list[str], list, list]:
     """Names, values and descriptors, as the command line asks for them."""
@@ -42,6 +50,10 @@ def test_what_is_dumped_loads_back(node: str, tmp_path: Path) -> None:
     assert len(values) == len(descriptors) == len(names) > 0
     own = [d for d in descriptors if not d.name.startswith(('use_sim', 'qos_', 'start_type'))]
     assert all(d.description for d in own)
+    if node == 'plant_node':
+        bounds = [(d.name, [*d.integer_range, *d.floating_point_range]) for d in descriptors]
+        ends = {name: (one.from_value, one.to_value) for name, found in bounds for one in found}
+        assert ends == RANGES
     dumped = {
         name: parameter_value_to_python(value) for name, value in zip(names, values, strict=True)
     }

@@ -541,6 +541,9 @@ PANELS = {  # name -> title, label, signal of a run
 }  # fmt: skip
 
 
+FAULTS = *MARKS, MARKS[1]._replace(number=3), MARKS[1]._replace(number=4, start=7.0)
+
+
 @pytest.fixture(scope='module')
 def page(runs):
     """Bokeh's figures of the page of all runs by name, and the panels that they are of."""
@@ -558,7 +561,7 @@ def page(runs):
     dashes = {'one': [], 'two': [7, 3], 'three': [2, 2]}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr('bokeh.document.Document', Kept)
-        _, roots = document([*panels.values()], dashes, MARKS, (START, START + 12.0))
+        _, roots = document([*panels.values()], dashes, FAULTS, (START, START + 12.0))
     plots_of = {plot.name: plot for plot in made[0].roots}
     assert list(plots_of) == list(panels)
     assert roots == {name: plot.id for name, plot in plots_of.items()}
@@ -652,11 +655,13 @@ def test_faults_are_shaded_in_interactive_panels_where_they_are(page) -> None:
     for plot in page[0].values():
         boxes = [one for one in plot.center if isinstance(one, BoxAnnotation)]
         labels = [one for one in plot.center if isinstance(one, Label)]
-        assert [box.left for box in boxes] == [5.0, 6.0]
+        assert [box.left for box in boxes] == [5.0, 6.0, 6.0, 7.0]
         assert boxes[0].right == 7.0
         assert not isinstance(boxes[1].right, float)
-        assert [(label.text, label.x) for label in labels] == [('1', 5.0), ('2', 6.0)]
-        assert labels[0].y > labels[1].y, 'two at one time stand below each other'
+        labelled = [(label.text, label.x) for label in labels]
+        assert labelled == [('1', 5.0), ('2', 6.0), ('3', 6.0), ('4', 7.0)]
+        first, second, third, fourth = (label.y for label in labels)
+        assert first > second > third == fourth, 'those at one time stand below each other'
 
 
 def test_a_page_spans_all_of_its_runs_and_names_their_dashes(runs) -> None:

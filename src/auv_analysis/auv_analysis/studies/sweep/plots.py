@@ -314,7 +314,6 @@ def _together(analysis: Analysis, measures: Sequence[Measure]) -> Drawn:
             axes.set_title(f'{controller}: {measure.label}', loc='left', pad=22, fontsize='medium')
             axes.set_ylabel(names[first.path])
             axes.set_xlabel(names[second.path])
-            axes.xaxis.set_label_position('bottom')
             plots.scale_bar(figure, axes.images[0], measure.unit, ax=axes, fraction=0.05)
     title = 'The two paths that matter most'
     caption = (

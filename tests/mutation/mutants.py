@@ -43,7 +43,7 @@ LAYOUT = re.compile(  # keywords: how large, how faint, where the name of someth
     r'|(width|height)_ratios|aspect|fraction|shrink|linscale|interpolation|textcoords|xytext'
     r'|rasterized|squeeze|no_wrap|overflow|justify|highlight|optimize|strict|digits|autohide'
     r'|level|\w*_font_\w+|minor_tick_line_color'
-    r'|padding|spacing|(glyph|label)_height|glyph_width|min_border_left|toolbar_location|sizing_mode'
+    r'|pad|padding|spacing|(glyph|label)_height|glyph_width|min_border_left|toolbar_location|sizing_mode'
 )
 COLOUR = re.compile(r'\w*colou?rs?|hatch|fmt')  # keywords whose value, where it is a text, is taste
 LAYS_OUT = {  # calls
@@ -51,6 +51,7 @@ LAYS_OUT = {  # calls
     'set_minor_locator', 'LogLocator', 'minorticks_off', '_small_heads', 'set_axis_off',
     'set_edgecolor', 'set_alpha',
 }  # fmt: skip
+KEYWORDS_FOLLOW = re.compile(r'\*,')  # a star of a signature, which is no product
 DASHED = re.compile(r'\(0, \([\d., ]+\)\)')  # lengths of the dashes of a line
 ROUNDED = {'number', 'plain', 'fixed'}  # calls: a value, and its digits
 
@@ -66,6 +67,9 @@ def mutants(paths: list[Path], wiring: set[Path]) -> list[MutationSpec]:
         for item in _all_work_items([path], {}):
             (mutant,) = item.mutations
             name = mutant.operator_name
+            row, column = mutant.start_pos
+            if KEYWORDS_FOLLOW.match(source.splitlines()[row - 1][column:]):
+                continue
             inside = any(first <= mutant.start_pos < last for first, last in spared)
             foreign = SWAPPED.search(name) if path in wiring else name.startswith('wiring/')
             if not inside and not foreign and not SPARED.search(name):

@@ -156,6 +156,14 @@ def test_exchanged_laws_turn_case_2_around(case2, approved):
     assert table[19].verdict == 'reproduced'
 
 
+def test_errors_of_every_axis_have_their_unit(case2):
+    shaken = {
+        name: replace(run, nu=run.nu + np.sin(7.0 * run.t)[:, None]) for name, run in case2.items()
+    }
+    values = _table(shaken)[18].values
+    assert [value.unit for value in values] == ['m/s'] * 6 + ['rad/s'] * 6
+
+
 def test_an_effort_of_one_law_alone_is_unbounded(case2):
     gvc, cl = (replace(run, tau=run.tau * (np.arange(6) != 1)) for run in case2.values())
     assert list(case2) == ['gvc', 'cl']

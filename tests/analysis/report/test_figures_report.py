@@ -75,7 +75,9 @@ def report(composed) -> str:
 
 @pytest.fixture(scope='module')
 def rendered(case1, tmp_path_factory) -> list[FigureRecord]:
-    return draw_figures({'gvc': _short(case1['gvc'], 1.0)}, tmp_path_factory.mktemp('rendered'))
+    return draw_figures(
+        {'gvc': _short(case1['gvc'], 1.0)}, tmp_path_factory.mktemp('rendered') / 'new'
+    )
 
 
 @pytest.fixture(scope='module')

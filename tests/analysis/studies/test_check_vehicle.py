@@ -174,9 +174,15 @@ def test_a_vehicle_with_its_weight_above_turns_over(written):
     for mode in document['hydrostatics']['modes'].values():
         assert mode['eigenvalue'] < -8
         assert mode['natural_frequency'] is mode['period'] is None
+    assert 'unstable in roll: the vehicle turns over' in printed(document)
+    data['rigid_body']['center_of_gravity'] = [0.0, 0.0, 0.0]
+    assert 'turns over' not in printed(check_vehicle(written(data)))
+
+
+def printed(document) -> str:
     out = io.StringIO()
     print_check(document, Console(file=out, width=120))
-    assert 'unstable in roll: the vehicle turns over' in out.getvalue()
+    return out.getvalue()
 
 
 @pytest.mark.parametrize('name', NAMES)
@@ -280,9 +286,7 @@ def test_largest_steps():
 @pytest.mark.parametrize('name', NAMES)
 def test_the_tables_carry_the_numbers(name, capsys):
     document = check_vehicle(name)
-    out = io.StringIO()
-    print_check(document, Console(file=out, width=120))
-    text = out.getvalue()
+    text = printed(document)
     for entry in document['couplings']:
         value = entry.get('delta_xi', entry.get('delta_pi'))
         row = [entry['from'], entry['to'], f'{value:+.4g}', *entry['unit'].split()]

@@ -331,10 +331,10 @@ def oscillates(of: Evidence) -> Judgement:
     """Row 18: total variation of the errors."""
     gvc, cl = (run.part('error').path for run in of.both)
     seen = np.maximum(*(run.peak('error') for run in of.both)) > NEAR_ZERO
-    quote, unit = Quotes(), ('m/s', 'rad/s')
+    quote, units = Quotes(), ('m/s',) * 3 + ('rad/s',) * 3
     text = '; '.join(
-        f'{ERRORS[i]} {quote(f"path of {ERRORS[i]}, cl", cl[i], unit[i // 3], 2)} against '
-        f'{quote(f"path of {ERRORS[i]}, gvc", gvc[i], unit[i // 3], 2)}'
+        f'{ERRORS[i]} {quote(f"path of {ERRORS[i]}, cl", cl[i], units[i], 2)} against '
+        f'{quote(f"path of {ERRORS[i]}, gvc", gvc[i], units[i], 2)}'
         for i in np.flatnonzero(seen).tolist()
     )
     text = f'total variation, CL against GVC: {text}'

@@ -258,11 +258,11 @@ class _Builder:
         for name, values in (since | {n: found[n] for n in ('nu_d', 'F') if n in found}).items():
             self._course.setdefault(name, []).append(values[kept].copy())
         self._add_shares(block.t, found['energy'])
-        error = found.get('error', np.zeros((1, 6)))
-        far = np.flatnonzero(np.any(np.abs(error) > NEAR_ZERO, axis=1))
-        if len(far):
-            self._outside = float(block.t[far[-1]] - self._run.start)
-            self._left = self._seen - len(error) + int(far[-1])
+        if 'error' in found:
+            far = np.flatnonzero(np.any(np.abs(found['error']) > NEAR_ZERO, axis=1))
+            if len(far):
+                self._outside = float(block.t[far[-1]] - self._run.start)
+                self._left = self._seen - len(block.t) + int(far[-1])
         self._estimates |= bool(np.any(block.disturbance_estimate != 0.0))
         if block.applied is not None:
             self._missed |= np.any(block.tau != block.applied, axis=0)

@@ -267,7 +267,7 @@ class NodeInterface:
 
     def _deep_enough(self, topic: Topic, qos: QoSProfile) -> SetParametersResult:
         name = f'qos_overrides.{self.node.resolve_topic_name(topic.name)}.publisher.depth'
-        if topic.step and qos.depth <= self.must_hold:
+        if topic in STEP_TOPICS and qos.depth <= self.must_hold:
             expected = f'more than {self.must_hold}, the steps that may be under way'
             raise InputError(self.node.get_name(), name, expected, qos.depth)
         return SetParametersResult(successful=True)

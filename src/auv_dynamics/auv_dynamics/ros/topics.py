@@ -22,22 +22,21 @@ from auv_dynamics.ros import interface
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of the graph: `step` ones carry one message per step."""
+    """A topic of the graph."""
 
     name: str
     type: type
-    step: bool = False
 
 
-ODOM = Topic(interface.ODOM, Odometry, step=True)
-TWIST = Topic(interface.TWIST, TwistStamped, step=True)
-CMD_VEL = Topic(interface.CMD_VEL, TwistStamped, step=True)
-CMD_ACCEL = Topic(interface.CMD_ACCEL, AccelStamped, step=True)
-WRENCH = Topic(interface.WRENCH, WrenchStamped, step=True)
-WRENCH_APPLIED = Topic(interface.WRENCH_APPLIED, WrenchStamped, step=True)
-GROUND_TRUTH = Topic(interface.GROUND_TRUTH, Odometry, step=True)
-DISTURBANCE = Topic(interface.DISTURBANCE, WrenchStamped, step=True)
-DISTURBANCE_ESTIMATE = Topic(interface.DISTURBANCE_ESTIMATE, WrenchStamped, step=True)
+ODOM = Topic(interface.ODOM, Odometry)
+TWIST = Topic(interface.TWIST, TwistStamped)
+CMD_VEL = Topic(interface.CMD_VEL, TwistStamped)
+CMD_ACCEL = Topic(interface.CMD_ACCEL, AccelStamped)
+WRENCH = Topic(interface.WRENCH, WrenchStamped)
+WRENCH_APPLIED = Topic(interface.WRENCH_APPLIED, WrenchStamped)
+GROUND_TRUTH = Topic(interface.GROUND_TRUTH, Odometry)
+DISTURBANCE = Topic(interface.DISTURBANCE, WrenchStamped)
+DISTURBANCE_ESTIMATE = Topic(interface.DISTURBANCE_ESTIMATE, WrenchStamped)
 KINETIC_ENERGY = Topic(interface.KINETIC_ENERGY, JointState)
 KINETIC_ENERGY_SHARES = Topic(interface.KINETIC_ENERGY_SHARES, JointState)
 DELTA_XI = Topic(interface.DELTA_XI, TwistStamped)
@@ -47,7 +46,7 @@ PROGRESS = Topic(interface.PROGRESS, Header)
 DIAGNOSTICS = Topic(interface.DIAGNOSTICS, DiagnosticArray)
 CLOCK = Topic(interface.CLOCK, Clock)
 
-STEP_TOPICS = (
+STEP_TOPICS = (  # one message per step
     *(ODOM, TWIST, CMD_VEL, CMD_ACCEL, WRENCH, DISTURBANCE, DISTURBANCE_ESTIMATE),
     *(WRENCH_APPLIED, GROUND_TRUTH),
 )

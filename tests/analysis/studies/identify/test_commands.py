@@ -1,6 +1,7 @@
 """`auv identify` and `auv predict` on bags: our own and others', with their refusals."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -178,12 +179,18 @@ def test_a_prior_file_needs_values_and_deviations(short, tmp_path, capsys):
     assert 'a mapping with value and a positive deviation' in said
 
 
+@pytest.mark.usefixtures('unrendered')
 def test_rotations_alone_tell_the_rotational_block(bag, tmp_path):
     """An Imu's log: what linear motion would tell stays open, or has an interval with the truth."""
     told = {'odometry': '/odom', 'wrench': '/wrench', 'unknown': ['x', 'y', 'z', 'u', 'v', 'w']}
     (tmp_path / 'map.yaml').write_text(yaml.safe_dump(told))
     main(['identify', str(bag), '--map', str(tmp_path / 'map.yaml'), '--vehicle', 'herman2018',
-          '--out', str(tmp_path / 'out'), '--no-report', '--part', '0:45'])  # fmt: skip
+          '--out', str(tmp_path / 'out'), '--part', '0:45'])  # fmt: skip
+    page = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
+    open_ = json.loads((tmp_path / 'out' / 'identify.json').read_text())['combinations']
+    told = [float(share) for share in re.findall(r'alone to (\d+)\s% of the', page)]
+    assert told == pytest.approx([100 * one['left'] for one in open_], abs=0.5)
+    assert max(told) > 50
     rows = parquet.read_table(tmp_path / 'out' / 'coefficients.parquet').to_pylist()
     found = {row['name']: row for row in rows if row['name'].startswith('M.')}
     truth = load_vehicle('herman2018')

@@ -332,8 +332,8 @@ def write_report(found: Identified, results: Results, out: Path) -> Path:
     facts, t = results.facts, results.tables
     told = [Sentence(text, 'predictions' if i == 0 else '')
             for i, text in enumerate(sentences(results))]  # fmt: skip
-    open_: list[Block] = [f'{one["words"][:1].upper()}{one["words"][1:]}: {100 * one["left"]:.0f} '
-                          'percent of the prior’s uncertainty are left.'
+    open_: list[Block] = [f'{one["words"][:1].upper()}{one["words"][1:]}: '
+                          f'by the data alone to {100 * one["left"]:.0f} % of its prior deviation.'
                           for one in facts['combinations']]  # fmt: skip
     sections = [
         Section('predictions', 'Judged on what it has not seen',

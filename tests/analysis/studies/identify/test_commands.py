@@ -188,7 +188,7 @@ def test_rotations_alone_tell_the_rotational_block(bag, tmp_path):
           '--out', str(tmp_path / 'out'), '--part', '0:45'])  # fmt: skip
     page = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
     open_ = json.loads((tmp_path / 'out' / 'identify.json').read_text())['combinations']
-    told = [float(share) for share in re.findall(r'alone to (\d+)\s% of the', page)]
+    told = [float(share) for share in re.findall(r'alone to (\d+)\s% of its', page)]
     assert told == pytest.approx([100 * one['left'] for one in open_], abs=0.5)
     assert max(told) > 50
     rows = parquet.read_table(tmp_path / 'out' / 'coefficients.parquet').to_pylist()

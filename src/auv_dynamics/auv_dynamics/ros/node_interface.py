@@ -179,9 +179,19 @@ class NodeInterface:
     def listen(
         self, topic: Topic, callback: Callable[[int, tuple[float, ...]], None], qos: QoSProfile
     ) -> None:
-        """Subscription to the stamps in ns and the numbers of a topic; broken ones are refused."""
+        """Subscription to the stamps in ns and the numbers of a topic; broken ones are refused.
+
+        So are those for which the callback raises ValueError.
+        """
         codec = self.codec(topic)
-        self.subscribe(topic, lambda data, _: callback(*codec.decode(data)), qos)
+
+        def take(data: bytes, _: dict[str, Any]) -> None:
+            try:
+                callback(*codec.decode(data))
+            except ValueError as error:
+                raise BadMessageError(str(error)) from error
+
+        self.subscribe(topic, take, qos)
 
     def subscribe(
         self, topic: Topic, callback: Callable[[bytes, dict[str, Any]], None], qos: QoSProfile

@@ -307,12 +307,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
         return True
 
     def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
-        if not self._active:
-            return
-        try:
+        if self._active:
             self._say(self._controller.odometry(ns, x, self._now()))
-        except ValueError as error:
-            self.graph.refuse(f'{topics.ODOM.name}: {error}')
 
     def _now(self) -> Now:
         if self._settings.lockstep:
@@ -324,11 +320,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
         def take(ns: int, values: tuple[float, ...]) -> None:
             self._idle.hear(topic, ns)
-            try:
-                keep(ns, values)
-            except ValueError as error:
-                self.graph.refuse(f'{topic.name}: {error}')
-                return
+            keep(ns, values)
             if self._active:
                 self._say(self._controller.answer(self._now()))
 

@@ -53,11 +53,7 @@ class SetpointNode(BulkNode):
 
     def _on_odometry(self, ns: int, x: tuple[float, ...]) -> None:
         restarts = self._guard.restarts
-        try:
-            elapsed = self._guard.accept(ns, x[7:], Now(time.monotonic()))
-        except ValueError as error:
-            self.graph.refuse(f'{topics.ODOM.name}: {error}')
-            return
+        elapsed = self._guard.accept(ns, x[7:], Now(time.monotonic()))
         newest = (ns - self._guard.origin) // self._step_ns
         if elapsed:
             gap = max(1, newest - self._newest)

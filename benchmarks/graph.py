@@ -13,15 +13,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import psutil
 import yaml
 from loops import CONTROLLER
 
-from auv_analysis.graph import supervisor
 from auv_analysis.graph.domain import chosen_domain
 from auv_analysis.graph.experiment import environment, run_controller
 from auv_analysis.scenario.scenario import load_scenario
@@ -112,16 +110,10 @@ def _pong() -> None:
         try_shutdown()
 
 
-@contextmanager
-def on_executor(name: str) -> Iterator[None]:
-    """Start nodes on one of rclpy's executors, 'plain' or 'events'; '': as `auv run` does."""
-    begin, wrapper = supervisor.begin, [sys.executable, str(ON_EXECUTOR), name]
-    if name:
-        supervisor.begin = lambda command, **how: begin([*wrapper, *command], **how)
-    try:
-        yield
-    finally:
-        supervisor.begin = begin
+def starter(executor: str) -> Callable[..., psutil.Popen]:
+    """What starts nodes on one of rclpy's executors, 'plain' or 'events'; '': as lock-step does."""
+    wrapper = [sys.executable, str(ON_EXECUTOR), executor] if executor else []
+    return lambda command, **how: psutil.Popen([*wrapper, *command], **how)
 
 
 def graph_rate(steps: int, *, composed: bool = False, executor: str = '') -> float:
@@ -149,11 +141,10 @@ def graph_rate(steps: int, *, composed: bool = False, executor: str = '') -> flo
         warm_up(scenario, [CONTROLLER])
         graph = Watcher(domain)
         try:
-            with on_executor(executor):
-                run_controller(
-                    scenario, CONTROLLER, Path(folder) / 'out', domain, graph,
-                    lambda step: progress.append((time.monotonic(), step)), composed=composed,
-                )  # fmt: skip
+            run_controller(
+                scenario, CONTROLLER, Path(folder) / 'out', domain, graph, starter(executor),
+                lambda step: progress.append((time.monotonic(), step)), composed=composed,
+            )  # fmt: skip
         finally:
             graph.close()
     low, high = (part * steps for part in STEADY)

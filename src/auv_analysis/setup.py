@@ -70,6 +70,7 @@ setup(
         'bokeh>=3.4,<4',
         'defusedxml>=0.7.1',
         'psutil>=5.9.4',
+        'setproctitle>=1.3',
         'rich>=13',
         'pyarrow>=17',
         'scipy>=1.15',

@@ -1,12 +1,10 @@
 """Our programs as processes of their own, forked from one that has imported them.
 
-To import what a node needs takes longer than most tests of nodes, and `auv run` starts five of
-them for each controller. What the executables themselves do before that is seen by the tests that
-start the installed ones.
+To import what a node needs takes longer than most tests of nodes. What the executables themselves
+do before that is seen by the tests that start the installed ones.
 """
 
 import contextlib
-import ctypes
 import gc
 import inspect
 import json
@@ -30,28 +28,26 @@ from rclpy.type_support import check_for_type_support
 from setproctitle import setproctitle
 
 from auv_analysis import load_scenario
-from auv_analysis.graph import supervisor
-from auv_analysis.graph.experiment import COMPOSED, PACKAGES
+from auv_analysis.graph.experiment import MODULES as OF_A_RUN
+from auv_analysis.graph.fork_server import entitle
 from auv_analysis.simulation.simulate import warm_up
 from auv_dynamics.ros import node_interface
 from auv_dynamics.ros.interface import PARENT
 from auv_dynamics.ros.topics import TOPICS
 
-NODES = {  # and the package of each
-    **PACKAGES,
-    'frame_converter_node': 'auv_dynamics',
-    'replay_node': 'auv_analysis',
-    COMPOSED: 'auv_analysis',
+NODES = {  # and the module of each
+    **OF_A_RUN,
+    'frame_converter_node': 'auv_dynamics.nodes.frame_converter_node',
+    'replay_node': 'auv_analysis.nodes.replay_node',
 }
 STARTERS = {'auv': 'auv_analysis.cli.main', 'record': 'helpers.graph_runs'}  # of nodes
-MODULES = {**{name: f'{package}.nodes.{name}' for name, package in NODES.items()}, **STARTERS}
+MODULES = {**NODES, **STARTERS}
 LOADED = (  # what `auv` imports once it knows what it has to do
     *('auv_analysis.cli.scenario_runs', 'auv_analysis.graph.recorded_runs'),
     *('auv_analysis.studies.compare.sources', 'auv_analysis.output.keyboard'),
 )
 PERIOD = 0.2  # s, of diagnostics: who waits for what a node says waits for a fifth
 REPORT = ('auv_analysis.report.document', 'auv_analysis.report.plots')
-INTERPRETER = Path(sys.executable).name.encode()
 OWNER = 'AUV_GVC_TESTS'  # in the environment: process id of the whole run, by tests/conftest.py
 SIZE = 1 << 20  # bytes of a request, at most
 ROOM = 4096  # bytes of a command line in the list of processes, which lie in the environment
@@ -130,11 +126,33 @@ class Process:
         self.send_signal(signal.SIGKILL)
 
 
-class Line:
-    """The way to the process that forks."""
+class ForkServer:
+    """The process that forks for all workers of a test run, started where it is not there yet."""
 
-    def __init__(self, end: socket.socket):
-        self._end = end
+    def __init__(self) -> None:
+        mine = str(os.getpid())
+        told = os.environ.get(OWNER)
+        # what a test starts has its own, which holds its output open no longer than it lives
+        owner = told if told in (mine, str(os.getppid())) else mine
+        name = f'\0auv_gvc forks for {owner}'
+        self._end = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        while self._end.connect_ex(name):
+            with (
+                socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as entrance,
+                contextlib.suppress(OSError),  # another worker has just taken the name
+            ):
+                entrance.bind(name)
+                entrance.listen()
+                self._start(entrance.fileno(), owner)
+
+    def _start(self, entrance: int, owner: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', __name__, str(entrance), owner],
+            env={**os.environ, 'AUV_GVC_ROOM': ' ' * ROOM},
+            cwd=Path(__file__).parents[1],
+            stdin=subprocess.DEVNULL,
+            pass_fds=[entrance],
+        )
 
     def start(
         self,
@@ -167,36 +185,6 @@ class Line:
         return Process(arguments, int(self._end.recv(16)), [pipe for pipe, _ in pipes], ended)
 
 
-class ForkServer(Line):
-    """The process that forks for all workers of a test run, started where it is not there yet."""
-
-    def __init__(self) -> None:
-        mine = str(os.getpid())
-        told = os.environ.get(OWNER)
-        # what a test starts has its own, which holds its output open no longer than it lives
-        owner = told if told in (mine, str(os.getppid())) else mine
-        name = f'\0auv_gvc forks for {owner}'
-        end = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        super().__init__(end)
-        while end.connect_ex(name):
-            with (
-                socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as entrance,
-                contextlib.suppress(OSError),  # another worker has just taken the name
-            ):
-                entrance.bind(name)
-                entrance.listen()
-                self._start(entrance.fileno(), owner)
-
-    def _start(self, entrance: int, owner: str) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, '-m', __name__, str(entrance), owner],
-            env={**os.environ, 'AUV_GVC_ROOM': ' ' * ROOM},
-            cwd=Path(__file__).parents[1],
-            stdin=subprocess.DEVNULL,
-            pass_fds=[entrance],
-        )
-
-
 def grow(main: Callable[[], Any], arguments: list[str]) -> int:
     """What the interpreter does with a script; its exit code."""
     sys.argv = arguments
@@ -210,38 +198,16 @@ def grow(main: Callable[[], Any], arguments: list[str]) -> int:
     return 0
 
 
-def entitle(command: Sequence[str]) -> None:
-    """Be found by a command line in the list of processes, under the interpreter's name for ROS."""
-    setproctitle(' '.join(command))
-    libc = ctypes.CDLL(None)
-    for name in ('program_invocation_name', 'program_invocation_short_name'):
-        ctypes.c_char_p.in_dll(libc, name).value = INTERPRETER
-
-
-def of_a_run(line: Line) -> Callable[..., Process]:
-    """What the supervisor of a run starts its nodes by, in place of a new interpreter."""
-
-    def begin(command: Sequence[str], env: Mapping[str, str], stdout: IO[bytes], **_: Any) -> Any:
-        return line.start(command, env, files=(stdout.fileno(), stdout.fileno()))
-
-    return begin
-
-
 def fork(
     main: Callable[[], Any], request: Any, said: Sequence[int], inherited: Sequence[int]
-) -> tuple[int, socket.socket | None]:
-    """Process id of a new program, and the way on which it asks for nodes."""
+) -> int:
+    """Process id of a new program."""
     arguments, environ, folder = request
-    is_starter = Path(arguments[0]).name in STARTERS
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     if pid := os.fork():
-        theirs.close()
-        if not is_starter:
-            ours.close()
-        return pid, ours if is_starter else None
+        return pid
     code = 1
     try:
-        for number in (*inherited, ours.detach()):
+        for number in inherited:
             os.close(number)
         os.environ.clear()
         os.environ.update(environ)
@@ -253,10 +219,7 @@ def fork(
         sys.stdout = os.fdopen(1, 'w', 1, closefd=False)
         sys.stderr = os.fdopen(2, 'w', 1, errors='backslashreplace', closefd=False)
         entitle([sys.executable, *arguments])
-        if is_starter:
-            supervisor.begin = of_a_run(Line(theirs))
-        else:
-            theirs.close()
+        if Path(arguments[0]).name not in STARTERS:
             os.setsid()
         code = grow(main, arguments)
         sys.stdout.flush()
@@ -320,12 +283,9 @@ def serve(entrance: socket.socket, owner: int) -> None:
             request, (*said, code) = json.loads(data), handed
             inherited = [entrance.fileno(), owner, *lines, code]
             inherited += [*ends, *(one[1] for one in ends.values())]
-            pid, line = fork(program(request[0]), request, said, inherited)
+            pid = fork(program(request[0]), request, said, inherited)
             for number in said:
                 os.close(number)
-            if line:
-                lines[line.fileno()] = line
-                selector.register(line, selectors.EVENT_READ)
             watched = os.pidfd_open(pid)
             ends[watched] = pid, code
             selector.register(watched, selectors.EVENT_READ)

@@ -6,6 +6,7 @@ import sys
 import time
 from collections import defaultdict
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -129,7 +130,8 @@ def plain(value: object) -> object:
 
 def main() -> None:
     """Record controllers of a scenario, all where none is named."""
-    from auv_analysis.graph.experiment import run_controller
+    from auv_analysis.graph.experiment import MODULES, run_controller
+    from auv_analysis.graph.fork_server import ForkServer
     from auv_analysis.simulation.simulate import warm_up
     from auv_dynamics.ros.participant import Watcher
 
@@ -138,9 +140,6 @@ def main() -> None:
     Path(out).mkdir()
     names = controllers or list(scenario.controllers)
     warm_up(scenario, names)
-    graph = Watcher(domain)
-    try:
+    with ForkServer(MODULES) as nodes, closing(Watcher(domain)) as graph:
         for name in names:
-            run_controller(scenario, name, Path(out), domain, graph, lambda _: None)
-    finally:
-        graph.close()
+            run_controller(scenario, name, Path(out), domain, graph, nodes.begin, lambda _: None)

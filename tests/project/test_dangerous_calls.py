@@ -39,6 +39,8 @@ LISTED = {
     ('auv_dynamics/kernel/jit.py', 'importlib.import_module'),  # a module of numba
     ('auv_analysis/output/parallel.py', 'pickle'),  # what a forked copy of the process computed
     ('auv_analysis/graph/domain.py', 'socket'),  # which ports are free
+    ('auv_analysis/graph/fork_server.py', 'socket'),  # a pair, of the process and its copy
+    ('auv_analysis/graph/fork_server.py', 'importlib.import_module'),  # names of ours
     ('udp.py', 'socket'),  # of the example's driver
     ('json_backend.py', 'socket'),  # of the example that is ArduSub's physics
     ('auv_analysis/report/document.py', 'markupsafe.Markup'),  # of text that was escaped before

@@ -26,6 +26,7 @@ KEYS = {  # of rosdep, for imports of another name
             'packaging',
             'psutil',
             'rich',
+            'setproctitle',
         )
     },
     'jinja2': 'python3-jinja2',

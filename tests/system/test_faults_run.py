@@ -1,20 +1,22 @@
 """`auv run` of a vehicle that fails: the graph equals the simulation, and the report says what
 each law did under each fault."""
 
+from contextlib import nullcontext
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
 from helpers.artists import captured
-from helpers.fork_server import of_a_run
+from helpers.fork_server import Process
 from helpers.graph_runs import assert_same, both
 from helpers.node_processes import fork_server, fresh_domain
 from helpers.report_pages import Page
 
 from auv_analysis.bag import load_run, read_bag
 from auv_analysis.cli.main import main
-from auv_analysis.graph import supervisor
+from auv_analysis.graph import recorded_runs
 from auv_analysis.metrics.fault_response import FILE, responses
 from auv_analysis.runs.run import Run
 from auv_dynamics.ros import interface
@@ -42,12 +44,18 @@ faults:
 """
 
 
+def begin(command, env, stdout, **_) -> Process:
+    """Start a process of a run."""
+    return fork_server().start(command, env, files=(stdout.fileno(), stdout.fileno()))
+
+
 @pytest.fixture(scope='module')
 def done(tmp_path_factory) -> Path:
     root = tmp_path_factory.mktemp('failing')
     (root / 'failing.yaml').write_text(SCENARIO)
     with captured(), pytest.MonkeyPatch.context() as patch:
-        patch.setattr(supervisor, 'begin', of_a_run(fork_server()))
+        # not forked from this process, which has threads
+        patch.setattr(recorded_runs, 'ForkServer', lambda _: nullcontext(Mock(begin=begin)))
         patch.setenv('ROS_DOMAIN_ID', str(fresh_domain()))
         main(['run', str(root / 'failing.yaml'), '--out', str(root / 'out'), '--composed'])
     return root

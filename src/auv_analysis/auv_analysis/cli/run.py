@@ -20,7 +20,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
     scenario, names = open_scenario(options)
     with (
-        free_graph(options.domain_id) as graph,
+        free_graph(options.domain_id, scenario, names) as graph,
         scenario_folder(options, scenario, names, '/*') as results,
     ):
         runs, failure = recorded(scenario, names, results, graph, composed=options.composed)

@@ -59,7 +59,11 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         options.hold = 'zoh'  # as the nodes do
     check_hold(scenario, options.hold)
     with ExitStack() as stack:
-        graph = stack.enter_context(free_graph(options.domain_id)) if options.run else None
+        graph = (
+            stack.enter_context(free_graph(options.domain_id, scenario, names))
+            if options.run
+            else None
+        )
         of_a_run = '/*' if options.run else ENDING
         folder = scenario_folder(options, scenario, names, '.parquet', of_a_run)
         results = stack.enter_context(folder)

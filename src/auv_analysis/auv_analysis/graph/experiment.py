@@ -15,7 +15,13 @@ from auv_analysis.graph.node_parameters import (
     node_parameters,
     parameter_file,
 )
-from auv_analysis.graph.supervisor import NodeDiedError, Supervisor, TroubleError, executable
+from auv_analysis.graph.supervisor import (
+    Begin,
+    NodeDiedError,
+    Supervisor,
+    TroubleError,
+    executable,
+)
 from auv_analysis.scenario.scenario import Scenario, write_inputs
 from auv_dynamics.ros.security import enclave, loopback
 
@@ -31,6 +37,10 @@ PACKAGES = {
 }
 OBSERVERS = (RECORDER, SETPOINT, ANALYSIS)  # nobody waits for an answer of theirs
 COMPOSED = 'composed_graph'  # the executable that holds them all
+MODULES = {
+    name: f'{package}.nodes.{name}'
+    for name, package in {**PACKAGES, COMPOSED: 'auv_analysis'}.items()
+}
 START_TIMEOUT = 60.0  # s until the start barrier must be down
 END_TIMEOUT = 30.0  # s for the recorder to close after the last step
 
@@ -52,6 +62,7 @@ def run_controller(
     out: Path,
     domain: int,
     graph: 'Watcher',
+    begin: Begin,
     progress: Callable[[int], None],
     *,
     composed: bool = False,
@@ -65,6 +76,7 @@ def run_controller(
     out : folder of the results; the bag goes to out/<controller>
     domain : ROS domain id
     graph : the graph as seen from here, a `Watcher` of the same domain
+    begin : what starts a process, as `psutil.Popen` does
     progress : told the last complete step whenever it changes
     composed : all nodes in one process, else one each
 
@@ -90,7 +102,7 @@ def run_controller(
     text = parameter_file(parameters, f'{scenario.name}, controller {controller}: auv run')
     path.write_text(text, encoding='utf-8')
     graph.complete_ns, graph.running = -1, False
-    supervisor = Supervisor(out / 'logs' / controller, environment(domain))
+    supervisor = Supervisor(out / 'logs' / controller, environment(domain), begin)
     try:
         for name, package in ({COMPOSED: PACKAGES[RECORDER]} if composed else PACKAGES).items():
             arguments = [*enclave(name), '--params-file', str(path)]

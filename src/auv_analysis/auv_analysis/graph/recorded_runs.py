@@ -12,8 +12,9 @@ from rich.progress import Progress, TaskID
 
 from auv_analysis.bag import open_bag
 from auv_analysis.graph.domain import VARIABLE, own_domain
-from auv_analysis.graph.experiment import environment, run_controller
-from auv_analysis.graph.supervisor import NodeDiedError, TroubleError
+from auv_analysis.graph.experiment import MODULES, environment, run_controller
+from auv_analysis.graph.fork_server import ForkServer
+from auv_analysis.graph.supervisor import Begin, NodeDiedError, TroubleError
 from auv_analysis.output.folder import ResultsFolder
 from auv_analysis.output.progress import Speed, bar, count, say, waiting
 from auv_analysis.runs.run import AnyRun
@@ -29,11 +30,17 @@ class FreeGraph(NamedTuple):
 
     domain: int
     watcher: Any
+    begin: Begin
 
 
 @contextmanager
-def free_graph(asked: int | None) -> Iterator[FreeGraph]:
-    """Join the domain that is asked for, or a free one.
+def free_graph(asked: int | None, scenario: Scenario, names: list[str]) -> Iterator[FreeGraph]:
+    """Join the domain that is asked for, or a free one, all loaded that its nodes need.
+
+    Parameters
+    ----------
+    asked : domain id; none: a free one
+    scenario, names : what is to run, and which of its controllers
 
     Raises
     ------
@@ -42,16 +49,19 @@ def free_graph(asked: int | None) -> Iterator[FreeGraph]:
     """
     with own_domain(asked) as (domain, picked):
         os.environ.update(environment(domain))
-        # the middleware reads its environment when it is loaded
-        from auv_dynamics.ros.participant import Watcher
+        with waiting('loading or compiling the kernel'):
+            warm_up(scenario, names)
+        with ForkServer(MODULES) as nodes:
+            # the middleware reads its environment when it is loaded
+            from auv_dynamics.ros.participant import Watcher
 
-        graph = Watcher(domain)
-        try:
-            if not picked:
-                _refuse_strangers(graph, domain)
-            yield FreeGraph(domain, graph)
-        finally:
-            graph.close()
+            graph = Watcher(domain)
+            try:
+                if not picked:
+                    _refuse_strangers(graph, domain)
+                yield FreeGraph(domain, graph, nodes.begin)
+            finally:
+                graph.close()
 
 
 def recorded(
@@ -79,8 +89,6 @@ def recorded(
 
     """
     out = results.folder
-    with waiting('loading or compiling the kernel'):
-        warm_up(scenario, names)
     say(f'export {VARIABLE}={graph.domain}')
     failure: FailedError | None = None
     done = []

@@ -4,17 +4,18 @@ import contextlib
 import os
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO
 
 import psutil
 
+from auv_analysis.graph.fork_server import Forked
 from auv_dynamics.files.errors import FailedError
 from auv_dynamics.ros.interface import PARENT
 
 GRACE = 5.0  # s between SIGTERM and SIGKILL
-begin = psutil.Popen  # what starts a process: tests put a faster one in its place
+Begin = Callable[..., psutil.Popen | Forked]
 
 
 class NodeDiedError(FailedError):
@@ -57,13 +58,14 @@ class Supervisor:
     ----------
     logs : folder of the nodes' output, one file each
     environment : of all of them
+    begin : what starts a process, as `psutil.Popen` does
 
     """
 
-    def __init__(self, logs: Path, environment: Mapping[str, str]):
-        self._logs = logs
+    def __init__(self, logs: Path, environment: Mapping[str, str], begin: Begin = psutil.Popen):
+        self._logs, self._begin = logs, begin
         self._environment = {**environment, PARENT: str(os.getpid())}
-        self._processes: dict[str, psutil.Popen] = {}
+        self._processes: dict[str, psutil.Popen | Forked] = {}
         self._outputs: dict[str, IO[bytes]] = {}  # open: the folder may be removed under us
 
     def start(self, name: str, command: list[str], *, observes: bool = False) -> None:
@@ -75,7 +77,7 @@ class Supervisor:
         log = (self._logs / f'{name}.log').open('w+b')
         self._outputs[name] = log
         # a session of its own: Ctrl-C reaches `auv`, which ends the nodes in order
-        self._processes[name] = begin(
+        self._processes[name] = self._begin(
             command,
             env=self._environment,
             stdin=-3,  # subprocess.DEVNULL
@@ -88,11 +90,8 @@ class Supervisor:
 
     def ended(self) -> dict[str, int]:
         """Name -> exit code of the processes that have ended."""
-        return {
-            name: process.returncode
-            for name, process in self._processes.items()
-            if process.poll() is not None
-        }
+        codes = {name: process.poll() for name, process in self._processes.items()}
+        return {name: code for name, code in codes.items() if code is not None}
 
     def check(self, may_end: str) -> bool:
         """Whether the process `may_end` has ended well; NodeDiedError when another has ended."""

@@ -358,6 +358,10 @@ def test_poles_ahead_say_whether_a_vehicle_keeps_its_course(written):
     data['damping'] = {'linear': [0.0] * 6, 'quadratic': [0.0] * 6}
     at_rest = cruise(written(data), 0.0)
     assert (at_rest['verdict'], at_rest['hint']) == ('marginal', None)
+    heavy_above = file_of('bluerov2') | {'added_mass': [20.0, 5.0, 5.0, 0.1, 0.1, 0.1]}
+    heavy_above['rigid_body']['center_of_gravity'] = [0.0, 0.0, -0.02]
+    turns_over = cruise(written(heavy_above), 1.0)
+    assert (turns_over['verdict'], turns_over['hint']) == ('unstable', None)
 
 
 def test_munk_terms_are_the_slopes_of_the_coriolis_wrench():

@@ -18,8 +18,8 @@ RNG = np.random.default_rng
 
 def test_an_excitation(tmp_path) -> None:
     rng = RNG(5)
-    states = rng.normal(size=(26, 1, 51, 13)) + np.arange(13)
-    commands = rng.normal(size=(26, 1, 50, 6)) * 9
+    states = rng.normal(size=(26, 2, 51, 13)) + np.arange(13)
+    commands = rng.normal(size=(26, 2, 50, 6)) * 9
     found = Made(
         request=Made(steps=50, step=0.1, bounds=Made(room=np.array([8.0, 6.0, np.inf]))),
         motion=Made(states=states, commands=commands),

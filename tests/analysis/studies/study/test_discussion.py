@@ -75,6 +75,14 @@ def test_a_vehicle_at_rest_has_nothing_to_be_said_of_its_energy():
     assert 'kinetic energy' not in said(found)
 
 
+def test_what_never_moves_by_itself_is_not_the_most_deformed():
+    found = {'gvc': summaries()['gvc']}
+    found['gvc']['velocity']['max'][3] = found['gvc']['effort']['max'][4] = 0.0
+    text = said(found)
+    assert 'component of roll' not in text
+    assert 'input of pitch' not in text
+
+
 def test_samples_carry_energy_over_time(tmp_path):
     run = runs('case1')['gvc']
     table = parquet.read_table(write_samples(run, tmp_path / 'gvc.parquet')).to_pydict()

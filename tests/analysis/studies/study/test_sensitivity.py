@@ -138,6 +138,7 @@ def test_loops_that_always_diverge_are_a_refusal_with_its_reason(monkeypatch, tm
     approved.add([found.refusal, own.refusal])
     assert 'own gains' in own.refusal
     assert not own.rows
+    assert (own.rollouts, found.rollouts) == (0, 0)
     table = left_out_table([own])
     assert own.refusal in [cell.text for row in table.rows for cell in row]
     path = write_sensitivities(tmp_path, [own, found])

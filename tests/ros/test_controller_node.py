@@ -292,7 +292,10 @@ def test_limits_and_timeouts_are_taken_while_inactive_only() -> None:
         five = ParameterValue(type=8, double_array_value=[5.0])
         assert set_parameter(peer, 'limits.wrench', five).successful
         two = ParameterValue(type=8, double_array_value=[5.0, 1.0])
-        assert 'limits.wrench: expected 1 or 6' in set_parameter(peer, 'limits.wrench', two).reason
+        reason = set_parameter(peer, 'limits.wrench', two).reason
+        assert reason.startswith('limits.wrench: expected 1 or 6')
+        reason = set_parameter(peer, 'gains.k_D', two).reason
+        assert reason == 'gains.k_D: expected 1, 6 or 36 finite numbers, found 2 numbers'
         second = ParameterValue(type=3, double_value=1.0)
         for name in ('odometry_timeout', 'setpoint_timeout', 'ramp', 'limits.speed'):
             assert set_parameter(peer, name, second).successful

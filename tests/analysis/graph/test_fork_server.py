@@ -43,7 +43,6 @@ def start(server, *arguments):
     process = server.begin(
         [str(Path('a_program').resolve()), *arguments], env=env, stdin=-3, stdout=log, stderr=log
     )
-    assert process.poll() is None
     while not Path('log').read_text().endswith('\\n'):
         time.sleep(0.01)
     return process, json.loads(Path('log').read_text())
@@ -53,6 +52,7 @@ with ForkServer({'a_program': 'a_module'}) as server:
     ended, found['forked'] = start(server, 'a', 'b c')
     found['code'] = ended.wait()
     waiting, _ = start(server, 'wait')
+    assert waiting.poll() is None
     waiting.kill()
     found['killed'] = waiting.wait(), waiting.poll()
     outliving, _ = start(server, 'wait')

@@ -15,13 +15,16 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Run the nodes, record, analyse and report."""
-    from auv_analysis.cli.scenario_runs import finish, open_scenario, scenario_folder
+    from auv_analysis.cli.scenario_runs import finish, open_scenario, scenario_folder, warn
+    from auv_analysis.graph.domain import own_domain
     from auv_analysis.graph.recorded_runs import free_graph, recorded
 
     scenario, names = open_scenario(options)
     with (
-        free_graph(options.domain_id, scenario, names) as graph,
+        own_domain(options.domain_id) as domain,
         scenario_folder(options, scenario, names, '/*') as results,
+        free_graph(*domain, scenario, names) as graph,
     ):
+        warn(scenario, names)
         runs, failure = recorded(scenario, names, results, graph, composed=options.composed)
         return finish(results.folder, runs, failure, scenario, report=not options.no_report)

@@ -1,8 +1,8 @@
 """What commands on scenarios and runs share: scenario and folder, runs, summary and report."""
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from glob import escape
 from pathlib import Path
@@ -45,11 +45,10 @@ def open_scenario(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
     return scenario, names
 
 
-@contextmanager
 def scenario_folder(
     options: argparse.Namespace, scenario: Scenario, names: Sequence[str], *own: str
-) -> Iterator[ResultsFolder]:
-    """Folder of the results; warnings only now, so that a refusal is one line.
+) -> AbstractContextManager[ResultsFolder]:
+    """Folder of the results.
 
     Parameters
     ----------
@@ -59,16 +58,19 @@ def scenario_folder(
     own : endings of what is written of each controller, such as '.npz' or '/*'
 
     """
-    with results_folder(
+    return results_folder(
         options.out or Path('runs') / scenario.name,
         overwrite=options.overwrite,
         own=[f'{escape(name)}{ending}' for name in names for ending in own],
         inputs=scenario.inputs,
-    ) as results:
-        for warning in scenario.warnings:
-            say(f'warning: {warning}')
-        say_margins(scenario, names)
-        yield results
+    )
+
+
+def warn(scenario: Scenario, names: Sequence[str]) -> None:
+    """Say what is odd about a scenario, once nothing is refused: a refusal is one line."""
+    for warning in scenario.warnings:
+        say(f'warning: {warning}')
+    say_margins(scenario, names)
 
 
 def say_margins(

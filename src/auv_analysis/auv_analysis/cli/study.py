@@ -47,7 +47,14 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """The paper's procedure, by `simulate` or on the node graph."""
-    from auv_analysis.cli.scenario_runs import finish, open_scenario, scenario_folder, simulated
+    from auv_analysis.cli.scenario_runs import (
+        finish,
+        open_scenario,
+        scenario_folder,
+        simulated,
+        warn,
+    )
+    from auv_analysis.graph.domain import own_domain
     from auv_analysis.graph.recorded_runs import free_graph, recorded
     from auv_analysis.runs.samples import ENDING
     from auv_analysis.simulation.simulate import check_hold
@@ -59,14 +66,12 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         options.hold = 'zoh'  # as the nodes do
     check_hold(scenario, options.hold)
     with ExitStack() as stack:
-        graph = (
-            stack.enter_context(free_graph(options.domain_id, scenario, names))
-            if options.run
-            else None
-        )
-        of_a_run = '/*' if options.run else ENDING
+        domain = stack.enter_context(own_domain(options.domain_id)) if options.run else None
+        of_a_run = '/*' if domain else ENDING
         folder = scenario_folder(options, scenario, names, '.parquet', of_a_run)
         results = stack.enter_context(folder)
+        graph = stack.enter_context(free_graph(*domain, scenario, names)) if domain else None
+        warn(scenario, names)
         runs, failure = (
             recorded(scenario, names, results, graph, composed=options.composed)
             if graph

@@ -3,7 +3,7 @@
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from rich.progress import Progress, TaskID
 
 from auv_analysis.bag import open_bag
-from auv_analysis.graph.domain import VARIABLE, own_domain
+from auv_analysis.graph.domain import VARIABLE
 from auv_analysis.graph.experiment import MODULES, environment, run_controller
 from auv_analysis.graph.fork_server import ForkServer
 from auv_analysis.graph.supervisor import Begin, NodeDiedError, TroubleError
@@ -34,34 +34,32 @@ class FreeGraph(NamedTuple):
 
 
 @contextmanager
-def free_graph(asked: int | None, scenario: Scenario, names: list[str]) -> Iterator[FreeGraph]:
-    """Join the domain that is asked for, or a free one, all loaded that its nodes need.
+def free_graph(
+    domain: int, picked: bool, scenario: Scenario, names: list[str]
+) -> Iterator[FreeGraph]:
+    """Join a domain, all loaded that its nodes need.
 
     Parameters
     ----------
-    asked : domain id; none: a free one
+    domain, picked : as of `own_domain`
     scenario, names : what is to run, and which of its controllers
 
     Raises
     ------
-    InputError : no such domain, or somebody's vehicle is on it
+    InputError : somebody's vehicle is on the domain
 
     """
-    with own_domain(asked) as (domain, picked):
-        os.environ.update(environment(domain))
-        with waiting('loading or compiling the kernel'):
-            warm_up(scenario, names)
-        with ForkServer(MODULES) as nodes:
-            # the middleware reads its environment when it is loaded
-            from auv_dynamics.ros.participant import Watcher
+    os.environ.update(environment(domain))
+    with waiting('loading or compiling the kernel'):
+        warm_up(scenario, names)
+    with ForkServer(MODULES) as nodes:
+        # the middleware reads its environment when it is loaded
+        from auv_dynamics.ros.participant import Watcher
 
-            graph = Watcher(domain)
-            try:
-                if not picked:
-                    _refuse_strangers(graph, domain)
-                yield FreeGraph(domain, graph, nodes.begin)
-            finally:
-                graph.close()
+        with closing(Watcher(domain)) as graph:
+            if not picked:
+                _refuse_strangers(graph, domain)
+            yield FreeGraph(domain, graph, nodes.begin)
 
 
 def recorded(

@@ -163,7 +163,7 @@ KEYS = (
     Key(
         'case1_again_s', '`auv run case1`, both laws on five nodes each, with report', '',
         'cost', 15.0, 10.0,
-        'the nodes are started anew for the second law, the steps of each law take some seconds, '
+        'the steps of each law take some seconds, the nodes of each have to find each other, '
         'and most of what the report takes are its figures.',
     ),
     Key(

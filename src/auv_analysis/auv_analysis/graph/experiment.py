@@ -108,8 +108,9 @@ def run_controller(
             arguments = [*enclave(name), '--params-file', str(path)]
             command = [str(executable(package, name)), *arguments]
             supervisor.start(name, command, observes=name in OBSERVERS)
-        _start(supervisor, graph)
-        _follow(supervisor, COMPOSED if composed else RECORDER, graph, scenario, progress)
+        last = COMPOSED if composed else RECORDER
+        _start(supervisor, last, graph)
+        _follow(supervisor, last, graph, scenario, progress)
         said = supervisor.complaints(COMPOSED if composed else CONTROLLER, CONTROLLER)
     finally:
         supervisor.stop()
@@ -120,11 +121,12 @@ def run_controller(
     return bag
 
 
-def _start(supervisor: Supervisor, graph: 'Watcher') -> None:
+def _start(supervisor: Supervisor, last: str, graph: 'Watcher') -> None:
     until = time.monotonic() + START_TIMEOUT
     while not graph.ask_to_run():
         graph.spin(0.05)
-        supervisor.check(may_end='')
+        if supervisor.check(may_end=last):  # a short run is over before its answer has come
+            return
         if time.monotonic() > until:
             raise NodeDiedError(
                 f'no start within {START_TIMEOUT:g} s: waiting for {graph.waits_for}'

@@ -44,7 +44,7 @@ from auv_dynamics.ros.topics import (
 
 DIAGNOSTICS_PERIOD = 1.0  # s
 LOUD = 1.0  # s between two reports of the same kind
-ASK_AGAIN = 0.2  # s: an answer is lost when it comes before both ends have matched
+ASK_AGAIN = 1.0  # s: an answer is lost when it comes before both ends have matched
 LASTING = 1.0  # s, after which what is wrong is logged: names and matches may come late
 REPEATED = 10.0  # s between two logs of what is wrong and lasts
 OK, WARN = DiagnosticStatus.OK, DiagnosticStatus.WARN

@@ -75,6 +75,13 @@ def test_a_vehicle_at_rest_has_nothing_to_be_said_of_its_energy():
     assert 'kinetic energy' not in said(found)
 
 
+@pytest.mark.parametrize(('largest', 'named'), [(94.9, True), (95.1, False)])
+def test_components_are_named_until_they_have_95_percent(largest, named):
+    found = {'gvc': summaries()['gvc']}
+    found['gvc']['kinetic_energy']['shares_percent'] = [largest, 99.0 - largest, 1.0, 0.0, 0.0, 0.0]
+    assert ('ξ2 (sway) has' in said(found)) == named
+
+
 def test_what_never_moves_by_itself_is_not_the_most_deformed():
     found = {'gvc': summaries()['gvc']}
     found['gvc']['velocity']['max'][3] = found['gvc']['effort']['max'][4] = 0.0

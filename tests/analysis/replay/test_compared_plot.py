@@ -35,6 +35,16 @@ def test_wrenches_of_another_law_beside_the_recorded_ones() -> None:
     assert figure.get_suptitle() == 'Not reproduced'
 
 
+@pytest.mark.parametrize(('n', 'most'), [(1, 1), (3998, 3998), (20_000, 4000)])
+def test_lines_have_as_many_points_as_can_be_seen(n: int, most: int) -> None:
+    both = replay.Compared(np.arange(n) * 0.01, *RNG(9).normal(size=(2, n, 6)))
+    document = {'answered': {'law': 'pid'}, 'recorded': {'law': ''}, 'reproduction': 'unknown'}
+    figure, *_ = replay._figure(document, both)
+    points = {len(line.get_xdata()) for axes in figure.axes for line in axes.lines}
+    assert max(points) <= most
+    assert min(points) >= min(n, most // 2)
+
+
 def test_differences_of_wrenches_have_their_sign() -> None:
     both = replay.Compared(
         np.arange(2.0), np.full((2, 6), 3.0), np.full((2, 6), [1.0, 2, 3, 4, 5, 7])

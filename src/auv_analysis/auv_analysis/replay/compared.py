@@ -194,7 +194,7 @@ def draw(document: Mapping[str, Any], both: Compared, folder: Path) -> Path:
 def _figure(document: Mapping[str, Any], both: Compared) -> tuple[Figure, str, str]:
     from auv_analysis.metrics.quantities import SIGNALS
     from auv_analysis.report.plots import COLOURS, DASHES, new_figure
-    from auv_analysis.report.traces import thinned
+    from auv_analysis.report.traces import FEW, thinned
 
     law, verdict = document['answered']['law'], document['reproduction']
     names = f'recorded ({document["recorded"]["law"] or "unknown law"})', f'{law}, open loop'
@@ -203,7 +203,8 @@ def _figure(document: Mapping[str, Any], both: Compared) -> tuple[Figure, str, s
     for axes, i in zip(panels.flat, ORDER, strict=True):
         pairs = zip(names, (both.recorded, both.answered), DASHES, strict=False)
         for k, (name, wrench, dash) in enumerate(pairs):
-            line = thinned(both.t, wrench[:, i])
+            line = both.t, wrench[:, i]
+            line = thinned(*line) if len(both.t) > FEW else line
             axes.plot(*line, color=COLOURS[k], linestyle=dash, label=name)
         axes.set_ylabel(f'{DOFS[i]}: {SIGNALS["tau"].axis([i])}')
     for axes in panels[-1]:

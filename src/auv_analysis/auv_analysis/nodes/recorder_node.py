@@ -207,8 +207,8 @@ class RecorderNode(BulkNode):
         found = self.get_publishers_info_by_topic(topic)
         offered = [one for one in found if one.topic_type == kind]
         qos = [qos_entry(one.qos_profile) for one in offered]
-        known = [*offered, *self.get_subscriptions_info_by_topic(topic)]  # our own at least
-        digest = str(known[0].topic_type_hash)
+        known = [*offered, *self.get_subscriptions_info_by_topic(topic)]
+        digest = next((str(one.topic_type_hash) for one in known), '')
         try:
             self._writer.add_channel(
                 Definition(topic, kind, qos=qos, digest=digest), schema_text(kind)

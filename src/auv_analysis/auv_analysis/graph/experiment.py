@@ -39,7 +39,7 @@ OBSERVERS = (RECORDER, SETPOINT, ANALYSIS)  # nobody waits for an answer of thei
 COMPOSED = 'composed_graph'  # the executable that holds them all
 MODULES = {
     name: f'{package}.nodes.{name}'
-    for name, package in {**PACKAGES, COMPOSED: 'auv_analysis'}.items()
+    for name, package in (*PACKAGES.items(), (COMPOSED, PACKAGES[RECORDER]))
 }
 START_TIMEOUT = 60.0  # s until the start barrier must be down
 END_TIMEOUT = 30.0  # s for the recorder to close after the last step

@@ -14,15 +14,15 @@ import socket
 import sys
 import time
 import traceback
-import warnings
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any, NoReturn, Self
 
 import psutil
 from setproctitle import getproctitle, getthreadtitle, setproctitle, setthreadtitle
+
+from auv_analysis.output.parallel import fork
 
 _NAME = getthreadtitle()
 getproctitle()  # finds its room in the environment, before that changes; changes the name
@@ -57,7 +57,7 @@ class ForkServer:
     def __init__(self, modules: Mapping[str, str]):
         self._end, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ctypes.CDLL(None).prctl(SUBREAPER, 1, 0, 0, 0)
-        self._pid = _fork()
+        self._pid = fork()
         if not self._pid:
             try:
                 _serve(theirs, modules)
@@ -70,7 +70,7 @@ class ForkServer:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         """End it; what it has forked goes on."""
         self._end.close()
         os.kill(self._pid, signal.SIGKILL)
@@ -78,7 +78,7 @@ class ForkServer:
 
     def begin(
         self, command: Sequence[str], *, env: Mapping[str, str], stdout: IO[bytes], **more: Any
-    ) -> 'Forked | psutil.Popen':
+    ) -> Forked | psutil.Popen:
         """Start a program in a session of its own; it is executed where it cannot be forked.
 
         Parameters
@@ -95,13 +95,6 @@ class ForkServer:
             return Forked(int(self._end.recv(16)))
         except (OSError, ValueError):  # it has ended, or the environment is too long
             return psutil.Popen(command, env=env, stdout=stdout, **more)
-
-
-def _fork() -> int:
-    with warnings.catch_warnings():
-        # Python warns where there are threads, such as those of BLAS, which know of forks
-        warnings.simplefilter('ignore', DeprecationWarning)
-        return os.fork()
 
 
 def _serve(asked: socket.socket, modules: Mapping[str, str]) -> NoReturn:

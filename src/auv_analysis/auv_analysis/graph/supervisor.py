@@ -6,16 +6,18 @@ import shutil
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 import psutil
 
-from auv_analysis.graph.fork_server import Forked
 from auv_dynamics.files.errors import FailedError
 from auv_dynamics.ros.interface import PARENT
 
+if TYPE_CHECKING:
+    from auv_analysis.graph.fork_server import Forked
+
 GRACE = 5.0  # s between SIGTERM and SIGKILL
-Begin = Callable[..., psutil.Popen | Forked]
+Begin = Callable[..., 'psutil.Popen | Forked']
 
 
 class NodeDiedError(FailedError):

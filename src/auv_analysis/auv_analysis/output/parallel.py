@@ -84,6 +84,14 @@ def _taken(numbers: int) -> Iterator[tuple[int, bool]]:
         following = byte[0] + 1
 
 
+def fork() -> int:
+    """Process id of a copy of this process, 0 in the copy."""
+    with warnings.catch_warnings():
+        # Python warns where there are threads; the copy calls nothing of what they do, and is left
+        warnings.simplefilter('ignore', DeprecationWarning)
+        return os.fork()
+
+
 def _forked(tasks: Sequence[Callable[[], T]]) -> tuple[int, int, int]:
     """End of a pipe with the numbers of tasks, the copy's process id, that of its results."""
     numbers, fill = os.pipe()
@@ -91,11 +99,7 @@ def _forked(tasks: Sequence[Callable[[], T]]) -> tuple[int, int, int]:
     os.close(fill)
     answer, end = os.pipe()
     gc.freeze()  # neither process looks through, and so copies, what both have
-    with warnings.catch_warnings():
-        # Python warns where there are threads; the copy calls nothing of what they do, and is left
-        warnings.simplefilter('ignore', DeprecationWarning)
-        copy = os.fork()
-    if copy:
+    if copy := fork():
         os.close(end)
         return numbers, copy, answer
     try:

@@ -38,7 +38,6 @@ def captured(*, panels: bool = False) -> Iterator[dict[str, Figure]]:
 
     def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
         found[name] = figure
-        folder.mkdir(parents=True, exist_ok=True)
         png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
         Image.new('RGB', (720, 300 + len(found)), 'white').save(png)
         pdf.write_text('\n'.join(figure_lines(figure)), encoding='utf-8')

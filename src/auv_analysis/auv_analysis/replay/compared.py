@@ -203,9 +203,10 @@ def _figure(document: Mapping[str, Any], both: Compared) -> tuple[Figure, str, s
     for axes, i in zip(panels.flat, ORDER, strict=True):
         pairs = zip(names, (both.recorded, both.answered), DASHES, strict=False)
         for k, (name, wrench, dash) in enumerate(pairs):
-            line = both.t, wrench[:, i]
-            line = thinned(*line) if len(both.t) > FEW else line
-            axes.plot(*line, color=COLOURS[k], linestyle=dash, label=name)
+            t, tau = both.t, wrench[:, i]
+            if len(t) > FEW:
+                t, tau = thinned(t, tau)
+            axes.plot(t, tau, color=COLOURS[k], linestyle=dash, label=name)
         axes.set_ylabel(f'{DOFS[i]}: {SIGNALS["tau"].axis([i])}')
     for axes in panels[-1]:
         axes.set_xlabel('$t$ (s)')

@@ -100,7 +100,6 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 
 def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     """Write <name>.png and <name>.pdf, the same bytes every time; return both paths."""
-    folder.mkdir(parents=True, exist_ok=True)
     png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
     # once each by the canvases themselves: savefig would draw every figure twice
     canvas = FigureCanvasAgg(figure)

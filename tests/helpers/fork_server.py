@@ -32,7 +32,6 @@ from auv_analysis.graph.experiment import MODULES as OF_A_RUN
 from auv_analysis.graph.fork_server import entitle
 from auv_analysis.simulation.simulate import warm_up
 from auv_dynamics.ros import node_interface
-from auv_dynamics.ros.interface import PARENT
 from auv_dynamics.ros.topics import TOPICS
 
 NODES = {  # and the module of each
@@ -159,26 +158,24 @@ class ForkServer:
         arguments: Sequence[str],
         environ: Mapping[str, str],
         folder: str = '',
-        files: tuple[int, int] | None = None,
     ) -> Process:
-        """Start a program.
+        """Start a program, with a pipe of its output and errors, or one of each of a starter's.
 
         Parameters
         ----------
         arguments : command line; the first is the program, by its name or as an executable
         environ : of the process
         folder : that it works in, by default that of this process
-        files : that take its output and its errors, by default pipes: one of a node, two of others
 
         """
         name = Path(arguments[0]).name
-        pipes = [] if files else [os.pipe() for _ in range(1 + (name in STARTERS))]
+        pipes = [os.pipe() for _ in range(1 + (name in STARTERS))]
         ended, code = os.pipe()
         ends = [end for _, end in pipes]
         request = [list(arguments), dict(environ), folder or os.getcwd()]
-        said = files or (ends[0], ends[-1])
+        handed = [ends[0], ends[-1], code]
         try:
-            socket.send_fds(self._end, [json.dumps(request).encode()], [*said, code])
+            socket.send_fds(self._end, [json.dumps(request).encode()], handed)
         finally:
             for number in (*ends, code):
                 os.close(number)
@@ -211,8 +208,6 @@ def fork(
             os.close(number)
         os.environ.clear()
         os.environ.update(environ)
-        if PARENT in environ:  # it is not `auv` that has forked it
-            os.environ[PARENT] = str(os.getppid())
         os.chdir(folder)
         os.dup2(said[0], 1)
         os.dup2(said[1], 2)

@@ -61,16 +61,15 @@ def mutants(paths: list[Path], wiring: set[Path]) -> list[MutationSpec]:
     found = []
     for path in paths:
         source = path.read_text(encoding='utf-8')
-        tree = ast.parse(source)
+        tree, lines = ast.parse(source), source.splitlines()
         parts = _no_code(tree) + (_judged(tree, source) if path in wiring else _texts(tree))
-        spared = [_place(part, source.splitlines()) for part in parts if part is not None]
+        spared = [_place(part, lines) for part in parts if part is not None]
         for item in _all_work_items([path], {}):
             (mutant,) = item.mutations
             name = mutant.operator_name
             row, column = mutant.start_pos
-            if KEYWORDS_FOLLOW.match(source.splitlines()[row - 1][column:]):
-                continue
             inside = any(first <= mutant.start_pos < last for first, last in spared)
+            inside |= bool(KEYWORDS_FOLLOW.match(lines[row - 1], column))
             foreign = SWAPPED.search(name) if path in wiring else name.startswith('wiring/')
             if not inside and not foreign and not SPARED.search(name):
                 found.append(mutant)

@@ -6,12 +6,12 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
+import psutil
 import pyarrow.parquet as parquet
 import pytest
 from helpers.artists import captured
-from helpers.fork_server import Process
 from helpers.graph_runs import assert_same, both
-from helpers.node_processes import fork_server, fresh_domain
+from helpers.node_processes import fresh_domain
 from helpers.report_pages import Page
 
 from auv_analysis.bag import load_run, read_bag
@@ -44,18 +44,13 @@ faults:
 """
 
 
-def begin(command, env, stdout, **_) -> Process:
-    """Start a process of a run."""
-    return fork_server().start(command, env, files=(stdout.fileno(), stdout.fileno()))
-
-
 @pytest.fixture(scope='module')
 def done(tmp_path_factory) -> Path:
     root = tmp_path_factory.mktemp('failing')
     (root / 'failing.yaml').write_text(SCENARIO)
     with captured(), pytest.MonkeyPatch.context() as patch:
-        # not forked from this process, which has threads
-        patch.setattr(recorded_runs, 'ForkServer', lambda _: nullcontext(Mock(begin=begin)))
+        executes = Mock(begin=psutil.Popen)  # not forked from this process, which has threads
+        patch.setattr(recorded_runs, 'ForkServer', lambda _: nullcontext(executes))
         patch.setenv('ROS_DOMAIN_ID', str(fresh_domain()))
         main(['run', str(root / 'failing.yaml'), '--out', str(root / 'out'), '--composed'])
     return root

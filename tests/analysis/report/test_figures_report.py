@@ -61,23 +61,20 @@ def _write(
 
 
 @pytest.fixture(scope='module')
-def composed(case1, tmp_path_factory, composing) -> tuple[str, dict[str, FigureRecord]]:
+def drawn(case1, tmp_path_factory) -> tuple[str, dict[str, FigureRecord]]:
     texts = load_scenario('case1').attachments
     folder = tmp_path_factory.mktemp('case1')
-    with composing(panels=True):
-        return _write(folder, case1, texts['scenario.yaml'], texts['vehicle.yaml'])
+    return _write(folder, case1, texts['scenario.yaml'], texts['vehicle.yaml'])
 
 
 @pytest.fixture(scope='module')
-def report(composed) -> str:
-    return composed[0]
+def report(drawn) -> str:
+    return drawn[0]
 
 
 @pytest.fixture(scope='module')
-def rendered(case1, tmp_path_factory) -> list[FigureRecord]:
-    return draw_figures(
-        {'gvc': _short(case1['gvc'], 1.0)}, tmp_path_factory.mktemp('rendered') / 'new'
-    )
+def figures(drawn) -> dict[str, FigureRecord]:
+    return drawn[1]
 
 
 @pytest.fixture(scope='module')
@@ -102,18 +99,18 @@ def _text(report: str) -> str:
     return unescape(re.sub(r'\s+', ' ', re.sub(r'<[^>]+>', '', body))).replace('\u00a0', ' ')
 
 
-def test_every_figure_is_a_png_and_a_pdf_with_something_on_it(rendered):
-    assert len(rendered) >= 7
-    for figure in rendered:
+def test_every_figure_is_a_png_and_a_pdf_with_something_on_it(figures):
+    assert len(figures) >= 7
+    for figure in figures.values():
         assert figure.pdf.read_bytes().startswith(b'%PDF')
         pixels = np.asarray(Image.open(figure.png).convert('L'), float)
         assert pixels.std() > 5.0, figure.name
         assert (pixels < 200).mean() > 0.003, figure.name
 
 
-def test_figures_are_what_the_journal_prints(rendered):
+def test_figures_are_what_the_journal_prints(figures):
     """At the width of its text, of lines and embedded fonts, without images and transparency."""
-    for figure in rendered:
+    for figure in figures.values():
         pdf = figure.pdf.read_bytes()
         left, _, right, _ = map(float, re.search(rb'/MediaBox \[([^]]*)\]', pdf)[1].split())
         assert right - left == pytest.approx(72 * 6.27, abs=0.5), figure.name
@@ -124,7 +121,7 @@ def test_figures_are_what_the_journal_prints(rendered):
             assert image.size[0] == pytest.approx(184 * 6.27, abs=1.0)
 
 
-def test_the_paper_figures_are_all_there(case1, tmp_path, unrendered):
+def test_the_paper_figures_are_all_there(figures, case1, tmp_path, unrendered):
     words = ' '.join(text for run in case1.values() for text in paper_figures(run))
     assert all(f'figure {number}' in words for number in '12345')
     short = {n: _short(r, 3.0) for n, r in _runs('case2').items()}
@@ -163,8 +160,8 @@ def test_unknown_disturbance_leaves_out_what_needs_it(other):
     assert 'is neither drawn nor tabulated' in _text(html)
 
 
-def test_one_uncertainty_figure_when_all_runs_have_the_same(composed, case1, tmp_path, unrendered):
-    assert [name for name in composed[1] if name.startswith('uncertainty')] == ['uncertainty_gvc']
+def test_one_uncertainty_figure_when_all_runs_have_the_same(figures, case1, tmp_path, unrendered):
+    assert [name for name in figures if name.startswith('uncertainty')] == ['uncertainty_gvc']
     gvc, cl = (_short(case1[name], 1.0) for name in ('gvc', 'cl'))
     cl = replace(cl, disturbance=2.0 * cl.disturbance)
     names = [f.name for f in draw_figures({'gvc': gvc, 'cl': cl}, tmp_path)]

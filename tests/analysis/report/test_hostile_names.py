@@ -117,7 +117,7 @@ def test_lines_of_an_error_stay_lines() -> None:
 
 @pytest.mark.usefixtures('unrendered')
 def test_names_that_look_like_symbols_stay_as_they_are(tmp_path: Path, capsys) -> None:
-    names = ('dolphin', 'psi_delta', 'nu-shell', 'k_D')
+    names = ('dolphin', 'alphabet', 'psi_delta', 'nu-shell', 'omega3', 'tau', 'k_D', 'Lambda')
     gvc = {'law': 'gvc', 'k_D': 6.0, 'k_I': 2.0, 'Lambda': 0.5, 'Gamma': 20.0}
     path = tunings.write(
         tmp_path, dict.fromkeys(names, gvc), name='w_X.phi', duration=0.1,

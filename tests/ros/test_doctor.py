@@ -1,5 +1,7 @@
 """`auv doctor` on real participants: discovery on the loopback, and who is in the domain."""
 
+import time
+
 import pytest
 from helpers.node_processes import Peer, fresh_domain
 from helpers.patience import patience
@@ -15,10 +17,12 @@ def test_two_participants_find_each_other() -> None:
 def test_a_foreign_node_in_the_domain_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     domain = fresh_domain()
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
-    monkeypatch.setattr(discovery, 'LOOKS', patience(discovery.LOOKS))
+    until = time.monotonic() + patience()
     peer = Peer(domain)
     try:
         (finding,) = discovery.peers()
+        while finding.verdict == 'ok' and time.monotonic() < until:
+            (finding,) = discovery.peers()  # a machine that stood still had no time to answer
     finally:
         peer.close()
     assert finding.verdict == 'warning'

@@ -17,7 +17,7 @@ from auv_analysis.doctor.checks import Finding
 
 FIRST, SECOND, LOOKING = 'auv_doctor_first', 'auv_doctor_second', 'auv_doctor'
 PATIENCE = 10.0  # s for two participants to find each other; they take 0.2
-LOOKS = 2.5  # s at who is in a domain
+LOOKS = 4.0  # s at who is in a domain: Fast DDS repeats an announcement that was lost after 3
 STARTS = 30.0  # s for a process to load the middleware, on a busy machine
 LOOPBACK = Path('/sys/class/net/lo')
 MULTICAST = 0x1000  # IFF_MULTICAST

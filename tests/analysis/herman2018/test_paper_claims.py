@@ -90,6 +90,8 @@ def test_every_number_of_the_texts_is_in_the_file(name, tmp_path):
     assert {row['number'] for row in rows} == set(range(1, 22))
     found = 0
     for claim in study(name).claims:
+        order = [row['of'] for row in rows if row['number'] == claim.number]
+        assert order == sorted(order)  # ours before the paper's
         for of in ('ours', 'paper'):
             text = getattr(claim, of)
             mine = [row for row in rows if (row['number'], row['of']) == (claim.number, of)]

@@ -32,7 +32,7 @@ def known(controller, values, index):
         name: factor * (1 + k) * (values[K_D] + (k % 3) * bent)
         for k, name in enumerate(NUMBERS)
     }  # fmt: skip
-    late = np.where(values[K_D] > 2.0, values[K_D] / factor, np.nan)
+    late = np.where(values[K_D] > 2.0, 2 ** (6 * values[K_D]) / factor, np.nan)  # far apart
     return made | {f'velocity_error.settling_time.{dof}': late for dof in ('surge', 'heave')}
 
 
@@ -113,7 +113,7 @@ def test_of_many_controllers_three_stand_side_by_side(simple: Drawn) -> None:
 def test_dependence_shows_the_quantiles_along_its_path(simple: Drawn) -> None:
     analysis, figures, captions = simple
     factors = {f.path: f for f in analysis.factors}
-    seen = set()
+    seen, apart = set(), set()
     for name in (name for name in figures if name.startswith('dependence')):
         figure, path = figures[name], captions[name].split(' on ')[1].split(' ', 1)[0].rstrip(':')
         seen.add(path)
@@ -125,6 +125,11 @@ def test_dependence_shows_the_quantiles_along_its_path(simple: Drawn) -> None:
         for axes, measure in zip(panels, chosen, strict=True):
             assert axes.get_title(loc='left') == measure.label
             assert axes.get_ylabel() == measure.unit
+            shown = axes.dataLim.intervaly
+            apart.add(shown[1] > 30 * shown[0])
+            assert axes.get_yscale() == ('log' if shown[1] > 30 * shown[0] else 'linear')
+            wide = path in (DAMPING, 'controllers.cl.k_I')
+            assert axes.get_xscale() == ('log' if wide else 'linear')
             controllers = ['cl'] if path == 'controllers.cl.k_I' else ['gvc', 'cl']
             for k, controller in enumerate(controllers):
                 mine = rows(
@@ -146,6 +151,7 @@ def test_dependence_shows_the_quantiles_along_its_path(simple: Drawn) -> None:
                     assert [t.get_text() for t in axes.get_xticklabels()] == ['ode5', 'rk4']
             assert [t.get_text() for t in figure.legends[0].get_texts()] == controllers
     assert seen == {K_D, DAMPING, 'controllers.cl.k_I', 'integrator'}
+    assert apart == {False, True}
 
 
 def _banded(axes, figure, controller: str, k: int, wanted) -> None:

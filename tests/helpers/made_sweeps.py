@@ -38,6 +38,16 @@ def simple(controller, values, index):
             'velocity_error.settling_time.heave': heave}  # fmt: skip
 
 
+MORRIS = f"""
+name: morr
+scenario: case1
+vary:
+  - morris:
+      {K_D}: {{uniform: {{from: 1.0, to: 2.0}}}}
+      {DAMPING}: {{uniform: {{from: 1.0, to: 2.0}}}}
+    count: 12
+"""
+SALTELLI = MORRIS.replace('morris', 'saltelli').replace('count: 12', 'count: 32')
 MIXED = """
 name: mixed
 scenario: case1

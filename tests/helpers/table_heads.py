@@ -26,7 +26,7 @@ WORDS = {  # as stored -> as a row says it
     'peak_effort': 'peak effort', 'settling': 'settled',
 }  # fmt: skip
 NAMES = ('controller', 'other', 'against', 'measure', 'name', 'coupling', 'label', 'path', 'value',
-         'status', 'reason', 'to', 'from', 'dof', 'run', 'predictor', 'pair')  # fmt: skip
+         'status', 'reason', 'to', 'from', 'dof', 'run', 'predictor', 'pair', 'with')  # fmt: skip
 LINES = Path(__file__).with_suffix('.txt').read_text(encoding='utf-8')
 ANY = {'<gain>': '.*', '<run>': '.*', '<phase>': 'before|after', '<DOF>': '|'.join(DOFS),
        '<dofs>': '|'.join(DOFS), '<linear>': '|'.join(DOFS[:3]),
@@ -131,7 +131,7 @@ def _fits(name: str, value: str, row: dict[str, Any], column: Any, words: str, e
     if name == '<best>':
         return value.endswith(row['column']) or row['column'] in _labels(value)
     if name == '<n>':
-        names = [key for key in NAMES if key in entry]
+        names = [key for key in NAMES if entry.get(key) is not None]
         names = [key for key in ('run', 'name') if key in entry][:1] or names
         return all(_said(entry[key], words) for key in names)
     if name == '<fault>':

@@ -171,6 +171,12 @@ def test_all_that_the_nodes_are_told(whole: Scenario, lockstep: bool, approved) 
     approved.add(parameter_file(parameters, 'whole').splitlines())
 
 
+def test_the_recorder_waits_for_an_analysis_where_one_comes_at_every_step(whole: Scenario) -> None:
+    for options, every in (({}, 10), ({'analysis': False}, 0), ({'plant': False}, 0)):
+        recorder = _parameters(whole, 'mine', **options)['recorder_node']
+        assert recorder['analysis_every'] == every
+
+
 def test_every_subscriber_that_is_waited_for_runs(whole: Scenario) -> None:
     for options in ({}, {'analysis': False}):
         parameters = _parameters(whole, 'mine', **options)

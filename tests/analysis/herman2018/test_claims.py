@@ -117,6 +117,7 @@ def test_a_slow_controller_does_not_reproduce_claim_1(case1):
     table = _table(case1 | {'gvc': replace(gvc, nu=gvc.nu_d + 0.01)})
     assert table[1].verdict == 'not reproduced'
     assert 'not in 30 s' in table[1].ours
+    assert ('length of the run, gvc', 30.0, 's') in table[1].values
     assert table[9].ours != _table(case1)[9].ours
 
 

@@ -235,6 +235,9 @@ def test_findings_of_one_run(runs, summaries) -> None:
     assert found['table-energy'] == [
         'The mean kinetic energy of one is 11.11 J over 3–13 s and 22.22 J over 3–15 s.'
     ]
+    windows[0]['mean'] = None
+    (energy,) = said({'one': runs['one']}, {'one': summary})['table-energy']
+    assert energy == 'The mean kinetic energy of one is 22.22 J over 3–15 s.'
     assert found['table-couplings'] == [
         'Inertial coupling deforms, under one, the velocity component of sway by up to 0.20 m/s, '
         'the velocity component of pitch by up to 0.012 rad/s, the input of heave by up to 7.0 N '

@@ -99,6 +99,19 @@ def test_a_spike_of_one_sample_is_seen_on_the_figure(run, tmp_path) -> None:
     assert np.ptp(columns) <= 6, 'and a few pixels wide'
 
 
+def test_lines_of_a_long_run_have_columns_over_all_that_is_shown_of_it(run) -> None:
+    noise = np.random.default_rng(0).normal(size=(60_000, 6))
+    long = replace(repeated(run, len(noise)), t=1e-4 * np.arange(len(noise)), nu_d=noise)
+    error, late = long.nu_d - long.nu, long.t > 2.0
+    drawn, end = digest(long), long.t[-1]
+    for part, seen, ends in (('early', ~late, (0.0, 2.0)), ('late', late, (2.0, end))):
+        wanted = thinned(long.t[seen], error[seen, 2], ends)
+        for found, expected in zip(drawn.line('error', 2, part), wanted, strict=True):
+            assert_array_equal(found, expected)
+    assert np.diff(drawn.line('energy')[0]).max() < 3 * end / COLUMNS
+    assert len(drawn.line('error', 2, 'log')[0]) > COLUMNS
+
+
 def test_shares_are_those_of_the_mean_energy_of_each_column(run) -> None:
     long = repeated(run, 8 * len(run.t))
     few_t, parts = digest(long).stack

@@ -101,6 +101,7 @@ MIXED = [0.5] * 3 + [2.0] * 3
         ({'rms': (HALF, ONE), 'K_D': (None, None)}, ['gvc tracks better than cl']),
         ({'rms': (HALF, ONE), 'K_D': ([[0.0] * 6] * 6,) * 2}, ['gvc tracks better than cl']),
         ({'times': ([None] * 6, [None] * 6)}, ['neither gvc nor cl settles in all']),
+        ({'times': (ONE, TWICE)}, ['gvc settles in 1.0 s, cl settles in 2.0 s']),
         ({'times': ([None, *ONE[1:]], ONE)}, ['cl settles in 1.0 s, gvc does not in surge']),
         ({'times': (ONE, [*ONE[1:], None])}, ['gvc settles in 1.0 s, cl does not in yaw']),
         ({'rms': (None, None), 'times': (None, None)}, []),

@@ -276,7 +276,8 @@ class _Builder:
             if np.isnan(found.L[0]):
                 return  # z is not known
             seen = found.L > 0
-            self._trace('L', 'whole', 0, found.t[seen], found.L[seen])
+            if seen.any():
+                self._trace('L', 'whole', 0, found.t[seen], found.L[seen])
             rates = {'increasing': (found.identity > 0).astype(float)}
             rates |= {name: getattr(found, name) for name in ('L_dot', 'identity', 'bound')}
             for name, values in rates.items():

@@ -313,7 +313,7 @@ def _label(quantity: Quantity, component: int) -> str:
 
 
 def _certificates(runs: Mapping[str, RunDigest]) -> Iterator[TimePanel]:
-    there = {n: r for n, r in runs.items() if ('L', 'whole') in r.traces and len(r.line('L')[0])}
+    there = {name: run for name, run in runs.items() if ('L', 'whole') in run.traces}
     if not there:
         return
     lines = tuple(_curve(name, run, 'L', INK, 'L') for name, run in there.items())

@@ -128,7 +128,7 @@ def certificate_figure(
 ) -> tuple[Figure | None, str, str]:
     """L, and its measured derivative against (26) and (28). Returns figure, title and caption."""
     title = f'Certificate, {run.controller}'
-    if run.samples < 3 or ('L', 'whole') not in run.traces or not len(run.line('L')[0]):
+    if run.samples < 3 or ('L', 'whole') not in run.traces:
         return None, title, f'{title}: too little to draw.'
     split = ('identity', 'early') in run.traces
     figure = plots.new_figure(4.6)

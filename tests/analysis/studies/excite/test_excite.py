@@ -160,6 +160,7 @@ def test_a_vehicle_that_sinks_must_close_its_loop() -> None:
     with pytest.raises(FailedError, match=r'the open loop leaves its bounds: .* --closed-loop'):
         excite(heavy)
     found = excite(replace(heavy, closed=True))
+    assert results_of(found).facts['loop'] == 'closed'
     assert found.used.max() <= 1.0
     assert set(found.scenario['controllers']) == {'gvc'}
     assert len(halves(found.predicted)) >= 30

@@ -6,9 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.made_sweeps import (
+    DAMPING,
     ENERGY,
     K_D,
     MIXED,
+    MORRIS,
+    SALTELLI,
     SIMPLE,
     change_manifest,
     make_sweep,
@@ -107,8 +110,18 @@ def test_the_document_has_no_nan(results: Analysis) -> None:
     assert json.loads(json.dumps(document, allow_nan=False))['rows'] == 1600
 
 
+SECOND_ORDER = f'{SALTELLI}    second_order: true\n'
+
+
+def product(controller, values, index):
+    return {ENERGY: values[K_D] * values[DAMPING] ** 2}
+
+
 @pytest.mark.usefixtures('unrendered')
-@pytest.mark.parametrize(('campaign', 'known'), [(SIMPLE, simple), (MIXED, mixed)])
+@pytest.mark.parametrize(
+    ('campaign', 'known'),
+    [(SIMPLE, simple), (MIXED, mixed), (SECOND_ORDER, product), (MORRIS, product)],
+)
 def test_every_number_of_the_report_is_in_a_file(tmp_path: Path, campaign, known, approved) -> None:
     out = tmp_path / 'report'
     cli.main(['analyze', str(make_sweep(tmp_path, campaign, known)), '--out', str(out)])

@@ -60,6 +60,8 @@ def test_folder_document_and_files_agree(command: Callable, tmp_path: Path, appr
     assert all(sentence['source'] for sentence in document['verdict'])
     assert check_numbers(folder) > 100
     approved.folder(folder, numbers=False)
+    page = (folder / 'report.html').read_text(encoding='utf-8')
+    assert 'equal effort within 0.1 %, hold continuous, seed 0' in page
     said = {sentence['text'] for sentence in document['verdict']}
     entries = document['controllers'].items()
     assert {f'{name}: {text}.' for name, entry in entries for text in entry['remarks']} <= said

@@ -301,7 +301,7 @@ def _indices(analysis: Analysis) -> Iterator[Table]:
             if row['method'] == method and bool(row['with']) is pairs
         ]
         if rows:
-            yield _view(name, caption, rows, INDEX | heads, 'indices', stub=3)
+            yield _view(name, caption, rows, INDEX | heads, 'indices', stub=4 if pairs else 3)
 
 
 def _best(analysis: Analysis) -> Table:
@@ -321,11 +321,11 @@ def _best(analysis: Analysis) -> Table:
 def _failures(analysis: Analysis) -> Iterator[Table]:
     """Values at which the largest shares of rows failed, and the commonest reasons."""
 
-    def share(row: Row) -> float:
-        return (row['diverged'] + row['refused']) / max(row['rows'], 1)
+    def count(row: Row) -> int:
+        return row['diverged'] + row['refused']
 
-    rows = [(i, row) for i, row in enumerate(analysis.tables['failures']) if share(row) > 0]
-    rows.sort(key=lambda entry: -share(entry[1]))
+    rows = [(i, row) for i, row in enumerate(analysis.tables['failures']) if count(row)]
+    rows.sort(key=lambda entry: -count(entry[1]) / entry[1]['rows'])
     left = len(rows) - MOST_FAILURES
     note = f'{left} others are in failures.parquet.' if left > 0 else ''
     if rows:

@@ -232,12 +232,12 @@ def test_a_gap_on_a_topic_without_steps_is_seen(tmp_path: Path, strict: bool, co
             clock.publish(topics.CLOCK.type(clock=convert.stamp(k)))
         process.send_signal(signal.SIGCONT)
         publish_step(peer, 1)
+        after = LAST.to_bytes(4, 'little')
 
         def heard() -> bool:
             clock.publish(topics.CLOCK.type(clock=convert.stamp(LAST)))
             return process.poll() is not None if strict else after in whole(tmp_path / 'bag')
 
-        after = LAST.to_bytes(4, 'little')
         peer.until(heard, 'what came after the gap')
         if not strict:
             acknowledged(peer, 1)

@@ -339,7 +339,7 @@ def numbers_of(tables: Iterable[Any]) -> Iterator[dict[str, Any]]:
     for table in tables:
         heads = table.columns
         for row in table.rows:
-            words = ', '.join(entry.text for entry in row[: table.stub])
+            words = ', '.join(entry.text for entry in row[: table.stub] if entry.text)
             for head, entry in zip(heads, row, strict=True):
                 where = {
                     'table': table.name,

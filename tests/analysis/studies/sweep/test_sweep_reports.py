@@ -114,7 +114,9 @@ SECOND_ORDER = f'{SALTELLI}    second_order: true\n'
 
 
 def product(controller, values, index):
-    return {ENERGY: values[K_D] * values[DAMPING] ** 2}
+    power = 2 if controller == 'gvc' else 3
+    both = values[K_D] * values[DAMPING] ** power
+    return {ENERGY: both, 'effort.max.roll': both + values[K_D] ** power}
 
 
 @pytest.mark.usefixtures('unrendered')

@@ -301,7 +301,7 @@ def _indices(analysis: Analysis) -> Iterator[Table]:
             if row['method'] == method and bool(row['with']) is pairs
         ]
         if rows:
-            yield _view(name, caption, rows, INDEX | heads, 'indices', stub=4 if pairs else 3)
+            yield _view(name, caption, rows, INDEX | heads, 'indices', stub=5)
 
 
 def _best(analysis: Analysis) -> Table:

@@ -80,4 +80,4 @@ def approved(request: pytest.FixtureRequest) -> Iterator[approving.Approved]:
     with shown.watching():
         yield shown
     path = request.path.parent / 'approved' / f'{request.path.stem.removeprefix("test_")}.txt'
-    approving.check(path, request.node.name, shown.lines())
+    approving.check(path, request.node.name, shown.lines(), shown.within)

@@ -10,7 +10,12 @@ from matplotlib.figure import Figure
 @pytest.mark.parametrize(
     ('one', 'other', 'same'),
     [
-        ('RMS 0.500 m/s', 'RMS 0.5004 m/s', True),
+        ('RMS 0.500 m/s', 'RMS 0.5001 m/s', True),
+        ('RMS 0.500 m/s', 'RMS 0.5004 m/s', False),  # as near, with more digits
+        ('RMS 0.872 m/s', 'RMS 0.8724 m/s', False),
+        ('RMS 0.3 m/s', 'RMS 0.2999 m/s', True),  # without trailing zeros
+        ('RMS 9.996 m/s', 'RMS 10.00 m/s', True),
+        ('RMS 99.96 m/s', 'RMS 100.04 m/s', True),
         ('RMS 0.500 m/s', 'RMS 0.502 m/s', False),
         ('RMS 0.500 m/s', 'RMS 0.500 m', False),
         ('RMS 0.500 m/s', 'max 0.500 m/s', False),
@@ -18,7 +23,8 @@ from matplotlib.figure import Figure
         ('2 of 3', '3 of 2', False),
         ('by 12\u202f345 N', 'by 12\u202f350 N', True),
         ('by 12\u202f345 N', 'by 12\u202f445 N', False),
-        ('3.24·10⁻⁵', '3.243·10⁻⁵', True),
+        ('3.24·10⁻⁵', '3.243·10⁻⁵', False),
+        ('3.240·10⁻⁵', '3.243·10⁻⁵', True),
         ('3.2·10⁻⁵', '3.2·10⁻⁴', False),
         ('4.1·10⁻¹⁷ J', '0 J', True),  # rounding noise
         ('1.234e+05', '1.235e+05', True),

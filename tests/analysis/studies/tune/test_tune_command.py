@@ -15,6 +15,7 @@ from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main
 from auv_analysis.studies.tune import search as searching
 from auv_analysis.studies.tune.cost import measures_of_run
+from auv_analysis.studies.tune.report import FAIR
 
 FILES = {'tune.json', 'scenario.yaml', 'vehicle.yaml', 'search.parquet', 'monte_carlo.parquet',
          'numbers.parquet', 'report.html', 'figures', 'manifest.json'}  # fmt: skip
@@ -59,9 +60,11 @@ def test_folder_document_and_files_agree(command: Callable, tmp_path: Path, appr
     _perturbed(document, folder)
     assert all(sentence['source'] for sentence in document['verdict'])
     assert check_numbers(folder) > 100
-    approved.folder(folder, numbers=False)
+    approved.folder(folder, tie='cl_tuned | gvc_tuned')
+    approved.within = 0.05
     page = (folder / 'report.html').read_text(encoding='utf-8')
     assert 'equal effort within 0.1 %, hold continuous, seed 0' in page
+    assert FAIR in page
     said = {sentence['text'] for sentence in document['verdict']}
     entries = document['controllers'].items()
     assert {f'{name}: {text}.' for name, entry in entries for text in entry['remarks']} <= said

@@ -101,6 +101,22 @@ def test_the_clock_of_the_last_steps_is_waited_for(tmp_path: Path, goes_on: bool
     assert counts['/odom'] == 21
 
 
+def test_the_analysis_of_the_last_step_is_waited_for(tmp_path: Path) -> None:
+    arguments = [*TOPICS, *parameters(bag=tmp_path / 'bag', duration=0.2, analysis_every=5)]
+    with graph(('recorder_node', arguments)) as (peer, processes):
+        peer.listen(topics.PROGRESS)
+        for k in range(21):
+            publish_step(peer, k)
+        acknowledged(peer, 20)
+        for k in (15, 20):
+            peer.spin(0.3)
+            assert processes['recorder_node'].poll() is None
+            peer.publish(topics.LUMPED_ERROR, convert.wrench(k * STEP, (0.1,) * 6, FRAMES))
+        peer.until(lambda: processes['recorder_node'].poll() is not None, 'the end')
+        assert processes['recorder_node'].returncode == 0
+    assert read_bag(tmp_path / 'bag', decode=False).counts[f'/{topics.LUMPED_ERROR.name}'] == 2
+
+
 def test_in_real_time_progress_is_that_of_odometry_and_whoever_comes_late_hears_it(
     tmp_path: Path,
 ) -> None:

@@ -11,11 +11,12 @@ import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018 import paper
-from auv_analysis.herman2018.claims import ROWS, Row, judge_runs
+from auv_analysis.herman2018.claims import ROWS, Row, claims_part, judge_runs
 from auv_analysis.herman2018.evidence import ErrorSensitivity, Evidence, Signals, grade
 from auv_analysis.output.text import MISSING
 from auv_analysis.report.digest import digests
 from auv_analysis.runs.run import Run
+from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle import DOFS
 
 CASE2_ONLY = {17, 18, 19, 20}
@@ -217,6 +218,14 @@ def test_other_scenarios_have_no_claims(case1, case2):
     other = {name: replace(run, scenario='other') for name, run in case1.items()}
     assert _table(other) == {}
     assert _table({'gvc': case1['gvc'], 'cl': case2['cl']}) == {}
+
+
+def test_the_paper_is_read_beside_any_run_of_its_vehicle(case1, tmp_path):
+    vehicle = load_vehicle('rexrov')
+    other = dict.fromkeys(('a', 'b'), replace(case1['gvc'], vehicle=vehicle))
+    for runs, read in ((case1 | other, True), (case1, True), (other, False)):
+        sections, _ = claims_part(tmp_path, [], runs)
+        assert [one.name for one in sections] == ['readings'] * read
 
 
 def test_grade_counts_the_parts():

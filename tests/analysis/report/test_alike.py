@@ -7,7 +7,9 @@ import pytest
 from helpers import made_runs
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.report import digest as digesting
 from auv_analysis.report.digest import alike, digests
+from auv_analysis.report.results import Table
 from auv_analysis.report.run_plots import common_bands
 from auv_analysis.report.run_report import SectionInputs, findings
 from auv_analysis.report.scenario_text import set_up
@@ -93,3 +95,29 @@ def test_settled_is_the_last_time_of_a_large_error_unless_it_is_too_late(last, s
     error[last, 4] = 0.02
     found = digests({'gvc': replace(run, nu=run.nu_d - error, faults=())})['gvc']
     assert found.settled == pytest.approx(settled)
+
+
+def test_a_course_has_as_many_samples_as_it_may(run) -> None:
+    for samples in (2, 200, 201, 399, 400):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(digesting, 'COURSE', 100)
+            shown = digests({'a': run.part(slice(0, samples))})['a']
+        assert min(samples, 50) <= len(shown.course['t']) <= 100, samples
+
+
+@pytest.mark.parametrize('count', [1, 2, 3])
+def test_each_scenario_has_a_table_of_its_own(run, count: int) -> None:
+    runs = {f'c{i}': replace(run, controller=f'c{i}', scenario=f's{i}') for i in range(count)}
+    summaries = {name: summarize(one) for name, one in runs.items()}
+    scenes = {(n,): set_up(digests({n: one}), summaries, '') for n, one in runs.items()}
+    blocks = SectionInputs(digests(runs), summaries, scenes, [], {}).sections()[0].blocks
+    names = [one.name for one in blocks if isinstance(one, Table) and one.name.startswith('set_up')]
+    assert names == (['set_up'] if count == 1 else [f'set_up_{i + 1}' for i in range(count)])
+
+
+def test_errors_after_two_seconds_are_told_of_runs_that_are_longer(run) -> None:
+    for seconds, told in ((1.5, False), (4.0, True)):
+        part = run.part(run.t <= seconds)
+        texts = [s.text for s in findings(digests({'gvc': part}), {'gvc': summarize(part)})]
+        assert any(text.startswith('After 2 s') for text in texts) is told
+        assert all(text.endswith('.') for text in texts if text), texts

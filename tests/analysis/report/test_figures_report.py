@@ -16,7 +16,7 @@ from auv_analysis.herman2018.claims import claims_part, judge_runs
 from auv_analysis.herman2018.paper import paper_figures
 from auv_analysis.output.text import fixed, join, number, plain, tied
 from auv_analysis.report import run_report
-from auv_analysis.report.plots import FigureRecord, style
+from auv_analysis.report.plots import PALETTE, FigureRecord, style
 from auv_analysis.report.run_plots import draw_figures
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.traces import thinned
@@ -106,6 +106,7 @@ def test_every_figure_is_a_png_and_a_pdf_with_something_on_it(figures):
         pixels = np.asarray(Image.open(figure.png).convert('L'), float)
         assert pixels.std() > 5.0, figure.name
         assert (pixels < 200).mean() > 0.003, figure.name
+        assert np.asarray(Image.open(figure.png))[1, 1] == PALETTE - 1, 'white has its own colour'
 
 
 def test_figures_are_what_the_journal_prints(figures):

@@ -114,6 +114,14 @@ def test_a_diagonal_M_is_said_to_have_no_coupling(name):
     assert document['structural_zeros'] == {'delta_xi': list(DOFS), 'delta_pi': list(DOFS)}
 
 
+def test_one_coupling_is_one(written):
+    data = file_of('bluerov2_heavy')
+    data['added_mass'] = np.diag([6.0, 7.0, 18.0, 0.2, 0.2, 0.2]).tolist()
+    data['added_mass'][1][5] = data['added_mass'][5][1] = 0.5
+    found = check_vehicle(written(data))
+    assert found['statement'] == 'M is not diagonal: 1 coupling of velocities by its inertia'
+
+
 def test_hydrostatics():
     found = check_vehicle('herman2018')['hydrostatics']
     assert found['difference'] == pytest.approx(1079.1, abs=0.05)
@@ -355,6 +363,12 @@ def test_poles_ahead_say_whether_a_vehicle_keeps_its_course(written):
     assert (bare['verdict'], bare['speed_source']) == ('unstable', 'given')
     assert 'key lift' in bare['hint']
     assert cruise(written(data | {'name': 'other'}))['speed_source'] == 'assumed'
+    data['added_mass'] = [1.0, 16.0, 0.5, 0.01, 1.0, 1.0]
+    M = load_vehicle(written(data)).M
+    assert munk_terms(M)[5, 1] < 0, 'it is turned in yaw'
+    assert munk_terms(M)[4, 2] <= 0, 'and not in pitch'
+    only = cruise(written(data), 2.0)
+    assert (only['verdict'], only['hint'][:15]) == ('unstable', 'the Munk moment')
     data['damping'] = {'linear': [0.0] * 6, 'quadratic': [0.0] * 6}
     at_rest = cruise(written(data), 0.0)
     assert (at_rest['verdict'], at_rest['hint']) == ('marginal', None)

@@ -1,5 +1,6 @@
 """Sentences and small tables of the studies, by their numbers: who, by how much, which way."""
 
+from dataclasses import fields
 from types import SimpleNamespace as Made
 
 import numpy as np
@@ -12,6 +13,7 @@ from auv_analysis.studies.identify import report as identify
 from auv_analysis.studies.sweep import report as sweep
 from auv_analysis.studies.tune import report as tune
 from auv_analysis.studies.tune.cost import Measures
+from auv_analysis.studies.tune.perturbations import Spread
 
 pytestmark = pytest.mark.usefixtures('approved')
 
@@ -235,6 +237,10 @@ def test_findings_of_a_tuning() -> None:
 
 
 # design
+
+
+def test_all_that_a_tuning_draws_is_explained() -> None:
+    assert list(tune.SPREADS) == [one.name for one in fields(Spread)]
 
 
 def test_changes_of_a_design_are_marked() -> None:

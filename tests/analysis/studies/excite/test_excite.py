@@ -180,3 +180,13 @@ def test_what_cannot_be_driven_is_refused(options, said, tmp_path, capsys) -> No
         main.main(['excite', VEHICLE, *options, '--out', str(tmp_path / 'out')])
     assert ended.value.code == 2
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_what_cannot_be_told_apart_is_said_in_whole_sentences(excited, tmp_path: Path) -> None:
+    results = results_of(excited)
+    results.facts['combinations'] = [{'words': 'mass and M.surge.surge stand for one another'}]
+    (tmp_path / 'scenario.yaml').write_text(scenario_text(excited))
+    page = write_report(excited, results, tmp_path).read_text(encoding='utf-8')
+    assert '>Mass and M.surge.surge stand for one another.<' in page
+    assert 'Open: mass and M.surge.surge stand for one another.' in page

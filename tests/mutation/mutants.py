@@ -30,7 +30,8 @@ SWAPPED = re.compile(  # of wiring: of many ways to break an operator, the next 
     r'|ComparisonOperator_(?!(Lt_LtE|LtE_Lt|Gt_GtE|GtE_Gt|Lt_Gt|Gt_Lt|LtE_GtE|GtE_LtE|Eq_NotEq'
     r'|NotEq_Eq|Is_IsNot|IsNot_Is|In_NotIn|NotIn_In)$)'
 )
-TYPES = {'Callable', 'Mapping', 'Sequence', 'dict', 'list', 'tuple'}  # a name of one is annotation
+# a name of one is annotation
+TYPES = {'Callable', 'Literal', 'Mapping', 'Sequence', 'dict', 'list', 'tuple'}
 TOLD = {'begin', 'info', 'warning', 'error', 'print', 'get_logger', 'InputError'}  # to people
 WAITED = {'wait_for_all_acked'}  # for how long
 REPEATED = {'steady_timer'}  # the second argument: how often

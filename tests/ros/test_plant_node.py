@@ -231,7 +231,7 @@ def test_a_reset_in_real_time_puts_the_vehicle_back_at_once(peer) -> None:
 REAL = [*parameters(vehicle='herman2018_neutral'), '-p', 'expected_subscribers:=["odom=1"]']
 
 
-def test_a_wrench_that_is_stamped_ahead_locks_out_none_of_those_that_follow() -> None:
+def test_a_wrench_that_is_stamped_ahead_locks_out_none_but_older_ones(capfd) -> None:
     with graph(('plant_node', REAL)) as (peer, _):
         listening(peer)
 
@@ -245,6 +245,10 @@ def test_a_wrench_that_is_stamped_ahead_locks_out_none_of_those_that_follow() ->
             return peer.heard['odom'][-1].twist.twist.linear.x
 
         peer.until(lambda: pushed() > 0.05, 'motion forward')
+        peer.publish(topics.WRENCH, wrench(3, (0.0,) * 6))
+        peer.spin(0.2)
+    said = capfd.readouterr().out
+    assert 'wrench: stamp: expected newer than the last, found 30000000 ns' in said
 
 
 def test_a_pause_in_real_time_is_bounded_and_said() -> None:

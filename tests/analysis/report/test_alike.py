@@ -1,5 +1,6 @@
 """What runs have in common is told from their samples, and never from names."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from auv_analysis.report.digest import alike, digests
 from auv_analysis.report.results import Table
 from auv_analysis.report.run_plots import common_bands
 from auv_analysis.report.run_report import SectionInputs, findings
-from auv_analysis.report.scenario_text import set_up
+from auv_analysis.report.scenario_text import SetUp, set_up
 from auv_analysis.runs.run import Run
 
 
@@ -121,3 +122,22 @@ def test_errors_after_two_seconds_are_told_of_runs_that_are_longer(run) -> None:
         texts = [s.text for s in findings(digests({'gvc': part}), {'gvc': summarize(part)})]
         assert any(text.startswith('After 2 s') for text in texts) is told
         assert all(text.endswith('.') for text in texts if text), texts
+
+
+def test_an_end_is_told_where_the_position_is_known(run) -> None:
+    lost = np.where(np.arange(6) < 3, np.nan, run.eta)
+    nowhere, turned, there = (
+        re.sub(' at 0x[0-9a-f]+', '', said({'a': replace(run, eta=eta)}))
+        for eta in (np.nan * lost, lost, run.eta)
+    )
+    assert nowhere == turned != there
+
+
+def test_disturbances_are_shared_where_the_faults_are_too(run) -> None:
+    drawn, same = digests({'a': run, 'b': replace(run, controller='b')}), []
+    for faults in ({'thruster': 1}, {'thruster': 2}):
+        scenes = {(name,): SetUp('', [], None, {'disturbance': [1], 'faults': told})
+                  for name, told in (('a', {'thruster': 1}), ('b', faults))}  # fmt: skip
+        report = SectionInputs(drawn, {}, scenes, [], {})
+        same.append(report._share_disturbances([*drawn.values()]))
+    assert same == [True, False]

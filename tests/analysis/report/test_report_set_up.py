@@ -18,7 +18,7 @@ from auv_analysis.report import plots, run_plots
 from auv_analysis.report.digest import digest, digests
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.run_tables import certificate_table, reasons
-from auv_analysis.report.scenario_text import gain_text, set_up
+from auv_analysis.report.scenario_text import _signal, gain_text, set_up
 from auv_analysis.report.wrench_plots import certificate_figure
 from auv_analysis.runs.run import FOREIGN, Run
 from auv_gvc_controller.laws.model import control_model
@@ -366,3 +366,8 @@ def test_how_a_law_is_run_is_said_of_those_that_differ() -> None:
     assert [('sampled' in text, 'every stage' in text) for text in said[2]] == [
         (True, False), (False, True),
     ]  # fmt: skip
+
+
+def test_a_wave_without_amplitude_has_no_minus() -> None:
+    term = {'amplitude': 0.0, 'omega': 2.0}
+    assert _signal({'terms': [term, term]}) == '0 sin(2 t) + 0 sin(2 t)'

@@ -47,6 +47,14 @@ def test_a_trace_in_blocks_is_the_line_of_the_whole(seed, n, rows, logarithmic) 
         assert_array_equal(found, expected)
 
 
+@pytest.mark.parametrize('more', [0, 1])
+def test_as_many_samples_as_columns_have_points_are_all_drawn(more: int) -> None:
+    t, y = signal(1, 2 * (COLUMNS - 1) + more)
+    trace = Trace(t[0], t[-1])
+    trace.add(t, y)
+    assert (len(trace.line()[0]) == len(t)) is (more == 0)
+
+
 @given(seed=st.integers(0, 999), n=st.integers(FEW + 1, 30_000))
 @quick
 def test_columns_keep_their_extremes_in_the_order_of_time(seed, n) -> None:

@@ -311,6 +311,7 @@ def test_findings_of_a_sweep() -> None:
         {'figure': settled, 'controller': 'gvc', 'rows': 20, 'known': 5, 'median': None},
         {'figure': settled, 'controller': 'cl', 'rows': 8, 'known': 6, 'median': 2.5},
         {'figure': settled, 'controller': 'none', 'rows': 0, 'known': 0, 'median': None},
+        {'figure': settled, 'controller': 'never', 'rows': 7, 'known': 0, 'median': None},
     ]
     analysis = Made(
         sweep=Made(rows=50, planned=60), tables={'quantiles': quantiles}, counts=lambda: counts,
@@ -322,6 +323,8 @@ def test_findings_of_a_sweep() -> None:
          'table-quantiles'),
         ('Under cl all errors settle in 75.0 % of the 8 rows that came to their end, in half of '
          'them within 2.50 s.', 'table-quantiles'),
+        ('Under never all errors settle in 0 % of the 7 rows that came to their end.',
+         'table-quantiles'),
         ('Of 30 rows of cl, 4 diverged and 6 refused.', 'failures'),
         ('What is odd.', 'campaign'),
     ]  # fmt: skip

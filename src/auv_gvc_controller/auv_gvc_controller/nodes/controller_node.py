@@ -242,8 +242,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         self.graph.in_trouble_while(self._trouble)
         self._subscribe()
         self.create_service(Trigger, '~/reset', self._on_reset)
-        period = WATCH_LOCKSTEP if self._settings.lockstep else WATCH
-        steady_timer(self, period, self._watch)
+        steady_timer(self, WATCH_LOCKSTEP if self._settings.lockstep else WATCH, self._watch)
         if self._settings.autostart:
             self._autostart()
         if self.exit_code is None:

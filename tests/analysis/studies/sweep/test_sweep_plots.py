@@ -278,6 +278,12 @@ def test_elementary_effects_stand_at_their_places(tmp_path: Path) -> None:
         (ends,) = [points(x) for x in artists.lines(axes) if len(x.get_xdata()) == 2]
         assert np.array_equal(ends[0], ends[1])
         assert ends[0][1] == pytest.approx(1.1 * max(row['mu_star'] for row in mine))
+    alone = replace(analysis, tables=analysis.tables | {
+        'indices': [row for row in analysis.tables['indices'] if row['controller'] == 'gvc']
+    })  # fmt: skip
+    legend = plots._effects(alone, shown)[0].legends[0]
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts == [short[path] for path in (K_D, DAMPING)], 'one controller needs no name'
 
 
 def test_total_indices_stand_in_their_cells(tmp_path: Path) -> None:

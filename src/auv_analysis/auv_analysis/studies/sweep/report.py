@@ -93,6 +93,8 @@ INDEX: Shown = {
     'path': 'path',
     'with': 'with',
     'case': 'case',
+}
+POINTS: Shown = {
     'points': described('points', 'base points or trajectories that came to their end'),
 }
 HALF = 'half of the 95 % interval'
@@ -301,7 +303,9 @@ def _indices(analysis: Analysis) -> Iterator[Table]:
             if row['method'] == method and bool(row['with']) is pairs
         ]
         if rows:
-            yield _view(name, caption, rows, INDEX | heads, 'indices', stub=5)
+            told = {key: head for key, head in INDEX.items() if any(row[key] for _, row in rows)}
+            shown = told | POINTS | heads
+            yield _view(name, caption, rows, shown, 'indices', stub=len(told))
 
 
 def _best(analysis: Analysis) -> Table:

@@ -1,5 +1,6 @@
 """Commands as people type them: a sweep of ten thousand rollouts, and what starting `auv` costs."""
 
+import os
 import statistics
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from bench_rollouts import BATCH, DURATION
 from loops import CONTROLLER, SPREAD, VARIED, case1, in_c, nominal, varied
 from measure import Measured, cost, interleaved, seconds
 
+from auv_analysis.graph.domain import VARIABLE
 from auv_analysis.graph.experiment import environment
 from auv_analysis.graph.node_parameters import CONTROLLER as CONTROLLER_NODE
 
@@ -111,8 +113,12 @@ def _alone(times: Sequence[float]) -> Measured:
 
 
 def run(command: Sequence[str]) -> None:
-    """Run a command to its end; RuntimeError with its last line when it fails."""
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    """Run a command to its end as in a new terminal; RuntimeError with its last line when it fails.
+
+    Where a domain is set, `auv run` first looks for 3 s whether somebody's vehicle is on it.
+    """
+    fresh = {name: value for name, value in os.environ.items() if name != VARIABLE}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=fresh)
     if done.returncode:
         last = (done.stderr.splitlines() or ['no message'])[-1]
         raise RuntimeError(f'{" ".join(command)}: exit code {done.returncode}: {last}')

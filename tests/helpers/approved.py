@@ -25,6 +25,7 @@ from helpers import shown
 from helpers.report_pages import value_of
 from matplotlib.figure import Figure
 
+from auv_analysis.driver.evidence import CheckResult
 from auv_analysis.report import document, panels, plots, results
 
 APPROVE = 'AUV_GVC_APPROVE' in os.environ and 'CI' not in os.environ
@@ -109,6 +110,13 @@ def _parts(path: Path) -> dict[str, list[str]]:
     return {name: text.splitlines() for name, _, text in (part.partition('\n') for part in parts)}
 
 
+def _check_line(one: CheckResult) -> Iterator[str]:
+    """What a check of a driver says, once it has its name."""
+    if one.id:
+        numbers = ', '.join(f'{name} {value:.4g}' for name, value in one.measured.items())
+        yield ' | '.join((one.id, one.verdict, one.expected, one.found, one.advice, numbers))
+
+
 class Approved:
     """What a test shows: figures, tables and panels that it makes, and pages that it names.
 
@@ -157,6 +165,8 @@ class Approved:
                 yield from shown.table_lines(one)
             elif isinstance(one, document.Sentence):
                 yield f'{one.text} {one.source}'
+            elif isinstance(one, CheckResult):
+                yield from _check_line(one)
             else:
                 yield from one
         for lines in self._told:
@@ -180,7 +190,7 @@ class Approved:
             return found
 
         with pytest.MonkeyPatch.context() as patch:
-            for kind in (Figure, plots.FigureRecord, results.Table, document.Sentence):
+            for kind in (Figure, plots.FigureRecord, results.Table, document.Sentence, CheckResult):
                 patch.setattr(kind, '__init__', kept(kind.__init__))
             patch.setattr(panels, 'document', panels_of)
             yield

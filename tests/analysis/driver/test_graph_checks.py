@@ -14,6 +14,8 @@ from auv_analysis.driver.evidence import (
     GraphSnapshot,
 )
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 CONTROLLER = Endpoint('/controller_node', WRENCH)
 
 

@@ -10,6 +10,8 @@ from auv_analysis.driver.odometry_log import OdometryLog
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.vehicle.frames import swap_state
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 SPEEDS = 'speeds', 'jumps'
 
 

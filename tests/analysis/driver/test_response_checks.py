@@ -21,6 +21,8 @@ from auv_analysis.driver.response import predicted
 from auv_dynamics import Vehicle, load_vehicle
 from auv_dynamics.vehicle import DOFS
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 AXES = ('surge', 'sway', 'yaw')
 
 

@@ -9,6 +9,8 @@ from helpers.made_odometry import BEGAN, found_in, healthy, motion, odometry_log
 from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, CheckResult
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 SECOND = 10**9
 
 

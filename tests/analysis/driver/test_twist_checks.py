@@ -22,6 +22,8 @@ from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.frames import swap_attitude, swap_body, swap_position, swap_state
 from auv_dynamics.vehicle.kinematics import euler, rotation
 
+pytestmark = pytest.mark.usefixtures('approved')
+
 MOTION = [id for id, check in CHECKS.items() if check.group == 'motion']
 NOISES = (0.0, 0.01)  # m, rad, m/s, rad/s
 

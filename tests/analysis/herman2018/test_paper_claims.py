@@ -151,6 +151,7 @@ def test_the_runs_at_hand_are_judged_not_others():
     assert claims[16].verdict == 'reproduced'  # of case 2, which is simulated
 
 
+@pytest.mark.usefixtures('approved')
 def test_a_changed_case_says_what_was_changed():
     values = {'vehicle.rigid_body.mass': 200.0, 'duration': 6.0}
     found = paper_claims(changed_scenario(load_scenario('case1'), values), {}, sensitivities())
@@ -166,8 +167,10 @@ def test_a_changed_case_says_what_was_changed():
         ({'actuators': {'limit': 100.0}}, 'actuators'),
         ({'disturbance': [{'kind': 'model_error', 'dD': 3.0}]}, 'model error'),
         ({'name': 'mine'}, 'no case of the paper'),
+        ({'sensors': {'velocity_noise': 0.1}, 'actuators': {'lag': 0.1}}, 'sensors'),
     ],
 )
+@pytest.mark.usefixtures('approved')
 def test_what_is_not_the_papers_is_not_judged(values, words):
     scenario = changed_scenario(load_scenario('case1'), values)
     found = paper_claims(scenario, {})

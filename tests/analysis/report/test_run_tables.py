@@ -13,7 +13,7 @@ from auv_analysis.report.digest import digests
 from auv_analysis.report.document import Gallery
 from auv_analysis.report.panels import panel_sets
 from auv_analysis.report.run_plots import draw_figures
-from auv_analysis.report.run_report import SectionInputs, _apart, findings, namesakes
+from auv_analysis.report.run_report import SectionInputs, _apart, _listings, findings, namesakes
 from auv_analysis.report.scenario_text import set_up
 from auv_analysis.report.wrench_plots import estimate_finding
 from auv_analysis.runs.run import Run
@@ -252,6 +252,70 @@ def test_findings_of_one_run(runs, summaries) -> None:
         'Under one, pitch does not settle within 12 s: in the last 0.6 s its error reaches '
         in (said({'one': runs['one']}, {'one': summary})['table-key_figures'][0])
     )
+
+
+def test_findings_say_what_is_not_known(runs, summaries) -> None:
+    def metrics(**error) -> list[str]:
+        summary = copy.deepcopy(summaries['one'])
+        summary['settling']['residual'] = error.pop('residual', [0.1] * 6)
+        summary['effort']['max'] = error.pop('peaks', [1.0, 3.0, 2.0, None, None, None])
+        summary['velocity_error'] |= error
+        return said({'one': runs['one']}, {'one': summary})['table-key_figures']
+
+    half = [1.0, 2.0, 0.5, None, None, None]
+    late = {'max_after_2s': [None] * 3 + [0.25, 0.5, 0.125]}
+    assert metrics(settling_time=None, **late)[:3] == [
+        'Of one no set-point is known, and so no error.',
+        'After 2 s the errors reach at most 0.50 rad/s (pitch) under one.',
+        'The largest commands are 3.00 N (sway) under one.',
+    ]
+    assert metrics(settling_time=[None] * 6, residual=[None] * 6, max_after_2s=None)[:2] == [
+        'Of one no axis has both a set-point and a velocity, and so no error is known.',
+        'The largest commands are 3.00 N (sway) under one.',
+    ]
+    (first, *rest) = metrics(
+        settling_time=half, residual=half, max_after_2s=[None] * 6, peaks=[None] * 6
+    )
+    assert first == 'Under one every velocity error that is known has settled after 2.00 s.'
+    assert not any('After 2 s' in text or 'commands' in text for text in rest)
+
+
+def test_findings_of_energy_and_couplings_where_there_are_none(runs, summaries) -> None:
+    one, summary = {'one': runs['one']}, copy.deepcopy(summaries['one'])
+    windows, coupling = summary['kinetic_energy_windows'], summary['coupling']
+    windows[0]['mean'], windows[1]['mean'] = 11.111, 22.222
+    windows[1]['window'] = [windows[0]['window'][0] + 1.0, windows[1]['window'][1]]
+    coupling |= {'delta_xi_max': [0.0] * 6, 'delta_pi_max': [None] * 6}
+    found = said(one, {'one': summary})
+    assert found['table-energy'] == ['The mean kinetic energy of one is 11.11 J over 3–13 s.']
+    assert 'table-couplings' not in found
+    for window in windows:
+        window['mean'] = None
+    coupling['structural_zeros'] = {'delta_xi': DOFS, 'delta_pi': DOFS[:5]}
+    found = said(one, {'one': summary})
+    assert found.keys().isdisjoint(('table-energy', 'table-couplings'))
+    coupling['structural_zeros'] = {'delta_xi': DOFS, 'delta_pi': DOFS}
+    assert said(one, {'one': summary})['table-couplings'] == [
+        'M is diagonal: no degree of freedom is coupled to another by inertia.'
+    ]
+    lost = replace(runs['one'], nu=runs['one'].nu.copy())
+    lost.nu[:, [1, 5]] = np.nan
+    (text,) = said({'one': lost}, {'one': summarize(lost)})['table-energy']
+    assert text == (
+        'Of one no velocity in sway and yaw was recorded: what rests on it, the total kinetic '
+        'energy before all, is not known.'
+    )
+
+
+def test_files_are_listed_once_for_the_runs_that_share_them(runs) -> None:
+    for texts, listed in (
+        ('a', [('File', 'a')]),
+        ('', []),
+        ({'one': 'a', 'two': 'a'}, [('File', 'a')]),
+        ({'one': 'a', 'two': 'b'}, [('File of one', 'a'), ('File of two', 'b')]),
+        ({'two': 'b'}, [('File of two', 'b')]),
+    ):
+        assert _listings(runs, 'File', texts) == listed
 
 
 def test_findings_of_what_the_actuators_left(runs, summaries) -> None:

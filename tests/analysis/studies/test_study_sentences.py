@@ -9,7 +9,16 @@ import pytest
 from auv_analysis.report.results import Results
 from auv_analysis.studies.atlas import report as atlas
 from auv_analysis.studies.design import report as design
+from auv_analysis.studies.design.results import (
+    COUPLINGS,
+    UNITS,
+    nothing_statement,
+    result_statement,
+)
 from auv_analysis.studies.identify import report as identify
+from auv_analysis.studies.identify import vehicle_text
+from auv_analysis.studies.identify.identified import _words
+from auv_analysis.studies.identify.whiteness import SLOW, told
 from auv_analysis.studies.sweep import report as sweep
 from auv_analysis.studies.tune import report as tune
 from auv_analysis.studies.tune.cost import Measures
@@ -380,3 +389,88 @@ def test_the_largest_share_of_energy_in_case_1_is_shown() -> None:
     results = Results('atlas', {'vehicles': {'a': {'case1': case1}}})
     ((*cells,),) = atlas.reached(results, [chart, _chart('b', 0.1, [], 'x')], 'delta_xi').rows
     assert [cell.value for cell in cells[1:]] == [1.0, 2.0, 3.0, 4.0, 5.0, None, 0.7]
+
+
+# identify, in words of its own
+
+
+def test_what_residuals_say() -> None:
+    def row(dof: str, verdict: str, largest: float, slow: float) -> dict:
+        return {'dof': dof, 'verdict': verdict, 'largest': largest, 'slow': slow,
+                'slow_if_white': 0.02}  # fmt: skip
+
+    white, one = row('roll', 'white', 0.1, 0.9), row('surge', 'coloured', 0.2, 0.05)
+    two, slow = row('yaw', 'coloured', -0.45, 0.04), row('sway', 'slow', 0.3, 0.5)
+    assert told([]).startswith('Whether the residuals are white cannot be told: no even rate')
+    assert told([white]) == 'The residuals are white: the model explains all but noise'
+    assert told([white, one, two]) == (
+        'The residuals are not white in surge and yaw: autocorrelation up to 0.45'
+    )
+    assert told([one, slow, white]) == (
+        'The residuals are not white in surge and sway: in sway 50 % of their power lies below '
+        f'{SLOW:g} Hz, of white noise 2.0 %; something slow acts that the model lacks'
+    )
+
+
+@pytest.mark.parametrize(
+    ('part', 'some', 'text'),
+    [
+        ([0.1, 0.9, 0.0], [1], 'nothing is known of b'),
+        ([0.5, 0.5, 0.0], [0, 1], 'only the difference of a and b is known, not all of them '
+                                  'together'),
+        ([0.5, -0.5, 0.1], [0, 1], 'a may grow if b becomes less'),
+        ([0.0, 0.0, 1.0], [2], 'the scale of the wrench cannot be told from that of all of M, D '
+                               'and g together'),
+    ],
+)  # fmt: skip
+def test_directions_that_the_data_leave_open(part: list[float], some: list[int], text: str) -> None:
+    assert _words(['a', 'b', 'gain.surge'], np.array(part), some) == text
+
+
+def test_each_coefficient_of_a_vehicle_file_has_its_line() -> None:
+    def row(name: str, status: str, low: float | None, high: float | None) -> dict:
+        return {'name': name, 'status': status, 'low': low, 'high': high, 'value': 2.5,
+                'prior': 1.5, 'unit': '' if name == 'gain' else 'kg'}  # fmt: skip
+
+    assert vehicle_text._said([], 'mass') == []
+    rows = [
+        row('a', 'at zero', None, None), row('b', 'at zero', None, 3.0),
+        row('c', 'identified', 2.0, 3.0), row('d', 'identified', -1.0, 6.0),
+        row('gain', 'not identified', None, None), row('e', 'identified', 0.0, 5.0),
+    ]  # fmt: skip
+    assert vehicle_text._said(rows, 'mass') == [
+        '# mass:',
+        '#   a: held at 0, as it would feed energy beside what was identified',
+        '#   b: at its bound 0 kg, at most 3.0000 kg',
+        '#   c: identified 2.5000 kg, within 2.0000 to 3.0000 kg',
+        '#   d: identified 2.5000 kg, within −1.0000 to 6.0000 kg; no more than its uncertainty',
+        '#   gain: prior 1.5000, not identified by itself',
+        '#   e: identified 2.5000 kg, within 0 to 5.0000 kg; no more than its uncertainty',
+    ]
+
+
+# design
+
+
+def test_a_design_says_what_it_does_or_why_there_is_nothing_to_do() -> None:
+    assert nothing_statement('rov', None, []).startswith('rov: M is diagonal, so Upsilon')
+    assert nothing_statement('rov', 'delta_xi.sway', ['delta_xi.roll', 'delta_pi.yaw']) == (
+        'rov: delta_xi.sway is zero in every motion by the structure of M: there is nothing to '
+        'remove. Not zero: delta_xi.roll and delta_pi.yaw.'
+    )
+    for target, what in ((None, 'every coupling'), ('delta_xi.roll', 'delta_xi.roll')):
+        assert nothing_statement('rov', target, ['delta_xi.roll']) == (
+            f'rov: {what} is zero throughout this scenario: there is nothing to remove.'
+        )
+    name, unit = COUPLINGS[1], UNITS[COUPLINGS[1]]
+    for best in (None, Made(ratio=None)):
+        assert result_statement(1, 0.5, best, [], 'by cl') == (
+            f'No change within the bounds lowers {name}, which is 0.500 {unit}, by cl.'
+        )
+    words = ['move it', 'add foam']
+    half = f'Move it; add foam: {name} falls from 0.500 to 0.250 {unit}, by 50.0 %, by cl.'
+    assert result_statement(1, 0.5, Made(ratio=0.5), words, 'by cl') == half
+    assert result_statement(1, 0.5, Made(ratio=0.8), words, 'by cl') == (
+        f'Move it; add foam: {name} falls from 0.500 to 0.400 {unit}, by 20.0 %, by cl. The '
+        'bounds do not allow half: 20.0 % is the most that was found.'
+    )

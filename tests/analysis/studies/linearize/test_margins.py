@@ -368,7 +368,7 @@ def test_refusals(options, said, tmp_path, monkeypatch, capsys):
     assert said in capsys.readouterr().err
 
 
-def test_a_scenario_without_delay_says_nothing_and_one_with_it_its_margins():
+def test_a_scenario_without_delay_says_nothing_and_one_with_it_its_margins(approved):
     assert margin_notes(scenario_of(), ['gvc']) == []
     (note,) = margin_notes(scenario_of(actuators={'delay': 0.04, 'lag': 0.04}), ['gvc'])
     assert note.startswith('note: ')
@@ -377,6 +377,7 @@ def test_a_scenario_without_delay_says_nothing_and_one_with_it_its_margins():
     (warning,) = margin_notes(fast, ['gvc'], delay=0.04)
     assert warning.startswith('warning: ')
     assert 'below 6 dB and 45 deg' in warning
+    approved.add([note, warning])
 
 
 def test_simulating_and_parameters_for_a_driver_warn(tmp_path, capsys):

@@ -36,7 +36,8 @@ from auv_analysis.report import plots
 from auv_analysis.report.digest import digests
 from auv_analysis.report.faults import fault_figure
 from auv_analysis.report.panels import document, interactive, panel_sets
-from auv_analysis.report.run_plots import draw_figures
+from auv_analysis.report.run_plots import APART, draw_figures, inputs
+from auv_analysis.report.wrench_plots import _applied_caption
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
 
@@ -398,6 +399,26 @@ def test_applied_and_commanded_wrench_are_told_apart(three, runs) -> None:
         assert abs(shown - value) <= half
     assert ('leave the panel' in caption) == bool(cut)
     assert 'never differ' not in caption
+
+
+@pytest.mark.parametrize('factor', [0.99 * APART, APART])
+def test_inputs_that_are_far_apart_share_no_linear_scale(runs, factor) -> None:
+    one = runs['three']
+    many = {'one': one, 'two': replace(one, controller='two', tau=factor * one.tau)}
+    figure, _, caption = inputs(digests(many))
+    assert ('times another’s' in caption) == (factor == APART)
+    assert {axes.get_yscale() == 'linear' for axes in figure.axes} == {factor < APART}
+
+
+def test_a_caption_says_what_the_actuators_did(runs) -> None:
+    run = digests(runs)['three']
+    alike = _applied_caption('T', run, None, [], [])
+    cut = _applied_caption('T', run, LIMIT, ['yaw'], ['yaw'])
+    for text, there, not_there in (('The two never differ in this run.', alike, cut),
+                                   ('Dotted: axis limits', cut, alike),
+                                   ('The commands in yaw leave the panel', cut, alike)):  # fmt: skip
+        assert text in there
+        assert text not in not_there
 
 
 def test_a_command_that_leaves_its_panel_is_told_with_its_sign_and_time(runs, tmp_path) -> None:

@@ -84,6 +84,22 @@ def test_couplings_say_symbol_rule_and_unit(summaries) -> None:
         assert list(found.values()) == pytest.approx(weight, rel=0.01, abs=1e-9)
 
 
+def test_whose_rule_a_coupling_follows_is_said_of_several_vehicles(summaries) -> None:
+    captions = [tables.couplings_table(summaries, name).caption for name in ('', 'rov')]
+    assert captions[0].endswith('the largest magnitude over the run.')
+    assert captions[1].endswith('over the run; the rule is that of rov.')
+
+
+def test_each_reason_for_no_certificate_is_said_once() -> None:
+    told = {'a': None, 'b': 'x; y', 'c': 'y'}
+    entries = {n: {'lyapunov': {'applicable': False, 'reason': why}} for n, why in told.items()}
+    assert tables.reasons(entries | {'d': {'lyapunov': {'applicable': True}}}) == [
+        'No certificate of a: not applicable.',
+        'No certificate of b: x.',
+        'No certificate of b and c: y.',
+    ]
+
+
 def test_pieces_of_the_couplings_are_those_of_the_run(runs, summaries) -> None:
     table = tables.terms_table('two', summaries['two'])
     run = runs['two']

@@ -14,7 +14,12 @@ from rich.console import Console
 
 from auv_analysis.cli.main import main
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
-from auv_analysis.studies.check_vehicle import check_vehicle, print_check
+from auv_analysis.studies.check_vehicle import (
+    _cruise_table,
+    _munk,
+    check_vehicle,
+    print_check,
+)
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle import DOFS
@@ -376,6 +381,32 @@ def test_poles_ahead_say_whether_a_vehicle_keeps_its_course(written):
     heavy_above['rigid_body']['center_of_gravity'] = [0.0, 0.0, -0.02]
     turns_over = cruise(written(heavy_above), 1.0)
     assert (turns_over['verdict'], turns_over['hint']) == ('unstable', None)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'title', 'said'),
+    [
+        ({'speed_source': 'assumed'}, '(assumed, see --speed)', 'stable at 2 m/s without control'),
+        ({'speed_source': 'given', 'verdict': 'marginal'}, '(--speed)',
+         'marginal at 2 m/s without control: no unstable pole, one does not decay, in yaw first'),
+        ({'verdict': 'unstable', 'hint': 'more fins'}, '(its top speed)',
+         'unstable at 2 m/s without control: it leaves straight motion, in yaw first'),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_straight_motion(changes, title, said):
+    out = io.StringIO()
+    _cruise_table(cruise('lauv') | {'mostly': 'yaw'} | changes, Console(file=out, width=120))
+    lines = [line.strip() for line in out.getvalue().splitlines()]
+    assert f'poles straight ahead at 2 m/s {title}' in lines
+    assert said in lines
+    assert ('hint: more fins' in lines) == ('hint' in changes)
+
+
+def test_with_lift_a_hint_lays_it_to_too_little():
+    assert _munk(load_vehicle('lauv')) == (
+        'the Munk moment of the added mass turns it across the flow; lift and damping are too '
+        'small against it'
+    )
 
 
 def test_munk_terms_are_the_slopes_of_the_coriolis_wrench():

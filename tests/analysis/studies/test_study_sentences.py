@@ -394,6 +394,22 @@ def test_the_largest_share_of_energy_in_case_1_is_shown() -> None:
 # identify, in words of its own
 
 
+def test_without_anything_held_out_or_with_a_contradiction_there_is_no_model() -> None:
+    assert identify.verdict([], []) == (
+        'Nothing was held out: how good the model is has not been tried.'
+    )
+    assert identify.verdict([], ['it is wrong', 'twice']) == 'No vehicle file: it is wrong.'
+    assert identify.verdict_alone('rov', []) == 'Nothing was held out.'
+
+
+def test_how_an_identification_was_asked_for() -> None:
+    assert identify._asked(Made(problem=Made(observer=0.0), resampled=[])) == []
+    gain, draws = identify._asked(Made(problem=Made(observer=0.25), resampled=[1, 2, 3]))
+    assert gain.startswith('Along segments the simulated state follows the measurements by a gain '
+                           'of 0.25 a step; residuals are')  # fmt: skip
+    assert draws.startswith('The bootstrap has 3 draws of blocks of time, each refitted')
+
+
 def test_what_residuals_say() -> None:
     def row(dof: str, verdict: str, largest: float, slow: float) -> dict:
         return {'dof': dof, 'verdict': verdict, 'largest': largest, 'slow': slow,

@@ -58,7 +58,7 @@ def test_sobol_of_a_linear_figure(tmp_path: Path) -> None:
         assert (row['points'], row['of']) == (256, 256)
 
 
-def test_a_base_point_with_a_failed_row_is_left_out_whole(tmp_path: Path) -> None:
+def test_a_base_point_with_a_failed_row_is_left_out_whole(tmp_path: Path, approved) -> None:
     def failing(controller, values, index):
         columns = linear(controller, values, index)
         status = np.where(index % 80 == 5, 'diverged', 'ok').astype(object)
@@ -69,13 +69,14 @@ def test_a_base_point_with_a_failed_row_is_left_out_whole(tmp_path: Path) -> Non
     found = [row for row in results.tables['indices'] if row['figure'] == ENERGY
              and row['with'] is None and row['case'] == 'integrator = ode5']  # fmt: skip
     assert 'no row failed' in ' '.join(results.notes)
+    approved.add(results.notes)
     lost = len({index // 8 for index in range(5, 2048, 80)})
     assert {row['points'] for row in found} == {256 - lost}
     for row in found:
         assert row['S1'] == pytest.approx({A: 0.9, B: 0.1, C: 0.0}[row['path']], abs=0.06)
 
 
-def test_rows_that_settle_are_no_sample_of_the_design(tmp_path: Path) -> None:
+def test_rows_that_settle_are_no_sample_of_the_design(tmp_path: Path, approved) -> None:
     """Their indices would be those of rows that were chosen by the figure itself."""
 
     def settling(controller, values, index):
@@ -88,6 +89,7 @@ def test_rows_that_settle_are_no_sample_of_the_design(tmp_path: Path) -> None:
     results = analysed(open_sweep(make_sweep(tmp_path, few, settling)))
     assert {row['figure'] for row in results.tables['indices']} == {ENERGY}
     assert len([note for note in results.notes if 'no indices of settled under gvc' in note]) == 1
+    approved.add(results.notes)
 
 
 def test_an_unfinished_design_uses_its_whole_base_points(tmp_path: Path) -> None:
@@ -104,7 +106,7 @@ def test_morris_of_a_linear_figure(tmp_path: Path) -> None:
         assert found[path]['sigma'] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_values_of_another_design_are_not_taken_for_it(tmp_path: Path) -> None:
+def test_values_of_another_design_are_not_taken_for_it(tmp_path: Path, approved) -> None:
     few = SALTELLI.replace('256', '16')
     out = make_sweep(tmp_path, few.replace('name: salt', 'name: salt\nseed: 3'), linear)
     manifest = (out / 'sweep.json').read_text()
@@ -112,22 +114,27 @@ def test_values_of_another_design_are_not_taken_for_it(tmp_path: Path) -> None:
     found, notes = designed(open_sweep(out))
     assert found == []
     assert 'another' in notes[0]
+    approved.add(notes)
 
 
-def test_many_other_combinations_are_said(tmp_path: Path) -> None:
+def test_many_other_combinations_are_said(tmp_path: Path, approved) -> None:
     many = "grid: {'initial.nu[0]': [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]}"
     text = SALTELLI.replace('grid: {integrator: [ode5, rk4]}', many).replace('256', '8')
     found, notes = designed(open_sweep(make_sweep(tmp_path, text, linear)))
     assert found == []
     assert '9 combinations' in notes[0]
+    approved.add(notes)
 
 
-def test_without_salib_it_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_salib_it_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, approved
+) -> None:
     import sys
 
     out = make_sweep(tmp_path, MORRIS, linear)
     monkeypatch.setitem(sys.modules, 'SALib', None)
     results = analysed(open_sweep(out))
     assert results.notes == ['sensitivity indices need SALib: pip install SALib']
+    approved.add(results.notes)
     assert results.tables['indices'] == []
     assert results.tables['influence']

@@ -414,9 +414,11 @@ def test_a_caption_says_what_the_actuators_did(runs) -> None:
     run = digests(runs)['three']
     alike = _applied_caption('T', run, None, [], [])
     cut = _applied_caption('T', run, LIMIT, ['yaw'], ['yaw'])
-    for text, there, not_there in (('The two never differ in this run.', alike, cut),
-                                   ('Dotted: axis limits', cut, alike),
-                                   ('The commands in yaw leave the panel', cut, alike)):  # fmt: skip
+    for text, there, not_there in (
+        ('The two never differ in this run.', alike, cut),
+        ('Dotted: axis limits', cut, alike),
+        ('The commands in yaw leave the panel', cut, alike),
+    ):
         assert text in there
         assert text not in not_there
 

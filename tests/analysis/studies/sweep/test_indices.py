@@ -126,9 +126,7 @@ def test_many_other_combinations_are_said(tmp_path: Path, approved) -> None:
     approved.add(notes)
 
 
-def test_without_salib_it_is_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, approved
-) -> None:
+def test_without_salib_it_is_said(tmp_path: Path, monkeypatch, approved) -> None:
     import sys
 
     out = make_sweep(tmp_path, MORRIS, linear)

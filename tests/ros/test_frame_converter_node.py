@@ -19,6 +19,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from std_srvs.srv import Trigger
 
+from auv_dynamics.nodes.frame_converter_node import mirrored_odometry
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.topics import Topic
@@ -113,6 +114,17 @@ def test_a_run_behind_two_mirrors_is_the_run_without() -> None:
     assert np.abs(straight['wrench'][-1, 1:]).min() > 1.0, 'every axis is commanded'
     for name, table in straight.items():
         assert_allclose(mirrored[name], table, rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+def test_a_quaternion_comes_out_with_a_norm_of_1() -> None:
+    q = np.array([0.1, 0.3, -0.2, 0.9]) / np.linalg.norm([0.1, 0.3, -0.2, 0.9])
+    turned = []
+    for norm in (1.0, 1.0 + 0.9 * interface.UNIT):
+        x = np.concatenate([UPRIGHT[:3], norm * q, UPRIGHT[7:]])
+        found = mirrored_odometry(convert.odometry(5, x, ENU), ENU, NED, 'odom').pose.pose
+        turned.append([getattr(found.orientation, axis) for axis in 'xyzw'])
+    assert_allclose(turned[1], turned[0], rtol=0.0, atol=1e-15)
+    assert np.linalg.norm(turned[0]) == pytest.approx(1.0, abs=1e-15)
 
 
 @pytest.fixture(scope='module')

@@ -102,7 +102,9 @@ def test_a_small_bar_has_its_colour_in_the_png(tmp_path) -> None:
         left, right = figure.subplots(1, 2)
         left.barh(range(6), [9.0, 9.0, 9.0, 0.3, 9.0, 9.0], color=plots.COLOURS)
         values = np.linspace(0.0, 1.0, 120).reshape(10, 12)
-        plots.draw_grid(right, HeatMap(values, [f'{i}' for i in range(12)], '', 'Blues'), 4.0)
+        plots.draw_grid(
+            right, HeatMap(values, [f'{i}' for i in range(12)], '', 'Blues'), fontsize=4.0
+        )
         png, _ = plots.save(figure, tmp_path, 'bars')
     pixels = np.asarray(Image.open(png).convert('RGB')).reshape(-1, 3).astype(int)
     for colour in plots.COLOURS:

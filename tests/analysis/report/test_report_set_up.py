@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,9 +19,10 @@ from auv_analysis.report import plots, run_plots
 from auv_analysis.report.digest import digest, digests
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.run_tables import certificate_table, reasons
-from auv_analysis.report.scenario_text import _signal, gain_text, set_up
+from auv_analysis.report.scenario_text import _of_the_runs, _signal, gain_text, harmonics, set_up
 from auv_analysis.report.wrench_plots import certificate_figure
 from auv_analysis.runs.run import FOREIGN, Run
+from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.laws.model import control_model
 
 DATA = {
@@ -371,3 +373,24 @@ def test_how_a_law_is_run_is_said_of_those_that_differ() -> None:
 def test_a_wave_without_amplitude_has_no_minus() -> None:
     term = {'amplitude': 0.0, 'omega': 2.0}
     assert _signal({'terms': [term, term]}) == '0 sin(2 t) + 0 sin(2 t)'
+
+
+def test_each_axis_has_its_unit() -> None:
+    spec = {dof: {'offset': i + 1.0} for i, dof in enumerate(DOFS)}
+    assert harmonics(spec, DOFS, ('N', 'N m')) == (
+        'surge 1 N; sway 2 N; heave 3 N; roll 4 N m; pitch 5 N m; yaw 6 N m'
+    )
+
+
+@pytest.mark.parametrize(
+    ('kinds', 'acting', 'sensing', 'text'),
+    [
+        (None, False, False, 'disturbances not known'),
+        ((), True, False, 'disturbances none; the actuators are not ideal'),
+        (('waves', 'current'), False, True,
+         'disturbances current and waves; the law sees measurements'),
+    ],
+)  # fmt: skip
+def test_what_runs_say_themselves(kinds, acting, sensing, text) -> None:
+    run = SimpleNamespace(kinds=kinds, acting=acting, sensing=sensing)
+    assert _of_the_runs({'gvc': run}) == [('gvc', [text])]

@@ -13,7 +13,15 @@ from auv_analysis.report.digest import digests
 from auv_analysis.report.document import Gallery
 from auv_analysis.report.panels import panel_sets
 from auv_analysis.report.run_plots import draw_figures
-from auv_analysis.report.run_report import SectionInputs, _apart, _listings, findings, namesakes
+from auv_analysis.report.run_report import (
+    NO_CERTIFICATE,
+    NO_F,
+    SectionInputs,
+    _apart,
+    _listings,
+    findings,
+    namesakes,
+)
 from auv_analysis.report.scenario_text import set_up
 from auv_analysis.report.wrench_plots import estimate_finding
 from auv_analysis.runs.run import Run
@@ -379,16 +387,16 @@ def test_runs_of_one_name_and_other_set_points_are_told_of(runs) -> None:
 
 
 def test_what_a_model_leaves_unexplained_in_words() -> None:
-    found = {'rms': [1.0, 2.0, 3.0, 4.0, 6.0, 5.0], 'error_rms': [0.1, 0.2, 0.3, 0.4, 0.6, 0.5]}
+    found = {'rms': [1.0, 2.0, 9.0, 4.0, 6.0, 5.0], 'error_rms': [0.1, 0.2, 0.3, 0.4, 0.6, 0.5]}
     effort = {'rms': [10.0, 20.0, 30.0, 40.0, 60.0, 50.0]}
     summary = {'unexplained': found, 'required_wrench': None, 'effort': effort}
     assert estimate_finding('told', summary) == (
-        'Of told the model leaves at most 3.00 ± 0.30 N (heave; the wrench has 30.0 N) and '
+        'Of told the model leaves at most 9.00 ± 0.30 N (heave; the wrench has 30.0 N) and '
         '6.00 ± 0.60 N m (pitch; the wrench has 60.0 N m) unexplained, RMS.'
     )
     summary = {'unexplained': None, 'required_wrench': found, 'effort': effort}
     assert estimate_finding('lost', summary) == (
-        'The motion of lost needed at most 3.00 ± 0.30 N (heave) and 6.00 ± 0.60 N m (pitch), RMS.'
+        'The motion of lost needed at most 9.00 ± 0.30 N (heave) and 6.00 ± 0.60 N m (pitch), RMS.'
     )
     assert estimate_finding('bare', {'unexplained': None, 'required_wrench': None}) == ''
 
@@ -433,6 +441,16 @@ def test_each_section_shows_its_own_tables_and_figures(runs, summaries, tmp_path
     assert found['energy'] == [
         '', 'energy', 'energy_components', 'kinetic_energy', 'energy_shares', '[]',
     ]  # fmt: skip
+
+
+def test_what_cannot_be_shown_is_said(runs) -> None:
+    for run, told in ((runs['one'], False), (replace(runs['one'], disturbance=None), True)):
+        shown, summaries = digests({'one': run}), {'one': summarize(run)}
+        scenes = {('one',): set_up(shown, summaries, '')}
+        tracking = SectionInputs(shown, summaries, scenes, [], {}).sections()[2]
+        assert tracking.name == 'tracking'
+        assert (NO_F in tracking.blocks) is told
+        assert NO_CERTIFICATE in tracking.blocks, 'no figure of one is at hand'
 
 
 def test_how_far_apart_runs_end(runs) -> None:

@@ -16,6 +16,7 @@ from auv_analysis.cli.main import main
 from auv_analysis.metrics.coupling import delta_pi, delta_xi
 from auv_analysis.studies.check_vehicle import (
     _cruise_table,
+    _hydrostatics_table,
     _munk,
     check_vehicle,
     print_check,
@@ -400,6 +401,15 @@ def test_what_is_said_of_straight_motion(changes, title, said):
     assert f'poles straight ahead at 2 m/s {title}' in lines
     assert said in lines
     assert ('hint: more fins' in lines) == ('hint' in changes)
+
+
+@pytest.mark.parametrize(('eigenvalue', 'turns'), [(-1e-3, True), (0.0, False), (2.0, False)])
+def test_what_turns_over_is_said(eigenvalue, turns):
+    out, found = io.StringIO(), check_vehicle('herman2018')['hydrostatics']
+    found['modes']['pitch']['eigenvalue'] = eigenvalue
+    _hydrostatics_table(found, Console(file=out, width=120))
+    assert ('unstable in pitch: the vehicle turns over' in out.getvalue()) is turns
+    assert 'unstable in roll' not in out.getvalue()
 
 
 def test_with_lift_a_hint_lays_it_to_too_little():

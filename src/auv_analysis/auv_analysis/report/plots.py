@@ -425,7 +425,7 @@ def heat_map(rows: Sequence[str], grids: Sequence[HeatMap], width: float = WIDTH
     panels = figure.subplots(1, len(grids), squeeze=False, width_ratios=ratios)[0]
     size = min(8.0, 72 * (height - MARGIN) / max(len(rows), 1) * 0.85)
     for i, (axes, grid) in enumerate(zip(panels, grids, strict=True)):
-        draw_grid(axes, grid, size if len(rows) <= MOST_NAMED else 0.0)
+        draw_grid(axes, grid, fontsize=size if len(rows) <= MOST_NAMED else 0.0)
         name_rows(axes, rows if i == 0 else [], len(rows))
         place: dict[str, Any] = {'location': 'bottom', 'aspect': 30, 'fraction': 0.05}
         scale_bar(figure, axes.images[0], grid.label, ax=axes, **place)
@@ -452,14 +452,14 @@ def name_rows(axes: Axes, rows: Sequence[str], count: int) -> None:
     axes.set_yticks(range(0, count, step), rows[::step])
 
 
-def draw_grid(axes: Axes, grid: HeatMap, size: float = 7.0) -> None:
+def draw_grid(axes: Axes, grid: HeatMap, *, fontsize: float = 7.0) -> None:
     """Cells with their numbers; what is zero is pale, what is unknown is crossed out.
 
     Parameters
     ----------
     axes : gets the image
     grid : what is drawn
-    size : of the numbers, points; 0: none
+    fontsize : of the numbers, points; 0: none
 
     """
     values = np.asarray(grid.values, float)
@@ -474,12 +474,12 @@ def draw_grid(axes: Axes, grid: HeatMap, size: float = 7.0) -> None:
         frame = Rectangle((j - 0.5, i - 0.5), 1, 1, fill=False, hatch='///', linewidth=0)
         frame.set_edgecolor('#c9c9c9')
         axes.add_patch(frame)
-    if size:
+    if fontsize:
         for (i, j), value in np.ndenumerate(values):
             if np.isfinite(value):
                 always = grid.structural is not None and grid.structural[i, j]
                 text = ALWAYS if always else _text(value, grid)
-                axes.text(j, i, text, ha='center', va='center', fontsize=size,
+                axes.text(j, i, text, ha='center', va='center', fontsize=fontsize,
                           color=GREY if value == 0 else _ink(colours(norm(value))))  # fmt: skip
 
 

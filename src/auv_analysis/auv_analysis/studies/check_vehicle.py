@@ -146,9 +146,8 @@ def _pendulum(vehicle: Vehicle) -> dict[str, dict[str, float | None]]:
         2 * small
     )
     values, modes = np.linalg.eig(np.linalg.solve(vehicle.M, slope)[3:5])
-    roll = int(np.argmax(np.abs(modes[0])))
     named = {}
-    for dof, i in (('roll', roll), ('pitch', 1 - roll)):
+    for dof, i in zip(('roll', 'pitch'), np.argsort(-np.abs(modes[0])), strict=True):
         value = float(values[i].real)
         stable = value > NEGLIGIBLE
         omega = float(np.sqrt(value)) if stable else None

@@ -2,11 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace as Made
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.metrics.summary import band_of
 from auv_analysis.report.digest import digest
 from auv_analysis.studies.compare import plots
 from auv_analysis.studies.compare.ranking import Entry, comparison_table, rank
@@ -80,6 +83,24 @@ def test_it_falls_below_one_where_the_run_settles(entries) -> None:
         settled = max(known.summary['velocity_error']['settling_time'])
         first = t[np.argmax(ratio <= 1.0)]
         assert first == pytest.approx(settled, abs=0.05)
+
+
+def test_what_is_still_to_come_is_the_largest_of_all_later_errors() -> None:
+    rng = np.random.default_rng(3)
+    lines = [(np.sort(rng.choice(50, 7, replace=False)) * 1.0, rng.normal(size=7))
+             for _ in range(6)]  # fmt: skip
+    peak = np.arange(1.0, 7.0)
+    run = Made(line=lambda signal, i, part: lines[i], part=lambda signal: Made(peak=peak))
+    t, ratio = plots.still_to_come(run)
+    assert list(t) == sorted({time for times, _ in lines for time in times})
+    for now, found in zip(t, ratio, strict=True):
+        later = [np.abs(error[times >= now]) / width
+                 for (times, error), width in zip(lines, band_of(peak), strict=True)]  # fmt: skip
+        assert found == max(np.concatenate(later))
+
+
+def test_a_failure_is_a_text_in_a_table_without_any(entries) -> None:
+    assert comparison_table(entries[:1]).schema.field('failure').type == pa.string()
 
 
 def test_lines_are_told_apart() -> None:

@@ -320,3 +320,12 @@ def test_what_does_not_vary_is_said(failing: Drawn) -> None:
     caption = failing[2]['distributions']
     assert 'The same in every row:' in caption
     assert 'RMS error, linear' in caption
+
+
+def test_measures_that_are_alike_in_all_rows_are_named_by_their_kind() -> None:
+    (zero, none, same), labels = list(BY_NAME)[:3], [one.label for one in BY_NAME.values()]
+    assert plots._fixed({zero: 0.0, none: None, same: 2.0}) == (
+        f' Zero in every row and not drawn: {labels[0]}. The same in every row: {labels[2]}.'
+        f' Without a value in any row: {labels[1]}.'
+    )
+    assert plots._fixed({}) == ''

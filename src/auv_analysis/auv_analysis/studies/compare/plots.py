@@ -227,8 +227,8 @@ def _panels(groups: Mapping[str, Mapping[str, RunDigest]], labels: Sequence[str]
         axes.axhline(1.0, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
         axes.set_title(scenario, loc='left')
         plots.logarithmic(axes, 'x', 'y')
-    low, high = panels[0].get_ylim()
-    panels[0].set_ylim(max(low, SMALLEST), min(high, LARGEST))
+    low, high = axes.get_ylim()  # that all share
+    axes.set_ylim(max(low, SMALLEST), min(high, LARGEST))
     plots.shared_legend(figure)
     figure.supxlabel('$t$ (s)', fontsize='medium')
     figure.supylabel('error still to come / band', fontsize='medium')

@@ -204,7 +204,7 @@ def _plot(found: Sensitivity) -> Drawn:
         for rows in shown.values()
     ])  # fmt: skip
     heads = [gain_mathtext(gain) for gain in found.gains]
-    plots.draw_grid(right, HeatMap(weights, heads, '', 'Blues', decimals=2), 7.5)
+    plots.draw_grid(right, HeatMap(weights, heads, '', 'Blues', decimals=2), fontsize=7.5)
     _bars(left, shown)
     plots.letter(left, 0, 'spread, 95 % interval')
     plots.letter(right, 1, 'total index $S_T$' if sobol else r'$\mu^*$')

@@ -314,7 +314,8 @@ def _together(analysis: Analysis, measures: Sequence[Measure]) -> Drawn:
             axes.set_title(f'{controller}: {measure.label}', loc='left', pad=22, fontsize='medium')
             axes.set_ylabel(names[first.path])
             axes.set_xlabel(names[second.path])
-            plots.scale_bar(figure, axes.images[0], measure.unit, ax=axes, fraction=0.05)
+            (image,) = axes.images
+            plots.scale_bar(figure, image, measure.unit, ax=axes, fraction=0.05)
     title = 'The two paths that matter most'
     caption = (
         f'{title}, together: median of the rows of each combination of {first.path} and '
@@ -329,7 +330,7 @@ def _one_pair(axes: Axes, cells: Sequence[Row], label: str, scale: Normalize) ->
     across = list(dict.fromkeys(cell['other_value'] for cell in cells))
     values = _array(cells, 'median').reshape(len(down), len(across))
     heads = [typeset(cut(word)) for word in across]
-    plots.draw_grid(axes, HeatMap(values, heads, label, scale=scale), 6.0)
+    plots.draw_grid(axes, HeatMap(values, heads, label, scale=scale), fontsize=6.0)
     axes.set_yticks(range(len(down)), [typeset(cut(word)) for word in down])
     axes.tick_params(labelsize=7)
     if len(across) > 4:

@@ -70,6 +70,17 @@ def test_odometry_within_the_horizon_is_no_jump_however_late_it_is_looked_at() -
         assert stamps(peer, 'cmd_vel') == [k * STEP for k in range(2 * far + 151)]
 
 
+def test_what_lies_behind_the_odometry_by_more_than_the_horizon_is_left_out() -> None:
+    with graph(('setpoint_node', SURGE)) as (peer, _):
+        peer.listen(topics.CMD_VEL)
+        for at in (0, 40):
+            peer.publish(topics.ODOM, odometry(10**9 + at * STEP))
+            newest = 10**9 + (at + 5) * STEP
+            peer.until(lambda newest=newest: newest in stamps(peer, 'cmd_vel'), 'the horizon')
+    steps = [(ns - 10**9) // STEP for ns in stamps(peer, 'cmd_vel')]
+    assert steps == [*range(6), *range(35, 46)]
+
+
 def test_a_jump_of_the_clock_is_no_burst() -> None:
     with graph(('setpoint_node', [*SURGE, *parameters(duration=3600.0)])) as (peer, _):
         peer.listen(topics.CMD_VEL)

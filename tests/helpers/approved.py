@@ -40,11 +40,6 @@ FOLDERS = re.compile(
 )
 
 
-def _words(line: str) -> str:
-    """A line without its numbers, and without the blanks that make up for their lengths."""
-    return ' '.join(NUMBER.sub('#', FOLDERS.sub('<folder>/', line)).split())
-
-
 def _digits(number: str) -> tuple[int, int]:
     """How many significant digits a number has, and how many decimals."""
     mantissa = re.split('[e·]', number)[0].lstrip('−+-').replace('\u202f', '')
@@ -134,10 +129,10 @@ class Approved:
         """Lines to approve beside, such as what is printed; they may be made later."""
         self._told.append(lines)
 
-    def folder(self, folder: Path, *, panels: bool = False, tie: str | None = None) -> None:
+    def folder(self, folder: Path, *, panels: bool = False, tie: str = '') -> None:
         """What is in a folder: page, figures, composed by `artists.captured`, and documents.
 
-        Of rows that begin with `tie` without their numbers: chance decides them.
+        Of rows that begin with `tie` no more than that: chance decides the rest.
         """
         page, lines = folder / 'report.html', list[str]()
         if page.exists():
@@ -149,8 +144,7 @@ class Approved:
                 lines += [path.name, *shown.document_lines(json.loads(path.read_text()))]
         for path in sorted(folder.glob('*.parquet')):
             lines += shown.parquet_lines(path)
-        tied = (tie is not None and line.startswith(tie) for line in lines)
-        self._pages += [_words(line) if t else line for line, t in zip(lines, tied, strict=True)]
+        self._pages += [tie if tie and one.startswith(tie) else one for one in lines]
 
     def lines(self) -> Iterator[str]:
         """The pages, else all that was made, in this order; then what was added."""

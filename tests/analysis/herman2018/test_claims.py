@@ -192,6 +192,18 @@ def test_one_run_leaves_the_comparisons_open(case1, approved):
     assert table[1].verdict == 'reproduced'
 
 
+@pytest.mark.parametrize(
+    ('case', 'law', 'gains'),
+    [('case1', 'gvc', '(36), (37)'), ('case1', 'cl', '(36), (37)'),
+     ('case2', 'gvc', '(36), (37)'), ('case2', 'cl', '(40)')],
+)  # fmt: skip
+def test_the_gains_of_a_run_that_is_missing_are_named(case, law, gains, request):
+    runs = dict(request.getfixturevalue(case))
+    del runs[law]
+    remarks = {claim.remark for claim in _table(runs).values() if 'No run' in claim.remark}
+    assert remarks == {f'No run of law {law} with gains {gains}.'}
+
+
 def test_unknown_disturbance_leaves_the_claims_on_it_open(case1, approved):
     blind = {name: replace(run, disturbance=None) for name, run in case1.items()}
     table = _table(blind)
@@ -235,6 +247,7 @@ def test_grade_counts_the_parts():
 
 
 FARTHEST = 300.0  # times
+ALL = 6  # in place of an axis
 ANSWERS = np.array([0.1, 0.2, 0.3, 0.4, 0.9, 0.5])
 Asked = tuple[str, str, tuple[float, ...]]  # law, name of a signal, window
 
@@ -269,7 +282,7 @@ class Experiment:
         self.asked |= {('', 'N', ()): None}
 
     def verdict(self, which: Asked, axis: int, factor: float) -> str:
-        times = np.where(np.arange(6) == axis, factor, 1.0)
+        times = np.where((np.arange(6) == axis) | (axis == ALL), factor, 1.0)
         signals = {
             law: Scaled(run, law, which, times, self.asked) for law, run in self._runs.items()
         }
@@ -302,9 +315,10 @@ def test_where_each_verdict_changes(case1, case2, approved):
         runs = known[row.cases[0]]
         runs = dict.fromkeys(runs, runs['gvc']) if number == 14 else runs  # else they differ by far
         tried = Experiment(row, runs)
-        for (law, name, window), axis in itertools.product([*tried.asked], range(6)):
+        for (law, name, window), axis in itertools.product([*tried.asked], range(ALL + 1)):
             if found := ', '.join(tried.flips((law, name, window), axis)):
                 begin = ' to '.join(f'{time:g}' for time in window)
-                lines.append(f'{number} {law} {name} {begin} {DOFS[axis]}: {found}')
+                where = (*DOFS, 'all axes')[axis]
+                lines.append(f'{number} {law} {name} {begin} {where}: {found}')
     approved.add(lines)
     assert {line.split()[0] for line in lines} == {str(n) for n in range(1, 22)} - {'17'}

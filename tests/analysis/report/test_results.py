@@ -60,6 +60,11 @@ def test_results_are_written_once_with_unknown_as_null(results: Results, tmp_pat
     assert about[b'meaning'].startswith(b'root mean square')
 
 
+def test_columns_are_stored_in_the_order_in_which_they_are_shown() -> None:
+    table = make_table('t', 'All.', [{'c': 3, 'b': 2, 'a': 1}], ['a', 'b'])
+    assert table.data.column_names == ['a', 'b', 'c']
+
+
 def test_every_pointer_leads_to_the_number_that_is_shown(results: Results, tmp_path: Path) -> None:
     paths = results.write(tmp_path)
     document, table = json.loads(paths[0].read_text()), parquet.read_table(paths[1]).to_pylist()

@@ -92,6 +92,12 @@ def test_couplings_say_symbol_rule_and_unit(summaries) -> None:
         assert list(found.values()) == pytest.approx(weight, rel=0.01, abs=1e-9)
 
 
+def test_rounding_beside_a_large_entry_is_left_out_of_a_rule() -> None:
+    assert tables._linear(np.array([-2e6, 1e-7, 0.5]), ['p', 'q', 'r']).endswith('p + 0.5 r')
+    assert tables._linear(np.array([0.0, 1e-7, -0.5]), ['p', 'q', 'r']).endswith('q − 0.5 r')
+    assert tables._linear(np.zeros(3), ['p', 'q', 'r']) == '0'
+
+
 def test_whose_rule_a_coupling_follows_is_said_of_several_vehicles(summaries) -> None:
     captions = [tables.couplings_table(summaries, name).caption for name in ('', 'rov')]
     assert captions[0].endswith('the largest magnitude over the run.')

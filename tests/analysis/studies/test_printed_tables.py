@@ -142,8 +142,8 @@ def test_a_vehicle_that_is_checked(monkeypatch, approved) -> None:
 def test_poles_of_models(monkeypatch, approved) -> None:
     printed = Printed(monkeypatch, linearize, approved)
     modes = [
-        {'pole': [0.5, 0.25], 'damping_ratio': 0.1, 'natural_frequency': 0.2, 'time_constant': 0.3,
-         'mostly': 'roll', 'part': 0.4},
+        {'pole': [0.5, 0.25], 'damping_ratio': 0.1234, 'natural_frequency': 0.2345,
+         'time_constant': 0.3456, 'mostly': 'roll', 'part': 0.4},
         {'pole': [0.0, 0.0], 'damping_ratio': None, 'natural_frequency': 0.6, 'time_constant': None,
          'mostly': 'yaw', 'part': 0.9},
         {'pole': [-3.0, 0.0], 'damping_ratio': 1.0, 'natural_frequency': 3.0, 'time_constant': 0.33,
@@ -157,8 +157,8 @@ def test_poles_of_models(monkeypatch, approved) -> None:
         {'pole, 1/s': text, 'damping': ratio, 'frequency, rad/s': omega, 'time constant, s': time,
          'mostly': dof, 'part, %': part}
         for text, ratio, omega, time, dof, part in (
-            ('0.5 ± 0.25i', 0.1, 0.2, 0.3, 'roll', 40.0), ('0', '–', 0.6, '–', 'yaw', 90.0),
-            ('-3', 1.0, 3.0, 0.33, 'sway', 100.0),
+            ('0.5 ± 0.25i', 0.1234, 0.2345, 0.3456, 'roll', 40.0),
+            ('0', '–', 0.6, '–', 'yaw', 90.0), ('-3', 1.0, 3.0, 0.33, 'sway', 100.0),
         )
     ]  # fmt: skip
     assert printed.lines == [
@@ -172,7 +172,8 @@ def test_margins_of_controllers(monkeypatch, approved) -> None:
     printed = Printed(monkeypatch, linearize, approved)
     axes = [
         {'axis': dof, 'gain_margin_db': 10.0 + k, 'phase_margin': 20.0 + k,
-         'delay_margin': 30.0 + k, 'crossover': 40.0 + k, 'value': 50.0 + k, 'largest': 60.0 + k}
+         'delay_margin': 30.25 + k, 'crossover': 40.25 + k, 'value': 50.25 + k,
+         'largest': 60.25 + k}
         for k, dof in enumerate(DOFS)
     ]  # fmt: skip
     found = {'axes': axes, 'period': 0.01, 'delay': 0.02, 'lag': 0.03, 'stable': True,

@@ -237,7 +237,8 @@ class _Builder:
         self._seen = 0
         self._outside, self._left = 0.0, -1  # time and number of the last sample far from zero
         self._estimates, self._missed = False, np.zeros(6, bool)
-        self._begin, self._end = np.zeros(12), np.zeros(6)
+        self._begin: np.ndarray  # eta and nu of the first sample
+        self._end: np.ndarray  # eta of the last
         self._every = 1 << ((run.samples - 1) // COURSE).bit_length()  # runs share the times of it
         self._course: dict[str, list[np.ndarray]] = {}
 

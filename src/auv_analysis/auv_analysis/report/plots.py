@@ -176,7 +176,7 @@ def look(index: int) -> dict[str, Any]:
 
 
 def small_multiples(
-    count: int, across: int = 3, height: float = 1.9, **axes: Any
+    count: int, across: int = 3, *, height: float = 1.9, **axes: Any
 ) -> tuple[Figure, list[Axes]]:
     """Figure of equal panels in rows, and its panels; what is left of the last row is empty.
 
@@ -201,7 +201,7 @@ def small_multiples(
 
 def time_panels(panels: Sequence[Panel], across: int = 1, height: float = 1.7) -> Figure:
     """Curves over one time axis, a panel each, with one legend above."""
-    figure, grid = small_multiples(len(panels), across, height, sharex=True)
+    figure, grid = small_multiples(len(panels), across, height=height, sharex=True)
     for index, (axes, panel) in enumerate(zip(grid, panels, strict=True)):
         for curve in panel.curves:
             axes.plot(curve.x, curve.y, **{'label': curve.label or '_', **curve.look})

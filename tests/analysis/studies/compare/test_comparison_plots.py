@@ -311,6 +311,9 @@ def test_sentences_count_what_settles_differs_and_fails() -> None:
         'Durations differ: 3 s (2 runs) and 5 s (1 runs); steps differ: 0.1 s (2 runs) and '
         '0.2 s (1 runs); means and root mean squares are those of each whole run.'
     )
+    for many, end in ((6, '5 s (1 runs) and 6 s (1 runs); '), (7, '6 s (1 runs) and others; ')):
+        text = said(*(a | {'duration': i + 1.0} for i in range(many)))[1]
+        assert f'{end}means and root mean squares' in text
     failed = [_row(f'f{i}', None, failure='lost') for i in range(7)]
     assert said(a, failed[0])[1] == '1 of 2 runs failed and have no figures: f0.'
     assert said(a, *failed)[1].endswith(': f0, f1, f2, f3, f4, f5 and others.')

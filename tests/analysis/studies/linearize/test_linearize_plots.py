@@ -66,3 +66,7 @@ def test_poles_and_loops(tmp_path) -> None:
             same((x, y), omega[seen], size[seen] if axes is upper else phase[seen])
     assert '0.01 s, 0.02 s late, actuator lag 0.03 s' in records['bode_cl'].caption
     assert (upper.get_xscale(), upper.get_yscale(), lower.get_yscale()) == ('log', 'log', 'linear')
+
+
+def test_markers_are_told_apart() -> None:
+    assert len(set(linearize.MARKS)) == len(linearize.MARKS)

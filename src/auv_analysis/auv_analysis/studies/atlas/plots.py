@@ -120,7 +120,7 @@ def _panels(grids: dict[str, HeatMap]) -> Figure | None:
     """A square panel per grid, all on one scale."""
     if not grids:
         return None
-    figure, panels = plots.small_multiples(len(grids), ACROSS, 2.9)
+    figure, panels = plots.small_multiples(len(grids), ACROSS, height=2.9)
     for axes, (name, grid) in zip(panels, grids.items(), strict=True):
         draw_grid(axes, grid)
         axes.set_yticks(range(6), DOFS)

@@ -218,7 +218,9 @@ def _groups(entries: Sequence[Entry]) -> dict[str, dict[str, RunDigest]]:
 
 def _panels(groups: Mapping[str, Mapping[str, RunDigest]], labels: Sequence[str]) -> Figure:
     across = -(-len(groups) // -(-len(groups) // ACROSS))
-    figure, panels = plots.small_multiples(len(groups), across, 1.75, sharex=True, sharey=True)
+    figure, panels = plots.small_multiples(
+        len(groups), across, height=1.75, sharex=True, sharey=True
+    )
     for axes, (scenario, runs) in zip(panels, groups.items(), strict=True):
         for label, run in runs.items():
             t, ratio = still_to_come(run)

@@ -223,7 +223,8 @@ def _differing(rows: Rows) -> str:
     for name in ('duration', 'step'):
         counts = Counter(row[name] for row in rows)
         if len(counts) > 1:
-            listed = [f'{value:g} s ({count} runs)' for value, count in counts.most_common(6)]
+            listed = [f'{value:g} s ({count} runs)' for value, count in counts.most_common()]
+            listed = [*listed[:MOST_NAMES], *(['others'] if len(listed) > MOST_NAMES else [])]
             parts.append(f'{name}s differ: {join(listed)}')
     if not parts:
         return ''

@@ -86,7 +86,7 @@ def _wrench(found: Excited) -> Drawn:
 
 def _tank(found: Excited) -> Drawn:
     """Paths of the prior and of vehicles around it, within the room that there is."""
-    figure, panels = small_multiples(len(PLANES), 2, 3.0)
+    figure, panels = small_multiples(len(PLANES), 2, height=3.0)
     room = found.request.bounds.room / 2.0
     for axes, (across, up, x_label, y_label) in zip(panels, PLANES, strict=True):
         for k, states in enumerate(found.motion.states[MOST:0:-1, 0]):

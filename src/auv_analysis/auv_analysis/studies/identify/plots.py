@@ -101,7 +101,7 @@ def _trace(found: Identified, pairs: Pairs) -> Drawn:
 
 def _inertia(rows: Sequence[Mapping[str, Any]]) -> Drawn:
     """Off-diagonal inertia before and after, with intervals."""
-    figure, panels = small_multiples(3, 3, 2.6)
+    figure, panels = small_multiples(3, 3, height=2.6)
     units = dict.fromkeys(row['unit'] for row in rows)
     for axes, unit in zip(panels, units, strict=False):
         some = [row for row in rows if row['unit'] == unit]
@@ -124,7 +124,7 @@ def _inertia(rows: Sequence[Mapping[str, Any]]) -> Drawn:
 def _profiles(found: Identified) -> Drawn:
     """Rise of the cost over each coefficient that was held, and the parabola of its interval."""
     count = len(found.profiles)
-    figure, panels = small_multiples(count, min(count, 3), 1.9)
+    figure, panels = small_multiples(count, min(count, 3), height=1.9)
     border = found.fit.quantile**2
     for axes, one in zip(panels, found.profiles, strict=False):
         x = np.linspace(one.values[0], one.values[-1], 101)
@@ -143,7 +143,7 @@ def _profiles(found: Identified) -> Drawn:
 
 def _residuals(found: Identified, pairs: Pairs) -> Drawn:
     """Spectra of the residuals: white ones are flat, at one."""
-    figure, panels = small_multiples(6, 3, 1.7, sharex=True, sharey=True)
+    figure, panels = small_multiples(6, 3, height=1.7, sharex=True, sharey=True)
     rate = 1.0 / found.problem.step
     for i, (axes, dof) in enumerate(zip(panels, DOFS, strict=True)):
         spectra = []

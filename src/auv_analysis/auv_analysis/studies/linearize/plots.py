@@ -40,7 +40,7 @@ def _bode(name: str, setting: ControlLoop) -> Drawn:
     loop = setting.loop()
     omega, S = setting.sensitivity(loop)
     gain = 1 / np.diagonal(S, axis1=1, axis2=2) - 1
-    figure, (upper, lower) = plots.small_multiples(2, 1, 2.0, sharex=True)
+    figure, (upper, lower) = plots.small_multiples(2, 1, height=2.0, sharex=True)
     for i, dof in enumerate(DOFS):
         size = np.abs(gain[:, i])
         seen = (size > BELOW) & (size < ABOVE)

@@ -75,7 +75,7 @@ def main_measures(analysis: Analysis, count: int = 6) -> list[Measure]:
 def _distributions(analysis: Analysis) -> Drawn:
     measures, controllers = analysis.measures, analysis.sweep.controllers
     looks = {name: look(i) for i, name in enumerate(controllers)}
-    figure, panels = plots.small_multiples(len(measures), 4, 1.75, sharey=True)
+    figure, panels = plots.small_multiples(len(measures), 4, height=1.75, sharey=True)
     for axes, measure in zip(panels, measures, strict=True):
         values = ordered(analysis.values[measure.name], measure.unit)
         samples = {name: thinned(values[analysis.rows_of(name)]) for name in controllers}
@@ -302,7 +302,7 @@ def _together(analysis: Analysis, measures: Sequence[Measure]) -> Drawn:
     rows = analysis.tables['together']
     controllers = list(dict.fromkeys(row['controller'] for row in rows))[:MOST_GRIDS]
     across = len(controllers)
-    figure, panels = plots.small_multiples(len(measures) * across, across, 2.6)
+    figure, panels = plots.small_multiples(len(measures) * across, across, height=2.6)
     first, second = analysis.pair
     names = short_names(analysis.factors)
     for i, measure in enumerate(measures):

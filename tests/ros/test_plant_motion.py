@@ -161,7 +161,9 @@ def test_a_reset_puts_the_vehicle_back_after_the_step_that_is_under_way(made, ve
     for k in range(3):
         answered(made, k)
     made.until(lambda: len(made.heard['odom']) == 4, 'step 3')
-    assert 'from step 4' in made.call(Trigger, 'plant_node/reset').message
+    answer = made.call(Trigger, 'plant_node/reset')
+    assert answer.success
+    assert 'from step 4' in answer.message
     for k in range(3, 6):
         answered(made, k)
     for k, (position, R, nu, _, F) in enumerate(moved(5, np.inf, reset=3)):

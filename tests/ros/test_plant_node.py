@@ -220,7 +220,9 @@ def test_a_reset_in_real_time_puts_the_vehicle_back_at_once(peer) -> None:
     listening(peer)
     odometry(peer, 20)
     moved = peer.heard['odom'][-1].pose.pose.position.z
-    said = peer.call(Trigger, 'plant_node/reset').message
+    answer = peer.call(Trigger, 'plant_node/reset')
+    said = answer.message
+    assert answer.success
     step = int(said.removeprefix('state of the start from step '))
     back = odometry(peer, step + 1)[step].pose.pose.position.z
     assert abs(back - 3.0) < 1e-6 < abs(moved - 3.0), 'it rises, being light'

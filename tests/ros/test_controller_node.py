@@ -30,8 +30,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from auv_dynamics.files.errors import ENDING
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
-from auv_dynamics.ros.node_interface import ERROR, WARN
-from auv_gvc_controller.nodes.controller_node import ControllerNode
+from auv_dynamics.ros.node_interface import ERROR, OK, WARN
+from auv_gvc_controller.nodes.controller_node import ControllerNode, Idle
 
 FRAMES = Frames()
 STEP = 10_000_000
@@ -395,3 +395,9 @@ def test_in_real_time_nothing_beyond_the_limit_is_published(limit: str) -> None:
         peer.spin(0.1)
         peer.until(lambda: offer(peer).wrench.force.x == 5.0, 'the limit')
         assert max(abs(m.wrench.force.x) for m in peer.heard['wrench']) == 5.0
+
+
+def test_what_nobody_upstream_can_mend_is_an_error() -> None:
+    idle = Idle(None, derivative=False)
+    assert idle.health('', 5) == (OK, '')
+    assert idle.health('the law answers nan', 5) == (ERROR, 'the law answers nan')

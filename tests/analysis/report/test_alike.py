@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace as Made
 
 import numpy as np
 import pytest
@@ -141,3 +142,11 @@ def test_disturbances_are_shared_where_the_faults_are_too(run) -> None:
         report = SectionInputs(drawn, {}, scenes, [], {})
         same.append(report._share_disturbances([*drawn.values()]))
     assert same == [True, False]
+
+
+def test_ten_samples_at_equal_times_are_enough_to_compare() -> None:
+    t, nu_d = np.arange(30.0), np.ones((30, 6))
+    for shared, known in ((9, None), (10, True), (11, True)):
+        later = t + 0.5 * (t >= shared)
+        runs = [Made(course={'t': times, 'nu_d': nu_d}) for times in (t, later)]
+        assert alike(runs, 'nu_d') is known

@@ -236,6 +236,14 @@ def test_thrusters():
     assert light['largest']['heave'] == pytest.approx([2 * 40.2, 2 * 51.5], rel=1e-3)
 
 
+def test_limits_of_thrusters_stand_under_their_names():
+    found, thrusters = check_vehicle('bluerov2_heavy')['thrusters'], load_vehicle(
+        'bluerov2_heavy').thrusters  # fmt: skip
+    assert (found['forward'], found['reverse']) == (
+        thrusters.forward.tolist(), thrusters.reverse.tolist()
+    )  # fmt: skip
+
+
 def test_rotors(capsys, approved):
     found = check_vehicle('bluerov2_heavy')['thrusters']['rotors']
     assert len(found) == 8

@@ -99,11 +99,10 @@ def test_settled_is_the_last_time_of_a_large_error_unless_it_is_too_late(last, s
     assert found.settled == pytest.approx(settled)
 
 
-def test_a_course_has_as_many_samples_as_it_may(run) -> None:
+def test_a_course_has_as_many_samples_as_it_may(run, monkeypatch) -> None:
+    monkeypatch.setattr(digesting, 'COURSE', 100)
     for samples in (2, 200, 201, 399, 400):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(digesting, 'COURSE', 100)
-            shown = digests({'a': run.part(slice(0, samples))})['a']
+        shown = digests({'a': run.part(slice(0, samples))})['a']
         assert min(samples, 50) <= len(shown.course['t']) <= 100, samples
 
 

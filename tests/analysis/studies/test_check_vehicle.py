@@ -237,11 +237,10 @@ def test_thrusters():
 
 
 def test_limits_of_thrusters_stand_under_their_names():
-    found, thrusters = check_vehicle('bluerov2_heavy')['thrusters'], load_vehicle(
-        'bluerov2_heavy').thrusters  # fmt: skip
-    assert (found['forward'], found['reverse']) == (
-        thrusters.forward.tolist(), thrusters.reverse.tolist()
-    )  # fmt: skip
+    found = check_vehicle('bluerov2_heavy')['thrusters']
+    thrusters = load_vehicle('bluerov2_heavy').thrusters
+    assert found['forward'] == thrusters.forward.tolist()
+    assert found['reverse'] == thrusters.reverse.tolist()
 
 
 def test_rotors(capsys, approved):

@@ -146,6 +146,77 @@ def test_numbers_for_programs_stand_under_their_names() -> None:
     ]
 
 
+def test_without_anything_held_out_or_with_a_contradiction_there_is_no_model() -> None:
+    assert identify.verdict([], []) == (
+        'Nothing was held out: how good the model is has not been tried.'
+    )
+    assert identify.verdict([], ['it is wrong', 'twice']) == 'No vehicle file: it is wrong.'
+    assert identify.verdict_alone('rov', []) == 'Nothing was held out.'
+
+
+def test_how_an_identification_was_asked_for() -> None:
+    assert identify._asked(Made(problem=Made(observer=0.0), resampled=[])) == []
+    gain, draws = identify._asked(Made(problem=Made(observer=0.25), resampled=[1, 2, 3]))
+    assert gain.startswith('Along segments the simulated state follows the measurements by a gain '
+                           'of 0.25 a step; residuals are')  # fmt: skip
+    assert draws.startswith('The bootstrap has 3 draws of blocks of time, each refitted')
+
+
+def test_what_residuals_say() -> None:
+    def row(dof: str, verdict: str, largest: float, slow: float) -> dict:
+        return {'dof': dof, 'verdict': verdict, 'largest': largest, 'slow': slow,
+                'slow_if_white': 0.02}  # fmt: skip
+
+    white, one = row('roll', 'white', 0.1, 0.9), row('surge', 'coloured', 0.2, 0.05)
+    two, slow = row('yaw', 'coloured', -0.45, 0.04), row('sway', 'slow', 0.3, 0.5)
+    assert told([]).startswith('Whether the residuals are white cannot be told: no even rate')
+    assert told([white]) == 'The residuals are white: the model explains all but noise'
+    assert told([white, one, two]) == (
+        'The residuals are not white in surge and yaw: autocorrelation up to 0.45'
+    )
+    assert told([one, slow, white]) == (
+        'The residuals are not white in surge and sway: in sway 50 % of their power lies below '
+        f'{SLOW:g} Hz, of white noise 2.0 %; something slow acts that the model lacks'
+    )
+
+
+@pytest.mark.parametrize(
+    ('part', 'some', 'text'),
+    [
+        ([0.1, 0.9, 0.0], [1], 'nothing is known of b'),
+        ([0.5, 0.5, 0.0], [0, 1], 'only the difference of a and b is known, not all of them '
+                                  'together'),
+        ([0.5, -0.5, 0.1], [0, 1], 'a may grow if b becomes less'),
+        ([0.0, 0.0, 1.0], [2], 'the scale of the wrench cannot be told from that of all of M, D '
+                               'and g together'),
+    ],
+)  # fmt: skip
+def test_directions_that_the_data_leave_open(part: list[float], some: list[int], text: str) -> None:
+    assert _words(['a', 'b', 'gain.surge'], np.array(part), some) == text
+
+
+def test_each_coefficient_of_a_vehicle_file_has_its_line() -> None:
+    def row(name: str, status: str, low: float | None, high: float | None) -> dict:
+        return {'name': name, 'status': status, 'low': low, 'high': high, 'value': 2.5,
+                'prior': 1.5, 'unit': '' if name == 'gain' else 'kg'}  # fmt: skip
+
+    assert vehicle_text._said([], 'mass') == []
+    rows = [
+        row('a', 'at zero', None, None), row('b', 'at zero', None, 3.0),
+        row('c', 'identified', 2.0, 3.0), row('d', 'identified', -1.0, 6.0),
+        row('gain', 'not identified', None, None), row('e', 'identified', 0.0, 5.0),
+    ]  # fmt: skip
+    assert vehicle_text._said(rows, 'mass') == [
+        '# mass:',
+        '#   a: held at 0, as it would feed energy beside what was identified',
+        '#   b: at its bound 0 kg, at most 3.0000 kg',
+        '#   c: identified 2.5000 kg, within 2.0000 to 3.0000 kg',
+        '#   d: identified 2.5000 kg, within −1.0000 to 6.0000 kg; no more than its uncertainty',
+        '#   gain: prior 1.5000, not identified by itself',
+        '#   e: identified 2.5000 kg, within 0 to 5.0000 kg; no more than its uncertainty',
+    ]
+
+
 # atlas
 
 
@@ -245,11 +316,11 @@ def test_findings_of_a_tuning() -> None:
     assert 'gvc_tuned (0.500 times) is ahead of gvc (ratios' in lost[2]
 
 
-# design
-
-
 def test_all_that_a_tuning_draws_is_explained() -> None:
     assert list(tune.SPREADS) == [one.name for one in fields(Spread)]
+
+
+# design
 
 
 def test_changes_of_a_design_are_marked() -> None:
@@ -304,6 +375,30 @@ def test_the_best_change_of_each_part_is_in_the_matrix() -> None:
         ['0.700', '0.900', '9.00', 'x 1.25', ''], ['0.700', '0.400', '9.00', 'x 1.25', 'proposed'],
         ['0.700', '–', '9.00', 'none', 'it diverges'],
     ]  # fmt: skip
+
+
+def test_a_design_says_what_it_does_or_why_there_is_nothing_to_do() -> None:
+    assert nothing_statement('rov', None, []).startswith('rov: M is diagonal, so Upsilon')
+    assert nothing_statement('rov', 'delta_xi.sway', ['delta_xi.roll', 'delta_pi.yaw']) == (
+        'rov: delta_xi.sway is zero in every motion by the structure of M: there is nothing to '
+        'remove. Not zero: delta_xi.roll and delta_pi.yaw.'
+    )
+    for target, what in ((None, 'every coupling'), ('delta_xi.roll', 'delta_xi.roll')):
+        assert nothing_statement('rov', target, ['delta_xi.roll']) == (
+            f'rov: {what} is zero throughout this scenario: there is nothing to remove.'
+        )
+    name, unit = COUPLINGS[1], UNITS[COUPLINGS[1]]
+    for best in (None, Made(ratio=None)):
+        assert result_statement(1, 0.5, best, [], 'by cl') == (
+            f'No change within the bounds lowers {name}, which is 0.500 {unit}, by cl.'
+        )
+    words = ['move it', 'add foam']
+    half = f'Move it; add foam: {name} falls from 0.500 to 0.250 {unit}, by 50.0 %, by cl.'
+    assert result_statement(1, 0.5, Made(ratio=0.5), words, 'by cl') == half
+    assert result_statement(1, 0.5, Made(ratio=0.8), words, 'by cl') == (
+        f'Move it; add foam: {name} falls from 0.500 to 0.400 {unit}, by 20.0 %, by cl. The '
+        'bounds do not allow half: 20.0 % is the most that was found.'
+    )
 
 
 # sweep
@@ -389,104 +484,3 @@ def test_the_largest_share_of_energy_in_case_1_is_shown() -> None:
     results = Results('atlas', {'vehicles': {'a': {'case1': case1}}})
     ((*cells,),) = atlas.reached(results, [chart, _chart('b', 0.1, [], 'x')], 'delta_xi').rows
     assert [cell.value for cell in cells[1:]] == [1.0, 2.0, 3.0, 4.0, 5.0, None, 0.7]
-
-
-# identify, in words of its own
-
-
-def test_without_anything_held_out_or_with_a_contradiction_there_is_no_model() -> None:
-    assert identify.verdict([], []) == (
-        'Nothing was held out: how good the model is has not been tried.'
-    )
-    assert identify.verdict([], ['it is wrong', 'twice']) == 'No vehicle file: it is wrong.'
-    assert identify.verdict_alone('rov', []) == 'Nothing was held out.'
-
-
-def test_how_an_identification_was_asked_for() -> None:
-    assert identify._asked(Made(problem=Made(observer=0.0), resampled=[])) == []
-    gain, draws = identify._asked(Made(problem=Made(observer=0.25), resampled=[1, 2, 3]))
-    assert gain.startswith('Along segments the simulated state follows the measurements by a gain '
-                           'of 0.25 a step; residuals are')  # fmt: skip
-    assert draws.startswith('The bootstrap has 3 draws of blocks of time, each refitted')
-
-
-def test_what_residuals_say() -> None:
-    def row(dof: str, verdict: str, largest: float, slow: float) -> dict:
-        return {'dof': dof, 'verdict': verdict, 'largest': largest, 'slow': slow,
-                'slow_if_white': 0.02}  # fmt: skip
-
-    white, one = row('roll', 'white', 0.1, 0.9), row('surge', 'coloured', 0.2, 0.05)
-    two, slow = row('yaw', 'coloured', -0.45, 0.04), row('sway', 'slow', 0.3, 0.5)
-    assert told([]).startswith('Whether the residuals are white cannot be told: no even rate')
-    assert told([white]) == 'The residuals are white: the model explains all but noise'
-    assert told([white, one, two]) == (
-        'The residuals are not white in surge and yaw: autocorrelation up to 0.45'
-    )
-    assert told([one, slow, white]) == (
-        'The residuals are not white in surge and sway: in sway 50 % of their power lies below '
-        f'{SLOW:g} Hz, of white noise 2.0 %; something slow acts that the model lacks'
-    )
-
-
-@pytest.mark.parametrize(
-    ('part', 'some', 'text'),
-    [
-        ([0.1, 0.9, 0.0], [1], 'nothing is known of b'),
-        ([0.5, 0.5, 0.0], [0, 1], 'only the difference of a and b is known, not all of them '
-                                  'together'),
-        ([0.5, -0.5, 0.1], [0, 1], 'a may grow if b becomes less'),
-        ([0.0, 0.0, 1.0], [2], 'the scale of the wrench cannot be told from that of all of M, D '
-                               'and g together'),
-    ],
-)  # fmt: skip
-def test_directions_that_the_data_leave_open(part: list[float], some: list[int], text: str) -> None:
-    assert _words(['a', 'b', 'gain.surge'], np.array(part), some) == text
-
-
-def test_each_coefficient_of_a_vehicle_file_has_its_line() -> None:
-    def row(name: str, status: str, low: float | None, high: float | None) -> dict:
-        return {'name': name, 'status': status, 'low': low, 'high': high, 'value': 2.5,
-                'prior': 1.5, 'unit': '' if name == 'gain' else 'kg'}  # fmt: skip
-
-    assert vehicle_text._said([], 'mass') == []
-    rows = [
-        row('a', 'at zero', None, None), row('b', 'at zero', None, 3.0),
-        row('c', 'identified', 2.0, 3.0), row('d', 'identified', -1.0, 6.0),
-        row('gain', 'not identified', None, None), row('e', 'identified', 0.0, 5.0),
-    ]  # fmt: skip
-    assert vehicle_text._said(rows, 'mass') == [
-        '# mass:',
-        '#   a: held at 0, as it would feed energy beside what was identified',
-        '#   b: at its bound 0 kg, at most 3.0000 kg',
-        '#   c: identified 2.5000 kg, within 2.0000 to 3.0000 kg',
-        '#   d: identified 2.5000 kg, within −1.0000 to 6.0000 kg; no more than its uncertainty',
-        '#   gain: prior 1.5000, not identified by itself',
-        '#   e: identified 2.5000 kg, within 0 to 5.0000 kg; no more than its uncertainty',
-    ]
-
-
-# design
-
-
-def test_a_design_says_what_it_does_or_why_there_is_nothing_to_do() -> None:
-    assert nothing_statement('rov', None, []).startswith('rov: M is diagonal, so Upsilon')
-    assert nothing_statement('rov', 'delta_xi.sway', ['delta_xi.roll', 'delta_pi.yaw']) == (
-        'rov: delta_xi.sway is zero in every motion by the structure of M: there is nothing to '
-        'remove. Not zero: delta_xi.roll and delta_pi.yaw.'
-    )
-    for target, what in ((None, 'every coupling'), ('delta_xi.roll', 'delta_xi.roll')):
-        assert nothing_statement('rov', target, ['delta_xi.roll']) == (
-            f'rov: {what} is zero throughout this scenario: there is nothing to remove.'
-        )
-    name, unit = COUPLINGS[1], UNITS[COUPLINGS[1]]
-    for best in (None, Made(ratio=None)):
-        assert result_statement(1, 0.5, best, [], 'by cl') == (
-            f'No change within the bounds lowers {name}, which is 0.500 {unit}, by cl.'
-        )
-    words = ['move it', 'add foam']
-    half = f'Move it; add foam: {name} falls from 0.500 to 0.250 {unit}, by 50.0 %, by cl.'
-    assert result_statement(1, 0.5, Made(ratio=0.5), words, 'by cl') == half
-    assert result_statement(1, 0.5, Made(ratio=0.8), words, 'by cl') == (
-        f'Move it; add foam: {name} falls from 0.500 to 0.400 {unit}, by 20.0 %, by cl. The '
-        'bounds do not allow half: 20.0 % is the most that was found.'
-    )

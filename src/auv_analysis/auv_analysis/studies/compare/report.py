@@ -217,6 +217,11 @@ def _settled(rows: Rows) -> str:
     return f'{text}, the first {ends} {number(settled[last])} s.'
 
 
+def _first(words: Sequence[str]) -> str:
+    """As many as are listed, and whether there are others."""
+    return join([*words[:MOST_NAMES], *(['others'] if len(words) > MOST_NAMES else [])])
+
+
 def _differing(rows: Rows) -> str:
     """Durations and steps where they are not all the same, and what that means."""
     parts = []
@@ -224,8 +229,7 @@ def _differing(rows: Rows) -> str:
         counts = Counter(row[name] for row in rows)
         if len(counts) > 1:
             listed = [f'{value:g} s ({count} runs)' for value, count in counts.most_common()]
-            listed = [*listed[:MOST_NAMES], *(['others'] if len(listed) > MOST_NAMES else [])]
-            parts.append(f'{name}s differ: {join(listed)}')
+            parts.append(f'{name}s differ: {_first(listed)}')
     if not parts:
         return ''
     text = '; '.join(parts)
@@ -236,5 +240,4 @@ def _diverged(rows: Rows) -> str:
     failed = [row['run'] for row in rows if row['failure']]
     if not failed:
         return ''
-    shown = [*failed[:MOST_NAMES], *(['others'] if len(failed) > MOST_NAMES else [])]
-    return f'{len(failed)} of {len(rows)} runs failed and have no figures: {join(shown)}.'
+    return f'{len(failed)} of {len(rows)} runs failed and have no figures: {_first(failed)}.'

@@ -314,8 +314,7 @@ def _together(analysis: Analysis, measures: Sequence[Measure]) -> Drawn:
             axes.set_title(f'{controller}: {measure.label}', loc='left', pad=22, fontsize='medium')
             axes.set_ylabel(names[first.path])
             axes.set_xlabel(names[second.path])
-            (image,) = axes.images
-            plots.scale_bar(figure, image, measure.unit, ax=axes, fraction=0.05)
+            plots.scale_bar(figure, axes.images[0], measure.unit, ax=axes, fraction=0.05)
     title = 'The two paths that matter most'
     caption = (
         f'{title}, together: median of the rows of each combination of {first.path} and '

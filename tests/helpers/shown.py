@@ -1,6 +1,7 @@
 """All that a page, a figure or a panel shows to a reader, as lines of text.
 
-How something is laid out (sizes, widths, places of legends) is left out. Of data stands a digest.
+How something is laid out (widths of lines, places of legends) is left out, but for the size of a
+figure, its grid, and sizes and angles of texts that a figure sets. Of data stands a digest.
 """
 
 import base64
@@ -16,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -83,6 +85,7 @@ def figure_lines(figure: Figure) -> Iterator[str]:
     """Panels of a figure, artist by artist; ValueError where a text cannot be set."""
     for text in _texts(figure):
         _set(text.get_text())
+    yield f'{digest(figure.get_size_inches())} in'
     title = figure.get_suptitle()
     yield from [f'title {title}'] if title else []
     yield from (f'text {_words(text)}' for text in figure.texts if text.get_text() != title)
@@ -116,7 +119,10 @@ def _set(text: str) -> None:
 
 def _axes_lines(axes: Axes) -> Iterator[str]:
     place = axes.get_subplotspec()
-    where = f' {place.rowspan.start},{place.colspan.start}' if place is not None else ''
+    where = ''
+    if place is not None:
+        rows, columns = place.get_gridspec().get_geometry()
+        where = f' {place.rowspan.start},{place.colspan.start} of {rows},{columns}'
     titles = [axes.get_title(loc=side) for side in ('left', 'center', 'right')]
     yield f'axes{where}: {" ".join(filter(None, titles))}'
     for name, axis in (('x', axes.xaxis), ('y', axes.yaxis)):
@@ -131,6 +137,8 @@ def _axes_lines(axes: Axes) -> Iterator[str]:
             ticks = ' ticks ' + ', '.join(a if a == b else f'{a} {b}' for a, b in pairs)
         elif isinstance(axis.get_major_formatter(), FuncFormatter):
             ticks = ' ticks ' + ', '.join(axis.get_major_formatter()(v, 0) for v in (0.01, 0.5, 20))
+        ticks += ''.join(f' {name[5:]} {value}' for name, value in axis.get_tick_params().items()
+                         if name in ('labelsize', 'labelrotation') and ticks)  # fmt: skip
         inverted = ' inverted' if axis.get_inverted() else ''
         yield f'  {name} {axis.get_label_text()} {scale}{inverted}{limits}{ticks}'
     kept = [one for one in axes.get_children() if one.get_visible() and one is not axes.patch]
@@ -247,7 +255,8 @@ def _words(text: Text) -> str:
     """A text and where it stands; how far an annotation stands off is layout."""
     at = text.xy if isinstance(text, Annotation) else text.get_position()
     numbers = [value for value in at if not isinstance(value, str)]
-    return f'{text.get_text()!r} {to_hex(text.get_color())} at {digest(numbers)}'
+    size = '' if text.get_fontsize() == rcParams['font.size'] else f' {text.get_fontsize():.3g} pt'
+    return f'{text.get_text()!r}{size} {to_hex(text.get_color())} at {digest(numbers)}'
 
 
 def _legend(key: Legend) -> str:

@@ -31,7 +31,7 @@ from matplotlib.mathtext import MathTextParser
 from matplotlib.patches import Patch
 from matplotlib.spines import Spine
 from matplotlib.text import Annotation, Text
-from matplotlib.ticker import FixedLocator, FuncFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 from pyarrow import parquet
 
 from auv_analysis.report.results import Table
@@ -129,12 +129,16 @@ def _axes_lines(axes: Axes) -> Iterator[str]:
         limits = '' if getattr(axes, f'get_autoscale{name}_on')() else f' {_limits(axes, name)}'
         alike = getattr(axes, f'get_shared_{name}_axes')().get_siblings(axes)
         scale = f'{axis.get_scale()}{" shared" * (len(alike) > 1)}'
+        if axis.get_scale() == 'symlog':
+            scale += f' from {_number(axis.get_transform().linthresh, 1.0)}'
         ticks = ''
         if isinstance(axis.get_major_locator(), FixedLocator):
             locations, texts = axis.get_ticklocs(), axis.get_ticklabels()
             words = [text.get_text() for text in texts]
             pairs = zip_longest((_number(at, 1.0) for at in locations), words, fillvalue='')
             ticks = ' ticks ' + ', '.join(a if a == b else f'{a} {b}' for a, b in pairs)
+        elif type(axis.get_major_locator()) is MaxNLocator:
+            ticks = f' ticks at most {axis.get_major_locator()._nbins}'  # no public way to it
         elif isinstance(axis.get_major_formatter(), FuncFormatter):
             ticks = ' ticks ' + ', '.join(axis.get_major_formatter()(v, 0) for v in (0.01, 0.5, 20))
         ticks += ''.join(f' {name[5:]} {value}' for name, value in axis.get_tick_params().items()

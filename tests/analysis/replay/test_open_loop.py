@@ -129,6 +129,10 @@ def test_in_real_time_a_law_is_asked_while_it_was_in_charge(tmp_path: Path, told
     wrong = replace(found, tau=1.1 * found.tau)
     assert reproduction(recorded, wrong).relative == pytest.approx(0.1)
     assert not reproduction(recorded, wrong).holds
+    assert reproduction(recorded, replace(found, tau=1.04 * found.tau)).holds
+    begun = np.arange(len(found.ns)) < 3
+    ramped = replace(found, tau=np.where(begun[:, None], 9.0, found.tau), ramps=begun)
+    assert reproduction(recorded, ramped).relative == 0.0, 'ramps follow the clock of the node'
 
 
 def test_odometry_that_only_the_controller_heard_is_counted(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from PIL import Image
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018.claims import claims_part, judge_runs
 from auv_analysis.herman2018.paper import paper_figures
-from auv_analysis.output.text import fixed, join, number, plain, tied
+from auv_analysis.output.text import capital, fixed, join, number, plain, tied
 from auv_analysis.report import run_report
 from auv_analysis.report.plots import PALETTE, FigureRecord, style
 from auv_analysis.report.run_plots import draw_figures
@@ -330,6 +330,7 @@ def test_numbers_as_text():
         '12', '0.8', '−0.025', '30\u202f000', '0',
     ]  # fmt: skip
     assert [fixed(x, 2) for x in (-4.016, None)] == ['−4.02', '–']
+    assert [capital(text) for text in ('', 'a', 'aB c', 'Δξ')] == ['', 'A', 'AB c', 'Δξ']
     assert [join(words) for words in ([], ['a'], ['a', 'b'], ['a', 'b', 'c'])] == [
         '', 'a', 'a and b', 'a, b and c',
     ]  # fmt: skip

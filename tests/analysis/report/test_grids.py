@@ -93,6 +93,10 @@ def test_a_symmetric_axis_marks_where_it_becomes_logarithmic() -> None:
     assert named == {
         0.0: '0', 10.0: '$10^{1}$', 100.0: '$10^{2}$', 1000.0: '$10^{3}$', -10.0: '$-10^{1}$'
     }  # fmt: skip
+    axes = _axes(-100.0, 0.0, 1000.0)
+    plots.symmetric(axes, 4.0)
+    ends = sorted(axes.get_yticks())
+    assert [ends[0], ends[-1]] == [-100.0, 1000.0], 'the ends of the data have their numbers'
     assert plots.symmetric(_axes(-1.0, 0.0, 2.0), 0.2) == 0.1
 
 

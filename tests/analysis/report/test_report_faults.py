@@ -16,7 +16,7 @@ from auv_analysis.cli import main
 from auv_analysis.report import plots
 from auv_analysis.report.digest import digests
 from auv_analysis.report.document import NUMBERS
-from auv_analysis.report.faults import fault_overview, fault_part
+from auv_analysis.report.faults import _panel, fault_overview, fault_part
 from auv_analysis.report.panels import interactive
 from auv_analysis.report.scenario_text import set_up
 from auv_analysis.runs.run import Run
@@ -99,6 +99,13 @@ def test_spans_and_numbers_of_a_figure(runs):
     assert [text.get_text() for text in axes.texts] == ['3'], 'those before are not seen here'
     sentence = plots.shade_sentence(digest)
     assert sentence.startswith(' Shaded: 1 thruster T3 at 50 %, 1–2 s; 2 25 % of the meas')
+
+
+def test_a_band_around_errors_that_keep_inside_is_in_sight(runs):
+    with plots.style():
+        axes = plots.new_figure(2.0).subplots()
+        _panel(axes, digests(runs), 0, 5.0)
+    assert axes.get_ylim() == pytest.approx((1.1 * -6.0, 1.3 * 6.0))
 
 
 def test_panels_are_shaded_where_all_runs_have_the_same_faults(runs, folder):

@@ -299,6 +299,7 @@ def test_certificate_figure_of_next_to_nothing(case1):
     title = 'Certificate, gvc'
     found = certificate_figure(digest(two), summary)
     assert found == (None, title, f'{title}: too little to draw.')
+    assert certificate_figure(digest(run.part(run.t <= 0.025)), summary)[0], 'three samples'
 
 
 def test_axes_that_are_called_logarithmic_are(case1):

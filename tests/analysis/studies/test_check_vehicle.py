@@ -2,6 +2,7 @@
 
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -375,7 +376,8 @@ def test_poles_ahead_say_whether_a_vehicle_keeps_its_course(written):
     bare = cruise(written(data), 2.0)
     assert (bare['verdict'], bare['speed_source']) == ('unstable', 'given')
     assert 'key lift' in bare['hint']
-    assert cruise(written(data | {'name': 'other'}))['speed_source'] == 'assumed'
+    other = cruise(written(data | {'name': 'other'}))
+    assert (other['speed_source'], other['speed']) == ('assumed', 1.0)
     data['added_mass'] = [1.0, 16.0, 0.5, 0.01, 1.0, 1.0]
     M = load_vehicle(written(data)).M
     assert munk_terms(M)[5, 1] < 0, 'it is turned in yaw'
@@ -417,6 +419,16 @@ def test_what_turns_over_is_said(eigenvalue, turns):
     _hydrostatics_table(found, Console(file=out, width=120))
     assert ('unstable in pitch: the vehicle turns over' in out.getvalue()) is turns
     assert 'unstable in roll' not in out.getvalue()
+
+
+@pytest.mark.parametrize(
+    ('sway', 'heave', 'turned'),
+    [(0.0, 0.0, False), (0.5, 0.0, True), (0.0, 0.5, True), (-1.0, -1.0, False)],
+)
+def test_what_turns_a_vehicle_across_the_flow(sway, heave, turned):
+    vehicle = load_vehicle('lauv')
+    M = np.diag([30.0, 30.0 + sway, 30.0 + heave, 1.0, 2.0, 3.0])
+    assert (_munk(replace(vehicle, M=M)) is not None) == turned
 
 
 def test_with_lift_a_hint_lays_it_to_too_little():

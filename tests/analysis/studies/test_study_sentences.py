@@ -61,6 +61,12 @@ def test_the_verdict_on_a_model(prior, rival, text: str) -> None:
     assert identify.verdict([], []).startswith('Nothing was held out')
 
 
+@pytest.mark.parametrize(('horizon', 'told'), [(0.1, False), (0.5, True), (5.0, True)])
+def test_a_rival_is_judged_where_more_than_noise_tells(horizon: float, told: bool) -> None:
+    rows = [_predicted('prior', 5.0, *BETTER), _predicted('black box', horizon, *EVEN)]
+    assert ('not clearly better than black box.' in identify.verdict(rows, [])) == told
+
+
 def test_the_worst_horizon_decides() -> None:
     rows = [_predicted('prior', 0.5, *WORSE), _predicted('prior', 5.0, *BETTER)]
     assert identify.verdict(rows, []) == (
@@ -77,6 +83,15 @@ def test_the_verdict_on_a_vehicle_alone() -> None:
     rows[-2] = _predicted('black box', 0.5, *EVEN)
     assert identify.verdict_alone('v', rows).endswith('not clearly better than black box.')
     assert identify.verdict_alone('v', []) == 'Nothing was held out.'
+
+
+@pytest.mark.parametrize('border', [(0.8, 0.9, 1.0), (1.0, 1.1, 1.2)])
+def test_an_interval_that_ends_at_one_tells_nothing(border) -> None:
+    rows = [_predicted(name, 5.0, *border) for name in ('prior', 'persistence', 'black box')]
+    assert identify.verdict(rows, []).startswith('The new model cannot be told from the prior')
+    assert identify.verdict_alone('v', rows) == (
+        'v predicts not clearly better than persistence and not clearly better than black box.'
+    )
 
 
 def test_sentences_of_an_identification() -> None:
@@ -257,6 +272,21 @@ def test_the_unit_of_an_entry_is_that_of_its_velocities() -> None:
         ['sway', 'roll', 'm/s per rad/s'], ['roll', 'yaw', 'rad/s per rad/s'],
         ['surge', 'heave', 'm/s per m/s'],
     ]  # fmt: skip
+
+
+# sweep
+
+
+@pytest.mark.parametrize(
+    ('count', 'note'),
+    [(20, ''), (21, 'Another one is in failures.parquet.'),
+     (22, '2 others are in failures.parquet.')],
+)  # fmt: skip
+def test_failures_that_are_left_out_are_counted(count: int, note: str) -> None:
+    row = {'path': 'p', 'value': '1', 'controller': 'c', 'rows': 8, 'diverged': 1, 'refused': 1,
+           'diverged_percent': 12.5, 'refused_percent': 12.5}  # fmt: skip
+    (table,) = sweep._failures(Made(tables={'failures': [row] * count}, reasons=list))
+    assert (len(table.rows), table.note) == (20, note)
 
 
 # tune

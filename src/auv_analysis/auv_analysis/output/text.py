@@ -80,6 +80,11 @@ def join(words: Sequence[str]) -> str:
     return ' and '.join(filter(None, [', '.join(words[:-1]), *words[-1:]]))
 
 
+def capital(text: str) -> str:
+    """A text as the begin of a sentence."""
+    return text[:1].upper() + text[1:]
+
+
 def residuals(summary: Mapping[str, Any]) -> list[str]:
     """Largest error of the final dwell time per degree of freedom of a summary, with its unit."""
     units = 3 * ['m/s'] + 3 * ['rad/s']

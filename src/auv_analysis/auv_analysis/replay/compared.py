@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from auv_analysis.bag.attachments import UNKNOWN
+from auv_analysis.output.text import capital
 from auv_analysis.replay.open_loop import OpenLoop, RecordedLoop
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -211,7 +212,7 @@ def _figure(document: Mapping[str, Any], both: Compared) -> tuple[Figure, str, s
     for axes in panels[-1]:
         axes.set_xlabel('$t$ (s)')
     panels[0, 1].legend(loc='lower right', bbox_to_anchor=(1.0, 1.02), ncols=2)
-    said = f'{verdict[0].upper()}{verdict[1:]}'
+    said = capital(verdict)
     figure.suptitle(said, fontsize='small')
     title = f'What {names[1]} would have commanded'
     recorded = 'at the recorded velocity and set-point, beside the recorded wrench'

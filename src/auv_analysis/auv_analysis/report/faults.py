@@ -21,7 +21,7 @@ from auv_analysis.metrics.fault_response import (
 )
 from auv_analysis.metrics.quantities import SIGNALS, mathtext
 from auv_analysis.metrics.summary import BAND_TEXT, TRANSIENT
-from auv_analysis.output.text import Maths, join, number
+from auv_analysis.output.text import Maths, capital, join, number
 from auv_analysis.report import plots
 from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence
@@ -146,9 +146,10 @@ def _panel(axes: Axes, runs: Mapping[str, RunDigest], i: int, band: float | None
             if part != 'early':
                 low, high = min(low, np.nanmin(error)), max(high, np.nanmax(error))
         axes.set_xlim(run.start, run.start + run.duration)
-    for level in () if band is None else (-band, band):
-        axes.axhline(level, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)), zorder=1.5)
-        low, high = min(low, 1.2 * level), max(high, 1.2 * level)
+    if band is not None:
+        for level in (-band, band):
+            axes.axhline(level, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)), zorder=1.5)
+        low, high = min(low, -1.2 * band), max(high, 1.2 * band)
     axes.set_ylim(1.1 * low, ROOM * high)
     plots.shade(axes, next(iter(runs.values())))
 
@@ -211,4 +212,4 @@ def _times(response: FaultResponse) -> str:
     note = f'as long as the fault ({SHORTEST:g} s at least) or up to the next change'
     until = '' if response.until is None else f'; recovery is looked for up to {response.until:g} s'
     text = ', '.join(texts)
-    return f'{text[0].upper()}{text[1:]} ({note}){until}.'
+    return f'{capital(text)} ({note}){until}.'

@@ -16,7 +16,7 @@ from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.report.digest import ESTIMATES, RunDigest
 from auv_analysis.report.plots import COLOURS, GREY, moving, unrecorded
 from auv_analysis.report.traces import broken, thinned
-from auv_analysis.scenario.fault_words import Mark
+from auv_analysis.scenario.fault_words import Mark, line_of
 from auv_dynamics.vehicle import DOFS
 
 INK, BOUND, IDENTITY = '#1a1a1a', '#D55E00', '#56B4E9'
@@ -249,14 +249,14 @@ def _shade(plot: Any, mark: Mark, faults: Sequence[Mark]) -> None:
     """Shade a fault, its number on it."""
     from bokeh.models.annotations import BoxAnnotation, Label
 
-    row = sum(other.start <= mark.start < other.end for other in faults[: mark.number - 1])
     box: Any = BoxAnnotation(left=mark.start, fill_color=FAULT, fill_alpha=0.14, line_color=None)
     box.level = 'underlay'
     if not math.isinf(mark.end):
         box.right = mark.end
     plot.add_layout(box)
     number: dict[str, Any] = {'text': f'{mark.number}', 'text_font_size': '10px', 'x_offset': 3}
-    plot.add_layout(Label(x=mark.start, y=120 - 13 * (row % 4), y_units='screen', **number))
+    height = 120 - 13 * line_of(mark, faults)
+    plot.add_layout(Label(x=mark.start, y=height, y_units='screen', **number))
 
 
 def panel_sets(runs: Mapping[str, RunDigest]) -> dict[str, PanelSet]:

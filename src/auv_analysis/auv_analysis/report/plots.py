@@ -29,6 +29,7 @@ from auv_analysis.metrics.statistics import Part
 from auv_analysis.output.parallel import results
 from auv_analysis.output.text import fixed, number, plain, typeset
 from auv_analysis.report.digest import RunDigest
+from auv_analysis.scenario.fault_words import line_of
 from auv_dynamics.vehicle import DOFS
 
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#D55E00', '#56B4E9')  # Okabe and Ito
@@ -293,11 +294,8 @@ def shade(axes: Axes, run: RunDigest) -> None:
         if begin >= end:
             continue
         axes.axvspan(begin, end, color=FAULT, linewidth=0, zorder=0.4)
-        level = sum(
-            other.start <= mark.start < other.end for other in run.faults[: mark.number - 1]
-        )
         axes.text(
-            (begin + end) / 2, 0.985 - 0.11 * (level % 4), f'{mark.number}',
+            (begin + end) / 2, 0.985 - 0.11 * line_of(mark, run.faults), f'{mark.number}',
             transform=axes.get_xaxis_transform(), ha='center', va='top', fontsize=6.5,
             color=FAULT_INK, zorder=3.5,
         )  # fmt: skip

@@ -8,6 +8,8 @@ from auv_dynamics.plant.faults import RANDOM
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle
 
+LINES = 4  # below each other, in which numbers of faults stand
+
 
 class Mark(NamedTuple):
     """A fault as a run shows it.
@@ -32,6 +34,12 @@ class Mark(NamedTuple):
         if math.isinf(self.end):
             return f'from {self.start:g} s on' if self.start else 'throughout'
         return f'{self.start:g}–{self.end:g} s'
+
+
+def line_of(mark: Mark, marks: Sequence[Mark]) -> int:
+    """In which of `LINES` the number of a mark stands: below those that its start finds there."""
+    earlier = marks[: mark.number - 1]
+    return sum(other.start <= mark.start < other.end for other in earlier) % LINES
 
 
 def marks_of(specs: Sequence[Mapping[str, Any]], vehicle: Vehicle) -> tuple[Mark, ...]:

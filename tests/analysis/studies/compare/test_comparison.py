@@ -128,3 +128,18 @@ def test_structural_zeros_are_told_from_what_is_zero(entries, table) -> None:
     assert always[2].all()
     assert not always[4].any()
     assert not plots.structural(table, 'effort.rms').any()
+
+
+def test_a_grid_of_panels_is_drawn_of_twelve_scenarios_at_most(entries) -> None:
+    for count, few in ((12, True), (13, False)):
+        many = [replace(entries[0], name=f's{i}/gvc', scenario=f's{i}') for i in range(count)]
+        assert ('falls below the dotted 1' in plots.errors(many)[2]) is few
+
+
+def test_a_line_ends_where_its_error_is_zero() -> None:
+    run = simulate(SHORT, 'gvc')
+    nu = np.where(run.t[:, None] > 3.0, run.nu_d, run.nu)
+    one = replace(entry('case1/gvc', SHORT, 'gvc'), digest=digest(replace(run, nu=nu)))
+    t, ratio = plots.errors([one])[0].axes[0].lines[0].get_data()
+    assert t.max() == pytest.approx(3.0)
+    assert ratio.min() > 0

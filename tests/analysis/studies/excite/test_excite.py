@@ -116,6 +116,13 @@ def test_the_report_has_its_numbers_where_their_heads_say(
     )
 
 
+def test_four_things_that_stay_open_are_said(excited) -> None:
+    results = results_of(excited)
+    results.facts['combinations'] = [{'words': f'w{k}'} for k in range(6)]
+    said = [text for text in sentences(results) if text.startswith('Open: ')]
+    assert said == [f'Open: w{k}.' for k in range(4)]
+
+
 def test_it_tells_more_than_case_1(excited) -> None:
     mine, case1 = halves(excited.predicted), halves(excited.case1)
     assert len(mine) > len(case1)

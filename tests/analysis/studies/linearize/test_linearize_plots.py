@@ -70,3 +70,10 @@ def test_poles_and_loops(tmp_path) -> None:
 
 def test_markers_are_told_apart() -> None:
     assert len(set(linearize.MARKS)) == len(linearize.MARKS)
+
+
+def test_poles_that_are_all_zero_have_panels_alike(tmp_path) -> None:
+    with artists.captured() as figures:
+        linearize.draw({'still': Made(A=np.zeros((8, 8)))}, {}, tmp_path)
+    every, slow = figures['poles'].axes
+    assert (every.get_xlim(), every.get_ylim()) == (slow.get_xlim(), slow.get_ylim())

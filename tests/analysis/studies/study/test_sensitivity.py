@@ -226,6 +226,8 @@ def test_a_users_own_law_is_studied_as_it_runs(monkeypatch, tmp_path):
     monkeypatch.setattr(batch, 'kernels', lambda law, hold: kernels(law, hold)[-1:])
     found = sensitivity(scenario, 'own')
     assert (found.method, found.count, found.rollouts) == ('morris', 4, 4 * 3 + 1)
+    assert sensitivity(scenario, 'own', method='morris').count == 4
+    assert sensitivity(scenario, 'own', count=2).method == 'morris'
     push = found.of('effort.max')['surge']
     assert [row['gain'] for row in push] == ['k_B', 'k_A']
     assert [row['elasticity'] for row in push] == pytest.approx([-2.0, 1.0])

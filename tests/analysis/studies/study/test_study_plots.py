@@ -67,6 +67,8 @@ def test_the_measure_that_follows_the_gains_most_in_words() -> None:
         '6 in 95 % of the resamplings): k_D makes 70 % of its variance, and doubling k_D changes '
         'it by about −58 %.'
     )
+    main |= {'doubled': 0.5}
+    assert study._headline(found, 'velocity_error.rms', 'sway', main).endswith('about +0.50 %.')
     main |= {'rank_high': 3, 'rank_low': 2, 'doubled': 12.0}
     found.method = 'morris'
     assert study._headline(found, 'velocity_error.rms', 'sway', main).endswith(

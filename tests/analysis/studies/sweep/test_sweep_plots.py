@@ -281,7 +281,9 @@ def test_elementary_effects_stand_at_their_places(tmp_path: Path) -> None:
     alone = replace(analysis, tables=analysis.tables | {
         'indices': [row for row in analysis.tables['indices'] if row['controller'] == 'gvc']
     })  # fmt: skip
-    legend = plots._effects(alone, shown)[0].legends[0]
+    figure = plots._effects(alone, [*shown, replace(shown[0], name='absent')])[0]
+    assert len([axes for axes in figure.axes if axes.axison]) == len(shown)
+    legend = figure.legends[0]
     texts = [text.get_text() for text in legend.get_texts()]
     assert texts == [short[path] for path in (K_D, DAMPING)], 'one controller needs no name'
 
@@ -299,6 +301,10 @@ def test_total_indices_stand_in_their_cells(tmp_path: Path) -> None:
                 if BY_NAME[r['figure']].label == label and short[r['path']] == path
             ]  # fmt: skip
             assert value == pytest.approx(row['ST'])
+    for cases, said in ((2, ''), (3, ' The first 4 of 6 cases; all are in indices.parquet.')):
+        many = [row | {'case': f'{k}'} for k in range(cases) for row in analysis.tables['indices']]
+        told = plots._total_indices(replace(analysis, tables=analysis.tables | {'indices': many}))
+        assert told[2].endswith(f'(d) cl, 1.{said}')
 
 
 def test_measures_of_errors_and_settling_are_drawn_first(simple: Drawn) -> None:
@@ -329,3 +335,14 @@ def test_measures_that_are_alike_in_all_rows_are_named_by_their_kind() -> None:
         f' Without a value in any row: {labels[1]}.'
     )
     assert plots._fixed({}) == ''
+
+
+@pytest.mark.parametrize(
+    ('words', 'angle'), [(('a' * 10, 'b' * 10), 0), (('a' * 10, 'b' * 11), 60)]
+)
+def test_words_below_an_axis_are_turned_where_they_are_long(words, angle: int) -> None:
+    axes = plots.plots.new_figure(2.0).subplots()
+    axes.plot([0, 1], [1.0, 2.0])
+    factor = SimpleNamespace(binned=False, numbers=None, labels=words)
+    plots._finish(axes, factor, next(iter(BY_NAME.values())))
+    assert {label.get_rotation() for label in axes.get_xticklabels()} == {angle}

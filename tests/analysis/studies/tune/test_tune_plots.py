@@ -83,6 +83,14 @@ def test_what_effort_buys(equal: str) -> None:
     assert f'dashed: equal {equal}' in caption
 
 
+def test_the_reference_is_in_sight_where_all_others_cost_more() -> None:
+    tuning = Tuned()
+    for one in tuning.searches:
+        one.evaluations.effort[:] += 2.0 * tuning.goal.reference.effort
+    (axes,) = tune.trade_off(tuning)[0].axes
+    assert axes.get_xlim() == pytest.approx((0.97, 2.0))
+
+
 def test_distributions_over_draws() -> None:
     tuning = Tuned()
     figure, title, _ = tune.distributions(tuning)

@@ -73,7 +73,7 @@ def six(table: pa.Table, family: str) -> np.ndarray:
 def _six(name: str, table: pa.Table) -> Drawn:
     family, title = SIX[name]
     values, entry = six(table, family), FAMILIES[family]
-    halves = [slice(0, 6)] if entry.units[0] == entry.units[1] else [slice(0, 3), slice(3, 6)]
+    halves = [slice(6)] if entry.units[0] == entry.units[1] else [slice(3), slice(3, 6)]
     zeros = structural(table, family)
     grids = [
         HeatMap(values[:, half], DOFS[half], f'{entry.label} ({unit})', structural=zeros[:, half])

@@ -12,7 +12,7 @@ from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.arrow import pa
 from auv_analysis.output.new_files import write_json
 from auv_analysis.output.progress import each, say, waiting
-from auv_analysis.output.text import join, number
+from auv_analysis.output.text import capital, join, number
 from auv_analysis.report.digest import digest
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
@@ -178,7 +178,7 @@ def overview(table: pa.Table) -> Table:
 def six_table(table: pa.Table, family: str) -> Table:
     """A row per run, a column per degree of freedom."""
     meaning = FAMILIES[family].meaning
-    caption, name = f'{meaning[0].upper()}{meaning[1:]}.', family.replace('.', '_')
+    caption, name = f'{capital(meaning)}.', family.replace('.', '_')
     shown = {'run': NAMED['run']} | _six_columns(family)
     return make_table(name, caption, table, shown, file=TABLE)
 
@@ -233,7 +233,7 @@ def _differing(rows: Rows) -> str:
     if not parts:
         return ''
     text = '; '.join(parts)
-    return f'{text[0].upper()}{text[1:]}; means and root mean squares are those of each whole run.'
+    return f'{capital(text)}; means and root mean squares are those of each whole run.'
 
 
 def _diverged(rows: Rows) -> str:

@@ -87,8 +87,9 @@ def _reduced(result: DesignStudy) -> Picture:
 
     def draw() -> Figure:
         figure = plotting.new_figure(2.5)
-        ratios = (1, 1.9) if split else (1,)
-        grid = figure.subplots(1, len(parts), squeeze=False, width_ratios=ratios)[0]
+        grid = figure.subplots(
+            1, len(parts), squeeze=False, width_ratios=(1, 1.9) if split else (1,)
+        )[0]
         for axes, part in zip(grid, parts, strict=True):
             for name, colour, dash in (('before', WAS, '-'), ('after', IS, (0, (4, 1.6)))):
                 t, y = lines[name].line(kind, column, part)

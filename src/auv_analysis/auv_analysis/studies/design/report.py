@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.output.progress import TextConsole
-from auv_analysis.output.text import Maths, plain
+from auv_analysis.output.text import Maths, capital, plain
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.results import (
@@ -92,7 +92,7 @@ def _findings(result: DesignStudy) -> Iterator[Sentence]:
     if not document['measures']:
         return
     for warning in document['warnings']:
-        yield Sentence(f'{warning[:1].upper()}{warning[1:]}.', 'proposal')
+        yield Sentence(f'{capital(warning)}.', 'proposal')
 
 
 def _sections(result: DesignStudy, figures: Mapping[str, FigureRecord]) -> list[Section]:
@@ -101,7 +101,7 @@ def _sections(result: DesignStudy, figures: Mapping[str, FigureRecord]) -> list[
         return []
     results = Results('design', document)
     proposal: list[Block] = [
-        *(f'{words[:1].upper()}{words[1:]}.' for words in document['proposal']['words']),
+        *(f'{capital(words)}.' for words in document['proposal']['words']),
         parameters_table(results),
         figures['Upsilon'],
         rest_table(results),

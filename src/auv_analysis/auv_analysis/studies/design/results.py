@@ -12,7 +12,7 @@ from auv_analysis.metrics.quantities import METRICS
 from auv_analysis.metrics.summary import summarize
 from auv_analysis.output.folder import ResultsFolder
 from auv_analysis.output.new_files import write_json
-from auv_analysis.output.text import join, number, plain
+from auv_analysis.output.text import capital, join, number, plain
 from auv_analysis.runs.run import Hold, Run
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.simulate import simulate
@@ -346,7 +346,7 @@ def result_statement(
     after = best.ratio * before
     lowered = 100 * (1 - best.ratio)
     text = (
-        f'{_capital("; ".join(words))}: {name} falls from {number(before)} to {number(after)} '
+        f'{capital("; ".join(words))}: {name} falls from {number(before)} to {number(after)} '
         f'{unit}, by {lowered:.1f} %, {by}.'
     )
     if best.ratio > HALF:
@@ -467,7 +467,3 @@ def rest_of(vehicle: Vehicle) -> dict[str, Any]:
         'stability': stability(vehicle),
         'tilt_at_rest_deg': None if angle is None else float(np.degrees(angle)),
     }
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]

@@ -8,7 +8,7 @@ import numpy as np
 import yaml
 
 from auv_analysis.output.progress import TextConsole
-from auv_analysis.output.text import join, number
+from auv_analysis.output.text import capital, join, number
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.results import Column, Results, Shown, described, terminal
 from auv_analysis.studies.excite.drive import WORDS
@@ -160,7 +160,7 @@ def write_report(found: Excited, results: Results, out: Path) -> Path:
     t, facts = results.tables, results.facts
     told = [Sentence(text, 'intervals' if i == 0 else '')
             for i, text in enumerate(sentences(results))]  # fmt: skip
-    open_: list[Block] = [f'{one["words"][:1].upper()}{one["words"][1:]}.'
+    open_: list[Block] = [f'{capital(one["words"])}.'
                           for one in facts['combinations']]  # fmt: skip
     sections = [
         Section('intervals', 'What the recording would tell',

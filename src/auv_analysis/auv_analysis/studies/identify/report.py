@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from auv_analysis.output.progress import TextConsole
-from auv_analysis.output.text import join, number
+from auv_analysis.output.text import capital, join, number
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.results import Column, Results, Shown, described, terminal
 from auv_analysis.studies.identify.couplings import couplings
@@ -278,7 +278,7 @@ def sentences(results: Results) -> list[str]:
     facts = results.facts
     count = len(facts['identified'])
     wrong = facts['contradictions'][0 if facts['file'] else 1 :]
-    said = [facts['verdict'], *(f'{text[:1].upper()}{text[1:]}.' for text in wrong)]
+    said = [facts['verdict'], *(f'{capital(text)}.' for text in wrong)]
     every = count + len(facts['not_identified'])
     said.append(f'{count} of {every} coefficients are identified.')
     real = [row for row in results.tables['inertia'].records() if row['verdict'] == 'real']
@@ -290,7 +290,7 @@ def sentences(results: Results) -> list[str]:
         said.append(f'Not searched, as it hardly moves: {join(facts["hardly_moving"])}.')
     said.append(f'{facts["residuals"]}.')
     said += [f'Open: {one["words"]}.' for one in facts['combinations'][:4]]
-    return said + [f'{text[:1].upper()}{text[1:]}.' for text in facts['excitation']]
+    return said + [f'{capital(text)}.' for text in facts['excitation']]
 
 
 def narrow(results: Results, name: str) -> Any:
@@ -332,7 +332,7 @@ def write_report(found: Identified, results: Results, out: Path) -> Path:
     facts, t = results.facts, results.tables
     told = [Sentence(text, 'predictions' if i == 0 else '')
             for i, text in enumerate(sentences(results))]  # fmt: skip
-    open_: list[Block] = [f'{one["words"][:1].upper()}{one["words"][1:]}: '
+    open_: list[Block] = [f'{capital(one["words"])}: '
                           f'by the data alone to {100 * one["left"]:.0f} % of its prior deviation.'
                           for one in facts['combinations']]  # fmt: skip
     sections = [

@@ -74,7 +74,7 @@ def _pole_map(models: Mapping[str, Linearization]) -> Drawn:
     poles = {name: np.sort_complex(np.linalg.eigvals(model.A)) for name, model in models.items()}
     every = np.concatenate(list(poles.values()))
     sizes = np.abs(every)[np.abs(every) > 1e-9]
-    near = SLOW * float(np.median(sizes)) if len(sizes) else 1.0
+    near = SLOW * float(np.median(sizes)) if len(sizes) else 0.0
     figure = plots.new_figure(3.1)
     panels = figure.subplots(1, 2)
     for index, (axes, limit) in enumerate(zip(panels, (np.abs(every).max(), near), strict=True)):

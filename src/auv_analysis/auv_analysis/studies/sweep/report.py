@@ -8,7 +8,7 @@ from auv_analysis.metrics.measures import BY_NAME
 from auv_analysis.metrics.quantities import Quantity
 from auv_analysis.output.folder import SWEEP, results_folder
 from auv_analysis.output.progress import console, say, waiting
-from auv_analysis.output.text import join, number
+from auv_analysis.output.text import capital, join, number
 from auv_analysis.report.document import Block, Section, Sentence, write_document
 from auv_analysis.report.plots import FigureRecord
 from auv_analysis.report.results import Column, Table, described, make_table, terminal, view_of_file
@@ -331,7 +331,8 @@ def _failures(analysis: Analysis) -> Iterator[Table]:
     rows = [(i, row) for i, row in enumerate(analysis.tables['failures']) if count(row)]
     rows.sort(key=lambda entry: -count(entry[1]) / entry[1]['rows'])
     left = len(rows) - MOST_FAILURES
-    note = f'{left} others are in failures.parquet.' if left > 0 else ''
+    others = f'{left} others are' if left > 1 else 'Another one is'
+    note = f'{others} in failures.parquet.' if left > 0 else ''
     if rows:
         caption = 'Values at which most rows fail.'
         yield _view('failures', caption, rows[:MOST_FAILURES], FAILURES, stub=3, note=note)
@@ -348,7 +349,7 @@ def findings(analysis: Analysis) -> list[Sentence]:
     """Sentences of the summary: what is missing, who settles, failures."""
     parts = (_unfinished, _settled, _failed)
     found = [sentence for part in parts for sentence in part(analysis)]
-    notes = (Sentence(f'{note[0].upper()}{note[1:]}.', 'campaign') for note in analysis.notes)
+    notes = (Sentence(f'{capital(note)}.', 'campaign') for note in analysis.notes)
     return [*found, *notes]
 
 

@@ -42,7 +42,7 @@ LAYOUT = re.compile(  # keywords: how large, how faint, where the name of someth
     r'(line|eline|edge|markeredge)widths?|lw|(font|label|marker|cap)size|s|fontweight'
     r'|\w*rotation|handlelength|loc|location|bbox_to_anchor|ncols|zorder|alpha|ha|va'
     r'|height|(width|height)_ratios|aspect|fraction|shrink|linscale|interpolation|textcoords|xytext'
-    r'|rasterized|squeeze|no_wrap|overflow|justify|highlight|optimize|strict|digits|autohide'
+    r'|\w+_alpha|rasterized|squeeze|no_wrap|overflow|justify|highlight|optimize|strict|digits|autohide'
     r'|level|\w*_font_\w+|minor_tick_line_color'
     r'|pad|padding|spacing|(glyph|label)_height|glyph_width|min_border_left|toolbar_location|sizing_mode'
 )

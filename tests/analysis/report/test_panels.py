@@ -4,6 +4,7 @@ import base64
 import json
 import zlib
 from dataclasses import replace
+from types import SimpleNamespace as Made
 
 import pytest
 
@@ -100,3 +101,14 @@ def test_many_lines_are_thinned_to_a_budget(case1, monkeypatch):
     monkeypatch.setattr(page, 'POINTS', 1_000)
     monkeypatch.setattr(page, 'FEWEST', 50)
     assert len(packed(shown(case1))) < 0.8 * whole
+
+
+@pytest.mark.parametrize(
+    ('lengths', 'columns'),
+    [((600, 400), 600), ((600, 401), 299), ((600, 500, 600), 176), ((600,) * 6, 100), ((), 100)],
+)
+def test_lines_are_as_fine_as_all_of_them_allow(monkeypatch, lengths, columns: int) -> None:
+    monkeypatch.setattr(page, 'POINTS', 1_000)
+    monkeypatch.setattr(page, 'FEWEST', 100)
+    panels = [Made(curves=[Made(t=range(n))]) for n in lengths]
+    assert page._columns(panels) == columns

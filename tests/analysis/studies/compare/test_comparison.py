@@ -133,7 +133,10 @@ def test_structural_zeros_are_told_from_what_is_zero(entries, table) -> None:
 def test_a_grid_of_panels_is_drawn_of_twelve_scenarios_at_most(entries) -> None:
     for count, few in ((12, True), (13, False)):
         many = [replace(entries[0], name=f's{i}/gvc', scenario=f's{i}') for i in range(count)]
-        assert ('falls below the dotted 1' in plots.errors(many)[2]) is few
+        figure, _, caption = plots.errors(many)
+        assert ('falls below the dotted 1' in caption) is few
+    left = figure.axes[0].collections[0].get_array().compressed()
+    assert 0.0 <= left.min() < np.log10(2.0), 'in colour down to the band'
 
 
 def test_a_line_ends_where_its_error_is_zero() -> None:

@@ -21,8 +21,9 @@ from auv_analysis.studies.study.procedure import (
     sensitivity_table,
     write_sensitivities,
 )
-from auv_analysis.studies.study.sensitivity import gain_factors, sensitivity
+from auv_analysis.studies.study.sensitivity import Kpi, _reason, gain_factors, sensitivity
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.vehicle import DOFS
 
 SPREAD = math.log(2.0) / math.sqrt(3.0)  # of one log-uniform factor up to 2
 
@@ -263,3 +264,12 @@ def test_table_sentences_and_file_say_the_same(monkeypatch, tmp_path, approved):
     (text,) = (s.text for s in sensitivity_sentences([sensitivity(short(), 'gvc', count=64)])
                if 'follows' in s.text)  # fmt: skip
     assert '−75 %' in text
+
+
+def test_what_is_small_throughout_its_kind_is_no_rounding():
+    values = 1e-12 * np.linspace(1.0, 2.0, 9)
+    found = {f'effort.max.{dof}': values for dof in DOFS}
+    assert _reason(Kpi('effort.max', 'surge'), found) == ''
+    found['effort.max.sway'] = np.ones(9)
+    assert _reason(Kpi('effort.max', 'surge'), found).startswith('rounding')
+    assert _reason(Kpi('effort.max', 'yaw'), found) == '', 'of the other half'

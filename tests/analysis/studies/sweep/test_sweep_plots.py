@@ -20,6 +20,7 @@ from helpers.made_sweeps import (
     mixed,
     rows,
 )
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from auv_analysis.metrics.measures import BY_NAME
@@ -345,4 +346,12 @@ def test_words_below_an_axis_are_turned_where_they_are_long(words, angle: int) -
     axes.plot([0, 1], [1.0, 2.0])
     factor = SimpleNamespace(binned=False, numbers=None, labels=words)
     plots._finish(axes, factor, next(iter(BY_NAME.values())))
+    assert {label.get_rotation() for label in axes.get_xticklabels()} == {angle}
+
+
+@pytest.mark.parametrize(('count', 'angle'), [(4, 0), (5, 60)])
+def test_values_across_are_turned_where_they_are_many(count: int, angle: int) -> None:
+    axes = plots.plots.new_figure(2.0).subplots()
+    cells = [{'value': 'a', 'other_value': f'{i}', 'median': 1.0 + i} for i in range(count)]
+    plots._one_pair(axes, cells, 'label', Normalize(0.0, 9.0))
     assert {label.get_rotation() for label in axes.get_xticklabels()} == {angle}

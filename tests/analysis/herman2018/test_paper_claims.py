@@ -10,11 +10,14 @@ import pytest
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.herman2018 import cases, paper
+from auv_analysis.herman2018 import responses as responses_of
 from auv_analysis.herman2018.cases import case_evidence, case_of, claims_sentences, paper_claims
 from auv_analysis.herman2018.claims import judged, write_claims
 from auv_analysis.herman2018.evidence import ErrorSensitivity, Quotes
+from auv_analysis.herman2018.responses import STEP, followed, response
 from auv_analysis.output.text import MISSING
 from auv_analysis.scenario.changes import changed_scenario
+from auv_analysis.simulation.simulate import DivergedError
 from auv_analysis.studies.study.sensitivity import sensitivity
 
 NUMBER = re.compile(r'([+−]?)(\d[\d\u202f]*)(?:\.(\d+))?(?:·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?')
@@ -186,3 +189,21 @@ def test_a_name_has_one_value():
     assert [entry.value for entry in quote.values] == [1.0, None]
     with pytest.raises(ValueError, match='one value of a'):
         quote('a', 2.0, 'm')
+
+
+def test_what_errors_follow_is_the_root_of_the_sum_over_the_others():
+    errors = np.array([[1.0, 2.0, 3.0, 4.0, 0.0, 6.0]] * 3)
+    errors[1, [0, 1]] *= STEP**0.5, STEP**3.0
+    errors[2, [0, 1]] *= STEP**2.0, STEP**4.0
+    assert followed(errors, [0, 2]) == pytest.approx([2.0, 5.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_a_controller_whose_loops_do_not_all_run_follows_nothing_that_is_known(monkeypatch):
+    scenario, found = load_scenario('case1'), sensitivities()['gvc']
+    assert response(scenario, 'gvc', replace(found, refusal='none')) is None
+
+    def diverges(*_):
+        raise DivergedError
+
+    monkeypatch.setattr(responses_of, 'simulate', diverges)
+    assert response(scenario, 'gvc', found) is None

@@ -133,6 +133,11 @@ def test_in_real_time_a_law_is_asked_while_it_was_in_charge(tmp_path: Path, told
     begun = np.arange(len(found.ns)) < 3
     ramped = replace(found, tau=np.where(begun[:, None], 9.0, found.tau), ramps=begun)
     assert reproduction(recorded, ramped).relative == 0.0, 'ramps follow the clock of the node'
+    apart = reproduction(recorded, replace(found, ns=found.ns + 1))
+    assert (apart.relative, apart.within) == (None, None)
+    still = replace(loop, series={**loop.series, 'wrench': (both[0], 0.0 * both[1])})
+    apart = reproduction(still, found)
+    assert (apart.relative, apart.within) == (None, np.abs(found.tau).max())
 
 
 def test_odometry_that_only_the_controller_heard_is_counted(tmp_path: Path) -> None:

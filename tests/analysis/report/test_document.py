@@ -60,6 +60,8 @@ def test_a_report_says_what_made_it(folder, monkeypatch):
     ):
         monkeypatch.setattr('sys.argv', [program, 'simulate', 'a b'])
         assert document.provenance().command == command
+    monkeypatch.setattr(document, 'PACKAGES', ('no such package', 'numpy'))
+    assert list(document.provenance().versions) == ['Python', 'numpy']
 
 
 def made(tmp_path: Path, **changes) -> str:

@@ -405,6 +405,12 @@ def test_what_a_model_leaves_unexplained_in_words() -> None:
         'The motion of lost needed at most 9.00 ± 0.30 N (heave) and 6.00 ± 0.60 N m (pitch), RMS.'
     )
     assert estimate_finding('bare', {'unexplained': None, 'required_wrench': None}) == ''
+    unknown = {'rms': [None] * 6, 'error_rms': [None] * 6}
+    assert estimate_finding('bare', {'unexplained': None, 'required_wrench': unknown}) == ''
+    half = {'rms': [*[None] * 5, 2.0], 'error_rms': [*[None] * 5, 0.2]}
+    assert estimate_finding('half', summary | {'required_wrench': half}) == (
+        'The motion of half needed at most 2.00 ± 0.20 N m (yaw), RMS.'
+    )
 
 
 def contents(runs, summaries, folder) -> dict[str, list[str]]:

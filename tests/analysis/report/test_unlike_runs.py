@@ -65,7 +65,7 @@ def _runs(folder: Path) -> tuple[dict[str, Run], dict[str, str]]:
     return runs, texts
 
 
-def _written(out: Path, runs: dict[str, Run], texts: dict[str, str]) -> Path:
+def _written(out: Path, runs: dict[str, Run], texts: str | dict[str, str]) -> Path:
     summaries = {name: summarize(run) for name, run in runs.items()}
     vehicles = {name: f'name: {run.vehicle.name}' for name, run in runs.items()}
     write_report(out, runs, summaries, texts, vehicles)
@@ -84,11 +84,16 @@ def folders(tmp_path_factory: pytest.TempPathFactory, composing) -> dict[str, Pa
     few = {'foreign': foreign, name: runs[name]}
     with composing():
         return {
+            'one text': _written(
+                tmp_path_factory.mktemp('one'),
+                {name: runs[name] for name in ('noisy-full', 'moved-gvc')},
+                texts['noisy-full'],
+            ),
             'all': _written(tmp_path_factory.mktemp('all'), runs, texts),
             'few': _written(tmp_path_factory.mktemp('few'), few, {name: texts[name]}),
         }
 
 
-@pytest.mark.parametrize('which', ['all', 'few'])
+@pytest.mark.parametrize('which', ['all', 'few', 'one text'])
 def test_all_that_it_shows(folders, which: str, approved) -> None:
     approved.folder(folders[which])

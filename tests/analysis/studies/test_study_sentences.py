@@ -344,6 +344,11 @@ def test_findings_of_a_tuning() -> None:
         '−0.20 % away, and cl_tuned is no fair comparison.'
     )
     assert 'gvc_tuned (0.500 times) is ahead of gvc (ratios' in lost[2]
+    none = Tuned(reached=False)
+    none.laws['gvc_tuned'].best.reached = False
+    assert [s.text[:25] for s in tune.findings(none)][:2] == [
+        'No gains of gvc that were', 'No gains of cl that were ',
+    ]  # fmt: skip
 
 
 def test_all_that_a_tuning_draws_is_explained() -> None:
@@ -377,6 +382,8 @@ def test_changes_of_a_design_are_marked() -> None:
         ['effort.max.surge', '4.00', '4.00', '=', 'N'],
     ]
     assert [row[0].kind for row in table.rows] == ['good', 'bad', '']
+    alone = design.controllers_table(Results('design', document | {'controllers': {'gvc': {}}}))
+    assert alone is None
     others = design.controllers_table(results)
     assert [[cell.text for cell in row] for row in others.rows] == [
         ['cl', 'delta_xi_max.sway', '1.00', '2.00', '+100.0 %', 'm/s']

@@ -119,6 +119,8 @@ def test_the_report_has_its_numbers_where_their_heads_say(
 def test_four_things_that_stay_open_are_said(excited) -> None:
     results = results_of(excited)
     results.facts['combinations'] = [{'words': f'w{k}'} for k in range(6)]
+    results.facts['not_identified'] = ['a', 'b']
+    assert 'Not told: a and b.' in sentences(results)
     said = [text for text in sentences(results) if text.startswith('Open: ')]
     assert said == [f'Open: w{k}.' for k in range(4)]
 

@@ -21,7 +21,13 @@ from auv_analysis.studies.study.procedure import (
     sensitivity_table,
     write_sensitivities,
 )
-from auv_analysis.studies.study.sensitivity import Kpi, _reason, gain_factors, sensitivity
+from auv_analysis.studies.study.sensitivity import (
+    Kpi,
+    _default_count,
+    _reason,
+    gain_factors,
+    sensitivity,
+)
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle import DOFS
 
@@ -273,3 +279,23 @@ def test_what_is_small_throughout_its_kind_is_no_rounding():
     found['effort.max.sway'] = np.ones(9)
     assert _reason(Kpi('effort.max', 'surge'), found).startswith('rounding')
     assert _reason(Kpi('effort.max', 'yaw'), found) == '', 'of the other half'
+
+
+def test_how_many_points_are_taken_where_nobody_says():
+    of = [
+        _default_count(law, method, slow=False)
+        for law in ('gvc', 'own:Law') for method in ('sobol', 'morris')
+    ]  # fmt: skip
+    assert of == [256, 32, 64, 16]
+    assert [_default_count('gvc', m, slow=True) for m in ('sobol', 'morris')] == [256, 4]
+
+
+def test_a_law_without_gains_and_one_that_fails_are_told_of(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / 'no_gains.py').write_text(LAW)
+    values = {'controllers': {'own': {'law': 'no_gains:Push', 'k_A': 0.0, 'k_B': 0.0}}}
+    found = sensitivity(changed_scenario(load_scenario('case1'), values), 'own')
+    assert found.refusal == 'the law has no gain that is not zero'
+    assert [s.text for s in sensitivity_sentences([found])] == [
+        'How own follows its gains is not known: the law has no gain that is not zero.'
+    ]

@@ -29,6 +29,7 @@ from auv_analysis.studies.sweep import plots
 from auv_analysis.studies.sweep.analysis import Analysis, analysed
 from auv_analysis.studies.sweep.dataset import numbers_of, open_sweep, short_names
 from auv_analysis.studies.sweep.plots import draw, main_measures
+from auv_analysis.studies.sweep.report import _listings
 
 pytestmark = pytest.mark.usefixtures('approved')
 
@@ -355,3 +356,9 @@ def test_values_across_are_turned_where_they_are_many(count: int, angle: int) ->
     cells = [{'value': 'a', 'other_value': f'{i}', 'median': 1.0 + i} for i in range(count)]
     plots._one_pair(axes, cells, 'label', Normalize(0.0, 9.0))
     assert {label.get_rotation() for label in axes.get_xticklabels()} == {angle}
+
+
+def test_a_campaign_that_is_gone_is_not_listed(tmp_path: Path) -> None:
+    assert _listings(tmp_path) == []
+    (tmp_path / 'campaign.yaml').write_text('name: x')
+    assert _listings(tmp_path) == [('campaign.yaml', 'name: x')]

@@ -21,7 +21,7 @@ from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.collections import Collection
+from matplotlib.collections import Collection, PathCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
@@ -221,7 +221,8 @@ def _frame(artist: Artist, axes: Axes) -> str:
 
 def _norm(mapped: Any) -> str:
     low, high = mapped.get_clim()
-    return f'{type(mapped.norm).__name__} {digest([low, high])}'
+    clips = ' clipped' * mapped.norm.clip
+    return f'{type(mapped.norm).__name__} {digest([low, high])}{clips}'
 
 
 def _look(artist: Any) -> str:
@@ -243,6 +244,8 @@ def _look(artist: Any) -> str:
         faces, edges = map(_colours, (artist.get_facecolor(), artist.get_edgecolor()))
         parts = [faces or edges]
         parts += [f'edged {edges}'] if faces and edges not in ('', faces) else []
+        if isinstance(artist, PathCollection) and artist.get_paths():
+            parts.append(f'marker {digest(artist.get_paths()[0].vertices)}')
         sizes = np.unique(getattr(artist, 'get_sizes', list)())
         parts += [f'sizes {digest(sizes)}'] if len(sizes) > 1 else []
     label = str(artist.get_label())

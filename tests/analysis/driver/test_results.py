@@ -95,7 +95,8 @@ def test_the_folder_holds_report_document_and_all_that_was_heard_and_sent(
     for id in CHECKS:
         assert f'>{id}' in page
     samples = parquet.read_table(tmp_path / 'samples.parquet')
-    assert samples.num_rows == len(evidence.log.arrived_ns)
+    for name in ('arrived_ns', 'stamp_ns'):
+        assert samples[name].to_pylist() == getattr(evidence.log, name).tolist()
     assert samples.column_names[2:] == [
         'x',
         'y',

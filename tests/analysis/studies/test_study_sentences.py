@@ -398,7 +398,7 @@ def test_the_best_change_of_each_part_is_in_the_matrix() -> None:
     alternatives = [
         one('delta_xi.sway', 'shift', 0.9), one('delta_xi.sway', 'shift', 0.4, proposed=True),
         one('delta_xi.sway', 'disc', None, failure='it diverges', values={}),
-        one('delta_pi.yaw', 'disc', 0.75),
+        one('delta_pi.yaw', 'disc', 0.75), one('delta_pi.yaw', 'disc', 0.9),
     ]  # fmt: skip
     results = Results('design', {'alternatives': alternatives, 'reduce': 'delta_xi.sway'})
     table = design.matrix_table(results)

@@ -67,7 +67,7 @@ def _number(value: float, size: float) -> str:
 
 def table_lines(table: Table) -> Iterator[str]:
     """Heads with units, and rows."""
-    yield f'table {table.name}: {table.caption}'
+    yield f'table {table.name}: {table.caption} Rows are named by {table.stub}.'
     heads = [(head.group, head.label, head.unit and f'({head.unit})') for head in table.columns]
     rows = [
         [(cell.text, cell.remark and f'({cell.remark})', cell.kind and f'[{cell.kind}]')
@@ -364,7 +364,7 @@ class _Reader(HTMLParser):
         self._flush()
 
     def _flush(self) -> None:
-        text = ' '.join(self._line.split()).strip('| ')
+        text = ' '.join(self._line.split()).strip('|‖ ')
         if text:
             self.lines.append(f'{self._head} {text}'.strip())
         self._line, self._head = '', ''
@@ -384,7 +384,7 @@ class _Reader(HTMLParser):
         if about.get('id'):
             self._line += f'#{about["id"]} '
         if tag in ('td', 'th'):
-            self._line += ' | '
+            self._line += ' ‖ ' if tag == 'th' else ' | '
         looks = {*about.get('class', '').split()} - {'n', 'text'}
         if looks and (tag in ('td', 'th', 'tr') or 'badge' in looks):
             self._line += f'[{" ".join(sorted(looks))}] '

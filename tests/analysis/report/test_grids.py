@@ -45,6 +45,9 @@ def test_names_and_numbers_give_way_where_rows_are_many() -> None:
     axes = many.axes[0]
     assert [label.get_text() for label in axes.get_yticklabels()][:2] == ['run 0', 'run 3']
     assert len(axes.texts) == 0
+    for count, texts in ((60, 60), (61, 0)):
+        axes = heat_map([f'{i}' for i in range(count)], [HeatMap(np.ones((count, 1)), 'a', 'x')])
+        assert len(axes.axes[0].texts) == texts
 
 
 @pytest.mark.parametrize('value', [1.5e9, -2.5e-7, 0.25, -12345.0])

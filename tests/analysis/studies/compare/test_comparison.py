@@ -146,3 +146,10 @@ def test_a_line_ends_where_its_error_is_zero() -> None:
     t, ratio = plots.errors([one])[0].axes[0].lines[0].get_data()
     assert t.max() == pytest.approx(3.0)
     assert ratio.min() > 0
+
+
+@pytest.mark.parametrize(('count', 'lines'), [(8, True), (9, False)])
+def test_ranks_are_lines_as_long_as_these_can_be_told_apart(entries, count, lines) -> None:
+    many = [replace(entries[i % 2], name=f'{i}') for i in range(count)]
+    caption = plots._ranking(rank(comparison_table(many)))[2]
+    assert ('Equal values share a rank' in caption) is lines

@@ -222,8 +222,17 @@ def test_a_short_run_decides_only_what_it_can(case1, approved):
 
 
 def test_every_duration_gives_a_table(case1):
-    for seconds in (0.05, 2.0, 2.5, 5.0, 10.0):
-        assert len(_table({name: _shortened(run, seconds) for name, run in case1.items()})) == 21
+    for seconds in (0.05, 2.0, 2.5, 5.0, 9.99, 10.0):
+        table = _table({name: _shortened(run, seconds) for name, run in case1.items()})
+        assert len(table) == 21
+        for number in (9, 10):
+            assert (table[number].verdict == 'not evaluated') == (seconds < 10.0)
+
+
+def test_laws_that_settle_at_one_time_do_not_reproduce_claim_17(case2):
+    assert _table(case2)[17].verdict == 'reproduced'
+    alike = replace(case2['cl'], nu=case2['gvc'].nu)
+    assert _table(case2 | {'cl': alike})[17].verdict == 'not reproduced'
 
 
 def test_other_scenarios_have_no_claims(case1, case2):

@@ -88,4 +88,5 @@ def test_what_is_said_of_a_recorded_law_that_is_asked_again(approved) -> None:
         for relative, within in ((None, None), (None, 0.0), (None, 2.0), (0.005, 1.0), (0.02, 1.0))
     ]
     assert [one.holds for one in found] == [None, True, False, True, False]
+    assert replay.Reproduction(0.01, 1.0, 0.01).holds
     approved.add(one.sentence() for one in found)

@@ -2,6 +2,7 @@
 
 import tracemalloc
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,9 +16,9 @@ from PIL import Image
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics.statistics import Statistics, followed, part_of
 from auv_analysis.report import plots, run_plots
-from auv_analysis.report.digest import digest
+from auv_analysis.report.digest import digest, is_split
 from auv_analysis.report.run_report import write_report
-from auv_analysis.report.traces import COLUMNS, FEW, Trace, thinned
+from auv_analysis.report.traces import COLUMNS, FEW, Trace, broken, thinned
 from auv_analysis.runs.run import Run
 
 quick = examples(15)
@@ -204,3 +205,24 @@ def test_memory_does_not_grow_with_the_run(run) -> None:
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.1 * peaks[0], peaks
+
+
+def test_a_gap_outside_a_line_does_not_break_it() -> None:
+    t, y = np.arange(5.0, 9.0), np.arange(4.0)
+    for gap in ((1.0, 2.0), (8.95, 12.0)):
+        assert np.array_equal(broken((t, y), [gap], 0.1), (t, y))
+    broken_t, broken_y = broken((t, y), [(6.0, 6.8)], 0.1)
+    assert broken_t.tolist() == [5.0, 6.0, 6.1, 7.0, 8.0]
+    assert np.isnan(broken_y).tolist() == [False, False, True, False, False]
+
+
+def test_columns_at_the_ends_of_a_gap_are_kept(run) -> None:
+    stack = np.array([0.5, 1.0, 1.5, 2.0, 2.5]), np.ones((5, 6))
+    t, parts = replace(digest(run), stack=stack, gaps=((1.0, 2.0),), step=0.1).shares()
+    assert t == pytest.approx([0.5, 1.0, 1.1, 1.9, 2.0, 2.5])
+    assert parts[:, 0].tolist() == [1.0, 1.0, 0.0, 0.0, 1.0, 1.0]
+
+
+@pytest.mark.parametrize(('seconds', 'split'), [(4.0, False), (4.1, True)])
+def test_the_first_phase_is_drawn_apart_where_more_than_it_follows(seconds, split) -> None:
+    assert is_split(SimpleNamespace(duration=seconds)) is split

@@ -88,7 +88,9 @@ def test_the_verdict_on_a_vehicle_alone() -> None:
 @pytest.mark.parametrize('border', [(0.8, 0.9, 1.0), (1.0, 1.1, 1.2)])
 def test_an_interval_that_ends_at_one_tells_nothing(border) -> None:
     rows = [_predicted(name, 5.0, *border) for name in ('prior', 'persistence', 'black box')]
-    assert identify.verdict(rows, []).startswith('The new model cannot be told from the prior')
+    text = identify.verdict(rows, [])
+    assert text.startswith('The new model cannot be told from the prior')
+    assert text.endswith('; not clearly better than persistence and black box.')
     assert identify.verdict_alone('v', rows) == (
         'v predicts not clearly better than persistence and not clearly better than black box.'
     )
@@ -400,6 +402,8 @@ def test_the_best_change_of_each_part_is_in_the_matrix() -> None:
         one('delta_xi.sway', 'disc', None, failure='it diverges', values={}),
         one('delta_pi.yaw', 'disc', 0.75), one('delta_pi.yaw', 'disc', 0.9),
     ]  # fmt: skip
+    half = Results('design', {'alternatives': [one('delta_xi.sway', 'shift', 0.5)]})
+    assert design.matrix_table(half).rows[0][1].kind == 'good'
     results = Results('design', {'alternatives': alternatives, 'reduce': 'delta_xi.sway'})
     table = design.matrix_table(results)
     assert [head.unit for head in table.columns] == ['', '%', '%']

@@ -67,8 +67,10 @@ def test_the_measure_that_follows_the_gains_most_in_words() -> None:
         '6 in 95 % of the resamplings): k_D makes 70 % of its variance, and doubling k_D changes '
         'it by about −58 %.'
     )
-    main |= {'doubled': 0.5}
-    assert study._headline(found, 'velocity_error.rms', 'sway', main).endswith('about +0.50 %.')
+    for doubled, words in ((0.5, '+0.50'), (0.0, '+0')):
+        main |= {'doubled': doubled}
+        text = study._headline(found, 'velocity_error.rms', 'sway', main)
+        assert text.endswith(f'about {words} %.')
     main |= {'rank_high': 3, 'rank_low': 2, 'doubled': 12.0}
     found.method = 'morris'
     assert study._headline(found, 'velocity_error.rms', 'sway', main).endswith(
@@ -81,3 +83,17 @@ def test_sensitivities_of_nothing_that_is_drawn(tmp_path) -> None:
     found.kpis.clear()
     (record,) = study.sensitivity_plots([found], tmp_path)
     assert (record.png, record.pdf) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ('shares', 'words'),
+    [
+        ([0.0, 95.0, 5.0, 0.0, 0.0, 0.0],
+         'ξ2 (sway) has 95.00 %; the other 5 have 5.00 % together.'),
+        ([94.0, 0.0, 0.0, 0.0, 0.0, 6.0], 'ξ1 (surge) has 94.00 % and ξ6 (yaw) has 6.00 %.'),
+    ],
+)  # fmt: skip
+def test_components_are_named_until_nearly_all_energy_is_told(shares, words: str) -> None:
+    (sentence,) = study._energy('gvc', {'kinetic_energy': {'shares_percent': shares}})
+    assert str(sentence.text) == f'Of the kinetic energy of gvc over the whole run, {words}'
+    assert [*study._energy('gvc', {'kinetic_energy': {'shares_percent': [0.0] * 6}})] == []

@@ -91,7 +91,11 @@ def test_sensitivities_of_nothing_that_is_drawn(tmp_path) -> None:
         ([0.0, 95.0, 5.0, 0.0, 0.0, 0.0],
          'ξ2 (sway) has 95.00 %; the other 5 have 5.00 % together.'),
         ([94.0, 0.0, 0.0, 0.0, 0.0, 6.0], 'ξ1 (surge) has 94.00 % and ξ6 (yaw) has 6.00 %.'),
+        ([30.0, 21.0, 19.0, 16.0, 10.0, 4.0],
+         'ξ1 (surge) has 30.00 %, ξ2 (sway) has 21.00 %, ξ3 (heave) has 19.00 %, ξ4 (roll) has '
+         '16.00 %, ξ5 (pitch) has 10.00 % and ξ6 (yaw) has 4.00 %.'),
     ],
+    ids=['many left', 'none left', 'one left'],
 )  # fmt: skip
 def test_components_are_named_until_nearly_all_energy_is_told(shares, words: str) -> None:
     (sentence,) = study._energy('gvc', {'kinetic_energy': {'shares_percent': shares}})

@@ -377,6 +377,7 @@ def _energy(name: str, summary: Summary) -> Iterator[Sentence]:
         return
     order = np.argsort(shares)[::-1]
     count = 1 + int(np.argmax(np.cumsum(np.array(shares)[order]) >= MOST))
+    count += count == len(order) - 1  # one alone that is left is named as well
     parts = [f'ξ{i + 1} ({DOFS[i]}) has {fixed(shares[i], 2)} %' for i in order[:count]]
     text = f'Of the kinetic energy of {{}} over the whole run, {join(parts)}'
     rest = float(np.array(shares)[order[count:]].sum())

@@ -16,7 +16,7 @@ from auv_analysis.cli import main
 from auv_analysis.report import plots
 from auv_analysis.report.digest import digests
 from auv_analysis.report.document import NUMBERS
-from auv_analysis.report.faults import _panel, fault_overview, fault_part
+from auv_analysis.report.faults import _panel, _rise, fault_overview, fault_part
 from auv_analysis.report.panels import interactive
 from auv_analysis.report.scenario_text import set_up
 from auv_analysis.runs.run import Run
@@ -127,6 +127,13 @@ def _response(number: int, dof: str, before: float | None, during: float | None,
     mark = Mark(number, 'x', f'fault {number}', 1.0 * number, 2.0 * number)
     usual = {'band': 0.1, 'recovery': 0.5, 'until': 9.0, 'peak': (1.0, 20.0 + number, 3.0)}
     return Made(mark=mark, dof=dof, rms=(before, during, None), **usual | about)
+
+
+@pytest.mark.parametrize(
+    ('before', 'during', 'bands'), [(0.1, 0.5, 4.0), (None, 0.5, 5.0), (0.1, None, -1.0)]
+)
+def test_how_much_a_fault_adds_to_an_error(before, during, bands):
+    assert _rise(_response(1, 'surge', before, during)) == pytest.approx(bands)
 
 
 def test_the_fault_that_disturbs_most_is_told():

@@ -36,7 +36,7 @@ from auv_analysis.report import plots
 from auv_analysis.report.digest import digests
 from auv_analysis.report.faults import fault_figure
 from auv_analysis.report.panels import document, interactive, panel_sets
-from auv_analysis.report.run_plots import APART, draw_figures, inputs
+from auv_analysis.report.run_plots import APART, _symmetric, draw_figures, inputs
 from auv_analysis.report.wrench_plots import _applied_caption
 from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.model import control_model
@@ -717,3 +717,15 @@ END = {
     'lost': ': every row of (1) needs what was not recorded.',
     'still': ': zero throughout.',
 }
+
+
+@pytest.mark.parametrize(
+    ('peaks', 'apart'),
+    [([0.001, 0.5], True), ([1.0, 20.0], True), ([1.0, 19.0], False), ([0.0, 5.0], False),
+     ([0.0, 0.0], False)],
+)  # fmt: skip
+def test_peaks_far_apart_share_a_logarithmic_axis(peaks: list[float], apart: bool) -> None:
+    axes = plots.new_figure(2.0).subplots()
+    axes.plot([0.0, 1.0], [0.0, max(peaks)])
+    assert _symmetric(axes, peaks) is apart
+    assert axes.get_yscale() == ('symlog' if apart else 'linear')

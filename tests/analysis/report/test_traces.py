@@ -223,6 +223,10 @@ def test_columns_at_the_ends_of_a_gap_are_kept(run) -> None:
     assert parts[:, 0].tolist() == [1.0, 1.0, 0.0, 0.0, 1.0, 1.0]
 
 
+def test_errors_that_are_never_far_from_zero_have_settled_at_once(run) -> None:
+    assert digest(replace(run, nu=run.nu_d + 1e-4)).settled == 0.0
+
+
 @pytest.mark.parametrize(('seconds', 'split'), [(4.0, False), (4.1, True)])
 def test_the_first_phase_is_drawn_apart_where_more_than_it_follows(seconds, split) -> None:
     assert is_split(SimpleNamespace(duration=seconds)) is split

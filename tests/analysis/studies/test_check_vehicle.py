@@ -376,6 +376,8 @@ def test_poles_ahead_say_whether_a_vehicle_keeps_its_course(written):
     bare = cruise(written(data), 2.0)
     assert (bare['verdict'], bare['speed_source']) == ('unstable', 'given')
     assert 'key lift' in bare['hint']
+    slow = cruise(written(data), 1.5)
+    assert (slow['verdict'], slow['hint']) == ('unstable', bare['hint']), 'however slowly'
     other = cruise(written(data | {'name': 'other'}))
     assert (other['speed_source'], other['speed']) == ('assumed', 1.0)
     data['added_mass'] = [1.0, 16.0, 0.5, 0.01, 1.0, 1.0]

@@ -135,6 +135,9 @@ def test_a_grid_of_panels_is_drawn_of_twelve_scenarios_at_most(entries) -> None:
         many = [replace(entries[0], name=f's{i}/gvc', scenario=f's{i}') for i in range(count)]
         figure, _, caption = plots.errors(many)
         assert ('falls below the dotted 1' in caption) is few
+        if few:
+            grid = figure.axes[0].get_subplotspec().get_gridspec()
+            assert grid.get_geometry() == (3, 4)
     left = figure.axes[0].collections[0].get_array().compressed()
     assert 0.0 <= left.min() < np.log10(2.0), 'in colour down to the band'
 
@@ -146,6 +149,9 @@ def test_a_line_ends_where_its_error_is_zero() -> None:
     t, ratio = plots.errors([one])[0].axes[0].lines[0].get_data()
     assert t.max() == pytest.approx(3.0)
     assert ratio.min() > 0
+    error = np.where(run.t[:, None] > 3.0, 1e-9, 1e9) * (run.nu_d - run.nu)
+    one = replace(one, digest=digest(replace(run, nu=run.nu_d - error)))
+    assert plots.errors([one])[0].axes[0].get_ylim() == (1e-3, 1e4)
 
 
 @pytest.mark.parametrize(('count', 'lines'), [(8, True), (9, False)])

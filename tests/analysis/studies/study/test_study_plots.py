@@ -101,3 +101,23 @@ def test_components_are_named_until_nearly_all_energy_is_told(shares, words: str
     (sentence,) = study._energy('gvc', {'kinetic_energy': {'shares_percent': shares}})
     assert str(sentence.text) == f'Of the kinetic energy of gvc over the whole run, {words}'
     assert [*study._energy('gvc', {'kinetic_energy': {'shares_percent': [0.0] * 6}})] == []
+
+
+def test_an_interval_beside_its_estimate_ends_there(tmp_path) -> None:
+    found = _sensitive('sobol')
+    for row, (low, high) in zip(
+        (rows[0] for rows in found.kpis.values()),
+        ((0.1, 0.2), (-0.2, -0.1), (-0.1, 0.1), (-0.1, 0.1)), strict=True,
+    ):  # fmt: skip
+        row |= {'spread_low': row['spread'] + low, 'spread_high': row['spread'] + high}
+    with artists.captured() as figures:
+        study.sensitivity_plots([found], tmp_path)
+    left = figures['sensitivity_cl'].axes[0]
+    (spans,) = [c for c in left.collections if len(c.get_segments()) == 3]
+    ends = {}
+    for span, bar in zip(spans.get_segments(), left.patches, strict=True):
+        ends[round(bar.get_width(), 9)] = span[:, 0] - bar.get_width()
+    (effort, sway, _, roll) = (rows[0]['spread'] for rows in found.kpis.values())
+    assert ends[round(effort, 9)] == pytest.approx([0.0, 0.2])
+    assert ends[round(sway, 9)] == pytest.approx([-0.2, 0.0])
+    assert ends[round(roll, 9)] == pytest.approx([-0.1, 0.1])

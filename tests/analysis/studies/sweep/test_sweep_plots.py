@@ -362,3 +362,11 @@ def test_a_campaign_that_is_gone_is_not_listed(tmp_path: Path) -> None:
     assert _listings(tmp_path) == []
     (tmp_path / 'campaign.yaml').write_text('name: x')
     assert _listings(tmp_path) == [('campaign.yaml', 'name: x')]
+
+
+@pytest.mark.parametrize(('count', 'angle'), [(2, 0), (3, 90)])
+def test_paths_above_columns_are_turned_where_they_are_more_than_two(count: int, angle) -> None:
+    grid = plots.HeatMap(np.ones((1, count)), ['path'] * count, 'x')
+    figure = plots.heat_map(['row'], [grid])
+    plots._small_heads(figure, [grid])
+    assert {label.get_rotation() for label in figure.axes[0].get_xticklabels()} == {angle}

@@ -122,7 +122,7 @@ def results_of(
     results = Results('linearization', {'name': name, 'models': found, 'left_out': list(left_out)})
     if margins:
         rows = [{'controller': key, **row} for key, one in margins.items() for row in one['axes']]
-        results.add('margins', 'Margins of each axis', rows, MARGINS, stub=2)
+        results.add('margins', 'Margins of each axis', rows, MARGINS)
     return results
 
 

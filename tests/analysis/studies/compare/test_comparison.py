@@ -157,5 +157,7 @@ def test_a_line_ends_where_its_error_is_zero() -> None:
 @pytest.mark.parametrize(('count', 'lines'), [(8, True), (9, False)])
 def test_ranks_are_lines_as_long_as_these_can_be_told_apart(entries, count, lines) -> None:
     many = [replace(entries[i % 2], name=f'{i}') for i in range(count)]
-    caption = plots._ranking(rank(comparison_table(many)))[2]
+    figure, _, caption = plots._ranking(rank(comparison_table(many)))
     assert ('Equal values share a rank' in caption) is lines
+    numbers = [text.get_text() for text in figure.axes[0].texts]
+    assert lines or {len(number.partition('.')[2]) for number in numbers if number != '0'} == {1}

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace as Made
 
 import numpy as np
 import pytest
@@ -191,3 +192,9 @@ def test_printed_result_is_a_few_lines_with_the_poles():
     assert len(text.splitlines()) <= 3
     assert 'law2' in text
     assert '-0.8' in text
+
+
+def test_poles_that_are_all_zero_are_told_as_such() -> None:
+    found = modes(Made(A=np.zeros((2, 2)), states=('a', 'b')))
+    assert [mode['pole'] for mode in found] == [[0.0, 0.0]] * 2
+    assert [mode['mostly'] for mode in found] == ['a', 'b']

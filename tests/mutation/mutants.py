@@ -44,7 +44,7 @@ LAYOUT = re.compile(  # keywords: how large, how faint, where the name of someth
     r'|height|(width|height)_ratios|aspect|fraction|shrink|linscale|interpolation|textcoords|xytext'
     r'|\w+_alpha|rasterized|squeeze|no_wrap|overflow|justify|highlight|optimize|strict|digits|autohide'
     r'|level|\w*_font_\w+|minor_tick_line_color'
-    r'|pad|padding|spacing|(glyph|label)_height|glyph_width|min_border_left|toolbar_location|sizing_mode'
+    r'|width|x_offset|pad|padding|spacing|(glyph|label)_height|glyph_width|min_border_left|toolbar_location|sizing_mode'
 )
 COLOUR = re.compile(r'\w*colou?rs?|hatch|fmt')  # keywords whose value, where it is a text, is taste
 LAYS_OUT = {  # calls

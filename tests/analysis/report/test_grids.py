@@ -21,6 +21,8 @@ def texts(grid: HeatMap) -> list[str]:
 def test_scale_is_logarithmic_only_where_it_has_to_be() -> None:
     columns = ('a', 'b')
     assert not isinstance(HeatMap(np.array([[1.0, 10.0]]), columns, '').norm(), LogNorm)
+    assert not isinstance(HeatMap(np.array([[1.0, 19.5]]), columns, '').norm(), LogNorm)
+    assert isinstance(HeatMap(np.array([[1.0, 20.5]]), columns, '').norm(), LogNorm)
     far = HeatMap(np.array([[1.0, 1e9]]), columns, '').norm()
     assert isinstance(far, LogNorm)
     assert (far.vmin, far.vmax) == pytest.approx((1e5, 1e9)), 'four decades at most'

@@ -64,6 +64,18 @@ def test_errors_gains_and_peaks_are_in_the_first_sentence(two: Runs) -> None:
     assert verdict(dict(reversed(runs.items())), summaries)[0] == first
 
 
+@pytest.mark.parametrize(
+    ('ratio', 'law', 'sentences'), [(1.09, 'gvc', 1), (1.12, 'gvc', 2), (1.12, 'own:Law', 1)]
+)
+def test_a_fair_comparison_is_advised_of_shipped_laws_that_differ(two, ratio, law, sentences):
+    runs, summaries = two[0], copy.deepcopy(two[1])
+    summaries['gvc']['gains']['K_D'] = np.eye(6).tolist()
+    summaries['cl']['gains']['K_D'] = (ratio * np.eye(6)).tolist()
+    summaries['gvc']['effort']['max'] = summaries['cl']['effort']['max']
+    summaries['gvc']['law'] = law
+    assert len(verdict(runs, summaries)) == sentences
+
+
 def test_the_verdict_stands_above_the_tables_and_first_in_the_report(
     tmp_path: Path, capsys, monkeypatch
 ) -> None:

@@ -87,6 +87,9 @@ def test_an_identification(tmp_path) -> None:
         assert (x[0], x[-1]) == (one.values[0], one.values[-1])
         assert levels(axes) == [pytest.approx(1.96**2)]
         assert axes.get_xlabel() == ('M.surge (kg)' if one.unit else 'lag')
+    found.profiles *= 2
+    grid = identify._profiles(found)[0].axes[0].get_subplotspec().get_gridspec()
+    assert grid.get_geometry() == (2, 3)
 
 
 def _traced(figure, pairs, noise) -> None:

@@ -364,6 +364,17 @@ def test_a_campaign_that_is_gone_is_not_listed(tmp_path: Path) -> None:
     assert _listings(tmp_path) == [('campaign.yaml', 'name: x')]
 
 
+@pytest.mark.parametrize(
+    ('values', 'scale'),
+    [((1.0, 29.5), 'linear'), ((1.0, 30.5), 'log'), ((0.0, 99.0), 'linear'),
+     ((-1.0, 99.0), 'linear'), ((), 'linear'), ((1.0, np.nan, 40.0), 'log')],
+)  # fmt: skip
+def test_values_far_apart_have_a_logarithmic_axis(values, scale: str) -> None:
+    axes = plots.plots.new_figure(2.0).subplots()
+    plots._logarithmic(axes, 'x', np.array(values))
+    assert axes.get_xscale() == scale
+
+
 @pytest.mark.parametrize(('count', 'angle'), [(2, 0), (3, 90)])
 def test_paths_above_columns_are_turned_where_they_are_more_than_two(count: int, angle) -> None:
     grid = plots.HeatMap(np.ones((1, count)), ['path'] * count, 'x')

@@ -152,7 +152,7 @@ WHOLE = {
     'least', 'most',
 }  # fmt: skip
 NEAR_ZERO = 0.005  # m/s, rad/s: what counts as a settled error
-SHARE_COLUMNS = 600  # of the stacked shares
+SHARE_COLUMNS = 600  # px across, of the stacked shares
 COURSE = 1000  # samples, at most, by which runs are compared
 
 

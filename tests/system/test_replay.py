@@ -368,5 +368,6 @@ def test_the_law_of_a_bag_in_real_time_is_reproduced(tmp_path: Path) -> None:
         if found.holds or not late:
             break
     assert found.holds, found.sentence()
-    assert answers.ns[0] > loop.series[interface.ODOM][0][20], 'not before its activation'
+    # the odometry upon which the test activates it may be still to be taken then
+    assert answers.ns[0] >= loop.series[interface.ODOM][0][20], 'not before its activation'
     assert any('was not in charge' in note for note in answers.notes)

@@ -65,3 +65,12 @@ def test_timing_motion_and_answers_of_a_driver(tmp_path) -> None:
         nu = one.nu[:, one.trial.axis]
         same(shown['measured'], one.t, nu - nu[0])
         same(shown['fit'], one.response.t + 0.3, one.response.form)
+
+
+@pytest.mark.parametrize(('count', 'drawn'), [(3, {'timing'}), (2, set())])
+def test_what_little_was_heard_is_drawn_or_left_out(tmp_path, count: int, drawn: set[str]) -> None:
+    stamps = 9_000_000_000 + 50_000_000 * np.arange(count)
+    log = Made(arrived_ns=stamps + 1_000_000, stamp_ns=stamps, began_ns=9_000_000_000)
+    evidence = Made(log=log, settings=Settings(), has_motion=False, answered=[])
+    with artists.captured():
+        assert set(driver.draw(evidence, tmp_path)) == drawn

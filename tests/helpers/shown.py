@@ -94,7 +94,8 @@ def figure_lines(figure: Figure) -> Iterator[str]:
     for axes in figure.axes:
         if getattr(axes, '_colorbar', None) is not None:
             words = f'{axes.get_xlabel()}{axes.get_ylabel()}'
-            yield f'colours: {words} {digest([*axes.get_xlim(), *axes.get_ylim()])}'
+            ends = digest([*axes.get_xlim(), *axes.get_ylim()])
+            yield f'colours: {words} {ends}{_sample(axes.xaxis)}{_sample(axes.yaxis)}'
         elif axes.axison and axes.get_visible():
             yield from _axes_lines(axes)
 
@@ -140,9 +141,11 @@ def _axes_lines(axes: Axes) -> Iterator[str]:
         elif type(axis.get_major_locator()) is MaxNLocator:
             ticks = f' ticks at most {axis.get_major_locator()._nbins}'  # no public way to it
         elif isinstance(axis.get_major_formatter(), FuncFormatter):
-            ticks = ' ticks ' + ', '.join(axis.get_major_formatter()(v, 0) for v in (0.01, 0.5, 20))
+            ticks = _sample(axis)
         ticks += ''.join(f' {name[5:]} {value}' for name, value in axis.get_tick_params().items()
                          if name in ('labelsize', 'labelrotation') and ticks)  # fmt: skip
+        side = 'bottom' if name == 'x' else 'left'
+        ticks += '' if axis.get_tick_params().get(f'label{side}', True) else ' bare'
         inverted = ' inverted' if axis.get_inverted() else ''
         yield f'  {name} {axis.get_label_text()} {scale}{inverted}{limits}{ticks}'
     kept = [one for one in axes.get_children() if one.get_visible() and one is not axes.patch]
@@ -151,6 +154,14 @@ def _axes_lines(axes: Axes) -> Iterator[str]:
             yield f'  {kind}{look}: {data}'
     if axes.get_legend() is not None:
         yield f'  {_legend(axes.get_legend())}'
+
+
+def _sample(axis: Axis) -> str:
+    """How an axis writes numbers in a way of its own."""
+    write = axis.get_major_formatter()
+    if not isinstance(write, FuncFormatter):
+        return ''
+    return ' ticks ' + ', '.join(write(value, 0) for value in (0.01, 0.5, 20))
 
 
 def _limits(axes: Axes, name: str) -> str:
@@ -273,7 +284,7 @@ def _legend(key: Legend) -> str:
     entries = ', '.join(
         f'{word}{look.removesuffix(f" {word!r}")}' for word, look in zip(words, looks, strict=True)
     )
-    return f'legend {title}: {entries}'
+    return f'legend {key._outside_loc or ""} {title}: {entries}'  # no public way to it
 
 
 # panels of a page

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.made_runs import N, made
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.herman2018 import paper
@@ -331,3 +332,16 @@ def test_where_each_verdict_changes(case1, case2, approved):
                 lines.append(f'{number} {law} {name} {begin} {where}: {found}')
     approved.add(lines)
     assert {line.split()[0] for line in lines} == {str(n) for n in range(1, 22)} - {'17'}
+
+
+def test_what_each_row_says_of_runs_whose_every_column_is_like_no_others(approved):
+    runs = digests({'gvc': made('gvc', 'gvc', 1), 'cl': made('cl', 'cl', 2)})
+    answers = {
+        law: ErrorSensitivity(np.roll(ANSWERS, k), np.roll(ANSWERS, k + 2))
+        for k, law in enumerate(runs)
+    }
+    evidence = Evidence({law: Signals(run) for law, run in runs.items()}, tuple(N), answers)
+    for number, row in enumerate(ROWS, start=1):
+        found = row.judge(evidence)
+        approved.add([f'{number} | {found.verdict} | {found.ours} | {found.window}'])
+        approved.add(f'  {value.name} | {value.value:#.4g} {value.unit}' for value in found.values)

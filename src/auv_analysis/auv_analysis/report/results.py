@@ -397,6 +397,12 @@ def view_of_file(
     return make_table(name, caption, rows, shown, pointer=pointer, **about)
 
 
+def place(*keys: object, file: str = 'summary.json') -> str:
+    """Where a number stands in a JSON file: a JSON pointer behind the file's name."""
+    parts = (str(key).replace('~', '~0').replace('/', '~1') for key in keys)
+    return f'{file}:/{"/".join(parts)}'
+
+
 def document_table(
     results: Results,
     name: str,
@@ -423,8 +429,7 @@ def document_table(
         entry = rows[i].get(column)
         if not isinstance(entry, tuple):
             return ''
-        parts = (str(key).replace('~', '~0').replace('/', '~1') for key in entry)
-        return f'{results.file}:/{"/".join(parts)}'
+        return place(*entry, file=results.file)
 
     return make_table(name, caption, data, shown, pointer=pointer, **about)
 

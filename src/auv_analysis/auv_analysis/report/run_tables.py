@@ -9,7 +9,7 @@ from auv_analysis.metrics.coupling import input_deformation, velocity_deformatio
 from auv_analysis.metrics.quantities import METRICS, SIGNALS, VELOCITY, WRENCH, Quantity
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import join, number, plain
-from auv_analysis.report.results import Column, Table, described, make_table
+from auv_analysis.report.results import Column, Table, described, make_table, place
 from auv_analysis.report.scenario_text import SetUp, gain_text
 from auv_analysis.runs.run import FOREIGN, RunInfo
 from auv_dynamics.vehicle import DOFS
@@ -22,12 +22,6 @@ ORIGIN = {
     'simulate': 'simulated in process',
     FOREIGN: 'recorded by another system',
 }
-
-
-def pointer(*keys: object, file: str = 'summary.json') -> str:
-    """Where a number stands in a JSON file: a JSON pointer behind the file's name."""
-    parts = (str(key).replace('~', '~0').replace('/', '~1') for key in keys)
-    return f'{file}:/{"/".join(parts)}'
 
 
 def controllers_table(runs: Mapping[str, RunInfo]) -> Table:
@@ -55,7 +49,7 @@ def controllers_table(runs: Mapping[str, RunInfo]) -> Table:
     }
     caption = 'Controllers: law, gains and origin of the run.'
     names = list(runs)
-    where = lambda row, column: pointer(names[row], column)  # noqa: E731
+    where = lambda row, column: place(names[row], column)  # noqa: E731
     return make_table('controllers', caption, rows, shown, pointer=where)
 
 
@@ -118,7 +112,7 @@ def _matrix(name: str, caption: str, values: Any, *where: str, digits: int = 4) 
     shown |= {dof: Column(dof, digits=digits, look='plain') for dof in DOFS}
 
     def at(row: int, column: str) -> str:
-        return pointer(*where, *([row] if square else []), DOFS.index(column))
+        return place(*where, *([row] if square else []), DOFS.index(column))
 
     return make_table(name, caption, rows, shown, pointer=at)
 
@@ -226,7 +220,7 @@ def _by_dof(
             rows.append(row)
 
     def at(row: int, column: str) -> str:
-        return pointer(names[row // 6], *column.split('.'), row % 6)
+        return place(names[row // 6], *column.split('.'), row % 6)
 
     return make_table(name, caption, rows, shown, pointer=at, stub=2, **about)
 
@@ -315,7 +309,7 @@ def certificate_table(summaries: Summaries) -> Table | None:
 
     def at(row: int, column: str) -> str:
         _, _, key, factor = CERTIFICATE[row]
-        where = pointer(names[column], 'lyapunov', key)
+        where = place(names[column], 'lyapunov', key)
         return where if factor == 1.0 else f'{where}*{factor:g}'
 
     caption = 'The certificate (23) to (28) of each run; the residual is that of an identity only '
@@ -359,7 +353,7 @@ def energy_table(summaries: Summaries) -> Table:
         shown[f'shares_percent.{k}'] = described(f'ξ{k + 1}', SIGNALS['share'].meaning, '%')
 
     def at(row: int, column: str) -> str:
-        return pointer(*places[row], *column.split('.'))
+        return place(*places[row], *column.split('.'))
 
     caption = 'Mean kinetic energy and the shares of its components, by window.'
     return make_table('energy', caption, rows, shown, pointer=at)
@@ -420,7 +414,7 @@ def couplings_table(summaries: Summaries, vehicle: str) -> Table:
     }
 
     def at(row: int, column: str) -> str:
-        return pointer(names[column], 'coupling', f'{list(KINDS)[row // 6]}_max', row % 6)
+        return place(names[column], 'coupling', f'{list(KINDS)[row // 6]}_max', row % 6)
 
     caption = 'Couplings: the rule, and the largest magnitude over the run'
     caption += f'; the rule is that of {vehicle}.' if vehicle else '.'
@@ -458,7 +452,7 @@ def terms_table(name: str, summary: Mapping[str, Any]) -> Table | None:
         'share_percent': described('part', part, '%'),
     }
     caption = f'The pieces that add to the couplings of {name}: which motion or input causes which.'
-    where = lambda row, column: pointer(*places[row], column)  # noqa: E731
+    where = lambda row, column: place(*places[row], column)  # noqa: E731
     return make_table('terms', caption, rows, shown, pointer=where, stub=3)
 
 

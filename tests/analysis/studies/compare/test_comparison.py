@@ -162,3 +162,16 @@ def test_ranks_are_lines_as_long_as_these_can_be_told_apart(entries, count, line
     assert lines or angles == {90.0}
     numbers = [text.get_text() for text in figure.axes[0].texts]
     assert lines or {len(number.partition('.')[2]) for number in numbers if number != '0'} == {1}
+
+
+def test_colours_of_a_ranking_end_at_sixteen_times_the_median(entries) -> None:
+    many = [replace(entries[i % 2], name=f'{i}') for i in range(9)]
+    ranking = rank(comparison_table(many))
+    for times, end in ((100.0, 4.0), (1e-6, 1.0)):
+        far = replace(ranking, ratios=times * ranking.ratios)
+        assert plots._ranking(far)[0].axes[0].images[0].get_clim() == (-end, end)
+
+
+def test_runs_that_differ_in_nothing_have_no_measures_to_be_ranked_by(entries) -> None:
+    ranking = rank(comparison_table([replace(entries[0], name=name) for name in ('a', 'b')]))
+    assert (list(ranking.measures), ranking.ranks.shape) == ([], (2, 0))

@@ -299,3 +299,17 @@ def test_a_law_without_gains_and_one_that_fails_are_told_of(tmp_path, monkeypatc
     assert [s.text for s in sensitivity_sentences([found])] == [
         'How own follows its gains is not known: the law has no gain that is not zero.'
     ]
+
+
+def test_where_the_scenarios_own_gains_fail_nothing_is_followed(monkeypatch):
+    known(monkeypatch, **LAWS)
+    usual = module.rollouts
+
+    def first_fails(*args, **about):
+        found = usual(*args, **about)
+        found['status'][0] = 'diverged'
+        return found | {'reason': np.full(len(found['status']), 'it falls over')}
+
+    monkeypatch.setattr(module, 'rollouts', first_fails)
+    found = sensitivity(short(), 'gvc', count=4)
+    assert found.refusal == 'with the scenario’s own gains: it falls over'

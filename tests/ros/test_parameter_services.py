@@ -11,6 +11,7 @@ from rclpy.parameter import parameter_value_to_python
 
 from auv_analysis.nodes.recorder_node import RecorderNode
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.ros.parameters import _taken
 from auv_gvc_controller.nodes.controller_node import ControllerNode
 
 FAULT = ['-p', 'faults.names:=["gone"]', *parameters(faults__gone__kind='sensor_drop_out')]
@@ -97,6 +98,35 @@ def test_what_decides_whom_a_controller_hears_is_fixed() -> None:
         'vehicle', 'lockstep', 'autostart', 'setpoint_pairing', 'setpoint_acceleration',
         'odom_frame', 'base_frame', 'expected_subscribers', 'start_type_description_service',
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('given', 'kind', 'taken'),
+    [
+        (3, float, 3.0), (True, float, True), ('a', float, 'a'), (2.5, list[float], [2.5]),
+        ((1, 2.5), list[float], [1.0, 2.5]), ([1.0, True], list[float], [1.0, True]),
+        ([1, '2'], list[float], [1, '2']), (('a', 'b'), list[str], ['a', 'b']), (7, int, 7),
+    ],
+)  # fmt: skip
+def test_only_numbers_are_taken_for_numbers(given, kind, taken) -> None:
+    found = _taken(given, kind)
+    assert found == taken
+    assert type(found) is type(taken)
+    if isinstance(taken, list):
+        assert [*map(type, found)] == [*map(type, taken)]
+
+
+def test_a_gain_that_is_refused_is_told_with_what_is_expected_and_what_was_found() -> None:
+    gains = {'gains.k_D': [1.0, 2.0], 'gains.k_I': 1.0, 'gains.Lambda': 0.8, 'gains.Gamma': 60.0}
+    given = {'law': 'gvc', 'vehicle': 'herman2018', **gains}
+    with program() as made:
+        node = made.add(ControllerNode, given)
+        with pytest.raises(InputError) as caught:
+            node._settings.build()
+    error = caught.value
+    assert (error.key, error.expected, error.found) == (
+        'gains.k_D', '1, 6 or 36 numbers', 'shape (2,)'
+    )  # fmt: skip
 
 
 CONTROL = {'law': 'gvc', 'vehicle': 'herman2018', 'gains.k_D': 12.0}

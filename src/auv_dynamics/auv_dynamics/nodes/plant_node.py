@@ -203,10 +203,8 @@ class RealTime:
 
     def _held(self) -> tuple[float, ...]:
         node = self._node
-        if time.monotonic() - self._heard <= node.wrench_timeout:
-            return self._tau
-        self._tau = self.ZERO
-        return self.ZERO
+        heard = time.monotonic() - self._heard <= node.wrench_timeout
+        return self._tau if heard else self.ZERO
 
     def _tick(self) -> None:
         node, plant = self._node, self._node.plant

@@ -1,6 +1,6 @@
 """All that a page, a figure or a panel shows to a reader, as lines of text.
 
-How something is laid out (widths of lines, places of legends) is left out, but for the size of a
+How something is laid out (widths of lines, legends in a panel) is left out, but for the size of a
 figure, its grid, and sizes and angles of texts that a figure sets. Of data stands a digest.
 """
 

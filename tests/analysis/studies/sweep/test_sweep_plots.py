@@ -25,11 +25,10 @@ from matplotlib.figure import Figure
 
 from auv_analysis.metrics.measures import BY_NAME
 from auv_analysis.simulation.reduction import COLUMNS
-from auv_analysis.studies.sweep import plots
+from auv_analysis.studies.sweep import plots, report
 from auv_analysis.studies.sweep.analysis import Analysis, analysed
 from auv_analysis.studies.sweep.dataset import numbers_of, open_sweep, short_names
 from auv_analysis.studies.sweep.plots import draw, main_measures
-from auv_analysis.studies.sweep.report import _listings
 
 pytestmark = pytest.mark.usefixtures('approved')
 
@@ -359,9 +358,9 @@ def test_values_across_are_turned_where_they_are_many(count: int, angle: int) ->
 
 
 def test_a_campaign_that_is_gone_is_not_listed(tmp_path: Path) -> None:
-    assert _listings(tmp_path) == []
+    assert report._listings(tmp_path) == []
     (tmp_path / 'campaign.yaml').write_text('name: x')
-    assert _listings(tmp_path) == [('campaign.yaml', 'name: x')]
+    assert report._listings(tmp_path) == [('campaign.yaml', 'name: x')]
 
 
 @pytest.mark.parametrize(
@@ -381,3 +380,13 @@ def test_paths_above_columns_are_turned_where_they_are_more_than_two(count: int,
     figure = plots.heat_map(['row'], [grid])
     plots._small_heads(figure, [grid])
     assert {label.get_rotation() for label in figure.axes[0].get_xticklabels()} == {angle}
+
+
+def test_notes_stand_behind_what_was_swept(simple: Drawn, monkeypatch, tmp_path: Path) -> None:
+    told: list = []
+    monkeypatch.setattr(report, 'write_document', lambda *of: told.extend(of))
+    report.write_report(tmp_path, replace(simple[0], notes=['odd', 'even']), {})
+    _, _, _, sentences, sections, _ = told
+    blocks = sections[0].blocks
+    assert [getattr(one, 'name', one) for one in blocks] == ['paths', 'counts', 'odd', 'even']
+    assert [one.text for one in sentences][-2:] == ['Odd.', 'Even.']

@@ -101,6 +101,15 @@ def test_spans_and_numbers_of_a_figure(runs):
     assert sentence.startswith(' Shaded: 1 thruster T3 at 50 %, 1–2 s; 2 25 % of the meas')
 
 
+def test_a_gap_beyond_what_is_shown_does_not_widen_the_axis(runs):
+    with plots.style():
+        axes = plots.new_figure(2.0).subplots()
+        axes.plot([0.0, 1.0], [0.0, 1.0])
+        limits = axes.get_xlim()
+        plots.shade(axes, replace(digests(runs)['gvc'], gaps=((3.0, 3.5),)))
+    assert axes.get_xlim() == limits
+
+
 def test_a_band_around_errors_that_keep_inside_is_in_sight(runs):
     with plots.style():
         axes = plots.new_figure(2.0).subplots()

@@ -210,7 +210,7 @@ def test_report_of_a_rough_scenario(page):
         'commanded input τ',
         'Of the commanded wrench.',
         'Kf of pid is zero (no adaptive term)',
-        'velocity gain K_D of gvc and wound',
+        'Velocity gain K_D of gvc and wound',
         'omega_f = 20 I (default)',
         'F contains model error and current and so depends on the motion of this very run.',
         'no certificate of the law pid is known',

@@ -166,8 +166,8 @@ def test_gains_are_a_sentence_or_a_matrix(summaries) -> None:
     drawn = {table.name: table for table in tables.gains_tables(info, gains)}
     assert list(drawn) == ['Upsilon', 'N', 'gain_K_D_3', 'gain_K_f_4']
     assert drawn['Upsilon'].caption == f'Υ of {VEHICLE.name}, (4).'
-    assert drawn['gain_K_D_3'].caption == 'velocity gain K_D of two in the body frame.'
-    assert drawn['gain_K_f_4'].caption == 'adaptation gain K_f of two in the body frame.'
+    assert drawn['gain_K_D_3'].caption == 'Velocity gain K_D of two in the body frame.'
+    assert drawn['gain_K_f_4'].caption == 'Adaptation gain K_f of two in the body frame.'
     for name, values in (
         ('Upsilon', summaries['one']['decomposition']['Upsilon']),
         ('gain_K_D_3', summaries['two']['gains']['K_D']),

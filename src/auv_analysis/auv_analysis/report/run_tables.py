@@ -97,7 +97,7 @@ def gains_tables(runs: Mapping[str, RunInfo], summaries: Summaries) -> Iterator[
             yield _matrix(f'gain_{symbol}_{index}', caption, gain, names[0], 'gains', symbol)
 
 
-SYMBOLS = {'K_D': 'velocity gain K_D', 'K_f': 'adaptation gain K_f'}
+SYMBOLS = {'K_D': 'Velocity gain K_D', 'K_f': 'Adaptation gain K_f'}
 
 
 def _matrix(name: str, caption: str, values: Any, *where: str, digits: int = 4) -> Table:

@@ -75,6 +75,11 @@ def _look(line: Line2D) -> dict[str, Any]:
     }
 
 
+def angles(axes: Axes) -> set[float]:
+    """By how much the words below a panel are turned, deg."""
+    return {label.get_rotation() for label in axes.get_xticklabels()}
+
+
 def legend(axes: Axes) -> Legend:
     """The legend of a panel, else the first of its figure."""
     own = axes.get_legend()

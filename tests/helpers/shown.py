@@ -132,28 +132,33 @@ def _axes_lines(axes: Axes) -> Iterator[str]:
         scale = f'{axis.get_scale()}{" shared" * (len(alike) > 1)}'
         if axis.get_scale() == 'symlog':
             scale += f' from {_number(axis.get_transform().linthresh, 1.0)}'
-        ticks = ''
-        if isinstance(axis.get_major_locator(), FixedLocator):
-            locations, texts = axis.get_ticklocs(), axis.get_ticklabels()
-            words = [text.get_text() for text in texts]
-            pairs = zip_longest((_number(at, 1.0) for at in locations), words, fillvalue='')
-            ticks = ' ticks ' + ', '.join(a if a == b else f'{a} {b}' for a, b in pairs)
-        elif type(axis.get_major_locator()) is MaxNLocator:
-            ticks = f' ticks at most {axis.get_major_locator()._nbins}'  # no public way to it
-        elif isinstance(axis.get_major_formatter(), FuncFormatter):
-            ticks = _sample(axis)
-        ticks += ''.join(f' {name[5:]} {value}' for name, value in axis.get_tick_params().items()
-                         if name in ('labelsize', 'labelrotation') and ticks)  # fmt: skip
-        side = 'bottom' if name == 'x' else 'left'
-        ticks += '' if axis.get_tick_params().get(f'label{side}', True) else ' bare'
         inverted = ' inverted' if axis.get_inverted() else ''
-        yield f'  {name} {axis.get_label_text()} {scale}{inverted}{limits}{ticks}'
+        side = 'bottom' if name == 'x' else 'left'
+        bare = '' if axis.get_tick_params().get(f'label{side}', True) else ' bare'
+        yield f'  {name} {axis.get_label_text()} {scale}{inverted}{limits}{_ticks(axis)}{bare}'
     kept = [one for one in axes.get_children() if one.get_visible() and one is not axes.patch]
     for (kind, look), group in groupby(kept, key=_kind_and_look):
         if kind and (data := _data(kind, [*group], axes)):
             yield f'  {kind}{look}: {data}'
     if axes.get_legend() is not None:
         yield f'  {_legend(axes.get_legend())}'
+
+
+def _ticks(axis: Axis) -> str:
+    """Ticks that a figure sets itself, with size and angle of their texts where it sets these."""
+    locator, look = axis.get_major_locator(), axis.get_tick_params()
+    if isinstance(locator, FixedLocator):
+        words = [text.get_text() for text in axis.get_ticklabels()]
+        places = (_number(at, 1.0) for at in axis.get_ticklocs())
+        pairs = zip_longest(places, words, fillvalue='')
+        ticks = ' ticks ' + ', '.join(a if a == b else f'{a} {b}' for a, b in pairs)
+    elif type(locator) is MaxNLocator:
+        ticks = f' ticks at most {locator._nbins}'  # no public way to it
+    else:
+        ticks = _sample(axis)
+    texts = [f' {key[5:]} {value}' for key, value in look.items()
+             if key in ('labelsize', 'labelrotation')]  # fmt: skip
+    return ticks and ticks + ''.join(texts)
 
 
 def _sample(axis: Axis) -> str:

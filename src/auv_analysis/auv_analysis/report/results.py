@@ -8,7 +8,7 @@ follow from the table.
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, cast
@@ -298,7 +298,7 @@ class Results:
         """
         about = {'file': f'{name}.parquet'} | about
         if not about['file']:
-            about.setdefault('pointer', lambda row, column: f'{self.file}:/{name}/{row}/{column}')
+            about.setdefault('pointer', partial(json_pointer, name, file=self.file))
         self.tables[name] = make_table(name, caption, rows, shown, **about)
         return self.tables[name]
 
@@ -397,7 +397,7 @@ def view_of_file(
     return make_table(name, caption, rows, shown, pointer=pointer, **about)
 
 
-def place(*keys: object, file: str = 'summary.json') -> str:
+def json_pointer(*keys: object, file: str = 'summary.json') -> str:
     """Where a number stands in a JSON file: a JSON pointer behind the file's name."""
     parts = (str(key).replace('~', '~0').replace('/', '~1') for key in keys)
     return f'{file}:/{"/".join(parts)}'
@@ -429,7 +429,7 @@ def document_table(
         entry = rows[i].get(column)
         if not isinstance(entry, tuple):
             return ''
-        return place(*entry, file=results.file)
+        return json_pointer(*entry, file=results.file)
 
     return make_table(name, caption, data, shown, pointer=pointer, **about)
 

@@ -9,7 +9,7 @@ from auv_analysis.metrics.coupling import input_deformation, velocity_deformatio
 from auv_analysis.metrics.quantities import METRICS, SIGNALS, VELOCITY, WRENCH, Quantity
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import join, number, plain
-from auv_analysis.report.results import Column, Table, described, make_table, place
+from auv_analysis.report.results import Column, Table, described, json_pointer, make_table
 from auv_analysis.report.scenario_text import SetUp, gain_text
 from auv_analysis.runs.run import FOREIGN, RunInfo
 from auv_dynamics.vehicle import DOFS
@@ -49,7 +49,7 @@ def controllers_table(runs: Mapping[str, RunInfo]) -> Table:
     }
     caption = 'Controllers: law, gains and origin of the run.'
     names = list(runs)
-    where = lambda row, column: place(names[row], column)  # noqa: E731
+    where = lambda row, column: json_pointer(names[row], column)  # noqa: E731
     return make_table('controllers', caption, rows, shown, pointer=where)
 
 
@@ -112,7 +112,7 @@ def _matrix(name: str, caption: str, values: Any, *where: str, digits: int = 4) 
     shown |= {dof: Column(dof, digits=digits, look='plain') for dof in DOFS}
 
     def at(row: int, column: str) -> str:
-        return place(*where, *([row] if square else []), DOFS.index(column))
+        return json_pointer(*where, *([row] if square else []), DOFS.index(column))
 
     return make_table(name, caption, rows, shown, pointer=at)
 
@@ -220,7 +220,7 @@ def _by_dof(
             rows.append(row)
 
     def at(row: int, column: str) -> str:
-        return place(names[row // 6], *column.split('.'), row % 6)
+        return json_pointer(names[row // 6], *column.split('.'), row % 6)
 
     return make_table(name, caption, rows, shown, pointer=at, stub=2, **about)
 
@@ -309,7 +309,7 @@ def certificate_table(summaries: Summaries) -> Table | None:
 
     def at(row: int, column: str) -> str:
         _, _, key, factor = CERTIFICATE[row]
-        where = place(names[column], 'lyapunov', key)
+        where = json_pointer(names[column], 'lyapunov', key)
         return where if factor == 1.0 else f'{where}*{factor:g}'
 
     caption = 'The certificate (23) to (28) of each run; the residual is that of an identity only '
@@ -353,7 +353,7 @@ def energy_table(summaries: Summaries) -> Table:
         shown[f'shares_percent.{k}'] = described(f'ξ{k + 1}', SIGNALS['share'].meaning, '%')
 
     def at(row: int, column: str) -> str:
-        return place(*places[row], *column.split('.'))
+        return json_pointer(*places[row], *column.split('.'))
 
     caption = 'Mean kinetic energy and the shares of its components, by window.'
     return make_table('energy', caption, rows, shown, pointer=at)
@@ -414,7 +414,7 @@ def couplings_table(summaries: Summaries, vehicle: str) -> Table:
     }
 
     def at(row: int, column: str) -> str:
-        return place(names[column], 'coupling', f'{list(KINDS)[row // 6]}_max', row % 6)
+        return json_pointer(names[column], 'coupling', f'{list(KINDS)[row // 6]}_max', row % 6)
 
     caption = 'Couplings: the rule, and the largest magnitude over the run'
     caption += f'; the rule is that of {vehicle}.' if vehicle else '.'
@@ -452,7 +452,7 @@ def terms_table(name: str, summary: Mapping[str, Any]) -> Table | None:
         'share_percent': described('part', part, '%'),
     }
     caption = f'The pieces that add to the couplings of {name}: which motion or input causes which.'
-    where = lambda row, column: place(*places[row], column)  # noqa: E731
+    where = lambda row, column: json_pointer(*places[row], column)  # noqa: E731
     return make_table('terms', caption, rows, shown, pointer=where, stub=3)
 
 

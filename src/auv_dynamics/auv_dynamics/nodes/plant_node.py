@@ -202,8 +202,7 @@ class RealTime:
         return STALE, f'no wrench for {timeout:g} s: zero wrench'
 
     def _held(self) -> tuple[float, ...]:
-        node = self._node
-        heard = time.monotonic() - self._heard <= node.wrench_timeout
+        heard = time.monotonic() - self._heard <= self._node.wrench_timeout
         return self._tau if heard else self.ZERO
 
     def _tick(self) -> None:

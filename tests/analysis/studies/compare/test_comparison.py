@@ -7,6 +7,7 @@ from types import SimpleNamespace as Made
 import numpy as np
 import pyarrow as pa
 import pytest
+from helpers.artists import angles
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics.summary import band_of
@@ -158,8 +159,7 @@ def test_ranks_are_lines_as_long_as_these_can_be_told_apart(entries, count, line
     many = [replace(entries[i % 2], name=f'{i}') for i in range(count)]
     figure, _, caption = plots._ranking(rank(comparison_table(many)))
     assert ('Equal values share a rank' in caption) is lines
-    angles = {label.get_rotation() for label in figure.axes[0].get_xticklabels()}
-    assert lines or angles == {90.0}
+    assert lines or angles(figure.axes[0]) == {90.0}
     numbers = [text.get_text() for text in figure.axes[0].texts]
     assert lines or {len(number.partition('.')[2]) for number in numbers if number != '0'} == {1}
 

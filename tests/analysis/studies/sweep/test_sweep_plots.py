@@ -24,6 +24,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from auv_analysis.metrics.measures import BY_NAME
+from auv_analysis.report.plots import new_figure
 from auv_analysis.simulation.reduction import COLUMNS
 from auv_analysis.studies.sweep import plots, report
 from auv_analysis.studies.sweep.analysis import Analysis, analysed
@@ -342,19 +343,19 @@ def test_measures_that_are_alike_in_all_rows_are_named_by_their_kind() -> None:
     ('words', 'angle'), [(('a' * 10, 'b' * 10), 0), (('a' * 10, 'b' * 11), 60)]
 )
 def test_words_below_an_axis_are_turned_where_they_are_long(words, angle: int) -> None:
-    axes = plots.plots.new_figure(2.0).subplots()
+    axes = new_figure(2.0).subplots()
     axes.plot([0, 1], [1.0, 2.0])
     factor = SimpleNamespace(binned=False, numbers=None, labels=words)
     plots._finish(axes, factor, next(iter(BY_NAME.values())))
-    assert {label.get_rotation() for label in axes.get_xticklabels()} == {angle}
+    assert artists.angles(axes) == {angle}
 
 
 @pytest.mark.parametrize(('count', 'angle'), [(4, 0), (5, 60)])
 def test_values_across_are_turned_where_they_are_many(count: int, angle: int) -> None:
-    axes = plots.plots.new_figure(2.0).subplots()
+    axes = new_figure(2.0).subplots()
     cells = [{'value': 'a', 'other_value': f'{i}', 'median': 1.0 + i} for i in range(count)]
     plots._one_pair(axes, cells, 'label', Normalize(0.0, 9.0))
-    assert {label.get_rotation() for label in axes.get_xticklabels()} == {angle}
+    assert artists.angles(axes) == {angle}
 
 
 def test_a_campaign_that_is_gone_is_not_listed(tmp_path: Path) -> None:
@@ -369,7 +370,7 @@ def test_a_campaign_that_is_gone_is_not_listed(tmp_path: Path) -> None:
      ((-1.0, 99.0), 'linear'), ((), 'linear'), ((1.0, np.nan, 40.0), 'log')],
 )  # fmt: skip
 def test_values_far_apart_have_a_logarithmic_axis(values, scale: str) -> None:
-    axes = plots.plots.new_figure(2.0).subplots()
+    axes = new_figure(2.0).subplots()
     plots._logarithmic(axes, 'x', np.array(values))
     assert axes.get_xscale() == scale
 
@@ -379,7 +380,7 @@ def test_paths_above_columns_are_turned_where_they_are_more_than_two(count: int,
     grid = plots.HeatMap(np.ones((1, count)), ['path'] * count, 'x')
     figure = plots.heat_map(['row'], [grid])
     plots._small_heads(figure, [grid])
-    assert {label.get_rotation() for label in figure.axes[0].get_xticklabels()} == {angle}
+    assert artists.angles(figure.axes[0]) == {angle}
 
 
 def test_notes_stand_behind_what_was_swept(simple: Drawn, monkeypatch, tmp_path: Path) -> None:

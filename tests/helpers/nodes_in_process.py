@@ -4,7 +4,7 @@ Nothing of ours makes or reads the messages here: an axis that `convert` and `in
 alike would not be seen by either.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
 from helpers.fork_server import PERIOD
 from helpers.node_processes import Peer, fresh_domain
 from nav_msgs.msg import Odometry
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
@@ -38,12 +39,16 @@ class Program(Peer):
         node_interface.DIAGNOSTICS_PERIOD = PERIOD
         self.nodes: list[Any] = []
 
-    def add(self, make: Callable[..., Any], given: dict[str, Any], **options: Any) -> Any:
+    def add(self, make: type, given: dict[str, Any], **options: Any) -> Any:
         """Add a node with parameters."""
         values = [Parameter(name, value=value) for name, value in given.items()]
-        node = make(
-            context=self.context, use_global_arguments=False, parameter_overrides=values, **options
-        )
+        options |= {'context': self.context, 'use_global_arguments': False}
+        node = make.__new__(make)
+        try:
+            node.__init__(parameter_overrides=values, **options)
+        except ValueError:
+            _end(node)
+            raise
         self.executor.add_node(node)
         self.nodes.append(node)
         return node
@@ -53,13 +58,23 @@ class Program(Peer):
         self.nodes.remove(node)
         self.executor.remove_node(node)
         node.close()
-        node.destroy_node()
+        _end(node)
 
     def close(self) -> None:
         """End everything."""
         for node in [*self.nodes]:
             self.drop(node)
         super().close()
+
+
+def _end(node: Any) -> None:
+    """Take a node, or what there is of one that was refused, out of the graph at once.
+
+    rclpy keeps a lifecycle node there until Python collects it, and a middleware's participant with
+    it. They are numbered within a process: from the tenth on `is_free` does not look for them.
+    """
+    Node.destroy_node(node)
+    vars(node).clear()
 
 
 @contextmanager

@@ -124,6 +124,18 @@ def change(node: ControllerNode, **values: Any) -> None:
     assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
 
 
+def test_a_set_point_of_before_is_not_followed_after_an_activation(made, vehicle) -> None:
+    held = {'setpoint_pairing': 'latest', 'setpoint_acceleration': 'none'}
+    node, answered = controller(made, vehicle, 'gvc', **held), []
+    made.publish(topics.CMD_VEL, by_hand.six(topics.CMD_VEL.type, 0, NU_D[0]))
+    for k in range(2):
+        made.publish(topics.ODOM, by_hand.odometry(k * STEP, [*ETA[0, :3], 1, 0, 0, 0, *NU[0]]))
+        made.until(lambda k=k: len(made.heard['wrench']) > k, f'wrench {k}')
+        answered.append(any(by_hand.six_of(made.heard['wrench'][-1])))
+        change(node)
+    assert answered == [True, False]
+
+
 @pytest.mark.parametrize('law', LAWS)
 def test_each_gain_that_is_changed_while_inactive_is_taken(made, vehicle, law: str) -> None:
     node, gains, k = controller(made, vehicle, law), dict(LAWS[law]), 0

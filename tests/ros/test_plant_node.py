@@ -2,8 +2,10 @@
 
 import re
 import signal
+import time
 from collections.abc import Iterator
 from subprocess import CompletedProcess
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,8 +23,10 @@ from helpers.nodes_in_process import Program, program
 from helpers.patience import patience
 from std_srvs.srv import SetBool, Trigger
 
+from auv_dynamics.nodes import plant_node
 from auv_dynamics.nodes.plant_node import PlantNode
 from auv_dynamics.ros import convert, interface, topics
+from auv_dynamics.ros.endpoints import UNNAMED
 from auv_dynamics.ros.interface import Frames
 
 FRAMES = Frames()
@@ -375,3 +379,17 @@ def test_real_time_withholds_a_lost_sample() -> None:
 def test_wrong_uncertainty_ends_with_one_line(extra, words) -> None:
     lockstep = parameters(**LOCKSTEP)
     assert_one_line(run_node('plant_node', *lockstep, *parameters(**extra)), *words)
+
+
+def test_another_clock_may_wait_for_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    others: list[SimpleNamespace] = []
+    monkeypatch.setattr(plant_node, 'other_publishers', lambda *_: others)
+    with program() as made:
+        plant = made.add(PlantNode, {'vehicle': 'herman2018', 'start_paused': True})
+        begin = plant_node.NEW + time.monotonic()
+        assert plant._is_only_clock(begin)
+        others.append(SimpleNamespace(node_name=UNNAMED, node_namespace=''))
+        assert not plant._is_only_clock(begin + 0.9 * plant_node.NEW)
+        assert plant.exit_code is None
+        assert not plant._is_only_clock(begin + plant_node.NEW)
+        assert plant.exit_code == 2

@@ -10,7 +10,7 @@ import pytest
 from helpers.report_pages import at
 from rich.console import Console
 
-from auv_analysis.metrics.quantities import METRICS, SIGNALS, mathtext, quantity
+from auv_analysis.metrics.quantities import METRICS, SIGNALS, Quantity, mathtext, quantity
 from auv_analysis.output.text import MISSING, Maths
 from auv_analysis.report.results import (
     Column,
@@ -58,6 +58,15 @@ def test_results_are_written_once_with_unknown_as_null(results: Results, tmp_pat
     about = table.schema.field('effort.rms.surge').metadata
     assert about[b'unit'] == b'N'
     assert about[b'meaning'].startswith(b'root mean square')
+
+
+def test_all_that_is_known_of_a_quantity_is_stored_beside_its_column() -> None:
+    what = Quantity('s', 'J', 'energy', '(23)', 'what it holds')
+    schema = make_table('t', 'All.', [{'E': 1.0}], {'E': what}).data.schema
+    assert schema.field('E').metadata == {
+        b'symbol': b's', b'unit': b'J', b'label': b'energy', b'equation': b'(23)',
+        b'meaning': b'what it holds',
+    }  # fmt: skip
 
 
 def test_columns_are_stored_in_the_order_in_which_they_are_shown() -> None:

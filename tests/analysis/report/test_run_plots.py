@@ -32,6 +32,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.markers import MarkerStyle
 
+from auv_analysis.metrics.quantities import SIGNALS
 from auv_analysis.report import plots
 from auv_analysis.report.digest import digests
 from auv_analysis.report.faults import fault_figure
@@ -729,3 +730,13 @@ def test_peaks_far_apart_share_a_logarithmic_axis(peaks: list[float], apart: boo
     axes.plot([0.0, 1.0], [0.0, max(peaks)])
     assert _symmetric(axes, peaks) is apart
     assert axes.get_yscale() == ('symlog' if apart else 'linear')
+
+
+def test_the_lines_of_a_panel_are_named_above_it_at_its_right() -> None:
+    figure = Figure()
+    axes = figure.subplots()
+    plots.key(axes, SIGNALS['nu'], [0, 1])
+    figure.draw_without_rendering()
+    words, panel = axes.get_legend().get_window_extent(), axes.get_window_extent()
+    assert words.y0 > panel.y1
+    assert panel.x1 - 20 < words.x1 < panel.x1 + 1

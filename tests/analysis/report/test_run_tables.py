@@ -193,6 +193,12 @@ def test_wrenches_that_were_estimated(kind: str) -> None:
     assert tables.estimate_table(found, other) is None
     table = tables.estimate_table(found, kind)
     group = 'F by (1)' if kind == 'unexplained' else 'required wrench'
+    symbol = 'F' if kind == 'unexplained' else 'it'
+    meanings = [head.meaning for head in table.columns if head.label in ('mean', 'RMS', 'max')]
+    assert meanings == [
+        f'mean of {symbol} over the samples', f'root mean square of {symbol}',
+        f'largest magnitude of {symbol}',
+    ]  # fmt: skip
     wanted = [
         ((group, 'mean', ''), wrench.mean(axis=0)),
         ((group, 'RMS', ''), np.sqrt((wrench**2).mean(axis=0))),

@@ -158,7 +158,7 @@ class Curve:
 
     x: np.ndarray
     y: np.ndarray
-    label: str = ''
+    label: str
     look: Mapping[str, Any] = field(default_factory=dict)
 
 

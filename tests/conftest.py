@@ -70,7 +70,7 @@ def pytest_collection() -> Iterator[None]:
     finally:
         gc.freeze()
         gc.enable()
-        gc.set_threshold(50_000, 20, 100)
+        gc.set_threshold(200_000, 20, 1000)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -155,6 +155,16 @@ def test_silence_ends_the_run_and_is_named(peer, capfd) -> None:
     assert 'its publisher: no controller' in said
 
 
+def test_whose_steps_are_all_answered_waits_for_its_recorder(peer) -> None:
+    short = {'duration': 0.01, 'recorder_window': 5, 'wrench_timeout': patience(0.4)}
+    plant = peer.add(PlantNode, {**BARRIER, **short})
+    listening(peer)
+    odometry(peer, 1)
+    answered(peer, 0, 2)
+    peer.spin(patience(0.8))
+    assert plant.exit_code is None
+
+
 def test_a_controller_that_falls_silent_ends_the_run_and_is_named(peer, capfd) -> None:
     plant = peer.add(PlantNode, {**BARRIER, 'wrench_timeout': patience(1.0)})
     listening(peer)

@@ -65,9 +65,13 @@ def test_records_every_step_and_leaves_when_it_has_all(tmp_path: Path) -> None:
     arguments += ['-p', f'attachments:=["scenario.yaml={attached}"]']
     with graph(('recorder_node', arguments)) as (peer, processes):
         peer.listen(topics.PROGRESS)
+        process = processes['recorder_node']
         for k in range(21):
             publish_step(peer, k)
-        process = processes['recorder_node']
+            if k == 19:
+                acknowledged(peer, 19)
+                peer.spin(0.2)
+                assert process.poll() is None, 'one step is left'
         peer.until(lambda: process.poll() is not None, 'the end')
         assert process.returncode == 0
         acknowledged(peer, 20)

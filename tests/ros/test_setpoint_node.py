@@ -27,9 +27,12 @@ def stamps(peer, topic: str) -> list[int]:
 def test_runs_ahead_of_the_odometry_on_its_grid() -> None:
     start = 7 * 10**9 + 123
     with graph(('setpoint_node', SURGE)) as (peer, _):
-        peer.listen(topics.CMD_VEL, topics.CMD_ACCEL)
+        peer.listen(topics.CMD_VEL, topics.CMD_ACCEL, topics.DIAGNOSTICS)
         peer.until(lambda: peer.node.count_publishers('cmd_vel'), 'a publisher')
-        peer.spin(0.3)
+        said = peer.heard[topics.DIAGNOSTICS.name]
+        for text in ('nobody publishes /odom', 'no odometry yet'):
+            peer.until(lambda text=text: said and said[-1].status[0].message == text, text)
+            peer.node.create_publisher(topics.ODOM.type, topics.ODOM.name, 1)
         assert not peer.heard['cmd_vel'], 'nothing before the first odometry'
         peer.publish(topics.ODOM, odometry(start))
         peer.until(lambda: len(peer.heard['cmd_vel']) >= 6, 'five steps ahead')

@@ -119,3 +119,18 @@ def test_a_small_bar_has_its_colour_in_the_png(tmp_path) -> None:
     for colour in plots.COLOURS:
         wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
         assert np.abs(pixels - wanted).max(axis=1).min() <= 12, colour
+
+
+@pytest.mark.parametrize('location', ['bottom', 'right'])
+def test_the_scale_of_far_values_is_told_in_few_numbers_on_either_axis(location: str) -> None:
+    figure = plots.new_figure(3.0)
+    axes = figure.subplots()
+    draw_grid(axes, HeatMap(np.array([[1.0, 40.0]]), 'ab', ''))
+    plots.scale_bar(figure, axes.images[0], 'x', ax=axes, location=location)
+    bar = figure.axes[1]
+    axis = bar.xaxis if location == 'bottom' else bar.yaxis
+    figure.draw_without_rendering()
+    low, high = axes.images[0].get_clim()
+    told = [label.get_text() for label, at in zip(axis.get_ticklabels(), axis.get_ticklocs(),
+                                                  strict=True) if low <= at <= high]  # fmt: skip
+    assert told == ['1', '2', '5', '10', '20']

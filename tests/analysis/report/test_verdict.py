@@ -3,6 +3,7 @@
 import copy
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from auv_analysis import simulate, summarize
 from auv_analysis.cli import main
 from auv_analysis.metrics.lyapunov import OF_THE_MOTION
 from auv_analysis.report.digest import RunDigest, digests
-from auv_analysis.report.verdict import FAILED, verdict
+from auv_analysis.report.verdict import FAILED, _tune, verdict
 from auv_analysis.runs.run import Extent
 
 CL = tunings.SAME_CL | {'k_D': 30.0}
@@ -204,3 +205,12 @@ def test_a_controller_that_diverged_is_named_first(two: Runs) -> None:
     left = {'gvc': replace(runs['gvc'], notes=(f'{FAILED}: cl diverges at 1 s',))}
     (text,) = verdict(left, {'gvc': summaries['gvc']})
     assert text == f'Not all are compared: {FAILED}: cl diverges at 1 s.'
+
+
+@pytest.mark.parametrize(
+    ('acting', 'sensing', 'words'),
+    [((), (), ''), (('lag',), (), ' --hold zoh'), ((), ('noise',), ' --hold zoh')],
+)
+def test_laws_behind_devices_are_tuned_as_they_are_sampled(acting, sensing, words: str) -> None:
+    run = SimpleNamespace(scenario='mine', law='gvc', acting=acting, sensing=sensing)
+    assert _tune('gvc', [run]) == f'auv tune SCENARIO{words}'

@@ -145,7 +145,6 @@ def _panel(axes: Axes, runs: Mapping[str, RunDigest], i: int, band: float | None
             axes.plot(t, error, **_look(n))
             if part != 'early':
                 low, high = min(low, np.nanmin(error)), max(high, np.nanmax(error))
-        axes.set_xlim(run.start, run.start + run.duration)
     if band is not None:
         for level in (-band, band):
             axes.axhline(level, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)), zorder=1.5)

@@ -305,7 +305,8 @@ def sensitivity(
         raise ValueError(f'span: expected a number above 1, found {span}')
     factors = gain_factors(scenario, controller)
     law = scenario.controller(controller)['law']
-    slow = (method is None or count is None) and _in_python(scenario, controller, hold)
+    asked = factors.names and (method is None or count is None)
+    slow = bool(asked) and _in_python(scenario, controller, hold)
     method = method or ('morris' if slow else 'sobol')
     count = count or _default_count(law, method, slow=slow)
     result = Sensitivity(

@@ -512,6 +512,13 @@ def test_errors_under_faults_are_those_of_their_runs(runs, tmp_path) -> None:
     assert record.caption.startswith('Velocity errors under faults, of one, two and three.')
 
 
+def test_errors_under_faults_are_seen_to_the_end_of_the_longest_run(runs, tmp_path) -> None:
+    one, two = runs['one'], runs['two']
+    with artists.captured() as found:
+        fault_figure(digests({'one': one, 'two': two.part(two.t < START + 6.0)}), tmp_path)
+    assert {axes.get_xlim() for axes in found['faults'].axes} == {(START, START + 12.0)}
+
+
 def test_settling_bands_stand_under_faults_where_the_runs_share_them(runs, tmp_path) -> None:
     two = {name: runs[name] for name in ('one', 'two')}
     with artists.captured() as found:

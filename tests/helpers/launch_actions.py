@@ -61,8 +61,9 @@ def launch_file() -> Iterator[dict[str, Any]]:
 
 
 def actions(launch_file: dict[str, Any], **values: str) -> list[Any]:
-    described = launch_file['generate_launch_description']().positional[0]
-    declared = {one.positional[0]: one.named for one in described if one.positional}
+    *known, last = launch_file['generate_launch_description']().positional[0]
+    assert last.named == {'function': launch_file['_nodes']}, 'it asks for what was declared before'
+    declared = {one.positional[0]: one.named for one in known}
     assert all(v in (declared[k]['choices'] or [v]) for k, v in values.items())
     defaults = {name: one['default_value'] for name, one in declared.items()}
     return launch_file['_nodes'](defaults | values)

@@ -297,6 +297,16 @@ def test_real_time_ends_where_the_loop_diverges() -> None:
     assert 'diverges' in output
 
 
+def test_lock_step_ends_where_the_loop_diverges(peer, capfd) -> None:
+    plant = peer.add(PlantNode, BARRIER)
+    listening(peer)
+    odometry(peer, 1)
+    peer.publish(topics.WRENCH, wrench(0, (1e9, 0, 0, 0, 0, 0)))
+    peer.until(lambda: plant.exit_code is not None, 'the end')
+    assert plant.exit_code == 1
+    assert 'diverges' in capfd.readouterr().err
+
+
 def test_a_second_clock_is_refused_by_who_comes_later() -> None:
     domain = fresh_domain()
     with graph(('plant_node', REAL), domain=domain) as (peer, processes):

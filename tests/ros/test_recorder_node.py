@@ -124,14 +124,19 @@ def test_the_analysis_of_the_last_step_is_waited_for(tmp_path: Path) -> None:
 def test_in_real_time_progress_is_that_of_odometry_and_whoever_comes_late_hears_it(
     tmp_path: Path,
 ) -> None:
-    given = {'bag': str(tmp_path / 'bag'), 'topics': ['odom', 'cmd_vel'], 'strict': False}
+    expected = ['odom', 'cmd_vel', 'cmd_accel']
+    given = {'bag': str(tmp_path / 'bag'), 'topics': expected, 'strict': False}
     with program() as made:
         made.add(RecorderNode, given)
         for k in range(3):
             publish_step(made, k)
         made.spin(0.3)
-        made.listen(topics.PROGRESS)
+        made.listen(topics.PROGRESS, topics.DIAGNOSTICS)
         acknowledged(made, 2)
+        said = made.heard[topics.DIAGNOSTICS.name]
+        made.until(lambda: said, 'diagnostics')
+        told = {pair.key: pair.value for pair in said[-1].status[0].values}
+        assert (told['complete'], told['behind']) == ('2', 'none')
 
 
 @pytest.mark.parametrize('how', [signal.SIGTERM, signal.SIGINT])

@@ -197,7 +197,7 @@ class GraphClock:
             apart = ns - self._node.get_clock().now().nanoseconds
             self._offset = apart if abs(apart) > EPOCH else 0
 
-    def now(self, received: int) -> int | None:
+    def now(self, received: int | None) -> int | None:
         """Time in ns of a message that came at `received` of the system's; None: not known yet."""
         if not self.simulated:
             wall = received or int(self._node.get_clock().now().nanoseconds)

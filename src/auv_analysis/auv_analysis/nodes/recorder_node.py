@@ -177,7 +177,7 @@ class RecorderNode(BulkNode):
 
     def _take(self, topic: str, kind: str, message: bytes, way: dict[str, Any]) -> None:
         """Write a message at the time when it came; before that is known, it waits."""
-        ns = self._time.now(way.get('received_timestamp') or 0)
+        ns = self._time.now(way.get('received_timestamp'))
         if ns is None:
             self._meet(topic, kind)  # its publisher may be gone by then
             self._time.hold((topic, kind, message, way))
@@ -197,8 +197,6 @@ class RecorderNode(BulkNode):
             self._writer.write(topic, ns, message, published)
         except RecordingError as error:
             self._end(str(error))
-        if self._writer.trouble:
-            self._end(self._writer.trouble)
 
     def _meet(self, topic: str, kind: str) -> None:
         """Define a topic in the bag, with what its publishers offer."""

@@ -245,7 +245,10 @@ def program(arguments: Sequence[str]) -> Callable[[], Any]:
 
 
 def serve(entrance: socket.socket, owner: int) -> None:
-    """Fork what is asked for and tell how it ended, for as long as the process `owner` runs."""
+    """Fork what is asked for and tell how it ended, for as long as the process `owner` runs.
+
+    What has outlived it then is ended: nobody else knows of it.
+    """
     selector, ends = selectors.DefaultSelector(), dict[int, tuple[int, int]]()
     lines = dict[int, socket.socket]()
     for waited in (entrance, owner):
@@ -253,6 +256,8 @@ def serve(entrance: socket.socket, owner: int) -> None:
     while True:
         for key, _ in selector.select():
             if key.fd == owner:
+                for pid, _ in ends.values():
+                    os.kill(pid, signal.SIGKILL)
                 return
             if key.fd in ends:
                 pid, code = ends.pop(key.fd)

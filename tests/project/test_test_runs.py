@@ -3,10 +3,14 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import psutil
 import pytest
 from helpers import needs
+from helpers.fork_server import OWNER
+from helpers.patience import patience
 
 TESTS = Path(__file__).resolve().parents[1]
 MADE = """
@@ -86,3 +90,25 @@ def test_a_skip_fails_but_for_what_ci_cannot_have(told: dict[str, str]) -> None:
     for name in ('chromium', 'fish', 'ros2'):
         assert needs.NEEDS[name].unproven in told['']
     assert 'not today' in told['']
+
+
+KILLED = """
+import os
+from helpers.node_processes import fresh_domain, start_node
+
+node = start_node('setpoint_node', fresh_domain())
+assert 'begins' in node.stdout.readline()
+print(node.pid, flush=True)
+os.kill(os.getpid(), 9)
+"""
+
+
+def test_a_run_that_is_killed_leaves_none_of_its_programs() -> None:
+    environ = {**os.environ, 'PYTHONPATH': str(TESTS), OWNER: ''}
+    command = [sys.executable, '-c', KILLED]
+    ended = subprocess.run(command, env=environ, stdout=subprocess.PIPE, text=True, check=False)
+    assert ended.returncode == -9
+    left, limit = int(ended.stdout), time.monotonic() + patience(10)
+    while psutil.pid_exists(left):
+        assert time.monotonic() < limit
+        time.sleep(0.01)

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import herman_reference as reference
@@ -17,6 +18,7 @@ from reference_cases import off_centre
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
+from auv_dynamics.nodes import plant_node
 from auv_dynamics.nodes.plant_node import PlantNode
 from auv_dynamics.ros import topics
 
@@ -234,10 +236,13 @@ def test_real_time_ends_with_its_last_step_and_tells_of_silence_until_then(made,
     made.until(lambda: level() == DiagnosticStatus.STALE, 'silence to be told')
     (status,) = told[-1].status
     assert 'no wrench for' in status.message
+    made.until(lambda: by_hand.ns_of(told[-1]) > 0, 'a later step')
+    facts = {value.key: value.value for value in told[-1].status[0].values}
+    assert int(facts['step']) * STEP == by_hand.ns_of(told[-1])
     assert (status.name, status.hardware_id) == ('/plant_node', 'rexrov')
     made.until(lambda: plant.exit_code is not None, 'the end')
     assert plant.exit_code == 0
-    assert stamps(made.heard['odom'])[-1] == 100 * STEP
+    assert stamps(made.heard['odom'])[-2:] == [99 * STEP, 100 * STEP]
     count = len(told)
     made.until(lambda: len(told) > count and level() == DiagnosticStatus.OK, 'no silence behind it')
 
@@ -277,3 +282,131 @@ def test_silence_of_the_controller_gives_zero_wrench_and_it_comes_back(made, veh
         assert time.monotonic() - last > REAL['wrench_timeout'], 'it is held before'
         held = [by_hand.six_of(message) for message in applied[begun:]]
         assert held == [[*tau]] * (len(held) - 1) + [[0.0] * 6]
+
+
+class Hours(list[float]):
+    """The steady clock of a plant, s, which goes on where a test says so."""
+
+    def __init__(self) -> None:
+        super().__init__([1000.0])
+
+    def go_on(self, seconds: float) -> None:
+        self[0] += seconds
+
+
+@pytest.fixture
+def hours(monkeypatch: pytest.MonkeyPatch) -> Hours:
+    found = Hours()
+    monkeypatch.setattr(plant_node, 'time', SimpleNamespace(monotonic=lambda: found[0]))
+    return found
+
+
+def begun(made: Program, hours: Hours, **given: Any) -> Any:
+    """A plant in real time that has published step 0."""
+    plant = made.add(PlantNode, {'vehicle': 'herman2018', **REAL, 'wrench_timeout': 0.5, **given})
+    made.until(lambda: made.node.get_publishers_info_by_topic(topics.ODOM.name), 'the plant')
+    made.spin(0.2)
+    assert not made.heard['odom'], 'it waits for who is there already'
+    hours.go_on(1.0)
+    until_step(made, 0)
+    return plant
+
+
+def until_step(made: Program, k: int) -> None:
+    """Wait until step k is published, and longer: no other one follows."""
+    made.until(lambda: k * STEP in stamps(made.heard['odom']), f'step {k}')
+    made.spin(3 * H)
+    assert stamps(made.heard['odom']) == [i * STEP for i in range(k + 1)]
+
+
+def test_real_time_publishes_what_is_due(made, hours, capfd) -> None:
+    begun(made, hours)
+    hours.go_on(3.5 * H)
+    until_step(made, 3)
+    assert made.call(SetBool, 'plant_node/run', SetBool.Request(data=False)).success
+    hours.go_on(10.0)
+    until_step(made, 3)
+    assert made.call(SetBool, 'plant_node/run', SetBool.Request(data=True)).success
+    until_step(made, 4)
+    hours.go_on(0.49)
+    until_step(made, 28)
+    assert ' s late' not in capfd.readouterr().err
+    hours.go_on(0.6)
+    until_step(made, 29)
+    assert ' s late: time goes on from step 29' in capfd.readouterr().err
+    hours.go_on(1.5 * H)
+    until_step(made, 30)
+
+
+def test_a_long_step_is_not_late(made, hours, capfd) -> None:
+    begun(made, hours, step=1.0)
+    hours.go_on(1.0)
+    made.until(lambda: len(made.heard['odom']) == 2, 'step 1')
+    made.spin(0.1)
+    assert ' s late' not in capfd.readouterr().err
+
+
+def test_a_wrench_is_of_a_step_up_to_a_second_ahead_and_ends_a_silence(made, hours) -> None:
+    plant = begun(made, hours)
+    made.listen(topics.DIAGNOSTICS)
+    told = made.heard['/diagnostics']
+    silent = DiagnosticStatus.STALE
+    made.until(lambda: told and told[-1].status[0].level == silent, 'silence to be told')
+
+    def say(k: int) -> None:
+        made.publish(topics.WRENCH, by_hand.six(topics.WRENCH.type, k * STEP, TAU[0]))
+        made.spin(3 * H)
+
+    for k in (0, 0, 51):  # step 1 is the next one
+        say(k)
+    assert plant.graph.refused.total() == 0
+    made.until(lambda: told[-1].status[0].level == DiagnosticStatus.OK, 'no silence')
+    say(52)
+    assert plant.graph.refused.total() == 1
+    hours.go_on(0.51)
+    made.until(lambda: told[-1].status[0].level == silent, 'silence again')
+
+
+@pytest.mark.parametrize('answered', [False, True])
+def test_the_last_wrench_in_real_time_is_waited_for(made, hours, answered) -> None:
+    plant = begun(made, hours, duration=2 * H)
+    hours.go_on(2.5 * H)
+    until_step(made, 2)
+    made.publish(topics.WRENCH, by_hand.six(topics.WRENCH.type, STEP, TAU[1]))
+    hours.go_on(0.4)
+    until_step(made, 2)
+    assert plant.exit_code is None
+    if answered:
+        made.publish(topics.WRENCH, by_hand.six(topics.WRENCH.type, 2 * STEP, TAU[2]))
+    else:
+        hours.go_on(0.2)
+    made.until(lambda: plant.exit_code is not None, 'the end')
+    assert plant.exit_code == 0
+
+
+def test_a_recorder_ends_a_run_in_real_time_whose_plant_then_stands_still(
+    made, hours, capfd
+) -> None:
+    plant = begun(made, hours, duration=2 * H, recorder_window=5)
+    hours.go_on(2.5 * H)
+    until_step(made, 2)
+    hours.go_on(5.0)
+    for data in (False, True):
+        assert made.call(SetBool, 'plant_node/run', SetBool.Request(data=data)).success
+        until_step(made, 2)
+    assert plant.exit_code is None
+    assert ' s late' not in capfd.readouterr().err
+
+
+def test_a_plant_that_diverges_in_real_time_says_after_which_step(made, hours, capfd) -> None:
+    plant = begun(made, hours, **{'actuators.limit': [1e9]})
+    made.publish(topics.WRENCH, by_hand.six(topics.WRENCH.type, 0, [1e9] * 6))
+    made.spin(3 * H)
+    hours.go_on(1.5 * H)
+    made.until(lambda: plant.exit_code is not None, 'the end')
+    hours.go_on(5.0)
+    until_step(made, 1)
+    assert plant.exit_code == 1
+    said = capfd.readouterr().err
+    assert said.count('diverges') == 1
+    assert 'after step 1:' in said

@@ -84,7 +84,7 @@ class LockStep:
         """Take the answer to the step that was published last."""
         node, plant = self._node, self._node.plant
         expected = plant.k * node.step_ns
-        if not (self._started and self._published and ns == expected):
+        if not (self._published and ns == expected):
             raise interface.BadMessageError(f'wrench: stamp: expected {expected} ns, found {ns} ns')
         k = plant.k
         applied, F = plant.answer(tau)
@@ -108,8 +108,8 @@ class LockStep:
         node.publish_forces(k, applied, F)
 
     def _go_on(self) -> None:
-        done = self._since is None or not self._started
-        if done or self._published or self._node.paused or self._waits_for_credit:
+        held = self._node.paused or self._waits_for_credit
+        if self._since is None or self._published or held:
             return
         self._published = True
         self._since = time.monotonic()
@@ -121,7 +121,7 @@ class LockStep:
 
     def _watch(self) -> None:
         node = self._node
-        if not self._started or self._since is None or node.paused:
+        if self._since is None or node.paused:
             return
         for topic in (topics.WRENCH.name, topics.PROGRESS.name):
             names = {info.node_name for info in node.get_publishers_info_by_topic(topic)}
@@ -196,8 +196,7 @@ class RealTime:
 
     def _silence(self) -> Health:
         timeout = self._node.wrench_timeout
-        runs = self._began is not None and self._ended is None
-        if not runs or time.monotonic() - self._heard <= timeout:
+        if self._began is None or time.monotonic() - self._heard <= timeout:
             return OK, ''
         return STALE, f'no wrench for {timeout:g} s: zero wrench'
 
@@ -215,15 +214,15 @@ class RealTime:
         if late > max(CATCH_UP, node.step_ns / interface.NANOSECONDS):
             node.graph.complain(f'{late:.3g} s late: time goes on from step {plant.k}')
             self._began, self._first, due = time.monotonic(), plant.k, plant.k
-        while plant.k <= due and self._ended is None:
+        while plant.k <= due and self._began is not None:
             node.publish_state(None if plant.lost else plant.measured_at)
             node.publish_forces(plant.k, *plant.answer(self._held(), heard=True))
             if plant.k == node.last:
-                self._ended = time.monotonic()
-                continue
+                self._began, self._ended = None, time.monotonic()
+                return
             plant.advance()
             if plant.diverged:
-                self._ended = time.monotonic()
+                self._began, self._ended = None, time.monotonic()
                 node.end(1, DIVERGES.format(plant.k - 1))
 
     def _end(self) -> None:

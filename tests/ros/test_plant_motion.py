@@ -391,6 +391,7 @@ def test_a_recorder_ends_a_run_in_real_time_whose_plant_then_stands_still(
     hours.go_on(2.5 * H)
     until_step(made, 2)
     hours.go_on(5.0)
+    until_step(made, 2)
     for data in (False, True):
         assert made.call(SetBool, 'plant_node/run', SetBool.Request(data=data)).success
         until_step(made, 2)

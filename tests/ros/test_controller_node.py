@@ -401,3 +401,16 @@ def test_what_nobody_upstream_can_mend_is_an_error() -> None:
     idle = Idle(None, derivative=False)
     assert idle.health('', 5) == (OK, '')
     assert idle.health('the law answers nan', 5) == (ERROR, 'the law answers nan')
+
+
+def test_stamps_far_from_those_of_odometry_are_explained_and_near_ones_are_not() -> None:
+    idle, said = Idle(None, derivative=True), 'no set-point for 2 s'
+    for topic in (topics.CMD_VEL, topics.CMD_ACCEL):
+        idle.hear(topic, 10**10)
+    for near in (9 * 10**9, 11 * 10**9):
+        assert idle.health(said, near) == (WARN, said)
+    for far in (8 * 10**9, 12 * 10**9):
+        level, text = idle.health(said, far)
+        assert level == WARN
+        assert text.startswith(f'{said}: cmd_vel: expected')
+        assert text.endswith('found stamps 2 s apart from those of odom')

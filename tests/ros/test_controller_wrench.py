@@ -172,6 +172,7 @@ def test_integrals_begin_anew_with_an_activation_and_with_a_reset(made, vehicle)
     answers_as(made, 'gvc', PER_AXIS, STEPS)
     assert made.call(Trigger, 'controller_node/reset').success
     answers_as(made, 'gvc', PER_AXIS, 2 * STEPS)
+    assert len(made.heard['wrench']) == 3 * STEPS, 'in lock-step it left nothing unanswered'
 
 
 def test_a_gain_may_be_one_number_six_or_a_matrix(made, vehicle) -> None:
@@ -203,6 +204,64 @@ def test_it_is_ready_while_it_is_active(made, vehicle) -> None:
     assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
     assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
     answers_as(made, 'gvc', PER_AXIS, STEPS)
+
+
+def test_before_it_is_configured_it_hears_and_resets_nothing(made, vehicle) -> None:
+    node = controller(made, vehicle, 'gvc', autostart=False)
+    for topic in (topics.CMD_VEL, topics.CMD_ACCEL):
+        made.publish(topic, by_hand.six(topic.type, 0, NU_D[0]))
+    made.publish(topics.ODOM, by_hand.odometry(0, [*ETA[0, :3], 1, 0, 0, 0, *NU[0]]))
+    assert made.call(Trigger, 'controller_node/reset').success
+    made.spin(0.2)
+    assert not made.heard['wrench']
+    assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+
+
+def test_what_is_missing_at_an_activation_is_told_and_leaves_it_inactive(made, vehicle) -> None:
+    node = controller(made, vehicle, 'gvc')
+    assert node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+    assert node.set_parameters([Parameter('law', value='pid')])[0].successful
+    assert node.trigger_activate() == TransitionCallbackReturn.FAILURE
+    assert 'found an unknown gain' in node.graph.trouble
+    assert not made.call(Trigger, 'controller_node/ready').success
+    assert node.set_parameters([Parameter('law', value='gvc')])[0].successful
+    assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+
+
+def test_an_error_while_it_leaves_still_leaves_no_wrench(made, vehicle, monkeypatch) -> None:
+    node = controller(made, vehicle, 'gvc', **BESIDE)
+    let_go, calls = node._let_go, []
+
+    def first_fails() -> None:
+        calls.append('let go')
+        if len(calls) == 1:
+            raise KeyError('what nobody thought of')
+        let_go()
+
+    monkeypatch.setattr(node, '_let_go', first_fails)
+    assert node.trigger_deactivate() == TransitionCallbackReturn.ERROR
+    made.until(lambda: made.heard['wrench'], 'a zero wrench')
+    assert by_hand.six_of(made.heard['wrench'][-1]) == [0.0] * 6
+    assert not made.call(Trigger, 'controller_node/ready').success
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'reason'),
+    [
+        ('gains.k_D', [1.0, 2.0, 3.0, 4.0, 5.0, float('inf')], 'gains.k_D: expected 1, 6 or 36'),
+        ('law', 'nonsense', 'law: '),
+    ],
+)
+def test_a_change_to_what_no_law_can_use_is_refused(made, vehicle, name, value, reason) -> None:
+    node = controller(made, vehicle, 'gvc', autostart=False)
+    (result,) = node.set_parameters([Parameter(name, value=value)])
+    assert not result.successful
+    assert result.reason.startswith(reason)
+
+
+def test_what_is_not_of_the_controller_may_change_while_it_is_active(made, vehicle) -> None:
+    node = controller(made, vehicle, 'gvc')
+    assert node.set_parameters([Parameter('use_sim_time', value=False)])[0].successful
 
 
 STILL = {  # without integrals and filter: the wrench of a state stays what it is
@@ -278,13 +337,15 @@ def test_silence_in_real_time_gives_zero_wrench_is_explained_and_it_comes_back(
     assert abs(tau[5]) == limit[5]
     assert np.abs(tau[:5]).min() > 1.0
     ship.says = set()
-    ship.is_told(STALE, 'no odometry yet', active='True', watchdog='none')
+    ship.is_told(STALE, 'no odometry yet: nobody publishes /odom', active='True', watchdog='none')
     ship.says = {topics.ODOM}
     ship.gets(zero)
     ship.is_told(WARN, 'no set-point yet: nobody publishes /cmd_vel', watchdog='no set-point yet')
     ship.says = {topics.ODOM, topics.CMD_VEL}
     ship.gets(tau)
     ship.is_told(OK, 'ok', watchdog='none', watchdog_trips='0', refused='0')
+    stamps = {by_hand.ns_of(message) for message in made.heard['wrench']}
+    assert by_hand.ns_of(made.heard['/diagnostics'][-1]) in stamps, 'of the newest answer'
     silences = (topics.ODOM, STALE, 'no odometry for'), (topics.CMD_VEL, WARN, 'no set-point for')
     for i, (silent, level, said) in enumerate(silences, start=1):
         ship.says.discard(silent)

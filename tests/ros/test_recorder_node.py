@@ -1,7 +1,9 @@
 """The recorder node: everything on disk after a signal, after a kill, and loud when it is not."""
 
 import itertools
+import math
 import signal
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
 from helpers.node_processes import (
     PATIENCE,
     Peer,
@@ -19,10 +22,11 @@ from helpers.node_processes import (
     run_node,
     stop,
 )
-from helpers.nodes_in_process import program
+from helpers.nodes_in_process import Program, program
 from helpers.patience import patience
 from mcap.reader import make_reader
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Header, String
@@ -30,6 +34,7 @@ from std_msgs.msg import Header, String
 from auv_analysis.bag import read_bag
 from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.mcap_file import McapFile
+from auv_analysis.nodes import recorder, recorder_node
 from auv_analysis.nodes.recorder_node import (
     LostStepError,
     PublicationLedger,
@@ -38,7 +43,7 @@ from auv_analysis.nodes.recorder_node import (
 )
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import NANOSECONDS, Frames, nanoseconds
-from auv_dynamics.ros.rclpy_internals import raw_class
+from auv_dynamics.ros.rclpy_internals import has_data_path, raw_class
 
 FRAMES = Frames()
 STEP = 10_000_000
@@ -106,13 +111,13 @@ def test_the_clock_of_the_last_steps_is_waited_for(tmp_path: Path, goes_on: bool
 
 
 def test_the_analysis_of_the_last_step_is_waited_for(tmp_path: Path) -> None:
-    arguments = [*TOPICS, *parameters(bag=tmp_path / 'bag', duration=0.2, analysis_every=5)]
+    arguments = [*TOPICS, *parameters(bag=tmp_path / 'bag', duration=0.2, analysis_every=6)]
     with graph(('recorder_node', arguments)) as (peer, processes):
         peer.listen(topics.PROGRESS)
         for k in range(21):
             publish_step(peer, k)
         acknowledged(peer, 20)
-        for k in (15, 20):
+        for k in (12, 18):
             peer.spin(0.3)
             assert processes['recorder_node'].poll() is None
             peer.publish(topics.LUMPED_ERROR, convert.wrench(k * STEP, (0.1,) * 6, FRAMES))
@@ -133,10 +138,12 @@ def test_in_real_time_progress_is_that_of_odometry_and_whoever_comes_late_hears_
         made.spin(0.3)
         made.listen(topics.PROGRESS, topics.DIAGNOSTICS)
         acknowledged(made, 2)
+        assert made.heard['recorder/progress'][0].frame_id == 'base_link_fsd'
         said = made.heard[topics.DIAGNOSTICS.name]
         made.until(lambda: said, 'diagnostics')
         told = {pair.key: pair.value for pair in said[-1].status[0].values}
         assert (told['complete'], told['behind']) == ('2', 'none')
+        made.until(lambda: nanoseconds(said[-1].header.stamp) == 2 * STEP, 'the stamp of a step')
 
 
 @pytest.mark.parametrize('how', [signal.SIGTERM, signal.SIGINT])
@@ -485,3 +492,190 @@ def test_a_driver_with_best_effort_is_heard_where_that_is_asked_for(tmp_path: Pa
     assert code == 1
     assert 'expected topics without any message: odom' in output
     assert read_bag(tmp_path / 'deaf').counts['/diagnostics'] > 0, 'its report is in its bag'
+
+
+Do = Callable[[], None]
+
+
+@pytest.fixture
+def timers(monkeypatch: pytest.MonkeyPatch) -> list[Do]:
+    """What the recorder's timers do, when a test says so: report, keep, look."""
+    found: list[Do] = []
+    monkeypatch.setattr(recorder_node, 'steady_timer', lambda node, period, do: found.append(do))
+    return found
+
+
+def recorder_in(made: Program, bag: Path, **given: Any) -> RecorderNode:
+    return made.add(RecorderNode, {'bag': str(bag), 'topics': ['odom', 'wrench'], **given})
+
+
+def give(node: RecorderNode, topic: str, message: Any, **way: int) -> None:
+    """Hand a message to a recorder with what the middleware knows of its way."""
+    name = node.resolve_topic_name(topic)
+    (end,) = [one for one in node.subscriptions if one.topic_name == name and one.raw]
+    end.callback(serialize_message(message), way)
+
+
+def give_steps(node: RecorderNode, *steps: int, origin: int = 0) -> None:
+    for k in steps:
+        give(node, 'odom', convert.odometry(origin + k * STEP, UPRIGHT, FRAMES))
+        give(node, 'wrench', convert.wrench(origin + k * STEP, (0.0,) * 6, FRAMES))
+
+
+def give_error(node: RecorderNode, ns: int, **way: int) -> None:
+    give(node, topics.LUMPED_ERROR.name, convert.wrench(ns, (0.1,) * 6, FRAMES), **way)
+
+
+def give_clock(node: RecorderNode, ns: int) -> None:
+    give(node, topics.CLOCK.name, Clock(clock=convert.stamp(ns)))
+
+
+def times(bag: Path) -> dict[str, list[tuple[int, int]]]:
+    """Log and publish times of each topic's messages."""
+    return {
+        topic: [(one.log_time, one.publish_time) for one in found]
+        for topic, found in logged(bag).items()
+    }
+
+
+def test_in_lock_step_what_is_said_of_a_step_has_its_time(tmp_path: Path, timers) -> None:
+    bag = tmp_path / 'bag'
+    with program() as made:
+        node = recorder_in(made, bag)
+        assert node.lockstep
+        health = DiagnosticArray()
+        give(node, '/diagnostics', health, source_timestamp=3)  # waits for the first step
+        give_steps(node, 5, 6)
+        give_error(node, 5 * STEP, source_timestamp=77)
+        give_error(node, 6 * STEP)
+        give_clock(node, 5 * STEP)
+        give(node, '/diagnostics', health, source_timestamp=88, received_timestamp=99)
+        give(node, '/diagnostics', health, source_timestamp=-88)
+        made.drop(node)
+    found, steps = times(bag), [(k * STEP, k * STEP) for k in (5, 6)]
+    assert found['/odom'] == found['/wrench'] == steps
+    assert found['/analysis/lumped_error'] == [(5 * STEP, 77), steps[1]]
+    assert found['/clock'] == steps[:1]
+    assert found['/diagnostics'] == [(5 * STEP, 3), (6 * STEP, 88), (6 * STEP, 0)]
+
+
+def test_in_real_time_it_has_the_time_when_it_came(tmp_path: Path, timers) -> None:
+    bag = tmp_path / 'bag'
+    with program() as made:
+        node = recorder_in(made, bag, strict=False)
+        assert not node.lockstep
+        now = node.get_clock().now().nanoseconds
+        give_steps(node, 0, origin=now)
+        came = {'received_timestamp': now + 7, 'source_timestamp': now + 3}
+        give_error(node, now, **came)
+        give(node, 'odom', convert.odometry(0, UPRIGHT, FRAMES), **came)  # without a stamp
+        give_clock(node, 0)
+        made.drop(node)
+    found = times(bag)
+    assert found['/analysis/lumped_error'] == [(now + 7, now + 3)]
+    assert found['/odom'] == [(now, now), (now + 7, now + 3)]
+    assert found['/clock'] == [(0, 0)]
+
+
+def test_what_waits_for_too_long_is_written_between_the_steps(
+    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder, 'EARLY_COUNT', 0)
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag')
+        give(node, '/diagnostics', DiagnosticArray(), source_timestamp=3)
+        timers[1]()
+        give_steps(node, 5)
+        made.drop(node)
+    assert times(tmp_path / 'bag')['/diagnostics'] == [(0, 3)]
+
+
+def test_a_topic_is_described_as_it_was_offered_when_its_first_message_came(
+    tmp_path: Path, timers
+) -> None:
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag')
+        remark = made.node.create_publisher(String, '/remark', BEST_EFFORT)
+        made.until(lambda: timers[2]() or remark.get_subscription_count(), 'the recorder')
+        give(node, '/remark', String(data='early'))  # its publisher goes before the first step
+        made.node.destroy_publisher(remark)
+        made.until(lambda: not node.count_publishers('/remark'), 'the end of the publisher')
+        give_steps(node, 0)
+        made.drop(node)
+    told = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())
+    entries = told['rosbag2_bagfile_information']['topics_with_message_count']
+    found = {one['topic_metadata']['name']: one['topic_metadata'] for one in entries}
+    assert found['/remark']['offered_qos_profiles'][0]['reliability'] == 'best_effort'
+    assert found['/odom']['type_description_hash'], 'known without any publisher'
+
+
+def test_a_loss_on_a_topic_of_the_analysis_stays_an_error_at_the_end(
+    tmp_path: Path, timers
+) -> None:
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', duration=0.2)
+        for number in (4, 5):
+            give_error(node, 0, publication_sequence_number=number)
+        assert node.exit_code is None
+        give_error(node, 0, publication_sequence_number=7)
+        assert node.exit_code == 1
+        give_steps(node, *range(21))
+        timers[0]()
+        assert node.exit_code == 1
+
+
+def test_the_analysis_of_the_first_step_is_waited_for(tmp_path: Path, timers) -> None:
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', duration=0.2, analysis_every=50)
+        give_steps(node, *range(21))
+        timers[0]()
+        assert node.exit_code is None
+        give_error(node, 0)
+        timers[0]()
+        assert node.exit_code == 0
+
+
+@pytest.mark.parametrize('clock', [False, True])
+def test_a_clock_is_waited_for_where_there_is_one(
+    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, clock: bool
+) -> None:
+    monkeypatch.setattr(recorder_node, 'PATIENCE', math.inf)
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', duration=0.2)
+        give_steps(node, *range(21))
+        if clock:
+            give_clock(node, 0)
+            timers[0]()
+            assert node.exit_code is None
+            give_clock(node, 20 * STEP)
+        timers[0]()
+        assert node.exit_code == 0
+
+
+def test_progress_is_said_once_and_repeated_now_and_then(tmp_path: Path, timers) -> None:
+    with program() as made:
+        made.listen(topics.PROGRESS)
+        node = recorder_in(made, tmp_path / 'bag')
+        report, keep, _ = timers
+        made.until(lambda: made.node.count_publishers('recorder/progress'), 'the recorder')
+        said = []
+        for k, do in ((None, report), (None, keep), (0, report), (None, report), (None, keep)):
+            if k is not None:
+                give_steps(node, k)
+            do()
+            made.spin(0.1)
+            said.append([nanoseconds(one.stamp) for one in made.heard['recorder/progress']])
+    assert said == [[], [], [0], [0], [0, 0]]
+
+
+def test_what_has_arrived_is_taken_before_the_bag_is_closed(tmp_path: Path, timers) -> None:
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag')
+        node.bulk = has_data_path()  # with one, nobody takes its data in between
+        made.listen(topics.WRENCH)
+        for k in range(3):
+            publish_step(made, k)
+        made.until(lambda: len(made.heard['wrench']) == 3, 'the steps')
+        made.spin(0.1)
+        made.drop(node)
+    assert read_bag(tmp_path / 'bag', decode=False).counts['/odom'] == 3

@@ -10,11 +10,13 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from helpers import nodes_in_process as by_hand
 from helpers.nodes_in_process import Program, program, write_vehicle
 from numpy.testing import assert_allclose
+from rclpy.serialization import serialize_message
 from reference_cases import off_centre
 
 from auv_analysis.nodes import analysis_node
 from auv_analysis.nodes.analysis_node import AnalysisNode
 from auv_dynamics.ros import topics
+from auv_dynamics.ros.interface import DEPTH
 
 STEP = 10_000_000
 EVERY = 3
@@ -87,17 +89,83 @@ def test_messages_that_come_in_any_order_are_paired_by_their_stamps(analysis) ->
             assert_allclose(by_hand.six_of(message), expected(k), rtol=1e-9, atol=1e-12)
 
 
-def test_as_many_wait_for_their_odometry_as_there_is_room_for(
+def give(made: Program, topic: topics.Topic, message: object) -> None:
+    """Hand a message to the node as the middleware would."""
+    (node,) = made.nodes
+    (end,) = [one for one in node.subscriptions if one.topic_name == f'/{topic.name}']
+    end.callback(serialize_message(message), {})
+
+
+def test_as_many_wait_for_their_odometry_as_the_middleware_keeps_twice(analysis) -> None:
+    rows = np.arange(2 * DEPTH + 1)  # the first one has no room
+    for ns in rows:
+        give(analysis, topics.WRENCH, by_hand.six(topics.WRENCH.type, int(ns), TAU[1]))
+    for ns in (0, 8000, 9000, 1):  # one of three is due: 0 and 1
+        x = np.array([1.0, -2.0, 3.0, 0.5, -0.5, 0.5, 0.5, *NU[1]])
+        give(analysis, topics.ODOM, by_hand.odometry(ns, x))
+    (found,) = heard(analysis, 'analysis/delta_pi', 1)
+    assert by_hand.ns_of(found) == 1
+
+
+def test_a_step_that_is_complete_makes_room_for_another(
     analysis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(analysis_node, 'CAPACITY', 6)
-    for k in range(1, 8):  # 1 has no room
-        analysis.publish(topics.WRENCH, of_step(k)[topics.WRENCH])
+    for k in range(7):  # two of 0, 3 and 6 may wait
+        for topic, message in of_step(k).items():
+            if k != 0 or topic is topics.ODOM:
+                give(analysis, topic, message)
+    give(analysis, topics.WRENCH, of_step(0)[topics.WRENCH])
+    found = heard(analysis, 'analysis/delta_pi', 3)
+    assert [by_hand.ns_of(message) for message in found] == [3 * STEP, 6 * STEP, 0]
+
+
+def test_a_run_that_begins_anew_is_not_paired_with_what_was_before(analysis) -> None:
+    for k in range(4):
+        for topic, message in of_step(k).items():
+            give(analysis, topic, message)
+    for k in (4, 5, 3, 1, 2, 0):  # 3 and 0 are due again
+        give(analysis, topics.ODOM, of_step(k)[topics.ODOM])
+    found = heard(analysis, 'analysis/delta_xi', 4)
+    assert [by_hand.ns_of(message) for message in found] == [k * STEP for k in (0, 3, 3, 0)]
     analysis.spin(0.1)
-    for k in (1, 8, 9, 2):  # one of three is due: 1 and 2
-        analysis.publish(topics.ODOM, of_step(k)[topics.ODOM])
+    assert len(analysis.heard['analysis/delta_pi']) == 2
+
+
+def test_a_message_that_is_refused_is_counted_and_holds_nothing_up(analysis) -> None:
+    strange = of_step(0)
+    strange[topics.WRENCH].header.frame_id = 'elsewhere'
+    for topic, message in strange.items():
+        give(analysis, topic, message)
+    for k in range(1, 4):
+        for topic, message in of_step(k).items():
+            give(analysis, topic, message)
     (found,) = heard(analysis, 'analysis/delta_pi', 1)
-    assert by_hand.ns_of(found) == 2 * STEP
+    assert by_hand.ns_of(found) == 3 * STEP
+    assert len(heard(analysis, 'analysis/lumped_error', 2)) == 2
+    told = analysis.heard['/diagnostics']
+
+    def refused() -> list[str]:
+        last = {pair.key: pair.value for pair in told[-1].status[0].values} if told else {}
+        return [key for key, value in last.items() if 'wrench' in key and value == '1']
+
+    analysis.until(refused, 'the report')
+
+
+def test_nothing_is_said_before_all_who_are_expected_listen(vehicle: Path) -> None:
+    expected = [f'{topics.DELTA_XI.name}=2']
+    given = {'vehicle': str(vehicle), 'every': 1, 'expected_subscribers': expected}
+    with program() as made:
+        made.add(AnalysisNode, given)
+        made.listen(topics.DELTA_XI)
+        made.until(lambda: made.node.count_publishers(topics.DELTA_XI.name), 'the node')
+        give(made, topics.ODOM, of_step(0)[topics.ODOM])
+        first = made.heard[topics.DELTA_XI.name]
+        made.listen(topics.DELTA_XI)
+        made.until(made.nodes[0].graph.ready, 'both')
+        give(made, topics.ODOM, of_step(1)[topics.ODOM])
+        heard(made, topics.DELTA_XI.name, 1)
+        assert [by_hand.ns_of(message) for message in first] == [STEP]
 
 
 def test_what_never_comes_holds_nothing_else_up(analysis, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -138,7 +206,10 @@ def test_health_tells_the_vehicle_the_newest_step_and_the_error_of_its_velocity(
 def test_where_sensors_lie_the_truth_is_looked_at(vehicle: Path) -> None:
     with program() as made:
         made.add(AnalysisNode, {'vehicle': str(vehicle), 'every': 1, 'ground_truth': True})
-        made.listen(topics.DELTA_XI)
+        made.listen(topics.DELTA_XI, topics.DIAGNOSTICS)
+        told = made.heard['/diagnostics']
+        made.until(lambda: told, 'diagnostics')
+        assert told[0].status[0].message == 'nobody publishes /ground_truth/odom'
         made.publish(topics.GROUND_TRUTH, of_step(2)[topics.ODOM])
         (message,) = heard(made, 'analysis/delta_xi', 1)
         expected = SAID['analysis/delta_xi'](2)

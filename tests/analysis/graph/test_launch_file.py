@@ -34,15 +34,29 @@ def nodes(listed: list[Any]) -> tuple[list[str], dict[str, dict[str, Any]]]:
         name = one.named['executable']
         assert (one.named['package'], one.named['name']) == (PACKAGES[name], name)
         assert one.named['ros_arguments'] == ['--enclave', f'/auv_gvc/{name}']
+        assert one.named['output'] == 'screen'
     return [one.named['executable'] for one in found], named
 
 
 def test_every_node_gets_its_parameters_and_the_bag_that_of_its_namespace(launch_file) -> None:
-    names, given = nodes(actions(launch_file, namespace='/auv1'))
+    listed = actions(launch_file, namespace='/auv1')
+    names, given = nodes(listed)
+    assert {one.named['namespace'] for one in of('Node', listed)} == {'/auv1'}
     assert names == list(given)
     assert set(names) == set(PACKAGES)
     assert Path(given['recorder_node']['bag']) == Path('runs/case1/auv1/gvc').resolve()
     assert all(given[name]['use_sim_time'] == (name != 'plant_node') for name in names)
+    kept = dict(entry.split('=') for entry in given['recorder_node']['attachments'])
+    assert [kept['params.yaml']] == of('Node', listed)[0].named['parameters']
+    _, given = nodes(actions(launch_file, bag='elsewhere'))
+    assert Path(given['recorder_node']['bag']) == Path('elsewhere').resolve()
+
+
+@pytest.mark.parametrize('left_out', ['record', 'analysis'])
+def test_a_node_is_left_out_alone(launch_file, left_out: str) -> None:
+    names, _ = nodes(actions(launch_file, **{left_out: 'false'}))
+    node = {'record': 'recorder_node', 'analysis': 'analysis_node'}[left_out]
+    assert {*names} == {*PACKAGES} - {node}
 
 
 def test_lock_step_and_the_clock_are_two_switches(launch_file) -> None:
@@ -87,6 +101,8 @@ def test_margins_are_said_before_a_vehicle_is_driven(launch_file, tmp_path: Path
     path.write_text(yaml.safe_dump(data | {'actuators': {'delay': 0.04}}))
     assert 'below 6 dB and 45 deg' in said(controller='quick')[0]
     assert said(controller='slow')[0].startswith('note: ')
+    path.write_text(yaml.safe_dump(data | {'initial': {'eta': [0, 0, 0, 90, 0, 0]}}))
+    assert any(one.startswith('warning: ') and 'degrees?' in one for one in said())
 
 
 @pytest.mark.parametrize('switch', ['plant', 'record', 'analysis', 'use_sim_time', 'lockstep'])
@@ -98,11 +114,19 @@ def test_a_switch_takes_no_other_word(launch_file, switch: str) -> None:
 
 
 def test_a_node_that_fails_ends_the_launch_and_the_last_one_ends_it_well(launch_file) -> None:
-    handlers = of('RegisterEventHandler', actions(launch_file))
+    listed = actions(launch_file)
+    order = [type(one).__name__ for one in listed][-10:]
+    assert order == ['RegisterEventHandler', 'Node'] * 5, 'one that ends at once is noticed'
+    handlers = of('RegisterEventHandler', listed)
     ends = [one.positional[0].named['on_exit'] for one in handlers]
     running = SimpleNamespace(is_shutdown=False)
     well, failed = (SimpleNamespace(returncode=code) for code in (0, 2))
     assert [bool(end(well, running)) for end in ends] == [False] * 4 + [True]
+    without = of('RegisterEventHandler', actions(launch_file, record='false'))
+    first, *others = (one.positional[0].named for one in without)
+    assert first['target_action'].named['name'] == 'plant_node', 'the last without a recorder'
+    assert first['on_exit'](well, running)
+    assert not any(one['on_exit'](well, running) for one in others)
     for end in ends:
         with pytest.raises(RuntimeError, match='_node ended with exit code 2'):
             end(failed, running)

@@ -85,9 +85,11 @@ faults: [{kind: sensor_delay, delay: 1, from: 1, to: 2}, {kind: wrench_loss, fro
 """
 
 
-def _parameters(scenario: Scenario, controller: str, **options: Any) -> dict[str, dict[str, Any]]:
+def _parameters(
+    scenario: Scenario, controller: str, *, bag: Path | None = Path('bag'), **options: Any
+) -> dict[str, dict[str, Any]]:
     files = {'scenario.yaml': Path('/x/scenario.yaml')}
-    return node_parameters(scenario, controller, bag=Path('bag'), attachments=files, **options)
+    return node_parameters(scenario, controller, bag=bag, attachments=files, **options)
 
 
 @pytest.fixture
@@ -175,6 +177,54 @@ def test_the_recorder_waits_for_an_analysis_where_one_comes_at_every_step(whole:
     for options, every in (({}, 10), ({'analysis': False}, 0), ({'plant': False}, 0)):
         recorder = _parameters(whole, 'mine', **options)['recorder_node']
         assert recorder['analysis_every'] == every
+
+
+def test_no_driver_has_to_offer_what_the_plant_alone_knows(whole: Scenario) -> None:
+    given = _parameters(whole, 'mine', plant=False)
+    expected = ['odom', 'cmd_vel', 'cmd_accel', 'wrench', 'disturbance_estimate']
+    assert sorted(given['recorder_node']['topics']) == sorted(expected)
+    assert not given['analysis_node']['ground_truth']
+
+
+@pytest.mark.parametrize(
+    ('part', 'topic'), [('actuators', 'wrench_applied'), ('sensors', 'ground_truth/odom')]
+)
+def test_what_acts_or_senses_has_a_topic_of_its_own(part: str, topic: str) -> None:
+    made = load_scenario('case1')
+    values = {'actuators': {'limit': 100.0}, 'sensors': {'velocity_noise': 0.1}}
+    some = replace(made, data=made.data | {part: values[part]})
+    recorder = _parameters(some, 'gvc')['recorder_node']
+    assert recorder['topics'] == [*STEP_TOPICS, topic]
+
+
+def test_a_plant_without_a_recorder_waits_for_none(whole: Scenario) -> None:
+    given = _parameters(whole, 'mine', bag=None)
+    assert 'recorder_node' not in given
+    assert given['plant_node']['recorder_window'] == 0
+
+
+def test_only_those_are_waited_for_who_run(whole: Scenario) -> None:
+    def expected(**options: Any) -> list[str]:
+        given = _parameters(whole, 'mine', bag=None, **options)
+        return given['plant_node']['expected_subscribers']
+
+    assert expected() == ['odom=2', 'disturbance=1', 'ground_truth/odom=1']
+    assert expected(analysis=False) == ['odom=2']
+
+
+def test_a_controller_is_told_of_the_actuators_and_how_the_vehicle_is_called(
+    whole: Scenario,
+) -> None:
+    actuators = {'thrusters': True, 'saturation': 'priority'}
+    mine = whole.data['controllers']['mine'] | {'anti_windup': False}
+    data = whole.data | {'actuators': actuators, 'controllers': {'mine': mine}}
+    given = _parameters(replace(whole, data=data), 'mine', vehicle='by_name')
+    controller = given['controller_node']
+    assert controller['actuators.thrusters']
+    assert controller['actuators.saturation'] == 'priority'
+    assert not controller['anti_windup']
+    for node in ('plant_node', 'controller_node', 'analysis_node'):
+        assert given[node]['vehicle'] == 'by_name'
 
 
 def test_every_subscriber_that_is_waited_for_runs(whole: Scenario) -> None:

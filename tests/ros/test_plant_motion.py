@@ -284,20 +284,19 @@ def test_silence_of_the_controller_gives_zero_wrench_and_it_comes_back(made, veh
         assert held == [[*tau]] * (len(held) - 1) + [[0.0] * 6]
 
 
-class Hours(list[float]):
+class Hours:
     """The steady clock of a plant, s, which goes on where a test says so."""
 
-    def __init__(self) -> None:
-        super().__init__([1000.0])
+    now = 1000.0
 
     def go_on(self, seconds: float) -> None:
-        self[0] += seconds
+        self.now += seconds
 
 
 @pytest.fixture
 def hours(monkeypatch: pytest.MonkeyPatch) -> Hours:
     found = Hours()
-    monkeypatch.setattr(plant_node, 'time', SimpleNamespace(monotonic=lambda: found[0]))
+    monkeypatch.setattr(plant_node, 'time', SimpleNamespace(monotonic=lambda: found.now))
     return found
 
 

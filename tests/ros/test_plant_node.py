@@ -59,6 +59,12 @@ def answered(peer, first: int, count: int) -> None:
         peer.publish(topics.WRENCH, wrench(k))
 
 
+def ready(_, response):
+    """The answer of a node that is waited for."""
+    response.success = True
+    return response
+
+
 @pytest.fixture
 def peer() -> Iterator[Program]:
     with program() as made:
@@ -117,10 +123,6 @@ def test_starts_by_itself_once_all_are_there(peer) -> None:
     peer.spin(0.8)
     assert not peer.heard['odom']
 
-    def ready(_, response):
-        response.success = True
-        return response
-
     peer.node.create_service(Trigger, 'first/ready', ready)
     assert step_of(odometry(peer, 1)[0]) == 0
     assert peer.call(Trigger, 'plant_node/ready').success
@@ -129,10 +131,6 @@ def test_starts_by_itself_once_all_are_there(peer) -> None:
 def test_run_names_the_first_node_that_is_not_ready(peer) -> None:
     peer.add(PlantNode, {**BARRIER, 'start_after': ['first', 'second'], 'start_paused': True})
     listening(peer)
-
-    def ready(_, response):
-        response.success = True
-        return response
 
     def ask():
         return peer.call(SetBool, 'plant_node/run', SetBool.Request(data=True))

@@ -214,16 +214,16 @@ class RealTime:
         if late > max(CATCH_UP, node.step_ns / interface.NANOSECONDS):
             node.graph.complain(f'{late:.3g} s late: time goes on from step {plant.k}')
             self._began, self._first, due = time.monotonic(), plant.k, plant.k
-        while plant.k <= due and self._began is not None:
+        while plant.k <= due:
             node.publish_state(None if plant.lost else plant.measured_at)
             node.publish_forces(plant.k, *plant.answer(self._held(), heard=True))
-            if plant.k == node.last:
-                self._began, self._ended = None, time.monotonic()
-                return
-            plant.advance()
-            if plant.diverged:
-                self._began, self._ended = None, time.monotonic()
+            if plant.k != node.last:
+                plant.advance()
+                if not plant.diverged:
+                    continue
                 node.end(1, DIVERGES.format(plant.k - 1))
+            self._began, self._ended = None, time.monotonic()
+            return
 
     def _end(self) -> None:
         """With no recorder to wait for, exit once the last wrench is here or overdue."""

@@ -305,8 +305,8 @@ def sensitivity(
         raise ValueError(f'span: expected a number above 1, found {span}')
     factors = gain_factors(scenario, controller)
     law = scenario.controller(controller)['law']
-    asked = factors.names and (method is None or count is None)
-    slow = bool(asked) and _in_python(scenario, controller, hold)
+    open_ = method is None or count is None
+    slow = bool(factors.names) and open_ and _in_python(scenario, controller, hold)
     method = method or ('morris' if slow else 'sobol')
     count = count or _default_count(law, method, slow=slow)
     result = Sensitivity(

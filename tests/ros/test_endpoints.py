@@ -15,6 +15,7 @@ from auv_analysis.nodes.analysis_node import AnalysisNode
 from auv_analysis.nodes.recorder_node import RecorderNode
 from auv_dynamics.nodes.frame_converter_node import FrameConverterNode
 from auv_dynamics.nodes.plant_node import PlantNode
+from auv_dynamics.ros import topics
 from auv_dynamics.ros.topics import type_name
 from auv_gvc_controller.nodes.controller_node import ControllerNode
 from auv_gvc_controller.nodes.setpoint_node import SetpointNode
@@ -124,6 +125,26 @@ def test_topics_types_and_quality_of_service_are_those_of_the_contract(
         usual = ('parameter', 'type_description')
         rest = {service for service in offered if not any(word in service for word in usual)}
         assert rest == own
+
+
+def test_a_second_publisher_is_an_error_where_it_would_be_obeyed_as_well() -> None:
+    with program() as made:
+        made.add(FrameConverterNode, {})
+        made.listen(topics.DIAGNOSTICS)
+        second = (topics.ODOM, topics.CMD_VEL, topics.CMD_ACCEL, topics.WRENCH, topics.WRENCH)
+        for topic in second:
+            made.node.create_publisher(topic.type, topic.name, 1)
+        said = made.heard[topics.DIAGNOSTICS.name]
+        expected = {'/odom: expected one publisher, found /frame_converter_node, /test_peer',
+                    '/wrench: expected one publisher, found /test_peer, /test_peer'}  # fmt: skip
+        made.until(
+            lambda: said and {*said[-1].status[0].message.split('; ')} == expected, 'both of them'
+        )
+
+
+def test_whoever_is_in_the_loop_is_waited_for() -> None:
+    loop = {PlantNode, ControllerNode, FrameConverterNode}
+    assert {make for make, *_ in CASES if make.latency_critical} == loop
 
 
 @pytest.mark.parametrize('sensing', [False, True])

@@ -13,13 +13,14 @@ from helpers.node_processes import (
     run_node,
     stop,
 )
+from helpers.nodes_in_process import ns_of, program, state_of
 from helpers.patience import patience
 from numpy.testing import assert_allclose
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from std_srvs.srv import Trigger
 
-from auv_dynamics.nodes.frame_converter_node import mirrored_odometry
+from auv_dynamics.nodes.frame_converter_node import FrameConverterNode, mirrored_odometry
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.ros.topics import Topic
@@ -127,6 +128,42 @@ def test_a_quaternion_comes_out_with_a_norm_of_1() -> None:
     assert np.linalg.norm(turned[0]) == pytest.approx(1.0, abs=1e-15)
 
 
+@pytest.mark.parametrize('lockstep', [True, False])
+def test_what_is_converted_waits_in_order_for_its_subscribers(lockstep: bool) -> None:
+    given = {'lockstep': lockstep, 'expected_subscribers': ['cmd_vel=1']}
+    stamps = [1_000_000_001, 1_000_000_002, 1_000_000_003]
+    with program() as made:
+        made.add(FrameConverterNode, given)
+        made.listen(topics.DIAGNOSTICS)
+        said = made.heard[topics.DIAGNOSTICS.name]
+
+        def converted() -> dict[str, str]:
+            values = said[-1].status[0].values if said else []
+            return {v.key: v.value for v in values if v.key.endswith(' converted')}
+
+        for ns in stamps:
+            made.publish(ENU_CMD_VEL, convert.twist(ns, UPRIGHT[7:], ENU))
+        made.until(lambda: converted().get('cmd_vel converted') == '3', 'three that are converted')
+        kinds = ('odom', 'cmd_accel', 'enu_flu/wrench')
+        others = {f'{name} converted': '0' for name in kinds}
+        assert converted() == {'cmd_vel converted': '3', **others}
+        assert ns_of(said[-1]) == 0, 'nothing before there is a subscriber'
+        made.listen(topics.CMD_VEL)
+        made.until(lambda: ns_of(said[-1]) == stamps[-1], 'the last of them')
+        assert [ns_of(m) for m in made.heard['cmd_vel']] == stamps
+
+
+def test_a_twist_in_the_world_frame_is_that_of_the_body_where_the_node_is_told_so() -> None:
+    # it heads north, and goes there with 2 m/s, 1 m/s to the west and 0.5 m/s up
+    x = np.array([0, 0, 0, 0.5**0.5, 0, 0, 0.5**0.5, -1.0, 2.0, 0.5, 0, 0, 0.3])
+    with program() as made:
+        made.add(FrameConverterNode, {'twist_frame': 'world'})
+        made.listen(topics.ODOM)
+        made.publish(ENU_ODOM, convert.odometry(5, x, ENU))
+        (found,) = made.until(lambda: made.heard['odom'], 'converted odometry')
+        assert_allclose(state_of(found)[7:], [2.0, -1.0, -0.5, 0.0, 0.0, -0.3], atol=1e-12)
+
+
 @pytest.fixture(scope='module')
 def running():
     with graph(('frame_converter_node', [])) as (peer, processes):
@@ -163,16 +200,17 @@ def test_set_points_and_wrenches_pass_and_stamps_are_kept(peer) -> None:
 @pytest.mark.parametrize(
     ('spoil', 'said'),
     [
-        (lambda m: setattr(m.pose.pose.orientation, 'w', 0.5), 'a unit quaternion'),
-        (lambda m: setattr(m.header, 'frame_id', 'odom_ned'), "expected 'odom', found 'odom_ned'"),
-        (lambda m: setattr(m.twist.twist.linear, 'y', np.nan), 'finite numbers'),
-        (lambda m: bytes(serialize_message(m))[:50], 'expected a serialized Odometry'),
+        (lambda m: setattr(m.pose.pose.orientation, 'w', 0.5), 'orientation: expected a unit'),
+        (lambda m: setattr(m.header, 'frame_id', 'odom_ned'), "header.frame_id: expected 'odom',"),
+        (lambda m: setattr(m.twist.twist.linear, 'y', np.nan), 'not finite: expected finite'),
+        (lambda m: bytes(serialize_message(m))[:50], 'not a message: expected a serialized Odom'),
     ],
     ids=['quaternion', 'frame', 'nan', 'cut'],
 )
 def test_broken_odometry_is_refused_counted_and_reported(peer, spoil, said) -> None:
     broken = convert.odometry(1, UPRIGHT, ENU)
     broken = spoil(broken) or broken
+    said = f'refused: enu_flu/odom: {said}'
 
     def reported() -> bool:
         peer.publish(ENU_ODOM, broken)  # best effort: the first ones may be lost

@@ -13,7 +13,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
-from auv_dynamics.ros.topics import is_name, message_class, qos_entry, type_name
+from auv_dynamics.ros.topics import best_effort, is_name, message_class, qos_entry, type_name
 
 
 def test_a_message_is_found_by_its_name() -> None:
@@ -39,7 +39,14 @@ def test_a_message_that_its_package_lacks_is_missed() -> None:
 
 def test_a_topic_has_a_name_that_the_middleware_takes_whole() -> None:
     assert all(map(is_name, ('odom', '/auv1/cmd_vel')))
-    assert not any(map(is_name, ('', 'a b', 'a\0b', 'é', '1st', 'a//b', 'a/')))
+    assert not any(map(is_name, ('', 'a b', 'a\0b', 'é', 'a/日本', '٣', '1st', 'a//b', 'a/')))
+
+
+def test_whoever_looks_on_takes_as_much_as_there_is_room_for_and_is_not_waited_for() -> None:
+    found = qos_entry(best_effort())
+    assert (found['reliability'], found['history'], found['depth']) == (
+        'best_effort', 'keep_last', 3000
+    )  # fmt: skip
 
 
 def test_a_profile_is_written_whole() -> None:

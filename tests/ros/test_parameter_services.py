@@ -11,7 +11,8 @@ from rclpy.parameter import parameter_value_to_python
 
 from auv_analysis.nodes.recorder_node import RecorderNode
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.ros.parameters import _taken
+from auv_dynamics.nodes.frame_converter_node import FrameConverterNode
+from auv_dynamics.ros.parameters import _taken, declare
 from auv_gvc_controller.nodes.controller_node import ControllerNode
 
 FAULT = ['-p', 'faults.names:=["gone"]', *parameters(faults__gone__kind='sensor_drop_out')]
@@ -80,9 +81,11 @@ def test_an_empty_list_and_null_are_no_value() -> None:
 def test_whole_numbers_are_numbers_and_one_is_a_list_where_several_may_be() -> None:
     given = {'limits.wrench': [70, 71, 72, 73, 74, 75], 'limits.wrench_rate': 80, 'ramp': 2}
     gains = {'gains.k_D': 12, 'gains.k_I': [1], 'gains.Lambda': 0.8, 'gains.Gamma': [60.0]}
+    gains['gains.of_my_own_law'] = 3
     with program() as made:
         node = made.add(ControllerNode, {'law': 'gvc', 'vehicle': 'herman2018', **gains, **given})
         found = {name: node.get_parameter(name).value for name in given}
+        assert list(node.get_parameter('gains.of_my_own_law').value) == [3.0]
     expected = {'limits.wrench': [70.0, 71.0, 72.0, 73.0, 74.0, 75.0], 'limits.wrench_rate': [80.0]}
     assert found == {**expected, 'ramp': 2.0}
     assert {type(value) for value in (*found['limits.wrench'], found['ramp'])} == {float}
@@ -130,6 +133,46 @@ def test_a_gain_that_is_refused_is_told_with_what_is_expected_and_what_was_found
 
 
 CONTROL = {'law': 'gvc', 'vehicle': 'herman2018', 'gains.k_D': 12.0}
+
+
+def test_the_first_unknown_parameter_is_told_with_all_that_are_known_but_those_of_rclpy() -> None:
+    with program() as made, pytest.raises(InputError) as caught:
+        made.add(FrameConverterNode, {'shade': 1, 'colour': 'red', 'tone': 2})
+    error = caught.value
+    known = 'base_frame, enu_frame, expected_subscribers, flu_frame, lockstep, odom_frame'
+    assert (error.key, error.expected) == ('colour', f'one of {known}, twist_frame')
+
+
+def test_what_every_node_of_rclpy_takes_is_taken() -> None:
+    given = {'use_sim_time': True, 'start_type_description_service': False}
+    given['qos_overrides./odom.publisher.depth'] = 7
+    with program() as made:
+        node = made.add(FrameConverterNode, given)
+        assert {name: node.get_parameter(name).value for name in given} == given
+
+
+def test_null_is_a_word_where_one_is_taken_for_granted_and_the_words_are_described() -> None:
+    with program() as made:
+        node = made.add(FrameConverterNode, {'enu_frame': 'null'})
+        assert node.get_parameter('enu_frame').value == 'null'
+        frame, twist = node.describe_parameters(['enu_frame', 'twist_frame'])
+    assert (frame.additional_constraints, frame.read_only) == ('', True)
+    assert (twist.additional_constraints, twist.read_only) == ('one of child, world', True)
+
+
+def test_a_range_may_have_an_upper_end_alone() -> None:
+    with program() as made:
+        node = made.add(FrameConverterNode, {})
+        assert declare(node, 'depth', float, -1.0, 'm', at_most=0.0) == -1.0
+        assert declare(node, 'count', int, -1, 'of layers', at_most=0) == -1
+        depth, count = node.describe_parameters(['depth', 'count'])
+        (depth,), (count,) = depth.floating_point_range, count.integer_range
+        node.given['height'] = 1.0
+        with pytest.raises(InputError) as caught:
+            declare(node, 'height', float, 0.0, 'm', at_most=0.0)
+    assert (depth.from_value, depth.to_value) == (-WIDE, 0.0)
+    assert (count.from_value, count.to_value) == (-WHOLE, 0)
+    assert caught.value.expected == 'a number from -inf to 0.0'
 
 
 @pytest.mark.parametrize(

@@ -679,3 +679,27 @@ def test_what_has_arrived_is_taken_before_the_bag_is_closed(tmp_path: Path, time
         made.spin(0.1)
         made.drop(node)
     assert read_bag(tmp_path / 'bag', decode=False).counts['/odom'] == 3
+
+
+def test_where_only_setpoints_are_expected_progress_is_theirs(tmp_path: Path, timers) -> None:
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', topics=['cmd_vel'], strict=False, duration=0.02)
+        give_steps(node, *range(9))
+        for k in range(3):
+            assert node.exit_code is None
+            give(node, 'cmd_vel', convert.twist(k * STEP, (0.0,) * 6, FRAMES))
+            timers[0]()
+        assert node.exit_code == 0
+
+
+def test_steps_and_messages_that_did_not_arrive_are_said_at_the_end(
+    tmp_path: Path, timers, capfd: pytest.CaptureFixture
+) -> None:
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', strict=False)
+        give_steps(node, 0, 1, 4)
+        for number in (4, 6):
+            give_error(node, 0, publication_sequence_number=number)
+        made.drop(node)
+    said = capfd.readouterr().err
+    assert "'odom': 2, 'wrench': 2, 'analysis/lumped_error': 1}" in said

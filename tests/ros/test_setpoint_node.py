@@ -60,7 +60,7 @@ def test_without_a_horizon_the_next_odometry_finds_its_set_point() -> None:
 
 
 def test_odometry_within_the_horizon_is_no_jump_however_late_it_is_looked_at() -> None:
-    far = 140  # steps, of more than a second
+    far = 160  # steps, of more than a second
     with graph(('setpoint_node', parameters(setpoint__surge__offset=0.2, horizon=150))) as (
         peer,
         _,
@@ -71,10 +71,15 @@ def test_odometry_within_the_horizon_is_no_jump_however_late_it_is_looked_at() -
             newest = (at + 150) * STEP
             peer.until(lambda newest=newest: newest in stamps(peer, 'cmd_vel'), 'the horizon')
         assert stamps(peer, 'cmd_vel') == [k * STEP for k in range(2 * far + 151)]
+        peer.listen(topics.DIAGNOSTICS)
+        peer.publish(topics.ODOM, odometry((3 * far + 1) * STEP))
+        said = peer.heard[topics.DIAGNOSTICS.name]
+        peer.until(lambda: any('stamp jumped' in m.status[0].message for m in said), 'a jump')
 
 
-def test_what_lies_behind_the_odometry_by_more_than_the_horizon_is_left_out() -> None:
-    with graph(('setpoint_node', SURGE)) as (peer, _):
+@pytest.mark.parametrize('more', [{}, {'duration': 60.0}, {'lockstep': True}], ids=str)
+def test_what_lies_behind_the_odometry_by_more_than_the_horizon_is_left_out(more: dict) -> None:
+    with graph(('setpoint_node', [*SURGE, *parameters(**more)])) as (peer, _):
         peer.listen(topics.CMD_VEL)
         for at in (0, 40):
             peer.publish(topics.ODOM, odometry(10**9 + at * STEP))
@@ -123,6 +128,11 @@ def test_refuses_odometry_in_another_frame() -> None:
     ('arguments', 'key', 'expected'),
     [
         (parameters(horizon=3000), 'horizon', '2999'),
+        (
+            [*parameters(horizon=50), '-p', 'qos_overrides./cmd_vel.publisher.depth:=50'],
+            'qos_overrides./cmd_vel.publisher.depth',
+            'more than 50',
+        ),
         (parameters(setpoint__warp__offset=1.0), 'setpoint.warp.offset', 'one of'),
         (['-p', 'setpoint.surge.amplitude:=[1.0]'], 'setpoint', 'of equal length'),
         (parameters(setpoint__file='none.csv'), 'none.csv', 'a CSV set-point file'),

@@ -10,6 +10,7 @@ from helpers.nodes_in_process import program
 from numpy.testing import assert_allclose
 from reference_cases import SIX
 
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import topics
 from auv_gvc_controller.nodes.setpoint_node import SetpointNode
 
@@ -69,9 +70,57 @@ def test_without_a_horizon_it_is_ahead_by_the_usual_gap_between_odometries() -> 
         def newest() -> float:
             return (by_hand.ns_of(heard[-1]) - START) / STEP if heard else -1
 
-        # after 5, which is late, as before; every other one from 6 on is usual when it is so twice
-        for at, until in ((0, 1), (1, 2), (5, 6), (6, 7), (8, 9), (10, 12), (12, 14)):
-            made.publish(topics.ODOM, by_hand.odometry(START + at * STEP, [0, 0, 0, 1, *[0] * 9]))
+        # two within a step are one apart, for there is always a next; after 5, which is late, as
+        # before; every other one from 6 on is usual when it is so twice
+        for at, until in ((0, 1), (0.5, 1), (1, 2), (5, 6), (6, 7), (8, 9), (10, 12), (12, 14)):
+            ns = START + int(at * STEP)
+            made.publish(topics.ODOM, by_hand.odometry(ns, [0, 0, 0, 1, *[0] * 9]))
             made.until(lambda n=until: newest() >= n, f'set-point {until}')
             made.spin(0.05)
             assert newest() == until
+
+
+def test_no_step_is_published_twice_where_the_clock_jumps_by_hardly_more_than_is_believed() -> None:
+    with program() as made:
+        made.add(SetpointNode, {'step': 0.02, 'lockstep': False, **WAVES})
+        made.listen(topics.CMD_VEL)
+        made.until(lambda: made.node.count_publishers('cmd_vel'), 'a publisher')
+        for at in (0, 50, 100, 150.1, 150.2):  # a second is believed; two in a row are a jump
+            ns = START + int(at * STEP)
+            made.publish(topics.ODOM, by_hand.odometry(ns, [0, 0, 0, 1, *[0] * 9]))
+            made.spin(0.05)
+        heard = made.heard['cmd_vel']
+        made.until(lambda: by_hand.ns_of(heard[-1]) == START + 200 * STEP, 'those after the jump')
+        steps = [(by_hand.ns_of(m) - START) / STEP for m in heard]
+        assert steps == [0, 1, *range(50, 52), *range(100, 201)], 'each once'
+
+
+@pytest.mark.parametrize('lockstep', [True, False])
+def test_what_odometry_asks_for_comes_once_its_subscribers_are_there(lockstep: bool) -> None:
+    grid = {'step': 0.02, 'duration': 1.0, 'horizon': 3, 'lockstep': lockstep}
+    with program() as made:
+        made.add(SetpointNode, {**grid, **WAVES, 'expected_subscribers': ['cmd_vel=1']})
+        made.listen(topics.DIAGNOSTICS)
+        said = made.heard[topics.DIAGNOSTICS.name]
+        made.until(lambda: said and said[-1].status[0].message != 'ok', 'no odometry yet')
+        made.publish(topics.ODOM, by_hand.odometry(START, [0, 0, 0, 1, *[0] * 9]))
+        made.until(lambda: said[-1].status[0].message == 'ok', 'odometry')
+        assert by_hand.ns_of(said[-1]) == 0, 'nothing before there is a subscriber'
+        made.listen(topics.CMD_VEL)
+        made.until(lambda: by_hand.ns_of(said[-1]) == START + 3 * STEP, 'the horizon')
+        found = [by_hand.ns_of(m) for m in made.heard['cmd_vel']]
+        assert found == [START + k * STEP for k in range(4)]
+
+
+def test_a_file_that_ends_too_early_and_a_run_between_two_steps_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / 'table.csv'
+    names = 't,surge,sway,heave,roll,pitch,yaw'
+    np.savetxt(path, ROWS, delimiter=',', header=names, comments='', fmt='%.17g')
+    for duration, file, key, expected in (
+        (13.0, str(path), 't', '0 to 13 s covered'),
+        (1.01, 'setpoint_node', 'duration', 'a multiple of step'),
+    ):
+        with program() as made, pytest.raises(InputError) as caught:
+            made.add(SetpointNode, {'step': 0.02, 'duration': duration, 'setpoint.file': str(path)})
+        assert (caught.value.file, caught.value.key) == (file, key)
+        assert expected in caught.value.expected

@@ -41,6 +41,7 @@ def nodes(listed: list[Any]) -> tuple[list[str], dict[str, dict[str, Any]]]:
 def test_every_node_gets_its_parameters_and_the_bag_that_of_its_namespace(launch_file) -> None:
     listed = actions(launch_file, namespace='/auv1')
     names, given = nodes(listed)
+    assert of('SetEnvironmentVariable', listed), 'with the plant all stays on this machine'
     assert {one.named['namespace'] for one in of('Node', listed)} == {'/auv1'}
     assert names == list(given)
     assert set(names) == set(PACKAGES)

@@ -122,6 +122,7 @@ def test_case1_has_every_parameter_of_the_contract() -> None:
     for node, names in CONTRACT.items():
         assert names <= set(parameters[node]), node
     assert parameters['recorder_node']['topics'] == list(STEP_TOPICS)
+    assert not parameters['analysis_node']['ground_truth'], 'nothing is measured'
     assert parameters['controller_node']['setpoint_pairing'] == 'exact'
     assert parameters['controller_node']['setpoint_acceleration'] == 'topic'
 

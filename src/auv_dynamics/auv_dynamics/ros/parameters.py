@@ -83,8 +83,9 @@ def declare(
     try:
         node.declare_parameter(name, value, descriptor, ignore_override=True)
     except InvalidParameterValueException:
-        expected = f'{at_least if at_least is not None else "-inf"} to {at_most or "inf"}'
-        raise InputError(node.get_name(), name, f'a number from {expected}', value) from None
+        low = '-inf' if at_least is None else at_least
+        high = 'inf' if at_most is None else at_most
+        raise InputError(node.get_name(), name, f'a number from {low} to {high}', value) from None
     if one_of and value not in one_of:
         raise InputError(node.get_name(), name, nearest_of(value, one_of), value)
     numbers: Any = value if isinstance(value, list) else [value]

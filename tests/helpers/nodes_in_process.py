@@ -34,8 +34,8 @@ PARTS = {  # of a stamped message: its linear and its angular vector
 class Program(Peer):
     """A program with nodes of ours and one of its own, in one executor of rclpy's."""
 
-    def __init__(self) -> None:
-        super().__init__(fresh_domain())
+    def __init__(self, domain: int | None = None) -> None:
+        super().__init__(fresh_domain() if domain is None else domain)
         node_interface.DIAGNOSTICS_PERIOD = PERIOD
         self.nodes: list[Any] = []
 
@@ -78,9 +78,9 @@ def _end(node: Any) -> None:
 
 
 @contextmanager
-def program() -> Iterator[Program]:
-    """A program that is ended after the test."""
-    made = Program()
+def program(domain: int | None = None) -> Iterator[Program]:
+    """A program that is ended after the test, by default in a domain of its own."""
+    made = Program(domain)
     try:
         yield made
     finally:

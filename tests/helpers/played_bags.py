@@ -7,8 +7,8 @@ from subprocess import Popen
 from typing import Any
 
 from helpers.made_messages import STRING, Bag, new, odometry, serialized, stamped
-from helpers.node_processes import Peer, fresh_domain, graph, parameters
-from rclpy.parameter import Parameter
+from helpers.node_processes import Peer, graph, parameters
+from helpers.nodes_in_process import program
 
 from auv_analysis.bag.step_topics import ODOMETRY
 from auv_analysis.nodes.replay_node import ReplayNode
@@ -70,18 +70,8 @@ def playing(
     folder: Path, domain: int | None = None, **values: Any
 ) -> Iterator[tuple[Peer, ReplayNode]]:
     """A replay of a bag with parameters, in this process, and a peer in its domain."""
-    peer = Peer(fresh_domain() if domain is None else domain)
-    try:
-        given = [Parameter(n, value=v) for n, v in {'bag': str(folder), **values}.items()]
-        node = ReplayNode(
-            context=peer.context, parameter_overrides=given, use_global_arguments=False
-        )
-        peer.executor.add_node(node)
-        yield peer, node
-        node.close()
-        node.destroy_node()
-    finally:
-        peer.close()
+    with program(domain) as peer:
+        yield peer, peer.add(ReplayNode, {'bag': str(folder), **values})
 
 
 @contextmanager

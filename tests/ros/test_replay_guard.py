@@ -121,7 +121,7 @@ def test_a_second_clock_ends_the_replay(tmp_path: Path) -> None:
         peer.until(lambda: peer.heard[ODOM.name], 'odometry')
         peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 10)
         assert ended(peer, replay) == 1
-    assert '/clock: expected no other publisher' in replay.failure
+        assert '/clock: expected no other publisher' in replay.failure
 
 
 @pytest.mark.parametrize('root', ['', 'replay/'])

@@ -194,7 +194,7 @@ def test_names_the_answer_that_does_not_come(tmp_path: Path, monkeypatch) -> Non
     monkeypatch.setattr('auv_analysis.nodes.replay_publishers.PATIENCE', 0.5)
     with playing(made(tmp_path / 'bag'), rate=0.0, answers='other/wrench') as (peer, replay):
         assert ended(peer, replay) == 1
-    assert replay.failure.startswith('no answer on other/wrench to the odometry of 0 s')
+        assert replay.failure.startswith('no answer on other/wrench to the odometry of 0 s')
 
 
 def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:

@@ -351,7 +351,7 @@ def test_restless_lines_lie_below_smooth_ones(case1):
         figure, _, _ = run_plots.inputs(digests(runs))
     for axes in figure.axes:
         smooth, noisy = axes.lines[:2]
-        assert smooth.get_zorder() > noisy.get_zorder()
+        assert 2 < noisy.get_zorder() < smooth.get_zorder() <= 3, 'above the grid, below words'
         assert smooth.get_color() != noisy.get_color()
 
 

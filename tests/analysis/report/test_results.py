@@ -102,7 +102,9 @@ def test_the_terminal_shows_the_same_table(results: Results) -> None:
     table = results.tables['draws']
     console = Console(width=100, file=io.StringIO(), markup=False)
     console.print(terminal(table))
-    assert '1\u202f234' in console.file.getvalue()
+    printed = console.file.getvalue()
+    assert '1\u202f234' in printed
+    assert [line[0] for line in printed.splitlines()] == ['c', '<', 'b'], 'from the left edge'
 
 
 LOOKS = {

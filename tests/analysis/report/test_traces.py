@@ -14,12 +14,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.metrics.energy import kinetic_energy
 from auv_analysis.metrics.statistics import Statistics, followed, part_of
 from auv_analysis.report import plots, run_plots
 from auv_analysis.report.digest import digest, is_split
 from auv_analysis.report.run_report import write_report
 from auv_analysis.report.traces import COLUMNS, FEW, Trace, broken, thinned
 from auv_analysis.runs.run import Run
+from auv_gvc_controller.laws.model import control_model
 
 quick = examples(15)
 
@@ -122,13 +124,12 @@ def test_lines_of_a_long_run_have_columns_over_all_that_is_shown_of_it(run) -> N
 
 
 def test_shares_are_those_of_the_mean_energy_of_each_column(run) -> None:
-    long = repeated(run, 8 * len(run.t))
+    long, model = repeated(run, 6000), control_model(run.vehicle)
     few_t, parts = digest(long).stack
-    assert len(few_t) < len(long.t) / 2
-    assert np.all(np.diff(few_t) > 0)
-    assert long.t[0] <= few_t[0] < few_t[-1] <= long.t[-1]
-    assert_allclose(few_t, np.linspace(few_t[0], few_t[-1], len(few_t)), atol=2 * long.step)
-    assert_allclose(parts.sum(axis=1), 100.0)
+    energy = kinetic_energy(model.Upsilon_inv.reshape(6, 6), model.N, long.nu)
+    energy = energy.reshape(600, 10, 6).mean(axis=1)
+    assert_allclose(few_t, long.t.reshape(600, 10).mean(axis=1), rtol=1e-12)
+    assert_allclose(parts, 100 * energy / energy.sum(axis=1, keepdims=True), atol=1e-9)
 
 
 @pytest.mark.long

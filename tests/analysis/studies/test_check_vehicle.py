@@ -138,6 +138,17 @@ def test_hydrostatics():
     assert check_vehicle('bluerov2')['hydrostatics']['moment_when_level'] == [0, 0]
 
 
+def test_hydrostatics_of_a_vehicle_whose_centres_lie_apart_in_every_axis(written):
+    data = file_of('herman2018')
+    data['hydrostatics']['center_of_buoyancy'] = [0.02, -0.03, -0.05]
+    found = check_vehicle(written(data))['hydrostatics']
+    assert found['r_G'] == [0.15, 0.0, 0.03]
+    assert found['r_B'] == [0.02, -0.03, -0.05]
+    assert found['metacentric_height'] == pytest.approx(0.08)
+    W, B = 250 * 9.81, 360 * 9.81  # N
+    assert found['moment_when_level'] == pytest.approx([0.03 * B, -0.15 * W + 0.02 * B])
+
+
 def period(vehicle, axis):
     """Of a small free oscillation without damping, by the equations of motion and RK4."""
 

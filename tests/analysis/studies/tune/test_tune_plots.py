@@ -38,7 +38,9 @@ class Tuned:
         tried = Measures(*rng.uniform(0.5, 4.0, (6, count)))
         tried.error[4] = np.nan
         stages = np.where(np.arange(count) % 7 == 0, tune.GRADIENT, 'point')
-        return Made(evaluations=tried, margins=rng.uniform(-0.2, 1.0, count), stages=stages)
+        margins = rng.uniform(-0.2, 1.0, count)
+        margins[np.where(margins > 0, margins, 1.0).argmin()] = 0.0  # just enough
+        return Made(evaluations=tried, margins=margins, stages=stages)
 
     def ratio(self, name: str, measure: str) -> float:
         return {'gvc': 1.0, 'cl_tuned': 0.8, 'mine': 1.3}[name] + 0.1 * (measure == 'effort') * (

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from rclpy.duration import Duration
@@ -191,28 +192,21 @@ class RecorderNode(BulkNode):
 
     def _write(self, topic: str, kind: str, message: bytes, ns: int, published: int) -> None:
         self._meet(topic, kind)
-        if self._writer.broken:
-            return
-        try:
+        with suppress(RecordingError):  # `_report` ends with it
             self._writer.write(topic, ns, message, published)
-        except RecordingError as error:
-            self._end(str(error))
 
     def _meet(self, topic: str, kind: str) -> None:
         """Define a topic in the bag, with what its publishers offer."""
-        if self._writer.broken or self._writer.has_channel(topic):
+        if self._writer.has_channel(topic):
             return
         found = self.get_publishers_info_by_topic(topic)
         offered = [one for one in found if one.topic_type == kind]
         qos = [qos_entry(one.qos_profile) for one in offered]
         known = [*offered, *self.get_subscriptions_info_by_topic(topic)]
         digest = next((str(one.topic_type_hash) for one in known), '')
-        try:
-            self._writer.add_channel(
-                Definition(topic, kind, qos=qos, digest=digest), schema_text(kind)
-            )
-        except RecordingError as error:
-            self._end(str(error))
+        definition = Definition(topic, kind, qos=qos, digest=digest)
+        with suppress(RecordingError):  # `_report` ends with it
+            self._writer.add_channel(definition, schema_text(kind))
 
     def _count(self, name: str, step_topic: str, ns: int, number: int | None) -> None:
         try:

@@ -98,6 +98,9 @@ def test_what_is_missing_is_a_comment(tmp_path) -> None:
         'topic': 'x', 'fields': ['motor1', 'motor2'], 'curve': 't200_16v', 'stamp': stamp,
     }  # fmt: skip
     assert '# pose: no topic was found with x, y, z\n' in text
+    assert 'setpoint' not in text, 'a recording may lack it'
+    path.write_text('\n'.join(row.rsplit(';', 2)[0] for row in [head, *rows]))
+    assert '# wrench or thrusters: no topic was found\n' in proposed(path)[0]
     read_mapping(saved(text, tmp_path), {})
 
 

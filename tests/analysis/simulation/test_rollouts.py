@@ -268,6 +268,8 @@ def test_a_rollout_that_diverges_says_when_and_leaves_the_others_alone():
     [
         ({'controllers.gvc.k_d': [1.0]}, {}, 'k_D'),
         ({'nothing': [1.0]}, {}, 'expected one of'),
+        ({'setpoint.surge.terms[9].amplitude': [1.0]}, {}, 'expected an index below 1'),
+        ({'setpoint.surge.terms[0].height': [1.0]}, {}, 'one of amplitude'),
     ],
 )
 def test_a_path_that_leads_nowhere_is_refused_at_once(changes, options, match):

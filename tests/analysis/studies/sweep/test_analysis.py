@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.made_sweeps import DAMPING, ENERGY, K_D, SETTLED, rows
+from helpers.made_sweeps import DAMPING, ENERGY, K_D, SETTLED, SIMPLE, make_sweep, rows
 from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +11,7 @@ from scipy.stats import f_oneway, spearmanr
 
 from auv_analysis.report.plots import distribution, new_figure
 from auv_analysis.studies.sweep.analysis import Analysis, analysed, explained
-from auv_analysis.studies.sweep.dataset import by_group
+from auv_analysis.studies.sweep.dataset import by_group, open_sweep
 from auv_analysis.studies.sweep.quantiles import ordered, quantiles, spread, thinned
 
 
@@ -69,6 +69,16 @@ def test_controllers_in_the_same_rollouts(results: Analysis) -> None:
     assert (row['ratio'], row['effect']) == (pytest.approx(1 / 1.5), -1.0)
     (same,) = rows(results, 'paired', figure='overall.effort.max.angular')
     assert same['equal_percent'] == 100.0
+
+
+def test_how_often_either_controller_is_the_smaller(tmp_path) -> None:
+    sizes = {'gvc': np.array([1.0, 1.0, 1.0, 1.0, 2.0, 3.0, 3.0, 3.0]), 'cl': 2.0 * np.ones(8)}
+    made = make_sweep(
+        tmp_path, SIMPLE, lambda controller, _, index: {ENERGY: sizes[controller][index % 8]}
+    )
+    (row,) = rows(analysed(open_sweep(made)), 'paired', figure=ENERGY)
+    parts = (row['smaller_percent'], row['equal_percent'], row['larger_percent'])
+    assert parts == (50.0, 12.5, 37.5)
 
 
 def test_two_paths_together(results: Analysis) -> None:

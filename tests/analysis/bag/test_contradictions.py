@@ -152,6 +152,8 @@ def test_a_wrench_of_zeros_is_named(run, tmp_path) -> None:
     found = loaded(bag_of(run, tmp_path, tau=none), **KEYS)
     (note,) = said(found, 'is zero')
     assert note.startswith('/w: every wrench is zero')
+    one = replace(run, tau=run.tau * [0, 0, 1, 0, 0, 0])
+    assert not said(loaded(bag_of(run, tmp_path / 'one', tau=one), **KEYS), 'is zero')
 
 
 def test_stamps_in_bursts_are_told_and_spread(run, tmp_path) -> None:

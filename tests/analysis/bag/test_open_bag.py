@@ -13,9 +13,11 @@ from helpers.strategies import examples
 from hypothesis import given
 from hypothesis import strategies as st
 from made_bags import make_bag
+from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, summarize
-from auv_analysis.bag import load_run, open_bag
+from auv_analysis.bag import load, load_run, open_bag
+from auv_analysis.bag.reading import slices
 from auv_analysis.report.digest import digest
 from auv_analysis.runs.run import Run, joined
 from auv_dynamics.files.errors import FailedError, InputError
@@ -170,3 +172,11 @@ def test_a_sketch_of_a_long_run_holds_few_points(tmp_path) -> None:
     lines = [t.line()[0] for traces in drawn.traces.values() for t in traces]
     assert max(map(len, lines)) <= 4000
     assert max(map(len, lines)) > 2000
+
+
+def test_the_heading_goes_on_from_block_to_block(monkeypatch) -> None:
+    monkeypatch.setattr(load, 'slices', lambda count: slices(count, 7))
+    psi = np.concatenate([np.linspace(0.0, 20.0, 60), np.linspace(20.0, -20.0, 90)])
+    x = np.zeros((len(psi), 13))
+    x[:, 3], x[:, 6] = np.cos(psi / 2), np.sin(psi / 2)
+    assert_allclose(np.concatenate([*load._unrolled(x)])[:, 5], psi, atol=1e-9)

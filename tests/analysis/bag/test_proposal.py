@@ -110,6 +110,7 @@ def test_what_is_missing_is_a_comment(tmp_path) -> None:
     ('log', 'yaw rate (deg/s)', 'r'),
     ('log', 'gyroY', 'q'), ('log', 'Heading', 'psi'), ('/ahrs', 'rpy[1]', 'theta'),
     ('/state', 'pose.orientation.w', 'qw'), ('/state', 'pose.orientation.x', 'qx'),
+    ('/imu', 'omega.y', 'q'), ('log', 'qy', 'qy'), ('log', 'q_x', 'qx'),
     ('/pressure', 'depth', 'z'), ('log', 'pos_north', 'x'), ('/tau', 'N', 'N'), ('log', 'Fz', 'Z'),
     ('/cmd', 'torque.x', 'K'), ('/wrench', 'data.yaw', 'N'),
     ('/imu', 'linear_acceleration.x', ''), ('/imu', 'velocity_covariance[0]', ''),

@@ -1,6 +1,7 @@
 """The bag writer without a graph: its thread keeps deadlines, files end where they should."""
 
 import os
+import re
 import time
 from collections import Counter
 from pathlib import Path
@@ -23,6 +24,7 @@ from auv_analysis.bag import writer as writer_module
 from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.output import LEAST_SIZE, Storage
 from auv_analysis.bag.recover import recover
+from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import BagWriter, RecordingError
 
 PATIENCE = patience(20.0)  # s
@@ -207,3 +209,10 @@ def test_definitions_stand_outside_of_the_chunks(tmp_path: Path) -> None:
     os.utime(path, (0, 0))
     document = recover(tmp_path / 'bag').document()
     assert document['topics']['/a']['messages'] > 5
+
+
+@pytest.mark.parametrize('kind', ['nav_msgs/msg/OccupancyGrid', 'sensor_msgs/msg/Imu'])
+def test_a_definition_holds_each_type_that_it_needs_once(kind: str) -> None:
+    named = re.findall('^MSG: (.*)$', schema_text(kind), re.M)
+    assert 'builtin_interfaces/Time' in named
+    assert len(set(named)) == len(named)

@@ -43,6 +43,7 @@ rigid_body.mass = heavy | rigid_body.mass | a positive number (kg) | heavy
 rigid_body.mass = true | rigid_body.mass | a positive number (kg) | True
 rigid_body.mass = .nan | rigid_body.mass | a finite number | nan
 rigid_body.mass = 1e400 | rigid_body.mass | a finite number | inf
+rigid_body.mass = 1.0e+200 | rigid_body.mass | a finite number, at most 1e+100 | 1e+200
 rigid_body.mass = 1:30 kg | rigid_body.mass | a positive number (kg) | 1:30 kg
 rigid_body.mass = | rigid_body.mass | a positive number (kg) | nothing
 rigid_body.inertia = | rigid_body.inertia | 3x3 tensor | nothing

@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -68,6 +69,17 @@ def test_link_of_gazebo_is_turned_to_forward_starboard_down(imported):
     assert_array_equal(np.diagonal(vehicle.D_quadratic), [18, 0, 0, 0, 0, 2])
 
 
+@pytest.mark.parametrize(('shape', 'volume'), [
+    ('<sphere><radius>0.1</radius></sphere>', np.pi * 0.004 / 3),
+    ('<cylinder><radius>0.1</radius><length>0.3</length></cylinder>', np.pi * 0.003),
+    ('<capsule><radius>0.1</radius><length>0.3</length></capsule>', np.pi * (0.003 + 0.004 / 3)),
+    ('<ellipsoid><radii>0.1 0.2 0.3</radii></ellipsoid>', np.pi * 0.008),
+])  # fmt: skip
+def test_volume_of_a_shape(imported, shape, volume):
+    vehicle, _ = imported('made.sdf', sdf().replace('<box><size>0.2 0.2 0.25</size></box>', shape))
+    assert vehicle.buoyancy == pytest.approx(volume * 1000 * 9.81, rel=1e-3)
+
+
 def test_prefixes_that_nobody_declares(imported):
     more = '<experimental:params><add name="a" gz:name="b"/></experimental:params>'
     text = sdf().replace('<model name="made">', f'<model name="made">{more}')
@@ -111,6 +123,8 @@ def test_what_a_file_cannot_hold_is_left_out_when_asked(imported):
     ):
         _, document = imported(name, text, '--leave-out')
         assert any(word in text for text in document['left_out'])
+        lines = Path('made.yaml').read_text(encoding='utf-8').splitlines()
+        assert any(line.startswith('# left out: ') and word in line for line in lines)
         assert document['vehicle']['name'] == 'made'
 
 

@@ -238,6 +238,16 @@ def test_recording_is_kept_until_the_next_command_succeeds(end, tmp_path: Path, 
     assert (tmp_path / 'unfinished_1/gvc/gvc_0.mcap').read_text() == 'recovered'
 
 
+def test_of_what_is_left_the_report_is_named_or_else_the_summary(tmp_path: Path, capsys) -> None:
+    for folder, names, said in (
+        ('a', ('report.html', 'summary.json'), 'report: {}/report.html'),
+        ('b', ('summary.json',), 'summary: {}/summary.json'),
+    ):
+        with pytest.raises(FailedError):
+            write(tmp_path / folder, dict.fromkeys(names, ''), end=FailedError('no'))
+        assert capsys.readouterr().err.splitlines() == [said.format(tmp_path / folder)]
+
+
 def test_new_results_that_are_not_whole_can_be_overwritten(tmp_path: Path) -> None:
     half = {'gvc/gvc_0.mcap': 'half', 'notes.md': 'mine'}
     with pytest.raises(KeyboardInterrupt):

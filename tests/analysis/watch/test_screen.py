@@ -130,6 +130,7 @@ def test_topics_and_nodes_are_listed_with_their_health() -> None:
     found = lines(FULL, 120)
     text = ' '.join(found)
     assert row(found, interface.ODOM)[1:5] == ['100', '0.2', 's', '0']
+    assert any(line.split()[-2:] == ['node', 'health'] for line in found)
     assert row(found, interface.PROGRESS)[-2:] == ['–', '–']
     assert 'auv1/controller_node  error refused 3' in text
     assert 'auv1/plant_node       ok step 1234' in text

@@ -60,6 +60,7 @@ def test_every_form_of_a_gain():
     [
         ({}, '^k_D: expected a number, 6 numbers or a 6x6 matrix, found nothing$'),
         (PAPER | {'k_P': 1.0}, '^k_P: expected one of k_D, k_I, Lambda, Gamma .*found an unknown'),
+        (PAPER | {'k_d': 1.0, 'gamma': 1.0}, '^k_d: .*nearest: k_D'),
         (PAPER | {'k_I': [1.0, 2.0]}, r'^k_I: expected 1, 6 or 36 numbers, found shape \(2,\)'),
         (PAPER | {'Lambda': float('nan')}, '^Lambda: expected finite numbers, found nan'),
         (PAPER | {'Gamma': [[1.0] * 6] * 5}, r'^Gamma: expected .* found shape \(5, 6\)'),

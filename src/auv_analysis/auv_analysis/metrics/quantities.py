@@ -140,8 +140,7 @@ SIGNALS = {
         '', 'J', 'kinetic energy', '½ ν^T M ν = Σ ½ N_i ξ_i², (30)', 'of vehicle and added mass'
     ),
     'energy': Quantity(
-        'ξ', 'J', 'energy of ξ', '½ N_i ξ_i², (30)', 'kinetic energy of a component',
-        _six('ξ', '123456'),
+        'ξ', 'J', 'energy of ξ', '½ N_i ξ_i², (30)', 'kinetic energy of a component'
     ),
     'share': Quantity('', '%', 'share', '½ N_i ξ_i² of (30)', _ENERGY_SHARE),
     's': Quantity('s', _VELOCITY, 's', '(19)', 'sliding variable: Λ z plus the velocity error'),

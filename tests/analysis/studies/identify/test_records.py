@@ -85,6 +85,23 @@ def test_many_short_stretches_are_enough(herman):
     assert len(found.problem.segments) == 20
 
 
+@pytest.mark.parametrize(('duration', 'count'), [(2.9, 2), (3.0, 3), (3.9, 3)])
+def test_segments_are_of_one_length(duration, count):
+    found = segments_of(record(duration, 0.1), 1.0, 0.0)
+    assert [len(one.command) for one in found] == [10] * count
+
+
+def test_a_start_keeps_the_prior_of_what_is_not_linear(herman):
+    """Gain, bias and current: the prior is theta = 0."""
+    free = ('M', 'D_linear', 'gain', 'bias', 'current')
+    u = unknowns(load_vehicle('herman2018'), free, speeds=np.ones(6), wrenches=np.ones(6))
+    theta, _, _ = least_squares_start([herman], u)
+    kept = [k for k, one in enumerate(u.entries) if one.group in ('gain', 'bias', 'current')]
+    assert len(kept) > 12
+    assert_allclose(theta[kept], 0.0, atol=1e-12)
+    assert np.abs(np.delete(theta, kept)).max() > 0
+
+
 @pytest.mark.parametrize('rate', [5.0, 9.5, 10.0, 10.4, 12.0])
 def test_a_start_is_found_from_a_slow_velocity(herman, rate):
     """As a Doppler log gives it; the prior is 25 % off."""

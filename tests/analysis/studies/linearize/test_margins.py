@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from auv_analysis import load_scenario, simulate
 from auv_analysis.cli.main import main
 from auv_analysis.studies.linearize.margins import (
     ControlLoop,
+    axis_margins,
     margin_notes,
     stability_margins,
     stable,
@@ -110,6 +112,22 @@ def test_margins_are_where_a_second_sampling_of_the_loop_turns_unstable(law, lat
         borders = [grown(loop, later=(k * unit).astype(int), fine=fine)
                    for k in (ticks, ticks + 1)]  # fmt: skip
         assert at_border(*borders), (DOFS[i], one)
+
+
+def test_of_several_crossovers_the_nearest_to_the_border_counts():
+    """A loop whose S comes to 1/2 + j y, on |L| = 1, three times."""
+    crossings = {1.0: 0.5, 3.0: 2.0, 9.0: -1.0}  # rad/s -> y
+
+    def sensitivity(at):
+        x = np.log(at)[..., None] - np.log(list(crossings))
+        y = sum(value * np.exp(-20 * x[..., k] ** 2) for k, value in enumerate(crossings.values()))
+        return (0.5 + 0.3 * np.prod(x, axis=-1) + 1j * y)[..., None, None] * np.eye(6)
+
+    omega = np.geomspace(0.5, 20.0, 500)
+    found = axis_margins(SimpleNamespace(sensitivity=sensitivity), 2, omega,
+                         sensitivity(omega)[:, 2, 2], delays=False)  # fmt: skip
+    assert found.crossover == pytest.approx(3.0, rel=1e-3)
+    assert found.phase == pytest.approx(np.pi - 2 * np.arctan(4.0), rel=1e-3)
 
 
 @pytest.mark.parametrize('periods', [0, 1, 2.5])

@@ -184,6 +184,7 @@ REFUSED = [  # a group, what its one line says
     (drawn(a={'triangular': {'from': 0, 'mode': 3, 'to': 1}}), 'a mode from 0 to 1, found 3'),
     (drawn(a={'normal': {'mean': 0, 'std': 1, 'from': 40, 'to': 41}}), 'probability between'),
     (drawn('morris', a={'normal': {'mean': 0, 'std': 1, 'from': 4}}), 'a: expected from and to'),
+    (drawn('morris', a={'normal': {'mean': 0, 'std': 1, 'to': 4}}), 'a: expected from and to'),
     (drawn('latin_hypercube', 6_000_000, a=UNIFORM, b=UNIFORM), 'at most 5000000 points of 2'),
     (drawn('morris', 6_000_000, a=UNIFORM), 'at most 10000000 points'),
 ]

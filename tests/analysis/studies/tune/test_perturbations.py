@@ -42,6 +42,17 @@ def test_relative_error_of_M_stays_within_its_size(seed: int, size: float) -> No
     assert np.linalg.eigvalsh(D + D.T)[0] >= 0
 
 
+def test_relative_errors_of_M_and_D_lie_on_either_side() -> None:
+    one, D = Spread(inertia=0.5, damping=0.5), HERMAN.vehicle.D_linear
+    found = [of_kind(perturbed(HERMAN, one, 1, i), 'model_error')[0] for i in range(30)]
+    L = np.linalg.inv(np.linalg.cholesky(HERMAN.vehicle.M))
+    inertia = [np.linalg.eigvalsh(L @ np.array(spec['dM']) @ L.T) for spec in found]
+    damping = [np.diag(np.array(spec['dD'])) / np.diag(D) for spec in found]
+    for values in (np.array(inertia), np.array(damping)):
+        assert values.min() < -0.4
+        assert values.max() > 0.4
+
+
 def test_drawn_numbers_fill_their_spread_on_either_side() -> None:
     found = [of_kind(perturbed(REXROV, Spread(), 1, i), 'model_error')[0] for i in range(60)]
     for name, largest in (

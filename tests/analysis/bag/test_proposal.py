@@ -99,6 +99,8 @@ def test_what_is_missing_is_a_comment(tmp_path) -> None:
     }  # fmt: skip
     assert '# pose: no topic was found with x, y, z\n' in text
     assert 'setpoint' not in text, 'a recording may lack it'
+    path.write_text('\n'.join([head.replace('vel_z', 'other'), *rows]))
+    assert '# twist: no topic was found with w\n' in proposed(path)[0]
     path.write_text('\n'.join(row.rsplit(';', 2)[0] for row in [head, *rows]))
     assert '# wrench or thrusters: no topic was found\n' in proposed(path)[0]
     read_mapping(saved(text, tmp_path), {})

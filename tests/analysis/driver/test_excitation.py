@@ -10,6 +10,7 @@ from helpers.simulated_driver import SimulatedDriver
 from auv_analysis.driver.excitation import (
     GOODBYE,
     PERIOD,
+    TOO_FAST,
     StoppedError,
     actuate,
     carry_out,
@@ -44,7 +45,11 @@ def test_it_begins_and_ends_with_zero_and_goes_both_ways() -> None:
 
 @pytest.mark.parametrize(
     ('fault', 'word'),
-    [('silent_after', 'no odometry'), ('fast_after', 'm/s'), ('joined_after', '/somebody')],
+    [
+        ('silent_after', 'no odometry for 0.5 s'),
+        ('fast_after', 'm/s'),
+        ('joined_after', '/somebody'),
+    ],
 )
 def test_what_must_end_it_ends_it_with_zero(fault: str, word: str) -> None:
     driver = SimulatedDriver(**{fault: 1.0})
@@ -57,7 +62,8 @@ def test_what_must_end_it_ends_it_with_zero(fault: str, word: str) -> None:
 
 def test_a_vehicle_that_moves_already_gets_nothing_but_zero() -> None:
     driver = SimulatedDriver(fast_after=0.0)
-    assert 'already' in sent_by(driver).aborted
+    found = sent_by(driver)
+    assert found.aborted.endswith(f'already, over {TOO_FAST * found.plan.speed:.3g}')
     assert set(driver.sent) == {ZERO}
 
 

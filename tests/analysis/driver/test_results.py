@@ -20,8 +20,16 @@ from auv_analysis.driver.checks import (
     failure_of,
     findings_table,
     judge,
+    refusal,
 )
-from auv_analysis.driver.evidence import NOT_CHECKED, PASS, VERDICTS, DriverRecord, Settings
+from auv_analysis.driver.evidence import (
+    NOT_CHECKED,
+    PASS,
+    VERDICTS,
+    CheckResult,
+    DriverRecord,
+    Settings,
+)
 from auv_analysis.driver.excitation import carry_out
 from auv_analysis.driver.plan import plan_of
 from auv_analysis.driver.report import write_results
@@ -174,3 +182,15 @@ def test_a_folder_that_is_there_is_refused_before_anything_is_heard(tmp_path, ca
     assert ended.value.code == 2
     assert '--overwrite' in capsys.readouterr().err
     assert (tmp_path / 'mine.txt').read_text() == 'kept'
+
+
+def test_nothing_is_sent_unless_those_pass_on_whom_safety_rests() -> None:
+    needed = {
+        'odom_publisher', 'wrench_subscriber', 'wrench_publishers', 'qos_wrench', 'frames',
+        'finite', 'quaternion_norm', 'rate', 'gaps', 'stamps',
+    }  # fmt: skip
+    for name in CHECKS:
+        for verdict in VERDICTS:
+            said = refusal([CheckResult('', '', verdict, id=name)])
+            bad = name in needed and verdict != PASS
+            assert said == (f'nothing was sent, since {name} did not pass' if bad else '')

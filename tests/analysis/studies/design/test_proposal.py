@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -355,3 +356,9 @@ def test_a_change_in_per_cent(before, after, text):
 def test_the_couplings_are_named_like_the_summary():
     assert COUPLINGS[1] == 'delta_xi.sway'
     assert len(COUPLINGS) == 12
+
+
+def test_the_largest_couplings_are_looked_at_first():
+    shares = np.array([0.2, 0.004, 0.9, 0.2, 0.05, 0.3, 0.1, 0.6])  # one is below a hundredth
+    found = search.Remedies.targets(SimpleNamespace(before=SimpleNamespace(shares=shares)))
+    assert found == [2, 7, 5, 0, 3, 6]

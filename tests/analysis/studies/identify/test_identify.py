@@ -225,6 +225,9 @@ def test_damping_of_a_vehicle_that_gains_speed_is_held_where_it_takes_energy():
     after, zeros = _dissipative(problem, fit, problem.covariance(fit))
     found = Identified(vehicle, [], held_of([], 0.6), problem, after, problem.covariance(after), [],
                        zeros, ())  # fmt: skip
+    rows = found.coefficients()
+    assert len({frozenset(row) for row in rows}) == 1
+    assert all((row['low'] is None) == (row['high'] is None) for row in rows)
     text = vehicle_text(found, yaml.safe_load(shipped('vehicles', 'lauv').read_text()), 'x', '')
     D = vehicle_from_dict(yaml.safe_load(text), 'written').D_linear
     assert D[2, 4] == vehicle.D_linear[2, 4], 'what takes energy stays'

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from auv_analysis.bag.tracks import Track, assembled
 from auv_analysis.studies.identify.bags import parts, without_constants
 from auv_analysis.studies.identify.identify import Settings, as_filed, identify, split
-from auv_analysis.studies.identify.output_error import on_steps
+from auv_analysis.studies.identify.output_error import delayed, on_steps
 from auv_analysis.studies.identify.prediction import held_of, predict
 from auv_analysis.studies.identify.record import (
     Record,
@@ -175,6 +175,25 @@ def test_the_observer_sees_velocity_and_attitude_with_stamps_of_their_own():
     expected, found = (on_steps(segments_of(r, 1.0, 0.6)[0]) for r in (one, later))
     assert np.isfinite(expected).all()
     assert_array_equal(found[:-1], expected[:-1])  # the last attitude is behind the end
+
+
+@pytest.mark.parametrize('steps', [0.0, 0.4, 2.0, 2.3])
+def test_commands_are_delayed_by_any_number_of_steps(steps):
+    commands, k = np.random.default_rng(3).normal(size=(2, 9, 6)), np.arange(9.0)
+    found = delayed(commands, steps)
+    for i, j in np.ndindex(2, 6):
+        assert_allclose(found[i, :, j], np.interp(k - steps, k, commands[i, :, j]), atol=1e-12)
+
+
+@pytest.mark.parametrize(('duration', 'apart'), [(30.0, 0.25), (200.0, 0.525)])
+def test_moments_of_prediction_are_apart_and_blocks_lie_in_one_recording(duration, apart):
+    records = [record(duration, 0.025), record(10.0 + duration / 2000, 0.025)]
+    held = held_of(records, 0.5)
+    begins = [np.array([one.begin for one in some]) for some in held.segments]
+    assert_allclose(np.diff(begins[0]), apart, atol=1e-9)
+    first, second = np.split(held.blocks, [len(begins[0])])
+    assert np.all(np.diff(first) >= 0)
+    assert len(second) == 0 or second.min() > first.max()
 
 
 def test_a_prediction_is_compared_at_the_time_of_the_measurement():

@@ -123,11 +123,18 @@ def test_of_several_crossovers_the_nearest_to_the_border_counts():
         y = sum(value * np.exp(-20 * x[..., k] ** 2) for k, value in enumerate(crossings.values()))
         return (0.5 + 0.3 * np.prod(x, axis=-1) + 1j * y)[..., None, None] * np.eye(6)
 
+    def closing(omega, axis, extra):
+        s = sensitivity(np.array(omega))[axis, axis]
+        return 1 + (1 / s - 1) * np.exp(-1j * omega * extra)
+
     omega = np.geomspace(0.5, 20.0, 500)
-    found = axis_margins(SimpleNamespace(sensitivity=sensitivity), 2, omega,
-                         sensitivity(omega)[:, 2, 2], delays=False)  # fmt: skip
+    loop = SimpleNamespace(sensitivity=sensitivity, closing=closing)
+    found = axis_margins(loop, 2, omega, sensitivity(omega)[:, 2, 2], delays=True)
     assert found.crossover == pytest.approx(3.0, rel=1e-3)
     assert found.phase == pytest.approx(np.pi - 2 * np.arctan(4.0), rel=1e-3)
+    phases = {at: np.angle(1 / (0.5 + 1j * y) - 1) for at, y in crossings.items()}
+    delays = [(np.pi + phase) % (2 * np.pi) / at for at, phase in phases.items()]
+    assert found.delay == pytest.approx(min(delays), rel=1e-2)
 
 
 @pytest.mark.parametrize('periods', [0, 1, 2.5])

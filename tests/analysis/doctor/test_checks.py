@@ -16,6 +16,8 @@ from auv_analysis.cli import doctor, main
 from auv_analysis.cli.doctor import findings_of
 from auv_analysis.doctor import checks, discovery
 from auv_analysis.doctor.checks import Finding
+from auv_analysis.graph import supervisor
+from auv_analysis.graph.supervisor import NodeDiedError
 
 RANGE = checks.RANGE
 Usage = namedtuple('Usage', 'total used free')
@@ -208,3 +210,14 @@ def _auv(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         command, cwd=folder, env=environ, capture_output=True, text=True, check=False
     )
+
+
+def test_nodes_that_are_not_installed_are_named(monkeypatch):
+    def missing(package, name):
+        if name != 'plant_node':
+            raise NodeDiedError(name)
+
+    assert {finding.verdict for finding in checks.executables()} == {'ok'}
+    monkeypatch.setattr(supervisor, 'executable', missing)
+    found = _one(checks.executables, 'broken', 'not installed: ', 'setpoint_node')
+    assert 'plant_node' not in found.found

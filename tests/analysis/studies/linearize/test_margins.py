@@ -15,6 +15,7 @@ from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
 from auv_analysis.cli.main import main
+from auv_analysis.cli.scenario_runs import warn
 from auv_analysis.studies.linearize.margins import (
     ControlLoop,
     axis_margins,
@@ -403,6 +404,11 @@ def test_a_scenario_without_delay_says_nothing_and_one_with_it_its_margins(appro
     assert warning.startswith('warning: ')
     assert 'below 6 dB and 45 deg' in warning
     approved.add([note, warning])
+
+
+def test_what_is_odd_about_a_scenario_is_said(capsys):
+    warn(SimpleNamespace(warnings=('file: key: odd', 'two'), path='x', data={}), [])
+    assert capsys.readouterr().err.splitlines() == ['warning: file: key: odd', 'warning: two']
 
 
 def test_simulating_and_parameters_for_a_driver_warn(tmp_path, capsys):

@@ -285,6 +285,11 @@ def test_what_lies_on_a_bound_or_outside_the_hull_is_warned_of():
     corner = inside.copy()
     corner[8:11] += 0.9 * axes
     assert place_warnings(space, inside) == []
+    for share, warnings in ((0.99, 0), (1.01, 1)):
+        for ahead in np.diag(axes):
+            on_axis = inside.copy()
+            on_axis[8:11] += share * ahead
+            assert len(place_warnings(space, on_axis)) == warnings
     (text,) = place_warnings(space, corner)
     assert text.startswith('the disc is placed outside the hull')
     rows = [{'name': 'disc.x', 'value': -1.135, 'unit': 'm', 'at_bound': 'lower'},

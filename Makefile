@@ -35,6 +35,7 @@ DAY ?= 86400
 EXAMPLES ?= 500
 SEEDS ?= 10
 MUTANTS ?= 500
+ONLY ?= formulas loops figures nodes pages
 
 .PHONY: help setup case1 case2 test kernels test-loaded quick coverage soak nightly fuzz identify-study properties mutation audit bench bench-growth build colcon-test wheels
 .PHONY: lint format hooks interop docs docs-links docs-test docs-tools clean
@@ -109,11 +110,11 @@ properties: setup  ## the property tests with EXAMPLES examples each, drawn by S
 	  tests/dynamics tests/controller tests/analysis tests/reference
 
 # in an environment of its own, so that .venv stays what people use
-mutation: setup  ## mutants of formulas, nodes, plots and reports: MUTANTS=count or all, SEED=number, ONLY="nodes pages" or parts of paths
+mutation: setup  ## mutants of formulas, nodes, plots and reports: MUTANTS=count or all, SEED=number, ONLY="nodes pages", others or parts of paths
 	test -x $(VENV)/mutation/bin/python || $(PYTHON) -m venv $(VENV)/mutation
 	$(VENV)/mutation/bin/python -m pip install --quiet -r requirements-mutation.txt
 	$(VENV)/mutation/bin/python tests/mutation/run.py --python $(abspath $(BIN))/python \
-	    --mutants $(MUTANTS) --seed $(SEED) $(if $(ONLY),--only $(ONLY))
+	    --mutants $(MUTANTS) --seed $(SEED) --only $(ONLY)
 
 audit: setup  ## known vulnerabilities of what is installed; exit code 3: nothing was audited
 	test -x $(VENV)/audit/bin/python || $(PYTHON) -m venv $(VENV)/audit

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from copies import Copy, Verdict, copies
 from cosmic_ray.work_item import MutationSpec
@@ -97,18 +97,30 @@ def equivalents() -> set[tuple[str, str, str]]:
     }
 
 
+def kinds_of(plan: dict[str, Any]) -> dict[Path, tuple[str, list[str]]]:
+    """Kind and tests of each file; of a folder's files, of those that no kind lists by name."""
+    found = {}
+    for folder, own in plan['others'].items():
+        for path in (ROOT / 'src' / folder).rglob('*.py'):
+            found[path] = 'others', own
+    for kind in plan['quick'].keys() - {'others'}:
+        for file, own in plan[kind].items():
+            found[ROOT / 'src' / file] = kind, own
+    return found
+
+
 def main() -> int:
     """Draw mutants, try them, print what survived and the ratio; 1 below 95 %."""
     given = arguments()
     plan = tomllib.loads((HERE / 'mutation.toml').read_text(encoding='utf-8'))
     equivalent = equivalents()
+    kinds = kinds_of(plan)
     tests = {
-        ROOT / 'src' / file: Tests([plan['quick'][kind], own], kind in plan['compiled'])
-        for kind in plan['quick']
-        for file, own in plan[kind].items()
-        if any(part in f'{kind} {file}' for part in given.only)
+        path: Tests([plan['quick'][kind], own], kind in plan['compiled'])
+        for path, (kind, own) in kinds.items()
+        if any(part in f'{kind} {path.relative_to(ROOT)}' for part in given.only)
     }
-    wiring = {ROOT / 'src' / file for kind in plan['wiring'] for file in plan[kind]}
+    wiring = {path for path, (kind, _) in kinds.items() if kind in plan['wiring']}
     every = mutants(sorted(tests), wiring)
     count = len(every) if given.mutants == 'all' else min(int(given.mutants), len(every))
     chosen = sorted(random.Random(given.seed).sample(range(len(every)), count))

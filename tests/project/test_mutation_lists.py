@@ -13,7 +13,11 @@ def listed(name: str) -> dict:
 
 def test_files_and_tests_are_there() -> None:
     stages = listed('mutation.toml')
-    files = {file: tests for kind in stages['quick'] for file, tests in stages[kind].items()}
+    folders = stages['others']
+    assert all((ROOT / 'src' / folder).is_dir() for folder in folders)
+    assert all((ROOT / 'tests' / test).is_dir() for own in folders.values() for test in own)
+    named = stages['quick'].keys() - {'others'}
+    files = {file: tests for kind in named for file, tests in stages[kind].items()}
     assert set(stages) == {'wiring', 'compiled', 'quick', *stages['quick']}
     assert {*stages['wiring'], *stages['compiled']} < {*stages['quick']}
     tests = [test for named in (*files.values(), *stages['quick'].values()) for test in named]

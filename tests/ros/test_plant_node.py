@@ -323,6 +323,21 @@ def test_a_wrench_that_is_stamped_ahead_locks_out_none_but_older_ones(capfd) -> 
     assert 'wrench: stamp: expected newer than the last, found 30000000 ns' in said
 
 
+def test_a_short_pause_in_real_time_is_made_up_for() -> None:
+    """Else its stamps stay behind, and a controller with a clock of its own takes them for old."""
+    with graph(('plant_node', REAL)) as (peer, processes):
+        peer.listen(topics.ODOM)
+        first, began = step_of(odometry(peer, 3)[-1]), time.monotonic()
+        processes['plant_node'].send_signal(signal.SIGSTOP)
+        peer.spin(1.0)
+        processes['plant_node'].send_signal(signal.SIGCONT)
+        peer.spin(0.5)
+        steps, passed = step_of(odometry(peer, 4)[-1]) - first, time.monotonic() - began
+        _, output = stop(processes['plant_node'])
+    assert 100 * passed - steps < 60, 'the pause was 100 steps'
+    assert 'late' not in output
+
+
 def test_a_pause_in_real_time_is_bounded_and_said() -> None:
     with graph(('plant_node', REAL)) as (peer, processes):
         listening(peer)

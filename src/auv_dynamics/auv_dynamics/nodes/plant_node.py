@@ -26,7 +26,7 @@ from auv_dynamics.ros.parameters import declare_settings
 from auv_dynamics.ros.settings import PlantSettings
 
 WATCH = 0.2  # s between two looks at the silence
-CATCH_UP = 0.5  # s that a plant in real time may be late: beyond, its time goes on from there
+CATCH_UP = 2.0  # s that a plant in real time may be late: beyond, its time goes on from there
 AHEAD = 1.0  # s that the stamp of a wrench may be ahead: it answers an odometry
 DIVERGES = 'beyond every speed after step {}: the closed loop diverges'
 

@@ -75,7 +75,7 @@ def test_lock_step_repeats_delays_biases_and_keeps() -> None:
 
 
 def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
-    heard_again = 120 + round(patience(60))  # steps, of which the watchdog waits for half
+    heard_again = 120 + round(patience(80))  # steps, of which the watchdog waits for 50
     last = heard_again + round(patience(70))
 
     def held(found: tuple[list[int], list[int], np.ndarray]) -> bool:
@@ -100,7 +100,7 @@ def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.
         late={'kind': 'sensor_delay', 'delay': 0.2, '_from': 0.6, 'to': 1.0},
         mute={'kind': 'wrench_loss', '_from': 1.2, 'to': heard_again * 0.01},
     )
-    plant = parameters(vehicle='herman2018', duration=last * 0.01, wrench_timeout=patience(0.3))
+    plant = parameters(vehicle='herman2018', duration=last * 0.01, wrench_timeout=patience(0.5))
     ready = ['-p', 'expected_subscribers:=["odom=2", "wrench_applied=1", "ground_truth/odom=1"]']
     with graph((PLANT, [*plant, *ready, *given])) as (peer, _):
         peer.listen(*HEARD)

@@ -327,14 +327,14 @@ def test_real_time_publishes_what_is_due(made, hours, capfd) -> None:
     until_step(made, 3)
     assert made.call(SetBool, 'plant_node/run', SetBool.Request(data=True)).success
     until_step(made, 4)
-    hours.go_on(0.49)
-    until_step(made, 28)
+    hours.go_on(1.99)
+    until_step(made, 103)
     assert ' s late' not in capfd.readouterr().err
-    hours.go_on(0.6)
-    until_step(made, 29)
-    assert ' s late: time goes on from step 29' in capfd.readouterr().err
+    hours.go_on(2.1)
+    until_step(made, 104)
+    assert ' s late: time goes on from step 104' in capfd.readouterr().err
     hours.go_on(1.5 * H)
-    until_step(made, 30)
+    until_step(made, 105)
 
 
 def test_a_long_step_is_not_late(made, hours, capfd) -> None:

@@ -97,16 +97,13 @@ def equivalents() -> set[tuple[str, str, str]]:
     }
 
 
-def kinds_of(plan: dict[str, Any]) -> dict[Path, tuple[str, list[str]]]:
-    """Kind and tests of each file; of a folder's files, of those that no kind lists by name."""
-    found = {}
-    for folder, own in plan['others'].items():
-        for path in (ROOT / 'src' / folder).rglob('*.py'):
-            found[path] = 'others', own
-    for kind in plan['quick'].keys() - {'others'}:
-        for file, own in plan[kind].items():
-            found[ROOT / 'src' / file] = kind, own
-    return found
+def files_of(plan: dict[str, Any], kind: str) -> Iterator[tuple[Path, list[str]]]:
+    """Files of a kind and their tests; of a folder those that no kind lists by name."""
+    named = {ROOT / 'src' / place for one in plan['quick'] for place in plan[one]}
+    for place, own in plan[kind].items():
+        path = ROOT / 'src' / place
+        inside = set(path.rglob('*.py')) - named
+        yield from ((file, own) for file in (inside if path.is_dir() else [path]))
 
 
 def main() -> int:
@@ -114,13 +111,13 @@ def main() -> int:
     given = arguments()
     plan = tomllib.loads((HERE / 'mutation.toml').read_text(encoding='utf-8'))
     equivalent = equivalents()
-    kinds = kinds_of(plan)
     tests = {
         path: Tests([plan['quick'][kind], own], kind in plan['compiled'])
-        for path, (kind, own) in kinds.items()
-        if any(part in f'{kind} {path.relative_to(ROOT)}' for part in given.only)
+        for kind in plan['quick']
+        for path, own in files_of(plan, kind)
+        if any(part in f'{kind} {path.relative_to(ROOT / "src")}' for part in given.only)
     }
-    wiring = {path for path, (kind, _) in kinds.items() if kind in plan['wiring']}
+    wiring = {path for kind in plan['wiring'] for path, _ in files_of(plan, kind)}
     every = mutants(sorted(tests), wiring)
     count = len(every) if given.mutants == 'all' else min(int(given.mutants), len(every))
     chosen = sorted(random.Random(given.seed).sample(range(len(every)), count))

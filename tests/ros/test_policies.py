@@ -83,18 +83,23 @@ def assert_exact(domain: int, wanted: policies.Allowed, namespace: str = '/') ->
     """
     seen: policies.Allowed = {}
 
-    def complete(peer: Peer) -> bool:
-        look(peer, seen, namespace)
+    def sees_all() -> bool:
+        limit = time.monotonic() + PATIENCE / 3
+        with closing(Peer(domain)) as peer:
+
+            def ends() -> bool:
+                look(peer, seen, namespace)
+                return seen == wanted or time.monotonic() > limit
+
+            peer.until(ends)
+            peer.spin(0.5)
+            look(peer, seen, namespace)
         return seen == wanted
 
     try:
-        end = time.monotonic() + 2 * PATIENCE
-        while seen != wanted and time.monotonic() < end:
-            with closing(Peer(domain)) as peer:
-                limit = time.monotonic() + PATIENCE / 3
-                peer.until(lambda: complete(peer) or time.monotonic() > limit)  # noqa: B023
-                peer.spin(0.5)
-                look(peer, seen, namespace)
+        for _ in range(6):
+            if sees_all():
+                break
     finally:
         for enclave in {*wanted, *seen}:
             ours, theirs = wanted.get(enclave, {}), seen.get(enclave, {})

@@ -214,3 +214,13 @@ def test_where_sensors_lie_the_truth_is_looked_at(vehicle: Path) -> None:
         (message,) = heard(made, 'analysis/delta_xi', 1)
         expected = SAID['analysis/delta_xi'](2)
         assert_allclose(by_hand.six_of(message), expected, rtol=1e-9, atol=1e-12)
+
+
+def test_however_few_steps_are_looked_at_they_are_waited_for(
+    analysis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(analysis_node, 'CAPACITY', EVERY - 1)
+    for message_of_topic in of_step(0).items():
+        give(analysis, *message_of_topic)
+    for name in SAID:
+        assert by_hand.ns_of(heard(analysis, name, 1)[0]) == 0

@@ -12,6 +12,7 @@ from helpers.node_processes import (
     CONTROLLER,
     GAINS,
     assert_one_line,
+    change,
     fresh_domain,
     graph,
     parameters,
@@ -150,7 +151,8 @@ def test_ends_on_a_signal(lockstep, how: int) -> None:
     peer.publish(topics.ODOM, odometry(0))
     answered(peer, 1)  # so that both ends have matched
     peer.publish(topics.ODOM, odometry(1))
-    peer.spin(patience(0.5))
+    for _ in range(2):  # between two answers it has taken what had come
+        state(peer)
     code, _ = stop(process, how)
     assert code == 0
     last = answered(peer, 2)[-1]
@@ -223,7 +225,9 @@ def explained(peer, level: bytes, said: str, *published: tuple[topics.Topic, Any
 
 def test_mistakes_with_set_points_are_explained() -> None:
     plain = topics.Topic('cmd_vel', Twist)
-    with graph(('controller_node', CONTROLLER)) as (peer, processes):
+    # no pause of a busy machine is as long as these
+    long = parameters(odometry_timeout=patience(30.0), limits__gap=patience(30.0))
+    with graph(('controller_node', [*CONTROLLER, *long])) as (peer, processes):
         peer.listen(topics.DIAGNOSTICS)
         explained(peer, WARN, 'nobody publishes /cmd_vel')
         named = 'expected geometry_msgs/msg/TwistStamped, found geometry_msgs/msg/Twist of /test_'
@@ -232,8 +236,7 @@ def test_mistakes_with_set_points_are_explained() -> None:
     assert code == 0
     assert 'begins: tracks cmd_vel with gvc in real time' in output
     assert 'ends with exit code 0: tracks cmd_vel' in output
-    errors = [line for line in output.splitlines() if 'ERROR' in line and 'stamp old' not in line]
-    assert not errors, 'a normal start and end'
+    assert 'ERROR' not in output, 'a normal start and end'
     assert 'takes over' not in output, 'it never was in charge'
 
 
@@ -252,11 +255,6 @@ def test_a_set_point_that_waits_for_its_acceleration_is_explained() -> None:
         moving = topics.CMD_VEL, lambda ns: convert.twist(ns, (0.1, 0, 0, 0, 0, 0), FRAMES)
         said = 'nobody publishes /cmd_accel; setpoint_acceleration: topic waits for it'
         explained(peer, WARN, said, moving)
-
-
-def change(peer, transition: int) -> bool:
-    request = ChangeState.Request(transition=Transition(id=transition))
-    return peer.call(ChangeState, 'controller_node/change_state', request).success
 
 
 def state(peer) -> str:
@@ -299,6 +297,10 @@ def test_limits_and_timeouts_are_taken_while_inactive_only() -> None:
         second = ParameterValue(type=3, double_value=1.0)
         for name in ('odometry_timeout', 'setpoint_timeout', 'ramp', 'limits.speed'):
             assert set_parameter(peer, name, second).successful
+        for name, words in (('stamp_clock', 'auto, ros, own'), ('actuators.saturation', 'scaled')):
+            wrong = set_parameter(peer, name, ParameterValue(type=4, string_value='rubbish'))
+            assert not wrong.successful
+            assert wrong.reason.startswith(f'{name}: expected one of {words}')
         decides = set_parameter(peer, 'lockstep', ParameterValue(type=1, bool_value=False))
         assert not decides.successful, 'it decides what is subscribed'
         assert change(peer, Transition.TRANSITION_ACTIVATE)

@@ -366,3 +366,32 @@ def test_silence_in_real_time_gives_zero_wrench_is_explained_and_it_comes_back(
     told = re.findall('takes over|lets go', capfd.readouterr().err)
     assert told == ['takes over', 'lets go'] * (len(told) // 2), 'each change is said, and once'
     assert len(told) >= 8
+
+
+def test_in_real_time_what_came_before_an_activation_is_not_obeyed(made, vehicle) -> None:
+    """The clock may have begun anew since: then set-points of the old time lie ahead of it."""
+    real = {'lockstep': False, 'setpoint_pairing': 'latest', 'limits.wrench': [1e4]}
+    real |= {'setpoint_acceleration': 'none', 'setpoint_timeout': 60.0, 'odometry_timeout': 60.0}
+    node = controller(made, vehicle, 'gvc', **real, ramp=0.0)
+    came: list[object] = []
+    listening = node._idle.hear
+    node._idle.hear = lambda *heard: (listening(*heard), came.append(heard))
+
+    def setpoint() -> None:
+        count = len(came)
+        made.publish(topics.CMD_VEL, by_hand.six(topics.CMD_VEL.type, 9 * STEP, NU_D[0]))
+        made.until(lambda: len(came) > count, 'the set-point')
+
+    def is_driven(k: int) -> bool:
+        count = len(made.heard['wrench'])
+        made.publish(topics.ODOM, by_hand.odometry(k * STEP, [*ETA[0, :3], 1, 0, 0, 0, *NU[0]]))
+        made.until(lambda: len(made.heard['wrench']) > count, f'answer {k}')
+        return any(by_hand.six_of(made.heard['wrench'][-1]))
+
+    assert node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+    made.until(lambda: made.heard['wrench'], 'the zero wrench that it leaves')
+    setpoint()
+    assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+    assert not is_driven(9)
+    setpoint()
+    assert is_driven(10)

@@ -4,9 +4,16 @@ from pathlib import Path
 
 import pytest
 import yaml
-from helpers.node_processes import CONTROLLER, Peer, fresh_domain, graph, parameters
+from helpers.node_processes import CONTROLLER, Peer, fresh_domain, graph, parameters, stop
 from helpers.nodes_in_process import program
-from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
 from rclpy.parameter import parameter_value_to_python
 
 from auv_analysis.nodes.recorder_node import RecorderNode
@@ -199,3 +206,18 @@ def test_what_is_refused_is_told_by_name(kind, given, expected: str) -> None:
         made.add(kind, own | given)
     assert caught.value.key == next(iter(given))
     assert expected in caught.value.expected
+
+
+@pytest.mark.parametrize('kind', [SetParameters, SetParametersAtomically])
+def test_a_value_of_a_type_that_there_is_not_is_refused(kind: type) -> None:
+    """rclpy raises for it, and answers nothing."""
+    odd = Parameter(name='gains.k_D', value=ParameterValue(type=200))
+    with graph(('controller_node', NODES['controller_node'])) as (peer, processes):
+        name = kind.__name__.replace('Set', 'set_').replace('sA', 's_a').replace('_P', '_p')
+        client = peer.node.create_client(kind, f'controller_node/{name}')
+        peer.until(client.service_is_ready, 'the service')
+        client.call_async(kind.Request(parameters=[odd]))
+        assert asked(peer, 'controller_node')[0]
+        code, output = stop(processes['controller_node'])
+    assert code == 0
+    assert 'refused: 200 is not a valid' in output

@@ -703,3 +703,53 @@ def test_steps_and_messages_that_did_not_arrive_are_said_at_the_end(
         made.drop(node)
     said = capfd.readouterr().err
     assert "'odom': 2, 'wrench': 2, 'analysis/lumped_error': 1}" in said
+
+
+DAY = 86_400 * NANOSECONDS
+
+
+def test_where_the_clock_is_set_no_time_has_passed() -> None:
+    ledger = StepLedger(['odom', 'wrench'], 10, strict=False)
+    for ns in (0, 10, 2 * DAY, 2 * DAY + 10, 2 * DAY + 30):
+        ledger.add('odom', ns)
+        ledger.add('wrench', ns)
+    assert (ledger.complete, ledger.gaps) == (4, {'odom': 1, 'wrench': 1})
+    ledger.add('odom', 7 * DAY)  # a stray
+    for ns in (2 * DAY + 40, 2 * DAY + 50):
+        ledger.add('odom', ns)
+        ledger.add('wrench', ns)
+    assert (ledger.complete, ledger.furthest) == (5, 5), 'nor with the stray'
+    assert ledger.gaps == {'odom': 1, 'wrench': 1}
+    ledger.add('odom', 3 * DAY)
+    assert ledger.furthest == DAY // 10, 'that of a day has'
+
+
+def test_in_real_time_a_message_without_a_stamp_begins_no_run(tmp_path: Path, timers) -> None:
+    """The zero wrench of a controller that has not heard the vehicle yet."""
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', strict=False, duration=0.2)
+        give(node, 'wrench', convert.wrench(0, (0.0,) * 6, FRAMES))
+        give_steps(node, *range(20), origin=made.node.get_clock().now().nanoseconds)
+        timers[0]()
+        assert node.exit_code is None
+        made.drop(node)
+    assert len(logged(tmp_path / 'bag')['/wrench']) == 21
+
+
+@pytest.mark.parametrize(('strict', 'ends'), [(False, True), (True, False)])
+def test_in_real_time_the_last_measurement_need_not_come(
+    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, strict: bool, ends: bool
+) -> None:
+    with program() as made:
+        node = recorder_in(made, tmp_path / 'bag', strict=strict, duration=0.2, analysis_every=4)
+        give_steps(node, *range(20))
+        monkeypatch.setattr(recorder_node, 'PATIENCE', -1.0)
+        timers[0]()
+        assert node.exit_code is None, 'no topic has come to the last step'
+        give(node, 'wrench', convert.wrench(20 * STEP, (0.0,) * 6, FRAMES))
+        monkeypatch.setattr(recorder_node, 'PATIENCE', math.inf)
+        timers[0]()
+        assert node.exit_code is None, 'the other one may be under way'
+        monkeypatch.setattr(recorder_node, 'PATIENCE', -1.0)
+        timers[0]()
+        assert node.exit_code == (0 if ends else None)

@@ -3,13 +3,16 @@
 from pathlib import Path
 
 import pytest
-from helpers.made_messages import Bag, serialized, stamped
+from geometry_msgs.msg import Twist, Wrench
+from helpers.made_messages import Bag, geometry, serialized, stamped
 from helpers.node_processes import assert_one_line, graph, parameters, run_node, stop
 from helpers.played_bags import STEP, ended, made, playing, process, steps_of, there
+from std_srvs.srv import Trigger
 
 from auv_analysis.bag import read_bag
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.interface import nanoseconds
+from auv_dynamics.ros.topics import Topic
 
 ODOM = there(topics.ODOM)
 AS_RECORDED = {'original_names': True, 'commands': True}
@@ -136,3 +139,35 @@ def test_no_odometry_beside_that_of_a_vehicle(tmp_path: Path, root: str) -> None
 
 def test_wrong_input_is_one_line(tmp_path: Path) -> None:
     assert_one_line(run_node('replay_node', *parameters(bag=tmp_path / 'none')), 'none')
+
+
+def test_what_has_no_header_is_checked_and_let_go_as_well(tmp_path: Path, capfd) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    for k, value in enumerate((1.0, float('nan'), 3.0)):
+        halves = geometry('Vector3', value, 0.0, 0.0), geometry('Vector3', 0.0, 0.0, value)
+        for topic, kind in (('/wrench', 'Wrench'), ('/cmd_vel', 'Twist')):
+            data = serialized(geometry(kind, *halves))
+            bag.add(topic, f'geometry_msgs/msg/{kind}', k * STEP, data)
+    plain = Topic('wrench', Wrench), Topic('cmd_vel', Twist)
+    with playing(bag.close(), **FORCED) as (peer, replay):
+        peer.listen(*plain)
+        assert ended(peer, replay) == 0
+        replay.close()
+        peer.until(lambda: len(peer.heard['wrench']) == 3, 'two wrenches and a zero')
+        peer.until(lambda: len(peer.heard['cmd_vel']) == 2, 'two velocities')
+    assert [message.force.x for message in peer.heard['wrench']] == [1.0, 3.0, 0.0]
+    assert [message.linear.x for message in peer.heard['cmd_vel']] == [1.0, 3.0]
+    error = capfd.readouterr().err
+    assert '/wrench: not finite: expected finite numbers' in error
+    assert '/cmd_vel: not finite: expected finite numbers' in error
+
+
+def test_a_vehicle_is_not_left_with_the_wrench_of_a_step(tmp_path: Path) -> None:
+    with playing(made(tmp_path / 'bag'), **FORCED, start_paused=True) as (peer, replay):
+        peer.listen(topics.WRENCH)
+        peer.until(lambda: replay.playing, 'the replay')
+        for k in range(3):
+            assert peer.call(Trigger, 'replay_node/step', once=True).success
+            peer.until(lambda k=k: len(peer.heard['wrench']) == 2 * (k + 1), 'a zero wrench')
+    forces = [message.wrench.force.x for message in peer.heard['wrench']]
+    assert forces == [0.0, 0.0, 1.0, 0.0, 2.0, 0.0]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.node_processes import assert_one_line, graph, parameters, run_node
+from helpers.node_processes import Peer, assert_one_line, graph, parameters, run_node
 from helpers.patience import patience
 
 from auv_dynamics.ros import convert, interface, topics
@@ -22,6 +22,19 @@ def odometry(ns: int):
 
 def stamps(peer, topic: str) -> list[int]:
     return [interface.nanoseconds(m.header.stamp) for m in peer.heard[topic]]
+
+
+def followed(peer: Peer, ns: int) -> None:
+    """Publish an odometry; set-points up to five steps ahead of it have come."""
+    peer.publish(topics.ODOM, odometry(ns))
+    peer.until(lambda: ns + 5 * STEP in stamps(peer, 'cmd_vel'), f'those of {ns} ns')
+
+
+def refused(peer: Peer, ns: int, word: str) -> None:
+    """Publish an odometry that is not believed yet; the node says so."""
+    peer.publish(topics.ODOM, odometry(ns))
+    said = peer.heard[topics.DIAGNOSTICS.name]
+    peer.until(lambda: any(word in m.status[0].message for m in said), word)
 
 
 def test_runs_ahead_of_the_odometry_on_its_grid() -> None:
@@ -72,9 +85,7 @@ def test_odometry_within_the_horizon_is_no_jump_however_late_it_is_looked_at() -
             peer.until(lambda newest=newest: newest in stamps(peer, 'cmd_vel'), 'the horizon')
         assert stamps(peer, 'cmd_vel') == [k * STEP for k in range(2 * far + 151)]
         peer.listen(topics.DIAGNOSTICS)
-        peer.publish(topics.ODOM, odometry((3 * far + 1) * STEP))
-        said = peer.heard[topics.DIAGNOSTICS.name]
-        peer.until(lambda: any('stamp jumped' in m.status[0].message for m in said), 'a jump')
+        refused(peer, (3 * far + 1) * STEP, 'stamp jumped')
 
 
 @pytest.mark.parametrize('more', [{}, {'duration': 60.0}, {'lockstep': True}], ids=str)
@@ -91,14 +102,12 @@ def test_what_lies_behind_the_odometry_by_more_than_the_horizon_is_left_out(more
 
 def test_a_jump_of_the_clock_is_no_burst() -> None:
     with graph(('setpoint_node', [*SURGE, *parameters(duration=3600.0)])) as (peer, _):
-        peer.listen(topics.CMD_VEL)
-        peer.publish(topics.ODOM, odometry(0))
-        for k in range(3):
-            peer.spin(0.2)
-            peer.publish(topics.ODOM, odometry(1800 * 10**9 + k * STEP))
-        last = 1800 * 10**9 + 7 * STEP
-        peer.until(lambda: last in stamps(peer, 'cmd_vel'), 'those after the jump')
-        first = 1800 * 10**9 + STEP  # the first odometry after it is not believed yet
+        peer.listen(topics.CMD_VEL, topics.DIAGNOSTICS)
+        followed(peer, 0)
+        refused(peer, 1800 * 10**9, 'stamp jumped')
+        first = 1800 * 10**9 + STEP
+        followed(peer, first)
+        followed(peer, first + STEP)
         assert stamps(peer, 'cmd_vel') == [
             *(k * STEP for k in range(6)), *(first + k * STEP for k in range(7))
         ]  # fmt: skip
@@ -146,20 +155,31 @@ def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expect
 def test_goes_on_when_the_driver_starts_again_with_its_clock_at_zero() -> None:
     """What it says next belongs to the time of the vehicle that it was at."""
     with graph(('setpoint_node', SURGE)) as (peer, _):
-        peer.listen(topics.CMD_VEL)
+        peer.listen(topics.CMD_VEL, topics.DIAGNOSTICS)
         old = 100 * 10**9
         for k in range(3):
-            peer.publish(topics.ODOM, odometry(old + k * STEP))
-            peer.spin(patience(0.2))
-        peer.until(lambda: len(peer.heard['cmd_vel']) >= 8, 'eight set-points')
+            followed(peer, old + k * STEP)
         peer.spin(patience(0.5))  # it was away
-        for k in range(3):
-            peer.publish(topics.ODOM, odometry(10**9 + k * STEP))
-            peer.spin(patience(0.2))
-        peer.until(lambda: stamps(peer, 'cmd_vel')[-1] == 10**9 + 7 * STEP, 'set-points')
+        refused(peer, 10**9, 'stamp went back')
+        for k in (1, 2):
+            followed(peer, 10**9 + k * STEP)
         new = [m for m in peer.heard['cmd_vel'] if interface.nanoseconds(m.header.stamp) < old]
         assert [interface.nanoseconds(m.header.stamp) for m in new] == [
             10**9 + k * STEP for k in range(1, 8)
         ]
         t = np.arange(2, 9) * 0.01
         assert np.allclose([m.twist.linear.x for m in new], 0.2 + np.sin(2 * t), atol=1e-15)
+
+
+def test_a_clock_that_is_set_takes_no_time_of_the_run() -> None:
+    """A first odometry without a stamp, and a computer that learns the date, end nothing."""
+    with graph(('setpoint_node', [*SURGE, *parameters(duration=30.0)])) as (peer, _):
+        peer.listen(topics.CMD_VEL, topics.DIAGNOSTICS)
+        followed(peer, 0)
+        now = 1_700_000_000 * 10**9
+        refused(peer, now, 'stamp jumped')
+        followed(peer, now + STEP)
+    assert stamps(peer, 'cmd_vel') == [
+        *(k * STEP for k in range(6)),
+        *(now + k * STEP for k in range(1, 7)),
+    ]

@@ -99,3 +99,11 @@ def test_a_loop_begins_where_it_is() -> None:
     playback.restart()
     assert playback.wait(NOW + 31.0, 0) == 0.0
     assert playback.wait(NOW + 31.0, SECOND) == pytest.approx(1.0)
+
+
+def test_however_high_the_rate_a_pause_holds_before_the_next_message():
+    playback = Playback(rate=1e300)
+    playback.wait(1.0, 0)
+    playback.pause(1e10, 5 * SECOND)
+    playback.run(2e10)
+    assert playback.wait(2e10, 5 * SECOND) == 0.0

@@ -474,3 +474,15 @@ def test_trips_are_counted_once_each():
         for ms in (70, 80, 90):
             bench.odometry(start + ms)
     assert bench.controller.trips == 2
+
+
+def test_a_reset_while_the_wrench_is_taken_back_changes_nothing():
+    bench = Bench(ramp=1.0)
+    for ms in range(0, 2000, 10):
+        bench.setpoint(ms)
+        full = bench.odometry(ms).tau[0]
+    taken = []
+    for at in range(2200, 3300, 100):
+        bench.controller.reset()
+        taken.append(bench.watch(at / 1000).tau[0] / full)
+    assert taken == pytest.approx([*np.arange(1.0, 0.05, -0.1), 0.0], abs=1e-9)

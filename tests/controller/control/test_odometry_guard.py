@@ -178,3 +178,15 @@ def test_free_running_clocks_may_drift_apart():
     guard = aged('own', most=0.05)
     for i in range(36_000):
         guard.accept(100 * i * MS, SLOW, Now(0.1 * i * 1.0003))
+
+
+@pytest.mark.parametrize(('days', 'anew'), [(0.9, False), (1.1, True)])
+def test_a_clock_that_is_set_to_another_day_begins_anew(days, anew):
+    guard = make()
+    guard.accept(0, SLOW)
+    guard.accept(10 * MS, SLOW)
+    then = round(days * 86_400_000) * MS
+    with pytest.raises(ValueError, match='stamp jumped'):
+        guard.accept(then, SLOW)
+    assert guard.accept(then + 10 * MS, SLOW) == 0.0
+    assert (guard.origin, guard.restarts) == ((then, 1) if anew else (0, 0))

@@ -181,3 +181,13 @@ def test_a_jump_of_the_set_point_has_no_derivative() -> None:
     assert pairing.find(10_000_000).nu_d_dot[0] == pytest.approx(50.0)
     pairing.setpoint(20_000_000, (2.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert pairing.find(20_000_000).nu_d_dot == (0.0,) * 6
+
+
+def test_a_set_point_that_came_out_of_order_is_not_gone_back_to():
+    pairing = SetpointBuffer(exact=False, acceleration=SAME)
+    for k in (20, 50, 10):
+        pairing.setpoint(k * MS, six(k))
+        pairing.derivative(k * MS, six(-k))
+    for k in (30, 35, 49):
+        assert pairing.find(k * MS) == Reference(20 * MS, six(20), six(-20))
+    assert pairing.find(50 * MS).ns == 50 * MS

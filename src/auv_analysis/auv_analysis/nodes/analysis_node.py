@@ -65,7 +65,8 @@ class AnalysisNode(BulkNode):
             if self._k % self._every == 0:
                 self._due[ns] = set(HEARD)
                 self.graph.latest_ns = ns
-                if len(self._due) > CAPACITY // self._every:  # one that will not come any more
+                room = max(1, CAPACITY // self._every)
+                if len(self._due) > room:  # one that will not come any more
                     self._values.pop(self._due.popitem(last=False)[0], None)
             self._k += 1
         if ns in self._due:

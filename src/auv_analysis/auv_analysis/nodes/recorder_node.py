@@ -12,7 +12,7 @@ from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import RecordingError
 from auv_analysis.graph.node_settings import RecorderSettings
-from auv_analysis.nodes.recorder import GraphClock, OtherTopics, make_wanted, make_writer
+from auv_analysis.nodes.recorder import EPOCH, GraphClock, OtherTopics, make_wanted, make_writer
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.ros.interface import RECORDER, BadMessageError
@@ -41,24 +41,33 @@ class StepLedger:
         self._step, self._strict = step_ns, strict
         self._newest = dict.fromkeys(topics, -1)
         self._last: dict[str, int] = {}
-        self._origin: int | None = None
+        self._origin = self._latest = -1  # stamps of the first step and of the last message
         self.gaps = dict.fromkeys(topics, 0)
 
     def add(self, topic: str, ns: int) -> None:
         """Count a message of a step topic stamped `ns`; Lost when it is not the next step."""
-        if self._origin is None:
-            self._origin = ns
+        if self._origin < 0:
+            self._origin = self._latest = ns
+        if not self._strict:
+            self._follow(topic, ns)
         k, rest = divmod(ns - self._origin, self._step)
         expected = self._newest[topic] + 1
         if self._strict and (rest or k != expected):
             due = self._origin + expected * self._step
             text = f'{topic}: expected step {expected} ({due} ns), found {ns} ns'
             raise LostStepError(f'{text}: {"doubled" if k < expected else "lost"}')
-        if not self._strict:  # without a grid: by the time since the message before
-            last = self._last.get(topic, ns)
-            self.gaps[topic] += max(0, round((ns - last) / self._step) - 1)
-            self._last[topic] = max(ns, last)
         self._newest[topic] = max(self._newest[topic], k)
+
+    def _follow(self, topic: str, ns: int) -> None:
+        """Without a grid: count gaps, and take no time for passed where a clock was set."""
+        apart, self._latest = ns - self._latest, ns
+        if abs(apart) > EPOCH:
+            self._origin += apart
+        last = self._last.get(topic, ns)
+        if abs(ns - last) > EPOCH:
+            last = ns
+        self.gaps[topic] += max(0, round((ns - last) / self._step) - 1)
+        self._last[topic] = max(ns, last)
 
     @property
     def complete(self) -> int:
@@ -66,14 +75,19 @@ class StepLedger:
         return min(self._newest.values())
 
     @property
+    def furthest(self) -> int:
+        """Last step that has arrived on any of them."""
+        return max(self._newest.values())
+
+    @property
     def complete_ns(self) -> int:
         """Stamp of that step."""
-        return (self._origin or 0) + self.complete * self._step
+        return self._origin + self.complete * self._step
 
     def behind(self) -> str:
         """Topics that have not reached the furthest one, for a message to a person."""
-        furthest = max(self._newest.values())
-        late = [f'{topic} at step {k}' for topic, k in self._newest.items() if k < furthest]
+        steps = self._newest.items()
+        late = [f'{topic} at step {k}' for topic, k in steps if k < self.furthest]
         return ', '.join(late) or 'none'
 
 
@@ -107,7 +121,7 @@ class PublicationLedger:
                 raise LostStepError(f'{text}: lost')
 
 
-PATIENCE = 2.0  # s for the clock of the last steps, which nothing else waits for
+PATIENCE = 2.0  # s without any step, after which what lacks at the end does not come any more
 NUMBERED = {*topics.STEP_TOPICS, *topics.ANALYSIS_TOPICS, topics.CLOCK}  # with one publisher each
 TIMED = {*topics.STEP_TOPICS, topics.CLOCK}  # whose stamp is the log time, and the publish time
 
@@ -130,7 +144,7 @@ class RecorderNode(BulkNode):
         self._publications = PublicationLedger(p.strict)
         self._time = GraphClock(self, p.strict)
         self._newest = {topics.LUMPED_ERROR.name: -1, topics.CLOCK.name: -1}  # stamps, ns
-        self._whole_since: float | None = None  # steady s
+        self._heard = 0.0  # steady s of the last step
         self._reported = -1
         self._complaints: set[str] = set()
         self.graph = NodeInterface(self, barrier=False, lockstep=p.strict)
@@ -211,6 +225,7 @@ class RecorderNode(BulkNode):
     def _count(self, name: str, step_topic: str, ns: int, number: int | None) -> None:
         try:
             if step_topic:
+                self._heard = time.monotonic()
                 self._ledger.add(step_topic, ns)
             self._publications.add(name, number)
         except LostStepError as error:
@@ -224,17 +239,20 @@ class RecorderNode(BulkNode):
         if complete > self._reported:
             self._reported = complete
             self._say_progress()
-        last, due = self._last, self._last_due
-        analysed = due is None or self._newest[topics.LUMPED_ERROR.name] >= due
-        if last is not None and complete >= last and analysed and self._clock_is_whole():
+        if self._last is not None and self._is_whole(self._last):
             self._end()
 
-    def _clock_is_whole(self) -> bool:
-        """Whether the clock, if there is one, has come to the last step too, or stands still."""
-        now = time.monotonic()
-        self._whole_since = self._whole_since or now
-        late = 0 <= self._newest[topics.CLOCK.name] < self._ledger.complete_ns
-        return not late or now - self._whole_since > PATIENCE
+    def _is_whole(self, last: int) -> bool:
+        """Whether all has come to the last step, or what need not come has stayed away.
+
+        In real time that is any topic: a measurement may be withheld. In lock-step it is the clock.
+        """
+        due, newest = self._last_due, self._newest
+        analysed = due is None or newest[topics.LUMPED_ERROR.name] >= due
+        late = time.monotonic() - self._heard > PATIENCE
+        if self._ledger.complete < last or not analysed:
+            return late and not self._settings.strict and self._ledger.furthest >= last
+        return late or not 0 <= newest[topics.CLOCK.name] < self._ledger.complete_ns
 
     def _say_progress(self) -> None:
         if self._reported >= 0:

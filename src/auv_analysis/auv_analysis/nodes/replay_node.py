@@ -106,8 +106,8 @@ class Playback:
         if self._place is None:
             return
         clock, place = self._place
-        here = place + round((now - clock) * self.rate * NANOSECONDS)
-        self._reached = max(self._reached, min(here, ns) if self.rate else self._reached)
+        passed = min((now - clock) * self.rate * NANOSECONDS, float(ns - place))  # may be infinite
+        self._reached = max(self._reached, place + round(passed) if self.rate else self._reached)
         self._place = now, self._reached
 
 
@@ -198,6 +198,8 @@ class Player:
         while (message := self._peek()) is not None:
             wait = self.playback.wait(now, message.ns)
             if wait > 0.0:
+                if self.playback.paused:  # also after a step
+                    self._commands.let_go()
                 return min(wait, LONGEST)
             if now >= until:
                 return 0.0
@@ -221,9 +223,8 @@ class Player:
             self.failure = self._answers.overdue()
 
     def pause(self) -> None:
-        """Hold; a vehicle that hears the commands is left without a wrench."""
+        """Hold; a vehicle that hears the commands is then left without a wrench."""
         self.playback.pause(time.monotonic(), self._ahead())
-        self._commands.let_go()
 
     def run(self) -> None:
         """Go on from where it was held."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import yaml
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import Twist, TwistStamped, Wrench, WrenchStamped
 from rclpy.client import Client
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -120,6 +120,7 @@ def _kept(recorded: str) -> list[int]:
 
 
 ACKNOWLEDGED = Duration(seconds=0.5)
+STAMPED = {Twist: TwistStamped, Wrench: WrenchStamped}  # of what has no header
 
 
 class Commands:
@@ -134,24 +135,29 @@ class Commands:
 
     def __init__(self, publishers: Mapping[str, Publisher], heard: bool):
         self._publishers, self._heard = publishers, heard
-        self._last: dict[str, WrenchStamped] = {}
+        self._last: dict[str, Wrench | WrenchStamped] = {}
 
     def check(self, name: str, data: bytes) -> None:
         """Raise BadMessageError for a command that must not go out: one that is not finite."""
         publisher = self._publishers.get(name)
-        kind = KINDS.get(publisher.msg_type) if publisher is not None else None
-        if publisher is None or kind is None or kind.read is None:
+        plain: Any = publisher.msg_type if publisher is not None else None
+        kind = STAMPED.get(plain, plain)
+        read = KINDS[kind].read if kind in KINDS else None
+        if read is None:
             return
-        message = message_of(data, publisher.msg_type, name)
-        child = getattr(message, 'child_frame_id', message.header.frame_id)
-        kind.read(message, Frames(message.header.frame_id, child), name)
-        if isinstance(message, WrenchStamped):
+        message = stamped = message_of(data, plain, name)
+        if kind is not plain:
+            stamped = kind(**{plain.__name__.lower(): message})
+        child = getattr(stamped, 'child_frame_id', stamped.header.frame_id)
+        read(stamped, Frames(stamped.header.frame_id, child), name)
+        if isinstance(stamped, WrenchStamped):
             self._last[name] = message
 
     def let_go(self) -> None:
         """Publish a zero wrench where a vehicle holds the last one."""
         for name, last in self._last.items() if self._heard else ():
-            self._publishers[name].publish(WrenchStamped(header=last.header))
+            still = isinstance(last, WrenchStamped)
+            self._publishers[name].publish(WrenchStamped(header=last.header) if still else Wrench())
             self._publishers[name].wait_for_all_acked(ACKNOWLEDGED)
         self._last.clear()
 

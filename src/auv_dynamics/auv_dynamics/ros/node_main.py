@@ -21,6 +21,7 @@ from rclpy.exceptions import ParameterUninitializedException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.service import Service
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.utilities import try_shutdown
@@ -280,13 +281,17 @@ def _next_look(nodes: list[Any]) -> float:
 
 def serve(node: Any, executor: SingleThreadedExecutor, timeout: float) -> bool:
     """Run a callback that is ready within so many s; whether there was one."""
+    entity: Any = None
     try:
-        callback, _, node = executor.wait_for_ready_callbacks(timeout_sec=timeout)
+        callback, entity, node = executor.wait_for_ready_callbacks(timeout_sec=timeout)
         callback()
         callback.result()
     except TimeoutException:
         return False
-    except (RCLError, RMWError) as error:  # a transition that does not exist, a broken request
+    # a transition that does not exist, a broken request, a parameter of a type that does not
+    except (RCLError, RMWError, ValueError) as error:
+        if isinstance(error, ValueError) and not isinstance(entity, Service):
+            raise
         node.get_logger().error(f'refused: {first_line(error)}')
     return True
 

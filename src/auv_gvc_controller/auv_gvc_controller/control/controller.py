@@ -160,7 +160,8 @@ class VelocityController:
     def reset(self) -> None:
         """Forget the integrals; the law comes in anew over the ramp."""
         self._law.reset()
-        self._output.restart()
+        if self._in_charge:
+            self._output.restart()
 
     def odometry(self, ns: int, x: tuple[float, ...], now: Now = UNTIMED) -> Answer | None:
         """Take an odometry.

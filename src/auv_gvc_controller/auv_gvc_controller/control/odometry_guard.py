@@ -133,7 +133,7 @@ class OdometryGuard:
     ----------
     last : stamp that was accepted last, ns
     origin : stamp from which the time of a run counts: it goes on where stamps begin anew
-    restarts : how often the stamps began anew, at an earlier time
+    restarts : how often the stamps began anew: at an earlier time, or more than a day later
 
     """
 
@@ -200,7 +200,7 @@ class OdometryGuard:
             if self._lockstep or not follows:
                 most = self.last + self._gap
                 raise ValueError(f'stamp jumped: expected at most {most} ns, found {ns} ns')
-            return 0.0, False
+            return 0.0, dt > SAME_EPOCH
         # late ones come one after the other as well: time goes back only where it had stopped
         stopped = now.steady - self._accepted_at > self._patience
         if self._lockstep or not follows or not stopped:

@@ -149,7 +149,7 @@ class SetpointBuffer:
 
     def forget(self) -> None:
         """Forget everything, as when the stamps begin anew."""
-        self._used = None
+        self.reset()
         self._nu_d.clear()
         self._nu_d_dot.clear()
 
@@ -196,8 +196,8 @@ class SetpointBuffer:
             nu_d_dot = self._difference(chosen) if self._acceleration == DIFFERENCE else ZERO
         self._used = Reference(chosen, self._nu_d[chosen], nu_d_dot)
         for buffer in (self._nu_d, self._nu_d_dot):
-            while buffer and next(iter(buffer)) <= chosen:
-                buffer.popitem(last=False)
+            for stamp in [stamp for stamp in buffer if stamp <= chosen]:
+                del buffer[stamp]
         return self._used
 
     def _complete(self, ns: int) -> bool:

@@ -16,6 +16,7 @@ from std_srvs.srv import Trigger
 
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.nearest import one_of as nearest_of
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.endpoints import why_silent
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -70,10 +71,13 @@ class ControllerParameters:
     def _present(self, changed: Mapping[str, Any]) -> ControllerSettings:
         """Settings of this moment, with what is about to change; InputError for a wrong value."""
 
-        def value(name: str, *_: Any, **__: Any) -> Any:
+        def value(name: str, *_: Any, **accepted: Any) -> Any:
             found = changed[name] if name in changed else self._node.get_parameter(name).value
             if isinstance(found, float) and not math.isfinite(found):
                 raise InputError(self._node.get_name(), name, 'a finite number', found)
+            if accepted.get('one_of') and found not in accepted['one_of']:
+                expected = nearest_of(found, accepted['one_of'])
+                raise InputError(self._node.get_name(), name, expected, found)
             return list(found) if isinstance(found, array) else found
 
         return ControllerSettings.read(value, self._node.get_name())
@@ -99,7 +103,10 @@ class ControllerParameters:
         self.settings = self._present({})
         self.settings.check_bounded()
         self.setpoints.believe(*self.settings.believed)
-        self.setpoints.reset()
+        if self.lockstep:
+            self.setpoints.reset()
+        else:  # what came to an inactive controller may be of a time that is over
+            self.setpoints.forget()
         return self.settings.build(gains, vehicle, self.setpoints)
 
     def _gains(self, law: str) -> dict[str, Any]:

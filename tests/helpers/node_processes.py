@@ -15,6 +15,8 @@ from typing import Any
 import rclpy
 from helpers.fork_server import ForkServer, Process
 from helpers.patience import patience
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -168,15 +170,17 @@ class Peer:
         while (left := limit - time.monotonic()) > 0:
             self.executor.spin_once(timeout_sec=left)
 
-    def call(self, kind: type, name: str, request: Any = None) -> Any:
-        """Call a service."""
+    def call(self, kind: type, name: str, request: Any = None, *, once: bool = False) -> Any:
+        """Call a service; `once`: a question that changes something is not asked again."""
         client = self.node.create_client(kind, name)
         self.until(client.service_is_ready, f'service {name}')
+        if once:  # as above: then both ends of this client are known
+            self.call(GetParameters, f'{name.rpartition("/")[0]}/get_parameters')
         futures = []
 
         def done() -> bool:
             # an answer is lost when it comes before both ends have matched: ask again
-            if len(futures) < 1 + (time.monotonic() - began) // 2:
+            if len(futures) < 1 + (0 if once else (time.monotonic() - began) // 2):
                 futures.append(client.call_async(request or kind.Request()))
             return any(future.done() for future in futures)
 
@@ -189,6 +193,12 @@ class Peer:
         self.node.destroy_node()
         self.executor.shutdown()
         rclpy.try_shutdown(context=self.context)
+
+
+def change(peer: Peer, transition: int) -> bool:
+    """Ask the controller for a transition; whether it was made."""
+    request = ChangeState.Request(transition=Transition(id=transition))
+    return peer.call(ChangeState, 'controller_node/change_state', request, once=True).success
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import pytest
 from helpers.node_processes import (
     CONTROLLER,
     Peer,
+    change,
     environment,
     fresh_domain,
     graph,
@@ -19,7 +20,7 @@ from helpers.node_processes import (
 )
 from helpers.patience import patience
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import GetState
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
@@ -259,11 +260,11 @@ def test_broken_messages_among_good_ones_are_refused_counted_and_never_forwarded
         # no pause of a busy machine is as long as these
         gains__Lambda='[1e-9]', gains__Gamma='[0.0]', odometry_timeout=SLOW, setpoint_timeout=SLOW,
         limits__gap=1.5e-9 * LONG, limits__wrench='[1e5]', setpoint_acceleration='none',
+        ramp=0.0,  # of which a burst of answers is no part
     )  # fmt: skip
     with graph(('controller_node', still)) as (peer, processes):
         driver = Driver(peer)
         driver.works()
-        driver.works()  # well past the ramp
         usual = driver.surge[-1]
         seen = len(driver.surge)
         health, limit = {}, time.monotonic() + patience(30.0)
@@ -288,11 +289,6 @@ def test_broken_messages_among_good_ones_are_refused_counted_and_never_forwarded
         assert code == 0
         for kind in BROKEN:
             assert f'refused: {kind}' in output
-
-
-def change(peer: Peer, transition: int) -> bool:
-    request = ChangeState.Request(transition=Transition(id=transition))
-    return peer.call(ChangeState, 'controller_node/change_state', request).success
 
 
 def state(peer: Peer) -> str:
@@ -407,9 +403,11 @@ STEPS = {  # s -> surge, m/s
 
 
 def test_set_points_by_hand_take_little_more_than_holds_the_speed() -> None:
-    """Ten a second, and jumps: with differences a step takes 1500 N, two at once thousands."""
+    """Ten a second, and jumps: without the filter a step takes 520 N, with differences 570 N."""
     law = [word.replace('herman2018', 'herman2018_neutral') for word in CONTROLLER]
-    law += parameters(use_sim_time=True)
+    # feedback too weak to add to it after a pause of plant or controller, whose wrench is then held
+    law += parameters(gains__k_D='[3.0]', gains__k_I='[0.0]', gains__Lambda='[1e-9]')
+    law += parameters(gains__Gamma='[0.0]', use_sim_time=True)
     with graph(
         ('plant_node', parameters(vehicle='herman2018_neutral')), ('controller_node', law)
     ) as (peer, _):

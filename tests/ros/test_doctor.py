@@ -10,7 +10,10 @@ from auv_analysis.doctor import discovery
 
 
 def test_two_participants_find_each_other() -> None:
+    until = time.monotonic() + patience()
     (finding,) = discovery.discovery()
+    while finding.verdict == 'broken' and time.monotonic() < until:
+        (finding,) = discovery.discovery()  # as below: neither waits for the other for ever
     assert (finding.check, finding.verdict) == ('discovery', 'ok'), finding
 
 

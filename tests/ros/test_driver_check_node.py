@@ -56,7 +56,12 @@ def domain() -> Iterator[int]:
 @pytest.fixture(scope='module')
 def judged(domain: int) -> dict[str, dict[str, CheckResult]]:
     """Driver -> check -> finding."""
-    return undisturbed(lambda: judged_once(domain), lambda found: not failed(found['healthy']))
+    return undisturbed(lambda: judged_once(domain), as_promised)
+
+
+def as_promised(found: dict[str, dict[str, CheckResult]]) -> bool:
+    slow = found['slow']['rate'].numbers['rate_hz']
+    return not failed(found['healthy']) and slow == pytest.approx(2.0, rel=0.2)
 
 
 def judged_once(domain: int) -> dict[str, dict[str, CheckResult]]:

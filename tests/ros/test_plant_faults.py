@@ -76,7 +76,7 @@ def test_lock_step_repeats_delays_biases_and_keeps() -> None:
 
 def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
     heard_again = 120 + round(patience(80))  # steps, of which the watchdog waits for 50
-    last = heard_again + round(patience(70))
+    last = heard_again + 200 + round(patience(70))  # of which a pause makes up for 200
 
     def held(found: tuple[list[int], list[int], np.ndarray]) -> bool:
         applied = found[2]

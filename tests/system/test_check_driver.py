@@ -151,7 +151,8 @@ def runs() -> Runs:
         healthy, reversed_ = (runs.ended[name] for name in ('healthy', 'reversed'))
         moved = any(tau != ZERO for tau in runs.vehicle.wrenches)
         answered = healthy.passed > {'response_sway', 'response_delay'}
-        return answered and reversed_.failed == {'response_sway'} and moved
+        well = healthy.code == 0 and answered
+        return well and reversed_.failed == {'response_sway'} and moved
 
     return undisturbed(Runs, as_promised)
 

@@ -10,10 +10,10 @@ import psutil
 import pytest
 import yaml
 from helpers.graph_runs import every_message, node_of, nodes, recorded, start, start_installed
-from helpers.node_processes import auv, graph, installed_auv, parameters, stop
+from helpers.node_processes import auv, change, graph, installed_auv, parameters, stop
 from helpers.patience import patience
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import GetState
 from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag import load_run, read_bag
@@ -134,22 +134,17 @@ def test_every_node_has_its_services_and_life(tmp_path: Path) -> None:
     path = tmp_path / 'params.yaml'
     path.write_text(parameter_file(values, 'by hand'))
     with graph((ALONE, ['--params-file', str(path)])) as (peer, processes):
-
-        def change(transition: int) -> bool:
-            request = ChangeState.Request(transition=Transition(id=transition))
-            return peer.call(ChangeState, 'controller_node/change_state', request).success
-
         for name in values:
             peer.until(lambda name=name: peer.call(Trigger, f'{name}/ready').success, name)
         peer.listen(topics.PROGRESS)
         heard = peer.heard[topics.PROGRESS.name]
         peer.until(lambda: heard and heard[-1].stamp.sec > 1, 'progress')
         assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=False)).success
-        assert change(Transition.TRANSITION_DEACTIVATE)
+        assert change(peer, Transition.TRANSITION_DEACTIVATE)
         state = peer.call(GetState, 'controller_node/get_state').current_state.label
         assert state == 'inactive'
         held = heard[-1].stamp.sec
-        assert change(Transition.TRANSITION_ACTIVATE)
+        assert change(peer, Transition.TRANSITION_ACTIVATE)
         assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=True)).success
         peer.until(lambda: heard[-1].stamp.sec > held + 1, 'more progress')
         code, output = stop(processes[ALONE])

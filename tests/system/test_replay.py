@@ -19,6 +19,7 @@ from helpers.graph_runs import every_message, recorded
 from helpers.node_processes import (
     PATIENCE,
     Peer,
+    change,
     environment,
     fresh_domain,
     graph,
@@ -30,7 +31,6 @@ from helpers.node_processes import (
 )
 from helpers.played_bags import ended, made, there
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 
 from auv_analysis import load_scenario
 from auv_analysis.bag import load_run
@@ -336,8 +336,7 @@ def in_real_time(folder: Path) -> tuple[Path, bool]:
             )
         peer.until(lambda: len(odometry) > 20, 'odometry')
         for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
-            request = ChangeState.Request(transition=Transition(id=transition))
-            assert peer.call(ChangeState, 'controller_node/change_state', request).success
+            assert change(peer, transition)
 
         def acts(number: int) -> bool:
             return sum(message.wrench.force.x != 0.0 for message in wrenches) > number

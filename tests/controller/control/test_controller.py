@@ -311,6 +311,17 @@ def test_odometry_that_falls_silent_takes_the_wrench_back_over_the_ramp():
     assert (bench.controller.watchdog, bench.controller.trips) == ('no odometry for 0.5 s', 1)
 
 
+@pytest.mark.parametrize(('stopped', 'left'), [(0.38, 1.0), (0.42, 0.0)])
+def test_a_controller_that_was_stopped_itself_does_not_publish_an_old_wrench(stopped, left):
+    bench = Bench(ramp=1.0)
+    for ms in range(0, 2000, 10):
+        bench.setpoint(ms)
+        full = bench.odometry(ms).tau
+    assert bench.watch(1.99 + stopped).tau == tuple(left * value for value in full)
+    later = bench.watch(1.99 + stopped + 0.1)
+    assert (later.tau[0] if later else 0.0) == pytest.approx(0.9 * left * full[0])
+
+
 def test_it_recovers_when_odometry_returns_and_comes_in_over_the_ramp():
     bench = Bench(ramp=0.2, odometry=0.5, setpoint=10.0)
     for ms in range(0, 500, 10):

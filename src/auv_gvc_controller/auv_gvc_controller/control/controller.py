@@ -230,8 +230,11 @@ class VelocityController:
         waits = self._waiting is not None and now.steady - self._unanswered_since > late.setpoint
         if self._waiting is not None and (waits or self.watchdog):
             return self._trip(self._waiting[0], 'no set-point of its stamp', now)
-        if now.steady - self._heard <= late.odometry:
+        silence = now.steady - self._heard
+        if silence <= late.odometry:
             return None
+        if self._in_charge and silence > 2 * late.odometry:  # it was stopped itself, and not heard
+            self._output.drop()  # a vehicle has let go since: the old wrench would be a new one
         answer = self._trip(self._guard.last or 0, f'no odometry for {late.odometry:g} s', now)
         if self._output.idle:
             self._heard = None  # said

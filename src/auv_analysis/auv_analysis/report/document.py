@@ -215,38 +215,18 @@ def maths(text: str) -> markupsafe.Markup:
 PACKAGES = ('auv_analysis', 'auv_gvc_controller', 'auv_dynamics', 'numpy', 'numba', 'scipy')
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """Where a report comes from.
-
-    Attributes
-    ----------
-    command : as it was typed, '' where it was no command
-    versions : name -> version of Python and of the packages that the numbers depend on
-    sources : digest of the workspace's own sources
-    written : UTC
-
-    """
-
-    command: str
-    versions: dict[str, str]
-    sources: str
-    written: str
-
-
-def provenance() -> Provenance:
-    """What made a report that is written now."""
-    program = Path(sys.argv[0])
-    ours = program.stem == 'auv' or program.match('auv_analysis/cli.py')
+def provenance() -> dict[str, Any]:
+    """What made a report that is written now; the command is '' where it was none."""
+    ours = Path(sys.argv[0]).stem == 'auv'
     versions = {'Python': platform.python_version()}
     for package in PACKAGES:
         try:
             versions[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
             continue
-    return Provenance(
-        command=shlex.join(['auv', *sys.argv[1:]]) if ours else '',
-        versions=versions,
-        sources=sources_digest(),
-        written=f'{datetime.now(UTC):%Y-%m-%d %H:%M} UTC',
-    )
+    return {
+        'command': shlex.join(['auv', *sys.argv[1:]]) if ours else '',
+        'versions': versions,
+        'sources': sources_digest(),
+        'written': f'{datetime.now(UTC):%Y-%m-%d %H:%M} UTC',
+    }

@@ -6,7 +6,7 @@ import yaml
 from numpy.testing import assert_allclose
 
 from auv_analysis.cli.main import main
-from auv_analysis.metrics.authority import beyond_authority, largest_wrench
+from auv_analysis.metrics.authority import beyond_authority
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.shipped import shipped
 
@@ -15,7 +15,7 @@ def test_the_largest_wrench_is_that_of_the_best_thrusts() -> None:
     thrusters = load_vehicle('bluerov2').thrusters
     rng = np.random.default_rng(2)
     u = rng.uniform(-thrusters.reverse, thrusters.forward, (2000, len(thrusters.names)))
-    found = largest_wrench(thrusters)
+    found = thrusters.largest()
     assert np.all(np.abs(u @ thrusters.matrix.T) <= found + 1e-9)
     for i, row in enumerate(thrusters.matrix):
         best = np.where(row > 0, thrusters.forward, -thrusters.reverse)

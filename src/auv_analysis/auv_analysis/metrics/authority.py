@@ -13,17 +13,6 @@ NOTHING = 1e-6  # of the largest command of its kind: rounding
 UNITS = ('N', 'N', 'N', 'N m', 'N m', 'N m')
 
 
-def largest_wrench(thrusters: Thrusters) -> np.ndarray:
-    """Largest magnitude (6,) of each degree of freedom that thrusters give, N and N m.
-
-    Each by itself, whatever the others then are: with T of tau = T u, the largest T_i u and the
-    largest -T_i u over all thrusts within their limits.
-    """
-    T, forward, reverse = thrusters.matrix, thrusters.forward, thrusters.reverse
-    along, against = np.maximum(T, 0.0), np.maximum(-T, 0.0)
-    return np.maximum(along @ forward + against @ reverse, along @ reverse + against @ forward)
-
-
 def beyond_authority(vehicle: Vehicle, largest: Sequence[float]) -> list[str]:
     """What is remarkable of the largest commands of a run, a phrase each; none where all is well.
 
@@ -65,7 +54,7 @@ def _without_actuators(thrusters: Thrusters, largest: Sequence[float]) -> Iterat
 
 
 def _above_thrust(thrusters: Thrusters, largest: Sequence[float]) -> Iterator[str]:
-    lost, most = thrusters.unactuated(), largest_wrench(thrusters)
+    lost, most = thrusters.unactuated(), thrusters.largest()
     asked = [
         f'{number(largest[i])} of at most {number(most[i])} {UNITS[i]} in {dof}'
         for i, dof in enumerate(DOFS)

@@ -18,9 +18,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.metrics import certificate
-from auv_analysis.metrics import moments as of
+from auv_analysis.metrics import signals as of
 from auv_analysis.metrics.certificate import certificate_blocks
 from auv_analysis.metrics.compiled_moments import add_compiled
+from auv_analysis.metrics.moments import Moments
 from auv_analysis.runs.run import Run, joined
 from auv_gvc_controller.laws.model import control_model
 
@@ -127,7 +128,7 @@ def test_moments_by_their_definition(run, seed, n) -> None:
     Upsilon, inverse = model.Upsilon.reshape(6, 6), model.Upsilon_inv.reshape(6, 6)
     xi, pi = np.linalg.solve(Upsilon, nu.T).T, tau @ Upsilon
     expected = nu_d - nu, f - F, tau, xi - nu, pi - tau, 0.5 * model.N * xi**2, nu_d
-    found = of.Moments()
+    found = Moments()
     flat = (values.ravel() for values in (nu, nu_d, tau, f, F))
     add_compiled(*flat, of.maps_of(model), found.sums, found.squares, found.peaks)
     assert_allclose(found.sums[of.ENERGY], expected[of.ENERGY].sum(axis=0), rtol=1e-11)
@@ -141,8 +142,9 @@ def test_moments_by_their_definition(run, seed, n) -> None:
 SCRIPT = """
 import json, sys
 import numpy as np
-from auv_analysis.metrics import moments as of
+from auv_analysis.metrics import signals as of
 from auv_analysis.metrics.compiled_moments import add_compiled
+from auv_analysis.metrics.moments import Moments, add_columns
 from auv_dynamics import load_vehicle
 from auv_dynamics.kernel.compile import JITTED
 from auv_gvc_controller.laws.model import control_model
@@ -150,8 +152,8 @@ from auv_gvc_controller.laws.model import control_model
 maps = of.maps_of(control_model(load_vehicle('herman2018')))
 flat = [v.ravel() for v in np.random.default_rng(7).normal(size=(5, 43, 6))]
 found = {'JITTED': JITTED}
-for add in (add_compiled, of.add_columns):
-    m = of.Moments()
+for add in (add_compiled, add_columns):
+    m = Moments()
     add(*flat, maps, m.sums, m.squares, m.peaks)
     found[add.__name__] = [m.sums.tolist(), m.squares.tolist(), m.peaks.tolist()]
 print(json.dumps(found))
@@ -166,7 +168,7 @@ def test_without_a_compiler_columns_give_what_samples_give(run) -> None:
     )
     document = json.loads(done.stdout)
     assert document['JITTED'] is False
-    compiled = of.Moments()
+    compiled = Moments()
     flat = [values.ravel() for values in numbers(7, 43)]
     maps = of.maps_of(control_model(run.vehicle))
     add_compiled(*flat, maps, compiled.sums, compiled.squares, compiled.peaks)

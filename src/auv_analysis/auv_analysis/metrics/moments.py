@@ -10,25 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.metrics.signals import (
-    DELTA_PI,
-    DELTA_XI,
-    ENERGY,
-    ERROR,
-    LUMPED,
-    NAMES,
-    SETPOINT,
-    TAU,
-    Maps,
-    maps_of,
-    signals,
-)  # fmt: skip
+from auv_analysis.metrics.signals import NAMES, Maps, signals
 from auv_analysis.runs.run import Run, Windows
 
-__all__ = [
-    'DELTA_PI', 'DELTA_XI', 'ENERGY', 'ERROR', 'LUMPED', 'SETPOINT', 'TAU', 'Maps', 'Moments',
-    'Tally', 'add_columns', 'known_or_zero', 'maps_of',
-]  # fmt: skip
 SIMULATED = 'simulate'  # source of a run that this process computed
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_analysis.metrics import moments
+from auv_analysis.metrics import signals
 from auv_analysis.metrics.coupling import (
     Products,
     coupling_terms,
@@ -17,7 +17,7 @@ from auv_analysis.metrics.coupling import (
 )
 from auv_analysis.metrics.energy import depends_on_known, shares
 from auv_analysis.metrics.lyapunov import lyapunov
-from auv_analysis.metrics.moments import Moments, Tally, maps_of
+from auv_analysis.metrics.moments import Moments, Tally
 from auv_analysis.runs.run import AnyRun, Run, RunInfo
 from auv_gvc_controller.control.gains import body_gains
 from auv_gvc_controller.laws.law import make_gains
@@ -61,7 +61,7 @@ def summarize(
     asked = [entry for entry in (chosen, *windows) if entry not in usual]
     late = run.start + TRANSIENT - 1e-9
     cuts = {entry: _cuts(run, entry) for entry in (*usual, *asked)}
-    maps = maps_of(model)
+    maps = signals.maps_of(model)
     tally = Tally(maps, (late, *chain.from_iterable(cuts[entry] for entry in usual)))
     # apart, so that the other figures do not depend on what is asked for, to the last bit
     special = Tally(maps, chain.from_iterable(cuts[entry] for entry in asked))
@@ -91,12 +91,12 @@ def summarize(
         'velocity': {'rms': velocities.rms, 'max': velocities.largest},
         **_errors(run, whole, after, moved),
         'lumped_error': {
-            'rms': whole.rms(moments.LUMPED) if run.knows_disturbance else None,
-            'max_after_2s': _peak(after, moments.LUMPED) if run.knows_disturbance else None,
+            'rms': whole.rms(signals.LUMPED) if run.knows_disturbance else None,
+            'max_after_2s': _peak(after, signals.LUMPED) if run.knows_disturbance else None,
         },
         'coupling': {
-            'delta_xi_max': if_known(deformed, whole.peak(moments.DELTA_XI)),
-            'delta_pi_max': if_known(input_deformed, whole.peak(moments.DELTA_PI)),
+            'delta_xi_max': if_known(deformed, whole.peak(signals.DELTA_XI)),
+            'delta_pi_max': if_known(input_deformed, whole.peak(signals.DELTA_PI)),
             'structural_zeros': structural_zeros(Upsilon),
         },
         'coupling_terms': {
@@ -104,8 +104,8 @@ def summarize(
             'delta_pi': coupling_terms(input_deformation(Upsilon), inputs),
         },
         'effort': {
-            'rms': if_known(commanded, whole.rms(moments.TAU)),
-            'max': if_known(commanded, whole.peak(moments.TAU)),
+            'rms': if_known(commanded, whole.rms(signals.TAU)),
+            'max': if_known(commanded, whole.peak(signals.TAU)),
         },
         'gains': {'K_D': gains[0], 'K_f': gains[1]},
         'decomposition': {'Upsilon': Upsilon.tolist(), 'N': model.N.tolist()},
@@ -217,13 +217,13 @@ def _errors(run: AnyRun, whole: Moments, after: Moments, known: np.ndarray) -> d
         return {'velocity_error': none, 'settling': None}
     asked = ~np.isnan(run.nu_d[0])
     known = known & asked
-    band = band_of(whole.peaks[moments.SETPOINT])
+    band = band_of(whole.peaks[signals.SETPOINT])
     blocks = ((block.t, block.nu_d - block.nu) for block in run.blocks())
     times, residual = _settling(blocks, run.samples, band)
-    late = _peak(after, moments.ERROR)
+    late = _peak(after, signals.ERROR)
     return {
         'velocity_error': {
-            'rms': if_known(known, whole.rms(moments.ERROR)),
+            'rms': if_known(known, whole.rms(signals.ERROR)),
             'max_after_2s': late and if_known(known, late),
             'settling_time': if_known(known, times),
         },
@@ -243,7 +243,7 @@ def _energy(inside: Moments, window: tuple[float, float], known: np.ndarray) -> 
             'shares_percent': None,
             'window': list(window),
         }
-    components = np.where(known, inside.mean(moments.ENERGY), np.nan)
+    components = np.where(known, inside.mean(signals.ENERGY), np.nan)
     return {
         'mean': float(components.sum()),
         'mean_by_component': components.tolist(),

@@ -122,14 +122,10 @@ def flat(summary: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in summary.items():
         found |= _columns(key, value)
     for measure in MEASURES:
-        parts = {name: np.array([_number(found.get(name))]) for name in measure.columns}
+        parts = {name: np.array([found.get(name)], float) for name in measure.columns}
         value = float(measure.of(parts.__getitem__)[0])
         found[measure.name] = None if np.isnan(value) else value
     return found
-
-
-def _number(value: float | None) -> float:
-    return np.nan if value is None else value
 
 
 def _columns(key: str, value: Any) -> dict[str, Any]:

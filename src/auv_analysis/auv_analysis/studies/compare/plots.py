@@ -61,8 +61,7 @@ def draw(
 
 def column(table: pa.Table, name: str) -> np.ndarray:
     """Column of numbers (n,), NaN where there is none."""
-    values = table[name].to_pylist()
-    return np.array([np.nan if value is None else value for value in values], float)
+    return np.array(table[name].to_pylist(), float)
 
 
 def six(table: pa.Table, family: str) -> np.ndarray:

@@ -45,10 +45,7 @@ def rank(table: pa.Table) -> Ranking:
     """Ranking of the runs of `comparison_table`."""
     names = np.array(table['run'].to_pylist())
     there = np.array([failure is None for failure in table['failure'].to_pylist()])
-    columns = [table[m.name].to_pylist() for m in MEASURES]
-    values = np.array(
-        [[np.nan if v is None else v for v in values] for values in columns], float
-    ).T[there]
+    values = np.array([table[m.name].to_pylist() for m in MEASURES], float).T[there]
     differ = [
         j for j in range(len(MEASURES)) if len({v for v in values[:, j] if np.isfinite(v)}) > 1
     ]

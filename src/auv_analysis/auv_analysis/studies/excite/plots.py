@@ -51,7 +51,7 @@ def _intervals(rows: Sequence[Mapping[str, Any]]) -> Drawn:
         ('left', 'this excitation', {'marker': 'D', 'color': COLOURS[0]}),
     )
     for key, label, look in looks:
-        values = [np.nan if row[key] is None else 100.0 * row[key] for row in some]
+        values = 100.0 * np.array([row[key] for row in some], float)
         axes.plot(values, y, linestyle='none', markersize=4, label=label, **look)
     axes.axvline(100.0 * KNOWN, color='black', linewidth=0.6)
     axes.set_yticks(y, [row['name'] for row in some])

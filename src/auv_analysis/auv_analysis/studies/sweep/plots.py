@@ -244,7 +244,7 @@ def _dependence(analysis: Analysis, factor: Factor, measures: Sequence[Measure])
 
 
 def _array(rows: Sequence[Row], name: str) -> np.ndarray:
-    return np.array([np.nan if row[name] is None else row[name] for row in rows], float)
+    return np.array([row[name] for row in rows], float)
 
 
 def _bands(axes: Axes, rows: Sequence[Row], style: dict[str, Any]) -> None:

@@ -11,13 +11,13 @@ from helpers.report_pages import at
 from rich.console import Console
 
 from auv_analysis.metrics.quantities import METRICS, SIGNALS, Quantity, mathtext, quantity
+from auv_analysis.output.new_files import known
 from auv_analysis.output.text import MISSING, Maths
 from auv_analysis.report.results import (
     Column,
     Results,
     described,
     document_table,
-    known,
     make_table,
     numbers_of,
     terminal,

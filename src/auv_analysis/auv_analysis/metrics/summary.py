@@ -1,6 +1,5 @@
 """The figures of a run, as written to summary.json."""
 
-import math
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from typing import Any
@@ -18,6 +17,7 @@ from auv_analysis.metrics.coupling import (
 from auv_analysis.metrics.energy import depends_on_known, shares
 from auv_analysis.metrics.lyapunov import lyapunov
 from auv_analysis.metrics.moments import Moments, Tally
+from auv_analysis.output.new_files import known
 from auv_analysis.runs.run import AnyRun, Run, RunInfo
 from auv_gvc_controller.control.gains import body_gains
 from auv_gvc_controller.laws.law import make_gains
@@ -116,21 +116,12 @@ def summarize(
         'gaps': gap_figures(run),
         'notes': list(run.notes),
     }
-    return _known(figures)
+    return known(figures)
 
 
 def if_known(known: np.ndarray, values: Sequence[float | None]) -> list[float | None]:
     """Figures of six degrees of freedom, None where they rest on what was not recorded."""
     return [value if there else None for there, value in zip(known, values, strict=True)]
-
-
-def _known(value: Any) -> Any:
-    """The same with null in place of every number that is not finite, such as an overflow."""
-    if isinstance(value, dict):
-        return {key: _known(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_known(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def lumped_error(run: Run) -> np.ndarray | None:

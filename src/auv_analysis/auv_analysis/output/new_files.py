@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -99,6 +100,17 @@ def write_json(path: Path, document: Any) -> None:
     """Write a document as `--json` prints it, for people: indented; NaN is a ValueError."""
     text = json.dumps(document, indent=2, allow_nan=False)
     path.write_text(text + '\n', encoding='utf-8')
+
+
+def known(value: Any) -> Any:
+    """The same for JSON: None for what is not finite, tuples and arrays as lists."""
+    if isinstance(value, Mapping):
+        return {key: known(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [known(entry) for entry in value]
+    if hasattr(value, 'tolist'):
+        return known(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def write_table(path: Path, columns: Mapping[str, Sequence[Any]]) -> Path:

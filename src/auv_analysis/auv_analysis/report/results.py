@@ -5,7 +5,6 @@ Nothing else is typed: texts, heads, units, and the pointer from a shown cell to
 follow from the table.
 """
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -19,7 +18,7 @@ from rich.text import Text
 
 from auv_analysis.metrics.quantities import Quantity, quantity
 from auv_analysis.output.arrow import pa
-from auv_analysis.output.new_files import write_json
+from auv_analysis.output.new_files import known, write_json
 from auv_analysis.output.text import MISSING, Maths, fixed, number, plain
 
 Rows: TypeAlias = Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]] | pa.Table
@@ -321,17 +320,6 @@ class Results:
                 paths.append(folder / table.file)
                 parquet.write_table(table.data, paths[-1])
         return paths
-
-
-def known(value: Any) -> Any:
-    """The same for JSON: None for what is not finite, tuples and arrays as lists."""
-    if isinstance(value, Mapping):
-        return {key: known(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [known(entry) for entry in value]
-    if hasattr(value, 'tolist'):
-        return known(value.tolist())
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def numbers_of(tables: Iterable[Any]) -> Iterator[dict[str, Any]]:

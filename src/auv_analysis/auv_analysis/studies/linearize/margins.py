@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar, root
 
+from auv_analysis.output.new_files import known
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.studies.linearize.linearize import (
     ATTITUDE,
@@ -396,7 +397,7 @@ def stability_margins(setting: ControlLoop) -> dict[str, Any]:
         'kept': all(row['kept'] for row in rows),
         'disk_margin': setting.disk_margin(loop) if holds else None,
         'gain': setting.gain,
-        'together': _bounded(setting.largest()) if setting.gain else None,
+        'together': known(setting.largest()) if setting.gain else None,
         'axes': rows,
     }
 
@@ -405,21 +406,17 @@ def _row(setting: ControlLoop, axis: int, found: AxisMargins | None) -> dict[str
     row: dict[str, Any] = {'axis': DOFS[axis], 'kept': found is not None and found.kept}
     if found is not None:
         row |= {
-            'gain_margin': _bounded(found.gain),
-            'gain_margin_db': _bounded(20 * np.log10(found.gain)),
+            'gain_margin': known(found.gain),
+            'gain_margin_db': known(20 * np.log10(found.gain)),
             'gain_reduction': found.reduction or None,
-            'phase_margin': _bounded(np.degrees(found.phase)),
-            'delay_margin': _bounded(found.delay),
-            'crossover': _bounded(found.crossover),
+            'phase_margin': known(np.degrees(found.phase)),
+            'delay_margin': known(found.delay),
+            'crossover': known(found.crossover),
         }
     if setting.gain:
         value = float(setting.values[axis])
-        row |= {'value': value, 'largest': _bounded(value * setting.largest(axis))}
+        row |= {'value': value, 'largest': known(value * setting.largest(axis))}
     return row
-
-
-def _bounded(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def margin_notes(

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from auv_analysis.metrics.measures import BY_NAME, FAMILIES, MEASURES, Measure, described
+from auv_analysis.output.new_files import known
 from auv_analysis.output.progress import each
 from auv_analysis.output.text import join
 from auv_analysis.report.results import Results
@@ -26,7 +27,6 @@ from auv_analysis.studies.sweep.indices import Designed, designed, failing, indi
 from auv_analysis.studies.sweep.quantiles import (
     Ordered,
     Row,
-    finite,
     ordered,
     quantiles,
     spread,
@@ -118,7 +118,7 @@ def along(figure: Ordered, codes: np.ndarray, factor: Factor, measure: Measure) 
     groups, rows = figure.groups(codes, count), np.bincount(codes, minlength=count)
     for i, (label, group) in enumerate(zip(factor.labels, groups, strict=True)):
         row: Row = {'path': factor.path, 'figure': measure.name, 'unit': measure.unit}
-        row |= {'group': i, 'value': label, 'middle': finite(factor.middles[i])}
+        row |= {'group': i, 'value': label, 'middle': known(factor.middles[i])}
         ends = (None, None) if factor.edges is None else map(float, factor.edges[i])
         yield (
             row
@@ -147,8 +147,8 @@ def together(
         names = {'figure': measure.name, 'unit': measure.unit}
         names |= {'path': pair[0].path, 'value': first[1][i // width]}
         names |= {'other_path': pair[1].path, 'other_value': second[1][i % width]}
-        known = int(np.isfinite(group).sum())
-        yield names | {'rows': len(group), 'known': known, 'median': finite(at)}
+        count = int(np.isfinite(group).sum())
+        yield names | {'rows': len(group), 'known': count, 'median': known(at)}
 
 
 def merged(factor: Factor) -> tuple[np.ndarray, list[str]]:
@@ -242,7 +242,7 @@ def best(
         for rank, (place, given) in enumerate(zip(places, table, strict=True), start=1):
             row = {'by': by.name, 'controller': controller, 'rank': rank}
             row |= {'rollout': given.pop('index'), **given}
-            found.append(row | {m.name: finite(figures[m.name][place]) for m in MEASURES})
+            found.append(row | {m.name: known(figures[m.name][place]) for m in MEASURES})
     return found
 
 
@@ -405,8 +405,8 @@ def _add(
 ) -> None:
     sweep, values = analysis.sweep, analysis.values[measure.name]
     if rows is None:
-        known = values[np.isfinite(values) & (sweep.status == 0)]
-        analysis.fixed[measure.name] = float(known[0]) if len(known) else None
+        finite = values[np.isfinite(values) & (sweep.status == 0)]
+        analysis.fixed[measure.name] = float(finite[0]) if len(finite) else None
         return
     analysis.measures.append(measure)
     for name, row in rows:

@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from auv_analysis.metrics.measures import Measure
+from auv_analysis.output.new_files import known
 from auv_analysis.studies.sweep.dataset import Sweep
 from auv_analysis.studies.sweep.variation import (
     LEVELS,
@@ -201,11 +202,11 @@ def _sobol(entry: Designed, Y: np.ndarray, whole: np.ndarray) -> Iterator[Row]:
     second = bool(entry.spec.get('second_order'))
     found = sobol_indices(entry.paths, Y.ravel(), SEED, second_order=second)
     for i, path in enumerate(entry.paths):
-        yield {'path': path, 'with': None} | {key: _known(found[key][i]) for key in FIRST_AND_TOTAL}
+        yield {'path': path, 'with': None} | {key: known(found[key][i]) for key in FIRST_AND_TOTAL}
     if second:
         for i, path in enumerate(entry.paths):
             for j in range(i + 1, len(entry.paths)):
-                row = {key: _known(found[key][i, j]) for key in SECOND}
+                row = {key: known(found[key][i, j]) for key in SECOND}
                 yield {'path': path, 'with': entry.paths[j]} | row
 
 
@@ -214,7 +215,7 @@ def _morris(entry: Designed, Y: np.ndarray, whole: np.ndarray) -> Iterator[Row]:
     X = entry.points.reshape(len(whole), entry.step, -1)[whole].reshape(Y.size, -1)
     found = morris_indices(entry.paths, X, Y.ravel(), SEED, int(entry.spec.get('levels', LEVELS)))
     for i, path in enumerate(entry.paths):
-        yield {'path': path, 'with': None} | {key: _known(found[key][i]) for key in EFFECTS}
+        yield {'path': path, 'with': None} | {key: known(found[key][i]) for key in EFFECTS}
 
 
 def sobol_indices(
@@ -254,10 +255,6 @@ def morris_indices(
     from SALib.analyze import morris
 
     return morris.analyze(cube(names), points, y, num_levels=levels, seed=seed)
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 Method = Literal['sobol', 'morris']
@@ -335,8 +332,8 @@ class SensitivityPlan:
             found = sobol_indices(self.names, y, self.seed + 1)
         else:
             found = morris_indices(self.names, self._unit, y, self.seed + 1, LEVELS)
-        known = {name: np.asarray(found[name], float) for name in NAMES[self.method]}
-        return known | {'slope': self._slope(y)}
+        chosen = {name: np.asarray(found[name], float) for name in NAMES[self.method]}
+        return chosen | {'slope': self._slope(y)}
 
     def _slope(self, y: np.ndarray) -> np.ndarray:
         free = self.points[self.independent.ravel()]

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from auv_analysis.output.new_files import known
 from auv_analysis.studies.sweep.dataset import by_group
 
 LEVELS = {'low': 0.05, 'quarter': 0.25, 'median': 0.5, 'three_quarters': 0.75, 'high': 0.95}
@@ -58,19 +59,14 @@ def quantiles(values: np.ndarray, levels: Iterable[float]) -> np.ndarray:
     levels : from 0 to 1
 
     """
-    known = values[~np.isnan(values)]
-    places = _places(len(known), levels)
-    return np.partition(known, places)[places] if len(known) else np.full(len(places), np.nan)
+    there = values[~np.isnan(values)]
+    places = _places(len(there), levels)
+    return np.partition(there, places)[places] if len(there) else np.full(len(places), np.nan)
 
 
 def _places(count: int, levels: Iterable[float]) -> np.ndarray:
     """Places of quantiles among sorted values: the inverse of their distribution function."""
     return np.clip(np.ceil(count * np.array([*levels]) - 1).astype(int), 0, max(count - 1, 0))
-
-
-def finite(value: float) -> float | None:
-    """A number, None where it is not finite."""
-    return float(value) if np.isfinite(value) else None
 
 
 def spread(values: np.ndarray, unit: str) -> Row:
@@ -88,26 +84,26 @@ def spread(values: np.ndarray, unit: str) -> Row:
 
 def spread_of_sorted(values: np.ndarray, rows: int) -> Row:
     """The same of sorted values, of which the last ones may be infinite."""
-    known = values[: np.searchsorted(values, np.inf)]
-    row: Row = {'rows': rows, 'known': len(known)}
-    row |= {'smallest': finite(known[0]) if len(known) else None}
+    finite = values[: np.searchsorted(values, np.inf)]
+    row: Row = {'rows': rows, 'known': len(finite)}
+    row |= {'smallest': known(finite[0]) if len(finite) else None}
     at = values[_places(len(values), LEVELS.values())] if len(values) else [np.nan] * len(LEVELS)
-    row |= {name: finite(value) for name, value in zip(LEVELS, at, strict=True)}
-    row |= {'largest': finite(known[-1]) if len(known) else None}
-    return row | {'mean': finite(known.mean()) if len(known) else None}
+    row |= {name: known(value) for name, value in zip(LEVELS, at, strict=True)}
+    row |= {'largest': known(finite[-1]) if len(finite) else None}
+    return row | {'mean': known(finite.mean()) if len(finite) else None}
 
 
 def thinned(values: np.ndarray) -> np.ndarray:
     """Values with the same quantiles, few enough to be drawn; NaN is left out."""
-    known = np.count_nonzero(~np.isnan(values))
-    return quantiles(values, np.linspace(0.0, 1.0, min(int(known), POINTS)))
+    count = np.count_nonzero(~np.isnan(values))
+    return quantiles(values, np.linspace(0.0, 1.0, min(int(count), POINTS)))
 
 
 def varying(values: Sequence[np.ndarray], unit: str) -> bool:
     """Whether there is more than one value; of a time, one that does not exist is one as well."""
     whole = np.concatenate(values)
-    known = whole[np.isfinite(whole)]
-    if len(known) == 0:
+    finite = whole[np.isfinite(whole)]
+    if len(finite) == 0:
         return False
-    late = unit == 's' and len(known) < len(whole)
-    return late or bool(np.ptp(known) > 1e-12 * np.abs(known).max())
+    late = unit == 's' and len(finite) < len(whole)
+    return late or bool(np.ptp(finite) > 1e-12 * np.abs(finite).max())

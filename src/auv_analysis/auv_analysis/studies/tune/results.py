@@ -11,7 +11,8 @@ import numpy as np
 from auv_analysis.metrics.authority import beyond_authority
 from auv_analysis.metrics.quantities import COSTS
 from auv_analysis.output.arrow import pa
-from auv_analysis.report.results import Results, known
+from auv_analysis.output.new_files import known
+from auv_analysis.report.results import Results
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scenario import Scenario, load_scenario, write_inputs
 from auv_analysis.simulation.simulate import DivergedError, simulate

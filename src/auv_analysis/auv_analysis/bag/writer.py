@@ -4,7 +4,7 @@ import contextlib
 import errno
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from auv_analysis.bag.metadata import (
@@ -99,31 +99,6 @@ class FileHealth:
             raise RecordingError(self.trouble)
 
 
-class FlushThread:
-    """Background thread that calls a function every tenth of a second until it is stopped.
-
-    Parameters
-    ----------
-    look : what is called; it must not raise
-
-    """
-
-    def __init__(self, look: Callable[[], None]):
-        self._look, self._stop = look, threading.Event()
-        self._thread = threading.Thread(target=self._run, name='bag flush', daemon=True)
-        self._thread.start()
-
-    def _run(self) -> None:
-        while not self._stop.wait(LOOK):
-            self._look()
-
-    def stop(self) -> bool:
-        """End the thread; whether it has ended: a dead disk may hold it."""
-        self._stop.set()
-        self._thread.join(PATIENCE)
-        return not self._thread.is_alive()
-
-
 class BagWriter:
     """Writes raw messages; a kill loses less than a second of them.
 
@@ -159,7 +134,9 @@ class BagWriter:
         self._synced = self._checked = time.monotonic()
         self._file = self._next_file()
         sync_folder(folder)
-        self._thread = FlushThread(self._look)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='bag flush', daemon=True)
+        self._thread.start()
 
     @property
     def trouble(self) -> str:
@@ -248,6 +225,10 @@ class BagWriter:
             self._file.flush()
             self._waits_since = None
 
+    def _run(self) -> None:
+        while not self._stop.wait(LOOK):
+            self._look()
+
     def _look(self) -> None:
         """What the thread does every tenth of a second; whatever it raises ends the recording."""
         if self.broken:
@@ -291,7 +272,9 @@ class BagWriter:
         if self._closed:
             return
         self._closed = True
-        if not self._thread.stop():
+        self._stop.set()
+        self._thread.join(PATIENCE)
+        if self._thread.is_alive():
             self._health.give_up(f'{self.path}: the disk does not answer')
             self._health.refuse_broken()
         self._full.append(self._file)

@@ -84,7 +84,8 @@ def messages(bag: Path, topics: Collection[str], notes: list[str]) -> Iterator[L
         for path in bag_files(bag):
             yield from _of_mcap(path, topics, notes)
     else:
-        yield from _messages_of_rosbags(bag, topics)
+        for part in _parts(bag):
+            yield from _of_rosbags(part, topics)
 
 
 def _of_mcap(path: Path, topics: Collection[str], notes: list[str]) -> Iterator[LoggedMessage]:
@@ -118,12 +119,6 @@ def _survey_of_rosbags(bag: Path) -> BagContents:
             if reader.message_count:
                 contents.span(reader.start_time, reader.end_time - 1)
     return contents
-
-
-def _messages_of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[LoggedMessage]:
-    """Messages of some topics, in the order of logging."""
-    for part in _parts(bag):
-        yield from _of_rosbags(part, topics)
 
 
 def _of_rosbags(bag: Path, topics: Collection[str]) -> Iterator[LoggedMessage]:

@@ -92,10 +92,7 @@ def _misfits(pose: Track, *velocities: Track) -> tuple[float, ...]:
 
     Over the longest stretch without a gap; zeros where that is too short.
     """
-    first = velocities[0]
-    span = max(pose.ns[0], first.ns[0]), min(pose.ns[-1], first.ns[-1])
-    begin, end = max(between_gaps(*span, (pose, first)), key=np.ptp, default=span)
-    ns = pose.ns[(pose.ns >= begin) & (pose.ns <= end)]
+    ns = _together(pose, velocities[0])
     if len(ns) < SMALLEST:
         return (0.0,) * (1 + len(velocities))
     at, t = at_times(pose, ns), (ns - ns[0]) / NANOSECONDS

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from pyarrow import parquet
 
 from auv_analysis.driver.checks import CHECKS, GROUPS
@@ -18,7 +17,7 @@ from auv_analysis.output.new_files import write_json
 from auv_analysis.output.text import join
 from auv_analysis.report import plots
 from auv_analysis.report.document import Block, Section, Sentence, write_document
-from auv_analysis.report.plots import COLOURS, GREY, Curve, FigureRecord, Panel, save_figures
+from auv_analysis.report.plots import COLOURS, GREY, Curve, Drawn, FigureRecord, Panel, save_figures
 from auv_analysis.report.results import Column, Shown, make_table
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle import DOFS
@@ -39,7 +38,6 @@ MS = 1e3
 BINS = 60
 WIDER = 1.05
 FEW = 3  # messages
-Drawn = tuple[Figure, str, str]  # with title and caption
 
 
 def write_results(

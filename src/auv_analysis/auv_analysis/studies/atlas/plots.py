@@ -14,6 +14,7 @@ from auv_analysis.report import plots
 from auv_analysis.report.plots import (
     ALWAYS,
     COLOURS,
+    Drawn,
     FigureRecord,
     HeatMap,
     draw_grid,
@@ -27,7 +28,6 @@ from auv_dynamics.vehicle import DOFS
 ACROSS = 2  # panels in a row
 SMALLEST_SHARE = 0.001  # %, low end of the scale
 KINDS = {'delta_xi': ('Δξ', VELOCITY), 'delta_pi': ('Δπ', WRENCH)}
-Drawn = tuple[Figure | None, str, str]
 
 
 def draw(charts: Sequence[Chart], folder: Path) -> dict[str, FigureRecord]:

@@ -14,7 +14,7 @@ from auv_analysis.metrics.summary import BAND_TEXT, DWELL, band_of
 from auv_analysis.output.arrow import pa
 from auv_analysis.report import plots
 from auv_analysis.report.digest import RunDigest
-from auv_analysis.report.plots import ALWAYS, COLOURS, GREY, MOST_LINES, FigureRecord, HeatMap, look
+from auv_analysis.report.plots import COLOURS, GREY, MOST_LINES, Drawn, FigureRecord, HeatMap, look
 from auv_analysis.report.run_plots import XI
 from auv_analysis.studies.compare.ranking import Entry, Ranking
 from auv_dynamics.vehicle import DOFS
@@ -24,7 +24,6 @@ ACROSS = 4  # panels in a row
 SMALLEST, LARGEST = 1e-3, 1e4  # of the axis, multiples of the band
 TIMES = 240  # columns of the rows of colours
 ENDS = f', unless that is in the last {DWELL} % of the time'
-Drawn = tuple[Figure | None, str, str]
 SIX = {  # name of the figure -> family, title
     'rms_errors': ('velocity_error.rms', 'Root mean square velocity errors'),
     'late_errors': ('velocity_error.max_after_2s', 'Largest velocity errors after 2 s'),
@@ -78,7 +77,7 @@ def _six(name: str, table: pa.Table) -> Drawn:
         HeatMap(values[:, half], DOFS[half], f'{entry.label} ({unit})', structural=zeros[:, half])
         for half, unit in zip(halves, entry.units, strict=False)
     ]
-    always = f', {ALWAYS}: for every motion by the structure of M' if zeros.any() else ''
+    always = f', {plots.ALWAYS}: for every motion by the structure of M' if zeros.any() else ''
     caption = f'{title}, a row per run ({entry.meaning}); {MARKS}{always}.'
     return plots.heat_map(table['run'].to_pylist(), grids), title, caption
 

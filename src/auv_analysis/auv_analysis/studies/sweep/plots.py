@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from auv_analysis.metrics.measures import BY_NAME, Measure
 from auv_analysis.output.text import join, plain, typeset
 from auv_analysis.report import plots
-from auv_analysis.report.plots import COLOURS, GREY, FigureRecord, HeatMap, heat_map, look
+from auv_analysis.report.plots import COLOURS, GREY, Drawn, FigureRecord, HeatMap, heat_map, look
 from auv_analysis.studies.sweep.analysis import SAMPLE, Analysis
 from auv_analysis.studies.sweep.dataset import Factor, cut, short_names, with_unit
 from auv_analysis.studies.sweep.quantiles import Row, ordered, thinned
@@ -32,7 +32,6 @@ PREFERRED = (
     'overall.effort.rms.linear',
     'overall.coupling.delta_xi_max.angular',
 )
-Drawn = tuple[Figure, str, str]  # with title and caption
 
 
 def draw(analysis: Analysis, folder: Path) -> dict[str, FigureRecord]:

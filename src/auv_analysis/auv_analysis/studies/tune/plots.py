@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from auv_analysis.metrics.quantities import COSTS
@@ -16,6 +15,7 @@ from auv_analysis.report.plots import (
     COLOURS,
     DASHES,
     GREY,
+    Drawn,
     FigureRecord,
     distribution,
     new_figure,
@@ -30,7 +30,6 @@ from auv_gvc_controller.laws import NAMES
 WIDEST = 2.0  # of the reference's effort, where the cloud is shown
 HEIGHTS = 0.05, 200.0  # of the reference's error
 LAWS = {law: i for i, law in enumerate(NAMES)}  # colour of a law
-Drawn = tuple[Figure, str, str]
 
 
 def draw_tuning(tuning: Tuning, folder: Path) -> dict[str, FigureRecord]:

@@ -2,7 +2,6 @@
 
 import copy
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,11 @@ from auv_dynamics.files.yaml_files import read_yaml
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 REFERENCE = 'herman2018'  # the vehicle that case1 was made for
+SCALE = f"""\
+scale, 6x6: F = scale F_39, where F_39 is (39) as printed, in N and N m. It is M M_ref^-1
+with M of this vehicle and M_ref of {REFERENCE}, and no coupling of the water: row i says how
+much of each entry of F_39, surge to yaw, acts in degree of freedom i.
+""".splitlines()  # for a comment on the `scale` of a scaled disturbance
 SLOWER = 0.5  # of the set-point (35): 0.6 m/s in surge, 0.8 m/s in heave, 0.05 rad/s in yaw
 DIGITS = 10  # of a written scale: the last ones differ between BLAS libraries
 ROUNDING = 1e-12  # relative to the largest entry, below which an entry of the scale is zero
@@ -42,25 +46,12 @@ COMMENT = """\
 """
 
 
-SCALE = (
-    'scale, 6x6: F = scale F_39, where F_39 is (39) as printed, in N and N m. It is M M_ref^-1',
-    'with M of this vehicle and M_ref of {reference}, and no coupling of the water: row i says how',
-    'much of each entry of F_39, surge to yaw, acts in degree of freedom i.',
-)
-
-
-def scale_lines(reference: str = REFERENCE) -> list[str]:
-    """What the `scale` of a scaled disturbance is, for a comment."""
-    return [line.format(reference=reference) for line in SCALE]
-
-
-def scaled_case1(vehicle: str | Path, reference: str = REFERENCE) -> dict[str, Any]:
+def scaled_case1(vehicle: str | Path) -> dict[str, Any]:
     """Case 1 of the paper for another vehicle, as the contents of a scenario file.
 
     Parameters
     ----------
     vehicle : path of a vehicle file, or the bare name of a shipped one
-    reference : name or path of the vehicle whose accelerations under (39) are kept
 
     Returns
     -------
@@ -80,7 +71,7 @@ def scaled_case1(vehicle: str | Path, reference: str = REFERENCE) -> dict[str, A
     scenario['setpoint'] = {
         dof: _slower(harmonics) for dof, harmonics in scenario['setpoint'].items()
     }
-    scale = _rounded(loaded.M @ np.linalg.inv(load_vehicle(reference).M))
+    scale = _rounded(loaded.M @ np.linalg.inv(load_vehicle(REFERENCE).M))
     scenario['disturbance'] = scenario['disturbance'] | {'scale': scale.tolist()}
     return scenario
 
@@ -100,21 +91,13 @@ def _rounded(A: np.ndarray) -> np.ndarray:
     return np.array([[float(f'{entry:.{DIGITS}g}') for entry in row] for row in A])
 
 
-def scenario_text(scenario: dict[str, Any], reference: str = REFERENCE) -> str:
-    """Text of a scenario file with what was scaled in its comment.
-
-    Parameters
-    ----------
-    scenario : of `scaled_case1`
-    reference : the same as there
-
-    """
+def scenario_text(scenario: dict[str, Any]) -> str:
+    """Text of a scenario file of `scaled_case1`, with what was scaled in its comment."""
     name = Path(scenario['vehicle']).stem
     comment = COMMENT.format(
         name=name,
-        reference=reference,
         factor=SLOWER,
-        scale='\n'.join(f'# {line}' for line in scale_lines(reference)),
+        scale='\n'.join(f'# {line}' for line in SCALE),
         speed=TOP_SPEED.get(name, 'not found in its sources'),
         **{dof: round(_peak(harmonics), 6) for dof, harmonics in scenario['setpoint'].items()},
     )
@@ -126,15 +109,8 @@ def _peak(harmonics: dict[str, Any]) -> float:
     return abs(harmonics.get('offset', 0.0)) + sum(abs(t['amplitude']) for t in harmonics['terms'])
 
 
-def scaled_scenarios() -> Iterator[tuple[str, str]]:
-    """File name and text of case1 for each shipped vehicle but the paper's own."""
-    for name in shipped_names('vehicles'):
-        if name != REFERENCE:
-            yield f'case1_{name}.yaml', scenario_text(scaled_case1(name))
-
-
 def write_scaled_scenarios(folder: Path) -> list[Path]:
-    """Write the scenarios of `scaled_scenarios` into a folder; same input, same bytes.
+    """Write case1 for each shipped vehicle but the paper's own; same input, same bytes.
 
     Parameters
     ----------
@@ -146,7 +122,8 @@ def write_scaled_scenarios(folder: Path) -> list[Path]:
 
     """
     paths = []
-    for name, text in scaled_scenarios():
-        paths.append(folder / name)
-        paths[-1].write_text(text, encoding='utf-8')
+    for name in shipped_names('vehicles'):
+        if name != REFERENCE:
+            paths.append(folder / f'case1_{name}.yaml')
+            paths[-1].write_text(scenario_text(scaled_case1(name)), encoding='utf-8')
     return paths

@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from auv_analysis.scenario.scaling import scale_lines, scaled_case1
+from auv_analysis.scenario.scaling import SCALE, scaled_case1
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import read_text, read_yaml, schema
@@ -191,7 +191,7 @@ def scenario_files(name: str, vehicle: str | None) -> dict[str, str]:
     data = scaled_case1(vehicle) | {'name': name, 'vehicle': vehicle}
     data['disturbance'] = [data['disturbance']]
     first = "A scenario of your own: the paper's case 1, scaled to the vehicle; SI units."
-    about = (first, 'Of the disturbance:', *scale_lines())
+    about = (first, 'Of the disturbance:', *SCALE)
     return {f'{name}.yaml': _text(data, SCHEMA, about)}
 
 

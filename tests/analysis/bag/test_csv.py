@@ -179,3 +179,17 @@ def test_a_long_table_is_read_in_parts_and_its_lines_are_known(tmp_path) -> None
     path.write_text('\n'.join(['t,u,mode', *lines[:20_000], '5,1e,run', *lines[20_000:], '']))
     with pytest.raises(InputError, match=r'line 20002, column u: expected a number, or nothing, f'):
         [message.message.u for message in messages(path, ['x'], [])]
+
+
+def test_a_time_without_its_unit_is_refused_in_one_line(run, tmp_path) -> None:
+    """Nanoseconds since 1970 that are read as seconds are times of no year."""
+    path = tmp_path / 'dive.csv'
+    path.write_text('t,u\n' + ''.join(f'{1_700_000_000_000_000_000 + k},0\n' for k in range(3)))
+    keys = {
+        'vehicle': 'rexrov',
+        'frames': 'ned_fsd',
+        'twist': {'topic': 'dive', 'stamp': 't', 'fields': {'u': 'u'}},
+    }
+    line = 'twist.stamp: expected times before the year 2116, in s, found none'
+    with pytest.raises(InputError, match=line):
+        read_sources(path, read_mapping(None, keys), [])

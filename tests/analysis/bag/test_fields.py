@@ -1,6 +1,7 @@
 """Messages of any type, read by paths to their fields, in other units, out of several topics."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from helpers.foreign_bags import SECOND, loaded, nanoseconds, simulated, write, 
 from helpers.foreign_logs import SENSORS, every, maker
 from numpy.testing import assert_allclose
 
+from auv_analysis.bag.foreign_fields import MessageReader
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import read_mapping
 from auv_analysis.bag.foreign_tracks import tracks_of
@@ -45,6 +47,15 @@ def test_a_motion_out_of_five_topics_of_nobodys_types(kind, run, tmp_path) -> No
     notes = '\n'.join(found.notes)
     assert '/imu: every stamp is zero, so the time of logging is taken' in notes
     assert '/imu: p, q, r in deg/s, turned into rad/s' in notes
+
+
+@pytest.mark.parametrize('unset', [2**64 - 1, -(2**70)])
+def test_a_message_whose_time_is_none_is_left_out(unset: int) -> None:
+    read = MessageReader('pose', {'z': 'z'}, {}, ('at', 'ns'))
+    one, other = (read(SimpleNamespace(at=at, z=1.0)) for at in (5, unset))
+    assert (one.stamp, one.row) == (5, (1.0,))
+    assert other.stamp == 0
+    assert np.isnan(other.row).all()
 
 
 def test_an_imu_is_known_without_paths(run, tmp_path) -> None:

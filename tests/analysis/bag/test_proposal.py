@@ -18,6 +18,7 @@ from helpers.foreign_bags import (
     write,
 )
 from helpers.foreign_logs import HEADS, SENSORS, columns, every, maker, text_of
+from helpers.made_messages import Bag, new, serialized
 from numpy.testing import assert_allclose
 
 from auv_analysis.bag.any_bag import survey
@@ -136,3 +137,14 @@ def test_info_shows_columns_and_the_mapping(run, tmp_path, capsys) -> None:
     main.main(['info', str(path)])
     text = capsys.readouterr().out
     assert document['mapping'] in text
+
+
+def test_numbers_of_whatever_width_are_written(tmp_path, capsys) -> None:
+    kind = 'std_msgs/msg/Float32MultiArray'
+    layout = new('std_msgs/msg/MultiArrayLayout', [], 0)
+    bag = Bag(tmp_path / 'dive.mcap')
+    for k in range(3):
+        bag.add('/thrusts', kind, k, serialized(new(kind, layout, np.array([k, -k], np.float32))))
+    main.main(['info', str(bag.close()), '--json'])
+    fields = json.loads(capsys.readouterr().out)['fields']['/thrusts']
+    assert (fields['data[1]']['least'], fields['data[0]']['largest']) == (-2.0, 2.0)

@@ -22,6 +22,9 @@ from helpers.made_messages import COMPRESSIONS, STRING, TYPES, Bag, serialized
 from helpers.strategies import examples
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.data_stream import RecordBuilder
+from mcap.records import Message
+from mcap.writer import Writer
 
 from auv_analysis.bag import read_bag
 from auv_analysis.bag.recover import recover
@@ -191,3 +194,23 @@ def test_bags_of_other_writers_with_damaged_bytes(data: bytes, flips: list) -> N
     for share, mask in flips:
         broken[min(int(share * len(data)), len(data) - 1)] ^= mask
     recovered(bytes(broken), checked=False)
+
+
+def test_messages_within_and_without_chunks_are_healthy(tmp_path: Path) -> None:
+    path = tmp_path / 'mixed.mcap'
+    with path.open('wb') as file:
+        writer = Writer(file, chunk_size=1 << 20)
+        writer.start()
+        channel = writer.register_channel('/a', 'json', 0)
+        for k in range(4):
+            writer.add_message(channel, k, b'{}', k, k)
+        writer._Writer__finalize_chunk()
+        for k in range(4, 8):
+            builder = RecordBuilder()
+            Message(channel_id=channel, data=b'{}', log_time=k, publish_time=k, sequence=k).write(
+                builder
+            )
+            file.write(builder.end())
+        writer.finish()
+    _, _, document = recovered(path.read_bytes())
+    assert document['files'][0]['state'] == 'healthy'

@@ -167,6 +167,14 @@ def test_poses_are_in_the_frame_that_they_name(imported, frame, pose, r_B):
     assert_allclose(vehicle.r_B, r_B, atol=1e-12)
 
 
+def test_the_link_is_that_of_the_model_with_the_plugin(imported):
+    buoy = '<model name="buoy"><link name="base_link"><inertial><mass>500</mass></inertial></link>'
+    alone = sdf()
+    text = alone.replace('<model', f'{buoy}</model><model', 1)
+    assert text != alone
+    assert_same(imported('made.sdf', text)[0], imported('other.sdf', alone)[0])
+
+
 def test_combined_derivatives_of_a_list_come_out_as_published(imported):
     options = [*LIST, '--lift', 'combined']
     vehicle, document = imported('remus.m', REMUS + REMUS_LIFT, *options)
@@ -239,6 +247,9 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'a product': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6*10'), LIST, 'Mq'),
     'a decimal comma': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -60,5'), LIST, 'Mq'),
     'pounds': ('a.m', BLUEROV2.replace('m = 11.5', 'm = 25 lb'), LIST, 'm: expected a number'),
+    'millimetres': ('a.m', BLUEROV2.replace('m = 11.5', 'm = 11.5 mm'), LIST, 'SI unit'),
+    'centimetres': ('a.m', BLUEROV2.replace('m = 11.5', 'm = 11.5 [kg cm^2]'), LIST, 'SI unit'),
+    'grams': ('a.m', BLUEROV2.replace('m = 11.5', 'm = 11.5 (g)'), LIST, 'SI unit'),
     'a formula': ('a.m', BLUEROV2 + 'V = m/rho', [], 'V: expected a number'),
     'no gravity': ('a.m', BLUEROV2, [*LIST, '--gravity', '0'], 'environment.gravity'),
     'no weight': ('a.m', BLUEROV2.replace('m = 11.5', 'm = 0'), LIST, 'm: expected a positive'),

@@ -102,6 +102,8 @@ def test_a_vehicle_in_a_namespace_has_the_same_topics() -> None:
         ('/mavros/setpoint_velocity/cmd_vel_unstamped', 'geometry_msgs/msg/Twist', True),
         ('/mavros/rc/override', 'mavros_msgs/msg/OverrideRCIn', True),
         ('/auv1/thrusters/3/input', 'std_msgs/msg/Float64', True),
+        ('/auv1/thruster12', 'std_msgs/msg/Float64', True),
+        ('/cmd2/x', 'std_msgs/msg/Float64', True),
         ('/joy', 'sensor_msgs/msg/Joy', False),
         ('/auv1/odom', ODOMETRY, False),
         ('/auv1/disturbance', WRENCH, False),

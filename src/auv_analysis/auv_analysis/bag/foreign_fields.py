@@ -46,6 +46,7 @@ UNITS: dict[str, tuple[str, float]] = {  # unit -> the SI unit, and how many of 
     'N': ('N', 1.0), 'kN': ('N', 1e3), 'kgf': ('N', 9.80665),
     'N m': ('N m', 1.0), 'kN m': ('N m', 1e3),
 }  # fmt: skip
+FAR = 2**62  # ns, in the year 2116: what is later is no time
 TIMES = {'s': NANOSECONDS, 'ms': 10**6, 'us': 10**3, 'ns': 1}  # unit -> ns
 UNIT = 1e-2  # of the norm of a quaternion: what rounding to single precision leaves, and more
 STEP = re.compile(r'\.?([^.\[\]]+)|\[(\d+)\]')
@@ -270,7 +271,7 @@ class MessageReader:
         """
         path, unit = self._stamp or ('', 's')
         seconds = column(path)
-        known = np.abs(seconds) < LARGEST
+        known = np.abs(seconds) < FAR / TIMES[unit]
         whole = np.floor(np.where(known, seconds, 0.0))
         part = np.where(known, seconds, 0.0) - whole
         stamps = whole.astype(np.int64) * TIMES[unit] + np.rint(part * TIMES[unit]).astype(np.int64)
@@ -378,10 +379,10 @@ def numbers(message: Any, path: str = '') -> Iterator[tuple[str, float]]:
 
 def _scaled(value: Any, ns: int) -> float:
     """A time in ns: whole numbers exactly; NaN where there is none."""
+    if not abs(value) < FAR / ns:
+        return math.nan
     if isinstance(value, int | np.integer):
         return int(value) * ns
-    if not abs(value) < LARGEST:
-        return math.nan
     whole = math.floor(value)
     return whole * ns + round((value - whole) * ns)
 

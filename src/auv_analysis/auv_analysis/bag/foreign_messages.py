@@ -9,6 +9,7 @@ import numpy as np
 from auv_analysis.bag.any_bag import messages, survey
 from auv_analysis.bag.csv_logs import CSV, Block, Row, blocks_of_csv
 from auv_analysis.bag.foreign_fields import (
+    FAR,
     FieldError,
     MessageReader,
     Reading,
@@ -221,7 +222,7 @@ class _Messages:
             ids = sorted(' '.join(filter(None, pair)) or 'none' for pair in self._frames)
             raise self._refusal('the same frame_id in all messages', '; '.join(ids))
         self._stamped = reading.stamp is not None
-        self._waiting.append((log, reading))
+        self._waiting.append((min(log, FAR), reading))
         if len(self._waiting) == TOGETHER:
             self._settle()
 
@@ -247,6 +248,9 @@ class _Messages:
         times, rows = (np.concatenate(part) for part in zip(*self._parts, strict=True))
         self._parts.clear()
         log, stamps = times.T if self._has_log else (times[:, 1], times[:, 1])
+        if self.source.stamp is not None and not stamps.any() and np.isnan(rows).all():
+            expected = f'times before the year 2116, in {self.source.stamp[1]}'
+            raise InputError(self._bag, f'{self._key}.stamp', expected, 'none')
         stamped = self._stamped and self.source.stamps != 'log'
         if stamped and not stamps.any():
             notes.append(f'{topic}: every stamp is zero, so the time of logging is taken')

@@ -173,7 +173,8 @@ class McapFile:
         self.begins_well, self.ends_well = False, False
         self.faults: list[str] = []
         self._stream: IO[bytes]
-        self._counts, self._has_chunks = Counts(self.size), False
+        self._counts = Counts(self.size)
+        self._in_chunks = self._is_damaged = False  # since the last whole chunk
         self._checksum: int | None = None  # of data, then summary; None: not all has been read
         self._summary = 0  # where it begins; 0: the end of the data has not been read
         self._budget = BUDGET * self.size + WINDOW
@@ -261,7 +262,7 @@ class McapFile:
                 if not self._resync:
                     yield found
                     return
-                self._checksum = None
+                self._checksum, self._is_damaged = None, True
                 if found.end and self._may_begin(found.end):
                     yield found
                     place = found.end
@@ -327,18 +328,18 @@ class McapFile:
         if opcode == Opcode.MESSAGE:
             if len(body) < HEAD.itemsize - PREFIX.size:
                 raise McapError('a record that is shorter than its fields')
-            if self._resync and self._has_chunks:
+            if self._in_chunks and self._is_damaged:
                 raise McapError('a message between chunks')  # of one whose own head is damaged
             self._verify(frame, None)
             return frame
         parts: list[Part] = []
         proven, compression = False, ''
         if opcode == Opcode.CHUNK:
-            self._has_chunks = True
             chunk = Chunk.read(Body(body))
             data = decompressed(chunk)
             parts += contents_of(data, self._counts, self._indexed(end))
             proven, compression = True, chunk.compression or 'none'
+            self._in_chunks, self._is_damaged = True, False
         elif opcode == Opcode.MESSAGE_INDEX:
             channel, size = struct.unpack_from('<HI', body)
             if size > len(body) - 6 or size % 16:

@@ -99,7 +99,7 @@ class Looked:
         for path, value in numbers(message):
             known, low, high = self.spans.get(path, (0, math.inf, -math.inf))
             if math.isfinite(value):
-                known, low, high = known + 1, min(low, value), max(high, value)
+                known, low, high = known + 1, min(low, float(value)), max(high, float(value))
             self.spans[path] = Span(known, low, high)
 
     @property

@@ -16,7 +16,9 @@ from auv_dynamics.vehicle.vehicle import munk_terms
 NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 ASSIGNED = re.compile(rf'([A-Za-z][\w{{}}|\\\']*)\s*[=:]\s*({NUMBER})?')
 # what may follow a number: its SI unit, then the end, a separator or the next name
-UNIT = r'(?:\[[^\]]*\]|\([^)]*\)|(?:kg|N|m|s|rad)(?:[ ./*^·\-\d²³]*(?:kg|N|m|s|rad))*[\^\-\d²³]*)'
+PART = r'(?:kg|N|m(?!m)|s|rad)'
+SI = rf'{PART}(?:[ ./*^·()\-\d²³]*{PART})*[\^()\-\d²³]*'
+UNIT = rf'(?:\[\s*(?:{SI}|[-1])?\s*\]|\((?!(?:mm|cm|km|g|lb|deg)\b)[^)]*\)|{SI})'
 FOLLOWS = re.compile(rf"\s*{UNIT}?\s*(?:$|[;,&|\\](?!\d)|(?=[A-Za-z][\w{{}}|\\']*\s*[=:]))")
 BRACED = re.compile(r'\{[^=]*\}')  # X_{\dot u}
 COMMENT = re.compile(r'(%|#|//).*')

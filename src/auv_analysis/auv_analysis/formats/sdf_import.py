@@ -34,7 +34,7 @@ def read_gazebo(root: Element, path: Path, choices: Choices) -> ImportedVehicle:
     draft = ImportedVehicle(path, choices)
     plugin = _plugin(root, draft)
     name = (plugin.findtext('link_name') or '').strip()
-    model, link = _link(root, name, draft)
+    model, link = _link(root, plugin, name, draft)
     draft.name = model.get('name') or path.stem
     link_inertia(draft, link, model)
     others = [other for other in model.iter('link') if other is not link]
@@ -66,9 +66,12 @@ def _plugin(root: Element, draft: ImportedVehicle) -> Element:
     return found[0]
 
 
-def _link(root: Element, name: str, draft: ImportedVehicle) -> tuple[Element, Element]:
-    wanted = name.rpartition('::')[2]
-    for model in (root, *root.iter('model')) if root.tag == 'model' else root.iter('model'):
+def _link(
+    root: Element, plugin: Element, name: str, draft: ImportedVehicle
+) -> tuple[Element, Element]:
+    wanted, models = name.rpartition('::')[2], [*root.iter('model')]
+    around = [one for one in models if plugin in one.iter('plugin')]  # the innermost is the last
+    for model in [one for outer in around[::-1] for one in outer.iter('model')] or models:
         for link in model.findall('link'):
             if link.get('name') == wanted:
                 return model, link

@@ -9,7 +9,15 @@ from auv_analysis.metrics.coupling import input_deformation, velocity_deformatio
 from auv_analysis.metrics.quantities import METRICS, SIGNALS, VELOCITY, WRENCH, Quantity
 from auv_analysis.metrics.summary import TRANSIENT
 from auv_analysis.output.text import join, number, plain
-from auv_analysis.report.results import Column, Table, described, json_pointer, make_table
+from auv_analysis.report.results import (
+    Column,
+    Results,
+    Table,
+    described,
+    document_table,
+    json_pointer,
+    make_table,
+)
 from auv_analysis.report.scenario_text import SetUp, gain_text
 from auv_analysis.runs.run import FOREIGN, RunInfo
 from auv_dynamics.vehicle import DOFS
@@ -207,22 +215,13 @@ def _by_dof(
     **about: Any,
 ) -> Table:
     """A row per run and degree of freedom; columns named by the keys of their summaries."""
-    rows, names = [], list(summaries)
-    for run, summary in summaries.items():
-        for i, dof in enumerate(DOFS):
-            row = {'controller': run, 'dof': dof, 'unit': WRENCH[i // 3]}
-            for metric in shown:
-                if '.' in metric:
-                    values: Any = summary
-                    for key in metric.split('.'):
-                        values = values[key]
-                    row[metric] = values and values[i]
-            rows.append(row)
-
-    def at(row: int, column: str) -> str:
-        return json_pointer(names[row // 6], *column.split('.'), row % 6)
-
-    return make_table(name, caption, rows, shown, pointer=at, stub=2, **about)
+    rows = [
+        {'controller': run, 'dof': dof, 'unit': WRENCH[i // 3],
+         **{metric: (run, *metric.split('.'), i) for metric in shown if '.' in metric}}
+        for run in summaries for i, dof in enumerate(DOFS)
+    ]  # fmt: skip
+    results = Results('summary', dict(summaries))
+    return document_table(results, name, caption, rows, shown, stub=2, **about)
 
 
 ESTIMATED = {  # key of the summary -> head, symbol, caption, note
@@ -335,14 +334,13 @@ def reasons(summaries: Summaries) -> list[str]:
 
 def energy_table(summaries: Summaries) -> Table:
     """Mean kinetic energy and its shares by run and window."""
-    rows, places = [], []
+    rows: list[dict[str, Any]] = []
     for name, summary in summaries.items():
-        for i, entry in enumerate(summary['kinetic_energy_windows']):
-            shares = entry['shares_percent'] or [None] * 6
-            row = {'controller': name, 'mean': entry['mean']}
-            row |= dict(zip(('window.0', 'window.1'), entry['window'], strict=True))
-            rows.append(row | {f'shares_percent.{k}': x for k, x in enumerate(shares)})
-            places.append((name, 'kinetic_energy_windows', i))
+        for i in range(len(summary['kinetic_energy_windows'])):
+            at = name, 'kinetic_energy_windows', i
+            row = {'controller': name, 'mean': (*at, 'mean')}
+            row |= {f'window.{k}': (*at, 'window', k) for k in range(2)}
+            rows.append(row | {f'shares_percent.{k}': (*at, 'shares_percent', k) for k in range(6)})
     shown: dict[str, Column | Quantity | str] = {
         'controller': 'controller',
         'window.0': described('from', 'begin of the window', 's', look='plain'),
@@ -352,11 +350,8 @@ def energy_table(summaries: Summaries) -> Table:
     for k in range(6):
         shown[f'shares_percent.{k}'] = described(f'ξ{k + 1}', SIGNALS['share'].meaning, '%')
 
-    def at(row: int, column: str) -> str:
-        return json_pointer(*places[row], *column.split('.'))
-
     caption = 'Mean kinetic energy and the shares of its components, by window.'
-    return make_table('energy', caption, rows, shown, pointer=at)
+    return document_table(Results('summary', dict(summaries)), 'energy', caption, rows, shown)
 
 
 def components_table(summaries: Summaries) -> Table | None:
@@ -398,7 +393,7 @@ def couplings_table(summaries: Summaries, vehicle: str) -> Table:
         weights = matrix(np.array(first['decomposition']['Upsilon']))
         zeros = first['coupling']['structural_zeros'][kind]
         for i, dof in enumerate(DOFS):
-            peaks = {n: s['coupling'][f'{kind}_max'][i] for n, s in summaries.items()}
+            peaks = {n: (n, 'coupling', f'{kind}_max', i) for n in summaries}
             rule = 'structural zero' if dof in zeros else _linear(weights[i], signals)
             rows.append({
                 'symbol': f'{symbol}_{i + 1}', 'dof': dof, 'rule': rule, 'unit': units[i // 3],
@@ -413,12 +408,10 @@ def couplings_table(summaries: Summaries, vehicle: str) -> Table:
         'unit': 'unit',
     }
 
-    def at(row: int, column: str) -> str:
-        return json_pointer(names[column], 'coupling', f'{list(KINDS)[row // 6]}_max', row % 6)
-
     caption = 'Couplings: the rule, and the largest magnitude over the run'
     caption += f'; the rule is that of {vehicle}.' if vehicle else '.'
-    return make_table('couplings', caption, rows, shown, pointer=at, stub=2)
+    results = Results('summary', dict(summaries))
+    return document_table(results, 'couplings', caption, rows, shown, stub=2)
 
 
 def terms_table(name: str, summary: Mapping[str, Any]) -> Table | None:
@@ -430,13 +423,14 @@ def terms_table(name: str, summary: Mapping[str, Any]) -> Table | None:
     summary : `summarize(run)`
 
     """
-    rows, places = [], []
+    rows = []
     for kind, (symbol, units, signals, _) in KINDS.items():
         for k, term in enumerate(summary['coupling_terms'][kind]):
             i, j = DOFS.index(term['to']), DOFS.index(term['from'])
             about = {'symbol': f'{symbol}_{i + 1}', 'times': signals[j], 'unit': units[i // 3]}
-            rows.append({**term, **about})
-            places.append((name, 'coupling_terms', kind, k))
+            at = name, 'coupling_terms', kind, k
+            numbers = {key: (*at, key) for key in ('coefficient', 'rms', 'max', 'share_percent')}
+            rows.append({**term, **about, **numbers})
     if not rows:
         return None
     part = 'part of the mean square of the whole deformation; those of one component add to 100 %'
@@ -452,8 +446,8 @@ def terms_table(name: str, summary: Mapping[str, Any]) -> Table | None:
         'share_percent': described('part', part, '%'),
     }
     caption = f'The pieces that add to the couplings of {name}: which motion or input causes which.'
-    where = lambda row, column: json_pointer(*places[row], column)  # noqa: E731
-    return make_table('terms', caption, rows, shown, pointer=where, stub=3)
+    results = Results('summary', {name: summary})
+    return document_table(results, 'terms', caption, rows, shown, stub=3)
 
 
 def _linear(row: np.ndarray, signals: list[str]) -> str:

@@ -1,9 +1,8 @@
 """Certificates of arrays and of whole runs, without blocks: what the library's are held against."""
 
-import numpy as np
-
 from auv_analysis.metrics.certificate import LAWS, certificate, integral_of
-from auv_analysis.metrics.lyapunov import summary_of
+from auv_analysis.metrics.lyapunov import lyapunov
+from auv_analysis.runs.run import Run
 from auv_gvc_controller.laws.law import make_gains
 
 
@@ -20,12 +19,11 @@ def lyapunov_summary(
     t, nu, nu_d, z, F, f, law, gains, model, *, kinds, sensors=False, actuators=False, sampled=False
 ):
     """Figures of the certificate of arrays as `certificate` takes them; None: not known."""
-    found = []
-    if law in LAWS and gains is not None:
-        unknown = np.full(np.shape(nu), np.nan)
-        z, known_F = unknown if z is None else z, unknown if F is None else F
-        found = [certificate(t, nu, nu_d, z, known_F, f, law, gains, model)]
-    return summary_of(
-        lambda: iter(found), float(t[0]), law, gains, model, knows_F=F is not None, kinds=kinds,
-        sensors=sensors, actuators=actuators, sampled=sampled,
+    run = Run(
+        vehicle=None, scenario='', controller='', law=law, step=0.01, source='', kinds=kinds,
+        gains=gains._asdict() if gains and law in LAWS else {},
+        hold='zoh' if sampled else 'continuous', t=t, eta=nu, nu=nu, nu_d=nu_d, nu_d_dot=nu_d,
+        tau=nu, disturbance=F, disturbance_estimate=f, law_state=z,
+        measured=nu if sensors else None, applied=nu if actuators else None,
     )  # fmt: skip
+    return lyapunov(run, model)

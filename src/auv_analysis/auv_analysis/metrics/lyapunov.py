@@ -1,6 +1,6 @@
 """The Lyapunov certificate as figures of a run: whether it applies, and what it says."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,6 @@ from auv_analysis.metrics.certificate import (
     LAWS,
     ROUNDING,
     SHARES,
-    Certificate,
     Form,
     as_figures,
     certificate_blocks,
@@ -90,66 +89,22 @@ def lyapunov(run: AnyRun, model: ControlModel) -> dict[str, Any]:
 
     """
     gains = make_gains(run.law, run.gains) if run.gains else None
-    return summary_of(
-        lambda: certificate_blocks(run, model),
-        run.start,
-        run.law,
-        gains,
-        model,
-        knows_F=run.knows_disturbance,
-        kinds=run.kinds,
-        sensors=run.sensing,
-        actuators=run.acting,
-        sampled=run.hold == 'zoh',
-        gaps=len(run.gaps),
-        whole=run.knows_wrench and not run.unknown,
-    )
-
-
-def summary_of(
-    found: Callable[[], Iterator[Certificate]],
-    start: float,
-    law: str,
-    gains: Any,
-    model: ControlModel,
-    *,
-    knows_F: bool,
-    kinds: Collection[str] | None,
-    sensors: bool,
-    actuators: bool,
-    sampled: bool,
-    gaps: int = 0,
-    whole: bool = True,
-) -> dict[str, Any]:
-    """The same from the certificates of consecutive blocks, and what is known of their run.
-
-    Parameters
-    ----------
-    found : goes through the certificates from the beginning
-    start : time of the first sample, s
-    law, gains, model : name, named tuple or None, and what the law knows of the vehicle
-    knows_F, kinds : whether F is known; kinds of disturbance, None where not known
-    sensors, actuators : the law does not see the true velocity; its wrench is not the one applied
-    sampled : zero-order hold
-    gaps : number of times without samples
-    whole : whether all velocities and the wrench were recorded
-
-    """
+    sensing, acting, whole = run.sensing, run.acting, run.knows_wrench and not run.unknown
     reasons = [
-        applicability(law, gains, model),
-        _against_15(knows_F, kinds),
-        'the law does not see the true velocity, so that (26) is not L_dot' if sensors else '',
+        applicability(run.law, gains, model),
+        _against_15(run.knows_disturbance, run.kinds),
+        'the law does not see the true velocity, so that (26) is not L_dot' if sensing else '',
         '' if whole else 'not all velocities and the wrench were recorded',
-        'the run has gaps, across which nothing has a rate' if gaps else '',
-        'the wrench applied is not that of the law, so that (26) is not L_dot' if actuators else '',
+        'the run has gaps, across which nothing has a rate' if run.gaps else '',
+        'the wrench applied is not that of the law, so that (26) is not L_dot' if acting else '',
     ]
     reason = '; '.join(filter(None, reasons))
     summary = {'applicable': not reason, 'reason': reason, **dict.fromkeys(FIGURES)}
-    if law in LAWS and gains is not None and not gaps and whole:
-        summary |= as_figures(found, start)
-        if sensors or actuators or _no_identity(form_of(law, gains, model)):
+    if run.law in LAWS and gains is not None and not run.gaps and whole:
+        summary |= as_figures(lambda: certificate_blocks(run, model), run.start)
+        if sensing or acting or _no_identity(form_of(run.law, gains, model)):
             summary |= dict.fromkeys(SHARES)
-    return summary | {'sampled': sampled}
+    return summary | {'sampled': run.hold == 'zoh'}
 
 
 def _against_15(known: bool, kinds: Collection[str] | None) -> str:

@@ -9,11 +9,10 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from auv_analysis.cli.arguments import add_no_report, add_results, import_law
+from auv_analysis.cli.arguments import add_no_report, add_results, add_topics, import_law, topic_map
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
-    from auv_analysis.bag.foreign_topics import TopicMap
     from auv_analysis.output.folder import ResultsFolder
     from auv_analysis.studies.compare.sources import RunSource
 
@@ -33,14 +32,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add_no_report(command)
     text = 'own law that results may name, as its code may run; may be repeated'
     command.add_argument('--law', metavar='MODULE:CLASS', action='append', help=text)
-    group = command.add_argument_group('bags of other systems')
-    group.add_argument('--map', metavar='FILE', help='mapping file; options replace its keys')
-    group.add_argument('--odom', dest='odometry', metavar='TOPIC', help='nav_msgs/Odometry')
-    group.add_argument('--wrench', metavar='TOPIC', help='the commanded WrenchStamped or Wrench')
+    group = add_topics(command)
     group.add_argument('--setpoint', metavar='TOPIC', help='TwistStamped, Twist or Odometry')
-    group.add_argument('--frames', choices=('ned_fsd', 'enu_flu'), help='axes of all topics')
-    text = 'axes in which the odometry writes the velocity, default: child'
-    group.add_argument('--twist-frame', choices=('child', 'world'), help=text)
     text = 'resampling period, default: the median period of the velocity'
     group.add_argument('--step', type=float, metavar='S', help=text)
     group.add_argument('--gap', type=float, metavar='S', help='longer pauses are gaps, s')
@@ -65,21 +58,11 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         return explore(Path(sweeps[0]), **chosen)
     for law in options.law or ():
         import_law(law)
-    mapping = _mapping(options)
+    mapping = topic_map(options, options.vehicle)
     sources = sources_of(options.results, mapping, options.namespace)
     if options.out:
         check_free(options.out, overwrite=options.overwrite)
     return _few(sources, options) if len(sources) <= FEW else _many(sources, options)
-
-
-def _mapping(options: argparse.Namespace) -> TopicMap | None:
-    """What is told of bags of other systems; None where nothing is."""
-    from auv_analysis.bag.foreign_topics import OPTIONS, read_mapping
-
-    given = {key: getattr(options, key) for key in OPTIONS}
-    if options.map is None and all(value is None for value in given.values()):
-        return None
-    return read_mapping(options.map, given | {'vehicle': options.vehicle})
 
 
 def _few(sources: Sequence[RunSource], options: argparse.Namespace) -> dict[str, Any]:

@@ -6,7 +6,10 @@ import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from auv_analysis.bag.foreign_topics import TopicMap
 
 NAMES = 15  # columns of the names of commands in the help
 SCENARIO = 'a scenario file, or the bare name of a shipped one'
@@ -187,6 +190,28 @@ def add_scenario(command: argparse.ArgumentParser) -> None:
     add_results(command)
     command.add_argument('scenario', help=SCENARIO)
     command.add_argument('--controller', action='append', help='only this one; may be repeated')
+
+
+def add_topics(command: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+    """What a bag of another system does not say of itself; the group, for more of that."""
+    group = command.add_argument_group('bags of other systems')
+    group.add_argument('--map', metavar='FILE', help='mapping file; options replace its keys')
+    group.add_argument('--odom', dest='odometry', metavar='TOPIC', help='nav_msgs/Odometry')
+    group.add_argument('--wrench', metavar='TOPIC', help='the commanded WrenchStamped or Wrench')
+    group.add_argument('--frames', choices=('ned_fsd', 'enu_flu'), help='axes of all topics')
+    text = 'axes in which the odometry writes the velocity, default: child'
+    group.add_argument('--twist-frame', choices=('child', 'world'), help=text)
+    return group
+
+
+def topic_map(options: argparse.Namespace, vehicle: str | None = None) -> 'TopicMap | None':
+    """What is told of bags of other systems; None where nothing is."""
+    from auv_analysis.bag.foreign_topics import OPTIONS, read_mapping
+
+    given = {key: getattr(options, key, None) for key in OPTIONS}
+    if options.map is None and all(value is None for value in given.values()):
+        return None
+    return read_mapping(options.map, given | {'vehicle': vehicle})
 
 
 def add_graph(command: argparse.ArgumentParser, when: str = '') -> None:

@@ -7,11 +7,11 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from auv_analysis.cli import arguments
 from auv_analysis.cli.arguments import VEHICLE, add_no_report, add_results, number, refused, whole
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
-    from auv_analysis.bag.foreign_topics import TopicMap
     from auv_analysis.studies.identify.record import Record
     from auv_dynamics.vehicle.vehicle import Vehicle
 
@@ -50,13 +50,7 @@ def add_bags(command: argparse.ArgumentParser) -> None:
     text = 'what the model does not see: a share of the recordings, their last part, or a bag; '
     command.add_argument('--holdout', default='0.25', metavar='SHARE_OR_BAG',
                          help=f'{text}default: 0.25')  # fmt: skip
-    group = command.add_argument_group('bags of other systems')
-    group.add_argument('--map', metavar='FILE', help='mapping file; options replace its keys')
-    group.add_argument('--odom', dest='odometry', metavar='TOPIC', help='nav_msgs/Odometry')
-    group.add_argument('--wrench', metavar='TOPIC', help='the commanded WrenchStamped or Wrench')
-    group.add_argument('--frames', choices=('ned_fsd', 'enu_flu'), help='axes of all topics')
-    text = 'axes in which the odometry writes the velocity, default: child'
-    group.add_argument('--twist-frame', choices=('child', 'world'), help=text)
+    arguments.add_topics(command)
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -155,7 +149,7 @@ def _recordings(
     from auv_analysis.studies.identify.identify import split
     from auv_analysis.studies.identify.plausibility import check_rates
 
-    mapping = _mapping(options)
+    mapping = arguments.topic_map(options)
 
     def records(bag: Path) -> list[Record]:
         found = read_records(bag, vehicle, mapping, applied=options.applied, notes=notes)
@@ -175,16 +169,6 @@ def _recordings(
         return every, other
     both = on_one_step([*every, *other])
     return both[: len(every)], both[len(every) :]
-
-
-def _mapping(options: argparse.Namespace) -> TopicMap | None:
-    from auv_analysis.bag.foreign_topics import read_mapping
-
-    keys = ('odometry', 'wrench', 'frames', 'twist_frame')
-    given = {key: getattr(options, key) for key in keys}
-    if options.map is None and all(value is None for value in given.values()):
-        return None
-    return read_mapping(options.map, given)
 
 
 def _believed(file: str | None) -> dict[str, tuple[float, float]]:

@@ -256,6 +256,12 @@ def _check_path(campaign: Campaign, path: str) -> None:
         raise InputError(path, '', expected, str(parts[1]))
 
 
+def concerns(path: str, controller: str) -> bool:
+    """Whether what varies at a path of a campaign affects a controller's loop."""
+    parts = split(path)
+    return parts[0] != 'controllers' or parts[1] in ('*', controller)
+
+
 def of_controller(path: str, controller: str) -> str:
     """Path of a campaign as it reads for one controller: `controllers.*` is each of them."""
     if not path.startswith(EVERY):

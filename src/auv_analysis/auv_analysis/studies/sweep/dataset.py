@@ -16,7 +16,8 @@ from pyarrow import parquet
 from auv_analysis.output.arrow import pa
 from auv_analysis.output.folder import PART, ROLLOUTS, SWEEP
 from auv_analysis.output.text import plain
-from auv_analysis.scenario.changes import said_of, split
+from auv_analysis.scenario.changes import said_of
+from auv_analysis.studies.sweep.campaign import concerns, of_controller
 from auv_analysis.studies.sweep.variation import kind_of
 from auv_dynamics.files.errors import InputError, first_line, reason, shorten
 
@@ -260,8 +261,7 @@ class Factor:
 
     def concerns(self, controller: str) -> bool:
         """Whether it affects this controller."""
-        parts = split(self.path)
-        return parts[0] != 'controllers' or parts[1] in ('*', controller)
+        return concerns(self.path, controller)
 
 
 def factors_of(sweep: Sweep) -> list[Factor]:
@@ -288,11 +288,9 @@ def _small(codes: np.ndarray) -> np.ndarray:
 
 
 def _said(sweep: Sweep, path: str) -> tuple[str, str]:
-    named, every = path, 'controllers.*.'
-    if path.startswith(every):
-        named = f"controllers.'{sweep.controllers[0]}'.{path.removeprefix(every)}"
     vehicles = list(sweep.manifest.get('vehicles', {}).values())
-    return said_of(sweep.manifest.get('scenario', {}), (vehicles or [{}])[0], named)
+    scenario, named = sweep.manifest.get('scenario', {}), of_controller(path, sweep.controllers[0])
+    return said_of(scenario, (vehicles or [{}])[0], named)
 
 
 def _groups(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:

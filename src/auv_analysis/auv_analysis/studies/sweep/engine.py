@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.output.arrow import pa
-from auv_analysis.scenario.changes import VEHICLE, split
+from auv_analysis.scenario.changes import VEHICLE
 from auv_analysis.scenario.scenario import Scenario, scenario_from
-from auv_analysis.studies.sweep.campaign import Campaign, of_controller
+from auv_analysis.studies.sweep.campaign import Campaign, concerns, of_controller
 from auv_analysis.studies.sweep.folder import SweepFolder, versions
 from auv_analysis.studies.sweep.variation import Values, take
 from auv_dynamics.files.errors import FailedError, InputError, first_line
@@ -106,7 +106,7 @@ def _figures(
     varied = {
         of_controller(path, controller): values
         for path, values in changes.items()
-        if path != VEHICLE and not _of_another(path, controller)
+        if path != VEHICLE and concerns(path, controller)
     }
     vehicles = np.array(changes.get(VEHICLE, [''] * len(seeds)))
     parts, order = [], []
@@ -120,12 +120,6 @@ def _figures(
         return parts[0]
     back = np.argsort(np.concatenate(order))
     return {key: np.concatenate([part[key] for part in parts])[back] for key in parts[0]}
-
-
-def _of_another(path: str, controller: str) -> bool:
-    """Whether a path is that of another controller, which has no say in this one's loop."""
-    parts = split(path)
-    return parts[0] == 'controllers' and parts[1] not in ('*', controller)
 
 
 def table_of(

@@ -9,7 +9,8 @@ from mcap_ros2.reader import read_ros2_messages
 from measure import Measured, interleaved, speed
 from rosbags.highlevel import AnyReader
 
-from auv_analysis.bag import bag_files, read_bag
+from auv_analysis.bag.metadata import bag_files
+from auv_analysis.bag.reading import read_bag
 
 FEW = 2_000  # steps of 8 messages each, for those that decode message by message
 

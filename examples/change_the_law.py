@@ -12,7 +12,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from auv_analysis.bag import load_run
+from auv_analysis import load_run
 from auv_analysis.graph.experiment import PACKAGES, environment, write_inputs
 from auv_analysis.graph.node_parameters import (
     CONTROLLER,

@@ -119,7 +119,7 @@ def try_scenario(text: bytes) -> str:
 
 def try_bag(data: bytes) -> str:
     """A bag: read whole and in blocks, listed, played, analysed, recovered."""
-    from auv_analysis.bag import load_run, open_bag
+    from auv_analysis.bag.load import load_run, open_bag
 
     with playground() as folder:
         bag = folder / 'bag'

@@ -18,7 +18,7 @@ from helpers.node_processes import GAINS, Peer, fresh_domain, parameters, start_
 from helpers.patience import patience
 from scramble import SPECIAL, scrambled
 
-from auv_analysis.bag import read_bag
+from auv_analysis.bag.reading import read_bag
 from auv_dynamics.nodes.frame_converter_node import ENU_FLU
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import ROS_FRAMES, Frames, wrench_of

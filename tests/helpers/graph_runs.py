@@ -25,7 +25,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.bag import load_run
+from auv_analysis.bag.load import load_run
 from auv_analysis.runs.run import Run
 
 ENOUGH = 150_000  # bytes of a bag in which there are steps

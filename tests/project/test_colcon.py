@@ -10,7 +10,7 @@ import pytest
 from helpers.graph_runs import SIGNALS
 from helpers.node_processes import fresh_domain, installed_auv
 
-from auv_analysis.bag import load_run
+from auv_analysis.bag.load import load_run
 
 pytestmark = pytest.mark.long  # builds the workspace and compiles the kernels in it
 

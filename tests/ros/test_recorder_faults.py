@@ -17,7 +17,7 @@ from helpers.disks import no_more_files, small_disk
 from helpers.needs import need
 from helpers.node_processes import assert_one_line, graph, parameters, run_node, stop
 
-from auv_analysis.bag import read_bag
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.recover import recover
 from auv_dynamics.ros import convert, topics
 from auv_dynamics.ros.interface import Frames, nanoseconds

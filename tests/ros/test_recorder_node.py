@@ -31,9 +31,9 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Header, String
 
-from auv_analysis.bag import read_bag
 from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.mcap_file import McapFile
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.nodes import recorder, recorder_node
 from auv_analysis.nodes.recorder_node import (
     LostStepError,

@@ -9,7 +9,7 @@ from helpers.node_processes import assert_one_line, graph, parameters, run_node,
 from helpers.played_bags import STEP, ended, made, playing, process, steps_of, there
 from std_srvs.srv import Trigger
 
-from auv_analysis.bag import read_bag
+from auv_analysis.bag.reading import read_bag
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.interface import nanoseconds
 from auv_dynamics.ros.topics import Topic

@@ -32,7 +32,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from auv_analysis.bag import read_bag
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.step_topics import ODOMETRY
 from auv_analysis.nodes.replay_node import ReplayNode
 from auv_analysis.nodes.replay_publishers import WINDOW

@@ -16,7 +16,8 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import GetState
 from std_srvs.srv import SetBool, Trigger
 
-from auv_analysis.bag import load_run, read_bag
+from auv_analysis.bag.load import load_run
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.scenario.scenario import load_scenario
 from auv_dynamics.ros import topics

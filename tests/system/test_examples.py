@@ -13,7 +13,7 @@ from helpers.needs import needing
 from helpers.node_processes import auv, fresh_domain
 from helpers.patience import patience
 
-from auv_analysis.bag import load_run
+from auv_analysis.bag.load import load_run
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'examples'
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}

@@ -13,7 +13,7 @@ from helpers.node_processes import environment, fresh_domain
 from helpers.patience import patience
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.bag import load_run
+from auv_analysis.bag.load import load_run
 from auv_analysis.graph.supervisor import executable
 
 SCENARIO = """

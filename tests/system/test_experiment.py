@@ -23,7 +23,8 @@ from helpers.node_processes import auv, fresh_domain, installed_auv
 from helpers.patience import patience
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.bag import load_run, read_bag
+from auv_analysis.bag.load import load_run
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.output.folder import results_folder
 from auv_dynamics.files.errors import ENDING
 from auv_dynamics.ros import interface

@@ -14,7 +14,8 @@ from helpers.graph_runs import assert_same, both
 from helpers.node_processes import fresh_domain
 from helpers.report_pages import Page
 
-from auv_analysis.bag import load_run, read_bag
+from auv_analysis.bag.load import load_run
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.cli.main import main
 from auv_analysis.graph import recorded_runs
 from auv_analysis.metrics.fault_response import FILE, responses

@@ -18,9 +18,10 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from auv_analysis.bag import bag_files, load_run, read_bag
-from auv_analysis.bag.metadata import Definition
+from auv_analysis.bag.load import load_run
+from auv_analysis.bag.metadata import Definition, bag_files
 from auv_analysis.bag.output import Storage
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.writer import BagWriter
 from auv_dynamics.ros import interface
 

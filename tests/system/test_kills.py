@@ -18,7 +18,7 @@ from helpers.graph_runs import long_run, nodes
 from helpers.node_processes import Peer, auv, fresh_domain, start_auv
 from helpers.patience import patience
 
-from auv_analysis.bag import load_run
+from auv_analysis.bag.load import load_run
 from auv_analysis.graph.experiment import COMPOSED, PACKAGES
 from auv_dynamics.ros import interface, topics
 

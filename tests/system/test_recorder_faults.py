@@ -22,7 +22,8 @@ from helpers.needs import need
 from helpers.node_processes import auv
 from helpers.patience import patience
 
-from auv_analysis.bag import load_run, read_bag
+from auv_analysis.bag.load import load_run
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.graph.supervisor import NodeDiedError, Supervisor
 from auv_dynamics.ros import interface
 

@@ -33,7 +33,7 @@ from helpers.played_bags import ended, made, there
 from lifecycle_msgs.msg import Transition
 
 from auv_analysis import load_scenario
-from auv_analysis.bag import load_run
+from auv_analysis.bag.load import load_run
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.replay.compared import reproduction
 from auv_analysis.replay.open_loop import open_loop, recorded_loop

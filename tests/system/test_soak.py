@@ -31,7 +31,7 @@ from helpers.node_processes import auv
 from helpers.patience import patience
 
 from auv_analysis import load_scenario
-from auv_analysis.bag import read_bag
+from auv_analysis.bag.reading import read_bag
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.codec import first_stamp
 from auv_dynamics.vehicle import DOFS

@@ -12,7 +12,8 @@ from helpers.node_processes import auv
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, simulate
-from auv_analysis.bag import load_run, read_bag
+from auv_analysis.bag.load import load_run
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.runs.run import Run
 from auv_dynamics.ros import interface
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from auv_dynamics.files.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from auv_analysis.bag import load_run, open_bag
+    from auv_analysis.bag.load import load_run, open_bag
     from auv_analysis.metrics.summary import summarize
     from auv_analysis.runs.run import Run
     from auv_analysis.scenario.scenario import load_scenario
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 _HOME = {
     'linearize': 'auv_analysis.studies.linearize.linearize',
-    'load_run': 'auv_analysis.bag',
-    'open_bag': 'auv_analysis.bag',
+    'load_run': 'auv_analysis.bag.load',
+    'open_bag': 'auv_analysis.bag.load',
     'Run': 'auv_analysis.runs.run',
     'load_scenario': 'auv_analysis.scenario.scenario',
     'open_loop': 'auv_analysis.simulation.open_loop',

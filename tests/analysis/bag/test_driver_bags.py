@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from auv_analysis import load_scenario
-from auv_analysis.bag import load_run, open_bag, read_bag
+from auv_analysis.bag.load import load_run, open_bag
 from auv_analysis.bag.metadata import RECORDING, recording_text
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.nodes.recorder_node import StepLedger
 from auv_analysis.runs.run import Run, joined
 from auv_dynamics.files.errors import InputError

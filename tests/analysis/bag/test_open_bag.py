@@ -16,7 +16,8 @@ from made_bags import make_bag
 from numpy.testing import assert_allclose
 
 from auv_analysis import load_scenario, summarize
-from auv_analysis.bag import load, load_run, open_bag
+from auv_analysis.bag import load
+from auv_analysis.bag.load import load_run, open_bag
 from auv_analysis.bag.reading import slices
 from auv_analysis.report.digest import digest
 from auv_analysis.runs.run import Run, joined

@@ -22,7 +22,8 @@ from helpers.strategies import examples
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
-from auv_analysis.bag import BagContents, read_bag, step_topics
+from auv_analysis.bag import step_topics
+from auv_analysis.bag.reading import BagContents, read_bag
 from auv_dynamics.files.errors import InputError
 
 STEP = 10_000_000

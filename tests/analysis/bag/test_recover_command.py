@@ -25,10 +25,10 @@ from helpers.damaged_bags import (
 from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk
 
-from auv_analysis.bag import read_bag
 from auv_analysis.bag import recover as recovery
 from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.output import Storage
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.recover import recover
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli.main import main

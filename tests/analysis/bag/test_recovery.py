@@ -26,7 +26,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import Message
 from mcap.writer import Writer
 
-from auv_analysis.bag import read_bag
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.recover import recover
 from auv_dynamics.files.errors import FailedError, InputError
 

@@ -17,10 +17,12 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Message, Schema
 
 from auv_analysis import load_scenario
-from auv_analysis.bag import attachments, limits, load_run, mcap_file, metadata, read_bag
+from auv_analysis.bag import attachments, limits, mcap_file, metadata
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.chunks import Body
+from auv_analysis.bag.load import load_run
 from auv_analysis.bag.metadata import Definition
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli.main import main
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file

@@ -19,10 +19,11 @@ from helpers.damaged_bags import (
 from helpers.made_messages import STRING, TYPES, serialized
 from helpers.patience import patience
 
-from auv_analysis.bag import output, read_bag
+from auv_analysis.bag import output
 from auv_analysis.bag import writer as writer_module
 from auv_analysis.bag.metadata import Definition
 from auv_analysis.bag.output import LEAST_SIZE, Storage
+from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.recover import recover
 from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import BagWriter, RecordingError

@@ -12,7 +12,7 @@ from helpers.mavlink_relay import EXAMPLE, fork_program, free_port
 from helpers.node_processes import PATIENCE, Peer, auv, fresh_domain, parameters, start_node, stop
 from numpy.testing import assert_array_equal
 
-from auv_analysis.bag import load_run, open_bag
+from auv_analysis.bag.load import load_run, open_bag
 from auv_analysis.cli.main import main
 from auv_analysis.runs.run import joined
 from auv_dynamics.ros import interface, topics

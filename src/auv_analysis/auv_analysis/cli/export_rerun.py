@@ -15,7 +15,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Write a bag as a file for the rerun viewer."""
-    from auv_analysis.bag import open_bag
+    from auv_analysis.bag.load import open_bag
     from auv_analysis.output.new_files import check_file
     from auv_analysis.report.rerun_export import export, library
     from auv_dynamics.files.errors import printable

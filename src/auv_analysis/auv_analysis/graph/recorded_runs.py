@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from rich.progress import Progress, TaskID
 
-from auv_analysis.bag import open_bag
+from auv_analysis.bag.load import open_bag
 from auv_analysis.graph.domain import VARIABLE
 from auv_analysis.graph.experiment import MODULES, environment, run_controller
 from auv_analysis.graph.fork_server import ForkServer

@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
-from auv_analysis.bag import open_bag
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.foreign_topics import TopicMap, other_odometries, with_candidates
-from auv_analysis.bag.load import Recording
+from auv_analysis.bag.load import Recording, open_bag
 from auv_analysis.bag.metadata import OTHERS, files_of, is_csv, is_mcap
 from auv_analysis.bag.step_topics import NotOursError
 from auv_analysis.output.folder import SWEEP

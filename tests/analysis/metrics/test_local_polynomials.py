@@ -89,6 +89,6 @@ def test_residuals_tell_the_variance_of_noise_whatever_moves_slowly() -> None:
 
 def test_a_value_is_that_of_the_fitted_polynomial() -> None:
     t = np.array([0.0, 0.1, 0.25, 0.3, 0.5, 0.55, 0.7, 0.9, 1.0])
-    (w,) = weights(t, np.array([0.4]), np.array([0]), 9, 3, rate=False)
+    (w,) = weights(t, np.array([0.4]), np.arange(9)[None], 3, rate=False)
     expected = np.polyval(np.polyfit(t, np.sin(5 * t), 3), 0.4)
     assert (w @ np.sin(5 * t))[0] == pytest.approx(expected, abs=1e-12)

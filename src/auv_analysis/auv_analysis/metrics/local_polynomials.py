@@ -9,7 +9,7 @@ signal passes another gain. The bias of the filter is taken to be what two order
 change, less the noise in that. What the signal may itself be off goes through the same filter.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -59,8 +59,16 @@ def nearest(times: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
     return np.where(reach[0] <= reach[1], earlier, later)
 
 
+def windows(times: np.ndarray, at: np.ndarray, count: int) -> Iterator[tuple[slice, np.ndarray]]:
+    """Slices of the times `at`, and indices (m, count) of the samples `nearest` to each of them."""
+    rows = max(AT_ONCE // count, 1)
+    for i in range(0, len(at), rows):
+        here = slice(i, i + rows)
+        yield here, nearest(times, at[here], count)[:, None] + np.arange(count)
+
+
 def weights(
-    times: np.ndarray, at: np.ndarray, first: np.ndarray, count: int, *orders: int, rate: bool
+    times: np.ndarray, at: np.ndarray, near: np.ndarray, *orders: int, rate: bool
 ) -> list[np.ndarray]:
     """Weights of the samples in the value, or the rate, of the fitted polynomials.
 
@@ -68,8 +76,7 @@ def weights(
     ----------
     times : (n,) rising, s
     at : (m,) times of interest, s
-    first : (m,) index of the first sample of each window
-    count : samples of a window, above each order
+    near : (m, count) indices of the samples of each window, more of them than each order
     orders : of the polynomials
     rate : whether the first derivative is asked for, else the value
 
@@ -78,7 +85,7 @@ def weights(
     weights : (m, count) for each order, those of a rate in 1/s
 
     """
-    window = times[first[:, None] + np.arange(count)]
+    window = times[near]
     middle = window.mean(axis=1, keepdims=True)
     scale = (window[:, -1:] - window[:, :1]) / 2.0
     V = _powers((window - middle) / scale, max(orders))
@@ -112,15 +119,12 @@ def rates(times: np.ndarray, values: np.ndarray, at: np.ndarray, count: int) -> 
     count = min(count, len(times))
     found, change = np.empty((2, len(at), values.shape[1]))
     gain, change_gain, inner_gain = np.empty((3, len(at)))
-    rows = max(AT_ONCE // count, 1)
-    for i in range(0, len(at), rows):
-        here = slice(i, i + rows)
-        first = nearest(times, at[here], count)
-        window = values[first[:, None] + np.arange(count)]
-        w, finer = weights(times, at[here], first, count, ORDER, ORDER + 2, rate=True)
+    for here, near in windows(times, at, count):
+        window = values[near]
+        w, finer = weights(times, at[here], near, ORDER, ORDER + 2, rate=True)
         more = finer - w
         # the weights of a rate sum up to zero, so that it is one of differences: by their sums
-        apart = np.diff(times[first[:, None] + np.arange(count)], axis=1)
+        apart = np.diff(times[near], axis=1)
         inner_gain[here] = ((np.cumsum(w[:, :-1], axis=1) * apart) ** 2).sum(axis=1)
         for result, squares, by in ((found, gain, w), (change, change_gain, more)):
             result[here] = np.einsum('mc,mck->mk', by, window)
@@ -135,14 +139,12 @@ def residuals(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, float]
     whatever polynomial of order 3 lies under every `SMALLEST` of them.
     """
     squares, freedom = np.zeros(values.shape[1]), 0.0
-    rows = max(AT_ONCE // SMALLEST, 1)
-    for i in range(0, len(times), rows):
-        here = np.arange(i, min(i + rows, len(times)))
-        first = nearest(times, times[here], SMALLEST)
-        (w,) = weights(times, times[here], first, SMALLEST, ORDER, rate=False)
-        smooth = np.einsum('mc,mck->mk', w, values[first[:, None] + np.arange(SMALLEST)])
+    for here, near in windows(times, times, SMALLEST):
+        (w,) = weights(times, times[here], near, ORDER, rate=False)
+        smooth = np.einsum('mc,mck->mk', w, values[near])
         squares += ((values[here] - smooth) ** 2).sum(axis=0)
-        freedom += float((1.0 - w[np.arange(len(here)), here - first]).sum())
+        own = np.arange(len(times))[here] - near[:, 0]
+        freedom += float((1.0 - w[np.arange(len(w)), own]).sum())
     return squares, freedom
 
 

@@ -7,14 +7,7 @@ from typing import Any
 import numpy as np
 
 from auv_analysis.bag.tracks import Track, between_gaps, integral
-from auv_analysis.metrics.local_polynomials import (
-    AT_ONCE,
-    ORDER,
-    SMALLEST,
-    nearest,
-    variance,
-    weights,
-)
+from auv_analysis.metrics.local_polynomials import ORDER, SMALLEST, variance, weights, windows
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.ros.interface import NANOSECONDS, WRENCH
 from auv_dynamics.vehicle.model import down
@@ -148,13 +141,9 @@ def smoothed(t: np.ndarray, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
     if len(t) < SMALLEST:
         return np.stack([np.interp(at, t, column) for column in rows.T], axis=1)
     found = np.empty((len(at), rows.shape[1]))
-    most = max(AT_ONCE // count, 1)
-    for i in range(0, len(at), most):
-        here = at[i : i + most]
-        first = nearest(t, here, count)
-        (w,) = weights(t, here, first, count, ORDER, rate=False)
-        window = rows[first[:, None] + np.arange(count)]
-        found[i : i + most] = np.einsum('mc,mck->mk', w, window)
+    for here, near in windows(t, at, count):
+        (w,) = weights(t, at[here], near, ORDER, rate=False)
+        found[here] = np.einsum('mc,mck->mk', w, rows[near])
     return found
 
 

@@ -6,9 +6,9 @@ from typing import Any
 
 from auv_analysis.bag.reading import BagContents
 from auv_analysis.scenario.fault_words import Mark, marks_of
-from auv_analysis.scenario.scenario import scenario_data
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.files.yaml_files import parse_yaml
+from auv_dynamics.files.yaml_files import check, parse_yaml
+from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import load_vehicle, vehicle_from_dict
 from auv_gvc_controller.laws.law import is_unasked, make_gains
@@ -97,8 +97,14 @@ def vehicle_of(contents: BagContents, bag: Path, vehicle: str | Path | None) -> 
 
 def faults_of(contents: BagContents, vehicle: Vehicle) -> tuple[Mark, ...]:
     """Faults of the scenario that the bag carries, none where that is not one."""
-    data = scenario_data(contents.attachments.get('scenario.yaml', ''))
-    return marks_of(data.get('faults', []), vehicle) if data else ()
+    try:
+        data = parse_yaml(
+            contents.attachments.get('scenario.yaml', ''), 'scenario.yaml', 'scenario'
+        )
+        check(data, SCHEMA, 'scenario.yaml')
+    except InputError:
+        return ()
+    return marks_of(data.get('faults', []), vehicle)
 
 
 def kinds_of(contents: BagContents, bag: Path) -> frozenset[str] | None:

@@ -12,9 +12,10 @@ import yaml
 from auv_analysis.output.text import join, plain
 from auv_analysis.runs.run import FOREIGN, RunInfo
 from auv_analysis.scenario.fault_words import Mark, marks_of
-from auv_analysis.scenario.scenario import scenario_data
-from auv_dynamics.files.yaml_files import matrix6
+from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import check, matrix6, parse_yaml
 from auv_dynamics.plant.faults import ACTING, SENSING
+from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle import DOFS
 from auv_gvc_controller.control.gains import sampling_warning
 
@@ -77,6 +78,16 @@ def set_up(runs: Mapping[str, RunInfo], summaries: Mapping[str, Any], scenario_t
     limit = (actuators or {}).get('limit')
     bounds = None if limit is None else np.broadcast_to(np.asarray(limit, float), 6)
     return SetUp(data['name'], rows, bounds, data)
+
+
+def scenario_data(text: str) -> dict[str, Any] | None:
+    """Contents of a scenario's text; None where it is not one."""
+    try:
+        data = parse_yaml(text, 'scenario', 'scenario')
+        check(data, SCHEMA, 'scenario')
+    except InputError:
+        return None
+    return data
 
 
 def sampling_warnings(runs: Mapping[str, RunInfo], summaries: Mapping[str, Any]) -> list[str]:

@@ -328,16 +328,6 @@ def load_scenario(scenario: str | Path) -> Scenario:
     return scenario_from(data, vehicle_data, path, vehicle_path, texts)
 
 
-def scenario_data(text: str) -> dict[str, Any] | None:
-    """Contents of a scenario's text; None where it is not one."""
-    try:
-        data = parse_yaml(text, 'scenario', 'scenario')
-        check(data, SCHEMA, 'scenario')
-    except InputError:
-        return None
-    return data
-
-
 def scenario_from(
     data: dict[str, Any],
     vehicle_data: dict[str, Any],

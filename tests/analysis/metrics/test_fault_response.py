@@ -52,6 +52,20 @@ def test_times_before_during_and_after(made):
     assert windows_of(first, replace(made, faults=(first, LATE))) == ((0, 0), (0, 0.5), (0.5, 1.5))
 
 
+def test_a_fault_that_follows_at_once_is_not_looked_at(made):
+    """Its interval is neither after the one nor before the other."""
+    next_one = LOST._replace(number=2, start=LOST.end, end=18.0)
+    both = replace(made, faults=(LOST, next_one))
+    assert windows_of(LOST, both)[2] == (14.0, 14.0)
+    assert windows_of(next_one, both) == ((14.0, 14.0), (14.0, 18.0), (18.0, 22.0))
+    found = {(one.mark.number, one.dof): one for one in responses(both)}
+    first, second = found[1, 'sway'], found[2, 'sway']
+    assert (first.rms[2], first.recovery, first.until) == (None, None, None)
+    assert (second.rms[0], second.until) == (None, 30.0)
+    together = LOST._replace(number=3)
+    assert windows_of(LOST, replace(made, faults=(LOST, together)))[2] == (14.0, 18.0)
+
+
 def test_errors_recovery_and_effort(made):
     found = {(one.mark.number, one.dof): one for one in responses(made)}
     sway = found[1, 'sway']

@@ -69,7 +69,7 @@ def test_a_fleet_is_the_vehicles_of_as_many_files(name, data):
     """Bit for bit, and refused where a file is."""
     file, count = FILES[name], data.draw(st.integers(1, 4))
     places = data.draw(st.lists(st.sampled_from(there(name)), unique=True, min_size=1))
-    factor = st.sampled_from([1.0, 0.5, 1.1, 3.0, -1.0, 0.0, 40.0])
+    factor = st.sampled_from([1.0, 0.5, 1.1, 3.0, -1.0, 0.0, 40.0, 1e3, 1e-3])
     columns = {
         keys: np.array([at(file, keys) * data.draw(factor) for _ in range(count)])
         for keys in places
@@ -104,6 +104,15 @@ def vehicle_or_refusal(data):
 def test_there_are_places_in_every_form():
     assert len(there('rexrov')) >= 10
     assert all(there(name) for name in FILES)
+
+
+@pytest.mark.parametrize('key', [('hydrostatics', 'volume'), ('rigid_body', 'mass')])
+def test_units_are_judged_as_in_a_file(key):
+    file = FILES['rexrov']
+    values = at(file, key) * np.array([1.0, 1e3, 1e-3])
+    _, good = fleet(file, {key: values}, vehicle_from_dict(file, 'file'), 3)
+    files = [vehicle_or_refusal(changed(file, {key: values}, i))[0] for i in range(3)]
+    assert good.tolist() == [one is not None for one in files] == [True, False, False]
 
 
 def test_whole_entries():

@@ -118,6 +118,8 @@ def test_the_columns_are_those_of_the_contract():
          'line 4: expected a time later than the line before, found 0.4'),
         (rows().replace('-0.1', 'slow', 1), 'line 3: expected 7 finite numbers, found 0.5,'),
         (rows().replace('-0.1', 'nan', 1), 'line 3: expected 7 finite numbers'),
+        (rows().replace('-0.1', '1e150', 1), 'line 3: expected 7 finite numbers, at most 1e+100'),
+        (rows().replace('-0.1', '1_0', 1), 'line 3: expected 7 finite numbers, found'),
         (rows().replace('-0.1', 'inf', 1), 'line 3: expected 7 finite numbers'),
         (rows().replace(',0.2\n', '\n', 1), 'line 3: expected 7 finite numbers'),
         (rows().replace(',0.2\n', ',0.2,9\n', 1), 'line 3: expected 7 finite numbers'),

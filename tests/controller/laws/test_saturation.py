@@ -61,6 +61,11 @@ def test_a_layer_that_is_no_positive_diagonal_is_refused(phi):
         make_gains('smc', GAINS | {'phi': phi})
 
 
+def test_a_layer_so_thin_that_the_gain_is_infinite_is_refused():
+    with pytest.raises(ValueError, match='phi: expected a width by which k_S is finite, found'):
+        make_gains('smc', GAINS | {'k_S': 1.0, 'phi': 1e-320})
+
+
 @pytest.mark.parametrize('omega_f', [0.0, -1.0, [1, 2, 3, 0, 5, 6], [1, 2, 3, 4, 5, -6]])
 def test_a_filter_that_is_not_stable_is_refused(omega_f):
     with pytest.raises(ValueError, match='omega_f: expected a positive cut-off'):

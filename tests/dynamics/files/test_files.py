@@ -19,7 +19,7 @@ from auv_analysis import load_scenario
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
-from auv_dynamics.files.yaml_files import read_yaml
+from auv_dynamics.files.yaml_files import parse_any_yaml, read_yaml, yaml_text
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 
 BOMB = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
@@ -50,6 +50,8 @@ TEXTS = {  # what it is -> text, what the line must say was found
     'bool tag on a word': ('name: !!bool perhaps\n', ''),
     'int tag on nothing': ('name: !!int ""\n', ''),
     'float tag on a word': ('name: !!float abc\n', ''),
+    'timestamp tag on a word': ('name: !!timestamp abc\n', ''),
+    'float tag on what is too large': (f'name: !!float "{":".join("1" * 400)}"\n', ''),
     'too many digits': (f'name: {"9" * 5000}\n', ''),
     'two documents': ('name: a\n---\nname: b\n', 'another document'),
     'other version': ('%YAML 9.9\n---\nname: x\n', 'version'),
@@ -104,6 +106,26 @@ def test_exponents_are_numbers(text: str, tmp_path: Path) -> None:
     path = tmp_path / 'number.yaml'
     path.write_text(f'step: {text}\n')
     assert read_yaml(path, 'scenario')['step'] == float(text)
+
+
+@pytest.mark.parametrize(
+    'word', ['1e3', '7e10', '1.5e-3', '12e0', 'on', 'null', '010', '1:30', '.5', 'x']
+)
+def test_what_is_written_reads_back(word: str) -> None:
+    """As words here, and to readers of YAML 1.1."""
+    data = {word: [word, 1e3, 1e-5, True, None], 'x': {word: word}}
+    text = yaml_text(data)
+    assert parse_any_yaml(text, 'a text') == data
+    assert yaml.safe_load(text) == data
+
+
+def test_half_a_character_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / 'half.yaml'
+    text = shipped('vehicles', 'rexrov').read_text(encoding='utf-8')
+    path.write_text(text.replace('name: rexrov', 'name: "gi\\uD800"'))
+    with pytest.raises(InputError, match='name: expected whole characters') as caught:
+        load_vehicle(path)
+    one_line(caught.value, str(path))
 
 
 def test_byte_order_mark_is_no_part_of_the_first_key(tmp_path: Path) -> None:

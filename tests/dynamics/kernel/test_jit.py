@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from helpers.needs import needing
 from helpers.patience import patience
 from numpy.testing import assert_allclose
@@ -204,3 +205,12 @@ def test_code_in_a_folder_of_somebody_else_is_neither_loaded_nor_kept(tmp_path):
     assert not list(tmp_path.glob('**/*.nb?'))
     said = f'warning: {cache}: not yours alone: compiled code is neither kept nor loaded'
     assert done.stderr.splitlines() == [said]
+
+
+@pytest.mark.parametrize(
+    ('value', 'expected'), [('', False), ('0', False), ('1', True), ('true', False)]
+)
+def test_the_switch_is_read_as_numba_reads_it(value, expected, monkeypatch):
+    monkeypatch.delitem(sys.modules, 'numba', raising=False)
+    monkeypatch.setenv(compile.SWITCH, value)
+    assert compile._switched_off() is expected

@@ -2,6 +2,7 @@
 
 import copy
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -227,3 +228,10 @@ def test_what_does_not_go_together_is_refused_in_a_line(case):
     spec, vehicle, key, expected = REFUSED[case]
     with pytest.raises(InputError, match=rf'^f: {re.escape(key)}: expected .*{expected}'):
         make_actuators({'thrusters': True, **spec}, vehicle, STEP, 'f')
+
+
+def test_a_cell_of_several_lines_is_refused_in_one(tmp_path: Path) -> None:
+    path = tmp_path / 'curve.csv'
+    path.write_text('pwm_us,thrust_n,note\n1100,-40,"a\nb"\n1500,0,c\n1900,50,d\n')
+    with pytest.raises(InputError, match=r'curve.csv: expected each row in a line, found'):
+        load_curve(str(path))

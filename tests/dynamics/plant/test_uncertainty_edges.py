@@ -52,6 +52,8 @@ def test_a_current_that_varies_needs_to_know_the_rigid_body(axis):
     waving = STEADY | {axis: WAVE}
     assert made(waving, {'kind': 'model_error', 'dD': 1.0}).current is not None
     refused(f'd[1].{axis}', 'a constant current', PUSH, waving, vehicle=WHOLE)
+    others = {one: {'offset': 0.3} for one in ('north', 'east', 'down')}
+    refused(f'd[0].{axis}', 'a constant current', {**waving, **others, axis: WAVE}, vehicle=WHOLE)
     dM = {'kind': 'model_error', 'dM': 1.0}
     refused(f'd[0].{axis}', 'a constant current beside dM', waving, dM)
     made(STEADY, dM)

@@ -4,10 +4,9 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-import yaml
-
 from auv_analysis.bag.mavlink_logs import PARAMETERS
 from auv_analysis.bag.reading import BagContents
+from auv_dynamics.files.yaml_files import yaml_text
 
 MOTOR = 33  # SERVOn_FUNCTION of motor 1
 MOTORS = {'0': 6, '1': 6, '2': 8, '3': 8, '4': 3, '5': 4, '6': 5}  # by FRAME_CONFIG
@@ -37,7 +36,7 @@ def preset(contents: BagContents) -> str:
         found |= _thrusters(contents, 'RCOU', {})
     else:
         return ''
-    return HEAD + yaml.safe_dump(found, sort_keys=False, default_flow_style=None, width=100)
+    return HEAD + yaml_text(found)
 
 
 HEAD = """# proposed for a log of ArduSub: check the curve and its voltage

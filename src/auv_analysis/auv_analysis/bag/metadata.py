@@ -10,7 +10,7 @@ import yaml
 
 from auv_analysis.output.new_files import replacing
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.files.yaml_files import parse_yaml
+from auv_dynamics.files.yaml_files import parse_yaml, yaml_text
 
 DISTRO = 'jazzy'
 BAG = 'a bag: a folder, an .mcap, a .db3 or a ROS 1 .bag file, or a .csv, .tlog or .BIN file'
@@ -233,7 +233,7 @@ def recording_text(strict: bool, names: Mapping[str, str], namespace: str = '/')
 
     """
     noted = {'strict': strict, 'namespace': namespace, 'topics': dict(names)}
-    return yaml.safe_dump(noted, sort_keys=False)
+    return yaml_text(noted, default_flow_style=False)
 
 
 def read_recording(text: str, bag: object) -> tuple[bool, dict[str, str], str | None]:

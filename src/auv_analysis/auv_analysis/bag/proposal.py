@@ -10,8 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from auv_analysis.bag.any_bag import messages
 from auv_analysis.bag.csv_logs import CSV, Span, Table, column_spans, csv_files
 from auv_analysis.bag.foreign_fields import (
@@ -30,6 +28,7 @@ from auv_analysis.bag.foreign_topics import ASKED, THRUSTING, candidates
 from auv_analysis.bag.mavlink_presets import CURVE
 from auv_analysis.bag.reading import BagContents
 from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.yaml_files import yaml_text
 from auv_dynamics.ros.interface import NANOSECONDS
 from auv_dynamics.vehicle.frames import ENU_FLU, NED_FSD, named_axes
 
@@ -379,7 +378,7 @@ def _role(role: str, shown: Sequence[tuple[dict[str, Any], str]]) -> list[str]:
     if not shown:
         lacking = {'thrusters': 'wrench or thrusters', 'setpoint': '', 'wrench': ''}.get(role, role)
         return [f'# {lacking}: no topic was found'] if lacking else []
-    flow = [yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=10**6).strip()
+    flow = [yaml_text(entry, default_flow_style=True, width=10**6).strip()
             for entry, _ in shown]  # fmt: skip
     comments = [f'    # {why}' if why else '' for _, why in shown]
     if len(flow) == 1:

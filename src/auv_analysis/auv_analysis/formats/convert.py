@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from auv_analysis.formats.derivatives import ASSIGNED, read_derivatives
 from auv_analysis.formats.imported import Choices, ImportedVehicle
@@ -14,7 +13,7 @@ from auv_analysis.formats.sdf_import import read_gazebo
 from auv_analysis.formats.uuv_urdf import read_uuv, uuv_entries
 from auv_analysis.formats.xml_parts import parse_xml
 from auv_dynamics.files.errors import InputError, printable
-from auv_dynamics.files.yaml_files import parse_yaml, read_text
+from auv_dynamics.files.yaml_files import parse_yaml, read_text, yaml_text
 
 OF_A_MESH = (
     'mass', 'center_of_gravity', 'inertia', 'units', 'axes', 'origin', 'tolerance', 'panels',
@@ -131,4 +130,4 @@ def _numbers(value: np.ndarray) -> str:
 
 def _scalar(text: Any) -> str:
     """Text as YAML writes it in one line."""
-    return yaml.safe_dump(str(text), width=10**6, allow_unicode=True).removesuffix('...\n').strip()
+    return yaml_text(str(text), width=10**6, allow_unicode=True).removesuffix('...\n').strip()

@@ -5,10 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from auv_analysis.graph.node_settings import AnalysisSettings, RecorderSettings
 from auv_analysis.scenario.scenario import Scenario
+from auv_dynamics.files.yaml_files import yaml_text
 from auv_dynamics.plant.parameters import numbers
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.settings import GraphSettings, PlantSettings, as_parameters, entries
@@ -189,5 +188,5 @@ def _controller(scenario: Scenario, anti_windup: bool, lockstep: bool) -> Contro
 def parameter_file(parameters: Mapping[str, Mapping[str, Any]], comment: str) -> str:
     """Text of a ROS parameter file; the nodes are found in any namespace."""
     data = {f'/**/{node}': {'ros__parameters': dict(v)} for node, v in parameters.items()}
-    body = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
+    body = yaml_text(data)
     return f'# {comment}\n{body}'

@@ -65,16 +65,19 @@ def windows_of(mark: Mark, run: RunInfo) -> tuple[Window, Window, Window]:
         first += TRANSIENT
     start, end = max(mark.start, first), min(mark.end, last)
     length = max(end - start, SHORTEST)
-    others = [time for other in run.faults if other != mark for time in (other.start, other.end)]
-    before = max([first, start - length, *(time for time in others if time < start)])
+    others = [other for other in run.faults if other != mark]
+    begun = [other.start for other in others if other.start < start]
+    ended = [other.end for other in others if other.end <= start]
+    before = max([first, start - length, *begun, *ended])
     return (before, start), (start, end), (end, min(end + length, next_change(mark, run)))
 
 
 def next_change(mark: Mark, run: RunInfo) -> float:
     """Time of the first begin or end of another fault behind the end of this one, or of the end."""
     last = run.start + run.duration + run.step / 2
-    others = [time for other in run.faults if other != mark for time in (other.start, other.end)]
-    return min([last, *(time for time in others if time > mark.end)])
+    others = [other for other in run.faults if other != mark]
+    begins = [other.start for other in others if other.start >= mark.end]
+    return min([last, *begins, *(other.end for other in others if other.end > mark.end)])
 
 
 def responses(run: AnyRun) -> list[FaultResponse]:

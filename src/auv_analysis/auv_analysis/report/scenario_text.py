@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import yaml
 
 from auv_analysis.output.text import join, plain
 from auv_analysis.runs.run import FOREIGN, RunInfo
 from auv_analysis.scenario.fault_words import Mark, marks_of
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.files.yaml_files import check, matrix6, parse_yaml
+from auv_dynamics.files.yaml_files import check, matrix6, parse_yaml, yaml_text
 from auv_dynamics.plant.faults import ACTING, SENSING
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle import DOFS
@@ -149,7 +148,7 @@ def _disturbances(specs: Any) -> list[str]:
 
 def _entries(spec: Mapping[str, Any]) -> str:
     """Entries of the scenario's file as they stand there, in one line."""
-    text = yaml.safe_dump(dict(spec), default_flow_style=True, sort_keys=False, width=math.inf)
+    text = yaml_text(dict(spec), default_flow_style=True, width=math.inf)
     return text.strip().removeprefix('{').removesuffix('}')
 
 

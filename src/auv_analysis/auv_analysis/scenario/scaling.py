@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from auv_dynamics.files.shipped import shipped, shipped_names
-from auv_dynamics.files.yaml_files import read_yaml
+from auv_dynamics.files.yaml_files import read_yaml, yaml_text
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 REFERENCE = 'herman2018'  # the vehicle that case1 was made for
@@ -101,7 +100,7 @@ def scenario_text(scenario: dict[str, Any]) -> str:
         speed=TOP_SPEED.get(name, 'not found in its sources'),
         **{dof: round(_peak(harmonics), 6) for dof, harmonics in scenario['setpoint'].items()},
     )
-    return comment + yaml.safe_dump(scenario, sort_keys=False, default_flow_style=None, width=200)
+    return comment + yaml_text(scenario, width=200)
 
 
 def _peak(harmonics: dict[str, Any]) -> float:

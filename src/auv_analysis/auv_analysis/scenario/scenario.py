@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from auv_analysis.output.folder import NAMES, ROLLOUTS, STAGING
 from auv_analysis.scenario.fault_words import Mark, marks_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of
 from auv_dynamics.files.shipped import shipped, shipped_by_name
-from auv_dynamics.files.yaml_files import check, parse_yaml, read_text
+from auv_dynamics.files.yaml_files import check, parse_yaml, read_text, yaml_text
 from auv_dynamics.plant.actuators import Actuators, make_actuators
 from auv_dynamics.plant.devices import SensorNoise
 from auv_dynamics.plant.faults import FaultRows, Faults, FaultSetting, make_faults
@@ -383,9 +382,7 @@ def write_inputs(scenario: Scenario, out: Path) -> dict[str, Path]:
     if 'setpoint.csv' in files:
         resolved['setpoint'] = {'file': 'setpoint.csv'}
     header = f'# {scenario.path.name} with every default filled in\n'
-    files['scenario.yaml'] = header + yaml.safe_dump(
-        resolved, sort_keys=False, default_flow_style=None, width=100
-    )
+    files['scenario.yaml'] = header + yaml_text(resolved)
     paths = {}
     for name, text in files.items():
         paths[name] = out / name

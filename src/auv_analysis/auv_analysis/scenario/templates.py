@@ -9,12 +9,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from auv_analysis.scenario.scaling import SCALE, scaled_case1
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
-from auv_dynamics.files.yaml_files import read_text, read_yaml, schema
+from auv_dynamics.files.yaml_files import read_text, read_yaml, schema, yaml_text
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle.vehicle_file import SCHEMA as VEHICLE_SCHEMA
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
@@ -135,13 +133,13 @@ def _block(line: str, value: Any, indent: str = '  ') -> Iterator[str]:
     if len(line) <= SHORT:
         yield line
     else:
-        text = yaml.safe_dump(value, sort_keys=False, default_flow_style=None, width=SHORT)
+        text = yaml_text(value, width=SHORT)
         yield from textwrap.indent(text.rstrip(), indent).split('\n')
 
 
 def _flow(value: Any) -> str:
     # in a list, which adds nothing else than its brackets
-    return yaml.safe_dump([value], default_flow_style=True, sort_keys=False, width=10**6)[1:-2]
+    return yaml_text([value], default_flow_style=True, width=10**6)[1:-2]
 
 
 STARTING = 'bluerov2_heavy'  # has thrusters and M_RB apart from M_A, so that every option applies

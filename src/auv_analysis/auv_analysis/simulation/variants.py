@@ -23,6 +23,7 @@ from auv_dynamics.plant.uncertainty import PlantModel, with_errors
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle import Vehicle, rigid_body_matrix, row_major
 from auv_dynamics.vehicle.vehicle_file import (
+    ABSURD,
     is_definite,
     is_semidefinite,
     is_symmetric,
@@ -426,6 +427,8 @@ def fleet(
         M_RB = rigid_body_matrix(mass, r_G, inertia, reference)
         M = M_RB + M_A
     linear = sign * matrices(of('damping', 'linear'))
+    density, volume = of('environment', 'water_density'), of('hydrostatics', 'volume')
+    good &= (density * volume <= ABSURD * mass) & (mass <= ABSURD * density * volume)
     gravity = of('environment', 'gravity')
     result = vehicle.changed(
         M=M,
@@ -433,7 +436,7 @@ def fleet(
         D_quadratic=sign * matrices(of('damping', 'quadratic')),
         lift=sign * matrices(of('lift')) if 'lift' in data else None,
         weight=mass * gravity,
-        buoyancy=of('environment', 'water_density') * gravity * of('hydrostatics', 'volume'),
+        buoyancy=density * gravity * volume,
         r_G=r_G,
         r_B=of('hydrostatics', 'center_of_buoyancy'),
         M_RB=M_RB,

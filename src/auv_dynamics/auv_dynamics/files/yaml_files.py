@@ -78,6 +78,33 @@ for _each in (_Loader, _FastLoader):
     _each.add_constructor('tag:yaml.org,2002:map', _unique_mapping)
 
 
+class _Dumper(yaml.SafeDumper):
+    """Quotes what is no word to the loader here, such as 1e3, or to one of YAML 1.1, such as on."""
+
+
+for _first, _entries in _Loader.yaml_implicit_resolvers.items():
+    for _tag, _pattern in _entries:
+        _Dumper.add_implicit_resolver(_tag, _pattern, [_first])
+
+
+def yaml_text(
+    data: Any,
+    *,
+    default_flow_style: bool | None = None,
+    width: float = 100,
+    allow_unicode: bool = False,
+) -> str:
+    """YAML that reads back as it is; entries in the order of `data`, options as PyYAML's."""
+    return yaml.dump(
+        data,
+        Dumper=_Dumper,
+        sort_keys=False,
+        default_flow_style=default_flow_style,
+        width=width,
+        allow_unicode=allow_unicode,
+    )
+
+
 def parse_yaml(text: str, path: object, kind: str) -> dict[str, Any]:
     """Mapping in a YAML text; InputError, which names `path`, when there is none."""
     data = parse_any_yaml(text, path)
@@ -113,7 +140,14 @@ def _parsed(text: str, path: str) -> Any:
         raise
     except RecursionError:
         raise InputError(path, '', 'valid YAML', 'too many levels') from None
-    except (yaml.YAMLError, ValueError, TypeError, LookupError) as error:
+    except (
+        yaml.YAMLError,
+        ValueError,
+        TypeError,
+        LookupError,
+        AttributeError,
+        OverflowError,
+    ) as error:
         # PyYAML's constructors of tagged scalars raise what their conversions raise
         raise InputError(path, '', 'valid YAML', first_line(error)) from None
     if not _is_small(data):
@@ -141,7 +175,7 @@ def _is_small(data: Any, levels: float = math.inf) -> bool:
 __all__ = [
     'InputError', 'check', 'dotted', 'first_line', 'matrix6', 'parse_any_yaml', 'parse_yaml',
     'read_text', 'read_yaml', 'reason', 'schema', 'shorten',
-    'validate',
+    'validate', 'yaml_text',
 ]  # fmt: skip
 LARGEST = 1e100  # products of a few such numbers are still finite
 LARGEST_FILE = 1 << 28  # bytes of a text file
@@ -298,6 +332,8 @@ def _leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any,
 def _check_finite(data: dict[str, Any], file: object) -> None:
     for path, value in _leaves(data):
         number = isinstance(value, int | float) and not isinstance(value, bool)
+        if isinstance(value, str) and any('\ud800' <= letter <= '\udfff' for letter in value):
+            raise InputError(file, dotted(path), 'whole characters', value)
         if number and not abs(value) <= LARGEST:
             huge = f', at most {LARGEST:g}' if abs(value) < float('inf') else ''
             expected = f'a finite number{huge}'

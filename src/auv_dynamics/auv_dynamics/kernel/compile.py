@@ -116,7 +116,11 @@ def _found() -> bool:
 
 def _switched_off() -> bool:
     numba = sys.modules.get('numba')
-    return bool(numba.config.DISABLE_JIT if numba else int(os.environ.get(SWITCH) or 0))
+    if numba:
+        return bool(numba.config.DISABLE_JIT)
+    with contextlib.suppress(ValueError):  # as numba takes it: what is no number is none
+        return bool(int(os.environ.get(SWITCH) or 0))
+    return False
 
 
 SWITCH = 'NUMBA_DISABLE_JIT'

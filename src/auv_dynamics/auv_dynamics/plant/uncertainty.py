@@ -191,7 +191,7 @@ def _check(
         if np.abs(dM - dM.T).max() > ASYMMETRY * np.abs(dM).max():
             raise InputError(file, f'{place}.dM', 'a symmetric matrix', 'an asymmetric one')
     if spec['kind'] == 'current' and varies(spec):
-        key = next(axis for axis in ('north', 'east', 'down') if axis in spec)
+        key = next(axis for axis in AXES if varies({axis: spec.get(axis, {})}))
         if not apart:
             expected = 'a constant current for a vehicle given by inertia_matrix'
             raise InputError(file, f'{place}.{key}', expected, 'one that varies in time')

@@ -216,6 +216,8 @@ def _parsed(text: str, path: Path, name: str) -> ThrusterCurve:
         rows = list(csv.reader(line for _, line in lines))
     except csv.Error as error:
         raise InputError(path, '', 'a CSV table', str(error)) from None
+    if len(rows) != len(lines):
+        raise InputError(path, '', 'each row in a line', 'a cell of several lines')
     header = [cell.strip() for cell in rows[0]] if rows else []
     try:
         unit, force = _columns(header)

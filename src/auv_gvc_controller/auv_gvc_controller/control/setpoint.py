@@ -10,7 +10,7 @@ import numpy as np
 
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
-from auv_dynamics.files.yaml_files import read_text
+from auv_dynamics.files.yaml_files import LARGEST, read_text
 from auv_dynamics.plant.disturbance import Harmonics
 from auv_dynamics.ros.interface import DEPTH
 from auv_dynamics.ros.settings import KEY, GridSettings, Spec, setting
@@ -125,11 +125,13 @@ def _rows(path: Path, text: str | None) -> tuple[list[int], list[list[str]]]:
 
 def _numbers(path: Path, line: int, row: list[str]) -> list[float]:
     try:
-        numbers = [float(cell) for cell in row]
+        numbers = [np.nan if '_' in cell else float(cell) for cell in row]
     except ValueError:
         numbers = [np.nan]
-    if len(numbers) != len(COLUMNS) or not np.all(np.isfinite(numbers)):
-        raise InputError(path, f'line {line}', f'{len(COLUMNS)} finite numbers', ','.join(row))
+    if len(numbers) != len(COLUMNS) or not np.all(np.abs(numbers) <= LARGEST):
+        huge = f', at most {LARGEST:g}' if np.all(np.isfinite(numbers)) else ''
+        expected = f'{len(COLUMNS)} finite numbers{huge}'
+        raise InputError(path, f'line {line}', expected, ','.join(row))
     return numbers
 
 

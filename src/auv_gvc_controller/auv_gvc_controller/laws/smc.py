@@ -83,6 +83,11 @@ class SMC(NamedTuple):
                 else 'a full matrix'
             )
             raise ValueError(f'phi: expected a positive number or 6 of them, found {found}')
+        with np.errstate(over='ignore'):
+            steepest = np.reshape(gains.k_S, (6, 6)) / np.diagonal(phi)
+        if not np.all(np.isfinite(steepest)):
+            found = f'smallest {np.diagonal(phi).min():g}'
+            raise ValueError(f'phi: expected a width by which k_S is finite, found {found}')
 
     @staticmethod
     def search(step: float) -> dict[str, Range]:

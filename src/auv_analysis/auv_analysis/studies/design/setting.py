@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from auv_analysis.output.text import join, number, plain
 from auv_analysis.runs.run import Hold, Run
@@ -17,7 +16,7 @@ from auv_analysis.simulation.simulate import simulate
 from auv_analysis.studies.design.change import ChangeSpace, disc_mass, normal_of, parts_of
 from auv_analysis.studies.design.prediction import Sizes, sizes_of
 from auv_dynamics.files.shipped import shipped
-from auv_dynamics.files.yaml_files import check, matrix6, read_text, read_yaml
+from auv_dynamics.files.yaml_files import check, matrix6, read_text, read_yaml, yaml_text
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_gvc_controller.control.sampled import is_compiled
 
@@ -58,9 +57,7 @@ def changed_data(space: ChangeSpace, x: np.ndarray, words: str = '') -> dict[str
 def changed_text(data: dict[str, Any], about: str) -> str:
     """Text of the file, every number in full; `about` lines stand in its comment."""
     comment = ''.join(f'# {line}\n' for line in about.splitlines())
-    body = yaml.safe_dump(
-        data, sort_keys=False, default_flow_style=None, width=110, allow_unicode=True
-    )
+    body = yaml_text(data, width=110, allow_unicode=True)
     return comment + body
 
 
@@ -296,6 +293,6 @@ def write_inputs(setting: Setting, x: np.ndarray | None, target: str, out: Path)
         csv = setting.scenario.attachments['setpoint.csv']
         (out / 'setpoint.csv').write_text(csv, encoding='utf-8')
     header = f'# {setting.scenario.name} with the vehicle beside it, every default filled in\n'
-    body = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
+    body = yaml_text(data)
     (out / 'scenario.yaml').write_text(header + body, encoding='utf-8')
     return load_scenario(out / 'scenario.yaml')

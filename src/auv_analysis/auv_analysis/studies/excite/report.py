@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from auv_analysis.output.progress import TextConsole
 from auv_analysis.output.text import capital, join, number
@@ -14,6 +13,7 @@ from auv_analysis.report.results import Column, Results, Shown, described, termi
 from auv_analysis.studies.excite.drive import WORDS
 from auv_analysis.studies.excite.excite import Excited
 from auv_analysis.studies.identify.identified import Identified
+from auv_dynamics.files.yaml_files import yaml_text
 from auv_dynamics.vehicle import DOFS
 
 SCENARIO, NAME = 'scenario.yaml', 'excite'
@@ -139,7 +139,7 @@ def scenario_text(found: Excited) -> str:
         f'# Written by auv excite, seed {request.seed}. Sensors and lag are those that the\n'
         '# prediction assumes; beside a vehicle they are its own.\n'
     )
-    return head + yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
+    return head + yaml_text(data)
 
 
 def print_results(results: Results, folder: Path) -> None:

@@ -13,6 +13,7 @@ from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.report import verdict
 from auv_analysis.studies.identify.unknowns import Coefficients
 from auv_dynamics.files.errors import InputError, printable
+from auv_dynamics.files.yaml_files import yaml_text
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_dynamics.vehicle.vehicle_file import is_semidefinite, vehicle_from_dict
 
@@ -65,7 +66,7 @@ def vehicle_text(found: Identified, data: Mapping[str, Any], name: str, source: 
         if start:
             lines += _said([row for row in rows if row['name'].startswith(start)], key)
         flow = None if isinstance(value, dict | list) else False  # lists of numbers in a line
-        text = yaml.safe_dump({key: value}, sort_keys=False, default_flow_style=flow, width=WIDTH)
+        text = yaml_text({key: value}, default_flow_style=flow, width=WIDTH)
         lines += text.rstrip().splitlines()
     return '\n'.join(lines) + '\n'
 

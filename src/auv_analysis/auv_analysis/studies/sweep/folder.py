@@ -14,8 +14,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from auv_analysis.output.folder import (
     CAMPAIGN,
     PART,
@@ -28,7 +26,7 @@ from auv_analysis.output.new_files import UNFINISHED, write
 from auv_analysis.studies.sweep.campaign import Campaign
 from auv_analysis.studies.sweep.variation import kind_of
 from auv_dynamics.files.errors import InputError
-from auv_dynamics.files.yaml_files import dotted
+from auv_dynamics.files.yaml_files import dotted, yaml_text
 from auv_dynamics.kernel.compile import JITTED, sources_digest
 
 if TYPE_CHECKING:
@@ -160,7 +158,7 @@ def _write_inputs(out: Path, campaign: Campaign) -> None:
     write_inputs(campaign.scenario, out)
     header = f'# {campaign.path.name} with every default filled in\n'
     resolved = {**campaign.data, 'scenario': 'scenario.yaml'}
-    text = yaml.safe_dump(resolved, sort_keys=False, default_flow_style=None, width=100)
+    text = yaml_text(resolved)
     write(out / CAMPAIGN, (header + text).encode())
 
 

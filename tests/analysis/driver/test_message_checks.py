@@ -6,7 +6,7 @@ from helpers.made_odometry import found_in as found_by
 from helpers.made_odometry import healthy, motion, odometry_log
 
 from auv_analysis.driver.evidence import FAIL, NOT_CHECKED, PASS, CheckResult
-from auv_analysis.driver.odometry_log import OdometryLog
+from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
 from auv_dynamics.ros.interface import Frames
 from auv_dynamics.vehicle.frames import swap_state
 
@@ -124,6 +124,17 @@ def test_speeds_and_steps_beyond_the_limits_of_the_controller_fail(
     x[50, column] += value
     found = found_by(odometry_log(x), *SPEEDS)
     assert found[id].verdict == FAIL
+
+
+def test_finite_numbers_whose_squares_are_not_fail_in_words() -> None:
+    x, frames, buffer = motion(), Frames(), OdometryBuffer()
+    x[[50, 60, 70], [7, 11, 0]] = -1e300
+    for ns, row in zip(odometry_log(x).stamp_ns.tolist(), x.tolist(), strict=True):
+        buffer.odometry(ns, ns, tuple(row), (frames.odom, frames.base), None)
+        assert np.isfinite(np.linalg.norm(buffer.recent(1)))  # what MotionGuard looks at
+    heard = buffer.log(buffer.newest[0] - 10**10, buffer.newest[0])
+    found = found_by(heard, *SPEEDS, 'twist_frame', 'angular_frame', 'axis_surge')
+    assert found['speeds'].verdict == found['jumps'].verdict == FAIL
 
 
 def test_speeds_of_a_healthy_driver_pass() -> None:

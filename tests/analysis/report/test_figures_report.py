@@ -323,8 +323,8 @@ def test_no_run_is_refused(tmp_path):
 
 
 def test_numbers_as_text():
-    assert [number(x) for x in (0.0, 11479.1, -0.51912, 528.184, None, 3.921e-5)] == [
-        '0', '11\u202f479', '−0.519', '528', '–', '3.92·10⁻⁵',
+    assert [number(x) for x in (0.0, 11479.1, -0.51912, 528.184, None, 3.921e-5, -np.inf)] == [
+        '0', '11\u202f479', '−0.519', '528', '–', '3.92·10⁻⁵', '−∞',
     ]  # fmt: skip
     assert [plain(x) for x in (12.0, 0.8, -0.025, 30000.0, 0)] == [
         '12', '0.8', '−0.025', '30\u202f000', '0',

@@ -1,7 +1,7 @@
 """Odometry as it was heard: a buffer that takes messages, a log of arrays that is judged."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,7 +9,14 @@ import numpy as np
 from auv_dynamics.ros.interface import NANOSECONDS
 
 NONE = np.zeros(0, np.int64)
+HUGE = 1e30  # no vehicle's, and powers and sums of it are finite
 State = tuple[float, ...]
+
+
+def _states(rows: Iterable[State]) -> np.ndarray:
+    """States (n, 13) with finite numbers within HUGE."""
+    x = np.array([*rows], float).reshape(-1, 13)
+    return np.clip(x, -HUGE, HUGE, out=x, where=np.isfinite(x))
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +27,8 @@ class OdometryLog:
     ----------
     began_ns, ended_ns : the window, of this machine's clock
     arrived_ns, stamp_ns : (n,) time of arrival by that clock, and header.stamp
-    x : (n, 13) position in m, quaternion w, x, y, z, velocity in m/s and rad/s, as they were sent
+    x : (n, 13) position in m, quaternion w, x, y, z, velocity in m/s and rad/s, as they were sent,
+        but finite numbers within HUGE
     frames : (header.frame_id, child_frame_id) -> in how many messages
     lost : messages that were numbered but did not arrive
     unreadable : topic -> how many messages were none of its type
@@ -75,7 +83,7 @@ class OdometryBuffer:
 
     def recent(self, count: int) -> np.ndarray:
         """States (up to count, 13) of the last messages."""
-        return np.array([row[2] for row in self._odometry[-count:]], float).reshape(-1, 13)
+        return _states(row[2] for row in self._odometry[-count:])
 
     def odometry(
         self,
@@ -118,7 +126,7 @@ class OdometryBuffer:
             ended_ns,
             np.array(arrived, np.int64),
             np.array(stamps, np.int64),
-            np.array(states, float).reshape(-1, 13),
+            _states(states),
             dict(self._frames),
             self._lost,
             clock[:, 0],

@@ -30,6 +30,8 @@ def number(value: Any, digits: int = 3) -> str:
     value = float(value)
     if value == 0.0:
         return '0'
+    if math.isinf(value):
+        return '∞' if value > 0 else '−∞'
     mantissa, exponent = f'{value:.{digits - 1}e}'.split('e')
     power = int(exponent)
     if power < -4 or power > 6:

@@ -16,8 +16,8 @@ from auv_analysis.driver.evidence import (
     Settings,
 )
 from auv_analysis.driver.excitation import carry_out
-from auv_analysis.driver.plan import PULSE, Plan, plan_of
-from auv_analysis.driver.response import predicted
+from auv_analysis.driver.plan import LEVEL, PULSE, ZERO, Plan, plan_of
+from auv_analysis.driver.response import Noise, fit_response, predicted
 from auv_dynamics import Vehicle, load_vehicle
 from auv_dynamics.vehicle import DOFS
 
@@ -180,6 +180,22 @@ def test_what_fits_both_signs_is_undecided(sign: float) -> None:
         assert 'undecided: both signs fit' in one.found
         assert 'reversed' not in one.advice
     assert found['response_delay'].verdict == NOT_CHECKED
+
+
+def test_the_other_sign_is_tried_as_late_whatever_the_pulse() -> None:
+    """The model's own response, 0.95 s late: of 0.5 s pulses it was called reversed."""
+    vehicle, pulse, sigma = load_vehicle('bluerov2_heavy'), 0.5, 3e-3
+    for trial in plan_of(vehicle, ('roll', 'pitch', 'yaw'), 0.1, None, None, 0.5).trials[:-1]:
+        assert trial.pulse == pulse
+        back = tuple(-number for number in trial.tau)
+        held = [(i * pulse, (i + 1) * pulse, tau) for i, tau in enumerate((ZERO, trial.tau, back))]
+        held.append((3 * pulse, 4 * pulse, ZERO))
+        model, t = predicted(vehicle, LEVEL, held), np.arange(0.0, 4 * pulse, 0.02)
+        nu = np.random.default_rng(0).normal(0.0, sigma, (len(t), 6))
+        nu[:, trial.axis] += np.interp(t - 0.95, model.t, model.added[:, trial.axis])
+        noise = Noise(np.full(6, sigma**2), np.ones(6))
+        found = fit_response(vehicle, LEVEL, held, t, nu, trial.axis, noise, pulse / 2)
+        assert found.sign == 0, trial.dof
 
 
 def test_the_delay_is_measured_and_what_to_do_with_it_is_said() -> None:

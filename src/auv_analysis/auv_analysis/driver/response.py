@@ -17,7 +17,7 @@ Wrench = tuple[float, ...]
 Held = Sequence[tuple[float, float, Wrench]]  # begin and end in s of each wrench
 
 STEPS, FINER = 0.02, 4  # s between two values of a prediction, and steps between them
-OPPOSED = 3.0  # times as late may the other sign be that has to fit worse
+OPPOSED = 1.5  # s that the other sign may be late that has to fit worse
 FINE = 0.01  # s between two delays that are tried
 ALIKE = 1e-6  # of the largest: terms that are as much alike are one
 SCALES = np.array(  # inertia and damping, times the model's, under which a sign has to hold
@@ -200,7 +200,7 @@ def fit_response(
     """
     model = predicted(vehicle, x, held)
     varied = _varied(vehicle, x, held, model, axis, scales)
-    delays = np.arange(0.0, OPPOSED * latest + FINE / 2, FINE)
+    delays = np.arange(0.0, OPPOSED + FINE / 2, FINE)
     early = delays < latest + FINE / 2
     late = np.maximum(t - delays[:, None], 0.0)
     forms = make_interp_spline(varied.t, varied.added, k=1)(late)

@@ -2,6 +2,7 @@
 
 import signal
 import threading
+from itertools import groupby
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from auv_analysis.driver.excitation import (
     actuate,
     carry_out,
 )
-from auv_analysis.driver.plan import SETTLE, plan_of
+from auv_analysis.driver.plan import PULSE, REST, SETTLE, UNHEARD, plan_of
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import ENDING, on_signals
 
@@ -41,6 +42,18 @@ def test_it_begins_and_ends_with_zero_and_goes_both_ways() -> None:
     assert not rows[:, 1:5].any()
     apart = np.diff([ns for ns, _ in excitation.sent[0].steps]) / 1e9
     np.testing.assert_allclose(apart, PERIOD)
+
+
+def test_parts_end_by_the_clock_where_each_period_overruns() -> None:
+    driver, overrun = SimulatedDriver(), 0.02
+    listen = driver.listen
+    driver.listen = lambda seconds: listen(seconds + overrun)
+    surge, _, silent = sent_by(driver).sent
+    began = [next(run)[0] for _, run in groupby(surge.steps, key=lambda step: step[1])]
+    lengths = np.diff([*began, surge.ended_ns]) / 1e9
+    np.testing.assert_allclose(lengths, [SETTLE, PULSE, PULSE, REST], atol=PERIOD + overrun)
+    unheard = (silent.ended_ns - silent.steps[-1][0]) / 1e9
+    assert unheard == pytest.approx(UNHEARD, abs=2 * (PERIOD + overrun))
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ zero however it ends.
 """
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
@@ -249,15 +249,23 @@ def carry_out(
 
 def _send(client: DriverClient, guard: MotionGuard, sent: Sent) -> None:
     for tau, seconds in sent.trial.parts:
-        for _ in range(round(seconds / PERIOD)):
+        for _ in _periods(client, seconds):
             sent.steps.append((client.send(tau), tau))
             guard.look(sent.trial.speed)
-            client.listen(PERIOD)
     if sent.trial.silent:
-        for _ in range(round(UNHEARD / PERIOD)):
-            client.listen(PERIOD)
+        for _ in _periods(client, UNHEARD):
             guard.look(sent.trial.speed)
     sent.ended_ns = client.now_ns()
+
+
+def _periods(client: DriverClient, seconds: float) -> Iterator[None]:
+    """Periods of listening: they end by the clock, and by their number if it is set back."""
+    end = client.now_ns() + round(seconds * NANOSECONDS)
+    for _ in range(round(seconds / PERIOD)):
+        if (left := end - client.now_ns()) <= 0:
+            return
+        yield
+        client.listen(min(PERIOD, left / NANOSECONDS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,8 +342,7 @@ def _measured(vehicle: Vehicle, sent: Sent, log: OdometryLog, noise: Noise) -> M
     """What was heard of a trial; None where it was broken off or too little came."""
     if not sent.ended_ns:
         return None
-    steps = sent.steps[round((sent.trial.rest - REST) / PERIOD) :]
-    began = steps[0][0]
+    began = next(ns for ns, tau in sent.steps if tau != ZERO) - round(REST * NANOSECONDS)
 
     def during(ns: np.ndarray) -> np.ndarray:
         return (ns >= began) & (ns <= sent.ended_ns)
@@ -352,7 +359,10 @@ def _measured(vehicle: Vehicle, sent: Sent, log: OdometryLog, noise: Noise) -> M
     start = before[0].copy()
     start[7:] = np.median(before[:, 7:], axis=0)
     # pieces of time in which one wrench was held
-    runs = [(next(run)[0], tau) for tau, run in groupby(steps, key=lambda step: step[1])]
+    runs = [
+        (max(next(run)[0], began), tau)
+        for tau, run in groupby(sent.steps, key=lambda step: step[1])
+    ]
     ends = [*(ns for ns, _ in runs[1:]), sent.ended_ns]
     held = [(seconds(ns), seconds(end), tau) for (ns, tau), end in zip(runs, ends, strict=True)]
     acted = during(log.applied_arrived_ns)
@@ -366,5 +376,5 @@ def _measured(vehicle: Vehicle, sent: Sent, log: OdometryLog, noise: Noise) -> M
         held,
         seconds(log.applied_arrived_ns[acted]),
         log.applied[acted],
-        seconds(steps[-1][0]),
+        seconds(sent.steps[-1][0]),
     )

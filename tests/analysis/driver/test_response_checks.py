@@ -16,7 +16,7 @@ from auv_analysis.driver.evidence import (
     Settings,
 )
 from auv_analysis.driver.excitation import carry_out
-from auv_analysis.driver.plan import LEVEL, PULSE, ZERO, Plan, plan_of
+from auv_analysis.driver.plan import HELD, LEVEL, PULSE, SWING, UNHEARD, ZERO, Plan, plan_of
 from auv_analysis.driver.response import Noise, fit_response, predicted
 from auv_dynamics import Vehicle, load_vehicle
 from auv_dynamics.vehicle import DOFS
@@ -149,6 +149,16 @@ def test_the_bound_holds_on_the_model_and_caps_are_kept() -> None:
     plan: Plan = plan_of(load_vehicle('rexrov'), (), 0.1, 5.0, 2.0)
     assert {trial.size for trial in plan.trials} == {5.0, 2.0}
     assert plan.trials[-1].silent
+
+
+@pytest.mark.parametrize(('name', 'raised'), [('herman2018', 0.0), ('bluerov2_heavy', 0.5)])
+def test_the_bound_holds_whenever_a_driver_lets_go(name: str, raised: float) -> None:
+    vehicle = load_vehicle(name)
+    plan = plan_of(vehicle, ['roll'], 0.1, None, None, raised)  # swings back
+    tau = plan.trials[-1].tau
+    for end in np.linspace(HELD, HELD + UNHEARD, 11):
+        held = [(0.0, end, tau), (end, end + SWING, ZERO)]
+        assert np.abs(predicted(vehicle, LEVEL, held).added).max() <= 1.01 * plan.trials[-1].speed
 
 
 def test_axes_without_thrusters_are_left_out(approved) -> None:

@@ -20,6 +20,8 @@ LOADED = 0.05  # of a wrench: a thruster that gives less of it does not matter
 REST = 0.5  # s of zero before and after
 SETTLE = 2.0  # s of it before the first: a driver arms, and the noise at rest is measured
 HELD, UNHEARD = 0.5, 2.0  # s of a wrench, then of silence, to see whether the driver lets go
+LET_GO = 0.25  # s between two times at which a driver may let go
+SWING = 4.0  # s of zero in which a vehicle swings back
 ROUNDS = 4  # of making a wrench smaller: drag is not linear
 LEVEL = np.eye(13)[3]  # at rest, upright
 CALM = ('surge', 'sway', 'yaw', 'heave', 'roll', 'pitch')  # those first that nothing restores
@@ -192,9 +194,14 @@ def _largest(vehicle: Vehicle, trial: Trial, speed: float) -> float:
 
 
 def _fastest(vehicle: Vehicle, trial: Trial) -> float:
-    """Largest velocity of any degree of freedom by the model, m/s and rad/s."""
+    """Largest velocity of any degree of freedom by the model, m/s and rad/s.
+
+    What rights the vehicle can swing it faster on the way back, or whenever the driver lets go.
+    """
     seconds, back = trial.way, tuple(-number for number in trial.tau)
-    held = [(0.0, seconds, trial.tau)]
-    if not trial.silent:  # what rights the vehicle can swing it faster on the way back
-        held += [(seconds, 2 * seconds, back), (2 * seconds, 4 * seconds, ZERO)]
-    return float(np.abs(predicted(vehicle, LEVEL, held).added).max())
+    pulses = [[(0.0, seconds, trial.tau), (seconds, 2 * seconds, back)]]
+    if trial.silent:
+        ends = np.arange(HELD, seconds + LET_GO / 2, LET_GO)
+        pulses = [[(0.0, end, trial.tau)] for end in ends.tolist()]
+    swings = ([*held, (held[-1][1], held[-1][1] + SWING, ZERO)] for held in pulses)
+    return max(float(np.abs(predicted(vehicle, LEVEL, held).added).max()) for held in swings)

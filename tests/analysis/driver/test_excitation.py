@@ -2,6 +2,7 @@
 
 import signal
 import threading
+from contextlib import nullcontext
 from itertools import groupby
 
 import numpy as np
@@ -11,12 +12,16 @@ from helpers.simulated_driver import SimulatedDriver
 from auv_analysis.driver.excitation import (
     GOODBYE,
     PERIOD,
+    RECENT,
     TOO_FAST,
+    AbortError,
+    MotionGuard,
     StoppedError,
     actuate,
     carry_out,
 )
-from auv_analysis.driver.plan import PULSE, REST, SETTLE, UNHEARD, plan_of
+from auv_analysis.driver.odometry_log import OdometryBuffer
+from auv_analysis.driver.plan import LEVEL, PULSE, REST, SETTLE, UNHEARD, plan_of
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import ENDING, on_signals
 
@@ -78,6 +83,26 @@ def test_a_vehicle_that_moves_already_gets_nothing_but_zero() -> None:
     found = sent_by(driver)
     assert found.aborted.endswith(f'already, over {TOO_FAST * found.plan.speed:.3g}')
     assert set(driver.sent) == {ZERO}
+
+
+@pytest.mark.parametrize(
+    ('surge', 'yaw', 'word'),
+    [(0.54, 0.29, ''), (0.56, 0.0, '0.56 m/s or rad/s, more than 0.55'), (0.0, 0.31, 'than 0.3')],
+)
+def test_a_drift_is_let_pass_and_leaves_the_turning_its_limit(surge, yaw, word: str) -> None:
+    buffer = OdometryBuffer()
+
+    def heard(u: float, r: float) -> None:
+        for _ in range(RECENT):
+            buffer.odometry(0, 0, (*LEVEL[:7], u, *(4 * [0.0]), r), ('', ''), None)
+
+    driver = SimulatedDriver()
+    driver.buffer, driver.now_ns = buffer, lambda: 0
+    heard(0.25, 0.0)
+    guard = MotionGuard(driver, 0.1, 0.5, lambda: False)
+    heard(surge, yaw)
+    with pytest.raises(AbortError, match=word) if word else nullcontext():
+        guard.look(0.1)
 
 
 def test_a_wrench_above_a_dead_band_leaves_the_others_their_speed() -> None:

@@ -117,7 +117,7 @@ def test_a_late_answer_is_told() -> None:
 
 
 def test_noise_that_hides_the_answer_gives_no_verdict() -> None:
-    found = judge(SimulatedDriver(noise=0.2), 'surge')
+    found = judge(SimulatedDriver(noise=0.15), 'surge')
     assert found['response_surge'].verdict == NOT_CHECKED
     assert 'too vague' in found['response_surge'].found
     assert found['silence'].verdict == NOT_CHECKED
@@ -133,7 +133,7 @@ def test_a_driver_without_a_watchdog_fails(applied: bool) -> None:
 
 
 def test_a_slow_watchdog_fails_and_what_was_applied_tells_it_exactly() -> None:
-    found = judge(SimulatedDriver(watchdog=1.5, applied=True, noise=0.2), 'surge')
+    found = judge(SimulatedDriver(watchdog=1.5, applied=True, noise=0.15), 'surge')
     assert found['silence'].verdict == FAIL
     assert found['silence'].numbers['ceased_s'] == pytest.approx(1.5, abs=0.03)
 

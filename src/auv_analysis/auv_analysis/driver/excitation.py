@@ -129,15 +129,17 @@ class MotionGuard:
     ):
         self._client, self._timeout, self._stopped = client, timeout, stopped
         self._count = 0
-        before, most = self._speed(), TOO_FAST * speed
-        if not before <= most:
-            raise AbortError(f'it moves by {before:.3g} m/s or rad/s already, over {most:.3g}')
+        before, most = self._speeds(), TOO_FAST * speed
+        if not (before <= most).all():
+            found = f'it moves by {before.max():.3g} m/s or rad/s already, over {most:.3g}'
+            raise AbortError(found)
         self._before = before
 
-    def _speed(self) -> float:
+    def _speeds(self) -> np.ndarray:
+        """Linear and angular speed (2,), m/s and rad/s."""
         recent = self._client.buffer.recent(RECENT)[:, 7:]
         nu = np.median(recent, axis=0) if len(recent) else np.zeros(6)
-        return max(float(np.linalg.norm(nu[:3])), float(np.linalg.norm(nu[3:])))
+        return np.linalg.norm(nu.reshape(2, 3), axis=1)
 
     def look(self, planned: float) -> None:
         """Raise AbortError or StoppedError where the next wrench must not be sent.
@@ -149,9 +151,10 @@ class MotionGuard:
         newest = self._client.buffer.newest
         if newest is None or self._client.now_ns() - newest[0] > self._timeout * NANOSECONDS:
             raise AbortError(f'no odometry for {self._timeout:g} s')
-        speed, most = self._speed(), TOO_FAST * planned + self._before
-        if not speed <= most:  # NaN is too fast as well
-            raise AbortError(f'{speed:.3g} m/s or rad/s, more than {most:.3g}')
+        speeds, most = self._speeds(), TOO_FAST * planned + self._before
+        if not (speeds <= most).all():  # NaN is too fast as well
+            i = int(np.argmax(speeds - most))
+            raise AbortError(f'{speeds[i]:.3g} m/s or rad/s, more than {most[i]:.3g}')
         if self._count % LOOK == 0 and (others := self._client.others()):
             raise AbortError(f'{others[0]} publishes the wrench as well')
         self._count += 1

@@ -16,7 +16,7 @@ import pytest
 
 from auv_analysis.cli import main, scenario_runs
 from auv_analysis.graph import recorded_runs
-from auv_analysis.output.folder import results_folder
+from auv_analysis.output.folder import check_free, results_folder
 from auv_analysis.output.new_files import replacing, unfinished_name, write_text
 from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.files.shipped import shipped
@@ -287,6 +287,23 @@ def test_folder_that_another_command_writes_into_is_refused(overwrite: bool, tmp
         fill(out, EARLIER)
         assert 'no other command' in refused(out, overwrite=overwrite)
     write(out, LATER, overwrite=True)
+
+
+def test_before_any_work_all_is_refused_that_would_be_after_it(tmp_path: Path, monkeypatch) -> None:
+    file, held, used, new = (tmp_path / name for name in ('file', 'held', 'used', 'new/folder'))
+    vehicle = held / 'vehicle.yaml'
+    fill(tmp_path, {'file': 'mine'})
+    write(held, {'vehicle.yaml': shipped('vehicles', 'bluerov2').read_text()})
+    monkeypatch.setattr('auv_analysis.graph.domain.join_domain', lambda _: pytest.fail('it works'))
+    check = ['check-driver', '--overwrite', '--vehicle', str(vehicle), '--out']
+    with results_folder(used, overwrite=False):
+        for out in (file, file / 'below', Path('/proc/nope'), used, held):
+            before = tree(tmp_path)
+            with pytest.raises(SystemExit, match='2'):
+                main.main([*check, str(out)])
+            assert tree(tmp_path) == before
+    check_free(new, overwrite=False, inputs=[])
+    assert not new.parent.exists()
 
 
 def test_no_file_is_written_through_a_link(tmp_path: Path) -> None:

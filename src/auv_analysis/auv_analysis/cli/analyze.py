@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     mapping = topic_map(options, options.vehicle)
     sources = sources_of(options.results, mapping, options.namespace)
     if options.out:
-        check_free(options.out, overwrite=options.overwrite)
+        check_free(options.out, overwrite=options.overwrite, inputs=_inputs(sources, options))
     return _few(sources, options) if len(sources) <= FEW else _many(sources, options)
 
 
@@ -98,6 +98,11 @@ def _many(sources: Sequence[RunSource], options: argparse.Namespace) -> dict[str
     return summaries
 
 
+def _inputs(sources: Sequence[RunSource], options: argparse.Namespace) -> list[Path]:
+    files = [file for source in sources for file in source.files]
+    return files + ([Path(options.map)] if options.map else [])
+
+
 def _folder(
     scenarios: Sequence[str], sources: Sequence[RunSource], options: argparse.Namespace
 ) -> AbstractContextManager[ResultsFolder]:
@@ -108,7 +113,6 @@ def _folder(
     name = '_'.join(names)
     if len(names) > FEW or len(name) > LONGEST:
         name = f'{names[0]}_and_{len(names) - 1}_more'
-    files = [file for source in sources for file in source.files]
-    files += [Path(options.map)] if options.map else []
+    inputs = _inputs(sources, options)
     out = options.out or Path('runs') / f'analyze_{name}'
-    return results_folder(out, overwrite=options.overwrite, inputs=files)
+    return results_folder(out, overwrite=options.overwrite, inputs=inputs)

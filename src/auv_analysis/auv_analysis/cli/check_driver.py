@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from auv_analysis.cli.arguments import (
@@ -74,7 +75,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     plan, frames = _plan(options), interface.Frames(options.odom_frame, options.base_frame)
     settings = Settings(frames, options.expect_rate, options.use_sim_time, options.actuate)
     if options.out is not None:
-        check_free(options.out, overwrite=options.overwrite)
+        check_free(options.out, overwrite=options.overwrite, inputs=_inputs(options))
     domain = join_domain(options.domain_id)
     # the middleware reads its environment when it is loaded
     from auv_analysis.nodes.driver_check_node import RosDriverClient
@@ -116,6 +117,12 @@ def _plan(options: argparse.Namespace) -> Plan | None:
     return plan
 
 
+def _inputs(options: argparse.Namespace) -> list[Path]:
+    from auv_dynamics.files.shipped import shipped
+
+    return [shipped('vehicles', options.vehicle)] if options.vehicle else []
+
+
 def _listen(client: Any, seconds: float) -> int:
     """Listen for so long from the first odometry on; the time of the first, ns."""
     from auv_analysis.output.progress import bar
@@ -140,7 +147,6 @@ def _conclude(options: argparse.Namespace, evidence: DriverRecord) -> dict[str, 
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import TextConsole, waiting
     from auv_dynamics.files.errors import FailedError
-    from auv_dynamics.files.shipped import shipped
 
     findings = judge(evidence)
     document = document_of(evidence, findings)
@@ -149,7 +155,7 @@ def _conclude(options: argparse.Namespace, evidence: DriverRecord) -> dict[str, 
     if options.out is not None:
         from auv_analysis.driver.report import write_results  # matplotlib loads slowly
 
-        inputs = [shipped('vehicles', options.vehicle)] if options.vehicle else []
+        inputs = _inputs(options)
         with (
             results_folder(options.out, overwrite=options.overwrite, inputs=inputs) as results,
             waiting('drawing plots, writing the report'),

@@ -228,7 +228,7 @@ def _open_loop(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.replay.open_loop import recorded_loop
 
     if options.out:
-        check_free(options.out, overwrite=options.overwrite)
+        check_free(options.out, overwrite=options.overwrite, inputs=[options.bag])
     import_law(options.law)
     with waiting(f'reading {options.bag}'):
         recorded = recorded_loop(options.bag, options.vehicle)

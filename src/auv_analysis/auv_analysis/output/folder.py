@@ -177,10 +177,14 @@ def results_folder(
         _say_where(out)
 
 
-def check_free(out: Path, *, overwrite: bool) -> None:
-    """Refuse, before any work, a folder of results that must not be replaced."""
-    if out.is_dir():
-        _replaceable(out, (), (), overwrite=overwrite)
+def check_free(out: Path, *, overwrite: bool, inputs: Iterable[Path]) -> None:
+    """Refuse, before any work, what `results_folder` would refuse after it."""
+    made = _make(out)
+    try:
+        with _locked(out):
+            _replaceable(out, (), inputs, overwrite=overwrite)
+    finally:
+        remove_empty(made)
 
 
 def _make(out: Path) -> list[Path]:

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from auv_analysis import load_scenario
+from auv_analysis import load_scenario, summarize
 from auv_analysis.bag.load import load_run, open_bag
 from auv_analysis.bag.metadata import RECORDING, recording_text
 from auv_analysis.bag.reading import read_bag
@@ -26,6 +26,10 @@ VEHICLE = load_scenario('case1').attachments['vehicle.yaml']
 GRID = 20  # ms between set-points
 quick = examples(15)
 EXACT = '/**/controller_node:\n  ros__parameters: {setpoint_pairing: exact}\n'
+GVC = (
+    '/**/controller_node:\n  ros__parameters: {law: gvc, gains.k_D: [12.0], gains.k_I: [1.0], '
+    'gains.Lambda: [0.8], gains.Gamma: [60.0]}\n'
+)
 
 
 def state(k: int) -> np.ndarray:
@@ -80,7 +84,7 @@ def test_each_odometry_has_the_newest_set_point_before_it(
     with tempfile.TemporaryDirectory() as folder:
         path = write(Path(folder), stamps, setpoints, ahead=ahead, unanswered=unanswered)
         if not setpoints:
-            expected = dict.fromkeys(answered, 0)
+            expected = dict.fromkeys(answered, np.nan)
         if len(expected) < 2:
             with pytest.raises(InputError, match='at least two steps'):
                 load_run(path)
@@ -102,6 +106,16 @@ def test_what_is_missing_at_the_start_is_said(tmp_path: Path) -> None:
         'odom: 1 of 4 messages are not complete on all topics',
         'wrench: 1 of 4 messages are not complete on all topics',
     )
+
+
+def test_without_a_set_point_there_is_no_error_of_it(tmp_path: Path) -> None:
+    run = load_run(write(tmp_path, [1000, 1020, 1040, 1060], [], params=GVC))
+    assert np.isnan(run.nu_d_dot).all()
+    found = summarize(run)
+    assert found['settling'] is None
+    assert not any(found['velocity_error'].values())
+    assert found['lyapunov']['share_bound_28'] is None
+    assert 'the set-point were recorded' in found['lyapunov']['reason']
 
 
 def test_a_controller_that_pairs_exactly_has_its_own_stamps(tmp_path: Path) -> None:

@@ -111,11 +111,11 @@ def _facts(
 
 
 def _run(ns: np.ndarray, values: dict[str, np.ndarray], facts: dict[str, Any], whole: float) -> Run:
-    """Run of complete steps; a nu_d_dot that was not recorded is the slope of nu_d."""
+    """Run of complete steps; nu_d is NaN where not recorded, nu_d_dot then the slope of nu_d."""
     x = values.get(interface.GROUND_TRUTH, values[interface.ODOM])
     t = ((rows_of(ns, here) - ns[0]) / interface.NANOSECONDS for here in slices(len(ns)))
-    zeros = np.zeros((len(ns), 6))
-    nu_d, nu_d_dot = values.get(interface.CMD_VEL, zeros), values.get(interface.CMD_ACCEL)
+    zeros, unknown = np.zeros((len(ns), 6)), np.broadcast_to(np.nan, (len(ns), 6))
+    nu_d, nu_d_dot = values.get(interface.CMD_VEL, unknown), values.get(interface.CMD_ACCEL)
     if nu_d_dot is None:
         nu_d_dot = gathered(_slopes(nu_d, facts['step']), whole)
     sensing = interface.GROUND_TRUTH in values

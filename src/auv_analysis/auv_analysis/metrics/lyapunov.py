@@ -89,12 +89,13 @@ def lyapunov(run: AnyRun, model: ControlModel) -> dict[str, Any]:
 
     """
     gains = make_gains(run.law, run.gains) if run.gains else None
-    sensing, acting, whole = run.sensing, run.acting, run.knows_wrench and not run.unknown
+    sensing, acting = run.sensing, run.acting
+    whole = run.knows_wrench and run.knows_setpoint and not run.unknown
     reasons = [
         applicability(run.law, gains, model),
         _against_15(run.knows_disturbance, run.kinds),
         'the law does not see the true velocity, so that (26) is not L_dot' if sensing else '',
-        '' if whole else 'not all velocities and the wrench were recorded',
+        '' if whole else 'not all velocities, the wrench and the set-point were recorded',
         'the run has gaps, across which nothing has a rate' if run.gaps else '',
         'the wrench applied is not that of the law, so that (26) is not L_dot' if acting else '',
     ]

@@ -18,6 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.bag.foreign_messages import Recorded, longest_stretch, on_the_clock, ordered
 from auv_analysis.bag.foreign_topics import MappedTopic
+from auv_analysis.bag.foreign_tracks import _on_one_clock
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
 
@@ -73,6 +74,15 @@ def test_logged_times_are_put_on_another_clock() -> None:
     assert 'logged 102 s off the stamps of /twist' in notes[0]
     near = recorded(np.arange(5) * SECOND, log=np.arange(5) * SECOND + SECOND // 10)
     assert on_the_clock(logged, near, []) is logged, 'one clock and a delay'
+
+
+def test_logged_times_follow_the_stretch_of_the_clock_that_is_read() -> None:
+    seconds = np.array([*range(6), *range(9)])
+    log = (100 + np.arange(15)) * SECOND
+    clock = recorded(seconds * SECOND, log=log)
+    found = _on_one_clock({'twist': clock, 'wrench': recorded(log, 'wrench', stamped=False)}, [])
+    assert_array_equal(found['wrench'].stamps, np.arange(9) * SECOND)
+    assert_array_equal(found['wrench'].rows[:, 0], np.arange(6, 15))
 
 
 def messages(run: Run) -> list:

@@ -143,7 +143,7 @@ def _on_one_clock(found: Mapping[str, Recorded], notes: list[str]) -> dict[str, 
     moving = moving or [one for one in found.values() if one.source.role == 'pose']
     clock = next((one for one in moving if one.stamped), moving[0])
     kept = longest_stretch(clock, [])
-    timed = {role: on_the_clock(one, clock, notes) for role, one in found.items()}
+    timed = {role: on_the_clock(one, kept, notes) for role, one in found.items()}
     if len(kept.log) < len(clock.log):
         timed = {
             role: one if one.source.topic == clock.source.topic else logged_with(one, kept)

@@ -238,6 +238,10 @@ def test_open_surfaces_and_other_files_are_refused(refused, tmp_path, capsys):
     hull.update_faces(np.linalg.norm(hull.triangles_center - [1, 0, 0], axis=1) > 0.6)
     line = refused(trimesh.util.concatenate([sphere(1, at=(3, 0, 0)), hull]), *SAID)
     assert 'open edges in part 2 of 2, at (' in line
+    flat = trimesh.Trimesh([[4, 0, 0], [5, 0, 0], [5, 1, 0], [4, 1, 0]],
+                           [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])  # fmt: skip
+    line = refused(trimesh.util.concatenate([sphere(1), flat]), *SAID)
+    assert 'expected parts with a volume, found part 2 without any' in line
     (tmp_path / 'list.m').write_text('Xudot = -5')
     with pytest.raises(SystemExit):
         main(['import-vehicle', str(tmp_path / 'list.m'), '--units', 'mm'])

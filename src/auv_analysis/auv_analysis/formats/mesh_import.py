@@ -157,8 +157,12 @@ def _united(draft: ImportedVehicle, mesh: Any, trimesh: Any) -> Any:
         trimesh.repair.fix_winding(part)
         if not part.is_winding_consistent:
             raise draft.refuse('surface', 'parts with two sides', f'part {number} with one')
-        turned += not was_consistent or part.volume < 0
-        if part.volume < 0:
+        with np.errstate(invalid='ignore'):  # trimesh divides by it
+            volume = part.volume
+        if volume == 0.0:
+            raise draft.refuse('surface', 'parts with a volume', f'part {number} without any')
+        turned += not was_consistent or volume < 0
+        if volume < 0:
             part.invert()
     if filled:
         draft.traps.append(f'surface: {filled} triangles added that close its holes')

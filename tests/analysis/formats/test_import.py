@@ -232,6 +232,9 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'frames in a circle': ('a.sdf', sdf(more='</plugin><frame name="a" attached_to="b"/>'
         '<frame name="b" attached_to="a"/><plugin>').replace(
         '<pose>0 0 0.05', '<pose relative_to="a">0 0 0.05'), [], 'in a circle'),
+    'a chain of frames': ('a.sdf', sdf(more='</plugin>' + ''.join(
+        f'<frame name="f{i}" attached_to="f{i + 1}"/>' for i in range(999)) + '<plugin>').replace(
+        '<pose>0 0 0.05', '<pose relative_to="f0">0 0 0.05'), [], 'or behind 100 others'),
     'xacro': ('a.urdf', URDF.replace('1.83826', '${volume}'), [], 'expand xacro first'),
     'positive damping': ('a.yaml', REXROV.replace('[-74.82', '[74.82'), [], 'damping.linear'),
     'unknown entry': ('a.yaml', f'{REXROV}colour: red\n', [], 'colour'),

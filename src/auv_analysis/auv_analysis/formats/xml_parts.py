@@ -65,6 +65,7 @@ def numbers(text: str | None, count: int, path: object, key: str) -> list[float]
 Pose = tuple[np.ndarray, np.ndarray]  # position (3,) in m, rotation (3, 3) to the outer frame
 SAME: Pose = (np.zeros(3), np.eye(3))
 MODEL = '__model__'
+LONGEST_CHAIN = 100  # links, joints and frames, each relative to the next
 
 
 def pose_in_link(element: Element, link: Element, model: Element, path: object, key: str) -> Pose:
@@ -78,14 +79,14 @@ def pose_in_link(element: Element, link: Element, model: Element, path: object, 
 
     Raises
     ------
-    InputError : a frame that the model does not have, or frames that go in a circle
+    InputError : a frame that the model does not have, or frames in a circle or a long chain
 
     """
     frame, inner = _pose_of(element, path, key)
     if frame in ('', link.get('name')):
         return inner
-    p, R = _chained(_in_model(frame, model, path, key, ()), inner)
-    origin, axes = _in_model(link.get('name', ''), model, path, key, ())
+    p, R = _chained(_in_model(frame, model, path, key), inner)
+    origin, axes = _in_model(link.get('name', ''), model, path, key)
     return axes.T @ (p - origin), axes.T @ R
 
 
@@ -103,20 +104,20 @@ def _chained(outer: Pose, inner: Pose) -> Pose:
     return outer[0] + outer[1] @ inner[0], outer[1] @ inner[1]
 
 
-def _in_model(name: str, model: Element, path: object, key: str, seen: tuple[str, ...]) -> Pose:
-    """Pose of a link, joint or frame of a model in the frame of the model."""
+def _in_model(name: str, model: Element, path: object, key: str, behind: int = 0) -> Pose:
+    """Pose of a link, joint or frame of a model in its frame; `behind`: so many that led there."""
     if name == MODEL:
         return SAME
     named = [e for tag in ('link', 'joint', 'frame') for e in model.findall(tag)]
     found = [e for e in named if e.get('name') == name]
-    if len(found) != 1 or name in seen:
-        why = 'in a circle' if name in seen else 'not one of them'
+    if len(found) != 1 or behind == LONGEST_CHAIN:
+        why = 'not one of them' if len(found) != 1 else f'in a circle or behind {behind} others'
         expected = 'a pose relative to a link, joint or frame of this model'
         raise InputError(path, f'{key}.pose', expected, f'{name}, {why}')
     usual = {'joint': found[0].findtext('child', '').strip(), 'frame': found[0].get('attached_to')}
     frame, inner = _pose_of(found[0], path, f'{found[0].tag} {name}')
     outer = frame or usual.get(str(found[0].tag)) or MODEL
-    return _chained(_in_model(outer, model, path, key, (*seen, name)), inner)
+    return _chained(_in_model(outer, model, path, key, behind + 1), inner)
 
 
 def displaced(link: Element, model: Element, path: Path) -> tuple[float, np.ndarray] | None:

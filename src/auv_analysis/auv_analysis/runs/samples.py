@@ -19,6 +19,8 @@ OPTIONAL = {  # name in the file -> of `Run`
     'law_state': 'law_state',
 }
 ENDING = '.npz'
+# of what is no archive, or a damaged one
+DAMAGED = (ValueError, TypeError, AttributeError, EOFError, MemoryError)
 
 
 def write_samples(run: Run, path: Path) -> None:
@@ -79,7 +81,7 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
             arrays = {name: file[name] for name in file.files}
     except OSError as error:
         raise InputError(path, '', expected, reason(error)) from None
-    except (ValueError, zipfile.BadZipFile, zlib.error, EOFError, AttributeError):
+    except (*DAMAGED, zipfile.BadZipFile, zlib.error):
         raise InputError(path, '', expected, 'a file that is cut, damaged or no archive') from None
     for name in (*MOTION, *FORCES):
         if name not in arrays:

@@ -1,6 +1,7 @@
 """What the arguments of `auv analyze` stand for, and what runs are called."""
 
 import shutil
+import zipfile
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -62,6 +63,8 @@ def test_samples_make_the_run_again(folder: Path, text: str, hold: str) -> None:
     [
         (lambda path: path.write_bytes(b'no archive'), 'cut, damaged or no archive'),
         (lambda path: path.write_bytes(path.read_bytes()[:-400]), 'cut, damaged or no archive'),
+        (lambda path: np.save(path.open('wb'), np.zeros(3)), 'cut, damaged or no archive'),
+        (lambda path: _declare(path, 10**12), 'cut, damaged or no archive'),
         (lambda path: np.savez(path, t=np.arange(3.0)), 'eta: expected an array of samples'),
         (lambda path: _change(path, nu=np.zeros((3, 6))), r'nu: expected \(31, 6\) numbers'),
         (lambda path: _change(path, t=np.zeros((31, 1))), 't: expected the times'),
@@ -72,6 +75,13 @@ def test_broken_samples_are_refused(results: Path, spoil, words: str) -> None:
     spoil(results / 'gvc.npz')
     with pytest.raises(InputError, match=words):
         open_source(sources_of([str(results / 'gvc.npz')])[0])
+
+
+def _declare(path: Path, count: int) -> None:
+    """Write an archive with an array that says that it has so many numbers."""
+    said = {'descr': '<f8', 'fortran_order': False, 'shape': (count,)}
+    with zipfile.ZipFile(path, 'w') as file, file.open('t.npy', 'w') as array:
+        np.lib.format.write_array_header_1_0(array, said)
 
 
 def _change(path: Path, **arrays: np.ndarray) -> None:

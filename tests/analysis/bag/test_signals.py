@@ -18,7 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.bag.foreign_messages import Recorded, longest_stretch, on_the_clock, ordered
 from auv_analysis.bag.foreign_topics import MappedTopic
-from auv_analysis.bag.foreign_tracks import _on_one_clock
+from auv_analysis.bag.foreign_tracks import _on_one_clock, _track
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
 
@@ -83,6 +83,11 @@ def test_logged_times_follow_the_stretch_of_the_clock_that_is_read() -> None:
     found = _on_one_clock({'twist': clock, 'wrench': recorded(log, 'wrench', stamped=False)}, [])
     assert_array_equal(found['wrench'].stamps, np.arange(9) * SECOND)
     assert_array_equal(found['wrench'].rows[:, 0], np.arange(6, 15))
+
+
+def test_no_line_leads_from_a_single_message() -> None:
+    with pytest.raises(InputError, match=r'/wrench: expected at least 2 messages .*, found 1'):
+        _track('wrench', recorded([1], 'wrench'), 'ned_fsd')
 
 
 def messages(run: Run) -> list:

@@ -208,7 +208,7 @@ def _said(axes: Mapping[str, str], found: Mapping[str, Recorded]) -> str:
 
 def _track(role: str, one: Recorded, axes: str, rows: np.ndarray | None = None) -> Track:
     rows = in_our_axes(one.rows, role, axes) if rows is None else rows
-    least = 2 if role in ('pose', 'twist') else 1  # a motion has a rate
+    least = 1 if _is_held(one.source) else 2  # no line leads from a single message
     if len(one.stamps) < least:
         expected = f'at least {least} messages on the clock of the velocity'
         raise InputError(one.bag, one.source.topic, expected, len(one.stamps) or 'none')

@@ -189,6 +189,13 @@ def test_limits_know_bursts() -> None:
     assert usual_limit(even[:1]) == np.inf
 
 
+def test_a_period_is_none_of_the_intervals_inside_of_bursts() -> None:
+    """Three samples 10 ns apart every 30 ms, and a pause of an hour."""
+    ns = np.cumsum([*np.tile([10, 10, 29_999_980], 60), 3600 * NANOSECONDS, 10, 10])
+    track = Track('twist', '/o', ns, np.zeros((len(ns), 6)), usual_limit(ns), held=False)
+    assert 0.9e7 < track.period < 1.1e7
+
+
 def test_steps_are_rounded_to_two_digits() -> None:
     assert [sensible_step(p) for p in (33_333_333.0, 9_987_654.0, 20e6)] == [
         33000000,

@@ -168,6 +168,7 @@ def test_topics_that_never_meet_are_refused(run, tmp_path) -> None:
     ({'odometry': '/w'}, r'/w: expected nav_msgs/msg/Odometry, found geometry_msgs/msg/WrenchStam'),
     ({'wrench': '/o'}, r'/o: expected geometry_msgs/msg/WrenchStamped or geometry_msgs/msg/Wr'),
     ({'frames': None}, r"/o: frame_id: expected --frames ned_fsd or enu_flu.*'odom', 'base_link'$"),
+    ({'step': 4e-5}, r'options: step: expected at least 5e-05 s, of which 200 .*, found 4e-05$'),
     ({'vehicle': None}, r'^options: vehicle \(--vehicle\): expected a vehicle file or a shipped'),
 ])  # fmt: skip
 def test_what_does_not_fit_is_refused_in_one_line(keys, line, run, tmp_path) -> None:

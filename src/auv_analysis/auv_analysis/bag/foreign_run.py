@@ -65,6 +65,7 @@ FILTER = 'local polynomials of order 3 (Savitzky-Golay for uneven stamps)'
 PROBES = 20  # motions by which is found what a wrench depends on
 SAME = 1e-12  # of the largest wrench
 LEVEL = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # pose, of an attitude that is not known
+FINEST = 200  # steps in a period of the velocity: time and memory follow the size of the file
 SMALL = 1e-6  # m/s, rad/s: step of the differences that tell how resistance depends on nu
 
 
@@ -246,6 +247,10 @@ def load_foreign(bag: str | Path, mapping: TopicMap) -> Recording:
     tracks, otherwise = tracks_of(read_sources(bag, mapping, notes), mapping, vehicle, notes)
     notes += contradictions(tracks, otherwise, mapping)
     step = round((mapping.step or 0.0) * NANOSECONDS) or sensible_step(tracks['twist'].period)
+    if step * FINEST < tracks['twist'].period:
+        least = tracks['twist'].period / FINEST / NANOSECONDS
+        expected = f'at least {least:.3g} s, of which {FINEST} make a period of the velocity'
+        raise InputError(mapping.origin, 'step', expected, mapping.step)
     base = time_base([*tracks.values()], tracks['twist'], step)
     if len(base.ns) < 2:
         expected = 'a time with all mapped topics and velocities enough for rates'

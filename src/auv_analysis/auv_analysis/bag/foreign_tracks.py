@@ -16,6 +16,7 @@ from auv_analysis.bag.foreign_messages import (
 )
 from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, HELD, MOVING, MappedTopic, TopicMap
 from auv_analysis.bag.tracks import (
+    BURST,
     ENOUGH,
     Track,
     assembled,
@@ -42,7 +43,7 @@ from auv_dynamics.vehicle.vehicle import Vehicle
 
 FRAMES = ('child', 'world')  # in which a velocity may be written
 POSE, TWIST = slice(0, 7), slice(7, 13)  # of an odometry's row
-BURST, BURSTS = 0.2, 0.2  # of the mean interval; share of intervals below it that makes bursts
+BURSTS = 0.2  # share of intervals of a burst that makes bursts
 _SWAPS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     'pose': lambda x: np.concatenate([swap_position(x[:, :3]), swap_attitude(x[:, 3:])], axis=1),
     'twist': swap_body,

@@ -14,7 +14,8 @@ from auv_dynamics.ros.interface import NANOSECONDS
 GAP_PERIODS = 5.0  # median periods, at least, that make a pause a gap
 GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in bursts
 USUAL = 90.0  # percentile
-AVERAGED = 1.5  # periods per step of the time base from which a signal is averaged over the step
+BURST = 0.2  # of the mean interval: shorter ones are those of a burst
+AVERAGED = 1.5  # intervals per step of the time base from which a signal is averaged over the step
 ENOUGH = 12  # velocity samples of a stretch, fewer are left out: no rate could be estimated
 
 
@@ -50,7 +51,15 @@ class Track:
 
     @property
     def period(self) -> float:
-        """Median period, ns; inf of a single sample."""
+        """Median interval, in bursts the mean one between gaps, ns; inf of a single sample."""
+        if len(self.ns) < 2:
+            return np.inf
+        mean = float(np.minimum(np.diff(self.ns), self.limit).mean())
+        return mean if self._interval < BURST * mean else self._interval
+
+    @property
+    def _interval(self) -> float:
+        """Median interval, ns; inf of a single sample."""
         return float(np.median(np.diff(self.ns))) if len(self.ns) > 1 else np.inf
 
     def gaps(self) -> np.ndarray:
@@ -67,7 +76,7 @@ class Track:
 
     def is_averaged(self, step: int) -> bool:
         """Whether several samples fall into one step, ns, so that single ones would alias."""
-        return step > AVERAGED * self.period
+        return step > AVERAGED * self._interval
 
 
 def usual_limit(ns: np.ndarray) -> float:
@@ -160,7 +169,7 @@ class TimeBase:
 
 
 def sensible_step(period: float) -> int:
-    """A median period, ns, rounded to two digits."""
+    """A period, ns, rounded to two digits."""
     return max(round(float(f'{period:.2g}')), 1)
 
 

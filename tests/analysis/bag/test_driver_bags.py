@@ -26,6 +26,7 @@ VEHICLE = load_scenario('case1').attachments['vehicle.yaml']
 GRID = 20  # ms between set-points
 quick = examples(15)
 EXACT = '/**/controller_node:\n  ros__parameters: {setpoint_pairing: exact}\n'
+STEPS = '/**/plant_node:\n  ros__parameters: {step: 0.02}\n'
 GVC = (
     '/**/controller_node:\n  ros__parameters: {law: gvc, gains.k_D: [12.0], gains.k_I: [1.0], '
     'gains.Lambda: [0.8], gains.Gamma: [60.0]}\n'
@@ -116,6 +117,15 @@ def test_without_a_set_point_there_is_no_error_of_it(tmp_path: Path) -> None:
     assert not any(found['velocity_error'].values())
     assert found['lyapunov']['share_bound_28'] is None
     assert 'the set-point were recorded' in found['lyapunov']['reason']
+
+
+def test_a_pause_of_a_driver_is_a_gap_and_one_of_lock_step_none(tmp_path: Path) -> None:
+    stamps = [1000, 1020, 1041, 1060, 1080, 61080, 61100, 61121, 61140]
+    run = load_run(write(tmp_path, stamps, SETPOINTS, params=STEPS))
+    assert run.gaps == ((0.08, 60.08),)
+    assert run.valid_share == pytest.approx(9 * 0.02 / 60.16)
+    strict = write(tmp_path / 'strict', stamps, stamps, recording=recording_text(True, {}))
+    assert load_run(strict).gaps == ()
 
 
 def test_a_controller_that_pairs_exactly_has_its_own_stamps(tmp_path: Path) -> None:

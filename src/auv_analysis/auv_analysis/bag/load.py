@@ -10,6 +10,7 @@ import numpy as np
 from auv_analysis.bag import attachments
 from auv_analysis.bag.reading import BagContents, Series, gathered, read_bag, slices
 from auv_analysis.bag.step_topics import READERS, NotOursError, namespace_of, role_of
+from auv_analysis.bag.tracks import usual_limit
 from auv_analysis.runs.run import Run, rows_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.plant import unwrapped_eta
@@ -106,8 +107,16 @@ def _facts(
         'source': 'bag',
         'kinds': attachments.kinds_of(contents, bag),
         'faults': attachments.faults_of(contents, known),
+        'gaps': _gaps(ns) if contents.lenient else (),
         'notes': (*contents.notes, *attachments.notes_on(law), *notes),
     }
+
+
+def _gaps(ns: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """Last time before and first behind each pause of rising stamps (n,), s from the first."""
+    where = np.flatnonzero(np.diff(ns) > usual_limit(ns))
+    edges = (np.stack([ns[where], ns[where + 1]], axis=1) - ns[0]) / interface.NANOSECONDS
+    return tuple((begin, end) for begin, end in edges.tolist())
 
 
 def _run(ns: np.ndarray, values: dict[str, np.ndarray], facts: dict[str, Any], whole: float) -> Run:

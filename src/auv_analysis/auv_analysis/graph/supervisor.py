@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING
 
 import psutil
 
-from auv_dynamics.files.errors import FailedError
+from auv_dynamics.files.errors import FailedError, undisturbed
 from auv_dynamics.ros.interface import PARENT
 
 if TYPE_CHECKING:
@@ -133,14 +133,18 @@ class Supervisor:
         return text
 
     def stop(self) -> dict[str, int]:
-        """End all that still run: SIGTERM, then SIGKILL; exit codes of all."""
-        running = [p for p in self._processes.values() if p.poll() is None]
-        for process in running:
-            process.terminate()
-        _, alive = psutil.wait_procs(running, timeout=GRACE)
-        for process in alive:
-            process.kill()
-        psutil.wait_procs(alive, timeout=GRACE)
+        """End all that still run: SIGTERM, then SIGKILL; exit codes of all.
+
+        A second Ctrl-C waits until they have ended: nobody would end them else.
+        """
+        with undisturbed():
+            running = [p for p in self._processes.values() if p.poll() is None]
+            for process in running:
+                process.terminate()
+            _, alive = psutil.wait_procs(running, timeout=GRACE)
+            for process in alive:
+                process.kill()
+            psutil.wait_procs(alive, timeout=GRACE)
         for log in self._outputs.values():
             log.close()
         return self.ended()

@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import tempfile
-import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from fnmatch import fnmatchcase
@@ -17,7 +16,7 @@ from typing import NamedTuple
 
 from auv_analysis.output.new_files import write
 from auv_analysis.output.progress import say
-from auv_dynamics.files.errors import FailedError, InputError, on_signals, reason
+from auv_dynamics.files.errors import FailedError, InputError, reason, undisturbed
 
 MANIFEST = 'manifest.json'
 Signature = tuple[int, int, int]  # of a file: inode, bytes, time of its last change in ns
@@ -285,7 +284,7 @@ def _swap(staging: Path, out: Path, old: dict[str, Signature], files: Mapping[st
         mine = name in old and there and signature(out / name) == old[name]
         if has_links(out, name) or (there and not mine) or any(p.is_file() for p in way):
             raise FailedError(f'{out / name}: expected no such file, found what is not ours')
-    with _undisturbed():
+    with undisturbed():
         for name in files:
             (out / name).parent.mkdir(parents=True, exist_ok=True)
             (staging / name).replace(out / name)
@@ -294,19 +293,6 @@ def _swap(staging: Path, out: Path, old: dict[str, Signature], files: Mapping[st
         shutil.rmtree(staging)
         for left in out.glob(f'{STAGING}*'):
             discard(left)
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Let Ctrl-C and the other signals that end a command wait for the end of this."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    asked: list[None] = []
-    with on_signals(lambda: asked.append(None)):
-        yield
-    if asked:
-        raise KeyboardInterrupt
 
 
 def _give_up(folder: Path, out: Path, own: Sequence[str], error: BaseException) -> None:

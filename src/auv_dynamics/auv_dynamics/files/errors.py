@@ -3,6 +3,7 @@
 import re
 import reprlib
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -97,3 +98,16 @@ def on_signals(callback: Callable[[], None]) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Let Ctrl-C and the other signals that end a command wait for the end of this."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    asked: list[None] = []
+    with on_signals(lambda: asked.append(None)):
+        yield
+    if asked:
+        raise KeyboardInterrupt

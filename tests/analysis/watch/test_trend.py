@@ -1,6 +1,7 @@
 """Largest values, rms and history of the last seconds."""
 
 import numpy as np
+import pytest
 from helpers.strategies import QUICK
 from hypothesis import given
 from hypothesis import strategies as st
@@ -35,3 +36,12 @@ def test_what_is_older_is_forgotten() -> None:
         trend.add(1.0 + i * BUCKET, np.full(6, 0.5))
     assert trend.largest == trend.rms == (0.5,) * 6
     assert len(trend.history) == BUCKETS
+
+
+@pytest.mark.parametrize('later', [SPAN, 100.0])
+def test_what_is_older_is_forgotten_however_few_come(later: float) -> None:
+    trend = Trend()
+    trend.add(0.0, np.full(6, 5.0))
+    trend.add(1.0, np.full(6, 0.25))
+    trend.add(later, np.full(6, 0.25))
+    assert trend.largest == trend.rms == (0.25,) * 6

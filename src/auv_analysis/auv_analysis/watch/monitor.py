@@ -153,10 +153,12 @@ class Trend:
     """The last ten seconds of six numbers that come in at steady times."""
 
     def __init__(self) -> None:
-        self._buckets: deque[Bucket] = deque(maxlen=BUCKETS)
+        self._buckets: deque[Bucket] = deque()
 
     def add(self, now: float, values: np.ndarray) -> None:
         """Take a sample (6,) at a steady time in s."""
+        while self._buckets and now - self._buckets[0].begin >= BUCKET * BUCKETS:
+            self._buckets.popleft()
         size = np.abs(values)
         new = Bucket(now, size, size * size, 1)
         if self._buckets and now - self._buckets[-1].begin < BUCKET:

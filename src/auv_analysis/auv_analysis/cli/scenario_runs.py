@@ -23,7 +23,7 @@ from auv_analysis.report.digest import RunDigest, digests
 from auv_analysis.report.verdict import FAILED, verdict
 from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.runs.samples import ENDING, write_samples
-from auv_analysis.scenario.scenario import Scenario, load_scenario, write_inputs
+from auv_analysis.scenario.scenario import Scenario, check_names, load_scenario, write_inputs
 from auv_analysis.simulation.simulate import announce, simulate
 from auv_dynamics.files.errors import first_line
 from auv_dynamics.vehicle import DOFS
@@ -57,7 +57,12 @@ def scenario_folder(
     names : of the controllers
     own : endings of what is written of each controller, such as '.npz' or '/*'
 
+    Raises
+    ------
+    InputError : a controller is called as a file of ours, or as for `results_folder`
+
     """
+    check_names(names, scenario.path, own)
     return results_folder(
         options.out or Path('runs') / scenario.name,
         overwrite=options.overwrite,

@@ -4,6 +4,7 @@ import copy
 import json
 import math
 import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -53,10 +54,10 @@ def resolved(data: dict[str, Any]) -> dict[str, Any]:
     return data
 
 
-def check_names(data: dict[str, Any], path: Path) -> None:
-    """Refuse a controller whose results would take the place of our own files."""
-    for name in data['controllers']:
-        if name in (*NAMES, STAGING, ROLLOUTS):
+def check_names(names: Iterable[str], path: Path, endings: Sequence[str] = ('',)) -> None:
+    """Refuse a controller whose results, of these endings, would take the place of our own."""
+    for name in names:
+        if any(f'{name}{ending}' in (*NAMES, STAGING, ROLLOUTS) for ending in endings):
             expected = 'names that are not those of our own files'
             raise InputError(path, 'controllers', expected, name)
 
@@ -354,7 +355,7 @@ def scenario_from(
     """
     check(data, SCHEMA, path)
     data = resolved(data)
-    check_names(data, path)
+    check_names(data['controllers'], path)
     check_time(data, path)
     check_excitation(data, path)
     vehicle = vehicle_from_dict(vehicle_data, vehicle_path)

@@ -1,0 +1,25 @@
+"""`auv study`: what it refuses before it works."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from auv_analysis.cli import main
+
+GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
+SCENARIO = {'name': 's', 'vehicle': 'herman2018', 'duration': 1.0, 'step': 0.01, 'setpoint': {}}
+
+
+@pytest.mark.parametrize('name', ['numbers', 'sensitivity', 'claims'])
+def test_samples_never_take_the_place_of_a_table(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    scenario = tmp_path / 's.yaml'
+    controllers = {'gvc': {'law': 'gvc', **GAINS}, name: {'law': 'cl', **GAINS}}
+    scenario.write_text(yaml.safe_dump(SCENARIO | {'controllers': controllers}))
+    with pytest.raises(SystemExit) as end:
+        main.main(['study', str(scenario), '--out', str(tmp_path / 'out')])
+    errors = capsys.readouterr().err
+    assert (end.value.code, errors.count('\n'), (tmp_path / 'out').exists()) == (2, 1, False)
+    assert f'expected names that are not those of our own files, found {name}' in errors

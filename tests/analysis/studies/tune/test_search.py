@@ -125,3 +125,15 @@ def test_on_multiples_of_M_gvc_and_cl_are_one_law(tmp_path, monkeypatch) -> None
     errors = [tuned(request, law, goal).best.measures.weighted_error[0] for law in request.laws]
     assert errors[0] == pytest.approx(errors[1], rel=1e-3)
     assert errors[0] <= goal.reference.weighted_error[0] * (1 + 1e-3)
+
+
+def test_an_open_loop_beside_the_reference_keeps_its_excitation(tmp_path, monkeypatch) -> None:
+    for name in ('POINTS', 'STARTS', 'SHORT', 'FINALISTS', 'LONG'):
+        monkeypatch.setattr(searching, name, 1)
+    wave = {'surge': {'terms': [{'amplitude': 5.0, 'omega': 1.0}]}}
+    controllers = {'gvc': GVC, 'wave': {'law': 'multisine'}}
+    base = scenario(tmp_path, controllers, duration=0.05, excitation=wave)
+    request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'scalar', 'continuous', 0, 1)
+    goal = Goal.of(request)
+    effort = tuned(request, 'gvc', goal).best.measures.effort[0]
+    assert effort == pytest.approx(goal.reference.effort[0], rel=1e-3), 'it starts at its gains'

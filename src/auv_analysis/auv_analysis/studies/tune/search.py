@@ -227,10 +227,10 @@ def tuned(
 def _evaluator(request: Request, space: GainSpace) -> Evaluate:
     """Function from gains (B, ...) of a space's law to measures (B,) in the request's scenario."""
     law, middle = space.law, (space.low + space.high) / 2
-    alone = changed_scenario(request.scenario, {'controllers': {law: space.entry(middle)}})
+    scenario = changed_scenario(request.scenario, {f'controllers.{law}': space.entry(middle)})
 
     def evaluate(gains: Mapping[str, np.ndarray]) -> Measures:
-        return measured(alone, law, gains, request.hold, request.threads)
+        return measured(scenario, law, gains, request.hold, request.threads)
 
     return evaluate
 

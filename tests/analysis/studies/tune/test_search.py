@@ -8,6 +8,7 @@ from auv_analysis.studies.tune import search as searching
 from auv_analysis.studies.tune.cost import Measures
 from auv_analysis.studies.tune.gain_space import make_space
 from auv_analysis.studies.tune.search import Goal, Request, search, tuned
+from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 from auv_gvc_controller.control.gains import sampled_rate
 from auv_gvc_controller.laws.model import control_model
@@ -137,3 +138,11 @@ def test_an_open_loop_beside_the_reference_keeps_its_excitation(tmp_path, monkey
     goal = Goal.of(request)
     effort = tuned(request, 'gvc', goal).best.measures.effort[0]
     assert effort == pytest.approx(goal.reference.effort[0], rel=1e-3), 'it starts at its gains'
+
+
+def test_a_reference_that_has_nothing_to_do_is_refused(tmp_path) -> None:
+    base = scenario(tmp_path, {'gvc': GVC}, setpoint={}, disturbance=[], duration=0.05)
+    request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'scalar', 'continuous', 0, 1)
+    expected = 'controllers.gvc: expected a reference with effort and error, found effort 0, error'
+    with pytest.raises(InputError, match=expected):
+        Goal.of(request)

@@ -20,6 +20,7 @@ from auv_analysis.simulation.simulate import DivergedError
 from auv_analysis.studies.optimise import DIFFERENCE, GRADIENT, WEIGHT, Search, sobol_points
 from auv_analysis.studies.tune.cost import Measures, joined, measured
 from auv_analysis.studies.tune.gain_space import BEST, EDGE, GainSpace, make_space, starts_of
+from auv_dynamics.files.errors import InputError
 from auv_gvc_controller.control.gains import body_gains, sampled_rate
 from auv_gvc_controller.laws.law import make_gains
 from auv_gvc_controller.laws.model import control_model
@@ -88,6 +89,7 @@ class Goal:
         Raises
         ------
         DivergedError : the reference's own loop diverges
+        InputError : it has no effort or no error
 
         """
         scenario, name = request.scenario, request.reference
@@ -95,6 +97,10 @@ class Goal:
         if np.isnan(reference.error[0]):
             text = f'{scenario.name}, {name}: the reference diverges: nothing to equal'
             raise DivergedError(text)
+        if not (reference.effort[0] > 0 and reference.error[0] > 0):
+            expected = 'a reference with effort and error'
+            found = f'effort {reference.effort[0]:g}, error {reference.error[0]:g}'
+            raise InputError(scenario.path, f'controllers.{name}', expected, found)
         return cls(request.equal, request.index, reference, request.tolerance)
 
     @property

@@ -435,8 +435,11 @@ def test_analyze_refuses_a_topic_of_another_type(folder, capsys) -> None:
 
 def test_a_controller_that_diverges_leaves_the_others_their_report(folder, capsys) -> None:
     with captured():
-        assert _exit_code('simulate', 'case1_lauv', '--hold', 'zoh', '--out', 'lauv') == 1
-    errors = capsys.readouterr().err.splitlines()
+        line = 'simulate', 'case1_lauv', '--hold', 'zoh', '--out', 'lauv', '--json'
+        assert _exit_code(*line) == 1
+    said = capsys.readouterr()
+    errors = said.err.splitlines()
+    assert json.loads(said.out) == json.loads(Path('lauv/summary.json').read_text())
     assert errors[-1] == 'case1_lauv, cl: the closed loop diverges, not finite from t = 0.27 s'
     assert json.loads(Path('lauv/summary.json').read_text()).keys() == {'gvc'}
     assert Path('lauv/report.html').exists()

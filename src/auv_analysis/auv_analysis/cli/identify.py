@@ -118,7 +118,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         if not options.json:
             print_results(results, trial.out)
     if not results.facts['file']:
-        raise FailedError(results.facts['verdict'])
+        raise FailedError(results.facts['verdict'], results.to_json())
     return results.to_json()
 
 

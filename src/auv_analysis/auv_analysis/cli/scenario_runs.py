@@ -25,7 +25,7 @@ from auv_analysis.runs.run import AnyRun, Hold
 from auv_analysis.runs.samples import ENDING, write_samples
 from auv_analysis.scenario.scenario import Scenario, check_names, load_scenario, write_inputs
 from auv_analysis.simulation.simulate import announce, simulate
-from auv_dynamics.files.errors import first_line
+from auv_dynamics.files.errors import FailedError, first_line
 from auv_dynamics.vehicle import DOFS
 
 VELOCITY, WRENCH = 'm,rad/s', 'N,N m'
@@ -250,7 +250,7 @@ def finish(
     scenario: Scenario,
     **chosen: Any,
 ) -> dict[str, Any]:
-    """Conclude the runs that came to their end; then raise the failure of another one."""
+    """Conclude the runs that came to their end; then raise the failure of another one with them."""
     texts, document = scenario.attachments, {}
     if failure is not None:
         note = first_line(failure)
@@ -260,7 +260,7 @@ def finish(
     if runs:
         document = conclude(out, runs, texts['scenario.yaml'], texts['vehicle.yaml'], **chosen)
     if failure is not None:
-        raise failure
+        raise FailedError(str(failure), document or None) from failure
     return document
 
 

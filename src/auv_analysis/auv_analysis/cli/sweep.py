@@ -105,9 +105,7 @@ def _conclude(campaign: Campaign, out: Path, outcome: Outcome) -> dict[str, Any]
     if refused:
         say(f'warning: {refused} of {rows} rows refused, the first: {outcome.reason}')
     say(f"rollouts: {rows} rows, pandas.read_parquet('{out / ROLLOUTS}')")
-    if refused == rows:
-        raise FailedError('every rollout was refused: its values make no scenario')
-    return {
+    document = {
         'campaign': campaign.name,
         'folder': str(out),
         'dataset': str(out / ROLLOUTS),
@@ -117,3 +115,6 @@ def _conclude(campaign: Campaign, out: Path, outcome: Outcome) -> dict[str, Any]
         'controllers': counts,
         'paths': list(campaign.values(0, 1)),
     }
+    if refused == rows:
+        raise FailedError('every rollout was refused: its values make no scenario', document)
+    return document

@@ -69,7 +69,7 @@ def test_values_that_make_no_scenario_are_counted(command, all_of_them: bool, fi
     varied = f"[{{grid: {{'vehicle.rigid_body.mass': {masses}}}}}]"
     text = f'name: small\nscenario: scenario.yaml\nvary: {varied}'
     (files / 'campaign.yaml').write_text(text)
-    code, _, lines = command()
+    code, out, lines = command('--json')
     table = rows(files / 'runs/small')
     refused = [i for i, status in enumerate(table['status'].to_pylist()) if status == 'refused']
     assert len(refused) == (4 if all_of_them else 2)
@@ -77,6 +77,7 @@ def test_values_that_make_no_scenario_are_counted(command, all_of_them: bool, fi
     assert all(table['kinetic_energy.mean'][i].as_py() is None for i in refused)
     assert any(line.startswith(f'warning: {len(refused)} of 4 rows refused') for line in lines)
     assert code == (1 if all_of_them else 0)
+    assert json.loads(out)['rows'] == 4
     assert ('every rollout was refused' in lines[-1]) is all_of_them
 
 

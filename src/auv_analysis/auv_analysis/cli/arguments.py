@@ -179,6 +179,18 @@ def import_law(law: str) -> None:
         raise InputError('--law', '', *refusal(error)[1:]) from None
 
 
+def refuse_given(
+    options: argparse.Namespace, names: Sequence[str], expected: str, found: object
+) -> None:
+    """Refuse options of these names, which mean nothing where this is called."""
+    from auv_dynamics.files.errors import InputError
+
+    for name in names:
+        value = getattr(options, name)
+        if value is not None and value is not False:  # 0 was given
+            raise InputError(f'--{name.replace("_", "-")}', '', expected, found)
+
+
 def add_results(command: argparse.ArgumentParser, text: str = 'folder of the results') -> None:
     """What a command writes, and whether it may replace what is there."""
     command.add_argument('--out', type=Path, help=text)

@@ -10,8 +10,15 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from auv_analysis.cli.arguments import add_domain, add_results, import_law, number, refused
-from auv_dynamics.files.errors import FailedError, InputError
+from auv_analysis.cli.arguments import (
+    add_domain,
+    add_results,
+    import_law,
+    number,
+    refuse_given,
+    refused,
+)
+from auv_dynamics.files.errors import FailedError
 
 if TYPE_CHECKING:
     from auv_analysis.output.keyboard import Keyboard
@@ -24,6 +31,11 @@ RIGHT, UP, DOWN = b'\x1b[C', b'\x1b[A', b'\x1b[B'  # arrows
 KEYS = 'space: pause, go on; right: a step; up, down: faster, slower; q: end'
 DOCUMENT = 'open_loop.json'
 NANOSECONDS = 1e9
+PLAYED = (
+    'rate', 'start', 'duration', 'loop', 'paused', 'skip_gaps', 'topics', 'namespace',
+    'original_names', 'commands', 'force_commands', 'all', 'no_clock', 'expect', 'answers',
+    'domain_id',
+)  # fmt: skip
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -32,7 +44,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     add('bag', type=Path, metavar='BAG', help='a bag folder or an .mcap file')
     text = 's of the bag per s, or max: as fast as it goes without loss; default: 1'
-    add('--rate', type=_rate, metavar='R', default=1.0, help=text)
+    add('--rate', type=_rate, metavar='R', help=text)
     text = 'offset from the beginning of the bag, s'
     add('--start', type=number(at_least=0), metavar='S', help=text)
     add('--duration', type=number(above=0), metavar='S', help='length that is played, s')
@@ -62,9 +74,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     text = 'law on the recorded odometry and set-points: gvc, cl, pid, smc or module:Class'
     group.add_argument('--law', help=text)
     text = 'NAME=VALUE of 1, 6 or 36 numbers, with commas; default: as recorded; may be repeated'
-    group.add_argument(
-        '--gain', type=_gain, action='append', default=[], metavar='NAME=VALUE', help=text
-    )
+    group.add_argument('--gain', type=_gain, action='append', metavar='NAME=VALUE', help=text)
     group.add_argument('--vehicle', help='vehicle file, for bags without their own')
 
 
@@ -87,10 +97,9 @@ def _gain(text: str) -> tuple[str, float | list[float]]:
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Play a bag, or ask a law; returns what was published or would have been commanded."""
     if options.law is not None:
+        refuse_given(options, PLAYED, 'no --law beside it: it takes the whole bag', options.law)
         return _open_loop(options)
-    for name in ('out', 'overwrite', 'gain', 'vehicle'):
-        if getattr(options, name):
-            raise InputError(f'--{name}', '', '--law beside it', None)
+    refuse_given(options, ('out', 'overwrite', 'gain', 'vehicle'), '--law beside it', None)
     from auv_analysis.graph.domain import join_domain, place_of
     from auv_analysis.output.keyboard import Keyboard
     from auv_analysis.output.progress import say, waiting
@@ -232,7 +241,7 @@ def _open_loop(options: argparse.Namespace) -> dict[str, Any]:
     import_law(options.law)
     with waiting(f'reading {options.bag}'):
         recorded = recorded_loop(options.bag, options.vehicle)
-    document, both = ask_law(recorded, options.law, dict(options.gain), _answers)
+    document, both = ask_law(recorded, options.law, dict(options.gain or ()), _answers)
     document['bag'] = str(options.bag)
     law = options.law.replace(':', '_').replace('.', '_').replace('/', '_')
     name = f'replay_{recorded.scenario}_{recorded.name}_{law}'

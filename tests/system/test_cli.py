@@ -102,6 +102,9 @@ WRONG_LINES = {  # what is typed -> what the one line names
     'params case1 --controller gvc --out taken --overwrite': 'taken: --out',
     'analyze': 'BAG',
     'analyze gone': 'gone',
+    'analyze case1 --by nonsense': '--by: expected a sweep, found case1',
+    'study case1 --run --hold continuous': '--hold: expected zoh with --run',
+    'study case1 --composed': '--composed: expected --run',
     'analyze taken': 'taken',
     'analyze case1 gone.npz': 'gone.npz',
     'analyze case1 --out taken': 'taken: --out',
@@ -246,11 +249,12 @@ def test_simulate_prints_one_document_and_leaves_its_files(offset, options, fold
     assert {path.name for path in results.iterdir()} == (left if options else left | report)
 
 
-def test_a_report_of_a_sweep_cannot_be_left_out(folder, capsys) -> None:
+@pytest.mark.parametrize('option', ['--no-report', '--map x', '--odom x', '--law x', '--vehicle x'])
+def test_what_is_of_runs_is_refused_with_a_sweep(option, folder, capsys) -> None:
     Path('taken', SWEEP).write_text('{}')
-    code = _exit_code('analyze', 'taken', '--no-report')
+    code = _exit_code('analyze', 'taken', *option.split())
     captured = capsys.readouterr()
-    _is_refusal(code, captured.out, captured.err, '--no-report', folder)
+    _is_refusal(code, captured.out, captured.err, f'{option.split()[0]}: expected runs', folder)
 
 
 def test_work_that_fails_ends_in_one_line_with_code_1(folder, capsys) -> None:

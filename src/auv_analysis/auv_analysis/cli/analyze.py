@@ -9,7 +9,14 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from auv_analysis.cli.arguments import add_no_report, add_results, add_topics, import_law, topic_map
+from auv_analysis.cli.arguments import (
+    add_no_report,
+    add_results,
+    add_topics,
+    import_law,
+    refuse_given,
+    topic_map,
+)
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,6 +25,10 @@ if TYPE_CHECKING:
 
 FEW = 3  # runs up to which the report shows every figure of each
 LONGEST = 80  # of a folder's name
+OF_RUNS = (
+    'no_report', 'vehicle', 'namespace', 'law', 'map', 'odometry', 'wrench', 'setpoint', 'frames',
+    'twist_frame', 'step', 'gap',
+)  # fmt: skip
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -50,12 +61,12 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         if len(options.results) > 1:
             found = f'{len(options.results)} arguments'
             raise InputError(sweeps[0], '', 'a sweep alone, without other results', found)
-        if options.no_report:
-            raise InputError('--no-report', '', 'runs', f'{sweeps[0]}, a sweep')
+        refuse_given(options, OF_RUNS, 'runs', f'{sweeps[0]}, a sweep')
         from auv_analysis.studies.sweep.report import explore
 
         chosen = {'out': options.out, 'by': options.by, 'overwrite': options.overwrite}
         return explore(Path(sweeps[0]), **chosen)
+    refuse_given(options, ('by',), 'a sweep', options.results[0])
     for law in options.law or ():
         import_law(law)
     mapping = topic_map(options, options.vehicle)

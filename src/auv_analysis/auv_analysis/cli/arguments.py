@@ -188,7 +188,8 @@ def refuse_given(
     for name in names:
         value = getattr(options, name)
         if value is not None and value is not False:  # 0 was given
-            raise InputError(f'--{name.replace("_", "-")}', '', expected, found)
+            option = {'odometry': '--odom'}.get(name, f'--{name.replace("_", "-")}')
+            raise InputError(option, '', expected, found)
 
 
 def add_results(command: argparse.ArgumentParser, text: str = 'folder of the results') -> None:

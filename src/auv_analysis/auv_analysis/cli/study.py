@@ -15,6 +15,7 @@ from auv_analysis.cli.arguments import (
     add_hold,
     add_scenario,
     number,
+    refuse_given,
     whole,
 )
 from auv_dynamics.files.errors import InputError
@@ -29,6 +30,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Scenario, windows of the energy, and how the sensitivity to the gains is estimated."""
     add_scenario(command)
     add_hold(command)
+    command.set_defaults(hold=None)
     text = 'real nodes, recorded, in place of this process'
     command.add_argument('--run', action='store_true', help=text)
     add_graph(command, 'with --run: ')
@@ -62,8 +64,11 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     scenario, names = open_scenario(options)
     windows = [_window(scenario, first, last) for first, last in options.window]
     _check_samples(options)
-    if options.run:
-        options.hold = 'zoh'  # as the nodes do
+    if not options.run:
+        refuse_given(options, ('domain_id', 'composed'), '--run beside it', None)
+    elif options.hold == 'continuous':
+        raise InputError('--hold', '', 'zoh with --run, as the nodes hold', options.hold)
+    options.hold = options.hold or ('zoh' if options.run else 'continuous')
     check_hold(scenario, options.hold)
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain(options.domain_id)) if options.run else None

@@ -12,6 +12,7 @@ from auv_analysis.graph.node_parameters import (
     PLANT,
     RECORDER,
     SETPOINT,
+    WRENCH_TIMEOUT,
     node_parameters,
     parameter_file,
 )
@@ -43,6 +44,8 @@ MODULES = {
 }
 START_TIMEOUT = 60.0  # s until the start barrier must be down
 END_TIMEOUT = 30.0  # s for the recorder to close after the last step
+SPIN = 0.1  # s between two looks at a run
+SILENCE = 2 * WRENCH_TIMEOUT  # s: the plant names others first; it may be what has fallen silent
 
 
 def environment(domain: int) -> dict[str, str]:
@@ -140,14 +143,25 @@ def _follow(
     scenario: Scenario,
     progress: Callable[[int], None],
 ) -> None:
-    """Show the progress until the process that ends last has ended well."""
-    step, done_since = -1, None
+    """Show the progress until the process that ends last has ended well.
+
+    A run that stands still goes on as long as all of its nodes publish their health: it is paused.
+    """
+    step, done_since, looks = -1, None, 0
     while not supervisor.check(may_end=last):
-        graph.spin(0.1)
+        graph.spin(SPIN)
+        looks += 1  # and no clock, which goes on where all of this is stopped
         complete = graph.complete_ns // scenario.step_ns
         if complete > step:
-            step = complete
+            step, looks = complete, 0
             progress(step)
+        elif looks > SILENCE / SPIN:
+            if silent := PACKAGES.keys() - graph.alive:
+                text = f'no step after {step} for {SILENCE:g} s, and no sign of life'
+                raise NodeDiedError(f'{text} of {", ".join(sorted(silent))}')
+            looks = 0
+        if looks < SILENCE / SPIN / 2:
+            graph.alive.clear()
         if step >= scenario.steps:
             done_since = done_since or time.monotonic()
             if time.monotonic() - done_since > END_TIMEOUT:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -18,7 +19,7 @@ from auv_dynamics.ros import interface
 from auv_dynamics.ros.endpoints import observes
 from auv_dynamics.ros.node_interface import ASK_AGAIN
 from auv_dynamics.ros.security import enclave, require
-from auv_dynamics.ros.topics import PROGRESS, one_at_a_time
+from auv_dynamics.ros.topics import DIAGNOSTICS, PROGRESS, one_at_a_time
 
 
 class Participant:
@@ -86,6 +87,10 @@ class Watcher(Participant):
     domain : ROS domain id
     plant : name of the plant node
 
+    Attributes
+    ----------
+    alive : nodes that have published their health since this was emptied
+
     """
 
     def __init__(self, domain: int, plant: str = 'plant_node'):
@@ -93,6 +98,10 @@ class Watcher(Participant):
         self._node.create_subscription(
             PROGRESS.type, PROGRESS.name, self._on_progress, one_at_a_time()
         )
+        self._node.create_subscription(
+            DIAGNOSTICS.type, DIAGNOSTICS.name, self._on_diagnostics, one_at_a_time()
+        )
+        self.alive: set[str] = set()
         self._run = self._node.create_client(SetBool, f'{plant}/run')
         self._asked: Future | None = None
         self._asked_at = 0.0
@@ -131,6 +140,9 @@ class Watcher(Participant):
 
     def _on_progress(self, message: Header) -> None:
         self.complete_ns = max(self.complete_ns, interface.nanoseconds(message.stamp))
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        self.alive.update(status.name.lstrip('/') for status in message.status)
 
 
 def _silent_node(context: Context) -> Node:

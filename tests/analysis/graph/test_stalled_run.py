@@ -1,0 +1,59 @@
+"""A run that stands still: ended where a node is silent, and not where it is paused."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import psutil
+import pytest
+
+from auv_analysis import load_scenario
+from auv_analysis.graph.experiment import PACKAGES, SILENCE, SPIN, run_controller
+from auv_analysis.graph.supervisor import NodeDiedError
+
+WHILE = round(0.9 * SILENCE / SPIN)  # looks at a run that are not yet too many
+ALL = set(PACKAGES)
+
+
+class OverError(Exception):
+    """The run was still waited for at the end of the test."""
+
+
+class Graph(SimpleNamespace):
+    """What is seen of a graph whose nodes do what a function of the number of the look says."""
+
+    def ask_to_run(self) -> bool:
+        return True
+
+    def spin(self, _: float) -> None:
+        self.looks += 1
+        if self.looks > 5 * WHILE:
+            raise OverError
+        self.does(self)
+
+
+def stalls(graph: Graph, silent: str) -> None:
+    if graph.looks == WHILE:
+        graph.complete_ns = 5 * 10_000_000
+    graph.alive |= ALL - ({silent} if graph.looks > WHILE + 10 else set())
+
+
+def watch(does: Callable[[Graph], None], folder: Path) -> None:
+    graph = Graph(looks=0, does=does, alive=set())
+
+    def begin(_: list[str], **options: object) -> psutil.Popen:
+        return psutil.Popen(['sleep', '600'], **options)
+
+    run_controller(load_scenario('case1'), 'gvc', folder, 0, graph, begin, lambda _: None)
+
+
+@pytest.mark.parametrize('silent', ['plant_node', 'recorder_node'])
+def test_a_node_that_hangs_ends_a_run_and_is_named(silent: str, tmp_path: Path) -> None:
+    expected = f'no step after 5 for 60 s, and no sign of life of {silent}$'
+    with pytest.raises(NodeDiedError, match=expected):
+        watch(lambda graph: stalls(graph, silent), tmp_path)
+
+
+def test_a_run_that_is_paused_goes_on(tmp_path: Path) -> None:
+    with pytest.raises(OverError):
+        watch(lambda graph: stalls(graph, ''), tmp_path)

@@ -11,6 +11,7 @@ from rich.console import Console
 from scipy.integrate import trapezoid
 
 from auv_analysis import summarize
+from auv_analysis.bag.reading import usual_limit
 from auv_analysis.bag.tracks import (
     Track,
     at_times,
@@ -18,7 +19,6 @@ from auv_analysis.bag.tracks import (
     means_over,
     sensible_step,
     time_base,
-    usual_limit,
 )
 from auv_analysis.cli.scenario_runs import summary_tables
 from auv_analysis.metrics.lyapunov import lyapunov

@@ -15,6 +15,7 @@ from auv_analysis.bag.foreign_messages import (
     ordered,
 )
 from auv_analysis.bag.foreign_topics import FROM_ATTITUDE, HELD, MOVING, MappedTopic, TopicMap
+from auv_analysis.bag.reading import usual_limit
 from auv_analysis.bag.tracks import (
     BURST,
     ENOUGH,
@@ -23,7 +24,6 @@ from auv_analysis.bag.tracks import (
     at_times,
     between_gaps,
     in_seconds,
-    usual_limit,
 )
 from auv_analysis.metrics.local_polynomials import SMALLEST, rates
 from auv_analysis.metrics.pose_twist import CONJUGATE, turn, turned

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.bag import attachments
-from auv_analysis.bag.reading import BagContents, Series, gathered, read_bag, slices
+from auv_analysis.bag.reading import BagContents, Series, gathered, read_bag, slices, usual_limit
 from auv_analysis.bag.step_topics import READERS, NotOursError, namespace_of, role_of
-from auv_analysis.bag.tracks import usual_limit
 from auv_analysis.runs.run import Run, rows_of
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.plant.plant import unwrapped_eta

@@ -104,6 +104,19 @@ def slices(count: int, rows: int = 1 << 16) -> Iterator[slice]:
     return (slice(i, min(i + rows, count)) for i in range(0, count, rows))
 
 
+GAP_PERIODS = 5.0  # median periods, at least, that make a pause a gap
+GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in bursts
+USUAL = 90.0  # percentile
+
+
+def usual_limit(ns: np.ndarray) -> float:
+    """Longest pause that is no gap, by the intervals of rising stamps (n,), ns."""
+    if len(ns) < 2:
+        return np.inf
+    apart = np.diff(ns)
+    return float(max(GAP_PERIODS * np.median(apart), GAP_USUAL * np.percentile(apart, USUAL)))
+
+
 @dataclass
 class BagContents(FileExtent):
     """What lies in a bag, before anything is made of it.

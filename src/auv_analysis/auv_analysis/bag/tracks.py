@@ -11,9 +11,6 @@ from auv_analysis.bag.foreign_fields import COMPONENTS
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros.interface import NANOSECONDS
 
-GAP_PERIODS = 5.0  # median periods, at least, that make a pause a gap
-GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in bursts
-USUAL = 90.0  # percentile
 BURST = 0.2  # of the mean interval: shorter ones are those of a burst
 AVERAGED = 1.5  # intervals per step of the time base from which a signal is averaged over the step
 ENOUGH = 12  # velocity samples of a stretch, fewer are left out: no rate could be estimated
@@ -77,14 +74,6 @@ class Track:
     def is_averaged(self, step: int) -> bool:
         """Whether several samples fall into one step, ns, so that single ones would alias."""
         return step > AVERAGED * self._interval
-
-
-def usual_limit(ns: np.ndarray) -> float:
-    """Longest pause that is no gap, by the intervals of rising stamps (n,), ns."""
-    if len(ns) < 2:
-        return np.inf
-    apart = np.diff(ns)
-    return float(max(GAP_PERIODS * np.median(apart), GAP_USUAL * np.percentile(apart, USUAL)))
 
 
 def at_times(track: Track, ns: np.ndarray) -> np.ndarray:

@@ -128,6 +128,41 @@ def test_a_pause_of_a_driver_is_a_gap_and_one_of_lock_step_none(tmp_path: Path) 
     assert load_run(strict).gaps == ()
 
 
+def begun_anew(folder: Path, old: int, new: int, wrenches: int) -> Path:
+    """Two motions of one time, of so many steps; the second one has set-points and wrenches."""
+    bag = Bag(folder / 'bag.mcap', chunk_size=2000)
+    bag.attach('vehicle.yaml', VEHICLE)
+    bag.attach(RECORDING, recording_text(False, {}))
+    for first, count in ((0, old), (100, new)):
+        for k in range(count):
+            ns = (1000 + 10 * k) * MS
+            bag.add('/odom', ODOMETRY, ns, serialized(odometry(ns, state(first + k))))
+            if first or k < wrenches:
+                made = stamped('Wrench', ns, [float(first + k)] * 6)
+                bag.add('/wrench', made.__msgtype__, ns, serialized(made))
+    return bag.close()
+
+
+@pytest.mark.parametrize(('old', 'new', 'first'), [(200, 150, 0), (150, 200, 100)])
+def test_of_a_clock_that_begins_anew_the_longest_stretch_is_read(
+    tmp_path: Path, old: int, new: int, first: int
+) -> None:
+    path = begun_anew(tmp_path, old, new, old)
+    run, mapped = load_run(path), open_bag(path, whole=1).run
+    assert run.samples == 200
+    for one in (run, joined([*mapped.blocks(50)])):
+        assert_array_equal(one.eta[:, 0], first + np.arange(200.0))
+        assert_array_equal(one.tau[:, 0], first + np.arange(200.0))
+    assert run.notes == (
+        'odom: the clock jumps back 1 times; read the longest of 2 stretches, left 150 messages',
+    )
+
+
+def test_a_topic_with_another_clock_is_said(tmp_path: Path) -> None:
+    run = load_run(begun_anew(tmp_path, 200, 150, 0))
+    assert 'wrench: its clock jumps back 0 times: what it says may be of another time' in run.notes
+
+
 def test_a_controller_that_pairs_exactly_has_its_own_stamps(tmp_path: Path) -> None:
     path = write(tmp_path, [1000, 1020, 1041, 1060], [1000, 1020, 1040, 1060], params=EXACT)
     assert_array_equal(load_run(path).t, [0.0, 0.02, 0.06])

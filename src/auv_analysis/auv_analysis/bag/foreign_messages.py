@@ -19,12 +19,12 @@ from auv_analysis.bag.foreign_fields import (
 )
 from auv_analysis.bag.foreign_topics import HELD, MappedTopic, TopicMap, other_odometries
 from auv_analysis.bag.metadata import is_csv
+from auv_analysis.bag.reading import BACK
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.interface import NANOSECONDS
 
 TOGETHER = 4096  # messages that wait as objects before they become rows of arrays
-BACK = NANOSECONDS  # ns: stamps that fall by more have begun anew, less is a message that came late
 APART = NANOSECONDS  # ns between logged and stamped time from which they are two clocks
 
 

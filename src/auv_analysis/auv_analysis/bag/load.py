@@ -8,7 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_analysis.bag import attachments
-from auv_analysis.bag.reading import BagContents, Series, gathered, read_bag, slices, usual_limit
+from auv_analysis.bag.reading import (
+    BACK,
+    BagContents,
+    Series,
+    gathered,
+    read_bag,
+    slices,
+    usual_limit,
+)
 from auv_analysis.bag.step_topics import READERS, NotOursError, namespace_of, role_of
 from auv_analysis.runs.run import Run, rows_of
 from auv_dynamics.files.errors import InputError
@@ -76,6 +84,7 @@ def open_bag(
     bag, contents = Path(bag), read_bag(bag, namespace, whole=whole)
     topics = topics_of_one_graph(contents.messages, contents, bag)
     series = {role: contents.messages.pop(topic) for role, topic in topics.items()}
+    series, begun = longest_stretch(series) if contents.lenient else (series, [])
     controller = attachments.parameters_of(contents, bag).get('controller_node', {})
     held = holds(contents, controller)
     if held:
@@ -83,7 +92,7 @@ def open_bag(
     counts = {role: len(stamps) for role, (stamps, _) in series.items()}
     ns, values = complete(series, whole)
     step_by_step = {r: count for r, count in counts.items() if not (held and r in SETPOINTS)}
-    notes = dropped(step_by_step, len(ns), bag)
+    notes = [*begun, *dropped(step_by_step, len(ns), bag)]
     facts = _facts(contents, bag, vehicle, ns, notes)
     return Recording(_run(ns, values, facts, whole), contents.attachments)
 
@@ -211,6 +220,40 @@ def _namespace(topics: set[str], contents: BagContents, bag: Path) -> str:
         listed = ', '.join(space.rstrip('/') or '/' for space in whole)
         raise InputError(bag, '', 'one vehicle, or --namespace with that of one', listed)
     return whole[0] if whole else spaces[0]
+
+
+def longest_stretch(series: Mapping[str, Series]) -> tuple[dict[str, Series], list[str]]:
+    """The part of each topic in which the odometry goes on longest, and notes on what is left out.
+
+    Where a clock begins anew, that of every topic does, but for one that has another clock.
+
+    Parameters
+    ----------
+    series : role -> stamps in the order of the bag, and rows
+
+    """
+    cuts = {
+        role: [0, *(np.flatnonzero(np.diff(ns) < -BACK) + 1).tolist(), len(ns)]
+        for role, (ns, _) in series.items()
+    }
+    edges = cuts[interface.ODOM]
+    if len(edges) == 2:
+        return dict(series), []
+    kept = int(np.argmax(np.diff(edges)))
+    times = len(edges) - 2
+    notes = [
+        f'{interface.ODOM}: the clock jumps back {times} times; read the longest of {times + 1} '
+        f'stretches, left {edges[-1] - edges[kept + 1] + edges[kept]} messages'
+    ]
+    found = dict(series)
+    for role, (ns, rows) in series.items():
+        if len(cuts[role]) == len(edges):
+            part = slice(*cuts[role][kept : kept + 2])
+            found[role] = ns[part], rows[part]
+        else:
+            own = f'{role}: its clock jumps back {len(cuts[role]) - 2} times'
+            notes.append(f'{own}: what it says may be of another time')
+    return found, notes
 
 
 def complete(series: Mapping[str, Series], whole: float = math.inf) -> Steps:

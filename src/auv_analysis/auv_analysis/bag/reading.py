@@ -104,6 +104,7 @@ def slices(count: int, rows: int = 1 << 16) -> Iterator[slice]:
     return (slice(i, min(i + rows, count)) for i in range(0, count, rows))
 
 
+BACK = interface.NANOSECONDS  # ns: stamps that fall by more have begun anew, less came late
 GAP_PERIODS = 5.0  # median periods, at least, that make a pause a gap
 GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in bursts
 USUAL = 90.0  # percentile

@@ -148,3 +148,16 @@ def test_numbers_of_whatever_width_are_written(tmp_path, capsys) -> None:
     main.main(['info', str(bag.close()), '--json'])
     fields = json.loads(capsys.readouterr().out)['fields']['/thrusts']
     assert (fields['data[1]']['least'], fields['data[0]']['largest']) == (-2.0, 2.0)
+
+
+def test_a_message_that_would_fill_the_memory_is_not_looked_into(tmp_path, capsys) -> None:
+    kind = 'std_msgs/msg/Float64MultiArray'
+    bag = Bag(tmp_path / 'dive.mcap')
+    layout = new('std_msgs/msg/MultiArrayLayout', [], 0)
+    for topic, count in (('/large', (1 << 21) // 8), ('/small', 2)):
+        bag.add(topic, kind, 0, serialized(new(kind, layout, np.zeros(count))))
+    main.main(['info', str(bag.close()), '--json'])
+    document = json.loads(capsys.readouterr().out)
+    assert document['topics']['/large']['messages'] == 1
+    assert document['fields']['/small']['data[1]']['least'] == 0.0
+    assert not document['fields'].get('/large')

@@ -13,7 +13,7 @@ from mcap.records import Channel
 
 from auv_analysis.bag.chunks import MessageTable
 from auv_analysis.bag.csv_logs import rows_of_csv, survey_of_csv
-from auv_analysis.bag.limits import LARGEST_PARSED, MOST_NAMED
+from auv_analysis.bag.limits import LARGEST_DECODED, LARGEST_PARSED, MOST_NAMED
 from auv_analysis.bag.mavlink_logs import messages_of_log, survey_of_log
 from auv_analysis.bag.mcap_file import McapFile
 from auv_analysis.bag.metadata import bag_files, check_regular, is_csv, is_log, is_mcap
@@ -258,6 +258,9 @@ def decoder_of(path: Path, topic: str, how: tuple[str, str, str, str]) -> Decode
 
 def decoded(path: Path, topic: str, decode: Decoder, data: bytes) -> Any:
     """A message; InputError, which names its topic, where it cannot be decoded."""
+    if len(data) > LARGEST_DECODED:
+        expected = f'messages of at most {LARGEST_DECODED} bytes'
+        raise InputError(path, topic, expected, f'{len(data)} bytes')
     return _guarded(path, topic, 'messages of its type', lambda: decode(data))
 
 

@@ -20,6 +20,7 @@ LARGEST_RECORD: dict[int, int] = {
     Opcode.CHUNK_INDEX: 2 * MIB,
 }
 LARGEST_OTHER = 64 * MIB  # bytes of a schema, of metadata and of what is not known
+LARGEST_DECODED = 2 * MIB  # bytes of a message, which may become a hundred times as many
 LARGEST_PARSED = MIB // 4  # bytes of the definitions of types that are parsed, of a file
 MOST_RECORDS = 1 << 21  # in a chunk; a chunk of 64 MiB holds so many of the smallest messages
 FREE_RECORDS = 1 << 17  # in all chunks of a file, beside one per byte of it

@@ -19,7 +19,7 @@ from auv_analysis.bag.foreign_fields import (
 )
 from auv_analysis.bag.foreign_topics import HELD, MappedTopic, TopicMap, other_odometries
 from auv_analysis.bag.metadata import is_csv
-from auv_analysis.bag.reading import BACK
+from auv_analysis.bag.reading import stretches
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import meant
 from auv_dynamics.ros.interface import NANOSECONDS
@@ -88,17 +88,19 @@ def on_the_clock(of: Recorded, clock: Recorded, notes: list[str]) -> Recorded:
 
 def longest_stretch(of: Recorded, notes: list[str]) -> Recorded:
     """The longest part, in messages, in which the clock never starts anew."""
-    cuts = np.flatnonzero(np.diff(of.stamps) < -BACK) + 1
-    if not len(cuts):
+    edges = stretches(of.stamps)
+    times = len(edges) - 2
+    if not times:
         return of
-    parts = np.split(np.arange(len(of.stamps)), cuts)
-    kept = max(parts, key=len)
-    back = np.max(-np.diff(of.stamps)[cuts - 1]) / NANOSECONDS
+    i = int(np.argmax(np.diff(edges)))
+    kept = of.part(slice(*edges[i : i + 2]))
+    back = -np.diff(of.stamps).min() / NANOSECONDS
     notes.append(
-        f'{of.source.topic}: the clock jumps back {len(cuts)} times, by up to {back:.6g} s; '
-        f'read the longest of {len(parts)} stretches, left {len(of.stamps) - len(kept)} messages'
+        f'{of.source.topic}: the clock jumps back {times} times, by up to {back:.6g} s; '
+        f'read the longest of {times + 1} stretches, '
+        f'left {len(of.stamps) - len(kept.stamps)} messages'
     )
-    return of.part(kept)
+    return kept
 
 
 def logged_with(of: Recorded, clock: Recorded) -> Recorded:

@@ -9,12 +9,12 @@ import numpy as np
 
 from auv_analysis.bag import attachments
 from auv_analysis.bag.reading import (
-    BACK,
     BagContents,
     Series,
     gathered,
     read_bag,
     slices,
+    stretches,
     usual_limit,
 )
 from auv_analysis.bag.step_topics import READERS, NotOursError, namespace_of, role_of
@@ -232,10 +232,7 @@ def longest_stretch(series: Mapping[str, Series]) -> tuple[dict[str, Series], li
     series : role -> stamps in the order of the bag, and rows
 
     """
-    cuts = {
-        role: [0, *(np.flatnonzero(np.diff(ns) < -BACK) + 1).tolist(), len(ns)]
-        for role, (ns, _) in series.items()
-    }
+    cuts = {role: stretches(ns) for role, (ns, _) in series.items()}
     edges = cuts[interface.ODOM]
     if len(edges) == 2:
         return dict(series), []

@@ -110,6 +110,11 @@ GAP_USUAL = 3.0  # times the interval that nine of ten keep: some topics come in
 USUAL = 90.0  # percentile
 
 
+def stretches(ns: np.ndarray) -> list[int]:
+    """Where the clock of stamps (n,) begins anew in the order of the bag, with 0 and n."""
+    return [0, *(np.flatnonzero(np.diff(ns) < -BACK) + 1).tolist(), len(ns)]
+
+
 def usual_limit(ns: np.ndarray) -> float:
     """Longest pause that is no gap, by the intervals of rising stamps (n,), ns."""
     if len(ns) < 2:

@@ -7,8 +7,16 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from auv_analysis.cli import arguments
-from auv_analysis.cli.arguments import VEHICLE, add_no_report, add_results, number, refused, whole
+from auv_analysis.cli.arguments import (
+    VEHICLE,
+    add_no_report,
+    add_results,
+    add_topics,
+    number,
+    refused,
+    topic_map,
+    whole,
+)
 from auv_dynamics.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -50,7 +58,7 @@ def add_bags(command: argparse.ArgumentParser) -> None:
     text = 'what the model does not see: a share of the recordings, their last part, or a bag; '
     command.add_argument('--holdout', default='0.25', metavar='SHARE_OR_BAG',
                          help=f'{text}default: 0.25')  # fmt: skip
-    arguments.add_topics(command)
+    add_topics(command)
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -149,7 +157,7 @@ def _recordings(
     from auv_analysis.studies.identify.identify import split
     from auv_analysis.studies.identify.plausibility import check_rates
 
-    mapping = arguments.topic_map(options)
+    mapping = topic_map(options)
 
     def records(bag: Path) -> list[Record]:
         found = read_records(bag, vehicle, mapping, applied=options.applied, notes=notes)

@@ -175,7 +175,7 @@ def test_a_reset_puts_the_vehicle_back_after_the_step_that_is_under_way(made, ve
 
 REAL = {'step': H, 'actuators.limit': [1e6], 'wrench_timeout': patience(0.2)}
 PACE = 0.05  # s, step of a plant whose pace is measured
-WINDOW = 2.0  # s of it
+WINDOW = 1.0  # s of it
 
 
 def arrivals(made: Program) -> list[tuple[float, float]]:
@@ -242,7 +242,7 @@ def test_real_time_ends_with_its_last_step_and_tells_of_silence_until_then(made,
     assert (status.name, status.hardware_id) == ('/plant_node', 'rexrov')
     made.until(lambda: plant.exit_code is not None, 'the end')
     assert plant.exit_code == 0
-    assert stamps(made.heard['odom'])[-2:] == [99 * STEP, 100 * STEP]
+    made.until(lambda: stamps(made.heard['odom'])[-2:] == [99 * STEP, 100 * STEP], 'the last step')
     count = len(told)
     made.until(lambda: len(told) > count and level() == DiagnosticStatus.OK, 'no silence behind it')
 
@@ -265,21 +265,19 @@ def test_silence_of_the_controller_gives_zero_wrench_and_it_comes_back(made, veh
     applied = made.heard['wrench_applied']
     made.until(lambda: len(applied) > 3, 'the beginning')
     assert by_hand.six_of(applied[-1]) == [0.0] * 6, 'nothing before the first wrench'
-    last = 0.0  # s, before the last wrench was said
     for tau in (TAU[0], TAU[1]):
 
         def drives(tau: np.ndarray = tau) -> bool:
-            nonlocal last
             newest = by_hand.ns_of(made.heard['odom'][-1])
-            last = time.monotonic()
             made.publish(topics.WRENCH, by_hand.six(topics.WRENCH.type, newest, tau))
             made.spin(H)
             return by_hand.six_of(applied[-1]) == [*tau]
 
+        first = time.monotonic()  # those that follow may come late, and be refused
         made.until(drives, 'the wrench')
         begun = len(applied)
         made.until(lambda: by_hand.six_of(applied[-1]) == [0.0] * 6, 'a zero wrench')
-        assert time.monotonic() - last > REAL['wrench_timeout'], 'it is held before'
+        assert time.monotonic() - first > REAL['wrench_timeout'], 'it is held before'
         held = [by_hand.six_of(message) for message in applied[begun:]]
         assert held == [[*tau]] * (len(held) - 1) + [[0.0] * 6]
 

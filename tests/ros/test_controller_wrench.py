@@ -368,6 +368,28 @@ def test_silence_in_real_time_gives_zero_wrench_is_explained_and_it_comes_back(
     assert len(told) >= 8
 
 
+@pytest.mark.parametrize('lockstep', [True, False])
+def test_an_answer_that_is_held_back_is_zero_where_the_controller_leaves(
+    made, vehicle, capfd, lockstep
+) -> None:
+    settings = {'lockstep': lockstep, 'setpoint_pairing': 'latest', 'setpoint_timeout': 60.0}
+    settings |= {'setpoint_acceleration': 'none', 'odometry_timeout': 60.0, 'limits.wrench': [1e4]}
+    settings |= {'ramp': 0.0, 'expected_subscribers': ['wrench=2']}
+    node = controller(made, vehicle, 'gvc', **settings)
+    made.publish(topics.CMD_VEL, by_hand.six(topics.CMD_VEL.type, 3 * STEP, NU_D[0]))
+    made.until(lambda: node._idle._heard, 'the set-point')
+    made.publish(topics.ODOM, by_hand.odometry(3 * STEP, [*ETA[0, :3], 1, 0, 0, 0, *NU[0]]))
+    made.until(lambda: node._held is not None and any(node._held.tau), 'an answer')
+    assert node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+    assert not made.heard['wrench'], 'one of two listens'
+    made.listen(topics.WRENCH)
+    made.until(lambda: made.heard['wrench'], 'what it leaves')
+    made.until(lambda: node._held is None, 'nothing held back')
+    assert {tuple(by_hand.six_of(message)) for message in made.heard['wrench']} == {(0.0,) * 6}
+    assert by_hand.ns_of(made.heard['wrench'][0]) == 3 * STEP
+    assert not re.search('takes over|lets go', capfd.readouterr().err)
+
+
 def test_in_real_time_what_came_before_an_activation_is_not_obeyed(made, vehicle) -> None:
     """The clock may have begun anew since: then set-points of the old time lie ahead of it."""
     real = {'lockstep': False, 'setpoint_pairing': 'latest', 'limits.wrench': [1e4]}

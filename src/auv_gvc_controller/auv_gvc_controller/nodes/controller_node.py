@@ -366,7 +366,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         if self._active:
             self._say(self._controller.watch(self._now()))
         if self._held is not None:
-            self._say(self._held)
+            self._say(self._held, leaves=not self._active)
         self.graph.facts.update(self._health())
 
     def _health(self) -> dict[str, Any]:
@@ -379,7 +379,8 @@ class ControllerNode(BulkMixin, LifecycleNode):
     def _let_go(self) -> None:
         if not self._active:
             return
-        if not self._settings.lockstep or self._controller.unanswered is not None:
+        waited_for = self._held is not None or self._controller.unanswered is not None
+        if waited_for or not self._settings.lockstep:
             self._say(self._controller.silence(), leaves=True)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

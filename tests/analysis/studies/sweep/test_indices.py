@@ -58,6 +58,18 @@ def test_sobol_of_a_linear_figure(tmp_path: Path) -> None:
         assert (row['points'], row['of']) == (256, 256)
 
 
+def test_indices_are_the_same_where_the_design_is_not_the_last_group(tmp_path: Path) -> None:
+    """One group outside of it and one inside: cases of two integrators and two durations."""
+    inside = '  - grid: {duration: [1.0, 2.0]}\n'
+    out = make_sweep(tmp_path, SALTELLI.replace('256', '64') + inside, linear)
+    found = [row for row in indices(out) if row['with'] is None]
+    cases = {f'integrator = {i}, duration = {d}' for i in ('ode5', 'rk4') for d in (1.0, 2.0)}
+    assert {row['case'] for row in found} == cases
+    assert {row['points'] for row in found} == {64}
+    for row in found:
+        assert row['ST'] == pytest.approx({A: 0.9, B: 0.1, C: 0.0}[row['path']], abs=0.06)
+
+
 def test_a_base_point_with_a_failed_row_is_left_out_whole(tmp_path: Path, approved) -> None:
     def failing(controller, values, index):
         columns = linear(controller, values, index)
@@ -98,8 +110,10 @@ def test_an_unfinished_design_uses_its_whole_base_points(tmp_path: Path) -> None
     assert {(row['case'], row['points']) for row in found} == {('integrator = ode5', 160)}
 
 
-def test_morris_of_a_linear_figure(tmp_path: Path) -> None:
-    found = {row['path']: row for row in indices(make_sweep(tmp_path, MORRIS, linear))}
+@pytest.mark.parametrize('levels', [4, 6])
+def test_morris_of_a_linear_figure(tmp_path: Path, levels: int) -> None:
+    text = MORRIS.replace('count: 12', f'count: 12\n    levels: {levels}')
+    found = {row['path']: row for row in indices(make_sweep(tmp_path, text, linear))}
     for path, slope in ((A, 3.0), (B, -1.0), (C, 0.0)):
         assert found[path]['mu'] == pytest.approx(slope)
         assert found[path]['mu_star'] == pytest.approx(abs(slope))

@@ -5,8 +5,10 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
+import numpy as np
 import pytest
-from helpers.sweeps import CAMPAIGN, ROLLOUTS, Counting, parts, rows, run, write_files
+import yaml
+from helpers.sweeps import CAMPAIGN, ROLLOUTS, SCENARIO, Counting, parts, rows, run, write_files
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.scenario.changes import changed_scenario
@@ -44,6 +46,34 @@ def test_rows_are_the_figures_of_their_simulations(files: Path) -> None:
                 assert row[f'{group}.{key}.{dof}'] == (
                     None if known is None else pytest.approx(known, rel=1e-9, abs=1e-12)
                 )
+
+
+def test_noise_of_a_row_is_that_of_its_seed_in_the_hold_of_the_campaign(files: Path) -> None:
+    (files / 'scenario.yaml').write_text(f'{SCENARIO}\nsensors: {{velocity_noise: 0.02}}\n')
+    sampled = CAMPAIGN.replace('block: 5', 'block: 5\nhold: zoh\ncontrollers: [gvc]')
+    (files / 'campaign.yaml').write_text(sampled)
+    run(files)
+    scenario = load_scenario(files / 'scenario.yaml')
+    paths = ('seed', 'vehicle', 'vehicle.damping.linear[0]', 'setpoint.surge.offset')
+    for row in rows(files / 'out').to_pylist()[::3]:
+        values = {path: row[path] for path in paths}
+        values['controllers.gvc.k_D'] = row['controllers.*.k_D']
+        summary = summarize(simulate(changed_scenario(scenario, values), 'gvc', 'zoh'))
+        found = [row[f'effort.rms.{dof}'] for dof in DOFS]
+        assert found == pytest.approx(summary['effort']['rms'], rel=1e-9), row['index']
+
+
+def test_a_worker_needs_no_file_of_the_set_point(files: Path) -> None:
+    way = files / 'way.csv'
+    way.write_text('t,surge,sway,heave,roll,pitch,yaw\n0,0,0,0,0,0,0\n1,0.5,0,0.2,0,0,0.1\n')
+    scenario = yaml.safe_load(SCENARIO) | {'setpoint': {'file': 'way.csv'}}
+    (files / 'scenario.yaml').write_text(yaml.safe_dump(scenario))
+    grid = 'name: x\nscenario: scenario.yaml\nvary: [{grid: {controllers.*.k_D: [6, 12.0]}}]'
+    (files / 'campaign.yaml').write_text(grid)
+    contents = sweep_block.contents_of(load_campaign(files / 'campaign.yaml'))
+    way.unlink()
+    found = sweep_block.scenario_of(contents, '').setpoint.value(0.2)
+    np.testing.assert_allclose(found, [0.1, 0, 0.04, 0, 0, 0.02])
 
 
 def test_rows_do_not_depend_on_blocks_workers_or_processes(files: Path) -> None:

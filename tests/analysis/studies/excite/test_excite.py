@@ -12,7 +12,14 @@ from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main
 from auv_analysis.output.folder import listed_in, results_folder
 from auv_analysis.studies.excite import excite as searching
-from auv_analysis.studies.excite.drive import Bounds, Family, Request, scenario_in_memory
+from auv_analysis.studies.excite.drive import (
+    Bounds,
+    Family,
+    Request,
+    motion_of,
+    scenario_in_memory,
+    scenario_of,
+)
 from auv_analysis.studies.excite.excite import _fleet, excite
 from auv_analysis.studies.excite.report import (
     print_results,
@@ -161,6 +168,20 @@ def test_no_two_sines_share_a_frequency_and_peaks_are_as_asked() -> None:
     peaks = np.abs(tau).max(axis=0)
     np.testing.assert_allclose(peaks, np.exp(x[0, :6]) * family.most, rtol=1e-9)
     np.testing.assert_allclose(family.offset, request.hold)
+
+
+def test_vehicles_of_a_closed_loop_move_as_their_errors_make_them() -> None:
+    request = request_of(closed=True, duration=2.0, seed=7)
+    family = Family.of(request, np.random.default_rng(0))
+    waves = family.waves(np.zeros((1, 2 * len(family.driven))))
+    wrong = {'kind': 'model_error', 'dM': (0.2 * request.vehicle.M).tolist()}
+    prior, other = motion_of(request, waves, request.vehicle.model, [{}, wrong]).states[:, 0]
+    data = scenario_of(request, waves.part(0))
+    assert data['seed'] == 7
+    del data['sensors']
+    run = simulate(scenario_in_memory(request, data | {'disturbance': [wrong]}), 'gvc', 'zoh')
+    np.testing.assert_allclose(other[:, 7:], run.nu, atol=1e-12)
+    assert np.abs(other - prior).max() > 1e-3
 
 
 def test_a_vehicle_that_sinks_must_close_its_loop() -> None:

@@ -13,6 +13,7 @@ from pyarrow import parquet
 
 from auv_analysis.cli.main import main
 from auv_analysis.report.results import Results
+from auv_analysis.studies.identify.bags import read_records
 from auv_analysis.studies.identify.vehicle_text import write_vehicle
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle import DOFS
@@ -134,6 +135,24 @@ def test_a_recording_that_contradicts_the_prior_gives_no_file(bag, tmp_path, cap
     code, said = auv(capsys, *given, '--accept', '--overwrite')
     assert code == 0, said
     assert (out / 'vehicle.yaml').exists()
+
+
+def test_the_wrench_that_acted_takes_the_place_of_the_command_and_the_truth_that_of_nothing(
+    tmp_path,
+):
+    _, run = sea_trials.trial(tmp_path, 'herman2018', 5, duration=3.0)
+    seen, frames = motion(run, enu=False), ('odom_ned', 'base_link_fsd')
+    truth = seen._replace(twist=seen.twist + 0.01)
+    half = seen._replace(tau=0.5 * seen.tau)
+    messages = simple(seen, Maker(), '/odom', '/wrench', frames)
+    messages += simple(truth, Maker(), '/ground_truth/odom', '/wrench_applied', frames, tau=half)
+    bag, vehicle = write(tmp_path / 'bag', messages, Maker()), load_vehicle('herman2018')
+    (asked,), (acted,) = (
+        read_records(bag, vehicle, None, applied=applied, notes=[]) for applied in (False, True)
+    )
+    np.testing.assert_allclose(acted.command, 0.5 * asked.command, atol=1e-9)
+    assert np.abs(asked.command).max() > 1.0
+    np.testing.assert_allclose(acted.velocity, run.nu, atol=1e-9)
 
 
 def test_a_vehicle_that_no_command_takes_gives_no_file(tmp_path):

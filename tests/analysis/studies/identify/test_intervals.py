@@ -1,5 +1,7 @@
 """What `auv identify` does on request: observer, bootstrap, profiles; whiteness of residuals."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from helpers.sea_trials import SWINGS, gauss_markov, trial, truth
@@ -73,6 +75,18 @@ def test_residuals_are_not_white_under_a_disturbance(disturbed):
     assert [row['verdict'] for row in rows] == ['slow'] * 6
     assert all(row['slow'] > 0.5 for row in rows)
     assert 'not white in surge' in told(rows)
+
+
+def test_residuals_that_alternate_are_coloured_and_not_slow():
+    """Of e_k = w_k - w_k-1 / 2 the autocorrelation is -0.4 after one sample, then zero."""
+    white = np.random.default_rng(0).normal(size=(2001, 9))
+    e, segment = white[1:] - 0.5 * white[:-1], SimpleNamespace(nu=np.zeros((2000, 6)))
+    segment.at = np.arange(2000.0)
+    rows = whiteness([(segment, e)], 0.02)
+    assert [row['verdict'] for row in rows] == ['coloured'] * 6
+    assert [row['largest'] for row in rows] == pytest.approx([-0.4] * 6, abs=0.1)
+    assert_allclose([row['slow_if_white'] for row in rows], 1.0 / 25.0, rtol=0.05)  # Hz of Hz
+    assert all(row['slow'] < row['slow_if_white'] for row in rows)
 
 
 def test_an_observer_makes_intervals_narrower_under_a_disturbance(disturbed):

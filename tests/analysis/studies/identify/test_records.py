@@ -9,8 +9,16 @@ from helpers.sea_trials import DELAY, LAG, trial, wrong_prior
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.bag.tracks import Track, assembled
-from auv_analysis.studies.identify.bags import parts, without_constants
-from auv_analysis.studies.identify.identify import Settings, as_filed, identify, split
+from auv_analysis.studies.identify.bags import on_one_step, parts, without_constants
+from auv_analysis.studies.identify.identify import (
+    HISTORY,
+    Settings,
+    as_filed,
+    check_motion,
+    identify,
+    judged,
+    split,
+)
 from auv_analysis.studies.identify.output_error import delayed, on_steps
 from auv_analysis.studies.identify.prediction import held_of, predict
 from auv_analysis.studies.identify.record import (
@@ -70,6 +78,23 @@ def test_between_two_pauses_close_together_there_is_no_record():
     t = np.arange(0.0, 10.0, 0.02)
     ns = (1e9 * t[(t < 4) | ((t > 5) & (t < 5.9)) | (t > 7)]).astype(np.int64)
     assert [round(one.end) for one in of_tracks('x', tracks(dict.fromkeys(ROWS, ns)))] == [4, 10]
+
+
+def test_commands_of_recordings_come_to_the_finest_step():
+    coarse, fine = record(9.0, 0.06), record(5.0, 0.02)
+    found, same = on_one_step([coarse, fine])
+    assert same is fine
+    assert found.step == 0.02
+    assert found.end == pytest.approx(coarse.end, abs=0.021)
+    middles = found.step * (np.arange(len(found.command)) + 0.5)
+    assert_array_equal(found.command, coarse.command[(middles / coarse.step).astype(int)])
+
+
+def test_a_command_that_never_changes_tells_nothing(herman):
+    held = replace(herman, command=np.full_like(herman.command, 3.0))
+    check_motion([held, herman], herman.noise())
+    with pytest.raises(InputError, match='wrench: expected a command that changes, found a const'):
+        check_motion([held], herman.noise())
 
 
 def test_a_segment_fits_into_a_record(herman):
@@ -209,3 +234,14 @@ def test_a_prediction_is_compared_at_the_time_of_the_measurement():
         return predict('x', held, vehicle, *as_filed(vehicle)).errors[0]
 
     assert_allclose(predicted(0.04), predicted(0.02), rtol=0.02)
+
+
+def test_a_vehicle_as_filed_acts_behind_the_lag_and_the_delay_that_are_given(herman):
+    vehicle, part = load_vehicle('herman2018'), herman.part(0.0, 10.0)
+    u, theta = as_filed(vehicle, 0.2, 0.06)
+    found = u.coefficients(theta)
+    assert (found.lag, found.delay) == (0.2, 0.06)
+    errors = predict('x', held_of([part], HISTORY), vehicle, u, theta).errors[:, 0, :3]
+    first, *_ = judged(vehicle, [part], [part], 0.2, 0.06)
+    assert first['predictor'] == 'herman2018'
+    assert first['linear'] == pytest.approx(np.sqrt((errors**2).sum(axis=1).mean()))

@@ -12,8 +12,8 @@ from helpers.report_pages import check_numbers
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.output.folder import ResultsFolder
 from auv_analysis.studies.design import search
-from auv_analysis.studies.design.change import NAMES, semi_axes
-from auv_analysis.studies.design.prediction import COUPLINGS, coupling_named
+from auv_analysis.studies.design.change import ALL, NAMES, semi_axes
+from auv_analysis.studies.design.prediction import COUPLINGS, Objective, coupling_named
 from auv_analysis.studies.design.report import _findings, change, print_design, write_report
 from auv_analysis.studies.design.results import (
     bound_warnings,
@@ -209,6 +209,32 @@ def test_the_same_input_gives_the_same_proposal(short):
     first, second = (propose(open_setting('herman2018', short), None) for _ in range(2))
     assert first.best.x.tolist() == second.best.x.tolist()
     assert first.best.ratio == second.best.ratio
+
+
+@pytest.fixture
+def remedies(short):
+    setting = open_setting('rexrov', short)
+    return search.Remedies(setting, *setting.simulated(setting.space.unchanged))
+
+
+PITCH = COUPLINGS.index('delta_pi.pitch')
+
+
+def test_a_change_that_was_not_as_predicted_is_searched_for_from_its_own_run(remedies, monkeypatch):
+    space, objective = remedies.setting.space, Objective(remedies.prediction, PITCH)
+    same = remedies._simulated(objective, ALL, space.unchanged)
+    assert same.ratio == pytest.approx(1.0)
+    assert remedies.refined(same) is same, 'it was as predicted'
+    better = remedies.refined(replace(same, predicted=0.5))
+    assert better.ratio < 0.5
+    wrong = replace(better, predicted=9.0)
+    monkeypatch.setattr(search, 'search', lambda *_: space.unchanged)
+    assert remedies.refined(wrong) is wrong, 'none that is worse takes its place'
+
+
+def test_at_any_cost_a_coupling_becomes_less_than_with_an_eye_on_the_others(remedies):
+    *_, careful = remedies.candidates(PITCH, 1)
+    assert remedies.at_any_cost(PITCH, 1).ratio < 0.5 * careful.ratio
 
 
 def test_a_part_that_is_held_is_not_changed(short, tmp_path):

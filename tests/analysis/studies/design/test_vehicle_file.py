@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from auv_analysis.studies.design.change import NAMES, ChangeSpace, rounded
+from auv_analysis.studies.design.change import NAMES, ChangeSpace, rounded, semi_axes
 from auv_analysis.studies.design.setting import changed_data, changed_text
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.files.yaml_files import parse_yaml, read_yaml
@@ -110,6 +110,20 @@ def test_only_what_changes_is_written_anew(form):
     dense = changed_data(space, change_at(space, disc_radius=0.2, disc_x=-1.0))
     assert dense['rigid_body'] == data['rigid_body']
     assert np.shape(dense['damping']['quadratic']) == (6,)
+
+
+def test_the_size_of_a_vehicle_is_that_of_its_ellipsoid_and_without_a_tensor_of_its_sphere():
+    data = read_yaml(shipped('vehicles', 'rexrov'), 'vehicle')
+    mass, axes = data['rigid_body']['mass'], np.array([1.2, 0.7, 0.5])
+    tensor = mass / 5 * np.diag((axes**2).sum() - axes**2)
+    data['rigid_body'] |= {'inertia': tensor.tolist(), 'center_of_gravity': [0.3, -0.1, 0.2]}
+    found = {}
+    for form in FORMS:
+        one = in_form(data, form)
+        found[form], _ = semi_axes(vehicle_from_dict(one, 'x'), one)
+    assert_allclose(found['cg'], axes)
+    assert_allclose(found['co'], axes)
+    assert_allclose(4 / 3 * np.pi * found['M'] ** 3, data['hydrostatics']['volume'])
 
 
 def test_the_stability_that_must_be_left_is_left():

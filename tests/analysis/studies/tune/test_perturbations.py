@@ -77,6 +77,8 @@ def test_draw_depends_on_seed_and_index_alone() -> None:
     assert perturbed(REXROV, Spread(), 5, 3).data['disturbance'] == one
     assert perturbed(REXROV, Spread(), 5, 4).data['disturbance'] != one
     assert perturbed(REXROV, Spread(), 6, 3).data['disturbance'] != one
+    seeds = [perturbed(REXROV, Spread(), 5, i).data['seed'] for i in (0, 1, 2, 0)]
+    assert len(set(seeds)) == 3, 'sensors have noise of their own in each draw'
 
 
 def test_without_spread_nothing_is_added() -> None:

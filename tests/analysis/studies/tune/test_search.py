@@ -1,12 +1,17 @@
 """The search against optima that are known on paper."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from helpers.tunings import DIAGONAL, GVC, scenario
 
+from auv_analysis import simulate
 from auv_analysis.studies.tune import search as searching
-from auv_analysis.studies.tune.cost import Measures
+from auv_analysis.studies.tune.cost import Measures, measures_of_run
 from auv_analysis.studies.tune.gain_space import make_space
+from auv_analysis.studies.tune.perturbations import Perturbations, Spread, perturbed
+from auv_analysis.studies.tune.results import tune
 from auv_analysis.studies.tune.search import Goal, Request, search, tuned
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
@@ -128,9 +133,70 @@ def test_on_multiples_of_M_gvc_and_cl_are_one_law(tmp_path, monkeypatch) -> None
     assert errors[0] <= goal.reference.weighted_error[0] * (1 + 1e-3)
 
 
-def test_an_open_loop_beside_the_reference_keeps_its_excitation(tmp_path, monkeypatch) -> None:
+@pytest.fixture
+def brief(monkeypatch) -> None:
     for name in ('POINTS', 'STARTS', 'SHORT', 'FINALISTS', 'LONG'):
         monkeypatch.setattr(searching, name, 1)
+
+
+@pytest.mark.usefixtures('brief')
+def test_a_sampled_scenario_is_tuned_with_its_noise_and_in_its_hold(tmp_path) -> None:
+    """Each number is that of `simulate`; the set-point is a file, the name as long as may be."""
+    way = 't,surge,sway,heave,roll,pitch,yaw\n0,0,0,0,0,0,0\n1,2,0,1,0,0,0.5\n'
+    (tmp_path / 'way.csv').write_text(way)
+    base = scenario(
+        tmp_path, {'gvc': GVC}, name='n' * 100, setpoint={'file': 'way.csv'}, seed=9, duration=0.1,
+        sensors={'velocity_noise': 0.1}, actuators={'lag': 0.05},
+    )  # fmt: skip
+    request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'scalar', 'zoh', 0, 1)
+    out = tmp_path / 'out'
+    out.mkdir()
+    found = tune(request, Perturbations(2, Spread(), 3), out, lambda *_: lambda: None)
+    draw = perturbed(found.scenario, Spread(), 3, 1)
+    for measures, one, name in (
+        (found.goal.reference, base, 'gvc'),
+        (found.laws['gvc_tuned'].best.measures, found.scenario, 'gvc_tuned'),
+        (found.draws['gvc'].part(slice(1, 2)), draw, 'gvc'),
+    ):
+        expected = measures_of_run(simulate(one, name, 'zoh'))
+        assert measures.effort == pytest.approx(expected.effort, rel=1e-9), name
+        assert measures.error == pytest.approx(expected.error, rel=1e-9), name
+    assert (out / 'setpoint.csv').read_text() == way
+
+
+@pytest.mark.usefixtures('brief')
+def test_six_numbers_begin_at_the_best_multiple_of_the_diagonal(tmp_path) -> None:
+    base = scenario(tmp_path, {'gvc': GVC}, vehicle='rexrov', duration=0.1)
+    how = 'effort', 'error', 1e-3, 'diagonal', 'continuous'
+    request = Request(base, 'gvc', ('gvc',), *how, 0, 1)
+    mass, diagonal = tuned(request, 'gvc', Goal.of(request)).searches
+    assert (mass.space.structure, diagonal.space.structure) == ('mass', 'diagonal')
+    begun = diagonal.space.nearest(mass.space.entry(mass.x))
+    assert np.abs(diagonal.points[:3] - begun).max(axis=1).min() < 1e-12
+
+
+@pytest.mark.usefixtures('brief')
+def test_the_reference_may_be_faster_than_the_samples_and_so_may_what_is_tuned(tmp_path) -> None:
+    base = scenario(tmp_path, {'gvc': GVC | {'k_D': 150.0}}, duration=0.05)
+    request = Request(base, 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'mass', 'continuous', 0, 1)
+    space = tuned(request, 'gvc', Goal.of(request)).best.space
+    assert space.fastest == pytest.approx(150.0)  # 1/s, of samples 0.01 s apart
+
+
+def test_the_best_structure_is_equal_and_where_none_is_the_nearest_to_it() -> None:
+    made = [(True, 5.0, 3.001), (True, 6.0, 3.0), (False, 1.0, 3.3), (False, 0.1, 2.0)]
+    ranks = [
+        searching._rank(
+            SimpleNamespace(reached=reached, measures=measures(*np.array([[error], [effort]]))),
+            goal('effort', 4.0, 3.0),
+        )
+        for reached, error, effort in made
+    ]
+    assert ranks == sorted(ranks)
+
+
+@pytest.mark.usefixtures('brief')
+def test_an_open_loop_beside_the_reference_keeps_its_excitation(tmp_path) -> None:
     wave = {'surge': {'terms': [{'amplitude': 5.0, 'omega': 1.0}]}}
     controllers = {'gvc': GVC, 'wave': {'law': 'multisine'}}
     base = scenario(tmp_path, controllers, duration=0.05, excitation=wave)

@@ -27,13 +27,13 @@ class Called(NamedTuple):
 
     scenario: str
     batches: Sequence[tuple[str, str]] = ()
-    is_tuned: bool = False
+    tuned: Sequence[str] = ()  # by their holds
     with_lift: str = ''
 
 
 LAWS = {
-    'gvc': Called('case1', [(path, hold) for path in (SHARED, OWN) for hold in HOLDS], True, LIFT),
-    'cl': Called('case1', [(SHARED, 'continuous'), (OWN, 'continuous')], True, LIFT),
+    'gvc': Called('case1', [(path, hold) for path in (SHARED, OWN) for hold in HOLDS], HOLDS, LIFT),
+    'cl': Called('case1', [(SHARED, HOLDS[0]), (OWN, HOLDS[0])], HOLDS[:1], LIFT),
     'pid': Called('faults_bluerov2_heavy'),
     'smc': Called('faults_bluerov2_heavy'),
 }
@@ -70,8 +70,8 @@ def compile_law(law: str) -> None:
             rollouts(scenario, law, {path.format(law): [0.1, 0.2]}, hold=hold)
         for hold in HOLDS if called.with_lift else ():
             simulate(shortened(called.with_lift), law, hold)
-        if called.is_tuned:
-            measured(scenario, law, {'k_D': np.array([0.1, 0.2])}, 'continuous', 1)
+        for hold in called.tuned:
+            measured(scenario, law, {'k_D': np.array([0.1, 0.2])}, hold, 1)
 
 
 def compile_open_loop() -> None:

@@ -2,6 +2,7 @@
 
 import tracemalloc
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,13 @@ from auv_analysis.studies.identify.couplings import couplings
 from auv_analysis.studies.identify.identified import Identified
 from auv_analysis.studies.identify.identify import Settings, _dissipative, feeding, identify, split
 from auv_analysis.studies.identify.output_error import OutputError
-from auv_analysis.studies.identify.plausibility import check_rates, contradictions, excitation
+from auv_analysis.studies.identify.plausibility import (
+    _scale,
+    _useless,
+    check_rates,
+    contradictions,
+    excitation,
+)
 from auv_analysis.studies.identify.prediction import held_of
 from auv_analysis.studies.identify.record import Record, of_tracks, segments_of
 from auv_analysis.studies.identify.unknowns import unknowns
@@ -95,6 +102,34 @@ def test_a_wrong_reading_is_told(herman, wrong, said, approved):
     assert said in contradictions(result)[0]
     approved.within = 0.02
     approved.add(contradictions(result))
+
+
+@pytest.mark.parametrize(('share', 'told'), [(0.4, True), (0.6, False)])
+def test_inertia_far_below_that_of_the_rigid_body_alone_is_told(share, told):
+    """Of lauv nearly all inertia in surge is its own."""
+    vehicle = load_vehicle('lauv')
+    M = vehicle.M * np.diag([share, 1, 1, 1, 1, 1])
+    rows = [
+        {'name': f'M.{dof}.{dof}', 'status': 'identified', 'value': M[i, i],
+         'prior': vehicle.M[i, i]} for i, dof in enumerate(DOFS)
+    ]  # fmt: skip
+    found = SimpleNamespace(vehicle=vehicle, found=SimpleNamespace(M=M), coefficients=lambda: rows)
+    said = _scale(found)
+    assert ['far below that of the rigid body alone' in text for text in said] == [True] * told
+
+
+@pytest.mark.parametrize(('low', 'told'), [(0.9, False), (1.1, True)])
+def test_a_model_that_predicts_worse_than_standing_still_is_told(low, told):
+    """At horizons of half a second and more, all of them."""
+    rows = [
+        {'predictor': predictor, 'horizon': horizon, 'ratio_low': ratio}
+        for predictor, horizon, ratio in (
+            ('persistence', 0.2, 0.5), ('persistence', 0.5, 1.5), ('persistence', 1.0, low),
+            ('black box', 1.0, 0.1),
+        )
+    ]  # fmt: skip
+    said = _useless(SimpleNamespace(predictions=rows))
+    assert ['worse than a velocity that stays' in text for text in said] == [True] * told
 
 
 def test_angular_velocity_in_other_axes_than_the_attitude_is_refused(herman):
@@ -229,7 +264,10 @@ def test_damping_of_a_vehicle_that_gains_speed_is_held_where_it_takes_energy():
     assert len({frozenset(row) for row in rows}) == 1
     assert all((row['low'] is None) == (row['high'] is None) for row in rows)
     text = vehicle_text(found, yaml.safe_load(shipped('vehicles', 'lauv').read_text()), 'x', '')
-    D = vehicle_from_dict(yaml.safe_load(text), 'written').D_linear
+    written = vehicle_from_dict(yaml.safe_load(text), 'written')
+    D = written.D_linear
+    assert_allclose(written.M, vehicle.M, rtol=1e-6, atol=1e-9)
+    assert_allclose(written.model.hydrostatics, vehicle.model.hydrostatics, rtol=1e-5, atol=1e-4)
     assert D[2, 4] == vehicle.D_linear[2, 4], 'what takes energy stays'
     assert 'D_linear.sway.yaw: held at 0, as it would feed energy' in text
     assert [e.name for e in zeros] == ['D_linear.yaw', 'D_linear.sway.yaw', 'D_linear.yaw.sway']

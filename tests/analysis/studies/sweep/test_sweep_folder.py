@@ -32,6 +32,9 @@ def test_interrupted_sweep_keeps_what_is_finished_and_goes_on(files: Path) -> No
     assert parts(files / 'out') == parts(files / 'reference')
     assert run(files, executor).counts == outcome.counts
     assert executor.submitted == 4 - len(kept)
+    campaign = load_campaign(files / 'campaign.yaml')
+    with sweep_folder(files / 'out', campaign, overwrite=False) as folder:
+        assert folder.stored(ROLLOUTS) == ROLLOUTS, 'the last block is a shorter one'
 
 
 def test_part_that_is_missing_or_broken_is_made_again(files: Path) -> None:

@@ -5,7 +5,7 @@ import pytest
 from helpers.tunings import GVC, SAME_CL, scenario
 from scipy.stats import binomtest, rankdata
 
-from auv_analysis.studies.pairs import NEVER, holm, log_ratios, paired
+from auv_analysis.studies.pairs import MOST, NEVER, holm, log_ratios, paired
 from auv_analysis.studies.tune.cost import Measures
 from auv_analysis.studies.tune.perturbations import Perturbations, Spread, monte_carlo
 from auv_analysis.studies.tune.results import COMPARED, compare
@@ -67,6 +67,15 @@ def test_effect_and_ratio_by_their_definitions(n: int, decimals: int) -> None:
     if n == 60:
         outside = [paired(d - np.log(end) * far) for end in found.interval for far in (0.9, 1.1)]
         assert sorted(other.p < 0.05 for other in outside) == [False, False, True, True]
+
+
+def test_of_very_many_pairs_quantiles_stand_for_all() -> None:
+    d = np.random.default_rng(0).normal(0.1, 0.3, 3 * MOST + 1)
+    found = paired(d, test=False)
+    assert np.log(found.ratio) == pytest.approx(np.median(d[1:] + d[:-1]) / 2, abs=0.005)
+    # 1.96 of the standard deviation of the Hodges-Lehmann estimate, sigma sqrt(pi / 3 n)
+    half = np.log(found.interval[1] / found.interval[0]) / 2
+    assert half == pytest.approx(1.96 * 0.3 * np.sqrt(np.pi / 3 / len(d)), rel=0.05)
 
 
 def test_wilcoxon_is_that_of_signs_where_all_differences_are_of_one_sign() -> None:

@@ -1,6 +1,7 @@
 """Thrusters: the matrix T, allocation within limits, what a vehicle file may not say of them."""
 
 import copy
+import itertools
 import re
 
 import numpy as np
@@ -46,6 +47,14 @@ def sets(draw, least=6):
     if least == 6:
         assume(np.linalg.cond(thrusters.matrix) < 1e3)
     return thrusters
+
+
+@QUICK
+@given(sets(least=1))
+def test_the_largest_wrench_of_an_axis_is_that_of_all_thrusters_at_their_limits(thrusters):
+    limits = zip(-thrusters.reverse, thrusters.forward, strict=True)
+    wrenches = np.array(list(itertools.product(*limits))) @ thrusters.matrix.T
+    assert_allclose(thrusters.largest(), np.abs(wrenches).max(axis=0), rtol=1e-9, atol=1e-9)
 
 
 @QUICK

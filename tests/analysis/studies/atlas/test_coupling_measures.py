@@ -109,6 +109,10 @@ def test_a_diagonal_inertia_couples_nothing() -> None:
     assert (found.strength, found.largest, found.pairs) == (0.0, 0.0, [])
     assert_array_equal(found.velocity_shares, np.eye(6))
     assert found.damped == [('sway', 'yaw'), ('heave', 'pitch')]
+    lifted = load_vehicle('lauv')
+    own = {key: np.diag(np.diag(getattr(lifted, key))) for key in ('D_linear', 'D_quadratic')}
+    assert couplings_of(lifted.changed(**own), 'lauv').damped == found.damped, 'by lift alone'
+    assert couplings_of(lifted.changed(**own, lift=None), 'lauv').damped == []
 
 
 def test_the_couplings_of_the_papers_vehicle() -> None:

@@ -13,6 +13,8 @@ from auv_analysis.studies.identify.bags import on_one_step, parts, without_const
 from auv_analysis.studies.identify.identify import (
     HISTORY,
     Settings,
+    _noise,
+    _trusting,
     as_filed,
     check_motion,
     identify,
@@ -171,6 +173,26 @@ def test_what_stands_still_tells_no_noise():
     found = replace(still, velocity=velocity).noise()
     assert_array_equal(np.isnan(found), np.isin(np.arange(9), [2, 6, 7, 8]))
     assert_allclose(found[[0, 1, 3, 4, 5]], 1.0, rtol=0.1)
+
+
+def test_noise_of_several_recordings_is_of_those_that_measure():
+    """The variance is a mean over them, whatever their length."""
+    some = [record(10.0, seed=k) for k in (1, 2)]
+    blind = replace(some[1], velocity=2.0 * some[1].velocity)
+    blind.velocity[:, 4] = np.nan
+    one, other = (part.noise()[:6] for part in (some[0], blind))
+    expected = np.sqrt((one**2 + other**2) / 2)
+    expected[4] = one[4]
+    assert_allclose(_noise([some[0], blind])[:6], expected)
+
+
+def test_the_prior_of_what_an_unmeasured_axis_would_tell_is_trusted_more():
+    vehicle, free = load_vehicle('herman2018'), ('M', 'D_linear.full', 'restoring', 'lag')
+    u = unknowns(vehicle, free, speeds=np.ones(6), wrenches=np.ones(6))
+    found = _trusting(u, np.arange(6) != 2)
+    for before, after in zip(u.entries, found.entries, strict=True):
+        told = before.group in ('M', 'D_linear') and 2 in before.index
+        assert after.unit == (0.3 if told else 1.0) * before.unit, before.name
 
 
 def test_residuals_are_measured_less_simulated_at_the_time_of_the_measurement():

@@ -1,5 +1,6 @@
 """The search against optima that are known on paper."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,8 +12,8 @@ from auv_analysis.studies.tune import search as searching
 from auv_analysis.studies.tune.cost import Measures, measures_of_run
 from auv_analysis.studies.tune.gain_space import make_space
 from auv_analysis.studies.tune.perturbations import Perturbations, Spread, perturbed
-from auv_analysis.studies.tune.results import tune
-from auv_analysis.studies.tune.search import Goal, Request, search, tuned
+from auv_analysis.studies.tune.results import _evaluations, tune
+from auv_analysis.studies.tune.search import Goal, Request, TunedLaw, search, tuned
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 from auv_gvc_controller.control.gains import sampled_rate
@@ -85,6 +86,10 @@ def test_loop_stays_slower_than_the_samples() -> None:
     found = search(slow, fast, goal('effort', 1.0, 1.0), points=256, seed=0)
     rate, _ = sampled_rate(np.array(slow.entry(found.x)['k_D']), VEHICLE.M)
     assert rate == pytest.approx(7.0, rel=1e-6)
+    for beyond, allowed in ((1e-12, True), (1e-6, False)):  # rounding is no excess
+        one = replace(found, margins=np.full(len(found.margins), -beyond))
+        rows = _evaluations({'cl_tuned': TunedLaw('cl', one, (one,))})
+        assert set(rows['allowed'].to_pylist()) == {allowed}
 
 
 INTEGRATORS = {

@@ -115,6 +115,14 @@ def test_margins_are_where_a_second_sampling_of_the_loop_turns_unstable(law, lat
         assert at_border(*borders), (DOFS[i], one)
 
 
+def test_margins_are_of_the_plant_with_its_model_errors():
+    scenario = scenario_of(disturbance=[{'kind': 'model_error', 'added_mass': 0.5, 'damping': 0.3}])
+    plant, vehicle = ControlLoop(scenario, 'gvc').plant, scenario.vehicle
+    M = vehicle.M_RB + 1.5 * vehicle.M_A
+    assert_allclose(plant.A[2:, 2:], -np.linalg.solve(M, 1.3 * vehicle.D_linear), atol=1e-12)
+    assert_allclose(plant.B[2:], np.linalg.inv(M), atol=1e-12)
+
+
 def test_of_several_crossovers_the_nearest_to_the_border_counts():
     """A loop whose S comes to 1/2 + j y, on |L| = 1, three times."""
     crossings = {1.0: 0.5, 3.0: 2.0, 9.0: -1.0}  # rad/s -> y

@@ -110,6 +110,11 @@ def test_scenario_is_named_relative_to_the_campaign(tmp_path: Path, monkeypatch)
     path = written(tmp_path, 'name: x\nscenario: mine.yaml\nvary: [{grid: {duration: [1.0]}}]')
     monkeypatch.chdir('/')
     assert load_campaign(path).scenario.name == 'case2'
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'elsewhere').mkdir()
+    moved = path.rename(tmp_path / 'elsewhere' / 'campaign.yaml')
+    with pytest.raises(InputError, match=r'elsewhere/mine\.yaml: expected a scenario file'):
+        load_campaign(moved)
 
 
 def test_readme_counts_the_shipped_campaign() -> None:

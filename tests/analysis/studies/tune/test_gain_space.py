@@ -13,7 +13,7 @@ from auv_analysis.studies.tune.search import Optimum, TunedLaw
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 from auv_gvc_controller.control.gains import sampling_warning
 from auv_gvc_controller.laws import NAMES as LAWS
-from auv_gvc_controller.laws.law import make_gains
+from auv_gvc_controller.laws.law import SHIPPED, make_gains
 from auv_gvc_controller.laws.model import control_model
 
 VEHICLE = load_vehicle('rexrov')
@@ -47,6 +47,11 @@ def test_structures_are_what_they_say() -> None:
     np.testing.assert_allclose(gains['mass']['Gamma'], 5.0 * np.diagonal(M))
     np.testing.assert_allclose(gains['inertia']['k_I'], 3.0 * M)
     assert [gains[s]['Lambda'] for s in gains] == pytest.approx([4.0] * 3)
+    about, axes = SHIPPED['cl'].search(STEP)['k_D'], np.diagonal(M)
+    for structure, least, most in (('scalar', axes.min(), axes.max()), ('mass', 1.0, 1.0)):
+        space = space_of('cl', structure)
+        ends = np.exp([space.low[0], space.high[0]])
+        assert ends == pytest.approx([about.low * least, about.high * most])
 
 
 def test_the_rate_margin_ends_where_the_sampled_loop_begins_to_ring() -> None:

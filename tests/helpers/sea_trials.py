@@ -46,7 +46,7 @@ def trial_scenario(folder: Path, name: str, vehicle: str = '', **entries: Any) -
         'integrator': 'ode5', 'seed': 0, 'setpoint': multisine(amplitudes, band),
         'controllers': {'gvc': {'law': 'gvc', 'k_D': gain, 'k_I': 0.5, 'Lambda': 0.5,
                                 'Gamma': 1.0}},
-        'actuators': {'lag': LAG, 'delay': DELAY},
+        'disturbance': {'kind': 'harmonic'}, 'actuators': {'lag': LAG, 'delay': DELAY},
         'sensors': {'velocity_noise': VELOCITY_NOISE, 'attitude_noise': ATTITUDE_NOISE},
     } | entries  # fmt: skip
     folder.mkdir(parents=True, exist_ok=True)

@@ -23,8 +23,7 @@ from auv_dynamics.ros.parameters import _taken, declare
 from auv_gvc_controller.nodes.controller_node import ControllerNode
 
 FAULT = ['-p', 'faults.names:=["gone"]', *parameters(faults__gone__kind='sensor_drop_out')]
-WAVE = parameters(disturbance__a__kind='harmonic', disturbance__a__sway__offset=1.0)
-HARMONIC = ['-p', 'disturbance.names:=["a"]', *WAVE]
+HARMONIC = ['-p', 'disturbance.names:=["a"]', *parameters(disturbance__a__kind='harmonic')]
 NODES = {
     'controller_node': [*CONTROLLER, *parameters(limits__wrench='[50.0]')],
     'plant_node': [*parameters(vehicle='herman2018', start_paused=True), *FAULT, *HARMONIC],

@@ -137,7 +137,6 @@ setpoint.surge = {terms: {omega: 1}} | setpoint.surge.terms | a list of terms | 
 setpoint = {file: x.csv, surge: {}} | setpoint | file alone | surge
 setpoint = {file: 5} | setpoint.file | a CSV file | 5
 disturbance = {kind: storm} | disturbance.kind | model_error or current | storm
-disturbance = {kind: harmonic} | disturbance | at least one of surge, sway | harmonic
 disturbance = [{kind: current}] | disturbance[0] | at least one of velocity, north | current
 disturbance = [{kind: current, velocity: [1, 2]}] | disturbance[0].velocity | 3 numbers | 2 numbers
 disturbance = {kind: model_error} | disturbance | at least one of mass | model_error

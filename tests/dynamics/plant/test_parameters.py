@@ -124,7 +124,6 @@ def test_phase_may_be_absent_and_terms_keep_their_order():
     [
         ('disturbance', {}, 'disturbance.kind: expected herman2018, harmonic'),
         ('disturbance', {'kind': 'tide'}, 'disturbance.kind: expected herman2018, harmonic'),
-        ('disturbance', {'kind': 'harmonic'}, 'at least one of surge, sway, heave'),
         ('disturbance', {'kind': 'model_error'}, 'at least one of mass'),
         ('actuators', {'limit': [1.0, 2.0]}, 'actuators.limit: expected a positive number or 6'),
         ('actuators', {'rate': [-1.0]}, 'actuators.rate: expected a positive number'),

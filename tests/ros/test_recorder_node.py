@@ -2,9 +2,11 @@
 
 import itertools
 import math
+import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -67,7 +69,7 @@ def test_records_every_step_and_leaves_when_it_has_all(tmp_path: Path) -> None:
     attached = tmp_path / 'scenario.yaml'
     attached.write_text('name: by_hand\n')
     arguments = [*TOPICS, *parameters(bag=tmp_path / 'bag', duration=0.2)]
-    arguments += ['-p', f'attachments:=["scenario.yaml={attached}"]']
+    arguments += ['-p', f'attachments:=["{attached}", "other.yaml={attached}"]']
     with graph(('recorder_node', arguments)) as (peer, processes):
         peer.listen(topics.PROGRESS)
         process = processes['recorder_node']
@@ -83,6 +85,7 @@ def test_records_every_step_and_leaves_when_it_has_all(tmp_path: Path) -> None:
     contents = read_bag(tmp_path / 'bag')
     assert contents.counts['/odom'] == contents.counts['/wrench'] == 21
     assert contents.attachments['scenario.yaml'] == 'name: by_hand\n'
+    assert contents.attachments['other.yaml'] == 'name: by_hand\n'
     assert contents.notes == []
     assert (contents.first, contents.last) == (0, 20 * STEP), 'log time is the header stamp'
 
@@ -435,6 +438,42 @@ def test_a_recorder_takes_its_own_vehicle_and_what_it_is_told(tmp_path: Path) ->
     assert contents.namespace == '/auv1'
 
 
+@pytest.mark.parametrize(
+    ('extra', 'exclude', 'taken'),
+    [
+        ((), None, {'/auv1/imu', '/tf'}),
+        (('/auv10/imu', '/rosout'), None, {'/auv1/imu', '/tf', '/auv10/imu', '/rosout'}),
+        (('all',), None, {'/auv1/imu', '/tf', '/auv10/imu', '/imu'}),
+        (('all', '/rosout'), '^/auv1/|out', {'/tf', '/auv10/imu', '/imu'}),
+    ],
+)
+def test_which_topics_are_wanted(extra: tuple, exclude: str | None, taken: set[str]) -> None:
+    wanted = recorder.Wanted('/auv1', extra, re.compile(exclude) if exclude else None)
+    there = ('/auv1/imu', '/auv10/imu', '/imu', '/tf', '/rosout', '/parameter_events')
+    assert {topic for topic in there if topic in wanted} == taken
+    assert '/rosout' not in recorder.Wanted('/')
+    assert '/imu' in recorder.Wanted('/')
+
+
+def test_who_keeps_nothing_for_late_comers_is_heard_beside_who_does() -> None:
+    kept, not_kept = (SimpleNamespace(qos_profile=qos) for qos in (KEPT, QoSProfile(depth=1)))
+    assert recorder.adapted([kept, kept]).durability == DurabilityPolicy.TRANSIENT_LOCAL
+    assert recorder.adapted([kept, not_kept]).durability == DurabilityPolicy.VOLATILE
+    assert recorder.adapted([kept], not_kept.qos_profile).durability == DurabilityPolicy.VOLATILE
+
+
+def test_a_bag_says_how_its_topics_were_remapped(tmp_path: Path, timers) -> None:
+    renamed = ['--ros-args', '-r', '__ns:=/auv1', '-r', 'wrench:=/thrust']
+    with program() as made:
+        given = {'bag': str(tmp_path / 'bag'), 'topics': ['odom', 'wrench']}
+        node = made.add(RecorderNode, given, cli_args=renamed)
+        give_steps(node, 0)
+        made.drop(node)
+    contents = read_bag(tmp_path / 'bag')
+    assert contents.names == {'/thrust': '/auv1/wrench'}
+    assert contents.counts['/thrust'] == contents.counts['/auv1/odom'] == 1
+
+
 def test_refuses_a_folder_that_holds_a_bag(tmp_path: Path) -> None:
     bag = tmp_path / 'bag'
     bag.mkdir()
@@ -577,10 +616,11 @@ def test_in_real_time_it_has_the_time_when_it_came(tmp_path: Path, timers) -> No
     assert found['/clock'] == [(0, 0)]
 
 
+@pytest.mark.parametrize('limit', ['EARLY_COUNT', 'EARLY_SIZE', 'EARLY_TIME'])
 def test_what_waits_for_too_long_is_written_between_the_steps(
-    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, timers, monkeypatch: pytest.MonkeyPatch, limit: str
 ) -> None:
-    monkeypatch.setattr(recorder, 'EARLY_COUNT', 0)
+    monkeypatch.setattr(recorder, limit, -1)
     with program() as made:
         node = recorder_in(made, tmp_path / 'bag')
         give(node, '/diagnostics', DiagnosticArray(), source_timestamp=3)

@@ -1,6 +1,7 @@
 """A replay beside a vehicle: it gets no recorded command unless somebody says so, and no clock."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from geometry_msgs.msg import Twist, Wrench
@@ -10,8 +11,11 @@ from helpers.played_bags import STEP, ended, made, playing, process, steps_of, t
 from std_srvs.srv import Trigger
 
 from auv_analysis.bag.reading import read_bag
+from auv_analysis.nodes import replay_publishers
+from auv_analysis.nodes.replay_publishers import CommandGuard
 from auv_dynamics.ros import topics
-from auv_dynamics.ros.interface import nanoseconds
+from auv_dynamics.ros.endpoints import NAMELESS, UNNAMED
+from auv_dynamics.ros.interface import RECORDER, nanoseconds
 from auv_dynamics.ros.topics import Topic
 
 ODOM = there(topics.ODOM)
@@ -127,6 +131,14 @@ def test_a_second_clock_ends_the_replay(tmp_path: Path) -> None:
         assert '/clock: expected no other publisher' in replay.failure
 
 
+def test_beside_another_clock_it_plays_without_its_own(tmp_path: Path) -> None:
+    with playing(made(tmp_path / 'bag'), clock=False, rate=0.0) as (peer, replay):
+        peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 10)
+        peer.listen(topics.CLOCK)
+        assert ended(peer, replay) == 0
+    assert peer.heard[topics.CLOCK.name] == []
+
+
 @pytest.mark.parametrize('root', ['', 'replay/'])
 def test_no_odometry_beside_that_of_a_vehicle(tmp_path: Path, root: str) -> None:
     """Its controller would believe both; in the namespace of the replay there is none."""
@@ -135,6 +147,31 @@ def test_no_odometry_beside_that_of_a_vehicle(tmp_path: Path, root: str) -> None
         peer.listen(there(topics.ODOM) if root else topics.ODOM)
         assert ended(peer, replay) == (0 if root else 2)
     assert root or peer.heard['odom'] == []
+
+
+def test_a_listener_without_a_name_gets_no_command_before_it_has_one(monkeypatch) -> None:
+    unnamed, ours = (SimpleNamespace(node_name=n, node_namespace='/') for n in (UNNAMED, RECORDER))
+    ours.qos_profile = topics.every_step()
+    found: list = []
+    monkeypatch.setattr(replay_publishers, 'other_subscribers', lambda node, topic: found)
+    node = SimpleNamespace(get_name=lambda: 'replay', count_subscribers=lambda topic: len(found))
+    complaints: list[str] = []
+    wrench = {'/wrench': SimpleNamespace(topic_name='/wrench')}
+    guard = CommandGuard(node, wrench, False, complaints.append)
+    assert guard.may('/wrench', 0.0)
+    found.append(unnamed)
+    assert guard.refusal(final=False) is None
+    assert NAMELESS in str(guard.refusal(final=True))
+    assert guard.may('/wrench', 1.0) is None
+    assert guard.may('/wrench', 1.9) is None
+    found[:] = [ours]
+    assert guard.may('/wrench', 1.9)
+    found[:] = [unnamed]  # in its place: their number tells nothing
+    guard.look(5.0)
+    assert guard.may('/wrench', 5.9) is None
+    assert not complaints
+    assert guard.may('/wrench', 6.1) is False
+    assert complaints == [f'commands are not published any more: {NAMELESS} on /wrench']
 
 
 def test_wrong_input_is_one_line(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from helpers.played_bags import (
 )
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
@@ -86,10 +87,14 @@ def test_keeps_to_the_barrier(tmp_path: Path) -> None:
         peer.listen(ODOM, topics.CLOCK)
         peer.until(lambda: 'wrench' in peer.call(Trigger, 'replay_node/ready').message, 'odom')
         assert not peer.call(Trigger, 'replay_node/ready').success
+        tool = Node('rosbag2_recorder', context=peer.context)
+        for topic in (WRENCH, CMD_VEL):
+            tool.create_subscription(topic.type, topic.name, print, 10)
         peer.spin(1.5)
-        assert peer.heard == {ODOM.name: [], topics.CLOCK.name: []}
+        assert peer.heard == {ODOM.name: [], topics.CLOCK.name: []}, 'tools are not waited for'
         peer.listen(WRENCH, CMD_VEL)
         assert ended(peer, replay) == 0
+        tool.destroy_node()
         all_heard(peer, 50, ODOM, WRENCH)
     assert steps_of(peer, ODOM) == steps_of(peer, WRENCH) == list(range(50))
 
@@ -107,7 +112,8 @@ def test_steps_pauses_and_goes_on(tmp_path: Path) -> None:
         assert steps_of(peer, ODOM) == steps_of(peer, CMD_VEL) == clocks(peer) == [0, 1]
         set_rate(peer, SLOW)
         assert peer.call(SetBool, 'replay_node/run', SetBool.Request(data=True)).success
-        assert not peer.call(Trigger, 'replay_node/step').success
+        answer = peer.call(Trigger, 'replay_node/step')
+        assert (answer.success, answer.message) == (False, 'not paused')
         peer.call(SetBool, 'replay_node/run', SetBool.Request(data=False))
         set_rate(peer, 0.0)
         peer.spin(0.3)
@@ -141,6 +147,42 @@ def test_names_gaps_and_jumps_over_them(tmp_path: Path) -> None:
         assert ended(peer, replay) == 0
         all_heard(peer, 4, ODOM)
         assert 'nothing from 0.01 to 1e+09 s of the bag' in ' '.join(replay.remarks())
+
+
+@pytest.mark.parametrize(
+    ('skip', 'then'), [(False, '--skip-gaps jumps over it'), (True, 'jumped over')]
+)
+def test_the_longest_gaps_are_named_in_their_order(tmp_path: Path, skip: bool, then: str) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    for second in (0, 100, 1000, 1200, 2000, 2300, 3000, 3110):
+        ns = second * 10**9
+        bag.add('/odom', ODOMETRY, ns, serialized(odometry(ns, STATE)))
+    named = [(100, 1000), (1000, 1200), (1200, 2000), (2000, 2300), (2300, 3000)]
+    with playing(bag.close(), skip_gaps=skip, start_paused=True) as (_, replay):
+        said = [f'nothing from {a} to {b} s of the bag: {then}' for a, b in named]
+        assert replay.remarks() == said
+
+
+def test_its_diagnostics_say_where_it_is_and_what_it_waits_for(tmp_path: Path) -> None:
+    values = {'expected_subscribers': ['odom=1'], 'start': 0.1, 'start_paused': True, 'rate': 2.0}
+    with playing(made(tmp_path / 'bag'), **values) as (peer, replay):
+        peer.listen(topics.DIAGNOSTICS)
+
+        def told(key: str) -> str:
+            heard = peer.heard[topics.DIAGNOSTICS.name][-1:]
+            return {one.key: one.value for m in heard for one in m.status[0].values}.get(key, '')
+
+        missing = '/odom: expected 1 subscribers, found 0'
+        peer.until(lambda: told('waits for') == missing, 'what it waits for')
+        peer.listen(ODOM)
+        peer.until(lambda: replay.playing, 'the replay')
+        for k in (1, 2):
+            replay.player.step()
+            peer.until(lambda k=k: told('published') == f'{4 * k}', 'a step')
+        names = ('time', 'rate', 'paused', 'loops', 'waits for')
+        assert [told(name) for name in names] == ['0.11', '2.0', 'True', '0', '']
+        said = peer.heard[topics.DIAGNOSTICS.name][-1]
+        assert nanoseconds(said.header.stamp) == 11 * STEP
 
 
 def test_plays_a_part_again_and_again(tmp_path: Path) -> None:
@@ -183,16 +225,24 @@ def test_waits_for_answers_in_lock_step(tmp_path: Path) -> None:
         peer.listen(ODOM, WRENCH, CMD_VEL)
         for k in range(50):
             peer.until(lambda k=k: len(peer.heard[ODOM.name]) == k + 1, f'odometry {k}')
-            if k in (0, 30):
+            if k in (0, 30, 49):
                 peer.spin(0.2)
                 assert len(peer.heard[ODOM.name]) == k + 1
+                assert replay.exit_code is None
             peer.publish(other, topics.WRENCH.type(header=peer.heard[ODOM.name][k].header))
         assert ended(peer, replay) == 0
 
 
 def test_names_the_answer_that_does_not_come(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr('auv_analysis.nodes.replay_publishers.PATIENCE', 0.5)
-    with playing(made(tmp_path / 'bag'), rate=0.0, answers='other/wrench') as (peer, replay):
+    monkeypatch.setattr('auv_analysis.nodes.replay_publishers.PATIENCE', 0.0)
+    values = {'rate': 0.0, 'answers': 'other/wrench', 'start_paused': True}
+    with playing(made(tmp_path / 'bag'), **values) as (peer, replay):
+        peer.until(lambda: replay.playing, 'the replay')
+        replay.player.step()
+        peer.until(lambda: replay.player.published['/odom'] == 1, 'a step')
+        peer.spin(0.5)
+        assert replay.exit_code is None, 'nobody has to answer in a pause'
+        replay.player.run()
         assert ended(peer, replay) == 1
         assert replay.failure.startswith('no answer on other/wrench to the odometry of 0 s')
 

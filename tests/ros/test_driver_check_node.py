@@ -14,6 +14,8 @@ from helpers.faulty_drivers import NAMES
 from helpers.node_processes import PATIENCE, Peer, environment, fresh_domain
 from helpers.patience import patience
 from helpers.stalls import undisturbed
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from auv_analysis.cli.main import main
 from auv_analysis.driver.checks import PASSIVE, judge, refusal
@@ -26,7 +28,7 @@ from auv_analysis.driver.evidence import (
     Settings,
 )
 from auv_analysis.nodes.driver_check_node import COMMANDER, RosDriverClient
-from auv_dynamics.ros import interface, topics
+from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 
 SECONDS = 3.0  # of listening
@@ -215,6 +217,53 @@ def test_what_there_is_elsewhere_is_named(domain: int) -> None:
     assert 'nav_msgs/msg/Odometry is on' in found[0].found
     assert '/healthy/odom of /healthy/driver' in found[0].found
     assert {one.verdict for one in found if one.id in ('rate', 'frames')} == {NOT_CHECKED}
+
+
+def test_who_would_take_a_wrench_is_seen_with_what_it_asks_for() -> None:
+    domain = fresh_domain()
+    peer, client = Peer(domain), RosDriverClient(domain, '/', TOPICS, Frames())
+    onlooker = Node(interface.RECORDER, context=peer.context)
+    kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    try:
+        onlooker.create_subscription(WrenchStamped, '/onlooked', print, 1)
+        peer.node.create_subscription(WrenchStamped, '/wrench', print, kept)
+        peer.node.create_subscription(WrenchStamped, '/thrust', print, 1)
+        peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 1)
+
+        def sees_all() -> bool:
+            client.listen(0.05)
+            seen = client.graph('here')
+            nodes = [end.node for end in (*seen.wrench_subscribers, *seen.clock_publishers)]
+            named = '/onlooked' in seen.topics and nodes == 2 * ['/test_peer']
+            return named and seen.listeners == {'/thrust': ('/test_peer',)}
+
+        peer.until(sees_all)
+        conflict = client.graph('here').conflicts['wrench']
+        assert conflict == 'volatile publisher and transient local subscription'
+    finally:
+        client.close()
+        onlooker.destroy_node()
+        peer.close()
+
+
+def test_what_was_applied_is_heard_by_who_commands() -> None:
+    domain = fresh_domain()
+    peer = Peer(domain)
+    client = RosDriverClient(domain, '/', TOPICS, Frames(), commands=True)
+    tau = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    try:
+        output = peer.node.create_publisher(WrenchStamped, 'wrench_applied', 10)
+
+        def heard() -> int:
+            output.publish(convert.wrench(7, tau, Frames()))
+            client.listen(0.05)
+            return len(client.log(0).applied)
+
+        peer.until(heard)
+        assert client.log(0).applied[0].tolist() == [*tau]
+    finally:
+        client.close()
+        peer.close()
 
 
 def test_with_another_commander_nothing_is_sent(domain: int) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from helpers.node_processes import PATIENCE, Peer, fresh_domain, graph, parameters
 from helpers.patience import patience
 from rclpy.node import Node
@@ -109,6 +110,21 @@ def test_numbers_of_every_kind_come_in_and_broken_messages_are_errors(ears: Ears
         ears.until(lambda t=topic, n=before: ears.topic(t).refused > n)
 
 
+def test_what_nodes_say_of_themselves_is_told(ears: Ears) -> None:
+    levels = {0: 'ok', 1: 'warning', 2: 'error', 3: 'stale', 9: 'stale'}
+    said = [
+        DiagnosticStatus(level=bytes([level]), name=f'/n{level}', message=f'is {word}')
+        for level, word in levels.items()
+    ]
+    said[0].values = [KeyValue(key='step', value='7'), KeyValue(key='ready', value='False')]
+    ears.publisher(topics.DIAGNOSTICS).publish(DiagnosticArray(status=said))
+    ears.until(lambda: ears.snapshot().nodes)
+    told = [(node.name, node.level, node.text) for node in ears.snapshot().nodes]
+    assert told == [(f'/n{level}', word, f'is {word}') for level, word in levels.items()]
+    assert ears.snapshot().nodes[0].facts == {'step': '7', 'ready': 'False'}
+    assert ears.topic(topics.DIAGNOSTICS).heard == 1
+
+
 def test_who_does_not_fit_is_named_with_topic_and_policy(ears: Ears) -> None:
     ears.peer.listen(topics.ODOM)  # reliable
     ears.publisher(topics.ODOM, BEST_EFFORT)
@@ -139,6 +155,12 @@ def test_another_namespace_is_found(ears: Ears) -> None:
     ears.peer.node.create_publisher(topics.ODOM.type, '/auv7/odom', topics.every_step())
     ears.peer.node.create_publisher(topics.ODOM.type, '/ground_truth/odom', topics.every_step())
     ears.until(lambda: ears.listener.elsewhere() == ['/auv7'])
+    ears.peer.node.create_publisher(topics.ODOM.type, '/odom', topics.every_step())
+    inside = Listener(ears.monitor.domain, '/auv1', FRAMES, ears.monitor)
+    try:
+        ears.until(lambda: inside.elsewhere() == ['/', '/auv7'])
+    finally:
+        inside.close()
 
 
 def test_it_is_no_stranger_on_a_domain(ears: Ears) -> None:

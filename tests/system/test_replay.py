@@ -16,6 +16,7 @@ import pytest
 import yaml
 from helpers.fork_server import Process
 from helpers.graph_runs import every_message, recorded
+from helpers.made_messages import Bag, odometry, serialized, stamped
 from helpers.node_processes import (
     PATIENCE,
     Peer,
@@ -29,11 +30,12 @@ from helpers.node_processes import (
     start_node,
     stop,
 )
-from helpers.played_bags import ended, made, there
+from helpers.played_bags import STATE, STEP, ended, fill, made, steps_of, there
 from lifecycle_msgs.msg import Transition
 
 from auv_analysis import load_scenario
 from auv_analysis.bag.load import load_run
+from auv_analysis.bag.step_topics import ODOMETRY, WRENCH
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
 from auv_analysis.replay.compared import reproduction
 from auv_analysis.replay.open_loop import open_loop, recorded_loop
@@ -269,6 +271,40 @@ def test_keys_step_and_go_on(tmp_path: Path) -> None:
     assert process.returncode == 0, errors
     assert 'space: pause, go on' in errors
     assert len(peer.heard[odom.name]) == 50
+
+
+def test_the_options_say_which_part_is_played_how_often_and_under_which_names(
+    tmp_path: Path,
+) -> None:
+    bag, domain = Bag(tmp_path / 'bag.mcap'), fresh_domain()
+    fill(bag, range(20))
+    derived = f'/{interface.DELTA_XI}'
+    bag.add(derived, WRENCH, 12 * STEP, serialized(stamped('Wrench', 12 * STEP, (1.0,) * 6)))
+    for k in (10_000, 10_050):
+        bag.add('/odom', ODOMETRY, k * STEP, serialized(odometry(k * STEP, STATE)))
+    odom = there(topics.ODOM, 'other')
+    options = ['--start', '0.1', '--duration', '100.1', '--loop', '--skip-gaps', '--all']
+    options += ['--namespace', 'other', '--no-clock', '--rate', 'max', '--expect', 'odom=1']
+    peer, once = Peer(domain), [*range(10, 20), 10_000]
+    try:
+        peer.listen(odom)
+        process = start_replay(domain, str(bag.close()), *options, '--json')
+        peer.until(lambda: len(peer.heard[odom.name]) >= 3 * len(once), 'three loops')
+        assert peer.node.count_publishers(topics.CLOCK.name) == 0
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=PATIENCE)
+    finally:
+        peer.close()
+    assert steps_of(peer, odom)[: 3 * len(once)] == 3 * once
+    document = json.loads(output)
+    assert {topic: one['published_as'] for topic, one in document['topics'].items()} == {
+        topic: f'/other{topic}' for topic in ('/odom', '/remark', derived)
+    }
+    assert document['left_out'].keys() == {'/cmd_vel', '/wrench'}
+    assert (document['start'], document['gaps']) == (0.1, [{'from': 0.19, 'to': 100.0}])
+    assert 0.0 <= document['duration'] <= 99.9
+    assert document['loops'] >= 2
+    assert 'nothing from 0.19 to 100 s of the bag: jumped over' in errors
 
 
 def test_a_foreign_listener_is_named_by_the_command(tmp_path: Path) -> None:

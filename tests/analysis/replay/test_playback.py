@@ -1,7 +1,10 @@
 """Bag time against the steady clock: exact over hours, whatever the rate, paused or not."""
 
+from types import SimpleNamespace
+
 import pytest
 
+from auv_analysis.cli.replay import DOWN, UP, _obey
 from auv_analysis.nodes.replay_node import HELD, Playback
 
 SECOND = 10**9
@@ -82,6 +85,18 @@ def test_another_rate_holds_from_now_on(paused: bool) -> None:
     if paused:
         playback.run(NOW + 0.5)
     assert playback.wait(NOW + 0.5, SECOND) == pytest.approx(5.0)
+
+
+def test_keys_change_the_rate() -> None:
+    rates: list[float] = []
+    playback = Playback(rate=3.0)
+    player = SimpleNamespace(playback=playback, change_rate=rates.append)
+    for keys in (UP, DOWN, UP + DOWN, DOWN + DOWN):
+        _obey(player, keys)
+    assert rates == [6.0, 1.5, 0.75]
+    playback.rate = 0.0  # as fast as it goes has no double
+    _obey(player, UP)
+    assert len(rates) == 3
 
 
 def test_from_full_speed_to_a_rate() -> None:

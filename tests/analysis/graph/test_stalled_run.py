@@ -1,4 +1,4 @@
-"""A run that stands still: ended where a node is silent, and not where it is paused."""
+"""A run that stands still: ended where it waits for what does not come, not where it is paused."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,6 +8,7 @@ import psutil
 import pytest
 
 from auv_analysis import load_scenario
+from auv_analysis.graph import experiment
 from auv_analysis.graph.experiment import PACKAGES, SILENCE, SPIN, run_controller
 from auv_analysis.graph.supervisor import NodeDiedError
 
@@ -22,8 +23,10 @@ class OverError(Exception):
 class Graph(SimpleNamespace):
     """What is seen of a graph whose nodes do what a function of the number of the look says."""
 
+    waits_for = ''
+
     def ask_to_run(self) -> bool:
-        return True
+        return not self.waits_for
 
     def spin(self, _: float) -> None:
         self.looks += 1
@@ -38,8 +41,8 @@ def stalls(graph: Graph, silent: str) -> None:
     graph.alive |= ALL - ({silent} if graph.looks > WHILE + 10 else set())
 
 
-def watch(does: Callable[[Graph], None], folder: Path) -> None:
-    graph = Graph(looks=0, does=does, alive=set())
+def watch(does: Callable[[Graph], None], folder: Path, **seen: str) -> None:
+    graph = Graph(looks=0, does=does, alive=set(), **seen)
 
     def begin(_: list[str], **options: object) -> psutil.Popen:
         return psutil.Popen(['sleep', '600'], **options)
@@ -57,3 +60,20 @@ def test_a_node_that_hangs_ends_a_run_and_is_named(silent: str, tmp_path: Path) 
 def test_a_run_that_is_paused_goes_on(tmp_path: Path) -> None:
     with pytest.raises(OverError):
         watch(lambda graph: stalls(graph, ''), tmp_path)
+
+
+def test_a_graph_that_does_not_start_is_given_up(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(experiment, 'START_TIMEOUT', 0.0)
+    with pytest.raises(NodeDiedError, match='no start within 0 s: waiting for the analysis_node'):
+        watch(lambda graph: None, tmp_path, waits_for='the analysis_node')
+
+
+def test_a_recorder_that_does_not_close_its_bag_is_given_up(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(experiment, 'END_TIMEOUT', 0.0)
+
+    def ends(graph: Graph) -> None:
+        graph.alive |= ALL
+        graph.complete_ns = load_scenario('case1').steps * 10_000_000
+
+    with pytest.raises(NodeDiedError, match='recorder_node does not close the bag'):
+        watch(ends, tmp_path)

@@ -12,6 +12,30 @@ from helpers.patience import patience
 from auv_analysis.graph import supervisor
 
 
+def test_who_ends_is_named_with_its_last_words_and_what_the_others_complain_of(
+    tmp_path: Path,
+) -> None:
+    group = supervisor.Supervisor(tmp_path, os.environ)
+    said = '; '.join(f'echo "[ERROR] [1.0] [other]: {word}"' for word in ('first', 'second'))
+    group.start('other', ['sh', '-c', f'{said}; echo well; exec sleep 600'])
+    group.start('quiet', ['sleep', '600'])
+    log, lines = tmp_path / 'other.log', '; '.join(f'echo line {k}' for k in range(10))
+    waits = f'until grep -q well {log}; do sleep 0.05; done'
+    group.start('node', ['sh', '-c', f'{waits}; {lines}; exit 3'])
+    try:
+        group._processes['node'].wait(patience(30.0))
+        with pytest.raises(supervisor.NodeDiedError) as caught:
+            group.check(may_end='node')
+        assert group.complaints('other', 'other') == ['first', 'second']
+        assert group.complaints('other', 'another') == []
+    finally:
+        codes = group.stop()
+    assert codes == {'other': -signal.SIGTERM, 'quiet': -signal.SIGTERM, 'node': 3}
+    kept = [f'    line {k}' for k in range(2, 10)]
+    told = [*kept, '    other: [ERROR] [1.0] [other]: second']
+    assert str(caught.value).splitlines() == ['node ended with exit code 3', *told]
+
+
 class Stuck(psutil.Popen):
     """A process that obeys no SIGTERM; whoever has sent it presses Ctrl-C once more."""
 

@@ -1,12 +1,27 @@
-"""The dashboard of a snapshot on terminals of several sizes, and as plain text."""
+"""The dashboard of a snapshot on terminals of several sizes and as text, and when it is shown."""
 
 import io
-from dataclasses import replace
+import math
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from rich.console import Console
 
-from auv_analysis.watch.screen import fact, fixed, screen, seconds, short, spark, stamp
+from auv_analysis.watch import screen as module
+from auv_analysis.watch.monitor import HEARD, GraphMonitor
+from auv_analysis.watch.screen import (
+    Display,
+    Session,
+    fact,
+    fixed,
+    screen,
+    seconds,
+    short,
+    spark,
+    stamp,
+)
 from auv_analysis.watch.snapshot import (
     Alert,
     Energy,
@@ -15,6 +30,7 @@ from auv_analysis.watch.snapshot import (
     Snapshot,
     TopicState,
 )  # fmt: skip
+from auv_dynamics.files.errors import FailedError
 from auv_dynamics.ros import interface
 from auv_dynamics.vehicle import DOFS
 
@@ -178,3 +194,74 @@ def test_texts_of_numbers() -> None:
     ]  # fmt: skip
     assert spark([0.0, 0.0]) == '▁▁'
     assert spark([0.0, 1.0, 2.0])[::2] == '▁█'
+
+
+@dataclass
+class Graph:
+    """A clock, a listener on a graph whose odometry begins at a time, and no keyboard."""
+
+    begins: float = math.inf
+    published: bool = False
+    others: list[str] = field(default_factory=list)
+    now: float = 0.0
+    ended: bool = False
+    monitor: GraphMonitor = field(default_factory=lambda: GraphMonitor(7))
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def listen(self) -> None:
+        ends = SimpleNamespace(publishers=self.published, subscribers=0, conflicts=(), foreign='')
+        self.monitor.see(self.now, dict.fromkeys(HEARD, ends))
+        if self.now >= self.begins:
+            self.monitor.hear(self.now, interface.ODOM, None, round(self.now * 1e9), None)
+
+    def elsewhere(self) -> list[str]:
+        return self.others
+
+    def wait(self, _: float) -> bytes:
+        self.now += 1 / 16  # s, which add up without rounding
+        return b''
+
+
+def run(graph: Graph, monkeypatch: pytest.MonkeyPatch, **options: Any) -> Snapshot:
+    """Run a session of `auv watch` in a pipe."""
+    given = {'single': False, 'rate': None, 'limit': math.inf, 'once': False, **options}
+    monkeypatch.setattr(module, 'time', graph)
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    display = Display(stderr=False, single=given['single'])
+    session = Session(graph.monitor, graph, display, given['rate'])
+    return session.run(graph, given['limit'], once=given['once'])
+
+
+def test_once_is_when_rates_are_known(monkeypatch, capsys) -> None:
+    found = run(Graph(begins=9.0), monkeypatch, once=True, single=True)
+    assert found.seconds == 11.0
+    said = capsys.readouterr()
+    assert said.out.count('auv watch') == 1
+    assert said.err.splitlines() == [
+        'nobody publishes odom, cmd_vel or wrench on ROS_DOMAIN_ID=7, '
+        'this machine only (ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST); waiting'
+    ]
+
+
+@pytest.mark.parametrize(('rate', 'shown'), [(None, 4), (4.0, 15)])
+def test_in_a_pipe_every_look_that_shows_something_is_printed(
+    monkeypatch, capsys, rate: float | None, shown: int
+) -> None:
+    found = run(Graph(begins=1.5), monkeypatch, limit=5.0, rate=rate)
+    assert found.heard
+    assert capsys.readouterr().out.count('auv watch') == shown
+
+
+@pytest.mark.parametrize(
+    ('there', 'words'),
+    [
+        ({}, '^nobody publishes odom, cmd_vel or wrench on .*: gave up after 2 s'),
+        ({'published': True}, '^nothing comes of odom, cmd_vel or wrench on '),
+        ({'others': ['/', '/auv7']}, 'but odometry in / or /auv7: see --namespace'),
+    ],
+)
+def test_what_was_waited_for_in_vain_is_said(monkeypatch, there: dict, words: str) -> None:
+    with pytest.raises(FailedError, match=words):
+        run(Graph(**there), monkeypatch, limit=2.0, single=True)

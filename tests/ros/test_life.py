@@ -1,12 +1,25 @@
 """What a node says while it lives, and the end of its process."""
 
+import math
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 from helpers.node_processes import PATIENCE, environment, fresh_domain
+from helpers.nodes_in_process import program
 
 from auv_dynamics.ros import node_interface
+from auv_dynamics.ros.node_main import BulkNode
+
+
+class Made(BulkNode):
+    """A node with what every node has in common."""
+
+    def __init__(self, **options: Any):
+        super().__init__('made', **options)
+        self.graph = node_interface.NodeInterface(self)
+
 
 STUCK = """
 import ctypes, sys
@@ -31,6 +44,23 @@ def test_a_teardown_without_end_does_not_change_the_exit_code(code: int) -> None
     command = [sys.executable, '-c', STUCK, str(code)]
     ended = subprocess.run(command, env=environment(fresh_domain()), timeout=PATIENCE, check=False)
     assert ended.returncode == code
+
+
+@pytest.mark.parametrize(('loud', 'logged'), [(math.inf, [1, 4]), (0.0, [1, 2, 3, 4])])
+def test_the_like_of_a_report_is_not_logged_at_once_again(
+    monkeypatch, capfd: pytest.CaptureFixture, loud: float, logged: list[int]
+) -> None:
+    monkeypatch.setattr(node_interface, 'LOUD', loud)
+    reports = [
+        f'{topic}: found {k}' for k, topic in enumerate(('odom', 'odom', 'odom', 'twist'), 1)
+    ]
+    with program() as made:
+        graph = made.add(Made, {}).graph
+        for report in reports:
+            graph.complain(report)
+            assert graph.trouble == report
+    said = [line for line in capfd.readouterr().err.splitlines() if '[ERROR]' in line]
+    assert [int(line.rpartition(' ')[2]) for line in said] == logged
 
 
 def test_what_lasts_is_logged_once_and_then_every_ten_seconds(monkeypatch) -> None:

@@ -8,6 +8,7 @@ from geometry_msgs.msg import Twist, Wrench
 from helpers.made_messages import Bag, geometry, serialized, stamped
 from helpers.node_processes import assert_one_line, graph, parameters, run_node, stop
 from helpers.played_bags import STEP, ended, made, playing, process, steps_of, there
+from rclpy.qos import DurabilityPolicy
 from std_srvs.srv import Trigger
 
 from auv_analysis.bag.reading import read_bag
@@ -172,6 +173,18 @@ def test_a_listener_without_a_name_gets_no_command_before_it_has_one(monkeypatch
     assert not complaints
     assert guard.may('/wrench', 6.1) is False
     assert complaints == [f'commands are not published any more: {NAMELESS} on /wrench']
+
+
+def test_a_command_is_kept_for_nobody_who_comes_late(tmp_path: Path) -> None:
+    bag, kind = Bag(tmp_path / 'bag.mcap'), 'geometry_msgs/msg/WrenchStamped'
+    schema = bag._writer.register_schema(kind, 'ros2msg', b'Wrench wrench')
+    kept = {'offered_qos_profiles': '[{durability: transient_local, depth: 1}]'}
+    channel = bag._writer.register_channel('/wrench', 'cdr', schema, kept)
+    bag._writer.add_message(channel, 0, serialized(stamped('Wrench', 0, (1.0,) * 6)), 0)
+    with playing(bag.close(), **FORCED, start_paused=True) as (peer, _):
+        ends = peer.node.get_publishers_info_by_topic
+        (end,) = peer.until(lambda: ends('/wrench'), 'its publisher')
+    assert end.qos_profile.durability == DurabilityPolicy.VOLATILE
 
 
 def test_wrong_input_is_one_line(tmp_path: Path) -> None:

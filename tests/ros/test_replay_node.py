@@ -29,17 +29,17 @@ from helpers.played_bags import (
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.step_topics import ODOMETRY
 from auv_analysis.nodes.replay_node import ReplayNode
-from auv_analysis.nodes.replay_publishers import WINDOW
+from auv_analysis.nodes.replay_publishers import LATE, WINDOW, offered_again
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import topics
-from auv_dynamics.ros.interface import nanoseconds
+from auv_dynamics.ros.interface import DEPTH, nanoseconds
 
 ODOM, WRENCH, CMD_VEL = there(topics.ODOM), there(topics.WRENCH), there(topics.CMD_VEL)
 REMARK = topics.Topic('replay/remark', String)
@@ -337,6 +337,26 @@ def test_a_bag_that_was_cut_is_played_up_to_there(tmp_path: Path) -> None:
     heard = steps_of(peer, ODOM)
     assert 100 < len(heard) < 300
     assert heard == list(range(len(heard)))
+
+
+@pytest.mark.parametrize(
+    ('recorded', 'depth'),
+    [
+        ('[{durability: transient_local, depth: 5}]', 5),
+        ('[{durability: 1, depth: 5}, {durability: transient_local, depth: 7}]', 7),
+        ('[{durability: 1, depth: 0}, {durability: volatile, depth: 200}]', LATE),
+        (f'[{{durability: 1, depth: {DEPTH + 1}}}]', LATE),
+        ('[{durability: volatile, depth: 5}, {durability: 2, depth: 5}]', None),
+        *(('', None), ('{', None), ('3', None), ('[3]', None)),
+    ],
+)
+def test_as_much_is_kept_as_was_recorded(recorded: str, depth: int | None) -> None:
+    found, held = offered_again(recorded), depth is not None
+    assert found.durability == getattr(DurabilityPolicy, 'TRANSIENT_LOCAL' if held else 'VOLATILE')
+    assert found.depth == (depth or DEPTH)
+    assert found.reliability == ReliabilityPolicy.RELIABLE
+    command = offered_again(recorded, volatile=True)
+    assert (command.durability, command.depth) == (DurabilityPolicy.VOLATILE, DEPTH)
 
 
 def test_late_comers_get_what_was_kept_for_them(tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ def test_no_step_is_published_twice_where_the_clock_jumps_by_hardly_more_than_is
 def test_what_odometry_asks_for_comes_once_its_subscribers_are_there(lockstep: bool) -> None:
     grid = {'step': 0.02, 'duration': 1.0, 'horizon': 3, 'lockstep': lockstep}
     with program() as made:
-        made.add(SetpointNode, {**grid, **WAVES, 'expected_subscribers': ['cmd_vel=1']})
+        node = made.add(SetpointNode, {**grid, **WAVES, 'expected_subscribers': ['cmd_vel=1']})
         made.listen(topics.DIAGNOSTICS)
         said = made.heard[topics.DIAGNOSTICS.name]
         made.until(lambda: said and said[-1].status[0].message != 'ok', 'no odometry yet')
@@ -110,6 +110,12 @@ def test_what_odometry_asks_for_comes_once_its_subscribers_are_there(lockstep: b
         made.until(lambda: by_hand.ns_of(said[-1]) == START + 3 * STEP, 'the horizon')
         found = [by_hand.ns_of(m) for m in made.heard['cmd_vel']]
         assert found == [START + k * STEP for k in range(4)]
+        (heard,) = [one for one in made.node.subscriptions if one.topic_name == '/cmd_vel']
+        made.node.destroy_subscription(heard)
+        left = node.graph.publishers['cmd_vel'].get_subscription_count
+        made.until(lambda: not left(), 'the end of the subscriber')
+        made.publish(topics.ODOM, by_hand.odometry(START + STEP, [0, 0, 0, 1, *[0] * 9]))
+        made.until(lambda: by_hand.ns_of(said[-1]) == START + 4 * STEP, 'one for all others')
 
 
 def test_a_file_that_ends_too_early_and_a_run_between_two_steps_are_refused(tmp_path: Path) -> None:

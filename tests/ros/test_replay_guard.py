@@ -1,5 +1,6 @@
 """A replay beside a vehicle: it gets no recorded command unless somebody says so, and no clock."""
 
+import math
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,7 +13,7 @@ from rclpy.qos import DurabilityPolicy
 from std_srvs.srv import Trigger
 
 from auv_analysis.bag.reading import read_bag
-from auv_analysis.nodes import replay_publishers
+from auv_analysis.nodes import replay_node, replay_publishers
 from auv_analysis.nodes.replay_publishers import CommandGuard
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.endpoints import NAMELESS, UNNAMED
@@ -108,8 +109,11 @@ def test_a_remapping_does_not_smuggle_commands(tmp_path: Path) -> None:
         peer.listen(topics.WRENCH, ODOM)
         assert ended(peer, replay) == 0
         peer.until(lambda: len(peer.heard[ODOM.name]) == 50, 'odometry')
+        _, output = stop(replay)
     assert peer.heard['wrench'] == []
     assert len(peer.heard[ODOM.name]) == 50
+    assert 'left out: /wrench: a command outside of /replay' in output
+    assert f'begins: plays {tmp_path / "bag"}' in output
 
 
 def test_there_is_one_clock(tmp_path: Path) -> None:
@@ -130,6 +134,21 @@ def test_a_second_clock_ends_the_replay(tmp_path: Path) -> None:
         peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 10)
         assert ended(peer, replay) == 1
         assert '/clock: expected no other publisher' in replay.failure
+
+
+def test_a_clock_of_a_node_without_a_name_is_another_one_unless_the_name_comes(
+    tmp_path: Path, monkeypatch
+) -> None:
+    unnamed = SimpleNamespace(node_name=UNNAMED, node_namespace='/')
+    monkeypatch.setattr(replay_node, 'other_publishers', lambda node, topic: [unnamed])
+    monkeypatch.setattr(replay_node, 'NAMED', math.inf)
+    with playing(made(tmp_path / 'bag'), start_paused=True) as (peer, replay):
+        peer.until(lambda: replay.playing or replay.exit_code is not None, 'the replay')
+        assert replay.exit_code is None
+        monkeypatch.setattr(replay_node, 'NAMED', 0.0)
+        assert ended(peer, replay) == 1
+        assert replay.failure.startswith('replay_node: /clock: expected no other publisher')
+        assert NAMELESS in replay.failure
 
 
 def test_beside_another_clock_it_plays_without_its_own(tmp_path: Path) -> None:

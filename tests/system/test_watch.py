@@ -1,5 +1,6 @@
 """`auv watch` beside a run: it sees what happens, and nothing is otherwise for it, even stopped."""
 
+import itertools
 import json
 import os
 import pty
@@ -12,10 +13,18 @@ import pytest
 import yaml
 from helpers.fork_server import Process
 from helpers.graph_runs import every_message, record
-from helpers.node_processes import PATIENCE, auv, fresh_domain, start_auv, start_installed_auv
+from helpers.node_processes import (
+    PATIENCE,
+    Peer,
+    auv,
+    fresh_domain,
+    start_auv,
+    start_installed_auv,
+)
 from helpers.patience import patience
 
-from auv_dynamics.ros import interface
+from auv_dynamics.ros import convert, interface, topics
+from auv_dynamics.ros.interface import Frames
 
 PACED = ('/diagnostics', '/recorder/progress', '/controller_node/transition_event')  # by the wall
 SCENARIO = {
@@ -86,6 +95,35 @@ def test_without_a_graph_it_says_where_it_waits_and_ends_with_1() -> None:
     assert first.startswith(f'listens on ROS_DOMAIN_ID={domain}, this machine only')
     for word in ('nobody publishes odom, cmd_vel or wrench', f'={domain}', 'gave up after 0.5 s'):
         assert word in last
+
+
+def test_it_listens_where_and_to_what_it_is_told() -> None:
+    domain, steps = fresh_domain(), itertools.count()
+    peer, state = Peer(domain), (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, *(0.1,) * 6)
+    odometry = peer.node.create_publisher(topics.ODOM.type, '/auv1/odom', topics.every_step())
+
+    def publish() -> None:
+        stamp = next(steps) * 20_000_000
+        odometry.publish(convert.odometry(stamp, state, Frames('map', 'body')))
+
+    peer.node.create_timer(0.02, publish)
+    options = ['--namespace', '/auv1', '--vehicle', 'herman2018', '--once', '--json']
+    frames = ['--odom-frame', 'map', '--base-frame', 'body']
+    watch = start_auv('watch', *options, *frames, domain=domain)
+    try:
+        peer.until(lambda: watch.poll() is not None, 'a snapshot')
+        output, errors = watch.communicate(timeout=PATIENCE)
+    finally:
+        watch.kill()
+        peer.close()
+    assert watch.returncode == 0, errors
+    found = json.loads(output)
+    assert [found[key] for key in ('domain', 'namespace', 'vehicle', 'computed')] == [
+        domain, '/auv1', 'herman2018', True
+    ]  # fmt: skip
+    assert found['nu'] == [0.1] * 6
+    assert found['kinetic_energy']['total'] > 0.0
+    assert sum(topic['refused'] for topic in found['topics']) == 0
 
 
 def test_on_a_terminal_q_ends_it_and_the_terminal_is_given_back() -> None:

@@ -1,6 +1,9 @@
 """`auv doctor`: each fault of a set-up is provoked and named, with what to do."""
 
+import ctypes
+import inspect
 import json
+import mmap
 import os
 import resource
 import shutil
@@ -68,10 +71,39 @@ def test_variables_that_break_something_are_named(check, name, value, verdict, w
     assert _one(check, verdict, word).check in {finding.check for finding in sound}
 
 
-def test_version_of_python_is_judged(monkeypatch):
+@pytest.mark.parametrize(
+    ('end', 'version', 'words'),
+    [('NEWEST', (3, 10), '3.11 to 3.10'), ('OLDEST', (3, 99), '3.99 to 3.13')],
+)
+def test_version_of_python_is_judged(end, version, words, monkeypatch):
     assert next(checks.python()).verdict == 'ok'
-    monkeypatch.setattr(checks, 'NEWEST', (3, 10))
-    _one(checks.python, 'broken', '3.11 to 3.10')
+    monkeypatch.setattr(checks, end, version)
+    _one(checks.python, 'broken', words)
+
+
+def test_packages_that_are_not_those_of_an_environment_are_a_warning(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, 'base_prefix', str(tmp_path))
+    monkeypatch.setenv('VIRTUAL_ENV', sys.prefix)
+    assert [finding.check for finding in checks.python()] == ['Python']
+    monkeypatch.setenv('VIRTUAL_ENV', str(tmp_path))
+    _one(checks.python, 'warning', f'{tmp_path} is active, but this is {sys.prefix}')
+    monkeypatch.setattr(sys, 'base_prefix', sys.prefix)
+    _one(checks.python, 'warning', 'no virtual environment')
+
+
+def test_a_range_that_is_chosen_and_safe_is_no_warning(monkeypatch):
+    monkeypatch.setenv(RANGE, 'LOCALHOST')
+    _one(checks.discovery_range, 'ok', 'this machine only')
+
+
+def test_every_check_is_made():
+    made = [
+        check
+        for module in (checks, discovery)
+        for name, check in vars(module).items()
+        if inspect.isgeneratorfunction(check) and not name.startswith('_')
+    ]
+    assert set(doctor.CHECKS) == set(made)
 
 
 def test_packages_that_are_missing_old_or_broken_are_named(tmp_path, monkeypatch):
@@ -115,6 +147,8 @@ def test_another_auv_in_front_is_a_warning(tmp_path, monkeypatch):
     other.chmod(0o755)
     monkeypatch.setenv('PATH', str(tmp_path))
     _one(checks.executables, 'warning', str(other))
+    monkeypatch.setenv('PATH', str(Path(sys.executable).parent))
+    assert {finding.verdict for finding in checks.executables()} == {'ok'}
 
 
 @pytest.mark.parametrize(('free', 'verdict'), [(1 << 20, 'broken'), (1 << 30, 'warning')])
@@ -123,27 +157,46 @@ def test_full_disk_is_said(free, verdict, monkeypatch):
     _one(checks.disk, verdict, 'make room')
 
 
-def test_left_over_segments_are_counted_and_those_in_use_are_not(tmp_path):
+def test_left_over_segments_are_counted_and_those_in_use_are_not(tmp_path, monkeypatch):
     for i in range(60):
-        (tmp_path / f'fastrtps_{i}').touch()
+        (tmp_path / f'fastrtps_{i}').write_bytes(b'x')
     (tmp_path / 'somebody_else').touch()
+    system, size = ctypes.CDLL(None), ctypes.c_size_t(1)
+    system.mmap.restype = ctypes.c_void_p
+    with (tmp_path / 'fastrtps_1').open('rb') as file:  # mapped and closed, as by Fast DDS
+        how = mmap.PROT_READ, mmap.MAP_SHARED, file.fileno(), ctypes.c_long(0)
+        mapped = ctypes.c_void_p(system.mmap(None, size, *how))
     with (tmp_path / 'fastrtps_0').open():
         left = checks.left_over(tmp_path)
-        assert len(left) == 59
-        assert tmp_path / 'fastrtps_0' not in left
+    system.munmap(mapped, size)
+    assert len(left) == 58
+    assert not {tmp_path / 'fastrtps_0', tmp_path / 'fastrtps_1'} & set(left)
     _one(lambda: checks.shared_memory(tmp_path), 'warning', '60 files', 'rm ')
+    monkeypatch.setattr(os, 'getuid', lambda: -1)  # nobody may remove those of others
+    assert checks.left_over(tmp_path) == []
 
 
-def test_full_or_absent_shared_memory_is_said(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ('free', 'verdict'), [(0, 'broken'), (32 << 20, 'warning'), (1 << 30, 'ok')]
+)
+def test_full_or_absent_shared_memory_is_said(free, verdict, tmp_path, monkeypatch):
     _one(lambda: checks.shared_memory(tmp_path / 'gone'), 'note', 'is not there')
-    monkeypatch.setattr(shutil, 'disk_usage', lambda _: Usage(1 << 20, 1 << 20, 0))
-    _one(lambda: checks.shared_memory(tmp_path), 'broken', '0 MB free')
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: Usage(1 << 40, 0, free))
+    _one(lambda: checks.shared_memory(tmp_path), verdict, f'{free >> 20} MB free')
+    (tmp_path / 'fastdds_0').touch()
+    few = 'note' if verdict == 'ok' else 'warning'
+    assert [*findings_of([lambda: checks.shared_memory(tmp_path)])][1].verdict == few
 
 
 @pytest.mark.parametrize(('limit', 'verdict'), [(64, 'broken'), (512, 'warning'), (4096, 'ok')])
 def test_few_open_files_are_said(limit, verdict, monkeypatch):
     monkeypatch.setattr(resource, 'getrlimit', lambda _: (limit, limit))
     _one(checks.files, verdict, f'{limit} per process')
+
+
+def test_no_limit_of_open_files_is_fine(monkeypatch):
+    monkeypatch.setattr(resource, 'getrlimit', lambda _: (resource.RLIM_INFINITY,) * 2)
+    _one(checks.files, 'ok', 'no limit')
 
 
 def test_clock_before_the_program_was_made_is_said(monkeypatch):
@@ -163,6 +216,33 @@ def test_participants_that_cannot_start_are_broken(tmp_path, monkeypatch):
     (tmp_path / 'rclpy' / '__init__.py').write_text('raise ImportError("no such library")\n')
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
     _one(discovery.discovery, 'broken', 'cannot start: ImportError: no such library')
+
+
+@pytest.mark.parametrize(
+    ('flags', 'advice'),
+    [
+        ('0x1048', ['ip link set lo up']),
+        ('0x49', ['allow UDP', 'ip link set lo multicast on']),
+        ('0x1049', ['allow UDP']),
+        (None, ['allow UDP']),
+    ],
+)
+def test_what_keeps_participants_apart_is_what_the_loopback_lacks(
+    flags, advice, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(discovery, 'LOOPBACK', tmp_path)
+    if flags:
+        (tmp_path / 'flags').write_text(f'{flags}\n')
+    parts = discovery._what_to_do('').split('; ')
+    assert [part[: len(begin)] for part, begin in zip(parts, advice, strict=True)] == advice
+
+
+def test_who_is_in_a_domain_matters_where_it_was_chosen(monkeypatch):
+    monkeypatch.setattr(discovery, '_start', lambda *_: None)
+    monkeypatch.setattr(discovery, '_answer', lambda _: {'seen': ['/one', '/other']})
+    _one(discovery.peers, 'note', '/one, /other')
+    monkeypatch.setenv('ROS_DOMAIN_ID', '7')
+    _one(discovery.peers, 'warning', 'domain 7 is in use by /one, /other', 'unset ROS_DOMAIN_ID')
 
 
 def test_a_check_that_fails_is_a_finding_and_the_others_go_on():

@@ -78,6 +78,16 @@ def test_what_must_end_it_ends_it_with_zero(fault: str, word: str) -> None:
     assert not excitation.sent[-1].ended_ns
 
 
+def test_the_vehicle_is_looked_at_while_nothing_is_sent_as_well() -> None:
+    plan = plan_of(SimulatedDriver().vehicle, ['surge', 'yaw'], 0.1, None, None)
+    in_silence = sum(trial.seconds for trial in plan.trials) - UNHEARD / 2
+    driver = SimulatedDriver(fast_after=in_silence)
+    excitation = sent_by(driver)
+    assert 'm/s' in excitation.aborted
+    assert excitation.sent[-1].trial.silent
+    assert driver.sent[-LAST:] == [ZERO] * LAST
+
+
 def test_a_vehicle_that_moves_already_gets_nothing_but_zero() -> None:
     driver = SimulatedDriver(fast_after=0.0)
     found = sent_by(driver)
@@ -102,6 +112,17 @@ def test_a_drift_is_let_pass_and_leaves_the_turning_its_limit(surge, yaw, word: 
     guard = MotionGuard(driver, 0.1, 0.5, lambda: False)
     heard(surge, yaw)
     with pytest.raises(AbortError, match=word) if word else nullcontext():
+        guard.look(0.1)
+
+
+@pytest.mark.parametrize(('arrived', 'stamp', 'silent'), [(0.6, 0.0, False), (0.4, 1.0, True)])
+def test_silence_is_counted_from_arrivals_whatever_the_stamps_say(arrived, stamp, silent) -> None:
+    driver = SimulatedDriver()
+    driver.buffer, driver.now_ns = OdometryBuffer(), lambda: 10**9
+    ns = round(arrived * 1e9), round(stamp * 1e9)
+    driver.buffer.odometry(*ns, tuple(LEVEL), ('', ''), None)
+    guard = MotionGuard(driver, 0.1, 0.5, lambda: False)
+    with pytest.raises(AbortError, match='no odometry') if silent else nullcontext():
         guard.look(0.1)
 
 
@@ -146,13 +167,37 @@ def test_a_signal_is_no_exception_but_a_wish_while_wrenches_are_sent(number: int
     assert signal.getsignal(number) == before
 
 
+def test_a_hang_up_that_nohup_ignores_is_no_wish() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    stop = threading.Event()
+    try:
+        with on_signals(stop.set):
+            signal.raise_signal(signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert not stop.is_set()
+
+
 def test_nothing_is_sent_where_another_begins_to_command_in_the_countdown(monkeypatch) -> None:
-    driver = SimulatedDriver(joined_after=0.0)
-    driver.advertise = driver.retire = lambda: True
+    driver, asked = SimulatedDriver(joined_after=0.0), []
+    driver.advertise = lambda: asked.append('advertise')
+    driver.retire = lambda: asked.append('retire')
     monkeypatch.setattr('auv_analysis.driver.excitation.COUNTDOWN', 0)
     plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
     excitation = actuate(driver, plan, 0.5)
     assert excitation.aborted == '/somebody publishes the wrench as well'
+    assert driver.sent == []
+    assert asked == ['advertise', 'retire']
+
+
+def test_nothing_is_sent_to_a_driver_that_does_not_hear_it(monkeypatch) -> None:
+    driver = SimulatedDriver()
+    driver.advertise, driver.retire = lambda: False, lambda: None
+    for name in ('COUNTDOWN', 'MATCHES', 'LOOK_AGAIN'):
+        monkeypatch.setattr(f'auv_analysis.driver.excitation.{name}', 0)
+    plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
+    assert 'does not hear' in actuate(driver, plan, 0.5).aborted
     assert driver.sent == []
 
 

@@ -114,6 +114,11 @@ def test_simulated_time_is_there_if_it_is_expected(there, clocks, sim_time, verd
     assert found['clock'].verdict == verdict
 
 
+def test_two_clocks_are_no_simulated_time() -> None:
+    ends = (Endpoint('/simulator', 'rosgraph_msgs/msg/Clock'),) * 2
+    assert seen_in(graph(clock_publishers=ends), 9, sim_time=True)['clock'].verdict == FAIL
+
+
 def test_a_conflict_names_the_policy_and_advises() -> None:
     best_effort = (Endpoint(DRIVER, ODOMETRY, reliability='best_effort'),)
     conflict = {'recorder': 'best effort publisher and reliable subscription'}

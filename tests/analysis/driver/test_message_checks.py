@@ -111,6 +111,8 @@ def test_a_position_above_its_origin_is_a_doubt_and_no_failure() -> None:
     finding = found_in(odometry_log(x))['depth']
     assert finding.verdict == NOT_CHECKED
     assert 'z is up' in finding.found
+    x[-1, 2] = 0.1  # it has been on its way down
+    assert found_in(odometry_log(x))['depth'].verdict == PASS
 
 
 @pytest.mark.parametrize(
@@ -142,6 +144,13 @@ def test_speeds_of_a_healthy_driver_pass() -> None:
     assert {one.verdict for one in found.values()} == {PASS}
     few = found_by(odometry_log(motion()[:5]), *SPEEDS)
     assert {one.verdict for one in few.values()} == {NOT_CHECKED}
+
+
+def test_times_of_arrival_are_no_measure_of_a_step() -> None:
+    heard = healthy()
+    found = found_by(healthy(stamp_ns=np.full_like(heard.stamp_ns, heard.stamp_ns[0])), *SPEEDS)
+    assert found['jumps'].verdict == NOT_CHECKED
+    assert found['speeds'].verdict == PASS
 
 
 def test_two_sources_in_turn_are_no_noise() -> None:

@@ -95,6 +95,12 @@ def test_stamps_that_do_not_rise_by_little_fail(fault: str, word: str) -> None:
     assert word in finding.advice
 
 
+def test_a_jump_within_limits_gap_is_integrated_and_no_fault() -> None:
+    stamps = healthy().stamp_ns.copy()
+    stamps[10:] += round(0.7 * SECOND)
+    assert found_in(stamped(stamps), 'stamps')['stamps'].verdict == PASS
+
+
 @pytest.mark.parametrize(
     ('age', 'verdict'), [(0.2, PASS), (0.3, FAIL), (5.0, FAIL), (-0.015, PASS), (-0.1, FAIL)]
 )
@@ -113,7 +119,11 @@ def test_another_epoch_is_no_age_and_gets_advice() -> None:
     assert found['age'].verdict == NOT_CHECKED
     assert 'another epoch' in found['age'].found
     assert 'stamp_clock: own' in found['age'].advice
+    assert 'the start of the computer' in found['age'].found
     assert found['stamps'].verdict == found['drift'].verdict == PASS
+    later = found_in(stamped(heard.stamp_ns + 3 * 86_400 * SECOND), 'age')['age']
+    assert later.verdict == NOT_CHECKED
+    assert 'another day' in later.found
 
 
 @pytest.mark.parametrize(('drift', 'verdict'), [(0.001, PASS), (0.02, FAIL), (-0.02, FAIL)])
@@ -127,7 +137,7 @@ def test_a_clock_that_runs_at_another_speed_fails(drift: float, verdict: str) ->
 
 def test_simulated_time_is_compared_with_the_clock() -> None:
     heard = healthy()
-    step = SECOND // 50
+    step = SECOND // 10
     stamps = 10 * SECOND + np.arange(500) * step
     # /clock follows each odometry, four times as fast as ours
     arrived = BEGAN + np.arange(500) * step // 4
@@ -137,7 +147,7 @@ def test_simulated_time_is_compared_with_the_clock() -> None:
     )  # fmt: skip
     found = timing_of(simulated, sim_time=True)
     assert found['age'].verdict == found['drift'].verdict == PASS
-    assert found['age'].numbers['age_median_s'] == pytest.approx(-0.02)
+    assert found['age'].numbers['age_median_s'] == pytest.approx(-0.1)  # a step of the clock
     assert timing_of(simulated)['age'].verdict == NOT_CHECKED
     old = replace(simulated, stamp_ns=stamps - SECOND)
     assert failed(old, sim_time=True) == {'age'}
@@ -148,8 +158,12 @@ def test_a_buffer_counts_what_the_middleware_numbered_and_lost() -> None:
     buffer = OdometryBuffer()
     for number in (1, 2, 5, 6, 9):
         buffer.odometry(number, number, (0.0,) * 13, ('a', 'b'), number)
+    buffer.unreadable('/odom', 10)  # which has arrived
+    buffer.odometry(11, 11, (0.0,) * 13, ('a', 'b'), 11)
     assert buffer.log(0, 10).lost == 4
-    assert len(buffer) == 5
+    buffer.odometry(12, 12, (0.0,) * 13, ('a', 'b'), 1)  # a publisher that was started again
+    assert buffer.log(0, 10).lost == 4
+    assert len(buffer) == 7
     assert timing_of(buffer.log(0, 10))['gaps'].numbers['lost'] == 4
 
 

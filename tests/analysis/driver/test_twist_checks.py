@@ -290,6 +290,14 @@ def test_at_rest_nothing_is_told_of_a_bias_that_is_not_there() -> None:
     assert 'current' not in found.found
 
 
+def test_a_position_that_is_too_noisy_tells_no_bias() -> None:
+    x = at_rest()
+    x[:, :3] += np.random.default_rng(6).normal(0.0, 3.0, (len(x), 3))
+    found = found_by(odometry_log(x), 'velocity_bias')['velocity_bias']
+    assert found.verdict == NOT_CHECKED
+    assert 'too noisy' in found.found
+
+
 @pytest.mark.parametrize('last', [0.0, 0.3, 1.0])
 def test_noise_of_the_depth_at_rest_is_no_false_alarm(last: float) -> None:
     x = at_rest()

@@ -101,6 +101,12 @@ def test_plain_aliases_are_fine(tmp_path: Path) -> None:
     assert read_yaml(path, 'vehicle')['b'] == [1, 2, 3, 4, 5, 6]
 
 
+def test_what_was_read_may_be_changed_and_is_read_anew() -> None:
+    text = 'a: {b: [1]}\n'
+    parse_any_yaml(text, 'a text')['a']['b'].append(2)
+    assert parse_any_yaml(text, 'a text') == {'a': {'b': [1]}}
+
+
 @pytest.mark.parametrize('text', ['1e-3', '1E+3', '-2.5e3', '.5e-1', '12e0', '+1.e2'])
 def test_exponents_are_numbers(text: str, tmp_path: Path) -> None:
     path = tmp_path / 'number.yaml'

@@ -68,6 +68,12 @@ REFUSED = {
     'a weak curve': (
         {'curve': 't200_10v'}, 'limit', 'at most what the curve of its rotor gives, 22.65 N',
         '40.2 N'),
+    'a curve that is weak ahead': (
+        {'curve': TABLE | {'thrust_n': [-60.0, 0.0, 0.0, 40.0]}}, 'limit',
+        'at most what the curve of its rotor gives, 40 N', '51.5 N'),
+    'a wide dead band astern': (
+        {'dead_band': [40.2, 1]}, 'rotor.dead_band', 'less than the limits, 40.2 and 51.5 N',
+        '[40.2, 1]'),
     'a wide dead band': (
         {'dead_band': [1, 51.5]}, 'rotor.dead_band', 'less than the limits, 40.2 and 51.5 N',
         '[1, 51.5]'),

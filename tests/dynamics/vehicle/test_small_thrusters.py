@@ -27,6 +27,12 @@ def test_limits_of_weak_thrusters(tau, u):
     assert_allclose(delivered, [*u, 0, 0, 0, 0], rtol=1e-12)
 
 
+def test_the_largest_wrench_is_that_of_the_stronger_way():
+    T = np.array([[1.0, -1.0], [0.0, 1.0], *np.zeros((4, 2))])
+    found = Thrusters(NAMES, T, np.array([5.0, 0.2]), np.array([0.4, 0.8])).largest()
+    assert_allclose(found, [5.8, 0.8, 0, 0, 0, 0])
+
+
 @pytest.mark.parametrize('scale', [1e-3, 1.0, 1e3])
 def test_what_rounding_makes_non_zero_does_not_count(scale):
     for small, rank in ((1e-8, 2), (1e-10, 1)):

@@ -124,6 +124,12 @@ ERRORS = {
     'both tensors': (
         without_inertia(matrix(0, 0, 100.0), inertia=np.eye(3).tolist()), 'rigid_body.inertia',
         'nothing beside inertia_matrix', 'both of them'),
+    'a reference of no tensor': (
+        without_inertia(matrix(0, 0, 100.0), inertia_reference='cg'),
+        'rigid_body.inertia_reference', 'nothing beside inertia_matrix', 'both of them'),
+    'a misspelt key, which leaves another one missing': (
+        BASE | {'environment': {'gravity': 9.81, 'water_densty': 1025.0}},
+        'environment.water_densty', 'one of water_density', 'an unknown key'),
     'a word for sign': (BASE | {'sign': 'minus'}, 'sign', 'positive or sname', 'minus'),
     'another format': (BASE | {'format': 2}, 'format', '1', '2'),
     'reference by another name': (
@@ -196,6 +202,7 @@ def test_damping_may_be_asymmetric_and_is_kept(tmp_path):
     ('data', 'key', 'text'),
     [
         (changed('hydrostatics.volume', 1.75), 'hydrostatics.volume', 'more than 2 % apart'),
+        (changed('hydrostatics.volume', 1.95), 'hydrostatics.volume', 'more than 2 % apart'),
         (changed('damping.quadratic', matrix(0, 1, 900.0)), 'damping.quadratic', 'gains energy'),
         (BASE | {'lift': matrix(1, 5, -3.0, -1.0)}, 'lift', '[5][5] = -1: feeds'),
         (changed('source', ''), 'source', 'no source is given'),
@@ -207,6 +214,11 @@ def test_damping_may_be_asymmetric_and_is_kept(tmp_path):
         (
             changed('hydrostatics.center_of_buoyancy', [0.0, 0.0, -506.0]),
             'hydrostatics.center_of_buoyancy',
+            'mm?',
+        ),
+        (
+            changed('rigid_body.center_of_gravity', [0.0, 0.0, 506.0]),
+            'rigid_body.center_of_gravity',
             'mm?',
         ),
     ],

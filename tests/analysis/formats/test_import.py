@@ -69,6 +69,17 @@ def test_link_of_gazebo_is_turned_to_forward_starboard_down(imported):
     assert_array_equal(np.diagonal(vehicle.D_quadratic), [18, 0, 0, 0, 0, 2])
 
 
+def test_a_tensor_in_axes_of_its_own_is_turned_into_those_of_the_link(imported):
+    text = sdf().replace('-0.03 0 0 0</pose>', '-0.03 0 0 1.5707963267948966</pose>')
+    fin = '<link name="fin"><inertial><mass>2.5</mass></inertial></link>'
+    text = text.replace('0 0 -9.81', '0 0 -3.71').replace('</model>', f'{fin}</model>')
+    vehicle, document = imported('a.sdf', text)
+    inertia = document['vehicle']['rigid_body']['inertia']
+    assert_allclose(inertia, [[0.5, 0.01, 0.03], [0.01, 0.4, 0.02], [0.03, 0.02, 0.6]], atol=1e-12)
+    assert vehicle.weight == pytest.approx(37.1)
+    assert any('1 other links of the model' in t and '2.5 kg' in t for t in document['assumed'])
+
+
 @pytest.mark.parametrize(('shape', 'volume'), [
     ('<sphere><radius>0.1</radius></sphere>', np.pi * 0.004 / 3),
     ('<cylinder><radius>0.1</radius><length>0.3</length></cylinder>', np.pi * 0.003),
@@ -108,11 +119,66 @@ def test_choices_of_the_user_take_the_place_of_what_is_missing(imported):
     assert_same(imported('list.m', positive, *LIST, '--sign', 'positive')[0], vehicle)
 
 
+def test_xUU_is_taken_for_xUabsU_where_that_was_said(imported):
+    vehicle, document = imported('made.sdf', sdf(more='<zWW>-3</zWW>'), '--quadratic-abs')
+    assert vehicle.D_quadratic[2, 2] == 3.0
+    assert any('zWW: taken for zWabsW' in text for text in document['traps'])
+
+
+@pytest.mark.parametrize(
+    ('file', 'text'),
+    [
+        ('a.yaml', REXROV.replace('cog: [0, 0, 0]', 'cog: [0.1, 0.2, 0.3]')),
+        ('a.urdf', URDF.replace('xyz="0 0 0"', 'xyz="0.1 0.2 0.3"')),
+    ],
+)
+def test_centre_of_gravity_of_uuv_simulator_is_turned(imported, file, text):
+    assert_allclose(imported(file, text)[0].r_G, [0.1, -0.2, -0.3])
+
+
+def test_what_uuv_simulator_does_by_itself(imported):
+    floating, document = imported('a.yaml', f'{REXROV}neutrally_buoyant: true\n')
+    assert floating.buoyancy == pytest.approx(floating.weight)
+    assert any('neutrally_buoyant' in text for text in document['traps'])
+    dense, _ = imported('a.urdf', URDF.replace('1028.0<', '1000.0<'))
+    assert dense.buoyancy == pytest.approx(1000.0 * 9.81 * 1.83826)
+    usual, document = imported('a.yaml', REXROV.replace('density: 1028.0', ''))
+    assert usual.buoyancy == pytest.approx(load_vehicle('rexrov').buoyancy)
+    assert any('1028 kg/m3, its default' in text for text in document['assumed'])
+    quadratic = -np.diag([5.0, 4.0, 3.0, 2.0, 1.0, 9.0])
+    quadratic[0, 1] = 7.0
+    told = ' '.join(map(str, quadratic.ravel()))
+    text = re.sub('quadratic_damping: .*', f'quadratic_damping: {told}', REXROV)
+    vehicle, document = imported('a.yaml', text)
+    assert_array_equal(vehicle.D_quadratic, np.diag([5, 4, 3, 2, 1, 9]))
+    assert any('quadratic_damping: what is off' in text for text in document['left_out'])
+
+
 def test_products_of_inertia_by_either_convention(imported):
     text = BLUEROV2.replace('zG = 0.02', 'zG = 0; Ixz = 0.01')
     for products, entry in (('integral', -0.01), ('tensor', 0.01)):
         _, document = imported('list.m', text, '--products', products)
         assert document['vehicle']['rigid_body']['inertia'][0][2] == entry
+
+
+def test_a_list_names_mass_and_water_as_papers_do(imported):
+    text = BLUEROV2.replace('m = 11.5; W = 112.8; B = 114.8;', 'mass = 10; g = 3.71; nabla = 0.02;')
+    text = re.sub('I([xyz]) =', r'I\1\1 =', text).replace('zG = 0.02', 'zg = 0.02')
+    reference = '--inertia-reference', 'co'
+    vehicle, _ = imported('list.m', f'{text}rho = 1030 // of the sea\n', *reference)
+    assert vehicle.weight == pytest.approx(10 * 3.71)
+    assert vehicle.buoyancy == pytest.approx(1030 * 3.71 * 0.02)
+    assert vehicle.r_G[2] == 0.02
+    assert_array_equal(np.diagonal(vehicle.M_RB)[3:], 0.16)
+    text = BLUEROV2.replace('m = 11.5; W = 112.8', 'm = 10; W = 98.3')
+    assert imported('list.m', text, *reference)[0].weight == pytest.approx(98.3)
+
+
+def test_what_the_user_says_is_taken_in_place_of_the_file(imported):
+    options = '--water-density', '1025', '--gravity', '9.8', '--source', 'Doe 2020'
+    vehicle, _ = imported('a.sdf', sdf(), *options)
+    assert vehicle.buoyancy == pytest.approx(1025 * 9.8 * 0.01)
+    assert vehicle.source == 'Doe 2020'
 
 
 def test_what_a_file_cannot_hold_is_left_out_when_asked(imported):
@@ -239,12 +305,16 @@ REFUSED = {  # what is wrong -> file, text, options, what the line names
     'positive damping': ('a.yaml', REXROV.replace('[-74.82', '[74.82'), [], 'damping.linear'),
     'unknown entry': ('a.yaml', f'{REXROV}colour: red\n', [], 'colour'),
     'scaled': ('a.yaml', f'{REXROV}scaling_damping: 2\n', [], 'scaling_damping'),
+    'twice, by two names': (
+        'a.yaml', f'{REXROV}center_of_gravity: [0, 0, 0]\n', [], 'each entry once'),
+    'too long': ('a.sdf', f'<sdf>{" " * (4 << 20)}</sdf>', [], 'XML of at most'),
     'no mass': ('a.yaml', REXROV.replace('mass: 1862.87', ''), [], 'mass'),
     'W and B swapped': (
         'a.m', BLUEROV2.replace('W = 112.8; B = 114.8', 'W = 114.8; B = 112.8'), [],
         '--swap-weight-buoyancy'),
     'which point': ('a.m', BLUEROV2, [], '--inertia-reference'),
     'products': ('a.m', BLUEROV2 + 'Ixz = 0.01', ['--inertia-reference', 'co'], '--products'),
+    'a name twice': ('a.m', BLUEROV2 + 'Mq = -0.08', LIST, 'Mq: expected each name once'),
     'nondimensional': ('a.m', BLUEROV2 + "Xvv' = 0.01", [], 'a prime'),
     'a letter for a digit': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6O'), LIST, 'Mq'),
     'a product': ('a.m', BLUEROV2.replace('Mq = -0.07', 'Mq = -6*10'), LIST, 'Mq'),
@@ -275,6 +345,16 @@ def test_refusals_are_one_line(what, tmp_path, monkeypatch, capsys):
     assert word in captured.err
     assert 'expected' in captured.err
     assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_the_file_that_is_read_is_never_replaced(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path('list.m').write_text(BLUEROV2, encoding='utf-8')
+    with pytest.raises(SystemExit) as end:
+        main(['import-vehicle', 'list.m', *LIST, '--out', 'list.m', '--overwrite'])
+    assert end.value.code == 2
+    assert 'list.m: --out' in capsys.readouterr().err
+    assert Path('list.m').read_text(encoding='utf-8') == BLUEROV2
 
 
 @pytest.mark.parametrize('unit', ['N m s', '[N m s/rad]', 'kg m^2/s', '(Nms)', 'kg·m²/s'])

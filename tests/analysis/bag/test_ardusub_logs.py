@@ -17,6 +17,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from auv_analysis.bag.any_bag import messages, survey
 from auv_analysis.bag.foreign_run import load_foreign
 from auv_analysis.bag.foreign_topics import read_mapping
+from auv_analysis.bag.mavlink_logs import PARAMETERS
+from auv_analysis.bag.mavlink_presets import preset
+from auv_analysis.bag.reading import BagContents
 from auv_analysis.cli.main import main
 from auv_analysis.runs.run import Run
 from auv_dynamics import load_vehicle
@@ -125,6 +128,32 @@ def test_thrusters_are_those_that_the_parameters_name(run, pulses, tmp_path) -> 
     assert proposed['thrusters']['reversed'] == [1, 6]
     found = load_foreign(log, read_mapping(None, proposed | {'vehicle': VEHICLE})).run
     assert_allclose(found.tau, run.tau, atol=1.0)
+
+
+@pytest.mark.parametrize(
+    ('frame', 'motors'), [('0', 6), ('1', 6), ('2', 8), ('3', 8), ('4', 3), ('5', 4), ('6', 5)]
+)
+def test_a_frame_of_ardusub_has_so_many_motors(frame: str, motors: int) -> None:
+    topics = {topic: f'mavlink/{topic}' for topic in ('ATTITUDE', 'SERVO_OUTPUT_RAW')}
+    contents = BagContents(types=topics, metadata={PARAMETERS: {'FRAME_CONFIG': frame}})
+    proposed = yaml.safe_load(preset(contents))
+    assert proposed['thrusters']['fields'] == [f'servo{i + 1}_raw' for i in range(motors)]
+
+
+@pytest.mark.parametrize(
+    ('topics', 'twist', 'rates'),
+    [
+        (['RATE', 'IMU[0]'], [('RATE', 'R')], None),
+        (['IMU[0]', 'IMU'], [('IMU[0]', 'GyrX')], None),
+        (['NKF1', 'XKF1[0]'], [('XKF1[0]', None)], 'from attitude'),
+        ([], [], 'from attitude'),
+    ],
+)
+def test_angular_velocity_comes_from_the_best_that_is_on_board(topics, twist, rates) -> None:
+    contents = BagContents(types={topic: f'dataflash/{topic}' for topic in ('ATT', *topics)})
+    proposed = yaml.safe_load(preset(contents))
+    found = [(one['topic'], one['fields'].get('p')) for one in proposed['twist']]
+    assert (found, proposed.get('rates')) == (twist, rates)
 
 
 def test_other_systems_are_left_out(run, pulses, tmp_path) -> None:

@@ -70,6 +70,13 @@ def test_a_folder_of_files_each_with_its_time(run, tmp_path) -> None:
     assert survey(folder).types == {'force': 'csv', 'state': 'csv'}
 
 
+def test_two_files_of_one_name_are_refused(tmp_path) -> None:
+    for name in ('state.csv', 'state.tsv'):
+        (tmp_path / name).write_text('t,u\n0,1\n')
+    with pytest.raises(InputError, match=r'state: expected one CSV file of each name, found state'):
+        survey(tmp_path)
+
+
 def test_empty_cells_are_no_values(run, tmp_path) -> None:
     """Signals of several rates in one file: velocity every fourth line, rates in all others."""
     cells = [line.split(',') for line in text_of(columns(run)).splitlines()]
@@ -103,7 +110,8 @@ def test_decimals_with_a_comma(tmp_path) -> None:
 
 def test_columns_have_counts_and_ranges(tmp_path) -> None:
     path = tmp_path / 'x.csv'
-    path.write_text('t,mode,u,v\n0,auto,,1\n1,auto,3,inf\n# end\n2,hold,-4,2\n')
+    lines = '0,auto,,1', '// pause', '1,auto,3,inf', '# dive', '2,hold,-4,2', '% end'
+    path.write_text('\n'.join(['t,mode,u,v', *lines, '']))
     notes: list[str] = []
     with Table(path) as table:
         spans = column_spans(table, notes)

@@ -9,9 +9,10 @@ import pytest
 import yaml
 from helpers.foreign_bags import SECOND, loaded, nanoseconds, simulated, write, write_chunks
 from helpers.foreign_logs import SENSORS, every, maker
+from helpers.made_messages import geometry, header
 from numpy.testing import assert_allclose
 
-from auv_analysis.bag.foreign_fields import MessageReader
+from auv_analysis.bag.foreign_fields import MessageReader, factor, presets
 from auv_analysis.bag.foreign_messages import read_sources
 from auv_analysis.bag.foreign_topics import read_mapping
 from auv_analysis.bag.foreign_tracks import tracks_of
@@ -47,6 +48,24 @@ def test_a_motion_out_of_five_topics_of_nobodys_types(kind, run, tmp_path) -> No
     notes = '\n'.join(found.notes)
     assert '/imu: every stamp is zero, so the time of logging is taken' in notes
     assert '/imu: p, q, r in deg/s, turned into rad/s' in notes
+
+
+@pytest.mark.parametrize(('name', 'unit', 'size'), [
+    ('x', 'cm', 0.01), ('y', 'mm', 1e-3), ('z', 'ft', 0.3048), ('phi', 'deg', 0.01745329),
+    ('u', 'cm/s', 0.01), ('v', 'mm/s', 1e-3), ('w', 'kn', 0.5144444), ('p', 'deg/s', 0.01745329),
+    ('X', 'kN', 1e3), ('Y', 'kgf', 9.80665), ('K', 'kN m', 1e3),
+])  # fmt: skip
+def test_a_unit_is_so_many_of_the_si_unit_where_it_fits(name, unit, size) -> None:
+    for units in (unit, {name: unit}):
+        assert factor(name, units) == pytest.approx(size, rel=1e-6)
+    assert factor('psi' if name != 'phi' else 'x', unit) == 1.0
+
+
+def test_a_stamped_pose_is_known_without_paths() -> None:
+    pose = geometry('Pose', geometry('Point', 1, 2, 3), geometry('Quaternion', 5, 6, 7, 4))
+    read = MessageReader('pose', presets('pose')['geometry_msgs/msg/PoseStamped'], '', None)
+    found = read(geometry('PoseStamped', header(9, 'map'), pose))
+    assert (found.stamp, found.frame, found.row) == (9, 'map', (1, 2, 3, 4, 5, 6, 7))
 
 
 @pytest.mark.parametrize('unset', [2**64 - 1, -(2**70)])

@@ -144,6 +144,7 @@ def test_a_killed_recorder_leaves_files_without_metadata(run, tmp_path) -> None:
     assert loaded(bag, **keys).samples == run.samples
     (file,) = bag.glob('*.db3')
     assert loaded(file, **keys).samples == run.samples
+    assert loaded(file, **keys, name='dive_7').scenario == 'dive_7'
 
 
 def test_an_mcap_that_was_not_finished_is_read_as_far_as_it_goes(run, tmp_path) -> None:

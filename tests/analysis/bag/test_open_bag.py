@@ -108,6 +108,40 @@ def test_blocks_of_a_bag(write: Any, rows: int, whole: int) -> None:
         assert_same(joined(blocks), expected)
 
 
+def test_each_topic_is_a_part_of_the_run_and_attachments_name_it(tmp_path) -> None:
+    bag, rows = Bag(tmp_path / 'dive' / 'bag.mcap'), {}
+    bag.attach('vehicle.yaml', VEHICLE)
+    for i, (role, name) in enumerate((ROLES | {'disturbance_estimate': 'Wrench'}).items()):
+        rows[role] = np.arange(24.0).reshape(4, 6) + 100.0 * i
+        for k, row in enumerate(rows[role]):
+            x, *pose = turning(k)[:7]
+            state = [x + 1e3 * i, *pose, *row]
+            made = stamped(name, k * STEP, row) if name else odometry(k * STEP, state)
+            bag.add(f'/{role}', made.__msgtype__, k * STEP, serialized(made))
+    parameters = 'recorder_node: {ros__parameters: {bag: runs/dive/cl}}\n'
+    bag.attach('params.yaml', parameters)
+    run = open_bag(bag.close(), vehicle='rexrov').run
+    parts = {
+        'measured': 'odom', 'tau': 'wrench', 'nu_d': 'cmd_vel', 'nu_d_dot': 'cmd_accel',
+        'disturbance': 'disturbance', 'applied': 'wrench_applied', 'nu': 'ground_truth/odom',
+        'disturbance_estimate': 'disturbance_estimate',
+    }  # fmt: skip
+    for part, role in parts.items():
+        np.testing.assert_array_equal(getattr(run, part), rows[role], err_msg=part)
+    np.testing.assert_array_equal(run.eta[:, 0], 6e3 + np.arange(4))
+    assert (run.scenario, run.controller, run.vehicle.name) == ('dive', 'cl', 'rexrov')
+
+
+def test_a_step_that_nobody_says_is_the_usual_one(tmp_path) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    bag.attach('vehicle.yaml', VEHICLE)
+    for k in (0, 1, 2, 3, 50):
+        for made in (odometry(k * STEP, turning(k)), stamped('Wrench', k * STEP, np.ones(6))):
+            topic = '/odom' if made.__msgtype__ == ODOMETRY else '/wrench'
+            bag.add(topic, made.__msgtype__, k * STEP, serialized(made))
+    assert load_run(bag.close()).step == pytest.approx(STEP / 1e9)
+
+
 def mapped(run: Run) -> set[str]:
     """Names of the arrays that lie in files."""
     return {name for name, values in run.arrays().items() if isinstance(root(values), mmap.mmap)}

@@ -22,8 +22,9 @@ from helpers.made_messages import Bag, new, serialized
 from numpy.testing import assert_allclose
 
 from auv_analysis.bag.any_bag import survey
-from auv_analysis.bag.foreign_topics import read_mapping
+from auv_analysis.bag.foreign_topics import candidates, read_mapping
 from auv_analysis.bag.proposal import component_of, looked_through, proposal
+from auv_analysis.bag.reading import BagContents
 from auv_analysis.cli import main
 from auv_analysis.runs.run import Run
 
@@ -79,8 +80,12 @@ def test_an_odometry_of_zeros_is_left_out_and_said(run, tmp_path) -> None:
     messages = simple(m, make, '/nav/odometry', '/rov/wrench', UNNAMED)
     for i, ns in enumerate(nanoseconds(m.t).tolist()):
         messages += [('/rov/odom', ns + k, make.odometry(ns, UNNAMED, still, i)) for k in range(2)]
+        messages.append(('/cmd_vel', ns, make.six('Twist', m.twist[i])))
+        messages += [('/nav2/odometry', ns, make.odometry(ns, UNNAMED, m, i))] * (i < 9)
     text, keys = proposed(write(tmp_path / 'dive', messages, make))
     assert keys['odometry'] == {'topic': '/nav/odometry'}
+    assert keys['setpoint'] == {'topic': '/cmd_vel'}
+    assert '# /nav2/odometry: an odometry as well\n' in text
     assert '# /rov/odom: no attitude or no velocity in it but zeros\n' in text
     assert 'frames: enu_flu    # the frame ids odom, base_link of /nav/odometry do not say' in text
 
@@ -105,6 +110,29 @@ def test_what_is_missing_is_a_comment(tmp_path) -> None:
     path.write_text('\n'.join(row.rsplit(';', 2)[0] for row in [head, *rows]))
     assert '# wrench or thrusters: no topic was found\n' in proposed(path)[0]
     read_mapping(saved(text, tmp_path), {})
+
+
+def test_candidates_are_those_with_messages_the_likeliest_first() -> None:
+    topics = {
+        '/a/odom': ('nav_msgs/msg/Odometry', 5), '/b/odom': ('nav_msgs/msg/Odometry', 50),
+        '/c/odom': ('nav_msgs/msg/Odometry', 0), '/cmd_vel': ('geometry_msgs/msg/Twist', 9),
+        '/dvl': ('geometry_msgs/msg/TwistStamped', 7), '/tau': ('geometry_msgs/msg/Wrench', 9),
+    }  # fmt: skip
+    kinds = {topic: kind for topic, (kind, _) in topics.items()}
+    contents = BagContents(types=kinds, counts={topic: n for topic, (_, n) in topics.items()})
+    found = {role: names for role, names in candidates(contents).items() if names}
+    assert found == {
+        'odometry': ['/b/odom', '/a/odom'], 'twist': ['/dvl'], 'wrench': ['/tau'],
+        'setpoint': ['/cmd_vel'],
+    }  # fmt: skip
+
+
+def test_units_that_nobody_says_are_told_by_sizes(tmp_path) -> None:
+    path = tmp_path / 'x.csv'
+    rows = [f'{20_000 * i},{i},{-i},{2 * i},{4 * i}' for i in range(99)]
+    path.write_text('\n'.join(['t,gyro_x,gyro_y,gyro_z,yaw', *rows]))
+    twist = proposed(path)[1]['twist']
+    assert (twist['stamp'], twist['units']) == ({'field': 't', 'units': 'us'}, 'deg/s')
 
 
 @pytest.mark.parametrize(('topic', 'path', 'component'), [

@@ -23,6 +23,7 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from auv_analysis.bag import step_topics
+from auv_analysis.bag.metadata import bag_files
 from auv_analysis.bag.reading import BagContents, read_bag
 from auv_dynamics.files.errors import InputError
 
@@ -249,3 +250,10 @@ def test_messages_without_a_channel_are_refused(tmp_path: Path) -> None:
     bag._writer.add_message(77, 0, data, 0)
     with pytest.raises(InputError, match='channel 77: expected a channel before its messages'):
         read_bag(bag.close())
+
+
+def test_files_of_a_bag_come_by_their_numbers(tmp_path: Path) -> None:
+    names = [f'dive_{number}.mcap' for number in (0, 2, 10)]
+    for name in names:
+        (tmp_path / name).touch()
+    assert [path.name for path in bag_files(tmp_path)] == names

@@ -83,6 +83,34 @@ def test_results_take_the_place_of_earlier_ones(excited, tmp_path: Path) -> None
     assert files <= listed_in(out).keys()
 
 
+def test_what_the_command_line_asks_for_is_what_is_searched(tmp_path, monkeypatch) -> None:
+    asked: list[Request] = []
+
+    def search(request: Request, _: object) -> None:
+        asked.append(request)
+        raise FailedError('enough')
+
+    monkeypatch.setattr(searching, 'excite', search)
+    line = (
+        'excite bluerov2 --duration 30 --step 0.1 --speed 0.4 --rate 0.7 --tank 3 4 5 --lag 0.3 '
+        '--velocity-noise 0.01 --attitude-noise 0.02 --spread 0.2 --closed-loop --seed 7 '
+        f'--free M --fixed lag --limit 6 --out {tmp_path / "out"}'
+    )
+    for arguments in (line, f'excite bluerov2 --speed 0.4 --depth 9 --out {tmp_path / "out"}'):
+        with pytest.raises(SystemExit):
+            main.main(arguments.split())
+    one, other = asked
+    assert (one.given, one.duration, one.step, one.lag) == ('bluerov2', 30.0, 0.1, 0.3)
+    assert (one.velocity_noise, one.attitude_noise, one.spread) == (0.01, 0.02, 0.2)
+    assert (one.closed, one.seed, one.free[-1], one.fixed) == (True, 7, 'M', ['lag'])
+    assert (one.bounds.speed, one.bounds.rate, one.bounds.room.tolist()) == (0.4, 0.7, [3, 4, 5])
+    assert one.bounds.wrench.tolist() == [6.0] * 6
+    assert (other.bounds.rate, other.bounds.room.tolist()) == (0.8, [np.inf, np.inf, 9.0])
+    largest = load_vehicle('bluerov2').thrusters.largest()
+    np.testing.assert_allclose(other.bounds.wrench, largest / 3)
+    assert (other.closed, other.seed, other.velocity_noise) == (False, 0, 0.005)
+
+
 @pytest.mark.usefixtures('unrendered')
 def test_the_report_has_its_numbers_where_their_heads_say(
     excited, tmp_path: Path, capsys, approved

@@ -13,8 +13,10 @@ from pyarrow import parquet
 
 from auv_analysis.cli.main import main
 from auv_analysis.report.results import Results
+from auv_analysis.studies.identify import identify
 from auv_analysis.studies.identify.bags import read_records
 from auv_analysis.studies.identify.vehicle_text import write_vehicle
+from auv_dynamics.files.errors import FailedError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
@@ -189,6 +191,34 @@ def test_refusals(short, extra, said, tmp_path, capsys):
     assert code == 2
     assert said in error
     assert not (tmp_path / 'x').exists()
+
+
+def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeypatch, capsys):
+    asked = []
+
+    def work(*given):
+        asked.append(given)
+        raise FailedError('enough')
+
+    monkeypatch.setattr(identify, 'identify', work)
+    monkeypatch.setattr(identify, 'judged', work)
+    applied = {'odometry': '/odom', 'wrench': '/wrench'}
+    applied['wrench_applied'] = {'topic': '/wrench', 'between': 'hold'}
+    (tmp_path / 'map.yaml').write_text(yaml.safe_dump(applied))
+    given = (short, '--vehicle', 'herman2018', '--out', tmp_path / 'x', '--holdout', '0.5')
+    lags = '--lag', '0.2', '--delay', '0.1'
+    assert auv(capsys, 'predict', *given, *lags) == (1, 'enough\n')
+    more = '--free', 'lag', '--fixed', 'delay', '--segment', '2', '--observer', '0.5'
+    more = *more, '--bootstrap', '50', '--profile', 'lag, delay'
+    assert auv(capsys, 'identify', *given, *more)[0] == 1
+    onboard = '--map', tmp_path / 'map.yaml', '--applied', '--observer', 'auto'
+    assert auv(capsys, 'identify', *given, *onboard)[0] == 1
+    (_, learnt, held, *late), (*_, one, _), (*_, other, _) = asked
+    assert late == [0.2, 0.1]
+    assert 0.0 < learnt[-1].end <= held[0].start
+    assert (one.free[-1], one.fixed, one.profile) == ('lag', ['delay'], ['lag', 'delay'])
+    assert (one.segment, one.observer, one.bootstrap) == (2.0, 0.5, 50)
+    assert (other.fixed, other.observer) == (['lag', 'delay'], None)
 
 
 def test_a_prior_file_needs_values_and_deviations(short, tmp_path, capsys):

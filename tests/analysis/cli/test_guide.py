@@ -1,6 +1,7 @@
 """What `auv` says without a command, by what lies where one is."""
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -30,7 +31,7 @@ def test_where_nothing_was_run_the_first_experiments_are_proposed(folder, capsys
 
 
 def test_results_are_proposed_to_be_looked_at_the_newest_first(folder, capsys):
-    for name in ('older', 'newer'):
+    for name in ('first', 'second'):
         bag = folder / 'runs' / name / 'gvc'
         bag.mkdir(parents=True)
         for file in (
@@ -39,11 +40,14 @@ def test_results_are_proposed_to_be_looked_at_the_newest_first(folder, capsys):
             bag.parent / 'summary.json',
         ):
             file.touch()
-    os.utime(folder / 'runs' / 'older', (1, 1))
+    os.utime(folder / 'runs' / 'first', (1, 1))
     text = _said(capsys)
-    assert 'runs/newer/report.html' in text
-    assert 'auv replay runs/newer/gvc' in text
-    assert 'auv analyze runs/older runs/newer' in text
+    assert 'runs/second/report.html' in text
+    assert 'auv replay runs/second/gvc' in text
+    assert 'auv analyze runs/first runs/second' in text
+    assert 'what the sweep says' not in text
+    (folder / 'runs' / 'second' / 'sweep.json').touch()
+    assert re.search('auv analyze runs/second +what the sweep says', _said(capsys))
     assert 'simulate case1' not in text
 
 

@@ -137,6 +137,14 @@ def test_layout(layout, kind, run, tmp_path) -> None:
     assert found.knows_setpoint == ('setpoint' in keys)
 
 
+def test_frames_that_are_told_against_the_frame_ids_are_taken_with_a_note(run, tmp_path) -> None:
+    messages, keys = cola2(run, Maker())
+    told = keys | {'frames': 'enu_flu'}
+    found = loaded(write(tmp_path / 'other', messages, Maker()), **told)
+    assert any('frame_id world_ned taken as enu_flu, as told' in note for note in found.notes)
+    assert_allclose(found.nu, run.nu * [1, -1, -1, 1, -1, -1], atol=1e-7)
+
+
 def test_a_killed_recorder_leaves_files_without_metadata(run, tmp_path) -> None:
     messages, keys = cola2(run, Maker())
     bag = write(tmp_path / 'other', messages, Maker(), kind='sqlite3')
@@ -145,6 +153,20 @@ def test_a_killed_recorder_leaves_files_without_metadata(run, tmp_path) -> None:
     (file,) = bag.glob('*.db3')
     assert loaded(file, **keys).samples == run.samples
     assert loaded(file, **keys, name='dive_7').scenario == 'dive_7'
+
+
+def test_files_of_a_killed_recorder_are_read_by_their_numbers(run, tmp_path) -> None:
+    seen, bag = motion(run, enu=False), tmp_path / 'killed'
+    bag.mkdir()
+    topics, frames = ('/o', '/w'), ('odom_ned', 'base_frd')
+    for number in (1, 2, 10):  # 3 s after another: by their names, the clock would begin anew
+        later = seen._replace(t=seen.t + 3.0 * number)
+        part = write(tmp_path / f'{number}', simple(later, Maker(), *topics, frames), Maker(),
+                     kind='sqlite3')  # fmt: skip
+        next(part.glob('*.db3')).rename(bag / f'killed_{number}.db3')
+    found = loaded(bag, odometry='/o', wrench='/w', frames='ned_fsd', step=0.01)
+    assert found.samples == 3 * run.samples
+    assert not any('jumps back' in note for note in found.notes)
 
 
 def test_an_mcap_that_was_not_finished_is_read_as_far_as_it_goes(run, tmp_path) -> None:

@@ -16,7 +16,14 @@ from auv_analysis.bag.csv_logs import rows_of_csv, survey_of_csv
 from auv_analysis.bag.limits import LARGEST_DECODED, LARGEST_PARSED, MOST_NAMED
 from auv_analysis.bag.mavlink_logs import messages_of_log, survey_of_log
 from auv_analysis.bag.mcap_file import McapFile
-from auv_analysis.bag.metadata import bag_files, check_regular, is_csv, is_log, is_mcap
+from auv_analysis.bag.metadata import (
+    bag_files,
+    check_regular,
+    is_csv,
+    is_log,
+    is_mcap,
+    split_order,
+)
 from auv_analysis.bag.reading import BagContents, read_bag
 from auv_analysis.bag.step_topics import refusal
 from auv_dynamics.files.errors import InputError
@@ -156,7 +163,7 @@ def _parts(bag: Path) -> list[Path]:
     if (bag / 'metadata.yaml').exists():
         _check_metadata(bag)
         return [bag]
-    files = sorted(bag.glob('*.db3'))
+    files = sorted(bag.glob('*.db3'), key=split_order)
     for file in files:
         check_regular(file, bag)
     return files

@@ -1,12 +1,14 @@
 """`auv analyze` of bags that were written without a node graph."""
 
+from argparse import Namespace
 from html import unescape
+from pathlib import Path
 
 import pytest
 from made_bags import make_bag
 
 from auv_analysis.bag import reading
-from auv_analysis.cli import main
+from auv_analysis.cli import analyze, main
 
 
 @pytest.mark.usefixtures('unrendered')
@@ -34,3 +36,20 @@ def test_equal_files_are_shown_once(tmp_path) -> None:
     report = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
     assert report.count('<summary>Scenario file</summary>') == 1
     assert report.count('<summary>Vehicle file</summary>') == 1
+
+
+@pytest.mark.parametrize(
+    ('scenarios', 'folder'),
+    [
+        (['one'], 'one'),
+        (['one', 'other', 'one'], 'one_other'),
+        (['one', 'two', 'three', 'four'], 'one_and_3_more'),
+        (['x' * 60, 'y' * 60], f'{"x" * 60}_and_1_more'),
+        (['x' * 90], 'x' * 90),
+    ],
+)
+def test_results_are_named_after_the_scenarios(scenarios, folder, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with analyze._folder(scenarios, [], Namespace(out=None, map=None, overwrite=False)):
+        pass
+    assert [path.name for path in Path('runs').iterdir()] == [f'analyze_{folder}']

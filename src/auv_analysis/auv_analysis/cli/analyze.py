@@ -122,7 +122,7 @@ def _folder(
 
     names = list(dict.fromkeys(scenarios))
     name = '_'.join(names)
-    if len(names) > FEW or len(name) > LONGEST:
+    if len(names) > 1 and (len(names) > FEW or len(name) > LONGEST):
         name = f'{names[0]}_and_{len(names) - 1}_more'
     inputs = _inputs(sources, options)
     out = options.out or Path('runs') / f'analyze_{name}'

@@ -142,6 +142,16 @@ def test_zero_stamps_give_way_to_the_time_of_logging(run, tmp_path) -> None:
     assert sum('every stamp is zero' in note for note in found.notes) == 2
 
 
+def test_the_time_of_logging_is_taken_where_that_was_told(run, tmp_path) -> None:
+    maker, listed = Maker(), messages(run)
+    for i, (_, _, message) in enumerate(listed):
+        message.header.stamp = maker.header(5 * SECOND + 7 * i, '').stamp
+    told = {role: {'topic': KEYS[role], 'stamps': 'log'} for role in ('odometry', 'wrench')}
+    found = loaded(write(tmp_path / 'other', listed, maker), **KEYS | told)
+    assert_allclose(found.nu, run.nu, atol=1e-9)
+    assert_allclose(found.tau, run.tau, rtol=1e-9)
+
+
 def test_messages_that_must_not_be_used_are_left_out(run, tmp_path) -> None:
     seen = motion(run, enu=True)
     seen.twist[50, 2], seen.attitude[70] = np.nan, 0.0

@@ -12,7 +12,8 @@ from helpers.simulated_driver import SimulatedDriver
 from pyarrow import parquet
 from rich.console import Console
 
-from auv_analysis.cli.main import main
+from auv_analysis.cli import check_driver
+from auv_analysis.cli.main import main, parser
 from auv_analysis.driver.checks import (
     CHECKS,
     GROUPS,
@@ -31,7 +32,7 @@ from auv_analysis.driver.evidence import (
     Settings,
 )
 from auv_analysis.driver.excitation import carry_out
-from auv_analysis.driver.plan import plan_of
+from auv_analysis.driver.plan import Plan, plan_of
 from auv_analysis.driver.report import write_results
 
 ROOT = Path(__file__).parents[3]
@@ -173,6 +174,18 @@ def test_wrong_input_is_one_line_and_exit_code_2(options, words, capsys) -> None
     assert len(err.splitlines()) == 1
     for word in (*words, 'expected', 'found'):
         assert word in err
+
+
+def planned(line: str) -> Plan:
+    return check_driver._plan(parser().parse_args(f'check-driver --actuate {line}'.split()))
+
+
+def test_a_plan_is_bounded_by_the_command_line() -> None:
+    plan = planned('--vehicle rexrov --axis surge --axis yaw --force 5 --torque 2')
+    sizes = [(one.dof, one.size, one.silent) for one in plan.trials]
+    assert sizes == [('surge', 5.0, False), ('yaw', 2.0, False), ('surge', 5.0, True)]
+    assert planned('--vehicle bluerov2_heavy --speed 0.05').speed == pytest.approx(0.05, rel=1e-3)
+    assert 0.11 < planned('--vehicle bluerov2_heavy').speed <= 0.5  # above their dead band
 
 
 def test_a_folder_that_is_there_is_refused_before_anything_is_heard(tmp_path, capsys) -> None:

@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 
 from auv_analysis.bag.step_topics import ODOMETRY, TWIST, WRENCH
+from auv_analysis.cli import replay
+from auv_analysis.cli.main import parser
 from auv_analysis.replay.played_bag import BagIndex, PlayedTopic
 from auv_analysis.replay.selection import ReplaySettings, is_command, select
 from auv_dynamics.files.errors import InputError
@@ -136,3 +138,31 @@ def test_what_a_command_is(topic: str, kind: str, expected: bool) -> None:
 def test_refuses_to_play_nothing(wish: ReplaySettings, bag: BagIndex, words: str) -> None:
     with pytest.raises(InputError, match=words):
         select(bag, wish, resolved)
+
+
+@pytest.mark.parametrize(
+    ('line', 'changed'),
+    [
+        ('--commands', {'commands': True}),
+        ('--force-commands', {'commands': True, 'allow_commands_to_foreign': True}),
+        ('--no-clock', {'clock': False}),
+        ('--paused', {'start_paused': True}),
+        ('--loop', {'loop': True}),
+        ('--all', {'all': True}),
+        ('--skip-gaps', {'skip_gaps': True}),
+        ('--original-names', {'original_names': True}),
+        ('--namespace x', {'namespace': 'x'}),
+        ('--rate max', {'rate': 0.0}),
+        ('--start 2 --duration 3', {'start': 2.0, 'duration': 3.0}),
+        ('--topics a b', {'topics': ['a', 'b']}),
+        ('--expect a=1 --answers b', {'expected_subscribers': ['a=1'], 'answers': 'b'}),
+    ],
+)
+def test_an_option_of_the_command_is_its_parameter_alone(line: str, changed: dict) -> None:
+    usual, asked = (
+        replay._parameters(parser().parse_args(['replay', 'bag', *words]))
+        for words in ((), line.split())
+    )
+    assert not any(usual[key] for key in ('commands', 'allow_commands_to_foreign'))
+    assert asked == usual | changed
+    assert asked.keys() == usual.keys()

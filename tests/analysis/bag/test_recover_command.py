@@ -81,6 +81,7 @@ def test_a_healthy_bag_is_not_touched(tmp_path: Path, capsys: pytest.CaptureFixt
     code, out, err = command(capsys, bag)
     assert (code, err) == (0, '')
     assert 'nothing was changed' in out
+    assert '0 known to be lost' in out
     assert contents(bag) == before
     assert bag.stat().st_mtime_ns == folder
 
@@ -97,6 +98,7 @@ def test_json_is_one_document(tmp_path: Path, capsys: pytest.CaptureFixture) -> 
     assert file['lost'][-1]['to'] == len(left)
     assert document['messages'] == len(messages_of(bag / 'bag_0.mcap'))
     assert document['attachments'] == sorted(ATTACHED)
+    assert (file['messages_lost'], document['messages_lost']) == (None, None), 'who knows'
     assert document['topics']['/odom']['spacing'] == {'gaps': 0, 'missing': 0, 'longest': []}
 
 
@@ -112,11 +114,18 @@ def test_a_damaged_chunk_amid_others_leaves_a_gap_that_is_named(
     path.write_bytes(data)
     code, out, _ = command(capsys, old(path).parent)
     assert code == 0
+    assert 'repaired, the damaged one is kept as bag_0.mcap.damaged' in out
     assert f'lost: bytes {begin} to {end}' in out
     assert f'{len(messages_in(chunk))} known to be lost' in out
     stamps = [message.log_time for message in messages_in(chunk) if message.channel_id == 1]
     first, last = (stamps[0] - STEP) / 1e9, (stamps[-1] + STEP) / 1e9
     assert f'/odom: nothing between {first:g} and {last:g} s' in out
+    kept = sum(
+        message.channel_id == 1 for *_, one in chunks if one is not chunk
+        for message in messages_in(one)
+    )  # fmt: skip
+    rows = [line.split() for line in out.splitlines()]
+    assert ['/odom', str(kept), '1', str(len(stamps))] in rows
     assert command(capsys, bag)[0] == 0
 
 
@@ -160,9 +169,11 @@ def test_a_last_file_in_which_nothing_is_yet(tmp_path: Path, size: int) -> None:
 def test_a_single_file(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     bag = split_bag(tmp_path / 'bag')
     left = cut(bag / 'bag_1.mcap')
+    (bag / 'bag_1.mcap').chmod(0o600)
     others = {k: v for k, v in contents(bag).items() if k != 'bag_1.mcap'}
     assert command(capsys, bag / 'bag_1.mcap')[0] == 0
     assert (bag / 'bag_1.mcap.damaged').read_bytes() == left
+    assert (bag / 'bag_1.mcap').stat().st_mode & 0o777 == 0o600, 'nobody else may read it now'
     assert others.items() <= contents(bag).items()
     assert messages_of(bag / 'bag_1.mcap')
 
@@ -175,6 +186,18 @@ def test_a_missing_metadata_yaml_is_written_as_it_was(tmp_path: Path) -> None:
     assert yaml.safe_load((bag / 'metadata.yaml').read_text()) == yaml.safe_load(text)
     after = contents(bag)
     assert all(after[name] == before[name] for name in before if name.endswith('.mcap'))
+
+
+def test_what_only_a_metadata_yaml_says_is_kept(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / 'bag') / 'metadata.yaml'
+    told = yaml.safe_load(path.read_text())
+    told['rosbag2_bagfile_information'] |= {'message_count': 1, 'ros_distro': 'humble'}
+    told['rosbag2_bagfile_information']['custom_data'] = {'dive': '7'}
+    path.write_text(yaml.safe_dump(told))
+    assert recover(path.parent).metadata == 'written'
+    found = yaml.safe_load(path.read_text())['rosbag2_bagfile_information']
+    assert (found['ros_distro'], found['custom_data']) == ('humble', {'dive': '7'})
+    assert found['message_count'] == 65
 
 
 @pytest.mark.parametrize(

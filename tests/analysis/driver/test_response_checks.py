@@ -138,6 +138,29 @@ def test_a_slow_watchdog_fails_and_what_was_applied_tells_it_exactly() -> None:
     assert found['silence'].numbers['ceased_s'] == pytest.approx(1.5, abs=0.03)
 
 
+def test_a_slow_watchdog_fails_by_the_motion_as_well() -> None:
+    found = judge(SimulatedDriver(watchdog=1.5, noise=1e-3), 'surge')['silence']
+    assert found.verdict == FAIL
+    assert 'by the motion' in found.found
+    assert found.numbers['ceased_s'] == pytest.approx(1.5, abs=0.3)
+
+
+def test_what_was_applied_tells_nothing_where_it_never_was_the_wrench() -> None:
+    driver = SimulatedDriver(mapping=gains(surge=0.0), applied=True, noise=1e-3)
+    found = judge(driver, 'surge')['silence']
+    assert found.verdict == NOT_CHECKED
+    assert 'never showed the wrench' in found.found
+
+
+def test_what_was_broken_off_fails_and_says_why_the_rest_is_not_told() -> None:
+    found = judge(SimulatedDriver(silent_after=2.5), 'surge')
+    assert found['actuation'].verdict == FAIL
+    assert found['actuation'].numbers['carried_out'] == 1
+    for id in ('response_surge', 'silence'):
+        assert found[id].verdict == NOT_CHECKED
+        assert 'no odometry for 0.5 s' in found[id].found
+
+
 def test_the_bound_holds_on_the_model_and_caps_are_kept() -> None:
     for name in ('bluerov2_heavy', 'lauv', 'rexrov'):
         vehicle = load_vehicle(name)

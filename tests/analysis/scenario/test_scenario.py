@@ -146,6 +146,7 @@ def test_setpoint_file_is_relative_to_the_scenario(tmp_path, monkeypatch) -> Non
     scenario = loaded(tmp_path / 'case', setpoint={'file': 'x.csv'})
     assert scenario.data['setpoint'] == {'file': str((tmp_path / 'case/x.csv').resolve())}
     assert scenario.attachments['setpoint.csv'] == TABLE
+    assert scenario.inputs[-1] == (tmp_path / 'case/x.csv').resolve(), 'no result may replace it'
     assert scenario.setpoint.value(1.0)[0] == pytest.approx(0.5)
 
 

@@ -8,7 +8,7 @@ import yaml
 from auv_analysis import load_scenario, simulate
 from auv_analysis.graph.node_parameters import node_parameters
 from auv_analysis.scenario.changes import check_paths
-from auv_analysis.scenario.fault_words import Mark, line_of
+from auv_analysis.scenario.fault_words import Mark, label, line_of
 from auv_analysis.simulation.simulate import check_hold
 from auv_analysis.studies.sweep.campaign import load_campaign
 from auv_dynamics.files.errors import InputError
@@ -187,3 +187,8 @@ def test_numbers_of_faults_at_one_time_stand_in_four_lines() -> None:
     times = [(1.0, 9.0), (1.0, 2.0), (2.0, 9.0), (3.0, 9.0), (3.0, 9.0), (4.0, 9.0), (9.0, 10.0)]
     marks = [Mark(i, 'kind', 'label', *ends) for i, ends in enumerate(times, start=1)]
     assert [line_of(mark, marks) for mark in marks] == [0, 1, 1, 2, 3, 0, 0]
+
+
+@pytest.mark.parametrize(('axis', 'unit'), [('heave', 'N'), ('roll', 'N m')])
+def test_a_stuck_actuator_has_the_unit_of_its_axis(axis: str, unit: str) -> None:
+    assert label({'kind': 'actuator', 'axis': axis, 'stuck': 2.5}).endswith(f'at 2.5 {unit}')

@@ -28,7 +28,9 @@ def test_the_largest_wrench_is_that_of_the_best_thrusts() -> None:
     [
         ([1.0, 0, 1, 0, 0, 0.1], []),
         ([1.0, 0, 1, 0, 1e-12, 0.1], []),
-        ([1.0, 0, 1, 0.1, 0.2, 0.1], ['surge and heave) is commanded, which no thruster actuates']),
+        ([0.0, 0, 0, 0, 1e-12, 0.1], []),  # rounding of a moment, though there is no force
+        ([1.0, None, 1, None, None, 0.1], []),
+        ([1.0, 0, 1, 0.1, 0.2, 0.1], ['pitch (up to 0.200 N m, not apart from surge and heave)']),
         ([1e3, 0, 0, 0, 0, 0], ['times the weight', 'more is commanded than the thrusters']),
     ],
 )

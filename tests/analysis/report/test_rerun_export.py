@@ -10,25 +10,27 @@ import numpy as np
 import pytest
 from helpers.needs import need
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 from auv_analysis.cli.main import main
 from auv_analysis.report import rerun_export
 from auv_analysis.runs.run import Run
 from auv_dynamics import load_vehicle
+from auv_dynamics.vehicle import DOFS
 
 SAMPLES = 7
 
 
 def made_run() -> Run:
+    """A run whose every column is like no other's."""
     t = 0.01 * np.arange(SAMPLES)
-    values = np.outer(1.0 + t, np.arange(1.0, 7.0))
+    names = 'eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance_estimate'
+    shapes = np.random.default_rng(1).normal(size=(len(names), SAMPLES, 6))
     facts = {'scenario': 'made', 'controller': 'my own', 'law': 'gvc', 'gains': {}, 'step': 0.01}
-    signals = dict.fromkeys(
-        ('eta', 'nu', 'nu_d', 'nu_d_dot', 'tau', 'disturbance_estimate'), values
-    )
     return Run(
-        vehicle=load_vehicle('rexrov'), source='bag', t=t, disturbance=None, **facts, **signals
-    )
+        vehicle=load_vehicle('rexrov'), source='bag', t=t, disturbance=None, **facts,
+        **dict(zip(names, shapes, strict=True)),
+    )  # fmt: skip
 
 
 def test_energy_shares_are_per_cent_of_what_moves() -> None:
@@ -68,17 +70,60 @@ def test_an_earlier_file_is_not_replaced_unasked(monkeypatch, capsys, tmp_path) 
     assert 'expected a new file, or --overwrite, found an existing file' in capsys.readouterr().err
 
 
-def test_every_sample_is_in_the_file(monkeypatch, tmp_path: Path) -> None:
+def exported(run: Run, path: Path) -> dict[str, dict[str, list]]:
+    """Entity of the file of a run -> component -> its values, by rising time."""
     need('rerun-sdk', find_spec('rerun'))
-    chunk = import_module('rerun.chunk')
-    monkeypatch.setattr(Run, 'blocks', lambda run: (run.part(slice(i, i + 3)) for i in (0, 3, 6)))
-    run, path = made_run(), tmp_path / 'made.rrd'
     assert rerun_export.export(run, path) == SAMPLES
+    found: dict[str, list[tuple[float, str, object]]] = {}
+    for part in import_module('rerun.chunk').RrdReader(path).stream().to_chunks():
+        batch = part.to_record_batch()
+        times = [0.0] * len(batch) if part.is_static else batch['t'].cast('int64').to_pylist()
+        for name in (name for name in batch.schema.names if ':' in name):
+            rows = zip(times, batch[name].to_pylist(), strict=True)
+            entity = part.entity_path.replace('\\', '')
+            found.setdefault(entity, []).extend((1e-9 * t, name, value) for t, (value,) in rows)
+    for rows in found.values():
+        rows.sort(key=lambda row: row[0])
+    return {
+        entity: {name: [(t, value) for t, known, value in rows if known == name]
+                 for name in {name for _, name, _ in rows}}
+        for entity, rows in found.items()
+    }  # fmt: skip
+
+
+@pytest.fixture
+def in_blocks(monkeypatch) -> None:
+    monkeypatch.setattr(Run, 'blocks', lambda run: (run.part(slice(i, i + 3)) for i in (0, 3, 6)))
+
+
+@pytest.mark.usefixtures('in_blocks')
+def test_every_sample_is_in_the_file(tmp_path: Path) -> None:
+    run, path = made_run(), tmp_path / 'made.rrd'
+    found = exported(run, path)
     assert list(tmp_path.iterdir()) == [path]
-    batches = [
-        part.to_record_batch()
-        for part in chunk.RrdReader(path).stream().to_chunks()
-        if not part.is_static and part.entity_path == '/wrench/yaw/my\\ own'
-    ]
-    found = [value for batch in batches for (value,) in batch['Scalars:scalars'].to_pylist()]
-    assert sorted(found) == run.tau[:, 5].tolist()
+    for entity, values, units in (
+        ('velocity/{}/my own', run.nu, ('m/s', 'rad/s')),
+        ('velocity/{}/setpoint', run.nu_d, ('m/s', 'rad/s')),
+        ('wrench/{}/my own', run.tau, ('N', 'N m')),
+    ):
+        for i, dof in enumerate(DOFS):
+            parts = found[f'/{entity.format(dof)}']
+            assert_allclose(parts['Scalars:scalars'], np.column_stack([run.t, values[:, i]]))
+            ((_, name),) = parts['SeriesLines:names']
+            assert name == f'{entity.rpartition("/")[2]} ({units[i // 3]})'
+
+
+@pytest.mark.usefixtures('in_blocks')
+def test_the_vehicle_goes_and_turns_as_in_the_run(monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(rerun_export, 'POINTS', 2)
+    run = made_run()
+    found = exported(run, tmp_path / 'made.rrd')
+    vehicle = found['/trajectory/my own/vehicle']
+    places, turns = (vehicle[f'Transform3D:{name}'] for name in ('translation', 'quaternion'))
+    assert_allclose([t for t, _ in places], run.t, atol=1e-9)
+    assert_allclose([place for _, place in places], run.eta[:, :3], rtol=1e-6)
+    expected = Rotation.from_euler('ZYX', run.eta[:, :2:-1]).as_matrix()
+    shown = Rotation.from_quat([turn for _, turn in turns]).as_matrix()
+    assert_allclose(shown, expected, atol=1e-6)
+    ((_, line),) = found['/trajectory/my own/path']['LineStrips3D:strips']
+    assert_allclose(line, run.eta[::4, :3], rtol=1e-6)

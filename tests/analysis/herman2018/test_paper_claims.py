@@ -14,7 +14,15 @@ from auv_analysis.herman2018 import responses as responses_of
 from auv_analysis.herman2018.cases import case_evidence, case_of, claims_sentences, paper_claims
 from auv_analysis.herman2018.claims import judged, write_claims
 from auv_analysis.herman2018.evidence import ErrorSensitivity, Quotes
-from auv_analysis.herman2018.responses import STEP, followed, response
+from auv_analysis.herman2018.responses import (
+    ERROR,
+    STEP,
+    followed,
+    moved_setpoints,
+    response,
+    rms_errors,
+    setpoint_changes,
+)
 from auv_analysis.output.text import MISSING
 from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.simulation.simulate import DivergedError
@@ -129,8 +137,7 @@ def test_claim_15_goes_by_its_rule(gains, others, verdict):
     known = evidence()['case1']
     claim = judged({'case1': replace(known, responses=responses(gains, others))})[14]
     assert claim.verdict == verdict
-    named = {value.name: value.value for value in claim.values}
-    assert named['RMS error of pitch by the gains, cl'] == gains[PITCH]
+    assert named(claim)['RMS error of pitch by the gains, cl'] == gains[PITCH]
 
 
 def test_claim_15_is_not_reproduced_without_the_coupling():
@@ -152,6 +159,35 @@ def test_the_runs_at_hand_are_judged_not_others():
     claims = paper_claims(scenario, slow, sensitivities()).claims
     assert claims[0].verdict == 'not reproduced'
     assert claims[16].verdict == 'reproduced'  # of case 2, which is simulated
+
+
+def named(claim):
+    return {value.name: value.value for value in claim.values}
+
+
+def test_a_sensitivity_at_hand_is_taken_not_another():
+    scenario = load_scenario('case1')
+    runs = {law: simulate(scenario, law) for law in scenario.controllers}
+    exchanged = dict(zip(('cl', 'gvc'), sensitivities().values(), strict=True))
+    usual, found = named(study().claims[14]), paper_claims(scenario, runs, exchanged).claims[14]
+    for one, other in (('gvc', 'cl'), ('cl', 'gvc')):
+        name = 'RMS error of pitch by the gains'
+        assert named(found)[f'{name}, {one}'] == usual[f'{name}, {other}']
+
+
+def test_what_is_simulated_beside_a_study_is_held_as_its_runs_are():
+    scenario = changed_scenario(load_scenario('case1'), {'duration': 3.0})
+    claims = paper_claims(scenario, {}, hold='zoh', threads=2).claims
+    follow, start = named(claims[14]), named(claims[19])
+    for law in ('gvc', 'cl'):
+        tau = simulate(case_of(scenario, 'case2'), law, 'zoh').tau[:201]
+        assert start[f'peak of τ_X, {law}'] == np.abs(tau[:, 0]).max()
+        gains = sensitivity(scenario, law, count=64, hold='zoh', threads=2).six(ERROR)
+        changed = (changed_scenario(scenario, values) for values in setpoint_changes(scenario))
+        errors = np.stack([rms_errors(simulate(one, law, 'zoh')) for one in changed])
+        others = followed(errors, moved_setpoints(scenario))
+        assert follow[f'RMS error of pitch by the gains, {law}'] == gains[PITCH]
+        assert follow[f'RMS error of pitch by the other set-points, {law}'] == others[PITCH]
 
 
 @pytest.mark.usefixtures('approved')

@@ -11,7 +11,10 @@ from helpers.report_pages import Page, at, check_numbers, tokens
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.cli import main
+from auv_analysis.herman2018.cases import case_of
 from auv_analysis.report.document import NUMBERS
+from auv_dynamics.files.shipped import shipped
+from auv_dynamics.vehicle import DOFS
 
 NO_NUMBER = re.compile(r'[ξπτΔ]+_?[1-6]|M46|equation \(\d+\)|\(39\)|m/s2|1/s2')
 
@@ -137,3 +140,23 @@ def test_a_study_of_another_vehicle_has_no_claims(tmp_path):
     assert 'claims' not in page.tables
     assert 'sensitivity' not in page.ids
     assert 'discussion' in page.ids
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_all_of_a_study_is_held_as_its_runs_are(tmp_path):
+    path, out = tmp_path / 'case1.yaml', tmp_path / 'out'
+    text = shipped('scenarios', 'case1').read_text(encoding='utf-8')
+    path.write_text(text.replace('duration: 30.0', 'duration: 2.5'))
+    main.main(['study', str(path), '--hold', 'zoh', '--samples', '2', '--out', str(out)])
+    summary = json.loads((out / 'summary.json').read_text(encoding='utf-8'))
+    varied = parquet.read_table(out / 'sensitivity.parquet').to_pylist()
+    errors = [row for row in varied if row['figure'] == 'velocity_error.rms']
+    assert {row['controller'] for row in errors} == {'gvc', 'cl'}
+    for row in errors:
+        rms = summary[row['controller']]['velocity_error']['rms'][DOFS.index(row['dof'])]
+        assert row['value'] == pytest.approx(rms, rel=1e-9)
+    claims = parquet.read_table(out / 'claims.parquet').to_pylist()
+    (start,) = (row['value'] for row in claims
+                if (row['number'], row['name']) == (20, 'peak of τ_X, cl'))  # fmt: skip
+    other = case_of(load_scenario(path), 'case2')
+    assert start == np.abs(simulate(other, 'cl', 'zoh').tau[:201, 0]).max()

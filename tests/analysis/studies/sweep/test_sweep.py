@@ -23,7 +23,13 @@ def files(tmp_path: Path) -> Path:
     return write_files(tmp_path)
 
 
-def test_rows_are_the_figures_of_their_simulations(files: Path) -> None:
+SENSORS = {'continuous': '', 'zoh': 'sensors: {velocity_noise: 0.01}\n'}
+
+
+@pytest.mark.parametrize('hold', SENSORS)
+def test_rows_are_the_figures_of_their_simulations(hold: str, files: Path) -> None:
+    (files / 'scenario.yaml').write_text(SCENARIO + SENSORS[hold])
+    (files / 'campaign.yaml').write_text(f'{CAMPAIGN}hold: {hold}\n')
     outcome = run(files)
     assert (outcome.rollouts, outcome.before) == (ROLLOUTS, 0)
     assert outcome.counts == {('gvc', 'ok'): ROLLOUTS, ('cl', 'ok'): ROLLOUTS}
@@ -35,9 +41,9 @@ def test_rows_are_the_figures_of_their_simulations(files: Path) -> None:
     for row in table[::5]:
         name = row['controller']
         values = {'vehicle': row['vehicle'], f'controllers.{name}.k_D': row['controllers.*.k_D']}
-        for path in ('vehicle.damping.linear[0]', 'setpoint.surge.offset'):
+        for path in ('vehicle.damping.linear[0]', 'setpoint.surge.offset', 'seed'):
             values[path] = row[path]
-        summary = summarize(simulate(changed_scenario(scenario, values), name))
+        summary = summarize(simulate(changed_scenario(scenario, values), name, hold))
         assert row['kinetic_energy.mean'] == pytest.approx(summary['kinetic_energy']['mean'])
         for i, dof in enumerate(DOFS):
             for group, key in (('velocity_error', 'rms'), ('effort', 'max'),

@@ -15,6 +15,7 @@ from auv_analysis import load_scenario, simulate
 from auv_analysis.cli import main
 from auv_analysis.studies.tune import search as searching
 from auv_analysis.studies.tune.cost import measures_of_run
+from auv_analysis.studies.tune.perturbations import Perturbations, Spread, monte_carlo
 from auv_analysis.studies.tune.report import FAIR
 
 FILES = {'tune.json', 'scenario.yaml', 'vehicle.yaml', 'search.parquet', 'monte_carlo.parquet',
@@ -122,6 +123,24 @@ def _perturbed(document: dict, folder: Path) -> None:
             assert row['interval'][0] <= row['ratio'] <= row['interval'][1]
             assert row['verdict'] * row['effect'] >= 0 <= row['effect'] * np.log(row['ratio'])
             assert row['smaller'] == pytest.approx((ratios < 1 - 1e-9).mean())
+
+
+@pytest.mark.usefixtures('unrendered')
+def test_search_check_and_draws_are_held_where_that_is_asked_for(command, tmp_path: Path) -> None:
+    write(tmp_path, {'gvc': GVC}, duration=0.5, step=0.05)
+    asked = '--law', 'gvc', '--structure', 'mass', '--samples', '10', '--hold', 'zoh', '--json'
+    code, out, _ = command(*asked)
+    document, folder = json.loads(out), tmp_path / 'runs/tune_small'
+    assert code == 0
+    scenario = load_scenario(folder / 'scenario.yaml')
+    drawn = monte_carlo(scenario, Perturbations(10, Spread(), 0), 'zoh', 1)
+    table = pq.read_table(folder / 'monte_carlo.parquet').to_pandas()
+    for name, entry in document['controllers'].items():
+        found = measures_of_run(simulate(scenario, name, 'zoh'))
+        assert entry['measures']['error'] == pytest.approx(found.error[0], rel=1e-6)
+        assert table.error[table.controller == name].tolist() == drawn[name].error.tolist()
+    base, best = (document['controllers'][name]['measures'] for name in ('gvc', 'gvc_tuned'))
+    assert best['effort'] == pytest.approx(base['effort'], rel=1e-3)
 
 
 @pytest.mark.usefixtures('unrendered')

@@ -128,12 +128,12 @@ def _perturbed(document: dict, folder: Path) -> None:
 @pytest.mark.usefixtures('unrendered')
 def test_search_check_and_draws_are_held_where_that_is_asked_for(command, tmp_path: Path) -> None:
     write(tmp_path, {'gvc': GVC}, duration=0.5, step=0.05)
-    asked = '--law', 'gvc', '--structure', 'mass', '--samples', '10', '--hold', 'zoh', '--json'
-    code, out, _ = command(*asked)
+    asked = '--law', 'gvc', '--structure', 'mass', '--samples', '10', '--hold', 'zoh'
+    code, out, _ = command(*asked, '--spread', 'waves=0.2', '--seed', '3', '--json')
     document, folder = json.loads(out), tmp_path / 'runs/tune_small'
     assert code == 0
     scenario = load_scenario(folder / 'scenario.yaml')
-    drawn = monte_carlo(scenario, Perturbations(10, Spread(), 0), 'zoh', 1)
+    drawn = monte_carlo(scenario, Perturbations(10, Spread(waves=0.2), 3), 'zoh', 1)
     table = pq.read_table(folder / 'monte_carlo.parquet').to_pandas()
     for name, entry in document['controllers'].items():
         found = measures_of_run(simulate(scenario, name, 'zoh'))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.foreign_bags import Maker, motion, simple, write
 from helpers.sea_trials import DELAY, LAG, trial, wrong_prior
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -21,6 +22,13 @@ from auv_analysis.studies.identify.identify import (
     judged,
     split,
 )
+from auv_analysis.studies.identify.bags import (
+    on_one_step,
+    parts,
+    read_records,
+    without_constants,
+)
+from auv_analysis.studies.identify.identify import Settings, as_filed, identify, split
 from auv_analysis.studies.identify.output_error import delayed, on_steps
 from auv_analysis.studies.identify.prediction import held_of, predict
 from auv_analysis.studies.identify.record import (
@@ -73,7 +81,31 @@ def test_nothing_to_learn_from_is_told():
         split([record(8.0)], 0.9)
     with pytest.raises(InputError, match=r'--part: expected .* for a second and more'):
         parts([record(30.0)], [(10.0, 10.1)])
-    assert parts([record(30.0)], [(10.0, 11.0)])
+    (part,), (whole,) = (parts([record(30.0)], [span]) for span in ((10.0, 11.0), (-5.0, 40.0)))
+    assert (part.start, part.end) == pytest.approx((10.0, 11.0))
+    assert (whole.start, whole.end) == pytest.approx((0.0, 30.0))
+
+
+def test_of_records_with_different_steps_the_finest_counts_and_commands_are_held():
+    coarse, fine = record(4.0, 0.04, 1), record(4.0, 0.02, 2)
+    one, other = on_one_step([coarse, fine])
+    assert (one.step, one.end, other) == (0.02, pytest.approx(coarse.end), fine)
+    assert_array_equal(one.command, np.repeat(coarse.command, 2, axis=0))
+
+
+def test_the_wrench_that_acted_is_read_where_it_is_asked_for(tmp_path):
+    _, run = trial(tmp_path, 'herman2018', 3, duration=3.0)
+    seen, maker, frames = motion(run, enu=False), Maker(), ('odom_ned', 'base_link_fsd')
+    acted = simple(seen, maker, '/odom', '/wrench_applied', frames, seen._replace(tau=2 * seen.tau))
+    more = [message for message in acted if message[0] == '/wrench_applied']
+    bag = write(tmp_path / 'bag', simple(seen, maker, '/odom', '/wrench', frames) + more, maker)
+    vehicle = load_vehicle('herman2018')
+    commanded, applied = (
+        read_records(bag, vehicle, None, applied=asked, notes=[])[0].command
+        for asked in (False, True)
+    )
+    assert np.abs(commanded).max() > 1.0
+    assert_allclose(applied, 2.0 * commanded, rtol=1e-9)
 
 
 def test_between_two_pauses_close_together_there_is_no_record():

@@ -19,6 +19,7 @@ from auv_analysis.bag.metadata import RECORDING, recording_text
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.nodes.recorder_node import StepLedger
 from auv_analysis.runs.run import Run, joined
+from auv_analysis.studies.compare.sources import open_source, sources_of
 from auv_dynamics.files.errors import InputError
 
 MS = 1_000_000
@@ -272,6 +273,8 @@ def test_the_namespace_of_the_recorder_is_the_one_that_is_read(tmp_path: Path) -
     assert joined(list(open_bag(told, whole=2).run.blocks())).tau[0, 0] == 1.0
     assert load_run(told, namespace='auv1').tau[0, 0] == 0.0
     assert load_run(untold, namespace='/auv2').tau[0, 0] == 1.0
+    (asked,) = sources_of([str(told)], namespace='/auv1')  # as `auv analyze` is
+    assert open_source(asked).run.tau[0, 0] == 0.0
     with pytest.raises(InputError, match=r'/auv1, /auv2$'):
         load_run(untold)
     for path, space in ((bag('/'), None), (told, '/auv4')):

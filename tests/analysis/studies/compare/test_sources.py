@@ -64,6 +64,12 @@ def test_a_scenario_is_simulated_as_its_devices_ask(folder: Path, text: str, hol
     run = open_source(sources_of(['short.yaml'])[0]).run
     assert run.hold == hold
     assert np.array_equal(run.nu, simulate(load_scenario('short.yaml'), 'gvc', hold).nu)
+def test_a_scenario_is_simulated_as_its_sensors_and_actuators_need(folder, text, hold) -> None:
+    (folder / 'short.yaml').write_text(text)
+    found = open_source(sources_of(['short.yaml'])[1])
+    expected = simulate(load_scenario('short.yaml'), 'cl', hold)
+    assert (found.run.hold, found.run.controller) == (hold, 'cl')
+    assert np.array_equal(found.run.nu, expected.nu)
 
 
 @pytest.mark.parametrize(

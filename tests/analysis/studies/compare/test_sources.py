@@ -16,7 +16,15 @@ from auv_dynamics import InputError
 
 ROOT = Path(__file__).parents[4]
 SHORT = (ROOT / 'config/scenarios/case1.yaml').read_text().replace('30.0', '0.3')
-NOISY = SHORT + '\nsensors: {velocity_noise: 0.01}\nactuators: {lag: 0.02}\n'
+NOISY = (
+    SHORT
+    + """
+sensors: {velocity_noise: 0.01}
+actuators: {lag: 0.02}
+faults: [{kind: sensor_drop_out, from: 0.1, to: 0.2}]
+"""
+)
+FACTS = ('scenario', 'controller', 'law', 'gains', 'step', 'source', 'kinds', 'faults')
 
 
 @pytest.fixture
@@ -56,6 +64,8 @@ def test_samples_make_the_run_again(folder: Path, text: str, hold: str) -> None:
         for signal, values in run.arrays().items():
             assert np.array_equal(getattr(again, signal), values), signal
         assert summarize(again) == summarize(run)
+        assert all(getattr(again, fact) == getattr(run, fact) for fact in FACTS)
+    assert bool(run.faults) == (text == NOISY)
 
 
 @pytest.mark.parametrize(('text', 'hold'), [(SHORT, 'continuous'), (NOISY, 'zoh')])

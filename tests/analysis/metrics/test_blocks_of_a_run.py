@@ -197,5 +197,6 @@ def test_a_run_is_a_data_frame(run: Run) -> None:
     assert_array_equal(frame['nu_d_dot.yaw'], run.nu_d_dot[:, 5])
     assert_array_equal(frame['F.heave'], run.disturbance[:, 2])
     assert 'applied.surge' not in frame, 'no actuators'
-    acting = replace(run, applied=2 * run.tau).to_pandas()
-    assert_array_equal(acting['applied.roll'], 2 * run.tau[:, 3])
+    devices = replace(run, applied=2 * run.tau, measured=3 * run.nu).to_pandas()
+    assert_array_equal(devices['applied.roll'], 2 * run.tau[:, 3])
+    assert_array_equal(devices['measured.pitch'], 3 * run.nu[:, 4])

@@ -15,6 +15,7 @@ from auv_analysis.output.text import MISSING, Maths
 from auv_analysis.report import document
 from auv_analysis.report.document import Section, Sentence
 from auv_analysis.report.results import described, make_table
+from auv_dynamics.kernel.compile import sources_digest
 
 
 @pytest.fixture(scope='module')
@@ -51,7 +52,7 @@ def test_a_report_says_what_made_it(folder, monkeypatch):
     packages = ('auv_analysis', 'auv_gvc_controller', 'auv_dynamics', 'numpy', 'numba', 'scipy')
     versions = {'Python': platform.python_version()} | {n: version(n) for n in packages}
     listed = ', '.join(f'{name} {found}' for name, found in versions.items())
-    assert f'<dt>versions</dt><dd>{listed}; sources' in text
+    assert f'<dt>versions</dt><dd>{listed}; sources <code>{sources_digest()}</code>' in text
     assert re.search(r'<dt>written</dt><dd>\d{4}-\d\d-\d\d', text)
     for program, command in (('bin/auv', "auv simulate 'a b'"), ('other.py', '')):
         monkeypatch.setattr('sys.argv', [program, 'simulate', 'a b'])

@@ -72,6 +72,19 @@ def test_another_experiment_of_the_same_name_is_not_the_papers(case1):
         assert _table({'gvc': replace(run, **changes)}) == {}
 
 
+def test_a_run_with_what_the_papers_have_not_is_none_of_the_papers(case1):
+    gvc = case1['gvc']
+    for changes in (
+        {'applied': gvc.tau}, {'measured': gvc.nu}, {'kinds': gvc.kinds | {'current'}},
+    ):  # fmt: skip
+        other = replace(gvc, **changes)
+        assert (_table({'gvc': other}), paper.paper_figures(other)) == ({}, [])
+        table = _table({'gvc': other, 'cl': case1['cl']})
+        assert (table[1].verdict, table[3].verdict) == ('not evaluated', 'reproduced')
+    assert paper.paper_figures(replace(gvc, gains=gvc.gains | {'k_D': 13.0})) == []
+    assert paper.paper_figures(gvc)[0].endswith('figure 1')
+
+
 def test_verdicts_of_case_2(case2, approved):
     table = _table(case2)
     approved.add(_lines(table))

@@ -11,7 +11,13 @@ import pytest
 from auv_analysis import load_scenario, simulate
 from auv_analysis.herman2018 import cases, paper
 from auv_analysis.herman2018 import responses as responses_of
-from auv_analysis.herman2018.cases import case_evidence, case_of, claims_sentences, paper_claims
+from auv_analysis.herman2018.cases import (
+    case_evidence,
+    case_of,
+    claims_sentences,
+    departures_of,
+    paper_claims,
+)
 from auv_analysis.herman2018.claims import judged, write_claims
 from auv_analysis.herman2018.evidence import ErrorSensitivity, Quotes
 from auv_analysis.herman2018.responses import (
@@ -198,6 +204,16 @@ def test_a_changed_case_says_what_was_changed():
     assert {claim.case for claim in found.claims} == {'case1, changed', 'case2, changed'}
     (sentence,) = claims_sentences(found)
     assert 'vehicle.rigid_body.mass = 200.0 (shipped: 250.0)' in sentence.text
+
+
+def test_every_kind_of_departure_from_the_shipped_case_is_named():
+    values = {
+        'duration': 6.0, 'step': 0.02, 'integrator': 'rk4', 'initial.nu[0]': 0.1,
+        'setpoint.surge.offset': 0.3, 'disturbance': [{'kind': 'herman2018', 'scale': 2.0}],
+        'vehicle.damping.linear[0]': 71.0,
+    }  # fmt: skip
+    found = {path for path, *_ in departures_of(changed_scenario(load_scenario('case1'), values))}
+    assert found == {path.partition('[')[0] for path in values}
 
 
 @pytest.mark.parametrize(

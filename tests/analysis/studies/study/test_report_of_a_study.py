@@ -13,6 +13,7 @@ from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.cli import main
 from auv_analysis.herman2018.cases import case_of
 from auv_analysis.report.document import NUMBERS
+from auv_analysis.studies.study.sensitivity import sensitivity
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle import DOFS
 
@@ -143,11 +144,12 @@ def test_a_study_of_another_vehicle_has_no_claims(tmp_path):
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_all_of_a_study_is_held_as_its_runs_are(tmp_path):
+def test_all_of_a_study_is_held_and_varied_as_it_is_asked_to(tmp_path):
     path, out = tmp_path / 'case1.yaml', tmp_path / 'out'
     text = shipped('scenarios', 'case1').read_text(encoding='utf-8')
     path.write_text(text.replace('duration: 30.0', 'duration: 2.5'))
-    main.main(['study', str(path), '--hold', 'zoh', '--samples', '2', '--out', str(out)])
+    asked = ['--hold', 'zoh', '--samples', '2', '--span', '1.5', '--seed', '3']
+    main.main(['study', str(path), *asked, '--out', str(out)])
     summary = json.loads((out / 'summary.json').read_text(encoding='utf-8'))
     varied = parquet.read_table(out / 'sensitivity.parquet').to_pylist()
     errors = [row for row in varied if row['figure'] == 'velocity_error.rms']
@@ -155,6 +157,9 @@ def test_all_of_a_study_is_held_as_its_runs_are(tmp_path):
     for row in errors:
         rms = summary[row['controller']]['velocity_error']['rms'][DOFS.index(row['dof'])]
         assert row['value'] == pytest.approx(rms, rel=1e-9)
+    known = sensitivity(load_scenario(path), 'gvc', count=2, span=1.5, seed=3, hold='zoh').rows
+    largest = {row['dof']: row['largest'] for row in known if row['figure'] == 'velocity_error.rms'}
+    assert largest == {r['dof']: r['largest'] for r in errors if r['controller'] == 'gvc'}
     claims = parquet.read_table(out / 'claims.parquet').to_pylist()
     (start,) = (row['value'] for row in claims
                 if (row['number'], row['name']) == (20, 'peak of τ_X, cl'))  # fmt: skip

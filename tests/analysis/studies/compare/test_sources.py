@@ -69,11 +69,6 @@ def test_samples_make_the_run_again(folder: Path, text: str, hold: str) -> None:
 
 
 @pytest.mark.parametrize(('text', 'hold'), [(SHORT, 'continuous'), (NOISY, 'zoh')])
-def test_a_scenario_is_simulated_as_its_devices_ask(folder: Path, text: str, hold: str) -> None:
-    (folder / 'short.yaml').write_text(text)
-    run = open_source(sources_of(['short.yaml'])[0]).run
-    assert run.hold == hold
-    assert np.array_equal(run.nu, simulate(load_scenario('short.yaml'), 'gvc', hold).nu)
 def test_a_scenario_is_simulated_as_its_sensors_and_actuators_need(folder, text, hold) -> None:
     (folder / 'short.yaml').write_text(text)
     found = open_source(sources_of(['short.yaml'])[1])

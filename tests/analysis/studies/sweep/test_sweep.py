@@ -54,21 +54,6 @@ def test_rows_are_the_figures_of_their_simulations(hold: str, files: Path) -> No
                 )
 
 
-def test_noise_of_a_row_is_that_of_its_seed_in_the_hold_of_the_campaign(files: Path) -> None:
-    (files / 'scenario.yaml').write_text(f'{SCENARIO}\nsensors: {{velocity_noise: 0.02}}\n')
-    sampled = CAMPAIGN.replace('block: 5', 'block: 5\nhold: zoh\ncontrollers: [gvc]')
-    (files / 'campaign.yaml').write_text(sampled)
-    run(files)
-    scenario = load_scenario(files / 'scenario.yaml')
-    paths = ('seed', 'vehicle', 'vehicle.damping.linear[0]', 'setpoint.surge.offset')
-    for row in rows(files / 'out').to_pylist()[::3]:
-        values = {path: row[path] for path in paths}
-        values['controllers.gvc.k_D'] = row['controllers.*.k_D']
-        summary = summarize(simulate(changed_scenario(scenario, values), 'gvc', 'zoh'))
-        found = [row[f'effort.rms.{dof}'] for dof in DOFS]
-        assert found == pytest.approx(summary['effort']['rms'], rel=1e-9), row['index']
-
-
 def test_a_worker_needs_no_file_of_the_set_point(files: Path) -> None:
     way = files / 'way.csv'
     way.write_text('t,surge,sway,heave,roll,pitch,yaw\n0,0,0,0,0,0,0\n1,0.5,0,0.2,0,0,0.1\n')

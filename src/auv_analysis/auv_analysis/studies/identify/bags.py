@@ -105,6 +105,6 @@ def on_one_step(records: Sequence[Record]) -> list[Record]:
 
 
 def _finer(record: Record, step: float) -> Record:
-    count = int((record.end - record.start) / step)
+    count = int((record.end - record.start) / step + 1e-6)  # 0.3 / 0.1 is less than 3
     rows = ((np.arange(count) + 0.5) * step / record.step).astype(int)
     return replace(record, step=step, command=record.command[rows])

@@ -209,7 +209,7 @@ def _increasing(axes: Axes, run: RunDigest, part: str) -> None:
     turns = np.flatnonzero(np.diff(increasing, prepend=0.0, append=0.0))
     begin, end = edges[turns].reshape(-1, 2).T
     axes.broken_barh(  # a shape each: one of thousands of corners takes 34 MB to draw
-        np.column_stack([begin, end - begin]), (0.0, 1.0),
+        list(zip(begin, end - begin, strict=True)), (0.0, 1.0),
         transform=axes.get_xaxis_transform(), color='#ececec', linewidth=0, zorder=0.2, snap=False,
     )  # fmt: skip
 

@@ -174,7 +174,7 @@ def test_a_reset_puts_the_vehicle_back_after_the_step_that_is_under_way(made, ve
 
 
 REAL = {'step': H, 'actuators.limit': [1e6], 'wrench_timeout': patience(0.2)}
-PACE = 0.05  # s, step of a plant whose pace is measured
+PACE = 0.05  # s, a step at which a loaded machine hears of every one in time
 WINDOW = 1.0  # s of it
 
 
@@ -248,11 +248,11 @@ def test_real_time_ends_with_its_last_step_and_tells_of_silence_until_then(made,
 
 
 def test_a_pause_in_real_time_stops_the_time_of_the_run(made, vehicle) -> None:
-    made.add(PlantNode, {'vehicle': str(vehicle), **REAL})
+    node = made.add(PlantNode, {'vehicle': str(vehicle), **REAL})
     made.until(lambda: len(made.heard['odom']) > 5, 'odometry')
     assert made.call(SetBool, 'plant_node/run', SetBool.Request(data=False)).message == 'paused'
-    made.spin(10 * H)  # what was under way
-    count = len(made.heard['odom'])
+    count = node.plant.k
+    made.until(lambda: len(made.heard['odom']) == count, 'what was under way')
     made.spin(10 * H)
     assert len(made.heard['odom']) == count
     assert made.call(SetBool, 'plant_node/run', SetBool.Request(data=True)).message == 'running'
@@ -261,7 +261,7 @@ def test_a_pause_in_real_time_stops_the_time_of_the_run(made, vehicle) -> None:
 
 
 def test_silence_of_the_controller_gives_zero_wrench_and_it_comes_back(made, vehicle) -> None:
-    made.add(PlantNode, {'vehicle': str(vehicle), **REAL, 'initial.nu': NU})
+    made.add(PlantNode, {'vehicle': str(vehicle), **REAL, 'step': PACE, 'initial.nu': NU})
     applied = made.heard['wrench_applied']
     made.until(lambda: len(applied) > 3, 'the beginning')
     assert by_hand.six_of(applied[-1]) == [0.0] * 6, 'nothing before the first wrench'

@@ -96,7 +96,7 @@ def _cloud(tuning: Tuning, name: str) -> tuple[np.ndarray, np.ndarray]:
     index, reference, parts = tuning.goal.index, tuning.goal.reference, []
     for one in tuning.laws[name].searches:
         measures = one.evaluations
-        keep = (one.margins >= 0) & (one.stages != GRADIENT) & np.isfinite(measures.error)
+        keep = one.allowed & (one.stages != GRADIENT) & np.isfinite(measures.error)
         error = getattr(measures, index)[keep] / getattr(reference, index)
         parts.append(np.stack([measures.effort[keep] / reference.effort, error]))
     x, y = np.concatenate(parts, axis=1)

@@ -20,14 +20,7 @@ from auv_analysis.studies.pairs import Pairs, holm, log_ratios, paired
 from auv_analysis.studies.tune.cost import Measures, measures_of_run, of_each
 from auv_analysis.studies.tune.gain_space import STRUCTURES
 from auv_analysis.studies.tune.perturbations import Perturbations, Spread, applicable, monte_carlo
-from auv_analysis.studies.tune.search import (
-    ROUNDING,
-    Goal,
-    Request,
-    TunedLaw,
-    structures_of,
-    tuned,
-)
+from auv_analysis.studies.tune.search import Goal, Request, TunedLaw, structures_of, tuned
 from auv_dynamics.files.errors import FailedError
 from auv_gvc_controller.laws.law import SHIPPED
 
@@ -251,7 +244,7 @@ def _evaluations(laws: Mapping[str, TunedLaw]) -> pa.Table:
                     **{key: [word] * len(one.points) for key, word in words.items()},
                     'stage': one.stages.tolist(),
                     'diverged': np.isnan(one.evaluations.error),
-                    'allowed': one.margins >= -ROUNDING,
+                    'allowed': one.allowed,
                     **_columns(one.evaluations),
                     **{f'gain.{gain}': values for gain, values in gains},
                 })

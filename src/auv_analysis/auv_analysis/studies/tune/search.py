@@ -145,6 +145,11 @@ class Optimum:
     margins: np.ndarray
     stages: np.ndarray
 
+    @property
+    def allowed(self) -> np.ndarray:
+        """(B,) whether the velocity loop of a point is slow enough for the control period."""
+        return self.margins >= -ROUNDING
+
 
 @dataclass(frozen=True, eq=False)
 class TunedLaw:

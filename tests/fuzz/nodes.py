@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from rclpy.duration import Duration
 from rclpy.serialization import deserialize_message, serialize_message
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -163,6 +164,11 @@ def _session(
         return _judge(name, heard)
 
     answers += peer.until(lives, f'{name} to go on with good messages')
+    # who has not met a publisher yet takes nothing of it: the recorder would end with none
+    for topic, publisher in publishers.items():
+        arrived = publisher.wait_for_all_acked(Duration(seconds=patience(30)))
+        if not arrived:
+            raise NodeFailedError(f'{name} does not take {topic.name} any more')
     return {'sent': sent, 'answers': answers}
 
 

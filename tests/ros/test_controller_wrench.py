@@ -368,9 +368,10 @@ def test_silence_in_real_time_gives_zero_wrench_is_explained_and_it_comes_back(
     assert len(told) >= 8
 
 
+@pytest.mark.parametrize('returns', [False, True])
 @pytest.mark.parametrize('lockstep', [True, False])
 def test_an_answer_that_is_held_back_is_zero_where_the_controller_leaves(
-    made, vehicle, capfd, lockstep
+    made, vehicle, capfd, lockstep, returns
 ) -> None:
     settings = {'lockstep': lockstep, 'setpoint_pairing': 'latest', 'setpoint_timeout': 60.0}
     settings |= {'setpoint_acceleration': 'none', 'odometry_timeout': 60.0, 'limits.wrench': [1e4]}
@@ -379,8 +380,10 @@ def test_an_answer_that_is_held_back_is_zero_where_the_controller_leaves(
     made.publish(topics.CMD_VEL, by_hand.six(topics.CMD_VEL.type, 3 * STEP, NU_D[0]))
     made.until(lambda: node._idle._heard, 'the set-point')
     made.publish(topics.ODOM, by_hand.odometry(3 * STEP, [*ETA[0, :3], 1, 0, 0, 0, *NU[0]]))
-    made.until(lambda: node._held is not None and any(node._held.tau), 'an answer')
+    made.until(lambda: node._held is not None and any(node._held[0].tau), 'an answer')
     assert node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+    if returns:
+        assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
     assert not made.heard['wrench'], 'one of two listens'
     made.listen(topics.WRENCH)
     made.until(lambda: made.heard['wrench'], 'what it leaves')

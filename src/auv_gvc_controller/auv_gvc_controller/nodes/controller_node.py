@@ -240,7 +240,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         )
         self._controller: VelocityController  # exists once configured
         self._active = False
-        self._held: Answer | None = None
+        self._held: tuple[Answer, bool] | None = None  # and whether the controller leaves with it
         self._follows = False
         self._publish_wrench = self.graph.output(topics.WRENCH)
         self._publish_estimate = self.graph.output(topics.DISTURBANCE_ESTIMATE)
@@ -332,10 +332,10 @@ class ControllerNode(BulkMixin, LifecycleNode):
 
         self.graph.listen(topic, take, topics.every_step())
 
-    def _say(self, answer: Answer | None, *, leaves: bool = False) -> None:
+    def _say(self, answer: Answer | None, leaves: bool = False) -> None:
         if answer is None:
             return
-        self._held = None if self.graph.ready() else answer
+        self._held = None if self.graph.ready() else (answer, leaves)
         if self._held is not None:
             return  # until the expected subscribers have matched; see _watch
         if not leaves:
@@ -366,7 +366,7 @@ class ControllerNode(BulkMixin, LifecycleNode):
         if self._active:
             self._say(self._controller.watch(self._now()))
         if self._held is not None:
-            self._say(self._held, leaves=not self._active)
+            self._say(*self._held)
         self.graph.facts.update(self._health())
 
     def _health(self) -> dict[str, Any]:

@@ -62,13 +62,14 @@ case1 case2: $(RUNS)  ## the paper's experiment: GVC against CL on real nodes, w
 	$(BIN)/auv run $@ --overwrite
 	@echo "open runs/$@/report.html"
 
-# four workers on two cores: the tests of the nodes mostly wait
-TEST := $(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder
+# on two cores: the tests of the nodes mostly wait
+WORKERS := 4
+TEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 test: kernels  ## the tests
 	$(TEST)
 
-# once: else four workers compile the same modules side by side; what cannot be imported they report
+# once: else the workers compile the same modules side by side; what cannot be imported they report
 $(COLLECTED): $(READY)
 	$(BIN)/python -m pytest --collect-only -qq > /dev/null || true
 	@touch $@
@@ -76,7 +77,8 @@ $(COLLECTED): $(READY)
 kernels: $(COLLECTED)  ## compile what the tests call, where it is not compiled
 	$(BIN)/python tests/compile_kernels.py
 
-# AUV_GVC_PATIENCE is the factor of every limit
+# half of the cores for the tests; AUV_GVC_PATIENCE is the factor of every limit
+test-loaded: WORKERS := 8
 test-loaded: kernels  ## the same beside LOAD busy processes, TIMES in a row, each in an order drawn by SEED, SEED + 1, ...
 	for seed in $$(seq $(SEED) $$(($(SEED) + $(TIMES) - 1))); do \
 	  AUV_GVC_PATIENCE=$${AUV_GVC_PATIENCE:-4} AUV_GVC_ORDER=$$seed \

@@ -92,22 +92,32 @@ def take_signals(handler: Any) -> dict[signal.Signals, Any]:
 @contextmanager
 def on_signals(callback: Callable[[], None]) -> Iterator[None]:
     """Call back on any of them while this lasts."""
-    before = take_signals(lambda *_: callback())
+    with _taken(lambda *_: callback()):
+        yield
+
+
+@contextmanager
+def _taken(handler: Any) -> Iterator[None]:
+    before = take_signals(handler)
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, former in before.items():
+            signal.signal(number, former)
 
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Let Ctrl-C and the other signals that end a command wait for the end of this."""
+    """Let Ctrl-C and the other signals that end a command wait for the end of this.
+
+    Compiled code may need that: pybind11 makes "Unable to convert call argument" of what a handler
+    raises while it converts one.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    asked: list[None] = []
-    with on_signals(lambda: asked.append(None)):
+    asked: list[int] = []
+    with _taken(lambda number, _: asked.append(number)):
         yield
-    if asked:
-        raise KeyboardInterrupt
+    for number in asked[:1]:
+        signal.raise_signal(number)

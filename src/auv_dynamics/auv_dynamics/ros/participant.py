@@ -15,6 +15,7 @@ from rclpy.utilities import try_shutdown
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 
+from auv_dynamics.files.errors import undisturbed
 from auv_dynamics.ros import interface
 from auv_dynamics.ros.endpoints import observes
 from auv_dynamics.ros.node_interface import ASK_AGAIN
@@ -24,6 +25,8 @@ from auv_dynamics.ros.topics import DIAGNOSTICS, PROGRESS, one_at_a_time
 
 class Participant:
     """A node that is served whenever there is time for it; signals stay with the program.
+
+    They wait while rclpy is at work, whose compiled half would take what they raise for its own.
 
     Parameters
     ----------
@@ -37,6 +40,7 @@ class Participant:
 
     """
 
+    @undisturbed()
     def __init__(self, domain: int, make: Callable[[Context], Any], executable: str = 'auv'):
         require(executable)
         self._context = Context()
@@ -58,13 +62,19 @@ class Participant:
         """Handle what comes in for so long."""
         until = time.monotonic() + seconds
         while (left := until - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left)
+            self._spin_once(left)
 
+    @undisturbed()
+    def _spin_once(self, seconds: float) -> None:
+        self._executor.spin_once(timeout_sec=seconds)
+
+    @undisturbed()
     def nodes(self) -> set[str]:
         """Full names of the nodes that are known so far, its own among them."""
         found = self._node.get_node_names_and_namespaces()
         return {f'{namespace.rstrip("/")}/{name}' for name, namespace in found}
 
+    @undisturbed()
     def close(self) -> None:
         """Leave the domain."""
         self._node.destroy_node()
@@ -93,6 +103,7 @@ class Watcher(Participant):
 
     """
 
+    @undisturbed()
     def __init__(self, domain: int, plant: str = 'plant_node'):
         super().__init__(domain, _silent_node)
         self._node.create_subscription(
@@ -109,6 +120,7 @@ class Watcher(Participant):
         self.running = False
         self.waits_for = f'{plant} to appear'
 
+    @undisturbed()
     def ask_to_run(self) -> bool:
         """Ask the plant to run, without waiting; True once it has agreed."""
         if self._asked is not None and self._asked.done():
@@ -122,6 +134,7 @@ class Watcher(Participant):
             self._asked_at = time.monotonic()
         return self.running
 
+    @undisturbed()
     def endpoints(self, names: Iterable[str] = (interface.WRENCH, interface.ODOM)) -> list[str]:
         """Nodes that publish or subscribe topics of such names already, in any namespace.
 

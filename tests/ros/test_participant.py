@@ -1,0 +1,76 @@
+"""Signals while a program takes part in a graph: they wait until rclpy has done what it does."""
+
+import signal
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from helpers.node_processes import fresh_domain
+from rclpy.node import Node
+
+from auv_dynamics.files.errors import on_signals
+from auv_dynamics.ros.participant import Watcher
+from auv_dynamics.ros.security import loopback
+
+CALLS: list[tuple[str, str, Callable[[Watcher], Any]]] = [
+    ('_executor', 'spin_once', lambda graph: (graph._executor.wake(), graph.spin(60.0))),
+    ('_node', 'get_node_names_and_namespaces', Watcher.nodes),
+    ('_node', 'get_topic_names_and_types', Watcher.endpoints),
+    ('_run', 'service_is_ready', Watcher.ask_to_run),
+    ('_node', 'destroy_node', Watcher.close),
+]
+
+
+@pytest.fixture
+def domain(monkeypatch) -> int:
+    for name, value in loopback().items():
+        monkeypatch.setenv(name, value)
+    return fresh_domain()
+
+
+@pytest.fixture
+def graph(domain: int) -> Iterator[Watcher]:
+    made = Watcher(domain)
+    yield made
+    made._context.try_shutdown()
+
+
+def interrupted(inner: Callable[..., Any], ended: list[str]) -> Callable[..., Any]:
+    """The same with a signal on its way."""
+
+    def call(*args: Any, **options: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        found = inner(*args, **options)
+        ended.append(inner.__name__)
+        return found
+
+    return call
+
+
+@pytest.mark.parametrize(('part', 'name', 'call'), CALLS, ids=[name for _, name, _ in CALLS])
+def test_a_signal_waits_until_rclpy_has_done_it(graph, monkeypatch, part, name, call) -> None:
+    ended: list[str] = []
+    inner = getattr(graph, part)
+    monkeypatch.setattr(inner, name, interrupted(getattr(inner, name), ended))
+    with pytest.raises(KeyboardInterrupt):
+        call(graph)
+    assert ended == [name]
+
+
+def test_so_it_does_while_the_participant_is_made(domain, monkeypatch) -> None:
+    ended: list[str] = []
+    inner = interrupted(Node.create_client, ended)
+    monkeypatch.setattr(Node, 'create_client', inner)
+    with pytest.raises(KeyboardInterrupt):
+        Watcher(domain)
+    assert ended == ['create_client']
+
+
+def test_who_takes_signals_in_another_way_is_told_in_that_way(graph, monkeypatch) -> None:
+    ended: list[str] = []
+    told: list[int] = []
+    inner = interrupted(graph._node.get_node_names_and_namespaces, ended)
+    monkeypatch.setattr(graph._node, 'get_node_names_and_namespaces', inner)
+    with on_signals(lambda: told.append(len(ended))):
+        graph.nodes()
+    assert told == [1], 'once, after it'

@@ -6,6 +6,7 @@ import json
 import os
 import random
 import re
+import socket
 import subprocess
 import sys
 import tempfile
@@ -63,8 +64,11 @@ def parameters(count: int, seed: int) -> Any:
     from helpers.node_processes import environment, fresh_domain
     from start_up import originals, try_parameters
 
-    os.environ.update(environment(fresh_domain()))
-    return structured(try_parameters, originals(), count, seed)
+    domain = fresh_domain()
+    os.environ.update(environment(domain))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as kept:
+        kept.bind(('127.0.0.1', 7400 + 250 * domain + 28))  # so it is free for no other target
+        return structured(try_parameters, originals(), count, seed)
 
 
 def messages(count: int, seed: int) -> Any:

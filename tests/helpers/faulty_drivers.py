@@ -22,7 +22,7 @@ from auv_dynamics.ros.interface import NANOSECONDS, Frames
 from auv_dynamics.vehicle.kinematics import rotation
 
 RATE, SLOW = 50.0, 2.0  # Hz
-SECONDS = 120.0  # of motion, more than any test takes
+SECONDS = patience(200.0)  # of motion: more than all tests of a module take
 OLD = round(patience(10.0) * NANOSECONDS)  # well past the timeout that the test gives
 HEALTHY = 'healthy'
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -81,7 +81,7 @@ def killed(folder: Path, kill: Kill) -> tuple[float, Process, Progress]:
         progress.peer.spin(0.02)
     progress.peer.spin(kill.after)
     victim.kill()
-    return time.monotonic(), process, progress
+    return (progress.times or [time.monotonic()])[-1], process, progress
 
 
 def check_kill(folder: Path, kill: Kill, *options: str) -> str:

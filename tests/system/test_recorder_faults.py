@@ -103,7 +103,7 @@ def test_what_was_finished_before_is_still_reported(tmp_path: Path) -> None:
     """The recorder of the second controller is killed: the first has its summary and report."""
     controllers = {'one': {'law': 'gvc', **GAINS}, 'two': {'law': 'cl', **GAINS}}
     out = tmp_path / 'out'
-    scenario = write(tmp_path / 's.yaml', duration=1.0, controllers=controllers)
+    scenario = write(tmp_path / 's.yaml', duration=30.0, controllers=controllers)
     process = start(scenario, out)
     while not any((out / 'two').glob('*.mcap')):
         assert process.poll() is None

@@ -189,7 +189,7 @@ def test_nothing_leaves_the_machine_and_nobody_outside_gets_in() -> None:
         with plant(environ, *inside.command()):
             assert found(inside, environ) == 'plant_node'
             assert inside.sent() == 0
-            assert found(outside, knows, 3.0) == ''
+            assert found(outside, knows, patience(3.0)) == ''
         before = inside.sent()
         with plant(opened, *inside.command()):
             assert found(outside, knows) == 'plant_node'

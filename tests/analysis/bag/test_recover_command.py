@@ -304,6 +304,7 @@ def test_a_file_that_grows_is_refused(
             file.write(b'more')
 
     monkeypatch.setattr(recovery.time, 'sleep', grow)
+    monkeypatch.setattr(recovery, 'QUIET', 3600.0)
     code, _, err = command(capsys, bag)
     assert code == 2
     assert 'found a file that is being written' in err

@@ -121,7 +121,6 @@ def test_any_exception_of_the_thread_ends_the_recording_in_good_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
     writer = writer_of(tmp_path / 'bag', free_space=1)
-    writer.write('/a', 0, said('a message'))
 
     def strange(*_: object) -> None:
         raise ValueError('nobody has thought of this')
@@ -129,6 +128,7 @@ def test_any_exception_of_the_thread_ends_the_recording_in_good_order(
     with monkeypatch.context() as patched:
         kind = writer_module.BagFile if where == 'flush' else output.Output
         patched.setattr(kind, where, strange)
+        writer.write('/a', 0, said('a message'))
         limit = time.monotonic() + PATIENCE
         while not writer.trouble:
             assert time.monotonic() < limit

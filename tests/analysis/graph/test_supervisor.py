@@ -2,6 +2,8 @@
 
 import os
 import signal
+import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -34,6 +36,22 @@ def test_who_ends_is_named_with_its_last_words_and_what_the_others_complain_of(
     kept = [f'    line {k}' for k in range(2, 10)]
     told = [*kept, '    other: [ERROR] [1.0] [other]: second']
     assert str(caught.value).splitlines() == ['node ended with exit code 3', *told]
+
+
+@pytest.mark.parametrize(('writes', 'code'), [('recorder', 7), ('', -signal.SIGKILL)])
+def test_who_writes_has_more_time_to_end(tmp_path: Path, monkeypatch, writes, code) -> None:
+    monkeypatch.setattr(supervisor, 'GRACE', 0.01)
+    group = supervisor.Supervisor(tmp_path, os.environ)
+    begin = f'import signal, sys, time; from pathlib import Path; ready = Path({str(tmp_path)!r})'
+    ends = 'signal.signal(signal.SIGTERM, lambda *_: (time.sleep(0.5), sys.exit(7)))'
+    ready = '(ready / "ready").touch(); time.sleep(600)'
+    group.start('recorder', [sys.executable, '-c', f'{begin}; {ends}; {ready}'])
+    group.start('node', ['sleep', '600'])
+    limit = time.monotonic() + patience(30.0)
+    while not (tmp_path / 'ready').exists():
+        assert time.monotonic() < limit
+        time.sleep(0.01)
+    assert group.stop(writes)['recorder'] == code
 
 
 class Stuck(psutil.Popen):

@@ -223,6 +223,20 @@ def test_command_that_is_killed_leaves_the_results(tmp_path: Path) -> None:
     assert tree(tmp_path) == {**LATER, **left, 'manifest.json': ''}  # no manifest lists it
 
 
+def test_what_a_command_killed_at_its_first_file_has_left_is_in_no_way(tmp_path: Path) -> None:
+    out = tmp_path / 'out'
+    out.mkdir()
+    (out / '.sweep.json.unfinished').write_text('{')
+    with results_folder(out, overwrite=False) as results:
+        assert results.folder == out
+    (out / 'unfinished').write_text('of somebody')
+    with (
+        pytest.raises(InputError, match='found an existing folder'),
+        results_folder(out, overwrite=False),
+    ):
+        pass
+
+
 @pytest.mark.parametrize('end', [FailedError('a node ended'), KeyboardInterrupt()])
 def test_recording_is_kept_until_the_next_command_succeeds(end, tmp_path: Path, capsys) -> None:
     write(tmp_path, EARLIER)

@@ -42,7 +42,7 @@ def test_panels_share_one_time_axis(report):
     box = plot.bounding_box()
     row = box['y'] + 110
     windows = [[0.0, 5.0]]
-    for _ in range(3):  # a busy page may miss the beginning of a drag
+    for _ in range(20):  # a busy page may miss the beginning of a drag
         report.page.mouse.move(box['x'] + 150, row)
         report.page.mouse.down()
         report.page.mouse.move(box['x'] + 300, row, steps=4)
@@ -62,9 +62,13 @@ def test_panels_share_one_time_axis(report):
 
 def test_values_are_shown_at_the_time_pointed_at(report):
     plot = report.panel('error-linear').locator('.plot')
-    plot.hover(position={'x': 250, 'y': 110})
-    tooltip = report.page.locator('.bk-tooltip-row-value, [class*="tooltip"]').first
-    tooltip.wait_for(state='attached')
+    tooltip = report.page.locator('.bk-tooltip-row-value, [class*="tooltip"]')
+    for x in range(250, 270):  # a busy page may miss it, as the beginning of a drag
+        plot.hover(position={'x': x, 'y': 110})
+        report.settle()
+        if tooltip.count():
+            break
+    tooltip.first.wait_for(state='attached')
 
 
 BEFORE_ALL = """() => {

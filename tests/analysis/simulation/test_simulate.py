@@ -1,5 +1,6 @@
 """The paper's numbers, the two holds, and what a simulation must notice."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis import load_scenario, simulate, summarize
-from auv_analysis.simulation.simulate import DivergedError
+from auv_analysis.simulation.simulate import DivergedError, warm_up
 from auv_dynamics import InputError
 from auv_dynamics.plant.disturbance import herman2018
 
@@ -227,3 +228,21 @@ def test_the_seed_decides_the_noise():
     ]  # fmt: skip
     np.testing.assert_array_equal(runs[0].nu, runs[1].nu)
     assert np.abs(runs[0].nu_measured - runs[2].nu_measured).max() > 0.005
+
+
+def works(seconds: float) -> None:
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+
+
+def test_a_kernel_that_takes_work_is_announced_and_no_machine_that_is_busy(monkeypatch, capsys):
+    scenario = load_scenario('case1')
+    warm_up(scenario, [])
+    monkeypatch.setattr('auv_analysis.simulation.simulate.NOTICE_AFTER', 0.2)
+    for takes, said in (time.sleep, False), (works, True):
+        capsys.readouterr()
+        plant = lambda *_, takes=takes: takes(0.3)  # noqa: E731
+        monkeypatch.setattr('auv_analysis.simulation.simulate.Plant', plant)
+        warm_up(scenario, [])
+        assert ('kernel ready after ' in capsys.readouterr().err) is said

@@ -29,7 +29,8 @@ class Sea:
 
     def __init__(self, start: Callable[..., Any] = fork_program) -> None:
         self.start = start
-        self.domain, port = fresh_domain(), free_port()
+        self.domain = fresh_domain()
+        port = free_port(self.domain)
         self.relay = Relay(port)
         self.driver = start(
             'driver.py', self.domain, '--ros-args',
@@ -197,7 +198,7 @@ def test_broken_and_foreign_packets_are_counted_and_change_nothing(sea) -> None:
 
 
 @pytest.mark.parametrize(
-    ('kind', 'tau', 'age'), [('age', PUSH, 2.0), ('', (np.nan,) * 6, 0.0)], ids=['old', 'nan']
+    ('kind', 'tau', 'age'), [('age', PUSH, 2.0), ('not finite', (np.nan,) * 6, 0.0)]
 )
 def test_a_wrench_that_must_not_be_used_is_refused(sea, kind, tau, age) -> None:
     def refused() -> int:
@@ -206,6 +207,7 @@ def test_a_wrench_that_must_not_be_used_is_refused(sea, kind, tau, age) -> None:
             if key.startswith('refused wrench') and kind in key
         )  # fmt: skip
 
+    sea.until(sea.facts, 'diagnostics')
     before, limit = refused(), time.monotonic() + PATIENCE
     while refused() == before:
         assert time.monotonic() < limit

@@ -11,6 +11,7 @@ import yaml
 from helpers.mavlink_relay import EXAMPLE, fork_program, free_port
 from helpers.node_processes import PATIENCE, Peer, auv, fresh_domain, parameters, start_node, stop
 from numpy.testing import assert_array_equal
+from std_srvs.srv import SetBool
 
 from auv_analysis.bag.load import load_run, open_bag
 from auv_analysis.cli.main import main
@@ -35,7 +36,8 @@ NEAR = np.array([0.02, 0.02, 0.02, 0.03, 0.03, 0.03])  # m/s and rad/s, of the m
 @pytest.fixture(scope='module')
 def dive(tmp_path_factory):
     """A recorded dive: the folder of its bag, the odometry that was heard."""
-    folder, domain, port = tmp_path_factory.mktemp('dive'), fresh_domain(), free_port()
+    folder, domain = tmp_path_factory.mktemp('dive'), fresh_domain()
+    port = free_port(domain)
     params, scenario = folder / 'params.yaml', folder / 'dive.yaml'
     data = yaml.safe_load((EXAMPLE / 'dive.yaml').read_text())
     data['controllers']['gvc'] |= INTEGRAL
@@ -48,7 +50,7 @@ def dive(tmp_path_factory):
     with ExitStack() as stack:
         peer = Peer(domain)
         stack.callback(peer.close)
-        peer.listen(ODOM, WRENCH)
+        peer.listen(ODOM, WRENCH, topics.DIAGNOSTICS)
         started['recorder_node'] = start_node(
             'recorder_node', domain, *common, *parameters(bag=bag)
         )
@@ -68,7 +70,15 @@ def dive(tmp_path_factory):
             stack.callback(process.kill)
         try:
             peer.until(lambda: peer.heard[WRENCH.name], 'the first wrench')
-            peer.until(lambda: tracks(peer.heard[ODOM.name]), 'the set-point reached')
+
+            def reached() -> bool:
+                heard = peer.heard[topics.DIAGNOSTICS.name]
+                if any('~/arm (' in one.message for array in heard for one in array.status):
+                    heard.clear()  # the machine stood still, and the driver let go
+                    peer.call(SetBool, '/rov/bluerov2_driver/arm', SetBool.Request(data=True))
+                return tracks(peer.heard[ODOM.name])
+
+            peer.until(reached, 'the set-point reached')
         finally:
             codes = {name: stop(process, signal.SIGTERM) for name, process in started.items()}
             print(codes)

@@ -106,17 +106,17 @@ def run_controller(
     path.write_text(text, encoding='utf-8')
     graph.complete_ns, graph.running = -1, False
     supervisor = Supervisor(out / 'logs' / controller, environment(domain), begin)
+    last = COMPOSED if composed else RECORDER
     try:
         for name, package in ({COMPOSED: PACKAGES[RECORDER]} if composed else PACKAGES).items():
             arguments = [*enclave(name), '--params-file', str(path)]
             command = [str(executable(package, name)), *arguments]
             supervisor.start(name, command, observes=name in OBSERVERS)
-        last = COMPOSED if composed else RECORDER
         _start(supervisor, last, graph)
         _follow(supervisor, last, graph, scenario, progress)
         said = supervisor.complaints(COMPOSED if composed else CONTROLLER, CONTROLLER)
     finally:
-        supervisor.stop()
+        supervisor.stop(last)
     if said:
         raise TroubleError(
             f'{controller}: {CONTROLLER}: {said[0]}; see {out / "logs" / controller}'

@@ -118,14 +118,18 @@ def _move_paths(parameters: Path, results: ResultsFolder) -> None:
 
 
 def _refuse_strangers(graph: Any, domain: int) -> None:
+    from auv_dynamics.ros.endpoints import UNNAMED
+
     until = time.monotonic() + DISCOVERY
     strangers: list[str] = []
     while not strangers and time.monotonic() < until:
         graph.spin(0.1)
         strangers = graph.endpoints()
     if strangers:
-        graph.spin(0.5)  # the names of nodes arrive behind their endpoints
-        strangers = graph.endpoints() or strangers
+        named = time.monotonic() + DISCOVERY  # the names of nodes arrive behind their endpoints
+        while any(UNNAMED in one for one in strangers) and time.monotonic() < named:
+            graph.spin(0.1)
+            strangers = graph.endpoints() or strangers
         expected = 'a domain without endpoints on wrench or odom'
         raise InputError(f'{VARIABLE}={domain}', '', expected, ', '.join(strangers))
 

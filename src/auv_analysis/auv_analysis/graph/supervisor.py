@@ -16,7 +16,7 @@ from auv_dynamics.ros.interface import PARENT
 if TYPE_CHECKING:
     from auv_analysis.graph.fork_server import Forked
 
-GRACE = 5.0  # s between SIGTERM and SIGKILL
+GRACE, WRITING = 5.0, 30.0  # s between SIGTERM and SIGKILL, and for the one that writes
 Begin = Callable[..., 'psutil.Popen | Forked']
 
 
@@ -132,19 +132,22 @@ class Supervisor:
                 text += f'\n    {name}: {errors[-1]}'
         return text
 
-    def stop(self) -> dict[str, int]:
+    def stop(self, writes: str = '') -> dict[str, int]:
         """End all that still run: SIGTERM, then SIGKILL; exit codes of all.
 
-        A second Ctrl-C waits until they have ended: nobody would end them else.
+        A second Ctrl-C waits until they have ended: nobody would end them else. The process
+        `writes` has more time than the others: it may have to bring what it knows to a slow disk.
         """
         with undisturbed():
-            running = [p for p in self._processes.values() if p.poll() is None]
-            for process in running:
+            running = {name: p for name, p in self._processes.items() if p.poll() is None}
+            for process in running.values():
                 process.terminate()
-            _, alive = psutil.wait_procs(running, timeout=GRACE)
-            for process in alive:
-                process.kill()
-            psutil.wait_procs(alive, timeout=GRACE)
+            for names, grace in ((running.keys() - {writes}, GRACE), ({writes}, WRITING)):
+                group = [running[name] for name in names & running.keys()]
+                _, alive = psutil.wait_procs(group, timeout=grace)
+                for process in alive:
+                    process.kill()
+                psutil.wait_procs(alive, timeout=GRACE)
         for log in self._outputs.values():
             log.close()
         return self.ended()

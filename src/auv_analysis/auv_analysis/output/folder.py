@@ -14,7 +14,7 @@ from itertools import count
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from auv_analysis.output.new_files import write
+from auv_analysis.output.new_files import UNFINISHED, write
 from auv_analysis.output.progress import say
 from auv_dynamics.files.errors import FailedError, InputError, reason, undisturbed
 
@@ -220,8 +220,8 @@ def _replaceable(
 ) -> dict[str, Signature]:
     """Files of the results that may be replaced; none where the folder is empty."""
     try:
-        if not any(out.iterdir()):
-            return {}
+        if all(fnmatchcase(path.name, f'.*{UNFINISHED}') for path in out.iterdir()):
+            return {}  # or a command was killed at its first file
     except OSError as error:
         found = reason(error)
         raise InputError(out, '--out', 'a folder that can be written', found) from None

@@ -372,7 +372,7 @@ class Session:
             if self._monitor.moves and settled == math.inf:
                 settled = now + SETTLED
             if now >= due:
-                self._show(now, waits=now - begin > PATIENCE)
+                self._show(now, waits=PATIENCE < now - begin < limit)
                 due = max(due + self._period, now)
             if keyboard.ended or (once and now >= settled):
                 break

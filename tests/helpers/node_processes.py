@@ -24,6 +24,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from auv_analysis.graph.domain import is_free
 from auv_dynamics.ros import topics
+from auv_dynamics.ros.endpoints import UNNAMED
 from auv_dynamics.ros.node_main import serve
 from auv_dynamics.ros.security import loopback
 
@@ -151,7 +152,12 @@ class Peer:
             return {node for node in nodes() if f'{node}/get_parameters' in services}
 
         limit = time.monotonic() + patience(1.0)  # a tool has no parameters, and answers nothing
-        self.until(lambda: asked() == nodes() or time.monotonic() > limit)
+        self.until(
+            lambda: (
+                asked() == nodes()
+                or (time.monotonic() > limit and not any(UNNAMED in node for node in nodes()))
+            )
+        )
         for node in asked():
             self.call(GetParameters, f'{node}/get_parameters')
 

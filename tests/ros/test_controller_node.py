@@ -25,7 +25,7 @@ from helpers.patience import patience
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterValue
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from auv_dynamics.files.errors import ENDING
@@ -318,6 +318,7 @@ def test_a_transition_that_does_not_exist_is_survived() -> None:
         peer.until(lambda: state(peer) == 'active', 'activation')
         client = peer.node.create_client(ChangeState, 'controller_node/change_state')
         peer.until(client.service_is_ready)
+        peer.call(GetParameters, 'controller_node/get_parameters')  # then both ends are known
         wrong = Transition(id=Transition.TRANSITION_ACTIVATE)
         client.call_async(ChangeState.Request(transition=wrong))
         peer.spin(patience(0.5))

@@ -204,7 +204,7 @@ def test_a_driver_that_starts_again_with_its_clock_at_zero_is_believed_after_a_p
         driver.until(lambda: newest(peer) < 50 * 10**9, 'an answer in the new time')
         driver.works()
         health = driver.health(lambda h: 'refused odom: stamp went back' in h)
-        assert int(health['refused odom: stamp went back']) >= 2
+        assert int(health['refused odom: stamp went back']) >= 1
 
 
 @pytest.mark.parametrize('jump', [3600, -3600], ids=['forward', 'back'])
@@ -417,6 +417,7 @@ def test_set_points_by_hand_take_little_more_than_holds_the_speed() -> None:
         peer.listen(topics.ODOM, topics.WRENCH)
         odometry, wrenches = peer.heard['odom'], peer.heard['wrench']
         peer.until(lambda: odometry, 'odometry')
+        peer.publish(topics.CMD_VEL, convert.twist(0, (0.5, 0, 0, 0, 0, 0), FRAMES))  # both are met
 
         def now() -> float:
             return interface.nanoseconds(odometry[-1].header.stamp) / 1e9

@@ -16,9 +16,11 @@ from helpers.node_processes import (
 from helpers.nodes_in_process import ns_of, program, state_of
 from helpers.patience import patience
 from numpy.testing import assert_allclose
+from rcl_interfaces.srv import GetParameters
+from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics.nodes.frame_converter_node import FrameConverterNode, mirrored_odometry
 from auv_dynamics.ros import convert, interface, topics
@@ -77,12 +79,17 @@ def run(*, mirrored: bool) -> dict[str, np.ndarray]:
             nodes.append(('frame_converter_node', here))
         plant += ['-p', f'start_after:={waits}'.replace("'", '"')]
         plant += ['-p', f'expected_subscribers:=["odom={2 if mirrored else 3}"]']
+        plant += parameters(start_paused=True)
         nodes += [('plant_node', plant)]
         peer, processes = stack.enter_context(graph(*nodes, domain=domain))
         names = ('plant/odom', 'plant/wrench') if mirrored else ('odom', 'wrench')
         kinds = (topics.ODOM, topics.WRENCH)
         heard = [Topic(n, k.type) for n, k in zip(names, kinds, strict=True)]
         peer.listen(*{topic.name: topic for topic in (*heard, *kinds)}.values())
+        if mirrored:
+            peer.call(GetParameters, 'mirror/get_parameters')  # who answers knows what we hear
+        run = SetBool.Request(data=True)
+        peer.until(lambda: peer.call(SetBool, 'plant_node/run', run).success, 'the start')
         peer.until(lambda: all(len(m) == STEPS + 1 for m in peer.heard.values()), 'all steps')
         peer.until(lambda: processes['plant_node'].poll() is not None, 'the end of the plant')
         assert processes['plant_node'].returncode == 0
@@ -150,6 +157,7 @@ def test_what_is_converted_waits_in_order_for_its_subscribers(lockstep: bool) ->
         assert ns_of(said[-1]) == 0, 'nothing before there is a subscriber'
         made.listen(topics.CMD_VEL)
         made.until(lambda: ns_of(said[-1]) == stamps[-1], 'the last of them')
+        made.until(lambda: len(made.heard['cmd_vel']) >= len(stamps), 'all of them')
         assert [ns_of(m) for m in made.heard['cmd_vel']] == stamps
 
 
@@ -162,6 +170,21 @@ def test_a_twist_in_the_world_frame_is_that_of_the_body_where_the_node_is_told_s
         made.publish(ENU_ODOM, convert.odometry(5, x, ENU))
         (found,) = made.until(lambda: made.heard['odom'], 'converted odometry')
         assert_allclose(state_of(found)[7:], [2.0, -1.0, -0.5, 0.0, 0.0, -0.3], atol=1e-12)
+
+
+def test_a_recorder_of_the_wrench_is_no_driver() -> None:
+    with program() as made:
+        node = made.add(FrameConverterNode, {'lockstep': False})
+        recorder = Node('rosbag2_recorder', context=made.context)
+        try:
+            recorder.create_subscription(ENU_WRENCH.type, ENU_WRENCH.name, print, 1)
+            made.until(node._commanded.get_subscription_count, 'the recorder')
+            made.until(lambda: 'rosbag2_recorder' in node.get_node_names(), 'its name')
+            assert node._untaken() == 'enu_flu/wrench: expected a subscriber, found none'
+            made.listen(ENU_WRENCH)
+            made.until(lambda: not node._untaken(), 'a driver')
+        finally:
+            recorder.destroy_node()
 
 
 @pytest.fixture(scope='module')

@@ -216,6 +216,7 @@ def test_a_value_of_a_type_that_there_is_not_is_refused(kind: type) -> None:
         name = kind.__name__.replace('Set', 'set_').replace('sA', 's_a').replace('_P', '_p')
         client = peer.node.create_client(kind, f'controller_node/{name}')
         peer.until(client.service_is_ready, 'the service')
+        peer.call(GetParameters, 'controller_node/get_parameters')  # then both ends are known
         client.call_async(kind.Request(parameters=[odd]))
         assert asked(peer, 'controller_node')[0]
         code, output = stop(processes['controller_node'])

@@ -13,7 +13,7 @@ from auv_dynamics.ros.participant import Watcher
 from auv_dynamics.ros.security import loopback
 
 CALLS: list[tuple[str, str, Callable[[Watcher], Any]]] = [
-    ('_executor', 'spin_once', lambda graph: (graph._executor.wake(), graph.spin(60.0))),
+    ('_executor', 'spin_once', lambda graph: graph._spin_once(0.1)),
     ('_node', 'get_node_names_and_namespaces', Watcher.nodes),
     ('_node', 'get_topic_names_and_types', Watcher.endpoints),
     ('_run', 'service_is_ready', Watcher.ask_to_run),

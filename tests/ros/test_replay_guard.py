@@ -22,11 +22,12 @@ from auv_dynamics.ros.topics import Topic
 
 ODOM = there(topics.ODOM)
 AS_RECORDED = {'original_names': True, 'commands': True}
+NEVER = '-p', 'expected_subscribers:=["odom=2"]'  # it meets others until it finds what it refuses
 FORCED = {**AS_RECORDED, 'allow_commands_to_foreign': True, 'rate': 0.0}
 
 
 def test_a_foreign_listener_gets_no_command(tmp_path: Path) -> None:
-    with process(made(tmp_path / 'bag'), **AS_RECORDED, rate=0.0) as (peer, replay):
+    with process(made(tmp_path / 'bag'), *NEVER, **AS_RECORDED, rate=0.0) as (peer, replay):
         peer.listen(topics.ODOM, topics.WRENCH, topics.CLOCK)
         assert ended(peer, replay) == 2
         _, output = stop(replay)
@@ -104,7 +105,7 @@ def test_without_commands_a_vehicle_hears_none(tmp_path: Path, root: str) -> Non
 
 
 def test_a_remapping_does_not_smuggle_commands(tmp_path: Path) -> None:
-    remapped = ('-r', 'replay/wrench:=/wrench')
+    remapped = '-r', 'replay/wrench:=/wrench', '-p', 'expected_subscribers:=["odom=1"]'
     with process(made(tmp_path / 'bag'), *remapped, rate=0.0) as (peer, replay):
         peer.listen(topics.WRENCH, ODOM)
         assert ended(peer, replay) == 0
@@ -117,7 +118,7 @@ def test_a_remapping_does_not_smuggle_commands(tmp_path: Path) -> None:
 
 
 def test_there_is_one_clock(tmp_path: Path) -> None:
-    with process(made(tmp_path / 'bag')) as (peer, replay):
+    with process(made(tmp_path / 'bag'), *NEVER) as (peer, replay):
         peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 10)
         peer.listen(ODOM)
         assert ended(peer, replay) == 2

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.node_processes import Peer, assert_one_line, graph, parameters, run_node
 from helpers.patience import patience
+from rcl_interfaces.srv import GetParameters
 
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
@@ -52,7 +53,8 @@ def test_runs_ahead_of_the_odometry_on_its_grid() -> None:
         peer.spin(0.2)
         assert stamps(peer, 'cmd_vel') == [start + k * STEP for k in range(6)]
         peer.publish(topics.ODOM, odometry(start + 2 * STEP))
-        peer.until(lambda: len(peer.heard['cmd_accel']) >= 8, 'two more')
+        both = [peer.heard[name] for name in ('cmd_vel', 'cmd_accel')]
+        peer.until(lambda: min(map(len, both)) >= 8, 'two more')
         assert stamps(peer, 'cmd_vel') == stamps(peer, 'cmd_accel')
     t = np.arange(8) * 0.01
     surge = [m.twist.linear.x for m in peer.heard['cmd_vel']]
@@ -119,17 +121,23 @@ def test_ends_with_its_duration() -> None:
         peer.publish(topics.ODOM, odometry(0))
         peer.until(lambda: len(peer.heard['cmd_vel']) >= 4, 'four set-points')
         peer.publish(topics.ODOM, odometry(3 * STEP))
+        peer.call(GetParameters, 'setpoint_node/get_parameters')  # it has taken what came before
         peer.spin(0.3)
         assert stamps(peer, 'cmd_vel') == [k * STEP for k in range(4)]
 
 
 def test_refuses_odometry_in_another_frame() -> None:
     with graph(('setpoint_node', SURGE)) as (peer, _):
-        peer.listen(topics.CMD_VEL)
-        peer.publish(
-            topics.ODOM, convert.odometry(0, UPRIGHT, Frames(odom='odom', base='base_link'))
-        )
-        peer.spin(0.3)
+        peer.listen(topics.CMD_VEL, topics.DIAGNOSTICS)
+        said = peer.heard[topics.DIAGNOSTICS.name]
+        foreign = convert.odometry(0, UPRIGHT, Frames(odom='odom', base='base_link'))
+
+        def refused() -> bool:
+            peer.publish(topics.ODOM, foreign)
+            peer.spin(0.1)
+            return any('header.frame_id' in one.status[0].message for one in said)
+
+        peer.until(refused, 'the refusal')
         assert not peer.heard['cmd_vel']
 
 

@@ -115,6 +115,7 @@ def test_what_odometry_asks_for_comes_once_its_subscribers_are_there(lockstep: b
         assert by_hand.ns_of(said[-1]) == 0, 'nothing before there is a subscriber'
         made.listen(topics.CMD_VEL)
         made.until(lambda: by_hand.ns_of(said[-1]) == START + 3 * STEP, 'the horizon')
+        made.until(lambda: len(made.heard['cmd_vel']) >= 4, 'all of them')
         found = [by_hand.ns_of(m) for m in made.heard['cmd_vel']]
         assert found == [START + k * STEP for k in range(4)]
         (heard,) = [one for one in made.node.subscriptions if one.topic_name == '/cmd_vel']

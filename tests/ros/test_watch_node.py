@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from helpers.node_processes import PATIENCE, Peer, fresh_domain, graph, parameters
 from helpers.patience import patience
 from rclpy.node import Node
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -181,12 +181,14 @@ def test_nobody_waits_for_it_and_it_does_not_start_a_run() -> None:
     plant = ('plant_node', [*parameters(vehicle='herman2018', lockstep=True), *expected])
     with graph(plant) as (peer, _):
         beside = Ears(peer, peer.context.get_domain_id())
-        others = [('recorder_node', '/auv2'), ('rosbag2_recorder', '/')]
-        strangers = [Node(name, namespace=at, context=peer.context) for name, at in others]
+        last = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # it hears nothing
+        others = [('recorder_node', '/auv2', 10), ('rosbag2_recorder', '/', 10)]
+        others += [('_ros2cli_7', '/', last)]
+        strangers = [Node(name, namespace=at, context=peer.context) for name, at, _ in others]
         try:
-            for stranger in strangers:
-                stranger.create_subscription(topics.ODOM.type, '/odom', print, 10)
-            beside.until(lambda: peer.node.count_subscribers('odom') == 3)
+            for stranger, (_, _, qos) in zip(strangers, others, strict=True):
+                stranger.create_subscription(topics.ODOM.type, '/odom', print, qos)
+            beside.until(lambda: peer.node.count_subscribers('odom') == 4)
             answer = peer.call(Trigger, 'plant_node/ready')
             assert not answer.success
             assert answer.message == 'odom: expected 1 subscribers, found 0'

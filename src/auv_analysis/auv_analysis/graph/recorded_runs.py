@@ -22,7 +22,7 @@ from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.simulate import warm_up
 from auv_dynamics.files.errors import FailedError, InputError
 
-DISCOVERY = 3.0  # s: discovery may take so long
+DISCOVERY = 4.0  # s: what discovery has lost, Fast DDS repeats after 3
 
 
 class FreeGraph(NamedTuple):

@@ -186,7 +186,7 @@ class Player:
         for topic, count in self._plan.expected.items():
             publisher = self._publishers[topic]
             found = publisher.get_subscription_count()
-            found -= onlookers(self._node, publisher.topic_name) if found >= count else 0
+            found -= onlookers(self._node, publisher) if found >= count else 0
             if found < count:
                 return f'{topic}: expected {count} subscribers, found {found}'
         return ''
@@ -303,7 +303,7 @@ class Player:
 
 NAME = 'replay_node'
 DISCOVERY = 1.0  # s in which those who are there already are met
-CAREFUL = 3.0  # s, the same where a vehicle may be among them
+CAREFUL = 4.0  # s, where it may be a vehicle: what was lost of it, Fast DDS repeats after 3 s
 LOOK = 0.1  # s between two looks at the others
 SHOWN = 5  # gaps that are named, the longest ones
 
@@ -317,6 +317,7 @@ class ReplayNode(BulkNode):
         self.plan = p = make_plan(self)
         self.player = Player(self, p)
         careful = p.selection.guarded and not p.settings.allow_commands_to_foreign
+        careful = careful or not {*self.player.alone} <= {interface.CLOCK}
         self._until = time.monotonic() + (CAREFUL if careful else DISCOVERY)
         self._phase: Callable[[float], float] = self._meet
         self.graph.also_ready_when(self.player.waits_for)

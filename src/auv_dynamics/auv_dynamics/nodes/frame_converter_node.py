@@ -15,6 +15,7 @@ from rclpy.qos import QoSProfile
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.codec import KINDS, message_of
+from auv_dynamics.ros.endpoints import acts, hearers, looks_on
 from auv_dynamics.ros.interface import ROS_FRAMES, BadMessageError, Frames, nanoseconds
 from auv_dynamics.ros.node_interface import NodeInterface, steady_timer
 from auv_dynamics.ros.node_main import BulkNode, main_of
@@ -174,7 +175,9 @@ class FrameConverterNode(BulkNode):
             self.graph.latest_ns = nanoseconds(message.header.stamp)
 
     def _untaken(self) -> str:
-        if self._commanded.get_subscription_count():
+        heard_by = hearers(self, self._commanded)
+        idle = sum(looks_on(self, one) or not acts(one) for one in heard_by)
+        if self._commanded.get_subscription_count() > idle:
             return ''
         return f'{_theirs(topics.WRENCH).name}: expected a subscriber, found none'
 

@@ -103,16 +103,30 @@ def why_silent(node: Node, topic: Topic) -> str:
     return f'{name}: expected {expected}, found {other} of {full_name(found[0])}; {remedy}'
 
 
-def onlookers(node: Node, topic: str) -> int:
-    """How many subscriptions of a topic are not of its graph, or may turn out not to be.
+def onlookers(node: Node, publisher: Any) -> int:
+    """How many that hear a publisher are not of its graph, or may turn out not to be.
 
     These are observers, the recorder of another namespace, and tools: `ros2 bag`, `ros2 topic`.
     """
-    found = node.get_subscriptions_info_by_topic(node.resolve_topic_name(topic))
-    return sum(_looks_on(node, one) for one in found)
+    return sum(looks_on(node, one) for one in hearers(node, publisher))
 
 
-def _looks_on(node: Node, endpoint: Any) -> bool:
+def hearers(node: Node, publisher: Any) -> list[Any]:
+    """Subscriptions that a publisher has matched, or is about to."""
+    kind, name = type_name(publisher.msg_type), publisher.topic_name
+    offered = [
+        one.qos_profile for one in node.get_publishers_info_by_topic(name) if is_of(node, one)
+    ]
+    return [
+        one
+        for one in node.get_subscriptions_info_by_topic(name)
+        if one.topic_type == kind
+        and not any(qos_conflict(ours, one.qos_profile) for ours in offered)
+    ]
+
+
+def looks_on(node: Node, endpoint: Any) -> bool:
+    """Whether a subscription is not of the graph of a node, or may turn out not to be."""
     name = endpoint.node_name
     foreign = name == interface.RECORDER and endpoint.node_namespace != node.get_namespace()
     return foreign or name == UNNAMED or observes(endpoint) or name.startswith(TOOLS)

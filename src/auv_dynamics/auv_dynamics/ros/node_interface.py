@@ -297,8 +297,8 @@ class NodeInterface:
         for topic, count in self._expected.items():
             publisher = self.publishers.get(topic)
             found = publisher.get_subscription_count() if publisher else 0
-            if found >= count:  # who only looks on is not waited for, and so is not counted
-                found -= onlookers(self.node, topic)
+            if publisher and found >= count:  # who only looks on is not waited for, nor counted
+                found -= onlookers(self.node, publisher)
             if found < count:
                 return f'{topic}: expected {count} subscribers, found {found}'
         return ''

@@ -202,7 +202,7 @@ TEARDOWN = 4.0  # s to leave the graph, after the last words; then the process e
 MONOTONIC, IN_A_THREAD = 1, 2  # CLOCK_MONOTONIC, SIGEV_THREAD
 SERVE = 0.05  # s of data between two looks at parameters, services and timers
 CALLBACKS = 50  # that are served at each look, at most
-DRAIN = 0.2  # s for what has arrived before the end, at most
+DRAIN, DRAINED = 0.2, 1000  # s or callbacks, what takes longer, for what has arrived before the end
 
 
 def live(makes: Sequence[Callable[[], Any]], args: list[str] | None = None) -> int:
@@ -267,9 +267,11 @@ def _spin(nodes: list[Any], executor: SingleThreadedExecutor, stop: threading.Ev
         for _ in range(CALLBACKS):
             if not serve(nodes[0], executor, 0.0):
                 break
-    until = time.monotonic() + DRAIN  # what has arrived before the end is not lost
-    while data is None and time.monotonic() < until and serve(nodes[0], executor, 0.0):
-        pass
+    until, left = time.monotonic() + DRAIN, DRAINED  # what has arrived before the end is not lost
+    while data is None and (left > 0 or time.monotonic() < until):
+        left -= 1
+        if not serve(nodes[0], executor, 0.0):
+            break
 
 
 def _next_look(nodes: list[Any]) -> float:

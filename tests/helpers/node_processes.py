@@ -25,7 +25,7 @@ from rclpy.signals import SignalHandlerOptions
 from auv_analysis.graph.domain import is_free
 from auv_dynamics.ros import topics
 from auv_dynamics.ros.endpoints import UNNAMED
-from auv_dynamics.ros.node_main import serve
+from auv_dynamics.ros.node_main import serve_all
 from auv_dynamics.ros.security import loopback
 
 PATIENCE = patience(30.0)  # s, after which a test that waits has failed
@@ -176,9 +176,7 @@ class Peer:
         limit = time.monotonic() + seconds
         while (left := limit - time.monotonic()) > 0:
             self.executor.spin_once(timeout_sec=left)
-        for _ in range(1000):  # what has come while this process got no turn
-            if not serve(self.node, self.executor, 0.0):
-                break
+        serve_all(self.node, self.executor, 1000)  # what has come while it got no turn
 
     def call(self, kind: type, name: str, request: Any = None, *, once: bool = False) -> Any:
         """Call a service; `once`: a question that changes something is not asked again."""

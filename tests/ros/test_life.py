@@ -3,13 +3,16 @@
 import math
 import subprocess
 import sys
+import threading
 from typing import Any
 
 import pytest
 from helpers.node_processes import PATIENCE, environment, fresh_domain
 from helpers.nodes_in_process import program
+from helpers.patience import patience
+from rclpy.duration import Duration
 
-from auv_dynamics.ros import node_interface
+from auv_dynamics.ros import node_interface, node_main, topics
 from auv_dynamics.ros.node_main import BulkNode
 
 
@@ -44,6 +47,21 @@ def test_a_teardown_without_end_does_not_change_the_exit_code(code: int) -> None
     command = [sys.executable, '-c', STUCK, str(code)]
     ended = subprocess.run(command, env=environment(fresh_domain()), timeout=PATIENCE, check=False)
     assert ended.returncode == code
+
+
+def test_all_that_has_arrived_before_the_end_is_taken() -> None:
+    stop, taken = threading.Event(), []
+    stop.set()
+    with program() as made:
+        node = made.add(Made, {'lockstep': False})
+        node.create_subscription(topics.WRENCH.type, 'late', taken.append, topics.every_step())
+        says = made.node.create_publisher(topics.WRENCH.type, 'late', topics.every_step())
+        made.until(says.get_subscription_count)
+        for _ in range(30):
+            says.publish(topics.WRENCH.type())
+        assert says.wait_for_all_acked(Duration(seconds=patience(30.0)))
+        node_main._spin([node], made.executor, stop)
+        assert len(taken) == 30
 
 
 @pytest.mark.parametrize(('loud', 'logged'), [(math.inf, [1, 4]), (0.0, [1, 2, 3, 4])])

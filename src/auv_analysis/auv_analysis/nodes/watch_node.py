@@ -21,14 +21,13 @@ from auv_dynamics.ros import interface, topics
 from auv_dynamics.ros.codec import KINDS, Codec, first_stamp, message_of
 from auv_dynamics.ros.endpoints import endpoints
 from auv_dynamics.ros.interface import BadMessageError, Frames
-from auv_dynamics.ros.node_main import BulkNode, serve
+from auv_dynamics.ros.node_main import BulkNode, serve_all
 from auv_dynamics.ros.participant import Participant
 from auv_dynamics.ros.rclpy_internals import has_data_path
 
 DEPTH = 256  # messages of a topic between two looks; of more, the oldest are dropped
 LOOK = 0.5  # s between two looks at who is there
 SERVED = 2000  # callbacks at each look, at most; only a plain executor brings messages as well
-BRIEF = 0.001  # s: without any patience it brings one message of each topic, however many wait
 
 
 class WatchNode(BulkNode):
@@ -174,16 +173,11 @@ class Listener(Participant):
         self._node.take()
         now = time.monotonic()
         if not self._node.bulk:
-            self._serve(BRIEF)
+            serve_all(self._node, self._executor, SERVED)
         if now - self._looked > LOOK:
             self._looked = now
-            self._serve(0.0)
+            serve_all(self._node, self._executor, SERVED)
             self._node.look()
-
-    def _serve(self, timeout: float) -> None:
-        for _ in range(SERVED):
-            if not serve(self._node, self._executor, timeout):
-                break
 
     def elsewhere(self) -> list[str]:
         """Other namespaces in which odometry is published."""

@@ -64,10 +64,12 @@ def parameters(count: int, seed: int) -> Any:
     from helpers.node_processes import environment, fresh_domain
     from start_up import originals, try_parameters
 
+    from auv_analysis.graph.domain import ports
+
     domain = fresh_domain()
     os.environ.update(environment(domain))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as kept:
-        kept.bind(('127.0.0.1', 7400 + 250 * domain + 28))  # so it is free for no other target
+        kept.bind(('127.0.0.1', ports(domain)[-1]))  # so it is free for no other target
         return structured(try_parameters, originals(), count, seed)
 
 

@@ -17,7 +17,6 @@ from auv_analysis.doctor.checks import Finding
 
 FIRST, SECOND, LOOKING = 'auv_doctor_first', 'auv_doctor_second', 'auv_doctor'
 PATIENCE = 10.0  # s for two participants to find each other; they take 0.2
-LOOKS = 4.0  # s at who is in a domain: Fast DDS repeats an announcement that was lost after 3
 STARTS = 30.0  # s for a process to load the middleware, on a busy machine
 LOOPBACK = Path('/sys/class/net/lo')
 MULTICAST = 0x1000  # IFF_MULTICAST
@@ -67,7 +66,7 @@ def _what_to_do(why: str) -> str:
 
 def peers() -> Iterator[Finding]:
     """Who is in the domain that commands join here."""
-    from auv_analysis.graph.domain import VARIABLE, joined_domain
+    from auv_analysis.graph.domain import ANNOUNCED, VARIABLE, joined_domain
     from auv_dynamics.files.errors import InputError
     from auv_dynamics.ros.security import RANGE, loopback
 
@@ -76,7 +75,7 @@ def peers() -> Iterator[Finding]:
     except InputError:
         return  # said elsewhere
     local = {} if os.environ.get(RANGE) else loopback()
-    answer = _answer(_start(domain, LOOKING, '', LOOKS, local))
+    answer = _answer(_start(domain, LOOKING, '', ANNOUNCED, local))
     if 'why' in answer:
         return  # said of discovery
     nodes = answer['seen']

@@ -15,6 +15,9 @@ from auv_dynamics.ros.security import HERE, RANGE, stay_local
 LARGEST = 101  # above it, DDS ports fall into the range that the system hands out
 VARIABLE = 'ROS_DOMAIN_ID'
 PARTICIPANTS = 10  # of a graph that is looked for
+ANNOUNCED = (
+    4.0  # s in which others are found: Fast DDS repeats an announcement that was lost after 3
+)
 
 
 def chosen_domain(option: int | str | None) -> tuple[int, bool]:
@@ -94,11 +97,16 @@ def _checked(value: object, name: str) -> int:
 
 
 def is_free(domain: int) -> bool:
-    """Whether the ports of a domain's first participants are unused (DDSI-RTPS 9.6.1.1).
+    """Whether the ports of a domain's first participants are unused.
 
     The very first one may have left before the others.
     """
-    return all(_is_unused(7400 + 250 * domain + 10 + 2 * i) for i in range(PARTICIPANTS))
+    return all(map(_is_unused, ports(domain)))
+
+
+def ports(domain: int) -> list[int]:
+    """UDP ports of a domain's first participants (DDSI-RTPS 9.6.1.1)."""
+    return [7400 + 250 * domain + 10 + 2 * i for i in range(PARTICIPANTS)]
 
 
 def _is_unused(port: int) -> bool:

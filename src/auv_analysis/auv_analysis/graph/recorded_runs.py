@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from rich.progress import Progress, TaskID
 
 from auv_analysis.bag.load import open_bag
-from auv_analysis.graph.domain import VARIABLE
+from auv_analysis.graph.domain import ANNOUNCED, VARIABLE
 from auv_analysis.graph.experiment import MODULES, environment, run_controller
 from auv_analysis.graph.fork_server import ForkServer
 from auv_analysis.graph.supervisor import Begin, NodeDiedError, TroubleError
@@ -21,8 +21,6 @@ from auv_analysis.runs.run import AnyRun
 from auv_analysis.scenario.scenario import Scenario
 from auv_analysis.simulation.simulate import warm_up
 from auv_dynamics.files.errors import FailedError, InputError
-
-DISCOVERY = 4.0  # s: what discovery has lost, Fast DDS repeats after 3
 
 
 class FreeGraph(NamedTuple):
@@ -120,13 +118,13 @@ def _move_paths(parameters: Path, results: ResultsFolder) -> None:
 def _refuse_strangers(graph: Any, domain: int) -> None:
     from auv_dynamics.ros.endpoints import UNNAMED
 
-    until = time.monotonic() + DISCOVERY
+    until = time.monotonic() + ANNOUNCED
     strangers: list[str] = []
     while not strangers and time.monotonic() < until:
         graph.spin(0.1)
         strangers = graph.endpoints()
     if strangers:
-        named = time.monotonic() + DISCOVERY  # the names of nodes arrive behind their endpoints
+        named = time.monotonic() + ANNOUNCED  # the names of nodes arrive behind their endpoints
         while any(UNNAMED in one for one in strangers) and time.monotonic() < named:
             graph.spin(0.1)
             strangers = graph.endpoints() or strangers

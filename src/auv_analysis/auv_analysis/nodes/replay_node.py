@@ -13,6 +13,7 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag.step_topics import ODOMETRY
+from auv_analysis.graph.domain import ANNOUNCED
 from auv_analysis.nodes.replay_publishers import (
     Answers,
     CommandGuard,
@@ -302,8 +303,7 @@ class Player:
 
 
 NAME = 'replay_node'
-DISCOVERY = 1.0  # s in which those who are there already are met
-CAREFUL = 4.0  # s, where it may be a vehicle: what was lost of it, Fast DDS repeats after 3 s
+DISCOVERY = 1.0  # s in which those who are there are met, where no vehicle may be among them
 LOOK = 0.1  # s between two looks at the others
 SHOWN = 5  # gaps that are named, the longest ones
 
@@ -316,9 +316,9 @@ class ReplayNode(BulkNode):
         self.graph = NodeInterface(self, barrier=False)
         self.plan = p = make_plan(self)
         self.player = Player(self, p)
-        careful = p.selection.guarded and not p.settings.allow_commands_to_foreign
-        careful = careful or not {*self.player.alone} <= {interface.CLOCK}
-        self._until = time.monotonic() + (CAREFUL if careful else DISCOVERY)
+        commands = p.selection.guarded and not p.settings.allow_commands_to_foreign
+        odometry = self.player.alone.keys() - {interface.CLOCK}
+        self._until = time.monotonic() + (ANNOUNCED if commands or odometry else DISCOVERY)
         self._phase: Callable[[float], float] = self._meet
         self.graph.also_ready_when(self.player.waits_for)
         self.create_service(SetBool, '~/run', self._on_run)

@@ -172,11 +172,11 @@ class Listener(Participant):
         """Take what has come, and look now and then who is there."""
         self._node.take()
         now = time.monotonic()
-        if not self._node.bulk:
+        looks = now - self._looked > LOOK
+        if looks or not self._node.bulk:
             serve_all(self._node, self._executor, SERVED)
-        if now - self._looked > LOOK:
+        if looks:
             self._looked = now
-            serve_all(self._node, self._executor, SERVED)
             self._node.look()
 
     def elsewhere(self) -> list[str]:

@@ -303,8 +303,10 @@ def serve_all(node: Any, executor: SingleThreadedExecutor, most: int) -> None:
     """
     idle = 0
     while idle < 2 and most > 0:
-        ready = serve(node, executor, 0.0)
-        idle, most = 0 if ready else idle + 1, most - ready
+        if serve(node, executor, 0.0):
+            idle, most = 0, most - 1
+        else:
+            idle += 1
 
 
 def _close(nodes: list[Any]) -> int:

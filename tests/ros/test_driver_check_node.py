@@ -279,6 +279,7 @@ def test_with_another_commander_nothing_is_sent(domain: int) -> None:
         peer.until(known, 'the other commander')
         settings = Settings(timeout=patience(4.0), actuates=True)
         found = judge(DriverRecord(client.graph('here'), client.log(0), settings), PASSIVE)
+        assert client.others() == ['/test_peer']
         assert 'wrench_publishers' in refusal(found)  # and whatever a busy machine adds
     finally:
         client.close()

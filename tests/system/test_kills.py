@@ -80,8 +80,9 @@ def killed(folder: Path, kill: Kill) -> tuple[float, Process, Progress]:
         victim = victim or nodes(out).get(kill.name)
         progress.peer.spin(0.02)
     progress.peer.spin(kill.after)
+    when = time.monotonic()  # before it: the machine may stand still behind it
     victim.kill()
-    return (progress.times or [time.monotonic()])[-1], process, progress
+    return when, process, progress
 
 
 def check_kill(folder: Path, kill: Kill, *options: str) -> str:

@@ -24,14 +24,16 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     from auv_analysis.output.folder import results_folder
     from auv_analysis.output.progress import TextConsole, waiting
     from auv_analysis.report.plots import save_figures
-    from auv_analysis.studies.identify.identify import judged
+    from auv_analysis.studies.identify.identify import HISTORY, compared
     from auv_analysis.studies.identify.plots import prediction
+    from auv_analysis.studies.identify.prediction import held_of
     from auv_analysis.studies.identify.report import narrow, prediction_results
 
     vehicle, training, held, notes, inputs, out = read(options, 'predict')
     with results_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with waiting('predicting'):
-            rows = judged(vehicle, training, held, options.lag, options.delay)
+            late = {'lag': options.lag, 'delay': options.delay}
+            rows = compared(training, held_of(held, HISTORY), vehicle, **late)
         results = prediction_results(vehicle.name, held, rows, notes)
         results.write(folder.folder)
         save_figures(folder.folder / 'figures', {'prediction': lambda: prediction(rows)})

@@ -430,8 +430,6 @@ class ReplayNode(BulkNode):
     def _on_parameters(self, changed: list[Parameter]) -> SetParametersResult:
         for parameter in changed:
             if parameter.name == 'rate':
-                if not math.isfinite(parameter.value):
-                    return SetParametersResult(successful=False, reason='rate: not finite')
                 self.player.change_rate(float(parameter.value))
         return SetParametersResult(successful=True)
 

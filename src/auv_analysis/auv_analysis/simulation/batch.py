@@ -4,7 +4,7 @@ import re
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache, partial
@@ -83,14 +83,13 @@ class Batch:
         return len(self.x)
 
 
-def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) -> Any:
+def run_batch(batch: Batch, threads: int = 1) -> Any:
     """Run all loops of a batch.
 
     Parameters
     ----------
     batch : Batch; the figures of a vehicle do not depend, bit for bit, on the others in it
     threads : how many to use
-    executor : of threads, to be used in place of own ones
 
     Returns
     -------
@@ -99,11 +98,9 @@ def run_batch(batch: Batch, threads: int = 1, executor: Executor | None = None) 
     """
     job = _job(batch, kernel_of(batch))
     parts = _parts(len(job.record.outside), job.kernel.lanes, threads, own=batch.shared is None)
-    if executor is None and (threads == 1 or len(parts) == 1):
+    if threads == 1 or len(parts) == 1:
         for part in each(parts, len(parts)):
             _run_part(job, part)
-    elif executor is not None:
-        list(executor.map(partial(_run_part, job), parts))
     else:
         with ThreadPoolExecutor(threads) as pool:
             list(each(pool.map(partial(_run_part, job), parts), len(parts)))

@@ -18,7 +18,7 @@ from auv_analysis.studies.design.prediction import (
     Objective,
     Prediction,
     RecordedMotion,
-    acceleration,
+    accelerations,
     effort_of,
     score,
     shares_of,
@@ -26,7 +26,6 @@ from auv_analysis.studies.design.prediction import (
     smooth_peak,
 )
 from auv_analysis.studies.design.setting import changed_data
-from auv_dynamics.vehicle.kinematics import quaternion, rotation
 from auv_dynamics.vehicle.vehicle_file import vehicle_from_dict
 from auv_gvc_controller.laws.model import decompose, inverse_upper
 
@@ -60,8 +59,7 @@ def test_the_input_is_that_of_inverse_dynamics(prediction, unit):
     vehicle = vehicle_from_dict(changed_data(space, x), 'x')
     where = np.array([0, 1, 17, 150, 300])
     part = run.part(where)
-    down = rotation(quaternion(part.eta[:, 3:]))[:, 2]
-    nu_dot = acceleration(part, down)
+    nu_dot = accelerations(part)
     motion = RecordedMotion.of(part, np.zeros_like(predicted.motion.row))
     assert len(motion.nu) == len(where)
     expected = [
@@ -77,10 +75,9 @@ def test_the_acceleration_is_that_of_the_plant(prediction, lift):
     _, run = prediction
     run = replace(run, vehicle=replace(run.vehicle, lift=lift))
     part = run.part(slice(0, None, 50))
-    down = rotation(quaternion(part.eta[:, 3:]))[:, 2]
     samples = zip(part.eta, part.nu, part.tau, part.disturbance, strict=True)
     expected = np.array([run.vehicle.forward_dynamics(*sample) for sample in samples])
-    assert_allclose(acceleration(part, down), expected, atol=1e-9 * np.abs(expected).max())
+    assert_allclose(accelerations(part), expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_the_unchanged_vehicle_is_predicted_as_it_was(prediction):

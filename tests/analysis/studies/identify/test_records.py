@@ -17,8 +17,8 @@ from auv_analysis.studies.identify.identify import (
     _trusting,
     as_filed,
     check_motion,
+    compared,
     identify,
-    judged,
     split,
 )
 from auv_analysis.studies.identify.output_error import delayed, on_steps
@@ -266,6 +266,6 @@ def test_a_vehicle_as_filed_acts_behind_the_lag_and_the_delay_that_are_given(her
     found = u.coefficients(theta)
     assert (found.lag, found.delay) == (0.2, 0.06)
     errors = predict('x', held_of([part], HISTORY), vehicle, u, theta).errors[:, 0, :3]
-    first, *_ = judged(vehicle, [part], [part], 0.2, 0.06)
+    first, *_ = compared([part], held_of([part], HISTORY), vehicle, lag=0.2, delay=0.06)
     assert first['predictor'] == 'herman2018'
     assert first['linear'] == pytest.approx(np.sqrt((errors**2).sum(axis=1).mean()))

@@ -15,8 +15,10 @@ from auv_analysis.runs.run import Run
 from auv_analysis.studies.design.change import UPPER, WIDTH, ChangeEffect, ChangeSpace
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.nearest import one_of
+from auv_dynamics.kernel.compile import plain
 from auv_dynamics.vehicle import DOFS
 from auv_dynamics.vehicle.kinematics import quaternion, rotation
+from auv_dynamics.vehicle.model import acceleration
 from auv_dynamics.vehicle.vehicle import Vehicle
 from auv_gvc_controller.laws.model import control_model, decompose, inverse_upper
 
@@ -158,7 +160,7 @@ class RecordedMotion:
         where = _samples(run)
         part = run.part(where)
         down = rotation(quaternion(part.eta[:, 3:]))[:, 2]
-        nu_dot = acceleration(part, down)
+        nu_dot = accelerations(part)
         columns = [added_wrench(_unit(k), part.nu, nu_dot, down).ravel() for k in range(WIDTH)]
         weights = _weights(where, len(run.t))
         return cls(part.nu, part.tau, np.stack(columns, axis=-1), np.asarray(row), weights)
@@ -196,19 +198,11 @@ def added_wrench(
     return dtau
 
 
-def acceleration(run: Run, down: np.ndarray) -> np.ndarray:
+def accelerations(run: Run) -> np.ndarray:
     """nu_dot (n, 6) of a run's samples by (1), with the wrench that was applied."""
-    vehicle, nu = run.vehicle, run.nu
-    couple = vehicle.weight * vehicle.r_G - vehicle.buoyancy * vehicle.r_B
-    whole = ChangeEffect(vehicle.M, couple, np.zeros(6))
-    rest = run.tau_applied - added_wrench(whole, nu, np.zeros_like(nu), down)
-    rest -= nu @ vehicle.D_linear.T + (np.abs(nu) * nu) @ vehicle.D_quadratic.T
-    if vehicle.lift is not None:
-        rest -= (np.abs(nu[:, :1]) * nu) @ vehicle.lift.T
-    rest[:, :3] += (vehicle.weight - vehicle.buoyancy) * down
-    if run.disturbance is not None:
-        rest -= run.disturbance
-    return np.linalg.solve(vehicle.M, rest.T).T
+    F = np.zeros_like(run.nu) if run.disturbance is None else run.disturbance
+    columns = (tuple(rows.T) for rows in (quaternion(run.eta[:, 3:]), run.nu, run.tau_applied, F))
+    return np.stack(plain(acceleration)(run.vehicle.model, *columns), axis=1)
 
 
 def _unit(k: int) -> ChangeEffect:

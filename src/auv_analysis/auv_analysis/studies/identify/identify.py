@@ -225,38 +225,25 @@ def _search(
     return final, problem(length / 2, gain), _with_best_delay(final, u, theta, late, PLAUSIBLE)
 
 
-def judged(
-    vehicle: Vehicle,
-    training: Sequence[Record],
-    held: Sequence[Record],
-    lag: float = 0.0,
-    delay: float = 0.0,
-) -> list[dict[str, Any]]:
-    """How well a vehicle as filed predicts recordings, beside persistence and a black box.
-
-    Parameters
-    ----------
-    vehicle : whose errors the others' are compared with
-    training, held : what the black box learns from, and what is predicted
-    lag, delay : of the actuators, s
-
-    Returns
-    -------
-    rows : of `prediction.compare`
-
-    """
-    return compared(training, held_of(held, HISTORY), vehicle, None, lag, delay)
-
-
 def compared(
     training: Sequence[Record],
     moments: Held,
     vehicle: Vehicle,
-    model: tuple[Unknowns, np.ndarray] | None,
+    model: tuple[Unknowns, np.ndarray] | None = None,
     lag: float = 0.0,
     delay: float = 0.0,
 ) -> list[dict[str, Any]]:
-    """Rows of `compare`: the new model, where there is one, the vehicle as filed, the others."""
+    """Rows of `compare`: the new model, where there is one, the vehicle as filed, the others.
+
+    Parameters
+    ----------
+    training : what the black box learns from
+    moments : what is predicted
+    vehicle : whose errors the others' are compared with
+    model : the new one
+    lag, delay : of the actuators of the vehicle as filed, s
+
+    """
     if not moments.count:
         return []
     predictors = [predict('new', moments, vehicle, *model)] if model else []

@@ -26,6 +26,7 @@ from helpers.report_pages import value_of
 from matplotlib.figure import Figure
 
 from auv_analysis.driver.evidence import CheckResult
+from auv_analysis.output.folder import MANIFEST, listed_in, paths_in
 from auv_analysis.report import document, panels, plots, results
 
 APPROVE = 'AUV_GVC_APPROVE' in os.environ and 'CI' not in os.environ
@@ -129,11 +130,10 @@ class Approved:
         """Lines to approve beside, such as what is printed; they may be made later."""
         self._told.append(lines)
 
-    def folder(self, folder: Path, *, panels: bool = False, tie: str = '') -> None:
-        """What is in a folder: page, figures, composed by `artists.captured`, and documents.
-
-        Of rows that begin with `tie` no more than that: chance decides the rest.
-        """
+    def folder(self, folder: Path, *, panels: bool = False) -> None:
+        """What is in a folder: page, figures, composed by `artists.captured`, and documents."""
+        listed = listed_in(folder)  # else it could not be replaced
+        assert listed is None or {*paths_in(folder)} <= {*listed, MANIFEST}
         page, lines = folder / 'report.html', list[str]()
         if page.exists():
             lines += shown.page_lines(page.read_text(encoding='utf-8'), panels=panels)
@@ -144,7 +144,7 @@ class Approved:
                 lines += [path.name, *shown.document_lines(json.loads(path.read_text()))]
         for path in sorted(folder.glob('*.parquet')):
             lines += shown.parquet_lines(path)
-        self._pages += [tie if tie and one.startswith(tie) else one for one in lines]
+        self._pages += lines
 
     def lines(self) -> Iterator[str]:
         """The pages, else all that was made, in this order; then what was added."""

@@ -10,6 +10,7 @@ from helpers.artists import captured
 from helpers.browser import Watched, chromium
 
 from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.output import parallel
 from auv_analysis.report import results
 from auv_analysis.report.run_report import write_report
 from auv_analysis.runs.run import Run
@@ -27,6 +28,14 @@ def known_columns() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(results, '_arrow', checked)
+        yield
+
+
+@pytest.fixture(scope='session', autouse=True)
+def no_copy() -> Iterator[None]:
+    """Commands share no work with a copy of this process: other tests run on the other core."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(parallel, '_two_cores', lambda: False)
         yield
 
 

@@ -20,12 +20,15 @@ VEHICLE, GROUND = (1, 1), (255, 190)
 Sent = tuple[int, tuple[int, int], Any]  # us since 1970, sender, message
 
 
-def write_tlog(path: Path, sent: Iterable[Sent], version: int = 2) -> Path:
+def write_tlog(path: Path, sent: Iterable[Sent], version: int = 2, *, signed: bool = False) -> Path:
     """Write messages as a ground station does, in their order, by a version of MAVLink."""
     writers: dict[tuple[int, int], Any] = {}
     with path.open('wb') as file:
         for time, sender, message in sent:
             writer = writers.setdefault(sender, mavlink.MAVLink(None, *sender))
+            if signed:
+                writer.signing.secret_key, writer.signing.sign_outgoing = b'x' * 32, True
+                writer.signing.timestamp = 1
             packed = message.pack(writer, force_mavlink1=version == 1)
             file.write(struct.pack('>Q', time) + packed)
             writer.seq = (writer.seq + 1) % 256

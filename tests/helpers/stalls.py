@@ -29,11 +29,18 @@ class Pauses(threading.Thread):
 PAUSES = Pauses()
 
 
-def undisturbed(attempt: Callable[[], Found], as_promised: Callable[[Found], bool]) -> Found:
-    """What an attempt finds: the first that is as promised, or during which nothing stood still."""
+def undisturbed(
+    attempt: Callable[[], Found],
+    as_promised: Callable[[Found], bool],
+    stalled: Callable[[Found], bool] = lambda _: False,
+) -> Found:
+    """What an attempt finds: the first that is as promised, or during which nothing stood still.
+
+    `stalled` says of what was found whether it shows that another process stood still.
+    """
     found = attempt()
     for _ in range(TRIES - 1):
-        if as_promised(found) or PAUSES.longest <= PAUSE:
+        if as_promised(found) or not (PAUSES.longest > PAUSE or stalled(found)):
             break
         PAUSES.longest = 0.0
         found = attempt()

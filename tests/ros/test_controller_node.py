@@ -166,9 +166,11 @@ def test_an_incompatible_publisher_is_heard(lockstep) -> None:
     said = peer.heard[topics.DIAGNOSTICS.name]
     peer.until(lambda: said, 'diagnostics')
     weak = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-    peer.node.create_publisher(topics.ODOM.type, 'odom', weak)
+    made = peer.node.create_publisher(topics.ODOM.type, 'odom', weak)
     peer.until(lambda: 'odom: incompatible QoS' in said[-1].status[0].message, 'the report')
     assert 'reliability' in said[-1].status[0].message
+    peer.node.destroy_publisher(made)
+    peer.until(lambda: 'incompatible' not in said[-1].status[0].message, 'the end of it')
     _, output = stop(process)
     assert 'odom: incompatible QoS' in output
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from helpers.node_processes import (
     CONTROLLER,
+    PATIENCE,
     Peer,
     change,
     environment,
@@ -410,7 +411,7 @@ def test_set_points_by_hand_take_little_more_than_holds_the_speed() -> None:
     law = [word.replace('herman2018', 'herman2018_neutral') for word in CONTROLLER]
     # feedback too weak to add to it after a pause of plant or controller, whose wrench is then held
     law += parameters(gains__k_D='[3.0]', gains__k_I='[0.0]', gains__Lambda='[1e-9]')
-    law += parameters(gains__Gamma='[0.0]', use_sim_time=True)
+    law += parameters(gains__Gamma='[0.0]', use_sim_time=True, setpoint_timeout=patience(0.5))
     with graph(
         ('plant_node', parameters(vehicle='herman2018_neutral')), ('controller_node', law)
     ) as (peer, _):
@@ -424,7 +425,9 @@ def test_set_points_by_hand_take_little_more_than_holds_the_speed() -> None:
 
         for steps in STEPS.values():
             begin, left, surge, sent = now(), dict(steps), 0.5, 0.0
-            while now() < begin + 1.2:
+            limit = time.monotonic() + PATIENCE
+            while now() < begin + 1.2 or abs(odometry[-1].twist.twist.linear.x - 0.5) > 0.1:
+                assert time.monotonic() < limit, 'the speed'
                 due = [left.pop(at) for at in [*left] if begin + at <= now()]
                 surge = due[-1] if due else surge
                 for value in due or [surge] * (now() >= sent + 0.1):
@@ -432,7 +435,6 @@ def test_set_points_by_hand_take_little_more_than_holds_the_speed() -> None:
                     command = convert.twist(round(sent * 1e9), (value, 0, 0, 0, 0, 0), FRAMES)
                     peer.publish(topics.CMD_VEL, command)
                 peer.spin(0.01)
-        peer.until(lambda: abs(odometry[-1].twist.twist.linear.x - 0.5) < 0.1, 'the speed')
     assert max(abs(message.wrench.force.x) for message in wrenches) < 200.0  # 60 N hold 0.5 m/s
 
 

@@ -27,7 +27,7 @@ from auv_analysis.driver.evidence import (
     DriverRecord,
     Settings,
 )
-from auv_analysis.nodes.driver_check_node import COMMANDER, RosDriverClient
+from auv_analysis.nodes.driver_check_node import COMMANDER, RosDriverClient, _arrived
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
 
@@ -53,6 +53,10 @@ def domain() -> Iterator[int]:
     finally:
         process.kill()
         process.communicate(timeout=PATIENCE)
+
+
+def test_ages_are_told_by_the_clock_of_this_machine() -> None:
+    assert _arrived({'source_timestamp': 3, 'received_timestamp': 7}) == 7
 
 
 @pytest.fixture(scope='module')

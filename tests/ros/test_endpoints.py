@@ -142,6 +142,16 @@ def test_a_second_publisher_is_an_error_where_it_would_be_obeyed_as_well() -> No
         )
 
 
+def test_two_clocks_are_an_error_of_who_follows_one() -> None:
+    with program() as made:
+        node = made.add(SetpointNode, {'use_sim_time': True})
+        for _ in range(2):
+            made.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 1)
+        made.until(lambda: made.node.count_publishers('/clock') == 2, 'both')
+        crowd = '/clock: expected one publisher, found /test_peer, /test_peer'
+        made.until(lambda: node.graph._crowd()[1] == crowd, 'an error')
+
+
 def test_whoever_is_in_the_loop_is_waited_for() -> None:
     loop = {PlantNode, ControllerNode, FrameConverterNode}
     assert {make for make, *_ in CASES if make.latency_critical} == loop

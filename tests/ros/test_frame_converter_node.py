@@ -22,6 +22,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from std_srvs.srv import SetBool, Trigger
 
+from auv_dynamics.nodes import frame_converter_node
 from auv_dynamics.nodes.frame_converter_node import FrameConverterNode, mirrored_odometry
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
@@ -172,14 +173,24 @@ def test_a_twist_in_the_world_frame_is_that_of_the_body_where_the_node_is_told_s
         assert_allclose(state_of(found)[7:], [2.0, -1.0, -0.5, 0.0, 0.0, -0.3], atol=1e-12)
 
 
-def test_a_recorder_of_the_wrench_is_no_driver() -> None:
+def test_what_arrives_is_passed_on_at_once(monkeypatch) -> None:
+    monkeypatch.setattr(frame_converter_node, 'steady_timer', lambda *_: None)
+    with program() as made:
+        made.add(FrameConverterNode, {'lockstep': False})
+        made.listen(topics.CMD_VEL)
+        made.publish(ENU_CMD_VEL, convert.twist(7, [0.1] * 6, ENU))
+        made.until(lambda: made.heard['cmd_vel'], 'a converted set-point')
+
+
+@pytest.mark.parametrize('name', ['rosbag2_recorder', interface.RECORDER])
+def test_a_recorder_of_the_wrench_is_no_driver(name: str) -> None:
     with program() as made:
         node = made.add(FrameConverterNode, {'lockstep': False})
-        recorder = Node('rosbag2_recorder', context=made.context)
+        recorder = Node(name, context=made.context)
         try:
             recorder.create_subscription(ENU_WRENCH.type, ENU_WRENCH.name, print, 1)
             made.until(node._commanded.get_subscription_count, 'the recorder')
-            made.until(lambda: 'rosbag2_recorder' in node.get_node_names(), 'its name')
+            made.until(lambda: name in node.get_node_names(), 'its name')
             assert node._untaken() == 'enu_flu/wrench: expected a subscriber, found none'
             made.listen(ENU_WRENCH)
             made.until(lambda: not node._untaken(), 'a driver')

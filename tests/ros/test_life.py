@@ -98,3 +98,6 @@ def test_what_lasts_is_logged_once_and_then_every_ten_seconds(monkeypatch) -> No
     lasting.see(node_interface.ERROR, 'too short')
     lasting.see(node_interface.OK, '')
     assert len(said) == 4
+    for now in (130, 131):
+        lasting.see(node_interface.ERROR, f'two of them for {now - 130} s')
+    assert said[4:] == [('error', 'two of them for 1 s')], 'which `auv run` repeats'

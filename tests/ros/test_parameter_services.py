@@ -198,6 +198,8 @@ def test_a_range_may_have_an_upper_end_alone() -> None:
         (ControllerNode, {'limits.wrench': [1.0, float('nan')]}, 'finite numbers'),
         (ControllerNode, {'setpoint_pairing': 'last'}, 'one of exact, latest'),
         (ControllerNode, {'rampe': 1.0}, '(nearest: ramp)'),
+        (ControllerNode, {'expected_subscribers': ['wrnch=1']}, '(nearest: wrench)'),
+        (ControllerNode, {'expected_subscribers': ['wrench=x']}, 'topic=count'),
     ],
 )
 def test_what_is_refused_is_told_by_name(kind, given, expected: str) -> None:

@@ -1,14 +1,17 @@
 """Signals while a program takes part in a graph: they wait until rclpy has done what it does."""
 
 import signal
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from helpers.node_processes import fresh_domain
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from helpers.node_processes import PATIENCE, Peer, fresh_domain
 from rclpy.node import Node
 
 from auv_dynamics.files.errors import on_signals
+from auv_dynamics.ros import topics
 from auv_dynamics.ros.participant import Watcher
 from auv_dynamics.ros.security import loopback
 
@@ -33,6 +36,31 @@ def graph(domain: int) -> Iterator[Watcher]:
     made = Watcher(domain)
     yield made
     made._context.try_shutdown()
+
+
+@pytest.fixture
+def peer(graph: Watcher) -> Iterator[Peer]:
+    made = Peer(graph._context.get_domain_id())
+    yield made
+    made.close()
+
+
+def until(graph: Watcher, done: Callable[[], bool]) -> None:
+    limit = time.monotonic() + PATIENCE
+    while not done():
+        assert time.monotonic() < limit
+        graph.spin(0.05)
+
+
+def test_who_hears_the_wrench_is_another_vehicle(graph: Watcher, peer: Peer) -> None:
+    peer.node.create_subscription(topics.WRENCH.type, '/auv1/wrench', print, 1)
+    until(graph, lambda: graph.endpoints() == ['test_peer on /auv1/wrench'])
+
+
+def test_who_says_how_it_is_lives(graph: Watcher, peer: Peer) -> None:
+    said = DiagnosticArray(status=[DiagnosticStatus(name='/plant_node')])
+    peer.publish(topics.DIAGNOSTICS, said)
+    until(graph, lambda: graph.alive == {'plant_node'})
 
 
 def interrupted(inner: Callable[..., Any], ended: list[str]) -> Callable[..., Any]:

@@ -94,16 +94,19 @@ def test_real_time_withholds_odometry_and_ignores_wrenches() -> None:
 
 
 def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.ndarray]:
-    """Steps of truth and odometry and the applied surge force, answering step k with k + 1 N."""
+    """Steps of truth and odometry and the applied surge force, answering step k with k + 1 N.
+
+    The twist has the stamps of the odometry.
+    """
     given = faults(
         gone={'kind': 'sensor_drop_out', '_from': 0.3, 'to': 0.5},
         late={'kind': 'sensor_delay', 'delay': 0.2, '_from': 0.6, 'to': 1.0},
         mute={'kind': 'wrench_loss', '_from': 1.2, 'to': heard_again * 0.01},
     )
     plant = parameters(vehicle='herman2018', duration=last * 0.01, wrench_timeout=patience(0.5))
-    ready = ['-p', 'expected_subscribers:=["odom=2", "wrench_applied=1", "ground_truth/odom=1"]']
-    with graph((PLANT, [*plant, *ready, *given])) as (peer, _):
-        peer.listen(*HEARD)
+    ready = 'expected_subscribers:=["odom=2","twist=1","wrench_applied=1","ground_truth/odom=1"]'
+    with graph((PLANT, [*plant, '-p', ready, *given])) as (peer, _):
+        peer.listen(*HEARD, topics.TWIST)
         say = peer.node.create_publisher(topics.WRENCH.type, topics.WRENCH.name, 10)
 
         def answer(message: Any) -> None:
@@ -116,7 +119,10 @@ def in_real_time(heard_again: int, last: int) -> tuple[list[int], list[int], np.
         peer.until(lambda: truth and step_of(truth[-1]) == last, 'the end')
         peer.until(lambda: len(peer.heard[topics.WRENCH_APPLIED.name]) > last, 'every wrench')
         applied = np.array([m.wrench.force.x for m in peer.heard[topics.WRENCH_APPLIED.name]])
-        return [step_of(m) for m in truth], [step_of(m) for m in peer.heard['odom']], applied
+        steps = [step_of(m) for m in peer.heard['odom']]
+        peer.until(lambda: len(peer.heard['twist']) == len(steps), 'every twist')
+        assert [step_of(m) for m in peer.heard['twist']] == steps
+        return [step_of(m) for m in truth], steps, applied
 
 
 @pytest.mark.parametrize(

@@ -174,8 +174,8 @@ def test_a_reset_puts_the_vehicle_back_after_the_step_that_is_under_way(made, ve
 
 
 REAL = {'step': H, 'actuators.limit': [1e6], 'wrench_timeout': patience(0.2)}
-PACE = 0.05  # s, a step at which a loaded machine hears of every one in time
-WINDOW = 1.0  # s of it
+PACE = patience(0.05)  # s, a step at which a loaded machine hears of every one in time
+COUNT = 20  # of them are looked at
 
 
 def arrivals(made: Program) -> list[tuple[float, float]]:
@@ -201,14 +201,13 @@ def test_real_time_keeps_its_pace(made, vehicle, capfd) -> None:
 
     def window() -> list[tuple[float, float]]:
         gaps = np.diff([at for at, _ in seen])
-        count = round(WINDOW / PACE)
         regular = np.abs(gaps - PACE) < PACE / 2
-        for i in range(1, len(gaps) - count):
-            if regular[i - 1 : i + count].all():
-                return seen[i : i + count + 1]
+        for i in range(1, len(gaps) - COUNT):
+            if regular[i - 1 : i + COUNT].all():
+                return seen[i : i + COUNT + 1]
         return []
 
-    found = np.array(made.until(window, f'{WINDOW:g} s without a stall'))
+    found = np.array(made.until(window, f'{COUNT} steps without a stall'))
     pace = np.polyfit(*found.T, 1)[0]
     assert abs(pace - 1.0) < 0.05
     assert_allclose(np.diff(found[:, 1]), PACE, rtol=0, atol=1e-9)

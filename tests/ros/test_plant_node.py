@@ -123,8 +123,15 @@ def test_starts_by_itself_once_all_are_there(peer) -> None:
     peer.spin(0.8)
     assert not peer.heard['odom']
 
-    peer.node.create_service(Trigger, 'first/ready', ready)
+    asked = []
+
+    def answer(request, response):
+        asked.append(True)
+        return ready(request, response) if len(asked) > 3 else response
+
+    peer.node.create_service(Trigger, 'first/ready', answer)
     assert step_of(odometry(peer, 1)[0]) == 0
+    assert len(asked) == 4, 'it was not ready when it was asked before'
     assert peer.call(Trigger, 'plant_node/ready').success
 
 

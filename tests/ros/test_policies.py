@@ -13,6 +13,7 @@ from helpers import graph_runs, policies
 from helpers.made_messages import Bag
 from helpers.node_processes import PATIENCE, Peer, fresh_domain, parameters, start_auv, start_node
 from rclpy.serialization import serialize_message
+from std_srvs.srv import SetBool
 
 from auv_analysis import load_scenario
 from auv_analysis.graph.experiment import PACKAGES
@@ -141,6 +142,10 @@ def test_policy_is_that_of_a_run_in_lock_step_and_of_those_who_look_on(tmp_path,
     domain = fresh_domain()
     run = graph_runs.record(long, tmp_path / 'out', domain=domain)
     with ended(run, start_auv('watch', '--for', '120', domain=domain)):
+        with closing(Peer(domain)) as peer:  # all are there, and need not compute
+            peer.listen(topics.PROGRESS)
+            peer.until(lambda: peer.heard[topics.PROGRESS.name], 'progress')
+            assert peer.call(SetBool, 'plant_node/run', SetBool.Request(data=False)).success
         assert_exact(domain, expected(SEPARATE, LOCK_STEP_LACKS))
 
 

@@ -44,7 +44,7 @@ from auv_analysis.nodes.recorder_node import (
     StepLedger,
 )
 from auv_dynamics.ros import convert, topics
-from auv_dynamics.ros.interface import NANOSECONDS, Frames, nanoseconds
+from auv_dynamics.ros.interface import DEPTH, NANOSECONDS, Frames, nanoseconds
 from auv_dynamics.ros.rclpy_internals import has_data_path, raw_class
 
 FRAMES = Frames()
@@ -443,25 +443,29 @@ def test_a_recorder_takes_its_own_vehicle_and_what_it_is_told(tmp_path: Path) ->
     assert contents.namespace == '/auv1'
 
 
+OF_ALL = ('/tf', '/tf_static', '/robot_description')  # in any namespace
+
+
 @pytest.mark.parametrize(
     ('extra', 'exclude', 'taken'),
     [
-        ((), None, {'/auv1/imu', '/tf'}),
-        (('/auv10/imu', '/rosout'), None, {'/auv1/imu', '/tf', '/auv10/imu', '/rosout'}),
-        (('all',), None, {'/auv1/imu', '/tf', '/auv10/imu', '/imu'}),
-        (('all', '/rosout'), '^/auv1/|out', {'/tf', '/auv10/imu', '/imu'}),
+        ((), None, {'/auv1/imu'}),
+        (('/auv10/imu', '/rosout'), None, {'/auv1/imu', '/auv10/imu', '/rosout'}),
+        (('all',), None, {'/auv1/imu', '/auv10/imu', '/imu'}),
+        (('all', '/rosout'), '^/auv1/|out', {'/auv10/imu', '/imu'}),
     ],
 )
 def test_which_topics_are_wanted(extra: tuple, exclude: str | None, taken: set[str]) -> None:
     wanted = recorder.Wanted('/auv1', extra, re.compile(exclude) if exclude else None)
-    there = ('/auv1/imu', '/auv10/imu', '/imu', '/tf', '/rosout', '/parameter_events')
-    assert {topic for topic in there if topic in wanted} == taken
+    there = ('/auv1/imu', '/auv10/imu', '/imu', *OF_ALL, '/rosout', '/parameter_events')
+    assert {topic for topic in there if topic in wanted} == taken | set(OF_ALL)
     assert '/rosout' not in recorder.Wanted('/')
     assert '/imu' in recorder.Wanted('/')
 
 
 def test_who_keeps_nothing_for_late_comers_is_heard_beside_who_does() -> None:
     kept, not_kept = (SimpleNamespace(qos_profile=qos) for qos in (KEPT, QoSProfile(depth=1)))
+    assert recorder.adapted([kept]).depth == DEPTH
     assert recorder.adapted([kept, kept]).durability == DurabilityPolicy.TRANSIENT_LOCAL
     assert recorder.adapted([kept, not_kept]).durability == DurabilityPolicy.VOLATILE
     assert recorder.adapted([kept], not_kept.qos_profile).durability == DurabilityPolicy.VOLATILE

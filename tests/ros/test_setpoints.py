@@ -109,12 +109,18 @@ def test_what_odometry_asks_for_comes_once_its_subscribers_are_there(lockstep: b
         node = made.add(SetpointNode, {**grid, **WAVES, 'expected_subscribers': ['cmd_vel=1']})
         made.listen(topics.DIAGNOSTICS)
         said = made.heard[topics.DIAGNOSTICS.name]
+
+        def fact(key: str) -> str:
+            return {one.key: one.value for one in said[-1].status[0].values}[key]
+
         made.until(lambda: said and said[-1].status[0].message != 'ok', 'no odometry yet')
         made.publish(topics.ODOM, by_hand.odometry(START, [0, 0, 0, 1, *[0] * 9]))
         made.until(lambda: said[-1].status[0].message == 'ok', 'odometry')
         assert by_hand.ns_of(said[-1]) == 0, 'nothing before there is a subscriber'
+        assert fact('ready') == 'False'
         made.listen(topics.CMD_VEL)
         made.until(lambda: by_hand.ns_of(said[-1]) == START + 3 * STEP, 'the horizon')
+        assert fact('ready') == 'True'
         made.until(lambda: len(made.heard['cmd_vel']) >= 4, 'all of them')
         found = [by_hand.ns_of(m) for m in made.heard['cmd_vel']]
         assert found == [START + k * STEP for k in range(4)]

@@ -10,6 +10,7 @@ import yaml
 from helpers.foreign_bags import NAMED, Maker, motion, nanoseconds, simple, simulated, write
 from helpers.node_processes import auv
 
+from auv_analysis.bag import foreign_topics
 from auv_analysis.cli import main
 
 TOPICS = '/rexrov/pose_gt', '/rexrov/thruster_manager/input'
@@ -36,6 +37,25 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture) -> str:
     assert (end.value.code, captured.out) == (2, '')
     (line,) = captured.err.splitlines()
     return line
+
+
+class AskedError(Exception):
+    """What was to be seen is seen."""
+
+
+@pytest.mark.parametrize(('option', 'key', 'value'), [
+    ('--odom', 'odometry', '/o'), ('--wrench', 'wrench', '/w'), ('--setpoint', 'setpoint', '/s'),
+    ('--frames', 'frames', 'enu_flu'), ('--twist-frame', 'twist_frame', 'world'),
+    ('--step', 'step', 0.02), ('--gap', 'gap', 0.5),
+])  # fmt: skip
+def test_what_is_told_of_a_bag_reaches_its_mapping(option, key, value, monkeypatch) -> None:
+    def asked(file: None, given: dict[str, Any]) -> None:
+        assert {k: v for k, v in given.items() if v is not None} == {key: value}
+        raise AskedError
+
+    monkeypatch.setattr(foreign_topics, 'read_mapping', asked)
+    with pytest.raises(AskedError):
+        main.main(['analyze', 'bag', option, str(value)])
 
 
 def test_info_names_what_could_be_mapped(bag, capsys) -> None:

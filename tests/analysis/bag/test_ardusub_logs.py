@@ -185,13 +185,18 @@ def test_both_versions_of_mavlink_may_stand_in_a_log(run, pulses, tmp_path) -> N
     heard = logs.telemetry(run.part(slice(0, 100)), pulses[:100])
     second = logs.write_tlog(tmp_path / 'x.tlog', heard)
     first = logs.write_tlog(tmp_path / 'y.tlog', heard, version=1)
+    signed = logs.write_tlog(tmp_path / 's.tlog', heard, signed=True)
+    assert signed.stat().st_size == second.stat().st_size + 13 * len(heard)
     assert first.read_bytes()[8] == 0xFE
     both = tmp_path / 'z.tlog'
     both.write_bytes(first.read_bytes() + second.read_bytes())
-    counts = [survey(path).counts for path in (first, second, both)]
-    assert counts[0] == counts[1] == {topic: n // 2 for topic, n in counts[2].items()}
-    read = [[m.to_dict() for *_, m in messages(path, ['ATTITUDE'], [])] for path in (first, second)]
-    assert read[0] == read[1]
+    counts = [survey(path).counts for path in (first, second, signed, both)]
+    assert counts[0] == counts[1] == counts[2] == {t: n // 2 for t, n in counts[3].items()}
+    read = [
+        [(stamp, m.to_dict()) for _, stamp, m in messages(path, ['ATTITUDE'], [])]
+        for path in (first, second, signed)
+    ]
+    assert read[0] == read[1] == read[2]
 
 
 def test_time_of_an_onboard_log_is_that_of_gps(tmp_path) -> None:

@@ -17,11 +17,12 @@ from helpers.foreign_bags import (
     simulated,
     write,
 )
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.foreign_checks import acts_behind
 from auv_analysis.bag.foreign_topics import candidates
+from auv_analysis.bag.foreign_tracks import _evenly
 from auv_analysis.bag.tracks import Track
 from auv_analysis.runs.run import Run
 from auv_dynamics.files.errors import InputError
@@ -170,6 +171,11 @@ def test_stamps_in_bursts_are_told_and_spread(run, tmp_path) -> None:
     assert said(mended, 'spread evenly, as told')
     errors = [np.abs(one.tau - run.tau[::2][: one.samples]).mean() for one in (found, mended)]
     assert errors[1] < errors[0]
+
+
+def test_stamps_are_spread_on_each_side_of_a_pause() -> None:
+    ns = np.r_[np.arange(50), 5000 + np.arange(50)] * 10**7
+    assert_array_equal(_evenly(ns, 1e9), ns)
 
 
 def test_a_state_of_a_filter_is_no_candidate_for_thrusters(run, tmp_path) -> None:

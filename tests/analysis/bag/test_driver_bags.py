@@ -1,5 +1,6 @@
 """Bags of a driver: stamps of its own, set-points on another grid, topics under other names."""
 
+import json
 import tempfile
 from itertools import product
 from pathlib import Path
@@ -11,12 +12,13 @@ from helpers.made_messages import FRAMES, ODOMETRY, Bag, odometry, serialized, s
 from helpers.strategies import examples
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis import load_scenario, summarize
-from auv_analysis.bag.load import load_run, open_bag
+from auv_analysis.bag.load import _slopes, load_run, open_bag
 from auv_analysis.bag.metadata import RECORDING, recording_text
 from auv_analysis.bag.reading import read_bag
+from auv_analysis.cli.main import main
 from auv_analysis.nodes.recorder_node import StepLedger
 from auv_analysis.runs.run import Run, joined
 from auv_analysis.studies.compare.sources import open_source, sources_of
@@ -250,7 +252,29 @@ def test_in_lock_step_they_are_refused(tmp_path: Path) -> None:
         load_run(with_unusable_messages(tmp_path / 'bag.mcap', strict=True))
 
 
-def test_the_namespace_of_the_recorder_is_the_one_that_is_read(tmp_path: Path) -> None:
+def test_without_accelerations_they_are_the_slopes_of_the_set_points(tmp_path: Path) -> None:
+    stamps = range(1000, 1200, GRID)
+    run = load_run(write(tmp_path, stamps, stamps, ahead=0))  # one more m/s in each 20 ms
+    assert_allclose(run.nu_d_dot, 50.0)
+    many = np.arange(70_000.0)[:, None] ** 2 * np.ones(6)  # in blocks: their seams do not show
+    slopes = np.concatenate(list(_slopes(many, 2.0)))
+    assert_allclose(slopes[1:-1, 0], np.arange(1.0, 69_999.0))
+
+
+def test_of_two_messages_of_a_stamp_the_first_counts(tmp_path: Path) -> None:
+    bag = Bag(tmp_path / 'bag.mcap')
+    bag.attach('vehicle.yaml', VEHICLE)
+    bag.attach(RECORDING, recording_text(False, {}))
+    for k in range(10):
+        wrench = stamped('Wrench', k * GRID * MS, [1.0] * 6)
+        for other in (0, 100):
+            moved = odometry(k * GRID * MS, state(k + other))
+            bag.add('/odom', ODOMETRY, k * GRID * MS, serialized(moved))
+        bag.add('/wrench', wrench.__msgtype__, k * GRID * MS, serialized(wrench))
+    assert_array_equal(load_run(bag.close()).eta[:, 0], np.arange(10.0))
+
+
+def test_the_namespace_of_the_recorder_is_the_one_that_is_read(tmp_path: Path, capsys) -> None:
     """Two vehicles in a bag; without a word of the recorder nobody chooses one."""
 
     def bag(namespace: str | None) -> Path:
@@ -273,7 +297,11 @@ def test_the_namespace_of_the_recorder_is_the_one_that_is_read(tmp_path: Path) -
     assert joined(list(open_bag(told, whole=2).run.blocks())).tau[0, 0] == 1.0
     assert load_run(told, namespace='auv1').tau[0, 0] == 0.0
     assert load_run(untold, namespace='/auv2').tau[0, 0] == 1.0
-    (asked,) = sources_of([str(told)], namespace='/auv1')  # as `auv analyze` is
+    main(['analyze', str(told), '--namespace', '/auv1', '--json', '--no-report',
+          '--out', str(tmp_path / 'out')])  # fmt: skip
+    (summary,) = json.loads(capsys.readouterr().out).values()
+    assert summary['effort']['rms'] == [0.0] * 6
+    (asked,) = sources_of([str(told)], namespace='/auv1')
     assert open_source(asked).run.tau[0, 0] == 0.0
     with pytest.raises(InputError, match=r'/auv1, /auv2$'):
         load_run(untold)

@@ -127,6 +127,13 @@ def test_thrusts_of_several_topics_in_their_order(run, tmp_path) -> None:
         {'topic': '/motors', 'fields': [f'motors[{i}].thrust' for i in range(6)], 'units': 'kgf'},
         {'topic': '/vertical', 'fields': '-deg'},
     ]}  # fmt: skip
+    apart = [  # of the second one half a step later, and so each change of either is one
+        (topic, ns + (topic == '/vertical') * SECOND // 200, m) for topic, ns, m in messages
+    ]
+    bag, mapping = write(tmp_path / 'apart', apart, make), read_mapping(None, keys)
+    sources = read_sources(bag, mapping, [])
+    tracks, _ = tracks_of(sources, mapping, load_vehicle('bluerov2_heavy'), [])
+    assert_allclose(np.diff(tracks['wrench'].ns), SECOND / 200, atol=2000)
     found = loaded(write(tmp_path / 'dive', messages, make), written(keys, tmp_path))
     assert_allclose(found.tau, u @ vehicle.thrusters.matrix.T, rtol=1e-12, atol=1e-12)
 

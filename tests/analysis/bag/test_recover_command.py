@@ -5,8 +5,10 @@ import fcntl
 import json
 import os
 import resource
+import stat
 import tracemalloc
 from collections import Counter
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +34,7 @@ from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.recover import recover
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli.main import main
+from auv_analysis.output import new_files
 
 
 def aged(bag: Path) -> Path:
@@ -312,6 +315,78 @@ def test_a_file_that_grows_is_refused(
     assert sorted(os.listdir(bag)) == ['bag_0.mcap', 'metadata.yaml']
 
 
+def test_a_recorder_that_comes_back_during_a_repair_loses_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    path = bag / 'bag_0.mcap'
+    left = cut(path)
+    write = recovery.Rewriter.write
+
+    def meanwhile(*given: Any) -> None:
+        write(*given)
+        with path.open('ab') as file:
+            file.write(b'more')
+
+    monkeypatch.setattr(recovery.Rewriter, 'write', meanwhile)
+    code, _, err = command(capsys, bag)
+    assert code == 2
+    assert 'found a file that is being written' in err
+    assert path.read_bytes() == left + b'more'
+    assert sorted(os.listdir(bag)) == ['bag_0.mcap', 'metadata.yaml']
+
+
+def order_of_calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What the disk is told, in its order."""
+    called: list[str] = []
+
+    def told(name: str) -> None:
+        original = getattr(os, name)
+
+        def call(*given: Any, **options: Any) -> Any:
+            folder = name == 'fsync' and stat.S_ISDIR(os.fstat(given[0]).st_mode)
+            called.append('folder' if folder else name)
+            return original(*given, **options)
+
+        monkeypatch.setattr(os, name, call)
+
+    for name in ('fsync', 'link', 'replace'):
+        told(name)
+    return called
+
+
+def test_what_takes_a_name_is_on_the_disk_before_and_the_name_after(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bag = write_bag(tmp_path / 'bag')
+    cut(bag / 'bag_0.mcap', 0.4)
+    called = order_of_calls(monkeypatch)
+    recover(bag)
+    whole = ['fsync', 'replace', 'folder']
+    assert called == ['fsync', 'link', 'folder', 'replace', 'folder', *whole]
+    called.clear()
+    new_files.write(tmp_path / 'x', b'x')
+    assert called == whole
+
+
+def test_what_few_may_read_is_read_by_few_during_its_repair(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bag, modes = write_bag(tmp_path / 'bag'), []
+    cut(bag / 'bag_0.mcap')
+    (bag / 'bag_0.mcap').chmod(0o600)
+    finish = recovery.Writer.finish
+
+    def finished(writer: Any) -> None:
+        modes.append((bag / 'bag_0.mcap.unfinished').stat().st_mode & 0o777)
+        finish(writer)
+
+    monkeypatch.setattr(recovery.Writer, 'finish', finished)
+    recover(bag)
+    assert modes == [0o600]
+    assert (bag / 'bag_0.mcap').stat().st_mode & 0o777 == 0o600
+
+
 class EndedError(BaseException):
     """The process is gone."""
 
@@ -339,16 +414,17 @@ def test_a_repair_that_is_ended_is_finished_by_the_next(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, number: int, links: bool
 ) -> None:
     bag = write_bag(tmp_path / 'bag')
-    left = cut(bag / 'bag_0.mcap')
+    left = cut(bag / 'bag_0.mcap', 0.4)  # messages are lost, so that metadata.yaml is written anew
     rows = len(messages_of_a_copy(bag, tmp_path / 'copy'))
     if not links:
         monkeypatch.setattr(os, 'link', no_links)
     with monkeypatch.context() as patch:
-        if name != 'link' or links:
+        called = {'link': links, 'rename': not links}.get(name, True)
+        if called:
             ended_at(patch, name, number)
-        try:
+        with pytest.raises(EndedError) if called else nullcontext():
             recover(bag)
-        except EndedError:
+        if called:
             kept = [p.read_bytes() for p in bag.glob('bag_0.mcap*') if not p.name.endswith('d')]
             kept += [p.read_bytes() for p in bag.glob('*.mcap.damaged')]
             assert left in kept, 'never less than before'

@@ -23,6 +23,7 @@ from helpers.strategies import examples
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.data_stream import RecordBuilder
+from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.writer import Writer
 
@@ -194,6 +195,29 @@ def test_bags_of_other_writers_with_damaged_bytes(data: bytes, flips: list) -> N
     for share, mask in flips:
         broken[min(int(share * len(data)), len(data) - 1)] ^= mask
     recovered(bytes(broken), checked=False)
+
+
+def test_all_of_a_record_is_kept(tmp_path: Path) -> None:
+    """Times, media type, sequence and metadata of other programs; and the compression."""
+    lz4 = COMPRESSIONS['lz4']
+    bag = Bag(tmp_path / 'whole' / 'bag_0.mcap', chunk_size=300, compression=lz4)
+    writer, data = bag._writer, serialized(TYPES.types[STRING]('y' * 40))
+    channel = bag.channel('/x', STRING)
+    writer.add_metadata('mine', {'a': '1'})
+    writer.add_attachment(7, 9, 'a', 'text/x', b'1')
+    for k in range(60):
+        writer.add_message(channel, k, data, k + 5, 100 + k)
+    whole = bag.close().read_bytes()
+    recover(put(tmp_path / 'cut', whole[: len(whole) // 2]).parent)
+    with (tmp_path / 'cut' / 'bag_0.mcap').open('rb') as file:
+        reader = make_reader(file)
+        rows = [(m.log_time, m.publish_time, m.sequence) for *_, m in reader.iter_messages()]
+        assert rows == [(k, k + 5, 100 + k) for k in range(len(rows))]
+        assert len(rows) > 5
+        (one,) = reader.iter_attachments()
+        assert (one.log_time, one.create_time, one.name, one.media_type) == (9, 7, 'a', 'text/x')
+        assert {'a': '1'} in [m.metadata for m in reader.iter_metadata() if m.name == 'mine']
+        assert {c.compression for c in reader.get_summary().chunk_indexes} == {'lz4'}
 
 
 def test_messages_within_and_without_chunks_are_healthy(tmp_path: Path) -> None:

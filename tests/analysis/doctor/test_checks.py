@@ -71,6 +71,15 @@ def test_variables_that_break_something_are_named(check, name, value, verdict, w
     assert _one(check, verdict, word).check in {finding.check for finding in sound}
 
 
+def test_a_jazzy_that_is_sourced_is_sound(monkeypatch):
+    version = '.'.join(map(str, sys.version_info[:2]))
+    monkeypatch.setenv('ROS_DISTRO', 'jazzy')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', '/opt/ros/jazzy')
+    monkeypatch.setenv('PYTHONPATH', f'/opt/ros/jazzy/lib/python{version}/site-packages')
+    (finding,) = checks.distro()
+    assert (finding.verdict, finding.found) == ('ok', 'jazzy, sourced')
+
+
 @pytest.mark.parametrize(
     ('end', 'version', 'words'),
     [('NEWEST', (3, 10), '3.11 to 3.10'), ('OLDEST', (3, 99), '3.99 to 3.13')],

@@ -5,10 +5,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import yaml
 from numpy.testing import assert_allclose
 
 from auv_analysis.cli.main import main
 from auv_dynamics import load_vehicle
+from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle.frames import swap_body
 
 NAMES = ('rexrov', 'bluerov2', 'bluerov2_heavy', 'lauv', 'lrauv_tethys', 'girona500')
@@ -31,9 +33,13 @@ def test_there_and_back(name, place, tmp_path, monkeypatch, capsys):
     assert_allclose(back.D(nu), vehicle.D(nu), rtol=1e-12)
 
 
-def test_damping_acts_in_gazebo_as_here(capsys):
-    """The plugin's own sum, its force turned to FSD, is -D(nu) nu."""
-    main(['export-vehicle', 'lauv'])
+def test_damping_acts_in_gazebo_as_here(tmp_path, capsys):
+    """The plugin's own sum, its force turned to FSD, is -D(nu) nu; of lift by surge itself too."""
+    data = yaml.safe_load(shipped('vehicles', 'lauv').read_text())
+    data['lift'][0][0] = 3.0
+    (tmp_path / 'lauv.yaml').write_text(yaml.safe_dump(data))
+    vehicle = load_vehicle(tmp_path / 'lauv.yaml')
+    main(['export-vehicle', str(tmp_path / 'lauv.yaml')])
     text = capsys.readouterr().out
     plugin = ElementTree.fromstring(text).find('.//plugin')
     nu = np.array([0.7, -0.2, 0.3, 0.1, -0.3, 0.2])
@@ -47,7 +53,7 @@ def test_damping_acts_in_gazebo_as_here(capsys):
         elif 'abs' in entry.tag:
             one, other = (state[columns.index(entry.tag[k])] for k in (1, 5))
             force[rows.index(entry.tag[0])] += float(entry.text) * abs(other) * one
-    assert_allclose(swap_body(force), -load_vehicle('lauv').D(nu) @ nu, atol=1e-12)
+    assert_allclose(swap_body(force), -vehicle.D(nu) @ nu, atol=1e-12)
 
 
 def test_document_says_what_gazebo_cannot_hold(capsys):

@@ -91,6 +91,23 @@ def test_volume_of_a_shape(imported, shape, volume):
     assert vehicle.buoyancy == pytest.approx(volume * 1000 * 9.81, rel=1e-3)
 
 
+def test_shapes_of_a_link_float_together(imported):
+    behind = (
+        '<collision name="b"><pose>1 0 0.05 0 0 0</pose><geometry><box><size>0.2 0.2 0.25</size>'
+    )
+    text = sdf().replace('</link>', f'{behind}</box></geometry></collision></link>')
+    vehicle, _ = imported('made.sdf', text)
+    assert vehicle.buoyancy == pytest.approx(2 * 98.1)
+    assert_allclose(vehicle.r_B, [0.5, 0, -0.05], atol=1e-12)
+
+
+def test_water_of_the_world_comes_before_that_of_the_plugin(imported):
+    text = sdf(more='<water_density>1025</water_density>')
+    assert imported('both.sdf', text)[0].buoyancy == pytest.approx(98.1)
+    alone = re.sub('<uniform.*density>', '', text)
+    assert imported('one.sdf', alone)[0].buoyancy == pytest.approx(1.025 * 98.1)
+
+
 def test_prefixes_that_nobody_declares(imported):
     more = '<experimental:params><add name="a" gz:name="b"/></experimental:params>'
     text = sdf().replace('<model name="made">', f'<model name="made">{more}')
@@ -155,10 +172,17 @@ def test_what_uuv_simulator_does_by_itself(imported):
 
 
 def test_products_of_inertia_by_either_convention(imported):
-    text = BLUEROV2.replace('zG = 0.02', 'zG = 0; Ixz = 0.01')
-    for products, entry in (('integral', -0.01), ('tensor', 0.01)):
+    text = BLUEROV2.replace('zG = 0.02', 'zG = 0; Ixy = 0.01; Ixz = 0.02; Iyz = 0.03')
+    for products, sign in (('integral', -1), ('tensor', 1)):
         _, document = imported('list.m', text, '--products', products)
-        assert document['vehicle']['rigid_body']['inertia'][0][2] == entry
+        inertia = np.array(document['vehicle']['rigid_body']['inertia'])
+        found = inertia[[0, 0, 1, 1, 2, 2], [1, 2, 2, 0, 0, 1]]
+        assert_array_equal(found, sign * np.tile([0.01, 0.02, 0.03], 2))
+
+
+def test_a_list_may_say_where_buoyancy_acts(imported):
+    vehicle, _ = imported('list.m', f'{BLUEROV2}xB = 0.01; yB = 0.02; zB = -0.03', *LIST)
+    assert_array_equal(vehicle.r_B, [0.01, 0.02, -0.03])
 
 
 def test_a_list_names_mass_and_water_as_papers_do(imported):

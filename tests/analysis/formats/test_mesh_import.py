@@ -204,17 +204,24 @@ def test_what_the_user_gives_is_taken_and_the_vehicle_by_other_commands(
     imported, rough, tmp_path, capsys
 ):
     hull = trimesh.creation.box((2, 1, 0.5))
-    inertia = ['--inertia', '110', '300', '400', '0', '5', '0', '--products', 'integral']
+    inertia = ['--inertia', '110', '300', '400', '1', '5', '2', '--products', 'integral']
     vehicle, document = imported(hull, '--cog', '0', '0', '0.05', *rough, *inertia)
     assert_array_equal(vehicle.r_G, [0, 0, 0.05])
     body = document['vehicle']['rigid_body']
-    assert body['inertia'] == [[110, 0, -5], [0, 300, 0], [-5, 0, 400]]
+    assert body['inertia'] == [[110, -1, -5], [-1, 300, -2], [-5, -2, 400]]
     assert not any('uniform' in text for text in document['assumed'])
     main(['check-vehicle', 'a.yaml', '--json'])
     json.loads(capsys.readouterr().out)
     main(['new', 'scenario', 'mine', '--vehicle', 'a.yaml'])
     main(['simulate', 'mine.yaml', '--controller', 'gvc', '--out', 'runs', '--no-report'])
     assert (tmp_path / 'runs' / 'summary.json').is_file()
+
+
+@pytest.mark.parametrize(('units', 'length'), [('mm', 0.001), ('cm', 0.01), ('in', 0.0254)])
+def test_units_of_a_mesh(imported, rough, units, length):
+    hull = trimesh.creation.box(np.array([2.0, 1.0, 0.5]) / length)
+    vehicle, _ = imported(hull, *rough, units=units, mass=RHO)
+    assert vehicle.buoyancy == pytest.approx(RHO * 9.81, rel=1e-6)
 
 
 SAID = ('--mass', '1000', '--water-density', '1000')

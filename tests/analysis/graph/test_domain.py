@@ -10,6 +10,7 @@ from auv_analysis.graph.domain import (
     LARGEST,
     VARIABLE,
     chosen_domain,
+    joined_domain,
     own_domain,
 )
 from auv_dynamics.files.errors import InputError
@@ -43,6 +44,12 @@ def test_empty_environment_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     domain, picked = chosen_domain(None)
     assert picked
     assert 1 <= domain <= LARGEST
+
+
+def test_who_joins_a_graph_is_on_the_domain_of_every_ros_program(monkeypatch) -> None:
+    assert joined_domain(None) == 0
+    monkeypatch.setenv(VARIABLE, '7')
+    assert (joined_domain(None), joined_domain(3)) == (7, 3)
 
 
 @pytest.mark.parametrize('participant', [0, 1, 4])

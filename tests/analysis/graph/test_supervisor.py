@@ -39,7 +39,7 @@ def test_who_ends_is_named_with_its_last_words_and_what_the_others_complain_of(
 
 
 @pytest.mark.parametrize(('writes', 'code'), [('recorder', 7), ('', -signal.SIGKILL)])
-def test_who_writes_has_more_time_to_end(tmp_path: Path, monkeypatch, writes, code) -> None:
+def test_who_writes_has_more_time_to_end(tmp_path: Path, monkeypatch, capsys, writes, code) -> None:
     monkeypatch.setattr(supervisor, 'GRACE', 0.01)
     group = supervisor.Supervisor(tmp_path, os.environ)
     begin = f'import signal, sys, time; from pathlib import Path; ready = Path({str(tmp_path)!r})'
@@ -52,6 +52,8 @@ def test_who_writes_has_more_time_to_end(tmp_path: Path, monkeypatch, writes, co
         assert time.monotonic() < limit
         time.sleep(0.01)
     assert group.stop(writes)['recorder'] == code
+    said = 'recorder still writes, for 30 s at most\n' if writes else ''
+    assert capsys.readouterr().err == said
 
 
 class Stuck(psutil.Popen):

@@ -234,6 +234,12 @@ def test_what_is_not_the_papers_is_not_judged(values, words):
     assert found.reason in claims_sentences(found)[0].text
 
 
+def test_a_set_point_of_a_file_is_not_the_papers():
+    case = load_scenario('case1')
+    told = replace(case, data=case.data | {'setpoint': {'file': 'way.csv'}})
+    assert 'a set-point from a file' in paper_claims(told, {}).reason
+
+
 def test_a_name_has_one_value():
     quote = Quotes()
     assert quote('a', 1.0, 'm') == quote('a', 1.0, 'm') == '1.00'

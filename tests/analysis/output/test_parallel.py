@@ -7,15 +7,18 @@ from functools import partial
 import psutil
 import pytest
 
+from auv_analysis.output import parallel
 from auv_analysis.output.parallel import a_copy_beside, meanwhile, results
 
 HERE = os.getpid()
+TWO_CORES = parallel._two_cores  # before any other test
 
 
 @pytest.fixture(autouse=True)
 def two_cores(monkeypatch):
     """Also where the machine has one: the copy then waits for it."""
     monkeypatch.setattr(os, 'sched_getaffinity', lambda process: {0, 1})
+    monkeypatch.setattr(parallel, '_two_cores', TWO_CORES)
 
 
 def doing(number):

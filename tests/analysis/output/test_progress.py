@@ -1,6 +1,7 @@
 """Progress with what is left: on a terminal, and nothing elsewhere."""
 
 from io import StringIO
+from types import SimpleNamespace
 
 import pytest
 
@@ -57,6 +58,8 @@ def test_bar_says_what_is_done_how_far_and_how_fast(terminal):
     text = terminal.getvalue()
     assert '4/4 steps' in text
     assert 'runs' in text
+    task = SimpleNamespace(finished_speed=None, speed=12.4)
+    assert progress.Speed('steps').render(task).strip() == '12 steps/s'
 
 
 def test_no_terminal_shows_nothing_but_the_line_that_is_kept(monkeypatch):

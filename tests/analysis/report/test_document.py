@@ -85,7 +85,7 @@ def test_a_document_of_all_kinds_of_blocks(tmp_path, approved):
     assert '(table 1)</a>' in text
     assert '(section 1)</a>' in text
     assert 'x<sub>d</sub>' in text
-    assert 'how far &lt;it&gt; is' in text
+    assert 'title="how far &lt;it&gt; is"' in text
     assert 'Second' not in text
     assert 'a: &lt;1&gt;' in text
     (zero, far) = parquet.read_table(tmp_path / document.NUMBERS).to_pylist()

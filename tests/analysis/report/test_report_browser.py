@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.browser import Watched, coloured, pixels
 
+from auv_analysis.output.text import MISSING
 from auv_analysis.report.plots import COLOURS
 
 PANELS = ('error-linear', 'error-angular', 'tau-linear')
@@ -56,6 +57,8 @@ def test_panels_share_one_time_axis(report):
     assert 0.0 < start < end < 5.0
     report.page.get_by_role('button', name='after 2 s', exact=True).click()
     assert report.shown('error-angular')['window'] == [2.0, 5.0]
+    report.page.get_by_role('button', name='first 2 s', exact=True).click()
+    assert report.shown('error-angular')['window'] == [0.0, 2.0]
     report.page.get_by_role('button', name='whole run').click()
     assert report.shown('tau-linear')['window'] == [0.0, 5.0]
 
@@ -178,6 +181,34 @@ def test_tables_sort_by_mouse_and_by_key(report):
     assert head.locator('..').get_attribute('aria-sort') == 'descending'
 
 
+def test_what_is_missing_is_last_however_a_table_is_sorted(report):
+    table = report.page.locator('table.data[data-name="key_figures"]')
+    head = table.get_by_role('button', name='settled').first
+    column = head.evaluate('(button) => button.parentElement.cellIndex')
+    for _ in range(2):
+        head.click()
+        cells = table.locator(f'tbody tr > :nth-child({column + 1})').all_text_contents()
+        known = [MISSING not in cell for cell in cells]
+        assert known == sorted(known, reverse=True)
+        assert 0 < sum(known) < len(known)
+
+
+GOOD_AND_BAD = """(names) => names.map((name) => {
+  const shown = document.createElement(name.startsWith('badge') ? 'span' : 'td');
+  shown.className = name;
+  document.body.append(shown);
+  const colour = getComputedStyle(shown).color.match(/[0-9.]+/g).map(Number);
+  shown.remove();
+  return colour;
+})"""
+
+
+def test_good_is_green_and_bad_is_red(report):
+    names = ['good', 'bad', 'badge reproduced', 'badge not-reproduced']
+    for i, (red, green, *_) in enumerate(report.page.evaluate(GOOD_AND_BAD, names)):
+        assert (green > red) == (i % 2 == 0), names[i]
+
+
 def _column(table, column: int) -> list[float]:
     cells = table.locator(f'tbody tr > :nth-child({column + 1})')
     return [
@@ -187,7 +218,7 @@ def _column(table, column: int) -> list[float]:
 
 
 def test_tables_download_what_they_show(report):
-    table = report.page.locator('table.data').nth(1)
+    table = report.page.locator('table.data[data-name="key_figures"]')
     with report.page.expect_download() as download:
         table.locator('.csv').click()
     assert download.value.suggested_filename == f'{table.get_attribute("data-name")}.csv'
@@ -196,3 +227,5 @@ def test_tables_download_what_they_show(report):
     shown = table.evaluate(CELLS)
     assert len(rows) == len(shown) + 1
     assert rows[1:] == shown
+    assert any(len(value) > 8 for value in shown[0]), 'all digits'
+    assert [rows[0][i] for i in (2, -1)] == ['velocity error RMS', 'input τ max']

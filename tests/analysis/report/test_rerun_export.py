@@ -19,6 +19,7 @@ from auv_dynamics import load_vehicle
 from auv_dynamics.vehicle import DOFS
 
 SAMPLES = 7
+FORWARD, RIGHT, DOWN = 5, 3, 2  # as rerun's ViewCoordinates has them
 
 
 def made_run() -> Run:
@@ -33,6 +34,12 @@ def made_run() -> Run:
     )  # fmt: skip
 
 
+def shares_of(run: Run) -> np.ndarray:
+    """Shares (n, 6) in per cent of N_i xi_i^2 / 2: M = C C^T, and sqrt(N_i) xi = C^T nu."""
+    energy = (run.nu @ np.linalg.cholesky(run.vehicle.M)) ** 2
+    return 100.0 * energy / energy.sum(axis=1, keepdims=True)
+
+
 def test_energy_shares_are_per_cent_of_what_moves() -> None:
     run = made_run()
     found = {(kind, whose): values for kind, whose, values in rerun_export.signals(run, run)}
@@ -40,7 +47,7 @@ def test_energy_shares_are_per_cent_of_what_moves() -> None:
         ('velocity', 'my own'), ('velocity', 'setpoint'), ('wrench', 'my own'),
         ('energy_shares', 'my own'),
     ]  # fmt: skip
-    assert_allclose(found['energy_shares', 'my own'].sum(axis=1), 100.0)
+    assert_allclose(found['energy_shares', 'my own'], shares_of(run), rtol=1e-9)
 
 
 def test_no_setpoint_is_drawn_where_none_is_known() -> None:
@@ -105,6 +112,7 @@ def test_every_sample_is_in_the_file(tmp_path: Path) -> None:
         ('velocity/{}/my own', run.nu, ('m/s', 'rad/s')),
         ('velocity/{}/setpoint', run.nu_d, ('m/s', 'rad/s')),
         ('wrench/{}/my own', run.tau, ('N', 'N m')),
+        ('energy_shares/{}/my own', shares_of(run), ('%', '%')),
     ):
         for i, dof in enumerate(DOFS):
             parts = found[f'/{entity.format(dof)}']
@@ -125,5 +133,6 @@ def test_the_vehicle_goes_and_turns_as_in_the_run(monkeypatch, tmp_path: Path) -
     expected = Rotation.from_euler('ZYX', run.eta[:, :2:-1]).as_matrix()
     shown = Rotation.from_quat([turn for _, turn in turns]).as_matrix()
     assert_allclose(shown, expected, atol=1e-6)
+    assert found['/trajectory']['ViewCoordinates:xyz'] == [(0.0, [FORWARD, RIGHT, DOWN])]
     ((_, line),) = found['/trajectory/my own/path']['LineStrips3D:strips']
     assert_allclose(line, run.eta[::4, :3], rtol=1e-6)

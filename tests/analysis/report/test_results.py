@@ -139,6 +139,8 @@ def test_a_terminal_says_units_and_colours_verdicts() -> None:
     assert [column.header for column in shown.columns][-2:] == ['far, m', 'not far']
     assert [column.justify for column in shown.columns] == ['left'] * 5 + ['right'] * 4
     assert [next(iter(c.cells)).style for c in shown.columns][-3:] == ['dim', '', 'red']
+    good = terminal(make_table('t', 'T.', [LOOKED | {'how': 'good'}], LOOKS))
+    assert next(iter(good.columns[-1].cells)).style == 'green'
 
 
 def test_a_table_of_a_document_points_into_it() -> None:

@@ -596,6 +596,10 @@ def page(runs):
     plots_of = {plot.name: plot for plot in made[0].roots}
     assert list(plots_of) == list(panels)
     assert roots == {name: plot.id for name, plot in plots_of.items()}
+    for name, plot in plots_of.items():
+        assert [legend.click_policy for legend in plot.legend] == ['hide'], name
+        if panels[name].kind != 'stack':
+            assert plot.y_range.only_visible, name
     return plots_of, panels
 
 

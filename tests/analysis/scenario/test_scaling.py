@@ -10,7 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from auv_analysis import load_scenario, simulate
+from auv_analysis import load_scenario, simulate, summarize
+from auv_analysis.report.scenario_text import sampling_warnings
+from auv_analysis.scenario.changes import changed_scenario
 from auv_analysis.scenario.scaling import (
     scaled_case1,
     scenario_text,
@@ -242,6 +244,17 @@ def test_a_scenario_warns_of_its_gains(tmp_path):
     scenario = load_scenario('case1_lauv')
     assert any('controllers.cl' in line and 'unstable' in line for line in scenario.warnings)
     assert not any('controllers.gvc' in line for line in scenario.warnings)
+
+
+def test_a_scenario_and_its_report_warn_of_the_states_of_a_law():
+    pid = {'law': 'pid', 'k_P': 400.0, 'k_I': 50.0, 'k_D': 5.0}
+    changes = {'controllers': {'slow': pid}, 'step': 0.11, 'duration': 1.1}
+    scenario = changed_scenario(load_scenario('case1_rexrov'), changes)
+    (warning,) = [w for w in scenario.warnings if "the law's own states" in w]
+    assert 'controllers.slow: ' in warning
+    run = simulate(scenario, 'slow', 'zoh')
+    said = sampling_warnings({'slow': run}, {'slow': summarize(run)})
+    assert [f'controllers.{text}' for text in said] == [warning.partition(': ')[2]]
 
 
 def test_gains_that_turn_ring_before_they_are_large():

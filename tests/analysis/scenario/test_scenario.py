@@ -207,6 +207,8 @@ def test_initial_angles_in_degrees_are_warned_of() -> None:
     scenario = load_scenario('case1')
     before = scenario.warnings
     data = scenario.data | {'initial': {'eta': [0, 0, 0, 0, 10.0, 400.0], 'nu': [0.0] * 6}}
+    turned = scenario.data | {'initial': {'eta': [0, 0, 0, 0, 0, 400.0], 'nu': [0.0] * 6}}
+    assert replace(scenario, data=turned).warnings == before, 'a heading may be unwrapped'
     (warning,) = [w for w in replace(scenario, data=data).warnings if w not in before]
     assert 'initial.eta' in warning
     assert 'degrees?' in warning

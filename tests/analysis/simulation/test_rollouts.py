@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.closed_loops import SIX, TURNED
+from helpers.closed_loops import SIX, TURNED, wave
 from helpers.needs import needing
 from helpers.strategies import examples
 from hypothesis import given
@@ -157,6 +157,43 @@ def test_rollouts_over_lag_dead_band_and_voltage():
     same_as_alone(scenario, 'gvc', changes, 'zoh', columns, (0, 4, 8))
 
 
+def test_rollouts_with_tables_of_their_own_are_more_than_a_table_holds():
+    scenario = scenario_of('gvc', duration=3.0, sensors=NOISY)
+    changes = {'setpoint.surge.offset': np.linspace(-0.4, 0.4, 21)}
+    seeds = np.arange(21)
+    columns = rollouts(scenario, 'gvc', changes, seeds=seeds, hold='zoh')
+    same_as_alone(scenario, 'gvc', changes, 'zoh', columns, (0, 17, 20), seeds)
+
+
+LIMITED = {'limit': 60.0, 'delay': 0.0}
+
+
+@pytest.mark.parametrize(
+    ('path', 'values', 'hold', 'base'),
+    [
+        ('disturbance[0].sway.offset', [0.0, 25.0, 80.0], 'continuous', {'disturbance': ROUGH[:1]}),
+        ('actuators.delay', [0.0, 0.02, 0.05], 'zoh', {'actuators': LIMITED}),
+        ('controllers.gvc.anti_windup', [True, False], 'zoh', {'actuators': LIMITED}),
+    ],
+)
+def test_rollouts_over_what_is_no_column_of_numbers(path, values, hold, base):
+    scenario = scenario_of('gvc', **base)
+    columns = rollouts(scenario, 'gvc', {path: values}, hold=hold)
+    assert len(set(columns['effort.rms.sway'])) == len(values)
+    same_as_alone(scenario, 'gvc', {path: values}, hold, columns, range(len(values)))
+
+
+def test_each_rollout_has_the_settling_band_of_its_own_set_point():
+    moderate = {'surge': wave(0.2, 0.0, 1.0)}
+    scenario = scenario_of('gvc', 'herman2018', duration=4.0, setpoint=moderate, initial={})
+    changes = {'setpoint.surge.offset': [0.1, 3.0]}
+    columns = rollouts(scenario, 'gvc', changes)
+    same_as_alone(scenario, 'gvc', changes, 'continuous', columns, range(2))
+    times = columns['velocity_error.settling_time.surge']
+    assert np.isfinite(times).all()
+    assert times[0] != times[1]
+
+
 def equal(one, other):
     for name, column in one.items():
         assert_array_equal(column, other[name], err_msg=name)
@@ -259,7 +296,7 @@ def test_a_rollout_that_diverges_says_when_and_leaves_the_others_alone():
         simulate(changed_scenario(scenario, {'controllers.gvc.k_D': 1e7}), 'gvc')
     assert f'{columns["reason"][2]}' in str(diverged.value)
     assert columns['reason'][2] == f'not finite from t = {columns["diverged_at"][2]:g} s'
-    assert np.isnan(columns['kinetic_energy.mean'][2])
+    assert [name for name in COLUMNS if not np.isnan(columns[name][2])] == ['diverged_at']
     assert columns['kinetic_energy.mean'][0] == columns['kinetic_energy.mean'][3]
 
 

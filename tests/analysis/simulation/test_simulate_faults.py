@@ -101,12 +101,22 @@ def rms(found: dict) -> np.ndarray:
     return np.stack([found[f'velocity_error.rms.{name}'] for name in names], axis=-1)
 
 
+def test_faults_and_noise_late_in_a_run():
+    late = {**HALF, 'from': 11.0, 'to': 11.5}  # the tables of 1024 steps are full by then
+    noisy = {'velocity_noise': 0.002}
+    run = simulate(scenario(duration=12.0, faults=[late], sensors=noisy), 'gvc', 'zoh')
+    at = np.flatnonzero(np.any(run.tau_applied != run.tau, axis=1)) * run.step
+    assert_allclose((at[0], at[-1]), (11.0, 11.49))
+    error = run.nu_measured - run.nu
+    assert np.abs(error[1024:1100] - error[:76]).max() > 0.002
+
+
 def test_a_batch_with_faults_is_its_loops_one_by_one():
-    one = scenario(actuators=THRUSTERS, sensors=SENSORS)
+    one = scenario(actuators=THRUSTERS, sensors=SENSORS, duration=4.0)
     changes = {
         'faults[2].from': [0.4, 0.6, 0.5, 0.41, 0.7],  # of a delay: lanes that are late at times
         'faults[5].stuck': [-120.0, 0.0, 50.0, 120.0, -30.0],
-        'faults[7].to': [1.5, 1.2, 1.3, 1.9, 1.4],
+        'faults[7].to': [1.5, 1.2, 1.3, 1.9, 3.4],  # behind 256 steps, which a table holds
         'seed': [1, 2, 3, 4, 5],
     }
     found = rollouts(one, 'gvc', changes, hold='zoh')

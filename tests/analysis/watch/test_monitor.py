@@ -139,6 +139,16 @@ def test_nodes_that_complain_and_nodes_that_fall_silent() -> None:
     assert monitor.snapshot(2.0 + KEPT).nodes == ()
 
 
+def test_errors_of_nodes_come_before_their_warnings() -> None:
+    monitor = GraphMonitor(0)
+    monitor.diagnose(0.0, NodeState('/controller_node', 'warning', 'no set-point', 0.0))
+    monitor.diagnose(0.0, NodeState('/plant_node', 'error', 'refused: wrench', 0.0))
+    assert texts(monitor, 1.0) == [
+        ('error', '/plant_node: refused: wrench'),
+        ('warning', '/controller_node: no set-point'),
+    ]
+
+
 def test_set_points_of_another_clock_are_a_warning() -> None:
     monitor = GraphMonitor(0)
     for k in range(50):

@@ -448,6 +448,22 @@ def test_exact_pairing_in_real_time_lets_go_when_set_points_stay_away():
     assert bench.odometry(610).trouble == ''
 
 
+def test_exact_pairing_lets_go_over_the_ramp():
+    bench = Bench(exact=True, acceleration=SAME, setpoint=0.3, odometry=0.5, ramp=0.1)
+    for ms in range(0, 300, 10):
+        bench.setpoint(ms)
+        last = bench.odometry(ms).tau[0]
+    found = []
+    for ms in range(300, 800, 10):
+        for answer in (bench.odometry(ms), bench.watch(ms / 1000 + 0.005)):
+            found += [] if answer is None else [answer.tau[0] / last]
+    assert found[0] == 1.0
+    assert found[-1] == 0.0
+    steps = -np.diff(found)
+    assert (steps >= 0.0).all()
+    assert steps.max() < 0.11, 'never faster than the ramp, which is looked at every 10 ms'
+
+
 def test_stamps_that_begin_anew_are_believed_after_a_pause_and_the_law_goes_on():
     seen = []
 

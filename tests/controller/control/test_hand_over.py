@@ -74,6 +74,14 @@ def test_a_wrench_is_taken_back_no_faster_than_it_may_change():
     assert output.idle
 
 
+def test_a_silence_does_not_count_for_the_slew_limit():
+    output = OutputStage(FREE, slew=(50.0,) * 6)
+    for i in range(3):
+        last = output.follow(WANTED, 1.0 * i)
+    assert output.release(7.0) == last
+    assert output.release(7.1)[2] == pytest.approx(25.0)
+
+
 def test_the_slew_limit_holds_from_the_zero_wrench_on():
     output = OutputStage(FREE, slew=(100.0, 100.0, 10.0, 1e9, 1e9, 1e9))
     assert output.follow(WANTED, 0.0) == ZERO

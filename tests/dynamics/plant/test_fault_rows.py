@@ -175,6 +175,27 @@ def test_a_reset_forgets_the_command_that_was_kept():
     assert plant.answer((9.0, 0, 0, 0, 0, 0), heard=True)[0][0] == 9.0
 
 
+def test_a_reset_forgets_what_was_on_its_way():
+    late = faults({'kind': 'sensor_delay', 'delay': 0.03})
+    x = initial_state(np.zeros(6), np.array([0.5, 0, 0, 0, 0, 0.1]))
+    noise = SensorNoise({}, 0, late)
+    plant = plant_of(HEAVY, [], H, 'ode5', x, noise=noise, faults=late)
+    for _ in range(6):
+        push(plant, (30.0, 0, 0, 0, 0, 1.0))
+    plant.reset()
+    for _ in range(3):
+        assert_array_equal(plant.measured, x)
+        push(plant, (30.0, 0, 0, 0, 0, 1.0))
+
+
+def test_a_thruster_is_stuck_within_what_it_gives_either_way():
+    most = {'kind': 'thruster', 'thruster': 0, 'stuck': 51.5}  # N, of a T200
+    faults(most, {**most, 'thruster': 1, 'stuck': -40.2})
+    for stuck in (51.6, -40.3):
+        with pytest.raises(InputError, match=r'a thrust of T1, -40.2 to 51.5 N'):
+            faults({**most, 'stuck': stuck})
+
+
 def test_a_dead_thruster_takes_its_column_out_of_the_wrench():
     dead = faults({'kind': 'thruster', 'thruster': 'T3', 'efficiency': 0.0})
     actuators = make_actuators({'thrusters': True}, HEAVY, H, 'f')

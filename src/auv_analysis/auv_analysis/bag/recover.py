@@ -65,7 +65,7 @@ class Rewriter:
 
         """
         known = self._inspection
-        with created(path) as file:
+        with created(path, known.path.stat().st_mode & 0o777) as file:
             self._writer = Writer(
                 file,
                 chunk_size=CHUNK_SIZE if known.compression is None else NEVER,

@@ -24,6 +24,18 @@ if TYPE_CHECKING:
     from auv_dynamics.vehicle.vehicle import Vehicle
 
 
+PRIOR = {  # JSON schema of what `--prior` reads
+    'additionalProperties': {
+        'title': 'a mapping with value and a positive deviation',
+        'type': 'object', 'required': ['value', 'deviation'], 'additionalProperties': False,
+        'properties': {
+            'value': {'title': 'a number', 'type': 'number'},
+            'deviation': {'title': 'a positive number', 'type': 'number', 'exclusiveMinimum': 0},
+        },
+    }
+}  # fmt: skip
+
+
 class Trial(NamedTuple):
     """What both commands are given: a vehicle, and recordings to learn from and held out.
 
@@ -183,17 +195,13 @@ def _believed(file: str | None) -> dict[str, tuple[float, float]]:
     """Coefficients that somebody knows: name -> value and standard deviation."""
     if file is None:
         return {}
-    from auv_dynamics.files.yaml_files import read_yaml
+    from auv_dynamics.files.yaml_files import read_yaml, validate
 
-    found = {}
-    for name, entry in read_yaml(Path(file), 'prior').items():
-        known = isinstance(entry, dict) and set(entry) == {'value', 'deviation'}
-        values = [entry[k] for k in ('value', 'deviation')] if known else []
-        if not all(isinstance(v, int | float) for v in values) or not values or values[1] <= 0:
-            expected = 'a mapping with value and a positive deviation'
-            raise InputError(file, str(name), expected, entry)
-        found[str(name)] = float(values[0]), float(values[1])
-    return found
+    known = read_yaml(Path(file), 'prior')
+    validate(known, PRIOR, file)
+    return {
+        name: (float(entry['value']), float(entry['deviation'])) for name, entry in known.items()
+    }
 
 
 def _gain(text: str) -> float | None:

@@ -10,6 +10,7 @@ from typing import IO, TYPE_CHECKING
 
 import psutil
 
+from auv_analysis.output.progress import say
 from auv_dynamics.files.errors import FailedError, undisturbed
 from auv_dynamics.ros.interface import PARENT
 
@@ -144,6 +145,8 @@ class Supervisor:
                 process.terminate()
             for names, grace in ((running.keys() - {writes}, GRACE), ({writes}, WRITING)):
                 group = [running[name] for name in names & running.keys()]
+                if grace == WRITING and any(process.poll() is None for process in group):
+                    say(f'{writes} still writes, for {WRITING:g} s at most')
                 _, alive = psutil.wait_procs(group, timeout=grace)
                 for process in alive:
                     process.kill()

@@ -22,14 +22,15 @@ def unfinished_name(path: Path) -> Path:
     return path.with_name(f'{path.name}{UNFINISHED}')
 
 
-def created(path: Path) -> IO[bytes]:
+def created(path: Path, mode: int = 0o666) -> IO[bytes]:
     """Open a new file, and sync it when it is whole.
 
     What stands under the name, such as what a killed process has left there, is removed first. Of
     a link only the link is: what it leads to is not touched, even where somebody puts it back.
+    `mode` says who may read and write it, as far as the process lets them.
     """
     path.unlink(missing_ok=True)
-    return os.fdopen(os.open(path, NEW, 0o666), 'wb')
+    return os.fdopen(os.open(path, NEW, mode), 'wb')
 
 
 @contextlib.contextmanager

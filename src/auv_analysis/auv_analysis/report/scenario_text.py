@@ -16,7 +16,8 @@ from auv_dynamics.files.yaml_files import check, matrix6, parse_yaml, yaml_text
 from auv_dynamics.plant.faults import ACTING, SENSING
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle import DOFS
-from auv_gvc_controller.control.gains import sampling_warning
+from auv_gvc_controller.control.gains import sampling_warning, state_warning
+from auv_gvc_controller.laws.law import make_gains
 
 VELOCITY, WRENCH = ('m/s', 'rad/s'), ('N', 'N m')
 IDEAL = 'ideal: the commanded wrench is the applied one'
@@ -90,13 +91,14 @@ def scenario_data(text: str) -> dict[str, Any] | None:
 
 
 def sampling_warnings(runs: Mapping[str, RunInfo], summaries: Mapping[str, Any]) -> list[str]:
-    """Runs whose velocity gain is too fast for their control period, in words."""
+    """Runs whose velocity gain, or law's own states, are too fast for the control period."""
     found = []
     for name, run in runs.items():
         K_D = summaries[name]['gains']['K_D']
         if run.hold == 'zoh' and K_D is not None:
-            text = sampling_warning(np.array(K_D), run.vehicle.M, run.step)
-            found += [f'{name}: {text}'] if text else []
+            loop = sampling_warning(np.array(K_D), run.vehicle.M, run.step)
+            own = state_warning(make_gains(run.law, run.gains), run.step)
+            found += [f'{name}: {text}' for text in (loop, own) if text]
     return found
 
 

@@ -13,7 +13,7 @@ from pyarrow import parquet
 
 from auv_analysis.cli.main import main
 from auv_analysis.report.results import Results
-from auv_analysis.studies.identify import identify
+from auv_analysis.studies.identify import identify, prediction
 from auv_analysis.studies.identify.bags import read_records
 from auv_analysis.studies.identify.vehicle_text import write_vehicle
 from auv_dynamics.files.errors import FailedError
@@ -196,12 +196,13 @@ def test_refusals(short, extra, said, tmp_path, capsys):
 def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeypatch, capsys):
     asked = []
 
-    def work(*given):
-        asked.append(given)
+    def work(*given, **options):
+        asked.append((*given, *options.values()))
         raise FailedError('enough')
 
     monkeypatch.setattr(identify, 'identify', work)
-    monkeypatch.setattr(identify, 'judged', work)
+    monkeypatch.setattr(identify, 'compared', work)
+    monkeypatch.setattr(prediction, 'held_of', lambda held, _: held)
     applied = {'odometry': '/odom', 'wrench': '/wrench'}
     applied['wrench_applied'] = {'topic': '/wrench', 'between': 'hold'}
     (tmp_path / 'map.yaml').write_text(yaml.safe_dump(applied))
@@ -213,21 +214,40 @@ def test_what_the_command_line_asks_for_is_what_is_done(short, tmp_path, monkeyp
     assert auv(capsys, 'identify', *given, *more)[0] == 1
     onboard = '--map', tmp_path / 'map.yaml', '--applied', '--observer', 'auto'
     assert auv(capsys, 'identify', *given, *onboard)[0] == 1
-    (_, learnt, held, *late), (*_, one, _), (*_, other, _) = asked
+    (learnt, held, _, *late), (*_, one, _), (*_, other, _) = asked
     assert late == [0.2, 0.1]
     assert 0.0 < learnt[-1].end <= held[0].start
     assert (one.free[-1], one.fixed, one.profile) == ('lag', ['delay'], ['lag', 'delay'])
     assert (one.segment, one.observer, one.bootstrap) == (2.0, 0.5, 50)
     assert (other.fixed, other.observer) == (['lag', 'delay'], None)
+    believed = tmp_path / 'prior.yaml'
+    believed.write_text('M.surge.surge: {value: 280, deviation: 5}')
+    apart = recording(tmp_path / 'apart', 3.0)
+    given = (*given[:-1], apart, '--prior', believed)
+    assert auv(capsys, 'identify', *given)[0] == 1
+    learnt, held, _, known, _ = asked[-1]
+    assert held[-1].end < 3.5 < learnt[-1].end
+    assert known.believed == {'M.surge.surge': (280.0, 5.0)}
 
 
-def test_a_prior_file_needs_values_and_deviations(short, tmp_path, capsys):
+@pytest.mark.parametrize(('entry', 'line'), [
+    ('300', 'M.x: expected a mapping with value and a positive deviation, found 300'),
+    ('{value: 3}', 'M.x.deviation: expected a positive number, found nothing'),
+    ('{value: 3, deviation: 0}', 'M.x.deviation: expected a positive number, found 0'),
+    ('{value: 3, deviation: .nan}', 'M.x.deviation: expected a finite number, found nan'),
+    ('{value: 3, deviation: .inf}', 'M.x.deviation: expected a finite number, found inf'),
+    ('{value: true, deviation: 1}', 'M.x.value: expected a number, found True'),
+    ('{value: 1e300, deviation: 1}', 'M.x.value: expected a finite number, at most '),
+    ('{value: 3, deviation: 1, mean: 2}', 'M.x.mean'),
+])  # fmt: skip
+def test_a_prior_file_needs_values_and_deviations(entry, line, short, tmp_path, capsys):
     file = tmp_path / 'prior.yaml'
-    file.write_text('M.surge.surge: 300\n', encoding='utf-8')
+    file.write_text(f'M.x: {entry}\n', encoding='utf-8')
     code, said = auv(capsys, 'identify', short, '--vehicle', 'herman2018', '--prior', file,
                      '--out', tmp_path / 'x')  # fmt: skip
     assert code == 2
-    assert 'a mapping with value and a positive deviation' in said
+    assert line in said
+    assert said.count('\n') == 1
 
 
 @pytest.mark.usefixtures('unrendered')

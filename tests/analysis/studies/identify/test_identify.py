@@ -97,7 +97,7 @@ def test_couplings_have_intervals(found):
     ],
 )  # fmt: skip
 def test_a_wrong_reading_is_told(herman, wrong, said, approved):
-    training, held = split([wrong(herman[0])], 0.25)
+    training, held = split([wrong(herman[0].part(0.0, 30.0))], 0.25)
     result = identify(training, held, wrong_prior(load_vehicle('herman2018'), 3))
     assert said in contradictions(result)[0]
     approved.within = 0.02
@@ -130,6 +130,19 @@ def test_a_model_that_predicts_worse_than_standing_still_is_told(low, told):
     ]  # fmt: skip
     said = _useless(SimpleNamespace(predictions=rows))
     assert ['worse than a velocity that stays' in text for text in said] == [True] * told
+
+
+@pytest.mark.parametrize(('disturbance', 'free', 'name', 'true'), [
+    ({'kind': 'harmonic', 'surge': {'offset': 20.0}}, 'bias', 'bias.surge', -20.0),
+    ({'kind': 'current', 'velocity': [0.2, 0.0, 0.0]}, 'current', 'current.north', 0.2),
+])  # fmt: skip
+def test_what_pushes_is_found_with_its_sign(disturbance, free, name, true, tmp_path):
+    record, _ = trial(
+        tmp_path, 'rexrov', 3, duration=10.0, disturbance=disturbance, actuators={'lag': 0.0}
+    )
+    found = identify(*split([record], 0.25), load_vehicle('rexrov'), Settings((free,)))
+    rows = {row['name']: row['value'] for row in found.coefficients()}
+    assert rows[name] == pytest.approx(true, rel=0.1), rows
 
 
 def test_angular_velocity_in_other_axes_than_the_attitude_is_refused(herman):
@@ -263,7 +276,8 @@ def test_damping_of_a_vehicle_that_gains_speed_is_held_where_it_takes_energy():
     rows = found.coefficients()
     assert len({frozenset(row) for row in rows}) == 1
     assert all((row['low'] is None) == (row['high'] is None) for row in rows)
-    text = vehicle_text(found, yaml.safe_load(shipped('vehicles', 'lauv').read_text()), 'x', '')
+    data = yaml.safe_load(shipped('vehicles', 'lauv').read_text()) | {'sign': 'sname'}
+    text = vehicle_text(found, data, 'x', '')  # what is written is positive, whatever the prior was
     written = vehicle_from_dict(yaml.safe_load(text), 'written')
     D = written.D_linear
     assert_allclose(written.M, vehicle.M, rtol=1e-6, atol=1e-9)

@@ -120,6 +120,19 @@ def test_morris_of_a_linear_figure(tmp_path: Path, levels: int) -> None:
         assert found[path]['sigma'] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_morris_leaves_out_the_trajectory_of_a_failed_row(tmp_path: Path) -> None:
+    def failing(controller, values, index):
+        energy = linear(controller, values, index)[ENERGY]
+        status = np.where(index == 1, 'diverged', 'ok').astype(object)
+        return {ENERGY: np.where(index == 1, np.nan, energy), 'status': status}
+
+    found = {row['path']: row for row in indices(make_sweep(tmp_path, MORRIS, failing))}
+    for path, slope in ((A, 3.0), (B, -1.0), (C, 0.0)):
+        assert found[path]['points'] == 11
+        assert found[path]['mu'] == pytest.approx(slope)
+        assert found[path]['sigma'] == pytest.approx(0.0, abs=1e-9)
+
+
 def test_values_of_another_design_are_not_taken_for_it(tmp_path: Path, approved) -> None:
     few = SALTELLI.replace('256', '16')
     out = make_sweep(tmp_path, few.replace('name: salt', 'name: salt\nseed: 3'), linear)

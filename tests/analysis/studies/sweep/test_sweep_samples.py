@@ -53,6 +53,14 @@ def stream(number: int = 0) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(SEED, spawn_key=(0, number)))
 
 
+def test_random_numbers_of_many_paths_are_numbers_of_their_own() -> None:
+    made = make_design('random', list('abcdef'), {'count': 16}, SEED, 0)
+    every = made.at(np.arange(16))
+    assert len(np.unique(every)) == 96
+    assert (made.at(np.array([9, 8])) == every[[9, 8]]).all()
+    assert (made.at(np.arange(8, 16)) == every[8:]).all()
+
+
 @pytest.mark.parametrize(('spec', 'reference'), QUANTILES, ids=[str(s) for s, _ in QUANTILES])
 def test_quantiles_are_those_of_scipy_stats(spec, reference) -> None:
     quantile = make_distribution(spec).quantile

@@ -137,6 +137,24 @@ def test_noise_is_that_of_the_sensors_alone():
     assert_array_equal(biased[:, 6:], plain[:, 6:])
 
 
+def test_faults_of_a_kind_add_up():
+    two = (
+        {'kind': 'sensor_bias', 'velocity': [0.1] * 6},
+        {'kind': 'sensor_bias', 'attitude': [0.2] * 3, 'from': 0.1},
+        {'kind': 'sensor_bias', 'velocity': [0.3] * 6, 'attitude': [0.1] * 3, 'from': 0.2},
+    )
+    found = SensorNoise({}, 3, faults(*two)).rows(30)[[5, 15, 25]]
+    assert_allclose(found[:, 0], [0.1, 0.1, 0.4])
+    turned = np.sqrt(3.0) * np.array([0.0, 0.2, 0.3])  # rad
+    assert_allclose(found[:, 6], np.cos(turned / 2))
+    gone = [{'kind': 'sensor_drop_out', 'from': a, 'to': b} for a, b in ((0.05, 0.1), (0.2, 0.23))]
+    lost = SensorNoise({}, 3, faults(*gone)).rows(40)[:, LOST]
+    assert_array_equal(np.flatnonzero(lost), [*range(5, 10), 20, 21, 22])
+    silent = {'kind': 'wrench_loss', 'from': 0.05}
+    kept = rows({**silent, 'timeout': 0.02}, silent)[5:10, WRENCH]
+    assert_array_equal(kept, [HELD, HELD, ZEROED, ZEROED, ZEROED])
+
+
 def test_a_first_sample_is_never_lost():
     lost = SensorNoise({}, 1, faults({'kind': 'sensor_drop_out'})).rows(5)[:, LOST]
     assert_array_equal(lost, [0, 1, 1, 1, 1])
@@ -176,7 +194,8 @@ def test_a_reset_forgets_the_command_that_was_kept():
 
 
 def test_a_reset_forgets_what_was_on_its_way():
-    late = faults({'kind': 'sensor_delay', 'delay': 0.03})
+    gone = {'kind': 'sensor_drop_out', 'from': 0.04, 'to': 0.06}
+    late = faults({'kind': 'sensor_delay', 'delay': 0.03}, gone)
     x = initial_state(np.zeros(6), np.array([0.5, 0, 0, 0, 0, 0.1]))
     noise = SensorNoise({}, 0, late)
     plant = plant_of(HEAVY, [], H, 'ode5', x, noise=noise, faults=late)
@@ -185,6 +204,7 @@ def test_a_reset_forgets_what_was_on_its_way():
     plant.reset()
     for _ in range(3):
         assert_array_equal(plant.measured, x)
+        assert not plant.lost
         push(plant, (30.0, 0, 0, 0, 0, 1.0))
 
 

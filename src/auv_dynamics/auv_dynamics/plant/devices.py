@@ -202,8 +202,8 @@ class Sensing:
 
     def reset(self, x: np.ndarray) -> None:
         """Forget all but the state x."""
-        self.measured = x.copy()
-        self._history[:] = x
+        self.measured, self.lost = x.copy(), False
+        self._history[:], self._losses[:] = x, False
 
     def rows(self, count: int) -> np.ndarray:
         """Random numbers of the next steps."""

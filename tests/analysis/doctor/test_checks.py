@@ -21,6 +21,7 @@ from auv_analysis.doctor import checks, discovery
 from auv_analysis.doctor.checks import Finding
 from auv_analysis.graph import supervisor
 from auv_analysis.graph.supervisor import NodeDiedError
+from auv_dynamics.ros.security import PROFILES, loopback
 
 RANGE = checks.RANGE
 Usage = namedtuple('Usage', 'total used free')
@@ -54,6 +55,7 @@ def _distribution(folder: Path, name: str, version: str, *requires: str, code: s
         (checks.distro, 'ROS_DISTRO', 'humble', 'broken', 'humble'),
         (checks.distro, 'AMENT_PREFIX_PATH', '/opt/ros/iron:/x', 'broken', '/opt/ros/iron'),
         (checks.distro, 'PYTHONPATH', '/x/lib/python3.8/site-packages', 'broken', '3.8'),
+        (checks.distro, 'LD_LIBRARY_PATH', '/opt/ros/humble/lib', 'broken', '/opt/ros/humble'),
         (checks.middleware, 'RMW_IMPLEMENTATION', 'rmw_zenoh_cpp', 'warning', 'rmw_zenoh_cpp'),
         (checks.discovery_range, RANGE, 'SUBNET', 'warning', 'everybody on the network'),
         (checks.discovery_range, RANGE, 'OFF', 'broken', 'no node finds another'),
@@ -98,6 +100,8 @@ def test_packages_that_are_not_those_of_an_environment_are_a_warning(tmp_path, m
     _one(checks.python, 'warning', f'{tmp_path} is active, but this is {sys.prefix}')
     monkeypatch.setattr(sys, 'base_prefix', sys.prefix)
     _one(checks.python, 'warning', 'no virtual environment')
+    monkeypatch.setenv('ROS_DISTRO', 'jazzy')  # whose Python has its packages
+    assert [finding.check for finding in checks.python()] == ['Python']
 
 
 def test_a_range_that_is_chosen_and_safe_is_no_warning(monkeypatch):
@@ -145,6 +149,9 @@ def test_absent_compiler_is_a_warning(monkeypatch):
 def test_cache_that_cannot_be_written_is_a_warning(tmp_path, monkeypatch):
     monkeypatch.setenv('AUV_GVC_CACHE_DIR', str(tmp_path / 'good'))
     assert checks._kept().verdict == 'ok'
+    assert ', empty: ' in checks._kept().found
+    (Path(checks._kept().found.partition(',')[0]) / 'x.nbi').touch()
+    assert ', empty: ' not in checks._kept().found
     (tmp_path / 'file').touch()  # not a folder: nobody can write into it, not even root
     monkeypatch.setenv('AUV_GVC_CACHE_DIR', str(tmp_path / 'file'))
     _one(checks.compiler, 'warning', 'at every start', 'AUV_GVC_CACHE_DIR')
@@ -197,9 +204,12 @@ def test_full_or_absent_shared_memory_is_said(free, verdict, tmp_path, monkeypat
     assert [*findings_of([lambda: checks.shared_memory(tmp_path)])][1].verdict == few
 
 
-@pytest.mark.parametrize(('limit', 'verdict'), [(64, 'broken'), (512, 'warning'), (4096, 'ok')])
-def test_few_open_files_are_said(limit, verdict, monkeypatch):
-    monkeypatch.setattr(resource, 'getrlimit', lambda _: (limit, limit))
+@pytest.mark.parametrize(
+    ('limit', 'verdict'), [(64, 'broken'), (512, 'warning'), (1024, 'ok'), (4096, 'ok')]
+)
+@pytest.mark.parametrize('hard', [1 << 20, resource.RLIM_INFINITY])
+def test_few_open_files_are_said(limit, verdict, hard, monkeypatch):
+    monkeypatch.setattr(resource, 'getrlimit', lambda _: (limit, hard))
     _one(checks.files, verdict, f'{limit} per process')
 
 
@@ -218,6 +228,8 @@ def test_single_core_and_absent_programs_are_said(monkeypatch):
     _one(checks.cores, 'warning', '--composed')
     monkeypatch.setattr(shutil, 'which', lambda _: None)
     assert [finding.check for finding in checks.programs()] == ['chromium', 'ros2']
+    monkeypatch.setattr(shutil, 'which', lambda name: name == checks.BROWSERS[0] or None)
+    assert [finding.check for finding in checks.programs()] == ['ros2']
 
 
 def test_participants_that_cannot_start_are_broken(tmp_path, monkeypatch):
@@ -247,11 +259,19 @@ def test_what_keeps_participants_apart_is_what_the_loopback_lacks(
 
 
 def test_who_is_in_a_domain_matters_where_it_was_chosen(monkeypatch):
-    monkeypatch.setattr(discovery, '_start', lambda *_: None)
+    asked = []
+    monkeypatch.setattr(discovery, '_start', lambda *given: asked.append(given[-1]))
+    for name in PROFILES:
+        monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(discovery, '_answer', lambda _: {'seen': ['/one', '/other']})
     _one(discovery.peers, 'note', '/one, /other')
     monkeypatch.setenv('ROS_DOMAIN_ID', '7')
     _one(discovery.peers, 'warning', 'domain 7 is in use by /one, /other', 'unset ROS_DOMAIN_ID')
+    monkeypatch.setenv(PROFILES[0], '/etc/own.xml')
+    _one(discovery.peers, 'warning')
+    monkeypatch.setenv(RANGE, 'SUBNET')
+    _one(discovery.peers, 'warning')
+    assert asked == [loopback(), loopback(), {RANGE: 'LOCALHOST'}, {RANGE: 'SUBNET'}]
 
 
 def test_a_check_that_fails_is_a_finding_and_the_others_go_on():

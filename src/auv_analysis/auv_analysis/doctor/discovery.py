@@ -68,14 +68,13 @@ def peers() -> Iterator[Finding]:
     """Who is in the domain that commands join here."""
     from auv_analysis.graph.domain import ANNOUNCED, VARIABLE, joined_domain
     from auv_dynamics.files.errors import InputError
-    from auv_dynamics.ros.security import RANGE, loopback
+    from auv_dynamics.ros.security import local
 
     try:
         domain = joined_domain(None)
     except InputError:
         return  # said elsewhere
-    local = {} if os.environ.get(RANGE) else loopback()
-    answer = _answer(_start(domain, LOOKING, '', ANNOUNCED, local))
+    answer = _answer(_start(domain, LOOKING, '', ANNOUNCED, local()))
     if 'why' in answer:
         return  # said of discovery
     nodes = answer['seen']

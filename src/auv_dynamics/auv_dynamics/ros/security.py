@@ -34,15 +34,20 @@ def loopback() -> dict[str, str]:
     return {RANGE: HERE, **dict.fromkeys(PROFILES, str(Path(__file__).with_name('fastdds.xml')))}
 
 
+def local() -> dict[str, str]:
+    """The same as far as the user has not said otherwise."""
+    chosen = os.environ.get(RANGE) or HERE
+    own = chosen != HERE or any(map(os.environ.get, PROFILES))
+    return {RANGE: chosen} if own else loopback()
+
+
 def stay_local() -> None:
     """Keep this process on this machine, as far as the user has not said otherwise.
 
     The middleware reads its environment when it is loaded, which `rclpy.init` does. Commands call
     this; a node that a user starts is heard as far as ROS lets it.
     """
-    os.environ[RANGE] = os.environ.get(RANGE) or HERE
-    if os.environ[RANGE] == HERE and not any(map(os.environ.get, PROFILES)):
-        os.environ.update(loopback())
+    os.environ.update(local())
 
 
 def enclave(executable: str) -> list[str]:

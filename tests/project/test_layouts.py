@@ -86,6 +86,16 @@ def test_energies_of_foxglove_are_those_of_the_named_dof() -> None:
         assert int(line['value'][-2]) == DOFS.index(line['label'])
 
 
+def test_curves_of_foxglove_are_those_of_the_named_dof() -> None:
+    for panel, line in in_foxglove():
+        topic, *fields = line['value'].split('.')
+        if '[' not in line['value']:
+            is_setpoint = line['label'] == 'set-point'
+            assert dof_of(topic, fields) == (
+                panel.partition('_')[2] if is_setpoint else line['label']
+            ), line
+
+
 def series(name: str) -> tuple[str, str, list[str]]:
     """Prefix, topic and fields of a curve of PlotJuggler."""
     prefix, _, rest = name.partition('/')

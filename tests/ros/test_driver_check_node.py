@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,15 @@ def domain() -> Iterator[int]:
     finally:
         process.kill()
         process.communicate(timeout=PATIENCE)
+
+
+def test_who_publishes_the_odometry_is_seen() -> None:
+    number = fresh_domain()
+    with closing(RosDriverClient(number, '/', TOPICS, Frames())) as client:
+        assert not client.publishes()
+        with closing(Peer(number)) as peer:
+            peer.node.create_publisher(topics.ODOM.type, topics.ODOM.name, 1)
+            peer.until(client.publishes, 'the publisher')
 
 
 def test_ages_are_told_by_the_clock_of_this_machine() -> None:

@@ -471,6 +471,22 @@ def test_who_keeps_nothing_for_late_comers_is_heard_beside_who_does() -> None:
     assert recorder.adapted([kept], not_kept.qos_profile).durability == DurabilityPolicy.VOLATILE
 
 
+def test_what_has_arrived_is_taken_before_a_subscription_is_made_anew() -> None:
+    """As a publisher that asks for less has come, which the old one would not hear."""
+    called: list[str] = []
+
+    class Recorded:
+        def __getattr__(self, name: str) -> Any:
+            return lambda *_, **__: called.append(name)
+
+    others = recorder.OtherTopics(Recorded(), recorder.Wanted('/', ('/x',)), print)
+    others._kinds['/x'] = 'std_msgs/msg/String'
+    others._heard['/x'] = SimpleNamespace(qos_profile=QoSProfile(depth=1))
+    weak = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    others._adapt('/x', [SimpleNamespace(qos_profile=weak)])
+    assert called == ['take_data', 'drop_data', 'create_subscription', 'add_data']
+
+
 def test_a_bag_says_how_its_topics_were_remapped(tmp_path: Path, timers) -> None:
     renamed = ['--ros-args', '-r', '__ns:=/auv1', '-r', 'wrench:=/thrust']
     with program() as made:

@@ -2,6 +2,7 @@
 
 import signal
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from helpers.made_messages import STRING, Bag, new, odometry, serialized
@@ -35,6 +36,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from auv_analysis.bag.reading import read_bag
 from auv_analysis.bag.step_topics import ODOMETRY
+from auv_analysis.nodes import replay_publishers
 from auv_analysis.nodes.replay_node import ReplayNode
 from auv_analysis.nodes.replay_publishers import LATE, WINDOW, offered_again
 from auv_dynamics.files.errors import InputError
@@ -314,11 +316,18 @@ def test_waits_for_a_subscriber_that_is_stopped(tmp_path: Path) -> None:
             assert replay.player.published['/odom'] == WINDOW
             recorder.send_signal(signal.SIGCONT)
             assert ended(peer, replay) == 0
+            assert not replay.player.silent
         assert recorder.wait(PATIENCE) == 0
     finally:
         recorder.send_signal(signal.SIGCONT)
         print(stop(recorder))
     assert read_bag(tmp_path / 'again', decode=False).counts['/odom'] == steps
+
+
+def test_who_cannot_be_asked_is_not_waited_for() -> None:
+    made = object.__new__(replay_publishers.Receivers)
+    made._clients, made.silent = {'/x': SimpleNamespace(service_is_ready=lambda: False)}, []
+    assert made._is_answered(replay_publishers._Round({}))
 
 
 def test_gives_up_a_subscriber_that_stays_silent(tmp_path: Path, monkeypatch) -> None:

@@ -114,8 +114,10 @@ def test_what_odometry_asks_for_comes_once_its_subscribers_are_there(lockstep: b
             return {one.key: one.value for one in said[-1].status[0].values}[key]
 
         made.until(lambda: said and said[-1].status[0].message != 'ok', 'no odometry yet')
+        assert said[-1].status[0].level == b'\x03', 'STALE'
         made.publish(topics.ODOM, by_hand.odometry(START, [0, 0, 0, 1, *[0] * 9]))
         made.until(lambda: said[-1].status[0].message == 'ok', 'odometry')
+        assert said[-1].status[0].level == b'\x00', 'OK'
         assert by_hand.ns_of(said[-1]) == 0, 'nothing before there is a subscriber'
         assert fact('ready') == 'False'
         made.listen(topics.CMD_VEL)

@@ -60,6 +60,7 @@ WRONG_LINES = {  # what is typed -> what the one line names
     'run case1 --controller gvc --controller pid': 'controllers',
     'run case1 --domain-id text': '--domain-id',
     'run case1 --domain-id 102': '--domain-id',
+    'study case1 --run --domain-id 102': '--domain-id',
     'run case1 --out taken': 'taken: --out',
     'watch --domain-id 102': '--domain-id',
     'watch --rate 0': '--rate',

@@ -155,6 +155,14 @@ def test_a_profile_of_the_user_stays_by_its_old_name_and_its_new_one(monkeypatch
     assert set(PROFILES) < set(loopback())
 
 
+def test_who_has_said_nothing_stays_on_the_loopback(monkeypatch) -> None:
+    for one in (RANGE, *PROFILES):
+        monkeypatch.setenv(one, 'before')  # which is put back
+        monkeypatch.delenv(one)
+    stay_local()
+    assert {one: os.environ[one] for one in (RANGE, *PROFILES)} == loopback()
+
+
 @pytest.mark.parametrize('chosen', ['SUBNET', 'OFF'])
 def test_what_the_user_has_chosen_stays(monkeypatch, chosen) -> None:
     monkeypatch.setenv(RANGE, chosen)

@@ -143,16 +143,19 @@ def test_a_frame_of_ardusub_has_so_many_motors(frame: str, motors: int) -> None:
 @pytest.mark.parametrize(
     ('topics', 'twist', 'rates'),
     [
-        (['RATE', 'IMU[0]'], [('RATE', 'R')], None),
-        (['IMU[0]', 'IMU'], [('IMU[0]', 'GyrX')], None),
-        (['NKF1', 'XKF1[0]'], [('XKF1[0]', None)], 'from attitude'),
+        (['RATE', 'IMU[0]'], [('RATE', 'R P Y')], None),
+        (['IMU[0]', 'IMU'], [('IMU[0]', 'GyrX GyrY GyrZ')], None),
+        (['NKF1', 'XKF1[0]'], [('XKF1[0]', '')], 'from attitude'),
         ([], [], 'from attitude'),
     ],
 )
 def test_angular_velocity_comes_from_the_best_that_is_on_board(topics, twist, rates) -> None:
     contents = BagContents(types={topic: f'dataflash/{topic}' for topic in ('ATT', *topics)})
     proposed = yaml.safe_load(preset(contents))
-    found = [(one['topic'], one['fields'].get('p')) for one in proposed['twist']]
+    found = [
+        (one['topic'], ' '.join(one['fields'][i] for i in 'pqr' if i in one['fields']))
+        for one in proposed['twist']
+    ]
     assert (found, proposed.get('rates')) == (twist, rates)
 
 

@@ -119,6 +119,14 @@ def test_columns_have_counts_and_ranges(tmp_path) -> None:
     assert survey(path).counts == {'x': 3}
 
 
+def test_words_for_nothing_are_no_number(tmp_path) -> None:
+    path = tmp_path / 'x.csv'
+    words = 'null', 'NA', ' None ', 'N/A', '-', 'NaN', ''
+    path.write_text('\n'.join(['t,u', *(f'{i},{word}' for i, word in enumerate(words)), '9,3', '']))
+    with Table(path) as table:
+        assert column_spans(table, [])['u'] == Span(1, 3, 3)
+
+
 def test_a_line_that_was_cut_off_is_left_out(tmp_path) -> None:
     path = tmp_path / 'x.csv'
     path.write_text('t,u,v\n0,1,2\n1,3')

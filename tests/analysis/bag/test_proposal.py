@@ -127,12 +127,26 @@ def test_candidates_are_those_with_messages_the_likeliest_first() -> None:
     }  # fmt: skip
 
 
-def test_units_that_nobody_says_are_told_by_sizes(tmp_path) -> None:
+@pytest.mark.parametrize(
+    ('step', 'units'), [(20_000_000, 'ns'), (20_000, 'us'), (20, 'ms'), (0.02, None)]
+)
+def test_units_that_nobody_says_are_told_by_sizes(tmp_path, step, units) -> None:
     path = tmp_path / 'x.csv'
-    rows = [f'{20_000 * i},{i},{-i},{2 * i},{4 * i}' for i in range(99)]
+    rows = [f'{step * i:g},{i},{-i},{2 * i},{4 * i}' for i in range(99)]
     path.write_text('\n'.join(['t,gyro_x,gyro_y,gyro_z,yaw', *rows]))
     twist = proposed(path)[1]['twist']
-    assert (twist['stamp'], twist['units']) == ({'field': 't', 'units': 'us'}, 'deg/s')
+    stamp = {'field': 't', 'units': units} if units else 't'
+    assert (twist['stamp'], twist['units']) == (stamp, 'deg/s')
+
+
+def test_units_below_the_head_are_believed(tmp_path) -> None:
+    path = tmp_path / 'x.csv'
+    rows = [f'{i},{i % 5},{i % 3},{i % 4},{i},{2 * i},{3 * i}' for i in range(50)]
+    units = 'ms,deg,deg,deg,cm/s,cm/s,cm/s'
+    path.write_text('\n'.join(['t,roll,pitch,yaw,u,v,w', units, *rows]))
+    keys = proposed(path)[1]
+    assert keys['twist']['stamp']['units'] == 'ms'
+    assert (keys['pose']['units'], keys['twist']['units']) == ('deg', 'cm/s')
 
 
 @pytest.mark.parametrize(('topic', 'path', 'component'), [

@@ -7,6 +7,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+import yaml
 from helpers.damaged_bags import (
     ATTACHED,
     QOS,
@@ -29,6 +30,14 @@ from auv_analysis.bag.ros2msg import schema_text
 from auv_analysis.bag.writer import BagWriter, RecordingError
 
 PATIENCE = patience(20.0)  # s
+
+
+def test_metadata_say_when_a_bag_begins_and_how_long_it_is(tmp_path: Path) -> None:
+    told = yaml.safe_load((write_bag(tmp_path / 'bag', first=1000) / 'metadata.yaml').read_text())
+    whole = told['rosbag2_bagfile_information']
+    for one in (whole, *whole['files']):
+        assert one['starting_time'] == {'nanoseconds_since_epoch': 1000 * STEP}
+        assert one['duration'] == {'nanoseconds': 29 * STEP}
 
 
 def writer_of(folder: Path, **storage: object) -> BagWriter:

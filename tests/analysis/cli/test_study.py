@@ -1,11 +1,15 @@
 """`auv study`: what it refuses before it works."""
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 import yaml
 
 from auv_analysis.cli import main
+from auv_analysis.graph import domain, recorded_runs
+from auv_analysis.simulation import simulate
+from auv_dynamics.files.errors import FailedError
 
 GAINS = {'k_D': 12.0, 'k_I': 1.0, 'Lambda': 0.8, 'Gamma': 60.0}
 SCENARIO = {'name': 's', 'vehicle': 'herman2018', 'duration': 1.0, 'step': 0.01, 'setpoint': {}}
@@ -23,3 +27,21 @@ def test_samples_never_take_the_place_of_a_table(
     errors = capsys.readouterr().err
     assert (end.value.code, errors.count('\n'), (tmp_path / 'out').exists()) == (2, 1, False)
     assert f'expected names that are not those of our own files, found {name}' in errors
+
+
+def test_a_study_on_the_nodes_is_one(tmp_path: Path, monkeypatch, capsys) -> None:
+    asked = []
+
+    def recorded(*given: object, composed: bool) -> tuple[dict, FailedError]:
+        asked.append((given[3], composed))
+        return {}, FailedError('enough')
+
+    monkeypatch.setattr(domain, 'own_domain', lambda number: nullcontext((number, False)))
+    monkeypatch.setattr(recorded_runs, 'free_graph', lambda *given: nullcontext(given[:2]))
+    monkeypatch.setattr(recorded_runs, 'recorded', recorded)
+    monkeypatch.setattr(simulate, 'check_hold', lambda _, hold: asked.append(hold))
+    options = '--run', '--composed', '--domain-id', '7', '--out', str(tmp_path / 'out')
+    with pytest.raises(SystemExit) as end:
+        main.main(['study', 'case1', *options])
+    assert (end.value.code, 'enough' in capsys.readouterr().err) == (1, True)
+    assert asked == ['zoh', ((7, False), True)]

@@ -2,8 +2,10 @@
 
 import io
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -34,6 +36,8 @@ from auv_analysis.driver.evidence import (
 from auv_analysis.driver.excitation import carry_out
 from auv_analysis.driver.plan import Plan, plan_of
 from auv_analysis.driver.report import write_results
+from auv_analysis.graph import domain
+from auv_dynamics.ros.interface import Frames
 
 ROOT = Path(__file__).parents[3]
 
@@ -54,6 +58,54 @@ def shown(evidence: DriverRecord) -> str:
     out = io.StringIO()
     Console(file=out, width=80).print(findings_table(judge(evidence)))
     return out.getvalue()
+
+
+class Client(SimulatedDriver):
+    """Stands for that of ROS: it notes how it was made."""
+
+    made: list['Client']
+
+    def __init__(self, *given: object, commands: bool) -> None:
+        super().__init__()
+        self.given, self.commands = given, commands
+        self.made.append(self)
+
+    def log(self, began: int):
+        return super().log()
+
+    def graph(self, place: str, **_: object):
+        return graph()
+
+    def publishes(self) -> bool:
+        return True
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_vehicle_with_a_fault_is_not_moved_and_options_are_heard(monkeypatch, capsys) -> None:
+    Client.made = []
+    node = SimpleNamespace(RosDriverClient=Client)
+    monkeypatch.setitem(sys.modules, 'auv_analysis.nodes.driver_check_node', node)
+    monkeypatch.setattr(domain, 'join_domain', lambda asked: asked)
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')  # as it would
+    options = '--actuate', '--vehicle', 'bluerov2_heavy', '--seconds', '0.1', '--expect-rate', '7'
+    names = '--odom', 'nav/odom', '--wrench', '/thrust', '--namespace', '/auv1'
+    frames = '--odom-frame', 'map', '--base-frame', 'body', '--use-sim-time', '--domain-id', '7'
+    with pytest.raises(SystemExit) as end:
+        main(['check-driver', *options, *names, *frames, '--json'])
+    assert end.value.code == 1
+    (client,) = Client.made
+    told = {'odom': 'nav/odom', 'wrench': '/thrust'}
+    assert client.given == (7, '/auv1', told, Frames('map', 'body'))
+    assert (client.commands, client.sent) == (True, [])
+    document = json.loads(capsys.readouterr().out)
+    settings = document['settings']
+    assert (settings['rate'], settings['sim_time'], settings['actuates']) == (7.0, True, True)
+    assert settings['frames'] == {'odom': 'map', 'base': 'body'}
+    verdicts = {one['id']: one['verdict'] for one in document['checks']}
+    assert verdicts['frames'] == 'fail'
+    assert verdicts['response_surge'] == NOT_CHECKED
 
 
 def test_a_document_is_json_and_counts_add_up() -> None:

@@ -13,10 +13,11 @@ from helpers.shown import document_lines
 
 from auv_analysis.bag.step_topics import ACCEL, ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import main
+from auv_analysis.replay import compared as comparing
 from auv_analysis.replay.compared import compared, metrics_of, reproduction
 from auv_analysis.replay.open_loop import OpenLoop, open_loop, recorded_loop, recorded_settings
 from auv_dynamics import load_vehicle
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.files.shipped import shipped
 from auv_dynamics.ros.settings import name_of
 from auv_gvc_controller.control.sampled import SampledLaw
@@ -273,6 +274,20 @@ def test_the_command_leaves_figures_and_refuses_a_taken_folder(tmp_path, capsys,
         main.main(command)
     assert ended.value.code == 2
     assert 'a new folder, or --overwrite' in capsys.readouterr().err
+
+
+def test_a_law_is_asked_with_the_vehicle_that_is_given(tmp_path, monkeypatch) -> None:
+    asked = []
+
+    def ask(recorded, law, gains, _):
+        asked.append(recorded.controller._vehicle.name)
+        raise FailedError('enough')
+
+    monkeypatch.setattr(comparing, 'ask_law', ask)
+    bag = write(tmp_path / 'bag.mcap')
+    with pytest.raises(SystemExit):
+        main.main(['replay', str(bag), '--law', 'cl', '--vehicle', 'rexrov'])
+    assert asked == ['rexrov']
 
 
 @pytest.mark.parametrize(

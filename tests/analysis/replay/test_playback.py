@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from auv_analysis.cli.replay import DOWN, UP, _obey
+from auv_analysis.cli.replay import DOWN, RIGHT, UP, _obey, _state
 from auv_analysis.nodes.replay_node import HELD, Playback
 
 SECOND = 10**9
@@ -122,3 +122,17 @@ def test_however_high_the_rate_a_pause_holds_before_the_next_message():
     playback.pause(1e10, 5 * SECOND)
     playback.run(2e10)
     assert playback.wait(2e10, 5 * SECOND) == 0.0
+
+
+def test_keys_pause_go_on_and_step_and_the_bar_says_so() -> None:
+    said = []
+    keys = {key: lambda key=key: said.append(key) for key in ('run', 'pause', 'step')}
+    player = SimpleNamespace(playback=Playback(rate=2.0), loops=1, **keys)
+    assert _state(player, '') == 'playing, x 2, loop 2'
+    _obey(player, b' ' + RIGHT)
+    player.playback.paused = True
+    _obey(player, b' ')
+    _obey(player, RIGHT + RIGHT)
+    assert said == ['pause', 'run', 'step', 'step']
+    assert _state(player, '') == 'paused, x 2, loop 2'
+    assert _state(player, 'somebody') == 'waiting, x 2, loop 2'

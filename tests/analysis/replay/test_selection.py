@@ -7,9 +7,10 @@ import pytest
 from auv_analysis.bag.step_topics import ODOMETRY, TWIST, WRENCH
 from auv_analysis.cli import replay
 from auv_analysis.cli.main import parser
+from auv_analysis.graph import domain
 from auv_analysis.replay.played_bag import BagIndex, PlayedTopic
 from auv_analysis.replay.selection import ReplaySettings, is_command, select
-from auv_dynamics.files.errors import InputError
+from auv_dynamics.files.errors import FailedError, InputError
 from auv_dynamics.ros import interface
 
 STRING = 'std_msgs/msg/String'
@@ -166,3 +167,19 @@ def test_an_option_of_the_command_is_its_parameter_alone(line: str, changed: dic
     assert not any(usual[key] for key in ('commands', 'allow_commands_to_foreign'))
     assert asked == usual | changed
     assert asked.keys() == usual.keys()
+
+
+def test_a_replay_is_as_fast_as_the_bag_from_its_begin_once() -> None:
+    s = ReplaySettings()
+    assert (s.rate, s.start, s.duration, s.loop, s.clock) == (1.0, 0.0, 0.0, False, True)
+    assert (s.namespace, s.start_paused) == ('replay', False)
+
+
+def test_a_replay_joins_the_domain_that_is_asked_for(monkeypatch) -> None:
+    def join(asked: int) -> None:
+        raise FailedError(f'joins {asked}')
+
+    monkeypatch.setattr(domain, 'join_domain', join)
+    options = parser(['replay']).parse_args(['replay', 'bag', '--domain-id', '7'])
+    with pytest.raises(FailedError, match='joins 7'):
+        replay.run(options)

@@ -13,6 +13,7 @@ import yaml
 
 from auv_analysis import load_scenario
 from auv_analysis.scenario.scenario import Scenario, write_inputs
+from auv_analysis.studies.sweep import campaign
 from auv_dynamics import load_vehicle
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
@@ -20,10 +21,10 @@ from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle import vehicle_file
 
 ROOT = Path(__file__).resolve().parents[3]
-SHIPPED = sorted(
-    p for kind in ('vehicles', 'scenarios') for p in (ROOT / 'config' / kind).glob('*.yaml')
-)
-SCHEMAS = {'vehicles': vehicle_file.SCHEMA, 'scenarios': SCHEMA}
+SCHEMAS = {
+    'vehicles': vehicle_file.SCHEMA, 'scenarios': SCHEMA, 'campaigns': campaign.SCHEMA,
+}  # fmt: skip
+SHIPPED = sorted(p for kind in SCHEMAS for p in (ROOT / 'config' / kind).glob('*.yaml'))
 LEAST = {
     'name': 'least',
     'vehicle': 'rexrov',
@@ -190,7 +191,9 @@ def test_shipped_file_names_the_schema_that_accepts_it(path: Path) -> None:
 
 @pytest.mark.parametrize('path', SHIPPED, ids=lambda path: path.stem)
 def test_shipped_file_loads_by_its_bare_name(path: Path) -> None:
-    load = {'vehicles': load_vehicle, 'scenarios': load_scenario}[path.parent.name]
+    load = {
+        'vehicles': load_vehicle, 'scenarios': load_scenario, 'campaigns': campaign.load_campaign,
+    }[path.parent.name]  # fmt: skip
     assert load(path.stem).name == path.stem
     assert shipped(path.parent.name, path.stem).samefile(path)
 

@@ -110,6 +110,8 @@ def test_endpoints_that_do_not_fit_are_errors() -> None:
     assert found[1][0] == 'error'
     assert 'found std_msgs/msg/String' in found[1][1]
     assert found[2] == ('warning', f'{interface.CMD_VEL}: expected one publisher, found 2')
+    counts = {t.name: (t.publishers, t.subscribers) for t in monitor.snapshot(0.1).topics}
+    assert [counts[name] for name in seen] == [(1, 2), (0, 2), (2, 2)]
 
 
 def test_what_is_published_and_does_not_come_is_said() -> None:

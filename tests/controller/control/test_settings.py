@@ -1,5 +1,7 @@
 """Parameters of a controller: which limit, filter, timeout and wrench each of them is."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -117,3 +119,13 @@ def test_the_timeout_of_odometry_is_also_the_age_and_the_pause_that_its_stamps_m
         with pytest.raises(ValueError, match='stamp went back'):
             controller.odometry(ms * MS, X, Now(at))
     assert controller.odometry(40 * MS, X, Now(0.41)).ns == 40 * MS
+
+
+@pytest.mark.parametrize(('clock', 'refused'), [('own', False), ('ros', True), ('auto', True)])
+def test_ages_are_judged_by_the_clock_of_the_parameter(clock, refused):
+    found = settings(limits__wrench=[1e4], stamp_clock=clock)
+    controller = found.build(GAINS, HEAVY, found.setpoints())
+    late = Now(0.0, 5_000 * MS)  # the node's clock is 5 s ahead of the stamps
+    at_rest = (0.0, 0.0, 3.0, 1.0, *[0.0] * 9)
+    with pytest.raises(ValueError, match='stamp old') if refused else nullcontext():
+        controller.odometry(0, at_rest, late)

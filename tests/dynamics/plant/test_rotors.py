@@ -62,6 +62,12 @@ def test_a_rotor_in_the_vehicle_file_acts_only_where_a_scenario_asks_for_it():
     assert np.abs(chain({'rotors': True}, [TAU] * 5) - expected).max() > 1.0
 
 
+@pytest.mark.parametrize('rotor', [{'omega': 14.0, 'zeta': 0.3}, {'lag': 0.1, 'lag_at': 20.0}])
+def test_the_lag_of_a_scenario_takes_the_place_of_any_dynamics(rotor):
+    found = chain({'rotors': True, 'rotor_lag': 0.15}, [TAU] * 20, vehicle_with(rotor))
+    assert_allclose(found, chain({'rotor_lag': 0.15}, [TAU] * 20, without_rotors()), atol=1e-12)
+
+
 def test_a_thrust_below_the_dead_band_is_swallowed():
     u = INVERSE @ TAU
     band = np.median(np.abs(u))

@@ -54,6 +54,12 @@ def test_the_bluerov2_has_the_t200_at_16_volts(name):
         assert 0.9 * turning.min() < min(rotor.dead_band) < max(rotor.dead_band) < 0.5
 
 
+def test_a_table_in_kilogram_force_is_one_in_newton():
+    table = {'command': [-1.0, 0.0, 1.0], 'thrust_kgf': [-6.0, 0.0, 8.0]}
+    curve = rotors_of(changed({'curve': table, 'voltage': 24.0}))[1].curve
+    assert_allclose(curve.thrusts, KGF * np.array([-6.0, 0.0, 8.0]))
+
+
 def test_a_table_in_the_file_is_a_curve():
     curve = rotors_of(changed({'curve': TABLE, 'voltage': 24.0}))[1].curve
     assert_array_equal(curve.thrust([-1, -0.55, 0, 0.6, 1]), [-60, -30, 0, 40, 80])

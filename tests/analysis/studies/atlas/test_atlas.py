@@ -12,8 +12,10 @@ from pyarrow import parquet
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.cli import main
+from auv_analysis.studies.atlas import atlas
 from auv_analysis.studies.atlas.atlas import charts, results_of
 from auv_analysis.studies.atlas.plots import coupled, uncoupled
+from auv_dynamics.files.errors import FailedError
 from auv_dynamics.files.shipped import shipped, shipped_names
 from auv_dynamics.vehicle import DOFS
 
@@ -96,3 +98,18 @@ def test_an_unknown_vehicle_is_refused_in_one_line(tmp_path: Path, capsys) -> No
     assert len(lines) == 1
     assert 'nautilus' in lines[0]
     assert not (tmp_path / 'out').exists()
+
+
+def test_a_vehicle_is_shown_beside_all_that_are_shipped(tmp_path: Path, monkeypatch) -> None:
+    mine = tmp_path / 'mine.yaml'
+    mine.write_text(shipped('vehicles', 'rexrov').read_text())
+    asked = []
+
+    def asks(vehicles: list[str]) -> None:
+        asked.extend(vehicles)
+        raise FailedError('enough')
+
+    monkeypatch.setattr(atlas, 'charts', asks)
+    with pytest.raises(SystemExit):
+        main.main(['atlas', 'rexrov', str(mine), '--out', str(tmp_path / 'out')])
+    assert asked == [*shipped_names('vehicles'), str(mine)]

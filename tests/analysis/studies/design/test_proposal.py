@@ -11,7 +11,7 @@ from helpers.report_pages import check_numbers
 
 from auv_analysis import load_scenario, simulate, summarize
 from auv_analysis.output.folder import ResultsFolder
-from auv_analysis.studies.design import search
+from auv_analysis.studies.design import results, search
 from auv_analysis.studies.design.change import ALL, NAMES, semi_axes
 from auv_analysis.studies.design.prediction import COUPLINGS, Objective, coupling_named
 from auv_analysis.studies.design.report import _findings, change, print_design, write_report
@@ -158,11 +158,14 @@ def test_a_coupling_that_the_scenario_does_not_move_is_told(tmp_path):
     assert 'zero throughout this scenario' in result.document['statement']
 
 
-def test_the_scenario_keeps_its_own_controllers(short, tmp_path):
+def test_the_scenario_keeps_its_own_controllers(short, tmp_path, monkeypatch):
+    said = lambda vehicle, largest: [f'{vehicle.name} {len(largest)}']  # noqa: E731
+    monkeypatch.setattr(results, 'beyond_authority', said)
     result, out = designed('rexrov', tmp_path, short, 'delta_xi.surge')
     document = result.document
     assert (document['scenario'], document['controller']) == ('short', 'firm')
     assert set(document['controllers']) == {'soft', 'firm'}
+    assert document['warnings'][-1] == 'design_rexrov 6'
     assert document['reduce'] == 'delta_xi.surge'
     row = by_name(document)['delta_xi_max.surge']
     assert row['after'] < row['before']
@@ -190,7 +193,14 @@ def test_a_sampled_scenario_with_a_set_point_of_its_own(tmp_path):
 @pytest.mark.parametrize(
     ('share', 'words'), [(0.02, 'The bounds do not allow half'), (0.0, 'No change within')]
 )
-def test_bounds_that_do_not_allow_half_are_told(share, words, short, tmp_path):
+def test_bounds_that_do_not_allow_half_are_told(share, words, short, tmp_path, monkeypatch):
+    asked, at_any_cost = [], search.Remedies.at_any_cost
+
+    def at_cost(self, target, *given):
+        asked.append(target)
+        return at_any_cost(self, target, *given)
+
+    monkeypatch.setattr(search.Remedies, 'at_any_cost', at_cost)
     setting = open_setting('rexrov', short)
     own = []
     for one in setting.space.parameters:
@@ -200,6 +210,7 @@ def test_bounds_that_do_not_allow_half_are_told(share, words, short, tmp_path):
     document = result.document
     assert words in document['statement']
     assert document['halved'] is False
+    assert len(asked) == 1
     row = by_name(document)['delta_pi_max.pitch']
     assert (row['after'] < row['before']) == (share > 0)
     assert f'{100 * (1 - row["after"] / row["before"]):.1f} %' in document['statement'] or not share

@@ -30,6 +30,7 @@ from auv_analysis.studies.excite.report import (
 )
 from auv_analysis.studies.identify.identify import identify
 from auv_dynamics.files.errors import FailedError
+from auv_dynamics.files.shipped import shipped
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
 
 TANK = (12.0, 12.0, 6.0)
@@ -248,3 +249,51 @@ def test_what_cannot_be_told_apart_is_said_in_whole_sentences(excited, tmp_path:
     page = write_report(excited, results, tmp_path).read_text(encoding='utf-8')
     assert '>Mass and M.surge.surge stand for one another.<' in page
     assert 'Open: mass and M.surge.surge stand for one another.' in page
+
+
+def test_a_vehicle_of_ones_own_is_named_where_it_lies(tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / 'mine.yaml').write_text(shipped('vehicles', VEHICLE).read_text())
+    monkeypatch.chdir(tmp_path)
+    request = request_of('mine.yaml', duration=2.0)
+    family = Family.of(request, np.random.default_rng(0))
+    wave = family.waves(np.zeros((1, 2 * len(family.driven)))).part(0)
+    assert scenario_of(request, wave)['vehicle'] == str(tmp_path / 'mine.yaml')
+
+
+def test_each_seed_draws_other_phases(monkeypatch) -> None:
+    drawn = []
+
+    def of(request: Request, rng: np.random.Generator) -> None:
+        drawn.append(rng.random())
+        raise FailedError('enough')
+
+    monkeypatch.setattr(searching.Family, 'of', of)
+    for seed in (0, 7, 7):
+        with pytest.raises(FailedError):
+            excite(request_of(seed=seed))
+    assert drawn[0] != drawn[1] == drawn[2]
+
+
+def test_vehicles_of_a_closed_loop_are_the_spread_away_from_the_prior() -> None:
+    request = request_of(spread=0.2)
+    _, errors = _fleet(request, np.random.default_rng(0), 4)
+    assert (len(errors), errors[0]) == (5, {})
+    for error, share in zip(errors[1:3], (0.2, -0.2), strict=True):
+        np.testing.assert_allclose(error['dM'], share * request.vehicle.M)
+        np.testing.assert_allclose(error['dD'], -share * np.diag(request.vehicle.D_linear))
+
+
+@pytest.mark.parametrize('closed', [False, True])
+def test_axes_that_may_not_be_driven_are_not(closed: bool) -> None:
+    wrench = np.array([15.0, 15.0, 0.0, 0.0, 0.0, 2.0])
+    request = request_of(bounds=replace(request_of().bounds, wrench=wrench), duration=2.0)
+    request = replace(request, closed=closed)
+    family = Family.of(request, np.random.default_rng(0))
+    assert family.driven.tolist() == [0, 1, 5]
+    assert not family.offset[2:5].any()
+    waves = family.waves(np.zeros((1, 6)))
+    limit = scenario_in_memory(request, scenario_of(request, waves.part(0))).data['actuators']
+    assert limit['limit'][2] == 1e-6
+    if closed:
+        assert family.most.tolist() == [0.5, 0.5, 0.0, 0.0, 0.0, 1.0]
+        np.testing.assert_allclose(waves.value(np.zeros(1)), 0.0, atol=1e-12)  # no jump from rest

@@ -14,7 +14,14 @@ from scipy.optimize import least_squares
 from auv_analysis.bag.tracks import Track
 from auv_analysis.studies.identify.couplings import couplings
 from auv_analysis.studies.identify.identified import Identified
-from auv_analysis.studies.identify.identify import Settings, _dissipative, feeding, identify, split
+from auv_analysis.studies.identify.identify import (
+    Settings,
+    _dissipative,
+    _of_still,
+    feeding,
+    identify,
+    split,
+)
 from auv_analysis.studies.identify.output_error import OutputError
 from auv_analysis.studies.identify.plausibility import (
     _scale,
@@ -116,6 +123,16 @@ def test_inertia_far_below_that_of_the_rigid_body_alone_is_told(share, told):
     found = SimpleNamespace(vehicle=vehicle, found=SimpleNamespace(M=M), coefficients=lambda: rows)
     said = _scale(found)
     assert ['far below that of the rigid body alone' in text for text in said] == [True] * told
+
+
+@pytest.mark.parametrize(('value', 'said'), [
+    (1.0, 'as 1/10 of that of the vehicle file: the wrench is that much too small'),
+    (100.0, 'as 10 times that of the vehicle file: the wrench is that much too large'),
+])  # fmt: skip
+def test_a_wrench_in_another_unit_is_told_with_its_factor(value, said):
+    rows = [{'name': f'M.{dof}.{dof}', 'status': 'identified', 'value': value, 'prior': 10.0}
+            for dof in DOFS]  # fmt: skip
+    assert said in _scale(SimpleNamespace(coefficients=lambda: rows))[0]
 
 
 @pytest.mark.parametrize(('low', 'told'), [(0.9, False), (1.1, True)])
@@ -270,6 +287,11 @@ def test_damping_of_a_vehicle_that_gains_speed_is_held_where_it_takes_energy():
     problem = OutputError(vehicle, segments_of(record, 2.0, 0.6), 0.05, np.full(9, 0.003))
     fit = problem.fit(u, np.zeros(6), most=10)
     assert fit.unknowns.coefficients(fit.theta).D_linear[5, 5] < 0.0
+    every = unknowns(vehicle, ('M.diagonal', 'D_linear'), speeds=np.full(6, 0.1),
+                     wrenches=np.ones(6))  # fmt: skip
+    unsure = _of_still(problem, fit, every)  # as the inertia is not searched
+    assert np.diag(unsure)[5] > 0.0
+    assert not _of_still(problem, fit, fit.unknowns).any()
     after, zeros = _dissipative(problem, fit, problem.covariance(fit))
     found = Identified(vehicle, [], held_of([], 0.6), problem, after, problem.covariance(after), [],
                        zeros, ())  # fmt: skip
@@ -277,10 +299,12 @@ def test_damping_of_a_vehicle_that_gains_speed_is_held_where_it_takes_energy():
     assert len({frozenset(row) for row in rows}) == 1
     assert all((row['low'] is None) == (row['high'] is None) for row in rows)
     data = yaml.safe_load(shipped('vehicles', 'lauv').read_text()) | {'sign': 'sname'}
+    data['lift'] = (-np.array(data['lift'])).tolist()
     text = vehicle_text(found, data, 'x', '')  # what is written is positive, whatever the prior was
     written = vehicle_from_dict(yaml.safe_load(text), 'written')
     D = written.D_linear
     assert_allclose(written.M, vehicle.M, rtol=1e-6, atol=1e-9)
+    assert_allclose(written.lift, vehicle.lift, rtol=1e-5)
     assert_allclose(written.model.hydrostatics, vehicle.model.hydrostatics, rtol=1e-5, atol=1e-4)
     assert D[2, 4] == vehicle.D_linear[2, 4], 'what takes energy stays'
     assert 'D_linear.sway.yaw: held at 0, as it would feed energy' in text

@@ -9,11 +9,13 @@ from helpers.sea_trials import DELAY, LAG, trial, wrong_prior
 from numpy.testing import assert_allclose, assert_array_equal
 
 from auv_analysis.bag.tracks import Track, assembled
+from auv_analysis.studies.identify import identify as identifying
 from auv_analysis.studies.identify.bags import on_one_step, parts, without_constants
 from auv_analysis.studies.identify.identify import (
     HISTORY,
     Settings,
     _noise,
+    _still,
     _trusting,
     as_filed,
     check_motion,
@@ -269,3 +271,22 @@ def test_a_vehicle_as_filed_acts_behind_the_lag_and_the_delay_that_are_given(her
     first, *_ = compared([part], held_of([part], HISTORY), vehicle, lag=0.2, delay=0.06)
     assert first['predictor'] == 'herman2018'
     assert first['linear'] == pytest.approx(np.sqrt((errors**2).sum(axis=1).mean()))
+
+
+def test_the_length_of_a_segment_is_as_asked_and_what_is_kept_counts(herman, monkeypatch):
+    monkeypatch.setattr(
+        identifying, '_of_still', lambda _, fit, every: 100.0 * np.eye(len(fit.theta))
+    )
+    few = Settings(('M.diagonal',), segment=2.0)
+    found = identify([herman.part(0.0, 20.0)], [], load_vehicle('herman2018'), few)
+    assert len(found.problem.segments[0].command) * found.problem.step == pytest.approx(2.0)
+    assert np.diag(found.covariance).min() >= 100.0
+
+
+def test_what_hardly_moves_is_not_searched():
+    some = record(10.0)
+    some.velocity[:, 1] *= 1e-3
+    u = unknowns(load_vehicle('herman2018'), ('M', 'D_linear'), speeds=np.ones(6),
+                 wrenches=np.ones(6))  # fmt: skip
+    found = _still([some], np.full(9, 0.01), u)
+    assert [e.name for e in found] == ['M.sway.sway', 'D_linear.sway']

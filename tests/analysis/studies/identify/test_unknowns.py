@@ -110,3 +110,19 @@ def test_a_value_that_no_vehicle_has_is_not_believed(name, value, said):
 def test_a_wrong_name_is_refused_with_the_nearest():
     with pytest.raises(InputError, match='nearest: restoring'):
         made(load_vehicle('rexrov'), ('restorin',))
+
+
+def test_a_coupling_that_is_believed_is_so_whatever_is_believed_of_its_diagonal():
+    vehicle = load_vehicle('herman2018')
+    M = vehicle.M
+    believed = {'M.pitch.heave': (0.8 * M[4, 2], 1.0), 'M.pitch.pitch': (1.3 * M[4, 4], 5.0)}
+    u = made(vehicle, DEFAULT, believed=believed)
+    found = u.coefficients(np.zeros(len(u.entries))).M
+    assert_allclose((found[4, 2], found[4, 4]), (0.8 * M[4, 2], 1.3 * M[4, 4]))
+
+
+def test_units_of_coupled_damping_are_those_of_force_and_velocity():
+    si = {entry.name: entry.si for entry in made(load_vehicle('herman2018')).entries}
+    assert (si['D_linear.sway.yaw'], si['D_linear.yaw.sway']) == ('N/rad/s', 'N m/m/s')
+    assert si['D_quadratic.sway.yaw'] == 'N/(rad/s)²'
+    assert si['D_quadratic.yaw.sway'] == 'N m/(m/s)²'

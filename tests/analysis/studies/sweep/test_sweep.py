@@ -54,6 +54,20 @@ def test_rows_are_the_figures_of_their_simulations(hold: str, files: Path) -> No
                 )
 
 
+def test_vehicles_that_alternate_keep_their_rows(files: Path) -> None:
+    contents = sweep_block.contents_of(load_campaign(files / 'campaign.yaml'))
+
+    def efforts(names: list[str], seeds: np.ndarray) -> list[float]:
+        changes = {'vehicle': names}
+        found = sweep_block.block_figures(contents, ['gvc'], 'continuous', changes, seeds)
+        return found['gvc']['effort.rms.heave'].tolist()
+
+    names = ['herman2018', *['herman2018_neutral'] * 2, 'herman2018']
+    alone = [efforts([name], np.array([i]))[0] for i, name in enumerate(names)]
+    assert efforts(names, np.arange(4)) == pytest.approx(alone)
+    assert alone[0] != pytest.approx(alone[1], rel=0.01)
+
+
 def test_a_worker_needs_no_file_of_the_set_point(files: Path) -> None:
     way = files / 'way.csv'
     way.write_text('t,surge,sway,heave,roll,pitch,yaw\n0,0,0,0,0,0,0\n1,0.5,0,0.2,0,0,0.1\n')

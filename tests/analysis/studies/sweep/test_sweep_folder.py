@@ -4,7 +4,18 @@ import json
 from pathlib import Path
 
 import pytest
-from helpers.sweeps import CAMPAIGN, ROLLOUTS, ROOT, Counting, Interrupted, parts, run, write_files
+import yaml
+from helpers.sweeps import (
+    CAMPAIGN,
+    ROLLOUTS,
+    ROOT,
+    SCENARIO,
+    Counting,
+    Interrupted,
+    parts,
+    run,
+    write_files,
+)
 
 from auv_analysis.studies.sweep.campaign import load_campaign
 from auv_analysis.studies.sweep.engine import SweepStoppedError
@@ -46,6 +57,19 @@ def test_part_that_is_missing_or_broken_is_made_again(files: Path) -> None:
     (data / '.part-00000003.parquet.unfinished').write_bytes(b'half')
     assert run(files).before == ROLLOUTS - 10
     assert parts(files / 'out') == before
+
+
+def test_a_sweep_does_not_go_on_with_another_set_point(files: Path) -> None:
+    way = 't,surge,sway,heave,roll,pitch,yaw\n0,0,0,0,0,0,0\n1,0.5,0,0.2,0,0,0\n'
+    (files / 'way.csv').write_text(way)
+    scenario = yaml.safe_load(SCENARIO) | {'setpoint': {'file': 'way.csv'}}
+    (files / 'scenario.yaml').write_text(yaml.safe_dump(scenario))
+    grid = 'vary: [{grid: {controllers.*.k_D: [6.0, 12.0]}}]'
+    (files / 'campaign.yaml').write_text(f'name: x\nscenario: scenario.yaml\n{grid}\n')
+    run(files)
+    (files / 'way.csv').write_text(way.replace('0.5', '0.6'))
+    with pytest.raises(InputError, match=r'setpoint\.csv'):
+        run(files)
 
 
 CHANGED = {  # file, old, new -> key that the line names

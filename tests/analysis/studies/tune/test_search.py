@@ -167,6 +167,17 @@ def test_a_sampled_scenario_is_tuned_with_its_noise_and_in_its_hold(tmp_path) ->
         assert measures.effort == pytest.approx(expected.effort, rel=1e-9), name
         assert measures.error == pytest.approx(expected.error, rel=1e-9), name
     assert (out / 'setpoint.csv').read_text() == way
+    loud = replace(found, commands={'gvc': np.array([1e6, 0.0, 0.0, 0.0, 0.0, 0.0])})
+    assert 'times the weight of the vehicle' in ' '.join(loud.remarks('gvc'))
+
+
+@pytest.mark.usefixtures('brief')
+def test_each_seed_searches_other_points(tmp_path) -> None:
+    base = scenario(tmp_path, {'gvc': GVC}, duration=0.05)
+    how = 'gvc', ('gvc',), 'effort', 'error', 1e-3, 'mass', 'continuous'
+    requests = [Request(base, *how, seed, 1) for seed in (0, 1)]
+    points = [tuned(request, 'gvc', Goal.of(request)).best.points for request in requests]
+    assert not np.array_equal(*points)
 
 
 @pytest.mark.usefixtures('brief')

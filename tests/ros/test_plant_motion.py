@@ -174,8 +174,8 @@ def test_a_reset_puts_the_vehicle_back_after_the_step_that_is_under_way(made, ve
 
 
 REAL = {'step': H, 'actuators.limit': [1e6], 'wrench_timeout': patience(0.2)}
-PACE = patience(0.05)  # s, a step at which a loaded machine hears of every one in time
-COUNT = 20  # of them are looked at
+PACE = patience(0.1)  # s, a step at which a loaded machine hears of every one in time
+COUNT = 15  # of them are looked at
 
 
 def arrivals(made: Program) -> list[tuple[float, float]]:

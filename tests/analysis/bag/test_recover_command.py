@@ -292,6 +292,14 @@ def test_two_repairs_at_once(tmp_path: Path, capsys: pytest.CaptureFixture) -> N
     assert (bag / 'bag_0.mcap').read_bytes() == left
 
 
+def assert_left_to_its_recorder(capsys: pytest.CaptureFixture, bag: Path, data: bytes) -> None:
+    code, _, err = command(capsys, bag)
+    assert code == 2
+    assert 'found a file that is being written' in err
+    assert (bag / 'bag_0.mcap').read_bytes() == data
+    assert sorted(os.listdir(bag)) == ['bag_0.mcap', 'metadata.yaml']
+
+
 def test_a_file_that_grows_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -308,11 +316,7 @@ def test_a_file_that_grows_is_refused(
 
     monkeypatch.setattr(recovery.time, 'sleep', grow)
     monkeypatch.setattr(recovery, 'QUIET', 3600.0)
-    code, _, err = command(capsys, bag)
-    assert code == 2
-    assert 'found a file that is being written' in err
-    assert path.read_bytes() == left + b'more'
-    assert sorted(os.listdir(bag)) == ['bag_0.mcap', 'metadata.yaml']
+    assert_left_to_its_recorder(capsys, bag, left + b'more')
 
 
 def test_a_recorder_that_comes_back_during_a_repair_loses_nothing(
@@ -329,11 +333,7 @@ def test_a_recorder_that_comes_back_during_a_repair_loses_nothing(
             file.write(b'more')
 
     monkeypatch.setattr(recovery.Rewriter, 'write', meanwhile)
-    code, _, err = command(capsys, bag)
-    assert code == 2
-    assert 'found a file that is being written' in err
-    assert path.read_bytes() == left + b'more'
-    assert sorted(os.listdir(bag)) == ['bag_0.mcap', 'metadata.yaml']
+    assert_left_to_its_recorder(capsys, bag, left + b'more')
 
 
 def order_of_calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:

@@ -199,9 +199,7 @@ def _believed(file: str | None) -> dict[str, tuple[float, float]]:
 
     known = read_yaml(Path(file), 'prior')
     validate(known, PRIOR, file)
-    return {
-        name: (float(entry['value']), float(entry['deviation'])) for name, entry in known.items()
-    }
+    return {str(k): (float(of['value']), float(of['deviation'])) for k, of in known.items()}
 
 
 def _gain(text: str) -> float | None:

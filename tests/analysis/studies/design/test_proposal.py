@@ -159,8 +159,9 @@ def test_a_coupling_that_the_scenario_does_not_move_is_told(tmp_path):
 
 
 def test_the_scenario_keeps_its_own_controllers(short, tmp_path, monkeypatch):
-    said = lambda vehicle, largest: [f'{vehicle.name} {len(largest)}']  # noqa: E731
-    monkeypatch.setattr(results, 'beyond_authority', said)
+    monkeypatch.setattr(
+        results, 'beyond_authority', lambda v, largest: [f'{v.name} {len(largest)}']
+    )
     result, out = designed('rexrov', tmp_path, short, 'delta_xi.surge')
     document = result.document
     assert (document['scenario'], document['controller']) == ('short', 'firm')

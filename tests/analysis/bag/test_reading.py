@@ -161,7 +161,7 @@ def test_bags_that_are_cut(write: Any, share: float) -> None:
 
 
 @given(bags(odd=()), st.lists(st.tuples(st.floats(0, 1), st.integers(1, 255)), min_size=1))
-@examples(15, suppress_health_check=SHARED)
+@examples(30, suppress_health_check=SHARED)
 def test_bags_with_damaged_bytes(write: Any, flips: list[tuple[float, int]]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         last = sorted(write(Path(folder)).glob('*.mcap'))[-1]

@@ -292,18 +292,23 @@ def test_two_repairs_at_once(tmp_path: Path, capsys: pytest.CaptureFixture) -> N
     assert (bag / 'bag_0.mcap').read_bytes() == left
 
 
-def assert_left_to_its_recorder(capsys: pytest.CaptureFixture, bag: Path, data: bytes) -> None:
+def go_on(path: Path) -> None:
+    """What a recorder does that takes no lock."""
+    with path.open('ab') as file:
+        file.write(b'more')
+
+
+def assert_left_to_its_recorder(capsys: pytest.CaptureFixture, bag: Path, left: bytes) -> None:
     code, _, err = command(capsys, bag)
     assert code == 2
     assert 'found a file that is being written' in err
-    assert (bag / 'bag_0.mcap').read_bytes() == data
+    assert (bag / 'bag_0.mcap').read_bytes() == left + b'more'
     assert sorted(os.listdir(bag)) == ['bag_0.mcap', 'metadata.yaml']
 
 
 def test_a_file_that_grows_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a recorder that takes no lock."""
     bag = write_bag(tmp_path / 'bag')
     path = bag / 'bag_0.mcap'
     left = cut(path)
@@ -311,12 +316,11 @@ def test_a_file_that_grows_is_refused(
 
     def grow(seconds: float) -> None:
         assert 0 < seconds <= recovery.QUIET
-        with path.open('ab') as file:
-            file.write(b'more')
+        go_on(path)
 
     monkeypatch.setattr(recovery.time, 'sleep', grow)
     monkeypatch.setattr(recovery, 'QUIET', 3600.0)
-    assert_left_to_its_recorder(capsys, bag, left + b'more')
+    assert_left_to_its_recorder(capsys, bag, left)
 
 
 def test_a_recorder_that_comes_back_during_a_repair_loses_nothing(
@@ -329,11 +333,10 @@ def test_a_recorder_that_comes_back_during_a_repair_loses_nothing(
 
     def meanwhile(*given: Any) -> None:
         write(*given)
-        with path.open('ab') as file:
-            file.write(b'more')
+        go_on(path)
 
     monkeypatch.setattr(recovery.Rewriter, 'write', meanwhile)
-    assert_left_to_its_recorder(capsys, bag, left + b'more')
+    assert_left_to_its_recorder(capsys, bag, left)
 
 
 def order_of_calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:

@@ -99,7 +99,7 @@ def fill_blocks(both, table, x, out, lanes):
 
 
 @needing('numba', LANES)
-@examples(15)
+@examples(30)
 @given(count=SIZES, seed=st.integers(0, 2**32 - 1))
 def test_compiled_lanes_do_what_is_done_to_each_vehicle(count, seed):
     """In registers, and compiled for one vehicle after the other, as in plain Python."""

@@ -32,8 +32,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     vehicle, training, held, notes, inputs, out = read(options, 'predict')
     with results_folder(out, overwrite=options.overwrite, inputs=inputs) as folder:
         with waiting('predicting'):
-            late = {'lag': options.lag, 'delay': options.delay}
-            rows = compared(training, held_of(held, HISTORY), vehicle, **late)
+            moments = held_of(held, HISTORY)
+            rows = compared(training, moments, vehicle, lag=options.lag, delay=options.delay)
         results = prediction_results(vehicle.name, held, rows, notes)
         results.write(folder.folder)
         save_figures(folder.folder / 'figures', {'prediction': lambda: prediction(rows)})

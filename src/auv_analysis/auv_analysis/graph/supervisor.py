@@ -145,7 +145,7 @@ class Supervisor:
                 process.terminate()
             for names, grace in ((running.keys() - {writes}, GRACE), ({writes}, WRITING)):
                 group = [running[name] for name in names & running.keys()]
-                if grace == WRITING and any(process.poll() is None for process in group):
+                if names == {writes} and any(process.poll() is None for process in group):
                     say(f'{writes} still writes, for {WRITING:g} s at most')
                 _, alive = psutil.wait_procs(group, timeout=grace)
                 for process in alive:

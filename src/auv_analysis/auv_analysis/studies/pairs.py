@@ -7,7 +7,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-TIE = 1e-6  # relative difference below which two are the same: nobody finds what a search leaves
+TIE = 1e-6  # relative difference of two that are the same: what a search leaves is no finding
 NEVER = np.log(1e300)  # of the ratio of what does not exist to what does
 KNOWN = NEVER / 4  # of a ratio: one above it is that of values that do not exist
 CONFIDENCE = 0.95

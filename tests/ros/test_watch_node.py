@@ -125,11 +125,16 @@ def test_what_nodes_say_of_themselves_is_told(ears: Ears) -> None:
     assert ears.topic(topics.DIAGNOSTICS).heard == 1
 
 
-def test_who_does_not_fit_is_named_with_topic_and_policy(ears: Ears) -> None:
+@pytest.mark.parametrize('named', [True, False])
+def test_who_does_not_fit_is_named_with_topic_and_policy(ears: Ears, named: bool, monkeypatch):
     ears.peer.listen(topics.ODOM)  # reliable
     ears.publisher(topics.ODOM, BEST_EFFORT)
     ears.publisher(topics.WRENCH, kind=String)
-    for word in ('odom: incompatible QoS of test_peer and test_peer: best effort publisher',
+    peer = ears.peer.node.get_fully_qualified_name()
+    if not named:
+        monkeypatch.setattr('auv_dynamics.ros.endpoints.UNNAMED', ears.peer.node.get_name())
+        peer = 'a node without a name yet'
+    for word in (f'odom: incompatible QoS of {peer} and {peer}: best effort publisher',
                  'wrench: expected the type of this topic, found std_msgs/msg/String'):  # fmt: skip
         ears.until(lambda word=word: word in ears.troubles())
 

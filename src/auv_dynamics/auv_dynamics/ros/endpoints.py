@@ -168,7 +168,7 @@ def has_conflict(node: Node, topic: Topic) -> bool:
 
 def _conflict(topic: Topic, publisher: Any, subscriber: Any) -> str:
     policies = qos_conflict(publisher.qos_profile, subscriber.qos_profile)
-    pair = f'{publisher.node_name} and {subscriber.node_name}'
+    pair = f'{full_name(publisher)} and {full_name(subscriber)}'
     return f'{topic.name}: incompatible QoS of {pair}: {policies}' if policies else ''
 
 

@@ -142,7 +142,7 @@ def write_document(
     )
     sections = [section for section in (*sections, quantities) if section.blocks]
     text = (
-        environment()
+        environment(HERE)
         .get_template('document.html.j2')
         .render(
             title=title,
@@ -172,10 +172,10 @@ def names_of(sections: Sequence[Section]) -> dict[str, str]:
 
 
 @cache
-def environment() -> jinja2.Environment:
-    """Where the report's templates are, with the filters that they use."""
+def environment(folder: Path) -> jinja2.Environment:
+    """Where the templates of a folder are, compiled once, with the filters that they use."""
     found = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(HERE),
+        loader=jinja2.FileSystemLoader(folder),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -191,8 +191,7 @@ def environment() -> jinja2.Environment:
 
 def prose(name: str, *, folder: Path = HERE, **context: Any) -> Prose:
     """Paragraphs of a macro of a folder's `prose.html.j2`, that sees the context."""
-    loader = jinja2.FileSystemLoader(folder)
-    module = environment().overlay(loader=loader).get_template('prose.html.j2').make_module(context)
+    module = environment(folder).get_template('prose.html.j2').make_module(context)
     return Prose(getattr(module, name)())
 
 

@@ -224,7 +224,14 @@ class _Builder:
     """Takes the blocks of a run in their order."""
 
     def __init__(self, run: AnyRun, window: float):
-        self._run, self._model = run, control_model(run.vehicle)
+        self._run, self._model, self._split = run, control_model(run.vehicle), is_split(run)
+        start, end = run.start, run.start + run.duration
+        self._ends = {
+            'whole': (start, end),
+            'early': (start, start + TRANSIENT),
+            'late': (start + TRANSIENT, end),
+            'log': (run.step, run.duration),
+        }
         behind = [cut_behind(run, time) for time in (TRANSIENT, ENERGY_WINDOW, window)]
         before = [cut_before(run, time) for time in (TRANSIENT, last_third(run))]
         self._statistics = Statistics([*behind, *before])
@@ -297,7 +304,7 @@ class _Builder:
             self._all('log', name, t[later] - run.start, np.abs(values[later]))
 
     def _in_phases(self, name: str, t: np.ndarray, values: np.ndarray) -> None:
-        if not is_split(self._run):
+        if not self._split:
             self._all('whole', name, t, values)
             return
         early = t <= self._run.start + TRANSIENT
@@ -311,14 +318,7 @@ class _Builder:
     def _trace(self, name: str, part: str, i: int, t: np.ndarray, y: np.ndarray) -> None:
         traces = self._traces.setdefault((name, part), [])
         if i == len(traces):
-            start, end = self._run.start, self._run.start + self._run.duration
-            ends = {
-                'whole': (start, end),
-                'early': (start, start + TRANSIENT),
-                'late': (start + TRANSIENT, end),
-                'log': (self._run.step, self._run.duration),
-            }
-            traces.append(Trace(*ends[part], logarithmic=part == 'log'))
+            traces.append(Trace(*self._ends[part], logarithmic=part == 'log'))
         traces[i].add(t, y)
 
     def _add_shares(self, t: np.ndarray, energy: np.ndarray) -> None:

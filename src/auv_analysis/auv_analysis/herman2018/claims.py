@@ -25,7 +25,7 @@ from auv_analysis.report.digest import TINY, RunDigest, digests
 from auv_analysis.report.document import Block, Section, Sentence, prose
 from auv_analysis.report.results import Column, Shown, Table, described, make_table
 from auv_analysis.runs.run import AnyRun, RunInfo
-from auv_analysis.scenario.scenario import load_scenario
+from auv_analysis.scenario.scenario import Scenario, load_scenario
 from auv_dynamics.plant.disturbance import make_disturbance
 
 
@@ -241,16 +241,17 @@ def judge_runs(
     (scenario,) = scenarios
     found = {law: paper_run(runs, law) for law in BOTH}
     known = digests({law: run for law, run in found.items() if run is not None})
-    if not all(_is_case(run) for run in known.values()):
+    case = load_scenario(scenario)
+    if not all(_is_case(run, case) for run in known.values()):
         return []
     signals = {law: Signals(run) for law, run in known.items()}
     N = next(iter(summaries.values()))['decomposition']['N']
     return judged({scenario: Evidence(signals, tuple(N))})
 
 
-def _is_case(run: RunDigest) -> bool:
+def _is_case(run: RunDigest, case: Scenario) -> bool:
     """Whether a run has the inertia, the set-point and the disturbance of the case it is named."""
-    case, t = load_scenario(run.scenario), run.course['t']
+    t = run.course['t']
     wanted = {'nu_d': case.setpoint.value(t)}
     if run.knows_disturbance:
         wanted['F'] = make_disturbance(case.data['disturbance'])(t)

@@ -33,6 +33,16 @@ def case2() -> dict[str, Run]:
     return _runs('case2')
 
 
+@pytest.fixture(scope='module')
+def table1(case1) -> dict:
+    return _table(case1)
+
+
+@pytest.fixture(scope='module')
+def table2(case2) -> dict:
+    return _table(case2)
+
+
 def _runs(name: str) -> dict[str, Run]:
     scenario = load_scenario(name)
     return {controller: simulate(scenario, controller) for controller in scenario.controllers}
@@ -52,15 +62,14 @@ def _shortened(run: Run, seconds: float) -> Run:
     return run.part(keep)
 
 
-def test_verdicts_of_case_1(case1):
-    table = _table(case1)
-    assert list(table) == list(range(1, 22))
-    verdicts = {number: claim.verdict for number, claim in table.items()}
+def test_verdicts_of_case_1(table1):
+    assert list(table1) == list(range(1, 22))
+    verdicts = {number: claim.verdict for number, claim in table1.items()}
     expected = dict.fromkeys(range(1, 22), 'reproduced')
     expected |= {8: 'partly', 9: 'partly', 14: 'not reproduced', 15: 'not evaluated'}
     expected |= dict.fromkeys(CASE2_ONLY, 'other case')
     assert verdicts == expected
-    assert all(claim.criterion for claim in table.values())
+    assert all(claim.criterion for claim in table1.values())
 
 
 def test_another_experiment_of_the_same_name_is_not_the_papers(case1):
@@ -85,12 +94,11 @@ def test_a_run_with_what_the_papers_have_not_is_none_of_the_papers(case1):
     assert paper.paper_figures(gvc)[0].endswith('figure 1')
 
 
-def test_verdicts_of_case_2(case2, approved):
-    table = _table(case2)
-    approved.add(_lines(table))
+def test_verdicts_of_case_2(table2, approved):
+    approved.add(_lines(table2))
     decided = CASE2_ONLY | {21}
-    assert {number for number, claim in table.items() if claim.verdict == 'reproduced'} == decided
-    others = [claim for number, claim in table.items() if number not in decided]
+    assert {number for number, claim in table2.items() if claim.verdict == 'reproduced'} == decided
+    others = [claim for number, claim in table2.items() if number not in decided]
     assert {claim.verdict for claim in others} == {'other case'}
     assert {claim.ours for claim in others} == {MISSING}
 
@@ -113,8 +121,8 @@ def test_verdicts_of_case_2(case2, approved):
         (21, ['39.98', '175.5', '141.114']),
     ],
 )
-def test_values_of_case_1(case1, number, parts):
-    ours = _table(case1)[number].ours
+def test_values_of_case_1(table1, number, parts):
+    ours = table1[number].ours
     assert [part for part in parts if part not in ours] == []
 
 
@@ -122,18 +130,18 @@ def test_values_of_case_1(case1, number, parts):
     ('number', 'parts'),
     [(17, ['1.68 s against 4.28 s']), (19, ['−2.1']), (20, ['829', '326', '3\u202f986'])],
 )
-def test_values_of_case_2(case2, number, parts):
-    ours = _table(case2)[number].ours
+def test_values_of_case_2(table2, number, parts):
+    ours = table2[number].ours
     assert [part for part in parts if part not in ours] == []
 
 
-def test_a_slow_controller_does_not_reproduce_claim_1(case1):
+def test_a_slow_controller_does_not_reproduce_claim_1(case1, table1):
     gvc = case1['gvc']
     table = _table(case1 | {'gvc': replace(gvc, nu=gvc.nu_d + 0.01)})
     assert table[1].verdict == 'not reproduced'
     assert 'not in 30 s' in table[1].ours
     assert ('length of the run, gvc', 30.0, 's') in table[1].values
-    assert table[9].ours != _table(case1)[9].ours
+    assert table[9].ours != table1[9].ours
 
 
 def test_equal_inputs_reproduce_claim_14(case1):
@@ -144,9 +152,9 @@ def test_equal_inputs_reproduce_claim_14(case1):
     assert _table(case1 | {'cl': replace(cl, tau=peak)})[14].verdict == 'partly'
 
 
-def test_claim_7_wants_both_uncertain_axes_above_the_certain_one(case1):
+def test_claim_7_wants_both_uncertain_axes_above_the_certain_one(case1, table1):
     gvc = case1['gvc']
-    assert _table(case1)[7].verdict == 'reproduced'
+    assert table1[7].verdict == 'reproduced'
     first = np.abs(gvc.disturbance_estimate - gvc.disturbance)[gvc.t < 2.0].max(axis=0)
     for certain, pair in ((1, (0, 2)), (3, (4, 5))):
         estimate = gvc.disturbance_estimate.copy()
@@ -190,9 +198,9 @@ def test_an_effort_of_one_law_alone_is_unbounded(case2):
     assert 'unbounded' not in neither
 
 
-def test_runs_are_known_by_law_and_gains_not_by_name(case1):
+def test_runs_are_known_by_law_and_gains_not_by_name(case1, table1):
     renamed = {'fast': case1['gvc'], 'slow': case1['cl']}
-    same = [(claim.ours, claim.verdict) for claim in _table(case1).values()]
+    same = [(claim.ours, claim.verdict) for claim in table1.values()]
     assert [(claim.ours, claim.verdict) for claim in _table(renamed).values()] == same
     other_gains = replace(case1['cl'], gains=case1['cl'].gains | {'k_D': 13.0})
     row = _table(case1 | {'cl': other_gains})[2]
@@ -245,8 +253,8 @@ def test_every_duration_gives_a_table(case1):
             assert (table[number].verdict == 'not evaluated') == (seconds < 10.0)
 
 
-def test_laws_that_settle_at_one_time_do_not_reproduce_claim_17(case2):
-    assert _table(case2)[17].verdict == 'reproduced'
+def test_laws_that_settle_at_one_time_do_not_reproduce_claim_17(case2, table2):
+    assert table2[17].verdict == 'reproduced'
     alike = replace(case2['cl'], nu=case2['gvc'].nu)
     assert _table(case2 | {'cl': alike})[17].verdict == 'not reproduced'
 
@@ -284,16 +292,18 @@ class Scaled(Signals):
     law: str
     which: Asked
     times: np.ndarray
-    asked: dict[Asked, None]
+    asked: dict[Asked, Any]  # and the answer
 
     def part(self, name: str, *window: float) -> Any:
-        found, key = super().part(name, *window), (self.law, name, window)
-        self.asked[key] = None
-        kinds = ('peak', 'rms', 'mean', 'span', 'path', 'last')
-        values = {kind: getattr(found, kind) for kind in kinds}
-        if key == self.which:
-            values = {kind: self.times * value for kind, value in values.items()}
-        return SimpleNamespace(**values)
+        key = self.law, name, window
+        if key not in self.asked:
+            found = super().part(name, *window)
+            kinds = ('peak', 'rms', 'mean', 'span', 'path', 'last')
+            self.asked[key] = SimpleNamespace(**{kind: getattr(found, kind) for kind in kinds})
+        if key != self.which:
+            return self.asked[key]
+        values = vars(self.asked[key]).items()
+        return SimpleNamespace(**{kind: self.times * value for kind, value in values})
 
 
 class Experiment:
@@ -301,7 +311,7 @@ class Experiment:
 
     def __init__(self, row: Row, runs: dict[str, Any]):
         self._row, self._runs = row, runs
-        self.asked: dict[Asked, None] = {}
+        self.asked: dict[Asked, Any] = {}
         self.usual = self.verdict(('', '', ()), 0, 1.0)
         self.asked |= {(law, name, ()): None for law in runs for name in ('gains', 'others')}
         self.asked |= {('', 'N', ()): None}

@@ -39,7 +39,7 @@ def captured(*, panels: bool = False) -> Iterator[dict[str, Figure]]:
     def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
         found[name] = figure
         png, pdf = folder / f'{name}.png', folder / f'{name}.pdf'
-        Image.new('RGB', (720, 300 + len(found)), 'white').save(png)
+        Image.new('1', (720, 300 + len(found)), 'white').save(png)
         pdf.write_text('\n'.join(figure_lines(figure)), encoding='utf-8')
         return png, pdf
 

@@ -20,6 +20,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, NullLocator
 from PIL import Image
@@ -311,7 +312,7 @@ def shade_sentence(run: RunDigest) -> str:
 
 def key(axes: Axes, quantity: Quantity, columns: Sequence[int]) -> None:
     """Name the lines above the panel, at its right."""
-    handles = [axes.plot([], [], color=COLOURS[i])[0] for i in columns]
+    handles = [Line2D([], [], color=COLOURS[i]) for i in columns]
     place: dict[str, Any] = {
         'loc': 'lower right',
         'bbox_to_anchor': (1.0, 1.02),
@@ -333,6 +334,8 @@ def logarithmic(axes: Axes, *directions: str) -> None:
     shown += [np.concatenate(marks)] if marks else []
     for direction in directions:
         values = [points[:, 'xy'.index(direction)] for points in shown]
+        if getattr(axes, f'get_{direction}scale')() == 'log':
+            continue  # shared with a panel that has one
         if not any(len(v) > 2 and np.any(v > 0) and np.all(v >= 0) for v in values):
             continue  # nothing positive to show: a logarithmic axis has no place for it
         axes.set(**{f'{direction}scale': 'log'})

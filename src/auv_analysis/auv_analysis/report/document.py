@@ -212,6 +212,7 @@ def maths(text: str) -> markupsafe.Markup:
 
 
 PACKAGES = ('auv_analysis', 'auv_gvc_controller', 'auv_dynamics', 'numpy', 'numba', 'scipy')
+_version, _sources = cache(metadata.version), cache(sources_digest)  # as they were loaded
 
 
 def provenance() -> dict[str, Any]:
@@ -220,12 +221,12 @@ def provenance() -> dict[str, Any]:
     versions = {'Python': platform.python_version()}
     for package in PACKAGES:
         try:
-            versions[package] = metadata.version(package)
+            versions[package] = _version(package)
         except metadata.PackageNotFoundError:
             continue
     return {
         'command': shlex.join(['auv', *sys.argv[1:]]) if ours else '',
         'versions': versions,
-        'sources': sources_digest(),
+        'sources': _sources(),
         'written': f'{datetime.now(UTC):%Y-%m-%d %H:%M} UTC',
     }

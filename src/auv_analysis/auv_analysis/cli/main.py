@@ -14,7 +14,7 @@ import signal
 import sys
 import threading
 from argparse import Namespace
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -75,21 +75,21 @@ def main(arguments: list[str] | None = None) -> None:
         sys.unraisablehook = before
 
 
-def parser(named: Collection[str] = COMMANDS) -> Parser:
-    """Grammar of `auv`, with the options of the subcommands that are named.
+def parser(line: Sequence[str] | None = None) -> Parser:
+    """Grammar of `auv` for a line, with the options of the subcommands that it names; None: of all.
 
-    Without a subcommand on the line, `command` is None.
+    A subcommand that the line begins with is there alone. Without any, `command` is None.
     """
     main = Parser(
         prog='auv', description='Experiments with underwater vehicles, and what they say.'
     )
     main.groups = GROUPS
     commands = main.add_subparsers(dest='command', metavar='COMMAND')
-    for name, text in COMMANDS.items():
-        command = commands.add_parser(name, help=text, description=text)
+    for name in COMMANDS.keys() & (line or [])[:1] or COMMANDS:
+        command = commands.add_parser(name, help=COMMANDS[name], description=COMMANDS[name])
         main.children[name] = command
         command.add_argument('--json', action='store_true', help='one JSON document on stdout')
-        if name in named:
+        if line is None or name in line:
             _module(name).add_arguments(command)
     return main
 

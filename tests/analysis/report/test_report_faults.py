@@ -117,7 +117,7 @@ def test_a_band_around_errors_that_keep_inside_is_in_sight(runs):
     assert axes.get_ylim() == pytest.approx((1.1 * -6.0, 1.3 * 6.0))
 
 
-def test_panels_are_shaded_where_all_runs_have_the_same_faults(runs, folder):
+def test_panels_are_shaded_where_all_runs_have_the_same_faults(runs, folder, unrendered):
     page = (folder / 'report.html').read_text(encoding='utf-8').replace('\u00a0', ' ')
     assert re.search(r'<p class="faults">Shaded: 1 .*; 3 wrenches lost, from 2.5 s on\.</p>', page)
     shown = digests(runs)

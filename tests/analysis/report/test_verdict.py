@@ -78,7 +78,7 @@ def test_a_fair_comparison_is_advised_of_shipped_laws_that_differ(two, ratio, la
 
 
 def test_the_verdict_stands_above_the_tables_and_first_in_the_report(
-    tmp_path: Path, capsys, monkeypatch
+    tmp_path: Path, capsys, monkeypatch, unrendered
 ) -> None:
     from auv_analysis.report import run_report
 

@@ -1,6 +1,7 @@
 """Case 1 on every shipped vehicle: GVC keeps its gains, CL does not, and the sampled bound."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -32,11 +33,14 @@ BAND = 0.005  # m/s, rad/s
 T = np.linspace(0, 30, 301)
 
 
-@pytest.fixture
-def scaled(tmp_path):
-    def load(name, **entries):
-        path = tmp_path / f'{name}.yaml'
-        path.write_text(scenario_text(scaled_case1(name) | entries), encoding='utf-8')
+@pytest.fixture(scope='module')
+def scaled(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('scaled')
+
+    @cache
+    def load(name):
+        path = folder / f'{name}.yaml'
+        path.write_text(scenario_text(scaled_case1(name)), encoding='utf-8')
         return load_scenario(path)
 
     return load

@@ -476,12 +476,13 @@ def draw_grid(axes: Axes, grid: HeatMap, *, fontsize: float = 7.0) -> None:
         frame.set_edgecolor('#c9c9c9')
         axes.add_patch(frame)
     if fontsize:
+        shades = colours(norm(hidden))
         for (i, j), value in np.ndenumerate(values):
             if np.isfinite(value):
                 always = grid.structural is not None and grid.structural[i, j]
                 text = ALWAYS if always else _text(value, grid)
                 axes.text(j, i, text, ha='center', va='center', fontsize=fontsize,
-                          color=GREY if value == 0 else _ink(colours(norm(value))))  # fmt: skip
+                          color=GREY if value == 0 else _ink(shades[i, j]))  # fmt: skip
 
 
 def _text(value: float, grid: HeatMap) -> str:
@@ -492,7 +493,7 @@ def _text(value: float, grid: HeatMap) -> str:
     return typeset(number(value, 2))
 
 
-def _ink(colour: tuple[float, float, float, float]) -> str:
+def _ink(colour: np.ndarray) -> str:
     """Black or white, whichever is read better on a colour."""
     red, green, blue, _ = colour
     return 'black' if 0.299 * red + 0.587 * green + 0.114 * blue > 0.5 else 'white'

@@ -133,7 +133,7 @@ class Table:
         kinds = {name: self.data.schema.field(name).type for name in self.shown}
         return {n: pa.types.is_integer(k) or pa.types.is_floating(k) for n, k in kinds.items()}
 
-    @property
+    @cached_property
     def columns(self) -> list['Head']:
         """Heads of the shown columns."""
         return [
@@ -153,7 +153,7 @@ class Table:
         """Columns whose meaning is said below the table."""
         return [column for column in self.columns if column.meaning]
 
-    @property
+    @cached_property
     def rows(self) -> list[list[Cell]]:
         """Shown cells, row by row."""
         columns = {name: self.data[name].to_pylist() for name in self.data.column_names}

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import yaml
 from geometry_msgs.msg import AccelStamped, TwistStamped, WrenchStamped
 from helpers.fork_server import PERIOD
@@ -19,8 +20,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
+from auv_analysis.nodes import replay_node
+from auv_dynamics.nodes import plant_node
 from auv_dynamics.ros import node_interface
 
+MEETING = (plant_node, 'MET'), (replay_node, 'DISCOVERY'), (replay_node, 'ANNOUNCED')  # s
 SECOND = 10**9
 NED, FSD = 'odom_ned', 'base_link_fsd'
 AXES = ('surge', 'sway', 'heave', 'roll', 'pitch', 'yaw')
@@ -39,9 +43,13 @@ class Program(Peer):
         node_interface.DIAGNOSTICS_PERIOD = PERIOD
         self.nodes: list[Any] = []
 
-    def add(self, make: type, given: dict[str, Any], **options: Any) -> Any:
-        """Add a node with parameters."""
-        values = [Parameter(name, value=value) for name, value in given.items()]
+    def add(self, make: type, given: dict[str, Any] | list[str], **options: Any) -> Any:
+        """Add a node with parameters, or with arguments as on its command line."""
+        values = []
+        if isinstance(given, dict):
+            values = [Parameter(name, value=value) for name, value in given.items()]
+        else:
+            options['cli_args'] = ['--ros-args', *given]
         options |= {'context': self.context, 'use_global_arguments': False}
         node = make.__new__(make)
         try:
@@ -79,10 +87,16 @@ def _end(node: Any) -> None:
 
 @contextmanager
 def program(domain: int | None = None) -> Iterator[Program]:
-    """A program that is ended after the test, by default in a domain of its own."""
+    """A program that is ended after the test, by default in a domain of its own.
+
+    Its nodes are one participant of the middleware: none has to wait until it has met the others.
+    """
     made = Program(domain)
     try:
-        yield made
+        with pytest.MonkeyPatch.context() as patch:
+            for module, name in MEETING:
+                patch.setattr(module, name, 0.0)
+            yield made
     finally:
         made.close()
 

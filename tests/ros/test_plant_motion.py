@@ -19,7 +19,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
 from auv_dynamics.nodes import plant_node
-from auv_dynamics.nodes.plant_node import PlantNode
+from auv_dynamics.nodes.plant_node import MET, PlantNode
 from auv_dynamics.ros import topics
 
 H, STEP = 0.02, 20_000_000
@@ -291,8 +291,9 @@ class Hours:
 
 
 @pytest.fixture
-def hours(monkeypatch: pytest.MonkeyPatch) -> Hours:
+def hours(made: Program, monkeypatch: pytest.MonkeyPatch) -> Hours:
     found = Hours()
+    monkeypatch.setattr(plant_node, 'MET', MET)  # as for a user
     monkeypatch.setattr(plant_node, 'time', SimpleNamespace(monotonic=lambda: found.now))
     return found
 

@@ -1,8 +1,6 @@
 """`auv check-driver` beside real drivers: each fault fails its check, and nothing is published."""
 
 import json
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -10,9 +8,10 @@ from pathlib import Path
 
 import pytest
 from geometry_msgs.msg import WrenchStamped
+from helpers import faulty_drivers
 from helpers.artists import captured
 from helpers.faulty_drivers import NAMES
-from helpers.node_processes import PATIENCE, Peer, environment, fresh_domain
+from helpers.node_processes import PATIENCE, Peer, environment, fork_server, fresh_domain
 from helpers.patience import patience
 from helpers.stalls import undisturbed
 from rclpy.node import Node
@@ -37,17 +36,12 @@ TOPICS = {interface.ODOM: interface.ODOM, interface.WRENCH: interface.WRENCH}
 # a machine that is busy with other tests may keep all of them waiting
 PATIENT = Settings(timeout=patience(4.0))
 
-TESTS = Path(__file__).parents[1]
-
 
 @pytest.fixture(scope='module')
 def domain() -> Iterator[int]:
     """Domain with all faulty drivers in it."""
     found = fresh_domain()
-    command = [sys.executable, '-m', 'helpers.faulty_drivers']
-    process = subprocess.Popen(
-        command, env=environment(found), cwd=TESTS, stdout=subprocess.PIPE, text=True
-    )
+    process = fork_server().start([faulty_drivers.__file__], environment(found))
     try:
         assert process.stdout.readline() == 'ready\n'
         yield found
@@ -161,6 +155,53 @@ def test_two_that_command_see_each_other_although_they_have_one_name() -> None:
             client.close()
 
 
+def test_who_would_take_a_wrench_is_seen_with_what_it_asks_for() -> None:
+    domain = fresh_domain()
+    peer, client = Peer(domain), RosDriverClient(domain, '/', TOPICS, Frames())
+    onlooker = Node(interface.RECORDER, context=peer.context)
+    kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    try:
+        onlooker.create_subscription(WrenchStamped, '/onlooked', print, 1)
+        peer.node.create_subscription(WrenchStamped, '/wrench', print, kept)
+        peer.node.create_subscription(WrenchStamped, '/thrust', print, 1)
+        peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 1)
+
+        def sees_all() -> bool:
+            client.listen(0.05)
+            seen = client.graph('here')
+            nodes = [end.node for end in (*seen.wrench_subscribers, *seen.clock_publishers)]
+            named = '/onlooked' in seen.topics and nodes == 2 * ['/test_peer']
+            return named and seen.listeners == {'/thrust': ('/test_peer',)}
+
+        peer.until(sees_all)
+        conflict = client.graph('here').conflicts['wrench']
+        assert conflict == 'volatile publisher and transient local subscription'
+    finally:
+        client.close()
+        onlooker.destroy_node()
+        peer.close()
+
+
+def test_what_was_applied_is_heard_by_who_commands() -> None:
+    domain = fresh_domain()
+    peer = Peer(domain)
+    client = RosDriverClient(domain, '/', TOPICS, Frames(), commands=True)
+    tau = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    try:
+        output = peer.node.create_publisher(WrenchStamped, 'wrench_applied', 10)
+
+        def heard() -> int:
+            output.publish(convert.wrench(7, tau, Frames()))
+            client.listen(0.05)
+            return len(client.log(0).applied)
+
+        peer.until(heard)
+        assert client.log(0).applied[0].tolist() == [*tau]
+    finally:
+        client.close()
+        peer.close()
+
+
 def test_a_healthy_driver_passes(judged) -> None:
     found = judged['healthy']
     assert failed(found) == set()
@@ -231,53 +272,6 @@ def test_what_there_is_elsewhere_is_named(domain: int) -> None:
     assert 'nav_msgs/msg/Odometry is on' in found[0].found
     assert '/healthy/odom of /healthy/driver' in found[0].found
     assert {one.verdict for one in found if one.id in ('rate', 'frames')} == {NOT_CHECKED}
-
-
-def test_who_would_take_a_wrench_is_seen_with_what_it_asks_for() -> None:
-    domain = fresh_domain()
-    peer, client = Peer(domain), RosDriverClient(domain, '/', TOPICS, Frames())
-    onlooker = Node(interface.RECORDER, context=peer.context)
-    kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    try:
-        onlooker.create_subscription(WrenchStamped, '/onlooked', print, 1)
-        peer.node.create_subscription(WrenchStamped, '/wrench', print, kept)
-        peer.node.create_subscription(WrenchStamped, '/thrust', print, 1)
-        peer.node.create_publisher(topics.CLOCK.type, topics.CLOCK.name, 1)
-
-        def sees_all() -> bool:
-            client.listen(0.05)
-            seen = client.graph('here')
-            nodes = [end.node for end in (*seen.wrench_subscribers, *seen.clock_publishers)]
-            named = '/onlooked' in seen.topics and nodes == 2 * ['/test_peer']
-            return named and seen.listeners == {'/thrust': ('/test_peer',)}
-
-        peer.until(sees_all)
-        conflict = client.graph('here').conflicts['wrench']
-        assert conflict == 'volatile publisher and transient local subscription'
-    finally:
-        client.close()
-        onlooker.destroy_node()
-        peer.close()
-
-
-def test_what_was_applied_is_heard_by_who_commands() -> None:
-    domain = fresh_domain()
-    peer = Peer(domain)
-    client = RosDriverClient(domain, '/', TOPICS, Frames(), commands=True)
-    tau = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-    try:
-        output = peer.node.create_publisher(WrenchStamped, 'wrench_applied', 10)
-
-        def heard() -> int:
-            output.publish(convert.wrench(7, tau, Frames()))
-            client.listen(0.05)
-            return len(client.log(0).applied)
-
-        peer.until(heard)
-        assert client.log(0).applied[0].tolist() == [*tau]
-    finally:
-        client.close()
-        peer.close()
 
 
 def test_with_another_commander_nothing_is_sent(domain: int) -> None:

@@ -269,7 +269,8 @@ def set_parameter(peer, name: str, value: ParameterValue):
 
 
 def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
-    with graph(('controller_node', [*CONTROLLER, *parameters(autostart=False)])) as (peer, _):
+    with program() as peer:
+        peer.add(ControllerNode, [*CONTROLLER, *parameters(autostart=False)])
         assert state(peer) == 'unconfigured'
         assert change(peer, Transition.TRANSITION_CONFIGURE)
         doubles = ParameterValue(type=8, double_array_value=[20.0])
@@ -286,7 +287,8 @@ def test_lifecycle_gains_are_taken_while_inactive_only() -> None:
 
 
 def test_limits_and_timeouts_are_taken_while_inactive_only() -> None:
-    with graph(('controller_node', [*LOCKSTEP, *parameters(autostart=False)])) as (peer, _):
+    with program() as peer:
+        peer.add(ControllerNode, [*LOCKSTEP, *parameters(autostart=False)])
         peer.listen(topics.WRENCH)
         assert change(peer, Transition.TRANSITION_CONFIGURE)
         five = ParameterValue(type=8, double_array_value=[5.0])
@@ -357,7 +359,8 @@ def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expect
 def test_integrals_stop_at_the_limits_that_are_known(told) -> None:
     """The adaptive term of surge stays zero while its wrench is cut, that of an idle axis too."""
     arguments = [*LOCKSTEP, *parameters(**told)]
-    with graph(('controller_node', arguments)) as (peer, _):
+    with program() as peer:
+        peer.add(ControllerNode, arguments)
         peer.listen(topics.WRENCH, topics.DISTURBANCE_ESTIMATE)
         peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
         for k in range(5):
@@ -373,7 +376,8 @@ def test_integrals_stop_at_the_limits_that_are_known(told) -> None:
 
 def test_without_anti_windup_they_do_not_stop() -> None:
     arguments = [*LOCKSTEP, *parameters(limits__wrench='[5.0]', anti_windup=False)]
-    with graph(('controller_node', arguments)) as (peer, _):
+    with program() as peer:
+        peer.add(ControllerNode, arguments)
         peer.listen(topics.WRENCH, topics.DISTURBANCE_ESTIMATE)
         peer.until(lambda: peer.node.count_publishers('wrench'), 'a wrench publisher')
         for k in range(3):

@@ -1,13 +1,18 @@
 """The set-point node: silent before the first odometry, ahead of it, and at an end."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
-from helpers.node_processes import Peer, assert_one_line, graph, parameters, run_node
+from helpers.node_processes import Peer, assert_one_line, parameters, run_node
+from helpers.nodes_in_process import program
 from helpers.patience import patience
 from rcl_interfaces.srv import GetParameters
 
 from auv_dynamics.ros import convert, interface, topics
 from auv_dynamics.ros.interface import Frames
+from auv_gvc_controller.nodes.setpoint_node import SetpointNode
 
 STEP = 10_000_000
 UPRIGHT = np.array([0, 0, 0, 1, *[0] * 9], float)
@@ -15,6 +20,14 @@ SURGE = [
     *parameters(setpoint__surge__offset=0.2, horizon=5),
     *['-p', 'setpoint.surge.amplitude:=[1.0]', '-p', 'setpoint.surge.omega:=[2.0]'],
 ]
+
+
+@contextmanager
+def started(arguments: list[str]) -> Iterator[Peer]:
+    """The node in this process, and who talks to it."""
+    with program() as made:
+        made.add(SetpointNode, arguments)
+        yield made
 
 
 def odometry(ns: int):
@@ -40,7 +53,7 @@ def refused(peer: Peer, ns: int, word: str) -> None:
 
 def test_runs_ahead_of_the_odometry_on_its_grid() -> None:
     start = 7 * 10**9 + 123
-    with graph(('setpoint_node', SURGE)) as (peer, _):
+    with started(SURGE) as peer:
         peer.listen(topics.CMD_VEL, topics.CMD_ACCEL, topics.DIAGNOSTICS)
         peer.until(lambda: peer.node.count_publishers('cmd_vel'), 'a publisher')
         said = peer.heard[topics.DIAGNOSTICS.name]
@@ -65,7 +78,7 @@ def test_runs_ahead_of_the_odometry_on_its_grid() -> None:
 
 
 def test_without_a_horizon_the_next_odometry_finds_its_set_point() -> None:
-    with graph(('setpoint_node', parameters(setpoint__surge__offset=0.2))) as (peer, _):
+    with started(parameters(setpoint__surge__offset=0.2)) as peer:
         peer.listen(topics.CMD_VEL)
         for at, last in ((0, 1), (1, 2), (6, 7), (11, 16), (16, 21), (18, 21), (21, 23)):  # steps
             peer.publish(topics.ODOM, odometry(10**9 + at * STEP))
@@ -76,10 +89,7 @@ def test_without_a_horizon_the_next_odometry_finds_its_set_point() -> None:
 
 def test_odometry_within_the_horizon_is_no_jump_however_late_it_is_looked_at() -> None:
     far = 160  # steps, of more than a second
-    with graph(('setpoint_node', parameters(setpoint__surge__offset=0.2, horizon=150))) as (
-        peer,
-        _,
-    ):
+    with started(parameters(setpoint__surge__offset=0.2, horizon=150)) as peer:
         peer.listen(topics.CMD_VEL)
         for at in (0, far, 2 * far):
             peer.publish(topics.ODOM, odometry(at * STEP))
@@ -92,7 +102,7 @@ def test_odometry_within_the_horizon_is_no_jump_however_late_it_is_looked_at() -
 
 @pytest.mark.parametrize('more', [{}, {'duration': 60.0}, {'lockstep': True}], ids=str)
 def test_what_lies_behind_the_odometry_by_more_than_the_horizon_is_left_out(more: dict) -> None:
-    with graph(('setpoint_node', [*SURGE, *parameters(**more)])) as (peer, _):
+    with started([*SURGE, *parameters(**more)]) as peer:
         peer.listen(topics.CMD_VEL)
         for at in (0, 40):
             peer.publish(topics.ODOM, odometry(10**9 + at * STEP))
@@ -103,7 +113,7 @@ def test_what_lies_behind_the_odometry_by_more_than_the_horizon_is_left_out(more
 
 
 def test_a_jump_of_the_clock_is_no_burst() -> None:
-    with graph(('setpoint_node', [*SURGE, *parameters(duration=3600.0)])) as (peer, _):
+    with started([*SURGE, *parameters(duration=3600.0)]) as peer:
         peer.listen(topics.CMD_VEL, topics.DIAGNOSTICS)
         followed(peer, 0)
         refused(peer, 1800 * 10**9, 'stamp jumped')
@@ -116,7 +126,7 @@ def test_a_jump_of_the_clock_is_no_burst() -> None:
 
 
 def test_ends_with_its_duration() -> None:
-    with graph(('setpoint_node', [*SURGE, *parameters(duration=0.03)])) as (peer, _):
+    with started([*SURGE, *parameters(duration=0.03)]) as peer:
         peer.listen(topics.CMD_VEL)
         peer.publish(topics.ODOM, odometry(0))
         peer.until(lambda: len(peer.heard['cmd_vel']) >= 4, 'four set-points')
@@ -127,7 +137,7 @@ def test_ends_with_its_duration() -> None:
 
 
 def test_refuses_odometry_in_another_frame() -> None:
-    with graph(('setpoint_node', SURGE)) as (peer, _):
+    with started(SURGE) as peer:
         peer.listen(topics.CMD_VEL, topics.DIAGNOSTICS)
         said = peer.heard[topics.DIAGNOSTICS.name]
         foreign = convert.odometry(0, UPRIGHT, Frames(odom='odom', base='base_link'))
@@ -162,7 +172,7 @@ def test_wrong_parameters_end_in_one_line(arguments: list[str], key: str, expect
 
 def test_goes_on_when_the_driver_starts_again_with_its_clock_at_zero() -> None:
     """What it says next belongs to the time of the vehicle that it was at."""
-    with graph(('setpoint_node', SURGE)) as (peer, _):
+    with started(SURGE) as peer:
         peer.listen(topics.CMD_VEL, topics.DIAGNOSTICS)
         old = 100 * 10**9
         for k in range(3):
@@ -181,7 +191,7 @@ def test_goes_on_when_the_driver_starts_again_with_its_clock_at_zero() -> None:
 
 def test_a_clock_that_is_set_takes_no_time_of_the_run() -> None:
     """A first odometry without a stamp, and a computer that learns the date, end nothing."""
-    with graph(('setpoint_node', [*SURGE, *parameters(duration=30.0)])) as (peer, _):
+    with started([*SURGE, *parameters(duration=30.0)]) as peer:
         peer.listen(topics.CMD_VEL, topics.DIAGNOSTICS)
         followed(peer, 0)
         now = 1_700_000_000 * 10**9

@@ -48,6 +48,7 @@ LOADED = (  # what `auv` imports once it knows what it has to do
 PERIOD = 0.2  # s, of diagnostics: who waits for what a node says waits for a fifth
 REPORT = ('auv_analysis.report.document', 'auv_analysis.report.plots')
 OWNER = 'AUV_GVC_TESTS'  # in the environment: process id of the whole run, by tests/conftest.py
+NAME = '\0auv_gvc forks for '  # of its socket, before the process id of the owner
 SIZE = 1 << 20  # bytes of a request, at most
 ROOM = 4096  # bytes of a command line in the list of processes, which lie in the environment
 
@@ -129,18 +130,18 @@ class ForkServer:
     """The process that forks for all workers of a test run, started where it is not there yet."""
 
     def __init__(self) -> None:
-        mine = str(os.getpid())
-        told = os.environ.get(OWNER)
-        # what a test starts has its own, which holds its output open no longer than it lives
-        owner = told if told in (mine, str(os.getppid())) else mine
-        name = f'\0auv_gvc forks for {owner}'
+        mine, told = str(os.getpid()), os.environ.get(OWNER)
         self._end = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        while self._end.connect_ex(name):
+        if told and not self._end.connect_ex(f'{NAME}{told}'):
+            return
+        # one that a test's process starts holds its output open no longer than it lives
+        owner = told if told in (mine, str(os.getppid())) else mine
+        while self._end.connect_ex(f'{NAME}{owner}'):
             with (
                 socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as entrance,
                 contextlib.suppress(OSError),  # another worker has just taken the name
             ):
-                entrance.bind(name)
+                entrance.bind(f'{NAME}{owner}')
                 entrance.listen()
                 self._start(entrance.fileno(), owner)
 

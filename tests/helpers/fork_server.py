@@ -28,6 +28,7 @@ from rclpy.type_support import check_for_type_support
 from setproctitle import setproctitle
 
 from auv_analysis import load_scenario
+from auv_analysis.graph import recorded_runs
 from auv_analysis.graph.experiment import MODULES as OF_A_RUN
 from auv_analysis.graph.fork_server import entitle
 from auv_analysis.simulation.simulate import warm_up
@@ -47,6 +48,7 @@ LOADED = (  # what `auv` imports once it knows what it has to do
 )
 PERIOD = 0.2  # s, of diagnostics: who waits for what a node says waits for a fifth
 REPORT = ('auv_analysis.report.document', 'auv_analysis.report.plots')
+CHECKS = ('auv_analysis.driver.checks', 'auv_analysis.nodes.driver_check_node')
 OWNER = 'AUV_GVC_TESTS'  # in the environment: process id of the whole run, by tests/conftest.py
 NAME = '\0auv_gvc forks for '  # of its socket, before the process id of the owner
 SIZE = 1 << 20  # bytes of a request, at most
@@ -236,7 +238,7 @@ def program(arguments: Sequence[str]) -> Callable[[], Any]:
         if name == 'auv':
             reports = {'run', 'simulate', 'analyze'} & {*arguments[1:2]}
             more = REPORT if reports and '--no-report' not in arguments else ()
-            for module in (*LOADED, *more):
+            for module in (*LOADED, *more, *(CHECKS if 'check-driver' in arguments else ())):
                 import_module(module)
         main = import_module(MODULES[name]).main
     if len(sys.modules) > known:
@@ -297,6 +299,7 @@ def main() -> None:
     """Load what the programs call most, then serve."""
     setproctitle('fork server')  # before the environment is changed, in which it finds its room
     node_interface.DIAGNOSTICS_PERIOD = PERIOD
+    recorded_runs.ANNOUNCED = 0.0  # s: the domain of a test is its own, no stranger is looked for
     warm_up(load_scenario('case1'), ['gvc'])
     for kind in (ParameterEvent, *(topic.type for topic in TOPICS)):
         check_for_type_support(kind)

@@ -228,7 +228,8 @@ def test_a_domain_with_another_vehicle_is_refused(tmp_path: Path) -> None:
     peer = Peer(domain)
     peer.node.create_publisher(topics.WRENCH.type, '/other/wrench', 10)
     scenario = write(tmp_path / 's.yaml')
-    ended = auv('run', str(scenario), '--out', str(tmp_path / 'out'), '--domain-id', str(domain))
+    told = '--out', str(tmp_path / 'out'), '--domain-id', str(domain)
+    ended = installed_auv('run', str(scenario), *told)
     peer.close()
     assert ended.returncode == 2
     assert 'test_peer on /other/wrench' in ended.stderr

@@ -52,6 +52,7 @@ def done(tmp_path_factory) -> Path:
     with captured(), pytest.MonkeyPatch.context() as patch:
         executes = Mock(begin=psutil.Popen)  # not forked from this process, which has threads
         patch.setattr(recorded_runs, 'ForkServer', lambda _: nullcontext(executes))
+        patch.setattr(recorded_runs, 'ANNOUNCED', 0.0)  # s: nobody else is on a domain of its own
         patch.setenv('ROS_DOMAIN_ID', str(fresh_domain()))
         main(['run', str(root / 'failing.yaml'), '--out', str(root / 'out'), '--composed'])
     return root

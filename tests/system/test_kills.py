@@ -75,10 +75,11 @@ def killed(folder: Path, kill: Kill) -> tuple[float, Process, Progress]:
     )
     limit = time.monotonic() + patience(60)
     victim: psutil.Process | None = None
-    while victim is None or not (kill.starting or progress.steps):
+    while victim is None:
         assert time.monotonic() < limit, f'{kill.name} does not run'
-        victim = victim or nodes(out).get(kill.name)
         progress.peer.spin(0.02)
+        if kill.starting or progress.steps:  # to look through all processes takes time
+            victim = nodes(out).get(kill.name)
     progress.peer.spin(kill.after)
     when = time.monotonic()  # before it: the machine may stand still behind it
     victim.kill()

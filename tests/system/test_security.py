@@ -12,9 +12,9 @@ import psutil
 import pytest
 import yaml
 from helpers import networks, policies
-from helpers.fork_server import NODES
+from helpers.fork_server import NODES, Process
 from helpers.needs import need
-from helpers.node_processes import PATIENCE, auv, environment, fresh_domain, stop
+from helpers.node_processes import PATIENCE, auv, environment, fork_server, fresh_domain, stop
 from helpers.patience import patience
 
 from auv_analysis import load_scenario
@@ -42,19 +42,22 @@ def bare(**extra: str) -> dict[str, str]:
 
 
 @contextmanager
-def plant(environ: dict[str, str], *before: str) -> Iterator[subprocess.Popen]:
-    """A plant node, started as by hand."""
-    command = [*before, str(executable('auv_dynamics', 'plant_node')), *PLANT]
-    process = subprocess.Popen(
-        command, env=environ, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
+def plant(environ: dict[str, str], *before: str) -> Iterator[subprocess.Popen | Process]:
+    """A plant node; behind another command, the installed one."""
+    if before:
+        command = [*before, str(executable('auv_dynamics', 'plant_node')), *PLANT]
+        process = subprocess.Popen(
+            command, env=environ, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+    else:
+        process = fork_server().start(['plant_node', *PLANT], environ)
     try:
         yield process
     finally:
         print(stop(process))
 
 
-def listening(process: subprocess.Popen) -> set[str]:
+def listening(process: Process) -> set[str]:
     """Addresses at which a node that has begun waits for others."""
     assert any('begins: ' in line for line in process.stdout)  # all its sockets are bound by then
     listed = psutil.Process(process.pid).net_connections('inet')

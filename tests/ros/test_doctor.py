@@ -20,6 +20,7 @@ def test_two_participants_find_each_other() -> None:
 def test_a_foreign_node_in_the_domain_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     domain = fresh_domain()
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+    monkeypatch.setattr('auv_analysis.graph.domain.ANNOUNCED', 1.0)  # s, and again until it is seen
     until = time.monotonic() + patience()
     peer = Peer(domain)
     try:

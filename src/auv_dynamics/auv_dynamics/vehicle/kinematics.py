@@ -12,6 +12,11 @@ from auv_dynamics.kernel.six import Vector
 GIMBAL = 1e-12  # distance of |sin(theta)| from 1 below which phi is put to 0 and psi takes the rest
 
 
+def _first(a: np.ndarray) -> np.ndarray:
+    """Put the last axis first: `np.moveaxis` takes longer than the rest of a single rotation."""
+    return a.transpose(-1, *range(a.ndim - 1))
+
+
 def quaternion(euler: np.ndarray) -> np.ndarray:
     """Unit quaternion of ZYX Euler angles.
 
@@ -24,7 +29,7 @@ def quaternion(euler: np.ndarray) -> np.ndarray:
     q : (..., 4) w, x, y, z, body to NED
 
     """
-    half = np.moveaxis(np.asarray(euler, float) / 2, -1, 0)
+    half = _first(np.asarray(euler, float) / 2)
     (cr, cp, cy), (sr, sp, sy) = np.cos(half), np.sin(half)
     return np.stack(
         [
@@ -49,7 +54,7 @@ def rotation(q: np.ndarray) -> np.ndarray:
     R : (..., 3, 3)
 
     """
-    w, x, y, z = np.moveaxis(np.asarray(q, float), -1, 0)
+    w, x, y, z = _first(np.asarray(q, float))
     R = np.empty((*w.shape, 3, 3))
     R[..., 0, 0], R[..., 1, 1] = 1 - 2 * (y * y + z * z), 1 - 2 * (x * x + z * z)
     R[..., 2, 2] = 1 - 2 * (x * x + y * y)

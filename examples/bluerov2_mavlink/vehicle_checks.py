@@ -118,7 +118,7 @@ class Profile:
 
     def tick(self, now: int) -> None:
         """Ask for what is missing."""
-        if self.complete or now < self._due:
+        if now < self._due or self.complete:
             return
         self._due, self._tries = now + AGAIN, self._tries + 1
         if self.version is None:  # the first is known since 4.0, the second until 4.5

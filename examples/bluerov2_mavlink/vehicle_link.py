@@ -170,7 +170,7 @@ class VehicleLink:
         self._telemetry.tick(self._heard, now)
         if self._has(mavlink.MAVLINK_MSG_ID_HEARTBEAT, now, GONE):
             self.profile.tick(now)
-        if self.profile.complete and not self._compared:
+        if not self._compared and self.profile.complete:
             self._compare()
         self._steer(now)
 

@@ -1,5 +1,7 @@
 """Vehicles, scenarios and runs that the tests of the reference share."""
 
+from copy import deepcopy
+from functools import cache
 from pathlib import Path
 
 import herman_reference as reference
@@ -33,6 +35,11 @@ TURNED = {'eta': [1.0, -2.0, 3.0, 0.4, -0.5, 2.5], 'nu': [0.4, -0.3, 0.2, 0.1, -
 
 
 def file_of(name: str, folder: str = 'vehicles') -> dict:
+    return deepcopy(parsed(name, folder))
+
+
+@cache
+def parsed(name: str, folder: str) -> dict:
     return yaml.safe_load((CONFIG / folder / f'{name}.yaml').read_text(encoding='utf-8'))
 
 

@@ -36,8 +36,8 @@ def make_law(M: Array, gains: dict[str, Any]) -> Law:
         xi_r_dot = u_inv @ (nu_d_dot + lam @ e)  # (20)
         s_xi = xi_r - xi  # (19)
         f_xi = n_gam @ sigma  # (21), integrated
-        c_xi, d_xi, g_xi = ut @ c @ u, ut @ d @ u, ut @ g  # (10)-(12)
-        pi_xi = n @ xi_r_dot + c_xi @ xi_r + d_xi @ xi_r + g_xi + n_k_d @ s_xi + ut_k_i @ z + f_xi
+        model_xi = ut @ ((c + d) @ (u @ xi_r) + g)  # C_xi xi_r + D_xi xi_r + g_xi, (10)-(12)
+        pi_xi = n @ xi_r_dot + model_xi + n_k_d @ s_xi + ut_k_i @ z + f_xi
         return ut_inv @ pi_xi, s_xi, ut_inv @ f_xi  # (16), (14), (13)
 
     def cl(nu, nu_d, nu_d_dot, z, sigma, c, d, g):
@@ -46,7 +46,7 @@ def make_law(M: Array, gains: dict[str, Any]) -> Law:
         nu_r_dot = nu_d_dot + lam @ e
         s = nu_r - nu
         f = gam @ sigma
-        tau = M @ nu_r_dot + c @ nu_r + d @ nu_r + g + k_d @ s + k_i @ z + f  # (29)
+        tau = M @ nu_r_dot + (c + d) @ nu_r + g + k_d @ s + k_i @ z + f  # (29)
         return tau, s, f
 
     return {'gvc': gvc, 'cl': cl}[gains['law']]

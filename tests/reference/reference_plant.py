@@ -74,8 +74,8 @@ def newton_euler(M_RB: Array, nu: Array) -> Array:
 
     Force m (omega x v + omega x (omega x r_G)), moment omega x I omega + m r_G x (omega x v).
     """
-    m = M_RB[0, 0]
-    m_r = [M_RB[5, 1], M_RB[3, 2], M_RB[4, 0]]  # the lower left block is m S(r_G)
+    m = M_RB.item(0, 0)
+    m_r = [M_RB.item(5, 1), M_RB.item(3, 2), M_RB.item(4, 0)]  # lower left block: m S(r_G)
     v, omega = nu[:3].tolist(), nu[3:].tolist()
     turning = cross(omega, v)
     swing = cross(omega, cross(omega, m_r))

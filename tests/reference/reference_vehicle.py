@@ -33,7 +33,8 @@ def skew(v: Array) -> Array:
 
 def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
     """a x b of plain numbers (np.cross costs more than the rest of a stage)."""
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    (a1, a2, a3), (b1, b2, b3) = a, b
+    return [a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1]
 
 
 def vehicle_matrices(spec: dict[str, Any]) -> dict[str, Any]:
@@ -85,18 +86,22 @@ def vehicle_matrices(spec: dict[str, Any]) -> dict[str, Any]:
 
 def coriolis(M: Array, nu: Array) -> Array:
     """C(nu) = [[0, -S(a)], [-S(a), -S(b)]], (a, b) = M nu; skew-symmetric."""
-    momentum = M @ nu
-    s_a = skew(momentum[:3])
-    c = np.zeros((6, 6))
-    c[:3, 3:] = -s_a
-    c[3:, :3] = -s_a
-    c[3:, 3:] = -skew(momentum[3:])
-    return c
+    a1, a2, a3, b1, b2, b3 = (M @ nu).tolist()
+    return np.array(
+        [
+            [0.0, 0.0, 0.0, 0.0, a3, -a2],
+            [0.0, 0.0, 0.0, -a3, 0.0, a1],
+            [0.0, 0.0, 0.0, a2, -a1, 0.0],
+            [0.0, a3, -a2, 0.0, b3, -b2],
+            [-a3, 0.0, a1, -b3, 0.0, b1],
+            [a2, -a1, 0.0, b2, -b1, 0.0],
+        ]
+    )
 
 
 def damping(spec_matrices: dict[str, Any], nu: Array) -> Array:
     """D(nu) = D_linear + D_quadratic diag(|nu|) + |u| lift: |nu_j| multiplies column j."""
-    drag = spec_matrices['D_linear'] + spec_matrices['D_quadratic'] * np.abs(nu)[np.newaxis, :]
+    drag = spec_matrices['D_linear'] + spec_matrices['D_quadratic'] * np.abs(nu)
     return drag + abs(nu[0]) * spec_matrices['lift']
 
 
@@ -119,12 +124,12 @@ def restoring(mats: dict[str, Any], eta: Array) -> Array:
 
 def restoring_from_rotation(mats: dict[str, Any], R: Array) -> Array:
     """g again, as minus the forces and their moments: W down at r_G, B up at r_B; R body to NED."""
-    down = R[2].tolist()
-    weight = [mats['W'] * d for d in down]
-    lift = [-mats['B'] * d for d in down]
-    moment_w, moment_b = cross(mats['r_G'].tolist(), weight), cross(mats['r_B'].tolist(), lift)
-    force = [-w - b for w, b in zip(weight, lift, strict=True)]
-    return np.array(force + [-w - b for w, b in zip(moment_w, moment_b, strict=True)])
+    x, y, z = R[2].tolist()  # down
+    w, b = mats['W'], mats['B']
+    moment_w = cross(mats['r_G'].tolist(), (w * x, w * y, w * z))
+    moment_b = cross(mats['r_B'].tolist(), (-b * x, -b * y, -b * z))
+    force = [(b - w) * x, (b - w) * y, (b - w) * z]
+    return np.array(force + [-m - n for m, n in zip(moment_w, moment_b, strict=True)])
 
 
 def jacobian(eta: Array) -> Array:

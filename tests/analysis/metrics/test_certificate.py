@@ -62,7 +62,8 @@ class Loop:
     def __init__(self, vehicle, values, law, dM=0.0, dD=0.0):
         mats = reference.vehicle_matrices(vehicle)
         self.mats, self.M = mats, mats['M']
-        self.dM, self.dD = dM * self.M, dD * mats['D_linear']
+        self.dM, self.dD = dM, dD * mats['D_linear']
+        self.inverse = np.linalg.inv((1.0 + dM) * self.M)
         self.law = reference.make_law(self.M, values | {'law': law})
 
     def evaluate(self, x, nu_d, nu_d_dot, push):
@@ -71,9 +72,10 @@ class Loop:
         C, D = reference.coriolis(self.M, nu), reference.damping(self.mats, nu)
         g = reference.restoring(self.mats, x[:6])
         tau, s, f = self.law(nu, nu_d, nu_d_dot, x[12:18], x[18:], C, D, g)
-        error = reference.coriolis(self.dM, nu) @ nu + self.dD @ nu + push
-        nu_dot = np.linalg.solve(self.M + self.dM, tau - C @ nu - D @ nu - g - error)
-        F = tau - self.M @ nu_dot - C @ nu - D @ nu - g
+        error = (self.dM * C + self.dD) @ nu + push
+        model = (C + D) @ nu + g
+        nu_dot = self.inverse @ (tau - model - error)
+        F = tau - self.M @ nu_dot - model
         return np.concatenate([reference.jacobian(x[:6]) @ nu, nu_dot, nu_d - nu, s]), f, F
 
     def tangent(self, x, nu_d, nu_d_dot, F, F_dot):
@@ -97,6 +99,7 @@ def solve(vehicle, scenario, law, step, duration, **errors):
     """(t, nu, nu_d, z, F, f) of a closed loop with the law inside every stage."""
     loop = Loop(vehicle, scenario['controllers'][law], law, **errors)
     c, rows, b = reference.TABLEAUX['ode5']
+    rows, b = [np.array(row) for row in rows], np.array(b)
     x, samples = np.zeros(24), []
 
     def rate(time, at):
@@ -106,11 +109,11 @@ def solve(vehicle, scenario, law, step, duration, **errors):
     for k in range(round(duration / step) + 1):
         t, stages = k * step, np.zeros((len(b), 24))
         for i, (node, row) in enumerate(zip(c, rows, strict=True)):
-            stages[i], f, F = rate(t + node * step, x + step * (np.array(row) @ stages[:i]))
+            stages[i], f, F = rate(t + node * step, x + step * (row @ stages[:i]))
             if i == 0:
                 nu_d = reference.setpoint(scenario['setpoint'], t)[0]
                 samples.append((x[6:12], nu_d, x[12:18], F, f))
-        x = x + step * (np.array(b) @ stages)
+        x = x + step * (b @ stages)
     columns = map(np.array, zip(*samples, strict=True))
     return np.arange(len(samples)) * step, *columns
 

@@ -1,12 +1,15 @@
 """A driver on a clock of its own: it takes wrenches and gives odometry, with a fault if wanted."""
 
+import math
 from collections import deque
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from helpers.made_odometry import BEGAN
 
 from auv_analysis.driver.odometry_log import OdometryBuffer, OdometryLog
+from auv_analysis.driver.plan import plan_of
 from auv_dynamics import load_vehicle
 from auv_dynamics.kernel.compile import plain
 from auv_dynamics.ros.interface import NANOSECONDS, Frames
@@ -15,6 +18,8 @@ from auv_dynamics.vehicle.model import acceleration
 
 STEP = 0.01  # s
 ZERO = (0.0,) * 6
+
+loaded, planned = cache(load_vehicle), cache(plan_of)
 
 
 class SimulatedDriver:
@@ -52,7 +57,7 @@ class SimulatedDriver:
         fast_after: float = np.inf,
         joined_after: float = np.inf,
     ):
-        self.vehicle, self._mapping, self._watchdog = load_vehicle(vehicle), mapping, watchdog
+        self.vehicle, self._mapping, self._watchdog = loaded(vehicle), mapping, watchdog
         model = self.vehicle.changed(
             M=inertia * self.vehicle.M,
             D_linear=damping * self.vehicle.D_linear,
@@ -68,8 +73,7 @@ class SimulatedDriver:
         self._until = {'silent': silent_after, 'fast': fast_after, 'joined': joined_after}
         self.buffer, self.sent = OdometryBuffer(), []
         self._random = np.random.default_rng(3)
-        self._pose = np.array([0.0, 0.0, 5.0, *quaternion([0.0, 0.0, 0.7])])
-        self._nu = np.zeros(6)
+        self._pose, self._nu = [0.0, 0.0, 5.0, *quaternion([0.0, 0.0, 0.7]).tolist()], [0.0] * 6
         self._k = 0
         self._ways: deque[tuple[float, tuple]] = deque()
         self._held, self._heard = ZERO, -np.inf
@@ -104,19 +108,21 @@ class SimulatedDriver:
         old = self._watchdog is not None and self._t - self._heard > self._watchdog
         tau = np.zeros(6) if old else self._mapping(np.array(self._held))
         self._acting += self._answers * (tau - self._acting)
-        acting = self._acting + self._drift
-        q, nu = self._pose[3:].tolist(), self._nu.tolist()
-        rate = plain(acceleration)(self._model, q, nu, acting.tolist(), ZERO)
-        self._pose += STEP * np.array(plain(position_rate)(q, nu) + plain(attitude_rate)(q, nu))
-        self._pose[3:] /= np.linalg.norm(self._pose[3:])
-        self._nu = self._nu + STEP * np.array(rate)
+        acting = (self._acting + self._drift).tolist()
+        q, nu = self._pose[3:], self._nu
+        rate = plain(acceleration)(self._model, q, nu, acting, ZERO)
+        moved = plain(position_rate)(q, nu) + plain(attitude_rate)(q, nu)
+        pose = [x + STEP * v for x, v in zip(self._pose, moved, strict=True)]
+        size = math.hypot(*pose[3:])
+        self._pose = pose[:3] + [x / size for x in pose[3:]]
+        self._nu = [x + STEP * v for x, v in zip(nu, rate, strict=True)]
         if self._t > self._until['fast']:
-            self._nu = np.array([5.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+            self._nu = [5.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         self._k += 1
         if self._t > self._until['silent']:
             return
         noise = self._noise * self._random.normal(size=6)
-        x = (*self._pose.tolist(), *(self._nu + self._bias + noise).tolist())
+        x = (*self._pose, *(self._nu + self._bias + noise).tolist())
         frames = Frames()
         ns = self.now_ns()
         self.buffer.odometry(ns, ns, x, (frames.odom, frames.base), self._k)

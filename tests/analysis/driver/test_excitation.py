@@ -7,7 +7,7 @@ from itertools import groupby
 
 import numpy as np
 import pytest
-from helpers.simulated_driver import SimulatedDriver
+from helpers.simulated_driver import SimulatedDriver, planned
 
 from auv_analysis.driver.excitation import (
     GOODBYE,
@@ -30,7 +30,7 @@ LAST = round(GOODBYE / PERIOD)
 
 
 def sent_by(driver: SimulatedDriver, stopped=lambda: False):
-    plan = plan_of(driver.vehicle, ['surge', 'yaw'], 0.1, None, None)
+    plan = planned(driver.vehicle, ('surge', 'yaw'), 0.1, None, None)
     return carry_out(driver, plan, 0.5, stopped, lambda _: None)
 
 
@@ -79,7 +79,7 @@ def test_what_must_end_it_ends_it_with_zero(fault: str, word: str) -> None:
 
 
 def test_the_vehicle_is_looked_at_while_nothing_is_sent_as_well() -> None:
-    plan = plan_of(SimulatedDriver().vehicle, ['surge', 'yaw'], 0.1, None, None)
+    plan = planned(SimulatedDriver().vehicle, ('surge', 'yaw'), 0.1, None, None)
     in_silence = sum(trial.seconds for trial in plan.trials) - UNHEARD / 2
     driver = SimulatedDriver(fast_after=in_silence)
     excitation = sent_by(driver)
@@ -184,7 +184,7 @@ def test_nothing_is_sent_where_another_begins_to_command_in_the_countdown(monkey
     driver.advertise = lambda: asked.append('advertise')
     driver.retire = lambda: asked.append('retire')
     monkeypatch.setattr('auv_analysis.driver.excitation.COUNTDOWN', 0)
-    plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
+    plan = planned(driver.vehicle, ('surge',), 0.1, None, None)
     excitation = actuate(driver, plan, 0.5)
     assert excitation.aborted == '/somebody publishes the wrench as well'
     assert driver.sent == []
@@ -196,7 +196,7 @@ def test_nothing_is_sent_to_a_driver_that_does_not_hear_it(monkeypatch) -> None:
     driver.advertise, driver.retire = lambda: False, lambda: None
     for name in ('COUNTDOWN', 'MATCHES', 'LOOK_AGAIN'):
         monkeypatch.setattr(f'auv_analysis.driver.excitation.{name}', 0)
-    plan = plan_of(driver.vehicle, ['surge'], 0.1, None, None)
+    plan = planned(driver.vehicle, ('surge',), 0.1, None, None)
     assert 'does not hear' in actuate(driver, plan, 0.5).aborted
     assert driver.sent == []
 

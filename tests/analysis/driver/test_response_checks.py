@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from helpers.made_odometry import graph
-from helpers.simulated_driver import SimulatedDriver
+from helpers.simulated_driver import SimulatedDriver, planned
 
 from auv_analysis.driver.checks import CHECKS, document_of
 from auv_analysis.driver.checks import judge as judged
@@ -57,7 +57,7 @@ def exchanged(one: str, other: str):
 
 
 def evidence_of(driver: SimulatedDriver, *axes: str, raised: float = 0.0) -> DriverRecord:
-    plan = plan_of(driver.vehicle, axes, 0.1, None, None, raised)
+    plan = planned(driver.vehicle, axes, 0.1, None, None, raised)
     excitation = carry_out(driver, plan, 0.5, lambda: False, lambda _: None)
     return DriverRecord(graph(), driver.log(), Settings(), excitation)
 

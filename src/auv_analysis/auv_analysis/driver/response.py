@@ -53,12 +53,12 @@ def predicted(vehicle: Vehicle, x: np.ndarray, held: Held) -> Predicted:
     times, rows = [np.array([held[0][0]])], [both[:, None]]
     for begin, end, tau in held:
         count = max(round((end - begin) / STEPS), 1)
-        commands = np.zeros((2, FINER * count, 6))
-        commands[0] = tau
+        commands, wrenches = np.zeros((1, FINER * count, 6)), np.array([tau, np.zeros(6)], float)
         step = (end - begin) / (FINER * count)
         found = open_loop(
-            vehicle, commands, both[None], step, integrator='ode5', every=FINER, threads=1
-        )[0]
+            vehicle, commands, both[:, None], step,
+            bias=wrenches, integrator='ode5', every=FINER, threads=1,
+        )[:, 0]  # fmt: skip
         both = found[:, -1]
         times.append(np.linspace(begin, end, count + 1)[1:])
         rows.append(found)
@@ -203,11 +203,8 @@ def fit_response(
     delays = np.arange(0.0, OPPOSED + FINE / 2, FINE)
     early = delays < latest + FINE / 2
     late = np.maximum(t - delays[:, None], 0.0)
-    forms = make_interp_spline(varied.t, varied.added, k=1)(late)
-    forms = np.ascontiguousarray(np.moveaxis(forms, 2, 0))  # each is gone through by itself
-    alone = make_interp_spline(varied.t, varied.alone, k=1)(t).T
-    fits = [_gains(t, nu[:, axis], form, free) for form, free in zip(forms, alone, strict=True)]
-    gains, squares, still = (np.array([fit[i] for fit in fits]) for i in range(3))
+    forms, alone = _at(late, varied.t, varied.added), _at(t, varied.t, varied.alone)
+    gains, squares, still = _gains(t, nu[:, axis], forms, alone)
     # of each sign: by no response at all, where none of its kind makes it better
     of_sign = {sign: np.where(np.sign(gains) == sign, squares, np.inf) for sign in (1, -1)}
     best = {one: min(float(left[:, early].min()), still.min()) for one, left in of_sign.items()}
@@ -243,38 +240,50 @@ def _peaks(
     t: np.ndarray, nu: np.ndarray, model: Predicted, axis: int, delays: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Peak of each velocity, measured at whatever delay and predicted, in the shape of an axis."""
-    forms = np.stack([np.interp(t - late, model.t, model.added[:, axis]) for late in delays])
-    peaks = np.zeros((2, 6))
-    for j in range(6):
-        free, prompt = (np.interp(t, model.t, part[:, j]) for part in (model.alone, model.added))
-        gains, squares, _ = _gains(t, nu[:, j], forms, free)
-        peaks[:, j] = gains[np.argmin(squares)], _gains(t, prompt, forms[:1], free)[0][0]
-    measured, shares = peaks * np.abs(model.added[:, axis]).max()
-    return measured, shares
+    forms = np.interp(t - delays[:, None], model.t, model.added[:, axis])
+    free, prompt = (_at(t, model.t, part) for part in (model.alone, model.added))
+    gains, squares, _ = _gains(t, nu.T, forms, free)
+    shares, _, _ = _gains(t, prompt, forms[:1], free)
+    measured = np.take_along_axis(gains, squares.argmin(axis=1)[:, None], axis=1)
+    peak = np.abs(model.added[:, axis]).max()
+    return peak * measured[:, 0], peak * shares[:, 0]
+
+
+def _at(wanted: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Columns of values (m, k) at times (m,), interpolated at those wanted: (k, ...)."""
+    return np.array([np.interp(wanted, t, column) for column in values.T])
 
 
 def _gains(
     t: np.ndarray, y: np.ndarray, forms: np.ndarray, free: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Factor of each form (k, n) beside line and free motion; squares left by it, and by none."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Factors of forms beside line and free motion; squares left by each, and by none.
+
+    They are (..., k), (..., k) and (...,) of signals y (..., n), forms (..., k, n) and motions
+    (..., n).
+    """
     basis = _steady(t, free)
     y = _beside(basis, y)
-    size = np.einsum('kn,kn->k', forms, forms)
-    strong = size - ((forms @ basis) ** 2).sum(axis=1)  # of what is left beside line and motion
+    size = np.einsum('...n,...n->...', forms, forms)
+    strong = size - ((forms @ basis) ** 2).sum(axis=-1)  # of what is left beside line and motion
     told = strong > ALIKE * size
-    gain = np.where(told, forms @ y / np.where(told, strong, 1.0), 0.0)
-    still = float(y @ y)
-    return gain, np.maximum(still - gain**2 * strong, 0.0), still
+    gain = np.where(told, (forms @ y[..., None])[..., 0] / np.where(told, strong, 1.0), 0.0)
+    still = (y**2).sum(axis=-1)
+    return gain, np.maximum(still[..., None] - gain**2 * strong, 0.0), still
 
 
 def _beside(basis: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """A signal (n,) without what an orthonormal basis (n, k) spans."""
-    return np.asarray(y - basis @ (y @ basis))
+    """Signals (..., n) without what an orthonormal basis (..., n, k) spans."""
+    return np.asarray(y - (basis @ (basis.swapaxes(-1, -2) @ y[..., None]))[..., 0])
 
 
 def _steady(t: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Orthonormal basis (n, k) of a straight line and a free motion (n,)."""
-    rest = np.stack([np.ones_like(t), t - t.mean(), free - free.mean()], axis=1)
-    size = np.maximum(np.linalg.norm(rest, axis=0), np.finfo(float).tiny)
+    """Orthonormal basis (..., n, 3) of a straight line and a free motion (..., n).
+
+    What is as much alike as to be one has a vector less, and zeros in its place.
+    """
+    line = np.ones_like(free), np.broadcast_to(t - t.mean(), free.shape)
+    rest = np.stack([*line, free - free.mean(axis=-1, keepdims=True)], axis=-1)
+    size = np.maximum(np.linalg.norm(rest, axis=-2, keepdims=True), np.finfo(float).tiny)
     basis, strength, _ = np.linalg.svd(rest / size, full_matrices=False)
-    return np.asarray(basis[:, strength > ALIKE * strength[0]])
+    return np.asarray(basis * (strength > ALIKE * strength[..., :1])[..., None, :])

@@ -4,7 +4,7 @@ import csv
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +95,7 @@ class ThrusterCurve:
         return np.where(reversed_, 2.0 * neutral - found, found)
 
 
+@cache  # every rotor of a vehicle asks
 def shipped_curves() -> list[str]:
     """Names of the curves that come along."""
     return sorted(path.stem for path in SHIPPED.glob('*.csv'))

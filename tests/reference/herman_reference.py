@@ -211,11 +211,14 @@ def simulate(
         tau, law_dot, _ = law(nu, *setpoint(target, time), g)(x[n + 6 :])
         return np.concatenate((pose_dot, plant.acceleration(time, R, nu, tau), law_dot))
 
-    def advance(derivative: Callable[..., Array], time: float, x: Array, *args: Array) -> Array:
-        """One explicit Runge-Kutta step of length h."""
+    def advance(
+        derivative: Callable[..., Array], time: float, x: Array, x_dot: Array, *args: Array
+    ) -> Array:
+        """One explicit Runge-Kutta step of length h from x, where the derivative is x_dot."""
         k = np.zeros((len(weights), len(x)))
-        for i, (node, row) in enumerate(zip(c_nodes, stage_rows, strict=True)):
-            k[i] = derivative(time + node * h, x + h * (row @ k[:i]), *args)
+        k[0] = x_dot
+        for i in range(1, len(weights)):
+            k[i] = derivative(time + c_nodes[i] * h, x + h * (stage_rows[i] @ k[:i]), *args)
         return x + h * (weights @ k)
 
     t = np.arange(steps + 1) * h
@@ -254,9 +257,10 @@ def simulate(
             rows.setdefault(name, []).append(np.array(row))
         if k == steps:
             break
+        x_dot = np.concatenate((pose.rate(x[:n], nu)[1], nu_dot, rate))
         if hold == 'continuous':
-            x = advance(closed_loop, t[k], x)
+            x = advance(closed_loop, t[k], x, x_dot)
         else:
-            x[: n + 6] = advance(open_loop, t[k], x[: n + 6], applied)
+            x[: n + 6] = advance(open_loop, t[k], x[: n + 6], x_dot[: n + 6], applied)
         x[:n] = pose.tidy(x[:n])
     return {'t': t, **{name: np.array(row) for name, row in rows.items()}}

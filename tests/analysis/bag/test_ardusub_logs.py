@@ -4,6 +4,7 @@ import io
 import json
 import sys
 from contextlib import redirect_stdout
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -268,6 +269,7 @@ def test_a_damaged_log_loses_what_is_damaged(log, every, seed, tmp_path) -> None
     assert any('bytes are no' in note for note in notes)
 
 
+@cache
 def hostile() -> dict[str, bytes]:
     """Files that ask for too much, or for nothing at all."""
     rng = np.random.default_rng(0)

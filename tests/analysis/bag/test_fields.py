@@ -32,6 +32,21 @@ def run() -> Run:
     return simulated(duration=1.0)
 
 
+def bag_of(run: Run, folder: Path) -> Path:
+    make = maker()
+    return write(folder / 'dive', every(run, make), make)
+
+
+@pytest.fixture(scope='module')
+def dive(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return bag_of(run, tmp_path_factory.mktemp('whole'))
+
+
+@pytest.fixture(scope='module')
+def short_dive(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return bag_of(run.part(slice(30)), tmp_path_factory.mktemp('short'))
+
+
 @pytest.mark.parametrize('kind', ['mcap', 'sqlite3', 'bag', 'chunks', 'chunks of ROS 1'])
 def test_a_motion_out_of_five_topics_of_nobodys_types(kind, run, tmp_path) -> None:
     make = maker(ros1=kind in ('bag', 'chunks of ROS 1'))
@@ -77,11 +92,9 @@ def test_a_message_whose_time_is_none_is_left_out(unset: int) -> None:
     assert np.isnan(other.row).all()
 
 
-def test_an_imu_is_known_without_paths(run, tmp_path) -> None:
-    make = maker()
-    bag = write(tmp_path / 'dive', every(run, make), make)
+def test_an_imu_is_known_without_paths(run, dive, tmp_path) -> None:
     attitude = {'topic': '/imu', 'frames': 'enu_flu'}
-    found = loaded(bag, written(SENSORS | {'pose': [attitude, *SENSORS['pose'][1:]]}, tmp_path))
+    found = loaded(dive, written(SENSORS | {'pose': [attitude, *SENSORS['pose'][1:]]}, tmp_path))
     assert_allclose(found.eta, run.eta, atol=1e-12)
 
 
@@ -157,19 +170,15 @@ DVL = SENSORS['twist'][0]
     ({'wrench': SENSORS['wrench'] | {'topic': '/force2'}}, r'wrench: expected a topic.*: /force'),
     ({'rates': 'from attitude', 'pose': SENSORS['pose'][1]}, 'found none for phi, theta, psi'),
 ])  # fmt: skip
-def test_paths_that_lead_nowhere_are_refused_in_one_line(keys, line, run, tmp_path) -> None:
-    make = maker()
-    bag = write(tmp_path / 'dive', every(run.part(slice(30)), make), make)
+def test_paths_that_lead_nowhere_are_refused_in_one_line(keys, line, short_dive, tmp_path) -> None:
     with pytest.raises(InputError, match=line) as refusal:
-        loaded(bag, written(SENSORS | keys, tmp_path))
-    assert str(refusal.value).startswith(str(bag))
+        loaded(short_dive, written(SENSORS | keys, tmp_path))
+    assert str(refusal.value).startswith(str(short_dive))
 
 
-def test_without_angular_velocity_the_attitude_has_it(run, tmp_path) -> None:
-    make = maker()
-    bag = write(tmp_path / 'dive', every(run, make), make)
+def test_without_angular_velocity_the_attitude_has_it(run, dive, tmp_path) -> None:
     keys = SENSORS | {'twist': DVL, 'rates': 'from attitude'}
-    found = loaded(bag, written(keys, tmp_path))
+    found = loaded(dive, written(keys, tmp_path))
     inner = slice(5, -5)
     assert_allclose(found.nu[inner, :3], run.nu[inner, :3], atol=1e-12)
     assert_allclose(found.nu[inner, 3:], run.nu[inner, 3:], atol=2e-3)
@@ -223,11 +232,9 @@ TILT, DEPTH, FIX = SENSORS['pose']
     ({'wrench': SENSORS['wrench'] | {'fields': {'Z': SENSORS['wrench']['fields']['Z']}}},
      ['tau_X', 'tau_Y', 'tau_K', 'tau_M', 'tau_N']),
 ])  # fmt: skip
-def test_what_no_topic_gives_is_unknown(keys, lacking, run, tmp_path) -> None:
-    make = maker()
-    bag = write(tmp_path / 'dive', every(run, make), make)
+def test_what_no_topic_gives_is_unknown(keys, lacking, run, dive, tmp_path) -> None:
     told = {key: value for key, value in (SENSORS | keys).items() if value is not None}
-    found = loaded(bag, written(told, tmp_path))
+    found = loaded(dive, written(told, tmp_path))
     wrench = [f'tau_{axis}' for axis in 'XYZKMN']
     values = np.concatenate([found.eta, found.nu, found.tau], axis=1)
     names = ['x', 'y', 'z', 'phi', 'theta', 'psi', *'uvwpqr', *wrench]

@@ -4,6 +4,7 @@ import os
 import resource
 import struct
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import lz4.frame
@@ -22,7 +23,7 @@ from auv_analysis.bag.any_bag import survey
 from auv_analysis.bag.chunks import Body
 from auv_analysis.bag.load import load_run
 from auv_analysis.bag.metadata import Definition
-from auv_analysis.bag.reading import read_bag
+from auv_analysis.bag.reading import BagContents, read_bag
 from auv_analysis.bag.writer import BagWriter
 from auv_analysis.cli.main import main
 from auv_analysis.graph.node_parameters import node_parameters, parameter_file
@@ -280,15 +281,20 @@ LAUGHS = 'a: &a [{0}]\n' + ''.join(
 )  # fmt: skip
 
 
+@pytest.fixture(scope='module')
+def usual(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, BagContents]:
+    bag = hostile(tmp_path_factory.mktemp('usual') / 'bag')
+    return bag, read_bag(bag)
+
+
 @pytest.mark.parametrize('inner', ['x,x,x', '', '[]', '{}', '!!pairs [a: b]'])
 @pytest.mark.parametrize('name', ['params.yaml', 'scenario.yaml', 'vehicle.yaml'])
-def test_attached_yaml_whose_aliases_explode(tmp_path: Path, name: str, inner: str) -> None:
-    case = load_scenario('case1')
-    texts = {**case.attachments, 'params.yaml': '{}', name: LAUGHS.format(inner)}
-    bag = hostile(tmp_path / 'usual')
-    contents = read_bag(bag)
-    contents.attachments.update(texts)
-
+def test_attached_yaml_whose_aliases_explode(
+    usual: tuple[Path, BagContents], name: str, inner: str
+) -> None:
+    bag, contents = usual
+    texts = {**load_scenario('case1').attachments, 'params.yaml': '{}', name: LAUGHS.format(inner)}
+    contents = replace(contents, attachments={**contents.attachments, **texts})
     reading = {
         'params.yaml': attachments.parameters_of,
         'scenario.yaml': attachments.scenario_name,
@@ -298,12 +304,11 @@ def test_attached_yaml_whose_aliases_explode(tmp_path: Path, name: str, inner: s
         reading[name](contents, bag)
 
 
-def test_attached_yaml_that_is_too_long(tmp_path: Path) -> None:
-    contents = read_bag(hostile(tmp_path / 'bag'))
-    contents.attachments['params.yaml'] = 'a: ' + 'x' * (5 << 20)
-
+def test_attached_yaml_that_is_too_long(usual: tuple[Path, BagContents]) -> None:
+    bag, contents = usual
+    contents = replace(contents, attachments={'params.yaml': 'a: ' + 'x' * (5 << 20)})
     with pytest.raises(InputError, match='YAML of at most 4194304 characters'):
-        attachments.parameters_of(contents, tmp_path)
+        attachments.parameters_of(contents, bag)
 
 
 def linked(bag: Path) -> None:

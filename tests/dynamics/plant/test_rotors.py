@@ -135,7 +135,7 @@ def test_a_propeller_with_drag_solves_its_equation_to_second_order():
 @pytest.mark.parametrize('share', [1.0, 0.25, 0.01])
 def test_the_time_constant_of_a_propeller_with_drag_goes_by_its_speed(share):
     vehicle = vehicle_with({'lag': 0.1, 'lag_at': 20.0})
-    settled = [share * FULL] * round(9.0 / np.sqrt(share) / STEP)
+    settled = [share * FULL] * round(2.5 / np.sqrt(share) / STEP)  # 40 time constants
     found = chain({'rotors': True}, [*settled, *[share * 0.9999 * FULL] * 30], vehicle)
     left = found[-30:, 2] / (share * FULL[2]) - 0.9999
     lag = 0.1 * np.sqrt(20.0 / (share * 51.5))

@@ -1,6 +1,7 @@
 """Odometry of a motion that is known, right or with one mistake, as a driver would send it."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -22,7 +23,13 @@ ODOMETRY, WRENCH = 'nav_msgs/msg/Odometry', 'geometry_msgs/msg/WrenchStamped'
 DRIVER = '/driver'
 
 
-def motion(
+def motion(*size: float, **kind: float) -> np.ndarray:
+    """States (n, 13) of `swinging`, to be changed."""
+    return swinging(*size, **kind).copy()
+
+
+@cache
+def swinging(
     seconds: float = 10.0,
     rate: float = 50.0,
     heading: float = 0.7,

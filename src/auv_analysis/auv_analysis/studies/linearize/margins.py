@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -105,6 +105,7 @@ def axis_margins(
     if np.abs(S - 1).max() < CLOSED:
         return AxisMargins()
 
+    @cache  # ends of an interval, and what was found in it, are asked for several times
     def exact(at: float) -> complex:
         try:
             return complex(loop.sensitivity(np.array(at))[axis, axis])
@@ -317,6 +318,7 @@ class ControlLoop:
         """
         chosen = list(range(6)) if axis is None else [axis]
 
+        @cache
         def to_spare(factor: float) -> float:
             scale = np.ones(6)
             scale[chosen] = factor

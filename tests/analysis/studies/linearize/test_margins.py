@@ -16,6 +16,7 @@ from numpy.testing import assert_allclose
 from auv_analysis import load_scenario, simulate
 from auv_analysis.cli.main import main
 from auv_analysis.cli.scenario_runs import warn
+from auv_analysis.studies.linearize import margins
 from auv_analysis.studies.linearize.margins import (
     ControlLoop,
     axis_margins,
@@ -363,8 +364,14 @@ def test_a_delay_of_many_steps_leaves_the_poles(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures('unrendered')
-def test_the_command_prints_margins_and_writes_them(tmp_path, capsys, approved):
-    out = tmp_path / 'out'
+def test_the_command_prints_margins_and_writes_them(tmp_path, monkeypatch, capsys, approved):
+    out, asked = tmp_path / 'out', []
+
+    def kept(setting):
+        asked.append((setting, stability_margins(setting)))
+        return asked[-1][1]
+
+    monkeypatch.setattr(margins, 'stability_margins', kept)
     check = tmp_path / 'check.json'
     check.write_text('{"command_to_response_delay": {"seconds": 0.03}}')
     line = ['linearize', 'case1_bluerov2_heavy', '--controller', 'gvc', '--out', str(out)]
@@ -379,8 +386,11 @@ def test_the_command_prints_margins_and_writes_them(tmp_path, capsys, approved):
     ):
         assert word in text
     document = json.loads((out / 'linearization.json').read_text())
-    expected = ControlLoop(load_scenario('case1_bluerov2_heavy'), 'gvc', 0.03, 0.02)
-    assert document['models']['gvc']['margins'] == stability_margins(expected)
+    ((setting, expected),) = asked
+    assert setting.scenario.data == load_scenario('case1_bluerov2_heavy').data
+    assert (setting.controller, setting.delay, setting.lag) == ('gvc', 0.03, 0.02)
+    assert (setting.nu0, setting.eta0) == (None, None)
+    assert document['models']['gvc']['margins'] == expected
     assert (out / 'margins.parquet').is_file()
     assert (out / 'figures' / 'bode_gvc.png').is_file()
 

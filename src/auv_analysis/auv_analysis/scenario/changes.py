@@ -248,12 +248,10 @@ def _property(node: Mapping[str, Any], key: str) -> Any:
 
 
 def _applicable(node: Any, root: dict[str, Any], data: Any) -> Iterator[dict[str, Any]]:
-    """Nodes of a schema that say something about `data`, references and conditions followed."""
+    """Nodes of a schema that say something about `data`, conditions followed."""
     if not isinstance(node, dict):
         return
     yield node
-    if '$ref' in node:
-        yield from _applicable(root['$defs'][node['$ref'].rsplit('/', 1)[-1]], root, data)
     for inner in (*node.get('allOf', ()), *node.get('anyOf', ())):
         yield from _applicable(inner, root, data)
     if 'if' in node:

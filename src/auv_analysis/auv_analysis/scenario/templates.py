@@ -2,6 +2,7 @@
 
 import copy
 import importlib.util
+import json
 import keyword
 import re
 import textwrap
@@ -12,7 +13,7 @@ from typing import Any
 from auv_analysis.scenario.scaling import SCALE, scaled_case1
 from auv_dynamics.files.errors import InputError
 from auv_dynamics.files.shipped import shipped
-from auv_dynamics.files.yaml_files import read_text, read_yaml, schema, yaml_text
+from auv_dynamics.files.yaml_files import read_text, read_yaml, yaml_text
 from auv_dynamics.plant.parameters import SCHEMA
 from auv_dynamics.vehicle.vehicle_file import SCHEMA as VEHICLE_SCHEMA
 from auv_dynamics.vehicle.vehicle_file import load_vehicle
@@ -214,4 +215,5 @@ def law_files(name: str, vehicle: str | None) -> dict[str, str]:
 def _text(data: dict[str, Any], schema_path: Path, about: tuple[str, ...]) -> str:
     lines = [f'# yaml-language-server: $schema={schema_path.as_uri()}', '#']
     lines += [f'# {line}' for line in (*about, *OPTIONS)]
-    return '\n'.join(lines) + '\n' + annotated(data, schema(schema_path))
+    as_written = json.loads(schema_path.read_text(encoding='utf-8'))  # references stay
+    return '\n'.join(lines) + '\n' + annotated(data, as_written)

@@ -222,8 +222,19 @@ def read_yaml(path: Path, kind: str) -> dict[str, Any]:
 
 @lru_cache
 def schema(path: Path) -> dict[str, Any]:
-    """Parse a JSON schema file."""
-    return json.loads(path.read_text(encoding='utf-8'))
+    """Parse a JSON schema file, what it refers to in place of the references: far faster."""
+    root = json.loads(path.read_text(encoding='utf-8'))
+
+    def whole(node: Any) -> Any:
+        if isinstance(node, list):
+            return [whole(one) for one in node]
+        if not isinstance(node, dict):
+            return node
+        name = node.get('$ref', '').rpartition('/')[2]
+        node = {**root.get('$defs', {}).get(name, {}), **node}
+        return {key: whole(inner) for key, inner in node.items() if key != '$ref'}
+
+    return whole(root)
 
 
 def check(data: dict[str, Any], schema_path: Path, file: object) -> None:
@@ -301,12 +312,6 @@ def _title(error: 'jsonschema.ValidationError', root: dict[str, Any]) -> str:
     node: Any = root
     title = root.get('title', '')
     for part in error.absolute_schema_path:
-        while isinstance(node, dict) and part not in node and '$ref' in node:
-            own = node.get('title')
-            node = root['$defs'][node['$ref'].rsplit('/', 1)[-1]]
-            title = own or node.get('title') or title
-        if part == '$ref':
-            continue
         node = node[part]
         if isinstance(node, dict) and isinstance(node.get('title'), str):
             title = node['title']

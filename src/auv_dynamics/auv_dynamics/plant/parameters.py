@@ -39,12 +39,7 @@ class Parameter(NamedTuple):
 def part(key: str) -> Node:
     """Schema of a key of a scenario; of an entry where the key has a list of them."""
     node = schema(SCHEMA)['properties'][key]
-    return _resolved(node.get('then', node).get('items', node))
-
-
-def _resolved(node: Node) -> Node:
-    name = node.get('$ref', '').rpartition('/')[2]
-    return {**schema(SCHEMA)['$defs'].get(name, {}), **node}
+    return node.get('then', node).get('items', node)
 
 
 def _properties(node: Node, kind: Any = None) -> dict[str, Node]:
@@ -53,18 +48,18 @@ def _properties(node: Node, kind: Any = None) -> dict[str, Node]:
     for branch in node.get('allOf', ()):
         if branch['if']['properties']['kind']['const'] == kind:
             found |= {k: v for k, v in branch['then']['properties'].items() if v is not True}
-    return {key: _resolved(inner) for key, inner in found.items()}
+    return found
 
 
 def _columns(node: Node) -> dict[str, Node]:
     """Key -> schema of the mappings that a list consists of; none where it is no such list."""
-    return _properties(_resolved(node.get('items', {})))
+    return _properties(node.get('items', {}))
 
 
 def _type(node: Node) -> Any:
     if 'enum' in node:
         return str if isinstance(node['enum'][0], str) else float
-    options = [_type(_resolved(option)) for option in node.get('anyOf', ())]
+    options = [_type(option) for option in node.get('anyOf', ())]
     if options:
         return list[float] if list[float] in options else options[0]
     return TYPES[node['type']]
@@ -130,7 +125,7 @@ def nested(node: Node, values: Mapping[str, Any], source: object, place: str) ->
     spec = _nested(node, values, source, place)
     try:
         if spec or 'kind' in _properties(node):
-            validate(spec, {**node, '$defs': schema(SCHEMA)['$defs']}, source)
+            validate(spec, dict(node), source)
     except InputError as error:
         key = f'{place}.{error.key}' if error.key else place
         raise InputError(source, key, error.expected, error.found) from None
